@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runs.deck.reading import read_deck
 from runs.store.reader import RunData
 
 STREAM = """
@@ -83,41 +82,6 @@ def test_a_uniform_stream_stays_uniform_across_curves_from_files_and_formulas(st
             assert np.abs(block.cell_fields[name] / value - 1.0).max() < 1e-12, (block, name)
     lines = last.blocks[0].nodes[:, -1], last.blocks[1].nodes[:, 0]
     assert np.array_equal(*lines) and np.ptp(lines[0][0]) > 0.03
-
-
-def test_the_triple_point_as_a_deck_of_blocks_is_the_triple_point(tmp_path):
-    ours = read_deck("triple-point", ("cells=6",)).make_problem().build()
-    walls = {"left": ("i_min", "j_min", "j_max"), "bottom": ("i_max", "j_min"),
-             "top": ("i_max", "j_max")}  # fmt: skip
-    text = ['problem = "blocks"', "run = { t_end = 5.0, cfl = 0.8 }"]
-    text += ["regrid = { epsilon = 0.1, options = { strengthening = 1.0, curves = false } }"]
-    links = [("left.i_max[0:9]", "bottom.i_min"), ("left.i_max[9:18]", "top.i_min"),
-             ("bottom.j_max", "top.j_min")]  # fmt: skip
-    for block in ours.blocks:
-        a, b, c, d = (
-            block.nodes[:, i, j].tolist() for i, j in ((0, 0), (-1, 0), (0, -1), (-1, -1))
-        )
-        rho, _, _, p = (float(row) for row in block.state[:, 1, 1])
-        text += [
-            "[[block]]", f'name = "{block.name}"', f"cells = [{block.ni}, {block.nj}]",
-            f"rho = {rho!r}", f"p = {p!r}",
-            f'material = {{ eos = "ideal-gas", gamma = {block.eos.gamma!r} }}',
-            f"curves.i_min = [{a}, {c}]", f"curves.i_max = [{b}, {d}]",
-            f"curves.j_min = [{a}, {b}]", f"curves.j_max = [{c}, {d}]",
-        ]  # fmt: skip
-        for side in walls[block.name]:
-            text += ["[[block.side]]", f'side = "{side}"', 'kind = "wall"']
-    for one, two in links:
-        text += ["[[link]]", 'kind = "interface"', f'sides = ["{one}", "{two}"]']
-    (tmp_path / "triple.toml").write_text("\n".join(text))
-    found = read_deck(str(tmp_path / "triple.toml")).make_problem().build()
-    for _ in range(10):
-        ours.advance()
-        found.advance()
-    assert found.t == pytest.approx(ours.t, rel=1e-12)
-    for one, two in zip(ours.blocks, found.blocks, strict=True):
-        assert np.abs(one.nodes - two.nodes).max() < 1e-9
-        assert np.abs(one.state - two.state)[:, 1:-1, 1:-1].max() < 1e-8
 
 
 REFUSED = [  # what the deck has, what stands there instead, what is said

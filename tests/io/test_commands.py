@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from problems.registry import PROBLEMS
@@ -102,26 +101,6 @@ def test_plot(shockgrid, run, words):
     assert pixels.shape[0] > 60 and pixels[..., :3].std() > 0.02
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["bla"], "no field 'bla'; there are: rho, q"),
-        (["--what", "colling"], "did you mean 'cooling'?"),
-        (["--zoom", "1,2"], "four numbers"),
-        (["--zoom", "0,1e9,0,1"], "more than 1000 times the other"),
-        (["--zoom", "5,6,0,1"], "outside the domain: x is 0 to 2 m, y is 0 to 1 m"),
-        (["--zoom", "0,1,1,2", "--what", "interface"], "outside the domain"),
-        (["--at", "soon"], "'soon' is not a number"),
-        (["-o", "nowhere/picture.png"], "nowhere is no folder to write picture.png into"),
-        (["-o", "picture.doc"], ".png, .pdf or .svg"),
-        (["dt_limit", "--what", "history"], "holds words"),
-    ],
-)
-def test_plot_of_what_is_not_there(shockgrid, run, words, said):
-    code, _, error = shockgrid("plot", "run", *words)
-    assert code == 2 and said in error
-
-
 def test_damaged_files_are_named(shockgrid, run):
     import h5py
 
@@ -189,24 +168,6 @@ def run_of_pictures(shockgrid):
     code, screen, error = shockgrid("run", "interface-instability", *WORDS, "-o", "run")
     assert code == 0, error
     return RunData("run"), screen
-
-
-def test_growth_stays_in_its_frame_and_says_what_it_shows(run_of_pictures):
-    data, _ = run_of_pictures
-    figure = new_figure()
-    data.problem.figures()["growth"](figure, data)
-    amplitude, rate, *panels, bar = figure.axes
-    for axes in (amplitude, rate):
-        low, high = axes.get_ylim()
-        for line in axes.get_lines():
-            values = np.asarray(line.get_ydata(), dtype=float)
-            if not values.size:  # an entry of the legend
-                continue
-            assert low <= values.min() and values.max() <= high, line.get_label()
-        assert axes.get_xlabel() and axes.get_ylabel()
-    assert len(panels) == 3
-    assert all(axes.get_xlabel() == "x [m]" and axes.get_title() for axes in panels)
-    assert panels[0].get_ylabel() == "y [m]" and bar.get_ylabel() == "density [kg/m3]"
 
 
 def test_history_has_units(run_of_pictures):

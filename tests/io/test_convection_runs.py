@@ -69,16 +69,6 @@ def test_the_closing_screen_stands_beside_the_reference(shockgrid):
     assert code == 0 and "no reference for this deck" in text
 
 
-@pytest.mark.parametrize("words", [STEADY, RESTING], ids=["cavity", "layer"])
-def test_pictures(shockgrid, words, toy):
-    assert shockgrid("run", *words, "--plot", "-o", "out")[0] == 0
-    names = {"flow", "nusselt", "grid"} | ({"growth"} if words is RESTING else set())
-    for name in names:
-        assert (toy / "out" / f"{name}.png").stat().st_size > 10_000
-    code, text, _ = shockgrid("info", "out")
-    assert code == 0 and "psi" not in text.split("block box")[0]
-
-
 BAD = {
     "rayleigh": (["rayleigh=-5"], "Ra = -5 is negative; heat the other wall or turn gravity"),
     "cells": (["cells=2"], "cells"),

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-
 import pytest
 
 import shockgrid as sg
-from builders import ROOT
 
 FILE = '''"""Heat that spreads, from a file of one's own."""
 from toy_problem import Toy as _Toy, ToyDeck
@@ -102,62 +97,3 @@ def test_missing_file_wrong_key_and_a_mistake_in_the_file(file, shockgrid):
     code, _, error = shockgrid("run", "my_heat.py", "--set", "density=7")
     line = error.strip().splitlines()[-1]
     assert code == 2 and "my_heat.py, line 10: a mistake in this file (RuntimeError" in line
-
-
-LAW = """
-from hydro.eos import IdealGas
-from problems.problem import Problem
-from regrid.jit import inlined
-
-FACTOR = 2.0
-
-
-@inlined
-def sound_speed_squared(rho, p, parameters):
-    return FACTOR * parameters[0] * p / rho
-
-
-class Law(IdealGas):
-    sound_speed_squared_part = staticmethod(sound_speed_squared)
-
-
-class Gas(Problem):
-    law = Law(1.5)
-"""
-SCRIPT = """
-import sys
-import numpy as np
-from hydro.interior.cell_fields import make_fill_sound_speed
-from problems.problem_file import read_problem_file
-
-law = read_problem_file(*sys.argv[1:]).problem.law
-state, sound = np.full((4, 5, 5), 2.0), np.zeros((3, 3))
-fill_sound_speed = make_fill_sound_speed(type(law))
-fill_sound_speed(state, law.parameters, 0, 3, sound)
-print(sound[0, 0] ** 2, sum(fill_sound_speed.stats.cache_hits.values()))
-"""
-
-
-@pytest.mark.slow
-def test_an_edited_equation_of_state_in_a_file_gets_new_kernels(tmp_path):
-    file = tmp_path / "gas.py"
-
-    def measure(*words) -> list[float]:
-        """Sound speed squared at rho = p = 2, and how often code came from the cache."""
-        environment = os.environ | {
-            "SHOCKGRID_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT),
-        }  # fmt: skip
-        done = subprocess.run(
-            [sys.executable, "-c", SCRIPT, *map(str, words or (file,))],
-            capture_output=True, text=True, env=environment, check=False,
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr
-        return [float(word) for word in done.stdout.split()]
-
-    file.write_text(LAW)
-    assert measure() == [pytest.approx(3.0), 0]
-    file.write_text(LAW.replace("FACTOR * parameters[0]", "FACTOR + parameters[0]"))
-    assert measure() == [pytest.approx(3.5), 0]
-    copy = tmp_path / "problem.py"  # the kept copy of a run has the kernels of its file
-    copy.write_text("# moved by a line\n" + LAW)
-    assert measure(copy, "gas.py") == [pytest.approx(3.0), 1]

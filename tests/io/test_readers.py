@@ -117,23 +117,3 @@ def test_state_comes_back_as_it_went(tmp_path):
         np.testing.assert_array_equal(back[key], value)
         if isinstance(value, np.ndarray):
             assert back[key].dtype == value.dtype
-
-
-def test_the_sidecar_describes_a_dump_as_it_reads_it(run, tmp_path):
-    import toy_problem
-
-    from runs.store.writing import make_pieces, write_sealed
-    from runs.store.xdmf import Sidecar
-
-    evolution = toy_problem.ToyEvolution(toy_problem.ToyDeck())
-    evolution.advance()
-    dump = tmp_path / "d.h5"
-    write_sealed(dump, make_pieces(evolution, "toy", ""))
-    texts = []
-    for add in (True, False):
-        sidecar = Sidecar(tmp_path / "run.xmf")
-        if add:
-            sidecar.add(dump, evolution)
-        sidecar.write([dump])
-        texts.append((tmp_path / "run.xmf").read_text())
-    assert texts[0] == texts[1] and "<Time" in texts[0]

@@ -73,37 +73,6 @@ def test_a_deck_changed_by_hand_is_refused(shockgrid, again, old, new, words):
     assert (again / "history.csv").read_bytes() == before, "nothing was touched"
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        pytest.param(
-            ("riemann", "--set=case=toro3", "--set=cells=20"), marks=pytest.mark.slow
-        ),  # kernels of its own
-        ("riemann", "--set=cells=20", "--set=contact=captured", "--set=mesh=wave"),
-        ("detonation", "--set=cells=20", "--set=clock=0.5"),
-        ("heated-cavity", "--set=method=time", "--set=cells=6", "--set=run.t_end=0.01"),
-        ("rayleigh-benard", "--set=cells=6", "--set=cells_up=6", "--set=run.t_end=0.01"),
-    ],
-    ids=lambda words: "-".join(words[:2]),
-)
-def test_what_is_made_for_an_end_stays_with_it(shockgrid, words):
-    code, _, error = shockgrid("run", *words, "--set=output.dumps=3", "-q", "-o", "run")
-    assert code == 0, error
-    dumps = RunData("run").dumps
-    t_end, middle = dumps[-1].t, dumps[1].step
-    later = f"run.t_end={1.25 * t_end!r}"
-    code, _, error = shockgrid("restart", "run", "-q", "--at", str(middle), "--set", later)
-    assert code == 0, error
-    settings = (f"--set={later}", f"--set=run.t_set_up={t_end!r}", "--set=output.dumps=3")
-    kept = [one for one in words if not one.startswith("--set=run.t_end")]
-    code, _, error = shockgrid("run", *kept, *settings, "-q", "-o", "whole")
-    assert code == 0, error
-    one, two = RunData("run").dumps[-1].blocks[0], RunData("whole").dumps[-1].blocks[0]
-    assert np.array_equal(one.nodes, two.nodes)
-    for name, field in one.cell_fields.items():
-        assert np.array_equal(field, two.cell_fields[name]), name
-
-
 GAS = (
     "interface-instability",
     "--set=mach=2",

@@ -6,9 +6,6 @@ that nothing disturbed.
 
 from __future__ import annotations
 
-import random
-import time
-
 import numpy as np
 import pytest
 
@@ -57,28 +54,3 @@ def test_a_restart_in_the_middle_has_the_same_end(shockgrid, words):
     code, _, error = shockgrid("restart", "other", "-q", "--set", "run.max_steps=99999")
     assert code == 0, error
     assert_same_end(shockgrid, [middle])
-
-
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_killed_at_a_random_moment_it_goes_on_to_the_same_end(shockgrid, spawn, toy, seed):
-    words = (*GAS, "--set=output.dumps=60", "--set=output.restart_every=0.03")
-    assert shockgrid("run", *words, "-o", "whole")[0] == 0
-    process = spawn("run", *words, "-o", "other")
-    chance = random.Random(seed)
-    wanted = chance.randrange(2, 40)
-    while len(list(toy.glob("other/dumps/dump_*.h5"))) < wanted:
-        assert process.poll() is None
-        time.sleep(0.002)
-    time.sleep(chance.uniform(0.0, 0.02))
-    process.kill()
-    process.wait()
-    run = RunData("other")
-    assert process.returncode == -9, "it was killed while it ran"
-    assert len(run.dumps) >= wanted and not run.skipped
-    assert all(np.isfinite(block.cell_fields["rho"]).all() for block in run.dumps[-1].blocks)
-    assert run.dumps[-1].t < RunData("whole").dumps[-1].t
-    assert run.directory.list_points(), "there is a restart point"
-    assert shockgrid("info", "other")[0] == 0
-    code, _, error = shockgrid("restart", "other", "-q")
-    assert code == 0, error
-    assert_same_end(shockgrid)

@@ -18,7 +18,7 @@ def make_flow(seed, inner="interface", piston=None):
     random = np.random.default_rng(seed)
     ni, nj = 10, 8
     waves, height = random.integers(1, 4), random.uniform(-1.0, 1.0)
-    gases = IdealGas(1.4), IdealGas(1.4) if inner == "seam" else StiffenedGas(4.4, 10.0)
+    gases = IdealGas(1.4), IdealGas(1.4 if inner == "seam" else 1.67)
     states = []
     for _ in range(2):
         rho = random.uniform(0.8, 1.2, (ni, nj))

@@ -102,18 +102,3 @@ def test_what_memory_does_not_hold_is_said_at_once(small_machine, name, settings
         assert tracemalloc.get_traced_memory()[1] < 100e6
     finally:
         tracemalloc.stop()
-
-
-@pytest.mark.parametrize("name", [name for name in OWN if name != "blocks-made-elsewhere"])
-def test_cells_are_estimated_well(name):
-    problem = resolve_deck({"problem": name}, "deck").make_problem()
-    told = problem.estimate_cells()
-    plan = problem.plan()
-    if plan is None and hasattr(problem, "make_grids"):
-        grids = problem.make_grids().values()
-        made = sum((nodes.shape[1] - 1) * (nodes.shape[2] - 1) for nodes in grids)
-    elif plan is None:
-        pytest.skip("its grid is made with its blocks alone")
-    else:
-        made = sum(block.cells[0] * block.cells[1] for block in plan[1])
-    assert 0.98 * made <= told <= 1.25 * made

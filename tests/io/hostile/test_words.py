@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import sys
 import tomllib
 import unicodedata
 from pathlib import Path
 
-import h5py
 import pytest
 
 from regrid.text_files import DEEPEST, escape_controls, load_toml
@@ -22,13 +20,6 @@ HARMLESS = "\n\t "
 def is_harmless(text: str) -> bool:
     wrong = {"Cc", "Cf", "Cs", "Zl", "Zp", "Co", "Cn"}
     return not any(unicodedata.category(c) in wrong and c not in HARMLESS for c in text)
-
-
-@pytest.fixture
-def evil_run(shockgrid):
-    name = f"ru{EVIL}n$\\frac$"
-    assert shockgrid("run", "toy", "-q", "-o", name, "--set", "run.max_steps=3")[0] == 0
-    return name
 
 
 @pytest.mark.parametrize(
@@ -77,28 +68,6 @@ def test_hostile_words_on_a_command_line(shockgrid, words):
     assert code == 2 and not out, (code, out, error)
     assert is_harmless(error) and re.search(r"\\(u00|x)1b", error), error
     assert all(len(line) < 1100 for line in error.splitlines())
-
-
-def test_hostile_names_in_hdf5_files(shockgrid, evil_run):
-    dump = sorted(Path(evil_run, "dumps").glob("*.h5"))[-1]
-    shutil.copy(dump, "evil.h5")
-    with h5py.File("evil.h5", "r+") as file:
-        file.attrs["problem"] = EVIL
-        file.attrs[EVIL] = EVIL
-        file[f"blocks/left/{EVIL}"] = file["blocks/left/rho"][()]
-        file[f"blocks/left/{EVIL}"].attrs["units"] = EVIL
-        file["provenance"].attrs["version"] = EVIL
-    for words in (
-        ("inspect", "evil.h5"),
-        ("inspect", "evil.h5", str(dump)),
-        ("info", "evil.h5"),
-        ("compare", "evil.h5", str(dump)),
-        ("grid", "check", "evil.h5"),
-        ("grid", "check", "evil.h5", "--block", EVIL),
-    ):
-        code, out, error = shockgrid(*words)
-        assert code in (0, 1, 2), error
-        assert is_harmless(out) and is_harmless(error), (words, out, error)
 
 
 DEEP, LONG = 5000, "9" * 5000

@@ -15,9 +15,7 @@ from builders import ROOT
 from mpiexec import find_mpiexec
 from runs.cli.main import main
 from runs.store.directory import RunDirectory
-from runs.store.dumps import open_dump
 from runs.store.history import read_history
-from runs.store.index import find_parts_by_name, read_parts
 
 DECK = ("triple-point", "--set", "cells=8")
 
@@ -145,32 +143,8 @@ def test_a_run_with_a_cut_block_and_its_restart_on_another_cut(tmp_path):
             np.testing.assert_array_equal(one[column], other[column], err_msg=column)
 
 
-def test_a_cut_of_a_block_that_there_is_not_is_refused_before_anything_is_written(tmp_path, capsys):
-    run = tmp_path / "run"
-    short = ("--set", "run.max_steps=1")
-    wrong = ("--set", "run.cut.firsts=2", "-q")
-    assert main(["run", *RANKS_DECK, *short, *wrong, "-o", str(run)]) == 2
-    assert "run.cut: there is no block 'firsts'; did you mean 'first'?" in capsys.readouterr().err
-    assert not run.exists()
-    assert main(["run", *RANKS_DECK, *short, "-o", str(run), "-q"]) == 0
-    kept = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
-    capsys.readouterr()
-    assert main(["restart", str(run), "--set", "run.max_steps=2", *wrong]) == 2
-    assert "did you mean 'first'?" in capsys.readouterr().err
-    assert kept == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
-
-
 RUN = ("triple-point", "--set", "cells=8", "--set", "output.dumps=2000", "-q")
 STEPS = 6
-
-
-def run_on(ranks: int, *words) -> tuple[int, str]:
-    """Exit code and standard error of a command on that many ranks."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-    command = [*find_mpiexec(ranks), sys.executable, "-m", "runs.cli", *map(str, words)]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment)
-    assert "Traceback" not in done.stderr, done.stderr
-    return done.returncode, done.stderr
 
 
 @pytest.fixture(scope="module")
@@ -180,21 +154,3 @@ def alone(tmp_path_factory):
     path = tmp_path_factory.mktemp("alone") / "run"
     assert main(["run", *RUN, "--set", f"run.max_steps={STEPS}", "-o", str(path)]) == 0
     return path
-
-
-@pytest.mark.slow
-def test_parts_of_three_ranks_go_on_with_two(alone, tmp_path):
-    out = tmp_path / "out"
-    code, error = run_on(3, "run", *RUN, "--set", f"run.max_steps={STEPS - 2}", "-o", out)
-    assert code == 0, error
-    last = RunDirectory(out).list_points()[-1][1]
-    assert len(find_parts_by_name(last)) == 3
-    code, error = run_on(2, "restart", out, "--set", f"run.max_steps={STEPS}", "-q")
-    assert code == 0, error
-    assert len(find_parts_by_name(RunDirectory(out).list_points()[-1][1])) == 2
-    assert main(["compare", str(alone), str(out)]) == 0
-    with open_dump(last) as file:
-        parts = {part.name for part in read_parts(file)}
-    assert parts == {path.name for path in find_parts_by_name(last)}
-    sidecar = (out / "run.xmf").read_text()
-    assert f"dumps/{last.name}:/blocks/" in sidecar and "part-" not in sidecar

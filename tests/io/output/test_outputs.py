@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from runs.forecast import past_runs
-from runs.store.checksum import seal
 from runs.store.reader import RunData
 
 DECK = ("interface-instability", "--set", "cells=16", "--set", "lengths=[2, 2]", "--set", "mach=2")
@@ -149,22 +148,3 @@ def test_curves_have_the_nodes_of_the_interface(shockgrid):
             assert [float(row["x"]) for row in own] == line[0].tolist()
             assert [float(row["s"]) for row in own] == group["s"][()].tolist()
             assert file[f"step_{dump.step:06d}"].attrs["t"] == dump.t
-
-
-def test_what_cannot_be_exported_is_said(shockgrid):
-    shockgrid("run", *GAS, "-o", "run", "--set=run.max_steps=1")
-    code, _, error = shockgrid("export", "run", "-o", "curves.txt")
-    assert (
-        code == 2 and "-o curves.txt: curves are written to a file ending in .csv or .h5" in error
-    )
-    code, _, error = shockgrid("export", "nowhere")
-    assert code == 2 and "nowhere does not exist" in error
-    shockgrid("run", "toy", "-o", "one", "-q", "--set=run.max_steps=1")
-    for path in Path("one/dumps").iterdir():
-        with h5py.File(path, "r+") as file:
-            for group in file["blocks"].values():
-                group.attrs["material"] = "gas"
-        path.write_bytes(b"".join(seal(path.read_bytes())))  # so that it counts as written
-    code, _, error = shockgrid("export", "one")
-    assert code == 2 and "one has no interface: all its blocks are of one material" in error
-    assert not Path("one/interfaces.csv").exists()

@@ -11,7 +11,6 @@ import h5py
 import numpy as np
 import pytest
 from matplotlib import animation
-from matplotlib.path import Path as Polygon
 from PIL import Image
 
 from regrid.errors import BadInput
@@ -19,7 +18,6 @@ from regrid.measure.corners import compute_centres
 from runs.inspection.tree import inspect_differences
 from runs.pictures.derived import get_field, get_words, has_field
 from runs.pictures.film import Frames, make_film
-from runs.pictures.lineouts import find_pieces
 from runs.store.checksum import seal
 from runs.store.provenance import find_provenance, hash_deck
 from runs.store.reader import RunData
@@ -57,20 +55,6 @@ def test_what_made_a_run_is_no_difference(shockgrid):
     path.write_bytes(b"".join(seal(path.read_bytes())))
     assert shockgrid("info", str(path))[0] == 0
     assert shockgrid("compare", "one", "other")[0] == 0
-
-
-def test_damage_and_bad_numbers_are_seen(shockgrid):
-    data = run(shockgrid, "one")
-    first, last = data.dumps[0].path, data.dumps[-1].path
-    with h5py.File(last, "r+") as file:
-        file["state/left/heat"][2, 3] = np.nan
-        file["blocks/right/rho"][1, 1] = np.inf
-    tree = shockgrid("inspect", str(last))[1]
-    assert "NOT AS STORED" in tree and "1 NaN" in tree and "1 infinite" in tree
-    code, words, _ = shockgrid("inspect", str(first), str(last))
-    assert code == 0
-    assert "/state/left/heat: 64 of 64 values differ" in words
-    assert "/ @step: 0 and" in words
 
 
 @pytest.fixture
@@ -141,9 +125,6 @@ def test_wrong_words_are_told(run_of_film, shockgrid, monkeypatch, words, told):
     assert not list(Path().rglob("*.gif"))
 
 
-LINE = (-0.1, 0.23, 1.2, 0.71)
-
-
 def make_block(seed: int = 0) -> SimpleNamespace:
     """A bent grid, sheared by chance, with fields linear in x and y and a solid rotation."""
     x, y = np.meshgrid(np.linspace(0, 1, 12), np.linspace(0, 1, 9), indexing="ij")
@@ -161,25 +142,6 @@ def test_gradients_of_linear_fields_are_exact_on_a_bent_grid(name, exact):
     block = make_block()
     assert has_field(block, name) and get_words(block, name)[0] != "1"
     np.testing.assert_allclose(get_field(block, name), exact, rtol=1e-12)
-
-
-@pytest.mark.parametrize("turned", [False, True])
-def test_pieces_of_a_line_fill_it_and_lie_in_their_cells(turned):
-    nodes = make_block(3).nodes
-    if turned:
-        nodes = nodes[:, ::-1]
-    inside = (0.3, 0.3, 0.9, 0.8)
-    cells, ends = find_pieces(nodes, inside)
-    assert np.diff(ends, axis=1).sum() == pytest.approx(1.0, abs=1e-12)
-    cells, ends = find_pieces(nodes, LINE)  # from outside to outside
-    order = np.argsort(ends[:, 0])
-    np.testing.assert_allclose(ends[order[1:], 0], ends[order[:-1], 1], atol=1e-12)
-    assert 0.0 < ends.min() and ends.max() < 1.0
-    for (i, j), (a, b) in zip(cells, ends, strict=True):
-        corners = nodes[:, [i, i + 1, i + 1, i], [j, j, j + 1, j + 1]].T
-        for part in (0.99 * a + 0.01 * b, 0.01 * a + 0.99 * b):
-            point = (LINE[0] + part * (LINE[2] - LINE[0]), LINE[1] + part * (LINE[3] - LINE[1]))
-            assert Polygon(corners).contains_point(point)
 
 
 @pytest.fixture(scope="module")

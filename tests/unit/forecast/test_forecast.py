@@ -13,8 +13,6 @@ from runs.early_end.causes import name_failure
 from runs.forecast.step_trend import StepTrend
 from runs.forecast.time_left import TimeLeft
 from runs.inspection.verdict import RULES, describe_verdict, judge
-from runs.store.directory import RunDirectory
-from runs.store.verdict_file import read_verdict, remove_verdict, write_verdict
 
 
 def make_block(name="a", ni=6, nj=8, squeezed=None, hot=None):
@@ -198,20 +196,3 @@ def test_an_early_end_has_the_name_of_its_cause(error, name):
     assert verdict["name"] == name
     line = describe_verdict(verdict)
     assert line.startswith(f"verdict: ended early, {name};") and "\n" not in line
-
-
-def test_a_verdict_is_kept_and_a_damaged_one_is_told(tmp_path):
-    directory = RunDirectory(tmp_path)
-    assert read_verdict(directory) is None
-    verdict = judge("finished", "t_end reached", make_history(retries=fill(1)), CELLS)
-    verdict["dt_trend"] = [{"x": float("nan"), "step": 3}]
-    write_verdict(directory, verdict)
-    kept = read_verdict(directory)
-    assert kept["trust"] == verdict["trust"] and kept["dt_trend"] == [{"x": None, "step": 3}]
-    for text in ("", "{", "[]", "{}", '{"status": "finished"}', "[" * 100_000, "\x00\xff"):
-        directory.verdict.write_text(text, encoding="utf-8")
-        with pytest.raises(BadInput, match=r"verdict\.json is damaged"):
-            read_verdict(directory)
-    remove_verdict(directory)
-    remove_verdict(directory)
-    assert read_verdict(directory) is None

@@ -46,14 +46,6 @@ def test_a_straight_line_is_a_line_and_its_ends_are_corners():
     assert classify(nodes, 5, 0, stretches) == "wall"
 
 
-def test_a_sharp_bend_is_told_where_it_is_and_not_elsewhere():
-    y = np.linspace(0.0, 1.0, N + 1)
-    nodes = fill(np.array([-0.8 * np.abs(y - 0.5), y]))  # a roof: it turns by 1.35 rad in one node
-    stretches = sides(nodes, i_max="interface")
-    assert classify(nodes, 9, 20, stretches) == "bend"
-    assert classify(nodes, 9, 10, stretches) == "line"
-
-
 def test_a_spiral_is_a_roll_for_either_turn():
     s = np.linspace(0.0, 1.0, 121)
     angle = 3.0 * np.pi * s
@@ -65,23 +57,6 @@ def test_a_spiral_is_a_roll_for_either_turn():
         )
         nodes = fill(line, low=4.0)
         assert classify(nodes, 9, 90, sides(nodes, i_max="interface")) == "roll"
-
-
-def make_finger(width: float) -> np.ndarray:
-    """A line with a finger of this width into the block's inside, from x = 0 to x = -2."""
-    half, depth, count = 0.5 * width, 2.0, 40
-    up = np.array([np.linspace(0.0, -depth, count), np.full(count, -half)])
-    down = up[:, ::-1] * np.array([[1.0], [-1.0]])
-    before = np.array([np.zeros(20), np.linspace(-1.0, -half, 20, endpoint=False)])
-    after = np.array([np.zeros(20), np.linspace(half, 1.0, 21)[1:]])
-    return np.concatenate([before, up, down, after], axis=1)
-
-
-def test_two_stretches_of_a_line_that_come_close_are_a_neck():
-    stretches_of = lambda nodes: sides(nodes, i_max="interface")  # noqa: E731
-    thin, wide = fill(make_finger(0.05), -4.0), fill(make_finger(1.6), -4.0)
-    assert classify(thin, 9, 35, stretches_of(thin)) == "neck"
-    assert classify(wide, 9, 35, stretches_of(wide)) != "neck"
 
 
 @pytest.mark.parametrize("kind", ["wall", "axis"])

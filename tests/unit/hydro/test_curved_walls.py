@@ -90,28 +90,6 @@ def test_a_free_surface_in_a_bent_pipe():
     assert np.arctan2(*block.nodes[::-1, 0, -1]) < 0.79, "pressed in"
 
 
-@pytest.mark.parametrize("motion", ["rest", "blast"])
-def test_a_ring_closed_in_itself(motion):
-    nodes = make_ring(0.0, 2.0 * np.pi, nj=32)
-    nodes[:, :, -1] = nodes[:, :, 0]
-    middle = 0.25 * (nodes[:, 1:, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, 1:] + nodes[:, :-1, :-1])
-    p = np.where((middle[1] > 0.0) & (motion == "blast"), 3.0, 1.0)
-    block = Block("ring", GAS, nodes, 1.0, 0.0, 0.0, p)
-    wall_off(block, "i_min", "i_max")
-    links = [join("seam", (block, "j_min"), (block, "j_max"))]
-    with np.errstate(all="raise"):
-        simulation = Simulation([block], links, t_end=0.5)
-    start = simulation.start_row()
-    row = march(simulation)[-1]
-    for side in ("i_min", "i_max"):
-        np.testing.assert_allclose(
-            block.side_line(side, block.nodes), block.side_line(side, nodes), atol=1e-12
-        )
-    assert row["total_energy"] == pytest.approx(start["total_energy"], rel=1e-12)
-    if motion == "rest":
-        np.testing.assert_allclose(block.state[3, 1:-1, 1:-1], 1.0, rtol=1e-11)
-
-
 def make_square(name, i, j, n=4):
     return Block(name, GAS, box((i, j), (i + 1.0, j + 1.0), (n, n)), 1.0, 0.0, 0.0, 1.0)
 

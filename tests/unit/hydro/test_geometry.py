@@ -72,28 +72,6 @@ def test_faces_of_a_moving_cell_close(seed):
         assert area_y == pytest.approx(np.mean(areas), rel=1e-13)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_face_against_quadrature(seed):
-    random = np.random.default_rng(seed)
-    (a, b), (a_new, b_new) = random.uniform(0.0, 1.0, (2, 2, 2))
-    area_x, area_y, sweep, x, y = AXISYMMETRIC.face(*a, *b, *a_new, *b_new, 1.0)
-    gauss, weight = np.polynomial.legendre.leggauss(4)
-    gauss, weight = 0.5 + 0.5 * gauss, 0.5 * weight
-    found, centre = np.zeros(3), np.zeros(3)
-    for t, part in zip(gauss, weight, strict=True):
-        start, end = a + t * (a_new - a), b + t * (b_new - b)
-        for s, share in zip(gauss, weight, strict=True):
-            point = start + s * (end - start)
-            speed = (a_new - a) + s * ((b_new - b) - (a_new - a))
-            normal = np.array([end[1] - start[1], start[0] - end[0]]) * point[1]
-            found += part * share * np.array([*normal, speed @ normal])
-    for s, share in zip(gauss, weight, strict=True):
-        point = 0.5 * (a + a_new + s * ((b + b_new) - (a + a_new)))
-        centre += share * point[1] * np.array([*point, 1.0])
-    assert (area_x, area_y, sweep) == pytest.approx(found, abs=1e-15)
-    assert (x, y) == pytest.approx(centre[:2] / centre[2], rel=1e-13)
-
-
 def close(block, j_min):
     put(block, "j_min", j_min)
     wall_off(block)

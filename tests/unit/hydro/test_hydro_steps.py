@@ -1,22 +1,13 @@
 """Steps: restarts, refusals, threads, sources, guards, both sides of a link."""
 
-import platform
-import re
-
-import numba
 import numpy as np
 import pytest
 
-from builders import SIDES, box, march, tensor, two_blocks, wall_off
+from builders import SIDES, box, march, two_blocks, wall_off
 from hydro import rim as on
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas, MieGruneisen
-from hydro.formulas.geometry import GEOMETRIES, PLANE
-from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
-from hydro.formulas.riemann import FLUXES
-from hydro.interior import axisymmetric, fluxes, reconstruction, slopes, traces, update
-from hydro.interior import scratch as at
 from hydro.interior.advance import make_flow_kernels
 from hydro.links.join import join
 from hydro.motion import line, thickness
@@ -128,85 +119,6 @@ def test_threads_give_the_same_bits():
     assert get_bits(one) == get_bits(two)
 
 
-PHASES = {
-    "fill_geometry": (),
-    "fill_length_after": (),
-    "fill_faces_i": (0.1,),
-    "fill_faces_j": (0.1,),
-    "fill_length_j": (),
-    "fill_slopes": (0.1, (1.4,)),
-    "fill_slopes_radial": (0.1, (1.4,)),
-    "fill_upwind_i": (),
-    "fill_upwind_j": (),
-    "gather_flux": (0.1, 10.0, (1.4,)),
-    "gather_flux_radial": (0.1, 10.0, (1.4,)),
-    "fill_push": (),
-    "fill_lines": (),
-    "fill_shift_after": (),
-    "fill_traces": (1.0, (1.4,)),
-    "fill_traces_in": (1.0, (1.4,)),
-    "fill_flux": ((1.4,),),
-    "smear_flux": (16, (1.4,)),
-    "fill_new_state": (0.1, 10.0, (1.4,)),
-    "update_rows": (0.1, 10.0, (1.4,)),
-    "fill_switch": ((1.4,),),
-}
-SWITCH = (IdealGas.sound_speed_squared_part, IdealGas.energy_part, FLUXES["hllc"], False)
-CURVED = GEOMETRIES["axisymmetric"]
-LIMIT, SOUND = LIMITERS[DEFAULT_LIMITER], IdealGas.sound_speed_squared_part
-I_FACES, J_FACES = (at.RHO_OUT, at.RHO_IN, at.AREA_X_I), (at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J)
-MADE = {
-    "fill_length_after": lambda: reconstruction.fill_length_after,
-    "fill_geometry": lambda: reconstruction.make_geometry(PLANE.volume),
-    "fill_faces_i": lambda: traces.make_faces(PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I),
-    "fill_faces_j": lambda: traces.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
-    "fill_length_j": lambda: reconstruction.fill_length_j,
-    "fill_slopes": lambda: slopes.make_slopes(LIMIT, False, PLANE, SWITCH),
-    "fill_slopes_radial": lambda: slopes.make_slopes(LIMIT, True, CURVED, SWITCH),
-    "fill_upwind_i": lambda: fluxes.make_upwind(
-        *I_FACES, at.TORN_BEFORE, at.ACOUSTIC_BEFORE, False, False
-    ),
-    "fill_upwind_j": lambda: fluxes.make_upwind(*J_FACES, at.TORN - 1, at.ACOUSTIC - 1, True, True),
-    "gather_flux": lambda: update.make_update(IdealGas, PLANE, False, True),
-    "fill_push": lambda: axisymmetric.make_push(
-        CURVED.split, at.PRESSURE_J, at.FLUX_J_Y, at.X_HIGH, at.X_LOW, at.AREA_Y_J, at.PUSH_J
-    ),
-    "fill_lines": lambda: axisymmetric.fill_lines,
-    "fill_shift_after": lambda: axisymmetric.fill_shift_after,
-    "gather_flux_radial": lambda: update.make_update(IdealGas, CURVED, False, True),
-    "fill_traces": lambda: traces.make_traces(SOUND, True)[1],
-    "fill_traces_in": lambda: traces.make_traces(SOUND, True)[0],
-    "fill_flux": lambda: fluxes.make_flux(
-        IdealGas.energy_part, at.AREA_X_J, at.FLUX_J_MASS, 0, False
-    ),
-    "smear_flux": lambda: fluxes.make_hll_flux(
-        IdealGas.energy_part, *J_FACES, at.HLL - 1, at.TORN - 1, at.FLUX_J_MASS, 0, True
-    ),
-    "fill_new_state": lambda: update.make_update(IdealGas, PLANE, True, False),
-    "update_rows": lambda: update.make_update(IdealGas, PLANE, True, True),
-    "fill_switch": lambda: reconstruction.make_switch(
-        SOUND, IdealGas.energy_part, FLUXES["hllc"], True
-    ),
-}
-HOISTED = {"fill_switch": 2}  # scalar instructions on numbers that are the same for all cells
-PACKED_SINCE = {"fill_switch": (0, 66)}  # numba
-INSTRUCTION = re.compile(r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*)(p|s)d\s", re.M)
-
-
-@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86-64 code")
-@pytest.mark.parametrize("name", PHASES)
-def test_row_phases_are_packed(name):
-    if numba.version_info.short < PACKED_SINCE.get(name, (0, 0)):
-        pytest.skip("the compiler of this numba leaves the loop scalar: slower, the same numbers")
-    # not through the disk cache: code loaded from there has no text to read
-    compiled = numba.njit(error_model="numpy")(MADE[name]())
-    compiled(np.ones(at.SIZE), 1 if name == "smear_flux" else 16, *PHASES[name])
-    (code,) = compiled.inspect_asm().values()
-    kinds = INSTRUCTION.findall(code)
-    packed, scalar = kinds.count("p"), kinds.count("s") - HOISTED.get(name, 0)
-    assert packed >= 0.9 * scalar and packed > 0, (packed, scalar)
-
-
 GAS = IdealGas(1.4)
 
 
@@ -284,33 +196,6 @@ def test_inflow_is_as_fast_as_its_sound():
     march(Simulation([block], [], t_end=1.0, mesh="fixed"), 1)
     rim = block.segments[0].rim
     assert rim.c2_beyond == pytest.approx(1.4 / 0.25) and rim.c_beyond**2 == pytest.approx(5.6)
-
-
-def measure_worst(cells):
-    """Worst error of the heat of a cell against the r-weighted average of the heating law."""
-    x, r = np.linspace(0.0, 1.0, cells + 1), np.linspace(0.0, 1.0, cells + 1)
-    nodes = tensor(x, r)
-    block = Block("gas", IdealGas(1.4), nodes, 1.0, 0.0, 0.0, 1.0)
-    put(block, "j_min", "axis")
-    wall_off(block, "i_min", "i_max", "j_max")
-    simulation = Simulation(
-        [block], [], t_end=1.0, mesh="fixed", geometry="axisymmetric",
-        source=lambda block, x, y, t, dt: (0.0, 0.0, dt * np.cos(2.0 * x) * np.cos(3.0 * y)),
-    )  # fmt: skip
-    simulation.flow.source.start_step(0.0, 2e-3)
-    rho, _, _, p = block.start[:, 1:-1, 1:-1]
-    heat = (block.eos.energy(rho, p) - block.cell_fields["e"]) / 1e-3
-    along = np.diff(np.sin(2.0 * x) / 2.0) / np.diff(x)
-    moment = r * np.sin(3.0 * r) / 3.0 + np.cos(3.0 * r) / 9.0  # of r cos 3 r
-    across = np.diff(moment) / (0.5 * np.diff(r * r))
-    return float(np.abs(heat - along[:, None] * across).max())
-
-
-@pytest.mark.kernels
-def test_a_heating_law_in_axisymmetric_flow_is_of_second_order():
-    errors = [measure_worst(cells) for cells in (8, 16, 32)]
-    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([2.0, 2.0], abs=0.1)
-    assert errors[-1] < 2e-3
 
 
 @pytest.mark.parametrize("name", ["barrier", "equidistribution"])

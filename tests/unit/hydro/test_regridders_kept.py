@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from builders import box, wall_off
@@ -12,7 +11,6 @@ from hydro.eos import IdealGas
 from hydro.simulation import Simulation
 from regrid.algebraic import TransfiniteRegridder
 from regrid.errors import BadInput
-from regrid.registry import make_regridder
 
 
 class Changed(TransfiniteRegridder):
@@ -64,11 +62,3 @@ def test_a_flow_does_not_believe_other_sides(change):
     flow = make_flow(lambda: Changed(change))
     with pytest.raises(BadInput, match=f"regridder Changed: block 'gas'[,:] {CHANGES[change]}"):
         flow.advance()
-
-
-def test_sides_that_are_a_regridders_own_may_change():
-    flow = make_flow(
-        lambda: make_regridder("equidistribution", weight="1 + x", boundary="equidistributed")
-    )
-    flow.advance()
-    assert np.ptp(np.diff(flow.blocks[0].nodes[0, :, 0])) > 1e-4

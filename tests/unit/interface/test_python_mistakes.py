@@ -170,21 +170,3 @@ def test_a_bad_hook_or_measure_leaves_no_directory(tmp_path):
         with pytest.raises(sg.BadInput, match=words):
             sg.run(make_tube(), place, measure=wrong)
     assert not place.exists()
-
-
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("nosuch", r"no field or picture 'nosuch' of interface-instability; there are: rho, u, v"),
-        ("mehs", "there are: rho.*, mesh, interface, line; did you mean 'mesh'"),
-        ("history", "'history' is a picture of a run's directory: run the case"),
-        ("growth", "'growth' is a picture of a run's directory: run the case"),
-        ("line", "which line"),
-    ],
-)
-def test_pictures_that_a_live_case_has_not(name, words):
-    case = sg.load("interface-instability", cells=8)
-    with pytest.raises(sg.BadInput, match=words):
-        case.plot(name)
-    with pytest.raises(sg.BadInput, match=words):
-        case.plot(what=name)

@@ -11,8 +11,6 @@ import pytest
 
 import shockgrid as sg
 from builders import ROOT, two_blocks, wall_off
-from problems.registry import PROBLEMS
-from regrid.registry import REGRIDDERS
 from runs.cli.main import main
 from runs.deck.reading import read_deck
 
@@ -170,65 +168,6 @@ def test_restart_with_blocks_made_anew_ends_in_the_same_bits(run, tmp_path):
     # nothing but the dump at which the first part ended
     assert {one.where for one in sg.compare(run, whole)} <= {"dumps"}
     assert whole.dumps[-1].step == run.dumps[-1].step
-
-
-class Leftmost(sg.AlgebraicRegridder):
-    """A regridder that lays nodes evenly between two opposite sides."""
-
-    start = "leftmost"
-
-    def make_nodes(self, previous, boundary):
-        part = np.linspace(0.0, 1.0, boundary.shape[1])[None, :, None]
-        found = (1.0 - part) * boundary[:, :1] + part * boundary[:, -1:]
-        for edge in (0, -1):
-            found[:, :, edge] = boundary[:, :, edge]
-        return found
-
-
-def test_grids_are_made_read_judged_and_compared(tmp_path):
-    made = sg.grid.make("dome", "transfinite", cells=(12, 8))
-    assert made.nodes.shape == (2, 13, 9) and made.quality.valid
-    (path,) = made.write(tmp_path / "dome.npz")
-    assert np.array_equal(sg.grid.read(path), made.nodes)
-    assert sg.grid.quality(path).least_sine == made.quality.least_sine
-    with pytest.raises(sg.BadInput, match="exists"):
-        made.write(path)
-    own = sg.grid.regrid(made, "winslow", passes=2)
-    for side in (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1]):
-        assert np.array_equal(own.nodes[side], made.nodes[side])
-    with pytest.raises(sg.BadInput, match="did you mean 'dome'"):
-        sg.grid.make("dme")
-    with pytest.raises(sg.BadInput, match="has no option 'sweps'"):
-        sg.grid.make("dome", "equidistribution", sweps=3)
-    families = {"own": Leftmost(), "transfinite": "transfinite"}
-    found = sg.grid.compare("dome", families, cells=(12, 8))
-    assert found["transfinite"].done == found["transfinite"].steps
-    assert found["own"].done == found["own"].steps  # i is along straight sides there: the same
-    assert found["own"].sine == pytest.approx(found["transfinite"].sine, rel=1e-12)
-
-
-def test_own_classes_get_names_for_decks(monkeypatch):
-    monkeypatch.setitem(REGRIDDERS, "leftmost", "")
-    del REGRIDDERS["leftmost"]
-    sg.register("leftmost", Leftmost)
-    sg.register("leftmost", Leftmost)  # again, as a notebook's cell does
-    assert type(sg.make_regridder("leftmost", threads=2)).__name__ == "Leftmost"
-    with pytest.raises(sg.BadInput, match="there is a regridder 'barrier' already"):
-        sg.register("barrier", Leftmost)
-    with pytest.raises(sg.BadInput, match="is no name: small letters"):
-        sg.register("Left Most", Leftmost)
-    with pytest.raises(sg.BadInput, match="is no problem, equation of state"):
-        sg.register("number", int)
-    with pytest.raises(sg.BadInput, match="a class is registered"):
-        sg.register("number", 3)
-    monkeypatch.setitem(PROBLEMS, "own-problem", "")
-    del PROBLEMS["own-problem"]
-    sg.register("own-problem", OwnProblem)
-    assert type(sg.load("own-problem").problem) is OwnProblem
-
-
-class OwnProblem(sg.Problem):
-    """A problem of a test."""
 
 
 def test_a_signal_in_a_script_ends_it_with_a_restart_point(tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import tomllib
 
@@ -11,7 +10,7 @@ import pytest
 
 from builders import ROOT
 from problems.interface_instability.deck import Fluid, InterfaceDeck
-from problems.interface_instability.line import Mode, measure_mode, measure_roughness
+from problems.interface_instability.line import Mode
 from problems.interface_instability.problem import InterfaceInstability
 from problems.interface_instability.theories import (
     PATH,
@@ -26,8 +25,6 @@ from problems.standard.rayleigh_taylor import GRAVITY, WAVE_NUMBER, RayleighTayl
 from problems.standard.rayleigh_taylor import RayleighTaylorDeck as Deck
 from regrid.errors import BadInput
 from runs.deck.reading import read_deck
-
-K = 2.0 * math.pi
 
 
 def caution_growth(*numbers, **options):
@@ -64,19 +61,6 @@ def find_row(screen, words):
 
 def find_percent(row):
     return float(re.search(r"([-+]\d+\.\d+) %", row)[1])
-
-
-@pytest.mark.parametrize("width", [0.5, 1.0])
-def test_each_mode_is_measured_apart_from_the_others(width):
-    phases = (0.0, 1.0, 2.5) if width == 1.0 else (0.0, 0.0, 0.0)
-    y = np.linspace(0.0, width, 1601)
-    y = y + 0.02 * np.sin(K * y / width)  # not evenly spaced
-    sizes = {1: 0.02, 2: -0.03, 5: 0.01}
-    waves = zip(sizes.items(), phases, strict=True)
-    x = 0.3 + sum(size * np.cos(n * K * y + phase) for (n, size), phase in waves)
-    for (number, size), phase in zip(sizes.items(), phases, strict=True):
-        found = measure_mode(np.array([x, y]), K, number, phase)
-        assert found == pytest.approx(size, rel=1e-4)
 
 
 def test_the_window_ends_where_the_wave_is_steep():
@@ -147,18 +131,6 @@ def test_decks_have_cautions_of_their_own(deck, words):
     problem = make_problem_of_cautions(*deck.pop("modes", []), **deck)
     told = problem.cautions()
     assert any(re.search(words, sentence) for sentence in told), told
-
-
-def test_roughness_is_what_the_high_harmonics_make():
-    y = np.linspace(0.0, 0.5, 65)
-    line = np.array([0.1 + 0.02 * np.cos(K * y), y])
-    assert measure_roughness(line, K) < 1e-15
-    line[0] += 3e-3 * np.cos(7 * K * y) - 4e-3 * np.cos(20 * K * y)
-    assert measure_roughness(line, K) == pytest.approx(5e-3, rel=1e-12)
-    assert measure_roughness(line, K, left_out=[7]) == pytest.approx(4e-3, rel=1e-12)
-    whole = np.linspace(0.0, 1.0, 129)
-    line = np.array([4e-3 * np.sin(9 * K * whole + 0.3), whole])
-    assert measure_roughness(line, K, even=False) == pytest.approx(4e-3, rel=1e-12)
 
 
 BLOCKS = """

@@ -12,7 +12,6 @@ from problems.grid_march import GridMarch, GridMarchDeck
 from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.problem import InterfaceInstability
 from problems.plate_on_wedge.problem import PlateOnWedge
-from problems.plate_on_wedge.report import find_plateau, measure_profile
 from problems.plate_on_wedge.set_up import PlateOnWedgeDeck
 from problems.riemann import BEYOND, MOST_GROWTH, SHARE, Riemann, RiemannDeck, SideState, grade
 from regrid.curves import RATIO, meeting_laws
@@ -113,63 +112,12 @@ def test_weights_of_position_and_of_the_flow(name, boundary):
         assert len(find_bad_cells(evolution.blocks[0].nodes)) == 0
 
 
-@pytest.mark.parametrize(
-    ("make", "regrid", "words"),
-    [
-        (make_march, {"name": "node-speed", "weight": "1 + rho"}, "no 'rho' here"),
-        (make_flow, {"name": "node-speed", "weight": "1 + roh"}, "did you mean 'rho'"),
-        (make_flow, {"name": "node-speed", "weight": "1 +"}, "can be read"),
-        (make_flow, {"name": "winslow", "weight": "1 + x"}, "takes no weight"),
-        (make_flow, {"name": "winslo"}, "did you mean 'winslow'"),
-        (make_flow, {"name": "node-speed", "options": {"tua": 1.0}}, "did you mean 'tau'"),
-        (make_flow, {"name": "node-speed", "options": {"tau": -1.0}}, "positive"),
-        (make_march, {"name": "node-speed", "weight": "y - 5"}, r"cell \(0, 0\)"),
-    ],
-)
-def test_mistakes_are_one_sentence(make, regrid, words):
-    with pytest.raises(BadInput, match=words) as caught:
-        make(**regrid).build().advance()
-    assert "\n" not in str(caught.value)
-
-
-PATH = 20e-3
-
-
 def make_problem(**options) -> PlateOnWedge:
     return PlateOnWedge(msgspec.convert(options, PlateOnWedgeDeck))
 
 
 def make_flying(speed=3000.0, **options) -> PlateOnWedge:
     return make_problem(drive={"kind": "moving", "speed": speed}, **options)
-
-
-def make_profiles(pressure, face=2e-4, rise=3.0, noise=0.0) -> np.ndarray:
-    """Rows of some steps: `pressure` of the part of the path behind A, spread by a scheme's rise.
-
-    The rise has a crest and a dip behind it, all counted in faces.
-    """
-    random, rows = np.random.default_rng(3), []
-    for path in np.linspace(0.7 * PATH, PATH, 12):
-        arc = face * np.arange(1 + round(path / face))
-        k = np.arange(arc.size - 1) + 0.5
-        ringing = 0.05 * np.exp(-k / rise) * np.sin(k / rise) - np.exp(-((k / rise) ** 2))
-        p = pressure((arc[1:] - 0.5 * face) / path) * (1.0 + ringing)
-        rows.append(measure_profile(arc, p * (1.0 + noise * random.normal(size=p.size)), path))
-    return np.array(rows)
-
-
-def flat_and_falling(end):
-    return lambda part: 40e9 * (1.0 - np.clip(1.2 * (part - end), 0.0, 0.4))
-
-
-@pytest.mark.parametrize("rise", [1.0, 4.0])
-@pytest.mark.parametrize("end", [0.2, 0.35])
-def test_a_plateau_is_found_between_the_rise_and_the_fall(end, rise):
-    found = find_plateau(make_profiles(flat_and_falling(end), face=1e-4, rise=rise))
-    assert found.flat
-    assert found.p == pytest.approx(40e9, rel=2e-3)
-    assert found.end == pytest.approx(end, abs=0.06)
-    assert found.start >= rise * 1e-4 / PATH
 
 
 @pytest.mark.parametrize("counts, lengths", [((49, 33), (30.0, 20.0)), ((97, 65), (12.0, 38.0))])

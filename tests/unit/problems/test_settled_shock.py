@@ -93,35 +93,3 @@ def test_a_profile_of_few_cells_at_its_place(name, part):
     assert level.max() < 1.03 and level.min() > -1e-6
     first = np.flatnonzero(level < 0.9)[0]
     assert (np.diff(level[first:]) < 1e-6).all(), "falls all the way ahead of it"
-
-
-def bend(x: np.ndarray, amplitude: float) -> np.ndarray:
-    """A grid whose lines are cosines of `amplitude` cells, ends not straight."""
-    y = np.linspace(0.0, 0.5, 9)
-    wave = amplitude * CELL * np.cos(2.0 * np.pi * y)
-    return np.array(np.broadcast_arrays(x[:, None] + wave, y))
-
-
-@pytest.mark.parametrize("name", MATERIALS)
-@pytest.mark.parametrize("amplitude", [0.0, 0.3, 5.0])
-def test_laid_on_a_grid_nothing_is_lost(name, amplitude):
-    line, shock = settle(name)
-    nodes = bend(X, amplitude)
-    rho, u, p = line.lay_on(nodes)
-    mids = 0.5 * (nodes[0, :, 1:] + nodes[0, :, :-1])
-    lengths = np.diff(mids, axis=0)
-    low, high = mids[0] - X[0], mids[-1] - X[-1]  # past the line's ends is what is there
-    exact = shock.rho, shock.particle_speed
-    for laid, given, behind, ahead in (
-        (rho, line.rho, shock.rho, line.rho[-1]),
-        (rho * u, line.rho * line.u, exact[0] * exact[1], line.rho[-1] * line.u[-1]),
-        (
-            rho * line.eos.energy(rho, p) + 0.5 * rho * u * u,
-            line.rho * line.eos.energy(line.rho, line.p) + 0.5 * line.rho * line.u**2,
-            shock.rho * float(line.eos.energy(shock.rho, shock.p)) + 0.5 * exact[0] * exact[1] ** 2,
-            line.rho[-1] * float(line.eos.energy(line.rho[-1], line.p[-1])),
-        ),
-    ):
-        held = (laid * lengths).sum(axis=0)
-        wanted = (given * np.diff(X)).sum() - low * behind + high * ahead
-        assert np.abs(held - wanted).max() < 1e-12 * np.abs(given * np.diff(X)).sum()

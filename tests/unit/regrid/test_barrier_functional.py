@@ -1,15 +1,10 @@
 """Gradient, Hessian, line solve and conjugate gradients against plain sums and dense algebra."""
 
 import functools
-import os
-import platform
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
-from builders import ROOT
 from regrid.barrier import line_cg as newton
 from regrid.barrier import untangle
 from regrid.barrier.functional import LEAST_FADING
@@ -217,60 +212,3 @@ def test_dear_cells_enter_the_estimate():
     # the minimum without what cells cost lies apart
     work.begin(True, 1.0, 0.0)
     assert work.look(settled, nodes)[1] > 1e-2 * begun
-
-
-PACKED = {  # least number of packed 256-bit sums and products
-    "functional.fill_barrier_corner": 85,
-    "functional.fill_cell_blocks": 50,
-    "functional.fill_own_blocks": 50,
-    "functional.fill_side_edges": 8,
-    "functional.fill_line_edges": 10,
-    "newton.fill_product": 70,
-    "newton.fill_line_solution": 30,
-    "corners.measure_corners": 30,
-    "estimate.take_row": 8,
-    "estimate.fill_side_edges": 8,
-    "estimate.compare_areas": 35,
-    "estimate.fill_weights": 35,
-    "estimate.fill_shares": 110,
-    "estimate.add_row": 25,
-}
-
-
-@pytest.mark.kernels
-@pytest.mark.skipif(platform.machine() != "x86_64", reason="counts x86-64 instructions")
-def test_loops_are_in_packed_instructions(tmp_path):
-    source = """
-import re, numpy as np
-from regrid.barrier import assembly as functional, line_cg as newton, step_control as corners
-from regrid.barrier import residual_estimate as estimate
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.tuning import DEFAULT, Tuning
-from regrid.barrier.workspace import Workspace
-work = Workspace(9, 9, 1)
-nodes = np.array(np.mgrid[0:10, 0:10], dtype=float)
-work.sides[:] = nodes
-work.begin(True, 1.0, 0.0)
-work.assemble(nodes)
-work.compare_corners(nodes, nodes)
-work.look(nodes, nodes)
-z, H, rows = work.z, work.H[0], work.scratch[0]
-newton.fill_product(work.p, 0.5, z, work.p_old, 1, 9, H, work.product, work.totals, rows)
-x = work.solution
-newton.fill_line_solution(0.5, work.p, work.product, x, work.r, z, 1, 9, H, work.totals)
-for name in NAMES:
-    text = "".join(eval(name).inspect_asm().values())
-    print(*(len(re.findall(f"v(?:mul|add|sub|div|sqrt)pd.*{kind}mm", text)) for kind in "yz"))
-"""
-    # Code loaded from the disk cache shows no assembly: compile once more, in a fresh place.
-    environment = {**os.environ, "SHOCKGRID_CACHE_DIR": str(tmp_path)}
-    source = source.replace("NAMES", repr(list(PACKED)))
-    found = subprocess.run(
-        [sys.executable, "-c", source], capture_output=True, text=True, env=environment, cwd=ROOT
-    )
-    assert found.returncode == 0, found.stderr
-    counts = [[int(word) for word in line.split()] for line in found.stdout.splitlines()]
-    if not np.any(counts):
-        pytest.skip("no 256-bit vectors on this processor")
-    for (name, least), (narrow, wide) in zip(PACKED.items(), counts, strict=True):
-        assert narrow + 2 * wide >= least, name

@@ -13,7 +13,7 @@ from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.repair import repair_grid
 from regrid.domains import DOMAINS, make_domain, transpose_nodes
 from regrid.errors import BadInput, RegridFailure
-from regrid.marching import march, march_domain
+from regrid.marching import march_domain
 from regrid.measure.crossings import find_self_crossing
 from regrid.measure.quality import find_bad_cells, measure_first_line_gap, measure_quality
 from regrid.sides import SIDES
@@ -82,26 +82,6 @@ def test_a_march_is_the_loop_that_one_would_write(valley):
     assert found.kept_times == [0.0, 0.5, 1.0] and np.array_equal(found.kept[0], valley.start)
     assert found.kept[-1] is found.nodes and found.cost > 0.0
     assert found.iterations == sum(report.iterations for report in found.reports)
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"cells": 0.0}, "cells = 0.0; it must be positive"),
-        ({"span": (1.0, 0.0)}, "must begin before it ends"),
-        ({"gap_sides": ["bottom"]}, "no side is called 'bottom'; sides are i_min"),
-        ({"keep_every": -1}, "keep_every = -1"),
-        ({"times": [0.1, np.nan]}, "times must be finite"),
-        ({"start": np.zeros((3, 4, 4))}, r"start has shape \(3, 4, 4\)"),
-        ({"start": np.full((2, 4, 4), np.nan)}, "start has nodes that are not finite"),
-        ({"boundary_at": lambda t: np.zeros((2, 3, 3))}, r"has shape \(2, 3, 3\), start"),
-        ({"boundary_at": lambda t: np.full((2, 17, 13), np.inf)}, "that are not finite"),
-    ],
-)
-def test_what_does_not_fit_is_refused(valley, options, words):
-    usual = {"start": valley.start, "boundary_at": valley.boundary}
-    with pytest.raises(BadInput, match=words):
-        march(BarrierRegridder(), **(usual | options))
 
 
 COST_WEIGHT = 0.2

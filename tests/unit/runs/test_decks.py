@@ -10,12 +10,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from builders import ROOT
 from regrid.errors import BadInput
 from runs.deck.reading import apply_setting, packaged_decks, parse_value, read_deck
 from runs.deck.unset import describe_unset
 from runs.inspection.account import measure_drifts
-from runs.inspection.units import pick_prefix
 from runs.store.history import HistoryWriter, read_history
 
 
@@ -77,36 +75,6 @@ def test_drift_leaves_out_what_came_through_the_boundary():
     drifts = measure_drifts(history)
     assert drifts["energy"] == 0.0
     assert drifts["momentum_y"] == pytest.approx(0.25e-12)
-
-
-@pytest.mark.parametrize(
-    ("value", "unit", "words"),
-    [
-        (1.25e-5, "s", "12.5 µs"),
-        (0.0, "s", "0 s"),
-        (5e9, "Pa", "5 GPa"),
-        (1e-3, "m", "1 mm"),
-        (2700.0, "kg/m3", "2700 kg/m3"),
-        (0.5, "1", "0.5"),
-        (999.9999999, "m", "1 km"),
-    ],
-)
-def test_units(value, unit, words):
-    factor, name = pick_prefix(value, unit)
-    assert f"{value * factor:.4g} {name}".rstrip() == words
-    assert pick_prefix(math.nan, unit)[0] == 1.0
-
-
-@pytest.mark.slow
-def test_every_column_of_a_flow_s_history_is_explained():
-    from runs.deck.reading import read_deck
-
-    page = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
-    row = read_deck("conical-target", ("cells=16",)).make_problem().build().compute_row("start", 0)
-    prefixes = ("total_", "boundary_")
-    assert all(f"`{prefix}*`" in page for prefix in prefixes)
-    mute = [name for name in row if not name.startswith(prefixes) and f"`{name}`" not in page]
-    assert not mute
 
 
 NONSENSE = [

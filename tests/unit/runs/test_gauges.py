@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from problems.deck import GaugePoint
-from regrid.measure.cells import INSIDE, find_places
 from regrid.measure.corners import compute_centres
 from runs.gauges.recorder import Gauges
 from runs.gauges.sampling import place_points
@@ -56,24 +55,6 @@ def test_linear_fields_are_exact_on_a_grid_that_moves(ni, nj):
             assert np.abs(found[name] - exact)[there].max() < 2e-14 * np.abs(exact).max()
             assert np.isnan(found[name][~there]).all()
     assert counted > 120
-
-
-@pytest.mark.parametrize("mirrored", [False, True])
-def test_the_cell_that_is_found_holds_the_point(mirrored):
-    nodes = distort(11, 6)
-    nodes = np.ascontiguousarray(nodes[:, ::-1]) if mirrored else nodes
-    chance = np.random.default_rng(5)
-    i, j = chance.integers(0, 11, 200), chance.integers(0, 6, 200)
-    s, t = chance.uniform(0.0, 1.0, (2, 200))
-    corners = [nodes[:, i + k, j + m] * w for k, m, w in (
-        (0, 0, (1 - s) * (1 - t)), (1, 0, s * (1 - t)), (0, 1, (1 - s) * t), (1, 1, s * t)
-    )]  # fmt: skip
-    points = np.ascontiguousarray(sum(corners))
-    cells, quads = np.zeros((2, 200), dtype=np.int64), np.zeros((2, 200), dtype=np.int64)
-    parts, where = np.zeros((2, 200)), np.zeros(200, dtype=np.int64)
-    find_places(nodes, points, 0.0, cells, quads, parts, where)
-    assert (where == INSIDE).all() and (cells == np.array([i, j])).all()
-    assert len(find_places.signatures) == 1
 
 
 class Carried:

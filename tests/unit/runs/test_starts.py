@@ -118,8 +118,3 @@ def test_a_step_of_two_blocks_makes_few_calls():
     assert 0 < calls.kernels <= MOST_KERNELS
     assert 0 < calls.others <= MOST_OTHERS
     assert calls.seconds > 0.0
-
-
-def test_calls_do_not_grow_with_cells():
-    few, many = (count_calls(make_step((f"cells={n}",))) for n in (16, 32))
-    assert (few.kernels, few.others) == (many.kernels, many.others)

@@ -10,7 +10,6 @@ import pytest
 from builders import march
 from hydro.convection.columns import (
     Column,
-    ColumnMarch,
     compute_wall_fluxes,
     settle_column,
     solve_column,
@@ -18,8 +17,7 @@ from hydro.convection.columns import (
     step_front,
 )
 from hydro.convection.tensor_grids import make_axis
-from problems.convection.convection_1d import Convection1D, Convection1DDeck, measure_errors
-from problems.convection.heated_cavity import AxisGrid
+from problems.convection.convection_1d import measure_errors
 from problems.convection.moving_grid_1d import MovingGrid1D, MovingGrid1DDeck, PlacingPart
 from problems.references.convection import BurgersFronts, VerticalPlates
 from runs.cli.main import main
@@ -89,19 +87,6 @@ def test_moving_nodes_keep_uniform_temperature_and_the_heat():
     gained = moved @ np.diff(new) - heat @ np.diff(old)
     assert gained == pytest.approx(0.01 * (fluxes[0] - fluxes[1]), abs=1e-14)
     assert abs(velocity @ np.diff(new)) < 1e-13 * np.abs(velocity).max()
-
-
-def test_restart_gives_the_same_bits():
-    deck = Convection1DDeck(cells=16, grid=AxisGrid(kind="combined", every=3))
-    whole, half = Convection1D(deck).build(), Convection1D(deck).build()
-    march(whole, 17)
-    march(half, 17)
-    other = Convection1D(deck).build()
-    other.set_state({name: np.copy(value) for name, value in half.get_state().items()})
-    for _ in range(9):
-        assert whole.advance() == other.advance()
-    assert np.array_equal(whole.x, other.x) and np.array_equal(whole.velocity, other.velocity)
-    assert isinstance(whole, ColumnMarch)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,6 @@ from problems.shock_bubble import (
     ShockBubble,
     ShockBubbleDeck,
 )
-from regrid.errors import BadInput
 
 SPEED = 80.0
 
@@ -43,32 +42,6 @@ def test_a_stream_carries_the_bubble_and_nothing_happens(gas):
             moved = block.side_line(side, block.nodes) - block.side_line(side, nodes)
             assert np.abs(moved[0] - SPEED * simulation.t).max() < 1e-9 * RADIUS
             assert np.abs(moved[1]).max() < 1e-9 * RADIUS
-
-
-def test_a_joint_keeps_its_share_of_the_contact_and_stays_on_it():
-    """A circle whose joints are moved along it: they come back, and every node stays round."""
-    simulation = ShockBubble(ShockBubbleDeck(cells=6)).build()
-    motion = simulation.motion
-    west, top = simulation.exchange.links[2].leader, simulation.exchange.links[5].leader
-    for block in simulation.blocks:
-        block.nodes_new[...] = block.nodes
-    joint = motion.joints[0]
-    first = joint.node.position()
-    turn = 0.02
-    turned = np.array([
-        first[0] * np.cos(turn) - first[1] * np.sin(turn),
-        first[0] * np.sin(turn) + first[1] * np.cos(turn),
-    ])  # fmt: skip
-    joint.node.shift(turned - first)
-    places = []
-    for _ in range(200):
-        joint.slide(0.05)
-        places.append(west.line(west.block.nodes_new)[:, -1].copy())
-    assert np.abs(np.hypot(*np.array(places).T) / RADIUS - 1.0).max() < 2e-5
-    assert np.hypot(*(places[-1] - first)) < 0.02 * np.hypot(*(turned - first))
-    assert np.array_equal(places[-1], top.line(top.block.nodes_new)[:, -1])
-    with pytest.raises(BadInput, match="do not go on into each other"):
-        motion.let_slide(west, simulation.exchange.links[3].leader)
 
 
 LIGHT, HEAVY = IdealGas(1.4), IdealGas(1.249)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from benchmarks.shocked_lines import measure_null_line, sweep_flat_line
-from builders import measure_growth
 from problems.deck import RunControl
 from problems.interface_instability.deck import Fluid, InterfaceDeck
 from problems.interface_instability.line import Mode, measure_mode
@@ -159,34 +158,6 @@ def test_a_line_almost_flat_in_one_gas():
     assert modes[:, 1].mean() == pytest.approx(0.2, abs=0.007)
     assert np.abs(modes[:, 1] - 0.2).max() < 0.017
     assert np.abs(modes[:, 2:]).max() < 0.0015
-
-
-# deck of a pair, by what part its rate may be off
-GROWTH = {
-    "1:3 at Mach 3": ({"mach": 3.0}, 0.012),
-    "1:3 at Mach 5": ({"mach": 5.0}, 0.011),
-    "1:3 at Mach 8": ({"mach": 8.0}, 0.012),
-    "3:1 at Mach 1.5": ({"mach": 1.5, "first": HEAVY, "second": LIGHT}, 0.02),
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", list(GROWTH))
-def test_growth_after_strong_shocks_is_that_of_theory_and_smooth(name):
-    """Rate within the bar, harmonics from the fifth on small beside the first."""
-    deck, bar = GROWTH[name]
-    problem = InterfaceInstability(InterfaceDeck(cells=CELLS, **deck))
-    flow = problem.build()
-    rows = [{"t": 0.0, **problem.measure(flow)}]
-    while flow.finished is None:
-        flow.advance()
-        rows.append({"t": flow.t, **problem.measure(flow)})
-    history = {key: np.array([row[key] for row in rows]) for key in rows[0]}
-    rate = measure_growth(problem, history)
-    assert rate == pytest.approx(problem.theory.get_mean_rate(), rel=bar)
-    settled = (history["t"] - problem.arrival) * problem.k * problem.theory.sound_speed > 6.0
-    rough = history["roughness"][settled] / np.abs(history["amplitude_mode_1"][settled])
-    assert rough.max() < 0.05
 
 
 BESIDE = 40  # cells from the line

@@ -205,24 +205,3 @@ def test_a_restart_has_the_same_end(phase, tmp_path, monkeypatch, capfd):
     code = main(["compare", "whole", "other"])
     text = capfd.readouterr().out
     assert (code, text.startswith("no difference")) == (0, True), text
-
-
-@pytest.mark.parametrize(
-    "settings, words",
-    [
-        (("angle=-5",), "angle is -5 degrees, which puts the plate inside the wedge"),
-        (("angle=80",), "it must be 0.5 to 75"),
-        (("drive.speed=40e3",), "the equation of state of Al1100 allows at most"),
-        (("drive.kind=pressure", "drive.pressure=1e13"), "allows at most"),
-        (("end_angle=35", "depth=40e-3"), "beyond the symmetry plane"),
-        (("cells=[6,12]",), "at least 4 of each"),
-        (("drive.history=[[1e-6,1],[0,1]]",), "drive.history: its times must increase"),
-        (("plate=air",), "air"),
-    ],
-)
-def test_bad_input(settings, words, capfd, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    sets = [f"--set={setting}" for setting in settings]
-    assert main(["run", "plate-on-wedge", *sets]) == 2
-    error = capfd.readouterr().err
-    assert words in error and error.count("\n") == 1 and "Traceback" not in error

@@ -206,32 +206,6 @@ def test_smooth_flow_converges_in_second_order(mesh, orders, mean):
             assert (row > least).all(), (coarse, found)
 
 
-def test_mirror_image():
-    """The rod turned round: i runs the other way along x."""
-
-    def make(turned):
-        nodes = make_grid((30, 10), lambda x: 0.0, lambda x: 0.4 + 0.1 * x, 0.0, 1.0)
-        rho = np.ones((30, 10))
-        rho[:12] = 2.0
-        u = np.zeros((30, 10))
-        u[:12] = 0.3
-        if turned:
-            nodes = np.array([-nodes[0, ::-1], nodes[1, ::-1]])
-            rho, u = rho[::-1], -u[::-1]
-        block = Block("rod", GAS, nodes, rho, u, 0.0, 1.0)
-        put(block, "j_min", "axis")
-        put(block, "j_max", "free-surface", pressure=1.0)
-        wall_off(block, "i_min", "i_max")
-        return Simulation([block], [], t_end=1e9, geometry="axisymmetric")
-
-    one, two = make(False), make(True)
-    march(one, 100)
-    march(two, 100)
-    state, image = one.blocks[0].state[:, 1:-1, 1:-1], two.blocks[0].state[:, -2:0:-1, 1:-1]
-    for value, other, sign in zip(state, image, (1, -1, 1, 1), strict=True):
-        assert np.abs(value - sign * other).max() < 1e-11
-
-
 def make_shaken_rod(threads=1):
     nodes = make_grid((70, 128), lambda x: 0.0, lambda x: 0.5 + 0.05 * np.sin(3 * x), 0.0, 1.0)
     x, y = nodes[:, 1:, 1:]

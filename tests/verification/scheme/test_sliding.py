@@ -12,7 +12,6 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.links.join import join, slide
 from hydro.simulation import Simulation
-from problems.references.exact_flows import Vortex
 from regrid.errors import BadInput
 
 GAS = IdealGas(1.4)
@@ -114,47 +113,6 @@ def test_matching_nodes_without_slip_are_an_interface():
         states.append([row[0].state[:, 1:-1, 1:-1].copy() for row in rows])
     for one, two in zip(*states, strict=True):
         assert np.abs(one - two).max() < 1e-10
-
-
-VORTEX = Vortex(beta=1.5, stream=(0.0, 0.0))
-
-
-def measure_vortex(cells, kind, t_end=2.0):
-    """Mean error of the density about a vortex whose centre lies on the cut."""
-    pairs = {"uncut": (cells,), "sliding": (cells, cells * 5 // 4)}.get(kind, (cells, cells))
-    blocks = []
-    for k, n in enumerate(pairs):
-        height = 10.0 / len(pairs)
-        nodes = box((0.0, k * height), (10.0, (k + 1) * height), (n, cells // len(pairs)))
-        averages = VORTEX.compute_cell_averages(nodes)
-        blocks.append(Block(f"row{k}", GAS, nodes, *averages, material="gas"))
-    links = [join("periodic", (block, "i_min"), (block, "i_max")) for block in blocks]
-    if len(blocks) == 2:
-        place, other = (blocks[0], "j_max"), (blocks[1], "j_min")
-        links.append(join(kind, place, other) if kind == "interface" else slide(place, other))
-    put(blocks[0], "j_min", "wall")
-    put(blocks[-1], "j_max", "wall")
-    simulation = Simulation(blocks, links, t_end=t_end)
-    march(simulation)
-    miss = area = 0.0
-    for block in blocks:
-        exact = VORTEX.compute_cell_averages(block.nodes)[0]
-        miss += (block.volume * np.abs(block.cell_fields["rho"] - exact)).sum()
-        area += block.volume.sum()
-    assert area == pytest.approx(100.0, rel=1e-12)
-    return miss / area
-
-
-def test_cut_without_jump():
-    """The material line through a vortex turns with it; the flow is the uncut one's."""
-    errors = {
-        (kind, cells): measure_vortex(cells, kind)
-        for kind in ("uncut", "interface", "matching", "sliding")
-        for cells in (32, 64)
-    }
-    for kind in ("interface", "matching", "sliding"):
-        assert math.log2(errors[kind, 32] / errors[kind, 64]) >= 1.5, kind
-        assert errors[kind, 64] < 2.0 * errors["uncut", 64], kind
 
 
 RADII, SPEED, PRESSURE = (1.0, 2.0, 3.0), 1.0, 2.0

@@ -97,15 +97,6 @@ def test_a_slave_and_its_master_cut(places):
     check_cut(read_builder("plate-on-wedge", "cells=[80,6]"), 10, places)
 
 
-@pytest.mark.parametrize("squeezed", [(31,), (31, 32, 64), (0, 63, 99), (38,)])
-def test_squeezed_cells_share_their_states_across_bands(squeezed):
-    def build():
-        return build_tube(squeezed=squeezed, mesh="fixed", small_cells=0.05)
-
-    rows = check_cut(build, 10, [(1, 2, 0, 3)])
-    assert sum(row["shared_cells"] > 0 for row in rows) >= 5  # dt grows from a small one
-
-
 class SeesDensity:
     """A regridder of which nodes follow the density of cells anywhere in the block."""
 

@@ -41,26 +41,6 @@ def fine_form(work, d):
     return float(total)
 
 
-@pytest.mark.parametrize("size", [(64, 48), (45, 33), (46, 27)])
-@pytest.mark.parametrize("axis", [1, 2])
-def test_a_mirrored_block_has_the_mirrored_correction(size, axis):
-    sign = np.where(np.arange(2) == axis - 1, -1.0, 1.0)[:, None, None]
-    one, nodes = make_work(*size, dear=True)
-    other = Workspace(*size, 1, Tuning(coarse_from=0))
-    turned = np.ascontiguousarray(np.flip(nodes * sign, axis))
-    other.old[:] = other.sides[:] = turned
-    other.sound[:] = np.flip(one.sound, axis - 1)
-    other.begin(True, 0.9, 0.1, Tuning(epsilon=1e-1), cost=True)
-    other.look(turned, turned)
-    found = []
-    for work, grid in ((one, nodes), (other, turned)):
-        moved = np.empty_like(grid)
-        assert work.coarse.find(grid, work.law) > 0.01
-        work.coarse.add(grid, moved)
-        found.append(moved - grid)
-    assert np.abs(np.flip(found[1] * sign, axis) - found[0]).max() < 1e-10 * np.abs(found[0]).max()
-
-
 @pytest.mark.parametrize("dear", [False, True])
 def test_coarse_matrix_is_that_of_the_fine_cells(dear):
     work, nodes = make_work(dear=dear)

@@ -1,22 +1,13 @@
 """ED3: the discrete operator, exact grids, orders, threads, and the order of work of a block."""
 
 import numpy as np
-import pytest
 
 from builders import box
-from regrid.equidistribution.volumes import equidistribute_block, is_valid, solve_ed3
+from regrid.equidistribution.volumes import solve_ed3
 
 
 def cube(*shape):
     return box((0.0,) * 3, (1.0,) * 3, shape)
-
-
-def bent_duct(p):
-    """A quarter of a ring from r = 1 to 2, between a bulging floor and z = 0."""
-    a, b, c = p
-    bulge = 1.0 - 0.05 * np.sin(np.pi * a) * np.sin(np.pi * b)
-    angle = 0.5 * np.pi * b
-    return np.array([(1.0 + a) * np.sin(angle), -(1.0 + a) * np.cos(angle), (c - 1.0) * bulge])
 
 
 def horn(p):
@@ -63,28 +54,6 @@ def test_spherical_shell_is_second_order():
         spreads.append(found.spreads[found.best])
     assert errors[0] / errors[1] > 3.3 and errors[1] < 1e-3
     assert spreads[0] / spreads[1] > 3.0 and spreads[1] < 1e-3
-
-
-@pytest.mark.parametrize("mapping", [bent_duct, horn])
-@pytest.mark.parametrize("weight", [1.0, weight_in_z])
-@pytest.mark.parametrize(
-    ("steps", "iterations"),
-    [
-        (12, 40),
-        pytest.param(20, 100, marks=pytest.mark.slow),
-        pytest.param(40, 100, marks=pytest.mark.slow),
-    ],
-)
-def test_curved_blocks_spread_falls_and_every_corner_is_positive(
-    mapping, weight, steps, iterations
-):
-    shape = (steps, steps, steps)
-    fixed = equidistribute_block(mapping, shape, weight, iterations, sides=False)
-    whole = equidistribute_block(mapping, shape, weight, iterations)
-    for found in (fixed, whole):
-        assert (np.diff(found.spreads) < 0.0).all()
-        assert is_valid(found.nodes)
-    assert whole.spreads[whole.best] < 0.7 * fixed.spreads[fixed.best]
 
 
 def test_turned_moved_and_scaled_blocks_have_the_same_grid():

@@ -7,12 +7,10 @@ from builders import box
 from regrid.equidistribution.weights import (
     Expression,
     Weight,
-    compute_side_density,
     measure_gradient,
 )
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
-from regrid.measure.quality import compute_corner_areas
 
 F = np.array([1.0, 2.0, 4.0])
 
@@ -98,14 +96,3 @@ def test_gradient_of_a_linear_field_is_exact_on_any_grid_turned_or_not():
         centres = compute_centres(nodes)
         slope = measure_gradient(3.0 * centres[0] - 4.0 * centres[1] + 7.0, centres)
         assert np.abs(slope - 5.0).max() < 1e-11
-
-
-def test_density_of_the_sides_and_of_the_grid_on_a_graded_rectangle():
-    nodes = np.array(
-        np.meshgrid(np.linspace(0, 2, 15) ** 1.5, np.linspace(0, 1, 11) ** 1.3, indexing="ij")
-    )
-    areas = 0.5 * compute_corner_areas(nodes).sum(axis=0)
-    for density in (compute_side_density(nodes), Weight("own").on(nodes, nodes)(nodes)):
-        product = density * areas
-        assert np.ptp(product) < 1e-13 * product.mean()
-    assert np.allclose(Weight("h").on(nodes, nodes)(nodes), np.sqrt(areas))

@@ -17,6 +17,7 @@ import numpy as np
 
 from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
+from regrid.measure.faults import take_nodes
 from regrid.measure.hexahedra import compute_corner_volumes, find_bad_hexahedra
 
 FACES = ("i_min", "i_max", "j_min", "j_max", "k_min", "k_max")
@@ -302,25 +303,20 @@ def check_grids_in_space(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
 
     Inner nodes of `boundary` may be anything.
     """
-    found = []
-    for name, given in (("previous", previous), ("boundary", boundary)):
-        nodes = np.ascontiguousarray(given, dtype=np.float64)
-        if nodes.ndim != 4 or nodes.shape[0] != 3 or min(nodes.shape[1:]) < 2:
-            raise BadInput(
-                f"regrid: {name} has shape {nodes.shape}; it must be (3, ni+1, nj+1, nk+1), "
-                "ni, nj, nk >= 1"
-            )
-        found.append(nodes)
-    if found[0].shape != found[1].shape:
+    previous, boundary = (
+        take_nodes(previous, "previous", "ijk"),
+        take_nodes(boundary, "boundary", "ijk"),
+    )
+    if previous.shape != boundary.shape:
         raise BadInput(
-            f"regrid: previous has shape {found[0].shape}, boundary {found[1].shape}; "
+            f"regrid: previous has shape {previous.shape}, boundary {boundary.shape}; "
             "they must agree"
         )
-    if not np.isfinite(found[0]).all():
+    if not np.isfinite(previous).all():
         raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
-    if not np.isfinite(gather_faces(found[1])).all():
+    if not np.isfinite(gather_faces(boundary)).all():
         raise BadInput("regrid: the boundary has nodes that are not finite numbers")
-    return found[0], found[1]
+    return previous, boundary
 
 
 def find_turned_edge(nodes: np.ndarray) -> tuple[str, str, tuple[int, ...]] | None:

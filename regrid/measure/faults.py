@@ -59,12 +59,14 @@ def take_grids(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
     return previous, boundary
 
 
-def take_nodes(nodes, name: str) -> np.ndarray:
-    """A grid as C-contiguous float64; BadInput, with its `name`, for what is no (2, ni+1, nj+1)."""
+def take_nodes(nodes, name: str, axes: str = "ij") -> np.ndarray:
+    """A grid as C-contiguous float64; BadInput, with its `name`, for what is none of these axes."""
     nodes = take_numbers(nodes, name)
-    shape = nodes.shape
-    if len(shape) != 3 or shape[0] != 2 or shape[1] < 2 or shape[2] < 2:
-        raise BadInput(f"regrid: {name} has shape {shape}; it must be (2, ni+1, nj+1), ni, nj >= 1")
+    shape, dimensions = nodes.shape, len(axes)
+    if len(shape) != dimensions + 1 or shape[0] != dimensions or min(shape) < 2:
+        wanted = ", ".join([str(dimensions), *(f"n{axis}+1" for axis in axes)])
+        cells = ", ".join(f"n{axis}" for axis in axes)
+        raise BadInput(f"regrid: {name} has shape {shape}; it must be ({wanted}), {cells} >= 1")
     return nodes
 
 

@@ -84,8 +84,9 @@ def distribute_by_arc_length(
     curve: np.ndarray, count: int, law: np.ndarray | None = None
 ) -> np.ndarray:
     """`count` nodes on the fine polyline `curve` (2, n), equidistant or by `law`, ends included."""
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=1)))])
     law = np.linspace(0.0, 1.0, count) if law is None else law
-    line = np.array([np.interp(law, arc_law(curve), part) for part in curve])
+    line = np.array([np.interp(law * arc[-1], arc, part) for part in curve])
     line[:, 0], line[:, -1] = curve[:, 0], curve[:, -1]
     return line
 

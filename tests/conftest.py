@@ -59,8 +59,6 @@ RARE_KERNELS = (
     "verification/scheme/test_reference_step.py::*[[]low-mach]",
     "verification/scheme/test_reference_step.py::*[[]minmod]",
     "verification/scheme/test_reference_step.py::*hll_alone",
-    "verification/scheme/test_surface_tension.py::test_drops*",
-    "verification/scheme/test_surface_tension.py::test_a_round_drop*",
 )
 
 # With a cold cache nearly all time goes into compiling.  Under `--dist loadfile` files that need

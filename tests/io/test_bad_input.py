@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import errno
-import os
 from pathlib import Path
 
 import pytest
 
-from runs.store import files
 from runs.store.directory import RunDirectory
 from runs.store.reader import RunData
 
@@ -124,20 +121,6 @@ def test_output_directory_in_use(shockgrid):
     code, _, error = shockgrid("run", "toy", "-o", "mine", "--force")
     assert code == 2 and "holds no run" in error
     assert Path("mine/thesis.txt").read_text() == "years of work"
-
-
-def test_full_disk_by_errors(shockgrid, monkeypatch):
-    written = []
-
-    def fail_later(descriptor):
-        written.append(descriptor)
-        if len(written) > 12:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(files.os, "fsync", fail_later)
-    code, _, error = shockgrid("run", "toy", "-q", "-o", "run")
-    assert code == 2 and "no space left for run/" in error and "last restart point is step" in error
-    monkeypatch.undo()
 
 
 @pytest.mark.parametrize("content", [b"", b"no HDF5 at all", b"\x89HDF\r\n\x1a\n" + b"\0" * 100])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from benchmarks.random_motions import OUTCOMES, count_outcomes, judge
-from problems.grid_march import shake_side
 from regrid.algebraic import transfinite_grid
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import DEFAULT
@@ -18,7 +17,7 @@ from regrid.marching import march
 from regrid.measure.corners import find_folded_cells
 from regrid.measure.quality import compute_corner_areas, find_bad_cells
 from regrid.registry import REGRIDDERS, make_regridder
-from regrid.sides import SIDES, copy_sides, get_side
+from regrid.sides import SIDES, copy_sides
 
 BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
 CONVEX = ("brackbill-saltzman", "ivanenko-charakhchyan", "node-speed")
@@ -148,41 +147,6 @@ def test_fingers_grow_without_a_bad_cell(name):
 @pytest.mark.parametrize("noise", [0.02, 0.05])
 def test_fresh_noise_on_the_boundary_is_survived(noise):
     assert march_domain("three_fingers", 60, 40, noise=noise)[0]["bad"] == 0
-
-
-def march_shaken(name, steps, noise):
-    domain, random = make_domain(name, 60, 40), np.random.default_rng(0)
-
-    def boundary_at(s):
-        boundary = np.array(domain.boundary(s))
-        if noise:
-            shake_side(get_side(boundary, "i_min"), noise, random)
-        return boundary
-
-    times = np.arange(1, steps + 1) / steps
-    return march(BarrierRegridder(), domain.start, boundary_at, times)
-
-
-@pytest.mark.parametrize(
-    ("name", "least"),
-    [
-        ("three_fingers", 0.03),
-        ("curled_fingers", 0.03),
-        ("single_finger", 0.04),
-        ("slender_finger", 0.025),
-        ("chicane", 0.05),
-    ],
-)
-def test_five_cells_a_step_take_no_parts(name, least):
-    found = march_shaken(name, make_domain(name, 60, 40).steps_for(5.0), 0.0)
-    assert found.failure is None and found.sub_moves == 0
-    assert found.sine > least
-
-
-def test_three_fingers_with_noisy_sides_take_no_parts():
-    found = march_shaken("three_fingers", 60, 0.05)
-    assert found.failure is None and found.sub_moves == 0
-    assert found.sine > 0.02
 
 
 KEPT = np.load(Path(__file__).with_name("motions.npz"))

@@ -11,11 +11,10 @@ import pytest
 
 from regrid.errors import Place, RunFailure
 from runs.deck.reading import read_deck
-from runs.early_end.causes import CAUSES, ENDS, Setting, settings_for
-from runs.early_end.explain import find_calm_point, list_settings
+from runs.early_end.causes import CAUSES, ENDS, Setting
+from runs.early_end.explain import find_calm_point
 from runs.march.launching import start_runner
 from runs.store.directory import RunDirectory
-from runs.store.history_rows import seal_rows
 from runs.store.reader import RunData
 
 
@@ -78,38 +77,6 @@ def test_the_error_in_python_carries_it(toy):
     assert end.picture.exists() and end.point == find_calm_point(runner.directory)
     assert list(end.lines) == failure.value.__notes__
     assert "\n" not in str(failure.value)
-
-
-def test_the_point_to_go_back_to_is_from_before_the_trouble(shockgrid, toy):
-    run_toy(shockgrid)
-    directory = RunDirectory("run")
-    points = [step for step, _ in directory.list_points() if step < 40]
-    assert find_calm_point(directory) == points[-1]
-    header, *rows = directory.history.read_text().splitlines()
-    names = header.split(",")[:-1]  # the last column is the checksum's
-    changed = []
-    for row in rows:
-        words = row.split(",")[:-1]
-        if int(words[0]) > points[-2]:
-            words[names.index("dt")] = "1e-9"
-        changed.append((int(words[0]), ",".join(words)))
-    directory.history.write_text("\n".join([*seal_rows(names, changed), ""]))
-    assert find_calm_point(directory) == points[-2]
-
-
-@pytest.mark.parametrize("cause", sorted(CAUSES))
-def test_settings_are_keys_of_packaged_problems(cause):
-    decks = {
-        "mesh-law": ("sedov", "mesh=follow"), "implicit-step": ("moving-grid-1d",),
-        "no-state": ("triple-point", "run.small_cells=0.1"),
-        "collapse": ("shock-bubble", "thickness=0.01"),
-        "lines-cross": ("shock-bubble", "thickness=0.01"),
-        "no-grid": ("interface-instability", "regrid.name=transfinite"),
-        "slow-regridder": ("interface-instability", "regrid.name=transfinite"),
-    }  # fmt: skip
-    name, *settings = decks.get(cause, ("interface-instability",))
-    taken = [words for words, _ in list_settings(cause, read_deck(name, tuple(settings)))]
-    assert len(taken) == len(settings_for(cause)), taken
 
 
 @pytest.mark.slow

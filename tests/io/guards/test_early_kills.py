@@ -74,27 +74,3 @@ def test_killed_between_any_two_files(shockgrid, toy, problem):
         code, _, error = shockgrid(*words, "--force")
         assert code == 0, (there, error)
     assert number < 39 and len(left) >= 5
-
-
-@pytest.mark.parametrize(
-    "files",
-    [
-        ["dumps/notes.txt"],
-        ["dumps/", "thesis.tex"],
-        ["dumps/", "problem.py"],
-        ["dumps/", "problem.json"],
-        ["dumps/.notes.part"],
-        ["history.csv"],
-    ],
-)
-def test_a_foreign_directory_keeps_its_files(shockgrid, toy, files):
-    for name in files:
-        path = toy / "mine" / name
-        path.mkdir(parents=True) if name.endswith("/") else path.parent.mkdir(
-            parents=True, exist_ok=True
-        )
-        if not name.endswith("/"):
-            path.write_text("{}")
-    code, _, error = shockgrid("run", "toy", "-q", "-o", "mine", "--force")
-    assert code == 2 and "holds no run" in error
-    assert all((toy / "mine" / name).exists() for name in files)

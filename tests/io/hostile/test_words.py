@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 import re
 import sys
-import tomllib
 import unicodedata
 from pathlib import Path
 
 import pytest
 
-from regrid.text_files import DEEPEST, escape_controls, load_toml
+from regrid.text_files import escape_controls
 
 EVIL = "k\x1b]0;x\x07\x9b31m\u202e\u2066\ufeff\u2028e"
 HARMLESS = "\n\t "
@@ -68,37 +67,6 @@ def test_hostile_words_on_a_command_line(shockgrid, words):
     assert code == 2 and not out, (code, out, error)
     assert is_harmless(error) and re.search(r"\\(u00|x)1b", error), error
     assert all(len(line) < 1100 for line in error.splitlines())
-
-
-DEEP, LONG = 5000, "9" * 5000
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "[" * DEEP + "]" * DEEP,
-        "{a=" * DEEP + "1" + "}" * DEEP,
-        "[" * (DEEPEST + 5) + "]" * (DEEPEST + 5),
-        LONG,
-        f"-{LONG}",
-        "0x" + "f" * 5000,
-        f"[{LONG}]",
-        "9" * 400,
-    ],
-    ids=["lists", "tables", "a few lists", "digits", "minus", "hexadecimal", "in a list", "float"],
-)
-def test_toml_that_is_too_deep_or_too_long(shockgrid, text):
-    with pytest.raises(tomllib.TOMLDecodeError, match=r"deep in one another|hundreds of digits"):
-        load_toml(f"x = {text}")
-    for key in ("density", "modes", "nothing"):
-        Path("deck.toml").write_text(f'problem = "toy"\n{key} = {text}\n')
-        code, _, error = shockgrid("check", "deck.toml")
-        assert code == 2 and "deck.toml is not valid TOML" in error and error.count("\n") == 1
-    code, _, error = shockgrid("run", "toy", "--set", f"density={text}", "--dry-run")
-    assert code == 2 and error.count("\n") == 1 and len(error) < 1100, error
-    code, _, error = shockgrid("study", "toy", "--vary", f"density={text},2", "-o", "study")
-    assert code == 2 and error.count("\n") == 1 and len(error) < 1100, error
-    assert not Path("study").exists()
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a system without pipes in folders")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import signal
@@ -19,21 +18,16 @@ from in_parts import (
     deal_blocks,
     forks,
     kill_at,
-    names_of_open_files,
     write_in_parts,
 )  # fmt: skip
-from toy_problem import ToyDeck, ToyEvolution
 
-import runs.store.files as files
 from regrid.errors import BadInput
 from runs.store.dumps import open_dump, read_state
 from runs.store.index import find_parts_by_name, read_parts
-from runs.store.parts import Share, write_dump_in_parts
 from runs.store.reader import RunData
 
 RUN = ("run", "toy", "-q", "--set", "cells=6", "--set", "output.dumps=3")
 SHORT = (*RUN, "--set", "run.max_steps=9")
-NAMES = "toy", 'problem = "toy"\n', "s"
 CUTS = [pytest.param(3, cut_in_bands, id="bands"), pytest.param(2, deal_blocks, id="blocks")]
 
 
@@ -46,13 +40,6 @@ def in_parts(request, shockgrid, monkeypatch):
         code, _, error = shockgrid(*SHORT, "-o", "run")
     assert code == 0, error
     return RunData("run").directory
-
-
-def make_evolution(steps: int = 3) -> ToyEvolution:
-    evolution = ToyEvolution(ToyDeck(cells=6))
-    for _ in range(steps):
-        evolution.advance()
-    return evolution
 
 
 @pytest.mark.parametrize(("parts", "cut"), CUTS)
@@ -185,33 +172,6 @@ def test_vtk_reads_the_index_by_the_sidecar(in_parts):
         for name in ("one", "run")
     )
     assert one == run and run.count("rho [") == run.count("v_node [") == 4
-
-
-@names_of_open_files
-def test_a_full_disk_of_one_process_ends_all(tmp_path, monkeypatch):
-    evolution, path = make_evolution(), tmp_path / "dump_000003.h5"
-    rows, told, left = cut_in_bands(evolution, 3), [], []
-    sync = os.fsync
-
-    def full(descriptor):
-        if "part-1-of-3" in os.readlink(f"/proc/self/fd/{descriptor}"):
-            raise OSError(28, "No space left on device")
-        sync(descriptor)
-
-    monkeypatch.setattr(files.os, "fsync", full)
-    first = "no space left for .*part-1-of-3.h5"
-
-    def gather_of(rank):  # what the three would have told one another
-        return lambda thing: told.append((rank, thing)) or [f"no space left for {path}"]
-
-    for rank in range(3):
-        share = Share(rank, 3, rows[rank], gather_of(rank))
-        with pytest.raises(BadInput, match="no space left"):
-            write_dump_in_parts(path, evolution, *NAMES, {}, share)
-        left += list(tmp_path.iterdir())
-    assert not path.exists() and not left
-    failed = [words for rank, words in told if isinstance(words, str) and words]
-    assert re.match(first, failed[0]) and {rank for rank, _ in told} == {0, 1, 2}
 
 
 @pytest.mark.slow

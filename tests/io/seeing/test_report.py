@@ -95,18 +95,3 @@ def test_the_deck_in_the_page_repeats_the_run(run, shockgrid, few_pictures):
     Path("deck.toml").write_bytes(base64.b64decode(link.partition(",")[2]))
     assert shockgrid("run", "deck.toml", "-q", "-o", "again")[0] == 0
     assert shockgrid("compare", "run", "again")[0] == 0
-
-
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (("run", "-o", "page.pdf"), "has to end in .html"),
-        (("run", "-o", "nowhere/page.html"), "is no folder"),
-        (("nowhere",), "nowhere does not exist"),
-        (("empty",), "is no run directory"),
-    ],
-)
-def test_wrong_words_are_told(run, shockgrid, words, told):
-    Path("empty").mkdir()
-    code, _, error = shockgrid("report", *words)
-    assert code == 2 and told in error and len(error.splitlines()) == 1

@@ -105,19 +105,6 @@ def test_a_falling_dt_is_followed(fall):
     assert forecast.low <= real <= forecast.high
 
 
-def test_nothing_is_said_before_there_is_something_to_say():
-    left = TimeLeft(1.0)
-    assert left.foretell(0, 0.0, 0.0) is None
-    left.note(1, 0.001, 0.01)
-    assert left.foretell(1, 0.001, 0.01) is None
-    assert TimeLeft(float("inf")).foretell(100, 0.5, 1.0) is None
-    rows = march(lambda t: 1e-2)
-    end = TimeLeft(1.0)
-    for row in rows:
-        end.note(*row)
-    assert end.foretell(*rows[-1]).seconds == 0.0
-
-
 STEPS, CELLS = 200, 1000
 
 

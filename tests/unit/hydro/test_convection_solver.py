@@ -8,7 +8,6 @@ import pytest
 from convecting import solve_steady
 from hydro.convection.box import (
     PERIODIC,
-    Axis,
     Fluid,
     Wall,
     adiabatic,
@@ -19,7 +18,7 @@ from hydro.convection.box import (
 from hydro.convection.equations import Equations
 from hydro.convection.march import March
 from hydro.convection.measure import compute_mean_nusselt
-from hydro.convection.steady import expand_nodes, transfer
+from hydro.convection.steady import expand_nodes
 from regrid.errors import BadInput
 
 RANDOM = np.random.default_rng(5)
@@ -52,20 +51,6 @@ def layer(flow: str = "no-slip") -> dict[str, Wall]:
 
 def random_state(equations: Equations, size: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     return tuple(size * RANDOM.standard_normal(n) for n in equations.sizes)
-
-
-@pytest.mark.parametrize("periodic", [False, True])
-def test_operators_of_an_axis_are_exact_for_straight_lines(periodic):
-    axis = Axis(uneven(9), periodic)
-    inner = slice(1, axis.cells)
-    line = 3.0 * axis.centres - 1.0
-    assert np.allclose((axis.interpolate_to_nodes() @ line)[inner], 3.0 * axis.nodes[1:-1] - 1.0)
-    slope = (axis.difference_to_nodes() @ line) / axis.distances
-    assert np.allclose(slope[inner], 3.0)
-    assert np.isclose(axis.distances.sum(), axis.length)
-    here = axis.difference_to_cells().toarray()
-    there = axis.difference_to_nodes().toarray()
-    assert np.array_equal(here.T, -there), "difference and its adjoint, walls included"
 
 
 @pytest.mark.parametrize("walls", [side_heated(), layer()])
@@ -118,18 +103,6 @@ def test_heat_in_is_heat_out_and_the_flow_is_its_own_half_turn():
     assert np.abs(psi - psi[::-1, ::-1]).max() < 1e-11 * np.abs(psi).max()
     heat = solver.temperature.reshape(solver.equations.shape)
     assert np.abs(heat + heat[::-1, ::-1]).max() < 1e-11
-
-
-@pytest.mark.parametrize("walls", [side_heated(), layer()])
-def test_transfer_keeps_mass_and_heat(walls):
-    old = Equations(uneven(14), uneven(12, seed=1), walls)
-    new = Equations(uneven(14, seed=5), uneven(12, seed=6), walls)
-    psi, temperature = random_state(old)
-    moved = transfer(old, new, psi, temperature)
-    assert new.areas @ moved[1] == pytest.approx(old.areas @ temperature, abs=1e-12)
-    assert np.abs(new.compute_divergence(moved[0])).max() < 1e-13
-    same = transfer(old, old, psi, temperature)
-    assert np.allclose(same[0], psi, atol=1e-12) and np.allclose(same[1], temperature, atol=1e-11)
 
 
 def test_uniform_flow_and_heat_stay_uniform_on_a_moving_grid():

@@ -11,7 +11,7 @@ from hydro.formulas.geometry import find_geometry
 from hydro.links.join import join, slide
 from hydro.rows import FLUX_ROWS, HOOP, MOMENTUM_Y, PUSH
 from hydro.simulation import Simulation
-from hydro.sliding.pieces import fill_pieces, fill_points, fill_slopes, solve_pieces
+from hydro.sliding.pieces import fill_pieces, fill_points, solve_pieces
 from hydro.sliding.polygons import make_fill_piece_flux
 
 SEEDS = range(6)
@@ -108,36 +108,6 @@ def test_contact_does_not_pull():
     assert out[1:3, 1] == pytest.approx([-0.05, 0.05])
     assert out[0, 1] == pytest.approx(rho * 0.05 * (c + 1.5 * 0.05), rel=1e-3)
     assert out[3, :2] == pytest.approx(5.0)
-
-
-def measure_slip_noise(count):
-    """Largest wrong pressure of a gas that slips along a full ring, in rho c V."""
-    angle, other_angle = (2.0 * np.pi * np.arange(n + 1) / n for n in (count, count * 4 // 3))
-    line = np.array([np.cos(angle), np.sin(angle)])
-    line[:, -1] = line[:, 0]
-    places = np.linspace(0.0, count, other_angle.size)
-    nodes = np.empty((2, places.size))
-    fill_points(line, places, nodes)
-    owners, faces = cut(line, places, turn=1.0)
-    sides = []
-    for points, speed in ((line, 0.0), (nodes, 0.5)):
-        middles = 0.5 * (points[:, 1:] + points[:, :-1])
-        states = np.ones((5, middles.shape[1]))
-        states[1:3] = speed * np.array([-middles[1], middles[0]])
-        slopes = np.empty((5, middles.shape[1]))
-        fill_slopes(states, middles, slopes)
-        laws = np.repeat(np.reshape((1.5, 1.5, 0.0), (3, 1)), middles.shape[1], axis=1)
-        sides.append((states, laws, middles, slopes))
-    out = np.empty((6, owners.shape[1]))
-    solve_pieces(*sides, owners, faces, owners.shape[1], out)
-    inner = (owners[1] > 0) & (owners[1] < nodes.shape[1] - 2)  # the ends have no slopes
-    return np.abs(out[0, inner] - 1.0).max() / 0.5
-
-
-def test_slip_along_a_ring_makes_no_pressure():
-    coarse, fine = measure_slip_noise(48), measure_slip_noise(96)
-    assert fine < 1e-3
-    assert coarse / fine > 3.5
 
 
 STREAM = 0.4, 0.3

@@ -7,13 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from hydro.eos import IdealGas
-from problems.initial_states import Front, settle_front
 from problems.interface_instability.deck import Fluid, InterfaceDeck, SecondShock
 from problems.interface_instability.line import Mode, Spectrum, measure_mode
 from problems.interface_instability.problem import BENDS, InterfaceInstability
 from problems.interface_instability.theories import TRUSTED, get_kct, predict_amplitude
-from problems.references.hugoniot import shock_to_pressure
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells, measure_quality
 
@@ -190,34 +187,3 @@ def test_the_line_has_the_amplitudes_of_linear_theory(name):
         grown = problem.theory.get_amplitude(mode.number * problem.k, -problem.arrival)
         found = measure_mode(line, problem.k, mode.number, mode.phase)
         assert found == pytest.approx(mode.amplitude * grown, rel=1e-3)
-
-
-GAS = IdealGas(1.4)
-
-
-def make_front(count: int, place: int, pressure: float = 20.0) -> Front:
-    shock = shock_to_pressure(GAS, 1.0, 1.0, pressure)
-    return Front(
-        GAS,
-        (shock.rho, shock.particle_speed, shock.p),
-        (1.0, 0.0, 1.0),
-        shock.shock_speed,
-        np.arange(count + 1.0) / 64.0,
-        place,
-        shock.particle_speed,
-    )
-
-
-@pytest.mark.parametrize("pressure", [20.0, 200.0])
-@pytest.mark.parametrize("cfl", [0.8, 0.4])
-def test_a_settled_front_stands_on_its_line_and_leaves_the_exact_density(cfl, pressure):
-    front = make_front(256, 40, pressure)
-    cells = settle_front(front, cfl=cfl, limiter=InterfaceDeck().limiter)
-    behind, ahead = front.behind, front.ahead
-    assert cells.first == 8
-    before = 40 - cells.first
-    place = (cells.rho - ahead[0]).sum() / (behind[0] - ahead[0])
-    assert place == pytest.approx(before, abs=0.01)
-    for found, exact in zip((cells.rho, cells.u, cells.p), behind, strict=True):
-        assert np.abs(found[: before - 18] / exact - 1.0).max() < 2e-3
-    assert np.abs(cells.rho[before + 6 :] - 1.0).max() < 1e-6

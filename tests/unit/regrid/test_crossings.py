@@ -5,7 +5,6 @@ import pytest
 
 from benchmarks.random_motions import is_simple
 from regrid.barrier.regridder import BarrierRegridder
-from regrid.errors import RegridFailure
 from regrid.measure.crossings import (
     GROUP,
     BoundaryCheck,
@@ -94,19 +93,3 @@ def test_a_ring_closed_on_itself_is_no_crossing_but_its_circles_may_cross(turned
     inner[0, 15:25] -= 1.2
     check = BoundaryCheck(*(count - 1 for count in nodes.shape[1:]))
     assert not check.is_simple(nodes) and find_crossing(nodes) is not None
-
-
-def test_lobes_that_meet_far_apart_are_refused_although_cells_stay_convex():
-    ni, nj = 80, 4
-    radius = 1.0 + 0.1 * np.linspace(-1.0, 1.0, nj + 1)
-
-    def bend(turn):
-        angle = -np.linspace(0.0, turn, ni + 1)[:, None]
-        return np.array([radius * np.cos(angle), radius * np.sin(angle)])
-
-    before, after = bend(1.98 * np.pi), bend(2.02 * np.pi)
-    regridder = BarrierRegridder()
-    assert regridder.regrid(before, bend(1.985 * np.pi)).nodes.shape == before.shape
-    with pytest.raises(RegridFailure, match="cross") as caught:
-        regridder.regrid(before, after)
-    assert caught.value.cause == "lines-cross"

@@ -125,22 +125,6 @@ def test_catenary_has_equal_arcs_in_the_limit_and_equal_chords_always(end):
     assert errors[2] < 4e-4 * end
 
 
-def test_helix_has_weight_times_chord_constant():
-    def helix(p):
-        return np.array([np.cos(5.0 * p), np.sin(5.0 * p), p * p])
-
-    def weight(x, y, z):
-        return 1.0 + 10.0 * z
-
-    p = solve_edc(helix, weight, 31)
-    points = helix(p)
-    products = weight(*helix(0.5 * (p[1:] + p[:-1])))
-    products *= np.sqrt((np.diff(points, axis=1) ** 2).sum(axis=0))
-    assert np.ptp(products) < 1e-12 * products.mean()
-    backward = solve_edc(helix, weight, 31, 1.0, 0.0)
-    assert np.abs(backward[::-1] - p).max() < 1e-12
-
-
 def square(steps, size=0.0):
     q = np.linspace(0.0, 1.0, steps + 1)
     p = tensor(q, q)

@@ -16,11 +16,6 @@ from regrid.curves import (
 from regrid.measure.quality import measure_edge_ratio, measure_turns
 
 
-def wavy(count=31):
-    t = np.linspace(0.0, 3.0, count) ** 1.2
-    return np.array([t, 0.3 * np.sin(2.0 * t)])
-
-
 @pytest.mark.parametrize("shape", ["chord", "spline"])
 def test_straight_line_stays_straight_and_gets_the_law(shape):
     place = np.sort(np.random.default_rng(4).uniform(0.0, 1.0, 25))
@@ -30,19 +25,6 @@ def test_straight_line_stays_straight_and_gets_the_law(shape):
     wanted = line[:, :1] + law * (line[:, -1:] - line[:, :1])
     assert np.abs(moved - wanted).max() < 4e-15
     assert np.array_equal(moved[:, [0, -1]], line[:, [0, -1]])
-
-
-def test_spline_meets_walls_of_any_direction():
-    line = wavy()
-    arc = compute_arc_lengths(line)
-    walls = ((np.cos(0.3), np.sin(0.3)), (np.cos(2.0), np.sin(2.0)))
-    near = arc / arc[-1]
-    near[1], near[-2] = 1e-6, 1.0 - 1e-6
-    moved = redistribute(line, near, shape="spline", walls=walls)
-    for wall, ends in zip(walls, ((0, 1), (-1, -2)), strict=True):
-        tangent = moved[:, ends[1]] - moved[:, ends[0]]
-        along = tangent @ (-wall[1], wall[0]) / np.hypot(*tangent)
-        assert abs(along) < 5e-4  # the line leaves the wall along the normal
 
 
 def test_a_periodic_line_goes_on_into_its_image():

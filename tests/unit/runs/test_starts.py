@@ -87,24 +87,6 @@ def test_every_module_is_imported_without_the_modules_of_unix():
     assert done.returncode == 0, done.stderr[-2000:]
 
 
-def test_a_run_a_restart_and_a_picture_without_them(tmp_path):
-    script = f"""{STRIPPED}
-sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests" / "io")!r}]
-from problems.registry import PROBLEMS
-from runs.cli.main import main
-PROBLEMS["toy"] = "toy_problem:Toy"
-for words in ("run toy -o a --set run.max_steps=20", "restart a --set run.max_steps=40",
-              "plot a", "info a"):
-    code = main(words.split())
-    assert code == 0, (words, code)
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
-    assert not (tmp_path / "a" / ".running").exists()
-
-
 # calls in a step of two blocks; among them the test for crossings of each, the flux along the
 # contact in its thickness for each, the contact's decay of short waves and its spacing by turning
 MOST_KERNELS = 72

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import beside_line, march, two_blocks, wall_off
+from builders import beside_line, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
@@ -74,28 +74,3 @@ def compare(flip_x, flip_y, steps=40, **options):
 def test_mirror_image_on_regridded_blocks(flips):
     """To round-off: the regridder's sums over nodes run in one order."""
     assert compare(*flips) <= 1e-12
-
-
-@pytest.mark.parametrize("mode", [1, 2])
-def test_half_between_walls_is_half_of_the_whole(mode):
-    """A symmetric interface between walls at y = 0 and y = 1, and its upper half alone."""
-
-    def run(low, count):
-        blocks, links = two_blocks(
-            lambda y: 0.05 * np.cos(2.0 * np.pi * mode * (y - 0.5)),
-            (NI, count),
-            (IdealGas(1.4), IdealGas(1.2)),
-            ((1, 0, 0, 1), (3, 0, 0, 1)),
-            ends=(low, 1.0),
-        )
-        put(blocks[0], "i_min", "piston", velocity=(0.6, 0.0))
-        for block in blocks:
-            wall_off(block)
-        simulation = Simulation(blocks, links, t_end=0.5)
-        march(simulation)
-        return blocks[0]
-
-    whole, half = run(0.0, 32), run(0.5, 16)
-    shape_whole, shape_half = whole.nodes[0, -1, 16:], half.nodes[0, -1]
-    cell = 1.0 / 32.0
-    assert np.abs(shape_whole - shape_half).max() <= 0.02 * cell

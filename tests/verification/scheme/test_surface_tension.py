@@ -11,14 +11,12 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from scipy.special import jv, jvp, spherical_jn, spherical_yn, yv, yvp
 
 from builders import (
     beside_line,
     check_budget,
     collect_columns,
     find_unexplained,
-    march,
     march_measured,
     wall_off,
 )
@@ -33,14 +31,12 @@ from problems.standard.rayleigh_taylor import (
     RayleighTaylor,
     RayleighTaylorDeck,
 )
-from regrid.algebraic import fill_from_sides
 from regrid.measure.corners import compute_centres
 
 GAS = IdealGas(1.4)
 K = 2.0 * math.pi
 HEIGHT = 1e-3  # of waves
 PERIODS = 1.25  # two zeros of the amplitude and more
-BOX = 2.0  # radius of the wall around a drop of radius 1
 
 
 def find_frequency(t, amplitude) -> float:
@@ -137,154 +133,6 @@ def test_capillary_waves_swing_as_theory_says(cells, mach, rho, limiter):
     both = history["total_energy"] + surface
     if len(rho) == 2:
         assert abs(both - both[0]).max() < 0.02 * given
-
-
-def find_push(r, k, curved, wall=None):
-    """Pressure at radius r of the second mode of sound of wave number k, with the slope 1 at
-    radius 1 and, where there is a wall, 0 at that."""
-    if curved:
-        functions = spherical_jn, spherical_yn
-        first, second = (lambda r, f=f: k * f(2, k * r, True) for f in functions)
-    else:
-        functions = jv, yv
-        first, second = (lambda r, f=f: k * f(2, k * r) for f in (jvp, yvp))
-    part = first(wall) / second(wall) if wall else 0.0
-    value = functions[0](2, k * r)
-    if wall:
-        value = value - part * functions[1](2, k * r)
-    return value / (first(1.0) - part * second(1.0))
-
-
-def find_drop_frequency(rho, c, curved) -> float:
-    """Angular frequency of the second mode of a drop of radius 1 in a round box.
-
-    That of Rayleigh (plane) and Lamb (round an axis), with the box and with sound.
-    """
-
-    def miss(omega):
-        inside = rho[0] * find_push(1.0, omega / c[0], curved)
-        outside = rho[1] * find_push(1.0, omega / c[1], curved, BOX)
-        return omega * omega * (inside - outside) - (4.0 if curved else 3.0)
-
-    return brentq(miss, 0.5, 4.0)
-
-
-def compute_mode(angle, curved):
-    """The second mode, of the angle from the x axis."""
-    return 1.5 * np.cos(angle) ** 2 - 0.5 if curved else np.cos(2.0 * angle)
-
-
-def make_drop_grids(cells, squash, curved, uneven):
-    """A quarter of a drop, of three blocks, and of what is around it, of two, by name."""
-    part = np.linspace(0.0, 1.0, cells // 2 + 1)
-    spread = part + uneven * np.sin(2.0 * math.pi * part) / (2.0 * math.pi)
-    end, corner = 0.5, 0.4  # of the core, on the axes and between them
-    curves = {
-        "east": np.array([end + (corner - end) * part**2, corner * part]),
-        "north": np.array([corner * (1.0 - part), end + (corner - end) * (1.0 - part) ** 2]),
-    }
-    core = np.zeros((2, part.size, part.size))
-    core[0, :, 0] = core[1, 0] = end * part
-    core[:, -1], core[:, :, -1] = curves["east"], curves["north"][:, ::-1]
-    fill_from_sides(core.copy(), core)
-    grids = {"core": core}
-    for turn, (name, curve) in enumerate(curves.items()):
-        angle = 0.25 * math.pi * (turn + spread)
-        ray = np.array([np.cos(angle), np.sin(angle)])
-        ray[np.abs(ray) < 1e-15] = 0.0
-        radius = 1.0 + squash * compute_mode(angle, curved)
-        way = np.linspace(0.0, 1.0, round(0.4 * cells) + 1)[:, None]
-        grids[name] = curve[:, None] * (1.0 - way) + (radius * ray)[:, None] * way
-        way = np.linspace(0.0, 1.0, round(math.log(BOX) * cells / (0.5 * math.pi)) + 1)[:, None]
-        grids[f"around-{name}"] = radius * (BOX / radius) ** way * ray[:, None]
-    return grids
-
-
-def make_drop(cells, mach, rho, squash, curved, uneven=0.0, periods=PERIODS):
-    """A quarter of a drop of radius 1 (1 + squash times its second mode); its frequency.
-
-    cells: on the quarter; mach: 1 over the sound speed; uneven: of the nodes on the surface.
-    """
-    pressure = max(rho) / mach**2 / 1.4
-    inside = pressure + (2.0 if curved else 1.0)
-    speeds = [math.sqrt(1.4 * p / d) for p, d in zip((inside, pressure), rho, strict=True)]
-    omega = find_drop_frequency(rho, speeds, curved)
-    b = {}
-    for name, grid in make_drop_grids(cells, squash, curved, uneven).items():
-        around = name.startswith("around")
-        density, c, p, wall = rho[around], speeds[around], (inside, pressure)[around], None
-        if around:
-            wall = BOX
-        x, y = compute_centres(grid)
-        push = find_push(np.hypot(x, y), omega / c, curved, wall)
-        push = density * omega**2 * squash * compute_mode(np.arctan2(y, x), curved) * push
-        state = density + push / c**2, 0.0, 0.0, p + push
-        material = "around" if around else "drop"
-        b[name] = Block(name, GAS, grid, *state, material=material, limiter="low-mach")
-        if "north" not in name:
-            put(b[name], "j_min", "axis" if curved else "wall")
-    links = [
-        join("interface", (b[name], "i_max"), (b[f"around-{name}"], "i_min"), tension=1.0)
-        for name in ("east", "north")
-    ]
-    links += [
-        join("seam", (b["core"], "i_max"), (b["east"], "i_min")),
-        join("seam", (b["core"], "j_max"), (b["north"], "i_min")),
-        join("seam", (b["east"], "j_max"), (b["north"], "j_min")),
-        join("seam", (b["around-east"], "j_max"), (b["around-north"], "j_min")),
-    ]
-    for block in b.values():
-        wall_off(block)
-    geometry = "axisymmetric" if curved else "plane"
-    t_end = periods * 2.0 * math.pi / omega
-    return Simulation(list(b.values()), links, t_end=t_end, geometry=geometry), omega
-
-
-def measure_drop(simulation, curved):
-    """Amplitude of the second mode of the surface."""
-    lines = [
-        line.line.segment.line(line.line.segment.block.nodes) for line in simulation.tension.lines
-    ]
-    x, y = np.concatenate([lines[0], lines[1][:, 1:]], axis=1)
-    radius, angle = np.hypot(x, y), np.arctan2(y, x)
-    steps, middle = np.diff(angle), 0.5 * (angle[1:] + angle[:-1])
-    mode = compute_mode(middle, curved)
-    weight = mode * steps * (np.sin(middle) if curved else 1.0)
-    return float(((0.5 * (radius[1:] + radius[:-1]) - 1.0) * weight).sum() / (mode * weight).sum())
-
-
-@pytest.mark.parametrize("curved", [False, True], ids=["plane", "axisymmetric"])
-@pytest.mark.parametrize(
-    ("cells", "mach", "rho"),
-    [
-        (16, 0.3, (1.0, 1.0)),
-        pytest.param(24, 0.3, (1.0, 0.1), marks=pytest.mark.slow),
-        pytest.param(24, 0.3, (0.2, 1.0), marks=pytest.mark.slow),
-    ],
-)
-def test_drops_swing_as_theory_says(cells, mach, rho, curved):
-    """Within half a per cent with 16 cells on a quarter, half a wave."""
-    simulation, omega = make_drop(cells, mach, rho, 0.01, curved)
-    found, history = march_amplitude(simulation, lambda: measure_drop(simulation, curved))
-    assert found == pytest.approx(omega, rel=5e-3 if cells == 16 else 3e-3)
-    check_budget(history, names=("energy",))
-    check_momentum(history)
-
-
-@pytest.mark.parametrize("curved", [False, True], ids=["plane", "axisymmetric"])
-@pytest.mark.parametrize(
-    ("uneven", "periods"), [(0.5, 1.0), pytest.param(0.0, 10.0, marks=pytest.mark.slow)]
-)
-def test_a_round_drop_rests(uneven, periods, curved):
-    """Its jump is that of Laplace on every face, however its nodes are spaced."""
-    simulation, _ = make_drop(8, 0.5, (1.0, 0.3), 0.0, curved, uneven, periods)
-    rows = march(simulation)
-    jump = np.concatenate([block.rim.jump for block in simulation.blocks])
-    assert (jump > 0.0).sum() == 8
-    assert jump[jump > 0.0] == pytest.approx(2.0 if curved else 1.0, rel=1e-12)
-    speed = max(float(np.abs(b.state[1:3, 1:-1, 1:-1]).max()) for b in simulation.blocks)
-    assert speed < 1e-12
-    assert rows[-1]["surface_energy"] == pytest.approx(rows[0]["surface_energy"], rel=1e-12)
 
 
 @pytest.mark.parametrize(("part", "grows"), [(0.95, True), (1.05, False)])

@@ -7,7 +7,6 @@ rank may not read of the others' blocks is NaN.
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,7 +15,7 @@ from hydro.eos import IdealGas
 from hydro.ranks.cutting import share_blocks, sum_cells
 from hydro.simulation import Simulation
 from hydro.sources import make_gravity
-from regrid.errors import RegridFailure, RunFailure
+from regrid.errors import RegridFailure
 from runs.deck.reading import read_deck
 from thread_ranks import march_on_ranks
 
@@ -122,25 +121,3 @@ def test_all_ranks_try_again_where_one_block_fails():
 
     rows = check_same(build_two, 8, settings=spoil_one)
     assert [row["retries"] for row in rows].count(1) == 1
-
-
-class Fails:
-    def regrid(self, previous, boundary):
-        raise RegridFailure("made to fail", cell=(2, 3))
-
-
-@pytest.mark.parametrize("broken", [(0,), (1,), (0, 1)])
-def test_the_first_block_that_fails_is_told_on_all_ranks(broken):
-    def build():
-        simulation = build_two()
-        for number in broken:
-            simulation.motion.regridders[number] = Fails()
-            simulation.motion.cost_aware[number] = False
-        return simulation
-
-    with pytest.raises(RunFailure) as told:
-        build().advance()
-    rows, state = march_on_ranks(2, build, 3)
-    assert str(rows[-1]) == str(told.value) and rows[-1].place == told.value.place
-    assert rows[-1].place.block == ("left", "right")[broken[0]]
-    assert np.array_equal(state["right/nodes"], build().blocks[1].nodes)

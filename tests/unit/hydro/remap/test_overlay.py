@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from builders import box, check_budget, march, two_blocks, wall_off
-from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from hydro.formulas.geometry import GEOMETRIES, compute_volumes
@@ -13,7 +12,6 @@ from hydro.remap.overlay import compute_cell_moments, lay_over, make_linear_fiel
 from hydro.remap.simulation import take_over
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
-from regrid.measure.corners import compute_centres
 
 LOW, HIGH = (0.0, 0.3), (1.0, 1.5)
 
@@ -105,13 +103,6 @@ def shake_of_states(cells, seed, part=0.25):
     return nodes + away * np.reshape([1.0 / cells[0], 1.2 / cells[1]], (2, 1, 1))
 
 
-def bulge(cells, height=0.2):
-    """A grid whose side i_max is an arc in as many chords as there are cells along it."""
-    nodes = box((0.0, 0.0), (1.0, 1.0), cells)
-    nodes[0] += height * np.sin(np.pi * nodes[1]) * nodes[0]
-    return nodes
-
-
 def sum_up(eos, nodes, state, void_energy, curved):
     volumes, _ = compute_cell_moments(nodes, curved)
     return (compute_conserved(eos, state, void_energy) * volumes).sum(axis=(1, 2))
@@ -157,22 +148,6 @@ def test_uniform_velocity_and_pressure_stay_so():
     assert found[0].max() > 999.0 and found[0].min() < 1.001
 
 
-@pytest.mark.parametrize("curved", [False, True])
-@pytest.mark.parametrize("cells", [(16, 24), (12, 9), (8, 12)])
-def test_slivers_between_chords_are_kept(cells, curved):
-    old, new = bulge((8, 12)), bulge(cells)
-    _, (x, y) = compute_cell_moments(old, curved)
-    state = np.array([1.0 + x, 0.5 * y, 0.0 * x + 0.1, 2.0 + y])
-    found, void, slivers = remap_state("gas", GAS, curved, old, state, np.zeros((8, 12)), new)
-    same = cells[1] == 12
-    assert (slivers.count == 0) == same
-    assert same or max(slivers.given, slivers.borrowed) < 0.01
-    assert_same_totals(GAS, (old, state, np.zeros((8, 12))), (new, found, void), curved)
-    _, (x, y) = compute_cell_moments(new, curved)
-    assert np.abs(found[0] - (1.0 + x)).max() < 0.02
-    assert np.abs(found[3] - (2.0 + y)).max() < 0.06
-
-
 def test_bad_grids_are_told():
     old = shake_of_states((8, 8), 1)
     state, nothing = wild_state((8, 8), 2), np.zeros((8, 8))
@@ -184,24 +159,6 @@ def test_bad_grids_are_told():
         remap_state("gas", GAS, False, folded, state, nothing, old)
 
 
-def swing(cells, t):
-    """Nodes of the unit square that sway inside it with time."""
-    x, y = box((0.0, 0.0), (1.0, 1.0), cells)
-    wave = 0.2 * np.sin(3.0 * t) * np.sin(np.pi * x) * np.sin(np.pi * y)
-    return np.array([x + 0.3 * wave, y - 0.2 * wave])
-
-
-def make_square(cells, mesh):
-    """A bump of pressure in a closed square; mesh "fixed", or "law" for `swing`."""
-    nodes = swing(cells, 0.0)
-    x, y = compute_centres(nodes)
-    bump = 1.0 + np.exp(-20.0 * ((x - 0.4) ** 2 + (y - 0.6) ** 2))
-    block = Block("square", GAS, nodes, bump, 0.0, 0.0, bump)
-    wall_off(block)
-    law = (lambda name, t: swing(cells, t)) if mesh == "law" else mesh
-    return Simulation([block], [], t_end=1.0, mesh=law)
-
-
 def make_pair(cells, pressures=(2.0, 1.0), second="wall"):
     """Two gases beside a bent interface between walls and a wall or an open side."""
     states = [(1.0, 0.0, 0.0, pressures[0]), (3.0, 0.0, 0.0, pressures[1])]
@@ -210,20 +167,6 @@ def make_pair(cells, pressures=(2.0, 1.0), second="wall"):
     for block in blocks:
         wall_off(block)
     return Simulation(blocks, links, t_end=1.0)
-
-
-@pytest.mark.parametrize("mesh", ["fixed", "law"])
-def test_meshes_that_are_given(mesh):
-    old, new = make_square((12, 10), mesh), make_square((20, 24), mesh)
-    rows = [old.start_row(), *march(old, 6)]
-    (report,) = take_over(old, new)
-    assert (report.before, report.now, report.slivers.count) == ((12, 10), (20, 24), 0)
-    assert (new.t, new.step, new.dt) == (old.t, old.step, old.dt)
-    if mesh == "law":
-        assert (new.blocks[0].nodes == swing((20, 24), old.t)).all()
-    assert 1.5 < new.clock.rate / old.clock.rate < 4.0, "the step is that of the smaller cells"
-    check_budget([*rows, *march(new, 6)], limit=1e-13)
-    assert new.t > old.t
 
 
 @pytest.mark.parametrize("cells", [(12, 16), (9, 5), (8, 8)])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from regrid.barrier import line_cg
-from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
 
@@ -74,31 +73,3 @@ def test_hessian_is_symmetric_and_positive_semidefinite(seed):
     assert np.abs(matrix - matrix.T).max() <= 1e-13 * size
     assert np.linalg.eigvalsh(matrix)[0] > -1e-12 * size
     assert np.linalg.eigvalsh(matrix)[-1] > 0.1 * size
-
-
-def bent_block(ni=20, nj=28):
-    nodes = np.array(np.mgrid[0 : ni + 1, 0 : nj + 1], dtype=float) / nj
-    wave = np.sin(3.0 * np.pi * nodes[1])
-    nodes[0] += 0.2 * wave * (1.0 - nodes[0] * nj / ni)
-    boundary = nodes.copy()
-    boundary[0, 0] += 0.1 * wave[0]
-    return nodes, boundary
-
-
-def transpose(field):
-    return np.ascontiguousarray(np.swapaxes(field, -1, -2))
-
-
-def test_the_same_bits_transposed_and_mirrored():
-    previous, boundary = bent_block()
-    sound = np.random.default_rng(1).uniform(0.8, 1.2, (20, 28))
-    regridder = BarrierRegridder(floor=1e-6)
-    result = regridder.regrid(previous, boundary, sound)
-    assert not np.array_equal(result.nodes, regridder.regrid(previous, boundary).nodes)
-    for turn, turn_cells in (
-        (transpose, transpose),
-        (lambda nodes: np.ascontiguousarray(nodes[::-1]), np.copy),
-        (lambda nodes: transpose(nodes[::-1]), transpose),
-    ):
-        turned = regridder.regrid(turn(previous), turn(boundary), turn_cells(sound))
-        assert np.array_equal(turned.nodes, turn(result.nodes))

@@ -122,6 +122,17 @@ def get_last(history: History, name: str) -> float:
     return float(column[-1]) if column is not None and len(column) else math.nan
 
 
+def find_crossing(x: np.ndarray, values: np.ndarray, level: float) -> float:
+    """The last place where `values` (n,) at `x` (n,) fall below a level, linear between two; NaN
+    where none is above it, or the last one still is."""
+    over = np.flatnonzero(values > level)
+    if over.size == 0 or over[-1] + 1 == values.size:
+        return math.nan
+    i = over[-1]
+    part = (values[i] - level) / (values[i] - values[i + 1])
+    return float(x[i] + part * (x[i + 1] - x[i]))
+
+
 def compare(
     history: History, name: str, theory: float = math.nan, label: str = "", **more: Any
 ) -> Row:

@@ -49,7 +49,7 @@ from problems.conical_target.report import (
     measure_departure,
 )
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, key
-from problems.problem import BlockPlan, Problem, Report, Row, check_memory
+from problems.problem import BlockPlan, Problem, Report, Row, check_memory, find_crossing
 from problems.references.hugoniot import find_rise, shock_to_pressure
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
@@ -337,11 +337,8 @@ def measure_front(block: Block, row: int, threshold: float, speed: float) -> tup
     """
     p = block.state[3, 1:-1, 1:-1][:, row]
     u, v = block.state[1:3, -2, 1:-1][:, row]
-    passed = np.flatnonzero(p > threshold)
-    if passed.size == 0 or passed[-1] == block.ni - 1 or math.hypot(u, v) > speed:
+    x = find_crossing(compute_centres(block.nodes)[0, :, row], p, threshold)
+    if math.isnan(x) or math.hypot(u, v) > speed:
         return math.nan, math.nan
-    last = int(passed[-1])
-    x = compute_centres(block.nodes)[0, :, row]
-    part = (p[last] - threshold) / (p[last] - p[last + 1])
-    behind = p[max(0, last - BEHIND) : last + 1]
-    return float(x[last] + part * (x[last + 1] - x[last])), float(behind.max())
+    last = int(np.flatnonzero(p > threshold)[-1])
+    return x, float(p[max(0, last - BEHIND) : last + 1].max())

@@ -30,7 +30,7 @@ from hydro.eos.materials import find_material
 from hydro.sources import ProgrammedBurn
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import make_plane_grid, put_walls
-from problems.problem import Problem, Report, Row, compare, draw_field, get_last
+from problems.problem import Problem, Report, Row, compare, draw_field, find_crossing, get_last
 from problems.references.exact_flows import compute_taylor_wave
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
@@ -124,12 +124,7 @@ class Detonation(Problem):
         """
         (block,) = evolution.blocks
         x, p = compute_centres(block.nodes)[0][:, 0], block.state[3, 1:-1, 1]
-        over = np.flatnonzero(p > 0.5 * self.pressure)
-        front, pressure = math.nan, float(p.max())
-        if over.size and over[-1] + 1 < x.size:
-            i = over[-1]
-            part = (p[i] - 0.5 * self.pressure) / (p[i] - p[i + 1])
-            front = float(x[i] + part * (x[i + 1] - x[i]))
+        front, pressure = find_crossing(x, p, 0.5 * self.pressure), float(p.max())
         if self.deck.behind == "piston" and math.isfinite(front):
             back = float(block.nodes[0, 0, 0])
             inside = (x > back + 0.3 * (front - back)) & (x < back + 0.8 * (front - back))

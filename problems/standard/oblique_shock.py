@@ -21,7 +21,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.problem import Problem, Report, compare, draw_field
+from problems.problem import Problem, Report, compare, draw_field, find_crossing
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
@@ -107,7 +107,8 @@ class ObliqueShock(Problem):
         (block,) = evolution.blocks
         x, y = compute_centres(block.nodes)
         p, x = block.state[3, 1:-1, 1:-1], x[:, 0]
-        heights = find_front(y, p, 0.5 * (self.ahead + self.pressure))
+        level = 0.5 * (self.ahead + self.pressure)
+        heights = np.array([find_crossing(*column, level) for column in zip(y, p, strict=True)])
         chosen = (x > 0.3 * LENGTH) & (x < 0.9 * LENGTH) & np.isfinite(heights)
         slope = math.nan
         if chosen.sum() > 2:
@@ -145,15 +146,3 @@ class ObliqueShock(Problem):
         right.plot((x[0], 0.0, 0.0, LENGTH), exact, "k--", lw=0.9, label="exact")
         right.legend(loc="lower right")
         right.set(xlabel="x [m]", ylabel="pressure on the wall [Pa]")
-
-
-def find_front(y: np.ndarray, p: np.ndarray, level: float) -> np.ndarray:
-    """Heights (ni,) of the outermost place where p (ni, nj) falls below `level`; NaN for none."""
-    heights = np.full(p.shape[0], math.nan)
-    for i, column in enumerate(p):
-        over = np.flatnonzero(column > level)
-        if over.size and over[-1] + 1 < column.size:
-            j = over[-1]
-            part = (column[j] - level) / (column[j] - column[j + 1])
-            heights[i] = y[i, j] + part * (y[i, j + 1] - y[i, j])
-    return heights

@@ -24,7 +24,7 @@ from hydro.eos import IdealGas
 from hydro.formulas.geometry import compute_volumes, find_geometry
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import RadialFlow, put_walls
-from problems.problem import Problem, Report, Row, compare, get_last, say_unreached
+from problems.problem import Problem, Report, Row, compare, find_crossing, get_last, say_unreached
 from problems.references.exact_flows import SedovBlast
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
@@ -163,13 +163,9 @@ def find_shock_radius(r: np.ndarray, rho: np.ndarray) -> float:
     rise = float(rho.max()) - 1.0
     if not rise > LEAST_RISE:
         return 0.0
-    found: list[float] = []
-    for radii, density in ((r, rho), (r.T, rho.T)):
-        over = density > 1.0 + 0.5 * rise
-        last = density.shape[0] - 1 - np.argmax(over[::-1], axis=0)
-        for line in np.flatnonzero(over.any(axis=0) & ~over[-1]):
-            i = last[line]
-            one, two = density[i : i + 2, line]
-            part = (one - 1.0 - 0.5 * rise) / (one - two)
-            found.append(radii[i, line] + part * (radii[i + 1, line] - radii[i, line]))
-    return float(np.mean(found)) if found else 0.0
+    found = [
+        find_crossing(radii[:, line], density[:, line], 1.0 + 0.5 * rise)
+        for radii, density in ((r, rho), (r.T, rho.T))
+        for line in range(density.shape[1])
+    ]
+    return float(np.nanmean(found)) if np.isfinite(found).any() else 0.0

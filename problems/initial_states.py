@@ -11,24 +11,51 @@ that runs outwards from a contact.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from hydro.block import Block
 from hydro.boundary.registry import put
-from hydro.eos import EquationOfState
+from hydro.eos import EquationOfState, IdealGas, StiffenedGas
+from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
+from problems.deck import DeckTable, key
 from problems.problem import draw_field
 from problems.references.hugoniot import Shock
+from regrid.errors import BadInput
 from regrid.measure.cells import compute_area_fractions
 from regrid.measure.corners import compute_centres
 from regrid.sides import SIDE_NAMES
 
 STRIP = 4  # cells across the strip of plane flow
 POINTS = 6  # for means over a cell, each way
+
+
+class Fluid(DeckTable, kw_only=True):
+    """One material: by name from the library, or as an ideal (stiffened) gas."""
+
+    material: key(str, "name in the material library; left out: a gas") | None = None
+    gamma: key(float, "ratio of specific heats of the gas", ge=1.001, le=1000) = 1.4
+    p_inf: key(float, "stiffness of the gas [Pa]; 0: ideal", ge=0, le=1e20) = 0.0
+    rho: key(float, "density [kg/m3]; left out: the library's", ge=1e-20, le=1e20) | None = None
+
+    @classmethod
+    def keeps_defaults(cls, table: Mapping[str, Any]) -> bool:
+        """A gas does; a material brings its own density."""
+        return "material" not in table
+
+    def make(self) -> tuple[EquationOfState, float]:
+        """Equation of state and density at the start."""
+        if self.material is not None:
+            found = find_material(self.material)
+            return found.eos, self.rho or found.rho0
+        eos = StiffenedGas(self.gamma, self.p_inf) if self.p_inf else IdealGas(self.gamma)
+        if self.rho is None:
+            raise BadInput("deck: a gas without `material` needs its density `rho`")
+        return eos, self.rho
 
 
 def make_plane_grid(x: np.ndarray, y: np.ndarray) -> np.ndarray:

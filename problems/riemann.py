@@ -30,8 +30,8 @@ from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.links.join import join
-from problems.deck import MOST_CELLS, Deck, DeckTable, Limiter, Regrid, RunControl, key
-from problems.initial_states import make_plane_grid, put_walls
+from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
+from problems.initial_states import Fluid, make_plane_grid, put_walls
 from problems.problem import Problem, Report, compare, get_last
 from problems.references.riemann import (
     RiemannSolution,
@@ -188,25 +188,16 @@ def grade(count: int, growth: float) -> np.ndarray:
     return positions / positions[-1]
 
 
-class SideState(DeckTable, kw_only=True):
+class SideState(Fluid, kw_only=True):
     """One state: a material of the library or an ideal (stiffened) gas, with rho, u, p."""
 
-    material: key(str, "name in the material library; left out: a gas") | None = None
-    gamma: key(float, "ratio of specific heats of the gas", ge=1.001, le=1000) = 1.4
-    p_inf: key(float, "stiffness of the gas [Pa]; 0: ideal", ge=0, le=1e20) = 0.0
-    rho: key(float, "density [kg/m3]; left out: the library's", ge=1e-20, le=1e20) | None = None
     u: key(float, "velocity [m/s]") = 0.0
     p: key(float, "pressure [Pa]", le=1e20) = 0.0
 
-    def make(self) -> tuple[EquationOfState, tuple[float, float, float]]:
+    def get_state(self) -> tuple[EquationOfState, tuple[float, float, float]]:
         """Equation of state and (rho, u, p)."""
-        if self.material is not None:
-            found = find_material(self.material)
-            return found.eos, (self.rho or found.rho0, self.u, self.p)
-        if self.rho is None:
-            raise BadInput("deck: a gas without `material` needs its density `rho`")
-        eos = StiffenedGas(self.gamma, self.p_inf) if self.p_inf else IdealGas(self.gamma)
-        return eos, (self.rho, self.u, self.p)
+        eos, rho = self.make()
+        return eos, (rho, self.u, self.p)
 
 
 class RiemannDeck(Deck, kw_only=True):
@@ -283,7 +274,7 @@ class Riemann(Problem):
         if (deck.left is None) != (deck.right is None):
             raise BadInput("deck: give both `left` and `right`, or neither and a `case`")
         if deck.left is not None:
-            case = Case(*deck.left.make(), *deck.right.make(), lengths=None)
+            case = Case(*deck.left.get_state(), *deck.right.get_state(), lengths=None)
         elif deck.case in CASES:
             case = CASES[deck.case]
         else:

@@ -11,14 +11,12 @@ have any number and phase.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import msgspec
 
-from hydro.eos import EquationOfState, IdealGas, StiffenedGas
-from hydro.eos.materials import find_material
 from problems.deck import (
     MOST_CELLS,
     Deck,
@@ -30,32 +28,9 @@ from problems.deck import (
     key,
     place_file,
 )
+from problems.initial_states import Fluid
 from problems.interface_instability.line import Mode, Spectrum
 from regrid.errors import BadInput
-
-
-class Fluid(DeckTable, kw_only=True):
-    """One material: by name from the library, or as an ideal (stiffened) gas."""
-
-    material: key(str, "name in the material library; left out: a gas") | None = None
-    gamma: key(float, "ratio of specific heats of the gas", ge=1.001, le=1000) = 1.4
-    p_inf: key(float, "stiffness of the gas [Pa]; 0: ideal", ge=0, le=1e20) = 0.0
-    rho: key(float, "density [kg/m3]; left out: the library's", ge=1e-20, le=1e20) | None = None
-
-    @classmethod
-    def keeps_defaults(cls, table: Mapping[str, Any]) -> bool:
-        """A gas does; a material brings its own density."""
-        return "material" not in table
-
-    def make(self) -> tuple[EquationOfState, float]:
-        """Equation of state and density at the start."""
-        if self.material is not None:
-            found = find_material(self.material)
-            return found.eos, self.rho or found.rho0
-        eos = StiffenedGas(self.gamma, self.p_inf) if self.p_inf else IdealGas(self.gamma)
-        if self.rho is None:
-            raise BadInput("deck: a gas without `material` needs its density `rho`")
-        return eos, self.rho
 
 
 class SecondShock(DeckTable, kw_only=True):

@@ -18,6 +18,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     soak PART                   outcomes or defects of `make soak`; see docs/soak_table.py
     regrid_suite PART           a table of docs/regrid-suite.md; see docs/regrid_suite_table.py
     motions PART                outcomes of random motions; see docs/motions_table.py
+    race PART                   tables of the race; see benchmarks/race/tables.py
     scaling PART                what ranks of MPI gain; see docs/scaling_table.py
 
 Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
@@ -53,6 +54,7 @@ from scaling_table import fill_scaling  # noqa: E402
 from soak_table import fill_soak  # noqa: E402
 from study_tables import fill_study, read_study  # noqa: E402
 
+from benchmarks.race.tables import fill_race  # noqa: E402
 from problems.registry import read_docstring  # noqa: E402
 from runs.early_end.causes import ENDS, SLOW  # noqa: E402
 from runs.inspection.account import describe_convexity, measure_drifts  # noqa: E402
@@ -257,6 +259,7 @@ KINDS = {
     "causes": fill_causes,
     "cost": fill_cost,
     "soak": fill_soak,
+    "race": fill_race,
     "regrid_suite": fill_regrid_suite,
     "motions": fill_motions,
     "scaling": fill_scaling,

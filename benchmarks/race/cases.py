@@ -1,0 +1,186 @@
+"""The cases: states, references, and how the error is measured from what a code computed.
+
+Every case is a dictionary of plain numbers, so that a script under another interpreter reads it
+from JSON.  Units are those of the decks (gas at density 1 and pressure 1, wavelength 1).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+import shockgrid as sg
+
+GAMMA = 1.4
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case: its title, the numbers that peers get, the reference, and grids by code."""
+
+    name: str
+    title: str
+    error_name: str
+    numbers: dict[str, Any]
+    cells: dict[str, tuple[int, ...]] = field(default_factory=dict)
+
+    def measure(self, found: dict[str, Any]) -> float:
+        """Relative error of what a code found (see `python_peers.py` for its keys)."""
+        numbers = self.numbers
+        if "rate" in numbers:
+            first, last = numbers["times"]
+            t, a = np.array(found["t"]), np.array(found["amplitude"])
+            rate = np.diff(np.interp((first, last), t, a))[0] / (last - first)
+            return float(rate / numbers["rate"] - 1.0)
+        if "amplitude" in numbers:
+            t, a = np.array(found["t"]), np.array(found["amplitude"])
+            return float(np.interp(numbers["times"][-1], t, a) / numbers["amplitude"] - 1.0)
+        x, y = np.array(found["x"]), np.array(found["y"])
+        rho, volume = np.array(found["rho"]), np.array(found["volume"])
+        exact = compute_exact_density(self, x, y)
+        near = np.hypot(x, y) < numbers["radius"] if "radius" in numbers else np.full(x.shape, True)
+        off = np.abs(rho - exact) * volume
+        return float(off[near].sum() / (exact * volume)[near].sum())
+
+
+def compute_exact_density(case: Case, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Exact density at points at the end of `noh`, `sedov` or `contact`."""
+    numbers = case.numbers
+    if case.name == "contact":
+        inside = np.abs(x - numbers["centre"]) < 0.5 * numbers["width"]
+        return np.where(inside, numbers["rho"][1], numbers["rho"][0])
+    problem = sg.load(case.name.split("-")[0], geometry=numbers["geometry"]).problem
+    radii, t = np.hypot(x, y), numbers["t_end"]
+    if case.name == "noh":
+        return problem.compute_density(radii, t)
+    return problem.blast.sample(radii, t)[0]
+
+
+def make_shocked_interface(deck: str, **settings: Any) -> dict[str, Any]:
+    """Numbers of a shocked interface of one gas in the frame of the interface after the shock.
+
+    The front meets the mean interface x = 0 at t = 0; `left`, `right` and `heavy` are
+    (rho, u, p) behind the shock, before it and beyond the interface.
+    """
+    problem = sg.load(deck, cells=16, **settings).problem
+    base, shock = problem.theory.base, problem.shock
+    sound = problem.theory.sound_speed
+    ka0 = problem.deck.modes[0].ka0
+    return {
+        "gamma": GAMMA,
+        "front": shock.shock_speed,
+        "interface": base.u_left,
+        "left": (shock.rho, shock.particle_speed - base.u_left, shock.p),
+        "right": (1.0, -base.u_left, 1.0),
+        "heavy": (problem.deck.second.rho, -base.u_left, 1.0),
+        "shocked": (base.rho_left, base.rho_right),
+        "a0": ka0 / (2.0 * math.pi),
+        "k_c": 2.0 * math.pi * sound,
+    }
+
+
+def make_growth() -> Case:
+    """The default deck: rate of growth against linear compressible theory."""
+    numbers = make_shocked_interface("interface-instability")
+    problem = sg.load("interface-instability", cells=16, kct_end=25.0).problem
+    wavenumber = 2.0 * math.pi
+    times = [kct / numbers["k_c"] for kct in (6.0, 25.0)]
+    first, last = (float(problem.theory.get_amplitude(wavenumber, t)) for t in times)
+    # theory's amplitude belongs to k a0 = 1
+    scale = numbers["a0"]  # theory's amplitude is in parts of the first
+    numbers |= {"times": times, "rate": scale * (last - first) / (times[1] - times[0])}
+    return Case(
+        "growth",
+        "growth of a shocked interface, Mach 1.5, 1 : 3, k a0 = 0.02",
+        "rate of growth, 6 < k c t < 25, against linear compressible theory",
+        numbers,
+        {
+            "shockgrid": (16, 24, 32, 64, 128),
+            "cloverleaf": (32, 64, 128, 256),
+            "pyclaw": (32, 64, 128, 256),
+            "pyro": (32, 64, 128),
+        },
+    )
+
+
+def make_mushroom() -> Case:
+    """A steep wave of one gas: half its width at k c t = 15, against this code on 256 cells."""
+    numbers = make_shocked_interface("interface-instability-mushroom", **MUSHROOM)
+    numbers |= {"times": [15.0 / numbers["k_c"]], "amplitude": math.nan}
+    return Case(
+        "mushroom",
+        "a steep wave, Mach 1.2, 1 : 5.1, k a0 = 0.5, to k c t = 15",
+        "half the width of the interface, against 256 cells",
+        numbers,
+        {
+            "shockgrid": (16, 32, 64, 256),
+            "cloverleaf": (32, 64, 128, 256),
+            "pyclaw": (32, 64, 128, 256),
+            "pyro": (32, 64, 128),
+        },
+    )
+
+
+def make_contact() -> Case:
+    """A slab ten times as dense as its surroundings moves by ten times its width."""
+    numbers = {
+        "gamma": GAMMA,
+        "rho": (1.0, 10.0),
+        "u": 1.0,
+        "p": 1.0,
+        "width": 1.0,
+        "t_end": 10.0,
+        "length": 2.0,  # of a periodic domain: the cheapest for a grid at rest
+        "centre": 1.0,
+        "rows": 8,
+    }
+    return Case(
+        "contact",
+        "a slab, ten times as dense as the gas about it, moves by ten widths",
+        "L1 of the density",
+        numbers,
+        {"shockgrid": (8, 16), "pyclaw": (16, 32, 64, 128, 256), "pyro": (16, 32, 64, 128)},
+    )
+
+
+def make_noh() -> Case:
+    """Noh's sphere on a rectangle beside the axis."""
+    numbers = {"gamma": 5.0 / 3.0, "t_end": 0.6, "radius": 0.4, "size": 1.0}
+    return Case(
+        "noh",
+        "Noh's sphere on a rectangular axisymmetric grid",
+        "L1 of the density out to twice the shock's radius",
+        numbers | {"geometry": "spherical"},
+        {"shockgrid": (50, 100, 200), "pennant": (50, 100, 200)},
+    )
+
+
+def make_sedov(geometry: str = "spherical") -> Case:
+    """Sedov's blast on a quarter; the energy starts in the corner's cell."""
+    blast = sg.load("sedov", geometry=geometry).problem.blast
+    sphere = geometry == "spherical"
+    share = 0.25 / math.pi if sphere else 0.25  # of a quarter, for a sphere a radian
+    numbers = {"gamma": GAMMA, "p": 1e-8, "t_end": 1.0, "size": 1.2, "energy": share * blast.energy}
+    peers = ("pennant",) if sphere else ("pyclaw", "pyro")
+    return Case(
+        "sedov" if sphere else "sedov-cylinder",
+        f"Sedov's {'sphere' if sphere else 'cylinder'} on a rectangular grid",
+        "L1 of the density",
+        numbers | {"geometry": geometry},
+        {code: (50, 100, 200) for code in ("shockgrid", *peers)},
+    )
+
+
+MUSHROOM = {"second": {"gamma": GAMMA, "rho": 5.1}, "kct_end": 15.0}
+CASES = {
+    "growth": make_growth,
+    "mushroom": make_mushroom,
+    "contact": make_contact,
+    "noh": make_noh,
+    "sedov": make_sedov,
+    "sedov-cylinder": functools.partial(make_sedov, "cylindrical"),
+}

@@ -1,0 +1,86 @@
+"""Tables of the race from docs/results/race.json, for its page and for README.
+
+race tables     a table a case: code, cells, error, CPU seconds
+race summary    CPU seconds to an error of BAR, a row a case
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+RESULTS = Path(__file__).resolve().parents[2] / "docs" / "results" / "race.json"
+NAMES = {
+    "shockgrid": "shockgrid",
+    "cloverleaf": "CloverLeaf_ref",
+    "pyclaw": "PyClaw",
+    "pyro": "pyro",
+    "pennant": "PENNANT",
+}
+BAR = 0.01  # the error that times are compared at
+
+
+def fill_race(arguments: str) -> list[str]:
+    """Lines of the part `arguments`: `tables` or `summary`."""
+    document = json.loads(RESULTS.read_text(encoding="utf-8"))
+    return {"tables": write_tables, "summary": write_summary}[arguments.strip()](document)
+
+
+def find_time(rows: list[dict[str, Any]], code: str) -> tuple[float, bool]:
+    """CPU seconds from which on a code stays within BAR, and whether that was measured.
+
+    Between two grids error and time are interpolated in logarithms; beyond the finest they are
+    continued at the slope of the last two.  NaN where the error does not fall.
+    """
+    mine = sorted((r for r in rows if r["code"] == code), key=lambda r: r["cells"])
+    errors, seconds = (np.array([abs(r[key]) for r in mine]) for key in ("error", "cpu"))
+    above = np.flatnonzero(errors > BAR)
+    if above.size == 0:
+        return float(seconds[0]), True
+    last = above[-1]
+    measured = last + 1 < len(mine)
+    i = last if measured else last - 1
+    fall = math.log(errors[i] / max(errors[i + 1], 1e-12))
+    if i < 0 or fall <= 0.0:
+        return math.nan, False
+    rise = math.log(seconds[i + 1] / seconds[i])
+    return float(seconds[i] * math.exp(rise * math.log(errors[i] / BAR) / fall)), measured
+
+
+def describe_time(rows: list[dict[str, Any]], code: str) -> str:
+    """CPU seconds to BAR in words; a value that was continued is in parentheses."""
+    if not any(r["code"] == code for r in rows):
+        return "-"
+    seconds, measured = find_time(rows, code)
+    if not math.isfinite(seconds):
+        return "not reached"
+    number = f"{seconds:.2g}" if seconds < 1000 else f"{seconds:.1e}"
+    return number if measured else f"({number})"
+
+
+def write_summary(document: dict[str, Any]) -> list[str]:
+    """One row a case."""
+    lines = [f"| CPU seconds to {100 * BAR:.0f} % | {' | '.join(NAMES.values())} |"]
+    lines.append("|---" * (len(NAMES) + 1) + "|")
+    for name, case in document["cases"].items():
+        rows = [r for r in document["rows"] if r["case"] == name]
+        cells = " | ".join(describe_time(rows, code) for code in NAMES)
+        lines.append(f"| {case['title']} | {cells} |")
+    return lines
+
+
+def write_tables(document: dict[str, Any]) -> list[str]:
+    """One table a case."""
+    lines: list[str] = []
+    for name, case in document["cases"].items():
+        title = case["title"]
+        lines += ["", f"## {title[0].upper()}{title[1:]}", "", f"Error: {case['error']}.", ""]
+        lines += ["| code | cells | error | CPU seconds |", "|---|---|---|---|"]
+        for row in (r for r in document["rows"] if r["case"] == name):
+            error = f"{100.0 * row['error']:.2g} %" if abs(row["error"]) > 1e-9 else "round-off"
+            lines.append(f"| {NAMES[row['code']]} | {row['cells']} | {error} | {row['cpu']:.3g} |")
+    return lines[1:]

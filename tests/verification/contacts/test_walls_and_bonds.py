@@ -15,31 +15,45 @@ from regrid.errors import BadInput
 AL = find_material("Al1100")
 
 
-def make_base(kind="wall", **options):
+def make_base(height):
     """A block of two cells whose side at x = 0 is a rigid wall."""
     steel = find_material("SS304")
-    block = Block(
-        "base", steel.eos, box((-2e-2, -1e-3), (0.0, 2e-3), (2, 3)), steel.rho0, 0.0, 0.0, 0.0
-    )
+    nodes = box((-2e-2, -1e-3), (0.0, height), (2, 3))
+    block = Block("base", steel.eos, nodes, steel.rho0, 0.0, 0.0, 0.0)
     for side in SIDES:
         put(block, side, "wall")
     return block
 
 
-def test_a_gas_bounces_off_a_wall():
-    """It leaves with the speed with which it came; the scheme's spread of the release takes 5 %."""
+@pytest.mark.parametrize(
+    ("mach", "cells", "kept"),
+    [
+        (0.01, 40, 0.970),
+        pytest.param(0.01, 160, 0.988, marks=pytest.mark.slow),
+        pytest.param(0.05, 160, 0.977, marks=pytest.mark.slow),
+    ],
+)
+def test_a_gas_bounces_off_a_wall(mach, cells, kept):
+    """It leaves with the speed with which it came, but for a part: 3 % at 40 cells, 1 % at 160.
+
+    The release that comes back from the free side opens the contact when the middle of it arrives;
+    what comes after stays in the gas as a wave.  By characteristics that is .3 Mach of the speed
+    (.015 at Mach .05).  The scheme spreads a step over four to six cells on its way there and back,
+    and a quarter of these over the cells is lost: no bar for few cells is below that.
+    """
     gas, c = IdealGas(1.4), (1.4 * 1e5 / 1.2) ** 0.5
-    speed = 0.05 * c
-    ball = Block("ball", gas, box((1e-3, 0.0), (11e-3, 1e-3), (40, 2)), 1.2, -speed, 0.0, 1e5)
+    speed, gap = mach * c, 2e-4
+    nodes = box((gap, 0.0), (gap + 1e-2, 2e-2), (cells, 2))
+    ball = Block("ball", gas, nodes, 1.2, -speed, 0.0, 1e5)
     for side in ("i_min", "i_max"):
         put(ball, side, "free-surface", pressure=1e5)
     wall_off(ball)
-    simulation = make_stack([ball, make_base()], 1e-3 / speed + 2.6e-2 / c)
+    simulation = make_stack([ball, make_base(3e-2)], gap / speed + 2.6e-2 / c)
     rows = advance(simulation)
     met = find_event(rows, "contacts_made")
-    assert met == pytest.approx(1e-3 / speed, rel=1e-6)
-    assert find_event(rows, "contacts_opened") - met == pytest.approx(2e-2 / c, rel=0.05)
-    assert mean_speed(ball) == pytest.approx(speed, rel=0.06)
+    assert met == pytest.approx(gap / speed, rel=1e-6)
+    assert find_event(rows, "contacts_opened") - met == pytest.approx(2e-2 / c, rel=0.02 + mach)
+    assert kept < mean_speed(ball) / speed < 1.0
     assert rows[-1]["contacts_made"] == rows[-1]["contacts_opened"] == 1
     check_budget(rows, limit=1e-11)
 

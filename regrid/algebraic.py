@@ -18,10 +18,12 @@ Sources: [CharakhchyanND] (2)-(4), theory R1; [ProkopovND] (6.1), theory R6.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from regrid.errors import BadInput
-from regrid.jit import kernel
+from regrid.jit import inlined, kernel
 from regrid.measure.corners import BLOCK_CORNERS
 from regrid.measure.faults import check_grids, explain_failure, name_cells
 from regrid.measure.quality import compute_corner_areas
@@ -47,29 +49,93 @@ def fill_arc_law(x, y, law):
     law[last] = 1.0
 
 
+@inlined
+def take_blend(i, along_i, corners):
+    """What the boolean sum (theory R6.4) takes of row i: its law and change, the corner terms."""
+    low_x, low_y = along_i[VALUE_X, i], along_i[VALUE_Y, i]
+    rise_x, rise_y = along_i[CHANGE_X, i], along_i[CHANGE_Y, i]
+    return (
+        along_i[LAW, i], along_i[LAW_CHANGE, i],
+        (low_x - corners[0, 0], corners[0, 2] - corners[0, 0]),
+        (low_y - corners[1, 0], corners[1, 2] - corners[1, 0]),
+        (low_x + rise_x - corners[0, 1], corners[0, 3] - corners[0, 1]),
+        (low_y + rise_y - corners[1, 1], corners[1, 3] - corners[1, 1]),
+        corners[0, 4], corners[1, 4],
+    )  # fmt: skip
+
+
+@inlined
+def blend(row, law, bend, value_x, value_y, change_x, change_y):
+    """Boolean sum (theory R6.4) of the sides' values at a node: x and y.
+
+    `row` is what `take_blend` gives of its row, the others are the rows along j at its column.
+    """
+    start, turn, under_x, under_y, over_x, over_y, mean_x, mean_y = row
+    blend_i = (start + law * turn) / (1.0 - turn * bend)
+    blend_j = law + blend_i * bend
+    # Corner terms of the boolean sum, folded into the part that runs along j.
+    low_x, low_y = under_x[0] - blend_i * under_x[1], under_y[0] - blend_i * under_y[1]
+    high_x, high_y = over_x[0] - blend_i * over_x[1], over_y[0] - blend_i * over_y[1]
+    side_x, side_y = value_x + blend_i * change_x, value_y + blend_i * change_y
+    return (
+        mean_x + (side_x + (low_x + blend_j * (high_x - low_x))),
+        mean_y + (side_y + (low_y + blend_j * (high_y - low_y))),
+    )
+
+
 @kernel
-def fill_blend(along_i, along_j, corners, mean_x, mean_y, out):
+def fill_blend(along_i, along_j, corners, out):
     """Boolean sum (theory R6.4) of the sides' values into the inner nodes; rows as named above."""
-    (corner_00x, corner_0mx, corner_n0x, corner_nmx) = corners[0]
-    (corner_00y, corner_0my, corner_n0y, corner_nmy) = corners[1]
     for i in range(1, out.shape[1] - 1):
-        start, turn = along_i[LAW, i], along_i[LAW_CHANGE, i]
-        low_x, low_y = along_i[VALUE_X, i], along_i[VALUE_Y, i]
-        rise_x, rise_y = along_i[CHANGE_X, i], along_i[CHANGE_Y, i]
-        row_x, row_y = out[0, i], out[1, i]
+        here, row_x, row_y = take_blend(i, along_i, corners), out[0, i], out[1, i]
         for j in range(1, out.shape[2] - 1):
-            bend = along_j[LAW_CHANGE, j]
-            blend_i = (start + along_j[LAW, j] * turn) / (1.0 - turn * bend)
-            blend_j = along_j[LAW, j] + blend_i * bend
-            # Corner terms of the boolean sum, folded into the part that runs along j.
-            under_x = low_x - corner_00x - blend_i * (corner_n0x - corner_00x)
-            under_y = low_y - corner_00y - blend_i * (corner_n0y - corner_00y)
-            over_x = low_x + rise_x - corner_0mx - blend_i * (corner_nmx - corner_0mx)
-            over_y = low_y + rise_y - corner_0my - blend_i * (corner_nmy - corner_0my)
-            side_x = along_j[VALUE_X, j] + blend_i * along_j[CHANGE_X, j]
-            side_y = along_j[VALUE_Y, j] + blend_i * along_j[CHANGE_Y, j]
-            row_x[j] = mean_x + (side_x + (under_x + blend_j * (over_x - under_x)))
-            row_y[j] = mean_y + (side_y + (under_y + blend_j * (over_y - under_y)))
+            row_x[j], row_y[j] = blend(
+                here, along_j[LAW, j], along_j[LAW_CHANGE, j], along_j[VALUE_X, j],
+                along_j[VALUE_Y, j], along_j[CHANGE_X, j], along_j[CHANGE_Y, j],
+            )  # fmt: skip
+
+
+@kernel
+def fill_tables(laws_of, values, moved, along_i, along_j, corners):
+    """Rows, as named above, of the values on the four sides of `values`; their corners and mean.
+
+    `laws_of` (2, ni+1, nj+1) is a grid whose sides give the spacing laws; where `moved`, its sides
+    are taken from those of `values` (same shape).  `along_i` (6, ni+1), `along_j` (6, nj+1),
+    `corners` (2, 5): (0, 0), (0, nj), (ni, 0), (ni, nj), and the mean that the values are beyond.
+    """
+    ni, nj = values.shape[1] - 1, values.shape[2] - 1
+    part = 1.0 if moved else 0.0
+    # The value rows first hold the sides of the grid, for the laws.
+    for j, law in ((0, LAW), (nj, LAW_CHANGE)):
+        for i in range(ni + 1):
+            along_i[VALUE_X, i], along_i[VALUE_Y, i] = laws_of[0, i, j], laws_of[1, i, j]
+        fill_arc_law(along_i[VALUE_X], along_i[VALUE_Y], along_i[law])
+    for i, law in ((0, LAW), (ni, LAW_CHANGE)):
+        fill_arc_law(laws_of[0, i], laws_of[1, i], along_j[law])
+    for k in range(2):
+        own, laws = values[k], laws_of[k]
+        value, change = VALUE_X + k, CHANGE_X + k
+        first, second = own[0, 0] - part * laws[0, 0], own[0, nj] - part * laws[0, nj]
+        third, fourth = own[ni, 0] - part * laws[ni, 0], own[ni, nj] - part * laws[ni, nj]
+        # The mean is symmetric in the corners, so that a mirrored or transposed block gets the
+        # same bits, and is the value itself where all agree: a block moved bodily keeps its shape.
+        mean = 0.25 * ((first + fourth) + (second + third))
+        for i in range(ni + 1):
+            low = own[i, 0] - part * laws[i, 0]
+            along_i[value, i] = low - mean
+            along_i[change, i] = (own[i, nj] - part * laws[i, nj]) - low
+        for j in range(nj + 1):
+            low = own[0, j] - part * laws[0, j]
+            along_j[value, j] = low - mean
+            along_j[change, j] = (own[ni, j] - part * laws[ni, j]) - low
+        corners[k, 0], corners[k, 1] = along_j[value, 0], along_j[value, nj]
+        corners[k, 2] = along_j[value, 0] + along_j[change, 0]
+        corners[k, 3] = along_j[value, nj] + along_j[change, nj]
+        corners[k, 4] = mean
+    for i in range(ni + 1):
+        along_i[LAW_CHANGE, i] -= along_i[LAW, i]
+    for j in range(nj + 1):
+        along_j[LAW_CHANGE, j] -= along_j[LAW, j]
 
 
 @kernel
@@ -79,35 +145,10 @@ def fill_from_sides(laws_of, out):
     `laws_of` (2, ni+1, nj+1) is a grid whose sides give the spacing laws; the sides of `out`
     (same shape) are left as they are.
     """
-    ni, nj = out.shape[1] - 1, out.shape[2] - 1
-    along_i, along_j = np.empty((6, ni + 1)), np.empty((6, nj + 1))
-    # The mean is symmetric in the corners, so that a mirrored or transposed block gets the same
-    # bits, and is the value itself where all agree: a block moved bodily keeps its shape.
-    mean_x = 0.25 * ((out[0, 0, 0] + out[0, ni, nj]) + (out[0, 0, nj] + out[0, ni, 0]))
-    mean_y = 0.25 * ((out[1, 0, 0] + out[1, ni, nj]) + (out[1, 0, nj] + out[1, ni, 0]))
-    # The value rows first hold the sides of the grid, for the laws.
-    for j, law in ((0, LAW), (nj, LAW_CHANGE)):
-        for i in range(ni + 1):
-            along_i[VALUE_X, i], along_i[VALUE_Y, i] = laws_of[0, i, j], laws_of[1, i, j]
-        fill_arc_law(along_i[VALUE_X], along_i[VALUE_Y], along_i[law])
-    for i, law in ((0, LAW), (ni, LAW_CHANGE)):
-        fill_arc_law(laws_of[0, i], laws_of[1, i], along_j[law])
-    for i in range(ni + 1):
-        along_i[LAW_CHANGE, i] -= along_i[LAW, i]
-        along_i[VALUE_X, i], along_i[VALUE_Y, i] = out[0, i, 0] - mean_x, out[1, i, 0] - mean_y
-        along_i[CHANGE_X, i] = out[0, i, nj] - out[0, i, 0]
-        along_i[CHANGE_Y, i] = out[1, i, nj] - out[1, i, 0]
-    for j in range(nj + 1):
-        along_j[LAW_CHANGE, j] -= along_j[LAW, j]
-        along_j[VALUE_X, j], along_j[VALUE_Y, j] = out[0, 0, j] - mean_x, out[1, 0, j] - mean_y
-        along_j[CHANGE_X, j] = out[0, ni, j] - out[0, 0, j]
-        along_j[CHANGE_Y, j] = out[1, ni, j] - out[1, 0, j]
-    low, high = along_j[VALUE_X : VALUE_Y + 1], along_j[CHANGE_X : CHANGE_Y + 1]
-    corners = (
-        (low[0, 0], low[0, nj], low[0, 0] + high[0, 0], low[0, nj] + high[0, nj]),
-        (low[1, 0], low[1, nj], low[1, 0] + high[1, 0], low[1, nj] + high[1, nj]),
-    )
-    fill_blend(along_i, along_j, corners, mean_x, mean_y, out)
+    along_i, along_j = np.empty((6, out.shape[1])), np.empty((6, out.shape[2]))
+    corners = np.empty((2, 5))
+    fill_tables(laws_of, out, False, along_i, along_j, corners)
+    fill_blend(along_i, along_j, corners, out)
 
 
 @kernel
@@ -125,41 +166,82 @@ def fill_displacement(previous, boundary, out):
         for j in range(nj + 1):
             out[k, 0, j] = boundary[k, 0, j] - previous[k, 0, j]
             out[k, ni, j] = boundary[k, ni, j] - previous[k, ni, j]
-    fill_from_sides(previous, out)
+    along_i, along_j = np.empty((6, ni + 1)), np.empty((6, nj + 1))
+    corners = np.empty((2, 5))
+    fill_tables(previous, boundary, True, along_i, along_j, corners)
+    fill_blend(along_i, along_j, corners, out)
+
+
+class SideMotion(NamedTuple):
+    """How the sides of a grid move, for `fill_moved_row`, and the new `sides` (2, ni+1, nj+1) [m].
+
+    `along_i`, `along_j` and `corners` are those of `fill_tables`.  Lines j = const that keep
+    spacing laws of their own (theory R4.9) take their part of the change `turn` (2, nj+1) of their
+    way from i_min to i_max; `reach` (nj+1) is the most that this is on each line.
+    """
+
+    sides: np.ndarray
+    along_i: np.ndarray
+    along_j: np.ndarray
+    corners: np.ndarray
+    turn: np.ndarray
+    reach: np.ndarray
 
 
 @kernel
-def fill_moved(old, sides, bend, most_bend, bent, displacement, base, reach):
-    """Move a grid: `base = old + displacement`, with the sides of `sides`; (2, ni+1, nj+1), in m.
+def prepare_motion(old, motion, most_bend, bent):
+    """Fill the tables of a `SideMotion` from the `old` grid to its sides; theory R6.5.
 
-    Lines j = const that keep spacing laws of their own (theory R4.9) take their part of the change
-    of their way from i_min to i_max: where `bent`, `displacement` is given `bend` (ni+1, nj+1)
-    times that change first; `reach` (nj+1) is the most that this is on each line, with
-    `most_bend` (nj+1), the most of `bend` there.
+    Where lines are `bent`, `most_bend` (nj+1) is how far their laws depart at most.
     """
+    sides, turn = motion.sides, motion.turn
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
-    turn = np.zeros((2, nj + 1))
+    fill_tables(old, sides, True, motion.along_i, motion.along_j, motion.corners)
     if bent:
-        for k in range(2):
-            for j in range(nj + 1):
+        for j in range(nj + 1):
+            for k in range(2):
                 way = sides[k, ni, j] - sides[k, 0, j]
                 turn[k, j] = way - (old[k, ni, j] - old[k, 0, j])
-        for j in range(nj + 1):
             square = turn[0, j] * turn[0, j] + turn[1, j] * turn[1, j]
-            reach[j] = most_bend[j] * np.sqrt(square)
-    for k in range(2):
-        turned = turn[k]
-        for i in range(ni + 1):
-            row, here, moved = displacement[k, i], old[k, i], base[k, i]
-            if bent:
-                part = bend[i]
-                for j in range(nj + 1):
-                    row[j] += part[j] * turned[j]
-            for j in range(nj + 1):
-                moved[j] = here[j] + row[j]
-            moved[0], moved[nj] = sides[k, i, 0], sides[k, i, nj]
-        for j in range(nj + 1):
-            base[k, 0, j], base[k, ni, j] = sides[k, 0, j], sides[k, ni, j]
+            motion.reach[j] = most_bend[j] * np.sqrt(square)
+
+
+@inlined
+def fill_moved_row(old, i, motion, bend, bent, low, count, out):
+    """Row i of the grid moved with its sides (R6.5), `count` columns from `low` on, into `out`."""
+    ni, nj, sides, along_j = out.shape[1] - 1, out.shape[2] - 1, motion.sides, motion.along_j
+    high = low + count
+    row_x, row_y = out[0, i, low:high], out[1, i, low:high]
+    if i == 0 or i == ni:
+        for col in range(count):
+            row_x[col], row_y[col] = sides[0, i, low + col], sides[1, i, low + col]
+        return
+    here = take_blend(i, motion.along_i, motion.corners)
+    old_x, old_y = old[0, i, low:high], old[1, i, low:high]
+    laws, bends = along_j[LAW, low:high], along_j[LAW_CHANGE, low:high]
+    value_x, value_y = along_j[VALUE_X, low:high], along_j[VALUE_Y, low:high]
+    change_x, change_y = along_j[CHANGE_X, low:high], along_j[CHANGE_Y, low:high]
+    for col in range(count):
+        x, y = blend(
+            here, laws[col], bends[col], value_x[col], value_y[col], change_x[col], change_y[col]
+        )
+        row_x[col] = old_x[col] + x
+        row_y[col] = old_y[col] + y
+    if bent:
+        part, turn_x, turn_y = bend[i, low:high], motion.turn[0, low:high], motion.turn[1, low:high]
+        for col in range(count):
+            row_x[col] += part[col] * turn_x[col]
+            row_y[col] += part[col] * turn_y[col]
+    for j in (0, nj):
+        if low <= j < high:
+            out[0, i, j], out[1, i, j] = sides[0, i, j], sides[1, i, j]
+
+
+@kernel
+def fill_moved(old, motion, bend, bent, out):
+    """The grid `old` moved with its sides (R6.5) into `out`, both (2, ni+1, nj+1)."""
+    for i in range(out.shape[1]):
+        fill_moved_row(old, i, motion, bend, bent, 0, out.shape[2], out)
 
 
 def displaced_grid(previous: np.ndarray, boundary: np.ndarray) -> np.ndarray:

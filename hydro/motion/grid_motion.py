@@ -141,7 +141,9 @@ class GridMotion(Sides):
             number, failure = self._regrid_own(fraction)
         rows = []
         for own in self.blocks.own if failure is None else ():
-            rows += [measure_worst(self.blocks[own].nodes_new) + self._count(own)]
+            report = self.reports[own] if self.mesh == "regrid" else None
+            known = report.quality if report is not None and not self._limited[own] else None
+            rows += [(known or measure_worst(self.blocks[own].nodes_new)) + self._count(own)]
         self.quality, self.counts = [], []
         for row in self.blocks.share_nodes(rows, number, failure):
             self.quality += [row[:4]]

@@ -21,7 +21,7 @@ from regrid.barrier.step_control import shorten_steps
 from regrid.barrier.tuning import Tuning
 from regrid.barrier.untangle import unfold, untangle
 from regrid.barrier.workspace import Workspace
-from regrid.measure.corners import count_triangles, count_turned_corners, find_folded_cells
+from regrid.measure.corners import count_triangles, find_folded_cells
 from regrid.measure.faults import find_impossible
 from regrid.protocol import RegridReport
 from regrid.sides import copy_sides, get_sides
@@ -46,7 +46,10 @@ class NewtonMove:
         self.ratio = np.inf
         self.start = "displacement"
         self.strayed = np.inf
-        self.exempt = count_turned_corners(work.sides)
+        self.quality: tuple[float, float, int, int] | None = None
+        self.triangles = -1  # not known
+        self._begin()
+        self.exempt = work.block.turned
 
     def report(self) -> RegridReport:
         inner = (self.work.ni - 1) * (self.work.nj - 1)
@@ -59,24 +62,28 @@ class NewtonMove:
             residual=self.residual,
             start=self.start,
             exempt_corners=self.exempt,
-            triangles=count_triangles(self.work.trial),
+            triangles=count_triangles(self.work.trial) if self.triangles < 0 else self.triangles,
             strayed=self.strayed,
+            quality=self.quality,
         )
 
     def is_settled(self) -> bool:
         """Check the residual of the moved grid: True when it is `work.trial` and needs no more."""
         work, tuning = self.work, self.tuning
-        self._begin()
         if work.ni == 1 or work.nj == 1:
+            work.fill_moved()
             return False
-        self.moved_ratio, self.estimate, strayed = work.look(work.base, work.old)
+        self.moved_ratio, self.estimate, strayed = work.look(work.base, work.old, moves=True)
+        corrected = False
         if self.moved_ratio > tuning.start_ratio and self._correct_smooth_error():
-            strayed = np.inf
+            strayed, corrected = np.inf, True
         good = self.estimate <= min(max(tuning.floor, ROUND_OFF), self._get_lost())
         if not (self.moved_ratio > tuning.start_ratio and good):
             return False
         self.residual = max(self.residual, self.estimate)
         self.strayed = strayed
+        if not corrected:
+            self.quality, self.triangles = work.get_quality(), work.marks.bit_count()
         work.base, work.trial = work.trial, work.base
         return self._accept(self.moved_ratio)
 
@@ -90,7 +97,7 @@ class NewtonMove:
         size = work.coarse.find(work.base, work.law, tuning.smooth_floor)
         if not tuning.smooth_floor < size < np.inf:
             return False
-        moved = max(work.displacement.max(), -work.displacement.min()) / math.sqrt(work.sigma)
+        moved = float(np.abs(work.base - work.old).max()) / math.sqrt(work.sigma)
         work.coarse.add(work.base, work.trial, min(1.0, tuning.smooth_part * moved / size))
         ratio = work.compare_corners(work.trial, work.old)
         if not ratio > min(self.moved_ratio, tuning.start_ratio):
@@ -110,7 +117,7 @@ class NewtonMove:
         begin, end = work.old.copy(), work.sides.copy()
         for halving in range(1, self.tuning.most_halvings + 1):
             parts = 2**halving
-            work.old[:] = begin
+            work.keep_own(begin, end)
             self.ratio = np.inf
             for part in range(1, parts + 1):
                 t = part / parts
@@ -118,6 +125,7 @@ class NewtonMove:
                     get_sides(work.sides), get_sides(begin), get_sides(end), strict=True
                 ):
                     now[:] = there if part == parts else then + t * (there - then)
+                self._begin()
                 if not (self.is_settled() or self._advance()):
                     break
                 work.old[:] = work.trial
@@ -125,7 +133,7 @@ class NewtonMove:
                 self.sub_moves = parts - 1
                 self.start, self.strayed = "halved", np.inf
                 return True
-        work.old[:], work.sides[:] = begin, end
+        work.keep_own(begin, end)
         return self._unfold()
 
     def _unfold(self) -> bool:
@@ -135,6 +143,7 @@ class NewtonMove:
             return False
         broken = self.broken
         self._begin()
+        work.fill_moved()
         straight = transfinite_grid(work.sides)
         for start in (work.base.copy(), straight, None):
             found = straight.copy() if start is None else start
@@ -155,10 +164,9 @@ class NewtonMove:
         return self._accept(work.compare_corners(found, work.old))
 
     def _begin(self) -> None:
-        """Laws of the part's sides, and the old grid moved along with them into `work.base`."""
+        """Laws of the part's sides, and how they move."""
         self.broken = False
         self.work.begin(**self.arguments)
-        self.work.carry_sides(self.work.old)
 
     def _advance(self) -> bool:
         """One part of the motion, `work.old` to `work.sides`, from the grid moved along.
@@ -245,7 +253,7 @@ class NewtonMove:
         """
         work, least = self.work, self.tuning.step_ratio
         work.assemble(work.old)
-        self._solve(work.displacement)
+        self._solve(work.base - work.old)
         np.add(work.old, work.change, out=work.trial)
         copy_sides(work.sides, work.trial)
         ratio = work.compare_corners(work.trial, work.old)

@@ -155,8 +155,7 @@ class BarrierRegridder:
             self.tuning, work, conditional=self.conditional, ki=float(ki), kj=float(kj),
             cost=sound_speed is not None, curved=self.curved,
         )  # fmt: skip
-        simple = compute_area(work.sides) > 0.0
-        simple = simple and (self.meets_itself or work.boundary_check.is_simple(work.sides))
+        simple = work.block.area > 0.0 and (self.meets_itself or work.is_simple)
         if not (simple and move.is_settled()):
             if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
                 raise explain_failure(boundary)
@@ -167,6 +166,8 @@ class BarrierRegridder:
             if not move.run():
                 raise explain_failure(boundary, work.trial, transposed, move.broken)
         report = move.report()
+        if report.quality and mirrored != transposed:  # of a grid that turns clockwise
+            report = replace(report, quality=None)
         return RegridResult(work.give(transposed, mirrored), report)
 
     def compute_dear_rate(self, boundary: np.ndarray, sound_speed: np.ndarray) -> float:

@@ -15,14 +15,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from regrid.algebraic import prepare_motion
 from regrid.jit import kernel
+from regrid.measure.corners import count_turned_corners
+from regrid.measure.crossings import search_meeting
 from regrid.sides import compute_area
 
 # Rows of the laws along i (one column an edge of the sides j_min and j_max) and along j; GROWTH is
 # for the workspace alone: up to which length over the shortest one the barrier fades.
 LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE, GROWTH = range(5)
-# Scalars of a block.
-SIGMA = 0
 
 
 class BarrierLaw(NamedTuple):
@@ -31,7 +32,8 @@ class BarrierLaw(NamedTuple):
     The laws of the sides `along_i` (5, ni) and `along_j` (5, nj), rows as named above, in m and
     without unit; where lines lie between opposite sides, `blend_i` (ni+1) and `blend_j` (nj+1);
     `bend` (ni+1, nj+1), by how much each line's own spacing law departs from the interpolated one,
-    and the `way` (2, nj+1) that it is a part of, from i_min to i_max in m;
+    `most_bend` (nj+1), the most of it on each line, and the `way` (2, nj+1) that it is a part of,
+    from i_min to i_max in m;
     `curve` (2, ni+1, nj+1), the grid in m that lines are drawn to, times its weight, read where
     `curved` (`regrid.algebraic`);
     the weights `ki`, `kj` of the two families of straight lines; `sigma`, the mean area of a cell
@@ -48,6 +50,7 @@ class BarrierLaw(NamedTuple):
     blend_i: np.ndarray
     blend_j: np.ndarray
     bend: np.ndarray
+    most_bend: np.ndarray
     way: np.ndarray
     curve: np.ndarray
     curved: bool
@@ -223,11 +226,14 @@ def fill_pair(low, high, laws):
 
 
 @kernel
-def fill_laws(sides, conditional, along_i, along_j, block):
-    """Laws along i and j of the block whose sides are `sides`, and its mean cell area sigma.
+def fill_laws(sides, conditional, along_i, along_j, blend_i, blend_j):
+    """Laws along i and j of the block with these sides, where its lines lie; its mean cell area.
 
-    `along_i` (4, ni), `along_j` (4, nj), rows as named above; a step of 1 is a uniform law.
-    `conditional` 0 gives every edge the same length: [IvanenkoCharakhchyan1988].
+    `along_i` (5, ni), `along_j` (5, nj), rows as named above; a step of 1 is a uniform law.
+    `conditional` 0 gives every edge the same length: [IvanenkoCharakhchyan1988].  `blend_i` (ni+1),
+    `blend_j` (nj+1), 0 to 1: the mean of the arc-length laws of the two sides that a line ends on:
+    a part of the way, not of the count of lines, so that a side is felt as far into a graded block
+    as into an even one.
     """
     x, y = sides
     ni, nj = x.shape[0] - 1, x.shape[1] - 1
@@ -238,39 +244,19 @@ def fill_laws(sides, conditional, along_i, along_j, block):
         step_x, step_y = x[i + 1, nj] - x[i, nj], y[i + 1, nj] - y[i, nj]
         high[i] = np.sqrt(step_x * step_x + step_y * step_y)
     fill_pair(low, high, along_i)
-    low, high = np.empty(nj), np.empty(nj)
-    fill_edge_lengths(x[0], y[0], low)
-    fill_edge_lengths(x[ni], y[ni], high)
-    fill_pair(low, high, along_j)
-    sigma = abs(compute_area(sides)) / (ni * nj)
-    if conditional == 0:
-        for laws in (along_i, along_j):
-            for k in range(laws.shape[1]):
-                laws[LENGTH, k] = np.sqrt(sigma)
-                laws[LENGTH_CHANGE, k] = 0.0
-    block[SIGMA] = sigma
-
-
-@kernel
-def fill_blends(sides, blend_i, blend_j):
-    """Where between two opposite sides each line lies: `blend_i` (ni+1), `blend_j` (nj+1), 0 to 1.
-
-    The mean of the arc-length laws of the two sides that the line ends on: a part of the way, not
-    of the count of lines, so that a side is felt as far into a graded block as into an even one.
-    """
-    x, y = sides
-    ni, nj = x.shape[0] - 1, x.shape[1] - 1
-    low, high = np.empty(ni), np.empty(ni)
-    for i in range(ni):
-        step_x, step_y = x[i + 1, 0] - x[i, 0], y[i + 1, 0] - y[i, 0]
-        low[i] = np.sqrt(step_x * step_x + step_y * step_y)
-        step_x, step_y = x[i + 1, nj] - x[i, nj], y[i + 1, nj] - y[i, nj]
-        high[i] = np.sqrt(step_x * step_x + step_y * step_y)
     fill_mean_law(low, high, blend_i)
     low, high = np.empty(nj), np.empty(nj)
     fill_edge_lengths(x[0], y[0], low)
     fill_edge_lengths(x[ni], y[ni], high)
+    fill_pair(low, high, along_j)
     fill_mean_law(low, high, blend_j)
+    sigma = abs(compute_area(sides)) / (ni * nj)
+    if not conditional:
+        for laws in (along_i, along_j):
+            for k in range(laws.shape[1]):
+                laws[LENGTH, k] = np.sqrt(sigma)
+                laws[LENGTH_CHANGE, k] = 0.0
+    return sigma
 
 
 @kernel
@@ -352,3 +338,47 @@ def compute_dear_rate(sound, along_i, along_j, blend_i, blend_j, area_target, ma
     for j in range(nj):
         most = rates[j] if rates[j] > most else most
     return margin * np.sqrt(2.0 * most) / area_target
+
+
+class Block(NamedTuple):
+    """What `prepare` finds of a block's sides: the area inside them, corners that they turn over,
+    two of their edges that may meet (`search_meeting`), and numbers of a `BarrierLaw`."""
+
+    area: float
+    turned: int
+    meeting: int
+    sigma: float
+    area_target: float
+    cost_scale: float
+
+
+@kernel
+def prepare(old, law, motion, bent, conditional, dear, check):
+    """All that a regrid takes from the sides: laws, the motion of the sides, the checks.
+
+    `law` is a `BarrierLaw` whose arrays are filled, but for curved lines, `motion` a `SideMotion`
+    from the grid `old`; `bent`: does `law.bend` hold anything?  `dear`: the margin of R and the
+    least R; `check`: the scratch of `search_meeting`.
+    """
+    sides = motion.sides
+    prepare_motion(old, motion, law.most_bend, bent)
+    along_i, along_j, blend_i, blend_j = law.along_i, law.along_j, law.blend_i, law.blend_j
+    sigma = fill_laws(sides, conditional, along_i, along_j, blend_i, blend_j)
+    fill_growth(along_i, law.ki - law.kj)
+    if bent:
+        for k in range(2):
+            for j in range(sides.shape[2]):
+                law.way[k, j] = sides[k, -1, j] - sides[k, 0, j]
+    area_target = sigma / compute_mean_area(along_i, along_j, blend_i, blend_j)
+    scale = 0.0
+    if law.cost_weight > 0.0:
+        rate = compute_dear_rate(
+            law.sound, along_i, along_j, blend_i, blend_j, area_target, dear[0]
+        )
+        rate = max(rate, dear[1])
+        scale = 2.0 / (rate * rate) if rate > 0.0 else 0.0
+    line, boxes, ways, ends, stack = check
+    meeting, _ = search_meeting(sides, line, boxes, ways, ends, stack)
+    return Block(
+        compute_area(sides), count_turned_corners(sides), meeting, sigma, area_target, scale
+    )

@@ -34,7 +34,6 @@ from regrid.barrier.functional import corner_blocks
 from regrid.barrier.side_laws import (
     LENGTH,
     LENGTH_CHANGE,
-    SIGMA,
     STEP,
     STEP_CHANGE,
     fill_family_weights,
@@ -411,7 +410,8 @@ class _Block:
         shape = (2, ni + 1, nj + 1)
         self.nodes, self.trial, self.direction, self.other_direction = np.zeros((4, *shape))
         self.tau = np.ones(shape[1:])
-        self.laws_i, self.laws_j, self.scalars = np.zeros((4, ni)), np.zeros((4, nj)), np.zeros(4)
+        self.laws_i, self.laws_j = np.zeros((4, ni)), np.zeros((4, nj))
+        self.blends = np.zeros(ni + 1), np.zeros(nj + 1)
         self.kept, self.scratch = np.zeros((ni + 1) * KEPT), np.zeros(ROWS)
         self.per_line, self.other_lines = np.zeros((2, 3, nj + 1))
         self.workspace: Workspace | None = None
@@ -454,8 +454,7 @@ class _Block:
 
     def _advance(self, old, wanted) -> bool:
         options = self.options
-        fill_laws(wanted, int(options.conditional), self.laws_i, self.laws_j, self.scalars)
-        sigma = float(self.scalars[SIGMA])
+        sigma = fill_laws(wanted, options.conditional, self.laws_i, self.laws_j, *self.blends)
         self.pull = 0.0 if options.alone else 1.0
         self.weight = 0.25 * sigma * (1.0 if options.alone else options.epsilon)
         self.floors = fill_floors(old, options.floor)

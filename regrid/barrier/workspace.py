@@ -14,7 +14,7 @@ import math
 import numba
 import numpy as np
 
-from regrid.algebraic import fill_curves, fill_displacement, fill_moved
+from regrid.algebraic import SideMotion, fill_curves, fill_moved
 from regrid.barrier.assembly import (
     NODE_ROWS,
     assemble_barrier,
@@ -23,17 +23,17 @@ from regrid.barrier.assembly import (
 )
 from regrid.barrier.coarse_nodes import CoarseCorrection
 from regrid.barrier.line_cg import fill_product, solve_serial, solve_threaded
-from regrid.barrier.residual_estimate import LOOK_ROWS, look_serial, look_threaded
-from regrid.barrier.side_laws import (
-    SIGMA,
-    BarrierLaw,
-    compute_dear_rate,
-    compute_mean_area,
-    fill_blends,
-    fill_growth,
-    fill_laws,
-    weigh_curves,
+from regrid.barrier.residual_estimate import (
+    ASPECT,
+    COSECANT,
+    LEAST_SCALED,
+    LOOK_ROWS,
+    MOST_SHRUNK,
+    STRAYED,
+    look_serial,
+    look_threaded,
 )
+from regrid.barrier.side_laws import BarrierLaw, prepare, weigh_curves
 from regrid.barrier.step_control import SPAN, WIDEST, measure_corners
 from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
@@ -86,11 +86,11 @@ class Workspace:
     lays them out there.
     """
 
-    old: np.ndarray
-    sides: np.ndarray
-    base: np.ndarray
-    trial: np.ndarray
-    sound: np.ndarray
+    own_old: np.ndarray
+    own_sides: np.ndarray
+    own_base: np.ndarray
+    own_trial: np.ndarray
+    own_sound: np.ndarray
     curve: np.ndarray
     gradient: np.ndarray
     solution: np.ndarray
@@ -115,9 +115,8 @@ class Workspace:
         self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
         self.bent = False
         self.bend = np.zeros((ni + 1, nj + 1))
-        self.way, self.reach = np.zeros((2, nj + 1)), np.zeros(nj + 1)
+        self.way = np.zeros((2, nj + 1))
         self.most_bend = np.zeros(nj + 1)
-        self.block = np.zeros(1)
         self.boundary_check = BoundaryCheck(ni, nj)
         inner = nj - 1
         chunks = max(1, min(threads, inner // 8), -(-inner // WIDEST))
@@ -128,13 +127,17 @@ class Workspace:
         self.whole_columns = self.columns.copy()
         self.whole_columns[-1] += -(nj - self.columns[-2]) % 8
         vector = (2, ni + 1, -(-(int(self.whole_columns[-1]) + 1) // 8) * 8)
-        self.totals, self.least = np.zeros(vector[2]), np.zeros((chunks, 3))
+        self.totals, self.found = np.zeros(vector[2]), np.zeros((chunks, 5))
+        self.motion_tables = (
+            np.zeros((6, ni + 1)), np.zeros((6, nj + 1)), np.zeros((2, 5)), np.zeros((2, nj + 1)),
+            np.zeros(nj + 1),
+        )  # fmt: skip
         self.least_dear_rate = 0.0
         self.coarse = CoarseCorrection(ni, nj, tuning)
         # what is of the block's size, by name: shape, and the column at which a cache line begins
         self.arrays = {
-            **dict.fromkeys(("old", "sides", "base", "trial"), (shape, 0)),
-            "sound": ((ni, nj), 0),
+            **dict.fromkeys(("own_old", "own_sides", "own_base", "own_trial"), (shape, 0)),
+            "own_sound": ((ni, nj), 0),
             "coarse_memory": ((self.coarse.size,), 0),
             "gradient": (shape, 0),
             **dict.fromkeys(VECTORS, (vector, 1)),
@@ -147,7 +150,8 @@ class Workspace:
         self._whole = np.zeros(0)
         if not shared:
             self._lay(np.zeros(self.size))
-            self.sound[:] = 1.0
+            self.own_sound[:] = 1.0
+            self.use_own()
 
     def _lay(self, whole: np.ndarray) -> None:
         """Lay the large arrays into `whole` (`size` or more,)."""
@@ -170,32 +174,45 @@ class Workspace:
         rows[-1, :, :, self.columns[-1] - self.columns[-2] + 1 :] = 0.0
         self.clean = True
 
-    @property
-    def displacement(self) -> np.ndarray:
-        """Of the old grid's nodes, (2, ni + 1, nj + 1), until something is tried."""
-        return self.trial
-
     @functools.cached_property
     def full_barrier(self) -> np.ndarray:
         """Parts (ni, nj) of a barrier that has the same weight everywhere."""
         return np.ones((self.ni, self.nj))
 
+    def use_own(self) -> None:
+        """Let all grids be arrays of the workspace, whose contents may be anything."""
+        self.old, self.sides, self.sound = self.own_old, self.own_sides, self.own_sound
+        self.base, self.trial = self.own_base, self.own_trial
+
     def take(self, previous, boundary, transposed, mirrored, sound=None) -> None:
         """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides.
 
         `sound` (ni, nj) [m/s], where speeds of sound are given; without a grid before sides alone.
+        In the workspace's own frame they are read where they are, and `base` is a new array.
         """
         if self.shared:
             self._lay(share_memory(self.size))
             self.clean = False
-        if previous is not None:
-            load_grid(previous, self.old, transposed, mirrored, inside=True)
-        load_grid(boundary, self.sides, transposed, mirrored, inside=False)
+        self.use_own()
+        if not (transposed or mirrored):
+            self.base, self.sides = np.empty(self.shape), boundary
+            self.old = boundary if previous is None else previous
+        else:
+            load_grid(boundary, self.sides, transposed, mirrored, inside=False)
+            if previous is not None:
+                load_grid(previous, self.old, transposed, mirrored, inside=True)
         if sound is not None:
-            self.sound[:] = sound.T if transposed else sound
+            self.sound = np.ascontiguousarray(sound.T) if transposed else sound
+
+    def keep_own(self, old: np.ndarray, sides: np.ndarray) -> None:
+        """Copies of `old` and `sides` that may be written to, in their places."""
+        self.old, self.sides = self.own_old, self.own_sides
+        self.old[:], self.sides[:] = old, sides
 
     def give(self, transposed: bool, mirrored: bool) -> np.ndarray:
         """The grid `trial` in the block's own frame, to keep."""
+        if not (transposed or mirrored or self.trial is self.own_trial):
+            return self.trial
         source = self.trial[::-1] if mirrored else self.trial
         return np.array(source.transpose(0, 2, 1) if transposed else source, order="C")
 
@@ -215,40 +232,36 @@ class Workspace:
         of sides bend, lines take their shapes and the barrier is no weaker than (R4.17) has it.
         """
         tuning = tuning or self.tuning
-        fill_laws(self.sides, 1 if conditional else 0, self.along_i, self.along_j, self.block)
-        fill_growth(self.along_i, ki - kj)
-        fill_blends(self.sides, self.blend_i, self.blend_j)
-        if self.bent:
-            np.subtract(self.sides[:, -1], self.sides[:, 0], out=self.way)
-        self.sigma = float(self.block[SIGMA])
-        self.area_target = self.sigma / compute_mean_area(
-            self.along_i, self.along_j, self.blend_i, self.blend_j
-        )
-        scale, epsilon, cost_weight = 0.0, tuning.epsilon, tuning.cost_weight if cost else 0.0
+        epsilon, share_i, share_j = float(tuning.epsilon), 0.0, 0.0
         if curved:
             share_i, share_j, least = weigh_curves(
                 self.sides, tuning.open_side, tuning.closed_side, tuning.curved_barrier,
                 tuning.half_barrier,
             )  # fmt: skip
-            curved = share_i + share_j > 0.0
-            if curved:
+            if share_i + share_j > 0.0:
                 fill_curves(self.sides, share_i, share_j, self.curve)
                 epsilon = max(epsilon, least)
-        if cost_weight > 0.0:
-            dear = compute_dear_rate(
-                self.sound, self.along_i, self.along_j, self.blend_i, self.blend_j,
-                self.area_target, tuning.cost_margin,
-            )  # fmt: skip
-            dear = max(dear, self.least_dear_rate)
-            scale = 2.0 / dear**2 if dear > 0.0 else 0.0
-        self.law = BarrierLaw(
-            self.along_i, self.along_j, self.blend_i, self.blend_j,
-            self.bend, self.way, self.curve, curved, float(ki), float(kj),
-            self.sigma, float(self.area_target), float(epsilon), float(tuning.area_weight),
-            float(tuning.least_sine), float(tuning.strengthening), 1.0, self.sound, float(scale),
-            float(cost_weight),
+        law = BarrierLaw(
+            self.along_i, self.along_j, self.blend_i, self.blend_j, self.bend, self.most_bend,
+            self.way, self.curve, share_i + share_j > 0.0, float(ki), float(kj), 0.0, 0.0, epsilon,
+            float(tuning.area_weight), float(tuning.least_sine), float(tuning.strengthening), 1.0,
+            self.sound, 0.0, float(tuning.cost_weight) if cost else 0.0,
         )  # fmt: skip
+        self.motion = SideMotion(self.sides, *self.motion_tables)
+        self.block = prepare(
+            self.old, law, self.motion, self.bent, conditional,
+            (float(tuning.cost_margin), float(self.least_dear_rate)), self.boundary_check.scratch,
+        )  # fmt: skip
+        _, _, _, self.sigma, self.area_target, scale = self.block
+        self.law = law._replace(sigma=self.sigma, area_target=self.area_target, cost_scale=scale)
         self.iterations = 0
+
+    @property
+    def is_simple(self) -> bool:
+        """Do the sides run round an area, and neither cross nor touch?"""
+        return self.block.area > 0.0 and self.boundary_check.is_clear(
+            self.block.meeting, self.sides
+        )
 
     def take_first_grid(self, first) -> None:
         """Keep the spacing law that each line j = const has in the grid `first`; theory R4.9."""
@@ -261,35 +274,39 @@ class Workspace:
         if self.bent:
             self.bend = bend
 
-    def carry_sides(self, old) -> None:
-        """Fill `displacement` of the nodes `old` from the sides', lines by their own laws.
+    def fill_moved(self) -> None:
+        """`base` = the old grid moved along with its sides (R6.5)."""
+        fill_moved(self.old, self.motion, self.bend, self.bent, self.base)
 
-        And `base`, the grid moved by it, with the sides themselves.
-        """
-        fill_displacement(old, self.sides, self.displacement)
-        fill_moved(
-            old, self.sides, self.bend, self.most_bend, self.bent, self.displacement, self.base,
-            self.reach,
-        )  # fmt: skip
-
-    def look(self, nodes, old) -> tuple[float, float, float]:
+    def look(self, nodes, old, moves: bool = False) -> tuple[float, float, float]:
         """Least ratio of corner areas to those of `old`, an estimate of the residual in cells, and
         how far inner nodes are from interpolated places at most, in old cell heights.
 
-        The ratio is 0 unless all areas are positive numbers; the estimate is infinite then.
+        With `moves` the `nodes` are written first: `old` moved along with its sides (R6.5).  The
+        ratio is 0 unless all areas are positive numbers; the estimate is infinite then.
         """
         look = look_serial
         if self.threads > 1:
             self._set_threads()
             look = look_threaded
-        ratio, area, total, strayed = look(
-            nodes, old, self.law, self.bent, self.reach, self.columns, self.coarse.starts_i,
-            self.coarse.sums, self.totals, self.least, self.scratch,
+        total, self.marks = look(
+            nodes, old, self.law, self.bent, self.motion, moves, self.columns,
+            self.coarse.starts_i, self.coarse.sums, self.totals, self.found, self.scratch,
         )  # fmt: skip
-        if not (area > 0.0 and ratio > 0.0 and total >= 0.0):
-            return max(ratio, 0.0) if area > 0.0 else 0.0, math.inf, math.inf
+        found = self.found[0]
+        good, shrunk = found[LEAST_SCALED] > 0.0, found[MOST_SHRUNK]
+        if not (good and shrunk > 0.0 and total >= 0.0):
+            return self.compare_corners(nodes, old) if good else 0.0, math.inf, math.inf
         inner = (self.ni - 1) * (self.nj - 1)
-        return ratio, math.sqrt(total / (self.sigma * inner)), strayed
+        residual = math.sqrt(total / (self.sigma * inner))
+        return float(1.0 / shrunk), residual, float(found[STRAYED])
+
+    def get_quality(self) -> tuple[float, float, int, int] | None:
+        """What `measure_worst` says of the grid looked at last, if all its corners are positive."""
+        cosecant, aspect = self.found[0, COSECANT], self.found[0, ASPECT]
+        if self.marks or not cosecant < math.inf:
+            return None
+        return math.sqrt(1.0 / cosecant), math.sqrt(aspect), 0, 0
 
     def assemble(self, nodes) -> None:
         """Gradient and Hessian of the functional on a convex grid."""

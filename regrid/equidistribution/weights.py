@@ -36,7 +36,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE, fill_blends, fill_laws
+from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE, fill_laws
 from regrid.curves import arc_law, solve_ed1
 from regrid.errors import BadInput, suggest
 from regrid.measure.corners import compute_centres
@@ -357,10 +357,9 @@ def compute_side_density(boundary: np.ndarray) -> np.ndarray:
     boundary (2, ni+1, nj+1), of which only the sides are read; theory R10.10.
     """
     ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
-    along_i, along_j, block = np.zeros((5, ni)), np.zeros((5, nj)), np.zeros(1)
+    along_i, along_j = np.zeros((5, ni)), np.zeros((5, nj))
     blend_i, blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
-    fill_laws(boundary, 1, along_i, along_j, block)
-    fill_blends(boundary, blend_i, blend_j)
+    fill_laws(boundary, True, along_i, along_j, blend_i, blend_j)
     u, v = 0.5 * (blend_i[1:] + blend_i[:-1]), 0.5 * (blend_j[1:] + blend_j[:-1])
     length = along_i[LENGTH][:, None] + along_i[LENGTH_CHANGE][:, None] * v
     width = along_j[LENGTH] + u[:, None] * along_j[LENGTH_CHANGE]

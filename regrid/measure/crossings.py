@@ -189,17 +189,22 @@ class BoundaryCheck:
     def __init__(self, ni: int, nj: int):
         count = 2 * (ni + nj)
         leaves = 1 << max(0, (-(-count // LEAF) - 1).bit_length())
-        self.line = np.empty((2, count + 1))
-        self.tree = np.empty((4, 2 * leaves)), np.empty(2 * leaves, dtype=np.int64)
-        self.ends = np.empty((2, 2 * leaves), dtype=np.int64)
-        self.stack = np.empty((2, 256), dtype=np.int64)
+        self.scratch = (
+            np.empty((2, count + 1)), np.empty((4, 2 * leaves)),
+            np.empty(2 * leaves, dtype=np.int64), np.empty((2, 2 * leaves), dtype=np.int64),
+            np.empty((2, 256), dtype=np.int64),
+        )  # fmt: skip
 
     def is_simple(self, nodes: np.ndarray) -> bool:
         """Does the boundary of `nodes` (2, ni+1, nj+1) neither cross nor touch itself?  Exact.
 
         False as well where two neighbours on it are one point, or a node is not finite.
         """
-        first, _ = search_meeting(nodes, self.line, *self.tree, self.ends, self.stack)
+        return self.is_clear(search_meeting(nodes, *self.scratch)[0], nodes)
+
+    @staticmethod
+    def is_clear(first: int, nodes: np.ndarray) -> bool:
+        """`is_simple`, where `search_meeting` has found `first`."""
         return first == NONE or (first != COINCIDENT and find_crossing(nodes) is None)
 
 

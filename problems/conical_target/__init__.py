@@ -1,4 +1,4 @@
-"""Graphite in a conical target: deck <- layout, ripple, growth, peaks <- report <- problem.
+"""Graphite in a conical target: layout <- report <- pictures <- problem.
 
 May import: the contract of `problems`, `problems.initial_states`, `problems.references`.
 """

@@ -1,10 +1,8 @@
-"""Convecting boxes as `runs` sees them: towards a steady state, or in time.
+"""Convecting boxes: as `runs` sees them, steady or in time; their reports and pictures.
 
 A steady run counts Newton iterations as its steps, and as its time as well.  Note: what its
 history shows before the end are iterates, most of them at a smaller Rayleigh number than the
 deck's; the column `buoyancy` says what part of the wanted one has been reached.
-
-The reports of `heated-cavity` and `rayleigh-benard`, and their pictures.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A plate on a wedge: deck, plateau <- set_up <- run, report <- pictures <- problem <- polars.
+"""A plate on a wedge: set_up <- report <- run, pictures <- problem.
 
 May import: the contract of `problems`, `problems.initial_states`, `problems.references`.
 """

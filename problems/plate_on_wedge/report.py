@@ -1,8 +1,8 @@
-"""The pressure behind a running contact point A: the plateau found in the data, or none.
+"""Closing screen of `plate-on-wedge`: the contact point A against shock polars.
 
-Nothing but A's path sets a length in the flow around A, so pressures at equal parts of the path
-behind A are compared: in every step on a fixed set of parts, then over all steps.  From A
-backwards there come
+The pressure behind A is a plateau found in the data, or none.  Nothing but A's path sets a length
+in the flow around A, so pressures at equal parts of the path behind A are compared: in every step
+on a fixed set of parts, then over all steps.  From A backwards there come
 
 1. the numerical rise and its ringing, as many faces long in any cells: left out of every step;
 2. the plateau, the zone of constant states that only A has seen;
@@ -11,8 +11,6 @@ backwards there come
 Near the critical angle there is no plateau: the fall begins at A.  Then the line of the fall is
 continued to A.  Note: behind the rise the scheme's own crest and dip are a few faces long
 each, and a mean over so few faces may pass for a plateau of the wrong pressure.
-
-Closing screen of `plate-on-wedge`: the contact point against shock polars.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Oblique waves in a steady supersonic flow of any material: shock polars and fans of expansion.
+"""Oblique waves of any material: shock polars, a shock along a line, a plate thrown onto a wedge.
 
-A flow at speed q meets a straight front at the angle phi (between oncoming flow and front).  The
-component along the front does not change, the component across it jumps like a plane shock whose
-speed is the oncoming normal component ([CourantFriedrichs1948] IV):
+Shock polars and fans.  A flow at speed q meets a straight front at the angle phi (between oncoming
+flow and front).  The component along the front does not change, the component across it jumps like
+a plane shock whose speed is the oncoming normal component ([CourantFriedrichs1948] IV):
 
     Us = q sin(phi),   tan(theta) = up cos(phi)/(q - up sin(phi)),
 
@@ -15,12 +15,11 @@ constant (c is the sound speed):
     d theta = sqrt(q^2/c^2 - 1) dp/(rho q^2).
 
 Note: a polar has two shocks of one deflection; the weak one, of lower pressure, is what a
-flow past a body chooses.  Angles are in radians, all other units are the caller's (SI here).
+flow past a body chooses.
 
-A shock that runs along a line between two materials, and what becomes of a ripple on the line.
-
-Seen from the point where the shocks cross the line, both materials come along it with the speed W
-of that point.  Each is turned by an oblique shock of its own, by the same angle and to the same
+A shock that runs along a line between two materials, and the ripple on it (`cross_line`).  Seen
+from the point where the shocks cross the line, both materials come along it with the speed W of
+that point.  Each is turned by an oblique shock of its own, by the same angle and to the same
 pressure; no further wave starts from the point when the flow behind the faster shock is subsonic
 ([CourantFriedrichs1948] IV).  Above the pressure ahead the polars cross first where
 
@@ -34,14 +33,12 @@ incompressible fluids [Mikaelian1994]:
     s = k |q_2 - q_1| sqrt(rho_1 rho_2)/(rho_1 + rho_2)
 
 with A = (rho_2 - rho_1)/(rho_2 + rho_1); r alone is Richtmyer's impulse, s alone Kelvin and
-Helmholtz's layer.  Note: time counts from the passage of the shock at the place of the wave.
-Units are the caller's, angles in radians.
+Helmholtz's layer.  Time counts from the passage of the shock at the place of the wave.
 
-Oblique collision of a plate with a wedge: attached shocks without a jet, or a jet.
-
-The plate moves at V across its own free surface, which makes the angle beta with the face of the
-wedge at rest; the contact point A then runs along the face at V/sin(beta).  In the frame of A
-both materials come in along their own surfaces [Walsh1953],
+Oblique collision of a plate with a wedge: attached shocks, or a jet (`solve_collision`).  The plate
+moves at V across its own free surface, which makes the angle beta with the face of the wedge at
+rest; the contact point A then runs along the face at V/sin(beta).  In the frame of A both materials
+come in along their own surfaces [Walsh1953],
 
     plate at q = V/tan(beta),   wedge at q = V/sin(beta),
 

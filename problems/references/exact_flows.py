@@ -1,4 +1,4 @@
-"""Exact flows: Sedov's blast wave, Taylor's wave behind a detonation, the isentropic vortex."""
+"""Exact flows: blast wave, wave behind a detonation, vortex, Kidder's shell, oblique shock."""
 
 from __future__ import annotations
 
@@ -227,3 +227,68 @@ class Vortex:
         u, v = momentum_x / rho, momentum_y / rho
         p = (self.gamma - 1.0) * (total - 0.5 * rho * (u * u + v * v))
         return rho, u, v, p
+
+
+RADII = (0.9, 1.0)
+PRESSURES = (0.1, 10.0)
+OUTER_DENSITY = 0.01
+
+
+class Shell:
+    """Exact solution of the shell in n dimensions [Kidder1976].
+
+    `tau`: when it has collapsed to the centre [s]; `entropy`: s of p = s rho^gamma; `densities`:
+    at both surfaces at t = 0 [kg/m³].
+    """
+
+    def __init__(self, n: int):
+        self.n, self.gamma = n, 1.0 + 2.0 / n
+        self.entropy = PRESSURES[1] / OUTER_DENSITY**self.gamma
+        inner, outer = ((p / self.entropy) ** (1.0 / self.gamma) for p in PRESSURES)
+        self.densities = inner, outer
+        # tau² = (g - 1)/2 (r2² - r1²)/(c2² - c1²), c² = g s rho^(g - 1)
+        power = self.gamma - 1.0
+        rise = self.gamma * self.entropy * (outer**power - inner**power)
+        self.tau = math.sqrt(0.5 * power * (RADII[1] ** 2 - RADII[0] ** 2) / rise)
+
+    def compute_shrinking(self, t: float) -> float:
+        """h(t), the ratio of any radius to its first one; t in seconds, below tau."""
+        return math.sqrt(1.0 - (t / self.tau) ** 2)
+
+    def compute_pressures(self, t: float) -> tuple[float, float]:
+        """On the inner and the outer surface at time t [Pa]."""
+        rise = self.compute_shrinking(t) ** -(self.n + 2)
+        return PRESSURES[0] * rise, PRESSURES[1] * rise
+
+    def compute_density(self, r: np.ndarray, t: float) -> np.ndarray:
+        """Density at time t [kg/m³] at the radii r [m]."""
+        h, power = self.compute_shrinking(t), self.gamma - 1.0
+        part = ((r / h) ** 2 - RADII[0] ** 2) / (RADII[1] ** 2 - RADII[0] ** 2)
+        inner, outer = (rho**power for rho in self.densities)
+        return ((1.0 - part) * inner + part * outer) ** (1.0 / power) / h**self.n
+
+
+def compute_wedge_deflection(mach: float, beta: float, gamma: float) -> float:
+    """Deflection [rad] of a gas by a shock at the angle `beta` [rad] to a flow at Mach `mach`.
+
+    Any text on gas dynamics, e.g. NACA report 1135 (1953), equation 148.
+    """
+    across = (mach * math.sin(beta)) ** 2
+    rise = 2.0 * (across - 1.0) / math.tan(beta)
+    return math.atan(rise / (mach**2 * (gamma + math.cos(2.0 * beta)) + 2.0))
+
+
+def find_shock_angle(mach: float, angle: float, gamma: float) -> float:
+    """Angle [rad] of the weak attached shock; BadInput where there is none."""
+    from scipy.optimize import brentq, minimize_scalar  # slow to load
+
+    ends = math.asin(1.0 / mach), 0.5 * math.pi
+    turn = lambda beta: compute_wedge_deflection(mach, beta, gamma)  # noqa: E731
+    exactly = {"method": "bounded", "options": {"xatol": 1e-10}}
+    best = minimize_scalar(lambda beta: -turn(beta), bounds=ends, **exactly).x
+    if angle >= turn(best):
+        raise BadInput(
+            f"deck: angle is {math.degrees(angle):g} degrees; at Mach {mach:g} the shock stays "
+            f"attached up to {math.degrees(turn(best)):.4g} degrees only"
+        )
+    return brentq(lambda beta: turn(beta) - angle, ends[0], best)

@@ -25,48 +25,12 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
 from problems.problem import Problem, Report, compare, draw_field, get_last
+from problems.references.exact_flows import RADII, Shell
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
-RADII = (0.9, 1.0)
-PRESSURES = (0.1, 10.0)
-OUTER_DENSITY = 0.01
 END = math.sqrt(0.75)  # of tau: h is one half
 SHAPES = {1: "slab", 2: "ring", 3: "sphere"}
-
-
-class Shell:
-    """Exact solution of the shell in n dimensions [Kidder1976].
-
-    `tau`: when it has collapsed to the centre [s]; `entropy`: s of p = s rho^gamma; `densities`:
-    at both surfaces at t = 0 [kg/m³].
-    """
-
-    def __init__(self, n: int):
-        self.n, self.gamma = n, 1.0 + 2.0 / n
-        self.entropy = PRESSURES[1] / OUTER_DENSITY**self.gamma
-        inner, outer = ((p / self.entropy) ** (1.0 / self.gamma) for p in PRESSURES)
-        self.densities = inner, outer
-        # tau² = (g - 1)/2 (r2² - r1²)/(c2² - c1²), c² = g s rho^(g - 1)
-        power = self.gamma - 1.0
-        rise = self.gamma * self.entropy * (outer**power - inner**power)
-        self.tau = math.sqrt(0.5 * power * (RADII[1] ** 2 - RADII[0] ** 2) / rise)
-
-    def compute_shrinking(self, t: float) -> float:
-        """h(t), the ratio of any radius to its first one; t in seconds, below tau."""
-        return math.sqrt(1.0 - (t / self.tau) ** 2)
-
-    def compute_pressures(self, t: float) -> tuple[float, float]:
-        """On the inner and the outer surface at time t [Pa]."""
-        rise = self.compute_shrinking(t) ** -(self.n + 2)
-        return PRESSURES[0] * rise, PRESSURES[1] * rise
-
-    def compute_density(self, r: np.ndarray, t: float) -> np.ndarray:
-        """Density at time t [kg/m³] at the radii r [m]."""
-        h, power = self.compute_shrinking(t), self.gamma - 1.0
-        part = ((r / h) ** 2 - RADII[0] ** 2) / (RADII[1] ** 2 - RADII[0] ** 2)
-        inner, outer = (rho**power for rho in self.densities)
-        return ((1.0 - part) * inner + part * outer) ** (1.0 / power) / h**self.n
 
 
 class KidderDeck(Deck, kw_only=True):

@@ -22,33 +22,11 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.problem import Problem, Report, compare, draw_field, find_crossing
+from problems.references.exact_flows import find_shock_angle
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
 LENGTH, BEFORE, HEIGHT = 1.0, 0.25, 1.0
-
-
-def compute_deflection(mach: float, beta: float, gamma: float) -> float:
-    """Deflection [rad] behind a shock at the angle `beta` [rad] to a flow at Mach `mach`."""
-    across = (mach * math.sin(beta)) ** 2
-    rise = 2.0 * (across - 1.0) / math.tan(beta)
-    return math.atan(rise / (mach**2 * (gamma + math.cos(2.0 * beta)) + 2.0))
-
-
-def find_shock_angle(mach: float, angle: float, gamma: float) -> float:
-    """Angle [rad] of the weak attached shock; BadInput where there is none."""
-    from scipy.optimize import brentq, minimize_scalar  # slow to load
-
-    ends = math.asin(1.0 / mach), 0.5 * math.pi
-    turn = lambda beta: compute_deflection(mach, beta, gamma)  # noqa: E731
-    exactly = {"method": "bounded", "options": {"xatol": 1e-10}}
-    best = minimize_scalar(lambda beta: -turn(beta), bounds=ends, **exactly).x
-    if angle >= turn(best):
-        raise BadInput(
-            f"deck: angle is {math.degrees(angle):g} degrees; at Mach {mach:g} the shock stays "
-            f"attached up to {math.degrees(turn(best)):.4g} degrees only"
-        )
-    return brentq(lambda beta: turn(beta) - angle, ends[0], best)
 
 
 class ObliqueShockDeck(Deck, kw_only=True):

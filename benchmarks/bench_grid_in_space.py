@@ -23,7 +23,7 @@ from regrid.measure.hexahedra import (
     compute_volumes,
     find_bad_hexahedra,
 )
-from runs.grids.marching_in_space import march_in_space
+from runs.grids.making import march_in_space
 
 BLOCKS = ("ks_block_1", "ks_block_2")
 SETTLED, PASSES = 1e-3, 40

@@ -27,7 +27,7 @@ from benchmarks.mpi_scaling.cases import Case, Timing, find_mpiexec, measure  # 
 from benchmarks.mpi_scaling.model import describe_load, fit, predict  # noqa: E402
 from benchmarks.mpi_scaling.picture import draw  # noqa: E402
 from benchmarks.mpi_scaling.projection import project  # noqa: E402
-from runs.bench.tables import describe_machine  # noqa: E402
+from runs.bench import describe_machine  # noqa: E402
 
 RESULT = ROOT / "docs" / "results" / "mpi.json"
 PICTURE = ROOT / "docs" / "pictures" / "scaling.png"

@@ -12,7 +12,7 @@ import sys
 
 from result_tables import Tables
 
-from runs.bench.child_time import read_child_time
+from runs.bench import read_child_time
 
 REPEATS = 5
 CASES = {

@@ -27,15 +27,17 @@ sys.path.insert(0, str(ROOT))
 
 from hydro.clock import START_FACTORS  # noqa: E402
 from runs.deck.reading import read_deck  # noqa: E402
-from runs.forecast.cost import foretell_steps, measure_size  # noqa: E402
-from runs.forecast.past_runs import (  # noqa: E402
+from runs.forecast.cost import (  # noqa: E402
     DELIVERED,
+    TimeLeft,
+    drop_events,
     find_past,
+    foretell_steps,
     make_past_run,
+    measure_size,
     name_flow,
     read_delivered,
 )
-from runs.forecast.time_left import TimeLeft, drop_events  # noqa: E402
 from runs.store.reader import RunData  # noqa: E402
 
 # decks whose steps are foretold from a run of theirs, at cells that take seconds

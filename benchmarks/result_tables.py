@@ -1,4 +1,4 @@
-"""Tables of the benchmarks: those of `runs.bench.tables`, kept as JSON by `--json FILE`."""
+"""Tables of the benchmarks: those of `runs.bench`, kept as JSON by `--json FILE`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from runs.bench import tables
+from runs import bench as tables
 
 
 class Tables(tables.Tables):

@@ -13,9 +13,8 @@ from pathlib import Path
 
 from accuracy_tables import make_table
 
-from runs.forecast.advice import describe_settings
-from runs.forecast.meaning import WORDS
-from runs.inspection.verdict import RULES
+from runs.forecast.step_trend import MEANINGS, describe_settings
+from runs.inspection.account import RULES
 
 RESULTS = Path(__file__).resolve().parent / "results"
 SHARES = ("10%", "25%", "50%")
@@ -74,5 +73,5 @@ def _list_rules() -> list[str]:
 
 
 def _list_meanings() -> list[str]:
-    rows = [[f"`{name}`", words, describe_settings(name)] for name, words in WORDS.items()]
+    rows = [[f"`{name}`", words, describe_settings(name)] for name, (words, _) in MEANINGS.items()]
     return make_table(["name", "what it says", "what can be changed"], rows)

@@ -59,7 +59,7 @@ from problems.registry import read_docstring  # noqa: E402
 from runs.early_end.causes import ENDS, SLOW  # noqa: E402
 from runs.inspection.account import describe_convexity, measure_drifts  # noqa: E402
 from runs.store.reader import RunData  # noqa: E402
-from runs.verify.table import HEADS, describe_bars, format_record  # noqa: E402
+from runs.verify import HEADS, describe_bars, format_record  # noqa: E402
 
 REGION = re.compile(
     r"(<!-- generated: (?P<kind>\w+) (?P<arguments>.*?) -->\n)(.*?)(<!-- end generated -->)",

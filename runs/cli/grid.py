@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import click
 
-from runs.cli.command_group import Commands
-from runs.cli.echo import echo
+from runs.cli.terminal import Commands, echo
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

@@ -16,13 +16,49 @@ import click
 
 from problems.problem_file import describe_mistake
 from regrid.errors import BadInput, RunFailure
-from runs.cli.command_group import Commands
-from runs.cli.echo import echo, echo_sentences, echo_usage
 from runs.cli.grid import grid
-from runs.cli.outside import describe_outside
-from runs.cli.streams import print_what_can_be_shown
-from runs.cli.study import study
+from runs.cli.terminal import (
+    Commands,
+    describe_outside,
+    echo,
+    echo_sentences,
+    echo_usage,
+    print_what_can_be_shown,
+)
 from runs.ranks.started import is_for_ranks
+
+
+@click.command()
+@click.argument("deck", metavar="PROBLEM_DECK_OR_STUDY")
+@click.option(
+    "--vary",
+    multiple=True,
+    metavar="KEY=VALUES",
+    help="A:B:N, A:B:N:log or V1,V2,...; several are varied in all combinations.",
+)
+@click.option(
+    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="A key of the deck for all runs."
+)
+@click.option("-o", "--output", metavar="DIR", help="Folder of the study.")
+@click.option("--jobs", type=click.IntRange(1), help="Runs at once [one a processor].")
+@click.option("--engine", default="processes", help="processes, mpi or dask://ADDRESS [processes].")
+@click.option("--of", "shown", multiple=True, metavar="NAME", help="Quantity to draw and print.")
+@click.option("--refine", metavar="KEY", help="The key of cells, for orders [cells].")
+@click.option("--retry", is_flag=True, help="Go on with runs that failed, too.")
+@click.option("--dry-run", is_flag=True, help="List the runs and what is there of each, and stop.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress, only the closing screen.")
+def study(deck, vary, settings, output, jobs, engine, shown, refine, retry, dry_run, quiet) -> int:
+    """Run a deck at many points: table, orders and picture.
+
+    DECK may be a study file, or the folder of a study to go on with.  Each point is a run directory
+    in DIR/runs and is computed once, also where the study was killed; a changed deck computes anew
+    what has changed.  Runs that fail are listed and end nothing.
+    """
+    from runs.study.command import study as compute
+
+    words = deck, vary, settings, output, jobs, engine, shown, refine, retry, dry_run, quiet
+    return compute(*words, echo, lambda text: echo(text, err=True))
+
 
 BAD_INPUT, FAILED, INTERNAL = 2, 3, 70
 
@@ -82,7 +118,7 @@ def list_problems(name: str | None) -> None:
 def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, picture, quiet) -> int:
     """Run a problem, a packaged deck, a deck file (TOML) or a problem's own file (Python)."""
     from runs.deck import reading as deck_reading
-    from runs.march.limits import WallLimit
+    from runs.march.runner import WallLimit
 
     limit = WallLimit(max_wall) if max_wall is not None else None
 
@@ -91,7 +127,7 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
         from regrid.interpreting import interpreted
         from runs.forecast.cost import foretell, measure_size
         from runs.inspection.listing import describe_plan
-        from runs.march.first_checks import check_deck_fully
+        from runs.march.launching import check_deck_fully
         from runs.ranks.map import describe_map
 
         with interpreted():
@@ -137,9 +173,8 @@ def restart(
     (or --set cells=N) the state is laid on another grid, and the run goes
     on in a directory of its own.
     """
-    from runs.march.launching import continue_runner
-    from runs.march.limits import WallLimit
-    from runs.march.remapping import remap_runner, wants_other_cells
+    from runs.march.launching import continue_runner, remap_runner, wants_other_cells
+    from runs.march.runner import WallLimit
     from runs.store.directory import open_directory
 
     limit = WallLimit(max_wall) if max_wall is not None else None
@@ -174,14 +209,14 @@ def check(deck, settings, schema) -> None:
 
     checked = deck_reading.read_deck(deck, settings)
     if schema:
-        from runs.deck.schema import schema_text
+        from runs.deck.checking import schema_text
 
         echo(schema_text(checked.problem), nl=False)
         return
     from regrid.interpreting import interpreted
-    from runs.deck.unset import describe_unset
-    from runs.inspection.cautions import describe_cautions
-    from runs.march.first_checks import check_deck_fully
+    from runs.deck.checking import describe_unset
+    from runs.inspection.account import describe_cautions
+    from runs.march.launching import check_deck_fully
 
     with interpreted():
         problem = checked.make_problem()
@@ -197,7 +232,7 @@ def check(deck, settings, schema) -> None:
 @click.argument("problem")
 def schema(problem) -> None:
     """Print the JSON schema of a problem's deck, for editors."""
-    from runs.deck.schema import schema_text
+    from runs.deck.checking import schema_text
 
     echo(schema_text(problem), nl=False)
 
@@ -228,7 +263,7 @@ def inspect(file, other) -> None:
 
     With OTHER, how that file differs from FILE, array by array.
     """
-    from runs.inspection.tree import inspect_differences, inspect_file
+    from runs.inspection.info import inspect_differences, inspect_file
 
     echo(inspect_differences(file, other) if other else inspect_file(file))
 
@@ -247,10 +282,27 @@ def inspect(file, other) -> None:
 @click.option("--mirror", type=click.Choice(["x", "y"]), help="Complete a half domain.")
 @click.option("--beside", metavar="DIR2", help="Another run, drawn to the same scale.")
 @click.option("--line", metavar="X0,Y0,X1,Y1", help="Values of the cells that this line [m] meets.")
+@click.option("--limits", metavar="LOW,HIGH", help="Of the colours, in SI units.")
+@click.option("--colours", metavar="NAME", help="A colour map of matplotlib, such as magma.")
 @click.option("--csv", "table", metavar="FILE", help="Write the values along --line, too.")
 @click.option("-o", "--output", metavar="FILE", help="Picture to write [DIR/<what>.png].")
 @click.option("--dpi", type=click.IntRange(20, 1200), default=140, help="Dots an inch [140].")
-def plot(directory, fields, what, at, mesh, zoom, mirror, beside, line, table, output, dpi) -> None:
+def plot(
+    directory,
+    fields,
+    what,
+    at,
+    mesh,
+    zoom,
+    mirror,
+    beside,
+    line,
+    limits,
+    colours,
+    table,
+    output,
+    dpi,
+) -> None:
     """Draw fields, grids, interfaces or the history of a run.
 
     Without options: the density (or the first field) at four times. Beside
@@ -260,7 +312,7 @@ def plot(directory, fields, what, at, mesh, zoom, mirror, beside, line, table, o
     from runs.pictures.command import draw
 
     words = fields, what, at, mesh, zoom, mirror, output, dpi, _say, beside, line, table
-    for path in draw(directory, *words):
+    for path in draw(directory, *words, limits, colours):
         echo(path)
 
 
@@ -272,7 +324,7 @@ def export(directory, output) -> None:
 
     At every dump: x, y and the length along each curve.
     """
-    from runs.pictures.interface_curves import export_interfaces
+    from runs.pictures.curves import export_interfaces
 
     for path in export_interfaces(directory, output):
         echo(path)
@@ -307,7 +359,7 @@ def report(directory, output, film, dpi) -> None:
     All is in the file; it needs no network. That of a study links those of its
     runs. Wants the extra: pip install 'shockgrid[report]'.
     """
-    from runs.report.study import report as write_report
+    from runs.report.page import report as write_report
 
     echo(write_report(directory, output, film=film, dpi=dpi, say=_say))
 
@@ -325,17 +377,15 @@ def compare(a, b, rtol, atol) -> int:
     with other numbers of cells, or that did not march the same steps, dumps are paired by time,
     and L1 norms are what tolerances hold for.
     """
-    from runs.inspection import compare_grids
-    from runs.inspection.compare import compare as find
-    from runs.inspection.compare import describe_makers, report
+    from runs.inspection import compare as comparing
 
-    if compare_grids.is_needed(a, b):
-        table, exceeded = compare_grids.compare(a, b, rtol, atol)
-        echo("\n".join([table, *describe_makers(a, b)]))
-        return 1 if exceeded else 0
-    differences = find(a, b, rtol, atol)
-    echo("\n".join([report(differences, a, b), *describe_makers(a, b)]))
-    return 1 if differences else 0
+    if comparing.is_needed(a, b):
+        table, differ = comparing.compare_by_norms(a, b, rtol, atol)
+    else:
+        differences = comparing.compare(a, b, rtol, atol)
+        table, differ = comparing.report(differences, a, b), bool(differences)
+    echo("\n".join([table, *comparing.describe_makers(a, b)]))
+    return 1 if differ else 0
 
 
 cli.add_command(grid)
@@ -351,7 +401,7 @@ def verify(problems, short, output, jobs) -> int:
 
     The exit code is 1 if a bar is missed.
     """
-    from runs.verify.table import verify as run_all
+    from runs.verify import verify as run_all
 
     return run_all(problems, short, output, echo, jobs)
 
@@ -372,7 +422,7 @@ def bench(cells, rounds, runs, path, peer) -> None:
 
     Other work on the machine counts: leave it alone meanwhile.
     """
-    from runs.bench.command import bench as measure
+    from runs.bench import bench as measure
 
     measure(cells, rounds, runs, path, peer, echo)
 
@@ -411,7 +461,7 @@ def main(arguments: list[str] | None = None) -> int:
     print_what_can_be_shown()
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     if is_for_ranks(arguments):
-        from runs.ranks.following import run_on_ranks
+        from runs.ranks.world import run_on_ranks
 
         return run_on_ranks(lambda world: _main(arguments, world), echo_sentences)
     return _main(arguments)

@@ -10,18 +10,171 @@ schema is made, needs no words, and is not shown to it.
 
 from __future__ import annotations
 
+import json
 import math
 import re
+import textwrap
+import typing
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from problems.deck import Deck, DeckTable
+from problems.registry import load_problem, read_docstring
 from regrid.errors import BadInput, find_nearest
-from runs.deck.schema import make_parts
 
 if TYPE_CHECKING:
     from jsonschema import ValidationError
+
+
+DIGESTS = "digests"
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A dotted key of two decks with both its values; None where a deck leaves it out."""
+
+    key: str
+    before: Any
+    now: Any
+
+
+def find_tables(kind: type[DeckTable], prefix: str = "") -> Iterator[tuple[str, type[DeckTable]]]:
+    """Each table class in a deck `kind` with the dotted key of the table; "" for the deck."""
+    yield prefix, kind
+    for field in msgspec.structs.fields(kind):
+        key = f"{prefix}.{field.name}" if prefix else field.name
+        for inner in _find_table_types(field.type):
+            yield from find_tables(inner, key)
+
+
+def _find_table_types(kind: Any) -> Iterator[type[DeckTable]]:
+    if isinstance(kind, type) and issubclass(kind, DeckTable):
+        yield kind
+    for inner in typing.get_args(kind):
+        yield from _find_table_types(inner)
+
+
+def list_runtime_keys(kind: type[Deck]) -> list[str]:
+    """The dotted keys of a deck `kind` that a restart may change, the deck's own first."""
+    return [
+        f"{key}.{name}" if key else name
+        for key, table in find_tables(kind)
+        for name in table.runtime
+    ]
+
+
+def describe_runtime_keys(kind: type[Deck]) -> str:
+    """The same in words for a sentence: `kct_end, run.t_end, ..., output.*`."""
+    words = []
+    for key, table in find_tables(kind):
+        whole = len(table.runtime) == len(table.__struct_fields__)
+        names = ["*"] if key and whole else table.runtime
+        words += [f"{key}.{name}" if key else name for name in names]
+    return ", ".join(words)
+
+
+def is_runtime_key(key: str, kind: type[Deck]) -> bool:
+    """May a restart change the dotted `key`, or all that is in it?"""
+    allowed = list_runtime_keys(kind)
+    if any(key == one or key.startswith(f"{one}.") for one in allowed):
+        return True
+    tables = {name: table for name, table in find_tables(kind) if name}
+    return key in tables and set(tables[key].runtime) == set(tables[key].__struct_fields__)
+
+
+def find_differences(before: Deck, now: Deck) -> list[Difference]:
+    """Where two decks of one problem differ, by the order of the keys of `before`."""
+    one, two = msgspec.to_builtins(before), msgspec.to_builtins(now)
+    known = [table.pop(DIGESTS, None) or {} for table in (one, two)]
+    return [
+        found for found in _walk(one, two, "") if not _is_same_file(found.before, found.now, *known)
+    ]
+
+
+def _walk(before: Any, now: Any, key: str) -> Iterator[Difference]:
+    if isinstance(before, dict) and isinstance(now, dict):
+        for name in dict.fromkeys((*before, *now)):
+            inner = f"{key}.{name}" if key else name
+            yield from _walk(before.get(name), now.get(name), inner)
+    elif isinstance(before, list | tuple) and isinstance(now, list | tuple):
+        if len(before) != len(now) or not any(isinstance(one, dict) for one in before):
+            if list(before) != list(now):
+                yield Difference(key, before, now)
+            return
+        for place, (one, two) in enumerate(zip(before, now, strict=True)):
+            yield from _walk(one, two, f"{key}.{place}")
+    elif before != now:
+        yield Difference(key, before, now)
+
+
+def _is_same_file(before: Any, now: Any, known: dict[str, str], known_now: dict[str, str]) -> bool:
+    if not (isinstance(before, str) and isinstance(now, str) and before in known):
+        return False
+    return known[before] == known_now.get(now)
+
+
+RUNTIME, MAY_CHANGE = "x-restart", "may change"  # marks keys in a schema; editors pass it over
+
+
+def make_schema(problem: str) -> dict[str, Any]:
+    """The schema of the decks of `problem` as a plain dict, ready for json."""
+    schema = make_parts(load_problem(problem).Deck)
+    schema["properties"] = {
+        "problem": {"const": problem, "description": "the problem this deck is for"},
+        **schema["properties"],
+    }
+    head = {
+        "title": f"shockgrid deck: {problem}",
+        "description": read_docstring(problem).split("\n\n")[0].strip(),
+        "required": ["problem"],
+    }
+    parts = schema.pop("$defs")
+    for _, table in find_tables(load_problem(problem).Deck):
+        for name in table.runtime:
+            parts.get(table.__name__, schema)["properties"][name][RUNTIME] = MAY_CHANGE
+    return {**schema, **head, "$defs": parts}
+
+
+def make_parts(kind: type) -> dict[str, Any]:
+    """The schema of a deck's own fields, without the key problem, by which decks are checked."""
+    (outline,), parts = msgspec.json.schema_components([kind], ref_template="#/$defs/{name}")
+    name = outline["$ref"].rsplit("/", 1)[-1]
+    root = parts.pop(name)
+    root, parts = _without_null(root), _without_null(parts)
+    needed = any(field.required for field in msgspec.structs.fields(kind))
+    default = {} if needed else _without_null(msgspec.to_builtins(kind()))
+    for key, value in default.items():
+        entry = root["properties"][key]
+        if "default" not in entry:
+            entry["default"] = value
+    return {"$schema": "http://json-schema.org/draft-07/schema#", **root, "$defs": parts}
+
+
+def _without_null(part: Any) -> Any:
+    """The same with every null left out: TOML has no word for it, a key is left out instead.
+
+    Lists of fixed length are written the way draft 7 has them, which editors know.
+    """
+    if isinstance(part, list):
+        return [_without_null(entry) for entry in part]
+    if not isinstance(part, dict):
+        return part
+    part = {key: _without_null(value) for key, value in part.items() if value is not None}
+    if "prefixItems" in part:
+        part["items"] = part.pop("prefixItems")
+    choices = [entry for entry in part.pop("anyOf", []) if entry != {"type": "null"}]
+    if len(choices) == 1:
+        return choices[0] | part
+    return part | ({"anyOf": choices} if choices else {})
+
+
+def schema_text(problem: str) -> str:
+    """The schema as JSON text."""
+    return json.dumps(make_schema(problem), indent=2, default=str) + "\n"
+
 
 Where = Callable[[str], str]  # dotted key -> words for where it was given
 Part = Mapping[str, Any]  # of a schema
@@ -35,7 +188,7 @@ BOUNDS = {
 }  # fmt: skip
 
 REPLACED = {  # the last name of a key of older decks: what took its place, and what that is
-    "damping": ("thickness", "waves of a contact much shorter decay [m]"),
+    "damping": ("thickness", "waves of a contact much shorter decay [m]")
 }
 
 
@@ -287,3 +440,46 @@ def show(value: Any) -> str:
     else:
         text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+WIDTH = 100  # of a line
+HEAD = "# keys without a value, and what that means or what they could be:"
+
+
+def describe_unset(deck: Deck) -> str:
+    """Comment lines on the keys of a deck without a value; "" where all have one."""
+    schema = make_parts(type(deck))
+    entries = list(_find_unset(schema, schema, msgspec.to_builtins(deck), ""))
+    lines = [HEAD] if entries else []
+    for key, words in entries:
+        lines += textwrap.wrap(
+            f"{key}: {words}", WIDTH, initial_indent="# ", subsequent_indent="#     "
+        )
+    return "".join(f"{line}\n" for line in (["", *lines] if lines else []))
+
+
+def _find_unset(
+    schema: Mapping[str, Any], part: Mapping[str, Any], value: Any, prefix: str
+) -> Iterator[tuple[str, str]]:
+    """Dotted keys of a table with their words; the keys of a table that is left out after it."""
+    part = resolve(schema, part)
+    if isinstance(value, list | tuple) and isinstance(part.get("items"), dict):
+        for k, entry in enumerate(value):
+            yield from _find_unset(schema, part["items"], entry, f"{prefix}{k}.")
+        return
+    if not isinstance(value, dict):
+        return
+    kinds = [resolve(schema, one) for one in part.get("anyOf", ())]  # of several kinds of tables
+    part = next((one for one in kinds if value.keys() <= one.get("properties", {}).keys()), part)
+    for name, field in part.get("properties", {}).items():
+        key, inner = prefix + name, resolve(schema, field)
+        if value.get(name) is not None:
+            yield from _find_unset(schema, field, value[name], f"{key}.")
+            continue
+        words = field.get("description", inner.get("description", "")).strip().partition("\n")[0]
+        table = "properties" in inner
+        yield key, f"{words.rstrip('.')} ({'a table' if table else describe(schema, field)})"
+        if table:
+            for name_inside, field_inside in inner["properties"].items():
+                told = field_inside.get("description", "")
+                yield f"{key}.{name_inside}", f"{told} ({describe(schema, field_inside)})"

@@ -16,10 +16,9 @@ from regrid.errors import RunFailure
 
 @dataclass(frozen=True)
 class Setting:
-    """A key of the deck and how to change it.
+    """A key of the deck and how to change it; `words`: what that does.
 
     `value`: as after `--set key=`; or `factor` on what the deck has, not beyond `least` and `most`.
-    `words`: what it does, for the page.
     """
 
     key: str
@@ -36,8 +35,7 @@ class Setting:
         if isinstance(present, bool) or not isinstance(present, int | float):
             return None
         wished = min(max(present * self.factor, self.least), self.most)
-        if isinstance(present, int):
-            wished = round(wished)
+        wished = round(wished) if isinstance(present, int) else wished
         if wished == present or (wished > present) != (self.factor > 1.0):
             return None
         return f"{wished:.3g}" if isinstance(wished, float) else str(wished)
@@ -53,11 +51,10 @@ class Setting:
 
 @dataclass(frozen=True)
 class Cause:
-    """Why a run ends early or slows down.
+    """`says`: what is seen; `means`: why; `settings`: what has helped, the best first; `advice`:
+    what else can be done; `name`: in a word or two, for the verdict.
 
-    `says`: what is seen or said; `means`: why; `settings`: what has helped, the best first;
-    `advice`: what else can be done, "" for nothing.  All may have Markdown's marks of code; no
-    links, since screens show them, too.  `name`: in a word or two, for the verdict.
+    All may have Markdown's marks of code; no links, since screens show them, too.
     """
 
     says: str
@@ -74,170 +71,119 @@ GRID_AT_REST = Setting("mesh", "the grid rests, the gas goes through it", value=
 LESS_SHARING = Setting("run.small_cells", "fewer cells share their states", factor=0.5)
 THICKER = Setting("thickness", "keeps the shortest waves of lines away", factor=2.0)
 BARRIER = Setting("regrid.name", "the regridder that finds a grid most often", value="barrier")
+CHEAPEST = Setting("regrid.name", "the regridder that costs least", value="barrier")
 FEWER_CELLS = Setting("cells", "larger cells do not follow the finest folds", factor=0.5)
+END = "end the run there (`run.t_end`)"
 
 ENDS: dict[str, Cause] = {  # by the id that errors carry
     "no-state": Cause(
         "density or sound speed is no longer positive",
-        "a torn cell is nearly empty, a shock meets vacuum, or a material with a phase transition "
-        "is far below its Hugoniot, where no shock and no isentrope leads",
+        "a failed cell is nearly empty, a shock meets vacuum, or a material with a phase "
+        "transition is far below its Hugoniot, where no shock and no isentrope leads",
         (LESS_SHARING,),
-        advice="a material with a strength; end before the material tears (`run.t_end`)",
-        name="state not positive",
-    ),
+        "a material with a strength; end before the material tears (`run.t_end`)",
+        "state not positive"),
     "left-table": Cause(
-        "the state is outside the table",
-        "a `tabular` material goes beyond its limits",
-        advice="a larger table: where waves meet, the pressure can be twice that of the impact",
-        name="state outside its table",
-    ),
+        "the state is outside the table", "a `tabular` material goes beyond its limits", (),
+        "a larger table: where waves meet, the pressure can be twice that of the impact",
+        "state outside its table"),
     "no-grid": Cause(
         "no valid grid was found, a cell folds",
-        "the sides of a block moved so that its inside has no convex grid, or turn too sharply: "
-        "a hook's tip, a corner that goes to nothing",
-        (BARRIER,),
-        advice="other cells; end the run there (`run.t_end`): corners are kept from opening too "
-        "far, not from closing",
-        name="no grid",
-    ),
+        "the sides of a block moved so that its inside has no convex grid, or turn too sharply: a "
+        "hook's tip, a corner that goes to nothing", (BARRIER,),
+        f"other cells; {END}: corners are kept from opening too far, not from closing", "no grid"),
     "flat-cell": Cause(
         "no grid was found: a cell is too flat for its equations to be solved",
-        "a corner of a block, or a film between two lines, has closed so far that the numbers of "
-        "its cell lose their digits",
-        (FEWER_CELLS,),
-        advice="end the run there (`run.t_end`); what lies between the lines is thinner than can "
-        "be computed",
-        name="no grid",
-    ),
+        "a corner of a block, or a film between two lines, is so thin that the area of its cell is "
+        "lost to round-off", (FEWER_CELLS,),
+        f"{END}; what lies between the lines is thinner than can be computed", "no grid"),
     "lines-cross": Cause(
         "the line of a side crosses itself or another side",
         "a line curls back on itself, or closes on another: a material is cut in two",
-        (THICKER, FEWER_CELLS, SMALLER_CFL),
-        advice="lines that meet anew cannot be followed: end the run there (`run.t_end`)",
-        name="lines cross",
-    ),
+        (THICKER, FEWER_CELLS, SMALLER_CFL), f"lines that meet anew cannot be followed: {END}",
+        "lines cross"),
     "collapse": Cause(
         "the time step has collapsed",
         "cells become flat without end: in a neck, in a film, at the tip of a hook",
-        (THICKER, FEWER_CELLS),
-        advice="end the run there (`run.t_end`)",
-        name="time step collapsed",
-    ),
+        (THICKER, FEWER_CELLS), END, "time step collapsed"),
     "line-torn": Cause(
         "neighbouring nodes of a line would come too far in one step",
-        "the flow parts two nodes of an interface or free surface faster than any step follows",
-        advice="look where the line was cut (`shockgrid plot DIR --what interface`); end the run "
-        "there (`run.t_end`)",
-        name="line torn",
-    ),
+        "the flow parts two nodes of an interface or free surface faster than any step follows", (),
+        f"look where the line was cut (`shockgrid plot DIR --what interface`); {END}", "line torn"),
     "contact-lost": Cause(
         "a sliding contact has shrunk to nothing, or takes all of a cell, or bodies that meet go "
         "far into each other in one step",
         "the contact point has come to the end of its line, or the other block presses through "
-        "the cells beside it",
-        advice="`contact.impactor=joined` where the problem has it; other cells",
-        name="contact lost",
-    ),
+        "the cells beside it", (),
+        "`contact.impactor=joined` where the problem has it; other cells", "contact lost"),
     "blocks-overlap": Cause(
         "two blocks lie on each other",
         "a body has run into another with sides that cannot meet: contacts close between free "
-        "surfaces, and free surfaces and walls, of bodies without links between them",
-        advice="end the run there (`run.t_end`), or make the sides that meet free surfaces; finer "
-        "cells where one line has bent through the other",
-        name="blocks overlap",
-    ),
+        "surfaces, and free surfaces and walls, of bodies without links between them", (),
+        f"{END}, or make the sides that meet free surfaces; finer cells where one line has bent "
+        "through the other", "blocks overlap"),
     "mesh-law": Cause(
         "mesh law: cells are not convex, or blocks are apart",
-        "nodes are moved by a law that knows no cells (`mesh=follow`: with the gas), and cross",
-        (GRID_AT_REST,),
-        name="no grid",
-    ),
+        "nodes are moved by a rule that knows no cells (`mesh=follow`: with the gas), and cross",
+        (GRID_AT_REST,), "", "no grid"),
     "pistons-part": Cause(
         "key node: two pistons move apart from each other",
-        "two sides with given velocities meet in a node and are parallel there",
-        advice="give both the same velocity, or put a wall between them",
-        name="pistons part",
-    ),
+        "two sides with given velocities meet in a node and are parallel there", (),
+        "give both the same velocity, or put a wall between them", "pistons part"),
     "no-surface": Cause(
         "a free surface under a pressure where the material has no sound speed",
-        "a gas has no surface to vacuum",
-        advice="a higher pressure on the surface, or an outflow side",
-        name="no free surface",
-    ),
+        "a gas has no surface to vacuum", (),
+        "a higher pressure on the surface, or an outflow side", "no free surface"),
     "not-steady": Cause(
         "not steady; no steady state was found; the iteration diverges",
-        "Newton's iteration did not settle: the steady state is not resolved, or none exists",
-        advice="a smaller Rayleigh number (`rayleigh`), `method=time`",
-        name="not steady",
-    ),
+        "Newton's iteration did not settle: the steady state is not resolved, or none exists", (),
+        "a smaller Rayleigh number (`rayleigh`), `method=time`", "not steady"),
     "implicit-step": Cause(
         "the implicit step did not settle",
-        "the front moves over too many cells in a step for Newton's iteration",
-        (SMALLER_CFL,),
-        name="implicit step not settled",
-    ),
+        "the front moves over too many cells in a step for Newton's iteration", (SMALLER_CFL,), "",
+        "implicit step not settled"),
     "singular": Cause(
         "a matrix is singular",
-        "the grid has cells without area, or the numbers of the deck are beyond all scales",
-        advice="look at the grid (`shockgrid plot DIR --what mesh`)",
-        name="singular matrix",
-    ),
+        "the grid has cells without area, or the numbers of the deck are beyond all scales", (),
+        "look at the grid (`shockgrid plot DIR --what mesh`)", "singular matrix"),
     "no-growth-rate": Cause(
         "no growth rate was found",
-        "the iteration for the eigenvalue did not settle near the number that it started from",
-        advice="more cells; a Rayleigh number farther from the critical one",
-        name="no growth rate",
-    ),
+        "the iteration for the eigenvalue did not settle near the number that it started from", (),
+        "more cells; a Rayleigh number farther from the critical one", "no growth rate"),
     "not-finite": Cause(
-        "a number is not finite",
-        "a formula was used beyond the range in which it holds",
-        advice="report it with the deck: an earlier sentence should have told of it",
-        name="number not finite",
-    ),
+        "a number is not finite", "a formula was used beyond the range in which it holds", (),
+        "report it with the deck: an earlier sentence should have told of it", "number not finite"),
     "remap": Cause(
         "remap: density or sound speed of a cell of the new grid is not positive",
-        "the state does not go onto these cells (`restart --cells`)",
-        advice="other cells, or an earlier restart point (`--at`)",
-        name="state not on new cells",
-    ),
-}
+        "the state does not go onto these cells (`restart --cells`)", (),
+        "other cells, or an earlier restart point (`--at`)", "state not on new cells"),
+}  # fmt: skip
 
 SLOW: dict[str, Cause] = {
     "flat-cells": Cause(
         "dt falls slowly, `dt_limit` is `sound`",
         "many cells become flat: behind the edge of a roll, in a film, in a neck; a few do not "
-        "matter, since they share their states",
-        (MORE_SHARING, FEWER_CELLS),
-    ),
+        "matter, since they share their states", (MORE_SHARING, FEWER_CELLS)),
     "closing-lines": Cause(
         "dt falls a hundredfold in few steps",
-        "a line curls back on itself, or closes on another",
-        advice="look at the picture: lines that meet anew cannot be followed; end the run there "
-        "(`run.t_end`)",
-    ),
+        "a line curls back on itself, or closes on another", (),
+        f"look at the picture: lines that meet anew cannot be followed; {END}"),
     "retries": Cause(
         "`retries` in many steps",
-        "steps are begun anew with shorter dt: no grid, or no positive state",
-        (SMALLER_CFL,),
-        "look which block the log names",
-    ),
+        "steps are retried with shorter dt: no grid, or no positive state", (SMALLER_CFL,),
+        "look which block the log names"),
     "rescues": Cause(
-        "`regrid_rescues` in many steps",
-        "sides move so that the inside folds",
-        (MORE_BARRIER, SMALLER_CFL),
-    ),
+        "`regrid_rescues` in many steps", "sides move so that the inside folds",
+        (MORE_BARRIER, SMALLER_CFL)),
     "slow-regridder": Cause(
         "steps are slow, dt is as usual",
         "`ivanenko-charakhchyan`, `brackbill-saltzman` or `equidistribution` are chosen, or many "
-        "Newton steps",
-        (Setting("regrid.name", "the regridder that costs least", value="barrier"),),
-    ),
+        "Newton steps", (CHEAPEST,)),
     "moving-convection": Cause(
         "convection: a step in time on a moving grid is slow",
-        "matrices are factorised anew in every step",
-        advice="a grid at rest, if the layers do not move",
-    ),
-}
+        "matrices are factorised anew in every step", (),
+        "a grid at rest, if the layers do not move"),
+}  # fmt: skip
 
 CAUSES = {**ENDS, **SLOW}
 
@@ -248,17 +194,14 @@ def name_failure(error: Exception) -> str:
     Failures have the id of their cause; what the disk refused has the system's error behind it.
     """
     if isinstance(error, RunFailure):
-        found = ENDS.get(error.cause)
-        return found.name if found else ""
+        return ENDS[error.cause].name if error.cause in ENDS else ""
     system = error.__cause__
     if not isinstance(system, OSError):
         return ""
-    return {errno.ENOSPC: "disk full", errno.EDQUOT: "disk full"}.get(
-        system.errno or 0, "disk not writable"
-    )
+    full = system.errno in (errno.ENOSPC, errno.EDQUOT)
+    return "disk full" if full else "disk not writable"
 
 
 def settings_for(cause: str) -> tuple[Setting, ...]:
     """Settings that have helped against a cause, the best first; none for an unknown id."""
-    found = CAUSES.get(cause)
-    return found.settings if found else ()
+    return CAUSES[cause].settings if cause in CAUSES else ()

@@ -2,12 +2,17 @@
 
 Nothing that goes wrong in here may hide the sentence: each part is made by itself, and one that
 cannot be made is told of in its place.
+
+What happened there is measured on the outlines of the last dump: two places of one outline that are
+near each other, but far along it, have thin material between them, or a gap.  Below MET of the
+distance of neighbouring nodes no grid resolves what lies between.
 """
 
 from __future__ import annotations
 
 import shlex
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,15 +20,19 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from regrid.errors import BadInput, RunFailure
+from regrid.errors import BadInput, Place, RunFailure
+from regrid.sides import get_side
+from runs.deck.checking import is_runtime_key
 from runs.deck.reading import ReadDeck, resolve_deck
-from runs.deck.runtime_keys import is_runtime_key
 from runs.early_end.causes import CAUSES, settings_for
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state
 from runs.store.files import write_atomically
 from runs.store.history import read_history
 
+MET = 0.1  # distances of neighbouring nodes: lines as near as this have met
+DETOUR = 6.0  # times their distance: two places of an outline less far apart along it are one
+NEAR = 10  # distances of neighbouring nodes from the place that failed
 CALM = 0.3  # of the usual dt: with less a run is in trouble already
 SHOWN = 3  # settings
 
@@ -51,80 +60,66 @@ def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restar
     restart: the command that goes on with the run.  The failure gets what was made as its
     `early_end`, and the words as its notes.  Raises nothing that is an Exception.
     """
-    lines, made = [], {}
-    cause = CAUSES.get(failure.cause)
+    made: dict[str, Any] = {}
+
+    def tell_event() -> list[str]:
+        from runs.store.reader import RunData
+
+        outputs = RunData(directory.path).outputs
+        event = describe_event(outputs[-1].blocks, failure.place) if outputs else ""
+        return [f"what happened there: {event}"] if event else []
+
+    def choose_point() -> list[str]:
+        made["point"] = find_calm_point(directory)
+        return []
+
+    def choose_settings() -> list[str]:
+        found, point = list_settings(failure.cause, deck)[:SHOWN], made.get("point")
+        commands = [make_command(one, directory, deck, restart, point) for one, _ in found]
+        made["settings"], made["commands"] = tuple(one for one, _ in found), tuple(commands)
+        told = [f"  {one}   ({words})" for (_, words), one in zip(found, commands, strict=True)]
+        return ["what has helped in such runs:", *told] if found else []
+
+    def draw() -> list[str]:
+        from runs.early_end import picture
+        from runs.store.reader import RunData
+
+        title = str(failure).partition("; last restart point is")[0]
+        title = title.partition("; there is no restart point yet")[0]
+        run, point = RunData(directory.path), made.get("point")
+        made["picture"] = picture.draw_early_end(run, title, failure.place, point)
+        return [f"picture of the place: {made['picture']}"]
+
+    cause, lines = CAUSES.get(failure.cause), []
     if cause is not None:
         lines.append(f"what it means: {cause.means.replace('`', '')}")
-    for part in (_tell_event, _choose_point, _choose_settings, _draw):
+    for part, otherwise in (
+        (tell_event, "the outlines could not be measured"),
+        (choose_point, "no restart point could be chosen"),
+        (choose_settings, "settings that have helped could not be looked up"),
+        (draw, "no picture of the place could be made"),
+    ):
         try:
-            lines += part(failure, directory, deck, restart, made)
+            lines += part()
         except Exception as error:  # whatever it is: the sentence comes first
-            told = str(error).partition("\n")[0] or type(error).__name__
-            lines.append(f"{FAILED[part.__name__]}: {told}")
+            lines.append(f"{otherwise}: {str(error).partition(chr(10))[0] or type(error).__name__}")
     if cause is not None and cause.advice:
         lines.append(f"what else can be done: {cause.advice.replace('`', '')}")
-    early_end = EarlyEnd(directory.path, failure.cause, **made, lines=tuple(lines))
-    failure.early_end = early_end
+    failure.early_end = EarlyEnd(directory.path, failure.cause, **made, lines=tuple(lines))
     for line in lines:
         failure.add_note(line)
     try:
         write_atomically(directory.early_words, "\n".join([str(failure), *lines]) + "\n")
     except (BadInput, OSError):
         pass
-    return early_end
-
-
-FAILED = {
-    "_tell_event": "the outlines could not be measured",
-    "_choose_point": "no restart point could be chosen",
-    "_choose_settings": "settings that have helped could not be looked up",
-    "_draw": "no picture of the place could be made",
-}
-
-
-def _tell_event(failure, directory, deck, restart, made) -> list[str]:
-    from runs.early_end.event import describe_event
-    from runs.store.reader import RunData
-
-    outputs = RunData(directory.path).outputs
-    event = describe_event(outputs[-1].blocks, failure.place) if outputs else ""
-    return [f"what happened there: {event}"] if event else []
-
-
-def _choose_point(failure, directory, deck, restart, made) -> list[str]:
-    made["point"] = find_calm_point(directory)
-    return []
-
-
-def _choose_settings(failure, directory, deck, restart, made) -> list[str]:
-    found = list_settings(failure.cause, deck)[:SHOWN]
-    made["settings"] = tuple(setting for setting, _ in found)
-    made["commands"] = tuple(
-        make_command(setting, directory, deck, restart, made.get("point"))
-        for setting in made["settings"]
-    )
-    lines = ["what has helped in such runs:"] if found else []
-    for (_, words), command in zip(found, made["commands"], strict=True):
-        lines.append(f"  {command}   ({words})")
-    return lines
-
-
-def _draw(failure, directory, deck, restart, made) -> list[str]:
-    from runs.early_end.picture import draw_early_end
-    from runs.store.reader import RunData
-
-    sentence = str(failure).partition("; last restart point is")[0]
-    sentence = sentence.partition("; there is no restart point yet")[0]
-    picture = draw_early_end(RunData(directory.path), sentence, failure.place, made.get("point"))
-    made["picture"] = picture
-    return [f"picture of the place: {picture}"]
+    return failure.early_end
 
 
 def find_calm_point(directory: RunDirectory) -> int | None:
     """Step of the last restart point from before the trouble; None where there is none at all.
 
-    Trouble begins after the last step that was not begun anew and had CALM of the usual dt.  Where
-    all points are later, the first of them.
+    Trouble begins after the last step that was not retried and had CALM of the usual dt.  Where all
+    points are later, the first of them.
     """
     points = []
     for step, path in directory.list_points():
@@ -139,19 +134,19 @@ def find_calm_point(directory: RunDirectory) -> int | None:
     if steps is None or dt is None or len(steps) < 2:
         return points[-1]
     retries = history.get("retries", np.zeros(len(steps)))
-    usual = float(np.nanmedian(dt))
-    calm = steps[(dt >= CALM * usual) & ~(retries > 0)]
+    calm = steps[(dt >= CALM * float(np.nanmedian(dt))) & ~(retries > 0)]
     last = int(calm[-1]) if len(calm) else points[0]
-    before = [step for step in points if step <= last and step < int(steps[-1])]
-    return before[-1] if before else points[0]
+    return max((s for s in points if s <= last and s < int(steps[-1])), default=points[0])
 
 
 def list_settings(cause: str, deck: ReadDeck) -> list[tuple[str, str]]:
     """(`key=value`, what it does) of the settings of a cause that this deck can take."""
     found = []
     for setting in settings_for(cause):
-        value = setting.choose(_look_up(deck.deck, setting.key))
-        if value is None:
+        present: Any = msgspec.to_builtins(deck.deck)
+        for name in setting.key.split("."):
+            present = present.get(name) if isinstance(present, dict) else None
+        if (value := setting.choose(present)) is None:
             continue
         words = f"{setting.key}={value}"
         try:
@@ -175,9 +170,111 @@ def make_command(
     return f"shockgrid run {shlex.quote(str(directory.deck))} {words}"
 
 
-def _look_up(deck: Any, key: str) -> Any:
-    """The value of a dotted key; None where the deck has no such key, or none is set."""
-    value = msgspec.to_builtins(deck)
-    for name in key.split("."):
-        value = value.get(name) if isinstance(value, dict) else None
-    return value
+def describe_event(blocks: Sequence, place: Place | None) -> str:
+    """A sentence on the thinnest film, neck or gap at the place that failed; "" where none is thin.
+
+    Where one of a film's sides is a seam inside one material, that is said: no material is cut.
+
+    blocks: with `name` and `nodes` (2, ni + 1, nj + 1) [m]; without a place all are looked at.
+    """
+    named = [block for block in blocks if place is not None and block.name == place.block]
+    found = []
+    for block in named or blocks:
+        event = find_thinnest(block.nodes, _find_centre(block.nodes, place) if named else None)
+        found += [(event, block.name)] if event is not None else []
+    (share, width, sides, x, y, inside), name = min(
+        found, key=lambda one: one[0][0], default=((np.inf, 0.0, ("", ""), 0.0, 0.0, False), "")
+    )
+    if share > MET:
+        return ""
+    size = f"{width:.3g} m, {share:.2g} of the distance of its nodes, at ({x:.6g}, {y:.6g})"
+    one, other = sides
+    if inside and one == other:
+        return f"block '{name}' is pinched off: between two parts of its side {one} it is {size}"
+    if inside and (seam := _find_seam(blocks, name, sides, x, y)) is not None:
+        side, neighbour = seam
+        return (
+            f"side {other if side == one else one} of block '{name}' has come to its seam with "
+            f"'{neighbour}', of the same material: what is left between them is {size}"
+        )
+    if inside:
+        return f"block '{name}' is a film: between its sides {one} and {other} it is {size}"
+    whose = f"side {one} of '{name}' has" if one == other else f"sides {one} and {other} have"
+    return f"{whose} met {'itself' if one == other else f'outside of {name!r}'}: the gap is {size}"
+
+
+def _find_seam(blocks, name: str, sides, x: float, y: float) -> tuple[str, str] | None:
+    """The one of two sides whose node nearest to (x, y) lies on another block of the same material,
+    and that block's name."""
+    block = next(block for block in blocks if block.name == name)
+    material = getattr(block, "material", "")
+    for side in sides if material else ():
+        line = get_side(block.nodes, side)
+        node = line[:, [int(np.argmin((line[0] - x) ** 2 + (line[1] - y) ** 2))]]
+        close = 1e-9 * float(np.ptp(line, axis=1).max())
+        for other in blocks:
+            if other.name != name and getattr(other, "material", "") == material:
+                if np.hypot(*(_trace_ring(other.nodes)[0] - node)).min() <= close:
+                    return side, other.name
+    return None
+
+
+def find_thinnest(nodes: np.ndarray, centre: np.ndarray | None = None):
+    """The nearest two places of a block's outline that are far apart along it, or None.
+
+    Returns their distance over that of neighbouring nodes, their distance [m], their sides, x, y of
+    the middle between them, and whether that lies inside of the block.  centre (2,): only nodes
+    near it count.
+    """
+    ring, side = _trace_ring(nodes)
+    way = np.roll(ring, -1, axis=1) - ring
+    steps = np.hypot(*way)
+    arc = np.concatenate(([0.0], np.cumsum(steps)))
+    spacing, best = np.maximum(steps, np.roll(steps, 1)), None
+    squares = np.maximum((way**2).sum(axis=0), 1e-300)
+    for k in range(ring.shape[1]):
+        here = ring[:, k : k + 1]
+        if centre is not None and np.hypot(*(ring[:, k] - centre)) > NEAR * spacing[k]:
+            continue
+        part = np.clip(((here - ring) * way).sum(axis=0) / squares, 0.0, 1.0)
+        foot = ring + part * way
+        away = np.hypot(*(foot - here))
+        along = np.abs(arc[:-1] + part * steps - arc[k])
+        along = np.minimum(along, arc[-1] - along)
+        far = (along > DETOUR * away) & (along > spacing[k])
+        if not far.any():
+            continue
+        m = int(np.argmin(np.where(far, away, np.inf)))
+        share = float(away[m] / spacing[k])
+        if best is None or share < best[0]:
+            x, y = 0.5 * (foot[:, m] + ring[:, k])
+            best = share, float(away[m]), (side[k], side[m]), float(x), float(y)
+    if best is None:
+        return None
+    (x0, y0), (x1, y1), (x, y) = ring, np.roll(ring, -1, axis=1), best[3:5]
+    with np.errstate(all="ignore"):
+        crossed = ((y0 > y) != (y1 > y)) & (x < x0 + (y - y0) / (y1 - y0) * (x1 - x0))
+    return (*best, bool(np.count_nonzero(crossed) % 2))
+
+
+def _trace_ring(nodes: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """Nodes (2, n) round a block, each once, and the side of the segment that begins at each."""
+    parts = (
+        ("j_min", nodes[:, :-1, 0]),
+        ("i_max", nodes[:, -1, :-1]),
+        ("j_max", nodes[:, :0:-1, -1]),
+        ("i_min", nodes[:, 0, :0:-1]),
+    )
+    ring = np.concatenate([line for _, line in parts], axis=1)
+    return ring, [name for name, line in parts for _ in range(line.shape[1])]
+
+
+def _find_centre(nodes: np.ndarray, place: Place | None) -> np.ndarray | None:
+    """Where in the block a place is; None where it names no more than the block."""
+    if place is not None and place.cell is not None:
+        i, j = (min(max(k, 0), n - 1) for k, n in zip(place.cell, nodes.shape[1:], strict=True))
+        return nodes[:, i, j]
+    if place is not None and place.side and place.nodes:
+        line = get_side(nodes, place.side)
+        return line[:, min(place.nodes[0], line.shape[1] - 1)]
+    return None

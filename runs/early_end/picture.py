@@ -11,14 +11,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 
 from problems.evolution import BlockView
 from regrid.errors import Place
 from regrid.measure.corners import compute_centres
 from regrid.sides import get_side
-from runs.inspection.units import pick_prefix
+from runs.inspection.account import pick_prefix
 from runs.pictures.command import new_figure, save
 from runs.pictures.fields import (
     View,
@@ -31,7 +30,7 @@ from runs.pictures.fields import (
     find_range,
     make_sheets,
 )
-from runs.store.reader import Dump, RunData
+from runs.store.reader import RunData
 
 AROUND = 5  # cells on each side of the marked one
 MOST_SHOWN = 0.3  # of the longer side of the domain: half a window at most
@@ -45,58 +44,47 @@ def draw_early_end(run: RunData, sentence: str, place: Place | None, point: int 
     sentence: the title; place: what is marked; point: step of the restart point to be marked on the
     curve of dt.  Raises BadInput where there is no dump, or where the disk is full.
     """
-    figure = new_figure()
-    fill_early_end(figure, run, sentence, place, point)
-    return save(figure, run.directory.early_picture, DPI)
-
-
-def fill_early_end(
-    figure: Figure, run: RunData, sentence: str, place: Place | None, point: int | None
-) -> None:
-    """Draw the three panels into `figure`; arguments as for `draw_early_end`."""
-    dump = run.outputs[-1]
+    figure, dump = new_figure(), run.outputs[-1]
     figure.set_size_inches(13.0, 6.8)
     figure.suptitle(textwrap.fill(sentence, 190), fontsize=9, x=0.01, ha="left")
     left, right = figure.subfigures(1, 2, width_ratios=(1.35, 1.0))
     near = left.subplots()
     whole, below = right.subplots(2, 1, height_ratios=(1.25, 1.0))
     block, cell, corners = find_marked(dump.blocks, place)
-    names = choose_field(dump)
+    known = dump.field_names()
+    names = ["rho"] if "rho" in known else known[:1]
     sheets = make_sheets(dump, names, View())
     extent = find_extent([sheets])
-    boxes = find_window(block.nodes, cell, extent), extent
-    scale, unit = pick_prefix(float(np.abs(boxes[1]).max()), "m")
-    labels = [f"{name} [{unit}]" for name in dump.axes]
-    for axes, box, title in zip(
-        (near, whole), boxes, (name_cell(block.name, cell, place), "the whole domain"), strict=True
+    window = find_window(block.nodes, cell, extent)
+    scale, unit = pick_prefix(float(np.abs(extent).max()), "m")
+    title = name_cell(block.name, cell, place)
+    for axes, box, words, lines in (
+        (near, window, title, 0.8),
+        (whole, extent, "the whole domain", 0.3),
     ):
-        image = None
         for name in names:
             look = choose_colours(dump, name, [find_range(sheets, name, box)])
-            norm, colours, factor, label = look
-            image = draw_sheets(axes, sheets, name, norm, colours, factor, scale)
-        draw_mesh(axes, sheets, scale, "k", 0.8 if axes is near else 0.3)
+            image = draw_sheets(axes, sheets, name, *look[:3], scale)
+            axes.figure.colorbar(image, ax=axes, label=look[3], shrink=0.9)
+        draw_mesh(axes, sheets, scale, "k", lines)
         draw_lines(axes, sheets, scale)
         dress(axes, box, scale)
-        if image is not None:
-            axes.figure.colorbar(image, ax=axes, label=label, shrink=0.9)
-        axes.set_title(title, fontsize=10, color=MARK if axes is near else "k")
-        axes.set_xlabel(labels[0])
-        axes.set_ylabel(labels[1])
+        axes.set_title(words, fontsize=10, color=MARK if axes is near else "k")
+        axes.set_xlabel(f"{dump.axes[0]} [{unit}]")
+        axes.set_ylabel(f"{dump.axes[1]} [{unit}]")
         axes.tick_params(labelsize=8)
+        x, y = corners.mean(axis=1) * scale  # a ring is seen however flat the cell is
+        ring = {"markersize": 16, "markeredgewidth": 1.8, "fillstyle": "none", "zorder": 6}
+        axes.plot(x, y, "o", color=MARK, **ring)
     near.add_patch(Polygon(corners.T * scale, fill=False, edgecolor=MARK, linewidth=2.0, zorder=5))
-    mark_place(near, corners, scale)
-    mark_nodes(near, block.nodes, place, scale)
-    x0, x1, y0, y1 = (bound * scale for bound in boxes[0])
+    if place is not None and place.side and place.nodes:
+        line = get_side(block.nodes, place.side)
+        there = [node for node in place.nodes if node < line.shape[1]]
+        near.plot(*(line[:, there] * scale), "o", markersize=5, color=MARK, zorder=7)
+    x0, x1, y0, y1 = (bound * scale for bound in window)
     whole.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, edgecolor=MARK, zorder=5))
-    mark_place(whole, corners, scale)
     draw_steps(below, run, dump.step, point)
-
-
-def choose_field(dump: Dump) -> list[str]:
-    """The density, else the first field, else none."""
-    names = dump.field_names()
-    return ["rho"] if "rho" in names else names[:1]
+    return save(figure, run.directory.early_picture, DPI)
 
 
 def find_marked(
@@ -109,7 +97,9 @@ def find_marked(
     """
     named = [block for block in blocks if place is not None and block.name == place.block]
     candidates = named or list(blocks)
-    areas = [measure_areas(block.nodes) for block in candidates]
+    ways = [(x[:, 1:, 1:] - x[:, :-1, :-1], x[:, :-1, 1:] - x[:, 1:, :-1])
+            for x in (block.nodes for block in candidates)]  # fmt: skip
+    areas = [0.5 * np.abs(a[0] * b[1] - a[1] * b[0]) for a, b in ways]
     number = int(np.argmin([float(area.min() / np.median(area)) for area in areas]))
     block = candidates[number]
     ni, nj = areas[number].shape
@@ -132,28 +122,16 @@ def measure_areas(nodes: np.ndarray) -> np.ndarray:
     return 0.5 * np.abs(one[0] * other[1] - one[1] * other[0])
 
 
-def find_window(
-    nodes: np.ndarray, cell: tuple[int, int], extent: tuple[float, float, float, float]
-) -> tuple[float, float, float, float]:
-    """The window (x0, x1, y0, y1) [m] that shows AROUND cells about a cell, within `extent`.
-
-    A square but for the domain's edges, beyond which it goes by little.
-    """
+def find_window(nodes: np.ndarray, cell: tuple[int, int], extent) -> tuple[float, ...]:
+    """The window (x0, x1, y0, y1) [m] that shows AROUND cells about a cell, within `extent`."""
     i, j = cell
-    part = nodes[
-        :, max(i - AROUND, 0) : i + AROUND + 2, max(j - AROUND, 0) : j + AROUND + 2
-    ].reshape(2, -1)
-    x, y = compute_centres(nodes)[:, i, j]
-    reach = 1.05 * max(float(np.abs(part[0] - x).max()), float(np.abs(part[1] - y).max()))
-    longest = max(extent[1] - extent[0], extent[3] - extent[2])
-    reach = min(reach, MOST_SHOWN * longest)
-    margin = 0.05 * reach
-    return (
-        max(x - reach, extent[0] - margin),
-        min(x + reach, extent[1] + margin),
-        max(y - reach, extent[2] - margin),
-        min(y + reach, extent[3] + margin),
-    )
+    part = nodes[:, max(i - AROUND, 0) : i + AROUND + 2, max(j - AROUND, 0) : j + AROUND + 2]
+    centre, box = compute_centres(nodes)[:, i, j], np.reshape(extent, (2, 2))
+    reach = 1.05 * float(np.abs(part.reshape(2, -1) - centre[:, None]).max())
+    reach = min(reach, MOST_SHOWN * float(np.ptp(box, axis=1).max()))
+    low = np.maximum(centre - reach, box[:, 0] - 0.05 * reach)
+    high = np.minimum(centre + reach, box[:, 1] + 0.05 * reach)
+    return low[0], high[0], low[1], high[1]
 
 
 def name_cell(block: str, cell: tuple[int, int], place: Place | None) -> str:
@@ -167,23 +145,8 @@ def name_cell(block: str, cell: tuple[int, int], place: Place | None) -> str:
     return words if place.cell is not None else f"{words}: the smallest of the block"
 
 
-def mark_place(axes, corners: np.ndarray, scale: float) -> None:
-    """A ring about a cell, seen however flat the cell is."""
-    x, y = corners.mean(axis=1) * scale
-    axes.plot(x, y, "o", markersize=16, markeredgewidth=1.8, color=MARK, fillstyle="none", zorder=6)
-
-
-def mark_nodes(axes, nodes: np.ndarray, place: Place | None, scale: float) -> None:
-    """Dots on the nodes of a side that a place names."""
-    if place is None or not place.side or not place.nodes:
-        return
-    line = get_side(nodes, place.side)
-    there = [node for node in place.nodes if node < line.shape[1]]
-    axes.plot(*(line[:, there] * scale), "o", markersize=5, color=MARK, zorder=7)
-
-
 def draw_steps(axes, run: RunData, step: int, point: int | None) -> None:
-    """dt over the steps, the steps that were begun anew, the end, the restart point."""
+    """dt over the steps, those that were retried, the end, the restart point."""
     history = run.history
     steps, dt = history.get("step"), history.get("dt")
     if steps is None or dt is None or not (np.isfinite(dt) & (dt > 0.0)).any():
@@ -193,7 +156,7 @@ def draw_steps(axes, run: RunData, step: int, point: int | None) -> None:
     axes.semilogy(steps, np.where(dt > 0.0, dt, np.nan), "-", color="k", linewidth=0.9)
     again = history.get("retries", np.zeros(len(steps))) > 0
     if again.any():
-        axes.semilogy(steps[again], dt[again], ".", color=MARK, markersize=4, label="begun anew")
+        axes.semilogy(steps[again], dt[again], ".", color=MARK, markersize=4, label="retried")
     axes.axvline(step, color=MARK, linewidth=1.2, label=f"end, step {step}")
     if point is not None:
         words = f"restart point, step {point}"

@@ -1,4 +1,4 @@
-"""How dt shrinks through a run: by how much, by which cell, and what that cell means.
+"""How dt shrinks through a run: by how much, by which cell, where that lies, and what may help.
 
 dt is compared with its largest value so far.  Each time that it has shrunk by another factor of
 FACTOR a mark is made: a line of run.log, and an entry of the verdict.  Once, when it has shrunk
@@ -17,16 +17,56 @@ from typing import Any
 
 import numpy as np
 
-from runs.forecast.advice import describe_settings
-from runs.forecast.meaning import WORDS, Stretch, classify
-from runs.inspection.verdict import OWN_REASONS
+from runs.early_end.causes import FEWER_CELLS, MORE_BARRIER, MORE_SHARING, SMALLER_CFL, Setting
+from runs.inspection.account import OWN_REASONS
 
 FACTOR = math.sqrt(10.0)
 MOST = 100.0
+NEAR = 2  # cells: so near to a key node or a side is at it
 SAMPLED = 50_000  # cells of a block from which medians are taken
-SLAB = 32  # rows of cells that are measured at a time
-OF_LINES = ("stretching", "tension", "touch")  # what limits dt and is no cell
 SAME = 1e-6  # relative: so near to the step's rate is the rate of the cell that set it
+OF_LINES = ("stretching", "tension", "touch")  # what limits dt and is no cell
+
+_BESIDE = (MORE_SHARING, FEWER_CELLS)  # for cells that a line itself made flat
+_INSIDE = (MORE_SHARING, MORE_BARRIER, FEWER_CELLS)  # those that the inside of a grid made flat
+MEANINGS: dict[str, tuple[str, tuple[Setting, ...]]] = {  # what dt is limited by: words, what helps
+    "hot": ("fast waves: the material is hot or moves fast, the cell is no thinner than others",
+            (FEWER_CELLS,)),
+    "crushed": ("crushed: all cells of the block have become thin", (FEWER_CELLS,)),
+    "stretching": ("stretching: nodes of a line part fast", (SMALLER_CFL, FEWER_CELLS)),
+    "touch": ("touch: bodies come to touch, node by node", (FEWER_CELLS,)),
+    "tension": ("tension: the shortest capillary waves of a line are fast", (FEWER_CELLS,)),
+    "corner": ("corner: at a key node, where lines meet", _BESIDE),
+    "sliding": ("sliding contact: in the first cells beside it", _BESIDE),
+    "line": ("line: the first cells beside an interface or a surface are squeezed", _INSIDE),
+    "axis": ("axis: in the first cells beside the axis", _BESIDE),
+    "wall": ("wall: in the first cells beside a wall", _BESIDE),
+    "inside": ("inside: cells away from all lines are squeezed", _INSIDE),
+}  # fmt: skip
+
+
+def describe_settings(meaning: str) -> str:
+    """The settings for one of MEANINGS, in a line."""
+    _, settings = MEANINGS.get(meaning, ("", (FEWER_CELLS,)))
+    words = [f"{setting.described.replace('`', '')}: {setting.words}" for setting in settings]
+    return "; ".join([*words, "run.t_end ends the run before"])
+
+
+def classify(block: Any, i: int, j: int) -> str:
+    """Which of MEANINGS holds for a thin cell: by the segments of its block that it lies beside."""
+    ni, nj = block.nodes.shape[1] - 1, block.nodes.shape[2] - 1
+    away = {"i_min": i, "i_max": ni - 1 - i, "j_min": j, "j_max": nj - 1 - j}
+    along = {"i_min": j, "i_max": j, "j_min": i, "j_max": i}
+    kinds = set()
+    for one in block.segments:
+        k = along[one.side]
+        if away[one.side] >= NEAR or not one.start <= k < one.stop:
+            continue
+        at_end = min(k - one.start, one.stop - 1 - k) < NEAR
+        if one.follows_flow and at_end and one.stop - one.start > 2 * NEAR:
+            return "corner"
+        kinds.add("line" if one.follows_flow and one.kind != "sliding" else one.kind)
+    return next((kind for kind in ("sliding", "line", "axis", "wall") if kind in kinds), "inside")
 
 
 @dataclass(frozen=True)
@@ -49,7 +89,7 @@ class Mark:
 
     def describe(self) -> str:
         """One line for run.log and the screen."""
-        words = WORDS.get(self.meaning, self.meaning)
+        words, _ = MEANINGS.get(self.meaning, (self.meaning, ()))
         cell = f", {self.block} i={self.i}, j={self.j} at ({self.x:.4g}, {self.y:.4g}) m"
         return (
             f"dt is {self.shrunk:.3g} times below its largest: {self.dt:.3g} s at step "
@@ -58,10 +98,7 @@ class Mark:
 
 
 class StepTrend:
-    """Follows dt.
-
-    note: takes a line for run.log; say: takes a line for the screen.  Both are called seldom.
-    """
+    """Follows dt; note: takes a line for run.log, say: one for the screen, both seldom."""
 
     def __init__(self, evolution: Any, note: Callable[[str], None], say: Callable[[str], None]):
         self.evolution, self.note, self.say = evolution, note, say
@@ -69,7 +106,8 @@ class StepTrend:
         self.marks: list[Mark] = []
         self._next = 0.0
         self._told = False
-        self._usual = _find_usual(evolution)
+        flow = getattr(evolution, "flow", None)
+        self._usual = [] if flow is None else [_find_usual(block) for block in flow.blocks]
 
     def resume(self, history: Mapping[str, np.ndarray]) -> None:
         """Take up where a run that goes on was, from its history."""
@@ -114,15 +152,14 @@ class StepTrend:
         number, i, j = find_limiting_cell(flow)
         block = flow.blocks[number]
         x, y = block.nodes[:, i : i + 2, j : j + 2].mean(axis=(1, 2))
-        meaning = self._find_meaning(number, i, j)
-        return Mark(*head, block.name, i, j, float(x), float(y), meaning)
+        return Mark(*head, block.name, i, j, float(x), float(y), self._find_meaning(number, i, j))
 
     def _find_meaning(self, number: int, i: int, j: int) -> str:
-        """Is the cell fast, or thin; if thin, why."""
+        """Is the cell fast, or thin; if thin, where it lies."""
         block = self.evolution.flow.blocks[number]
         usual_speed, usual = self._usual[number]
         if usual_speed > 0.0:
-            median = float(np.median(sample_cells(block)[0]))
+            median = float(np.median(_sample(block)[0]))
             thinness = float(measure_thinness(block.nodes[:, i : i + 2, j : j + 2])[0, 0])
             faster = float(block.rates[i, j]) / thinness / usual_speed
             all_thinner, alone = median / usual, thinness / median
@@ -130,31 +167,23 @@ class StepTrend:
                 return "hot"
             if all_thinner > max(alone, 2.0):
                 return "crushed"
-        return classify(block.nodes, i, j, list_stretches(block))
+        return classify(block, i, j)
 
     def describe(self) -> list[dict[str, Any]]:
         """The marks as plain data."""
         return [asdict(mark) for mark in self.marks]
 
 
-def _find_usual(evolution: Any) -> list[tuple[float, float]]:
-    """`_find_usual_of` all blocks."""
-    flow = getattr(evolution, "flow", None)
-    return [] if flow is None else [_find_usual_of(block) for block in flow.blocks]
-
-
-def _find_usual_of(block: Any) -> tuple[float, float]:
+def _find_usual(block: Any) -> tuple[float, float]:
     """The usual speed [m/s] of waves (a cell's rate over its thinness) and thinness [1/m]."""
-    thinness, rates = sample_cells(block)
+    thinness, rates = _sample(block)
     return float(np.median(rates / thinness)), float(np.median(thinness))
 
 
-def sample_cells(block: Any) -> tuple[np.ndarray, np.ndarray]:
+def _sample(block: Any) -> tuple[np.ndarray, np.ndarray]:
     """Thinness [1/m] and rates [1/s] of a block's cells, (n, nj): of every so many rows of cells
     where there are more than SAMPLED."""
     apart = max(1, block.rates.size // SAMPLED)
-    if apart == 1:
-        return measure_thinness(block.nodes), block.rates
     rows = [measure_thinness(block.nodes[:, i : i + 2]) for i in range(0, len(block.rates), apart)]
     return np.concatenate(rows), block.rates[::apart]
 
@@ -164,17 +193,10 @@ def measure_thinness(nodes: np.ndarray) -> np.ndarray:
 
     Of a rectangle it is the sum of the inverse widths, as in the rate at which waves cross it.
     """
-    out = np.empty([size - 1 for size in nodes.shape[1:]])
-    for first in range(0, len(out), SLAB):
-        rows = nodes[:, first : first + SLAB + 1]
-        middle_i = 0.5 * (rows[:, :, 1:] + rows[:, :, :-1])
-        middle_j = 0.5 * (rows[:, 1:, :] + rows[:, :-1, :])
-        along_i, along_j = np.diff(middle_i, axis=1), np.diff(middle_j, axis=2)
-        area = np.abs(along_i[0] * along_j[1] - along_i[1] * along_j[0])
-        out[first : first + SLAB] = (np.hypot(*along_i) + np.hypot(*along_j)) / np.maximum(
-            area, 1e-300
-        )
-    return out
+    along_i = np.diff(0.5 * (nodes[:, :, 1:] + nodes[:, :, :-1]), axis=1)
+    along_j = np.diff(0.5 * (nodes[:, 1:, :] + nodes[:, :-1, :]), axis=2)
+    area = np.abs(along_i[0] * along_j[1] - along_i[1] * along_j[0])
+    return (np.hypot(*along_i) + np.hypot(*along_j)) / np.maximum(area, 1e-300)
 
 
 def find_limiting_cell(flow: Any) -> tuple[int, int, int]:
@@ -191,11 +213,3 @@ def find_limiting_cell(flow: Any) -> tuple[int, int, int]:
             found = float(rates.flat[place]), number, place
     i, j = np.unravel_index(found[2], flow.blocks[found[1]].rates.shape)
     return found[1], int(i), int(j)
-
-
-def list_stretches(block: Any) -> list[Stretch]:
-    """The parts of a block's sides."""
-    return [
-        Stretch(segment.side, segment.start, segment.stop, segment.kind, segment.follows_flow)
-        for segment in block.segments
-    ]

@@ -18,20 +18,30 @@ from regrid.errors import BadInput, RunFailure, suggest
 from regrid.given import is_file_name, read_grid, read_sides
 from regrid.registry import find_usable, load_regridder
 from runs.grids.compare import default_cells
-from runs.grids.files import check_free, plan_outputs, write_grid
 from runs.grids.making import (
     Made,
+    make_family,
     make_in_block,
+    make_moving,
     make_on_curves,
     make_on_domain,
     make_spatial_law,
+    march,
+    parse_options,
     regrid_plane,
     regrid_space,
+    takes_weight,
     weigh_cells,
 )
-from runs.grids.marching import make_family, march, parse_options, takes_weight
-from runs.grids.marching_in_space import make_moving
-from runs.grids.quality import Judgement, describe, describe_histograms, judge
+from runs.grids.quality import (
+    Judgement,
+    check_free,
+    describe,
+    describe_histograms,
+    judge,
+    plan_outputs,
+    write_grid,
+)
 
 CELLS_IN_SPACE = (20, 20, 20)
 MOST_CELLS = 4_000_000
@@ -151,11 +161,7 @@ def _explain_unknown(source: str) -> None:
 
 
 def regrid_file(
-    file: str,
-    request: Request,
-    passes: int,
-    block: str | None,
-    files: Files,
+    file: str, request: Request, passes: int, block: str | None, files: Files
 ) -> list[str]:
     """`grid regrid`."""
     family, words, weight = request

@@ -27,9 +27,17 @@ from regrid.measure.quality import measure_first_line_gap
 from regrid.registry import find_usable
 from regrid.sides import SIDE_NAMES, get_side, get_sides
 from runs.deck.reading import packaged_decks, read_deck
-from runs.grids.files import check_free
-from runs.grids.making import make_on_curves, regrid_plane
-from runs.grids.marching import March, make_family, march, parse_options, takes_weight, warm_up
+from runs.grids.making import (
+    March,
+    make_family,
+    make_on_curves,
+    march,
+    parse_options,
+    regrid_plane,
+    takes_weight,
+    warm_up,
+)
+from runs.grids.quality import check_free
 
 HEAD = (
     f"{'family':34s} {'steps':>12s} {'gap':>7s} {'least sine':>10s} {'aspect':>8s}"

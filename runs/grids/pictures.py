@@ -16,7 +16,7 @@ from matplotlib.colors import Normalize
 
 from regrid.measure.hexahedra import compute_hexahedron_sines
 from regrid.sides import get_sides
-from runs.grids.marching import March
+from runs.grids.making import March
 from runs.grids.quality import Judgement
 from runs.pictures.command import new_figure, save
 

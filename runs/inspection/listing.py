@@ -100,8 +100,7 @@ def describe_deck(path: Path) -> str:
 def describe_plan(deck: ReadDeck) -> str:
     """Blocks, cells, memory, end time and cautions of the run that a deck would make."""
     from problems.problem import BlockPlan
-    from runs.inspection.account import count
-    from runs.inspection.cautions import describe_cautions
+    from runs.inspection.account import count, describe_cautions
     from runs.inspection.info import other_name
 
     with deck.numbers_in_reach(), interpreted():

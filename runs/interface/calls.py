@@ -7,19 +7,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from problems.evolution import Evolution
-from problems.own_simulation import Measure
+from problems.evolution import Evolution, get_material
+from problems.own_simulation import Measure, OwnSimulation, OwnSimulationDeck
 from regrid.errors import BadInput
+from runs.deck.reading import ReadDeck, read_toml, resolve_deck
 from runs.interface.case import Case, load
-from runs.interface.hooks import Hooks, HooksGiven
 from runs.interface.opened import OpenRun, finish
-from runs.interface.own_simulation import continue_case, make_case
-from runs.interface.settings import check_options, make_settings, said_in_python
-from runs.march.launching import read_restart_deck
-from runs.march.runner import Runner
-from runs.march.schedule import check_output
+from runs.interface.settings import Hooks, HooksGiven, check_options, make_settings, said_in_python
+from runs.march.launching import check_changeable, read_restart_deck
+from runs.march.runner import Runner, check_output
 from runs.ranks.started import check_single
-from runs.store.directory import open_directory
+from runs.store.directory import RunDirectory, open_directory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,6 +25,113 @@ if TYPE_CHECKING:
     from runs.inspection.compare import Difference
     from runs.store.reader import Dump
     from runs.study.study import Study
+
+
+NAME = "simulation"  # of the problem, in decks and folders
+OWN_KEYS = ("run.max_steps", "output", "gauge")  # of the deck, or tables of it
+
+
+def make_case(
+    simulation: Evolution, settings: tuple[str, ...] = (), measure: Measure | None = None
+) -> Case:
+    """A case of a simulation that a script has made.
+
+    settings: `key=value` of run.max_steps, output.* and gauge; all else is the simulation's own.
+    Raises BadInput for other keys and for what is no simulation.
+    """
+    table = {"run": _describe_march(simulation)}
+    return _make(
+        simulation, table, f"a simulation of {_find_script() or 'Python'}", settings, measure
+    )
+
+
+def continue_case(
+    directory: RunDirectory,
+    simulation: Evolution,
+    settings: tuple[str, ...] = (),
+    measure: Measure | None = None,
+) -> Case:
+    """A case that goes on with the run in `directory` with blocks made anew by its script.
+
+    Raises BadInput for a run of something else, for a simulation that has marched already, and
+    where its blocks have other materials.
+    """
+    table = read_toml(directory.deck)
+    if table.get("problem") != NAME:
+        raise BadInput(
+            f"{directory} is a run of {table.get('problem')}, which makes its blocks itself: "
+            "restart it without simulation="
+        )
+    if simulation.step:
+        raise BadInput(
+            f"the simulation has made {simulation.step} steps already; a restart needs one as it "
+            "was before its first step"
+        )
+    check_changeable(settings, OwnSimulationDeck)
+    kept: dict[str, Any] = {key: table[key] for key in ("output", "gauge") if key in table}
+    march = _describe_march(simulation)
+    if "max_steps" in table.get("run", {}):
+        march["max_steps"] = table["run"]["max_steps"]
+    case = _make(simulation, {"run": march, **kept}, str(directory.deck), settings, measure)
+    before, now = table.get("materials", {}), _describe_materials(simulation)
+    if before != now:
+        which = [name for name in {**before, **now} if before.get(name) != now.get(name)]
+        name = which[0]
+        raise BadInput(
+            f"block {name!r} is of {now.get(name, 'no block')} in this simulation, of "
+            f"{before.get(name, 'no block')} in the run in {directory}: that is another flow"
+        )
+    return case
+
+
+def _make(simulation, table: dict[str, Any], origin: str, settings, measure) -> Case:
+    for setting in settings:
+        key = setting.partition("=")[0].strip()
+        if not any(f"{key}.".startswith(f"{own}.") for own in OWN_KEYS):
+            raise BadInput(
+                f"{key}: a simulation of one's own has all but {', '.join(OWN_KEYS)} from its "
+                "script; give it to shockgrid.Simulation or to its blocks"
+            )
+    table = {
+        "problem": NAME,
+        "script": _find_script(),
+        "materials": _describe_materials(simulation),
+        **table,
+    }
+    read: ReadDeck = resolve_deck(table, origin, settings)
+    return Case(read, OwnSimulation(read.deck, simulation, measure))  # type: ignore[arg-type]
+
+
+def _describe_march(simulation: Evolution) -> dict[str, Any]:
+    """What the deck can say of how a simulation marches; BadInput where it is none."""
+    if not isinstance(simulation, Evolution):
+        raise BadInput(
+            f"a {type(simulation).__name__} is no simulation; give a shockgrid.Simulation, a case "
+            "of shockgrid.load, or the name of a problem or deck"
+        )
+    clock = getattr(simulation, "clock", None)
+    march: dict[str, Any] = {"t_end": float(simulation.t_end)}
+    if clock is not None:
+        march |= {"cfl": float(clock.cfl), "threads": int(getattr(simulation, "threads", 1))}
+    return march
+
+
+def _describe_materials(simulation: Evolution) -> dict[str, str]:
+    """Material and equation of state of each block, by which a run is known again."""
+    words = {}
+    for block in simulation.blocks:
+        eos = getattr(block, "eos", None)
+        kind = getattr(eos, "kind", type(eos).__name__)
+        numbers = getattr(eos, "parameters", ())
+        told = "" if eos is None else f", {kind} {' '.join(f'{n:.6g}' for n in numbers[:8])}"
+        words[block.name] = f"{get_material(block)}{told}".rstrip()
+    return words
+
+
+def _find_script() -> str:
+    """The name of the file that Python was started with; "" in a notebook."""
+    return Path(getattr(sys.modules.get("__main__"), "__file__", None) or "").name
+
 
 Run = OpenRun | str | Path
 
@@ -108,7 +213,7 @@ def restart(
 
 def _go_on_with(opened, cells, words, at, output, force, hooks, quiet) -> OpenRun:
     """`restart` on other cells."""
-    from runs.march.remapping import remap_runner
+    from runs.march.launching import remap_runner
 
     if hooks:
         raise BadInput("hooks: a run that goes on with other cells has none; restart it once more")
@@ -143,7 +248,7 @@ def report(directory: Run | Study, output: str | Path | None = None, **options: 
     output: FILE [DIR/report.html]; options: film (bool), dpi.  Raises BadInput where the directory
     is neither, or the extra `report` is not installed.
     """
-    from runs.report.study import report as write
+    from runs.report.page import report as write
 
     check_options("report", write, options)
     return write(_find_path(directory), output, **options)
@@ -154,7 +259,7 @@ def inspect(file: str | Path | Dump, other: str | Path | Dump | None = None) -> 
 
     Each is a file or a dump of an opened run.  Raises BadInput where one is no HDF5 file.
     """
-    from runs.inspection.tree import inspect_differences, inspect_file
+    from runs.inspection.info import inspect_differences, inspect_file
 
     path = str(getattr(file, "path", file))
     if other is None:
@@ -179,7 +284,7 @@ def verify(*problems: str, short: bool = False) -> list[dict[str, Any]]:
     A record has "problem", "what", "size", "error", "order", "bar" and "met", None where there is
     none.  short: one small size of each.  Raises BadInput for a name that is none.
     """
-    from runs.verify.table import choose_cases, compute_rows
+    from runs.verify import choose_cases, compute_rows
 
     return [row.make_record() for row in compute_rows(choose_cases(problems), short)]
 

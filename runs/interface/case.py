@@ -1,40 +1,168 @@
 """A problem with its deck, to look at, step, run and draw: what `shockgrid.load` gives.
 
 The traps: blocks are built when they are first asked for, which may compile kernels for a minute;
-their arrays are live (`runs.interface.blocks`).
+their arrays are live (`runs.interface.case`).
 """
 
 from __future__ import annotations
 
 import sys
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from problems.deck import Deck
-from problems.evolution import Evolution, Scalar, is_axisymmetric
+from problems.evolution import (
+    BlockView,
+    Evolution,
+    Scalar,
+    get_long_names,
+    get_material,
+    get_node_fields,
+    is_axisymmetric,
+)
 from problems.problem import Problem, check_memory
-from regrid.errors import BadInput, find_nearest
+from regrid.errors import BadInput, find_nearest, suggest
+from regrid.measure.corners import compute_centres
 from runs.deck.reading import ReadDeck, read_deck, resolve_deck
-from runs.inspection.cautions import describe_cautions
-from runs.interface.blocks import Blocks, LiveBlock
-from runs.interface.hooks import Hooks, HooksGiven, is_count
-from runs.interface.settings import make_settings, said_in_python, with_known_options
-from runs.interface.words import make_table
-from runs.march.first_checks import check_requests
+from runs.inspection.account import describe_cautions
+from runs.interface.settings import (
+    Hooks,
+    HooksGiven,
+    is_count,
+    make_settings,
+    make_table,
+    said_in_python,
+    with_known_options,
+)
+from runs.march.launching import check_requests
 from runs.march.progress import patience
 from runs.march.runner import Runner
 from runs.ranks.started import check_single
 from runs.store.directory import create_directory
+from runs.store.reader import get_field
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from runs.interface.opened import OpenRun
     from runs.interface.pictures import Curve
+
+
+def lock(values: np.ndarray) -> np.ndarray:
+    """A view of an array through which nothing can be written."""
+    view = values.view()
+    view.flags.writeable = False
+    return view
+
+
+class LockedFields(Mapping[str, np.ndarray]):
+    """Fields by name, each a view through which nothing can be written."""
+
+    def __init__(self, fields: Mapping[str, np.ndarray]):
+        self._fields = fields
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return lock(self._fields[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._fields)
+
+    def __len__(self) -> int:
+        return len(self._fields)
+
+
+class LiveBlock:
+    """One block: `nodes` (2, ni+1, nj+1) [m], and its fields `rho`, `u`, `v`, `p`, `e`, (ni, nj).
+
+    SI units; a field of another name is an attribute too.  An unknown name raises AttributeError
+    with those that there are.
+    """
+
+    def __init__(self, block: BlockView, axes: tuple[str, str] = ("x", "y")):
+        self._block = block
+        self.name: str = block.name
+        self.material: str = get_material(block)
+        self.axes = axes
+        self.units: Mapping[str, str] = block.units
+        fields = {*block.cell_fields, *get_node_fields(block)}
+        told = get_long_names(block)
+        self.long_names: Mapping[str, str] = {name: told.get(name, name) for name in fields}
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Nodes (2, ni+1, nj+1) [m], a view."""
+        return lock(self._block.nodes)
+
+    @property
+    def centres(self) -> np.ndarray:
+        """Middles of the cells (2, ni, nj) [m], computed now."""
+        return compute_centres(self._block.nodes)
+
+    @property
+    def cells(self) -> tuple[int, int]:
+        """Cells along i and along j."""
+        ni, nj = (size - 1 for size in self._block.nodes.shape[1:])
+        return ni, nj
+
+    @property
+    def cell_fields(self) -> Mapping[str, np.ndarray]:
+        """Fields of the cells by name, (ni, nj) each: views, and what is computed from them."""
+        return LockedFields(self._block.cell_fields)
+
+    @property
+    def node_fields(self) -> Mapping[str, np.ndarray]:
+        """Fields at the nodes by name, (ni+1, nj+1) each; none in most flows."""
+        return LockedFields(get_node_fields(self._block))
+
+    @property
+    def state_fields(self) -> Mapping[str, np.ndarray]:
+        """What is kept of the cells besides: their rates [1/s], (ni, nj), in flows."""
+        rates = getattr(self._block, "rates", None)
+        return LockedFields({} if rates is None else {"rates": rates})
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return get_field(self, name)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self.cell_fields, *self.node_fields})
+
+    def __repr__(self) -> str:
+        ni, nj = self.cells
+        return f"<block {self.name}: {self.material}, {ni} x {nj} cells>"
+
+
+class Blocks(Mapping[str, LiveBlock]):
+    """The blocks of a flow by name, in their order; BadInput for a name that none has."""
+
+    def __init__(self, blocks: Sequence[BlockView], axes: tuple[str, str]):
+        self._blocks = {block.name: LiveBlock(block, axes) for block in blocks}
+
+    def __getitem__(self, name: str) -> LiveBlock:
+        try:
+            return self._blocks[name]
+        except KeyError:
+            raise BadInput(f"there is no block {name!r}{suggest(name, self._blocks)}") from None
+
+    def __contains__(self, name: Any) -> bool:
+        return name in self._blocks
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._blocks)
+
+    def __len__(self) -> int:
+        return len(self._blocks)
+
+    def __repr__(self) -> str:
+        return f"<blocks: {', '.join(self._blocks)}>"
+
 
 LIVE_PICTURES = ("fields", "mesh", "interface", "line")  # of the state in memory
 
@@ -86,7 +214,7 @@ class Case:
     def blocks(self) -> Blocks:
         """The blocks by name: `case.blocks["second"].rho`, (ni, nj) without ghost cells.
 
-        The arrays are views of live data, not to be written to: see `runs.interface.blocks`.
+        The arrays are views of live data, not to be written to: see `runs.interface.case`.
         """
         return Blocks(self.simulation.blocks, self._axes)
 
@@ -213,26 +341,31 @@ class Case:
         mirror: str | None = None,
         beside: str | Path | None = None,
         line: Sequence[float] | None = None,
+        limits: Sequence[float] | None = None,
+        colours: str | None = None,
     ) -> Figure:
         """The figure of the present state: fields (the density where none is named) or grids.
 
         what: "fields", "mesh", "interface" or "line"; a single word that is one of these may stand
         in place of a field.  mesh: draw the grid over the fields; zoom: x0, x1, y0, y1 [m]; mirror:
         "x" or "y" completes a half domain; beside: the directory of a run, its dump nearest in time
-        drawn to the same scale; line: x0, y0, x1, y1 [m], the fields along it are drawn.  Raises
-        BadInput for what there is not.
+        drawn to the same scale; line: x0, y0, x1, y1 [m], the fields along it are drawn; limits:
+        low, high of the colours in SI units; colours: a colour map.  Raises BadInput for what there
+        is not.
         """
         from runs.interface.pictures import draw_picture
 
         live = _LiveRun(self)
         fields, what = self._choose_picture(fields, what, live.dumps[0])
-        return draw_picture(live, fields, what, None, mesh, zoom, mirror, beside, line)
+        return draw_picture(
+            live, fields, what, None, mesh, zoom, mirror, beside, line, limits, colours
+        )
 
     def _choose_picture(
         self, fields: tuple[str, ...], what: str | None, state: Any
     ) -> tuple[tuple[str, ...], str | None]:
         """Fields and `what` of a picture; BadInput with the names there are for any other."""
-        from runs.pictures.derived import list_fields
+        from runs.pictures.fields import list_fields
 
         known = list_fields(state)
         if what is None and len(fields) == 1 and not set(fields[0].split(",")) <= set(known):

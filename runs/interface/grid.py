@@ -18,17 +18,18 @@ from regrid.errors import BadInput, RegridFailure, suggest
 from regrid.given import check_nodes, is_file_name, read_grid, read_sides
 from regrid.protocol import Regridder
 from runs.grids.compare import default_cells
-from runs.grids.files import check_free, plan_outputs, write_grid
 from runs.grids.making import (
     PASSES,
     Made,
+    March,
+    make_family,
     make_on_curves,
     make_on_domain,
+    march,
     regrid_plane,
     weigh_cells,
 )
-from runs.grids.marching import March, make_family, march
-from runs.grids.quality import Judgement, judge
+from runs.grids.quality import Judgement, check_free, judge, plan_outputs, write_grid
 
 STEPS = 40
 Family = str | Regridder

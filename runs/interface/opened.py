@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import importlib
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from problems.evolution import Evolution
-from regrid.errors import BadInput
-from runs.inspection.units import describe_time
-from runs.interface.history import History
-from runs.interface.settings import check_options, with_known_options
-from runs.interface.words import make_table
+from regrid.errors import BadInput, suggest
+from runs.inspection.account import describe_time
+from runs.interface.settings import check_options, make_table, with_known_options
 from runs.march.runner import Ending, Runner
 from runs.store.reader import RunData
 
@@ -20,6 +22,73 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from runs.interface.pictures import Curve, Times
+
+
+class NoColumn(BadInput, KeyError):
+    """A column that the history does not have; the sentence names those that are like it."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class History(dict[str, np.ndarray]):
+    """Columns of the history by name, (steps + 1,) each; `history.t` is `history["t"]`.
+
+    Row 0 is the start, where only some columns have a value (nan, "" in a column of words).
+    `units` maps columns to their SI unit, as far as it is known.  An unknown name raises
+    AttributeError or, in brackets, BadInput, which here is a KeyError too.
+    """
+
+    def __init__(
+        self, columns: Mapping[str, np.ndarray], units: Mapping[str, str], name: str = "history"
+    ):
+        super().__init__(columns)
+        self.units = {key: unit for key, unit in units.items() if key in columns}
+        self.name = name
+
+    def __missing__(self, name: str) -> np.ndarray:
+        raise NoColumn(f"the history has no column {name!r}{suggest(name, self)}")
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        try:
+            return self[name]
+        except KeyError as error:
+            raise AttributeError(str(error)) from None
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self})
+
+    def __repr__(self) -> str:
+        rows = len(next(iter(self.values()), ()))
+        return f"<history of {self.name}: {rows} rows, {len(self)} columns: {', '.join(self)}>"
+
+    def to_xarray(self) -> Any:
+        """An xarray.Dataset over `step`, with `t` beside it and units as attributes.
+
+        Raises BadInput where xarray is not installed.
+        """
+        xarray = _load("xarray")
+        data = {
+            name: ("step", values, {"units": self.units[name]} if name in self.units else {})
+            for name, values in self.items()
+        }
+        return xarray.Dataset(data).set_coords(["step", "t"])
+
+    def to_pandas(self) -> Any:
+        """A pandas.DataFrame with a row a step, `step` being its index.
+
+        Raises BadInput where pandas is not installed.
+        """
+        return _load("pandas").DataFrame(dict(self)).set_index("step")
+
+
+def _load(package: str) -> ModuleType:
+    try:
+        return importlib.import_module(package)
+    except ImportError as error:
+        words = f"{package} is not installed here: python -m pip install {package}"
+        raise BadInput(f"to_{package} needs {package}, and {words}") from error
+
 
 FIRST_SIGNAL = 128  # exit codes from here on: stopped by a signal
 INTERRUPTED = 130
@@ -83,6 +152,8 @@ class OpenRun(RunData):
         mirror: str | None = None,
         beside: str | Path | None = None,
         line: Sequence[float] | None = None,
+        limits: Sequence[float] | None = None,
+        colours: str | None = None,
     ) -> Figure:
         """The figure that `shockgrid plot` draws: fields (the density where none is named), ...
 
@@ -90,13 +161,16 @@ class OpenRun(RunData):
         "line" or a picture of the problem's own; a single word that is one of these may stand in
         place of a field.  at: times [s], "start" or "end"; mesh, zoom, mirror: see `Case.plot`;
         beside: the directory of another run, drawn to the same scale; line: x0, y0, x1, y1 [m], the
-        fields along it are drawn.  Raises BadInput for what there is not.
+        fields along it are drawn; limits: low, high of the colours in SI units; colours: a colour
+        map.  Raises BadInput for what there is not.
         """
         from runs.interface.pictures import draw_picture
 
         if what is None and len(fields) == 1 and fields[0] in self.pictures:
             what, fields = fields[0], ()
-        return draw_picture(self, fields, what, at, mesh, zoom, mirror, beside, line)
+        return draw_picture(
+            self, fields, what, at, mesh, zoom, mirror, beside, line, limits, colours
+        )
 
     @property
     def pictures(self) -> list[str]:
@@ -127,7 +201,7 @@ class OpenRun(RunData):
 
         options: film (bool), dpi.  Raises BadInput where the extra `report` is not installed.
         """
-        from runs.report.study import report
+        from runs.report.page import report
 
         check_options("report", report, options)
         return report(self.path, output, **options)

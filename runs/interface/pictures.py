@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from regrid.errors import BadInput
 from runs.pictures.command import fill_figure, new_figure
-from runs.pictures.outlines import split_outline
+from runs.pictures.fields import split_outline
 
 Times = float | str | Sequence[float] | None
 
@@ -47,6 +47,8 @@ def draw_picture(
     mirror: str | None,
     beside: str | Path | None = None,
     line: Sequence[float] | None = None,
+    limits: Sequence[float] | None = None,
+    colours: str | None = None,
 ) -> Figure:
     """What `shockgrid plot` draws, as a figure; `run` has what RunData has.
 
@@ -56,10 +58,8 @@ def draw_picture(
         raise BadInput(f"mirror = {mirror!r}: 'x' or 'y' is wanted")
     figure = new_figure(Picture)
     other = None if beside is None else str(beside)
-    fill_figure(
-        figure, run, fields, what, _say_times(at), mesh, say_numbers(zoom), mirror, None, other,
-        say_numbers(line),
-    )  # fmt: skip
+    ways = say_numbers(zoom), mirror, None, other, say_numbers(line), say_numbers(limits), colours
+    fill_figure(figure, run, fields, what, _say_times(at), mesh, *ways)
     return figure
 
 

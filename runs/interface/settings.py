@@ -6,16 +6,36 @@ They become the words of `--set`, so that the command line and Python have the s
 from __future__ import annotations
 
 import functools
+import html
 import inspect
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import tomli_w
 
+from hydro.boundary.registry import SEGMENTS
+from hydro.boundary.segment import Segment
+from hydro.eos import EQUATIONS_OF_STATE
+from hydro.eos.base import EquationOfState
+from problems.problem import Problem
+from problems.registry import PROBLEMS
 from regrid.errors import BadInput, suggest
+from regrid.registry import REGRIDDERS
+
+
+def make_table(rows: Sequence[tuple[str, str]]) -> str:
+    """Two columns: what, and its value; both as plain text."""
+    lines = "".join(
+        f"<tr><th style='text-align:left'>{html.escape(what)}</th>"
+        f"<td style='text-align:left'>{html.escape(value)}</td></tr>"
+        for what, value in rows
+    )
+    return f"<table>{lines}</table>"
 
 
 def make_settings(keywords: Mapping[str, Any]) -> tuple[str, ...]:
@@ -97,3 +117,124 @@ def _format(value: Any, key: str) -> str:
     if not isinstance(value, bool | int | float | str):
         raise BadInput(f"{key}: a deck cannot hold a {type(value).__name__}; give a number or text")
     return tomli_w.dumps({"value": value}).partition("=")[2].strip()
+
+
+class Marched(Protocol):
+    """What tells when a hook is due; `runs.interface.case.Case` is one."""
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+        ...
+
+    @property
+    def step(self) -> int:
+        """Number of the last step."""
+        ...
+
+
+HookFunction = Callable[[Any], Any]  # of the case; None, or words on why to stop
+
+
+def is_count(value: object) -> bool:
+    """Is it a whole number of at least 1?"""
+    return type(value) is int and value >= 1
+
+
+class Hook:
+    """A function to be called every `steps` steps or every `time` [s], after each step
+    where neither is given.
+
+    Times are multiples of `time`; a call is made after the first step past one.  Raises BadInput
+    where both are given, or one that is not positive.
+    """
+
+    def __init__(
+        self, function: HookFunction, *, steps: int | None = None, time: float | None = None
+    ):
+        if not callable(function):
+            raise BadInput(f"a hook is a function of the case, not a {type(function).__name__}")
+        if steps is not None and time is not None:
+            raise BadInput(
+                "a hook is called every so many steps or every so many seconds, not both"
+            )
+        if steps is not None and not is_count(steps):
+            raise BadInput(f"steps = {steps!r} of a hook: a whole number of at least 1 is wanted")
+        if time is not None and not (math.isfinite(time) and time > 0.0):
+            raise BadInput(f"time = {time!r} s of a hook: a positive number is wanted")
+        self.function, self.steps, self.time = function, steps, time
+
+    def is_due(self, case: Marched, t_before: float) -> bool:
+        """Is it to be called after the step from `t_before` to the time of the case?"""
+        if self.time is not None:
+            return math.floor(case.t / self.time) > math.floor(t_before / self.time)
+        return case.step % (self.steps or 1) == 0
+
+
+HooksGiven = Sequence[Hook | HookFunction] | Hook | HookFunction
+
+
+class Hooks:
+    """All hooks of a run; called after each step."""
+
+    def __init__(self, case: Marched, hooks: HooksGiven):
+        self.case = case
+        if isinstance(hooks, Hook) or not isinstance(hooks, Sequence):
+            hooks = [hooks]
+        self.hooks = [hook if isinstance(hook, Hook) else Hook(hook) for hook in hooks]
+
+    def __call__(self, t_before: float) -> str | None:
+        """Call those that are due after the step from `t_before` [s]; the first reason to stop.
+
+        Raises BadInput for what is neither None nor text.
+        """
+        due = [hook for hook in self.hooks if hook.is_due(self.case, t_before)]
+        for hook in due:
+            reason = hook.function(self.case)
+            if reason is not None and not isinstance(reason, str):
+                name = getattr(hook.function, "__name__", "hook")
+                raise BadInput(
+                    f"{name} returned {reason!r}: a hook returns None, or words on why to stop"
+                )
+            if reason:
+                return reason
+        return None
+
+
+NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
+_OWN: dict[tuple[str, str], str] = {}  # what was registered here: kind and name, and its class
+
+
+def register(name: str, thing: type) -> None:
+    """Make a class known by name: a problem, an equation of state, a boundary kind, a regridder.
+
+    A regridder is a class with a method `regrid(previous, boundary)`.  The same name may be given
+    again by the same class, written anew.  Raises BadInput for another class, for a name that is
+    taken, and for one that is not of small letters, digits and hyphens.
+    """
+    if not isinstance(thing, type):
+        raise BadInput(f"{name!r}: a class is registered, not a {type(thing).__name__}")
+    if not NAME.fullmatch(name):
+        raise BadInput(f"{name!r} is no name: small letters, digits and hyphens are wanted")
+    place = f"{thing.__module__}:{thing.__qualname__}"
+    registry: MutableMapping[str, Any]
+    value: Any
+    if issubclass(thing, Problem):
+        kind, registry, value = "problem", PROBLEMS, place
+    elif issubclass(thing, EquationOfState):
+        kind, registry, value = "equation of state", EQUATIONS_OF_STATE, thing
+    elif issubclass(thing, Segment):
+        kind, registry, value = "boundary kind", SEGMENTS, thing
+    elif callable(getattr(thing, "regrid", None)):
+        kind, registry, value = "regridder", REGRIDDERS, place
+    else:
+        raise BadInput(
+            f"{thing.__name__} is no problem, equation of state, boundary kind or regridder: it is "
+            "derived from none of them and has no method regrid"
+        )
+    if "<locals>" in place:
+        raise BadInput(f"{thing.__qualname__}: a class inside a function cannot be registered")
+    if name in registry and _OWN.get((kind, name)) != place:
+        raise BadInput(f"there is a {kind} {name!r} already; choose another name")
+    registry[name] = value
+    _OWN[kind, name] = place

@@ -3,18 +3,48 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from problems.deck import Deck, place_gauges
 from problems.evolution import Evolution
+from problems.problem import Problem
 from regrid.text_files import escape_controls
-from runs.forecast.cost import describe_seconds_range
-from runs.forecast.time_left import TimeLeft
-from runs.inspection.account import count_cells
-from runs.inspection.units import describe_time
+from runs.deck.reading import ReadDeck
+from runs.early_end.causes import name_failure
+from runs.forecast.cost import (
+    Course,
+    TimeLeft,
+    describe_seconds_range,
+    find_past,
+    keep_run,
+    make_past_run,
+    measure_size,
+    name_flow,
+    name_kernels,
+)
+from runs.forecast.step_trend import StepTrend
+from runs.gauges import NO_BLOCK
+from runs.inspection.account import (
+    count,
+    count_cells,
+    describe_cautions,
+    describe_own,
+    describe_run,
+    describe_seconds,
+    describe_time,
+    describe_verdict,
+    judge,
+)
+from runs.store.directory import RunDirectory
+from runs.store.guards import remove_verdict, write_verdict
+from runs.store.history import read_history
 
 PATIENCE = 3.0  # wall seconds before a person is told what takes so long
 REMINDER = 60.0  # wall seconds until the person is told again
@@ -172,3 +202,140 @@ class Progress:
         if self.bar is not None:
             self.bar.close()
             self.bar = None
+
+
+class Outlook:
+    """Follows the steps of one run in its directory; `say`: takes a line for the screen."""
+
+    def __init__(
+        self,
+        deck: ReadDeck,
+        problem: Problem,
+        evolution: Evolution,
+        directory: RunDirectory,
+        say: Callable[[str], None],
+    ):
+        self.deck, self.problem, self.evolution = deck, problem, evolution
+        self.directory = directory
+        self.began = evolution.step
+        self.flow, self.cells = name_flow(deck.problem, deck.deck), count_cells(evolution)
+        self.finest = measure_size(problem, evolution).finest
+        self.trend = StepTrend(evolution, directory.note, say)
+        remove_verdict(directory)
+        if self.began:
+            self.trend.resume(read_history(directory.history))
+
+    def find_course(self) -> Course | None:
+        """How dt went in a past run of the same flow."""
+        past = find_past(self.flow, self.cells)
+        return past.course if past and math.isclose(past.t_end, self.evolution.t_end) else None
+
+    def follow(self, row: Mapping[str, Any]) -> None:
+        """Take note of a step's history row."""
+        self.trend.follow(row)
+
+    def fail(self, error: Exception) -> None:
+        """The verdict on a run that has failed; nothing may hide its own sentence."""
+        with contextlib.suppress(Exception):
+            history = read_history(self.directory.history)
+            self.close("ended early", str(error), history, name_failure(error))
+
+    def close(
+        self, status: str, reason: str, history: Mapping[str, np.ndarray], name: str = ""
+    ) -> dict[str, Any]:
+        """Write the verdict, which is returned; keep what a whole run tells of later ones.
+
+        name: of the cause of an early end.
+        """
+        marks = self.trend.describe()
+        verdict = judge(status, reason, history, self.cells, self.problem, marks, name)
+        write_verdict(self.directory, verdict)
+        clock = getattr(self.evolution, "clock", None)
+        if status == "finished" and clock is not None and not self.began:
+            run = make_past_run(
+                self.flow, self.deck.problem, self.cells, self.evolution.t_end, self.finest,
+                clock.first_stable_dt, history, name_kernels(self.evolution),
+            )  # fmt: skip
+            if run is not None:
+                keep_run(run)
+        return verdict
+
+
+def closing_screen(
+    problem: Problem,
+    evolution: Evolution,
+    history: Mapping[str, np.ndarray],
+    directory: RunDirectory,
+    reason: str,
+    seconds: float,
+    verdict: Mapping[str, Any],
+    ranks: Sequence[str] = (),
+) -> str:
+    """All of the screen as text; ranks: lines about those of MPI."""
+    cells = count_cells(evolution)
+    blocks = count(len(evolution.blocks), "block")
+    marched = [describe_time(evolution.t, problem.t_unit)]
+    if problem.t_unit == "s":
+        marched.append(count(evolution.step, "step"))
+    words = ", ".join([*marched, f"{cells} cells in {blocks}", describe_seconds(seconds)])
+    lines = [f"{reason}: {words}", describe_verdict(verdict)]
+    lines += describe_run(history, cells, [block.name for block in evolution.blocks])
+    lines += describe_gauges(problem.deck, directory)
+    motion = getattr(evolution, "motion", None)
+    if motion is not None and motion.blocks.size > 1:
+        lines.append(f"ranks of MPI: {motion.blocks.size}; on the first of them")
+    lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")
+    lines += ranks
+    if len(history.get("step", ())) > 1:
+        own = describe_own(problem, history, evolution)
+        if own:
+            lines += ["", own]
+    cautions = describe_cautions(problem, history)
+    lines += ["", *cautions] if cautions else []
+    dumps = count(len(directory.list_files("dump")), "dump")
+    lines += [
+        "",
+        f"in {directory}: {dumps}, history.csv, run.xmf (ParaView)",
+        f"look at it:  shockgrid plot {directory.quoted}    shockgrid info {directory.quoted}",
+    ]
+    if evolution.finished is None:
+        lines.append(f"go on:       {problem.say_restart(directory.quoted)}")
+    return "\n".join(lines)
+
+
+def describe_gauges(deck: Deck, directory: RunDirectory) -> list[str]:
+    """How many gauges there are, and which of them have been outside of all blocks how often."""
+    points = place_gauges(deck.gauge)
+    if not points:
+        return []
+    table = read_history(directory.gauges)
+    words = f"{count(len(points), 'gauge')} in gauges.csv"
+    outside = {p.name: int((table[f"{p.name}_block"] == NO_BLOCK).sum()) for p in points if table}
+    rows = len(table.get("step", ()))
+    told = [f"{name} in {times} of {rows} rows" for name, times in outside.items() if times]
+    if told:
+        more = f" and {len(told) - 3} more" if len(told) > 3 else ""
+        words += f"; outside of all blocks: {', '.join(told[:3])}{more}"
+    return [words]
+
+
+def describe_threads(wanted: int | None, evolution: Evolution) -> str:
+    """Threads that the blocks asked for, those there are, and how they are started."""
+    workers = getattr(evolution, "workers", None)
+    if workers and workers.side_by_side:
+        return f"{workers.threads}, blocks side by side"
+    wanted = workers.threads if workers else wanted or 1
+    numba = sys.modules.get("numba")
+    if wanted == 1 or numba is None:
+        return "1"
+    allowed = numba.config.NUMBA_NUM_THREADS
+    try:
+        layer = numba.threading_layer()
+    except ValueError:  # nothing has run on more than one
+        return f"{wanted} wanted, 1 used: the blocks are too small to gain by more"
+    text = f"{min(wanted, allowed)} ({layer})"
+    if wanted > allowed:
+        text += f"; {wanted} wanted, but this machine has {allowed}"
+    if layer == "workqueue":
+        text += "; omp is missing here (install libgomp): threads start more slowly"
+    return text

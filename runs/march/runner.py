@@ -13,46 +13,197 @@ import contextlib
 import math
 import os
 import platform
+import re
 import signal
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hydro.history import compute_chosen_columns, find_columns
-from problems.evolution import Evolution, get_missed, get_start_row
+from problems.deck import Output
+from problems.evolution import Evolution, get_missed, get_node_fields, get_start_row
 from problems.problem import Problem
-from regrid.errors import BadInput, RunFailure
+from regrid.errors import BadInput, RunFailure, find_nearest
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import ENDS
 from runs.early_end.explain import explain
-from runs.gauges.recorder import Gauges, GaugeTable, make_gauges
-from runs.inspection.account import count
-from runs.inspection.units import describe_time
-from runs.march.background import Background
-from runs.march.closing import closing_screen
-from runs.march.history_repair import mend_history
-from runs.march.limits import WallLimit
-from runs.march.outlook import Outlook
-from runs.march.progress import Progress, patience
-from runs.march.restart_point import find_restart_point, is_light, restore
-from runs.march.schedule import is_dump_due
-from runs.ranks.account import describe_ranks
-from runs.ranks.files import write_on_ranks
-from runs.ranks.lost import loss_told
-from runs.ranks.sharing import check_cut
-from runs.ranks.world import World
+from runs.gauges import Gauges, GaugeTable, make_gauges
+from runs.inspection.account import count, describe_time
+from runs.march.progress import Outlook, Progress, closing_screen, patience
+from runs.march.restart import find_restart_point, is_light, restore
+from runs.ranks.map import check_cut
+from runs.ranks.world import World, describe_ranks, loss_told, write_on_ranks
 from runs.store.directory import RunDirectory
+from runs.store.dumps import (
+    choose_arrays,
+    is_large,
+    make_image,
+    make_light_image,
+    write_sealed,
+)
 from runs.store.files import write_atomically
-from runs.store.guards import note_summary
-from runs.store.history import HistoryWriter, check_columns, read_history
-from runs.store.light import choose_arrays, write_light_dump
+from runs.store.guards import keep_problem_file, note_summary
+from runs.store.history import HistoryWriter, check_columns, read_history, truncate_history
+from runs.store.paraview import Sidecar
 from runs.store.parts import Moment
 from runs.store.provenance import describe_provenance, find_provenance
-from runs.store.run_deck import keep_problem_file
-from runs.store.writing import count_safe_steps, is_large, make_pieces, write_sealed
-from runs.store.xdmf import Sidecar
+
+
+class Background:
+    """A file that is written while the run goes on, one at a time, by a thread.
+
+    What follows a file (older restart points go, the sidecar shows it) is done by the thread of the
+    run, when that looks and the file is on the disk.  As a context it is left when that is so.
+    """
+
+    def __init__(self) -> None:
+        self._executor: ThreadPoolExecutor | None = None
+        self._writing: Future[Any] | None = None
+        self._then: Callable[[], None] = lambda: None
+
+    def start(self, write: Callable[[], Any], then: Callable[[], None]) -> None:
+        """Call `write` in the thread, when what is being written is; `then` follows in `finish`."""
+        self.finish()
+        self._executor = self._executor or ThreadPoolExecutor(1, thread_name_prefix="dump")
+        self._writing, self._then = self._executor.submit(write), then
+
+    def look(self) -> None:
+        """`finish`, where that needs no waiting."""
+        if self._writing is not None and self._writing.done():
+            self.finish()
+
+    def finish(self) -> None:
+        """Wait for the file and do what follows.  Raises what its writing has raised, once."""
+        if self._writing is None:
+            return
+        self._writing.exception()  # waits; interrupted, it can be waited for again
+        writing, self._writing = self._writing, None
+        writing.result()
+        self._then()
+
+    def __enter__(self) -> Background:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
+        """Finish; where something else has failed before, that is what is told."""
+        try:
+            with contextlib.suppress(BadInput) if kind else contextlib.nullcontext():
+                self.finish()
+        finally:
+            if self._executor is not None:
+                self._executor.shutdown()
+                self._executor = None
+
+
+MARGIN = 2.0  # times the longest of the last steps and the longest write: time left for both
+REMEMBERED = 50  # steps
+FORM = re.compile(r"(?:(\d+(?:\.\d+)?)h)?(?:(\d+(?:\.\d+)?)m)?(?:(\d+(?:\.\d+)?)s?)?")
+CLOCK = re.compile(r"(\d+):([0-5]\d):([0-5]\d)")
+
+
+def parse_duration(text: str) -> float:
+    """Seconds [s] of a duration: 2h, 90m, 1h30m, 1:30:00 or a number of seconds.
+
+    Raises BadInput for anything else, and for no time at all.
+    """
+    word = text.strip()
+    clock, form = CLOCK.fullmatch(word), FORM.fullmatch(word)
+    parts = clock.groups() if clock else form.groups() if form else ()
+    seconds = sum(
+        float(part) * scale
+        for part, scale in zip(parts, (3600.0, 60.0, 1.0), strict=False)
+        if part is not None
+    )
+    if not 0.0 < seconds < float("inf"):
+        raise BadInput(
+            f"--max-wall {text!r} is no time; write 2h, 90m, 1h30m, 1:30:00 or seconds, above 0"
+        )
+    return seconds
+
+
+class WallLimit:
+    """Wall time that a run may take, counted from when this is made.
+
+    The first step, for which kernels may be compiled, counts for the time that has gone and not for
+    how long steps are.  At least one step is made, so that runs in a queue come to their end.
+    """
+
+    def __init__(self, text: str):
+        self.text = text
+        self.end = time.monotonic() + parse_duration(text)
+        self._steps: list[float] = []
+        self._write = 0.0
+        self._made = 0
+
+    def __str__(self) -> str:
+        return f"--max-wall {self.text}"
+
+    @property
+    def reached(self) -> bool:
+        """Would one more step, and the restart point after it, come too late?"""
+        if not self._made:
+            return False
+        needed = MARGIN * (max(self._steps, default=0.0) + self._write)
+        return time.monotonic() + needed >= self.end
+
+    def note_step(self, seconds: float) -> None:
+        """Remember how long a step has taken [s]."""
+        self._made += 1
+        if self._made > 1:
+            self._steps = [*self._steps[1 - REMEMBERED :], seconds]
+
+    def note_write(self, seconds: float) -> None:
+        """Remember how long a restart point has taken [s]."""
+        self._write = max(self._write, seconds)
+
+
+def is_dump_due(output: Output, t_end: float, t_before: float, t: float) -> bool:
+    """Does a dump's time lie in (t_before, t]?  Depends on these alone, as a restart must."""
+    if any(t_before < time <= t for time in output.times):
+        return True
+    if output.every is not None:
+        return math.floor(t / output.every) > math.floor(t_before / output.every)
+    if not output.dumps or not math.isfinite(t_end):
+        return False
+    return math.floor(t * output.dumps / t_end) > math.floor(t_before * output.dumps / t_end)
+
+
+def check_output(output: Output, evolution: Evolution) -> None:
+    """Raise BadInput for a time of a dump past the end and for a field that no block has."""
+    check_times(output, evolution.t_end)
+    check_fields(output, evolution)
+
+
+def check_times(output: Output, t_end: float) -> None:
+    """Raise BadInput for a time of a dump past the end of the run."""
+    late = [time for time in output.times if time > t_end]
+    if late:
+        raise BadInput(
+            f"deck: output.times has {late[0]:g}, which is after the end of the run, t = {t_end:g}"
+        )
+
+
+def check_fields(output: Output, evolution: Evolution) -> None:
+    """Raise BadInput for a field of light dumps that no block has."""
+    there = list(
+        dict.fromkeys(
+            name
+            for block in evolution.blocks
+            for name in (*block.cell_fields, *get_node_fields(block))
+        )
+    )
+    for name in output.fields:
+        if name not in there:
+            nearest = find_nearest(name, there, cutoff=0.6)
+            hint = f"; did you mean {nearest!r}?" if nearest else ""
+            raise BadInput(
+                f"deck: output.fields has {name!r}; no block has such a field, there are: "
+                f"{', '.join(there)}{hint}"
+            )
+
 
 MISSED = "not-steady"  # the cause of an end that is not what the run is for
 
@@ -96,7 +247,6 @@ class Runner:
         self.problem = problem
         self.evolution = evolution
         self.columns: list[str] | None = None
-        self.first_rows: list[dict[str, Any]] = []  # of a history that begins anew
         self.chosen = find_columns(deck.deck.output.columns)
         compute_chosen_columns(evolution, self.chosen)  # refused before anything is written
         check_cut(deck.deck.run.cut, [block.name for block in evolution.blocks])
@@ -122,19 +272,27 @@ class Runner:
         """Go on from the last good restart point, or from the one of step `at`."""
         with self.directory.claimed():
             check_columns(self.directory.history, self.evolution, self._measure())
-            state, step = find_restart_point(self.directory, at, say)
-            restore(self.evolution, state, self.directory, step)
-            self._restored = True
-            self.gauges.resume(state, step)
+            tables = [self.directory.history] + [self.gauges.path] * (
+                self.gauges.gauges is not None
+            )
+            state, step, rows = find_restart_point(self.directory, at, say, tables)
+            if step or all(one.rows for one in rows):  # else it is as it was built
+                restore(self.evolution, state, self.directory, step)
+                self._restored = True
+                self.gauges.set_state(state)
+            for one in rows:
+                if one.fault:
+                    say(f"{one.path} {one.fault}: cut back to step {step} and computed again")
+                    if one.path.exists():
+                        self.directory.set_aside(one.path)
+            columns = [truncate_history(one.path, step, one) for one in rows]
+            self.columns, self.gauges.columns = columns[0], columns[-1]
             if self.evolution.finished:
                 say(
                     f"this run has finished ({self.evolution.finished}); "
                     f"--set run.t_end=T with T > {self.evolution.t:.6g} goes on"
                 )
             moved = self.directory.set_aside_after(step)
-            self.columns, self.first_rows = mend_history(
-                self.directory, self.deck, step, self.evolution.t, restore, say
-            )
             if moved:
                 say(f"{count(moved, 'later file')} moved to {self.directory}/superseded")
             self._note_start(f"restart from step {step}")
@@ -239,8 +397,7 @@ class Runner:
         if self.columns is None:
             first = {"step": evolution.step, "t": evolution.t}
             first |= get_start_row(evolution)
-            for row in [*self.first_rows, first | self._measure()]:
-                self.history.start(row)
+            self.history.start(first | self._measure())
         if self.last_point is None:
             self._dump_light() if self.deck.deck.output.light else self._dump()
         written = time.monotonic()
@@ -264,7 +421,6 @@ class Runner:
             if self.limit is not None and self.limit.reached:
                 self._write_restart_point()
                 raise OutOfTime(str(self.limit))
-            self.writing.begin_step()
             t_before, clock = evolution.t, time.perf_counter()
             with patience(self.quiet) if self.progress.steps == 0 else contextlib.nullcontext():
                 row = evolution.advance()
@@ -342,7 +498,7 @@ class Runner:
         if self._ranked:
             self.sidecar.add(path, write_on_ranks(self._ranked, path, evolution, names, {}, output))
         else:
-            write_light_dump(path, evolution, *names, output)
+            write_sealed(path, make_light_image(evolution, *names, output))
             self.sidecar.add(path, evolution, lambda block: choose_arrays(block, output))
         self.sidecar.write([path for _, path in self.directory.list_files("dump")])
 
@@ -375,13 +531,12 @@ class Runner:
             self._describe(path, moment)
             follow()
             return
-        pieces = make_pieces(self.evolution, *names, besides)
+        image = make_image(self.evolution, *names, besides)
         self._describe(path, self.evolution)
         if is_large(self.evolution):
-            steps = 0 if self.after_step else count_safe_steps(self.evolution)
-            self.writing.start(lambda: write_sealed(path, pieces), follow, steps)
+            self.writing.start(lambda: write_sealed(path, image), follow)
         else:
-            write_sealed(path, pieces)
+            write_sealed(path, image)
             follow()
 
     @property

@@ -6,27 +6,87 @@ matplotlib is used through its objects, without pyplot: faster to load and no di
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cbook import is_math_text
 from matplotlib.figure import Figure
+from matplotlib.mathtext import MathTextParser
+from matplotlib.text import Text
 
 from regrid.errors import BadInput, suggest
+from regrid.text_files import escape_controls
+from runs.pictures.curves import (
+    draw_interfaces,
+    draw_lineouts,
+    parse_line,
+    take_lineouts,
+    write_csv,
+)
 from runs.pictures.fields import View, check_nodes, draw_fields, draw_meshes, time_titles
-from runs.pictures.gauges import draw_gauges
-from runs.pictures.history import draw_history
-from runs.pictures.interfaces import draw_interfaces
-from runs.pictures.lineouts import draw_lineouts, parse_line, take_lineouts, write_csv
-from runs.pictures.saving import write_figure
+from runs.pictures.history import draw_gauges, draw_history
 from runs.store.files import check_not_of_a_run, check_replaceable, disk_errors
+from runs.store.provenance import describe_software, hash_deck
 from runs.store.reader import Dump, RunData
+
+NAMES = {  # of the fields of metadata: what made it, what of
+    "png": ("Software", "Description"), "pdf": ("Creator", "Subject"),
+    "svg": ("Creator", "Description"), "eps": ("Creator", None), "ps": ("Creator", None),
+}  # fmt: skip
+
+
+def write_figure(
+    figure: Figure, target: Path | IO[bytes], dpi: int, ending: str, deck_text: str | None = None
+) -> None:
+    """Write a figure in the format of that ending.
+
+    deck_text: the resolved deck as TOML of the run that is shown; its digest goes into the file.
+    Raises OSError where the disk does not take it.
+    """
+    clean_words(figure)
+    metadata = make_metadata(ending, deck_text)
+    figure.savefig(target, dpi=dpi, format=ending, metadata=metadata or None)
+
+
+def clean_words(figure: Figure) -> None:
+    """Escape controls in all words of a figure; those that are no formula are drawn as they are."""
+    for text in figure.findobj(Text):
+        words = text.get_text()
+        if (plain := escape_controls(words)) != words:
+            text.set_text(plain)
+        if "$" in plain and not _is_formula(plain):
+            text.set_parse_math(False)
+
+
+def _is_formula(words: str) -> bool:
+    if not is_math_text(words):
+        return True
+    try:
+        for line in words.splitlines():
+            MathTextParser("path").parse(line)
+    except ValueError:
+        return False
+    return True
+
+
+def make_metadata(ending: str, deck_text: str | None) -> dict[str, Any]:
+    """Names and words on what made a file; {} for formats without a place for them."""
+    maker, content = NAMES.get(ending.lower(), (None, None))
+    words = {maker: describe_software()} if maker else {}
+    if content and deck_text is not None:
+        words[content] = f"deck SHA-256 {hash_deck(deck_text)}"
+    return words
+
 
 OWN = ("fields", "mesh", "interface", "history", "gauges", "line")
 HEEDED = {  # of the options that choose what is shown, by picture; a problem's own heeds none
-    "fields": ("FIELDS", "--at", "--mesh", "--zoom", "--mirror"),
+    "fields": ("FIELDS", "--at", "--mesh", "--zoom", "--mirror", "--limits", "--colours"),
     "mesh": ("--at", "--zoom", "--mirror"),
     "interface": ("--at", "--zoom", "--mirror"),
     "history": ("FIELDS",),
@@ -54,6 +114,8 @@ def draw(
     beside: str | None = None,
     line: str | None = None,
     table: str | None = None,
+    limits: str | None = None,
+    colours: str | None = None,
 ) -> list[Path]:
     """Write one picture of a run; returns its path, and that of the table of a line, if wished.
 
@@ -61,7 +123,7 @@ def draw(
     """
     run, figure = RunData(directory), new_figure()
     stem, write_table = fill_figure(
-        figure, run, fields, what, at, mesh, zoom, mirror, say, beside, line
+        figure, run, fields, what, at, mesh, zoom, mirror, say, beside, line, limits, colours
     )
     if table and not write_table:
         raise BadInput(f"--csv {table}: it is for the values along a line; --line says which")
@@ -110,12 +172,14 @@ def fill_figure(
     say: Callable[[str], None] | None = None,
     beside: str | None = None,
     line: str | None = None,
+    limits: str | None = None,
+    colours: str | None = None,
 ) -> tuple[str, Callable[[Path], Path] | None]:
     """Draw one picture of a run into `figure`; words as for `make_picture`.
 
     Returns the stem of a name for it, and what writes the table of a line's values, if it is one.
     """
-    view = View(parse_zoom(zoom), mirror, mesh)
+    view = View(parse_zoom(zoom), mirror, mesh, parse_limits(limits), check_colours(colours))
     names = [name for entry in fields for name in entry.split(",") if name]
     what = what or ("line" if line else "fields")
     stem, write_table = what, None
@@ -162,11 +226,15 @@ def fill_figure(
             check_history(run)
             raise
     given = {"FIELDS": names, "--at": at, "--mesh": mesh, "--zoom": zoom, "--mirror": mirror}
-    given["--line"] = line
+    given |= {"--line": line, "--limits": limits, "--colours": colours}
     idle = [option for option in given if given[option] and option not in HEEDED.get(what, ())]
     if idle and say:
         say(f"{', '.join(idle)}: not heeded by the picture {what!r}")
-    return stem, write_table
+    marks = [f"{option[2:]}-{given[option]}" for option in given if given[option]][bool(names) :]
+    if mesh:
+        marks = [mark.replace("mesh-True", "mesh") for mark in marks]
+    marks += [f"beside-{Path(beside).name}"] if beside else []
+    return "-".join([stem, *(re.sub(r"[^\w.+-]+", "_", mark) for mark in marks)]), write_table
 
 
 def check_history(run: RunData) -> None:
@@ -224,10 +292,7 @@ def default_fields(run: RunData) -> list[str]:
 
 
 def choose_dumps(
-    run: RunData,
-    at: str | None,
-    count: int = TIMES,
-    say: Callable[[str], None] | None = None,
+    run: RunData, at: str | None, count: int = TIMES, say: Callable[[str], None] | None = None
 ) -> list[Dump]:
     """The dumps nearest to the times in `at`, or `count` of them from first to last.
 
@@ -292,6 +357,23 @@ def parse_zoom(zoom: str | None) -> tuple[float, float, float, float] | None:
     if not 1.0 / SLENDER <= (x1 - x0) / (y1 - y0) <= SLENDER:
         raise BadInput(f"--zoom {zoom}: one side is more than {SLENDER:g} times the other")
     return x0, x1, y0, y1
+
+
+def parse_limits(limits: str | None) -> tuple[float, float] | None:
+    """low,high of the colours in SI units."""
+    if limits is None:
+        return None
+    numbers = [_number(word, f"--limits {limits}") for word in limits.split(",")]
+    if len(numbers) != 2 or not numbers[0] < numbers[1]:
+        raise BadInput(f"--limits {limits}: two numbers are wanted, low,high with low < high")
+    return numbers[0], numbers[1]
+
+
+def check_colours(name: str | None) -> str | None:
+    """The name of a colour map of matplotlib; BadInput for any other."""
+    if name is not None and name not in colormaps:
+        raise BadInput(f"--colours {name}: there is no such colour map{suggest(name, colormaps)}")
+    return name
 
 
 def _number(word: str, whole: str) -> float:

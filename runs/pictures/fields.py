@@ -6,19 +6,179 @@ spans decades (velocities excepted), symmetric about zero where the field has bo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize, PowerNorm
 
+from problems.evolution import get_material
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
-from runs.inspection.units import pick_prefix
-from runs.pictures.derived import get_field, get_style, get_words, has_field, list_fields
-from runs.pictures.outlines import split_outline
-from runs.store.reader import Dump
+from regrid.sides import SIDE_NAMES, get_side
+from runs.inspection.account import pick_prefix
+from runs.store.reader import Dump, DumpBlock
+
+CLOSE = 0.05  # of an edge: beyond the gap that chords of one curve leave between them
+
+
+def split_outline(blocks: Sequence) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """(interfaces, outer lines): polylines (2, n); seams are in neither.
+
+    An interface is listed once, from the first of its two blocks.
+    """
+    interfaces, outer = trace_outline(blocks)
+    return [line for _, line in interfaces], outer
+
+
+def trace_outline(
+    blocks: Sequence,
+) -> tuple[list[tuple[tuple[str, str], np.ndarray]], list[np.ndarray]]:
+    """As `split_outline`, each interface with the names of its two materials before it."""
+    interfaces, outer = [], []
+    for k, block in enumerate(blocks):
+        material = get_material(block)
+        for side in SIDE_NAMES:
+            line = get_side(block.nodes, side)
+            edges = np.hypot(*np.diff(line, axis=1))
+            reach = CLOSE * float(np.median(edges)) if edges.size else 0.0
+            touched = np.zeros(edges.size, dtype=bool)
+            for m, other in enumerate(blocks):
+                if m == k or not _boxes_touch(line, other.nodes, reach):
+                    continue
+                on_it = _edges_on(line, other.nodes, reach) & ~touched
+                touched |= on_it
+                if get_material(other) != material and m > k:
+                    pair = material, get_material(other)
+                    interfaces += [(pair, run) for run in _runs(line, on_it)]
+            outer += _runs(line, ~touched)
+    return interfaces, outer
+
+
+def _boxes_touch(line: np.ndarray, nodes: np.ndarray, reach: float) -> bool:
+    low, high = nodes.min(axis=(1, 2)) - reach, nodes.max(axis=(1, 2)) + reach
+    return bool(np.all(line.max(axis=1) >= low) and np.all(line.min(axis=1) <= high))
+
+
+def _edges_on(line: np.ndarray, nodes: np.ndarray, reach: float) -> np.ndarray:
+    """Which edges of `line` have both ends and the middle within `reach` of one side of `nodes`."""
+    middle = 0.5 * (line[:, 1:] + line[:, :-1])
+    on_it = np.zeros(middle.shape[1], dtype=bool)
+    for side in SIDE_NAMES:
+        other = get_side(nodes, side)
+        ends = _distance(line, other) <= reach
+        on_it |= ends[1:] & ends[:-1] & (_distance(middle, other) <= 4 * reach)
+    return on_it
+
+
+def _distance(points: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """Distance of each of `points` (2, n) to the polyline `line` (2, m)."""
+    start, along = line[:, None, :-1], np.diff(line, axis=1)[:, None, :]
+    offset = points[:, :, None] - start
+    length = np.maximum((along**2).sum(axis=0), 1e-300)
+    share = np.clip((offset * along).sum(axis=0) / length, 0.0, 1.0)
+    return np.sqrt((((offset - share * along) ** 2).sum(axis=0)).min(axis=1))
+
+
+def _runs(line: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:
+    """The pieces of `line` made of consecutive chosen edges."""
+    bounds = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
+    return [line[:, a : b + 1] for a, b in zip(bounds[::2], bounds[1::2], strict=True)]
+
+
+@dataclass(frozen=True)
+class Derived:
+    """How a field is made, its unit and words, what it needs, and how it is drawn."""
+
+    compute: Callable[[DumpBlock], np.ndarray]
+    unit: str
+    words: str
+    needs: tuple[str, ...]  # fields of the dump; "state/NAME": an array of the restart state
+    colours: str = ""  # a colour map of its own, from 0
+    power: float = 1.0  # of the value that the colour follows
+    marked: bool = False  # is the cell of the largest value marked?
+
+
+def compute_gradient(block: DumpBlock, name: str) -> np.ndarray:
+    """Gradient (2, ni, nj) of a field of cells, in its unit per metre."""
+    from hydro.formulas.reconstruction import compute_gradient as solve  # numba: loaded if wanted
+
+    x, y = compute_centres(block.nodes)
+    values = block.cell_fields[name]
+    (x_i, x_j), (y_i, y_j), (along_i, along_j) = (np.gradient(a) for a in (x, y, values))
+    inverse = 1.0 / (x_i * y_j - x_j * y_i)
+    return np.array(solve(along_i, along_j, x_i, y_i, x_j, y_j, inverse))
+
+
+def measure_gradient(block: DumpBlock, name: str) -> np.ndarray:
+    """Size (ni, nj) of the gradient of a field, in its unit per metre."""
+    return np.hypot(*compute_gradient(block, name))
+
+
+def compute_vorticity(block: DumpBlock) -> np.ndarray:
+    """Vorticity dv/dx - du/dy (ni, nj) [1/s], 2 omega in solid rotation; about the axis normal to
+    the plane, also where y is a radius."""
+    return compute_gradient(block, "v")[0] - compute_gradient(block, "u")[1]
+
+
+DERIVED = {
+    "schlieren": Derived(
+        lambda block: measure_gradient(block, "rho"),
+        "kg/m4", "density gradient, its size", ("rho",), "Greys", 0.4,
+    ),
+    "pressure_gradient": Derived(
+        lambda block: measure_gradient(block, "p"),
+        "Pa/m", "pressure gradient, its size", ("p",), "magma_r", 0.4,
+    ),
+    "vorticity": Derived(compute_vorticity, "1/s", "vorticity", ("u", "v")),
+    "rate": Derived(
+        lambda block: block.state_fields["rates"],
+        "1/s", "rate of the cells; the largest (marked) limits dt", ("state/rates",), marked=True,
+    ),
+}  # fmt: skip
+
+
+def has_field(block: DumpBlock, name: str) -> bool:
+    """Is the field there, or can it be derived from what is?"""
+    if name in block.cell_fields:
+        return True
+    derived = DERIVED.get(name)
+    if derived is None or min(block.nodes.shape[1:]) < 3:
+        return False
+    return all(
+        need.removeprefix("state/") in block.state_fields
+        if need.startswith("state/")
+        else need in block.cell_fields
+        for need in derived.needs
+    )
+
+
+def get_field(block: DumpBlock, name: str) -> np.ndarray:
+    """A field of cells (ni, nj) in its SI unit, from the dump or derived; KeyError if neither."""
+    if name in block.cell_fields:
+        return block.cell_fields[name]
+    return DERIVED[name].compute(block)
+
+
+def get_words(block: DumpBlock, name: str) -> tuple[str, str]:
+    """Unit and long name of a field that `has_field`."""
+    if name in block.cell_fields:
+        return block.units[name], block.long_names[name]
+    return DERIVED[name].unit, DERIVED[name].words
+
+
+def get_style(dump: Dump, name: str) -> Derived | None:
+    """The line of the table for a field that is derived in this dump."""
+    stored = any(name in block.cell_fields for block in dump.blocks)
+    return None if stored else DERIVED.get(name)
+
+
+def list_fields(dump: Dump) -> list[str]:
+    """Names of all fields of the dump, then of those that can be derived."""
+    derived = [n for n in DERIVED if any(has_field(block, n) for block in dump.blocks)]
+    return list(dict.fromkeys([*dump.field_names(), *derived]))
+
 
 WIDTH, PAGE = 12.0, 6.5  # inches: of every picture, wished for
 TALLEST, TALLEST_ALONE = 16.0, 8.0  # at most, at most of one panel
@@ -40,6 +200,8 @@ class View:
     zoom: tuple[float, float, float, float] | None = None
     mirror: str | None = None
     mesh: bool = False
+    limits: tuple[float, float] | None = None  # of the colours, in SI units
+    colours: str | None = None  # name of a colour map
 
 
 @dataclass(frozen=True)
@@ -120,7 +282,7 @@ def draw_fields(
     panels = make_panels(figure, boxes[0], len(names), len(dumps), lengths, following)
     titles = titles or time_titles(dumps)
     for k, name in enumerate(names):
-        norm, colours, factor, label = find_colours(dumps[0], moments, name, boxes)
+        norm, colours, factor, label = find_colours(dumps[0], moments, name, boxes, view)
         image = None
         for axes, sheets, box, title in zip(panels[k], moments, boxes, titles, strict=True):
             image = draw_sheets(axes, sheets, name, norm, colours, factor, scale) or image
@@ -282,11 +444,16 @@ def dress(axes, box, scale: float) -> None:
     axes.set_ylim(box[2] * scale, box[3] * scale)
 
 
-def find_colours(dump: Dump, moments, name: str, boxes):
+def find_colours(dump: Dump, moments, name: str, boxes, view: View):
     """Norm, colour map, factor and label for a field, from all visible cells at all times."""
     pairs = zip(moments, boxes, strict=True)
     ranges = [find_range(sheets, name, box) for sheets, box in pairs]
-    return choose_colours(dump, name, ranges)
+    norm, colours, factor, label = choose_colours(
+        dump, name, (view.limits and [view.limits]) or ranges
+    )
+    if view.limits:
+        norm = Normalize(view.limits[0] * factor, view.limits[1] * factor)
+    return norm, view.colours or colours, factor, label
 
 
 def find_range(sheets: Sequence[Sheet], name: str, box) -> tuple[float, float]:

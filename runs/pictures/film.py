@@ -19,8 +19,8 @@ from matplotlib.cm import ScalarMappable
 from tqdm import tqdm
 
 from regrid.errors import BadInput
-from runs.inspection.units import pick_prefix
-from runs.pictures.command import default_fields, new_figure, parse_zoom
+from runs.inspection.account import pick_prefix
+from runs.pictures.command import clean_words, default_fields, new_figure, parse_zoom
 from runs.pictures.fields import (
     LONG,
     View,
@@ -34,10 +34,9 @@ from runs.pictures.fields import (
     find_extent,
     find_range,
     make_sheets,
+    split_outline,
     time_titles,
 )
-from runs.pictures.outlines import split_outline
-from runs.pictures.saving import clean_words
 from runs.store.files import disk_errors
 from runs.store.provenance import describe_software, hash_deck
 from runs.store.reader import Dump, RunData

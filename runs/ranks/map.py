@@ -2,14 +2,86 @@
 
 from __future__ import annotations
 
+import functools
+import json
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from hydro.interior.advance import TILE_ROWS
-from hydro.ranks.cutting import Shares, sum_cells
-from hydro.ranks.messages import CELLS_DEEP
+from hydro.ranks.cutting import Shares, share_blocks, sum_cells
+from hydro.ranks.messages import CELLS_DEEP, NODES_DEEP
+from hydro.simulation import Simulation
 from problems.problem import estimate_memory
-from runs.ranks.sharing import share_named_blocks
-from runs.ranks.speed import foretell_speed
+from regrid.errors import BadInput, suggest
+
+
+def check_cut(cut: Mapping[str, int], names: Sequence[str]) -> None:
+    """Raise BadInput where `run.cut` of a deck names a block that there is not."""
+    for name in cut:
+        if name not in names:
+            raise BadInput(f"deck: run.cut: there is no block {name!r}{suggest(name, names)}")
+
+
+def share_named_blocks(
+    blocks: Sequence[tuple[str, Sequence[int]]],
+    ranks: int,
+    cut: Mapping[str, int],
+    whole: bool = False,
+) -> Shares:
+    """Share blocks, given as names and cells (ni, nj), among ranks; whole: none can be cut.
+
+    Raises BadInput where `cut` names a block that there is not.
+    """
+    names = [name for name, _ in blocks]
+    check_cut(cut, names)
+    wanted = {names.index(name): count for name, count in cut.items()}
+    cells = [(int(ni), int(nj)) for _, (ni, nj) in blocks]
+    return share_blocks(cells, ranks, wanted, range(len(cells)) if whole else ())
+
+
+def share_evolution(evolution: Simulation, ranks: int, cut: Mapping[str, int]) -> Shares:
+    """Share the blocks of a flow among ranks; those that a body source acts on are not cut.
+
+    What a source adds is summed over whole blocks.  Raises BadInput as `share_named_blocks`.
+    """
+    blocks = [(block.name, (block.ni, block.nj)) for block in evolution.blocks]
+    return share_named_blocks(blocks, ranks, cut, evolution.flow.source.law is not None)
+
+
+COSTS = Path(__file__).with_name("rank_costs.json")
+FACE_BYTES = 8 * (2 * NODES_DEEP + 5 * CELLS_DEEP)  # that a face of a side stands for in a step
+
+
+@functools.cache
+def read_costs() -> Mapping[str, float]:
+    """Seconds of a cell, a node's iteration, a face, a message, ...: letters in docs/scaling.md.
+
+    `iterations` and `messages` are numbers: of a node and of a step.
+    """
+    return json.loads(COSTS.read_text("utf-8"))
+
+
+def foretell_speed(cells: Sequence[tuple[int, int]], shares: Shares, ranks: int) -> float:
+    """The time of a step on one rank over that on `ranks`, of blocks with these cells (ni, nj).
+
+    A cut block is regridded by its home alone; what goes between its bands is left out.
+    """
+    cost = read_costs()
+    faces = sum(2 * (ni + nj) for ni, nj in cells)
+    alike = cost["face"] * faces + cost["block"] * len(cells) + cost["step"] + cost["record"]
+    own = [0.0] * ranks
+    for (ni, nj), there, bounds in zip(cells, shares.places, shares.bounds, strict=True):
+        nodes = (ni + 1) * (nj + 1)
+        own[there[0]] += cost["iteration"] * cost["iterations"] * nodes
+        for rank, first, last in zip(there, bounds, bounds[1:], strict=False):
+            own[rank] += cost["own_block"] + cost["cell"] * (last - first) * nj
+    whole = len(cells) * cost["own_block"] + sum(
+        cost["iteration"] * cost["iterations"] * (ni + 1) * (nj + 1) + cost["cell"] * ni * nj
+        for ni, nj in cells
+    )
+    messages = cost["message"] * cost["messages"] + cost["byte"] * FACE_BYTES * faces
+    return (whole + alike) / (max(own) + alike + (messages if ranks > 1 else 0.0))
+
 
 MOST_NAMED = 8  # ranks that are told one by one
 
@@ -21,7 +93,7 @@ def describe_map(
     memory of each, how much faster than one.  cut: as in a deck's `run`.
 
     The greatest speed-up is that of the cells alone, with nothing else to do and nobody to wait
-    for; the likely one is that of `runs.ranks.speed`.
+    for; the likely one is that of `runs.ranks.map`.
     """
     cells = [(int(ni), int(nj)) for _, (ni, nj) in blocks]
     shares = share_named_blocks(blocks, ranks, cut)

@@ -1,7 +1,7 @@
 """The ranks that `mpiexec -n N shockgrid run` has started, as the first one sees them.
 
 The first rank runs the command as it would alone: it reads the deck, prints, and writes all
-files.  The others wait to be told (`runs.ranks.following`): to build the flow, as the first one
+files.  The others wait to be told (`runs.ranks.world`): to build the flow, as the first one
 does at the same time, to begin, to make a step, to send what they have computed, to end.  MPI is
 asked for nothing unless the environment says that more than one rank was started.
 
@@ -12,21 +12,33 @@ wait for ever.
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import platform
-from typing import Any
+import signal
+import socket
+import sys
+import threading
+import time
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, TextIO
 
 import numpy as np
 
-from hydro.ranks.ranks import END, Ranks, tell
+from hydro.ranks.ranks import COLLECT, COUNT, END, STEP, Ranks, hear, tell
 from hydro.simulation import Simulation
 from hydro.workers import count_processors
+from problems.deck import Output
+from problems.evolution import Evolution, State
 from problems.problem import Problem, Watched
-from regrid.errors import BadInput
-from runs.deck.reading import ReadDeck
-from runs.ranks.map import describe_shares
-from runs.ranks.sharing import share_evolution
-from runs.ranks.started import count_started
+from problems.problem_file import read_problem_file
+from regrid.errors import BadInput, RunFailure
+from runs.deck.reading import ReadDeck, resolve_deck
+from runs.ranks.map import describe_shares, share_evolution
+from runs.ranks.started import count_started, find_rank
+from runs.store.parts import Moment, Share, write_dump_in_parts, write_light_dump_in_parts
 
 BUILD = END + 1  # told first: the deck follows
 BEGIN = END + 2  # told once: who has what and, of a run that goes on, the state follow
@@ -134,3 +146,261 @@ def count_own_processors(comm: Any) -> int:
     machines = comm.allgather(platform.node())
     beside = machines.count(platform.node())
     return max(1, min(count_processors(), (os.cpu_count() or 1) // beside))
+
+
+PATIENCE = 0.05  # seconds: less than mpiexec has
+
+
+@contextlib.contextmanager
+def loss_told(several: bool, is_heard: Callable, describe: Callable[[], str]):
+    """In the block: SIGTERM that the main thread does not hear of is told on standard error.
+
+    several: are there other ranks at all?  is_heard: has the main thread's handler been called?
+    describe: gives the end of the sentence.  Only a main thread can watch; others pass.
+    """
+    if not several or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    ours, theirs = socket.socketpair()
+    theirs.setblocking(False)
+    before = signal.set_wakeup_fd(theirs.fileno(), warn_on_full_buffer=False)
+    watch = threading.Thread(target=_watch, args=(ours, is_heard, describe), daemon=True)
+    watch.start()
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+        theirs.close()
+        watch.join()
+        ours.close()
+
+
+def _watch(
+    ours: socket.socket, is_heard: Callable[[], object], describe: Callable[[], str]
+) -> None:
+    for number in _read(ours):
+        if number == signal.SIGTERM:
+            time.sleep(PATIENCE)
+            if not is_heard():
+                words = (
+                    "asked to stop, after this step; where a rank has died, there is no end of it: "
+                )
+                os.write(2, f"\nshockgrid: {words}{describe()}\n".encode())
+
+
+def _read(ours: socket.socket) -> Iterator[int]:
+    while numbers := ours.recv(64):
+        yield from numbers
+
+
+NOTED = "ranks: "  # how the line of run.log begins; JSON follows
+
+
+def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str]:
+    """The line of the closing screen, none for a run in one process; all ranks have to be alive.
+
+    note: takes the line of run.log, the books of all ranks (`hydro.ranks.messages.Book.gather`).
+    """
+    if world is None or world.ranks is None:
+        return []
+    books = world.ranks.count()
+    note(NOTED + json.dumps(books))
+    return [f"messages of ranks: {describe_books(books)}"]
+
+
+def describe_books(books: Mapping[str, Any]) -> str:
+    """Messages and megabytes of a step, and the part of it that the ranks wait for them."""
+    steps, words = books["steps"], list[str]()
+    if steps:
+        kinds = [kind for kind, calls in books["calls"].items() if calls]
+        calls = sum(books["calls"][kind] for kind in kinds) / steps
+        sizes = [f"{kind} {books['bytes'][kind] / steps / 1e6:.2g}" for kind in kinds]
+        words.append(f"{calls:.1f} a step, MB of {', '.join(sizes)}")
+        parts = [
+            100.0 * waited / seconds
+            for waited, seconds in zip(books["waited"], books["seconds"], strict=True)
+            if seconds > 0.0
+        ]
+        if parts:
+            words.append(f"{min(parts):.0f}% to {max(parts):.0f}% of a step are waits for them")
+    return "; ".join(words) or "none"
+
+
+def read_books(log: str) -> dict[str, Any] | None:
+    """The last line of a run.log about ranks as `describe_ranks` noted it; None without any."""
+    found = [line for line in log.splitlines() if NOTED + "{" in line]
+    return json.loads(found[-1].split(NOTED, 1)[1]) if found else None
+
+
+WRITE = BEGIN + 1  # told; where to, and the words of the dump, follow
+
+
+def make_share(comm: Any, ranks: Ranks) -> Share:
+    """The rows of blocks that this rank of an mpi4py communicator updates."""
+    rows = {ranks[number].name: (first, last) for number, first, last in ranks.pieces}
+    return Share(ranks.rank, ranks.size, rows, comm.allgather)
+
+
+def write_on_ranks(
+    world: World,
+    path: Path,
+    evolution: Any,
+    names: tuple[str, str, str],
+    besides: State,
+    output: Output | None = None,
+) -> Moment:
+    """Write a dump with all ranks; what its index tells.  For the first rank, between two steps.
+
+    names: problem, text of the deck, unit of time; besides: see `write_dump_in_parts`; output: says
+    what is in a light dump, None for a whole one.  Raises BadInput where a disk has refused it.
+    """
+    ranks = world.ranks
+    if ranks is None:
+        raise ValueError("the ranks have not begun")
+    tell(world.comm, WRITE)
+    world.comm.bcast((str(path.absolute()), names, output), root=0)
+    with _busy(ranks):
+        moment = _write(world.comm, ranks, path, evolution, names, besides, output)
+    if moment is None:
+        raise ValueError("this is not the first rank")
+    return moment
+
+
+def follow_in_writing(comm: Any, evolution: Simulation, ranks: Ranks) -> None:
+    """The part of another rank, when it has heard WRITE."""
+    path, names, output = comm.bcast(None, root=0)
+    with _busy(ranks), contextlib.suppress(BadInput):  # the first rank tells it
+        _write(comm, ranks, Path(path), evolution, names, {}, output)
+
+
+def _write(
+    comm: Any,
+    ranks: Ranks,
+    path: Path,
+    evolution: Any,
+    names: tuple[str, str, str],
+    besides: State,
+    output: Output | None,
+) -> Moment | None:
+    share = make_share(comm, ranks)
+    if output is not None:
+        return write_light_dump_in_parts(path, evolution, *names, output, share)
+    return write_dump_in_parts(path, evolution, *names, besides, share)
+
+
+@contextlib.contextmanager
+def _busy(ranks: Ranks) -> Iterator[None]:
+    """Until they have agreed that it has been written or has failed, all ranks are at it."""
+    ranks.busy = True
+    try:
+        yield
+    except BadInput:
+        ranks.busy = False
+        raise
+    ranks.busy = False
+
+
+BAD_INPUT, INTERNAL = 2, 70  # exit codes, as in `runs.cli.main`
+
+
+def run_on_ranks(command: Callable[[World | None], int], say: Callable[[str], None]) -> int:
+    """Run a command on the first of the ranks that were started; the others follow it.
+
+    say: takes a sentence for the person.  Returns the exit code, the same on all ranks.
+    """
+    try:
+        comm = open_world()
+    except BadInput as error:
+        if find_rank() == 0:
+            say(str(error))
+        return BAD_INPUT
+    if comm.size == 1:
+        return command(None)
+    if comm.rank > 0:
+        return _follow_silently(comm)
+    world, code = World(comm), INTERNAL
+    try:
+        code = command(world)
+    finally:
+        world.dismiss(code)
+    return code
+
+
+def _follow_silently(comm: Any) -> int:
+    for name in ("SIGINT", "SIGTERM", "SIGUSR1"):  # the first rank says when it is time to end
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    screen = sys.stderr
+    with (
+        open(os.devnull, "w", encoding="utf-8") as nowhere,
+        contextlib.redirect_stdout(nowhere),
+        contextlib.redirect_stderr(nowhere),
+    ):
+        return follow(comm, screen)
+
+
+def follow(comm: Any, screen: TextIO) -> int:
+    """Do what the first rank tells until the end; returns the exit code.
+
+    What fails here alone is said on `screen`, and ends all ranks.
+    """
+    try:
+        built: Evolution | Exception | None = None
+        word, code = hear(comm)
+        while word == BUILD:
+            built = build(comm)
+            word, code = hear(comm)
+        if word == END:
+            return code
+        evolution, ranks = begin(comm, built)
+        while True:
+            word, code = hear(comm)
+            if word == END:
+                return code
+            if word == STEP:
+                with contextlib.suppress(RunFailure):  # agreed on by all ranks
+                    Simulation.advance(evolution)  # what a problem adds is for the first rank
+            elif word == COLLECT:
+                ranks.collect()
+            elif word == WRITE:
+                follow_in_writing(comm, evolution, ranks)
+            elif word == COUNT:
+                ranks.count()
+    except BaseException as error:
+        code = BAD_INPUT if isinstance(error, BadInput | MemoryError | OSError) else INTERNAL
+        words = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"
+        print(f"shockgrid: rank {comm.rank}: {words}; all ranks end", file=screen, flush=True)
+        comm.Abort(code)
+        raise
+
+
+def build(comm: Any) -> Evolution | Exception:
+    """The evolution of the deck that the first rank has sent, or what has failed.
+
+    The first rank builds the same at the same time, and says what is wrong with a deck.
+    """
+    text, origin, path = comm.bcast(None, root=0)
+    try:
+        file = read_problem_file(path) if path else None
+        deck = resolve_deck(tomllib.loads(text), origin, file=file)
+        return deck.make_problem().build()
+    except Exception as error:
+        return error
+
+
+def begin(comm: Any, built: Evolution | Exception | None) -> tuple[Simulation, Ranks]:
+    """The evolution that was built with the state of the first rank's, and the ranks that share it.
+
+    Raises what has failed here alone.
+    """
+    shares, watched = comm.bcast(None, root=0)
+    if isinstance(built, Exception):
+        raise built
+    if not isinstance(built, Simulation):
+        raise TypeError("what was built is no flow on blocks")
+    evolution, state = built, receive_state(comm)
+    if state:
+        evolution.set_state(state)
+    ranks = Ranks(comm, evolution.blocks, *shares, watched)
+    evolution.spread(ranks, count_own_processors(comm))
+    return evolution, ranks

@@ -7,8 +7,11 @@ are theirs.  What cannot be drawn is left out, with the sentence that says why.
 from __future__ import annotations
 
 import base64
+import csv
+import html
+import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,19 +22,132 @@ from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
 from regrid.text_files import escape_controls
 from runs.grids.quality import judge
-from runs.inspection.account import describe_convexity, describe_run, measure_drifts
-from runs.inspection.cautions import HEAD, describe_cautions
+from runs.inspection.account import (
+    HEAD,
+    compute_drifts,
+    describe_cautions,
+    describe_convexity,
+    describe_own,
+    describe_run,
+    describe_time,
+    measure_drifts,
+    pick_prefix,
+)
 from runs.inspection.info import describe_settings, other_name
-from runs.inspection.own_words import describe_own
-from runs.inspection.units import describe_time
-from runs.pictures.command import default_fields, find_deck_text, make_picture
-from runs.pictures.derived import list_fields
+from runs.pictures.command import default_fields, find_deck_text, make_picture, write_figure
+from runs.pictures.fields import list_fields, scale_times
 from runs.pictures.film import make_film
-from runs.pictures.saving import write_figure
-from runs.report.plots import EXTRA, make_history_plot
+from runs.pictures.history import choose_panels, find_units
 from runs.store.directory import RunDirectory
-from runs.store.files import write_atomically
+from runs.store.files import disk_errors, write_atomically
 from runs.store.reader import Dump, RunData
+
+MOST = 4000  # points of a curve; a longer one is thinned
+COLUMNS, HEIGHT = 2, 230  # panels beside each other, pixels of each
+COLOURS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#17becf")
+EXTRA = "a report needs {name}, which is not installed: pip install 'shockgrid[report]'"
+
+
+def make_history_plot(run: RunData) -> str:
+    """The history as HTML with the plotting library inside; "" where no step was made.
+
+    All panels share the axis of time.  Raises BadInput where plotly is missing.
+    """
+    try:
+        from plotly.subplots import make_subplots
+    except ImportError as error:
+        raise BadInput(EXTRA.format(name="plotly")) from error
+    history = dict(run.history)
+    if len(history.get("t", ())) < 2:
+        return ""
+    factor, unit = scale_times(run.dumps) if run.dumps else pick_prefix(history["t"][-1], "s")
+    if run.dumps and run.dumps[-1].t_unit != "s":
+        history = {name: values[1:] for name, values in history.items()}
+    units = find_units(run)
+    panels, constant = choose_panels(history, units)
+    drawn = [make_panel(history, names, units) for names in panels]
+    rows = -(-len(drawn) // COLUMNS)
+    figure = make_subplots(
+        rows,
+        COLUMNS,
+        shared_xaxes="all",
+        subplot_titles=[title for title, _ in drawn],
+        vertical_spacing=min(0.3 / rows, 0.08),
+        horizontal_spacing=0.2,  # the names of curves stand there
+    )
+    t = history["t"] * factor
+    for number, (_, curves) in enumerate(drawn):
+        place = {"row": number // COLUMNS + 1, "col": number % COLUMNS + 1}
+        legend = f"legend{number + 1}" if number else "legend"
+        for k, (name, values, mode) in enumerate(curves):
+            x, y = thin(t, values)
+            look = {"color": COLOURS[k % len(COLOURS)]}
+            figure.add_scatter(
+                x=x, y=y, name=name, legend=legend, mode=mode, showlegend=len(curves) > 1,
+                line={"width": 1.2, **look}, marker={"size": 3, **look}, **place,
+            )  # fmt: skip
+        figure.update_xaxes(showticklabels=True, **place)
+        axes = figure.get_subplot(place["row"], place["col"])
+        side = {"x": axes.xaxis.domain[1] + 0.005, "y": axes.yaxis.domain[1]}
+        side |= {"xanchor": "left", "yanchor": "top", "font": {"size": 10}}
+        figure.update_layout({legend: side})
+    last = {"row": rows, "col": 1}
+    figure.update_xaxes(title_text=f"t [{unit}]" if unit.endswith("s") else unit, **last)
+    figure.update_annotations(font_size=13)
+    figure.update_layout(
+        template="plotly_white",
+        height=HEIGHT * rows + 80,
+        margin={"l": 50, "r": 20, "t": 40, "b": 50},
+        hovermode="closest",
+    )
+    told = [f"{name.replace('_', ' ')} {np.nanmax(history[name]):.4g}" for name in constant]
+    words = f'<p class="small">Constant: {html.escape(", ".join(told))}.</p>' if told else ""
+    return words + figure.to_html(
+        full_html=False,
+        include_plotlyjs=True,
+        include_mathjax=False,
+        div_id="history",
+        config={"displaylogo": False, "responsive": True},
+    )
+
+
+def make_panel(
+    history: Mapping[str, np.ndarray], names: list[str], units: Mapping[str, str]
+) -> tuple[str, list[tuple[str, np.ndarray, str]]]:
+    """Title of a panel, and name, values and mode of its curves."""
+    if names == ["drift"]:
+        drifts = compute_drifts(history)
+        curves = [(name.replace("_", " "), drift, "lines") for name, drift in drifts.items()]
+        return "change of conserved totals, relative", curves
+    largest = max(float(np.nanmax(np.abs(history[name]))) for name in names)
+    factor, unit = pick_prefix(largest, units.get(names[0], "s" if names == ["dt"] else "1"))
+    title = ", ".join(name.replace("_", " ") for name in names) + (f" [{unit}]" if unit else "")
+    words = history.get("dt_limit")
+    if names == ["dt"] and words is not None and words.dtype.kind == "U":
+        kinds = [word for word in dict.fromkeys(words.tolist()) if word]
+        values = history["dt"] * factor
+        return title, [(kind, np.where(words == kind, values, np.nan), "markers") for kind in kinds]
+    return title, [(name.replace("_", " "), history[name] * factor, "lines") for name in names]
+
+
+def thin(t: np.ndarray, values: np.ndarray, most: int = MOST) -> tuple[np.ndarray, np.ndarray]:
+    """At most `most` points (t, values) of a curve (n,), the extremes of every stretch among them.
+
+    Points that are not finite are left out where others are in their stretch.
+    """
+    values = np.asarray(values, dtype=float)
+    if values.size <= most:
+        return t, values
+    kept: list[Any] = []
+    for part in np.array_split(np.arange(values.size), most // 2):
+        known = part[np.isfinite(values[part])]
+        if known.size:
+            ends = {int(known[values[known].argmin()]), int(known[values[known].argmax()])}
+            kept += sorted(ends)
+        else:
+            kept.append(int(part[0]))
+    return t[kept], values[kept]
+
 
 TEMPLATES = Path(__file__).resolve().parent
 KINDS = {".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4", ".toml": "text/plain"}
@@ -261,7 +377,102 @@ def find_script(run: RunData) -> str:
 
 def describe_repeat(directory: RunDirectory) -> list[str]:
     """Commands that compute the run again and compare the two."""
-    return [
-        "shockgrid run deck.toml -o again",
-        f"shockgrid compare {directory.quoted} again",
-    ]
+    return ["shockgrid run deck.toml -o again", f"shockgrid compare {directory.quoted} again"]
+
+
+TABLE, RUNS, PAGE = "study.csv", "runs", "report.html"
+
+
+def report(
+    directory: str | Path,
+    output: str | Path | None = None,
+    *,
+    film: bool | None = None,
+    dpi: int = 90,
+    say: Callable[[str], None] | None = None,
+) -> Path:
+    """Write the report of a run or of a study and return its path [DIR/report.html].
+
+    film: with films; if not said, of a run yes, of the runs of a study no.  `say` takes remarks.
+    Raises BadInput where the directory is neither, or the file cannot be written.
+    """
+    if is_study(Path(directory)):
+        return make_study_report(directory, output, film=bool(film), dpi=dpi, say=say)
+    return make_report(directory, output, film=film is not False, dpi=dpi, say=say)
+
+
+def is_study(directory: Path) -> bool:
+    """Does the folder hold the table of a study?"""
+    return (directory / TABLE).is_file()
+
+
+def make_study_report(
+    directory: str | Path,
+    output: str | Path | None = None,
+    *,
+    film: bool = False,
+    dpi: int = 90,
+    say: Callable[[str], None] | None = None,
+) -> Path:
+    """Write the reports of a study's runs where they are missing or old, and the page over them.
+
+    Raises BadInput where the table cannot be read; a run that cannot be reported is named on the
+    page.
+    """
+    home = Path(directory)
+    path = Path(output) if output else home / PAGE
+    check_path(path)
+    heads, rows = read_table(home / TABLE)
+    folders = sorted(one.parent for one in (home / RUNS).glob("*/deck.toml"))
+    links, failed = {}, []
+    for folder in folders:
+        page = folder / PAGE
+        try:
+            if is_old(page, folder):
+                make_report(folder, page, film=film, dpi=dpi)
+            links[folder.name] = Path(os.path.relpath(page, path.parent)).as_posix()
+        except BadInput as error:
+            failed.append(f"{folder.name}: {error}")
+    named = [next((cell for cell in row if Path(cell).name in links), "") for row in rows]
+    lonely = [name for name in links if name not in {Path(cell).name for cell in named}]
+    cells = [[(show_number(cell), links.get(Path(cell).name, "")) for cell in row] for row in rows]
+    pictures = [(one.stem, embed(one.read_bytes(), ".png")) for one in sorted(home.glob("*.png"))]
+    page_text = load_template("study.html.j2").render(
+        title=f"study {home.resolve().name}",
+        directory=str(home),
+        heads=heads,
+        rows=cells,
+        pictures=pictures,
+        lonely=[(name, links[name]) for name in lonely],
+        failed=failed,
+        log=read_text(home / "study.toml"),
+    )
+    for sentence in failed if say else ():
+        say(f"no report of {sentence}")
+    write_atomically(path, page_text, durable=False)
+    return path
+
+
+def read_table(path: Path) -> tuple[list[str], list[list[str]]]:
+    """Heads and rows of a table in CSV; lines that begin with # are remarks."""
+    with disk_errors(path), open(path, encoding="utf-8", newline="") as file:
+        lines = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
+    if not lines:
+        raise BadInput(f"{path} is empty: the study has no table yet")
+    return lines[0], lines[1:]
+
+
+def show_number(cell: str) -> str:
+    """A number of the table to six digits; words and whole numbers as they are."""
+    try:
+        return cell if cell.lstrip("+-").isdigit() else f"{float(cell):.6g}"
+    except ValueError:
+        return cell
+
+
+def is_old(page: Path, folder: Path) -> bool:
+    """Is there no page of a run, or has its log been written to since?"""
+    log = folder / "run.log"
+    if not page.exists():
+        return True
+    return log.exists() and log.stat().st_mtime > page.stat().st_mtime

@@ -11,23 +11,28 @@ The trap: what changes a file on purpose (h5repack, an attribute added by hand) 
 from __future__ import annotations
 
 import os
+import re
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
-from problems.evolution import Computed
+from regrid.errors import BadInput
 from runs.store.files import disk_errors
+
+if TYPE_CHECKING:
+    import h5py
+
 
 NAME = "checksum"  # of the attribute
 HEAD = b"crc32 of all other bytes: "
 DIGITS = 8
 Bytes = bytes | bytearray | memoryview
 SEARCHED = 1 << 20  # bytes from a file's start in which the attribute lies
-CHUNK = 1 << 22  # bytes that are read at a time,
-COPIED = 1 << 19  # and those of an array that lie apart and are copied
+CHUNK = 1 << 22  # bytes that are read at a time
 
 _Key = tuple[str, int, int, int]
 judged: dict[_Key, bool | None] = {}  # files that are as they were
@@ -39,80 +44,16 @@ def make_blank() -> bytes:
     return HEAD + b"0" * DIGITS
 
 
-class ArrayBytes:
-    """The bytes of an array in C order, some rows at a time: a view of one is not copied whole.
-
-    Nor is what is computed for the rows that are asked for (`problems.evolution.Computed`).
-    """
-
-    def __init__(self, array: np.ndarray | Computed):
-        self.array = array
-
-    def __len__(self) -> int:
-        return self.array.nbytes
-
-    def __iter__(self) -> Iterator[memoryview]:
-        array = self.array
-        if isinstance(array, np.ndarray):
-            if array.flags.c_contiguous:
-                yield array.reshape(-1).view(np.uint8).data
-                return
-            if array.ndim > 2:
-                for part in array:
-                    yield from ArrayBytes(part)
-                return
-        count = array.shape[0]
-        rows = max(1, COPIED * count // max(1, array.nbytes))
-        for first in range(0, count, rows):
-            last = min(first + rows, count)
-            if isinstance(array, np.ndarray):
-                part = np.ascontiguousarray(array[first:last])
-            else:
-                part = array.compute_rows(first, last)
-            yield part.reshape(-1).view(np.uint8).data
-
-
-Piece = Bytes | ArrayBytes
-
-
-def seal(image: Bytes | Sequence[Piece]) -> list[Piece]:
-    """The bytes of a file with its checksum in place, in parts that follow one another.
-
-    image: the file, whole or in parts, with a blank attribute in the part that has it.  Raises
-    ValueError where it has none.
-    """
-    parts = [image] if isinstance(image, Bytes) else image
-    number, view, place = _find_blank(parts)
+def seal(image: Bytes) -> list[memoryview | bytes]:
+    """The bytes of a file with its checksum in place of the blank one, in parts that follow one
+    another.  Raises ValueError where it has no attribute for it."""
+    view = memoryview(image).cast("B")
+    place = bytes(view[:SEARCHED]).find(HEAD)
+    if place < 0:
+        raise ValueError("a file without the attribute for its checksum")
     start = place + len(HEAD)
-    head, tail = [*parts[:number], view[:start]], [view[start + DIGITS :], *parts[number + 1 :]]
-    found = 0
-    for chunk in iterate_bytes([*head, *tail]):
-        found = zlib.crc32(chunk, found)
-    return [*head, _format(found), *tail]
-
-
-def iterate_bytes(parts: Iterable[Piece]) -> Iterator[Bytes]:
-    """The parts of a file, those of arrays some rows at a time."""
-    for part in parts:
-        if isinstance(part, ArrayBytes):
-            yield from part
-        else:
-            yield part
-
-
-def _find_blank(parts: Sequence[Piece]) -> tuple[int, memoryview, int]:
-    """Where the blank attribute is: the number of the part, its bytes, and the place in them."""
-    left = SEARCHED
-    for number, part in enumerate(parts):
-        if isinstance(part, Bytes):
-            view = memoryview(part).cast("B")
-            place = bytes(view[:left]).find(HEAD)
-            if place >= 0:
-                return number, view, place
-        left -= len(part)
-        if left <= 0:
-            break
-    raise ValueError("a file without the attribute for its checksum")
+    head, tail = view[:start], view[start + DIGITS :]
+    return [head, _format(zlib.crc32(tail, zlib.crc32(head))), tail]
 
 
 def is_sound(path: Path) -> bool | None:
@@ -165,3 +106,92 @@ def judge(file: BinaryIO) -> bool | None:
 
 def _format(number: int) -> bytes:
     return b"%08x" % number
+
+
+PARTS = "parts"  # the group of an index
+PART_NAME = re.compile(r"(.+)\.part-(\d+)-of-(\d+)\.h5")
+
+
+@dataclass(frozen=True)
+class StoredPart:
+    """A part as its index knows it: name of the file beside the index, size [bytes], checksum."""
+
+    name: str
+    size: int
+    crc: str
+
+
+def get_part_path(path: Path, number: int, parts: int) -> Path:
+    """Where part `number` of `parts` lies of the dump whose index is at `path`."""
+    return path.with_name(f"{path.stem}.part-{number}-of-{parts}.h5")
+
+
+def find_parts_by_name(path: Path) -> list[Path]:
+    """The files beside `path` that are called parts of it."""
+    found = path.parent.glob(f"{path.stem}.part-*-of-*.h5")
+    return sorted(part for part in found if PART_NAME.fullmatch(part.name))
+
+
+def find_unlisted_parts(folder: Path, indexes: Iterable[Path]) -> list[Path]:
+    """Parts in `folder` that no index lists; those of an index that cannot be read are not told."""
+    parts = [path for path in folder.iterdir() if PART_NAME.fullmatch(path.name)]
+    if not parts:
+        return []
+    listed: set[str] = set()
+    for index in indexes:
+        names = _read_names(index)
+        listed |= {p.name for p in find_parts_by_name(index)} if names is None else names
+    return [path for path in parts if path.name not in listed]
+
+
+def _read_names(path: Path) -> set[str] | None:
+    """Names of the parts that the dump at `path` lists; None where it cannot be read."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            return {part.name for part in read_parts(file)}
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError):
+        return None
+
+
+def write_parts(file: h5py.File, parts: Iterable[StoredPart]) -> None:
+    """Write the list of its parts into an index."""
+    group, parts = file.create_group(PARTS), list(parts)
+    group.create_dataset("file", data=np.array([part.name.encode() for part in parts]))
+    group.create_dataset("bytes", data=np.array([part.size for part in parts]))
+    group.create_dataset("crc32", data=np.array([part.crc.encode() for part in parts]))
+
+
+def read_parts(file: h5py.File) -> list[StoredPart]:
+    """The parts that an open dump lists; [] for one that is whole in one file.
+
+    Raises KeyError, ValueError, TypeError or OSError where the list is damaged.
+    """
+    if PARTS not in file:
+        return []
+    columns = (file[PARTS][name][()].tolist() for name in ("file", "bytes", "crc32"))
+    return [StoredPart(f.decode(), int(n), c.decode()) for f, n, c in zip(*columns, strict=True)]
+
+
+def find_fault(path: Path, part: StoredPart) -> str:
+    """What is wrong with a part of the index at `path`, in words that name it; "" for nothing."""
+    there = path.parent / part.name
+    if there.name != part.name or not there.is_file():
+        return f"its part {part.name} is not beside it"
+    size = there.stat().st_size
+    if size != part.size:
+        return f"its part {part.name} has {size} bytes, not {part.size}"
+    stored = read_sum(there)
+    if stored is not None and stored != part.crc:
+        return f"its part {part.name} is of another dump (its checksum is {stored}, not {part.crc})"
+    if stored is None or not is_sound(there):
+        return f"its part {part.name} is torn or damaged: its checksum is wrong"
+    return ""
+
+
+def check_parts(path: Path, file: h5py.File) -> None:
+    """Raise BadInput where a part of an open dump is missing, damaged or another dump's."""
+    for part in read_parts(file):
+        if fault := find_fault(path, part):
+            raise BadInput(f"{path} cannot be read: {fault}")

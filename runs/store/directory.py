@@ -29,9 +29,17 @@ from pathlib import Path
 
 from regrid.errors import BadInput
 from regrid.text_files import check_regular, escape_controls
-from runs.store.files import DUMPS, KEPT_NAMES, LOCK, disk_errors, get_part, replace_file
-from runs.store.index import PART_NAME, find_parts_by_name, find_unlisted_parts
-from runs.store.locking import KEEPS_OPEN_FILES, try_lock
+from runs.store.checksum import PART_NAME, find_parts_by_name, find_unlisted_parts
+from runs.store.files import (
+    DUMPS,
+    KEEPS_OPEN_FILES,
+    KEPT_NAMES,
+    LOCK,
+    disk_errors,
+    get_part,
+    replace_file,
+    try_lock,
+)
 
 KEPT_RESTARTS = 2
 STUDY_FILE = "study.toml"  # what a study is known by; its runs lie in its folder `runs`
@@ -205,23 +213,18 @@ def create_directory(wanted: str | None, problem: str, force: bool = False) -> R
 
 
 def _next_free(problem: str) -> RunDirectory:
-    parent = Path("out")
+    parent, form = Path("out"), re.compile(rf"{re.escape(problem)}-(\d+)")
     with disk_errors(parent):
         parent.mkdir(exist_ok=True)
-        taken = [
-            int(path.name.rpartition("-")[2])
-            for path in parent.glob(f"{problem}-*")
-            if path.name.rpartition("-")[0] == problem and path.name.rpartition("-")[2].isdigit()
-        ]
+        taken = [int(m[1]) for path in parent.iterdir() if (m := form.fullmatch(path.name))]
         number = max(taken, default=0) + 1
         while True:  # another run may take the same number at the same moment
-            path = parent / f"{problem}-{number}"
+            directory = RunDirectory(parent / f"{problem}-{number}")
             try:
-                path.mkdir()
+                directory.path.mkdir()
                 break
             except FileExistsError:
                 number += 1
-        directory = RunDirectory(path)
         directory.dumps_folder.mkdir()
     return directory
 

@@ -1,19 +1,23 @@
 """HDF5 dumps: each one a picture of all blocks and, but for light ones, a full restart point.
 
-Layout (version 2; version 1 is the same without `checksum`):
+Layout (version 4; older ones: 2 and 3 have a crc32 at each array of the state, too, 1 has no
+`checksum`):
 
     /                     format, format_version, checksum (of the whole file), problem, deck
                           (TOML), step, t, t_end, t_unit, finished
     /blocks/<name>/       material; x, y (nodes), fields of cells and nodes, dimension scales
                           i, j (cells) and i_node, j_node, each with units and long_name
-    /state/<key>          what Evolution.get_state() gave, each with its crc32; an array whose rows
-                          are arrays of a block is a virtual dataset of these, stored once
+    /state/<key>          what Evolution.get_state() gave; an array whose rows are arrays of a
+                          block is a virtual dataset of these, stored once
     /provenance           attributes: version, commit, platform, packages, hash of the deck
-    /parts                in an index alone (version 3): its parts, see `runs.store.index`
+    /parts                in an index alone: its parts, see `runs.store.checksum`
 
-The trap: a full disk inside the HDF5 library ends in errors from its closing handlers.  A dump is
-therefore made in memory and written with plain calls (`runs.store.writing`); it holds no wall time,
-so the same run gives the same bytes.
+Light dumps are pictures alone, with chosen fields, single precision or compression, and without
+/state.  Their nodes keep double precision, as cells may be thinner than what single one resolves.
+
+Note: a full disk inside the HDF5 library ends in errors from its closing handlers.  A dump is
+therefore made in memory and written with plain calls; it holds no wall time, so the same run gives
+the same bytes.
 """
 
 from __future__ import annotations
@@ -21,7 +25,6 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -29,6 +32,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from problems.deck import Output
 from problems.evolution import (
     BlockView,
     Evolution,
@@ -41,16 +45,16 @@ from problems.evolution import (
 )
 from regrid.errors import BadInput
 from runs.store.checksum import NAME as CHECKSUM
-from runs.store.checksum import ArrayBytes, is_sound, make_blank
-from runs.store.index import check_parts, read_parts
+from runs.store.checksum import Bytes, check_parts, is_sound, make_blank, seal
+from runs.store.files import write_atomically
 from runs.store.provenance import find_provenance
 
 FORMAT = "shockgrid dump"
 FORMAT_OF_PARTS = "shockgrid dump part"
-FORMAT_VERSION = 2
-INDEX_VERSION = 3  # the newest: an index, whose arrays lie in parts
+FORMAT_VERSION = 4
 FIRST_WITH_CHECKSUM = 2  # version of the format
 WRITABLE = 1  # H5LT_FILE_IMAGE_OPEN_RW
+LARGE = 1 << 22  # bytes of the nodes of a dump that is written while the run goes on
 LONG_NAMES = {
     "x": "x of the nodes",
     "y": "y of the nodes",
@@ -83,99 +87,53 @@ def make_image(
 
     Its checksum is blank: `seal` fills it in.  HDF5 takes its time over groups, scales and
     attributes, which are the same in all dumps of a run: they are made once, in a file in memory
-    that stays open, and the numbers of each dump written over the last one's.  The file may not
-    tell whose numbers were in it: all are written anew, words are part of `Form`.
+    that stays open, and the numbers of each dump written over the last one's.
     """
     state = {**evolution.get_state(), **besides}
-    form = Form.of(evolution, state, problem, deck_text, t_unit, kind)
+    shown = find_shown(evolution.blocks, state)
+    words = problem, deck_text, t_unit, kind, evolution.finished, is_axisymmetric(evolution)
+    kinds = [(key, v if isinstance(v, str) else _type(v)) for key, v in state.items()]
+    shown = find_shown(evolution.blocks, state)
+    form = repr((words, kinds, shown, [_describe_form(block) for block in evolution.blocks]))
     if form not in _FORMS:
         for last in _FORMS.values():
             last.close()
         _FORMS.clear()
-        with h5py.File("dump", "w", driver="core", backing_store=False) as made:
-            write_form(made, evolution, state, form)
-            image = made.id.get_file_image()
+        with h5py.File("dump", "w", driver="core", backing_store=False) as file:
+            write_head(file, evolution, problem, deck_text, t_unit, kind)
+            _write_blocks(file, evolution)
+            group = file.create_group("state")
+            for key, value in state.items():
+                if key in shown:
+                    _link_arrays(group, key, value, shown[key])
+                else:
+                    group.create_dataset(key, data=value)
+            made = file.create_group("provenance", track_order=True)
+            made.attrs.update(find_provenance(deck_text))
+            file.flush()
+            image = file.id.get_file_image()
         _FORMS[form] = h5py.File(h5py.h5f.open_file_image(image, WRITABLE))
     file = _FORMS[form]
-    fill_form(file, evolution, state, form, _put)
+    for name, value in (("step", int(evolution.step)), ("t", float(evolution.t)),
+                        ("t_end", float(evolution.t_end))):  # fmt: skip
+        h5py.h5a.open(file.id, name.encode()).write(np.asarray(value))
+    for block in evolution.blocks:
+        for name, values in list_arrays(block):
+            _put(file["blocks"][block.name], name, values)
+    for key, value in state.items():
+        if not isinstance(value, str) and key not in shown:
+            _put(file["state"], key, value)
+    file.flush()
     return file.id.get_file_image()
 
 
-Create = Callable[[h5py.Group, str, np.ndarray], h5py.Dataset]
-Put = Callable[[h5py.Group, str, Any], h5py.h5d.DatasetID]
+_FORMS: dict[str, h5py.File] = {}  # of the last dump: all but its numbers
 
 
-def fill_form(
-    file: h5py.File,
-    evolution: Evolution,
-    state: Mapping[str, Any],
-    form: Form,
-    put: Put,
-    computed: bool = False,
-) -> None:
-    """Write all numbers of a dump into a file of its form, arrays with `put`; then flush it.
-
-    computed: may `put` be given fields that are computed as they are read?
-    """
-    shown = dict(form.shown)
-    _write_attribute(file.id, "step", int(evolution.step))
-    _write_attribute(file.id, "t", float(evolution.t))
-    _write_attribute(file.id, "t_end", float(evolution.t_end))
-    for block in evolution.blocks:
-        group = file["blocks"][block.name]
-        for name, values in list_arrays(block, computed):
-            put(group, name, values)
-    group = file["state"]
-    for key, value in state.items():
-        if not isinstance(value, str):
-            if key in shown:
-                data = h5py.h5d.open(group.id, key.encode("utf-8"))
-            else:
-                data = put(group, key, value)
-            if np.ndim(value):
-                _write_attribute(data, "crc32", compute_crc(value))
-    file.flush()
-
-
-@dataclass(frozen=True)
-class Form:
-    """All of a dump but its numbers: words, and names, types and shapes of arrays."""
-
-    kind: str
-    problem: str
-    deck_text: str
-    t_unit: str
-    finished: str
-    radial: bool
-    blocks: tuple
-    state: tuple
-    shown: tuple
-
-    @classmethod
-    def of(cls, evolution, state, problem, deck_text, t_unit, kind) -> Form:
-        """The form of a dump of the present state."""
-        blocks = tuple(
-            (
-                block.name,
-                getattr(block, "first_row", 0),
-                get_material(block),
-                tuple(block.units.items()),
-                tuple(get_long_names(block).items()),
-                tuple((name, *_type(values)) for name, values in list_arrays(block, True)),
-            )
-            for block in evolution.blocks
-        )
-        kinds = tuple(
-            (key, value) if isinstance(value, str) else (key, *_type(value))
-            for key, value in state.items()
-        )
-        finished = evolution.finished or ""
-        radial = is_axisymmetric(evolution)
-        shown = find_shown(evolution.blocks, state)
-        return cls(kind, problem, deck_text, t_unit, finished, radial, blocks, kinds, shown)
-
-
-_FORMS: dict[Form, h5py.File] = {}  # of the last dump
+def _describe_form(block: BlockView) -> tuple:
+    arrays = [(name, *_type(values)) for name, values in list_arrays(block, True)]
+    words = dict(block.units), dict(get_long_names(block))
+    return block.name, getattr(block, "first_row", 0), get_material(block), *words, arrays
 
 
 def _type(value) -> tuple[str, tuple[int, ...]]:
@@ -183,25 +141,20 @@ def _type(value) -> tuple[str, tuple[int, ...]]:
     return array.dtype.str, array.shape
 
 
-def write_form(
-    file: h5py.File,
-    evolution: Evolution,
-    state: Mapping[str, Any],
-    form: Form,
-    create: Create | None = None,
-) -> None:
-    """Write a dump of this form into an empty file; `create` makes its arrays, else they are
-    written."""
-    write_head(file, evolution, form.problem, form.deck_text, form.t_unit, form.kind)
-    names = RADIAL if form.radial else {}
+def _put(group: h5py.Group, name: str, value) -> None:
+    """Write numbers into a dataset that is there and has their type and shape."""
+    data = h5py.h5d.open(group.id, name.encode("utf-8"))
+    data.write(h5py.h5s.ALL, h5py.h5s.ALL, np.ascontiguousarray(value))
+
+
+def _write_blocks(file: h5py.File, evolution: Evolution, output: Output | None = None) -> None:
+    """Write all blocks; output: those arrays alone that a light dump takes."""
+    names = RADIAL if is_axisymmetric(evolution) else {}
     blocks = file.create_group("blocks", track_order=True)
     for block in evolution.blocks:
         group = blocks.create_group(block.name, track_order=True)
-        write_block(group, block, names, create=create)
-    _write_state(file.create_group("state"), state, dict(form.shown), create)
-    made = file.create_group("provenance", track_order=True)
-    made.attrs.update(find_provenance(form.deck_text))
-    file.flush()
+        arrays = choose_arrays(block, output) if output else None
+        write_block(group, block, names, arrays, output.compression if output else 0)
 
 
 def write_head(
@@ -211,11 +164,10 @@ def write_head(
     deck_text: str,
     t_unit: str,
     kind: str = FORMAT,
-    version: int = FORMAT_VERSION,
 ) -> None:
     """Write the attributes of a dump's root."""
     file.attrs["format"] = kind
-    file.attrs["format_version"] = version
+    file.attrs["format_version"] = FORMAT_VERSION
     file.attrs[CHECKSUM] = np.bytes_(make_blank())
     file.attrs["problem"] = problem
     file.attrs["deck"] = deck_text
@@ -228,12 +180,9 @@ def write_head(
 
 def find_shown(
     blocks: Sequence[BlockView], state: Mapping[str, Any]
-) -> tuple[tuple[str, str | tuple[str, ...]], ...]:
-    """Arrays of a state that lie in the blocks, too: (key, path of the whole or paths of its rows).
-
-    They are the same to the last bit, so that the checksum of what is read back is that of the
-    state.  Of equal arrays that of the same block goes first.
-    """
+) -> dict[str, str | tuple[str, ...]]:
+    """Arrays of a state that lie in the blocks, too, to the last bit: path of the whole or paths of
+    its rows by key.  Of equal arrays that of the same block goes first."""
     shown: dict[tuple, list[tuple[str, np.ndarray]]] = {}
     for block in blocks:
         for name, values in list_arrays(block, computed=True):
@@ -252,36 +201,16 @@ def find_shown(
                     return path
         return None
 
-    found: list[tuple[str, str | tuple[str, ...]]] = []
+    found: dict[str, str | tuple[str, ...]] = {}
     for key, value in state.items():
         if not isinstance(value, np.ndarray) or value.ndim < 2 or not value.size:
             continue
         if (whole := find(key, value)) is not None:
-            found.append((key, whole))
+            found[key] = whole
             continue
         rows = [path for row in value if (path := find(key, row)) is not None]
         if len(rows) == len(value):
-            found.append((key, tuple(rows)))
-    return tuple(found)
-
-
-def _put(group: h5py.Group, name: str, value) -> h5py.h5d.DatasetID:
-    """Write numbers into a dataset that is there and has their type and shape."""
-    data = h5py.h5d.open(group.id, name.encode("utf-8"))
-    data.write(h5py.h5s.ALL, h5py.h5s.ALL, np.ascontiguousarray(value))
-    return data
-
-
-def _write_attribute(place: h5py.h5g.GroupID | h5py.h5d.DatasetID, name: str, value) -> None:
-    """Write a number into an attribute that is there and has its type."""
-    h5py.h5a.open(place, name.encode("utf-8")).write(np.asarray(value))
-
-
-def compute_crc(value: np.ndarray | float | int) -> int:
-    """CRC-32 of the numbers in C order."""
-    found = 0
-    for chunk in ArrayBytes(np.atleast_1d(value)):
-        found = zlib.crc32(chunk, found)
+            found[key] = tuple(rows)
     return found
 
 
@@ -307,7 +236,7 @@ def write_block(
     names: Mapping[str, str] = MappingProxyType({}),
     arrays: Sequence[tuple[str, np.ndarray]] | None = None,
     compression: int = 0,
-    create: Create | None = None,
+    create: Callable[[h5py.Group, str, np.ndarray], h5py.Dataset] | None = None,
 ) -> None:
     """Write nodes (2 or 3, ...) and fields of a block, with dimension scales, into its group.
 
@@ -349,23 +278,6 @@ def write_block(
     in_cells = set(block.cell_fields)
     for name, values in list_arrays(block, create is not None) if arrays is None else arrays:
         write(name, values, tuple(axes) if name in in_cells else at_nodes)
-
-
-def _write_state(
-    group: h5py.Group,
-    state: Mapping[str, Any],
-    shown: Mapping[str, str | tuple[str, ...]],
-    create: Create | None = None,
-) -> None:
-    for key, value in state.items():
-        if key in shown:
-            _link_arrays(group, key, value, shown[key])
-            group[key].attrs["crc32"] = compute_crc(value)
-        elif isinstance(value, np.ndarray) and value.ndim:
-            data = create(group, key, value) if create else group.create_dataset(key, data=value)
-            data.attrs["crc32"] = compute_crc(value)
-        else:
-            group.create_dataset(key, data=value)
 
 
 def _link_arrays(
@@ -451,11 +363,11 @@ def _check_format(path: Path, file: h5py.File, sound: bool) -> None:
         told = "no format_version" if version is None else f"the format version {version!r}"
         raise BadInput(
             f"{path} has {told}, so that nobody knows how to read it; dumps have one from 1 to "
-            f"{INDEX_VERSION}"
+            f"{FORMAT_VERSION}"
         )
-    if version > INDEX_VERSION:
+    if version > FORMAT_VERSION:
         raise BadInput(
-            f"{path} has format version {version}; this shockgrid reads up to {INDEX_VERSION}"
+            f"{path} has format version {version}; this shockgrid reads up to {FORMAT_VERSION}"
         )
     if version >= FIRST_WITH_CHECKSUM and not sound:
         raise BadInput(f"{path} is damaged: it has lost its checksum")
@@ -468,10 +380,7 @@ def has_state(path: Path) -> bool:
 
 
 def read_state(path: Path) -> dict[str, Any]:
-    """The state in a dump, every array checked against its crc32; BadInput if damaged.
-
-    An array that is put together from parts has no crc32: those of the parts guard it.
-    """
+    """The state in a dump; BadInput if damaged, also where a sum of an older file is wrong."""
     state: dict[str, Any] = {}
 
     def take(key: str, item: h5py.Dataset | h5py.Group) -> None:
@@ -480,17 +389,59 @@ def read_state(path: Path) -> dict[str, Any]:
         value = item[()]
         if isinstance(value, bytes):
             state[key] = value.decode("utf-8")
-        elif isinstance(value, np.ndarray):
-            joined = item.is_virtual and "crc32" not in item.attrs and bool(parts)
-            if not joined and zlib.crc32(value.tobytes()) != item.attrs.get("crc32"):
-                raise BadInput(f"{path}: the stored state is damaged at {key!r}")
-            state[key] = value
-        else:
+        elif not isinstance(value, np.ndarray):
             state[key] = value.item()
+        elif item.attrs.get("crc32", crc := zlib.crc32(value.tobytes())) != crc:
+            raise BadInput(f"{path}: the stored state is damaged at {key!r}")
+        else:
+            state[key] = value
 
     with open_dump(path) as file, damage_told(path, "its state"):
         if "state" not in file:
             raise BadInput(f"{path} is a light dump: it holds pictures, and no state to go on from")
-        parts = read_parts(file)
         file["state"].visititems(take)
     return state
+
+
+def choose_arrays(block: BlockView, output: Output) -> list[tuple[str, np.ndarray]]:
+    """Nodes and the chosen fields of a block by name, in the precision of light dumps."""
+    kind = np.float32 if output.precision == "single" else None
+    chosen = []
+    for name, values in list_arrays(block):
+        if name in tuple("xyz"):
+            chosen.append((name, values))
+        elif not output.fields or name in output.fields:
+            is_float = kind is not None and values.dtype == np.float64
+            chosen.append((name, values.astype(kind) if is_float else values))
+    return chosen
+
+
+def make_light_image(
+    evolution: Evolution,
+    problem: str,
+    deck_text: str,
+    t_unit: str,
+    output: Output,
+    kind: str = FORMAT,
+) -> bytes:
+    """The bytes of a light dump of the present state, its checksum blank."""
+    with h5py.File("dump", "w", driver="core", backing_store=False) as file:
+        write_head(file, evolution, problem, deck_text, t_unit, kind)
+        _write_blocks(file, evolution, output)
+        file.flush()
+        return file.id.get_file_image()
+
+
+def write_sealed(path: Path, image: Bytes) -> tuple[int, str]:
+    """Put the bytes of a dump with a blank checksum at `path`, as `write_atomically`.
+
+    Returns its size [bytes] and its checksum.
+    """
+    parts = seal(image)
+    write_atomically(path, parts)
+    return sum(map(len, parts)), bytes(parts[1]).decode("ascii")
+
+
+def is_large(evolution: Evolution) -> bool:
+    """Is a dump of this evolution a large one?"""
+    return sum(block.nodes.nbytes for block in evolution.blocks) >= LARGE

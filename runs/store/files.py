@@ -7,11 +7,13 @@ written, are for the person at the keyboard to mend.
 from __future__ import annotations
 
 import errno
+import importlib
 import os
 import time
 from collections.abc import Iterable
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO, Any
 
 from regrid.errors import BadInput
 
@@ -134,3 +136,35 @@ def describe_disk_error(error: OSError, path: Path) -> str:
         case errno.EISDIR:
             return f"{path} is a folder, a file is needed"
     return f"{path}: {error.strerror or error}"
+
+
+def _import_here(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        return None
+
+
+fcntl = _import_here("fcntl")  # None on Windows
+msvcrt = _import_here("msvcrt")  # None everywhere else
+KEEPS_OPEN_FILES = os.name == "nt"  # a file that is open cannot be removed there
+
+
+def try_lock(file: IO) -> bool:
+    """Lock an open file for this process alone, without waiting; False where another has it.
+
+    The lock is given up when the file is closed.  Raises OSError where the file system has no
+    locks.
+    """
+    if fcntl is not None:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+    elif msvcrt is not None:
+        file.seek(0)
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        except PermissionError:
+            return False
+    return True

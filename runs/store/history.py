@@ -2,18 +2,21 @@
 
 The first row is step 0, where only some columns have a value; an empty field reads as nan (as ""
 in a column of words).  A last line without its end is a torn write and is dropped on reading.
-Numbers are written with `repr`, so that they read back to the same bits.  The last column of the
-file has the rows' checksums (`runs.store.history_rows`); readers do not see it.
+Numbers are written with `repr`, so that they read back to the same bits.
 
-A history that was lost and made again from the dumps lacks the columns that only a step tells: it
-is provisional, and the next step writes it anew with all columns.
+The last column, `crc32`, is the CRC-32 of the file's first line, the step of the row before and
+the row's text: so a row that was changed is seen, and so is one that lacks the row before it.  What
+follows the first such row is not trusted: a restart cuts the file there and computes it again.
+Files without that column, from before it was there, are judged by their steps alone.
 """
 
 from __future__ import annotations
 
 import csv
 import os
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +25,92 @@ import numpy as np
 from problems.evolution import Evolution, get_start_row
 from regrid.errors import BadInput
 from runs.store.files import disk_errors, write_atomically
-from runs.store.history_rows import SUM, Rows, read_rows, seal_more, seal_rows
 
-STEP_TIME = "seconds_step"  # a column of every step; a history without it is provisional
+SUM = "crc32"
+STEP_TIME = "seconds_step"  # a column that the runner adds
 NUMBERS = (int, float)  # types, exactly, whose repr is what the file holds
+
+
+@dataclass
+class Rows:
+    """What a history file holds.
+
+    columns: names without that of the sums, None where the first line is lost or there is no file;
+    rows: step and text without its sum, up to what is damaged; fault: what that is, "" for nothing.
+    """
+
+    path: Path
+    columns: list[str] | None = None
+    rows: list[tuple[int, str]] = field(default_factory=list)
+    fault: str = ""
+
+    @property
+    def last(self) -> int:
+        """Step of the last row; -1 without any."""
+        return self.rows[-1][0] if self.rows else -1
+
+    def check(self, words: str = "") -> None:
+        """Raise BadInput where something is damaged or cut out; `words`: what to do."""
+        if self.fault:
+            raise BadInput("; ".join([f"{self.path} {self.fault}", *filter(None, [words])]))
+
+
+def read_rows(path: Path) -> Rows:
+    """The rows of a file up to the first that is damaged; BadInput where it cannot be opened."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return Rows(path)
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror}") from error
+    lines = content.split(b"\n")[:-1]  # what follows the last line's end is torn
+    if not lines:
+        return Rows(path)
+    names = lines[0].decode("utf-8", "replace").split(",")
+    sealed = names[-1] == SUM
+    nearly = len(names[-1]) == len(SUM) and sum(map(str.__eq__, names[-1], SUM)) >= 3
+    if "step" not in names or (nearly and not sealed):
+        return Rows(path, fault="is damaged in its first line, that of the names")
+    while not sealed and lines[-1].count(b",") != len(names) - 1:
+        lines.pop()  # torn, without a sum to tell
+    found = Rows(path, names[:-1] if sealed else names)
+    start, where, last = zlib.crc32(lines[0]), names.index("step"), None
+    for number, line in enumerate(lines[1:], start=2):
+        text, _, digits = line.rpartition(b",") if sealed else (line, b"", b"")
+        try:
+            step = int(text.split(b",")[where])
+            if sealed:
+                good = int(digits) == _sum(start, last, text)
+            else:
+                good = text.count(b",") == len(names) - 1 and last in (None, step - 1)
+        except (ValueError, IndexError):
+            good = False
+        if not good:
+            after = "its names" if last is None else f"step {last}"
+            found.fault = f"is damaged, or lacks rows, from line {number} on (after {after})"
+            break
+        found.rows.append((step, text.decode("utf-8", "replace")))
+        last = step
+    return found
+
+
+def _sum(start: int, after: int | None, text: bytes) -> int:
+    before = b"" if after is None else str(after).encode("ascii")
+    return zlib.crc32(before + b":" + text, start)
+
+
+def seal_rows(columns: Sequence[str], rows: Iterable[tuple[int, str]]) -> Iterable[str]:
+    """The lines of a file, its first one included, each row with its checksum."""
+    head = ",".join([*columns, SUM])
+    return [head, *_seal_more(head, rows, None)]
+
+
+def _seal_more(head: str, rows: Iterable[tuple[int, str]], after: int | None) -> Iterable[str]:
+    """Lines for rows that follow the one of step `after` in a file with this first line."""
+    start = zlib.crc32(head.encode("utf-8"))
+    for step, text in rows:
+        yield f"{text},{_sum(start, after, text.encode('utf-8'))}"
+        after = step
 
 
 class HistoryWriter:
@@ -35,50 +120,34 @@ class HistoryWriter:
         self.path = path
         self.columns = columns
         self._waiting: list[dict[str, Any]] = []
-        self._replaces = columns is None and bool(read_rows(path).rows)  # a provisional file
         self._last = None if columns is None else read_rows(path).last  # step of the last row
         self._order: tuple[str, ...] = ()  # names of the row that was checked last
         with disk_errors(path):
             self._file = open(path, "a", encoding="utf-8", newline="")
 
     def start(self, row: Mapping[str, Any]) -> None:
-        """Take a row of the start; it is written once the first step tells all columns.
-
-        All rows of a provisional file are to be given so: it is replaced then.
-        """
+        """Take the row of the start; it is written once the first step tells all columns."""
         self._waiting.append(dict(row))
 
     def append(self, row: Mapping[str, Any]) -> None:
         """Write one step and flush; raises BadInput when the columns have changed."""
-        rows = [row]
-        new = self.columns is None
+        rows, head = [row], []
         if self.columns is None:
             first = [name for one in self._waiting for name in one if name not in row]
             self.columns = [*row, *dict.fromkeys(first)]
             rows, self._waiting = [*self._waiting, row], []
+            head = [",".join([*self.columns, SUM])]
         elif tuple(row) != self._order and (
             len(row) != len(self.columns) or any(name not in row for name in self.columns)
         ):
             raise BadInput(f"{self.path}: {describe_change(self.columns, row)}")
         self._order = tuple(row)
         texts = [(int(one["step"]), format_row(self.columns, one)) for one in rows]
-        head = ",".join([*self.columns, SUM])
-        lines = [*[head] * new, *seal_more(head, texts, self._last)]
+        lines = [*head, *_seal_more(",".join([*self.columns, SUM]), texts, self._last)]
         self._last = texts[-1][0]
-        if self._replaces:
-            self._replace(lines)
-            return
         with disk_errors(self.path):
             self._file.write("\n".join(lines) + "\n")
             self._file.flush()
-
-    def _replace(self, lines: Sequence[str]) -> None:
-        """Put these lines in place of the provisional file; more rows follow them."""
-        self.close()
-        write_atomically(self.path, "\n".join([*lines, ""]))
-        with disk_errors(self.path):
-            self._file = open(self.path, "a", encoding="utf-8", newline="")
-        self._replaces = False
 
     def sync(self) -> None:
         """Force the rows to the disk: called before a dump, which must not outlive its rows."""
@@ -102,39 +171,31 @@ def format_row(columns: Sequence[str], row: Mapping[str, Any]) -> str:
     )
 
 
-def describe_change(before: Iterable[str], now: Iterable[str]) -> str:
-    """A sentence on the columns that are missing `now` or new; both are names of columns."""
-    now = list(now)
-    missing = [name for name in before if name not in now]
-    new = [name for name in now if name not in before]
-    told = [
-        f"{word} {', '.join(names)}"
-        for word, names in (("without", missing), ("with", new))
-        if names
-    ]
-    return (
-        f"the columns of a history stay the same through a run, and this one would go on "
-        f"{' and '.join(told)}"
-    )
-
-
 def _format_value(value: Any) -> str:
     if isinstance(value, str):
         return value.replace(",", ";").replace('"', "'").replace("\n", " ")
-    if isinstance(value, bool | np.bool_):
-        return str(int(value))
-    if isinstance(value, int | np.integer):
+    if isinstance(value, bool | np.bool_ | int | np.integer):
         return str(int(value))
     return repr(float(value))
 
 
-def read_history(path: Path, words: str = "") -> dict[str, np.ndarray]:
+def describe_change(before: Iterable[str], now: Iterable[str]) -> str:
+    """A sentence on the columns that are missing `now` or new; both are names of columns."""
+    before, now = list(before), list(now)
+    missing = [name for name in before if name not in now]
+    new = [name for name in now if name not in before]
+    kinds = (("without", missing), ("with", new))
+    told = " and ".join(f"{word} {', '.join(names)}" for word, names in kinds if names)
+    return f"the columns of a history stay the same through a run, and this one would go on {told}"
+
+
+def read_history(path: Path) -> dict[str, np.ndarray]:
     """The columns of a history file: whole numbers, floats or words; {} where there is none.
 
-    Raises BadInput where it is damaged or rows are cut out; `words` then say what to do.
+    Raises BadInput where it is damaged or rows are cut out.
     """
     found = read_rows(path)
-    found.check(words)
+    found.check()
     return read_columns(found)
 
 
@@ -167,16 +228,6 @@ def _to_array(texts: tuple[str, ...]) -> np.ndarray:
         return np.array(texts, dtype=str)
 
 
-def list_texts(columns: Sequence[str], rows: Iterable[tuple[int, str]]) -> list[dict[str, str]]:
-    """Rows of a file, steps and texts, as what `HistoryWriter.start` takes."""
-    return [dict(zip(columns, text.split(","), strict=True)) for _, text in rows]
-
-
-def is_provisional(columns: Sequence[str]) -> bool:
-    """Does a history with these columns lack those of its steps?"""
-    return STEP_TIME not in columns
-
-
 def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> None:
     """Raise BadInput where a run that goes on would have other columns than the history at `path`.
 
@@ -187,13 +238,7 @@ def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> 
     if names is None:
         return
     tell: Any = getattr(evolution, "compute_row", None)
-    own = tell("start", 0) if tell else {}
-    if is_provisional(names):
-        tell, own = (
-            True,
-            {name: None for name in ("t", *own) if name == "t" or name.startswith("boundary_")},
-        )
-    now = [*own, *get_start_row(evolution), *measured]
+    now = [*(tell("start", 0) if tell else {}), *get_start_row(evolution), *measured]
     missing = [name for name in names if name not in (*now, "step", STEP_TIME)]
     if [name for name in now if name not in names] or (tell and missing):
         kept = [name for name in names if not (tell and name in missing)]
@@ -204,27 +249,22 @@ def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> 
         )
 
 
-def truncate_history(path: Path, step: int) -> list[str] | None:
-    """Drop all rows after `step` (and a torn line); return the columns, None if none are known.
+def truncate_history(path: Path, step: int, source: Rows | None = None) -> list[str] | None:
+    """Drop all rows after `step`, and a torn line; the columns, None if none are known.
 
-    Raises BadInput where the file is damaged or ends before `step`.
+    source: rows of another file, which are put in place of those.  Raises BadInput where rows up to
+    `step` are lost.
     """
-    found = read_rows(path)
-    found.check()
-    if found.columns is None:
+    found = source or read_rows(path)
+    if found.columns is None or (step == 0 and not found.rows):
         path.unlink(missing_ok=True)
         return None
-    kept = [(number, text) for number, text in found.rows if number <= step]
-    last = kept[-1][0] if kept else 0
-    if last < step:
+    if found.last < step:
+        found.check()
         raise BadInput(
-            f"{path} ends at step {last}, before the restart point of step {step}; "
+            f"{found.path} ends at step {found.last}, before the restart point of step {step}; "
             "choose an earlier one with --at"
         )
-    write_rows(path, found.columns, kept)
+    kept = [(number, text) for number, text in found.rows if number <= step]
+    write_atomically(path, "\n".join([*seal_rows(found.columns, kept), ""]))
     return found.columns
-
-
-def write_rows(path: Path, columns: Sequence[str], rows: Iterable[tuple[int, str]]) -> None:
-    """Write a history file anew: steps and texts of rows, which get their checksums."""
-    write_atomically(path, "\n".join([*seal_rows(columns, rows), ""]))

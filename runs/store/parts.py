@@ -2,8 +2,8 @@
 
 Every process calls `write_dump_in_parts` (or `write_light_dump_in_parts`) with its `Share`.  A part
 is a dump of the rows of blocks that are the process's own.  When all parts lie on the disk the
-first process writes the index (`runs.store.index`), after which there is a dump.  Killed anywhere
-before, there is none; `RunDirectory` clears the parts away that no index lists.
+first process writes the index, after which there is a dump.  Killed anywhere before, there is
+none; `RunDirectory` clears the parts away that no index lists.
 
 Of the state of a restart, arrays `<block>/...` that are shaped as the block's cells or nodes lie in
 the parts; all else is the same in all processes and lies in the index.
@@ -33,22 +33,21 @@ from problems.evolution import (
     is_axisymmetric,
 )
 from regrid.errors import BadInput
-from runs.store.checksum import Piece
+from runs.store.checksum import StoredPart, get_part_path, write_parts
 from runs.store.dumps import (
     FORMAT_OF_PARTS,
-    INDEX_VERSION,
     RADIAL,
-    compute_crc,
+    choose_arrays,
     create_virtual,
     encode_source,
     list_arrays,
+    make_image,
+    make_light_image,
     write_block,
     write_head,
+    write_sealed,
 )
-from runs.store.index import StoredPart, get_part_path, write_parts
-from runs.store.light import choose_arrays, make_light_image
 from runs.store.provenance import find_provenance
-from runs.store.writing import make_pieces, write_sealed
 
 Rows = Mapping[str, tuple[int, int]]  # by block: the first row of cells and the one after the last
 
@@ -265,7 +264,7 @@ def write_index(
     """
     blocks = [_Shape(block, find_bands(receipts, block)) for block in evolution.blocks]
     with h5py.File("index", "w", driver="core", backing_store=False) as file:
-        write_head(file, evolution, problem, deck_text, t_unit, version=INDEX_VERSION)
+        write_head(file, evolution, problem, deck_text, t_unit)
         names = RADIAL if is_axisymmetric(evolution) else {}
         group = file.create_group("blocks", track_order=True)
         for block in blocks:
@@ -300,9 +299,7 @@ def _write_state(
     for key, value in state.items():
         if isinstance(value, np.ndarray) and find_centring(key, value, views) is not None:
             continue
-        data = group.create_dataset(key, data=value)
-        if isinstance(value, np.ndarray) and value.ndim:
-            data.attrs["crc32"] = compute_crc(value)
+        group.create_dataset(key, data=value)
     for block in blocks:
         first, start, end = block.bands[0]
         for path, (kind, shape) in first.arrays.items():
@@ -362,8 +359,8 @@ def write_dump_in_parts(
     Raises BadInput in all processes where the disk has refused one of them.
     """
 
-    def make(mine: Evolution) -> list[Piece]:
-        return make_pieces(mine, problem, deck_text, t_unit, kind=FORMAT_OF_PARTS)
+    def make(mine: Evolution) -> bytes:
+        return make_image(mine, problem, deck_text, t_unit, kind=FORMAT_OF_PARTS)
 
     def write(receipts: list[Receipt]) -> Moment:
         return write_index(path, receipts, evolution, problem, deck_text, t_unit, besides)

@@ -12,13 +12,18 @@ import numpy as np
 
 from problems.problem import Problem
 from regrid.errors import BadInput, suggest
+from regrid.measure.corners import compute_centres
 from runs.deck.reading import ReadDeck, read_toml
 from runs.store.directory import RunDirectory, open_directory
 from runs.store.dumps import damage_told, has_state, open_dump, read_state
-from runs.store.guards import check_deck, check_summary, read_rows_beside_dumps
+from runs.store.guards import (
+    check_deck,
+    check_summary,
+    read_rows_beside_dumps,
+    read_run_deck,
+    read_verdict,
+)
 from runs.store.history import read_columns, read_history
-from runs.store.run_deck import read_run_deck
-from runs.store.verdict_file import read_verdict
 
 
 class MissingField(BadInput, KeyError):
@@ -83,6 +88,11 @@ class DumpBlock:
         self.state_fields = Fields(path, self.name, stored, "state")
         self.units = {name: str(data.attrs.get("units", "1")) for name, data in fields.items()}
         self.long_names = {n: str(d.attrs.get("long_name", n)) for n, d in fields.items()}
+
+    @property
+    def centres(self) -> np.ndarray:
+        """Middles of the cells (2, ni, nj) [m]."""
+        return compute_centres(self.nodes)
 
     def __getattr__(self, name: str) -> np.ndarray:
         """A field by its name: `block.rho`; AttributeError with what there is."""
@@ -203,19 +213,14 @@ class RunData:
         Raises BadInput where it is damaged, rows are cut out or it ends before the last dump.
         """
         found = read_rows_beside_dumps(self.directory)
-        found.check(f"shockgrid restart {self.directory.quoted} makes of it what can be made")
+        found.check(f"shockgrid restart {self.directory.quoted} cuts it back and computes it again")
         return read_columns(found)
-
-    @cached_property
-    def history_gaps(self) -> list[tuple[int, int]]:
-        """First and last step of each stretch of the history that is known to be lost."""
-        return read_rows_beside_dumps(self.directory).gaps
 
     @cached_property
     def verdict(self) -> dict[str, Any] | None:
         """How the run ended (`status`, `name`, `reason`) and what limits `trust`; None: it did not.
 
-        Made by `runs.inspection.verdict`; `dt_trend` tells how dt fell, by which cell.
+        Made by `runs.inspection.account`; `dt_trend` tells how dt fell, by which cell.
         """
         return read_verdict(self.directory)
 

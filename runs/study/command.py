@@ -10,25 +10,24 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from regrid.errors import BadInput
 from runs.deck.reading import parse_value
-from runs.engines.engine import open_engine
+from runs.engines import open_engine
 from runs.inspection.account import count
-from runs.study.checking import check_study
 from runs.study.computing import Result
 from runs.study.definition import (
+    NUMBER,
     Definition,
     check_same_deck,
     is_study,
     make_definition,
     read_definition,
+    read_vary,
 )
 from runs.study.orders import describe_series
-from runs.study.points import NUMBER, read_vary
 from runs.study.study import (
     Study,
+    check_study,
     claim_folder,
     compute_results,
     describe_states,
@@ -36,7 +35,6 @@ from runs.study.study import (
 )
 
 FAILED, INTERRUPTED = 3, 128 + 2
-MOST_ROWS = 30  # of the table on the screen
 MOST_CAUTIONS = 10  # on the screen
 STATES = {"done": "done", "failed": "failed", "half": "half done", "other": "of another deck"}
 
@@ -211,7 +209,7 @@ def describe_study(study: Study, progress: Progress, seconds: float) -> str:
         f"{count(runs, 'run')}: {progress.done} computed now, {progress.there} there already, "
         f"{progress.failed} failed; {seconds:.1f} s"
     ]
-    lines += ["", *make_rows(study)]
+    lines += ["", *study.make_rows()]
     if study.orders:
         names = [*study.shown, *(name.removesuffix("_error") for name in study.shown)]
         lines += ["", f"orders over {study.refined_key}:", *describe_series(study.orders, names)]
@@ -236,30 +234,3 @@ def describe_cautions(study: Study) -> list[str]:
         lines.append(f"  in {count(len(sentences), 'run')}{words}: {sentences[0]}")
     more = len(alike) - MOST_CAUTIONS
     return [*lines, f"  ... and {more} more in {study.path}/study.csv"] if more > 0 else lines
-
-
-def make_rows(study: Study) -> list[str]:
-    """The table on the screen: what is varied and what is shown, MOST_ROWS of the rows."""
-    table = study.table
-    columns = list(study.definition.keys)
-    for name in study.shown:
-        stem = name.removesuffix("_error")
-        columns += [c for c in (stem, f"{stem}_theory", f"{stem}_error", name) if c in table]
-    columns = list(dict.fromkeys(columns))
-    cells = [columns]
-    cells += [[_write(table[name][n]) for name in columns] for n in range(len(study.results))]
-    widths = [max(len(row[n]) for row in cells) for n in range(len(columns))]
-    rows = [
-        "  " + "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
-        for row in cells
-    ]
-    more = len(rows) - 1 - MOST_ROWS
-    if more > 0:
-        rows = [*rows[: MOST_ROWS + 1], f"  ... and {more} more in {study.path}/study.csv"]
-    return rows
-
-
-def _write(value) -> str:
-    if isinstance(value, np.floating):
-        return "-" if np.isnan(value) else f"{value:.6g}"
-    return str(value)

@@ -3,16 +3,20 @@
 What is to be done is told from the folder alone.  `result.json` is written when a run has ended;
 it holds the digest of the deck and what the table takes.  Without it a run of the same deck goes on
 from its last restart point.  A run of another deck is moved to `superseded` and the point begins
-anew.  The trap: a run that was stopped, or that the disk failed, has no result; it goes on the next
+anew.  A run that was stopped, or that the disk failed, has no result; it goes on the next
 time.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
+import inspect
 import math
 import os
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,16 +26,41 @@ import numpy as np
 
 from hydro.workers import count_processors
 from problems.problem_file import describe_mistake
+from problems.registry import PROBLEMS
 from regrid.errors import BadInput, RunFailure
-from runs.deck.reading import ReadDeck, read_deck, to_toml
-from runs.inspection.cautions import HEAD, describe_cautions
+from runs.deck.reading import ReadDeck, packaged_decks, read_deck, read_toml, to_toml
+from runs.inspection.account import HEAD, describe_cautions
 from runs.march.launching import continue_runner, start_runner
 from runs.march.runner import Runner
 from runs.store.directory import RunDirectory
 from runs.store.files import disk_errors, write_atomically
+from runs.store.guards import read_run_deck
 from runs.store.history import read_history
-from runs.store.run_deck import read_run_deck
-from runs.study.error_names import find_error_columns
+from runs.verify import CASES, Case
+
+
+@functools.cache
+def _find_problem(deck: str) -> str:
+    return deck if deck in PROBLEMS else str(read_toml(packaged_decks()[deck])["problem"])
+
+
+def find_error_columns(problem: str, measured: Iterable[str] = ()) -> tuple[str, ...]:
+    """Names of errors that `verify` has statements about for `problem`, columns among them.
+
+    And those of `measured` that begin with `error`.
+    """
+    judged = (case.quantity for case in CASES if _find_problem(case.deck) == problem)
+    named = (name for name in measured if name.startswith("error"))
+    return tuple(dict.fromkeys([*judged, *named]))
+
+
+def find_case(deck: str, settings: tuple[str, ...], quantity: str) -> Case | None:
+    """The statement of `verify` on this quantity of this very deck, None where there is none."""
+    for case in CASES:
+        if (case.deck, case.quantity, set(case.settings)) == (deck, quantity, set(settings)):
+            return case
+    return None
+
 
 RESULT = "result.json"
 
@@ -64,7 +93,8 @@ class Result(msgspec.Struct, kw_only=True):
 class Work:
     """A point for a worker: the deck, its settings, the folder, and its share of processors.
 
-    retry: compute it again where it has failed.
+    retry: compute it again where it has failed; function: computes it from `values`, instead of a
+    run of a deck.
     """
 
     source: str
@@ -72,6 +102,8 @@ class Work:
     folder: str
     threads: int | None = None
     retry: bool = False
+    function: Callable[..., Mapping[str, float]] | None = None
+    values: tuple[tuple[str, Any], ...] = ()
 
 
 def compute_digest(deck: ReadDeck) -> str:
@@ -83,6 +115,27 @@ def compute_digest(deck: ReadDeck) -> str:
     alone = msgspec.structs.replace(deck.deck, run=run)
     text = to_toml(deck.problem, alone) + (deck.file.digest if deck.file else "")
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def compute_digest_of(work: Work) -> str:
+    """`compute_digest` of a point's deck; of a function the digest of its text and values."""
+    if work.function is None:
+        return compute_digest(read_deck(work.source, work.settings))
+    try:
+        text = inspect.getsource(work.function)
+    except (OSError, TypeError):
+        text = work.source
+    return hashlib.sha256(f"{text}\n{sorted(work.values)!r}".encode()).hexdigest()
+
+
+def find_names(results: Sequence[Result | None]) -> tuple[list[str], list[str], list[str]]:
+    """Names of the problem's results, of its errors and of its measurements, in their order."""
+    known = [result for result in results if result is not None]
+
+    def gather(part: str) -> list[str]:
+        return list(dict.fromkeys(name for result in known for name in getattr(result, part)))
+
+    return gather("computed"), gather("errors"), gather("values")
 
 
 def read_result(folder: str | Path, digest: str) -> Result | None:
@@ -118,11 +171,32 @@ def compute_point(work: Work) -> Result:
     one's own.
     """
     try:
-        return _compute(work)
+        return _compute(work) if work.function is None else _call(work)
     except Exception as error:
         if not isinstance(error, BadInput) and (mistake := describe_mistake(error)):
             raise BadInput(mistake) from error
         raise
+
+
+def _call(work: Work) -> Result:
+    """What a function of one's own gives at a point; what it raises is the point's failure."""
+    assert work.function is not None
+    digest, begun = compute_digest_of(work), time.monotonic()
+    result = Result(digest=digest, reason="computed")
+    try:
+        found = work.function(**dict(work.values))
+        if not isinstance(found, Mapping):
+            raise BadInput(f"{work.source} returned {found!r}; numbers by name are wanted (a dict)")
+        result.values = {str(name): _number(value) for name, value in found.items()}
+    except Exception as error:
+        told = "" if isinstance(error, BadInput | RunFailure) else f"{type(error).__name__}: "
+        result.failure = result.reason = f"{told}{error}"
+    result.seconds = time.monotonic() - begun
+    folder = Path(work.folder)
+    with disk_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    write_atomically(folder / RESULT, msgspec.json.format(msgspec.json.encode(result), indent=1))
+    return result
 
 
 def _compute(work: Work) -> Result:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import io
 import itertools
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -17,11 +17,11 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from runs.pictures.saving import write_figure
+from runs.pictures.command import write_figure
 from runs.store.files import write_atomically
-from runs.study.definition import Definition
+from runs.study.computing import find_case
+from runs.study.definition import make_column
 from runs.study.orders import Series
-from runs.study.table import make_column
 
 MOST_LINES = 10  # in a panel with a legend
 LEAST_MAP = 4  # values of each key from which a map is drawn
@@ -31,19 +31,7 @@ APART = 3.0  # distance of series over their own length from which they are draw
 DPI = 130
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """What a picture takes of a study: its table, units by column, quantities `shown`, orders."""
-
-    definition: Definition
-    table: dict[str, np.ndarray]
-    units: dict[str, str]
-    shown: list[str]
-    refined_key: str | None
-    orders: list[Series]
-
-
-def draw_study(study: Drawn) -> Figure:
+def draw_study(study: Any) -> Figure:
     """The figure of a study: a panel for each quantity shown."""
     refined = study.refined_key is not None
     panels = [] if refined else list(study.shown)
@@ -75,13 +63,13 @@ def save_figure(figure: Figure, path: Path, deck_text: str | None = None) -> Non
     write_atomically(path, image.getvalue(), durable=False)
 
 
-def _numbers(study: Drawn, key: str) -> np.ndarray | None:
+def _numbers(study: Any, key: str) -> np.ndarray | None:
     """Values of a key (n,), None where they are no numbers."""
     column = study.table[key]
     return column.astype(float) if column.dtype.kind in "if" else None
 
 
-def _choose_axis(study: Drawn) -> str:
+def _choose_axis(study: Any) -> str:
     """The key along x: of those that are numbers the one with the most values."""
     keys = [key for key in study.definition.keys if _numbers(study, key) is not None]
     if not keys:
@@ -98,7 +86,7 @@ def _is_even_in_log(values: np.ndarray) -> bool:
     return ratios.max() / ratios.min() < steps.max() / steps.min()
 
 
-def _draw_lines(axes, study: Drawn, name: str) -> None:
+def _draw_lines(axes, study: Any, name: str) -> None:
     """A quantity over the key along x, a line for each value of the others; theory dashed."""
     key = _choose_axis(study)
     table = study.table
@@ -156,19 +144,19 @@ def _say(value) -> str:
     return f"{value:.4g}" if isinstance(value, float | np.floating) else str(value)
 
 
-def _label(study: Drawn, name: str) -> str:
+def _label(study: Any, name: str) -> str:
     units = study.units.get(name, "1")
     return name.replace("_", " ") + (f" [{units}]" if units != "1" else "")
 
 
-def _is_map(study: Drawn, name: str) -> bool:
+def _is_map(study: Any, name: str) -> bool:
     vary = study.definition.vary
     numbers = [key for key in vary if _numbers(study, key) is not None]
     large = len(vary) == len(numbers) == 2 and min(map(len, vary.values())) >= LEAST_MAP
     return large and f"{name}_error" in study.table
 
 
-def _draw_map(figure, axes, study: Drawn, name: str) -> None:
+def _draw_map(figure, axes, study: Any, name: str) -> None:
     """How far a quantity is off theory, in per cent, over the two varied keys."""
     first, second = study.definition.vary
     x, y = (make_column(list(study.definition.vary[key])).astype(float) for key in (first, second))
@@ -207,7 +195,7 @@ def _find_edges(values: np.ndarray) -> np.ndarray:
     return np.exp(edges) if log else edges
 
 
-def _choose_series(study: Drawn) -> dict[str, list[Series]]:
+def _choose_series(study: Any) -> dict[str, list[Series]]:
     """Series by quantity, of those that are shown."""
     chosen: dict[str, list[Series]] = {name: [] for name in study.shown}
     for one in study.orders:
@@ -216,7 +204,7 @@ def _choose_series(study: Drawn) -> dict[str, list[Series]]:
     return {name: series for name, series in chosen.items() if series}
 
 
-def _draw_orders(axes, study: Drawn, name: str, series: list[Series]) -> None:
+def _draw_orders(axes, study: Any, name: str, series: list[Series]) -> None:
     """Errors over the cell size with their orders; other quantities with their uncertainty."""
     axes.set_xlabel(f"1 / {study.refined_key}")
     if series[0].error:
@@ -231,10 +219,8 @@ def _name_series(one: Series, order: str) -> str:
     return ", ".join(words for words in (one.words, order) if words)
 
 
-def _draw_errors(axes, study: Drawn, name: str, series: list[Series]) -> None:
+def _draw_errors(axes, study: Any, name: str, series: list[Series]) -> None:
     """Both axes logarithmic; the bar of `shockgrid verify` where it has one for this deck."""
-    from runs.study.error_names import find_case
-
     for one, colour in zip(series, _make_colours(len(series)), strict=True):
         order = f"order {one.order:.2f}" if np.isfinite(one.order) else one.why_none
         label = _name_series(one, order)
@@ -251,7 +237,7 @@ def _draw_errors(axes, study: Drawn, name: str, series: list[Series]) -> None:
         axes.axhline(case.bar, color="C3", lw=1.0, ls=":", label=label)
 
 
-def _draw_values(axes, study: Drawn, name: str, series: list[Series]) -> None:
+def _draw_values(axes, study: Any, name: str, series: list[Series]) -> None:
     """Values with the uncertainty of the finest, theory dashed, a star for cells of no size.
 
     Series that lie farther apart than they are long are drawn as what they are off theory, or off

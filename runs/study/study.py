@@ -1,43 +1,53 @@
-"""A study: all its points computed, at most once each, and what came out.
+"""A study: a deck, or a function of one's own, at many points; each is computed at most once.
 
 The folder of a study:
 
     study.toml      what is varied: `shockgrid study DIR` goes on
     runs/           a run directory for each point, called by its values
-    study.csv       the table
-    study.h5        the table as NetCDF-4
+    study.csv       the table; study.h5: the same as NetCDF-4
     orders.csv      orders of accuracy, where cells are varied
     study.png       the picture
     superseded/     runs of another deck at the same values
 
-The trap: points that are no longer part of a study keep their runs; they are not in the table.
+In study.h5 each quantity of a product of points is an array over the varied keys, which are
+dimension scales; points given one by one lie along `point`.  A number that there is not is NaN.
+
+Note: points that are no longer part of a study keep their runs; they are not in the table.
 """
 
 from __future__ import annotations
 
 import contextlib
+import csv
+import importlib
+import io
 import signal
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import h5py
 import numpy as np
 
-from regrid.errors import BadInput
+from problems.evolution import get_start_row
+from problems.problem import Problem
+from regrid.errors import BadInput, suggest
 from runs.deck.reading import read_deck
-from runs.engines.engine import open_engine
-from runs.engines.protocol import Engine
+from runs.engines import Engine, open_engine
 from runs.inspection.account import count
 from runs.store.directory import RunDirectory
 from runs.store.files import disk_errors, write_atomically
-from runs.study.checking import check_study
+from runs.store.provenance import find_provenance
 from runs.study.computing import (
     Result,
     Work,
-    compute_digest,
+    compute_digest_of,
     compute_point,
+    find_error_columns,
+    find_names,
     find_state,
     read_result,
     share_processors,
@@ -47,27 +57,41 @@ from runs.study.definition import (
     FILE,
     Definition,
     check_same_deck,
+    flatten,
     is_study,
+    make_column,
     make_definition,
     read_definition,
 )
 from runs.study.orders import Series, find_refined_key, find_series, write_orders
-from runs.study.points import flatten
-from runs.study.table import find_names, make_table, write_csv, write_hdf5
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
 OWN = {FILE, "runs", "study.csv", "study.h5", "orders.csv", "study.png", "superseded", ".running"}
+FORMAT, FORMAT_VERSION = "shockgrid study", 1
+LONG_NAMES = {
+    "run": "folder in runs", "state": "how the run ended",
+    "cautions": "where not to trust the run", "step": "steps made", "t": "time at the end",
+    "seconds": "wall time of the steps",
+}  # fmt: skip
+MOST_ROWS = 30  # of the table on the screen
 Tell = Callable[[int, Result, bool], None]  # number of the point, its result, was it there already
+
+
+class Table(dict[str, np.ndarray]):
+    """Columns by name; the KeyError of a name that is none says which is nearest."""
+
+    def __missing__(self, name: str) -> np.ndarray:
+        raise KeyError(f"the table has no column {name!r}{suggest(str(name), self)}")
 
 
 class Study:
     """A study in its folder with the results that are there, one a point, None where there is none.
 
-    `table`: arrays by column; `failures`: sentences by run; `orders`: what grids show where cells
-    are varied (`refine` names their key where it is not `cells`).
+    It prints as its table.  `table`: arrays by column; `failures`: sentences by run; `orders`: what
+    grids show where cells are varied (`refine` names their key where it is not `cells`).
     """
 
     def __init__(
@@ -83,15 +107,58 @@ class Study:
     def __repr__(self) -> str:
         done = sum(result is not None for result in self.results)
         runs = f"{done} of {len(self.results)} runs, {len(self.failures)} failed"
-        return f"<study in {self.path}: {runs}>"
+        return "\n".join([f"study in {self.path}: {runs}", *self.make_rows()])
+
+    def make_rows(self) -> list[str]:
+        """The table in words: what is varied and what is shown, MOST_ROWS of the rows."""
+        table, columns = self.table, list(self.definition.keys)
+        for name in self.shown:
+            stem = name.removesuffix("_error")
+            columns += [c for c in (stem, f"{stem}_theory", f"{stem}_error", name) if c in table]
+        columns = list(dict.fromkeys(columns))
+        cells = [columns]
+        cells += [[_say(table[name][n]) for name in columns] for n in range(len(self.results))]
+        widths = [max(len(row[n]) for row in cells) for n in range(len(columns))]
+        rows = [
+            "  " + "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
+            for row in cells
+        ]
+        if (more := len(rows) - 1 - MOST_ROWS) > 0:
+            rows = [*rows[: MOST_ROWS + 1], f"  ... and {more} more in {self.path}/study.csv"]
+        return rows
 
     @cached_property
-    def table(self) -> dict[str, np.ndarray]:
+    def table(self) -> Table:
         """Columns (n,) of the n points: what is varied, how runs ended, and all that is measured.
 
-        Units are those of the deck.
+        Units are those of the deck.  Of a result `x` there are `x`, `x_theory` and `x_error`.
         """
-        return make_table(self.definition, self.results)
+        table, points, results = Table(), self.definition.points, self.results
+        for key in self.definition.keys:
+            table[key] = make_column([dict(point.values)[key] for point in points])
+        table["run"] = np.array([point.name for point in points], dtype=str)
+        table["state"] = np.array([_describe_state(result) for result in results], dtype=str)
+        cautions = [" | ".join(result.cautions) if result else "" for result in results]
+        table["cautions"] = np.array(cautions, dtype=str)
+        for name, kind in (("step", np.int64), ("t", float), ("seconds", float)):
+            table[name] = np.array([getattr(r, name) if r else 0 for r in results], dtype=kind)
+        computed, errors, values = find_names(results)
+        parts = [
+            (part, name, column)
+            for name in computed
+            for part, name, column in (
+                ("computed", name, name),
+                ("theory", name, f"{name}_theory"),
+                ("errors", f"{name}_error", f"{name}_error"),
+            )
+        ]
+        parts += [("errors", name, name) for name in errors]
+        parts += [("values", name, name) for name in values]
+        for part, name, column in parts:
+            if column not in table:
+                found = [getattr(r, part).get(name) if r is not None else None for r in results]
+                table[column] = np.array([np.nan if v is None else float(v) for v in found])
+        return table
 
     @property
     def units(self) -> dict[str, str]:
@@ -142,22 +209,22 @@ class Study:
 
         Raises BadInput where xarray or h5netcdf is not installed.
         """
-        try:
-            import h5netcdf  # noqa: F401 - the engine
-            import xarray
-        except ImportError as error:
-            raise BadInput(
-                f"to_xarray needs xarray and h5netcdf, and {error.name} is not installed here: "
-                "python -m pip install xarray h5netcdf"
-            ) from error
+        load_package("h5netcdf", "to_xarray")
+        xarray = load_package("xarray", "to_xarray")
         return xarray.load_dataset(self.path / "study.h5", engine="h5netcdf")
+
+    def to_pandas(self) -> Any:
+        """The table as a pandas.DataFrame, a row a point.
+
+        Raises BadInput where pandas is not installed.
+        """
+        return load_package("pandas", "to_pandas").DataFrame(dict(self.table))
 
     def plot(self, path: Path | str | None = None) -> Figure:
         """The figure of `shown`, written to `path` where there is one."""
-        from runs.study.pictures import Drawn, draw_study, save_figure
+        from runs.study.pictures import draw_study, save_figure
 
-        what = self.table, self.units, self.shown, self.refined_key, self.orders
-        figure = draw_study(Drawn(self.definition, *what))
+        figure = draw_study(self)
         if path is not None:
             save_figure(figure, Path(path), self.definition.to_toml())
         return figure
@@ -168,8 +235,13 @@ class Study:
         Raises BadInput where the disk does not take them.
         """
         paths = [self.path / "study.csv", self.path / "study.h5"]
-        write_csv(paths[0], self.table)
-        write_hdf5(paths[1], self.definition, self.table, self.units)
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(self.table)
+        for row in zip(*self.table.values(), strict=True):
+            writer.writerow([_say(value, repr, "") for value in row])
+        write_atomically(paths[0], text.getvalue())
+        write_atomically(paths[1], self._make_hdf5())
         if self.orders:
             paths.append(self.path / "orders.csv")
             write_orders(paths[-1], self.orders)
@@ -178,9 +250,61 @@ class Study:
             self.plot(paths[-1])
         return paths
 
+    def _make_hdf5(self) -> bytes:
+        definition, units = self.definition, self.units
+
+        def write(file: h5py.File, name: str, values: np.ndarray) -> h5py.Dataset:
+            if values.dtype.kind == "U":
+                kind = h5py.string_dtype()
+                data = file.create_dataset(name, data=values.astype(object), dtype=kind)
+            else:
+                data = file.create_dataset(name, data=values)
+                data.attrs["units"] = "s" if name in ("t", "seconds") else units.get(name, "1")
+            data.attrs["long_name"] = LONG_NAMES.get(name, name.replace("_", " "))
+            return data
+
+        with h5py.File("study", "w", driver="core", backing_store=False) as file:
+            file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+            file.attrs["study"] = text = definition.to_toml()
+            file.create_group("provenance").attrs.update(find_provenance(text))
+            scales = {key: make_column(list(values)) for key, values in definition.vary.items()}
+            scales = scales or {"point": np.arange(len(definition.points))}
+            for name, values in scales.items():
+                write(file, name, values).make_scale(name)
+            shape = tuple(len(values) for values in scales.values())
+            for name, values in self.table.items():
+                if name not in scales:
+                    data = write(file, name, values.reshape(shape))
+                    for axis, scale in enumerate(scales):
+                        data.dims[axis].attach_scale(file[scale])
+            file.flush()
+            return file.id.get_file_image()
+
+
+def load_package(name: str, call: str) -> Any:
+    """An optional package; BadInput that says how to install it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        words = f"{call} needs {name}, which is not installed here: python -m pip install {name}"
+        raise BadInput(words) from error
+
+
+def _say(value: Any, write: Callable[[float], str] = "{:.6g}".format, none: str = "-") -> str:
+    if isinstance(value, np.floating):
+        return none if np.isnan(value) else write(float(value))
+    return str(value)
+
+
+def _describe_state(result: Result | None) -> str:
+    """How a run ended, in its own words; a failure in its sentence."""
+    if result is None:
+        return "not run"
+    return f"failed: {result.failure}" if result.failure else result.reason
+
 
 def study(
-    deck: str | Path,
+    deck: str | Path | Callable[..., Mapping[str, float]],
     vary: Mapping[str, Any] | None = None,
     output: str | Path = "",
     *,
@@ -194,25 +318,27 @@ def study(
 ) -> Study | None:
     """Compute a deck at many points, as `shockgrid study` does, and return the study.
 
-    deck: problem, packaged deck, deck file, study file, or the folder of a study; vary: values by
-    key, or words as `--vary` takes them ("1.2:3:7"), their product is computed; points: instead of
-    it; settings, or keywords as for `run` (cells=32): keys for all points; output: the folder, made
-    if need be; shown: quantities of the picture; jobs, engine: as `open_engine` takes them (with
-    several jobs a script calls this under `if __name__ == "__main__":`).
+    deck: problem, packaged deck, deck file, study file, the folder of a study, or a function that
+    takes the varied keys as keywords and returns numbers by name; vary: values by key, or words as
+    `--vary` takes them ("1.2:3:7"), their product is computed; points: instead of it; settings, or
+    keywords as for `run` (cells=32): keys for all points; output: the folder, made if need be;
+    shown: quantities of the picture; jobs, engine: as `open_engine` takes them (with several jobs a
+    script calls this under `if __name__ == "__main__":`, and a function is one of a module).
 
     None on the ranks of MPI that only compute.  Raises BadInput for what cannot be a study; runs
     that fail are in `Study.failures`.  KeyboardInterrupt where it was stopped; it can be gone on
     with.
     """
-    file = is_study(str(deck))
+    file = None if callable(deck) else is_study(str(deck))
     if file is not None:
         if vary or points or settings or keywords:
             raise BadInput(f"{deck} is a study already; leave vary, points and settings out")
         definition = read_definition(file)
-        output = output or (file.parent if Path(deck).is_dir() else "")
+        output = output or (file.parent if file.parent == Path(str(deck)) else "")
     else:
+        source = deck if callable(deck) else str(deck)
         fixed = flatten({**(settings or {}), **keywords})
-        definition = make_definition(str(deck), vary, points, fixed, shown)
+        definition = make_definition(source, vary, points, fixed, shown)
     if not str(output):
         raise BadInput("study: the output folder is missing; name it with `output` (-o)")
     with open_engine(engine, jobs) as opened:
@@ -232,6 +358,76 @@ def study(
         return made
 
 
+def check_study(definition: Definition, refine: str | None = None) -> None:
+    """Raise BadInput where no point can be begun, or a name of `shown` is in none.
+
+    refine: the key of cells, as `--refine` names it.  A value that is wrong at some points fails
+    these alone.
+    """
+    find_refined_key(definition, refine)
+    if definition.function is not None:
+        return
+    sentences = []
+    for number in range(len(definition.points)):
+        try:
+            _make_problem(definition, number)
+            break
+        except BadInput as error:
+            sentences.append(str(error))
+    else:
+        many = len(set(sentences)) > 1
+        head = f"all {len(sentences)} points are wrong; {definition.points[0].name}: " * many
+        raise BadInput(head + sentences[0])
+    _check_shown(definition)
+
+
+def _make_problem(definition: Definition, number: int) -> tuple[str, Problem]:
+    """The problem of a point, with its name in decks; BadInput where the deck is wrong."""
+    settings = (*definition.settings, *definition.points[number].settings)
+    deck = read_deck(definition.source, settings)
+    return deck.problem, deck.make_problem()
+
+
+def _check_shown(definition: Definition) -> None:
+    """Raise BadInput for a name of `shown` that no kind of point has at its start.
+
+    Points of one kind differ in decimal numbers alone.  Where a problem cannot say its names before
+    its first step, nothing is refused.
+    """
+    missing, known, kinds = list(definition.shown), [], set()
+    for number, point in enumerate(definition.points):
+        kind = tuple(str(value) for _, value in point.values if not isinstance(value, float))
+        if not missing:
+            return
+        if kind in kinds:
+            continue
+        try:
+            names = _find_start_names(*_make_problem(definition, number))
+        except BadInput:
+            continue  # it fails by itself
+        except Exception:
+            return
+        kinds.add(kind)
+        known += names
+        missing = [name for name in missing if name not in names]
+    if missing:
+        words = f"; there are: {', '.join(dict.fromkeys(known))}" if known else ""
+        raise BadInput(f"--of {missing[0]}: no run has it{words}")
+
+
+def _find_start_names(problem_name: str, problem: Problem) -> list[str]:
+    """Names of results, errors and measurements, from a history that has its first row alone."""
+    evolution = problem.build()
+    measured = problem.measure(evolution)
+    row = {"step": evolution.step, "t": evolution.t, **get_start_row(evolution), **measured}
+    history = {name: np.array([value]) for name, value in row.items()}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # one row is little to compute with
+        results = list(problem.results(history))
+        errors = [*problem.errors(history), *find_error_columns(problem_name, measured)]
+    return [*results, *(f"{name}_error" for name in results), *errors, *measured]
+
+
 @contextlib.contextmanager
 def claim_folder(path: str | Path, definition: Definition) -> Iterator[Path]:
     """The folder of a study, made and held for this process, with its study.toml.
@@ -243,7 +439,7 @@ def claim_folder(path: str | Path, definition: Definition) -> Iterator[Path]:
     if folder.exists() and not folder.is_dir():
         raise BadInput(f"{folder} is a file, a study needs a folder; choose another with -o")
     with disk_errors(folder):
-        (folder / "runs").parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         strange = sorted(p.name for p in folder.iterdir() if p.name not in OWN)
         if strange and not (folder / FILE).exists():
             raise BadInput(
@@ -278,25 +474,31 @@ def compute_results(
     for number in range(len(definition.points)):
         work = make_work(definition, number, folder, share_processors(engine.workers), retry)
         try:
-            digest = compute_digest(read_deck(work.source, work.settings))
+            known = read_result(work.folder, compute_digest_of(work))
         except BadInput as error:
-            wrong = Result(digest="", failure=str(error))
-            results[number] = wrong
+            results[number] = wrong = Result(digest="", failure=str(error))
             tell(number, wrong, False)
             continue
-        known = read_result(work.folder, digest)
         if known is not None and not (known.failure and retry):
             results[number] = known
             tell(number, known, True)
         else:
             works[number] = work
-    if len(works) > 1 and engine.workers > 1:
-        _compile_kernels(definition, list(works.items()), engine)
+    if len(works) > 1 and engine.workers > 1 and definition.function is None:
+        # one step of one point of each kind, so that not every worker compiles the same kernels:
+        # these are made for materials, limiters and the like, for what is not a number in a deck
+        kinds: dict[tuple, Work] = {}
+        for number, work in works.items():
+            values = definition.points[number].values
+            kind = tuple(str(v) for _, v in values if not isinstance(v, int | float))
+            kinds.setdefault(kind, work)
+        for _ in engine.compute(warm_up, list(kinds.values())):
+            pass  # what is wrong with a point is told where it is computed
     numbers = list(works)
     for place, found in engine.compute(compute_point, list(works.values())):
         number = numbers[place]
         if isinstance(found, Exception):
-            found = Result(digest="", failure=describe_error(found))
+            found = Result(digest="", failure=_describe_error(found))
         if found.stopped:
             raise KeyboardInterrupt(found.reason)
         results[number] = found
@@ -312,18 +514,18 @@ def make_work(
     retry: bool = False,
 ) -> Work:
     """What a worker needs for a point, all paths in full."""
-    point = definition.points[number]
-    source = Path(definition.source)
-    return Work(
-        str(source.resolve()) if source.is_file() else definition.source,
-        (*definition.settings, *point.settings),
-        str((folder / "runs" / point.name).resolve()),
-        threads,
-        retry,
-    )
+    point, source = definition.points[number], Path(definition.source)
+    place = str((folder / "runs" / point.name).resolve())
+    if definition.function is not None:
+        values = dict(definition.fixed) | dict(point.values)
+        return Work(
+            definition.source, point.settings, place, None, retry, definition.function, values
+        )
+    name = str(source.resolve()) if source.is_file() else definition.source
+    return Work(name, (*definition.settings, *point.settings), place, threads, retry)
 
 
-def describe_error(error: Exception) -> str:
+def _describe_error(error: Exception) -> str:
     """A sentence for what a worker raised."""
     if isinstance(error, BadInput):
         return str(error)
@@ -334,30 +536,15 @@ def describe_error(error: Exception) -> str:
     return f"a mistake in shockgrid itself ({type(error).__name__}: {error})"
 
 
-def _compile_kernels(definition: Definition, works: list[tuple[int, Work]], engine: Engine) -> None:
-    """One step of one point of each kind, so that not every worker compiles the same kernels.
-
-    Kernels are made for materials, limiters and the like: for what is not a number in a deck.
-    """
-    kinds: dict[tuple, Work] = {}
-    for number, work in works:
-        values = definition.points[number].values
-        kinds.setdefault(tuple(str(v) for _, v in values if not isinstance(v, int | float)), work)
-    for _ in engine.compute(warm_up, list(kinds.values())):
-        pass  # what is wrong with a point is told where it is computed
-
-
 def describe_states(definition: Definition, folder: Path) -> list[str]:
     """What is there of each point: "done", "failed", "half", "other", "new", or a sentence."""
     states = []
     for number in range(len(definition.points)):
         work = make_work(definition, number, folder)
         try:
-            digest = compute_digest(read_deck(work.source, work.settings))
+            states.append(find_state(work.folder, compute_digest_of(work)))
         except BadInput as error:
             states.append(str(error))
-            continue
-        states.append(find_state(work.folder, digest))
     return states
 
 

@@ -121,7 +121,7 @@ def test_damaged_files_are_named(shockgrid, run):
     run.directory.history.write_text("\n".join(lines) + "\n")
     for words in (("info", "run"), ("plot", "run", "--what", "history")):
         code, text, error = shockgrid(*words)
-        assert code == 2 and "history.csv is damaged in line 3" in text + error
+        assert code == 2 and "history.csv is damaged, or lacks rows, from line 3" in text + error
 
 
 def test_compare_codes(shockgrid, run):

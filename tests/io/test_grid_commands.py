@@ -63,7 +63,7 @@ def test_own_grid_is_untangled_and_keeps_its_sides(shockgrid, kind):
     np.savez("start.npz", x=nodes[0], y=nodes[1])
     with h5py.File("mine.h5", "w") as file:
         file["some/where/nodes"] = np.moveaxis(nodes, 0, -1)
-    from runs.store.vtk import write_vts
+    from runs.store.paraview import write_vts
 
     write_vts(Path("mine.vts"), nodes, {})
     np.savez("mine.npz", nodes=nodes)

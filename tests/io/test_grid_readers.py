@@ -15,7 +15,7 @@ import pytest
 from foreign_readers import missing
 
 from regrid.given import read_structured
-from runs.store.vtk import write_vts
+from runs.store.paraview import write_vts
 
 SHOW = """
 import json, sys

@@ -9,9 +9,8 @@ import pytest
 
 from problems.problem import Problem
 from problems.registry import PROBLEMS, load_problem
-from runs.deck.checking import check_deck
+from runs.deck.checking import check_deck, make_schema
 from runs.deck.reading import packaged_decks, read_deck, resolve_deck, to_toml
-from runs.deck.schema import make_schema
 from runs.inspection.listing import describe_deck
 
 NAMES = tuple(PROBLEMS)

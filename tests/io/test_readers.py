@@ -96,8 +96,7 @@ def test_vtk_reads_the_sidecar(run):
 def test_state_comes_back_as_it_went(tmp_path):
     import toy_problem
 
-    from runs.store.dumps import read_state
-    from runs.store.writing import make_pieces, write_sealed
+    from runs.store.dumps import make_image, read_state, write_sealed
 
     evolution = toy_problem.ToyEvolution(toy_problem.ToyDeck())
     evolution.advance()
@@ -109,7 +108,7 @@ def test_state_comes_back_as_it_went(tmp_path):
         "deep/er/number": 0.1,
     }
     evolution.get_state = lambda: state
-    write_sealed(tmp_path / "d.h5", make_pieces(evolution, "toy", ""))
+    write_sealed(tmp_path / "d.h5", make_image(evolution, "toy", ""))
     back = read_state(tmp_path / "d.h5")
     assert set(back) == set(state)
     for key, value in state.items():

@@ -9,9 +9,8 @@ import pytest
 from problems import problem as size
 from problems.registry import OWN, load_problem
 from regrid.errors import BadInput
-from runs.deck.checking import resolve
+from runs.deck.checking import make_parts, resolve
 from runs.deck.reading import resolve_deck
-from runs.deck.schema import make_parts
 from runs.inspection.listing import describe_plan
 
 SMALL = size.PROGRAM + 20_000 * size.RUN_BYTES  # bytes of a machine that holds so many cells

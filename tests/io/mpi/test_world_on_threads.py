@@ -10,8 +10,7 @@ from regrid.errors import BadInput
 from runs.cli.main import main
 from runs.deck.reading import read_deck
 from runs.march.launching import start_runner
-from runs.ranks.following import follow
-from runs.ranks.world import World
+from runs.ranks.world import World, follow
 from runs.store.directory import open_directory
 from thread_ranks import run_on_threads
 
@@ -58,7 +57,7 @@ def test_a_follower_that_cannot_build_the_flow_says_so_and_breaks_off(tmp_path, 
 
     def rank(comm):
         if comm.rank:
-            monkeypatch.setattr("runs.ranks.following.resolve_deck", fail)
+            monkeypatch.setattr("runs.ranks.world.resolve_deck", fail)
             return follow(comm, screens)
         read = read_deck("triple-point", SETTINGS)
         runner = start_runner(read, str(tmp_path / "out"), False, True, lambda text: None)

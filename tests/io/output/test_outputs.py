@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
-from runs.forecast import past_runs
+from runs.forecast import cost as past_runs
 from runs.store.reader import RunData
 
 DECK = ("interface-instability", "--set", "cells=16", "--set", "lengths=[2, 2]", "--set", "mach=2")

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from runs.march import limits
-from runs.march.limits import WallLimit, parse_duration
+from runs.march import runner as limits
+from runs.march.runner import WallLimit, parse_duration
 from runs.store.reader import RunData
 
 

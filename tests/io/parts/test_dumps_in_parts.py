@@ -22,8 +22,8 @@ from in_parts import (
 )  # fmt: skip
 
 from regrid.errors import BadInput
+from runs.store.checksum import find_parts_by_name, read_parts
 from runs.store.dumps import open_dump, read_state
-from runs.store.index import find_parts_by_name, read_parts
 from runs.store.reader import RunData
 
 RUN = ("run", "toy", "-q", "--set", "cells=6", "--set", "output.dumps=3")

@@ -15,8 +15,8 @@ from PIL import Image
 
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
-from runs.inspection.tree import inspect_differences
-from runs.pictures.derived import get_field, get_words, has_field
+from runs.inspection.info import inspect_differences
+from runs.pictures.fields import get_field, get_words, has_field
 from runs.pictures.film import Frames, make_film
 from runs.store.checksum import seal
 from runs.store.provenance import find_provenance, hash_deck
@@ -179,3 +179,16 @@ def test_wrong_words_are_told_in_a_sentence(toys, shockgrid, words, told):
     code, _, error = shockgrid("plot", "one", *words)
     assert code == 2 and told in error and len(error.splitlines()) == 1
     assert not list(Path().glob("*.csv")) and not list(Path("one").glob("*.png"))
+
+
+def test_pictures_of_one_run_have_names_of_their_own(shockgrid, toy):
+    assert shockgrid("run", "toy", "-q", "-o", "mine", "--set", "run.max_steps=3")[0] == 0
+    words = ("plot", "mine", "q", "--dpi", "30")
+    names = [shockgrid(*words, *more)[1].strip() for more in (
+        (), ("--at", "start"), ("--mesh",), ("--limits", "0,1", "--colours", "magma"),
+    )]  # fmt: skip
+    assert len(set(names)) == 4 and names[0] == "mine/fields-q.png"
+    code, _, error = shockgrid(*words, "--colours", "magmaa")
+    assert code == 2 and "did you mean 'magma'" in error
+    code, _, error = shockgrid(*words, "--limits", "1,0")
+    assert code == 2 and "low < high" in error

@@ -10,9 +10,9 @@ import pytest
 
 from regrid.errors import BadInput, RegridFailure, RunFailure
 from runs.early_end.causes import name_failure
-from runs.forecast.step_trend import StepTrend
-from runs.forecast.time_left import TimeLeft
-from runs.inspection.verdict import RULES, describe_verdict, judge
+from runs.forecast.cost import TimeLeft
+from runs.forecast.step_trend import StepTrend, classify
+from runs.inspection.account import RULES, describe_verdict, judge
 
 
 def make_block(name="a", ni=6, nj=8, squeezed=None, hot=None):
@@ -183,3 +183,16 @@ def test_an_early_end_has_the_name_of_its_cause(error, name):
     assert verdict["name"] == name
     line = describe_verdict(verdict)
     assert line.startswith(f"verdict: ended early, {name};") and "\n" not in line
+
+
+def test_a_thin_cell_is_told_by_what_it_lies_beside():
+    def part(side, kind, start=0, stop=12):
+        moves = kind in ("interface", "sliding")
+        return SimpleNamespace(side=side, start=start, stop=stop, kind=kind, follows_flow=moves)
+
+    block = SimpleNamespace(nodes=np.zeros((2, 13, 13)))
+    block.segments = [part("i_max", "interface"), part("j_min", "axis"), part("j_max", "wall")]
+    cells = {(11, 6): "line", (11, 0): "corner", (5, 0): "axis", (5, 11): "wall", (5, 5): "inside"}
+    assert {cell: classify(block, *cell) for cell in cells} == cells
+    block.segments[0] = part("i_max", "sliding")
+    assert classify(block, 11, 6) == "sliding"

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from regrid.errors import BadInput
+from runs.deck.checking import describe_unset
 from runs.deck.reading import apply_setting, packaged_decks, parse_value, read_deck
-from runs.deck.unset import describe_unset
 from runs.inspection.account import measure_drifts
 from runs.store.history import HistoryWriter, read_history
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from regrid.errors import Place
-from runs.early_end.event import describe_event
+from runs.early_end.explain import describe_event
 
 
 def lay(lower, upper, name="gas", count=9):

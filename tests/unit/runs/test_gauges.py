@@ -9,8 +9,7 @@ import pytest
 
 from problems.deck import GaugePoint
 from regrid.measure.corners import compute_centres
-from runs.gauges.recorder import Gauges
-from runs.gauges.sampling import place_points
+from runs.gauges import Gauges, place_points
 
 FIELDS = ("rho", "u", "v", "p", "e", "c")
 

@@ -10,7 +10,7 @@ import pytest
 import shockgrid
 from builders import ROOT
 from regrid.errors import BadInput
-from runs.bench.steps import count_calls, make_step
+from runs.bench import count_calls, make_step
 from runs.ranks.started import RANKS, SIZES, SLURM, count_started, find_rank, is_for_ranks
 
 

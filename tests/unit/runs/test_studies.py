@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from regrid.errors import BadInput
-from runs.study.definition import read_definition
-from runs.study.points import read_vary, write_value
-from runs.study.refinement import SAFETY, refine
+from runs.study.definition import read_definition, read_vary, write_value
+from runs.study.orders import SAFETY, refine
 
 VALUES = st.recursive(
     st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | st.text(),

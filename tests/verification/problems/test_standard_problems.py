@@ -12,7 +12,7 @@ from problems.references.exact_flows import compute_wedge_deflection, find_shock
 from problems.registry import PROBLEMS
 from regrid.errors import BadInput
 from runs.deck.reading import read_deck
-from runs.verify.table import march
+from runs.verify import march
 
 SMALL = {
     "interface-instability": ("cells=8", "lengths=[2,2]"),

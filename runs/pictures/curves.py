@@ -1,28 +1,204 @@
-"""Values of the cells that a straight line meets: a picture over the way along it, and a table.
-
-Nothing is interpolated: each cell that the line crosses gives its value at the middle of the piece
-of the line inside it.  The trap: a line on the edge between two cells meets both in the same piece;
-both are given.
-"""
+"""Curves of a run: its interfaces over time and as tables, values of cells along a line."""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
 
+import h5py
 import numpy as np
+from matplotlib.colors import Normalize
 
 from regrid.errors import BadInput
-from runs.inspection.units import pick_prefix
-from runs.pictures.derived import get_words, has_field
-from runs.pictures.fields import Sheet, View, check_fields, make_sheets, time_titles
-from runs.store.files import write_atomically
-from runs.store.reader import Dump
+from runs.inspection.account import pick_prefix
+from runs.pictures.fields import (
+    Sheet,
+    View,
+    check_fields,
+    check_zoom,
+    find_extent,
+    get_words,
+    has_field,
+    make_sheets,
+    scale_times,
+    split_outline,
+    time_titles,
+    trace_outline,
+)
+from runs.store.files import check_not_of_a_run, write_atomically
+from runs.store.reader import Dump, RunData
+
+CLOSE = 1e-9  # of the interfaces' extent: ends so near are one point
+FORMAT = "shockgrid interfaces"
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One interface at one time: its name and its nodes (2, n) [m]."""
+
+    name: str
+    nodes: np.ndarray
+
+    @property
+    def length(self) -> np.ndarray:
+        """Length s (n,) [m] along the curve, from its first node."""
+        steps = np.hypot(*np.diff(self.nodes, axis=1))
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def find_curves(blocks: Sequence) -> list[Curve]:
+    """All interfaces of some blocks, by their materials' names in the blocks' order."""
+    found: dict[tuple[str, str], list[np.ndarray]] = {}
+    for pair, line in trace_outline(blocks)[0]:
+        pair = pair if pair[::-1] not in found else pair[::-1]
+        found.setdefault(pair, []).append(line)
+    curves = []
+    for pair, lines in found.items():
+        name = "interface_" + "_".join(word.replace("/", "-") for word in pair)
+        joined = _join(lines)
+        for number, nodes in enumerate(joined, start=1):
+            curves.append(Curve(f"{name}_{number}" if len(joined) > 1 else name, nodes))
+    return curves
+
+
+def _join(lines: list[np.ndarray]) -> list[np.ndarray]:
+    """Lines that meet end to end as one, until none is left that meets another."""
+    near = CLOSE * max(float(np.ptp(line, axis=1).max()) for line in lines)
+    waiting, joined = list(lines), []
+    while waiting:
+        line = waiting.pop(0)
+        while (number := _find_next(line, waiting, near)) is not None:
+            line = _append(line, waiting.pop(number), near)
+        joined.append(line)
+    return joined
+
+
+def _find_next(line: np.ndarray, others: list[np.ndarray], near: float) -> int | None:
+    ends = line[:, [0, -1]]
+    for number, other in enumerate(others):
+        gaps = np.hypot(*(ends[:, :, None] - other[:, None, [0, -1]]))
+        if gaps.min() <= near:
+            return number
+    return None
+
+
+def _append(line: np.ndarray, other: np.ndarray, near: float) -> np.ndarray:
+    """Both lines as one; it keeps the direction of the first."""
+    for forward in (other, other[:, ::-1]):
+        if np.hypot(*(line[:, -1] - forward[:, 0])) <= near:
+            return np.hstack([line, forward[:, 1:]])
+        if np.hypot(*(line[:, 0] - forward[:, -1])) <= near:
+            return np.hstack([forward[:, :-1], line])
+    raise AssertionError("lines that meet")
+
+
+def export_interfaces(directory: str, output: str | None = None) -> list[Path]:
+    """Write the interfaces at all dumps of a run; returns the files.
+
+    `output`: a file ending in .csv or .h5, left out: interfaces.csv and interfaces.h5 in the run's
+    directory.  Raises BadInput for another ending, and where there is no dump or no interface.
+    """
+    run = RunData(directory)
+    paths = [Path(output)] if output else [run.path / f"interfaces.{end}" for end in ("csv", "h5")]
+    for path in paths:
+        if path.suffix not in WRITERS:
+            raise BadInput(f"-o {path}: curves are written to a file ending in .csv or .h5")
+        check_not_of_a_run(path)
+    if not run.dumps:
+        raise BadInput(f"{run.path} has no dump that can be read")
+    moments = [(dump, find_curves(dump.blocks)) for dump in run.dumps]
+    if not any(curves for _, curves in moments):
+        raise BadInput(f"{run.path} has no interface: all its blocks are of one material")
+    for path in paths:
+        write_atomically(path, WRITERS[path.suffix](moments))
+    return paths
+
+
+Moments = Sequence[tuple[Dump, Sequence[Curve]]]
+
+
+def _list_rows(moments: Moments) -> Iterator[list]:
+    yield ["step", "t", "interface", "x", "y", "s"]
+    for dump, curves in moments:
+        for curve in curves:
+            for x, y, s in zip(*curve.nodes.tolist(), curve.length.tolist(), strict=True):
+                yield [dump.step, repr(dump.t), curve.name, repr(x), repr(y), repr(s)]
+
+
+def _make_csv(moments: Moments) -> bytes:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(_list_rows(moments))
+    return text.getvalue().encode("utf-8")
+
+
+def _make_hdf5(moments: Moments) -> bytes:
+    with h5py.File("interfaces", "w", driver="core", backing_store=False) as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["format_version"] = 1
+        for dump, curves in moments:
+            moment = file.create_group(f"step_{dump.step:06d}")
+            moment.attrs["step"], moment.attrs["t"] = dump.step, dump.t
+            for curve in curves:
+                group = moment.create_group(curve.name)
+                words = (*dump.axes, "length along the curve")
+                columns = zip("xys", (*curve.nodes, curve.length), words, strict=True)
+                for name, values, long_name in columns:
+                    data = group.create_dataset(name, data=values)
+                    data.attrs["units"], data.attrs["long_name"] = "m", long_name
+        file.flush()
+        return file.id.get_file_image()
+
+
+WRITERS = {".csv": _make_csv, ".h5": _make_hdf5}
+
+
+def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
+    """All interfaces at the times of `dumps`, coloured by time; centred if they travel far."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+
+    moments = [make_sheets(dump, (), view) for dump in dumps]
+    if view.zoom is not None:
+        check_zoom(view.zoom, find_extent(moments))
+    shapes = [(d.t, split_outline(sheets)[0]) for d, sheets in zip(dumps, moments, strict=True)]
+    shapes = [(t, lines) for t, lines in shapes if lines]
+    if not shapes:
+        raise BadInput(f"{dumps[0].path}: no two materials touch, so there is no interface to draw")
+    every = [np.concatenate(lines, axis=1) for _, lines in shapes]
+    middles = [0.5 * (points.min(axis=1) + points.max(axis=1)) for points in every]
+    sizes = np.max([np.ptp(points, axis=1) for points in every], axis=0)
+    travel = np.ptp(middles, axis=0)
+    centred = (travel > 0.5 * sizes.max()) & (view.zoom is None)
+    largest = float(max(sizes.max(), 0.0 if centred.any() else np.abs(every[0]).max()))
+    scale, length = pick_prefix(largest, "m")
+    factor, unit = scale_times(dumps)
+    norm = Normalize(shapes[0][0] * factor, max(shapes[-1][0] * factor, 1e-300))
+    colours = colormaps["viridis_r"]
+    figure.set_size_inches(8.0, 6.5)
+    axes = figure.subplots()
+    for (t, lines), middle in zip(shapes, middles, strict=True):
+        shift = np.where(centred, middle, 0.0)
+        for line in lines:
+            x, y = (line - shift[:, None]) * scale
+            axes.plot(x, y, color=colours(norm(t * factor)), linewidth=1.2)
+    names = [f"{n} - its middle" if c else n for n, c in zip(dumps[0].axes, centred, strict=True)]
+    axes.set_xlabel(f"{names[0]} [{length}]")
+    axes.set_ylabel(f"{names[1]} [{length}]")
+    stretched = view.zoom is None and sizes.min() < 0.25 * sizes.max()
+    axes.set_aspect("auto" if stretched else "equal", adjustable="box" if view.zoom else "datalim")
+    if view.zoom:
+        axes.set_xlim(view.zoom[0] * scale, view.zoom[1] * scale)
+        axes.set_ylim(view.zoom[2] * scale, view.zoom[3] * scale)
+    figure.colorbar(ScalarMappable(norm, colours), ax=axes, label=f"t [{unit}]")
+    first, last = shapes[0][0] * factor, shapes[-1][0] * factor
+    note = ", axes not to one scale" if stretched else ""
+    axes.set_title(f"interface, t = {first:.4g} to {last:.4g} {unit}{note}", fontsize=10)
+
 
 LEAST = 1e-9  # of the line: shorter pieces touch a corner only
 STYLES = ("-", "--")  # of the first run, and of the one beside it

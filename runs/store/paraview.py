@@ -1,8 +1,8 @@
-"""The XDMF sidecar: opens all dumps of a run in ParaView, VisIt and whatever else reads XDMF.
+"""Files for ParaView and other readers of VTK: the XDMF sidecar of a run, and grids as .vts.
 
-The form is the one that real readers of VTK 9.3 to 9.7 open without loss: `2DSMesh` with `X_Y`
-geometry, rank-2 dimensions, a temporal collection of spatial collections, node velocity as two
-scalars (node vectors and `3DSMesh` lose data silently there).
+The XDMF form is the one that VTK 9.3 to 9.7 opens without loss: `2DSMesh` with `X_Y` geometry,
+rank-2 dimensions, a temporal collection of spatial collections, node velocity as two scalars (node
+vectors and `3DSMesh` lose data silently there).
 """
 
 from __future__ import annotations
@@ -21,6 +21,37 @@ from regrid.errors import BadInput
 from runs.store.dumps import list_arrays, open_dump
 from runs.store.files import write_atomically
 from runs.store.parts import Moment
+from runs.store.provenance import describe_software
+
+
+def write_vts(path: Path, nodes: np.ndarray, cell_fields: Mapping[str, np.ndarray]) -> None:
+    """Write nodes (2 or 3, n1+1, n2+1[, n3+1]) and fields of the cells as a .vts file."""
+    counts = [n - 1 for n in nodes.shape[1:]] + [0] * (4 - nodes.ndim)
+    extent = " ".join(f"0 {n}" for n in counts)
+    points = np.zeros((nodes[0].size, 3))
+    for k, component in enumerate(nodes):
+        points[:, k] = component.ravel(order="F")
+    data, offset, fields = [], 0, []
+    arrays = [("points", points, 3), *((n, v.ravel(order="F"), 1) for n, v in cell_fields.items())]
+    for name, values, components in arrays:
+        image = np.ascontiguousarray(values, dtype="<f8").tobytes()
+        fields.append(
+            f'<DataArray type="Float64" Name={quoteattr(name)} NumberOfComponents="{components}" '
+            f'format="appended" offset="{offset}"/>'
+        )
+        data += [np.uint64(len(image)).astype("<u8").tobytes(), image]
+        offset += 8 + len(image)
+    head = (
+        f'<?xml version="1.0"?>\n<!-- made by {describe_software()} -->\n'
+        '<VTKFile type="StructuredGrid" version="1.0" '
+        'byte_order="LittleEndian" header_type="UInt64">\n'
+        f'<StructuredGrid WholeExtent="{extent}">\n<Piece Extent="{extent}">\n'
+        f"<Points>{fields[0]}</Points>\n<PointData/>\n<CellData>{''.join(fields[1:])}</CellData>\n"
+        '</Piece>\n</StructuredGrid>\n<AppendedData encoding="raw">\n_'
+    )
+    tail = "\n</AppendedData>\n</VTKFile>\n"
+    write_atomically(path, head.encode() + b"".join(data) + tail.encode())
+
 
 HEAD = '<?xml version="1.0" ?>\n<Xdmf Version="3.0"><Domain>\n'
 TAIL = "</Domain></Xdmf>\n"

@@ -1,0 +1,441 @@
+"""`shockgrid bench`: how fast this machine computes, and where the time of a step goes.
+
+CloverLeaf_ref, compiled Fortran on a grid at rest, can be measured beside it (`--peer`).  A
+profiler sees every call of a kernel as one of the function that was compiled.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+
+from hydro.block import Block
+from hydro.boundary.registry import put
+from hydro.eos import EquationOfState, IdealGas, MieGruneisen
+from hydro.history import PHASES
+from hydro.links.join import join
+from hydro.simulation import Simulation
+from regrid.errors import BadInput
+from regrid.jit import find_kernel_codes
+from regrid.registry import make_regridder
+from runs.deck.reading import read_deck
+from runs.store.reader import RunData
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None  # type: ignore[assignment]
+
+
+class ChildTime(NamedTuple):
+    """Seconds of CPU time of all ended child processes so far."""
+
+    user: float
+    system: float
+
+
+def read_child_time() -> ChildTime:
+    """User and system time of ended child processes; BadInput where the system keeps no count."""
+    if resource is None:
+        raise BadInput(
+            "bench: this system does not tell the CPU time of a command that has ended; "
+            "take --runs none and leave out --peer"
+        )
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return ChildTime(used.ru_utime, used.ru_stime)
+
+
+CELLS, STEPS = 400, 87
+DECK = """*clover
+ state 1 density=0.2 energy=1.0
+ state 2 density=1.0 energy=2.5 geometry=rectangle xmin=0.0 xmax=5.0 ymin=0.0 ymax=2.0
+ x_cells={cells}
+ y_cells={cells}
+ xmin=0.0
+ ymin=0.0
+ xmax=10.0
+ ymax=10.0
+ initial_timestep=0.04
+ timestep_rise=1.5
+ max_timestep=0.04
+ end_step={steps}
+ test_problem 0
+*endclover
+"""
+
+
+class Peer:
+    """CloverLeaf_ref in the built checkout `path`; raises BadInput where there is none."""
+
+    name = "CloverLeaf"
+
+    def __init__(self, path: str):
+        self.program = (Path(path) / "clover_leaf").resolve()
+        if shutil.which(str(self.program)) is None:
+            raise BadInput(
+                f"--peer {path}: there is no program clover_leaf in it; build CloverLeaf_ref there "
+                "first (make COMPILER=GNU)"
+            )
+
+    def measure(self) -> float:
+        """Million cell updates a CPU second of one run on one core."""
+        alone = {**os.environ, "OMP_NUM_THREADS": "1"}  # threads that wait count as CPU time
+        with tempfile.TemporaryDirectory() as folder:
+            text = DECK.format(cells=CELLS, steps=STEPS)
+            (Path(folder) / "clover.in").write_text(text, encoding="ascii")
+            before = read_child_time()
+            done = subprocess.run(
+                [str(self.program)], cwd=folder, env=alone, capture_output=True, text=True
+            )
+            after = read_child_time()
+        if done.returncode:
+            raise BadInput(f"{self.program} ended with {done.returncode}: {done.stderr[-200:]}")
+        return CELLS * CELLS * STEPS / (after.user - before.user) / 1e6
+
+
+def time_rounds(
+    call: Callable[[], object], count: int, times: int, rounds: int, peer: Peer | None
+) -> dict[str, float]:
+    """Best and median million cell updates a CPU second of `times` calls that make `count` each.
+
+    With a peer each round has one of its runs beside it, and the ratio is of medians.
+    """
+    speeds, others = [], []
+    for _ in range(rounds):
+        start = time.process_time()
+        for _ in range(times):
+            call()
+        speeds.append(count * times / (time.process_time() - start) / 1e6)
+        if peer:
+            others.append(peer.measure())
+    return compare_speeds(speeds, others, peer)
+
+
+def compare_speeds(speeds: list[float], others: list[float], peer: Peer | None) -> dict[str, float]:
+    """Columns of a row: best, median, and the median over the peer's."""
+    middle = statistics.median(speeds)
+    row = {"best, million/s": max(speeds), "median, million/s": middle}
+    if peer:
+        row[f"{peer.name}, million/s"] = statistics.median(others)
+        row[f"over {peer.name}"] = middle / statistics.median(others)
+    return row
+
+
+def describe_machine() -> str:
+    """Kind of processor, its threads, the load and the versions that decide speed."""
+    words = [f"{platform.machine()}, {os.cpu_count()} hardware threads"]
+    if hasattr(os, "getloadavg"):
+        words.append(f"load {os.getloadavg()[0]:.1f} at the end")
+    words += [f"Python {platform.python_version()}"]
+    words += [f"{name} {version(name)}" for name in ("numpy", "numba", "scipy")]
+    return ", ".join(words)
+
+
+class Tables:
+    """Rows by table; `path`: of the JSON file, or None; `say` is told each row at once."""
+
+    def __init__(self, path: str | None, command: str, say: Callable[[str], None]):
+        self.path, self.command, self.say = Path(path) if path else None, command, say
+        self.rows: dict[str, list[dict[str, Any]]] = {}
+        if self.path and not self.path.parent.is_dir():
+            raise BadInput(f"{self.path}: there is no directory {self.path.parent}")
+        self.known = self._read()
+
+    def _read(self) -> dict[str, Any]:
+        if self.path is None or not self.path.exists():
+            return {}
+        try:
+            known = json.loads(self.path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError) as error:
+            raise BadInput(f"{self.path} is not a JSON file of measurements: {error}") from None
+        if not isinstance(known, dict):
+            raise BadInput(f"{self.path} is not a JSON file of measurements")
+        return known
+
+    def add(self, table: str, **row: str | int | float) -> None:
+        """One more row; numbers are rounded to three digits."""
+        kept = {k: float(f"{v:.3g}") if isinstance(v, float) else v for k, v in row.items()}
+        self.rows.setdefault(table, []).append(kept)
+        self.say(f"{table}: " + "  ".join(f"{head} {value}" for head, value in kept.items()))
+
+    def write(self) -> None:
+        """Put the tables into the file, if one is named."""
+        if self.path is None:
+            return
+        for table, rows in self.rows.items():
+            self.known[table] = {
+                "command": self.command,
+                "machine": describe_machine(),
+                "rows": rows,
+            }
+        text = json.dumps(self.known, indent=1, ensure_ascii=False) + "\n"
+        self.path.write_text(text, encoding="utf-8")
+
+
+PARTS = ("sides", "regrid", "flow")
+# which commands each choice of `--runs` measures
+RUNS: dict[str, tuple[tuple[str, ...], ...]] = {
+    "none": (),
+    "default": (("interface-instability",),),
+    "long": (("interface-instability",), ("interface-instability-mushroom",)),
+    "large": (
+        ("interface-instability",),
+        ("interface-instability-mushroom",),
+        ("interface-instability", "--set", "cells=256"),
+    ),
+}
+
+
+def measure_command(tables: Tables, words: tuple[str, ...], rounds: int, peer: Peer | None) -> None:
+    """Table `commands`: `shockgrid run WORDS`, warm; the first of its runs is not counted."""
+    speeds, others, seconds, walls = [], [], [], []
+    with tempfile.TemporaryDirectory() as folder:
+        output = str(Path(folder) / "run")
+        program = [sys.executable, "-m", "shockgrid", "run", *words, "-q", "--force", "-o", output]
+        for number in range(rounds + 1):
+            before, begin = read_child_time(), time.perf_counter()
+            done = subprocess.run(program, capture_output=True, text=True)
+            after, end = read_child_time(), time.perf_counter()
+            if done.returncode:
+                raise BadInput(f"{' '.join(words)}: {done.stderr.strip()}")
+            run = RunData(output)
+            steps = run.dumps[-1].step
+            cells = sum(np.prod(np.array(b.nodes.shape[1:]) - 1) for b in run.dumps[-1].blocks)
+            if number == 0:
+                continue
+            used = after.user - before.user + after.system - before.system
+            seconds.append(used)
+            walls.append(end - begin)
+            speeds.append(float(cells) * steps / used / 1e6)
+            if peer:
+                others.append(peer.measure())
+        history = run.history
+    shares = {part: float(np.nansum(history[f"seconds_{part}"])) for part in PARTS}
+    tables.add(
+        "commands",
+        command="run " + " ".join(word for word in words if word != "--set"),
+        cells=int(cells),
+        steps=int(steps),
+        **{"CPU s": float(np.median(seconds)), "wall s": float(np.median(walls))},
+        **compare_speeds(speeds, others, peer),
+        **{f"{part}, %": 100.0 * value / float(np.median(walls)) for part, value in shares.items()},
+    )
+
+
+# equation of state, density, pressure and speed of the flow
+MATERIALS: dict[str, tuple[EquationOfState, float, float, float]] = {
+    "ideal gas": (IdealGas(1.4), 1.0, 1.0, 0.3),
+    "Mie-Gruneisen": (MieGruneisen(), 2707.0, 1.0e9, 100.0),
+}
+UPDATES = 2_000_000  # cell updates of a timing, or three steps
+LONGEST = 4  # steps of all timings over the cells of a side: later the piston comes too close
+
+
+def make_simulation(material: str, cells: int, mesh: str, threads: int) -> Simulation:
+    """Two blocks side by side, cells × cells together, a smooth flow and a moving interface."""
+    eos, rho, p, speed = MATERIALS[material]
+    blocks = []
+    for name, start in (("left", 0.0), ("right", 0.5)):
+        x = np.linspace(start, start + 0.5, cells // 2 + 1)
+        y = np.linspace(0.0, 1.0, cells + 1)
+        nodes = np.array(np.meshgrid(x, y, indexing="ij"))
+        centre = 0.5 * (x[1:] + x[:-1])[:, None]
+        u = np.where(centre < 0.4, speed, 0.0) * np.ones(cells)
+        blocks.append(Block(name, eos, nodes, rho, u, 0.0, p))
+    left, right = blocks
+    kind = "seam" if mesh == "fixed" else "interface"
+    links = [join(kind, (left, "i_max"), (right, "i_min"))]
+    if mesh == "fixed":
+        put(left, "i_min", "wall")
+    else:
+        put(left, "i_min", "piston", velocity=(0.5 * speed, 0.0))
+    put(right, "i_max", "wall")
+    for block in blocks:
+        put(block, "j_min", "wall")
+        put(block, "j_max", "wall")
+    return Simulation(
+        blocks,
+        links,
+        t_end=1e9,
+        mesh=mesh,
+        threads=threads,
+        make_regridder=lambda: make_regridder("barrier", threads=threads),
+    )
+
+
+def count_steps(cells: int, rounds: int) -> int:
+    """Steps of one timing at cells × cells."""
+    return max(1, min(max(3, UPDATES // (cells * cells)), LONGEST * cells // rounds))
+
+
+def measure_flow(tables: Tables, cells: int, rounds: int, peer: Peer | None) -> None:
+    """Tables `flow`, `flow-parts` and `flow-threads` at cells × cells."""
+    repeats = count_steps(cells, rounds)
+    for name in MATERIALS:
+        fixed = make_simulation(name, cells, "fixed", 1)
+        fixed.advance()
+        block, dt = fixed.blocks[0], 1e-3 * fixed.dt
+        block.predict(dt)  # the new state's ghosts: cells of zeros would all ask for HLL
+        moving = make_simulation(name, cells, "regrid", 1)
+        cases: dict[str, tuple[Callable[[], object], int, int]] = {
+            "flow kernel of one block": (
+                lambda b=block, d=dt: b.update(d),
+                block.ni * block.nj,
+                repeats,
+            ),
+            "whole step, fixed mesh": (fixed.advance, cells * cells, repeats),
+            "whole step, grid rebuilt": (moving.advance, cells * cells, (repeats + 1) // 2),
+        }
+        for what, (call, count, times) in cases.items():
+            call()
+            found = time_rounds(call, count, times, rounds, peer)
+            tables.add("flow", case=f"{name}, {cells}²", what=what, **found)
+        row = moving.advance()
+        parts = {part: row[f"seconds_{part}"] for part in PHASES}
+        shares = {f"{part}, %": 100.0 * v / sum(parts.values()) for part, v in parts.items()}
+        arrays = [v for b in fixed.blocks for v in vars(b).values() if isinstance(v, np.ndarray)]
+        held = round(sum(a.nbytes for a in arrays) / cells**2)
+        tables.add("flow-parts", case=f"{name}, {cells}²", **shares, **{"bytes a cell": held})
+
+
+def measure_threads(tables: Tables, sizes: tuple[int, ...], rounds: int) -> None:
+    """Table `flow-threads`: two threads over one, by the clock on the wall."""
+    if numba.config.NUMBA_NUM_THREADS < 2:
+        return
+    for cells in sizes:
+        best = []
+        simulations = [make_simulation("ideal gas", cells, "regrid", n) for n in (1, 2)]
+        for simulation in simulations:
+            simulation.advance()
+        repeats = count_steps(cells, rounds)
+        for simulation in simulations * rounds:
+            start = time.perf_counter()
+            for _ in range(repeats):
+                simulation.advance()
+            best.append(time.perf_counter() - start)
+        gain = min(best[0::2]) / min(best[1::2])
+        tables.add(
+            "flow-threads", case=f"ideal gas, {cells}²", **{"two threads over one, wall time": gain}
+        )
+
+
+STEPS_DECK = "interface-instability"  # two blocks, a contact, walls and a piston
+FIRST_STEPS = 20  # not counted: kernels are loaded, the first steps are short
+STEPS_STEPS = 50  # of each round, with the profiler and without
+
+
+class Calls:
+    """Counts, while `sys.setprofile` holds it: calls of `kernels` and their seconds, `others`."""
+
+    def __init__(self):
+        self.codes = find_kernel_codes()
+        self.kernels = self.others = 0
+        self.seconds = self._begun = 0.0
+
+    def __call__(self, frame, event: str, argument) -> None:
+        is_kernel = id(frame.f_code) in self.codes
+        if event == "call" and is_kernel:
+            self.kernels += 1
+            self._begun = time.process_time()
+        elif event == "return" and is_kernel:
+            self.seconds += time.process_time() - self._begun
+        elif event in ("call", "c_call"):
+            self.others += 1
+
+
+def make_step(settings: tuple[str, ...]) -> Callable[[], None]:
+    """A run of DECK on one thread, its first steps taken; each call is a step and its columns."""
+    problem = read_deck(STEPS_DECK, ("run.threads=1", *settings)).make_problem()
+    evolution = problem.build()
+
+    def step() -> None:
+        evolution.advance()
+        problem.measure(evolution)
+
+    for _ in range(FIRST_STEPS):
+        step()
+    return step
+
+
+def count_calls(step: Callable[[], None]) -> Calls:
+    """The calls of one step."""
+    calls = Calls()
+    sys.setprofile(calls)
+    try:
+        step()
+    finally:
+        sys.setprofile(None)
+    calls.others -= 1  # of `sys.setprofile` itself
+    return calls
+
+
+def measure_steps(tables: Tables, rounds: int) -> None:
+    """Table `steps`: medians of a step of DECK with two blocks."""
+    step = make_step(())
+    counted, whole = [], []
+    for _ in range(rounds):
+        counted += [count_calls(step) for _ in range(STEPS_STEPS)]
+        for _ in range(STEPS_STEPS):
+            start = time.process_time()
+            step()
+            whole.append(time.process_time() - start)
+    kernels = statistics.median(calls.seconds for calls in counted)
+    tables.add(
+        "steps",
+        case=f"{DECK}, two blocks",
+        **{
+            "calls of kernels": statistics.median_high(calls.kernels for calls in counted),
+            "other calls": statistics.median_high(calls.others for calls in counted),
+            "kernels, us": 1e6 * kernels,
+            "outside kernels, us": 1e6 * (statistics.median(whole) - kernels),
+        },
+    )
+
+
+EXPLANATION = """\
+flow: million cell updates a CPU second on one thread. A whole step holds the sides, the history row
+with the quality of every cell, and the ledger; where the grid is rebuilt, the regridder too.
+flow-parts: how the time of such a step divides. steps: calls of kernels and of all else in a step
+of a small run, CPU time inside and outside of kernels. commands: whole commands, start and output
+included, kernels compiled before; what their shares leave of the wall time is start and output."""
+
+
+def bench(
+    cells: int,
+    rounds: int,
+    runs: str,
+    path: str | None,
+    peer: str | None,
+    say: Callable[[str], None],
+) -> None:
+    """Measure and print; into the JSON file `path`, if one is named.
+
+    runs: a key of `RUNS`; peer: a built checkout of CloverLeaf_ref to measure beside, or None.
+    Raises BadInput.
+    """
+    words = ["shockgrid bench", f"--cells {cells}", f"--rounds {rounds}"]
+    command = " ".join([*words, f"--runs {runs}", *["--peer CHECKOUT"] * (peer is not None)])
+    tables = Tables(path, command, say)
+    beside = Peer(peer) if peer else None
+    say(describe_machine().replace(" at the end", " now"))
+    say(EXPLANATION)
+    measure_flow(tables, cells, rounds, beside)
+    measure_threads(tables, (cells // 2, cells), rounds)
+    measure_steps(tables, rounds)
+    for words_of_run in RUNS[runs]:
+        measure_command(tables, words_of_run, rounds, beside)
+    tables.write()

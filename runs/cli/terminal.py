@@ -1,0 +1,82 @@
+"""The terminal: commands by their nearest name, words without control characters, errors of the
+system in one sentence.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+from io import TextIOWrapper
+from pathlib import Path
+
+import click
+
+from regrid.errors import BadInput, suggest
+from regrid.text_files import MOST_IN_LINE, cut, escape_controls
+from runs.store.files import describe_disk_error
+
+
+class Commands(click.Group):
+    """Commands in the order of a first acquaintance; a mistyped one gets the nearest name."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(self.commands)
+
+    def resolve_command(self, ctx: click.Context, args: list[str]):
+        if args and args[0] not in self.commands and not args[0].startswith("-"):
+            words = " ".join(ctx.command_path.split()[1:])
+            within = f" of {words!r}" if words else ""
+            hint = suggest(args[0], self.commands)
+            raise BadInput(f"there is no command {args[0]!r}{within}{hint}")
+        return super().resolve_command(ctx, args)
+
+
+def echo(text: object = "", err: bool = False, nl: bool = True) -> None:
+    """Print to standard output, or to standard error, what people or files may have written."""
+    click.echo(escape_controls(str(text)), err=err, nl=nl)
+
+
+def echo_sentences(text: str, start: str = "shockgrid: ") -> None:
+    """Print each line of an error to standard error behind `start`, cut where it is long."""
+    for sentence in text.splitlines():
+        echo(f"{start}{cut(sentence, MOST_IN_LINE)}", err=True)
+
+
+def echo_usage(error: click.ClickException) -> None:
+    """Print what click has to say about a mistyped command."""
+    words = io.StringIO()
+    error.show(file=words)
+    for line in words.getvalue().splitlines():
+        echo(cut(line, MOST_IN_LINE), err=True)
+
+
+NAMES = {  # what Python says where a name is none that a file can have
+    "embedded null byte": "a file's name cannot hold the character \\u0000",
+    "embedded null character": "a file's name cannot hold the character \\u0000",
+}
+
+
+def describe_outside(error: BaseException) -> str | None:
+    """A sentence on an error of the system or of a file's name; None for any other error."""
+    if isinstance(error, OSError) and error.errno is not None:
+        if error.filename is None:
+            return f"a file or device that was given cannot be used: {os.strerror(error.errno)}"
+        return describe_disk_error(error, Path(os.fsdecode(error.filename)))
+    if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
+        return "a name that was given is no text in UTF-8; rename it, or give another"
+    words = str(error)
+    if isinstance(error, RuntimeError) and words.startswith("Symlink loop from"):
+        return f"{words.removeprefix('Symlink loop from ')} is a link that leads back to itself"
+    return NAMES.get(words) if isinstance(error, ValueError) else None
+
+
+def print_what_can_be_shown() -> None:
+    """From here on standard output and error show "?" for signs that their encoding has not got.
+
+    Python opens standard output so that such a sign raises UnicodeEncodeError: a name in Greek, in
+    a pipe on Windows.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")

@@ -1,0 +1,267 @@
+"""One way to have many tasks computed, whatever computes them: `open_engine`.
+
+A task is a function of a module, its arguments are pickled: the same function must be importable
+where it is computed.  Results come as they are ready, each with the number of its task; a task that
+raises gives its exception in place of a result, so that one failure does not end the others.
+
+The trap: with MPI every rank runs the whole program.  All but the first get None from
+`open_engine`, after the others' work is done, and have nothing to do themselves.
+"""
+
+from __future__ import annotations
+
+import collections
+import contextlib
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    as_completed,
+    wait,
+)
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, Protocol, cast
+
+from hydro.workers import count_processors
+from regrid.errors import BadInput
+
+Task = Callable[[Any], Any]
+
+
+class Engine(Protocol):
+    """What computes tasks; `workers`: how many at once."""
+
+    workers: int
+
+    def compute(self, task: Task, arguments: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+        """Yield (number of the argument, result or exception), in the order in which they end."""
+        ...
+
+
+SUSPECT, GUILTY = 2, 3  # deaths from which a task is computed alone, and given up
+
+
+class WorkerDied(Exception):
+    """The process of a task died, again and again."""
+
+
+def _begin_worker(started) -> None:
+    """In a new worker: say so, leave Ctrl-C to the tasks, and watch for the end of the parent."""
+    started.set()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+class Processes:
+    """A pool of `workers` processes as an `Engine`; to be used in a `with` statement."""
+
+    def __init__(self, workers: int):
+        if multiprocessing.parent_process() is not None:
+            raise BadInput(
+                "processes are started while a worker process reads the script; "
+                'put what starts them under if __name__ == "__main__":'
+            )
+        self.workers = workers
+        self._context = multiprocessing.get_context("spawn")
+        self._started = self._context.Event()
+        self._before = set(multiprocessing.active_children())
+        self._pool: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> Processes:
+        return self
+
+    def __exit__(self, kind, error, trace) -> None:
+        """End the workers; where something went wrong, ask what they compute to stop first."""
+        if self._pool is None:
+            return
+        if kind is not None:
+            for child in set(multiprocessing.active_children()) - self._before:
+                child.terminate()
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def compute(self, task: Task, arguments: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+        """As `Engine.compute`; a task whose process died GUILTY times gives a WorkerDied."""
+        waiting = collections.deque(range(len(arguments)))
+        deaths: collections.Counter[int] = collections.Counter()
+        running: dict[Future, int] = {}
+        while waiting or running:
+            lost = self._submit(task, arguments, waiting, running, deaths)
+            if running:
+                done, _ = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    number, error = running[future], future.exception()
+                    if isinstance(error, BrokenProcessPool):
+                        lost = True
+                        continue
+                    del running[future]
+                    yield number, future.result() if error is None else error
+            if lost:
+                yield from self._take_back(waiting, running, deaths)
+
+    def _submit(self, task, arguments, waiting, running, deaths) -> bool:
+        """Fill the pool: no more than it computes at once, suspects alone; True: it is broken."""
+        while waiting and len(running) < self.workers:
+            alone = deaths[waiting[0]] >= SUSPECT
+            if running and (alone or any(deaths[n] >= SUSPECT for n in running.values())):
+                return False
+            if self._pool is None:
+                self._pool = ProcessPoolExecutor(
+                    self.workers, self._context, _begin_worker, (self._started,)
+                )
+            try:
+                future = self._pool.submit(task, arguments[waiting[0]])
+            except BrokenProcessPool:
+                return True
+            running[future] = waiting.popleft()
+        return False
+
+    def _take_back(self, waiting, running, deaths) -> Iterator[tuple[int, Any]]:
+        """After a death: all that was running waits again, or has failed; the pool is given up."""
+        if not self._started.is_set():
+            raise BadInput(
+                "the worker processes end before they begin; in a script, put what starts them "
+                'under if __name__ == "__main__":'
+            )
+        wait(running)
+        for future, number in list(running.items()):
+            del running[future]
+            error = future.exception()
+            if not isinstance(error, BrokenProcessPool):  # it ended before the death
+                yield number, future.result() if error is None else error
+                continue
+            deaths[number] += 1
+            if deaths[number] >= GUILTY:
+                yield number, WorkerDied(f"its process died {GUILTY} times (out of memory?)")
+            elif deaths[number] >= SUSPECT:
+                waiting.append(number)  # after those that are under no suspicion
+            else:
+                waiting.appendleft(number)
+        if self._pool is not None:
+            self._pool.shutdown(wait=True)
+            self._pool = None
+
+
+ANSWER = 20.0  # seconds for a scheduler to answer
+
+
+class Cluster:
+    """An executor as an `Engine`: all tasks are handed over at once."""
+
+    def __init__(self, executor: Executor, workers: int):
+        self.executor, self.workers = executor, workers
+
+    def compute(self, task: Task, arguments: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+        """As `Engine.compute`; a task whose workers died gives the executor's exception."""
+        numbers = {self.executor.submit(task, one): n for n, one in enumerate(arguments)}
+        try:
+            for future in as_completed(numbers):
+                error = future.exception()
+                yield numbers[future], future.result() if error is None else error
+        except BaseException:
+            for future in numbers:
+                future.cancel()
+            raise
+
+
+@contextlib.contextmanager
+def open_mpi() -> Iterator[Cluster | None]:
+    """The ranks of MPI but the first, which gets the engine; the others get None in the end.
+
+    Started as `mpiexec -n N shockgrid ...`.  BadInput where mpi4py is missing.
+    """
+    try:
+        from mpi4py import MPI
+        from mpi4py.futures import MPICommExecutor
+    except (ImportError, RuntimeError) as error:  # RuntimeError: no MPI library
+        raise BadInput(
+            f"--engine mpi needs mpi4py and an MPI library: pip install 'shockgrid[mpi]' ({error})"
+        ) from error
+    with MPICommExecutor(MPI.COMM_WORLD, root=0) as executor:
+        workers = max(1, MPI.COMM_WORLD.size - 1)
+        yield None if executor is None else Cluster(cast(Executor, executor), workers)
+
+
+@contextlib.contextmanager
+def open_dask(address: str) -> Iterator[Cluster]:
+    """The workers of the dask scheduler at `address` ("127.0.0.1:8786").
+
+    A task whose worker dies is given to another.  BadInput where dask is missing, nothing answers,
+    or a worker computes several tasks in one process, which kernels do not allow.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise BadInput(
+            f"--engine dask:// needs dask: pip install 'shockgrid[dask]' ({error})"
+        ) from error
+    try:
+        client = Client(address, timeout=ANSWER)
+    except (OSError, ValueError) as error:  # TimeoutError is an OSError
+        raise BadInput(f"--engine dask://{address}: no scheduler answers there") from error
+    with client:
+        workers = client.scheduler_info(n_workers=-1)["workers"]
+        if not workers:
+            raise BadInput(f"--engine dask://{address}: this scheduler has no workers")
+        if any(worker["nthreads"] > 1 for worker in workers.values()):
+            raise BadInput(
+                f"--engine dask://{address}: start the workers with --nthreads 1 "
+                "(--nworkers N for more of them)"
+            )
+        with client.get_executor() as executor:
+            yield Cluster(executor, len(workers))
+
+
+ENGINES = ("processes", "mpi", "dask://ADDRESS")
+
+
+class InTurn:
+    """All tasks one after another in this process."""
+
+    workers = 1
+
+    def compute(self, task: Task, arguments: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+        """As `Engine.compute`."""
+        for number, argument in enumerate(arguments):
+            try:
+                result = task(argument)
+            except Exception as error:
+                result = error
+            yield number, result
+
+
+@contextlib.contextmanager
+def open_engine(name: str = "processes", jobs: int | None = None) -> Iterator[Engine | None]:
+    """The engine `name`, one of ENGINES, with `jobs` workers (None: one a processor).
+
+    None on the ranks of MPI that only compute.  BadInput for an unknown name, for `jobs` where the
+    engine brings its own workers, and where a package or a scheduler is missing.
+    """
+    kind, _, address = name.partition("://")
+    if kind == "processes" and not address:
+        jobs = jobs or count_processors()
+        if jobs == 1:
+            yield InTurn()
+            return
+        with Processes(jobs) as processes:
+            yield processes
+        return
+    if name != "mpi" and not (kind == "dask" and address):
+        raise BadInput(f"--engine {name!r}: there are {', '.join(ENGINES)}")
+    if jobs is not None:
+        raise BadInput(f"--jobs goes with --engine processes; {name} brings its own workers")
+
+    with open_mpi() if name == "mpi" else open_dask(address) as engine:
+        yield engine

@@ -125,6 +125,7 @@ def run_on_ranks(size, *words):
     return done.stdout
 
 
+@pytest.mark.slow
 def test_a_run_with_a_cut_block_and_its_restart_on_another_cut(tmp_path):
     whole, part = tmp_path / "whole", tmp_path / "part"
     cut = ("--set", "run.cut.first=3", "--set", "run.max_steps=60")

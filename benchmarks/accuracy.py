@@ -8,7 +8,7 @@
 Parts: rates (growth beside theory), polars (pressure behind a running contact point), lines (a flat
 line, the shock begun a part of a cell farther away), null (a wavy line in one gas), pairs (random
 Riemann problems).  A part is written when all of it is measured, in place of all that was there, so
-that rows of two versions of the scheme never stand side by side.  The trap: parts can.  After a
+that rows of two versions of the scheme never stand side by side.  Note: parts can.  After a
 change of the scheme make all parts anew.
 """
 

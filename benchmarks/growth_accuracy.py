@@ -4,7 +4,7 @@
     python benchmarks/growth_accuracy.py --metals --mach 1.1 1.2 1.5
 
 Rows go into problems/interface_instability/accuracy.json, which the screens of runs look things up
-in; a row of the same materials, Mach number, ratio and cells is replaced.  The trap: rows of two
+in; a row of the same materials, Mach number, ratio and cells is replaced.  Note: rows of two
 versions of the scheme side by side; after a change of the scheme `make accuracy` makes all anew.
 """
 

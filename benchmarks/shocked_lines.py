@@ -17,7 +17,7 @@ carried along at u from the moment when the shock, of speed D, reaches it:
     x(y, t) = u t + (1 - u/D) x(y, 0)
 
 so that every mode is 1 - u/D of its first size (.20 for gamma 1.4 at Mach 5), for ever, and modes
-that were not there are not there afterwards.  What else comes out is the scheme's own.  The trap:
+that were not there are not there afterwards.  What else comes out is the scheme's own.  Note:
 a run that ends before the shock has passed the line shows nothing.
 """
 

@@ -22,7 +22,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     scaling PART                what ranks of MPI gain; see docs/scaling_table.py
 
 Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
-The trap: a result is as old as its last run; after a change of the scheme run all again.
+Note: a result is as old as its last run; after a change of the scheme run all again.
 """
 
 from __future__ import annotations

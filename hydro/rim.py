@@ -4,7 +4,7 @@ The faces are numbered side by side in the order of SIDES, each side by rising i
 face has, its cell, its ghost, its traces, its contact state, its flux, is one row (2 (ni + nj),) of
 `Rim.rows`.  Python names rows as attributes, `rim.rho`, `rim.p_star`; kernels take `rim.rows` and
 name them by this module's constants (`from hydro import rim as on`, then `rim[on.P_STAR, k]`).
-The trap: faces towards -i and -j have outward normals, too.
+Note: faces towards -i and -j have outward normals, too.
 """
 
 from __future__ import annotations

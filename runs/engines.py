@@ -4,7 +4,7 @@ A task is a function of a module, its arguments are pickled: the same function m
 where it is computed.  Results come as they are ready, each with the number of its task; a task that
 raises gives its exception in place of a result, so that one failure does not end the others.
 
-The trap: with MPI every rank runs the whole program.  All but the first get None from
+Note: with MPI every rank runs the whole program.  All but the first get None from
 `open_engine`, after the others' work is done, and have nothing to do themselves.
 """
 

@@ -4,7 +4,7 @@
 well and raise AssertionError with a sentence where a promise is broken.  The tests of shockgrid put
 its own parts through the same functions; those of REGRIDDER_PROMISES can be asked one by one.
 
-The trap: states and motions here are examples.  What passes may still fail elsewhere.
+Note: states and motions here are examples.  What passes may still fail elsewhere.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ beside this file.
     python -m benchmarks.hosts.pennant_nodes [--plot FILE]
     python -m benchmarks.hosts.pennant_nodes --collect a.geo b.geo -o nodes.npz
 
-The trap: the regridder knows geometry alone.  The whole way to its grid gives up the cells that the
+Note: the regridder knows geometry alone.  The whole way to its grid gives up the cells that the
 material had gathered in the shock; a Lagrangian code goes a part of the way, as often as it has to.
 """
 

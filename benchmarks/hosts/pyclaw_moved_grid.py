@@ -7,7 +7,7 @@ above it is regridded every step.  PyClaw sees the flow relative to the grid,
     kappa q_t + U q_xi + V q_eta = 0,  U = (psi across the edge - area it sweeps / dt) / d eta,
 
 psi at the middle of the step, kappa the mean of the cell's old and new area: constants stay to the
-bit.  At t = T line, grid and pulse have to be back.  The trap: PyClaw's ghost cells hold edges of
+bit.  At t = T line, grid and pulse have to be back.  Note: PyClaw's ghost cells hold edges of
 the block's far sides, so that aux arrays come from nodes carried on beyond the sides.
 
     python -m benchmarks.hosts.pyclaw_moved_grid [--cells 24,48] [--families barrier]

@@ -9,7 +9,7 @@ all ranks do alike; `packing`, the copying of a rank's messages; `messages`, the
 what the first rank has to say, are in it).  Counts: `calls`, `bytes`, of messages, and
 `node_iterations` of the regridder, `nodes` of all blocks.
 
-The trap: a clock of a call of a microsecond would measure itself; these are of tens of them.
+Note: a clock of a call of a microsecond would measure itself; these are of tens of them.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ and r for the history's row and what the first rank has to say.  u, i, p, s, c, 
 runs of one machine, where a = 1/b = 0; the latency a and the bandwidth b of a network are assumed.
 Each part of a step is fitted by itself, with relative errors and without negative constants.
 
-The trap: constants of a machine with its cores to itself; a run beside others looks slower.
+Note: constants of a machine with its cores to itself; a run beside others looks slower.
 """
 
 from __future__ import annotations

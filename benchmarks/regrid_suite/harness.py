@@ -8,8 +8,8 @@ parts in `sub_moves`.
 
 The rules: a grid counts when its sides are those asked for, to the bit, and its cells are valid.
 Where one does not, the step is tried again in 2, 4, 8 and 16 equal parts of the sides' motion.
-Where that fails the march ends at that step.  Tries of a step that was done are paid for.  The
-trap: the clock is that of the process; peers have to run on one thread.
+Where that fails the march ends at that step.  Tries of a step that was done are paid for.
+Note: the clock is that of the process; peers have to run on one thread.
 """
 
 from __future__ import annotations

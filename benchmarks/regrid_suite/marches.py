@@ -1,6 +1,6 @@
 """What a march is: a grid to start from, and the nodes of its sides at every step.
 
-A march has dim = 2 or 3; grids have the shape (dim, ni+1, nj+1[, nk+1]).  The trap: `boundary(k)`
+A march has dim = 2 or 3; grids have the shape (dim, ni+1, nj+1[, nk+1]).  Note: `boundary(k)`
 has NaN inside, so that nobody can read a grid that is not given.
 """
 

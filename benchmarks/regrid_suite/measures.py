@@ -17,7 +17,7 @@ between the middles of opposite faces, and the area, or volume, V = l_i x l_j[ .
     lag           largest distance of the grid from the one that further calls on the same sides
                   lead to, over the mean edge
 
-The trap: a valid grid on a simple boundary covers each point once; on one that crosses itself cells
+Note: a valid grid on a simple boundary covers each point once; on one that crosses itself cells
 may be convex and overlap.
 """
 

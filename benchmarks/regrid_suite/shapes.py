@@ -5,7 +5,7 @@ parameter a, 0 at the start and 1 at the end.  Node (i, j) of a side has xi = i/
 docstring's first line says what moves, `formula` (the next lines) the formula itself; both are
 written into the march's file (`regrid_suite.files`).
 
-The trap: a formula is read on the edge of the unit square alone; inside it may fold.
+Note: a formula is read on the edge of the unit square alone; inside it may fold.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ MINRES then minimises the sum of a metric of T = A W^-1 at the nodes of a Gauss-
 Jacobian of a cell's map, W its target.  "shape": metric 2 (302 in space) on squares; "start":
 metric 7 (321), shape and size, on the cells of the march's first grid.  The sides' nodes are fixed.
 
-The trap: these metrics have a barrier and cannot start on a folded grid; the harness then halves
+Note: these metrics have a barrier and cannot start on a folded grid; the harness then halves
 the step.
 
 Source: [Dobrev2019].

@@ -2,7 +2,7 @@
 
 The copy may be killed: after a time, or just before its n-th change of files below a folder, which
 is the same moment whenever it is tried again.  What it may use of processor time is bounded by the
-system; past that its stack is in what it said.  The trap: a copy of a process with threads may
+system; past that its stack is in what it said.  Note: a copy of a process with threads may
 stand still for ever, so that all commands here run with one.
 """
 

@@ -12,7 +12,7 @@ part of the second phase goes with eta in a straight line from 0 to 1 through th
 with it rho G from the first phase's rho0 G0 to the second's: beyond it the law is the second
 phase's own.  The energy
 of the transition is taken into the Hugoniots and there is no delay and no memory: released
-material turns back on the same line.  Traps: the mixed region's line must rise, else no sound; and
+material turns back on the same line.  Note: the mixed region's line must rise, else no sound; and
 far below the Hugoniot in it, where no shock or isentrope leads, c² is negative as rho G rises.
 """
 

@@ -2,8 +2,8 @@
 
 The file has datasets `rho` (n,) [kg/m³] and `e` (m,) [J/kg], both rising, and `p` (n, m) [Pa],
 rising along both.  Bilinear interpolation keeps it rising, is inverted exactly for e(rho, p), and
-the sound speed is that of the interpolated surface, so that all three agree to round-off.  The
-trap: nothing is extrapolated; a state outside is NaN to the kernels, the step fails with a
+the sound speed is that of the interpolated surface, so that all three agree to round-off.
+Note: nothing is extrapolated; a state outside is NaN to the kernels, the step fails with a
 sentence.
 """
 

@@ -11,7 +11,7 @@ volumes add up to its growth, axial parts of the normals to zero, and radial par
 mean plane area.  The pressure pushes outwards by its force per depth at the radius of the centre of
 volume, as it would in plane flow: what a scheme is off in the pressures of all faces alike then
 cancels, where it would stand over the radius.
-The traps: faces on the axis have zero area and no normal; averages are values at the centre of
+Note: faces on the axis have zero area and no normal; averages are values at the centre of
 volume, which in the cell at the axis is a sixth of its height above the middle.  Sums over corners
 take opposite ones together, so that a cell has the same bits whichever way it is turned: along j a
 block's sides go through the kernels turned by a right angle.

@@ -4,7 +4,7 @@ One array, rows at constant offsets: the vectoriser then needs no run-time check
 silently gives up beyond 128 of them).  SPAN is a multiple of 8 and not a power of two.  In every
 row of cells, entry k is cell k - 1 of the chunk, so that k = 0 and k = m + 1 are the neighbours
 of its m cells; in rows of nodes or faces along j entry k is the one at the low side of cell k.
-The trap: entry 1, where most loops start, lies on a cache line (`allocate` sees to the first
+Note: entry 1, where most loops start, lies on a cache line (`allocate` sees to the first
 row); loads and stores across two lines take twice the time.  Loops run in whole vectors
 (`count_padded`), so that what lies beyond a row's last neighbour is written but never meant.
 A loop that reads entries k - 1 or k + 1 of a row and writes one of the next two
@@ -17,7 +17,7 @@ loops over its halves do not.  Rows are copied by the machine's own `memcpy`, a 
 a loop that must first see that nothing overlaps, and rows that the next phases copy are brought
 into the second-level cache ahead: a block's arrays are longer than the caches, and a chunk of a row
 is too short for the processor to see what comes next (at 400² cells the flow waited for memory in a
-fifth of its time).  The trap: numba knows no such hint, so that it is an instruction of LLVM, bound
+fifth of its time).  Note: numba knows no such hint, so that it is an instruction of LLVM, bound
 to a plain function that does nothing (the digest of a kernel's contents then sees a plain
 function).
 """

@@ -2,7 +2,7 @@
 
 The matrix is that of `regrid.barrier.assembly`, kept by column chunks.  Every sum over the block
 is kept as one partial a column, filled over i in order and summed over j in order, so that
-neither chunks nor threads change a bit.  The trap: a chunk computes the direction
+neither chunks nor threads change a bit.  Note: a chunk computes the direction
 in its neighbours' first columns itself, so that a pass needs no waiting inside; both write the
 same number there.
 """

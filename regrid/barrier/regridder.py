@@ -6,7 +6,7 @@
     2 boundary displacement carried inside                   5 corner areas against the old ones
     3 look: corner areas, gradient, residual                 6 shorten, untangle, or halve the move
 
-The promise: every grid handed back is convex, or RegridFailure names side and nodes.  The trap:
+The promise: every grid handed back is convex, or RegridFailure names side and nodes.  Note:
 the result may depend on `previous` and `boundary` only, never on earlier calls.
 """
 

@@ -4,7 +4,7 @@ The functional knows the boundary through these only: for every edge its conditi
 the step of the spacing law it takes, both interpolated linearly between the two opposite sides
 (theory R1.2, R2.3), and the weights of the two families of straight lines (theory R4.5).  The
 paper's sweeps interpolate lengths by the count of lines, the Newton step by the part of the way
-(`fill_blends`, theory R2.4).  The trap: a family swapped costs everything, so the sides' bend is
+(`fill_blends`, theory R2.4).  Note: a family swapped costs everything, so the sides' bend is
 measured on smoothed, thinned-out nodes, which noise of the node spacing on a flat side does not
 turn.
 """

@@ -4,7 +4,7 @@
 
 has no pole, so that it may begin from a folded grid; as e shrinks its minimiser unfolds (theory
 R5.1, after [Garanzha1999]).  Steps are Newton steps with backtracking on the energy at fixed e.
-The trap: the barrier must outweigh the straight-line terms while cells are folded, so that here it
+Note: the barrier must outweigh the straight-line terms while cells are folded, so that here it
 carries its greatest weight everywhere.
 """
 

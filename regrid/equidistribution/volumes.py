@@ -11,7 +11,7 @@ EDS, a surface f(p1, p2):  ∂1(W g~22 ∂1 p) + ∂2(W g~11 ∂2 p) = 0,  W = w
 
 g~ and J~ are those of p(q), J is the area of a surface cell.  Both act on the parameters, so the
 nodes stay on the curve or surface.  EDC is solved as w times chord, by Newton's method; EDS is ED2
-in the plane of the parameters, with W in place of w, and inherits its traps.  The print has
+in the plane of the parameters, with W in place of w, and inherits its limits.  The print has
 W = w sqrt(g22 g33)/J~, which is J for grids with perpendicular lines only.  With the area itself a
 plane with Cartesian parameters has W = w on every grid: EDS is ED2 there, term by term, as the
 paper says.

@@ -4,7 +4,7 @@ A domain is marched from its simple shape to its last one; a flow is run from it
 end, with each family; on the sides in a file a family is called until its grid stays.  Rows are
 handed out as they are found.
 
-The trap: figures are the worst over the steps that a family survived (in a file those of the last
+Note: figures are the worst over the steps that a family survived (in a file those of the last
 grid); one that ends early looks better than it is, so the steps come first.
 """
 

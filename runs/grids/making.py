@@ -6,7 +6,7 @@ Then the family is called again and again until its grid stays where it is.
 
 Where no grid is found the one that it came to is handed back with `failure`, to be looked at.
 
-The trap: far from its own grid a family may leave corners much sharper for a while, on the way to
+Note: far from its own grid a family may leave corners much sharper for a while, on the way to
 better ones or for good.  So passes are shortened where they spoil the grid; how far the last one
 moved a node is told.
 """

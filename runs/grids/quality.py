@@ -1,6 +1,6 @@
 """Judging a grid: is every cell convex, where not, how good are its cells.
 
-Plane grids and grids in space alike.  The trap: a grid whose indices turn the other way than its
+Plane grids and grids in space alike.  Note: a grid whose indices turn the other way than its
 coordinates has negative areas throughout; it is judged in its own orientation, which is said.
 """
 

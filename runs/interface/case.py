@@ -1,6 +1,6 @@
 """A problem with its deck, to look at, step, run and draw: what `shockgrid.load` gives.
 
-The traps: blocks are built when they are first asked for, which may compile kernels for a minute;
+Note: blocks are built when they are first asked for, which may compile kernels for a minute;
 their arrays are live (`runs.interface.case`).
 """
 

@@ -1,7 +1,7 @@
 """Films: a field and its grid over all dumps of a run, on one colour scale.
 
 An mp4 where ffmpeg is there, else a GIF; written under another name first, so that what is there
-is whole.  The trap: a long run does not fit into memory; the dumps are read twice, one at a time,
+is whole.  Note: a long run does not fit into memory; the dumps are read twice, one at a time,
 first for the scale and the window, then for the frames.
 """
 

@@ -5,7 +5,7 @@ files.  The others wait to be told (`runs.ranks.world`): to build the flow, as t
 does at the same time, to begin, to make a step, to send what they have computed, to end.  MPI is
 asked for nothing unless the environment says that more than one rank was started.
 
-The trap: after `begin`, whatever ends the first rank has to go through `dismiss`, or the others
+Note: after `begin`, whatever ends the first rank has to go through `dismiss`, or the others
 wait for ever.
 """
 

@@ -5,7 +5,7 @@ HDF5 library reads it like any other attribute and this module finds it without 
 file is judged before anything in it is trusted.  It covers arrays, their names, types and shapes,
 attributes and the tree itself, every byte once.
 
-The trap: what changes a file on purpose (h5repack, an attribute added by hand) changes the sum.
+Note: what changes a file on purpose (h5repack, an attribute added by hand) changes the sum.
 """
 
 from __future__ import annotations

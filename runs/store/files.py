@@ -81,7 +81,7 @@ def replace_file(source: Path, path: Path) -> None:
 def check_replaceable(path: Path) -> None:
     """Raise BadInput for what a file must not be put in place of: a folder, a device, a pipe.
 
-    The trap: a rename does not write into a device, it replaces it, /dev/null for all programs.
+    Note: a rename does not write into a device, it replaces it, /dev/null for all programs.
     """
     if not path.name or path.is_dir():
         raise BadInput(f"{path} is a folder, a file is needed")

@@ -1,7 +1,7 @@
 """What made a file: versions, commit, machine and deck, for dumps, logs and tables.
 
 All of it is the same in every run of one deck on one machine, so dumps keep their bits: no time of
-day, no wall time, no name of a host.  The trap: an installed package may lie inside somebody
+day, no wall time, no name of a host.  Note: an installed package may lie inside somebody
 else's repository; git is asked only where the `.git` beside the packages is our own.
 """
 

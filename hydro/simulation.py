@@ -65,8 +65,9 @@ class Simulation:
     all integrals are then per radian); `measure_block`: gives the numbers of a block,
     `measured_numbers` of them, that history columns want of the whole of it, found by whoever
     computes it; `refining`: adds grid lines on the way (`hydro.remap.refinement`), None: the cells
-    stay as many as they are.  Raises BadInput for sides that are not covered once by segments, and
-    for blocks that lie on each other.
+    stay as many as they are; `void_fill`: pressure [Pa] and gamma of the gas that a void between
+    surfaces holds when it closes, None: nothing.  Raises BadInput for sides that are not covered
+    once by segments, and for blocks that lie on each other.
     """
 
     def __init__(
@@ -86,6 +87,7 @@ class Simulation:
         measure_block: Callable[[Block], Sequence[float]] | None = None,
         measured_numbers: int = 1,
         refining: Refining | None = None,
+        void_fill: tuple[float, float] | None = None,
     ):
         self.geometry = find_geometry(geometry)
         _check_parts(blocks, links)
@@ -99,6 +101,7 @@ class Simulation:
         self._mesh = mesh
         self._line_rule = line_rule or LineRule()
         self._source = source
+        self._void_fill = void_fill
         self.refining, self._counts_cells = refining, refining is not None
         self._connect(blocks, links, make_regridder)
         self._overlaps.check_pistons(float(t_end))
@@ -144,7 +147,7 @@ class Simulation:
         self.motion = GridMotion(
             self._shared, self.exchange, self._mesh, make_regridder, self._line_rule
         )
-        self.meetings = Meetings(blocks, links, self.motion, self.geometry)
+        self.meetings = Meetings(blocks, links, self.motion, self.geometry, self._void_fill)
         self.tension = SurfaceTension(blocks, self.exchange, self.motion)
         if self._mesh != "fixed":
             self._overlaps.watch(everything=callable(self._mesh))

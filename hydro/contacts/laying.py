@@ -63,7 +63,8 @@ def straighten(points, k, start, x, y):
 
 @kernel
 def lay(
-    points, line, found, others, hits, held, inner, closed_before, back, straight, ways, ends
+    points, line, old_points, old_line, places, found, others, hits, held, inner, closed_before,
+    back, straight, part_back, ways, ends,
 ):  # fmt: skip
     """Move new nodes (2, n + 1) onto the other's new line: the closed part, and what came through.
 
@@ -74,6 +75,8 @@ def lay(
     both faces hold each other's nodes, so they are one straight line, from the leader's node before
     to the follower's free one.  straight: the line is a plane.  ways (2, n + 1): scratch; ends
     (2, 3): for both ends, is it to be moved (by who knows all that meets there), and the way.
+    A node that was behind the other line when the step began, at `places`, goes back by the part
+    `part_back` of that alone: a finite way in a short step would crush its cells.
     Returns how many inner nodes are moved, -1 where one has gone far into the other body.
     """
     last, most = points.shape[1] - 1, line.shape[1] - 1
@@ -106,8 +109,18 @@ def lay(
             takes = takes and beside <= max(abs(outside), 1e-9 * length)
         if not takes or (not straight and max(abs(x), abs(y)) <= STILL * length):
             continue
-        if x * x + y * y > (MOST_LAID * length) ** 2:
+        way = (x * x + y * y) ** 0.5
+        if way > MOST_LAID * length:
             return -1
+        if hits[k] < 0.0 and places[k] >= 0.0:
+            b = min(int(places[k]), most - 1)
+            at = places[k] - b
+            dx = old_line[0, b] + at * (old_line[0, b + 1] - old_line[0, b]) - old_points[0, k]
+            dy = old_line[1, b] + at * (old_line[1, b + 1] - old_line[1, b]) - old_points[1, k]
+            was = (dx * dx + dy * dy) ** 0.5
+            if was > MATCHED * length:
+                scale = max(0.0, 1.0 - (1.0 - part_back) * was / way)
+                x, y = scale * x, scale * y
         if 0 < k < last:
             ways[0, k], ways[1, k] = x, y
             moved += 1

@@ -23,6 +23,7 @@ from hydro.contacts.facet_states import make_add_facet_flux
 from hydro.contacts.pair import Pair, PlanePair
 from hydro.contacts.rows import AREAS, COVERED, FOLLOWER, LEADER
 from hydro.contacts.surface import Surface, find_planes, is_surface
+from hydro.contacts.voids import Voids
 from hydro.formulas.geometry import Geometry
 from hydro.links.link import Link
 from hydro.motion.grid_motion import GridMotion
@@ -33,6 +34,7 @@ LEAST_STEP = 1e-3  # of the stable step: a touch that comes sooner is taken at i
 CUTS = 5  # times that a step is cut to the first touch, and made a little longer again
 MOST_LONGER = 1.5  # a step that was cut too short
 REACHED = 1e-6  # of a step: a touch that comes so shortly before or after its end is at its end
+BACK = 0.2  # part that nodes behind the other line are taken back in a stable step
 ROUNDS = 2  # in which nodes of both lines are laid on the other one
 
 
@@ -45,6 +47,7 @@ class Meetings:
         links: Sequence[Link | SlidingContact],
         motion: GridMotion,
         geometry: Geometry,
+        void_fill: tuple[float, float] | None = None,
     ):
         self.geometry = geometry
         self.add_flux = make_add_facet_flux(geometry)
@@ -60,6 +63,7 @@ class Meetings:
             for regridder, block in zip(motion.regridders, blocks, strict=False)
             if (own := [pair for pair in self.pairs if pair.one_block is block])
         ]
+        self.voids = Voids(self.surfaces, self.pairs, geometry.curved, void_fill)
         self.near: list[Pair] = []  # with facets
         self.touching: list[Pair] = []  # with pins
         self._sides: list[Surface] = []  # of the near pairs, and their walls
@@ -101,6 +105,7 @@ class Meetings:
             return
         if self.pairs and not self._found:
             self._find()
+        self.voids.find_stiffness()
         if self.near:
             self._set_velocities(t)
             for surface in self._solve(on.AT_FACE):
@@ -138,7 +143,8 @@ class Meetings:
             surface.read_new()
         for pair in awake:
             pair.forget_hits()
-        self._lay(self.touching)
+        part_back = min(1.0, BACK * dt / stable_dt)
+        self._lay(self.touching, part_back)
         for surface in self.surfaces if self.touching else ():
             surface.measure_way()
         first = self._find_first(awake, 1.0 if self._cuts == 0 else MOST_LONGER)
@@ -153,7 +159,7 @@ class Meetings:
         else:
             for pair in awake:
                 pair.forget_hits()
-        self._lay([pair for pair in awake if pair.touched])
+        self._lay([pair for pair in awake if pair.touched], part_back)
         for guard in self.guards:  # of bodies' corners, which the laying may have opened
             guard.hold()
         for regridder, pairs in self._folding:
@@ -164,7 +170,7 @@ class Meetings:
     def _find_first(pairs: list[Pair], stretch: float, cuts: bool = True) -> float:
         return min(pair.find_touch(stretch, cuts) for pair in pairs)
 
-    def _lay(self, pairs: list[Pair]) -> None:
+    def _lay(self, pairs: list[Pair], part_back: float) -> None:
         for pair in pairs:
             if not pair.leader.rigid and pair.match():
                 for surface, shifts in (
@@ -178,7 +184,7 @@ class Meetings:
                     mover = pair.leader if back else pair.follower
                     if mover.rigid:
                         continue
-                    if pair.lay(back):
+                    if pair.lay(back, part_back):
                         mover.write_new()
                     _shift_ends(mover, pair.shifts[:2], self.surfaces)
 
@@ -241,6 +247,10 @@ class Meetings:
         for surface in self.surfaces:
             surface.moving_line.is_kinked = id(surface) in sides
         self._found = True
+        if self._read or self.voids.found:
+            if not self._read:
+                self._read_lines()
+            self.voids.find()
 
     def _set_velocities(self, t: float) -> None:
         for surface in self.surfaces:
@@ -274,6 +284,7 @@ class Meetings:
             "contacts_made": self.made,
             "contacts_opened": self.opened,
             "contact_length": self.length,
+            **self.voids.compute_row(),
         }
 
     def get_state(self) -> dict[str, Any]:
@@ -281,13 +292,18 @@ class Meetings:
         if not self.pairs:
             return {}
         counts = np.array([self.made, self.opened, *self.stretches], dtype=np.int64)
-        return {"contacts/counts": counts, "contacts/length": self.length}
+        return {
+            "contacts/counts": counts,
+            "contacts/length": self.length,
+            **self.voids.get_state(),
+        }
 
     def set_state(self, state: Any) -> None:
         """Take up a state of `get_state`; a restart point without one had met nothing."""
         self._found = False
         for pair in self.pairs:
             pair.clearance = 0.0
+        self.voids.set_state(state)
         counts = state.get("contacts/counts")
         if counts is None or len(counts) != len(self.stretches) + 2:
             return

@@ -274,7 +274,7 @@ class Pair:
         one, other = self.follower.new, self.leader.new
         return match(one, other, places, self.hits, self.held, self.shifts)
 
-    def lay(self, back: bool) -> int:
+    def lay(self, back: bool, part_back: float) -> int:
         """Lay the follower's new nodes on the leader's new line (the leader's with `back`).
 
         Those of the closed part, and those that have come through.  How many inner nodes moved;
@@ -289,8 +289,8 @@ class Pair:
         self._follow(mover.new, line.new, np.maximum(old, hits), found, int(back))
         others = self.positions if back else self.back_positions
         moved = lay(
-            mover.new, line.new, found, others, hits, held, self.inner, self.closed_before, back,
-            self.straight, self._ways, self.shifts[:2],
+            mover.new, line.new, mover.line, line.line, old, found, others, hits, held, self.inner,
+            self.closed_before, back, self.straight, part_back, self._ways, self.shifts[:2],
         )  # fmt: skip
         if moved < 0:
             raise RegridFailure(
@@ -312,8 +312,7 @@ class PlanePair(Pair):
         super().__init__(plane, surface)  # type: ignore[arg-type]
         self.asked[:] = True
         for end, key_node in enumerate(surface.ends):
-            held = key_node is not None and any(s in plane.segments for s, _ in key_node.ends)
-            self.asked[-end] = not held
+            self.asked[-end] = key_node is None or not plane.holds(key_node)
         self.common = int((~self.asked).sum())
 
     def _measure_clearance(self):

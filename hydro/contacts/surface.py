@@ -137,6 +137,16 @@ class Surface:
         """Ghosts beyond the faces from the states there."""
         fill_ghosts_from_faces(self.block.rim.rows, self.segment.spans)
 
+    def press(self, pressure: float, face: int | None = None) -> None:
+        """Put a pressure beside a face of the line, or all of them, beyond the segment's own."""
+        jump = self.segment.rim.jump[:: self.step]
+        jump[slice(None) if face is None else face] = pressure
+
+    def find_stiffness(self, face: int) -> float:
+        """rho c² [Pa] of the cell along a face of the line."""
+        rim, at = self.block.rim, self.start + self.step * face
+        return float(rim.rho[at] * rim.c[at] ** 2)
+
     def __str__(self) -> str:
         return str(self.segment)
 
@@ -172,6 +182,10 @@ class Plane:
         plane = Plane(self.origin, self.along, self.segments, surface)
         plane.read()
         return plane
+
+    def holds(self, key_node: KeyNode) -> bool:
+        """Does a line that ends there keep to the plane?"""
+        return any(segment in self.segments for segment, _ in key_node.ends)
 
     def read(self) -> None:
         """Begin before the present nodes of the surface that it is under."""

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from wedges import find_end, find_oblique_contact, make_wedge
 
-from builders import check_budget
+from builders import SIDES, check_budget
+from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
 from hydro.rows import P
+from hydro.simulation import Simulation
 
 CELL = 1e-4
 
@@ -86,4 +88,23 @@ def test_a_hundred_cells_meet_at_once(degrees):
     assert rows[-1]["contacts_made"] == 1 and rows[-1]["contacts_opened"] == 0
     assert rows[-1]["contact_length"] == pytest.approx(100 * CELL, rel=1e-3)
     assert len(rows) < 300
+    check_budget(rows, names=("momentum_y", "energy"))
+
+
+@pytest.mark.slow
+def test_free_corners_curl_up():
+    """A plate without walls comes down at 12 degrees and 3 km/s: its corners do not end the run."""
+    angle, speed, cells = math.radians(12.0), 3000.0, 60
+    plate, base, _ = make_wedge(angle, speed, length=cells, below=10, materials=("Al1100", "SS304"))
+    for block in (plate, base):
+        block.segments.clear()
+        for side in SIDES:
+            put(block, side, "free-surface")
+    run = 1.2 * cells * CELL * math.tan(angle) / speed
+    simulation = Simulation([plate, base], [], t_end=run)
+    rows = [simulation.start_row() | {"t": 0.0}]
+    while not simulation.finished:
+        rows.append(simulation.advance())
+    assert rows[-1]["contacts_made"] > 0
+    assert max(row["cells_not_convex"] for row in rows[1:]) == 0
     check_budget(rows, names=("momentum_y", "energy"))

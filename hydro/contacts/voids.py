@@ -1,0 +1,274 @@
+"""Voids that surfaces, contacts and planes close off: places, areas, the gas in them.
+
+Round a void one goes along surfaces, each with its outside on the right: where a contact begins,
+over to the other line; where a line ends, on to the next one there or to the plane that holds the
+end; along a plane to the next line on it.  Ways round that come back to where they began are voids
+if they run clockwise.  Theory F16.7.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hydro.contacts.pair import Pair, PlanePair
+from hydro.contacts.rows import FOLLOWER_START, FOLLOWER_STOP, LEADER_START, LEADER_STOP
+from hydro.contacts.surface import Plane, Surface
+from regrid.errors import BadInput
+
+SMALL = 0.5  # of the depth of the cells around it: a void whose area has this side is closed
+ROUND = 0.02  # of its perimeter squared: such a void has no contact on its way to close by
+LEAST = 0.1  # of the same depth: slivers whose area has a smaller side are no voids
+Place = tuple[int, float]  # number of a curve, position on it
+
+
+@dataclass
+class Void:
+    """A void: its faces (curve, face), area, volume, perimeter, depth of the cells along it.
+
+    gas: p V^gamma; rest: the volume at which it was found closed (0: it is not); stiffness: rho c²
+    around it then; growth: of its volume in the step before.
+    """
+
+    faces: set[tuple[int, int]]
+    area: float
+    volume: float
+    around: float
+    depth: float
+    gas: float = 0.0
+    rest: float = 0.0
+    stiffness: float = 0.0
+    growth: float = 0.0
+
+    def compute_pressure(self, gamma: float) -> float:
+        """In the middle of the step: of the gas, and what little is left as of the material."""
+        volume = self.volume + 0.5 * max(-0.5 * self.volume, min(self.growth, self.volume))
+        pressure = self.gas / volume**gamma
+        if self.rest > volume:
+            pressure += self.stiffness * (self.rest / volume - 1.0)
+        return pressure
+
+
+class Voids:
+    """The voids between surfaces and planes; fill: pressure [Pa] of the gas that a void holds when
+    it is closed off, and its gamma."""
+
+    def __init__(
+        self,
+        surfaces: Sequence[Surface],
+        pairs: Sequence[Pair],
+        curved: bool,
+        fill: tuple[float, float] | None = None,
+    ):
+        self.pressure, self.gamma = fill or (0.0, 1.4)
+        if not (0.0 <= self.pressure < math.inf and 1.0 < self.gamma < math.inf):
+            raise BadInput(
+                f"void_fill = {fill!r}: the gas in voids has a pressure of 0 Pa or more and a "
+                "gamma above 1"
+            )
+        self.curved, self.pairs = curved, list(pairs)
+        self.surfaces = list(surfaces)
+        self.planes: list[Plane] = []
+        self.numbers = {id(surface): number for number, surface in enumerate(self.surfaces)}
+        for pair in self.pairs:
+            if isinstance(pair, PlanePair):
+                origins = [id(plane.origin) for plane in self.planes]
+                if id(pair.leader.origin) not in origins:
+                    origins.append(id(pair.leader.origin))
+                    self.planes.append(pair.leader)
+                place = origins.index(id(pair.leader.origin))
+                self.numbers[id(pair.leader)] = len(self.surfaces) + place
+        self.found: list[Void] = []
+        self._pushed = False  # has any face a pressure from a void?
+
+    def find(self) -> None:
+        """The voids of the present lines, with what those before held; their faces' pressures."""
+        before, self.found = self.found, [self._measure(*loop) for loop in self._find_loops()]
+        self.found = [void for void in self.found if void.area > (LEAST * void.depth) ** 2]
+        self._hand_on(before)
+        self._press()
+
+    # --- ways round ------------------------------------------------------------------------------
+
+    def _find_loops(self) -> list[tuple[np.ndarray, list[tuple[int, float, float]]]]:
+        """Ways round that close: their points (2, n), and the stretches of curves in them."""
+        steps = self._find_steps()
+        loops, seen = [], set()
+        for start in [target for own in steps.values() for _, target in own]:
+            if start in seen:
+                continue
+            here, stretches, points = start, [], []
+            for _ in range(2 * sum(map(len, steps.values()))):
+                seen.add(here)
+                curve, position = here
+                beyond = [step for step in steps.get(curve, ()) if step[0] >= position - 1e-9]
+                if not beyond:
+                    break
+                stop, here = min(beyond)
+                stretches.append((curve, position, stop))
+                points.append(self._cut(curve, position, stop))
+                if here == start:
+                    loops.append((np.concatenate(points, axis=1), stretches))
+                    break
+                if here in seen:
+                    break
+        return loops
+
+    def _find_steps(self) -> dict[int, list[tuple[float, Place]]]:
+        """On each curve the positions where one goes over to another, and to where."""
+        steps: dict[int, list[tuple[float, Place]]] = {}
+
+        def add(curve: int, position: float, target: int, place: float) -> None:
+            steps.setdefault(curve, []).append((float(position), (target, float(place))))
+
+        for pair in self.pairs:
+            one, other = self.numbers[id(pair.leader)], self.numbers[id(pair.follower)]
+            ends = pair.ends[:, : pair.count if pair.is_near else 0]
+            leads = [self._convert(pair, ends[row]) for row in (LEADER_START, LEADER_STOP)]
+            for k in range(ends.shape[1]):
+                if k == 0 or ends[LEADER_START, k] != ends[LEADER_STOP, k - 1]:
+                    add(one, leads[0][k], other, ends[FOLLOWER_START, k])
+                if k == ends.shape[1] - 1 or ends[LEADER_START, k + 1] != ends[LEADER_STOP, k]:
+                    add(other, ends[FOLLOWER_STOP, k], one, leads[1][k])
+        for number, surface in enumerate(self.surfaces):
+            for following, other in enumerate(self.surfaces):
+                if surface.ends[1] is None or surface.ends[1] is not other.ends[0]:
+                    continue
+                if np.array_equal(surface.line[:, -1], other.line[:, 0]):  # no periodic image
+                    add(number, surface.count, following, 0.0)
+            for side, plane in enumerate(self.planes, len(self.surfaces)):
+                for end, node in ((0, 0), (1, surface.count)):
+                    if surface.ends[end] is None or not plane.holds(surface.ends[end]):
+                        continue
+                    place = float((surface.line[:, node] - plane.origin) @ plane.along)
+                    if end == 0:
+                        add(side, place, number, 0.0)
+                    else:
+                        add(number, surface.count, side, place)
+        for k, one_plane in enumerate(self.planes):
+            for m, two_plane in enumerate(self.planes):
+                a, b = one_plane.along, two_plane.along
+                out = a[0] * b[1] - a[1] * b[0]  # along a, how fast the height over b rises
+                if out < -1e-9:
+                    way = two_plane.origin - one_plane.origin
+                    place = (way[0] * b[1] - way[1] * b[0]) / out
+                    there = one_plane.origin + place * a
+                    add(
+                        k + len(self.surfaces), place, m + len(self.surfaces),
+                        (there - two_plane.origin) @ b,
+                    )  # fmt: skip
+        return steps
+
+    @staticmethod
+    def _convert(pair: Pair, positions: np.ndarray) -> np.ndarray:
+        """Positions on the leader; on a plane in metres from its origin."""
+        if not isinstance(pair, PlanePair):
+            return positions
+        plane = pair.leader
+        start = (plane.line[:, 0] - plane.origin) @ plane.along
+        return start + positions * ((plane.line[:, 1] - plane.line[:, 0]) @ plane.along)
+
+    def _cut(self, curve: int, start: float, stop: float) -> np.ndarray:
+        """Points (2, n) of a curve between two positions."""
+        if curve >= len(self.surfaces):
+            plane = self.planes[curve - len(self.surfaces)]
+            return plane.origin[:, None] + plane.along[:, None] * np.array([start, stop])
+        line = self.surfaces[curve].line
+        inner = np.arange(math.floor(start) + 1, math.ceil(stop))
+        at = np.concatenate([[start], inner, [stop]])
+        a = np.minimum(at.astype(np.int64), line.shape[1] - 2)
+        return line[:, a] + (at - a) * (line[:, a + 1] - line[:, a])
+
+    def _measure(self, points: np.ndarray, stretches: list[tuple[int, float, float]]) -> Void:
+        """Area and volume of a loop; depth and stiffness of the cells along it."""
+        x, y = points
+        x_next, y_next = np.roll(points, -1, axis=1)
+        area = 0.5 * float((x_next * y - x * y_next).sum())
+        volume = area
+        if self.curved:
+            volume = float(((x_next - x) * (y * y + y * y_next + y_next * y_next)).sum()) / 6.0
+        faces, depth = set(), []
+        for curve, start, stop in stretches:
+            if curve >= len(self.surfaces) or self.surfaces[curve].rigid:
+                continue
+            surface = self.surfaces[curve]
+            own = np.arange(int(start), min(math.ceil(stop), surface.count))
+            faces |= {(curve, int(face)) for face in own}
+            depth.append(np.hypot(*(surface.inner - surface.line))[own].sum() / max(1, own.size))
+        around = float(np.hypot(x_next - x, y_next - y).sum())
+        return Void(faces, area, volume, around, sum(depth) / max(1, len(depth)))
+
+    # --- what they hold --------------------------------------------------------------------------
+
+    def _hand_on(self, before: list[Void]) -> None:
+        """Give the gas of the voids before to those that have their faces; fill new ones."""
+        for void in self.found:
+            parents = [old for old in before if old.faces & void.faces]
+            if not parents:
+                void.gas = self.pressure * void.volume**self.gamma
+            children = [
+                v for v in self.found if any(old.faces & v.faces for old in parents)
+            ]  # with the same pressure
+            was = sum(old.volume for old in parents)
+            now = sum(child.volume for child in children)
+            for old in parents:
+                pressure = old.gas / old.volume**self.gamma
+                void.gas += pressure * old.volume / was * (was / now * void.volume) ** self.gamma
+            if len(parents) == len(children) == 1:
+                void.growth = now - was
+            void.rest = max((old.rest for old in parents), default=0.0)
+            void.stiffness = max((old.stiffness for old in parents), default=0.0)
+            small = void.area < (SMALL * void.depth) ** 2
+            if void.rest == 0.0 and small and void.area > ROUND * void.around**2:
+                void.rest = void.volume
+            elif void.volume > void.rest:
+                void.rest = void.stiffness = 0.0
+
+    def _press(self) -> None:
+        """Write the pressures in the voids beside their faces, as jumps of the free surfaces'."""
+        pressures = [void.compute_pressure(self.gamma) for void in self.found]
+        if self._pushed or any(pressures):
+            for surface in self.surfaces:
+                if not surface.rigid and surface.segment.tension == 0.0:
+                    surface.press(0.0)
+            for void, pressure in zip(self.found, pressures, strict=True):
+                for curve, face in void.faces:
+                    if self.surfaces[curve].segment.tension == 0.0:
+                        self.surfaces[curve].press(pressure, face)
+        self._pushed = any(pressures)
+
+    def find_stiffness(self) -> None:
+        """Of voids that have just closed, from the cells of this step."""
+        for void in self.found:
+            if void.rest > 0.0 and void.stiffness == 0.0:
+                void.stiffness = max(
+                    self.surfaces[curve].find_stiffness(face) for curve, face in void.faces
+                )
+
+    def compute_row(self) -> dict[str, float | int]:
+        """Columns of the history: how many voids, their area [m²]."""
+        return {"voids": len(self.found), "void_area": sum(void.area for void in self.found)}
+
+    def get_state(self) -> dict[str, Any]:
+        """What the voids held, and the faces by which they are known again."""
+        faces = [(n, *face) for n, void in enumerate(self.found) for face in sorted(void.faces)]
+        numbers = [
+            (v.area, v.volume, v.around, v.depth, v.gas, v.rest, v.stiffness) for v in self.found
+        ]
+        return {
+            "contacts/void_faces": np.array(faces, dtype=np.int64).reshape(-1, 3),
+            "contacts/voids": np.array(numbers, dtype=np.float64).reshape(-1, 7),
+        }
+
+    def set_state(self, state: Any) -> None:
+        """Take up a state of `get_state`."""
+        self.found = []
+        if state.get("contacts/voids") is not None:
+            self.found = [Void(set(), *map(float, row)) for row in state["contacts/voids"]]
+            for number, curve, face in np.asarray(state["contacts/void_faces"]).tolist():
+                self.found[number].faces.add((curve, face))
+        self._pushed = True

@@ -173,7 +173,7 @@ def add_friction(
     The traction is `friction` times the contact pressure against the slip of the cells beside the
     facet, but no more than stops it within the step; without end it welds.  It works at the mean
     of both velocities by the other's impedance, so that its heat goes into the cells as their
-    impedances.  Theory F16.6.
+    impedances.  Theory F16.5.
     """
     for k in range(count):
         if states[CLOSED, k] == 0.0:

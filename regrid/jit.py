@@ -296,24 +296,31 @@ def inlined(function):
     """Mark a plain function to be inlined in every kernel that calls it; callable from Python too.
 
     The function stays a plain function: the same text serves numpy arrays, and a kernel made by a
-    factory that holds it in its closure contains its code.
+    factory that holds it in its closure contains its code.  It makes no arrays.  Note: LLVM inlines
+    it, of which loops over rows become packed all the same; numba's own inlining compiles a
+    function again for every call of it.
     """
-    function.compiled_as = "inlined"
-    return register_jitable(inline="always")(function)
+    return _mark(function, "inlined", allocates=False, forceinline=True)
 
 
 def compiled_once(function=None, *, allocates=True):
-    """Mark a plain function to be compiled once and called by kernels, not inlined.
+    """Mark a plain function to be compiled once and called by kernels; as `inlined` but for that.
 
-    Like `inlined` it may sit in the closure of a kernel made by a factory.  `allocates`: as of
-    `kernel`.
+    allocates: as of `kernel`.
     """
     if function is None:
         return functools.partial(compiled_once, allocates=allocates)
-    options = {} if allocates else {"_nrt": False}
-    function.compiled_as = "called" if allocates else "called without counting references"
+    return _mark(function, "called" if allocates else "called without counting", allocates)
+
+
+def _mark(function, how: str, allocates: bool, **options):
+    function.compiled_as = how
     _name_by_contents(function)
-    return register_jitable(error_model="numpy", **options)(function)
+    if not allocates:
+        options["_nrt"] = False
+    return register_jitable(
+        error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, **options
+    )(function)
 
 
 def replaces(function):

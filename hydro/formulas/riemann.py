@@ -9,7 +9,7 @@ after the other: their long chains of dependent operations then overlap between 
 
 from __future__ import annotations
 
-from regrid.jit import inlined
+from regrid.jit import compiled_once, inlined
 
 # pressure jump to a neighbour, over rho c², from which on all faces of a cell get HLL
 FLUXES = {"hllc": 0.1, "hll": -1.0}
@@ -98,7 +98,7 @@ def compute_star_flux(side, wave, face):
     )
 
 
-@inlined
+@compiled_once(allocates=False)
 def compute_hllc_flux(left, right, face, acoustic_weight):
     """HLLC flux of mass, momentum and energy through a moving face, times its length.
 
@@ -163,7 +163,7 @@ def compute_hll_flux(left, right, face):
     )
 
 
-@inlined
+@compiled_once(allocates=False)
 def compute_wave_pressure(rho, p, c, law, du):
     """Pressure behind a wave that changes the normal velocity by `du`, and its slope in du.
 
@@ -205,7 +205,7 @@ def compute_wave_pressure(rho, p, c, law, du):
     return pressure, slope
 
 
-@inlined
+@compiled_once(allocates=False)
 def compute_contact(left, right, jump):
     """Mean pressure and normal velocity of the contact between two states, each behind one wave.
 
@@ -232,7 +232,7 @@ def compute_contact(left, right, jump):
     return 0.5 * (left + right), w_star
 
 
-@inlined
+@compiled_once(allocates=False)
 def compute_speed_at_pressure(rho, w, p, c, law, p_star):
     """Normal velocity of a surface with given pressure `p_star` (free surface, pressure piston).
 

@@ -328,7 +328,7 @@ def make_side_kernels(
         for k in range(rim.shape[1]):
             rim[on.X_TRACE, k] = rim[on.X_AREA, k]
             rim[on.Y_TRACE, k] = rim[on.Y_AREA, k]
-        for wall in range(walls.shape[0]):
+        for wall in range(walls.shape[0] if curved else 0):
             if walls[wall, 2] == AXIS:
                 place_traces_on_axis(nodes, nodes_new, walls[wall, 0], walls[wall, 1], rim)
         trace_faces(rim, parameters, 0, rim.shape[1])

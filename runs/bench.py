@@ -30,7 +30,7 @@ from hydro.history import PHASES
 from hydro.links.join import join
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
-from regrid.jit import find_kernel_codes
+from regrid.jit import KERNEL_CODES
 from regrid.registry import make_regridder
 from runs.deck.reading import read_deck
 from runs.store.reader import RunData
@@ -342,7 +342,7 @@ class Calls:
     """Counts, while `sys.setprofile` holds it: calls of `kernels` and their seconds, `others`."""
 
     def __init__(self):
-        self.codes = find_kernel_codes()
+        self.codes = KERNEL_CODES
         self.kernels = self.others = 0
         self.seconds = self._begun = 0.0
 

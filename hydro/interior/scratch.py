@@ -29,7 +29,7 @@ from itertools import count
 import numpy as np
 from numba.extending import intrinsic, overload
 
-from regrid.jit import compiled_once, replaces
+from regrid.jit import compiled_once
 
 LANES = 8  # entries of the widest vector
 LINE = 8  # entries of a cache line
@@ -157,18 +157,22 @@ def _copy_back(typing_context, Z, offset, count, target, row, start):
     return types.void(Z, types.intp, types.intp, target, types.intp, types.intp), generate
 
 
-@replaces(copy_row)
+@overload(copy_row)
 def _copy_row_in_kernels(source, row, start, count, Z, offset):
     return lambda source, row, start, count, Z, offset: _copy_row(
         source, row, start, count, Z, offset
     )
 
 
-@replaces(copy_back)
+@overload(copy_back)
 def _copy_back_in_kernels(Z, offset, count, target, row, start):
     return lambda Z, offset, count, target, row, start: _copy_back(
         Z, offset, count, target, row, start
     )
+
+
+# for the kernels' digests
+copy_row.compiled_as, copy_back.compiled_as = _copy_row_in_kernels, _copy_back_in_kernels
 
 
 @compiled_once(allocates=False)

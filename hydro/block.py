@@ -33,7 +33,6 @@ from hydro.perimeter.strips import make_side_kernels
 from hydro.rim import SIDES, make_rim
 from hydro.rows import (
     CONSERVED,
-    FIRST_ORDER,
     LEAST_C2,
     MOMENTUM_AND_ENERGY,
     NO_C2,
@@ -392,18 +391,6 @@ class Block:
     def take_sums(self) -> None:
         """Take up what has been written into `sums_array`."""
         self._summed = self.sums_array.tolist()
-
-    def count_first_order(self) -> int:
-        """Faces that were of first order in the last step."""
-        return int(self.sums[FIRST_ORDER])
-
-    def count_voided(self) -> int:
-        """Cells that hold voids after the last step."""
-        return int(self.sums[VOIDED])
-
-    def sum_totals(self) -> list[float]:
-        """Mass, momentum x and y, energy of the block, per depth or radian."""
-        return self.sums[CONSERVED]
 
     def add_source_totals(self, gained: np.ndarray) -> None:
         """Add momentum x, y and energy (3,) that a body source has brought after the update."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from hydro import rim as on
 from hydro.block import Block
-from hydro.rows import ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y
+from hydro.rows import CONSERVED, ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y
 
 
 class Ledger:
@@ -48,7 +48,7 @@ class Ledger:
         sums = {name: 0.0 for name in self.materials}
         momentum_x = momentum_y = energy = 0.0
         for block in self.blocks:
-            total = block.sum_totals()
+            total = block.sums[CONSERVED]
             sums[block.material] += total[MASS]
             momentum_x += total[MOMENTUM_X]
             momentum_y += total[MOMENTUM_Y]

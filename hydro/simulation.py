@@ -249,13 +249,13 @@ class Simulation:
         """One step; returns its history row.  Raises RunFailure with block, cell and time."""
         if self.finished:
             raise BadInput(f"the run is at its end already: {self.finished}")
-        ranks = self._shared
+        ranks, clock = self._shared, self.clock
         ranks.begin_step()
-        self.clock.tension_dt = self.tension.find_step()
+        clock.tension_dt = self.tension.find_step()
         try:
             self._check_collapse()
-            touching = self.meetings.find(self.t, self.step)
-            self._overlaps.check(self.t, self.step, touching)
+            touching = self.meetings.find(clock.t, clock.step)
+            self._overlaps.check(clock.t, clock.step, touching)
             record = take_step(self._flow)
         except RunFailure:  # all ranks have agreed on it
             ranks.end_step()
@@ -358,8 +358,8 @@ class Simulation:
     def compute_row(self, limit: str, retries: int) -> dict:
         """The history row of the current state."""
         row = {
-            "t": self.t,
-            "dt": self.dt,
+            "t": self.clock.t,
+            "dt": self.clock.dt,
             "dt_limit": limit,
             "retries": retries,
             **compute_columns(self._flow),

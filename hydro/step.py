@@ -17,6 +17,7 @@ from hydro.motion import sides as on_sides
 from hydro.motion.grid_motion import GridMotion
 from hydro.motion.sides import Sides, Span
 from hydro.motion.tension import SurfaceTension
+from hydro.perimeter.contacts import AT_CELLS, AT_FLUX, AT_TRACES
 from hydro.ranks.blocks import Blocks
 from hydro.small_cells.small_cells import SmallCells
 from hydro.sources import BodySource
@@ -116,14 +117,14 @@ def try_step(flow: Flow, dt: float) -> RunFailure | float | None:
             for block in blocks:
                 block.gather(t)
             flow.tension.fill_jumps(new=False)
-            exchange.solve_at_cells()
+            exchange.solve(AT_CELLS, dt)
             for block in blocks:
                 block.fill_ghosts(t)
             meetings.fill_ghosts(t)
             for block in blocks:
                 block.predict(dt)
             # 3 traces at the sides: Riemann problems, contact speeds
-            exchange.solve_at_traces()
+            exchange.solve(AT_TRACES, dt)
             for block in blocks:
                 block.fill_speeds(middle)
             meetings.fill_speeds(middle)
@@ -143,7 +144,7 @@ def try_step(flow: Flow, dt: float) -> RunFailure | float | None:
             flow.tension.fill_jumps(new=True)
             for block in blocks:
                 block.fill_flux(middle)
-            exchange.fill_flux(dt)
+            exchange.solve(AT_FLUX, dt)
             meetings.fill_flux(middle, dt)
             flow.tension.add_rest()
         with watch("flow"):

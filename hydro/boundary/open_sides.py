@@ -34,6 +34,7 @@ class Inflow(Segment):
     def __init__(self, block, side, start, stop, state, velocity=None):
         super().__init__(block, side, start, stop)
         self.state = state if callable(state) else (lambda t: state)
+        self._is_steady, self._filled = not callable(state), False  # the rows beyond keep it
         self.check_numbers(self.state(0.0), ("rho", "u", "v", "p"), "state")
         self._velocity = 0.0, 0.0
         if velocity is not None:
@@ -53,6 +54,9 @@ class Inflow(Segment):
 
     def fill_speeds(self, t):
         """The state beyond at mid-time, for the flux."""
+        if self._is_steady and self._filled:
+            return
+        self._filled = True
         rim, eos = self.rim, self.block.eos
         rho, u, v, p = self.state(t)
         rim.rho_beyond[:], rim.u_beyond[:], rim.v_beyond[:], rim.p_beyond[:] = rho, u, v, p

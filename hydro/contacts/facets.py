@@ -369,11 +369,8 @@ def measure_radius_weighted_facets(old, new, inverse_dt, owners, ends, count, ar
     for k in range(count):
         a = owners[LEADER, k]
         start, stop = ends[LEADER_START, k], ends[LEADER_STOP, k]
-        x, y = find_point(old, a, start)
-        x_end, y_end = find_point(old, a, stop)
-        x_new, y_new = find_point(new, a, start)
-        x_end_new, y_end_new = find_point(new, a, stop)
         area_x, area_y, sweep, _, _ = compute_radius_weighted_face(
-            x, y, x_end, y_end, x_new, y_new, x_end_new, y_end_new, inverse_dt
-        )
+            find_point(old, a, start), find_point(old, a, stop),
+            find_point(new, a, start), find_point(new, a, stop), inverse_dt,
+        )  # fmt: skip
         areas[AREA_X, k], areas[AREA_Y, k], areas[SWEPT_RATE, k] = area_x, area_y, sweep

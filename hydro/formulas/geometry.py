@@ -29,29 +29,30 @@ TINY = 1e-300  # keeps 0/0 at faces on the axis from being a NaN
 
 
 @inlined
-def keep_area(area, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
+def keep_area(area, mid_i, mid_j, twist, y):
     """Plane: volume per depth."""
     return area
 
 
 @inlined
-def weigh_area(area, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
+def weigh_area(area, mid_i, mid_j, twist, y):
     """Volume per radian of a quadrilateral: its integral of the radius, exactly (theory F9.1).
 
     mi, mj: vectors between opposite face midpoints; twist = a - b + c - d of the corners; y: mean
     of their radii; area = mi × mj.
     """
-    bend_i = mid_i_x * twist_y - mid_i_y * twist_x
-    bend_j = twist_x * mid_j_y - twist_y * mid_j_x
-    return area * y + (mid_i_y * bend_i + mid_j_y * bend_j) / 12.0
+    bend_i = mid_i[0] * twist[1] - mid_i[1] * twist[0]
+    bend_j = twist[0] * mid_j[1] - twist[1] * mid_j[0]
+    return area * y + (mid_i[1] * bend_i + mid_j[1] * bend_j) / 12.0
 
 
 @inlined
-def compute_plane_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_dt):
+def compute_plane_face(a, b, a_new, b_new, inverse_dt):
     """Normal times length, swept area per time and midpoint of a moving edge at mid-time.
 
-    The normal lies to the right of the way from a to b.
+    The normal lies to the right of the way from a to b, points (x, y).
     """
+    (ax, ay), (bx, by), (ax_new, ay_new), (bx_new, by_new) = a, b, a_new, b_new
     area_x = 0.5 * ((by - ay) + (by_new - ay_new))
     area_y = 0.5 * ((ax - bx) + (ax_new - bx_new))
     motion_x = (ax_new - ax) + (bx_new - bx)
@@ -66,25 +67,24 @@ def compute_plane_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_d
 
 
 @inlined
-def compute_radius_weighted_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_dt):
+def compute_radius_weighted_face(a, b, a_new, b_new, inverse_dt):
     """The same weighted by the radius: means over the step of the integrals along the edge.
 
     The point is the edge's centre of area at mid-time.  Theory F9.2.
     """
+    (ax, ay), (bx, by), (ax_new, ay_new), (bx_new, by_new) = a, b, a_new, b_new
     radius = 0.5 * (ay + by)
     radius_new = 0.5 * (ay_new + by_new)
     weight = (2.0 * radius + radius_new) / 6.0
     weight_new = (2.0 * radius_new + radius) / 6.0
-    twist_x = (bx_new - ax_new) - (bx - ax)
-    twist_y = (by_new - ay_new) - (by - ay)
+    twist = (bx_new - ax_new) - (bx - ax), (by_new - ay_new) - (by - ay)
     edge_x = 0.5 * ((bx - ax) + (bx_new - ax_new))
     edge_y = 0.5 * ((by - ay) + (by_new - ay_new))
     way_x = 0.5 * ((ax_new - ax) + (bx_new - bx))
     way_y = 0.5 * ((ay_new - ay) + (by_new - by))
     middle = 0.5 * (radius + radius_new)
-    swept = weigh_area(
-        way_x * edge_y - way_y * edge_x, way_x, way_y, edge_x, edge_y, twist_x, twist_y, middle
-    )
+    area = way_x * edge_y - way_y * edge_x
+    swept = weigh_area(area, (way_x, way_y), (edge_x, edge_y), twist, middle)
     outwards = edge_y / (12.0 * middle + TINY)
     return (
         (by - ay) * weight + (by_new - ay_new) * weight_new,
@@ -96,8 +96,9 @@ def compute_radius_weighted_face(ax, ay, bx, by, ax_new, ay_new, bx_new, by_new,
 
 
 @inlined
-def compute_centre_offset(mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
+def compute_centre_offset(mid_i, mid_j, twist, y):
     """Way from the middle of a cell to its centre of volume, exactly (theory F9.4)."""
+    (mid_i_x, mid_i_y), (mid_j_x, mid_j_y), (twist_x, twist_y) = mid_i, mid_j, twist
     area = mid_i_x * mid_j_y - mid_i_y * mid_j_x
     bend_i = mid_i_x * twist_y - mid_i_y * twist_x
     bend_j = twist_x * mid_j_y - twist_y * mid_j_x
@@ -112,11 +113,12 @@ def compute_centre_offset(mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, 
 
 
 @inlined
-def lean_line(mx, my, nx, ny, twist_x, twist_y, scale):
+def lean_line(m, n, twist, scale):
     """The mid-line m as the centres of volume go along it, n being the other one.
 
     Their ways from the middles along n, n n_y / (12 y), change from cell to cell; scale: 1/(12 y).
     """
+    (mx, my), (nx, ny), (twist_x, twist_y) = m, n, twist
     turn = my * ny * (12.0 * scale)
     lean_x = scale * ((twist_x * ny + nx * twist_y) - nx * turn)
     lean_y = scale * (2.0 * (twist_y * ny) - ny * turn)
@@ -125,12 +127,10 @@ def lean_line(mx, my, nx, ny, twist_x, twist_y, scale):
 
 
 @inlined
-def lean_lines(mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, y):
+def lean_lines(mid_i, mid_j, twist, y):
     """Vectors along both lines through the centres of volume (theory F9.6)."""
     scale = 1.0 / (12.0 * y)
-    line_i_x, line_i_y = lean_line(mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, scale)
-    line_j_x, line_j_y = lean_line(mid_j_x, mid_j_y, mid_i_x, mid_i_y, twist_x, twist_y, scale)
-    return line_i_x, line_i_y, line_j_x, line_j_y
+    return lean_line(mid_i, mid_j, twist, scale), lean_line(mid_j, mid_i, twist, scale)
 
 
 @inlined
@@ -171,23 +171,14 @@ def push_outwards(momentum, lever, push, share, hoop):
 
 
 @inlined
-def stretch_ring(
-    momentum,
-    push,
-    mid_i_x,
-    mid_i_y,
-    mid_j_x,
-    mid_j_y,
-    mid_i_x_new,
-    mid_i_y_new,
-    mid_j_x_new,
-    mid_j_y_new,
-):
+def stretch_ring(momentum, push, lines, lines_new):
     """Radial momentum with a source: `push` (pressure times dt) on the mean plane area.
 
     The mean over the step of the area, whose mid-lines change evenly: to round-off what the radial
-    normals of a cell's faces add up to (theory F9.3).
+    normals of a cell's faces add up to (theory F9.3).  lines: both mid-lines, old and new.
     """
+    (mid_i_x, mid_i_y), (mid_j_x, mid_j_y) = lines
+    (mid_i_x_new, mid_i_y_new), (mid_j_x_new, mid_j_y_new) = lines_new
     area = (mid_i_x * mid_j_y - mid_i_y * mid_j_x) + (
         mid_i_x_new * mid_j_y_new - mid_i_y_new * mid_j_x_new
     )
@@ -254,11 +245,8 @@ def find_geometry(name: str) -> Geometry:
 
 def compute_volumes(geometry: Geometry, nodes):
     """Volumes (ni, nj) of the cells between nodes (2, ni + 1, nj + 1): m² or m³ per radian."""
-    (xa, xb, xc, xd), (ya, yb, yc, yd) = (
-        (q[:-1, :-1], q[1:, :-1], q[1:, 1:], q[:-1, 1:]) for q in nodes
-    )
-    area = 0.5 * ((xc - xa) * (yd - yb) - (xd - xb) * (yc - ya))
-    mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd)
-    twist_x, twist_y = (xa - xb) + (xc - xd), (ya - yb) + (yc - yd)
-    middle = 0.25 * ((ya + yc) + (yb + yd))
-    return geometry.volume(area, mid_i_x, mid_i_y, mid_j_x, mid_j_y, twist_x, twist_y, middle)
+    a, b, c, d = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
+    area = 0.5 * ((c[0] - a[0]) * (d[1] - b[1]) - (d[0] - b[0]) * (c[1] - a[1]))
+    mid_i, mid_j, _ = compute_line_geometry(a, b, c, d)
+    middle = 0.25 * ((a[1] + c[1]) + (b[1] + d[1]))
+    return geometry.volume(area, mid_i, mid_j, (a - b) + (c - d), middle)

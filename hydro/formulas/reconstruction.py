@@ -64,17 +64,16 @@ DEFAULT_LIMITER = "monotonised-central"
 
 
 @inlined
-def compute_line_geometry(xa, ya, xb, yb, xc, yc, xd, yd):
-    """Vectors between opposite face midpoints, along i and along j, and the cell's area.
+def compute_line_geometry(a, b, c, d):
+    """Vectors (x, y) between opposite face midpoints, along i and along j, and the cell's area.
 
     Nodes a = (i, j), b = (i+1, j), c = (i+1, j+1), d = (i, j+1).  The cross product of the two
     vectors is the quadrilateral's area exactly.
     """
-    mid_i_x = 0.5 * ((xb + xc) - (xa + xd))
-    mid_i_y = 0.5 * ((yb + yc) - (ya + yd))
-    mid_j_x = 0.5 * ((xd + xc) - (xa + xb))
-    mid_j_y = 0.5 * ((yd + yc) - (ya + yb))
-    return mid_i_x, mid_i_y, mid_j_x, mid_j_y, mid_i_x * mid_j_y - mid_i_y * mid_j_x
+    (xa, ya), (xb, yb), (xc, yc), (xd, yd) = a, b, c, d
+    mid_i = 0.5 * ((xb + xc) - (xa + xd)), 0.5 * ((yb + yc) - (ya + yd))
+    mid_j = 0.5 * ((xd + xc) - (xa + xb)), 0.5 * ((yd + yc) - (ya + yb))
+    return mid_i, mid_j, mid_i[0] * mid_j[1] - mid_i[1] * mid_j[0]
 
 
 @inlined
@@ -110,11 +109,10 @@ def compute_face_state(state, gradients, dx, dy):
 
 
 @inlined
-def compute_gradient(along_i, along_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse):
+def compute_gradient(along_i, along_j, mid_i, mid_j, inverse):
     """The vector g with g·mi = along_i and g·mj = along_j; `inverse` = 1 / (mi × mj)."""
-    return (along_i * mid_j_y - along_j * mid_i_y) * inverse, (
-        along_j * mid_i_x - along_i * mid_j_x
-    ) * inverse
+    x = (along_i * mid_j[1] - along_j * mid_i[1]) * inverse
+    return x, (along_j * mid_i[0] - along_i * mid_j[0]) * inverse
 
 
 @inlined
@@ -131,13 +129,12 @@ def compute_acoustic_weight(a, b, c, d, lines, inverse, c2):
     along j below (c), above (d); lines: both line vectors.
     """
     (u_a, v_a), (u_b, v_b), (u_c, v_c), (u_d, v_d) = a, b, c, d
-    mid_i_x, mid_i_y, mid_j_x, mid_j_y = lines
     u_i = 0.5 * (u_a + u_b)
     v_i = 0.5 * (v_a + v_b)
     u_j = 0.5 * (u_c + u_d)
     v_j = 0.5 * (v_c + v_d)
-    u_x, u_y = compute_gradient(u_i, u_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse)
-    v_x, v_y = compute_gradient(v_i, v_j, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse)
+    u_x, u_y = compute_gradient(u_i, u_j, *lines, inverse)
+    v_x, v_y = compute_gradient(v_i, v_j, *lines, inverse)
     divergence = u_x + v_y
     whole = ((u_x * u_x + v_y * v_y) + (u_y * u_y + v_x * v_x)) + TINY
     jumps = ((u_a * u_a + v_a * v_a) + (u_b * u_b + v_b * v_b)) + (

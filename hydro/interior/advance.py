@@ -79,10 +79,10 @@ def make_flow_kernels(
     fill_flux_i = make_flux(energy, at.AREA_X_I, at.FLUX_I_MASS, pressure_i, opens_voids)
     fill_flux_j = make_flux(energy, at.AREA_X_J, at.FLUX_J_MASS, pressure_j, opens_voids)
     use_hll_i = make_hll_flux(
-        energy, *i_faces, at.HLL_BEFORE, at.TORN_BEFORE, at.FLUX_I_MASS, pressure_i, opens_voids
+        energy, i_faces, at.HLL_BEFORE, at.TORN_BEFORE, at.FLUX_I_MASS, pressure_i, opens_voids
     )
     use_hll_j = make_hll_flux(
-        energy, *j_faces, at.HLL - 1, at.TORN - 1, at.FLUX_J_MASS, pressure_j, opens_voids
+        energy, j_faces, at.HLL - 1, at.TORN - 1, at.FLUX_J_MASS, pressure_j, opens_voids
     )
     # axisymmetric flow alone
     fill_source_pressure = make_source_pressure(sound)

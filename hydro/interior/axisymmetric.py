@@ -24,6 +24,13 @@ def clear_shift_after(Z, n):
         Z[at.SHIFT_AFTER + k] = 0.0
 
 
+@inlined
+def find_even_twist(a, b, c, d):
+    """a - b + c - d of a cell's corners, opposite ones together, and the mean of their y."""
+    (xa, ya), (xb, yb), (xc, yc), (xd, yd) = a, b, c, d
+    return ((xa + xc) - (xb + xd), (ya + yc) - (yb + yd)), 0.25 * ((ya + yc) + (yb + yd))
+
+
 @compiled_once(allocates=False)
 def fill_shift_after(Z, n):
     """How far centres of volume lie from the middles of the cells between i + 1 and i + 2.
@@ -31,22 +38,11 @@ def fill_shift_after(Z, n):
     By x and y, and along both lines; entry 0, the cell before the first one, included.
     """
     for k in range(n + 1):
-        xa, ya = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
-        xb, yb = Z[at.X_NEXT + k], Z[at.Y_NEXT + k]
-        xc, yc = Z[at.X_NEXT + k + 1], Z[at.Y_NEXT + k + 1]
-        xd, yd = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
-        mid_i_x, mid_i_y, mid_j_x, mid_j_y, _ = compute_line_geometry(
-            xa, ya, xb, yb, xc, yc, xd, yd
-        )
-        x, y = compute_centre_offset(
-            mid_i_x,
-            mid_i_y,
-            mid_j_x,
-            mid_j_y,
-            (xa + xc) - (xb + xd),
-            (ya + yc) - (yb + yd),
-            0.25 * ((ya + yc) + (yb + yd)),
-        )
+        a, b, c, d = at.load_corners(Z, at.X_HIGH, at.X_NEXT, k)
+        mid_i, mid_j, _ = compute_line_geometry(a, b, c, d)
+        (mid_i_x, mid_i_y), (mid_j_x, mid_j_y) = mid_i, mid_j
+        twist, middle = find_even_twist(a, b, c, d)
+        x, y = compute_centre_offset(mid_i, mid_j, twist, middle)
         length_i = (mid_i_x * mid_i_x + mid_i_y * mid_i_y) ** 0.5
         length_j = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
         Z[at.OFFSET_X_AFTER + k] = x
@@ -76,24 +72,14 @@ def compute_plane_area_y(Z, a, b):
 def fill_lines(Z, n):
     """Lines through the centres of volume, and 1/area between them."""
     for k in range(1, n + 1):
-        xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
-        xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
-        xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
-        xd, yd = Z[at.X_LOW + k + 1], Z[at.Y_LOW + k + 1]
-        line_i_x, line_i_y, line_j_x, line_j_y = lean_lines(
-            Z[at.MI_X + k],
-            Z[at.MI_Y + k],
-            Z[at.MJ_X + k],
-            Z[at.MJ_Y + k],
-            (xa + xc) - (xb + xd),
-            (ya + yc) - (yb + yd),
-            0.25 * ((ya + yc) + (yb + yd)),
-        )
-        Z[at.LEAN_I_X + k] = line_i_x
-        Z[at.LEAN_I_Y + k] = line_i_y
-        Z[at.LEAN_J_X + k] = line_j_x
-        Z[at.LEAN_J_Y + k] = line_j_y
-        Z[at.LEAN_INVERSE + k] = 1.0 / (line_i_x * line_j_y - line_i_y * line_j_x)
+        a, b, c, d = at.load_corners(Z, at.X_LOW, at.X_HIGH, k)
+        mid_i = Z[at.MI_X + k], Z[at.MI_Y + k]
+        mid_j = Z[at.MJ_X + k], Z[at.MJ_Y + k]
+        twist, middle = find_even_twist(a, b, c, d)
+        line_i, line_j = lean_lines(mid_i, mid_j, twist, middle)
+        at.store_vector(Z, at.LEAN_I_X, k, line_i)
+        at.store_vector(Z, at.LEAN_J_X, k, line_j)
+        Z[at.LEAN_INVERSE + k] = 1.0 / (line_i[0] * line_j[1] - line_i[1] * line_j[0])
 
 
 def make_push(split, pressure, flux, node_a, node_b, area, push):

@@ -129,12 +129,15 @@ def make_flux(energy_part, face, target, pressure_row, opens_voids):
     return fill_flux
 
 
-def make_hll_flux(energy_part, left, right, face, switch, torn, target, pressure_row, opens_voids):
+def make_hll_flux(energy_part, faces, switch, torn, target, pressure_row, opens_voids):
     """Phase that replaces HLLC fluxes by HLL ones at the faces of cells whose switch is on.
 
-    Scratch offsets as in `make_flux`; `left, right`: the traced densities; `switch`: the HLL
+    Scratch offsets as in `make_flux`; `faces`: the traced densities on both sides and the normals
+    of the faces; `switch`: the HLL
     switch of the cells on the left; `torn`: their energies where they are torn.
     """
+
+    left, right, face = faces
 
     @compiled_once(allocates=False)
     def use_hll(row, first, last, parameters):

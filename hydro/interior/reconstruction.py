@@ -68,27 +68,12 @@ def make_geometry(weigh):
     def fill_geometry(Z, n):
         """Line vectors and volume of the row's cells."""
         for k in range(1, n + 1):
-            xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
-            xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
-            xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
-            xd, yd = Z[at.X_LOW + k + 1], Z[at.Y_LOW + k + 1]
-            mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
-                xa, ya, xb, yb, xc, yc, xd, yd
-            )
-            Z[at.MI_X + k] = mid_i_x
-            Z[at.MI_Y + k] = mid_i_y
-            Z[at.MJ_X + k] = mid_j_x
-            Z[at.MJ_Y + k] = mid_j_y
-            Z[at.VOLUME + k] = weigh(
-                area,
-                mid_i_x,
-                mid_i_y,
-                mid_j_x,
-                mid_j_y,
-                (xa - xb) + (xc - xd),
-                (ya - yb) + (yc - yd),
-                0.25 * ((ya + yc) + (yb + yd)),
-            )
+            a, b, c, d = at.load_corners(Z, at.X_LOW, at.X_HIGH, k)
+            mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
+            at.store_vector(Z, at.MI_X, k, mid_i)
+            at.store_vector(Z, at.MJ_X, k, mid_j)
+            twist, y = at.find_twist(a, b, c, d)
+            Z[at.VOLUME + k] = weigh(area, mid_i, mid_j, twist, y)
 
     return fill_geometry
 

@@ -29,7 +29,7 @@ from itertools import count
 import numpy as np
 from numba.extending import intrinsic, overload
 
-from regrid.jit import compiled_once
+from regrid.jit import compiled_once, inlined
 
 LANES = 8  # entries of the widest vector
 LINE = 8  # entries of a cache line
@@ -173,6 +173,28 @@ def _copy_back_in_kernels(Z, offset, count, target, row, start):
 
 # for the kernels' digests
 copy_row.compiled_as, copy_back.compiled_as = _copy_row_in_kernels, _copy_back_in_kernels
+
+
+@inlined
+def load_corners(Z, low, high, k):
+    """Corners (x, y) of cell k between two rows of nodes, anticlockwise from its own node."""
+    return (
+        (Z[low + k], Z[low + SPAN + k]), (Z[high + k], Z[high + SPAN + k]),
+        (Z[high + k + 1], Z[high + SPAN + k + 1]), (Z[low + k + 1], Z[low + SPAN + k + 1]),
+    )  # fmt: skip
+
+
+@inlined
+def store_vector(Z, row, k, vector):
+    """Put x and y into two rows."""
+    Z[row + k], Z[row + SPAN + k] = vector
+
+
+@inlined
+def find_twist(a, b, c, d):
+    """a - b + c - d of a cell's corners, and the mean of their y."""
+    (xa, ya), (xb, yb), (xc, yc), (xd, yd) = a, b, c, d
+    return ((xa - xb) + (xc - xd), (ya - yb) + (yc - yd)), 0.25 * ((ya + yc) + (yb + yd))
 
 
 @compiled_once(allocates=False)

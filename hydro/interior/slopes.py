@@ -87,22 +87,19 @@ def make_slopes(limit, relaxed, geometry, switch):
         row before) become those of the row after.  The predicted state is that of the old centre.
         """
         for k in range(1, n + 1):
-            xa, ya = Z[at.X_LOW + k], Z[at.Y_LOW + k]
-            xb, yb = Z[at.X_HIGH + k], Z[at.Y_HIGH + k]
-            xc, yc = Z[at.X_HIGH + k + 1], Z[at.Y_HIGH + k + 1]
-            xd, yd = Z[at.X_LOW + k + 1], Z[at.Y_LOW + k + 1]
-            mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
-                xa, ya, xb, yb, xc, yc, xd, yd
-            )
+            a, b, c, d = at.load_corners(Z, at.X_LOW, at.X_HIGH, k)
+            mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
+            (xa, ya), (xb, yb), (xc, yc), (xd, yd) = a, b, c, d
+            (mid_i_x, mid_i_y), (mid_j_x, mid_j_y) = mid_i, mid_j
             rho = Z[at.RHO + k]
             p = Z[at.P + k]
             if curved:
-                line_i_x, line_i_y = Z[at.LEAN_I_X + k], Z[at.LEAN_I_Y + k]
-                line_j_x, line_j_y = Z[at.LEAN_J_X + k], Z[at.LEAN_J_Y + k]
+                line_i = Z[at.LEAN_I_X + k], Z[at.LEAN_I_Y + k]
+                line_j = Z[at.LEAN_J_X + k], Z[at.LEAN_J_Y + k]
                 inverse = Z[at.LEAN_INVERSE + k]
                 c2 = Z[at.C2 + k]
             else:
-                line_i_x, line_i_y, line_j_x, line_j_y = mid_i_x, mid_i_y, mid_j_x, mid_j_y
+                line_i, line_j = mid_i, mid_j
                 inverse = 1.0 / area
                 Z[at.VOLUME + k] = area
                 c2 = sound(rho, p, parameters)
@@ -135,16 +132,12 @@ def make_slopes(limit, relaxed, geometry, switch):
             along_i = limit(Z[at.RHO_STEP + k] * before, step_after * after)
             along_j = limit((rho - Z[at.RHO + k - 1]) * below, (Z[at.RHO + k + 1] - rho) * above)
             Z[at.RHO_STEP + k] = step_after
-            rho_x, rho_y = compute_gradient(
-                along_i, along_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse
-            )
+            rho_x, rho_y = compute_gradient(along_i, along_j, line_i, line_j, inverse)
             step_after = Z[at.P_AFTER + k] - p
             along_i = limit(Z[at.P_STEP + k] * before, step_after * after)
             along_j = limit((p - Z[at.P + k - 1]) * below, (Z[at.P + k + 1] - p) * above)
             Z[at.P_STEP + k] = step_after
-            p_x, p_y = compute_gradient(
-                along_i, along_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse
-            )
+            p_x, p_y = compute_gradient(along_i, along_j, line_i, line_j, inverse)
             square_i = mid_i_x * mid_i_x + mid_i_y * mid_i_y
             square_j = mid_j_x * mid_j_x + mid_j_y * mid_j_y
             scale = 1.0 / (square_i * square_j)
@@ -167,7 +160,7 @@ def make_slopes(limit, relaxed, geometry, switch):
             if relaxed:
                 acoustic_weight = compute_acoustic_weight(
                     (u_a, v_a), (u_b, v_b), (u_c, v_c), (u_d, v_d),
-                    (line_i_x, line_i_y, line_j_x, line_j_y), inverse, c2,
+                    (line_i, line_j), inverse, c2,
                 )  # fmt: skip
                 u_i = relax_limit(u_i, u_a, u_b, acoustic_weight)
                 v_i = relax_limit(v_i, v_a, v_b, acoustic_weight)
@@ -175,8 +168,8 @@ def make_slopes(limit, relaxed, geometry, switch):
                 v_j = relax_limit(v_j, v_c, v_d, acoustic_weight)
                 Z[at.ACOUSTIC_BEFORE + k] = Z[at.ACOUSTIC + k]
                 Z[at.ACOUSTIC + k] = acoustic_weight
-            u_x, u_y = compute_gradient(u_i, u_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
-            v_x, v_y = compute_gradient(v_i, v_j, line_i_x, line_i_y, line_j_x, line_j_y, inverse)
+            u_x, u_y = compute_gradient(u_i, u_j, line_i, line_j, inverse)
+            v_x, v_y = compute_gradient(v_i, v_j, line_i, line_j, inverse)
             if curved:
                 # pairs of opposite corners: the same bits whichever way the cell is turned
                 x = 0.25 * ((xa + xc) + (xb + xd)) + Z[at.OFFSET_X + k]
@@ -236,16 +229,8 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
             before, after = weigh(
                 Z, at.LENGTH_BEFORE + k, at.LENGTH + k, at.LENGTH_AFTER + k, at.SHIFT - at.LENGTH
             )
-            line_x, line_y, _, _, _ = compute_line_geometry(
-                Z[at.X_LOW + k],
-                Z[at.Y_LOW + k],
-                Z[at.X_HIGH + k],
-                Z[at.Y_HIGH + k],
-                Z[at.X_HIGH + k + 1],
-                Z[at.Y_HIGH + k + 1],
-                Z[at.X_LOW + k + 1],
-                Z[at.Y_LOW + k + 1],
-            )
+            a, b, c, d = at.load_corners(Z, at.X_LOW, at.X_HIGH, k)
+            (line_x, line_y), _, _ = compute_line_geometry(a, b, c, d)
             rho, p, c = rim[on.RHO, face], rim[on.P, face], rim[on.C, face]
             jump, jump_beyond = abs(p - Z[at.P + k]), abs(Z[at.P + k] - Z[at.P_AFTER + k])
             jump = jump if jump > jump_beyond else jump_beyond

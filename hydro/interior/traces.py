@@ -24,17 +24,11 @@ def make_faces(compute_face, node_a, node_b, target):
     def fill_faces(Z, n, inverse_dt):
         """Faces at mid-time (theory F3.1)."""
         for k in range(1, n + 1):
-            area_x, area_y, sweep, x, y = compute_face(
-                Z[node_a + k],
-                Z[node_a + at.SPAN + k],
-                Z[node_b + k],
-                Z[node_b + at.SPAN + k],
-                Z[node_a + 2 * at.SPAN + k],
-                Z[node_a + 3 * at.SPAN + k],
-                Z[node_b + 2 * at.SPAN + k],
-                Z[node_b + 3 * at.SPAN + k],
-                inverse_dt,
-            )
+            a = Z[node_a + k], Z[node_a + at.SPAN + k]
+            b = Z[node_b + k], Z[node_b + at.SPAN + k]
+            a_new = Z[node_a + 2 * at.SPAN + k], Z[node_a + 3 * at.SPAN + k]
+            b_new = Z[node_b + 2 * at.SPAN + k], Z[node_b + 3 * at.SPAN + k]
+            area_x, area_y, sweep, x, y = compute_face(a, b, a_new, b_new, inverse_dt)
             Z[target + k] = area_x
             Z[target + at.SPAN + k] = area_y
             Z[target + 2 * at.SPAN + k] = sweep

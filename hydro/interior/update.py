@@ -134,14 +134,9 @@ def make_update(eos_class, geometry, finishes, gathers):
                     (Z[at.FLUX_J_ENERGY + k + 1] - Z[at.FLUX_J_ENERGY + k])
                     - Z[at.FLUX_I_ENERGY + k]
                 )
-                xa, ya = Z[at.X_LOW_NEW + k], Z[at.Y_LOW_NEW + k]
-                xb, yb = Z[at.X_HIGH_NEW + k], Z[at.Y_HIGH_NEW + k]
-                xc, yc = Z[at.X_HIGH_NEW + k + 1], Z[at.Y_HIGH_NEW + k + 1]
-                xd, yd = Z[at.X_LOW_NEW + k + 1], Z[at.Y_LOW_NEW + k + 1]
-                mid_i_x, mid_i_y, mid_j_x, mid_j_y, area = compute_line_geometry(
-                    xa, ya, xb, yb, xc, yc, xd, yd
-                )
-                y_new = 0.25 * ((ya + yc) + (yb + yd))
+                a, b, c, d = at.load_corners(Z, at.X_LOW_NEW, at.X_HIGH_NEW, k)
+                mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
+                twist, y_new = at.find_twist(a, b, c, d)
                 if curved:
                     lever, share = compute_lever(
                         Z[at.Y_CENTRE + k],
@@ -160,35 +155,16 @@ def make_update(eos_class, geometry, finishes, gathers):
                         dt * share,
                         (Z[at.HOOP_J + k + 1] - Z[at.HOOP_J + k]) - Z[at.HOOP_I + k],
                     )
-                    momentum_y = stretch_ring(
-                        momentum_y,
-                        dt * share * Z[at.SOURCE_P + k],
-                        Z[at.MI_X + k],
-                        Z[at.MI_Y + k],
-                        Z[at.MJ_X + k],
-                        Z[at.MJ_Y + k],
-                        mid_i_x,
-                        mid_i_y,
-                        mid_j_x,
-                        mid_j_y,
-                    )
+                    lines = (Z[at.MI_X + k], Z[at.MI_Y + k]), (Z[at.MJ_X + k], Z[at.MJ_Y + k])
+                    push = dt * share * Z[at.SOURCE_P + k]
+                    momentum_y = stretch_ring(momentum_y, push, lines, (mid_i, mid_j))
                     Z[at.LEVER + k] = lever
                     Z[at.SHARE + k] = share
                 Z[at.MOMENTUM_Y + k] = momentum_y
-                Z[at.MI_X_NEW + k] = mid_i_x
-                Z[at.MI_Y_NEW + k] = mid_i_y
-                Z[at.MJ_X_NEW + k] = mid_j_x
-                Z[at.MJ_Y_NEW + k] = mid_j_y
-                Z[at.VOLUME_NEW + k] = weigh(
-                    area,
-                    mid_i_x,
-                    mid_i_y,
-                    mid_j_x,
-                    mid_j_y,
-                    (xa - xb) + (xc - xd),
-                    (ya - yb) + (yc - yd),
-                    y_new,
-                )
+                at.store_vector(Z, at.MI_X_NEW, k, mid_i)
+                at.store_vector(Z, at.MJ_X_NEW, k, mid_j)
+                Z[at.VOLUME_NEW + k] = weigh(area, mid_i, mid_j, twist, y_new)
+                (xa, ya), (xb, yb), (xc, yc), (xd, yd) = a, b, c, d
                 Z[at.W_X + k] = 0.25 * (
                     ((xa - Z[at.X_LOW + k]) + (xd - Z[at.X_LOW + k + 1]))
                     + ((xb - Z[at.X_HIGH + k]) + (xc - Z[at.X_HIGH + k + 1]))

@@ -11,8 +11,6 @@ import numpy as np
 
 from hydro.boundary.linked import Linked, Seam
 from hydro.perimeter.contacts import (
-    AT_CELLS,
-    AT_FLUX,
     AT_TRACES,
     pass_seam,
     solve_link,
@@ -59,7 +57,7 @@ class Link:
         """Nodes of the leader's line as the follower has them."""
         return (line + self.shift[:, None])[:, :: -1 if self.reverse else 1]
 
-    def solve(self, phase: int) -> None:
+    def solve(self, phase: int, dt: float) -> None:
         """Contact states of both sides in a phase of `hydro.perimeter.contacts`, with ghosts
         AT_CELLS and fluxes AT_FLUX; of a seam these alone."""
         curved = self.leader.block.geometry.curved
@@ -90,32 +88,18 @@ class Exchange:
     def __init__(self, links: list[Link | SlidingContact]):
         self.links = [link for link in links if isinstance(link, Link)]
         self.contacts = [link for link in links if isinstance(link, SlidingContact)]
+        self.all = [*self.links, *self.contacts]
 
     def cut_contacts(self) -> None:
         """What sliding contacts must know of the grid of the step's start."""
         for contact in self.contacts:
             contact.cut()
 
-    def solve_at_cells(self) -> None:
-        """Contact states and ghosts from the cells on both sides, on the old grid."""
-        for link in self.links:
-            link.solve(AT_CELLS)
-        for contact in self.contacts:
-            contact.solve_at_cells()
-
-    def solve_at_traces(self) -> None:
-        """Contact states from the traces of both sides, on the old grid."""
-        for link in self.links:
-            link.solve(AT_TRACES)
-        for contact in self.contacts:
-            contact.solve_at_traces()
-
-    def fill_flux(self, dt: float) -> None:
-        """Fluxes through the common faces, both grids being known."""
-        for link in self.links:
-            link.solve(AT_FLUX)
-        for contact in self.contacts:
-            contact.fill_flux(dt)
+    def solve(self, phase: int, dt: float) -> None:
+        """Contact states of all sides in a phase of `hydro.perimeter.contacts`: on the old grid
+        from the cells, with ghosts, or from the traces; between both grids with fluxes."""
+        for link in self.all:
+            link.solve(phase, dt)
 
     def accept(self) -> None:
         """The step stands."""

@@ -9,6 +9,7 @@ from hydro import rim as on
 from hydro.eos.base import make_least_pressure
 from hydro.formulas.geometry import Geometry, compute_plane_face
 from hydro.formulas.reconstruction import compute_line_geometry
+from hydro.interior.scratch import find_twist
 from hydro.rim import find_cell
 from hydro.rows import (
     LEAST_C2,
@@ -26,28 +27,28 @@ from regrid.jit import compiled_once, inlined, kernel
 
 
 @inlined
+def find_corners(nodes, i, j):
+    """Corners (x, y) of a cell, anticlockwise from its own node."""
+    return (
+        (nodes[0, i, j], nodes[1, i, j]), (nodes[0, i + 1, j], nodes[1, i + 1, j]),
+        (nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1]), (nodes[0, i, j + 1], nodes[1, i, j + 1]),
+    )  # fmt: skip
+
+
+@inlined
 def measure_lines(nodes, i, j):
     """Line vectors and area of a cell."""
-    return compute_line_geometry(
-        nodes[0, i, j], nodes[1, i, j],
-        nodes[0, i + 1, j], nodes[1, i + 1, j],
-        nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1],
-        nodes[0, i, j + 1], nodes[1, i, j + 1],
-    )  # fmt: skip
+    (xi, yi), (xj, yj), area = compute_line_geometry(*find_corners(nodes, i, j))
+    return xi, yi, xj, yj, area
 
 
 @inlined
 def measure_volume(nodes, i, j, weigh):
     """Volume of a cell with straight faces; `weigh`: `Geometry.volume`."""
-    xi, yi, xj, yj, area = measure_lines(nodes, i, j)
-    xa, ya = nodes[0, i, j], nodes[1, i, j]
-    xb, yb = nodes[0, i + 1, j], nodes[1, i + 1, j]
-    xc, yc = nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1]
-    xd, yd = nodes[0, i, j + 1], nodes[1, i, j + 1]
-    return weigh(
-        area, xi, yi, xj, yj, (xa - xb) + (xc - xd), (ya - yb) + (yc - yd),
-        0.25 * ((ya + yc) + (yb + yd)),
-    )  # fmt: skip
+    a, b, c, d = find_corners(nodes, i, j)
+    mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
+    twist, y = find_twist(a, b, c, d)
+    return weigh(area, mid_i, mid_j, twist, y)
 
 
 def make_fill_faces(geometry: Geometry):
@@ -66,22 +67,18 @@ def make_fill_faces(geometry: Geometry):
         for face in range(rim.shape[1]):
             side, i, j, i_end, j_end = on.find_ends(face, ni, nj)
             sign = 1.0 if side == on.I_MAX or side == on.J_MIN else -1.0
-            ax, ay = nodes[0, i, j], nodes[1, i, j]
-            bx, by = nodes[0, i_end, j_end], nodes[1, i_end, j_end]
-            ax_new, ay_new = nodes_new[0, i, j], nodes_new[1, i, j]
-            bx_new, by_new = nodes_new[0, i_end, j_end], nodes_new[1, i_end, j_end]
-            area_x, area_y, sweep, x, y = compute_plane_face(
-                ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_dt
-            )
+            a = nodes[0, i, j], nodes[1, i, j]
+            b = nodes[0, i_end, j_end], nodes[1, i_end, j_end]
+            a_new = nodes_new[0, i, j], nodes_new[1, i, j]
+            b_new = nodes_new[0, i_end, j_end], nodes_new[1, i_end, j_end]
+            area_x, area_y, sweep, x, y = compute_plane_face(a, b, a_new, b_new, inverse_dt)
             rim[on.NX, face] = sign * area_x
             rim[on.NY, face] = sign * area_y
             rim[on.SWEEP, face] = sign * sweep
             rim[on.X, face] = x
             rim[on.Y, face] = y
             if curved:
-                area_x, area_y, sweep, x, y = compute_face(
-                    ax, ay, bx, by, ax_new, ay_new, bx_new, by_new, inverse_dt
-                )
+                area_x, area_y, sweep, x, y = compute_face(a, b, a_new, b_new, inverse_dt)
             rim[on.AREA_X, face] = sign * area_x
             rim[on.AREA_Y, face] = sign * area_y
             rim[on.SWEPT, face] = sign * sweep

@@ -18,6 +18,7 @@ from hydro import rim as on
 from hydro.boundary.linked import Sliding
 from hydro.boundary.node_motion import NodeMotion
 from hydro.formulas.geometry import PLANE, Geometry
+from hydro.perimeter.contacts import AT_CELLS, AT_FLUX
 from hydro.rows import FLUX_ROWS
 from hydro.sliding.pieces import (
     AREAS,
@@ -298,17 +299,14 @@ class SlidingContact:
             np.add(nodes[:, 1:], nodes[:, :-1], out=middles)
             middles *= 0.5
 
-    def solve_at_cells(self) -> None:
-        """Contact states from the cells on both sides, extrapolated to their faces."""
-        self._solve(*(chain.gather(on.AT_FACE) for chain in self._chains))
-
-    def solve_at_traces(self) -> None:
-        """Contact states from the traces of both sides."""
-        self._solve(*(chain.gather(on.TRACE) for chain in self._chains))
-
-    @property
-    def _chains(self) -> tuple[Chain, Chain]:
-        return self.master, self.slave
+    def solve(self, phase: int, dt: float) -> None:
+        """Contact states of both sides from the cells, extrapolated to their faces, or from the
+        traces; or fluxes from the traces."""
+        if phase == AT_FLUX:
+            self.fill_flux(dt)
+        else:
+            rows = on.AT_FACE if phase == AT_CELLS else on.TRACE
+            self._solve(self.master.gather(rows), self.slave.gather(rows))
 
     def _solve(self, mine: np.ndarray, other: np.ndarray) -> None:
         """States of the pieces, averaged to the faces; writes the contact states of both sides."""

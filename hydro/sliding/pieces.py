@@ -227,14 +227,10 @@ def fill_radius_weighted_pieces(
         dx, dy = line[0, a + 1] - x, line[1, a + 1] - y
         dx_new, dy_new = line_new[0, a + 1] - x_new, line_new[1, a + 1] - y_new
         area_x, area_y, sweep, _, _ = compute_radius_weighted_face(
-            x + first * dx,
-            y + first * dy,
-            x + second * dx,
-            y + second * dy,
-            x_new + first * dx_new,
-            y_new + first * dy_new,
-            x_new + second * dx_new,
-            y_new + second * dy_new,
+            (x + first * dx, y + first * dy),
+            (x + second * dx, y + second * dy),
+            (x_new + first * dx_new, y_new + first * dy_new),
+            (x_new + second * dx_new, y_new + second * dy_new),
             inverse_dt,
         )
         radius_weighted_faces[AREA_X, k] = orientation * area_x

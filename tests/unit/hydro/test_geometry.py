@@ -37,7 +37,7 @@ def sum_faces(old, new, inverse_dt):
     ends = ((0, 1), (1, 2), (2, 3), (3, 0))  # outwards is to the right of each way
     return np.sum(
         [
-            AXISYMMETRIC.face(*old[:, a], *old[:, b], *new[:, a], *new[:, b], inverse_dt)[:3]
+            AXISYMMETRIC.face(old[:, a], old[:, b], new[:, a], new[:, b], inverse_dt)[:3]
             for a, b in ends
         ],
         axis=0,

@@ -10,6 +10,7 @@ from builders import box
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
+from hydro.rows import CONSERVED
 from hydro.simulation import Simulation
 
 
@@ -49,7 +50,7 @@ def find_event(rows, column, number=1):
 
 
 def mean_speed(block):
-    mass, momentum = block.sum_totals()[:2]
+    mass, momentum = block.sums[CONSERVED][:2]
     return momentum / mass
 
 

@@ -6,7 +6,7 @@ cost until `accept` swaps them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,6 @@ from hydro.interior.cell_fields import (
 )
 from hydro.interior.update import sum_tiles
 from hydro.perimeter.contacts import fill_open_flux
-from hydro.perimeter.plan import PerimeterPlan, PerimeterSegment
 from hydro.perimeter.strips import make_side_kernels
 from hydro.rim import SIDES, make_rim
 from hydro.rows import (
@@ -64,6 +63,44 @@ def _check_name(name: object, what: str, other: str = "/,") -> None:
     if not name.strip() or name == "." or not name.isprintable() or set(name) & set(other):
         signs = " or ".join(other)
         raise BadInput(f"{what} is called {name!r}: a name has one sign at least, and no {signs}")
+
+
+class PerimeterPlan:
+    """What the phases of a step need to know of a block's segments
+    (`hydro.boundary.segment.Segment`), made once.
+
+    `ghosts`, `speeds`, `fluxes`: the segments that fill these themselves; `walls` (n, 3), `opened`
+    (n, 3): the others, for kernels, with their kinds and the rows of the states beyond; `pistons`:
+    walls that move, by number, whose velocities are in `wall_speeds` (n, 2); `inwards` (faces,): of
+    which the next cells inwards are asked; `moving` (n, 2): the spans of faces that go with the
+    flow; `counted`: the spans of segments without a partner, and of those under surface tension,
+    through which totals change; `is_slave`: does a sliding contact lay nodes of these segments on
+    another's line?
+    """
+
+    def __init__(self, segments: Sequence[Any], faces: int = 0):
+        self.segments = list(segments)
+        self.ghosts, self.speeds, self.fluxes = (
+            [segment for segment in segments if segment.has(phase)]
+            for phase in ("fill_ghosts", "fill_speeds", "fill_flux")
+        )
+        walls = [s for s in segments if s.wall is not None]
+        self.walls = _collect([(s.first, s.last, s.wall) for s in walls], 3)
+        self.opened = _collect(
+            [(s.first, s.last, s.beyond) for s in segments if s.beyond is not None], 3
+        )
+        self.pistons = [(n, wall) for n, wall in enumerate(walls) if wall.moves]
+        self.wall_speeds = np.zeros((len(walls), 2))
+        self.moving = _collect([(s.first, s.last) for s in segments if s.follows_flow], 2)
+        self.inwards = np.zeros(faces, dtype=np.bool_)
+        for segment in segments:
+            self.inwards[segment.first : segment.last] = segment.moves
+        self.counted = [(s.first, s.last) for s in segments if not s.linked or s.tension > 0.0]
+        self.is_slave = any(segment.is_slave for segment in segments)
+
+
+def _collect(rows: list, width: int) -> np.ndarray:
+    return np.array(rows, dtype=np.int64).reshape(-1, width)
 
 
 class Block:
@@ -160,7 +197,7 @@ class Block:
         self.body_acceleration: np.ndarray | None = None
         self.excess_volume = np.zeros(count)  # areas of polygon cells beyond their straight faces
         self.excess_volume_new = np.zeros(count)
-        self.segments: list[PerimeterSegment] = []  # `hydro.boundary.registry.put` adds them
+        self.segments: list[Any] = []  # `hydro.boundary.registry.put` adds them
         self.set_geometry(PLANE)
 
     def set_geometry(self, geometry: Geometry) -> None:

@@ -9,11 +9,19 @@ import inspect
 from collections import ChainMap
 
 from hydro.block import Block
-from hydro.boundary.free_surface import FreeSurface
-from hydro.boundary.linked import Interface, Periodic, Seam, Sliding
-from hydro.boundary.open_sides import Inflow, Outflow
+from hydro.boundary.kinds import (
+    Axis,
+    FreeSurface,
+    Inflow,
+    Interface,
+    Outflow,
+    Periodic,
+    Piston,
+    Seam,
+    Sliding,
+    Wall,
+)
 from hydro.boundary.segment import Segment
-from hydro.boundary.walls import Axis, Piston, Wall
 from regrid.errors import BadInput, suggest
 from regrid.plug_ins import PlugIns
 

@@ -7,13 +7,23 @@ A kind of segment is one class and one line in SEGMENTS.  It says what ghosts st
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import Any, ClassVar
 
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.node_motion import NodeMotion
 from regrid.errors import BadInput
+
+
+class NodeMotion(Enum):
+    """What rules the nodes of a segment; `hydro.motion.line` has a class for each but FOLLOW."""
+
+    FLOW = "they go with the contact speeds of their faces"
+    GIVEN = "they go with a given velocity"
+    SLIDE = "they stay on their first line and are spread between its ends"
+    JOIN = "they are spread between the ends, which nothing holds to a line"
+    FOLLOW = "they are laid on the master line of a sliding contact"
 
 
 class Segment:

@@ -18,7 +18,7 @@ import numpy as np
 
 from hydro import rim as on
 from hydro.block import Block
-from hydro.boundary.walls import Piston
+from hydro.boundary.kinds import Piston
 from hydro.contacts.facet_states import make_add_facet_flux
 from hydro.contacts.pair import Pair, PlanePair
 from hydro.contacts.rows import AREAS, COVERED, FOLLOWER, LEADER

@@ -8,9 +8,8 @@ import numpy as np
 
 from hydro import rim as on
 from hydro.block import Block
-from hydro.boundary.free_surface import FreeSurface
+from hydro.boundary.kinds import Axis, FreeSurface, Piston, Wall
 from hydro.boundary.segment import Segment
-from hydro.boundary.walls import Axis, Piston, Wall
 from hydro.contacts.facet_states import cover_surface
 from hydro.contacts.laying import fit_plane
 from hydro.contacts.rows import COVER_ROWS, COVERED

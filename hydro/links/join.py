@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, cast
 
 from hydro.block import Block
-from hydro.boundary.linked import Linked, Sliding
+from hydro.boundary.kinds import Linked, Sliding
 from hydro.boundary.registry import put
 from hydro.links.link import Link
 from hydro.sliding.contact import SlidingContact

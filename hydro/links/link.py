@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.boundary.linked import Linked, Seam
+from hydro.boundary.kinds import Linked, Seam
 from hydro.perimeter.contacts import (
     AT_TRACES,
     pass_seam,

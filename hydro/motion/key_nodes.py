@@ -21,8 +21,7 @@ import numpy as np
 
 from hydro import rim as on
 from hydro.block import Block
-from hydro.boundary.node_motion import NodeMotion
-from hydro.boundary.segment import Segment
+from hydro.boundary.segment import NodeMotion, Segment
 from hydro.links.link import Link
 from hydro.motion.line import Track
 from hydro.sliding.contact import SlidingContact

@@ -20,8 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hydro import rim as on
-from hydro.boundary.node_motion import NodeMotion
-from hydro.boundary.segment import Segment
+from hydro.boundary.segment import NodeMotion, Segment
 from hydro.rim import SIDES
 from regrid.curves import (
     FREE_END,

@@ -10,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.node_motion import NodeMotion
-from hydro.boundary.segment import Segment
+from hydro.boundary.segment import NodeMotion, Segment
 from hydro.links.link import Exchange
 from hydro.motion.constraints import CarriedSeam, CornerGuard, Joint, SlaveMotion
 from hydro.motion.key_nodes import KeyNode, find_key_nodes

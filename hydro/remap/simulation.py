@@ -22,7 +22,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import map_coordinates
 
 from hydro.block import Block
-from hydro.boundary.node_motion import NodeMotion
+from hydro.boundary.segment import NodeMotion
 from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import Line
 from hydro.remap.conserved import Slivers, remap_state

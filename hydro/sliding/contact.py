@@ -15,8 +15,8 @@ import itertools
 import numpy as np
 
 from hydro import rim as on
-from hydro.boundary.linked import Sliding
-from hydro.boundary.node_motion import NodeMotion
+from hydro.boundary.kinds import Sliding
+from hydro.boundary.segment import NodeMotion
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.perimeter.contacts import AT_CELLS, AT_FLUX
 from hydro.rows import FLUX_ROWS

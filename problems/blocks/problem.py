@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.linked import Linked
+from hydro.boundary.kinds import Linked
 from hydro.boundary.registry import SEGMENTS, put
 from hydro.eos.materials import Material, find_material, make_material
 from hydro.links.join import join, slide

@@ -15,7 +15,7 @@ from runs.store.reader import RunData
 MODULE = '''
 """A gas, a regridder, an outlet and a column of somebody else."""
 
-from hydro.boundary.open_sides import Outflow
+from hydro.boundary.kinds import Outflow
 from hydro.eos.gases import IdealGas
 from regrid.algebraic import TransfiniteRegridder
 from toy_problem import Toy

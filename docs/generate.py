@@ -201,11 +201,19 @@ def make_table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]
 
 
 def fill_runs(arguments: str) -> list[str]:
-    """`NAME... | COLUMN; HEAD=COLUMN; ...`, the usual columns where none are given."""
+    """`NAME... | COLUMN; HEAD=COLUMN; ...`, the usual columns where none are given.
+
+    With `command` as the first column it stands in place of the run's label.
+    """
     names, _, words = arguments.partition("|")
     columns = [word.strip() for word in words.split(";") if word.strip()] or list(USUAL)
     pairs = [column.split("=", 1) if "=" in column else (column, column) for column in columns]
     results = [read_result(name) for name in choose(names.split())]
+    if columns[0] == "command":
+        rows = [
+            [f"`{r['command']}`", *(find_cell(r, one) for _, one in pairs[1:])] for r in results
+        ]
+        return make_table([head for head, _ in pairs], rows)
     rows = [[r["label"], *(find_cell(r, column) for _, column in pairs)] for r in results]
     return make_table(["run", *(head for head, _ in pairs)], rows)
 

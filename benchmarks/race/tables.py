@@ -44,17 +44,22 @@ def find_time(rows: list[dict[str, Any]], code: str) -> tuple[float, bool]:
     last = above[-1]
     measured = last + 1 < len(mine)
     i = last if measured else last - 1
+    if i < 0:
+        return math.nan, False
     fall = math.log(errors[i] / max(errors[i + 1], 1e-12))
-    if i < 0 or fall <= 0.0:
+    if fall <= 0.0:
         return math.nan, False
     rise = math.log(seconds[i + 1] / seconds[i])
     return float(seconds[i] * math.exp(rise * math.log(errors[i] / BAR) / fall)), measured
 
 
 def describe_time(rows: list[dict[str, Any]], code: str) -> str:
-    """CPU seconds to BAR in words; a value that was continued is in parentheses."""
-    if not any(r["code"] == code for r in rows):
+    """CPU seconds to BAR, in parentheses if extrapolated; of a single grid its error and time."""
+    mine = [r for r in rows if r["code"] == code]
+    if not mine:
         return "-"
+    if len(mine) == 1 and abs(mine[0]["error"]) > BAR:
+        return f"{100.0 * abs(mine[0]['error']):.2g} % in {mine[0]['cpu']:.2g}"
     seconds, measured = find_time(rows, code)
     if not math.isfinite(seconds):
         return "not reached"

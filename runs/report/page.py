@@ -19,7 +19,7 @@ import numpy as np
 
 from problems.evolution import get_material
 from problems.registry import PROBLEMS, summary_line
-from regrid.errors import BadInput
+from regrid.errors import BadInput, RunFailure
 from regrid.text_files import escape_controls
 from runs.grids.quality import judge
 from runs.inspection.account import (
@@ -227,7 +227,7 @@ def describe_run_in_words(run: RunData, left_out: list[str]) -> dict[str, Any]:
         cautions = describe_cautions(run.problem, history)
         errors = run.problem.errors(history) if len(history.get("t", ())) > 1 else {}
         verdict = find_verdict(run, screen)
-    except (BadInput, KeyError, ValueError, IndexError) as error:  # a deck of another version
+    except (BadInput, RunFailure, KeyError, ValueError, IndexError) as error:  # of another version
         left_out.append(f"what the problem says ({error})")
         cautions, errors, verdict = [], {}, ""
     left_out += [f"{sentence}" for sentence in run.skipped]

@@ -108,7 +108,7 @@ def compute_gradient(block: DumpBlock, name: str) -> np.ndarray:
     values = block.cell_fields[name]
     (x_i, x_j), (y_i, y_j), (along_i, along_j) = (np.gradient(a) for a in (x, y, values))
     inverse = 1.0 / (x_i * y_j - x_j * y_i)
-    return np.array(solve(along_i, along_j, x_i, y_i, x_j, y_j, inverse))
+    return np.array(solve(along_i, along_j, (x_i, y_i), (x_j, y_j), inverse))
 
 
 def measure_gradient(block: DumpBlock, name: str) -> np.ndarray:

@@ -104,7 +104,7 @@ def make_image(
             _write_blocks(file, evolution)
             group = file.create_group("state")
             for key, value in state.items():
-                if key in shown:
+                if key in shown and isinstance(value, np.ndarray):
                     _link_arrays(group, key, value, shown[key])
                 else:
                     group.create_dataset(key, data=value)

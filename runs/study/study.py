@@ -517,10 +517,8 @@ def make_work(
     point, source = definition.points[number], Path(definition.source)
     place = str((folder / "runs" / point.name).resolve())
     if definition.function is not None:
-        values = dict(definition.fixed) | dict(point.values)
-        return Work(
-            definition.source, point.settings, place, None, retry, definition.function, values
-        )
+        own = definition.function, (*definition.fixed, *point.values)
+        return Work(definition.source, point.settings, place, None, retry, *own)
     name = str(source.resolve()) if source.is_file() else definition.source
     return Work(name, (*definition.settings, *point.settings), place, threads, retry)
 

@@ -195,3 +195,18 @@ def test_a_study_of_another_deck_leaves_a_folder_alone(shockgrid, toy):
     assert after == before
     code, out, _ = shockgrid(*WORDS_TOY, "--vary", "cells=6,8", "-o", "s")
     assert code == 0 and "1 computed now, 1 there already" in out
+
+
+def add(a, b):
+    if a > 2:
+        raise ValueError("too large")
+    return {"sum": a + b, "product": a * b}
+
+
+def test_a_study_of_a_function_is_a_table_and_computes_once(tmp_path):
+    made = study(add, {"a": [1, 2, 3], "b": "1:2:2"}, tmp_path / "s", shown=["sum"])
+    assert made.table["sum"].tolist()[:4] == [2.0, 3.0, 3.0, 4.0]
+    assert set(made.failures) == {"a=3,b=1", "a=3,b=2"} and "too large" in str(made.failures)
+    assert "sum" in repr(made) and repr(made).count("\n") == 7
+    again = study(add, {"a": [1, 2], "b": [1, 2]}, tmp_path / "s")
+    assert again.table["product"].tolist() == [1.0, 2.0, 2.0, 4.0]

@@ -165,10 +165,11 @@ def find_pins(
 
 
 @kernel
-def find_deepest(points, line, boxes, group, reach):
+def find_deepest(points, pinned, line, boxes, group, reach):
     """The point furthest behind a face that looks at the points' line, in faces: (depth, point).
 
-    Points further from the line than `reach` [m] are not looked at, nor are its end faces: round a
+    Points that are `pinned`, with a position that is not negative, are not looked at, nor those
+    further from the line than `reach` [m], nor its end faces: round a
     body's corner what is behind one side is in front of the next.
     """
     count, last = line.shape[1] - 1, points.shape[1] - 1
@@ -177,6 +178,8 @@ def find_deepest(points, line, boxes, group, reach):
     for k in range(last + 1):
         if k % group == 0:
             near = find_groups(points, k, min(last + 1, k + group), boxes, reach, groups)
+        if near == 0 or pinned[k] >= 0.0:
+            continue
         x, y = points[0, k], points[1, k]
         along_x, along_y = find_direction(points, k)
         least, depth = 1e300, 0.0

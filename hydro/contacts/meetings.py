@@ -22,7 +22,7 @@ from hydro.boundary.kinds import Piston
 from hydro.contacts.facet_states import make_add_facet_flux
 from hydro.contacts.pair import Pair, PlanePair
 from hydro.contacts.rows import AREAS, COVERED, FOLLOWER, LEADER
-from hydro.contacts.surface import Surface, find_planes, is_surface
+from hydro.contacts.surface import Plane, Surface, find_planes, is_surface
 from hydro.contacts.voids import Voids
 from hydro.formulas.geometry import Geometry
 from hydro.links.link import Link
@@ -35,7 +35,6 @@ CUTS = 5  # times that a step is cut to the first touch, and made a little longe
 MOST_LONGER = 1.5  # a step that was cut too short
 REACHED = 1e-6  # of a step: a touch that comes so shortly before or after its end is at its end
 BACK = 0.2  # part that nodes behind the other line are taken back in a stable step
-ROUNDS = 2  # in which nodes of both lines are laid on the other one
 
 
 class Meetings:
@@ -68,10 +67,10 @@ class Meetings:
         self.touching: list[Pair] = []  # with pins
         self._sides: list[Surface] = []  # of the near pairs, and their walls
         self._walls: list[Surface] = []
-        self._found = self._read = False  # the present grid's facets; its lines
+        self._found = False  # the present grid's facets?
+        self._read: set[int] = set()  # surfaces whose lines are those of the present grid
         self._cuts = 0
         self.made = self.opened = 0
-        self.stretches = np.zeros(len(self.pairs), dtype=np.int64)
         self.length = 0.0
 
     def find(self, t: float, step: int) -> set[frozenset[int]]:
@@ -80,7 +79,7 @@ class Meetings:
         Raises RunFailure where two lines have crossed each other too far to go on.
         """
         if self.pairs and not self._found:
-            self._find()
+            self._find(step)
             for pair in self.touching:
                 crossing = pair.find_crossing()
                 if crossing:
@@ -137,8 +136,7 @@ class Meetings:
         if not awake:
             self._cuts = 0
             return None
-        if not self._read:
-            self._read_lines()
+        self._read_lines([s for pair in awake for s in (pair.follower, pair.leader)])
         for surface in self.surfaces:
             surface.read_new()
         for pair in awake:
@@ -178,15 +176,22 @@ class Meetings:
                 ):  # fmt: skip
                     surface.write_new()
                     _shift_ends(surface, shifts, self.surfaces)
-        for k in range(ROUNDS if pairs else 0):
+        for pair in pairs:
+            self._lay_line(pair, False, part_back)
+        if any([self._lay_line(pair, True, part_back) for pair in pairs]):
             for pair in pairs:
-                for back in (False, True) if k < ROUNDS - 1 else (False,):
-                    mover = pair.leader if back else pair.follower
-                    if mover.rigid:
-                        continue
-                    if pair.lay(back, part_back):
-                        mover.write_new()
-                    _shift_ends(mover, pair.shifts[:2], self.surfaces)
+                self._lay_line(pair, False, part_back)
+
+    def _lay_line(self, pair: Pair, back: bool, part_back: float) -> bool:
+        """Lay the follower's nodes on the leader, or with `back` the leader's; has any moved?"""
+        mover = pair.leader if back else pair.follower
+        if mover.rigid:
+            return False
+        moved = pair.lay(back, part_back)
+        if moved:
+            mover.write_new()
+        _shift_ends(mover, pair.shifts[:2], self.surfaces)
+        return bool(moved or pair.shifts[:2, 0].any())
 
     def fill_flux(self, t: float, dt: float) -> None:
         """Add the fluxes through closed facets to those of the free surfaces."""
@@ -213,43 +218,43 @@ class Meetings:
         if not self.pairs:
             return
         self.length = 0.0
-        for number, pair in enumerate(self.pairs):
+        for pair in self.pairs:
             pair.clearance -= pair.leader.way + pair.follower.way
             stretches = 0
             if pair.is_near:
                 stretches, length = pair.measure_closed()
                 self.length += length
-            change = stretches - int(self.stretches[number])
-            self.made += max(0, change)
-            self.opened += max(0, -change)
-            self.stretches[number] = stretches
+            if stretches != pair.stretches:
+                self.made += max(0, stretches - pair.stretches)
+                self.opened += max(0, pair.stretches - stretches)
+                pair.stretches = stretches
         self._found = False
 
     # --- parts -----------------------------------------------------------------------------------
 
-    def _read_lines(self) -> None:
-        for surface in (*self.surfaces, *self.planes):
-            surface.read()
-        self._read = True
+    def _read_lines(self, surfaces: Sequence[Surface | Plane]) -> None:
+        for surface in surfaces:
+            if id(surface) not in self._read:
+                surface.read()
+                self._read.add(id(surface))
 
-    def _find(self) -> None:
-        self._read = False
+    def _find(self, step: int = 0) -> None:
+        self._read.clear()
         for pair in self.pairs:
             if pair.is_near or pair.clearance <= 0.0:
-                if not self._read:
-                    self._read_lines()
+                self._read_lines((pair.follower, pair.leader))
                 pair.find()
-        self.near = [pair for pair in self.pairs if pair.is_near and pair.count]
-        self.touching = [pair for pair in self.pairs if pair.touches]
+        near = [pair for pair in self.pairs if pair.is_near]
+        self.near = [pair for pair in near if pair.count]
+        self.touching = [pair for pair in near if pair.touches]
         sides = {id(s) for pair in self.near for s in (pair.leader, pair.follower)}
         self._sides = [s for s in self.surfaces if id(s) in sides and not s.rigid]
         self._walls = [s for s in self.surfaces if id(s) in sides and s.rigid]
         for surface in self.surfaces:
             surface.moving_line.is_kinked = id(surface) in sides
         self._found = True
-        if self._read or self.voids.found:
-            if not self._read:
-                self._read_lines()
+        if self.voids.are_due(step, bool(self.near)):
+            self._read_lines((*self.surfaces, *self.planes))
             self.voids.find()
 
     def _set_velocities(self, t: float) -> None:
@@ -291,7 +296,9 @@ class Meetings:
         """What is counted."""
         if not self.pairs:
             return {}
-        counts = np.array([self.made, self.opened, *self.stretches], dtype=np.int64)
+        counts = np.array(
+            [self.made, self.opened, *(pair.stretches for pair in self.pairs)], dtype=np.int64
+        )
         return {
             "contacts/counts": counts,
             "contacts/length": self.length,
@@ -302,13 +309,14 @@ class Meetings:
         """Take up a state of `get_state`; a restart point without one had met nothing."""
         self._found = False
         for pair in self.pairs:
-            pair.clearance = 0.0
+            pair.clearance, pair.is_near = 0.0, False
         self.voids.set_state(state)
         counts = state.get("contacts/counts")
-        if counts is None or len(counts) != len(self.stretches) + 2:
+        if counts is None or len(counts) != len(self.pairs) + 2:
             return
         self.made, self.opened = int(counts[0]), int(counts[1])
-        self.stretches[:] = counts[2:]
+        for pair, stretches in zip(self.pairs, counts[2:].tolist(), strict=True):
+            pair.stretches = stretches
         self.length = float(state["contacts/length"])
 
 

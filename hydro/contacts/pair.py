@@ -59,6 +59,7 @@ class Pair:
         self.parts = (LATER, EARLIER) if self.is_one else (BOTH, BOTH)
         self.clearance = 0.0
         self.is_near = False
+        self.stretches = 0  # that are closed
         self.touched = False  # does a node of one come through the other in this step?
         self.count = self.closed = self.pinned = self.common = 0  # common: pins at shared ends
         nodes, back = self.follower.count + 1, self.leader.count + 1
@@ -96,16 +97,22 @@ class Pair:
 
     def find(self) -> None:
         """Facets of the old grid."""
-        if self.clearance <= 0.0:
+        lay = self.touches  # then they will do so still, which pins tell
+        if self.clearance <= 0.0 and not lay:
             self.clearance = self._measure_clearance()
         self.count = self.closed = self.pinned = 0
         self.is_near = self.clearance <= 0.0
+        if self.is_near:
+            self.pinned = self._find_pins()
+        if self.is_near and lay and not self.touches:
+            self.clearance = self._measure_clearance()
+            self.is_near = self.clearance <= 0.0
         if not self.is_near:
+            self.pinned = 0
             self.positions.fill(-1.0)
             self.back_positions.fill(-1.0)
             self.covered.fill(False)
             return
-        self.pinned = self._find_pins()
         if self.pinned > 1:
             line, other = self.leader.line, self.follower.line
             self._cut(line, other, self.positions, self.back_positions, self.covered)
@@ -128,9 +135,14 @@ class Pair:
         """A surface, the other one and the node of the first that is deep behind it, or None."""
         if self.one_body:
             return None  # what is behind a surface may be the other side of a film
-        for one, other in ((self.leader, self.follower), (self.follower, self.leader)):
+        for one, pinned, other in (
+            (self.leader, self.back_positions, self.follower),
+            (self.follower, self.positions, self.leader),
+        ):
             reach = 2.0 * MOST_BEHIND * other.longest
-            depth, node = find_deepest(one.line, other.line, other.boxes, other.group, reach)
+            depth, node = find_deepest(
+                one.line, pinned, other.line, other.boxes, other.group, reach
+            )
             # behind a line, yet beyond the other side of a thin body, is not in it
             if depth > MOST_BEHIND and is_inside(tuple(one.line[:, node]), other.block.nodes):
                 return one, other, int(node)

@@ -136,10 +136,9 @@ class Surface:
         """Ghosts beyond the faces from the states there."""
         fill_ghosts_from_faces(self.block.rim.rows, self.segment.spans)
 
-    def press(self, pressure: float, face: int | None = None) -> None:
-        """Put a pressure beside a face of the line, or all of them, beyond the segment's own."""
-        jump = self.segment.rim.jump[:: self.step]
-        jump[slice(None) if face is None else face] = pressure
+    def press(self, pressure: float, first: int = 0, last: int | None = None) -> None:
+        """Put a pressure beside faces first..last - 1 of the line, beyond the segment's own."""
+        self.segment.rim.jump[:: self.step][first:last] = pressure
 
     def find_stiffness(self, face: int) -> float:
         """rho c² [Pa] of the cell along a face of the line."""

@@ -23,18 +23,20 @@ from regrid.errors import BadInput
 SMALL = 0.5  # of the depth of the cells around it: a void whose area has this side is closed
 ROUND = 0.02  # of its perimeter squared: such a void has no contact on its way to close by
 LEAST = 0.1  # of the same depth: slivers whose area has a smaller side are no voids
+LARGE = 8.0  # of the same: larger voids without gas are measured, and new ones looked for,
+SELDOM = 8  # every so many steps
 Place = tuple[int, float]  # number of a curve, position on it
 
 
 @dataclass
 class Void:
-    """A void: its faces (curve, face), area, volume, perimeter, depth of the cells along it.
+    """A void: its faces (curve, first, after the last), area, volume, perimeter, cells' depth.
 
     gas: p V^gamma; rest: the volume at which it was found closed (0: it is not); stiffness: rho c²
     around it then; growth: of its volume in the step before.
     """
 
-    faces: set[tuple[int, int]]
+    faces: list[tuple[int, int, int]]
     area: float
     volume: float
     around: float
@@ -82,27 +84,36 @@ class Voids:
                     self.planes.append(pair.leader)
                 place = origins.index(id(pair.leader.origin))
                 self.numbers[id(pair.leader)] = len(self.surfaces) + place
+        self._steps = self._find_lasting_steps()
         self.found: list[Void] = []
+        self._asked = True  # at the start
         self._pushed = False  # has any face a pressure from a void?
+
+    def are_due(self, step: int, touching: bool) -> bool:
+        """Are they to be looked for?  Large ones with nothing in them only now and then."""
+        if self._asked or self.pressure > 0.0 or step % SELDOM == 0:
+            return touching or self._asked or bool(self.found)
+        return any(
+            void.gas != 0.0 or void.rest != 0.0 or void.area < (LARGE * void.depth) ** 2
+            for void in self.found
+        )
 
     def find(self) -> None:
         """The voids of the present lines, with what those before held; their faces' pressures."""
-        before, self.found = self.found, [self._measure(*loop) for loop in self._find_loops()]
+        self._asked = False
+        before, self.found = self.found, [self._measure(loop) for loop in self._find_loops()]
         self.found = [void for void in self.found if void.area > (LEAST * void.depth) ** 2]
         self._hand_on(before)
         self._press()
 
     # --- ways round ------------------------------------------------------------------------------
 
-    def _find_loops(self) -> list[tuple[np.ndarray, list[tuple[int, float, float]]]]:
-        """Ways round that close: their points (2, n), and the stretches of curves in them."""
-        steps = self._find_steps()
-        loops, seen = [], set()
+    def _find_loops(self) -> list[list[tuple[int, float, float]]]:
+        """Ways round that close, as stretches of curves; none that are points."""
+        steps, loops, seen = self._find_steps(), [], set()
         for start in [target for own in steps.values() for _, target in own]:
-            if start in seen:
-                continue
-            here, stretches, points = start, [], []
-            for _ in range(2 * sum(map(len, steps.values()))):
+            here, stretches, length = start, [], 0.0
+            while here not in seen:
                 seen.add(here)
                 curve, position = here
                 beyond = [step for step in steps.get(curve, ()) if step[0] >= position - 1e-9]
@@ -110,67 +121,72 @@ class Voids:
                     break
                 stop, here = min(beyond)
                 stretches.append((curve, position, stop))
-                points.append(self._cut(curve, position, stop))
-                if here == start:
-                    loops.append((np.concatenate(points, axis=1), stretches))
-                    break
-                if here in seen:
-                    break
+                length += stop - position if curve < len(self.surfaces) else 0.0
+            if stretches and here == start and length > 1e-6:
+                loops.append(stretches)
         return loops
+
+    def _find_lasting_steps(self) -> list[tuple[int, float, int, float]]:
+        """Steps from curve to curve, at positions on both, that stay: at ends, planes' corners."""
+        steps, first = [], len(self.surfaces)
+        for number, surface in enumerate(self.surfaces):
+            for following, other in enumerate(self.surfaces):
+                same = surface.ends[1] is not None and surface.ends[1] is other.ends[0]
+                if same and np.array_equal(surface.line[:, -1], other.line[:, 0]):  # no image
+                    steps.append((number, float(surface.count), following, 0.0))
+        for k, one_plane in enumerate(self.planes, first):
+            for m, two_plane in enumerate(self.planes, first):
+                a, b = one_plane.along, two_plane.along
+                out = float(a[0] * b[1] - a[1] * b[0])  # how fast the height over b rises along a
+                if out < -1e-9:
+                    way = two_plane.origin - one_plane.origin
+                    place = float(way[0] * b[1] - way[1] * b[0]) / out
+                    there = float((one_plane.origin + place * a - two_plane.origin) @ b)
+                    steps.append((k, place, m, there))
+        self._held = [
+            (number, end, side)
+            for number, surface in enumerate(self.surfaces)
+            for side, plane in enumerate(self.planes, first)
+            for end, key_node in enumerate(surface.ends)
+            if key_node is not None and plane.holds(key_node)
+        ]
+        return steps
 
     def _find_steps(self) -> dict[int, list[tuple[float, Place]]]:
         """On each curve the positions where one goes over to another, and to where."""
-        steps: dict[int, list[tuple[float, Place]]] = {}
-
-        def add(curve: int, position: float, target: int, place: float) -> None:
-            steps.setdefault(curve, []).append((float(position), (target, float(place))))
-
+        found = list(self._steps)
+        for number, end, side in self._held:
+            surface, plane = self.surfaces[number], self.planes[side - len(self.surfaces)]
+            place = float((surface.line[:, -end] - plane.origin) @ plane.along)
+            if end == 0:
+                found.append((side, place, number, 0.0))
+            else:
+                found.append((number, float(surface.count), side, place))
         for pair in self.pairs:
+            if not (pair.is_near and pair.count):
+                continue
             one, other = self.numbers[id(pair.leader)], self.numbers[id(pair.follower)]
-            ends = pair.ends[:, : pair.count if pair.is_near else 0]
-            leads = [self._convert(pair, ends[row]) for row in (LEADER_START, LEADER_STOP)]
-            for k in range(ends.shape[1]):
-                if k == 0 or ends[LEADER_START, k] != ends[LEADER_STOP, k - 1]:
-                    add(one, leads[0][k], other, ends[FOLLOWER_START, k])
-                if k == ends.shape[1] - 1 or ends[LEADER_START, k + 1] != ends[LEADER_STOP, k]:
-                    add(other, ends[FOLLOWER_STOP, k], one, leads[1][k])
-        for number, surface in enumerate(self.surfaces):
-            for following, other in enumerate(self.surfaces):
-                if surface.ends[1] is None or surface.ends[1] is not other.ends[0]:
-                    continue
-                if np.array_equal(surface.line[:, -1], other.line[:, 0]):  # no periodic image
-                    add(number, surface.count, following, 0.0)
-            for side, plane in enumerate(self.planes, len(self.surfaces)):
-                for end, node in ((0, 0), (1, surface.count)):
-                    if surface.ends[end] is None or not plane.holds(surface.ends[end]):
-                        continue
-                    place = float((surface.line[:, node] - plane.origin) @ plane.along)
-                    if end == 0:
-                        add(side, place, number, 0.0)
-                    else:
-                        add(number, surface.count, side, place)
-        for k, one_plane in enumerate(self.planes):
-            for m, two_plane in enumerate(self.planes):
-                a, b = one_plane.along, two_plane.along
-                out = a[0] * b[1] - a[1] * b[0]  # along a, how fast the height over b rises
-                if out < -1e-9:
-                    way = two_plane.origin - one_plane.origin
-                    place = (way[0] * b[1] - way[1] * b[0]) / out
-                    there = one_plane.origin + place * a
-                    add(
-                        k + len(self.surfaces), place, m + len(self.surfaces),
-                        (there - two_plane.origin) @ b,
-                    )  # fmt: skip
+            ends = pair.ends[:, : pair.count]
+            breaks = np.flatnonzero(ends[LEADER_START, 1:] != ends[LEADER_STOP, :-1])
+            for k in (0, *(breaks + 1)):
+                place = self._convert(pair, ends[LEADER_START, k])
+                found.append((one, place, other, float(ends[FOLLOWER_START, k])))
+            for k in (*breaks, pair.count - 1):
+                place = self._convert(pair, ends[LEADER_STOP, k])
+                found.append((other, float(ends[FOLLOWER_STOP, k]), one, place))
+        steps: dict[int, list[tuple[float, Place]]] = {}
+        for curve, position, target, place in found:
+            steps.setdefault(curve, []).append((position, (target, place)))
         return steps
 
     @staticmethod
-    def _convert(pair: Pair, positions: np.ndarray) -> np.ndarray:
-        """Positions on the leader; on a plane in metres from its origin."""
+    def _convert(pair: Pair, position: float) -> float:
+        """A position on the leader; on a plane in metres from its origin."""
         if not isinstance(pair, PlanePair):
-            return positions
+            return float(position)
         plane = pair.leader
         start = (plane.line[:, 0] - plane.origin) @ plane.along
-        return start + positions * ((plane.line[:, 1] - plane.line[:, 0]) @ plane.along)
+        return float(start + position * ((plane.line[:, 1] - plane.line[:, 0]) @ plane.along))
 
     def _cut(self, curve: int, start: float, stop: float) -> np.ndarray:
         """Points (2, n) of a curve between two positions."""
@@ -178,27 +194,32 @@ class Voids:
             plane = self.planes[curve - len(self.surfaces)]
             return plane.origin[:, None] + plane.along[:, None] * np.array([start, stop])
         line = self.surfaces[curve].line
-        inner = np.arange(math.floor(start) + 1, math.ceil(stop))
-        at = np.concatenate([[start], inner, [stop]])
-        a = np.minimum(at.astype(np.int64), line.shape[1] - 2)
-        return line[:, a] + (at - a) * (line[:, a + 1] - line[:, a])
+        a, b = math.floor(start), min(math.floor(stop), line.shape[1] - 2)
+        first, last = (
+            line[:, k : k + 1] + (at - k) * (line[:, k + 1 : k + 2] - line[:, k : k + 1])
+            for k, at in ((min(a, line.shape[1] - 2), start), (b, stop))
+        )
+        return np.concatenate([first, line[:, a + 1 : math.ceil(stop)], last], axis=1)
 
-    def _measure(self, points: np.ndarray, stretches: list[tuple[int, float, float]]) -> Void:
-        """Area and volume of a loop; depth and stiffness of the cells along it."""
+    def _measure(self, stretches: list[tuple[int, float, float]]) -> Void:
+        """Area and volume of a loop, depth of the cells along it."""
+        points = np.concatenate([self._cut(*stretch) for stretch in stretches], axis=1)
         x, y = points
         x_next, y_next = np.roll(points, -1, axis=1)
         area = 0.5 * float((x_next * y - x * y_next).sum())
         volume = area
         if self.curved:
             volume = float(((x_next - x) * (y * y + y * y_next + y_next * y_next)).sum()) / 6.0
-        faces, depth = set(), []
+        faces, depth = [], []
         for curve, start, stop in stretches:
             if curve >= len(self.surfaces) or self.surfaces[curve].rigid:
                 continue
             surface = self.surfaces[curve]
-            own = np.arange(int(start), min(math.ceil(stop), surface.count))
-            faces |= {(curve, int(face)) for face in own}
-            depth.append(np.hypot(*(surface.inner - surface.line))[own].sum() / max(1, own.size))
+            first, last = int(start), min(math.ceil(stop), surface.count)
+            if first < last:
+                faces.append((curve, first, last))
+                ways = surface.inner[:, first : last + 1] - surface.line[:, first : last + 1]
+                depth.append(float(np.hypot(*ways).mean()))
         around = float(np.hypot(x_next - x, y_next - y).sum())
         return Void(faces, area, volume, around, sum(depth) / max(1, len(depth)))
 
@@ -207,11 +228,11 @@ class Voids:
     def _hand_on(self, before: list[Void]) -> None:
         """Give the gas of the voids before to those that have their faces; fill new ones."""
         for void in self.found:
-            parents = [old for old in before if old.faces & void.faces]
+            parents = [old for old in before if _share_faces(old, void)]
             if not parents:
                 void.gas = self.pressure * void.volume**self.gamma
             children = [
-                v for v in self.found if any(old.faces & v.faces for old in parents)
+                v for v in self.found if any(_share_faces(old, v) for old in parents)
             ]  # with the same pressure
             was = sum(old.volume for old in parents)
             now = sum(child.volume for child in children)
@@ -236,9 +257,9 @@ class Voids:
                 if not surface.rigid and surface.segment.tension == 0.0:
                     surface.press(0.0)
             for void, pressure in zip(self.found, pressures, strict=True):
-                for curve, face in void.faces:
+                for curve, first, last in void.faces:
                     if self.surfaces[curve].segment.tension == 0.0:
-                        self.surfaces[curve].press(pressure, face)
+                        self.surfaces[curve].press(pressure, first, last)
         self._pushed = any(pressures)
 
     def find_stiffness(self) -> None:
@@ -246,7 +267,7 @@ class Voids:
         for void in self.found:
             if void.rest > 0.0 and void.stiffness == 0.0:
                 void.stiffness = max(
-                    self.surfaces[curve].find_stiffness(face) for curve, face in void.faces
+                    self.surfaces[curve].find_stiffness(first) for curve, first, _ in void.faces
                 )
 
     def compute_row(self) -> dict[str, float | int]:
@@ -255,12 +276,13 @@ class Voids:
 
     def get_state(self) -> dict[str, Any]:
         """What the voids held, and the faces by which they are known again."""
-        faces = [(n, *face) for n, void in enumerate(self.found) for face in sorted(void.faces)]
+        faces = [(n, *face) for n, void in enumerate(self.found) for face in void.faces]
         numbers = [
             (v.area, v.volume, v.around, v.depth, v.gas, v.rest, v.stiffness) for v in self.found
         ]
         return {
-            "contacts/void_faces": np.array(faces, dtype=np.int64).reshape(-1, 3),
+            "contacts/void_faces": np.array(faces, dtype=np.int64).reshape(-1, 4),
+            "contacts/voids_asked": self._asked,
             "contacts/voids": np.array(numbers, dtype=np.float64).reshape(-1, 7),
         }
 
@@ -268,7 +290,17 @@ class Voids:
         """Take up a state of `get_state`."""
         self.found = []
         if state.get("contacts/voids") is not None:
-            self.found = [Void(set(), *map(float, row)) for row in state["contacts/voids"]]
-            for number, curve, face in np.asarray(state["contacts/void_faces"]).tolist():
-                self.found[number].faces.add((curve, face))
+            self._asked = bool(state["contacts/voids_asked"])
+            self.found = [Void([], *map(float, row)) for row in state["contacts/voids"]]
+            for number, *faces in np.asarray(state["contacts/void_faces"]).tolist():
+                self.found[number].faces.append(tuple(faces))
         self._pushed = True
+
+
+def _share_faces(one: Void, other: Void) -> bool:
+    """Have two voids, of different times, a face in common?"""
+    return any(
+        curve == there and first < end and start < last
+        for curve, first, last in one.faces
+        for there, start, end in other.faces
+    )

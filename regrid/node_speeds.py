@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrid.algebraic import fill_displacement
-from regrid.jit import kernel
+from regrid.jit import inlined, kernel
 from regrid.measure.corners import compute_doubled_area, find_triangle
 from regrid.measure.quality import find_bad_cells
 from regrid.work_arrays import share_memory
@@ -104,6 +104,22 @@ def fill_limited(old, new, interpolated, most, first, last, out):
     return limited
 
 
+@inlined
+def mark_cell(loose, i, j):
+    """Mark the four nodes of a cell."""
+    loose[i, j] = loose[i + 1, j] = loose[i, j + 1] = loose[i + 1, j + 1] = 1
+
+
+@inlined
+def move_marked(limited, new, first, last, loose, part):
+    """Move marked nodes by a part of the way from `limited` to `new`."""
+    for i in range(1, limited.shape[1] - 1):
+        for j in range(first[i], last[i] + 1):
+            if loose[i, j] > 0:
+                for k in range(2):
+                    limited[k, i, j] += part * (new[k, i, j] - limited[k, i, j])
+
+
 @kernel
 def relax_sharpened(old, new, limited, first, last, loose):
     """Go half the way from `limited` to `new` with nodes of cells that the limit sharpens.
@@ -129,12 +145,8 @@ def relax_sharpened(old, new, limited, first, last, loose):
                 sharpened |= not (area >= KEPT * min(before, after))
             if sharpened:
                 count += 1
-                loose[i, j] = loose[i + 1, j] = loose[i, j + 1] = loose[i + 1, j + 1] = 1
-    for i in range(1, ni):
-        for j in range(first[i], last[i] + 1):
-            if loose[i, j] > 0:
-                for k in range(2):
-                    limited[k, i, j] = 0.5 * (limited[k, i, j] + new[k, i, j])
+                mark_cell(loose, i, j)
+    move_marked(limited, new, first, last, loose, 0.5)
     return count
 
 
@@ -165,12 +177,8 @@ def release_folded(new, limited, first, last, whole, loose):
                 folded |= not (compute_doubled_area(limited, i, j, corner) > ROUND_OFF * squares)
             if folded:
                 count += 1
-                loose[i, j] = loose[i + 1, j] = loose[i, j + 1] = loose[i + 1, j + 1] = 1
-    for i in range(1, ni):
-        for j in range(first[i], last[i] + 1):
-            if loose[i, j] > 0:
-                for k in range(2):
-                    limited[k, i, j] += part * (new[k, i, j] - limited[k, i, j])
+                mark_cell(loose, i, j)
+    move_marked(limited, new, first, last, loose, part)
     return count
 
 

@@ -26,7 +26,7 @@ from regrid.barrier.functional import (
 )
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
 from regrid.barrier.step_control import SPAN
-from regrid.jit import kernel
+from regrid.jit import inlined, kernel
 
 # What a column chunk keeps for every row of nodes: the Hessian's couplings as 2 × 2 blocks (xx,
 # xy, yx, yy) to the nodes (i, j+1), (i+1, j+1), from (i+1, j) to (i, j+1), and to (i+1, j); the
@@ -171,10 +171,9 @@ def end_row(cells, Z):
         Z[OLD_FY + col] = Z[FLUX_Y + col]
         Z[OLD_RIGHT_GX + col] = Z[RIGHT_GX + col]
         Z[OLD_RIGHT_GY + col] = Z[RIGHT_GY + col]
-        Z[OLD_RIGHT + col] = Z[RIGHT + col]
-        Z[OLD_RIGHT + SPAN + col] = Z[RIGHT + SPAN + col]
-        Z[OLD_RIGHT + 2 * SPAN + col] = Z[RIGHT + 2 * SPAN + col]
-        Z[OLD_RIGHT + 3 * SPAN + col] = Z[RIGHT + 3 * SPAN + col]
+    for k in range(0, 4 * SPAN, SPAN):
+        for col in range(cells):
+            Z[OLD_RIGHT + k + col] = Z[RIGHT + k + col]
 
 
 @kernel(allocates=False)
@@ -188,6 +187,26 @@ def fill_fading(growth, cells, Z):
     for col in range(cells):
         ratio = (Z[GA + col] + Z[GA + col + 1]) / (Z[GB + col] + Z[GC + col])
         Z[FADING + col] = fade(ratio, growth)
+
+
+@inlined
+def fill_cell_numbers(aa, bb, ab, ba, to, cells, now, Z):
+    """One number, `to`, of every 2 × 2 block of a row of cells: of its edges and across it.
+
+    `aa`, `bb`, `ab`: the rows of that number in the terms of a corner, `ba` of the transposed one.
+    """
+    for col in range(cells):
+        near_1, far_1 = Z[TERMS + ab + col], Z[TERMS + ba + col]
+        near_3, far_3 = Z[CORNER_3 + ab + col], Z[CORNER_3 + ba + col]
+        far_2, near_4 = Z[CORNER_2 + ba + col], Z[CORNER_4 + ab + col]
+        low, up = Z[TERMS + aa + col] + Z[CORNER_4 + aa + col], Z[CORNER_2 + aa + col]
+        left, right = Z[TERMS + bb + col] + Z[CORNER_2 + bb + col], Z[CORNER_3 + bb + col]
+        Z[LOW + to + col] = (near_4 - far_1) - low
+        Z[UP + to + col] = (far_2 - near_3) - (up + Z[CORNER_3 + aa + col])
+        Z[LEFT + to + col] = (far_2 - near_1) - left
+        Z[RIGHT + to + col] = (near_4 - far_3) - (right + Z[CORNER_4 + bb + col])
+        now[DIAGONAL + to + col] = -(near_4 + far_2)
+        now[CROSS + to + col] = near_1 + far_3
 
 
 @kernel(allocates=False)
@@ -206,66 +225,10 @@ def fill_cell_blocks(cells, now, Z):
         Z[LEFT_GY + col] = Z[TERMS + GRAD_BY + col] + Z[CORNER_2 + GRAD_BY + col]
         Z[RIGHT_GX + col] = Z[CORNER_3 + GRAD_BX + col] + Z[CORNER_4 + GRAD_BX + col]
         Z[RIGHT_GY + col] = Z[CORNER_3 + GRAD_BY + col] + Z[CORNER_4 + GRAD_BY + col]
-    for col in range(cells):
-        xx1, xx2, xx3, xx4 = (
-            Z[TERMS + AB_XX + col],
-            Z[CORNER_2 + AB_XX + col],
-            Z[CORNER_3 + AB_XX + col],
-            Z[CORNER_4 + AB_XX + col],
-        )
-        yy1, yy2, yy3, yy4 = (
-            Z[TERMS + AB_YY + col],
-            Z[CORNER_2 + AB_YY + col],
-            Z[CORNER_3 + AB_YY + col],
-            Z[CORNER_4 + AB_YY + col],
-        )
-        Z[LOW + col] = (xx4 - xx1) - (Z[TERMS + AA_XX + col] + Z[CORNER_4 + AA_XX + col])
-        Z[UP + col] = (xx2 - xx3) - (Z[CORNER_2 + AA_XX + col] + Z[CORNER_3 + AA_XX + col])
-        Z[LEFT + col] = (xx2 - xx1) - (Z[TERMS + BB_XX + col] + Z[CORNER_2 + BB_XX + col])
-        Z[RIGHT + col] = (xx4 - xx3) - (Z[CORNER_3 + BB_XX + col] + Z[CORNER_4 + BB_XX + col])
-        Z[LOW + 3 * SPAN + col] = (yy4 - yy1) - (Z[TERMS + AA_YY + col] + Z[CORNER_4 + AA_YY + col])
-        Z[UP + 3 * SPAN + col] = (yy2 - yy3) - (
-            Z[CORNER_2 + AA_YY + col] + Z[CORNER_3 + AA_YY + col]
-        )
-        Z[LEFT + 3 * SPAN + col] = (yy2 - yy1) - (
-            Z[TERMS + BB_YY + col] + Z[CORNER_2 + BB_YY + col]
-        )
-        Z[RIGHT + 3 * SPAN + col] = (yy4 - yy3) - (
-            Z[CORNER_3 + BB_YY + col] + Z[CORNER_4 + BB_YY + col]
-        )
-        now[DIAGONAL + col] = -(xx4 + xx2)
-        now[DIAGONAL + 3 * SPAN + col] = -(yy4 + yy2)
-        now[CROSS + col] = xx1 + xx3
-        now[CROSS + 3 * SPAN + col] = yy1 + yy3
-    for col in range(cells):
-        xy1, xy2, xy3, xy4 = (
-            Z[TERMS + AB_XY + col],
-            Z[CORNER_2 + AB_XY + col],
-            Z[CORNER_3 + AB_XY + col],
-            Z[CORNER_4 + AB_XY + col],
-        )
-        yx1, yx2, yx3, yx4 = (
-            Z[TERMS + AB_YX + col],
-            Z[CORNER_2 + AB_YX + col],
-            Z[CORNER_3 + AB_YX + col],
-            Z[CORNER_4 + AB_YX + col],
-        )
-        low = Z[TERMS + AA_XY + col] + Z[CORNER_4 + AA_XY + col]
-        up = Z[CORNER_2 + AA_XY + col] + Z[CORNER_3 + AA_XY + col]
-        left = Z[TERMS + BB_XY + col] + Z[CORNER_2 + BB_XY + col]
-        right = Z[CORNER_3 + BB_XY + col] + Z[CORNER_4 + BB_XY + col]
-        Z[LOW + SPAN + col] = (xy4 - yx1) - low
-        Z[LOW + 2 * SPAN + col] = (yx4 - xy1) - low
-        Z[UP + SPAN + col] = (yx2 - xy3) - up
-        Z[UP + 2 * SPAN + col] = (xy2 - yx3) - up
-        Z[LEFT + SPAN + col] = (yx2 - xy1) - left
-        Z[LEFT + 2 * SPAN + col] = (xy2 - yx1) - left
-        Z[RIGHT + SPAN + col] = (xy4 - yx3) - right
-        Z[RIGHT + 2 * SPAN + col] = (yx4 - xy3) - right
-        now[DIAGONAL + SPAN + col] = -(xy4 + yx2)
-        now[DIAGONAL + 2 * SPAN + col] = -(yx4 + xy2)
-        now[CROSS + SPAN + col] = xy1 + yx3
-        now[CROSS + 2 * SPAN + col] = yx1 + xy3
+    fill_cell_numbers(AA_XX, BB_XX, AB_XX, AB_XX, 0, cells, now, Z)
+    fill_cell_numbers(AA_XY, BB_XY, AB_XY, AB_YX, SPAN, cells, now, Z)
+    fill_cell_numbers(AA_XY, BB_XY, AB_YX, AB_XY, 2 * SPAN, cells, now, Z)
+    fill_cell_numbers(AA_YY, BB_YY, AB_YY, AB_YY, 3 * SPAN, cells, now, Z)
 
 
 @kernel(allocates=False)
@@ -367,50 +330,32 @@ def add_cost(x0, y0, x1, y1, sound, scale, weight, cells, now, Z):
             )
             # Each of A and B is the mean of the cell's two edges that way.
             half = 0.5 * first
-            Z[LOW_GX + col] += half * dax
-            Z[LOW_GY + col] += half * day
-            Z[UP_GX + col] += half * dax
-            Z[UP_GY + col] += half * day
-            Z[LEFT_GX + col] += half * dbx
-            Z[LEFT_GY + col] += half * dby
-            Z[RIGHT_GX + col] += half * dbx
-            Z[RIGHT_GY + col] += half * dby
-            less_xx, less_xy, less_yy = (
-                0.25 * (aa_xx - bb_xx),
-                0.25 * (aa_xy - bb_xy),
-                0.25 * (aa_yy - bb_yy),
-            )
-            odd = 0.25 * (ab_xy - ab_yx)
-            Z[LOW + col] -= less_xx
-            Z[LOW + SPAN + col] -= less_xy - odd
-            Z[LOW + 2 * SPAN + col] -= less_xy + odd
-            Z[LOW + 3 * SPAN + col] -= less_yy
-            Z[UP + col] -= less_xx
-            Z[UP + SPAN + col] -= less_xy + odd
-            Z[UP + 2 * SPAN + col] -= less_xy - odd
-            Z[UP + 3 * SPAN + col] -= less_yy
-            Z[LEFT + col] += less_xx
-            Z[LEFT + SPAN + col] += less_xy - odd
-            Z[LEFT + 2 * SPAN + col] += less_xy + odd
-            Z[LEFT + 3 * SPAN + col] += less_yy
-            Z[RIGHT + col] += less_xx
-            Z[RIGHT + SPAN + col] += less_xy + odd
-            Z[RIGHT + 2 * SPAN + col] += less_xy - odd
-            Z[RIGHT + 3 * SPAN + col] += less_yy
+            for edge, dx, dy in (
+                (LOW_GX, dax, day), (UP_GX, dax, day), (LEFT_GX, dbx, dby), (RIGHT_GX, dbx, dby),
+            ):  # fmt: skip
+                Z[edge + col] += half * dx
+                Z[edge + SPAN + col] += half * dy
+            less_xx, less_xy = 0.25 * (aa_xx - bb_xx), 0.25 * (aa_xy - bb_xy)
+            less_yy, odd = 0.25 * (aa_yy - bb_yy), 0.25 * (ab_xy - ab_yx)
+            for edge, sign, turn in (
+                (LOW, -1.0, odd),
+                (UP, -1.0, -odd),
+                (LEFT, 1.0, -odd),
+                (RIGHT, 1.0, odd),
+            ):
+                Z[edge + col] += sign * less_xx
+                Z[edge + SPAN + col] += sign * less_xy + turn
+                Z[edge + 2 * SPAN + col] += sign * less_xy - turn
+                Z[edge + 3 * SPAN + col] += sign * less_yy
             sum_xx, sum_xy, sum_yy = (
-                0.25 * (aa_xx + bb_xx),
-                0.25 * (aa_xy + bb_xy),
-                0.25 * (aa_yy + bb_yy),
-            )
+                0.25 * (aa_xx + bb_xx), 0.25 * (aa_xy + bb_xy), 0.25 * (aa_yy + bb_yy),
+            )  # fmt: skip
             even_xx, even_xy, even_yy = 0.5 * ab_xx, 0.25 * (ab_xy + ab_yx), 0.5 * ab_yy
-            now[DIAGONAL + col] -= sum_xx + even_xx
-            now[DIAGONAL + SPAN + col] -= sum_xy + even_xy
-            now[DIAGONAL + 2 * SPAN + col] -= sum_xy + even_xy
-            now[DIAGONAL + 3 * SPAN + col] -= sum_yy + even_yy
-            now[CROSS + col] -= sum_xx - even_xx
-            now[CROSS + SPAN + col] -= sum_xy - even_xy
-            now[CROSS + 2 * SPAN + col] -= sum_xy - even_xy
-            now[CROSS + 3 * SPAN + col] -= sum_yy - even_yy
+            for block, sign in ((DIAGONAL, 1.0), (CROSS, -1.0)):
+                now[block + col] -= sum_xx + sign * even_xx
+                now[block + SPAN + col] -= sum_xy + sign * even_xy
+                now[block + 2 * SPAN + col] -= sum_xy + sign * even_xy
+                now[block + 3 * SPAN + col] -= sum_yy + sign * even_yy
 
 
 def make_corner(corner_terms):

@@ -14,7 +14,6 @@ import time
 import numpy as np
 from result_tables import Tables
 
-from regrid.algebraic import fill_displacement
 from regrid.barrier import newton_move
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.sweeps import Sweeps
@@ -60,7 +59,7 @@ def time_parts(tables: Tables, ni: int, nj: int) -> None:
     work.old[:] = work.sides[:] = nodes
     work.begin(True, 0.9, 0.1)
     parts = {
-        "displacement": lambda: fill_displacement(nodes, nodes, work.displacement),
+        "move and look": lambda: work.look(work.base, work.old, moves=True),
         "corner test": lambda: work.compare_corners(nodes, work.old),
         "assembly": lambda: work.assemble(nodes),
         "start of the solve": lambda: work.solve(0.0, 0.0, 0),

@@ -210,30 +210,30 @@ def prepare_motion(old, motion, most_bend, bent):
 def fill_moved_row(old, i, motion, bend, bent, low, count, out):
     """Row i of the grid moved with its sides (R6.5), `count` columns from `low` on, into `out`."""
     ni, nj, sides, along_j = out.shape[1] - 1, out.shape[2] - 1, motion.sides, motion.along_j
-    high = low + count
-    row_x, row_y = out[0, i, low:high], out[1, i, low:high]
     if i == 0 or i == ni:
-        for col in range(count):
-            row_x[col], row_y[col] = sides[0, i, low + col], sides[1, i, low + col]
+        for j in range(low, low + count):
+            out[0, i, j], out[1, i, j] = sides[0, i, j], sides[1, i, j]
         return
+    # Sides may be those of `out` itself: inner nodes alone are computed.
+    first, last = max(low, 1), min(low + count, nj)
+    row_x, row_y = out[0, i, first:last], out[1, i, first:last]
     here = take_blend(i, motion.along_i, motion.corners)
-    old_x, old_y = old[0, i, low:high], old[1, i, low:high]
-    laws, bends = along_j[LAW, low:high], along_j[LAW_CHANGE, low:high]
-    value_x, value_y = along_j[VALUE_X, low:high], along_j[VALUE_Y, low:high]
-    change_x, change_y = along_j[CHANGE_X, low:high], along_j[CHANGE_Y, low:high]
-    for col in range(count):
+    old_x, old_y = old[0, i, first:last], old[1, i, first:last]
+    laws, bends = along_j[LAW, first:last], along_j[LAW_CHANGE, first:last]
+    value_x, value_y = along_j[VALUE_X, first:last], along_j[VALUE_Y, first:last]
+    change_x, change_y = along_j[CHANGE_X, first:last], along_j[CHANGE_Y, first:last]
+    for col in range(last - first):
         x, y = blend(
             here, laws[col], bends[col], value_x[col], value_y[col], change_x[col], change_y[col]
         )
         row_x[col] = old_x[col] + x
         row_y[col] = old_y[col] + y
     if bent:
-        part, turn_x, turn_y = bend[i, low:high], motion.turn[0, low:high], motion.turn[1, low:high]
-        for col in range(count):
-            row_x[col] += part[col] * turn_x[col]
-            row_y[col] += part[col] * turn_y[col]
+        for j in range(first, last):
+            out[0, i, j] += bend[i, j] * motion.turn[0, j]
+            out[1, i, j] += bend[i, j] * motion.turn[1, j]
     for j in (0, nj):
-        if low <= j < high:
+        if low <= j < low + count:
             out[0, i, j], out[1, i, j] = sides[0, i, j], sides[1, i, j]
 
 

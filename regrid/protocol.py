@@ -55,7 +55,7 @@ class RegridReport:
 class RegridResult:
     """A valid grid on the wanted boundary: `nodes` of shape (2, ni+1, nj+1), and its report.
 
-    `nodes` is a fresh array that belongs to the caller.
+    `nodes` belongs to the caller: a fresh array, or `boundary` where that was asked for.
     """
 
     nodes: np.ndarray
@@ -138,16 +138,22 @@ def check_regridder(regridder: object, given: str) -> None:
 
 
 def call_regridder(
-    regridder: Regridder, previous: np.ndarray, boundary: np.ndarray, *more: Any, where: str = ""
+    regridder: Regridder,
+    previous: np.ndarray,
+    boundary: np.ndarray,
+    *more: Any,
+    where: str = "",
+    in_place: bool = False,
 ) -> RegridResult:
     """What `regridder.regrid` returns, if it keeps its word about the shape and the sides.
 
     Nodes of sides that a regridder places itself (`free_sides`) are its own.  `where`: words for a
-    message, "block 'gas'".  Raises BadInput for other sides or no grid at all, and what `regrid`
-    raises.
+    message, "block 'gas'"; `in_place`: the grid may be written into `boundary`.  Raises BadInput
+    for other sides or no grid at all, and what `regrid` raises.
     """
     given = np.concatenate(get_sides(boundary), axis=1)
-    result = regridder.regrid(previous, boundary, *more)
+    options = {"in_place": True} if in_place and hasattr(regridder, "works_in_place") else {}
+    result = regridder.regrid(previous, boundary, *more, **options)
     name = f"regridder {type(regridder).__name__}"
     place = f"{name}: {where}" if where else name
     nodes = getattr(result, "nodes", None)

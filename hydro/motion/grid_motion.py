@@ -195,15 +195,17 @@ class GridMotion(Sides):
         more = (block.compute_sound_speed(block.start),) if self.cost_aware[number] else ()
         try:
             result = call_regridder(
-                regridder, block.nodes, block.nodes_new, *more, where=f"block {block.name!r}"
-            )
+                regridder, block.nodes, block.nodes_new, *more, where=f"block {block.name!r}",
+                in_place=True,
+            )  # fmt: skip
         except RegridFailure as failure:
             failure.block = block.name
             raise
         nodes, most = result.nodes, MOST_EXCESS * min(1.0, fraction)
         if result.report.strayed > most:
             nodes, self._limited[number] = self.limiters[number].limit(block.nodes, nodes, most)
-        block.nodes_new[...] = nodes
+        if nodes is not block.nodes_new:
+            block.nodes_new[...] = nodes
         self.reports[number] = result.report
 
     def _spare_polygons(self, number: int, most: float) -> None:

@@ -112,6 +112,9 @@ class NewtonMove:
         True when `work.trial` is valid.
         """
         work = self.work
+        if work.sides is not work.own_sides:  # the moved grid may lie in the same array
+            work.own_sides[:] = work.sides
+            work.sides = work.own_sides
         if self._advance():
             return True
         begin, end = work.old.copy(), work.sides.copy()

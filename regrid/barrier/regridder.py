@@ -112,6 +112,8 @@ class BarrierRegridder:
                 edge_lengths=edge_lengths, family=family, threads=threads,
             )  # fmt: skip
 
+    works_in_place = True  # may it be asked to write the grid into `boundary`?
+
     @property
     def sees_cost(self) -> bool:
         """Does it want the sound speeds?  Not the sweeps."""
@@ -123,17 +125,21 @@ class BarrierRegridder:
         boundary: np.ndarray,
         sound_speed: np.ndarray | None = None,
         least_dear_rate: float = 0.0,
+        in_place: bool = False,
     ) -> RegridResult:
         """The grid inside `boundary` (2, ni+1, nj+1; only its sides are read), near `previous`.
 
         With `sound_speed` (ni, nj) [m/s], cells that would set the time step are opened (R4.10):
         those crossed in less than 1/R, R the greater of this block's (`compute_dear_rate`) and
-        `least_dear_rate` [1/s], the greatest of the blocks that share the step.
+        `least_dear_rate` [1/s], the greatest of the blocks that share the step.  `in_place` writes
+        the grid into `boundary`, if that is in order, and loses its inside in any case.
         Raises RegridFailure, naming side and nodes, when there is no valid grid or none is found.
         """
         if self._sweeps is not None:
             return self._sweeps.regrid(previous, boundary)
+        target = boundary
         previous, boundary = take_grids(previous, boundary)
+        into = boundary if in_place and boundary is target else None
         weights = self.family
         if weights is None:
             weights = np.empty(2)
@@ -149,7 +155,7 @@ class BarrierRegridder:
                     f"regrid: sound_speed has shape {sound_speed.shape}; it must be (ni, nj), "
                     f"here {(previous.shape[1] - 1, previous.shape[2] - 1)}"
                 )
-        work.take(previous, boundary, transposed, mirrored, sound_speed)
+        work.take(previous, boundary, transposed, mirrored, sound_speed, into)
         work.least_dear_rate = float(least_dear_rate)
         move = NewtonMove(
             self.tuning, work, conditional=self.conditional, ki=float(ki), kj=float(kj),
@@ -168,7 +174,7 @@ class BarrierRegridder:
         report = move.report()
         if report.quality and mirrored != transposed:  # of a grid that turns clockwise
             report = replace(report, quality=None)
-        return RegridResult(work.give(transposed, mirrored), report)
+        return RegridResult(work.give(transposed, mirrored, into), report)
 
     def compute_dear_rate(self, boundary: np.ndarray, sound_speed: np.ndarray) -> float:
         """R [1/s] of theory R4.11: the rate that these sides ask for, whatever is inside.

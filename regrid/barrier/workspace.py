@@ -184,18 +184,19 @@ class Workspace:
         self.old, self.sides, self.sound = self.own_old, self.own_sides, self.own_sound
         self.base, self.trial = self.own_base, self.own_trial
 
-    def take(self, previous, boundary, transposed, mirrored, sound=None) -> None:
+    def take(self, previous, boundary, transposed, mirrored, sound=None, into=None) -> None:
         """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides.
 
         `sound` (ni, nj) [m/s], where speeds of sound are given; without a grid before sides alone.
-        In the workspace's own frame they are read where they are, and `base` is a new array.
+        In the workspace's own frame they are read where they are, and `base` is the array `into`,
+        a new one without it.
         """
         if self.shared:
             self._lay(share_memory(self.size))
             self.clean = False
         self.use_own()
         if not (transposed or mirrored):
-            self.base, self.sides = np.empty(self.shape), boundary
+            self.base, self.sides = np.empty(self.shape) if into is None else into, boundary
             self.old = boundary if previous is None else previous
         else:
             load_grid(boundary, self.sides, transposed, mirrored, inside=False)
@@ -209,12 +210,16 @@ class Workspace:
         self.old, self.sides = self.own_old, self.own_sides
         self.old[:], self.sides[:] = old, sides
 
-    def give(self, transposed: bool, mirrored: bool) -> np.ndarray:
-        """The grid `trial` in the block's own frame, to keep."""
+    def give(self, transposed: bool, mirrored: bool, into=None) -> np.ndarray:
+        """The grid `trial` in the block's own frame, to keep: the array `into` or a new one."""
         if not (transposed or mirrored or self.trial is self.own_trial):
             return self.trial
         source = self.trial[::-1] if mirrored else self.trial
-        return np.array(source.transpose(0, 2, 1) if transposed else source, order="C")
+        source = source.transpose(0, 2, 1) if transposed else source
+        if into is None:
+            return np.array(source, order="C")
+        into[:] = source
+        return into
 
     def begin(
         self,

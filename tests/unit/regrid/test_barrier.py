@@ -7,7 +7,7 @@ from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import Tuning
 from regrid.domains import three_fingers
 from regrid.errors import BadInput, RegridFailure
-from regrid.measure.quality import find_bad_cells, measure_quality
+from regrid.measure.quality import find_bad_cells, measure_quality, measure_worst
 
 
 def graded_box(ni=24, nj=16, ratio_i=1.08, ratio_j=0.93, width=2.0):
@@ -132,6 +132,18 @@ def test_threads_do_not_change_a_bit():
             nodes = regridder.regrid(nodes, moving.boundary(0.01 * step)).nodes
         grids.append(nodes)
     assert np.array_equal(grids[0], grids[1]) and np.array_equal(grids[0], grids[2])
+
+
+@pytest.mark.parametrize("part", [0.01, 0.5, 3.0])
+def test_a_grid_written_into_the_boundary_has_the_same_bits_and_the_quality_measured(part):
+    nodes, boundary = bent_motion()
+    boundary = nodes + part * (boundary - nodes)
+    fresh = BarrierRegridder().regrid(nodes, boundary)
+    placed = BarrierRegridder().regrid(nodes, boundary, in_place=True)
+    assert placed.nodes is boundary and np.array_equal(placed.nodes, fresh.nodes)
+    assert placed.report == fresh.report
+    if fresh.report.iterations == 0:
+        assert fresh.report.quality == pytest.approx(measure_worst(fresh.nodes), rel=1e-12)
 
 
 def test_corner_that_the_boundary_turns_over_is_left_out_and_counted():

@@ -94,7 +94,7 @@ COLUMNS: dict[str, ColumnGroup] = {
     "grid-quality": compute_grid_quality,
     "regridding": count_regridding,
     "surfaces": measure_surfaces,
-    "contacts": lambda flow: flow.meetings.compute_row(),
+    "contacts": lambda flow: flow.meetings.compute_row() if flow.meetings.pairs else {},
     "special-cells": count_special_cells,
     "step-limit": find_step_limit,
     "seconds": lambda flow: flow.watch.take(PHASES),

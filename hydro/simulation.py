@@ -251,10 +251,12 @@ class Simulation:
             raise BadInput(f"the run is at its end already: {self.finished}")
         ranks, clock = self._shared, self.clock
         ranks.begin_step()
-        clock.tension_dt = self.tension.find_step()
+        if self.tension.lines:
+            clock.tension_dt = self.tension.find_step()
         try:
             self._check_collapse()
-            touching = self.meetings.find(clock.t, clock.step)
+            meets = bool(self.meetings.pairs)
+            touching = self.meetings.find(clock.t, clock.step) if meets else set()
             self._overlaps.check(clock.t, clock.step, touching)
             record = take_step(self._flow)
         except RunFailure:  # all ranks have agreed on it

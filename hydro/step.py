@@ -105,7 +105,8 @@ def try_step(flow: Flow, dt: float) -> RunFailure | float | None:
     Where surfaces come to touch: the shorter step that ends with it.
     """
     blocks, exchange, motion, watch = flow.blocks, flow.exchange, flow.motion, flow.watch
-    meetings = flow.meetings
+    meetings, tension = flow.meetings, flow.tension
+    touches, pulls = bool(meetings.pairs), bool(tension.lines)  # is there any of them?
     sides, agreed = watch("sides"), False  # agreed: do all ranks hear of what fails?
     t, middle = flow.clock.t, flow.clock.t + 0.5 * dt
     fraction = flow.clock.compute_fraction(dt)
@@ -116,22 +117,25 @@ def try_step(flow: Flow, dt: float) -> RunFailure | float | None:
             flow.source.start_step(t, dt)
             for block in blocks:
                 block.gather(t)
-            flow.tension.fill_jumps(new=False)
+            if pulls:
+                tension.fill_jumps(new=False)
             exchange.solve(AT_CELLS, dt)
             for block in blocks:
                 block.fill_ghosts(t)
-            meetings.fill_ghosts(t)
+            if touches:
+                meetings.fill_ghosts(t)
             for block in blocks:
                 block.predict(dt)
             # 3 traces at the sides: Riemann problems, contact speeds
             exchange.solve(AT_TRACES, dt)
             for block in blocks:
                 block.fill_speeds(middle)
-            meetings.fill_speeds(middle)
+            if touches:
+                meetings.fill_speeds(middle)
         with watch("regrid"):
             # 4 key nodes and lines moved and spread again
             move_sides(motion, Span(t, dt, fraction))
-            if shorter := meetings.meet(dt, dt / fraction):
+            if touches and (shorter := meetings.meet(dt, dt / fraction)):
                 return shorter
             # 5 interiors regridded, convexity proved; the new nodes along all sides are shared
             agreed = True
@@ -141,12 +145,15 @@ def try_step(flow: Flow, dt: float) -> RunFailure | float | None:
             # traces, swept volumes, fluxes, update
             for block in blocks:
                 block.trace(dt)
-            flow.tension.fill_jumps(new=True)
+            if pulls:
+                tension.fill_jumps(new=True)
             for block in blocks:
                 block.fill_flux(middle)
             exchange.solve(AT_FLUX, dt)
-            meetings.fill_flux(middle, dt)
-            flow.tension.add_rest()
+            if touches:
+                meetings.fill_flux(middle, dt)
+            if pulls:
+                tension.add_rest()
         with watch("flow"):
             blocks.update(dt)
             flow.small_cells.share_states(flow.clock.cfl / dt, dt)
@@ -198,7 +205,8 @@ def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
     for block in flow.blocks:
         block.accept()
     flow.exchange.accept()
-    flow.meetings.accept()
+    if flow.meetings.pairs:
+        flow.meetings.accept()
     flow.source.end_step(flow.clock.t, dt)
     if flow.source.law is not None:
         flow.ledger.add_source(flow.source.gained)

@@ -7,6 +7,8 @@ and written into both rims; nothing else of either block is touched.  A sliding 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from hydro.boundary.kinds import Linked, Seam
@@ -88,7 +90,7 @@ class Exchange:
     def __init__(self, links: list[Link | SlidingContact]):
         self.links = [link for link in links if isinstance(link, Link)]
         self.contacts = [link for link in links if isinstance(link, SlidingContact)]
-        self.all = [*self.links, *self.contacts]
+        self.all: list[Any] = [*self.links, *self.contacts]
 
     def cut_contacts(self) -> None:
         """What sliding contacts must know of the grid of the step's start."""

@@ -174,15 +174,6 @@ def test_a_history_without_a_point_before_its_damage_is_refused(shockgrid, whole
     assert code == 2 and "choose an earlier restart point with --at" in error
 
 
-def test_the_history_of_another_run_is_not_taken(shockgrid, whole):
-    shockgrid("run", "toy", "-q", "-o", "other", "--set", "run.max_steps=30", "--set", "cells=6")
-    HISTORY.write_bytes(Path("other/history.csv").read_bytes())
-    code, _, error = shockgrid("restart", "run", "-q", "--set", "run.max_steps=34")
-    assert code == 0 and "has a row of step 30 that is not of t =" in error
-    assert (RunData("run").history["hottest"][:31] == whole[0]["hottest"]).all()
-    assert Path("run/superseded/history.csv").read_bytes() == Path("other/history.csv").read_bytes()
-
-
 KEPT = Path(__file__).parent / "files_of_0_1"
 
 

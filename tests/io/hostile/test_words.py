@@ -69,25 +69,6 @@ def test_hostile_words_on_a_command_line(shockgrid, words):
     assert all(len(line) < 1100 for line in error.splitlines())
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a system without pipes in folders")
-@pytest.mark.parametrize("kind", ["pipe", "device", "socket", "large"])
-def test_decks_that_are_no_files(shockgrid, kind):
-    import socket
-
-    path = Path("deck.toml")
-    if kind == "pipe":
-        os.mkfifo(path)  # reading it would wait for ever
-    elif kind == "device":
-        path.symlink_to("/dev/zero")  # reading it would never end
-    elif kind == "socket":
-        socket.socket(socket.AF_UNIX).bind(str(path))
-    else:
-        with path.open("wb") as file:
-            file.truncate(10**10)  # takes no room on the disk
-    code, _, error = shockgrid("check", "deck.toml")
-    assert code == 2 and "deck.toml is" in error and error.count("\n") == 1, error
-
-
 KINDS = ("empty", "folder", "pipe", "loop", "broken", "zero", "too long", "binary")
 COMMANDS = (
     ("check", "{}.toml"), ("run", "{}.toml", "--dry-run"), ("check", "{}.py"), ("list", "{}.py"),

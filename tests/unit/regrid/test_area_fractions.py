@@ -26,16 +26,3 @@ def test_plane_front_cuts_the_exact_area(front):
     fraction = compute_area_fractions(nodes, front)
     assert np.sum(fraction * compute_areas(nodes)) == pytest.approx(front, abs=1e-14)
     assert set(np.unique(fraction[[0, -1]])) <= {0.0, 1.0}
-
-
-def test_curved_front_cuts_the_exact_area():
-    nodes = make_wavy_grid()
-    y = np.linspace(-0.1, 1.1, 333)
-    points = np.array([1.0 + 0.2 * np.cos(2 * np.pi * y), y])
-    fraction = compute_area_fractions(nodes, points)
-    fine = np.unique(np.concatenate([[0.0, 1.0], y[(y > 0) & (y < 1)]]))
-    f = np.interp(fine, y, points[0])
-    exact = np.sum(0.5 * (f[1:] + f[:-1]) * np.diff(fine))
-    assert np.sum(fraction * compute_areas(nodes)) == pytest.approx(exact, abs=1e-14)
-    cut = (fraction > 0) & (fraction < 1)
-    assert 13 <= cut.sum() <= 80

@@ -200,24 +200,3 @@ def test_1d_mirror_image():
     for one, other in zip(ahead.columns, back.columns, strict=True):
         assert np.allclose(one.x, 1.0 - other.x[::-1], atol=1e-9)
         assert np.allclose(one.u, -other.u[::-1], atol=1e-7)
-
-
-@pytest.mark.parametrize(
-    ("setting", "words"),
-    [
-        ("levels=[0.0, 1.0, 0.5]", "u has to fall"),
-        ("levels=[1.0]", "levels need"),
-        ("fronts=[0.2]", "fronts between"),
-        ("fronts=[0.5, 0.2]", "have to rise"),
-        ("fronts=[0.5, 1.2]", "between 0 and 1"),
-        ("viscosity=0", "viscosity"),
-        ("cells=4", "cells"),
-        ("grid.tau=-1", "tau"),
-        ("grid.start=lying", "rest"),
-    ],
-)
-def test_1d_bad_input_is_one_sentence(setting, words, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(["run", "moving-grid-1d", "--set", setting]) == 2
-    error = capsys.readouterr().err.strip()
-    assert words in error and len(error.splitlines()) == 1, error

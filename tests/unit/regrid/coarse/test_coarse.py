@@ -5,11 +5,8 @@ import pytest
 
 from regrid.barrier import coarse_matrix as cells
 from regrid.barrier.line_cg import fill_product as multiply_fine
-from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
-
-LARGE, SMALL = (120, 80), (60, 40)
 
 
 def make_work(ni=64, nj=48, dear=False, seed=0):
@@ -83,35 +80,3 @@ def test_solve_is_that_of_the_dense_matrix():
     cells.factor_lines(level.matrix)
     assert 0 < cells.solve(level.matrix, right, x, z, p, product, 1e-10, 500) < 500
     assert np.allclose(x[inner], wanted, rtol=0.0, atol=1e-7)
-
-
-def shifted(size, waves, cells):
-    """A unit square's even grid, and the same with its inside shifted along i by sine waves."""
-    i, j = np.mgrid[0 : size[0] + 1, 0 : size[1] + 1].astype(float)
-    even = np.array([i / size[0], j / size[1]])
-    wave = np.sin(np.pi * waves[0] * i / size[0]) * np.sin(np.pi * waves[1] * j / size[1])
-    moved = even.copy()
-    moved[0] += cells / size[0] * wave
-    moved[:, [0, -1]], moved[:, :, [0, -1]] = even[:, [0, -1]], even[:, :, [0, -1]]
-    return even, moved
-
-
-def error(nodes, even, size):
-    return float(np.abs(nodes - even)[0].max() * size[0])
-
-
-@pytest.mark.parametrize("waves", [(1, 1), (2, 5)])
-def test_smooth_errors_go_that_the_residual_does_not_show(waves):
-    even, moved = shifted(LARGE, waves, 0.3)
-    step = np.array([0.0, 2.0 / LARGE[1]])[:, None, None]
-    without = BarrierRegridder(floor=0.1, family="i", coarse_from=np.inf)
-    assert error(without.regrid(moved, even + step).nodes, even, LARGE) == pytest.approx(
-        0.3, rel=0.01
-    )
-    regridder = BarrierRegridder(floor=0.1, family="i")
-    assert error(regridder.regrid(moved, even).nodes, even, LARGE) == pytest.approx(0.3, rel=0.01)
-    moved = regridder.regrid(moved, even + step).nodes
-    assert error(moved, even, LARGE) < 0.5 * 0.3
-    for call in range(2, 5):
-        moved = regridder.regrid(moved, even + call * step).nodes
-    assert error(moved, even, LARGE) < 0.055  # floor over part

@@ -23,7 +23,7 @@ help:
 	@echo "make soak     20 minutes of kills, damaged files, odd decks; SOAK='--minutes 60': longer"
 	@echo "make bench    speed, cold and warm start"
 	@echo "make accuracy the figures of docs/accuracy.md anew; ACCURACY='--short': fewer, printed only"
-	@echo "make docs     the site of all pages and docstrings in site/; warnings are errors"
+	@echo "make docs     the site of all pages and docstrings in site/; NOTEBOOKS=true runs the notebooks too"
 	@echo "make dist     wheel and sdist in dist/; make sbom: dist/shockgrid.cdx.json, what a run stands on"
 	@echo "make requirements   the oldest and the pinned packages of requirements/ anew"
 	@echo "make lint | format | setup | clean"

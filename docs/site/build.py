@@ -54,13 +54,15 @@ def write_page(room: Path) -> str:
 
 
 def on_config(config):
-    """Append the reference to the navigation, a group for each package, and list the problems."""
+    """Put the reference into the navigation, that of `shockgrid` first, and list the problems."""
     problems = sorted(Path(config.docs_dir, "problems").glob("*.md"))
     for entry in config.nav:
         if entry.get("Problems") == "problems/":
             entry["Problems"] = [{path.stem: f"problems/{path.name}"} for path in problems]
+        if "In Python" in entry:
+            entry["In Python"].insert(0, {"import shockgrid as sg": name_page(ROOT / "shockgrid")})
     groups = []
-    for package in PACKAGES:
+    for package in PACKAGES[1:]:
         first, *rooms = list_rooms(package)
         entries = [{name_module(room).partition(".")[2]: name_page(room)} for room in rooms]
         groups.append({package: [name_page(first), *entries]})  # a bare page: that of the group

@@ -144,7 +144,7 @@ class NewtonMove:
         work = self.work
         if work.ni == 1 or work.nj == 1 or find_impossible(work.sides) is not None:
             return False
-        broken = self.broken
+        broken, self.quality, self.triangles = self.broken, None, -1
         self._begin()
         work.fill_moved()
         straight = transfinite_grid(work.sides)
@@ -177,6 +177,7 @@ class NewtonMove:
         True when `work.trial` is valid.
         """
         work, tuning = self.work, self.tuning
+        self.quality, self.triangles = None, -1
         if work.ni == 1 or work.nj == 1:
             work.trial[:] = work.base
             return self._accept(work.compare_corners(work.trial, work.old))

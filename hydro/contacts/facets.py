@@ -45,16 +45,17 @@ def snap_position(position):
 
 
 @compiled_once
-def find_groups(points, first, stop, boxes, reach, groups):
-    """Numbers of the boxes (4, n) that points first..stop - 1 may be as near to as `reach` [m].
+def find_groups(old, new, first, stop, boxes, reach, groups):
+    """Numbers of the boxes (4, n) that points first..stop - 1 may come as near to as `reach` [m].
 
-    Into `groups` (n,); returns how many.  So each point is compared with few boxes.
+    On their way from old to new; into `groups` (n,); returns how many.  So each point is compared
+    with few boxes.
     """
-    low_x = high_x = points[0, first]
-    low_y = high_y = points[1, first]
-    for k in range(first + 1, stop):
-        low_x, high_x = min(low_x, points[0, k]), max(high_x, points[0, k])
-        low_y, high_y = min(low_y, points[1, k]), max(high_y, points[1, k])
+    low_x = high_x = old[0, first]
+    low_y = high_y = old[1, first]
+    for k in range(first, stop):
+        low_x, high_x = min(low_x, old[0, k], new[0, k]), max(high_x, old[0, k], new[0, k])
+        low_y, high_y = min(low_y, old[1, k], new[1, k]), max(high_y, old[1, k], new[1, k])
     found = 0
     for g in range(boxes.shape[1]):
         if low_x > boxes[MOST_X, g] + reach or high_x < boxes[LEAST_X, g] - reach:
@@ -129,7 +130,7 @@ def find_pins(
     groups, near, found = np.empty(boxes.shape[1], np.int64), 0, 0
     for k in range(last + 1):
         if k % group == 0:
-            near = find_groups(points, k, min(last + 1, k + group), boxes, reach, groups)
+            near = find_groups(points, points, k, min(last + 1, k + group), boxes, reach, groups)
         positions[k] = -1.0
         if near == 0:
             continue
@@ -177,7 +178,7 @@ def find_deepest(points, pinned, line, boxes, group, reach):
     deepest, which = 0.0, -1
     for k in range(last + 1):
         if k % group == 0:
-            near = find_groups(points, k, min(last + 1, k + group), boxes, reach, groups)
+            near = find_groups(points, points, k, min(last + 1, k + group), boxes, reach, groups)
         if near == 0 or pinned[k] >= 0.0:
             continue
         x, y = points[0, k], points[1, k]

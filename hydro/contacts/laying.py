@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.contacts.facets import BULGE
+from hydro.contacts.facets import BULGE, find_depth
 from hydro.contacts.rows import (
     CLOSED,
     FOLLOWER_START,
@@ -190,13 +190,6 @@ def measure_shorter(points, k):
 
 
 @compiled_once
-def measure_height(line, x, y):
-    """How high a point lies over a plane, whose outside is on the right of its face."""
-    dx, dy = line[0, 1] - line[0, 0], line[1, 1] - line[1, 0]
-    return ((x - line[0, 0]) * dy - (y - line[1, 0]) * dx) / (dx * dx + dy * dy) ** 0.5
-
-
-@compiled_once
 def find_foot(line, x, y):
     """Position on a plane of the point below."""
     dx, dy = line[0, 1] - line[0, 0], line[1, 1] - line[1, 0]
@@ -222,7 +215,7 @@ def measure_clearance_of_plane(points, line, asked):
     least = 1e300
     for k in range(points.shape[1]):
         if asked[k]:
-            high = measure_height(line, points[0, k], points[1, k])
+            high = -find_depth(line, 0, points[0, k], points[1, k])
             least = min(least, high - BULGE * measure_shorter(points, k))
     return least
 
@@ -234,7 +227,7 @@ def find_plane_pins(points, line, tolerance, positions):
     for k in range(points.shape[1]):
         x, y = points[0, k], points[1, k]
         positions[k] = -1.0
-        if measure_height(line, x, y) <= tolerance * measure_shorter(points, k):
+        if -find_depth(line, 0, x, y) <= tolerance * measure_shorter(points, k):
             positions[k] = find_foot(line, x, y)
             found += 1
     return found
@@ -257,8 +250,8 @@ def find_plane_touches(old, new, pinned, line, positions):
         positions[k] = -1.0
         if pinned[k] >= 0.0:
             continue
-        high = measure_height(line, old[0, k], old[1, k])
-        low = measure_height(line, new[0, k], new[1, k])
+        high = -find_depth(line, 0, old[0, k], old[1, k])
+        low = -find_depth(line, 0, new[0, k], new[1, k])
         if high > 0.0 and low <= 0.0:
             positions[k] = find_foot(line, old[0, k], old[1, k])
             first = min(first, high / (high - low))

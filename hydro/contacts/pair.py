@@ -119,6 +119,9 @@ class Pair:
             self._measure(line, other, self._still, 0.0)
         else:
             self.covered.fill(False)
+        if not self.count:
+            self.held.fill(False)
+            self.back_held.fill(False)
 
     def _find_pins(self) -> int:
         one, other, parts = self.leader, self.follower, self.parts

@@ -50,7 +50,9 @@ def measure_distance(points, inner, line, boxes, group, asked, part, one_body, m
     groups, near = np.empty(boxes.shape[1], np.int64), 0
     for k in range(last):
         if k % group == 0:
-            near = find_groups(points, k, min(last, k + group), boxes, least**0.5, groups)
+            near = find_groups(
+                points, points, k, min(last, k + group), boxes, least**0.5, groups
+            )  # fmt: skip
         if near == 0 or not asked[k]:
             continue
         x, y = points[0, k], points[1, k]
@@ -145,25 +147,6 @@ def find_touch(x, y, dx, dy, old, new, a):
     return (time if -MARGIN <= part <= 1.0 + MARGIN else 2.0), min(1.0, max(0.0, part))
 
 
-@compiled_once
-def find_swept_groups(old, new, first, stop, boxes, groups):
-    """Numbers of the boxes that points first..stop - 1 may come through in the step; how many."""
-    low_x = high_x = old[0, first]
-    low_y = high_y = old[1, first]
-    for k in range(first, stop):
-        low_x, high_x = min(low_x, old[0, k], new[0, k]), max(high_x, old[0, k], new[0, k])
-        low_y, high_y = min(low_y, old[1, k], new[1, k]), max(high_y, old[1, k], new[1, k])
-    found = 0
-    for g in range(boxes.shape[1]):
-        if low_x > boxes[MOST_X, g] or high_x < boxes[LEAST_X, g]:
-            continue
-        if low_y > boxes[MOST_Y, g] or high_y < boxes[LEAST_Y, g]:
-            continue
-        groups[found] = g
-        found += 1
-    return found
-
-
 @kernel
 def find_touches(
     old_points, new_points, pinned, covered, others, cuts, old, new, boxes, group, part, positions
@@ -186,7 +169,7 @@ def find_touches(
     for k in range(last):
         if k % group == 0:
             stop = min(last, k + group)
-            near = find_swept_groups(old_points, new_points, k, stop, boxes, groups)
+            near = find_groups(old_points, new_points, k, stop, boxes, 0.0, groups)
         positions[k] = -1.0
         if near == 0 or pinned[k] >= 0.0 or beside[k] or (covered.shape[0] > 0 and covered[k]):
             continue

@@ -95,3 +95,24 @@ def test_gas_between_plates_is_squeezed():
 def test_nonsense_fills_are_bad_input(fill):
     with pytest.raises(BadInput, match=r"void_fill = .*a pressure of 0 Pa or more"):
         make_quarter(4, 1.0, 1e-6, 4, void_fill=fill)
+
+
+def test_restarts_while_a_void_closes():
+    """Before it closes, with what resists in it, and after: the same bits."""
+
+    def make():
+        return make_quarter(6, 50.0, 1.25e-5, 12, void_fill=(1e4, 1.4))[1]
+
+    one, states, rows = make(), [], []
+    while not one.finished:
+        rows.append(one.advance())
+        states.append(one.get_state())
+    closed = next(k for k, state in enumerate(states) if state["contacts/voids"][0, 5] > 0.0)
+    for at in (2, closed - 1, closed, closed + 1):
+        other = make()
+        other.set_state(states[at])
+        for k in range(at + 1, at + 4):
+            row, new = other.advance(), other.get_state()
+            assert (row["voids"], row["void_area"]) == (rows[k]["voids"], rows[k]["void_area"])
+            for name, array in states[k].items():
+                assert np.array_equal(new[name], array), name

@@ -94,7 +94,7 @@ def lay(
         if back and held[k]:
             inwards = -1 if closed_before[k] else 1
             pin, free = (a + 1, a) if inwards < 0 else (a, a + 1)
-            if 0.0 < inwards * (others[pin] - k) < 1.0:
+            if 0.0 < inwards * (others[pin] - k) < 1.0 and others[free] < 0.0:
                 x, y = straighten(points, k, k + inwards, line[0, free], line[1, free])
         x, y = x - points[0, k], y - points[1, k]
         outside = (y * dx - x * dy) / length  # of the foot, from the node

@@ -38,7 +38,6 @@ OFF = {
     "bound of four bent sides": {"curved_barrier": 0.0},
     "stiffness of sharp cells": {"stiffness": 1.0},
     "coarse nodes": {"coarse_from": np.inf},
-    "deep solve": {"hover": 0.0},
     "prediction": {"predict_iterations": 0},
     "more Newton steps": {"more_steps": 0},
     "straight-line start": {"lost": np.inf},

@@ -181,15 +181,13 @@ class NewtonMove:
         if work.ni == 1 or work.nj == 1:
             work.trial[:] = work.base
             return self._accept(work.compare_corners(work.trial, work.old))
-        if self.estimate <= tuning.near:
-            slow, fast = SLOW * tuning.fast_sides, tuning.fast_sides
-            stiffness = compute_stiffness(work.old, work.sides, tuning.stiffness, slow, fast)
-            work.law = work.law._replace(stiffness=stiffness)
+        slow, fast = SLOW * tuning.fast_sides, tuning.fast_sides
+        stiffness = compute_stiffness(work.old, work.sides, tuning.stiffness, slow, fast)
+        work.law = work.law._replace(stiffness=stiffness)
         moved, untangled = self.moved_ratio > tuning.start_ratio, False
         if moved:
             done = self.iterations
-            deep = self.estimate < tuning.hover * tuning.floor
-            ratio = self._newton(work.base, work.old, deep)
+            ratio = self._newton(work.base, work.old)
             if self.iterations == done:
                 ratio = self.moved_ratio
             if self.error > self._get_lost():
@@ -265,7 +263,7 @@ class NewtonMove:
             return ratio
         return self._newton(work.base, work.base) if self.moved_ratio > least else 0.0
 
-    def _newton(self, base, old, deep: bool = False) -> float:
+    def _newton(self, base, old) -> float:
         """`work.trial` = a Newton step from the valid `base`, shortened node by node if need be.
 
         Returns the least ratio of corner areas to those of `old`; those of `base` must be above
@@ -273,7 +271,7 @@ class NewtonMove:
         """
         work = self.work
         work.assemble(base)
-        if self._solve(None, deep) == 0:
+        if self._solve(None) == 0:
             work.trial[:] = base
             return 0.0 if self.broken else 1.0
         np.add(base, work.change, out=work.trial)
@@ -300,16 +298,15 @@ class NewtonMove:
         work.trial[:] = base
         return work.compare_corners(base, old)
 
-    def _solve(self, guess, deep: bool = False) -> int:
+    def _solve(self, guess) -> int:
         """Fill `work.change`; the iterations done, and `error`, the first residual in cells.
 
-        It goes down to the floor, or to a part of it where `deep`.
         `broken` where the line solve overflows, since corners are too sharp for it: its residual
         is then not finite, negative or nothing at all, and no sign of a minimum.
         """
         work, tuning = self.work, self.tuning
         scale = work.sigma * (work.ni - 1) * (work.nj - 1)
-        floor = max((tuning.deep if deep else 1.0) * tuning.floor, ROUND_OFF) ** 2 * scale
+        floor = max(tuning.floor, ROUND_OFF) ** 2 * scale
         if guess is None:
             done, first, last = work.solve(tuning.tolerance, floor, tuning.max_iterations)
         else:

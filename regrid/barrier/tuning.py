@@ -27,13 +27,10 @@ class Tuning:
     half_barrier: float = 0.15  # R4.17: and the ratio of their bends at which it is half of that
     stiffness: float = 2.0  # R4.18: of sharp cells' corners in the matrix
     fast_sides: float = 1e-2  # R4.18: cells a step from which sides count as moving
-    near: float = 0.04  # R4.18: residual in cells beyond which cells have to open at once
     # the linear solve
     tolerance: float = 0.05  # R4.8: of the first residual
     floor: float = 1e-3  # R4.8: residual in cells that is left
     max_iterations: int = 16  # R4.8
-    hover: float = 1.3  # R4.8: first residuals up to so many floors are solved down to
-    deep: float = 0.25  # R4.8: this part of the floor
     exact_tolerance: float = 0.02  # R4.8, step 2, R4.14, R5.4: of solves that stand for exact ones
     predict_iterations: int = 30  # R4.8, step 2
     # the move

@@ -40,6 +40,7 @@ from problems.references.riemann import (
     solve_riemann,
 )
 from regrid.errors import BadInput, suggest
+from regrid.roots import find_root
 
 WAY = 0.8  # of the length of a side that its fastest wave goes, where no end time is given
 STARS = ("p_left", "p_right", "u_left", "u_right", "rho_left", "rho_right")
@@ -165,8 +166,6 @@ def choose_captured_domain(exact: RiemannSolution, speed: float, t_end: float | 
 def find_growth(part: float, count: int) -> float:
     """Growth of `count` cells from one to the next, such that SHARE of them are in the first `part`
     of their length; 1 where that is so with even cells, MOST_GROWTH at most."""
-    from scipy.optimize import brentq  # slow to load
-
     first = SHARE * count
 
     def excess(growth):
@@ -179,7 +178,7 @@ def find_growth(part: float, count: int) -> float:
         return 1.0
     if excess(MOST_GROWTH) > 0.0:
         return MOST_GROWTH
-    return float(brentq(excess, LEAST_GROWTH, MOST_GROWTH, xtol=1e-12))
+    return float(find_root(excess, LEAST_GROWTH, MOST_GROWTH, xtol=1e-12))
 
 
 def grade(count: int, growth: float) -> np.ndarray:

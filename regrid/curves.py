@@ -24,6 +24,7 @@ import numpy as np
 
 from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
+from regrid.roots import find_root
 
 SETTLED = 1e-9  # relative spread of products that passes for equal
 RATIO = 1.15  # of neighbouring steps where a line is refined towards one end
@@ -77,14 +78,7 @@ def clustered_law(count: int, first: float, at_end: bool = False) -> np.ndarray:
     bound = 1.0
     while excess(bound) > 0.0 or excess(-bound) < 0.0:
         bound *= 2.0
-    try:
-        from scipy.optimize import brentq  # slow to load
-    except ImportError:  # this library does without: bisection
-        low, high = -bound, bound
-        while low < (ratio := 0.5 * (low + high)) < high:
-            low, high = (low, ratio) if excess(ratio) <= 0.0 else (ratio, high)
-    else:
-        ratio = brentq(excess, -bound, bound, xtol=1e-15)
+    ratio = find_root(excess, -bound, bound, xtol=1e-15)
     law = geometric_law(count, float(np.exp(ratio)))
     return (1.0 - law)[::-1] if at_end else law
 

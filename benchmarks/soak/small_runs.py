@@ -11,7 +11,7 @@ from runs.store.directory import RunDirectory
 OFTEN = ("output.dumps=4", "output.restart_every=0.02", "run.threads=1")
 POINT = '[{name="g", x=0.0, y=0.0}]'
 SMALL = {
-    "interface-instability": ("cells=8", "kct_end=1"),
+    "interface-instability": ("cells=8", "kct_end=4"),
     "plate-on-wedge": ("cells=[24,4]", "run.max_steps=60"),
     "riemann": ("cells=32",),
     "heated-cavity": ("cells=16",),

@@ -27,6 +27,7 @@ from hydro.eos.base import EquationOfState, compute_whole_ratio
 from hydro.eos.mie_gruneisen import least_pressure, strength_left
 from regrid.errors import BadInput
 from regrid.jit import inlined
+from regrid.roots import find_root
 
 # positions in the parameter tuple, the first five as of Mie–Grüneisen
 RHO0, C0, S, GRUNEISEN, STRENGTH = 0, 1, 2, 3, 4
@@ -183,14 +184,12 @@ class PhaseTransition(EquationOfState):
     @cached_property
     def mixed_region(self) -> tuple[float, float]:
         """eta = 1 - rho0/rho on the Hugoniot where the mixed region starts and ends."""
-        from scipy.optimize import brentq  # slow to load
-
         modulus = self.rho0 * self.c0**2
 
         def first(eta):
             return modulus * eta / (1.0 - self.s * eta) ** 2 - self.onset
 
-        start = brentq(first, 0.0, (1.0 - 1e-9) / self.s, xtol=1e-15)
+        start = find_root(first, 0.0, (1.0 - 1e-9) / self.s, xtol=1e-15)
         ratio = self.rho0_second / self.rho0
         numbers = tuple(float(value) for value in astuple(self))
         # limits of the second Hugoniot: its own compression and its energy's
@@ -200,7 +199,7 @@ class PhaseTransition(EquationOfState):
             low, high = high, high + 0.1 * (most - high)
         if second_hugoniot(high, numbers)[0] < self.complete:
             return start, most
-        return start, brentq(
+        return start, find_root(
             lambda eta: second_hugoniot(eta, numbers)[0] - self.complete, low, high, xtol=1e-15
         )
 

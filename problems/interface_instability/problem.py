@@ -51,6 +51,7 @@ from problems.references.linear_growth import LinearGrowth, compute_linear_growt
 from regrid.errors import BadInput
 from regrid.measure.crossings import find_self_crossing
 from regrid.measure.quality import measure_turns
+from regrid.roots import find_root
 
 BENDS = 6.0  # least reach over the amplitude: cells shrink or grow by no more than a quarter
 ROOM = 1.25  # least length over what waves take of it before a start after the passage
@@ -115,6 +116,12 @@ class InterfaceInstability(Problem):
         self.start = self._choose_start()
         self.begun = arrival + self._choose_since() if self.start == "crossed" else 0.0
         self.arrival = arrival - self.begun
+        if self.start == "crossed" and deck.run.t_end is None and self.t_end <= 0.0:
+            raise BadInput(
+                f"deck: kct_end is {deck.kct_end:g}, and the run begins after the shock has "
+                f"crossed the interface, at k c t = {-self.arrival * self._rate:.3g}; take a "
+                "greater kct_end, or start = 'incident'"
+            )
 
     def _choose_start(self) -> str:
         """How the run begins: as the deck says, or after the passage where that can be had.
@@ -201,7 +208,12 @@ class InterfaceInstability(Problem):
         """End time: the deck's, or the one its `kct_end` means."""
         if self.deck.run.t_end is not None:
             return self.deck.run.t_end
-        return self.arrival + self.deck.kct_end / (self.k * self.theory.sound_speed)
+        return self.arrival + self.deck.kct_end / self._rate
+
+    @property
+    def _rate(self) -> float:
+        """k c [1/s]."""
+        return self.k * self.theory.sound_speed
 
     def shape(self, y: np.ndarray) -> np.ndarray:
         """First place x of the interface at the heights `y` (its mean is x = 0)."""
@@ -262,8 +274,6 @@ class InterfaceInstability(Problem):
 
         Open ends are so far from the interface that no wave reaches them.
         """
-        from scipy.optimize import brentq  # slow to load
-
         if self.deck.lengths is not None:
             return self.deck.lengths
         base, t0 = self.theory.base, self.arrival
@@ -279,7 +289,7 @@ class InterfaceInstability(Problem):
 
         least = margin + 2.0 * self.deck.gap * self.deck.wavelength
         longest = 50.0 * c_left * t_end + least
-        first = least if late_echo(least) >= 0.0 else brentq(late_echo, least, longest)
+        first = least if late_echo(least) >= 0.0 else find_root(late_echo, least, longest)
         front, back = self._find_second_echo()
         second = (t_end - t0) * front * back / (front - base.u + back)
         return 1.02 * first + margin, 1.02 * second + margin
@@ -419,19 +429,22 @@ class InterfaceInstability(Problem):
 
     def build(self) -> Simulation:
         """Blocks at the start: the shock, run in, `gap` waves before the interface or beyond it."""
-        from hydro.remap.refinement import Refinement  # slow to load
-
         deck = self.deck
         grids, states = self._make_states()
         blocks, links, make_regridder = self.assemble(grids, states)
         del grids, states  # the blocks have them
+        refining = None
+        if deck.refine:
+            from hydro.remap.refinement import Refinement  # with scipy: slow to load
+
+            refining = Refinement(blocks, self.assemble)
         return self.simulate(
             blocks,
             links,
             line_rule=LineRule(deck.line.shape, deck.line.relax, self.thickness),
             make_regridder=make_regridder,
             measure_block=measure_far_speed,
-            refining=Refinement(blocks, self.assemble) if deck.refine else None,
+            refining=refining,
         )
 
     def _make_states(self):

@@ -10,6 +10,7 @@ import numpy as np
 
 from hydro.eos import JWL
 from regrid.errors import BadInput
+from regrid.roots import find_root
 
 DIMENSIONS = {"plane": 1, "cylindrical": 2, "spherical": 3}
 SHELLS = 4000  # points of the tabulated profile
@@ -280,7 +281,7 @@ def compute_wedge_deflection(mach: float, beta: float, gamma: float) -> float:
 
 def find_shock_angle(mach: float, angle: float, gamma: float) -> float:
     """Angle [rad] of the weak attached shock; BadInput where there is none."""
-    from scipy.optimize import brentq, minimize_scalar  # slow to load
+    from scipy.optimize import minimize_scalar  # slow to load
 
     ends = math.asin(1.0 / mach), 0.5 * math.pi
     turn = lambda beta: compute_wedge_deflection(mach, beta, gamma)  # noqa: E731
@@ -291,4 +292,4 @@ def find_shock_angle(mach: float, angle: float, gamma: float) -> float:
             f"deck: angle is {math.degrees(angle):g} degrees; at Mach {mach:g} the shock stays "
             f"attached up to {math.degrees(turn(best)):.4g} degrees only"
         )
-    return brentq(lambda beta: turn(beta) - angle, ends[0], best)
+    return find_root(lambda beta: turn(beta) - angle, ends[0], best)

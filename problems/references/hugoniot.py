@@ -23,6 +23,7 @@ import numpy as np
 
 from hydro.eos import IdealGas, StiffenedGas
 from regrid.errors import BadInput
+from regrid.roots import find_root
 
 TOLERANCE = 1e-12
 
@@ -257,8 +258,6 @@ def shock_to_pressure(eos, rho: float, p: float, p_behind: float) -> Shock:
 
 
 def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
-    from scipy.optimize import brentq  # slow to load
-
     ahead = 1.0 / rho
     stiffened = get_stiffened_parameters(eos)
     if stiffened is not None:
@@ -298,7 +297,7 @@ def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
         if math.isnan(here) and not math.isnan(there):
             near, here = _find_edge(excess, near, far)
         if here * there <= 0.0:
-            return brentq(excess, near, far, xtol=1e-17 * ahead, rtol=RELATIVE)
+            return find_root(excess, near, far, xtol=1e-17 * ahead, rtol=RELATIVE)
         outside |= math.isnan(there)
         left = math.isnan(there) and not math.isnan(here)  # the table: nothing lies further on
         near, here = far, there
@@ -357,8 +356,6 @@ def find_rise(excess: Callable[[float], float], scale: float) -> float:
 
     Rises that no shock reaches (BadInput) are kept clear of as long as there are lower ones.
     """
-    from scipy.optimize import brentq  # slow to load
-
     low, high, limit = 0.0, scale, math.inf
     while True:
         try:
@@ -369,7 +366,7 @@ def find_rise(excess: Callable[[float], float], scale: float) -> float:
             limit = high
         else:
             if beyond:
-                return brentq(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
+                return find_root(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
             low = high
         high = min(2.0 * high, 0.5 * (low + limit))
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from problems.references.hugoniot import make_isentrope, shock_to_pressure
 from regrid.errors import BadInput
+from regrid.roots import find_root
 
 RELATIVE = 8.9e-16
 GAUSS_POINTS = 8
@@ -136,8 +137,6 @@ def solve_riemann(eos_left, left, eos_right, right, cavitation_pressure: float |
     would need less pressure part and a gap at that pressure opens between them.  Raises BadInput
     for an impossible state, or where no pressure can join the states and no gap is allowed.
     """
-    from scipy.optimize import brentq  # slow to load
-
     sides = _Side(eos_left, left, -1), _Side(eos_right, right, +1)
     least = max(side.isentrope.least_pressure for side in sides)
     if cavitation_pressure is not None:
@@ -157,7 +156,7 @@ def solve_riemann(eos_left, left, eos_right, right, cavitation_pressure: float |
     while closing(high) > 0.0:
         low, rise = high, 2.0 * rise
         high = low + rise
-    p = low if closing(low) == 0.0 else brentq(closing, low, high, xtol=1e-300, rtol=RELATIVE)
+    p = low if closing(low) == 0.0 else find_root(closing, low, high, xtol=1e-300, rtol=RELATIVE)
     u = 0.5 * (sides[0].velocity(p) + sides[1].velocity(p))
     waves = sides[0].wave(p), sides[1].wave(p)
     densities = sides[0].density(p), sides[1].density(p)

@@ -73,6 +73,7 @@ from problems.references.hugoniot import (
 )
 from problems.references.linear_growth import compute_atwood_number
 from regrid.errors import BadInput
+from regrid.roots import find_root
 
 RELATIVE = 8.9e-16
 FAN_POINTS, FAN_WEIGHTS = np.polynomial.legendre.leggauss(40)
@@ -329,8 +330,6 @@ def cross_line(first: Body, second: Body, speed: float) -> CrossedLine:
     The body in which the shock leads must come first.  Raises BadInput when the point is no
     faster than sound in both, or when the polars do not cross.
     """
-    from scipy.optimize import brentq  # slow to load
-
     one, two = ShockPolar(first, speed), ShockPolar(second, speed)
     top = min(one.find_normal_shock().p, two.find_normal_shock().p)
     low = max(first.p, second.p)
@@ -347,7 +346,7 @@ def cross_line(first: Body, second: Body, speed: float) -> CrossedLine:
             f"shocks along a line at {speed:g}: no common pressure and deflection up to {top:g}"
         )
     at = int(found[0])
-    p = low + brentq(excess, shares[at], shares[at + 1], xtol=1e-13) * (top - low)
+    p = low + find_root(excess, shares[at], shares[at + 1], xtol=1e-13) * (top - low)
     return CrossedLine(float(speed), one.wave_to_pressure(p), two.wave_to_pressure(p))
 
 
@@ -405,8 +404,6 @@ def solve_collision(plate: Body, wedge: Body | None, speed: float, angle: float)
     `wedge` None is a rigid one.  With unequal pressures ahead the wave in one of the bodies may
     be an expansion fan.  Raises BadInput for speed <= 0 or an angle outside 0 to 90 degrees.
     """
-    from scipy.optimize import brentq  # slow to load
-
     _check_collision(speed, angle)
     flow, contact_speed = speed / math.tan(angle), speed / math.sin(angle)
     machs = flow / plate.sound_speed, contact_speed / wedge.sound_speed if wedge else 0.0
@@ -428,7 +425,7 @@ def solve_collision(plate: Body, wedge: Body | None, speed: float, angle: float)
         )
         return Collision(*given, DETACHED, reason)
     low, high = bracket
-    p = brentq(
+    p = find_root(
         lambda p: _sum_deflections(polars, p) - angle, low, high, xtol=1e-14 * high, rtol=RELATIVE
     )
     waves = [polar.wave_to_pressure(p) for polar in polars]
@@ -557,8 +554,6 @@ def _find_greatest_angle(shocks: list[Shock], speed: float) -> float:
 
     0 when there is none.  At the greatest beta possible one of the shocks is normal to its flow.
     """
-    from scipy.optimize import brentq  # slow to load
-
     limit = math.atan(speed / shocks[0].shock_speed)
     if len(shocks) > 1:
         limit = min(limit, math.asin(min(1.0, speed / shocks[1].shock_speed)))
@@ -580,7 +575,7 @@ def _find_greatest_angle(shocks: list[Shock], speed: float) -> float:
         end = angles[enough[-1] + 1]
     elif excess(end) >= 0.0:
         return limit
-    return brentq(lambda angle: float(excess(angle)), last, end, xtol=1e-15, rtol=RELATIVE)
+    return find_root(lambda angle: float(excess(angle)), last, end, xtol=1e-15, rtol=RELATIVE)
 
 
 @dataclass(frozen=True)

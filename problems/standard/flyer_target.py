@@ -31,6 +31,7 @@ from problems.initial_states import make_plane_grid, put_walls
 from problems.problem import BlockPlan, Problem, Report, Row
 from problems.references.hugoniot import make_isentrope, shock_to_pressure
 from regrid.errors import BadInput
+from regrid.roots import find_root
 
 TALL = 8.0  # heights of cells over their least width: square ones would halve the time step
 
@@ -143,8 +144,6 @@ class FlyerTarget(Problem):
     @functools.cached_property
     def theory(self) -> Theory:
         """The first impact, and the trace of a free surface behind two plates."""
-        from scipy.optimize import brentq  # slow to load
-
         deck = self.deck
         bodies = [(one.eos, one.rho0) for one in self.materials[:2]]
         flyer, target = bodies
@@ -154,7 +153,7 @@ class FlyerTarget(Problem):
             return sum(shock.particle_speed for shock in shocks) - deck.speed
 
         scale = flyer[1] * deck.speed * (float(flyer[0].sound_speed(flyer[1], 0.0)) + deck.speed)
-        p = brentq(excess, 1e-3 * scale, 10.0 * scale)
+        p = find_root(excess, 1e-3 * scale, 10.0 * scale)
         one, other = (shock_to_pressure(*body, 0.0, p) for body in bodies)
         gain = float(make_isentrope(target[0], other.rho, other.p).velocity_gain(0.0))
         free = other.particle_speed + gain

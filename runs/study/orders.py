@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from regrid.errors import BadInput, suggest
+from regrid.roots import find_root
 from runs.store.files import write_atomically
 from runs.study.computing import Result, find_names
 from runs.study.definition import Definition, write_value
@@ -115,8 +116,6 @@ def find_order(h1: float, h2: float, h3: float, ratio: float) -> float:
     rises with p: below its value at p = 0 the values diverge (NaN).
     """
 
-    from scipy.optimize import brentq  # slow to load
-
     def mismatch(p: float) -> float:
         fine, coarse = (h2 / h1) ** p, (h3 / h2) ** p
         return math.log(fine * (coarse - 1.0) / (fine - 1.0)) - math.log(ratio)
@@ -126,7 +125,7 @@ def find_order(h1: float, h2: float, h3: float, ratio: float) -> float:
         return math.nan
     if mismatch(HIGHEST) <= 0.0:
         return HIGHEST
-    return brentq(mismatch, least, HIGHEST)
+    return find_root(mismatch, least, HIGHEST)
 
 
 CELLS = "cells"

@@ -187,3 +187,9 @@ def test_the_line_has_the_amplitudes_of_linear_theory(name):
         grown = problem.theory.get_amplitude(mode.number * problem.k, -problem.arrival)
         found = measure_mode(line, problem.k, mode.number, mode.phase)
         assert found == pytest.approx(mode.amplitude * grown, rel=1e-3)
+
+
+def test_an_end_before_the_start_is_refused():
+    with pytest.raises(BadInput, match=r"kct_end is 1, .* start = 'incident'"):
+        InterfaceInstability(InterfaceDeck(cells=8, kct_end=1.0))
+    InterfaceInstability(InterfaceDeck(cells=8, kct_end=1.0, start="incident"))

@@ -22,6 +22,7 @@ from hydro.boundary.registry import put
 from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
+from hydro.step import take_step
 from problems.deck import DeckTable, key
 from problems.problem import draw_field
 from problems.references.hugoniot import Shock
@@ -252,6 +253,37 @@ def settle_front(front: Front, *, cfl: float, limiter: str) -> SettledFront:
     return strip.cut(rho, u, p)
 
 
+def run_strip(
+    eos, place_nodes, size, begin, states, ends, duration, *, cfl, limiter
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Density, velocity and pressure (n,) of a row of cells after `duration` [s].
+
+    place_nodes: time -> places (n + 1) [m] of the nodes; size: its width over ROWS [m]; before
+    `begin` [m] is the first of both states (rho, 0, u, p), beyond it the second; ends: what the
+    first and the last side are, as for `put`.  The row lies along j, as do the cells in memory.
+    """
+    x = np.broadcast_to(size * np.arange(ROWS + 1.0)[:, None], (ROWS + 1, place_nodes(0.0).size))
+
+    def lay_nodes(_, t):
+        nodes = np.empty((2, *x.shape))
+        nodes[0], nodes[1] = x, place_nodes(t)
+        return nodes
+
+    nodes = lay_nodes("", 0.0)
+    part = compute_area_fractions(nodes, begin, along="x")
+    block = Block("strip", eos, nodes, *mix_states(eos, part, *states), limiter=limiter)
+    for side, end in zip(("j_min", "j_max"), ends, strict=True):
+        put(block, side, **end)
+    for side in ("i_min", "i_max"):
+        put(block, side, "wall")
+    strip = Simulation([block], [], t_end=duration, cfl=cfl, small_cells=0.0, mesh=lay_nodes)
+    flow = strip.flow
+    while not take_step(flow).last:
+        pass
+    rho, _, u, p = block.state[:, 1, 1:-1].copy()
+    return rho, u, p
+
+
 class _Strip:
     def __init__(self, front: Front, cfl: float, limiter: str):
         self.front, self.cfl, self.limiter = front, cfl, limiter
@@ -272,34 +304,27 @@ class _Strip:
         if begin < 0.0:
             self.rate_beyond = max(self.rate, SLOWEST * self.relative / begin)
         rate = self.rate_beyond if begin < 0.0 else self.rate
+        self.stretch = np.where(self.first < 0.0, self.rate_beyond, self.rate)
         self.duration = (nodes[place] - begin) / (self.relative - begin * rate)
 
-    def place_nodes(self, _name: str, t: float) -> np.ndarray:
+    def place_nodes(self, t: float) -> np.ndarray:
+        """Places of the nodes along the strip."""
         since = t - self.duration
-        stretch = np.where(self.first < 0.0, self.rate_beyond, self.rate)
-        x = self.contact_speed * since + self.first * (1.0 + stretch * since)
-        y = self.size * np.arange(ROWS + 1.0)
-        return np.array(np.broadcast_arrays(x[:, None], y[None, :]))
+        return self.contact_speed * since + self.first * (1.0 + self.stretch * since)
 
     def run(self, shift: float):
         front = self.front
         begin = front.nodes[front.place] - front.speed * self.duration + shift
-        nodes = self.place_nodes("", 0.0)
-        states = [(rho, u, 0.0, p) for rho, u, p in (front.behind, front.ahead)]
-        fractions = compute_area_fractions(nodes, begin)
-        cells = mix_states(front.eos, fractions, *states)
-        block = Block("strip", front.eos, nodes, *cells, limiter=self.limiter)
-        put(block, "i_min", "inflow", state=states[0])
-        put(block, "i_max", "inflow", state=states[1])
-        put(block, "j_min", "wall")
-        put(block, "j_max", "wall")
-        strip = Simulation(
-            [block], [], t_end=self.duration, cfl=self.cfl, small_cells=0.0, mesh=self.place_nodes
+        ends = [
+            {"kind": "inflow", "state": (rho, 0.0, u, p)}
+            for rho, u, p in (front.behind, front.ahead)
+        ]
+        states = [end["state"] for end in ends]
+        strip = begin, states, ends, self.duration
+        rho, u, p = run_strip(
+            front.eos, self.place_nodes, self.size, *strip, cfl=self.cfl, limiter=self.limiter
         )
-        while strip.finished is None:
-            strip.advance()
-        rho, u, _, p = block.state[:, 1:-1, 1].copy()
-        return rho, u, p, block.nodes[0, :, 0]
+        return rho, u, p, self.place_nodes(self.duration)
 
     @property
     def kept(self) -> slice:
@@ -388,7 +413,7 @@ def settle_shock(
     returned goes on a little beyond.  Where
     there is less room than RUN_IN cells between piston and shock it has run less.
     """
-    behind = (shock.rho, shock.particle_speed, 0.0, shock.p)
+    behind = (shock.rho, 0.0, shock.particle_speed, shock.p)
     ahead = (shock.rho_ahead, 0.0, 0.0, shock.p_ahead)
     cell = int(np.clip(np.searchsorted(x, position) - 1, 0, x.size - 2))
     size = float(x[cell + 1] - x[cell])
@@ -397,22 +422,13 @@ def settle_shock(
     duration = way / shock.shock_speed
     line = np.concatenate([x, x[-1] + (x[-1] - x[-2]) * np.arange(1.0, BEYOND + 1.0)])
     part = np.maximum(x[-1] - line, 0.0) / (x[-1] - x[0])
-    height = size * np.arange(ROWS + 1.0)
 
-    def place_nodes(_, t):
-        moved = line - part * shock.particle_speed * (duration - t)
-        return np.array(np.broadcast_arrays(moved[:, None], height[None, :]))
+    def place_nodes(t):
+        return line - part * shock.particle_speed * (duration - t)
 
-    nodes = place_nodes("", 0.0)
-    states = mix_states(eos, compute_area_fractions(nodes, position - way), behind, ahead)
-    block = Block("strip", eos, nodes, *states, limiter=limiter)
-    put(block, "i_min", "piston", velocity=(shock.particle_speed, 0.0))
-    for side in ("i_max", "j_min", "j_max"):
-        put(block, side, "wall")
-    strip = Simulation([block], [], t_end=duration, cfl=cfl, small_cells=0.0, mesh=place_nodes)
-    while strip.finished is None:
-        strip.advance()
-    rho, u, _, p = block.state[:, 1:-1, 1].copy()
+    ends = {"kind": "piston", "velocity": (0.0, shock.particle_speed)}, {"kind": "wall"}
+    strip = position - way, (behind, ahead), ends, duration
+    rho, u, p = run_strip(eos, place_nodes, size, *strip, cfl=cfl, limiter=limiter)
     spot = way / size * (1.0 - shock.particle_speed / shock.shock_speed)  # cells behind the shock
     front = max(0, cell - min(MOST_KEPT, int(CLEAN * spot)))
     rho[:front], u[:front], p[:front] = shock.rho, shock.particle_speed, shock.p

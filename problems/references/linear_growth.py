@@ -81,10 +81,13 @@ def fill_rates(t, state, slopes, coefficients, sizes, edges, impedances, inner, 
         for q in range(3):
             for j in range(size):
                 slope[q, j] = 0.0
-            for i in range(size):
-                value = state[q, first + i]
-                for j in range(size):
-                    slope[q, j] += value * slopes[zone, i, j]
+        for i in range(size):
+            row = slopes[zone, i]
+            p, u, v = state[P, first + i], state[U, first + i], state[V, first + i]
+            for j in range(size):
+                slope[P, j] += p * row[j]
+                slope[U, j] += u * row[j]
+                slope[V, j] += v * row[j]
         c = coefficients[zone]
         for j in range(size):
             k = first + j

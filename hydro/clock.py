@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 
 import numpy as np
+
+from regrid.jit import read_clock
 
 START_FACTORS = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the stable step: the first steps of a run
 RECOVERY = 1.3  # growth of the step after it was cut
@@ -72,7 +73,7 @@ class Clock:
 
 
 class Phase:
-    """A block of code whose wall seconds are added up."""
+    """A block of code whose wall seconds are added up, but for those of compiling kernels."""
 
     __slots__ = ("begun", "seconds")
 
@@ -80,10 +81,10 @@ class Phase:
         self.seconds, self.begun = 0.0, 0.0
 
     def __enter__(self):
-        self.begun = time.perf_counter()
+        self.begun = read_clock()
 
     def __exit__(self, *failure):
-        self.seconds += time.perf_counter() - self.begun
+        self.seconds += read_clock() - self.begun
 
 
 class Stopwatch:

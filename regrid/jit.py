@@ -13,6 +13,8 @@ import io
 import os
 import pickle
 import sys
+import threading
+import time
 import uuid
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
@@ -23,6 +25,7 @@ import numpy as np
 from numba.core import serialize
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
+from numba.core.environment import Environment, _rebuild_env, lookup_environment
 from numba.core.runtime import rtsys
 from numba.extending import register_jitable
 
@@ -133,8 +136,8 @@ class KernelCache:
     def load_overload(self, types, context):
         rtsys.initialize(context)
         with contextlib.suppress(OSError, EOFError, pickle.UnpicklingError):
-            code = self._find(types, context).read_bytes()
-            return CompileResult._rebuild(context, *pickle.loads(code))
+            with self._find(types, context).open("rb") as file:
+                return CompileResult._rebuild(context, *_Reader(file).load())
 
     def save_overload(self, types, result) -> None:
         with contextlib.suppress(OSError):  # where nothing can be written the run goes on without
@@ -146,6 +149,25 @@ class KernelCache:
             found = sorted(path.parent.iterdir(), key=os.path.getmtime)
             for old in found[: -KEPT_FILES // 2] if len(found) > KEPT_FILES else ():
                 old.unlink()
+
+
+class _Reader(pickle.Unpickler):
+    """Reads compiled code; of numba's own modules none is imported for it, for with numba.np they
+    bring scipy, a quarter of a second.  Globals are looked up by code that calls Python alone."""
+
+    def find_class(self, module, name):
+        if name == "_rebuild_env":
+            return _rebuild_environment
+        return super().find_class(module, name)
+
+
+def _rebuild_environment(module: str, constants: list, name: str) -> Environment:
+    if module.startswith("numba.") and lookup_environment(name) is None:
+        made = Environment({})
+        made.consts[:] = constants
+        made.env_name = name
+        Environment._memo[name] = made
+    return _rebuild_env(module, constants, name)
 
 
 def _name_by_contents(function, options=()) -> None:
@@ -161,7 +183,36 @@ def _compile_or_interpret(compiled: Dispatcher, *arguments):
     numbers = sum(one.size for one in arguments if isinstance(one, np.ndarray))
     if is_interpreting() and numbers <= MOST_NUMBERS:
         return compiled.py_func
-    return type(compiled)._compile_for_args(compiled, *arguments)
+    with _COMPILING:
+        return type(compiled)._compile_for_args(compiled, *arguments)
+
+
+class _Compiling:
+    """Wall seconds [s] in which at least one thread compiled or loaded kernels."""
+
+    def __init__(self) -> None:
+        self.seconds, self.threads, self.begun = 0.0, 0, 0.0
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self.threads:
+                self.begun = time.perf_counter()
+            self.threads += 1
+
+    def __exit__(self, *failure: object) -> None:
+        with self._lock:
+            self.threads -= 1
+            if not self.threads:
+                self.seconds += time.perf_counter() - self.begun
+
+
+_COMPILING = _Compiling()
+
+
+def read_clock() -> float:
+    """Wall seconds [s] from some moment on; the clock stands while kernels are compiled."""
+    return (_COMPILING.begun if _COMPILING.threads else time.perf_counter()) - _COMPILING.seconds
 
 
 def kernel(function=None, *, allocates=True, **options):

@@ -206,7 +206,7 @@ def compute_drifts(history: History) -> dict[str, np.ndarray]:
 
 def describe_speed(history: History, cells: int) -> str:
     """Cell updates a second of wall time and the share of each phase."""
-    step = history.get("seconds_step", NONE)[2:]  # row 1 may have compiled its kernels
+    step = history.get("seconds_step", NONE)[2:]  # row 0 is the start; row 1 fills caches
     total = float(np.nansum(step))
     if not cells or total <= 0:
         return ""

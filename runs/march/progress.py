@@ -15,6 +15,7 @@ import numpy as np
 from problems.deck import Deck, place_gauges
 from problems.evolution import Evolution
 from problems.problem import Problem
+from regrid.jit import read_clock
 from regrid.text_files import escape_controls
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import name_failure
@@ -108,9 +109,8 @@ class Progress:
         self.left = TimeLeft(evolution.t_end)
         self._left_said = (-1.0, "?")  # wall time, words
         self._foretold = False
-        self._began = self._said = time.monotonic()
+        self._began = self._said = read_clock()
         self.steps = 0
-        self._first_seconds = 0.0
         if not quiet and self.stream.isatty():
             from tqdm import tqdm
 
@@ -126,13 +126,11 @@ class Progress:
     def update(self, evolution: Evolution, row: Mapping[str, Any]) -> None:
         """Take note of a step."""
         self.steps += 1
-        now = time.monotonic()
-        if self.steps == 1:
-            self._first_seconds = now - self._began  # loading or compiling kernels: not speed
+        now = read_clock()
         self.left.note(self.steps, evolution.t, now)
         if self.quiet:
             return
-        if not self._foretold and now - self._began - self._first_seconds > FIRST_WORD:
+        if not self._foretold and now - self._began > FIRST_WORD:
             self._foretell(evolution, now)
         if self.bar is not None:
             self.bar.set_description_str(self.say_time(evolution.t), refresh=False)
@@ -159,9 +157,9 @@ class Progress:
         if "dt" in row:
             limit = f" ({row['dt_limit']})" if row.get("dt_limit") else ""
             words.append(f"dt {row['dt']:.2e} s{limit}")
-        running = now - self._began - self._first_seconds
-        if self.steps > 1 and running > 0:
-            rate = (self.steps - 1) * self.cells / running
+        running = now - self._began
+        if self.steps and running > 0:
+            rate = self.steps * self.cells / running
             words.append(f"{rate / 1e6:.2f} Mcells/s" if rate > 1e5 else f"{rate:.0f} cells/s")
         if "least_scaled_jacobian" in row:
             words.append(f"corner {row['least_scaled_jacobian']:.3f}")
@@ -185,7 +183,7 @@ class Progress:
         if found.seconds < WORTH_A_WORD:
             return
         ends = describe_seconds_range(found.low, found.seconds, found.high)
-        a_step = (now - self._began - self._first_seconds) / max(self.steps - 1, 1)
+        a_step = (now - self._began) / self.steps
         self.say(f"measured: {a_step * 1e3:.3g} ms a step; {ends} to the end")
 
     def say(self, text: str) -> None:

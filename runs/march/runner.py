@@ -27,6 +27,7 @@ from problems.deck import Output
 from problems.evolution import Evolution, get_missed, get_node_fields, get_start_row
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure, find_nearest
+from regrid.jit import read_clock
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import ENDS
 from runs.early_end.explain import explain
@@ -421,10 +422,10 @@ class Runner:
             if self.limit is not None and self.limit.reached:
                 self._write_restart_point()
                 raise OutOfTime(str(self.limit))
-            t_before, clock = evolution.t, time.perf_counter()
+            t_before, clock = evolution.t, read_clock()
             with patience(self.quiet) if self.progress.steps == 0 else contextlib.nullcontext():
                 row = evolution.advance()
-            seconds = time.perf_counter() - clock
+            seconds = read_clock() - clock
             self._record(row, seconds)
             self.writing.look()
             if self.limit is not None:

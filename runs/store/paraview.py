@@ -10,8 +10,8 @@ from __future__ import annotations
 import functools
 import os
 from collections.abc import Iterable, Mapping
+from html import escape
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import h5py
 import numpy as np
@@ -36,7 +36,7 @@ def write_vts(path: Path, nodes: np.ndarray, cell_fields: Mapping[str, np.ndarra
     for name, values, components in arrays:
         image = np.ascontiguousarray(values, dtype="<f8").tobytes()
         fields.append(
-            f'<DataArray type="Float64" Name={quoteattr(name)} NumberOfComponents="{components}" '
+            f'<DataArray type="Float64" Name="{escape(name)}" NumberOfComponents="{components}" '
             f'format="appended" offset="{offset}"/>'
         )
         data += [np.uint64(len(image)).astype("<u8").tobytes(), image]
@@ -133,7 +133,7 @@ def describe_arrays(
     size = " ".join(str(n) for n in nodes)
     geometry = "_".join(components).upper()
     lines = [
-        f'<Grid Name={quoteattr(group.rsplit("/", 1)[-1])} GridType="Uniform">',
+        f'<Grid Name="{escape(group.rsplit("/", 1)[-1])}" GridType="Uniform">',
         f'<Topology TopologyType="{len(nodes)}DSMesh" Dimensions="{size}"/>',
         f'<Geometry GeometryType="{geometry}">{"".join(map(item, components))}</Geometry>',
     ]
@@ -142,7 +142,7 @@ def describe_arrays(
             continue
         center = "Node" if data.shape == nodes else "Cell"
         lines.append(
-            f'<Attribute Name={quoteattr(name)} AttributeType="Scalar" Center="{center}">'
+            f'<Attribute Name="{escape(name)}" AttributeType="Scalar" Center="{center}">'
             f"{item(name)}</Attribute>"
         )
     return "\n".join(lines) + "\n</Grid>\n"

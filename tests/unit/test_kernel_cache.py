@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from builders import ROOT
-from regrid.jit import compute_contents_digest
+from regrid.jit import compute_contents_digest, kernel, read_clock
 
 LAW = """
 from hydro.eos import IdealGas
@@ -36,6 +37,19 @@ state, sound = np.full((4, 5, 5), 2.0), np.zeros((3, 3))
 fill = make_fill_sound_speed(Law)
 fill(state, Law(1.5).parameters, 0, 3, sound)
 print(sound[0, 0] ** 2, sum(fill.stats.cache_hits.values()))
+"""
+
+
+LEAST = """
+import sys
+import numpy as np
+from regrid.jit import kernel
+
+@kernel
+def find_least(x):
+    return np.median(x) + x.min()
+
+print(find_least(np.ones(4)), int("scipy.linalg" in sys.modules))
 """
 
 
@@ -134,3 +148,24 @@ def test_the_digest_follows_what_users_write_helpers_as(text):
         exec(f"{head}{text.replace('K', number)}def f(x):\n    return h(x)\n", space)
         digests.append(compute_contents_digest(space["f"]))
     assert digests[0] == digests[2] != digests[1]
+
+
+def test_the_clock_of_steps_stands_while_a_kernel_is_compiled():
+    @kernel
+    def double(x):
+        return 2.0 * x
+
+    began, wall_began = read_clock(), time.perf_counter()
+    assert double(1.5) == 3.0
+    seconds, wall = read_clock() - began, time.perf_counter() - wall_began
+    assert 0.0 <= seconds < 0.2 * wall
+    began = read_clock()
+    time.sleep(0.01)
+    assert read_clock() - began >= 0.009
+
+
+def test_code_that_uses_numpy_is_loaded_without_numba_np_and_scipy(tmp_path):
+    script = tmp_path / "least.py"
+    script.write_text(LEAST)
+    assert run(tmp_path, script=str(script))[0] == 2.0
+    assert run(tmp_path, script=str(script)) == (2.0, 0)

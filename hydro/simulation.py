@@ -112,7 +112,6 @@ class Simulation:
         self.watch = Stopwatch()
         self.last_reason: RunFailure | None = None  # why a step was rejected last
         self.finished: str | None = None
-        self._shows = False  # does `get_state` show the blocks' arrays themselves?
         if not is_interpreting():  # built to be looked at, it needs no rates and totals
             self._update_rates()
         if small_cells is None:  # a mesh that is given has the cells that it is to have
@@ -397,19 +396,8 @@ class Simulation:
                 ("void_energy", block.void_energy),
                 ("rates", block.rates),
             ):
-                state[f"{block.name}/{name}"] = array if self._shows else array.copy()
+                state[f"{block.name}/{name}"] = array.copy()
         return state
-
-    def view_state(self) -> dict:
-        """`get_state` with the blocks' own arrays, not copies: they hold for the next step, too.
-
-        That one writes to the other of the two arrays that a block has of everything.
-        """
-        self._shows = True
-        try:
-            return self.get_state()
-        finally:
-            self._shows = False
 
     def set_state(self, state) -> None:
         """Take up a state of `get_state` of the same blocks."""

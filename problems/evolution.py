@@ -26,7 +26,7 @@ of an Evolution
 - `missed`: what a run that ends now has not reached, in a few words; such a run has exit code 3
 - `geometry.curved`: is y the distance from the axis x?
 - `take_cells(state)`: have as many cells as a state of `get_state`, before `set_state` takes it up
-- `get_state_of(names)`, `view_state()`: see `HasStateOfBlocks`, `HasViewOfState`
+- `get_state_of(names)`: see `HasStateOfBlocks`
 
 of a block
 - `material`: its name
@@ -113,16 +113,6 @@ class HasStateOfBlocks(Protocol):
 
     def get_state_of(self, names: Container[str]) -> State:
         """`get_state`, with the arrays `<block>/...` of the blocks of these names alone."""
-        ...
-
-
-@runtime_checkable
-class HasViewOfState(Protocol):
-    """An Evolution that can show its state without copying it."""
-
-    def view_state(self) -> State:
-        """`get_state` of arrays, and parts of arrays, that no step writes to but those after the
-        next one."""
         ...
 
 

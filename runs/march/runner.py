@@ -40,7 +40,6 @@ from runs.ranks.world import World, describe_ranks, loss_told, write_on_ranks
 from runs.store.directory import RunDirectory
 from runs.store.dumps import (
     choose_arrays,
-    is_large,
     make_image,
     make_light_image,
     write_sealed,
@@ -514,7 +513,7 @@ class Runner:
     def _write(self, path: Path, then: Callable[[], None]) -> None:
         """A whole dump of this step, and `then` what follows when it is on the disk.
 
-        A large one is written while the run goes on.
+        It is written while the run goes on.
         """
         began = time.monotonic()
         self._sync()
@@ -534,11 +533,7 @@ class Runner:
             return
         image = make_image(self.evolution, *names, besides)
         self._describe(path, self.evolution)
-        if is_large(self.evolution):
-            self.writing.start(lambda: write_sealed(path, image), follow)
-        else:
-            write_sealed(path, image)
-            follow()
+        self.writing.start(lambda: write_sealed(path, image), follow)
 
     @property
     def _ranked(self) -> World | None:

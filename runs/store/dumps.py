@@ -54,7 +54,6 @@ FORMAT_OF_PARTS = "shockgrid dump part"
 FORMAT_VERSION = 4
 FIRST_WITH_CHECKSUM = 2  # version of the format
 WRITABLE = 1  # H5LT_FILE_IMAGE_OPEN_RW
-LARGE = 1 << 22  # bytes of the nodes of a dump that is written while the run goes on
 LONG_NAMES = {
     "x": "x of the nodes",
     "y": "y of the nodes",
@@ -90,7 +89,6 @@ def make_image(
     that stays open, and the numbers of each dump written over the last one's.
     """
     state = {**evolution.get_state(), **besides}
-    shown = find_shown(evolution.blocks, state)
     words = problem, deck_text, t_unit, kind, evolution.finished, is_axisymmetric(evolution)
     kinds = [(key, v if isinstance(v, str) else _type(v)) for key, v in state.items()]
     shown = find_shown(evolution.blocks, state)
@@ -440,8 +438,3 @@ def write_sealed(path: Path, image: Bytes) -> tuple[int, str]:
     parts = seal(image)
     write_atomically(path, parts)
     return sum(map(len, parts)), bytes(parts[1]).decode("ascii")
-
-
-def is_large(evolution: Evolution) -> bool:
-    """Is a dump of this evolution a large one?"""
-    return sum(block.nodes.nbytes for block in evolution.blocks) >= LARGE

@@ -37,7 +37,7 @@ def test_a_limit_leaves_time_for_the_last_restart_point():
 def test_a_run_ends_at_its_limit_and_goes_on(shockgrid, toy, monkeypatch):
     """By a clock that goes on by a minute whenever it is looked at."""
     minutes = itertools.count()
-    clock = SimpleNamespace(monotonic=lambda: 60.0 * next(minutes))
+    clock = SimpleNamespace(**vars(time) | {"monotonic": lambda: 60.0 * next(minutes)})
     monkeypatch.setattr(limits, "time", clock)
     words = ("--set", "output.dumps=2", "-q")
     code, output, error = shockgrid("run", "toy", "-o", "limited", "--max-wall", "12m", *words)

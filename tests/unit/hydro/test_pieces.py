@@ -9,7 +9,7 @@ from hydro.boundary.registry import put
 from hydro.eos import IdealGas, StiffenedGas
 from hydro.formulas.geometry import find_geometry
 from hydro.links.join import join, slide
-from hydro.rows import FLUX_ROWS, HOOP, MOMENTUM_Y, PUSH
+from hydro.rows import FLUX_ROWS, HOOP, MOMENTUM_Y, PUSH, RHO, V
 from hydro.simulation import Simulation
 from hydro.sliding.pieces import fill_pieces, fill_points, solve_pieces
 from hydro.sliding.polygons import make_fill_piece_flux
@@ -206,3 +206,14 @@ def test_sums_are_kept_while_the_slave_slides_on_a_curve(ends):
     for what in ("momentum_x", "momentum_y", "energy"):
         drift = row[f"total_{what}"] - row[f"boundary_{what}"] - start[f"total_{what}"]
         assert abs(drift) < 1e-13 * start["total_energy"], what
+
+
+def test_fields_may_be_functions_of_the_centres():
+    x, y = np.meshgrid(np.linspace(0.0, 2.0, 4), np.linspace(0.0, 1.0, 3), indexing="ij")
+    nodes = np.array([x + 0.1 * y, y])
+    block = Block("air", IdealGas(1.4), nodes, lambda x, y: 1.0 + x * y, 0.0, lambda x, y: y, 1.0)
+    centre_x, centre_y = block.centres
+    assert block.centres.shape == (2, 3, 2)
+    assert np.allclose(centre_x[0], [(2.0 / 3.0) / 2.0 + 0.025, (2.0 / 3.0) / 2.0 + 0.075])
+    assert np.array_equal(block.state[RHO, 1:-1, 1:-1], 1.0 + centre_x * centre_y)
+    assert np.array_equal(block.state[V, 1:-1, 1:-1], centre_y)

@@ -35,7 +35,7 @@ def _read() -> dict:
 
 
 def _judge() -> list[str]:
-    heads = ["run", "cells", "steps", "foretold before", "wall time [s]"]
+    heads = ["run", "cells", "steps", "predicted before", "wall time [s]"]
     heads += [f"at {share} of it" for share in SHARES]
     rows = []
     for row in _read()["rows"]:
@@ -50,7 +50,7 @@ def _judge() -> list[str]:
 
 
 def _list_sizes() -> list[str]:
-    heads = ["run", "cells", "memory [MB]", "foretold", "a dump [MB]", "foretold"]
+    heads = ["run", "cells", "memory [MB]", "predicted", "a dump [MB]", "predicted"]
     rows = []
     for row in sorted(_read()["rows"], key=lambda row: row["cells"]):
         numbers = (row[name] / 1e6 for name in ("memory", "foretold memory"))
@@ -69,7 +69,7 @@ def _list_rules() -> list[str]:
         for rule in RULES
     ]
     rows.append(["cautions", "sentences of the problem on this deck and run", "above 0"])
-    return make_table(["rule", "what is measured", "told"], rows)
+    return make_table(["rule", "what is measured", "reported"], rows)
 
 
 def _list_meanings() -> list[str]:

@@ -13,8 +13,9 @@ after the step, what lies beyond their sides, and dt.  `take_step` makes the new
 Arrays are (component, i, j) or (component, n) along a side.  In `curved` flow x is the axis and y
 the radius, and all integrals are weighted by y (theory F9); they are taken at two Gauss points,
 which is exact here and needs no closed form.  Formulas of single numbers are those of
-`hydro/formulas`.  Left out: how nodes move (they are given), sliding contacts, surface tension,
-body forces, small cells.  `tests/verification/scheme/test_reference_step.py` compares.
+`hydro/formulas`.  Left out: how nodes move (they are given), surface tension, body
+forces, small cells.  Sliding contacts are in `tests/reference_sliding.py`.
+`tests/verification/scheme/test_reference_step.py` compares.
 """
 
 from __future__ import annotations
@@ -26,25 +27,16 @@ import numpy as np
 from hydro.eos.base import make_least_pressure
 from hydro.formulas import riemann
 from hydro.formulas.reconstruction import LIMITERS, RELAXED
+from reference_sliding import SlidingContact, dot, find_free_speed, solve_contact
 
 GAUSS = 0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5
 SIDES = ("i_min", "i_max", "j_min", "j_max")
 TINY = 1e-300
 Trace = namedtuple("Trace", "rho u v p e c2 hll acoustic")  # rows of what is traced to faces
-find_free_speed = np.vectorize(riemann.compute_speed_at_pressure, excluded={4})
 find_wall_pressure = np.vectorize(riemann.compute_wave_pressure, excluded={3})
 
 
-def _solve_contact(rho_l, w_l, p_l, c_l, law_l, rho_r, w_r, p_r, c_r, law_r, jump):
-    """Pressure and speed of the contact between two states."""
-    left, right = (rho_l, w_l, p_l, c_l, law_l), (rho_r, w_r, p_r, c_r, law_r)
-    return riemann.compute_contact(left, right, jump)
-
-
-solve_contact = np.vectorize(_solve_contact, excluded={4, 9})  # but for the wave laws
-
-
-def take_step(blocks, links, t, dt, curved=False):
+def take_step(blocks, links, t, dt, curved=False, contacts=()):
     """New states (4, ni, nj) and void energies of all blocks, in their order.
 
     A block has `nodes`, `nodes_new`, `state` (4, ni + 2, nj + 2), whose ghosts are not read,
@@ -55,6 +47,9 @@ def take_step(blocks, links, t, dt, curved=False):
     for link in links:
         one, two = sides[id(link.leader)], sides[id(link.follower)]
         one.partner, two.partner, one.reverse, two.reverse = two, one, link.reverse, link.reverse
+    for contact in contacts:
+        one, two = (sides[id(segment)] for segment in contact.segments)
+        one.contact = two.contact = SlidingContact(contact, one, two, dt)
     for side in sides.values():
         side.fill_ghosts(t)
     for patch in patches:
@@ -63,10 +58,6 @@ def take_step(blocks, links, t, dt, curved=False):
     for side in sides.values():
         side.fill_flux(t + 0.5 * dt)
     return [patch.update() for patch in patches]
-
-
-def dot(a, b):
-    return a[0] * b[0] + a[1] * b[1]
 
 
 def cross(a, b):
@@ -189,6 +180,7 @@ class Patch:
             {axis: measure_faces(nodes, new, axis, dt, weighted) for axis in "ij"}
             for weighted in (curved, False)
         )
+        self.extra, self.extra_new = np.zeros((2, *self.rho.shape))  # of polygons, along slaves
         self.fluxes = {axis: np.zeros((5, *self.faces[axis][1].shape)) for axis in "ij"}
 
     def compute_c2(self, rho, p):
@@ -294,11 +286,15 @@ class Patch:
     def update(self):
         """New state and void energy: what was there less what flowed out, over the new volume."""
         total = self.e + 0.5 * dot(self.velocity, self.velocity)
-        amounts = self.volume * self.rho * np.stack((np.ones_like(total), *self.velocity, total))
+        amounts = (
+            (self.volume + self.extra)
+            * self.rho
+            * np.stack((np.ones_like(total), *self.velocity, total))
+        )
         amounts -= self.dt * flow_out({axis: q[:4] for axis, q in self.fluxes.items()})
         if self.curved:
             amounts[2] += self.dt * self.push_outwards()
-        volume, _ = measure_cells(self.block.nodes_new, self.curved)
+        volume = measure_cells(self.block.nodes_new, self.curved)[0] + self.extra_new
         rho, velocity, e = amounts[0] / volume, amounts[1:3] / amounts[0], amounts[3] / amounts[0]
         e = e - 0.5 * dot(velocity, velocity)
         p = self.eos.pressure(rho, e)
@@ -342,6 +338,9 @@ class Side:
     def take(self, field, depth=0):
         return at_side(field, self.name, depth)[..., self.segment.start : self.segment.stop]
 
+    def find_line(self, nodes):
+        return at_side(nodes, self.name)[:, self.segment.start : self.segment.stop + 1]
+
     def ask(self, find):
         """What `find` finds of the partner, in this side's order."""
         return find(self.partner)[..., :: -1 if self.reverse else 1]
@@ -361,7 +360,7 @@ class Side:
             excess = dot(state[1:3] - np.reshape(segment.velocity(t), (2, 1)), normal)
             part = self.shorten(excess, normal) if kind == "piston" else 1.0
             state[1:3] -= 2.0 * part * excess * normal
-        elif kind in ("interface", "free-surface"):
+        elif kind in ("interface", "free-surface", "sliding"):
             pressure, speed = self.solve(Side.find_state_at_face, normal, t)
             c2, rise = self.take(patch.c2), 2.0 * (pressure - state[3])
             jump = np.minimum(2.0 * (speed - dot(state[1:3], normal)), 1.5 * np.sqrt(c2))
@@ -405,13 +404,15 @@ class Side:
 
     def solve(self, find, normal, t):
         """Pressure and normal speed of a contact or a free surface between the states found."""
+        if self.segment.kind == "sliding":
+            return self.contact.find_surface(self, normal)
         (rho, u, v, p, c2), law = find(self), self.patch.eos.wave_law
         mine = rho, dot((u, v), normal), p, np.sqrt(c2), law
         if self.partner is None:
             pressure = self.segment.pressure(t) + 0.0 * rho
             return pressure, find_free_speed(*mine, pressure)
         (rho, u, v, p, c2), law = self.ask(find), self.partner.patch.eos.wave_law
-        return solve_contact(*mine, rho, dot((u, v), normal), p, np.sqrt(c2), law, 0.0)
+        return solve_contact(*mine, rho, dot((u, v), normal), p, np.sqrt(c2), law)
 
     def find_inflow(self, t):
         """What stands beyond an inflow side."""
@@ -428,6 +429,8 @@ class Side:
             other = self.find_inflow(t) if kind == "inflow" else trace
             other = other if self.partner is None else self.ask(Side.find_trace)
             flux = compute_flux(trace, other, normal, sweep)
+        elif kind == "sliding":
+            flux = self.contact.find_flux(self)
         else:
             pressure = self.find_pressure(Trace(*trace), t)
             flux = np.stack((0.0 * pressure, *(pressure * normal), pressure * sweep, pressure))

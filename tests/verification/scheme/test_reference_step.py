@@ -1,7 +1,7 @@
 """The fast step against the plain one of `tests/reference_step.py`: random blocks, random motion.
 
-Every kind of side but sliding contacts, plane and axisymmetric; rough and smooth states of gases
-and of materials that tear; every limiter and both fluxes; a few steps on from each other.
+Every kind of side, plane and (all but sliding contacts) axisymmetric; rough and smooth states of
+gases and of materials that tear; every limiter and both fluxes; a few steps on from each other.
 """
 
 from types import SimpleNamespace
@@ -15,14 +15,16 @@ from hydro.boundary.registry import OWN, put
 from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
 from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
 from hydro.formulas.riemann import DEFAULT_FLUX
-from hydro.links.join import join
+from hydro.links.join import join, slide
 from hydro.simulation import Simulation
+from reference_sliding import find_points, find_positions
 from reference_step import take_step
 
 GAS, WATER = (IdealGas(1.4), 1.2, 1e5), (StiffenedGas(4.4, 6e8), 1000.0, 3e8)
 METAL = (MieGruneisen(2707.0, 5386.0, 1.339, 1.97), 2800.0, 6e9)
 MATERIALS = {"gas": (GAS, GAS), "metal": (METAL, WATER)}
 STEPS, SHAKE = 6, 0.017  # of nodes [m]: a tenth of a cell, anew in every step
+OTHERS = "upper", "slave"  # blocks of the second material
 EXACT = 1e-12  # of the largest density, sound speed, rho c squared
 
 
@@ -43,6 +45,12 @@ class Shaken:
                 found[two][there] = found[one][here] + np.reshape(shift, (2, 1))
             for key in self.on_axis:
                 found[key][1, :, 0] = 0.0
+            if "slave" in found:  # its nodes lie on the master's line
+                line, points = found["master"][:, :, -1], found["slave"][:, :, 0]
+                for end in (0, -1):
+                    if self.grids["slave"][0, end, 0] == self.grids["master"][0, end, 0]:
+                        points[:, end] = line[:, end]
+                points[...] = find_points(line, find_positions(line, points))
             self.shaken[t] = found
         return self.shaken[t][name]
 
@@ -65,6 +73,12 @@ def make_state(nodes, material, rough, random):
     )
 
 
+def make_block(name, materials, nodes, rough, random, **options):
+    eos, *_ = material = materials[name in OTHERS]
+    state, words = make_state(nodes(name, 0.0), material, rough, random), f"of {name in OTHERS}"
+    return Block(name, eos, nodes(name, 0.0), *state, material=words, **options)
+
+
 def make_flow(materials, geometry, rough, limiter=DEFAULT_LIMITER, flux=DEFAULT_FLUX, seed=1):
     """A block below and one above an interface, one beside the lower one, and one alone."""
     random, curved = np.random.default_rng(seed), geometry == "axisymmetric"
@@ -84,15 +98,9 @@ def make_flow(materials, geometry, rough, limiter=DEFAULT_LIMITER, flux=DEFAULT_
     if not curved:
         alike += [(("alone", first_row), ("alone", last_row), (0.0, 0.9))]
     nodes = Shaken(grids, alike, ("lower", "beside") if curved else (), random)
-    blocks = {}
-    for name in grids:
-        eos, *_ = material = materials[name == "upper"]
-        state = make_state(nodes(name, 0.0), material, rough, random)
-        blocks[name] = Block(
-            name, eos, nodes(name, 0.0), *state, material=f"material {name == 'upper'}",
-            limiter=limiter, flux=flux,
-        )  # fmt: skip
-    lower, upper, beside, alone = blocks.values()
+    options = {"limiter": limiter, "flux": flux}
+    blocks = [make_block(name, materials, nodes, rough, random, **options) for name in grids]
+    lower, upper, beside, alone = blocks
     (eos, rho, p), (other, other_rho, other_p) = materials
     c, other_c = float(eos.sound_speed(rho, p)), float(other.sound_speed(other_rho, other_p))
     links = [
@@ -116,8 +124,27 @@ def make_flow(materials, geometry, rough, limiter=DEFAULT_LIMITER, flux=DEFAULT_
         put(alone, "j_max", "outflow")
     else:
         links.append(join("periodic", (alone, "j_min"), (alone, "j_max")))
-    blocks = list(blocks.values())
     return Simulation(blocks, links, t_end=1e9, mesh=nodes, geometry=geometry, cfl=0.4)
+
+
+def make_sliding_flow(materials, rough):
+    """Two blocks that slide on each other.
+
+    The slave covers all of a gas; a condensed master goes on, as a free surface, at one end.
+    """
+    random, gas = np.random.default_rng(1), materials is MATERIALS["gas"]
+    grids = {
+        "master": box((0.0, 0.0), (1.0, 0.8), (6, 5)),
+        "slave": box((0.0, 0.8), (1.0 if gas else 0.87, 1.8), (8, 6)),
+    }
+    nodes = Shaken(grids, [], (), random)
+    blocks = [make_block(name, materials, nodes, rough, random) for name in grids]
+    contact = slide((blocks[0], "j_max"), (blocks[1], "j_min"))
+    for block, side in zip(blocks, ("j_min", "j_max"), strict=True):
+        put(block, "i_min", "wall")
+        put(block, "i_max", "outflow")
+        put(block, side, "outflow")
+    return Simulation(blocks, [contact], t_end=1e9, mesh=nodes, cfl=0.4)
 
 
 def hold(block):
@@ -137,8 +164,8 @@ def follow(simulation):
         retries += row["retries"]
         for block, now in zip(given, simulation.blocks, strict=True):
             block.nodes_new = now.nodes
-        links, curved = simulation.exchange.links, simulation.geometry.curved
-        found = take_step(given, links, start, row["dt"], curved)
+        exchange, curved = simulation.exchange, simulation.geometry.curved
+        found = take_step(given, exchange.links, start, row["dt"], curved, exchange.contacts)
         for block, (state, void) in zip(simulation.blocks, found, strict=True):
             rho, c2 = state[0].max(), block.eos.sound_speed(state[0], state[3]).max() ** 2
             got = *block.state[:, 1:-1, 1:-1], block.void_energy
@@ -159,6 +186,13 @@ def test_fast_step_is_the_plain_one(materials, geometry, rough):
 
 
 @pytest.mark.kernels
+@pytest.mark.parametrize("rough", [False, True], ids=["smooth", "rough"])
+@pytest.mark.parametrize("materials", MATERIALS)
+def test_fast_step_is_the_plain_one_where_blocks_slide(materials, rough):
+    follow(make_sliding_flow(MATERIALS[materials], rough))
+
+
+@pytest.mark.kernels
 @pytest.mark.parametrize("limiter", [name for name in LIMITERS if name != DEFAULT_LIMITER])
 def test_fast_step_is_the_plain_one_with_every_limiter(limiter):
     follow(make_flow(MATERIALS["gas"], "plane", False, limiter))
@@ -170,10 +204,7 @@ def test_fast_step_is_the_plain_one_with_hll_alone():
 
 
 def test_every_kind_of_side_is_there():
-    kinds = {
-        segment.kind
-        for geometry in ("plane", "axisymmetric")
-        for block in make_flow(MATERIALS["gas"], geometry, False).blocks
-        for segment in block.segments
-    }
-    assert kinds == set(OWN) - {"sliding"}
+    flows = [make_flow(MATERIALS["gas"], geometry, False) for geometry in ("plane", "axisymmetric")]
+    flows += [make_sliding_flow(MATERIALS["gas"], False)]
+    kinds = {s.kind for flow in flows for block in flow.blocks for s in block.segments}
+    assert kinds == set(OWN)

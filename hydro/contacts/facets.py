@@ -106,25 +106,27 @@ def faces_each_other(line, a, along_x, along_y):
 
 
 @compiled_once
-def is_film(inner, k, line, a, deep):
-    """Is node `k`, which lies `deep` behind face `a`, on the other side of a film of one body?
+def is_film(inner, k, line, a, x, y):
+    """Is node `k`, at (x, y), on the other side of a film of one body than face `a`?
 
     inner (2, n): the next nodes inwards.  That of a node which has come through the face is in
     front of it, that of one on the film's other side behind.
     """
-    return -find_depth(line, a, inner[0, k], inner[1, k]) < 2.0 * deep
+    deep = max(0.0, find_depth(line, a, x, y))
+    return -find_depth(line, a, inner[0, k], inner[1, k]) <= 2.0 * deep
 
 
 @kernel
 def find_pins(
-    points, inner, line, boxes, group, tolerance, reach, one_body, part, positions
+    points, inner, line, boxes, group, tolerance, reach, asked, one_body, part, positions
 ):  # fmt: skip
     """Positions (n,) of the points (2, n) that lie on a line (2, m + 1), -1.0 for all others.
 
     On: closer than `tolerance` of a face's length, or behind a face that looks at the points' own
     line, by no more than BULGE of it: where a curved contact has opened, nodes lie behind the
-    other line's chords.  inner (2, n), one_body: see `is_film`.  boxes (4, groups): of `group`
-    faces each; reach: BULGE of the longest [m]; part: see `may_lie_on`.  Returns how many do.
+    other line's chords.  inner (2, n), one_body: see `is_film`; asked (n,): of which nodes.  boxes
+    (4, groups): of `group` faces each; reach: BULGE of the longest [m]; part: see `may_lie_on`.
+    Returns how many do.
     """
     count, last = line.shape[1] - 1, points.shape[1] - 1
     groups, near, found = np.empty(boxes.shape[1], np.int64), 0, 0
@@ -156,8 +158,7 @@ def find_pins(
                         is_on = False  # behind the next side, at the corner of a body
                     if a == count - 1 and (1.0 - at) * square**0.5 < deep:
                         is_on = False
-                    is_on = is_on and not (one_body and is_film(inner, k, line, a, deep))
-                if is_on:
+                if is_on and not (asked[k] and one_body and is_film(inner, k, line, a, x, y)):
                     least, position = away, snap_position(a + at)
         positions[k] = position
         if position >= 0.0:

@@ -17,7 +17,7 @@ from regrid.jit import compiled_once, kernel
 DEEP = 0.05  # of a face's length: so far the leader's nodes may lie behind the follower's chords
 MOST_LAID = 0.3  # of a face's length: nodes that have gone further into the other body fail
 MATCHED = 1e-6  # of a face's length: nodes of both lines that lie so near each other are a pair
-STILL = 1e-14  # of a face's length: a node this near is where it is to be
+STILL = 1e-12  # of a face's length: a node this near is where it is to be
 
 
 @kernel

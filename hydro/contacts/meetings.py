@@ -30,7 +30,8 @@ from hydro.motion.grid_motion import GridMotion
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import Place, RunFailure
 
-LEAST_STEP = 1e-3  # of the stable step: a touch that comes sooner is taken at its end
+LEAST_STEP = 2e-3  # of the stable step: a touch that comes sooner is taken at its end
+LEAST_BESIDE = 1e-2  # the same where surfaces touch already
 CUTS = 5  # times that a step is cut to the first touch, and made a little longer again
 MOST_LONGER = 1.5  # a step that was cut too short
 REACHED = 1e-6  # of a step: a touch that comes so shortly before or after its end is at its end
@@ -143,10 +144,11 @@ class Meetings:
             pair.forget_hits()
         part_back = min(1.0, BACK * dt / stable_dt)
         self._lay(self.touching, part_back)
-        for surface in self.surfaces if self.touching else ():
+        for surface in self._sides:
             surface.measure_way()
         first = self._find_first(awake, 1.0 if self._cuts == 0 else MOST_LONGER)
-        other = max(first * dt, min(dt, LEAST_STEP * stable_dt))
+        least = LEAST_BESIDE if self.touching else LEAST_STEP
+        other = max(first * dt, min(dt, least * stable_dt))
         misses = other < (1.0 - REACHED) * dt or (1.0 + REACHED) * dt < other <= MOST_LONGER * dt
         if misses and self._cuts < CUTS:
             self._cuts += 1

@@ -127,11 +127,11 @@ class Pair:
         one, other, parts = self.leader, self.follower, self.parts
         pinned = find_pins(
             other.line, other.inner, one.line, one.boxes, one.group, ON, BULGE * one.longest,
-            self.one_body, parts[0], self.positions,
+            self.asked, self.one_body, parts[0], self.positions,
         )  # fmt: skip
         return pinned + find_pins(
             one.line, one.inner, other.line, other.boxes, other.group, ON, BULGE * other.longest,
-            self.one_body, parts[1], self.back_positions,
+            self.back_asked, self.one_body, parts[1], self.back_positions,
         )  # fmt: skip
 
     def find_crossing(self) -> tuple[Surface, Surface, int] | None:

@@ -10,7 +10,6 @@ import numpy as np
 
 from hydro.contacts.facets import (
     faces_each_other,
-    find_depth,
     find_direction,
     find_groups,
     is_film,
@@ -72,8 +71,7 @@ def measure_distance(points, inner, line, boxes, group, asked, part, one_body, m
                 if one_body:
                     if not faces_each_other(line, a, along_x, along_y):
                         continue
-                    deep = find_depth(line, a, x, y)
-                    if deep > 0.0 and is_film(inner, k, line, a, deep):
+                    if is_film(inner, k, line, a, x, y):
                         continue
                 least = away
     return least**0.5

@@ -12,8 +12,10 @@ from collections.abc import Container
 import numpy as np
 
 from hydro.block import Block
+from hydro.motion.overlaps import is_inside
 from hydro.simulation import Simulation
 from hydro.sliding.contact import SlidingContact
+from hydro.sliding.pieces import project
 from problems.plate_on_wedge.report import COLUMNS, REFINED_RINGING, RINGING, measure_profile
 from problems.plate_on_wedge.set_up import JET, PHASES, PlateSetUp
 from regrid.curves import compute_arc_lengths
@@ -280,7 +282,7 @@ class PlateRun(Simulation):
             face = self.get_end_face()
             if face.shape[1] > 4 and free.shape[1] > APART:
                 away = cdist(free[:, APART:].T, face[:, 2:].T)
-                if (away.min(axis=1) < near[APART:]).any():
+                if (away.min(axis=1) < near[APART:]).any() or self.is_folded(free, face, near):
                     return "cavity closed: the jet has met the end face of the wedge"
         away = cdist(free.T, free.T)
         index = np.arange(free.shape[1])
@@ -288,6 +290,20 @@ class PlateRun(Simulation):
         if (away.min(axis=1) < near).any():
             return "cavity closed: the free surface has met itself"
         return None
+
+    def is_folded(self, free: np.ndarray, face: np.ndarray, near: np.ndarray) -> bool:
+        """Has the free surface beside A come so far through the wedge's end face?
+
+        Both lines begin at A, where no contact is between them.
+        """
+        wedge = self.problem.to_set_up(self.wedge.nodes)
+        for k in range(1, APART):
+            x, y = free[:, k]
+            if is_inside((x, y), wedge):
+                away = min(project(face, a, x, y)[1] for a in range(face.shape[1] - 1))
+                if away > near[k] ** 2:
+                    return True
+        return False
 
     # --- state ---------------------------------------------------------------------------------
 

@@ -38,7 +38,7 @@ def fill_shift_after(Z, n):
     By x and y, and along both lines; entry 0, the cell before the first one, included.
     """
     for k in range(n + 1):
-        a, b, c, d = at.load_corners(Z, at.X_HIGH, at.X_NEXT, k)
+        a, b, c, d = at.load_corners(Z, at.HIGH, at.NEXT, k)
         mid_i, mid_j, _ = compute_line_geometry(a, b, c, d)
         (mid_i_x, mid_i_y), (mid_j_x, mid_j_y) = mid_i, mid_j
         twist, middle = find_even_twist(a, b, c, d)
@@ -72,13 +72,13 @@ def compute_plane_area_y(Z, a, b):
 def fill_lines(Z, n):
     """Lines through the centres of volume, and 1/area between them."""
     for k in range(1, n + 1):
-        a, b, c, d = at.load_corners(Z, at.X_LOW, at.X_HIGH, k)
+        a, b, c, d = at.load_corners(Z, at.LOW, at.HIGH, k)
         mid_i = Z[at.MI_X + k], Z[at.MI_Y + k]
         mid_j = Z[at.MJ_X + k], Z[at.MJ_Y + k]
         twist, middle = find_even_twist(a, b, c, d)
         line_i, line_j = lean_lines(mid_i, mid_j, twist, middle)
-        at.store_vector(Z, at.LEAN_I_X, k, line_i)
-        at.store_vector(Z, at.LEAN_J_X, k, line_j)
+        at.store_vector(Z, at.LEAN_I, k, line_i)
+        at.store_vector(Z, at.LEAN_J, k, line_j)
         Z[at.LEAN_INVERSE + k] = 1.0 / (line_i[0] * line_j[1] - line_i[1] * line_j[0])
 
 

@@ -68,10 +68,10 @@ def make_geometry(weigh):
     def fill_geometry(Z, n):
         """Line vectors and volume of the row's cells."""
         for k in range(1, n + 1):
-            a, b, c, d = at.load_corners(Z, at.X_LOW, at.X_HIGH, k)
+            a, b, c, d = at.load_corners(Z, at.LOW, at.HIGH, k)
             mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
-            at.store_vector(Z, at.MI_X, k, mid_i)
-            at.store_vector(Z, at.MJ_X, k, mid_j)
+            at.store_vector(Z, at.MI, k, mid_i)
+            at.store_vector(Z, at.MJ, k, mid_j)
             twist, y = at.find_twist(a, b, c, d)
             Z[at.VOLUME + k] = weigh(area, mid_i, mid_j, twist, y)
 

@@ -94,6 +94,12 @@ LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY, SUM_VOIDED = _rows(7)
 
 SIZE = next(_next) + 1
 
+# rows that hold a vector: offsets of x and y
+LOW, HIGH, NEXT = (X_LOW, Y_LOW), (X_HIGH, Y_HIGH), (X_NEXT, Y_NEXT)
+LOW_NEW, HIGH_NEW = (X_LOW_NEW, Y_LOW_NEW), (X_HIGH_NEW, Y_HIGH_NEW)
+MI, MJ, MI_NEW, MJ_NEW = (MI_X, MI_Y), (MJ_X, MJ_Y), (MI_X_NEW, MI_Y_NEW), (MJ_X_NEW, MJ_Y_NEW)
+LEAN_I, LEAN_J = (LEAN_I_X, LEAN_I_Y), (LEAN_J_X, LEAN_J_Y)
+
 
 @compiled_once(allocates=False)
 def count_padded(m):
@@ -177,17 +183,23 @@ copy_row.compiled_as, copy_back.compiled_as = _copy_row_in_kernels, _copy_back_i
 
 @inlined
 def load_corners(Z, low, high, k):
-    """Corners (x, y) of cell k between two rows of nodes, anticlockwise from its own node."""
+    """Corners (x, y) of cell k between two rows of nodes, anticlockwise from its own node.
+
+    `low`, `high`: offsets (of x, of y) of the rows.  Note: not that of x alone, for LLVM adds k and
+    an offset of which it knows a part in an order in which it sees indices that may be negative.
+    """
+    (low_x, low_y), (high_x, high_y) = low, high
     return (
-        (Z[low + k], Z[low + SPAN + k]), (Z[high + k], Z[high + SPAN + k]),
-        (Z[high + k + 1], Z[high + SPAN + k + 1]), (Z[low + k + 1], Z[low + SPAN + k + 1]),
+        (Z[low_x + k], Z[low_y + k]), (Z[high_x + k], Z[high_y + k]),
+        (Z[high_x + k + 1], Z[high_y + k + 1]), (Z[low_x + k + 1], Z[low_y + k + 1]),
     )  # fmt: skip
 
 
 @inlined
-def store_vector(Z, row, k, vector):
-    """Put x and y into two rows."""
-    Z[row + k], Z[row + SPAN + k] = vector
+def store_vector(Z, rows, k, vector):
+    """Put x and y into two rows, whose offsets are `rows`."""
+    x, y = rows
+    Z[x + k], Z[y + k] = vector
 
 
 @inlined

@@ -87,7 +87,7 @@ def make_slopes(limit, relaxed, geometry, switch):
         row before) become those of the row after.  The predicted state is that of the old centre.
         """
         for k in range(1, n + 1):
-            a, b, c, d = at.load_corners(Z, at.X_LOW, at.X_HIGH, k)
+            a, b, c, d = at.load_corners(Z, at.LOW, at.HIGH, k)
             mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
             (xa, ya), (xb, yb), (xc, yc), (xd, yd) = a, b, c, d
             (mid_i_x, mid_i_y), (mid_j_x, mid_j_y) = mid_i, mid_j
@@ -229,7 +229,7 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
             before, after = weigh(
                 Z, at.LENGTH_BEFORE + k, at.LENGTH + k, at.LENGTH_AFTER + k, at.SHIFT - at.LENGTH
             )
-            a, b, c, d = at.load_corners(Z, at.X_LOW, at.X_HIGH, k)
+            a, b, c, d = at.load_corners(Z, at.LOW, at.HIGH, k)
             (line_x, line_y), _, _ = compute_line_geometry(a, b, c, d)
             rho, p, c = rim[on.RHO, face], rim[on.P, face], rim[on.C, face]
             jump, jump_beyond = abs(p - Z[at.P + k]), abs(Z[at.P + k] - Z[at.P_AFTER + k])

@@ -134,7 +134,7 @@ def make_update(eos_class, geometry, finishes, gathers):
                     (Z[at.FLUX_J_ENERGY + k + 1] - Z[at.FLUX_J_ENERGY + k])
                     - Z[at.FLUX_I_ENERGY + k]
                 )
-                a, b, c, d = at.load_corners(Z, at.X_LOW_NEW, at.X_HIGH_NEW, k)
+                a, b, c, d = at.load_corners(Z, at.LOW_NEW, at.HIGH_NEW, k)
                 mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
                 twist, y_new = at.find_twist(a, b, c, d)
                 if curved:
@@ -161,8 +161,8 @@ def make_update(eos_class, geometry, finishes, gathers):
                     Z[at.LEVER + k] = lever
                     Z[at.SHARE + k] = share
                 Z[at.MOMENTUM_Y + k] = momentum_y
-                at.store_vector(Z, at.MI_X_NEW, k, mid_i)
-                at.store_vector(Z, at.MJ_X_NEW, k, mid_j)
+                at.store_vector(Z, at.MI_NEW, k, mid_i)
+                at.store_vector(Z, at.MJ_NEW, k, mid_j)
                 Z[at.VOLUME_NEW + k] = weigh(area, mid_i, mid_j, twist, y_new)
                 (xa, ya), (xb, yb), (xc, yc), (xd, yd) = a, b, c, d
                 Z[at.W_X + k] = 0.25 * (

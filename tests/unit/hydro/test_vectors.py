@@ -1,0 +1,82 @@
+"""The loops over a row of cells are compiled into vector instructions."""
+
+import platform
+import re
+
+import numba
+import numpy as np
+import pytest
+
+from hydro.eos import IdealGas
+from hydro.formulas.geometry import GEOMETRIES, PLANE
+from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
+from hydro.formulas.riemann import FLUXES
+from hydro.interior import axisymmetric, fluxes, reconstruction, slopes, traces, update
+from hydro.interior import scratch as at
+
+CURVED = GEOMETRIES["axisymmetric"]
+LIMIT, SOUND, ENERGY = (
+    LIMITERS[DEFAULT_LIMITER],
+    *(getattr(IdealGas, part) for part in ("sound_speed_squared_part", "energy_part")),
+)
+SWITCH = SOUND, ENERGY, FLUXES["hllc"], False
+I_FACES = at.RHO_OUT, at.RHO_IN, at.AREA_X_I
+J_FACES = at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J
+UPWIND_I = *I_FACES, at.TORN_BEFORE, at.ACOUSTIC_BEFORE
+UPWIND_J = *J_FACES, at.TORN - 1, at.ACOUSTIC - 1
+HLL = J_FACES, at.HLL - 1, at.TORN - 1, at.FLUX_J_MASS, 0, True
+RADIAL = at.PRESSURE_J, at.FLUX_J_Y, at.X_HIGH, at.X_LOW, at.AREA_Y_J, at.PUSH_J
+GAS = ((1.4,),)
+STEP = 0.1, 10.0, (1.4,)  # dt, 1/dt, parameters
+PHASES = {  # how a phase is made, its arguments after the scratch and the number of cells
+    "lengths along i": (lambda: reconstruction.fill_length_after, ()),
+    "lengths along j": (lambda: reconstruction.fill_length_j, ()),
+    "geometry": (lambda: reconstruction.make_geometry(PLANE.volume), ()),
+    "switch": (lambda: reconstruction.make_switch(*SWITCH[:3], True), GAS),
+    "faces along i": (
+        lambda: traces.make_faces(PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I),
+        (0.1,),
+    ),
+    "faces along j": (
+        lambda: traces.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
+        (0.1,),
+    ),
+    "radial faces": (
+        lambda: traces.make_faces(CURVED.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
+        (0.1,),
+    ),
+    "slopes": (lambda: slopes.make_slopes(LIMIT, False, PLANE, SWITCH), (0.1, (1.4,))),
+    "radial slopes": (lambda: slopes.make_slopes(LIMIT, True, CURVED, SWITCH), (0.1, (1.4,))),
+    "traces": (lambda: traces.make_traces(SOUND, True)[1], (1.0, (1.4,))),
+    "traces in": (lambda: traces.make_traces(SOUND, True)[0], (1.0, (1.4,))),
+    "upwind along i": (lambda: fluxes.make_upwind(*UPWIND_I, False, False), ()),
+    "upwind along j": (lambda: fluxes.make_upwind(*UPWIND_J, True, True), ()),
+    "flux": (lambda: fluxes.make_flux(ENERGY, at.AREA_X_J, at.FLUX_J_MASS, 0, False), GAS),
+    "HLL flux": (lambda: fluxes.make_hll_flux(ENERGY, *HLL), (16, (1.4,))),
+    "gathering": (lambda: update.make_update(IdealGas, PLANE, False, True), STEP),
+    "new states": (lambda: update.make_update(IdealGas, PLANE, True, False), STEP),
+    "update": (lambda: update.make_update(IdealGas, PLANE, True, True), STEP),
+    "radial gathering": (lambda: update.make_update(IdealGas, CURVED, False, True), STEP),
+    "radial push": (lambda: axisymmetric.make_push(CURVED.split, *RADIAL), ()),
+    "radial lines": (lambda: axisymmetric.fill_lines, ()),
+    "radial shifts": (lambda: axisymmetric.fill_shift_after, ()),
+}
+HOISTED = {"switch": 2}  # scalar instructions on numbers that are the same for all cells
+PACKED_SINCE = {"switch": (0, 66)}  # numba
+INSTRUCTION = re.compile(r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*)(p|s)d\s", re.M)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86-64 code")
+@pytest.mark.parametrize("name", PHASES)
+def test_rows_of_cells_are_vectors(name):
+    if numba.version_info.short < PACKED_SINCE.get(name, (0, 0)):
+        pytest.skip("the compiler of this numba leaves the loop scalar: slower, the same numbers")
+    make, arguments = PHASES[name]
+    # not through the disk cache: code loaded from there has no text to read
+    compiled = numba.njit(error_model="numpy")(make())
+    compiled(np.ones(at.SIZE), 1 if name == "HLL flux" else 16, *arguments)
+    (code,) = compiled.inspect_asm().values()
+    kinds = INSTRUCTION.findall(code)
+    packed, scalar = kinds.count("p"), kinds.count("s") - HOISTED.get(name, 0)
+    assert packed >= 0.9 * scalar and packed > 0, (packed, scalar)

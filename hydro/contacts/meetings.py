@@ -10,7 +10,6 @@ counted is part of a restart point.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -35,6 +34,7 @@ LEAST_BESIDE = 1e-2  # the same where surfaces touch already
 CUTS = 5  # times that a step is cut to the first touch, and made a little longer again
 MOST_LONGER = 1.5  # a step that was cut too short
 REACHED = 1e-6  # of a step: a touch that comes so shortly before or after its end is at its end
+ROUND_OFF = 1e-12  # of a surface's length: ends so near to the axis are on it
 BACK = 0.2  # part that nodes behind the other line are taken back in a stable step
 
 
@@ -177,7 +177,7 @@ class Meetings:
                     (pair.follower, pair.shifts[:2]), (pair.leader, pair.shifts[2:])
                 ):  # fmt: skip
                     surface.write_new()
-                    _shift_ends(surface, shifts, self.surfaces)
+                    self._shift_ends(surface, shifts)
         for pair in pairs:
             self._lay_line(pair, False, part_back)
         if any([self._lay_line(pair, True, part_back) for pair in pairs]):
@@ -192,8 +192,22 @@ class Meetings:
         moved = pair.lay(back, part_back)
         if moved:
             mover.write_new()
-        _shift_ends(mover, pair.shifts[:2], self.surfaces)
+        self._shift_ends(mover, pair.shifts[:2])
         return bool(moved or pair.shifts[:2, 0].any())
+
+    def _shift_ends(self, surface: Surface, shifts: np.ndarray) -> None:
+        """Move the new nodes at a surface's ends on, with all that meets there."""
+        if not shifts[:, 0].any():
+            return
+        for (asked, *way), key_node in zip(shifts, surface.ends, strict=True):
+            if not asked or key_node is None or key_node.given or key_node.carried:
+                continue
+            key_node.shift(_turn_into_wall(np.array(way), key_node.find_wall()))
+            if self.geometry.curved:
+                key_node.put_on_axis(ROUND_OFF * surface.length)
+            for other in self.surfaces:
+                if key_node in other.ends:
+                    other.read_new()
 
     def fill_flux(self, t: float, dt: float) -> None:
         """Add the fluxes through closed facets to those of the free surfaces."""
@@ -364,27 +378,12 @@ def _find_pairs(
     return surfaces, pairs
 
 
-def _shift_ends(surface: Surface, shifts: np.ndarray, surfaces: list[Surface]) -> None:
-    """Move the new nodes at a surface's ends on, with all that meets there."""
-    if not shifts[:, 0].any():
-        return
-    for (asked, *way), key_node in zip(shifts, surface.ends, strict=True):
-        if not asked or key_node is None or key_node.given or key_node.carried:
-            continue
-        key_node.shift(_turn_into_wall(np.array(way), key_node.find_wall()))
-        for other in surfaces:
-            if key_node in other.ends:
-                other.read_new()
-
-
 def _turn_into_wall(way: np.ndarray, walls: tuple[int, float, float]) -> np.ndarray:
     """The way along a wall that gets a node as far across the line as `way` does."""
     number, x, y = walls
     if number == 0:
         return way
-    square = float(way @ way)
-    along_x, along_y = -y, x
-    part = float(way[0] * along_x + way[1] * along_y)
-    if number > 1 or part * part < 0.1 * square or math.isclose(square, 0.0):
+    along = float(way[1] * x - way[0] * y)
+    if number > 1 or along == 0.0 or along * along < 0.1 * float(way @ way):
         return np.zeros(2)
-    return np.array([along_x, along_y]) * (square / part)
+    return np.array([-y, x]) * (float(way @ way) / along)

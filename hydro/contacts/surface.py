@@ -12,7 +12,7 @@ from hydro.boundary.kinds import Axis, FreeSurface, Piston, Wall
 from hydro.boundary.segment import Segment
 from hydro.contacts.facet_states import cover_surface
 from hydro.contacts.laying import fit_plane
-from hydro.contacts.rows import COVER_ROWS, COVERED
+from hydro.contacts.rows import COVER_ROWS
 from hydro.contacts.touch import fill_inner, measure_longest, measure_way
 from hydro.motion.grid_motion import GridMotion
 from hydro.motion.key_nodes import KeyNode
@@ -72,11 +72,6 @@ class Surface:
         """Does it go on from the end of a sliding contact, or lie opposite to it?"""
         return self.moving_line.at_contact or self.moving_line.follows_contact
 
-    @property
-    def moves(self) -> bool:
-        """May it leave the line on which it is?"""
-        return self.segment.moves
-
     def read(self) -> None:
         """Take up the present nodes."""
         self.line[...] = self.segment.line(self.block.nodes)[:, :: self.step]
@@ -125,12 +120,9 @@ class Surface:
         self.middles *= 0.5
         fill_slopes(states, self.middles, self.slopes)
 
-    def put_cover(self, state: int) -> bool:
-        """Put contact states over those of the free surface; is there any?  Ghosts as well."""
-        if self.rigid or not self.cover[COVERED].any():
-            return False
+    def put_cover(self, state: int) -> None:
+        """Put contact states over those of the free surface."""
         cover_surface(self.cover, self.start, self.step, state, self.block.rim.rows)
-        return True
 
     def fill_ghosts(self) -> None:
         """Ghosts beyond the faces from the states there."""
@@ -156,7 +148,7 @@ class Plane:
     beyond this face.
     """
 
-    rigid, moves, back = True, False, False
+    rigid, back = True, False
     count, way = 1, 0.0
     bond = friction = length = np.inf
     block = None
@@ -215,7 +207,10 @@ def find_planes(blocks: Sequence[Block], axis: bool) -> list[Plane]:
             if segment.side in ("i_max", "j_min"):  # what is outside is then on the left
                 line = line[:, ::-1]
             along = line[:, -1] - line[:, 0]
-            along = along / np.hypot(*along)
+            length = np.hypot(*along)
+            if length <= IN_LINE * size:  # it closes on itself
+                continue
+            along /= length
             heights = _measure_heights(nodes, line[:, 0], along)
             on_line = np.abs(_measure_heights(line, line[:, 0], along)).max() <= IN_LINE * size
             if not on_line or heights.min() < -IN_LINE * size:

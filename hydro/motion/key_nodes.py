@@ -170,6 +170,12 @@ class KeyNode:
         for block, i, j in self.members:
             block.nodes_new[:, i, j] += way
 
+    def put_on_axis(self, near: float) -> None:
+        """Let the new node be on the axis exactly where it is at most so far from it."""
+        for block, i, j in self.members:
+            if abs(block.nodes_new[1, i, j]) <= near:
+                block.nodes_new[1, i, j] = 0.0
+
     def turn_mirrors(self) -> None:
         """Turn the mirrors of moving lines that end here with the curved wall they stand on."""
         for track, mirrors, end in self.tracks:

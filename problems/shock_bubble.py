@@ -1,20 +1,20 @@
 """A shock in air meets a round bubble of a light or heavy gas, on an O-grid of blocks.
 
 Half a shock tube: the axis of the bubble is a line of symmetry, the tube's wall lies above.  The
-bubble is a barrel in the middle and three blocks around it, the air three blocks from the bubble
-out to a box and two to the tube's ends; inside a gas the blocks are joined by seams, the bubble's
-surface is an interface, a grid line from the first step to the last.  The sizes are those of Haas
+bubble is a barrel-shaped block in the middle and three blocks around it; the air has three blocks
+from the bubble out to a box and two to the tube's ends.  Seams join blocks of one gas; the bubble's
+surface is an interface, a grid line throughout the run.  The sizes are those of Haas
 and Sturtevant's experiment, diameter 50 mm in a tube of 89 mm, Mach 1.22; "helium" is helium with
 28 % of air by mass (g 1.648), "R22" the heavy refrigerant (g 1.249).
 
-Measured are the bubble's ends on the axis, its rearmost point, height and volume, the shocks along
-axis and wall, and from them, by straight lines, the velocities that experiment and computations
-have published.  Most of these change while they are fitted, so that the window counts more than the
-scheme; the windows are printed beside the figures.  Note: a straight seam leads from the surface to
-the box's corner, and where its end on the surface lies decides how far the bubble may curl before
-it is cut.  The run ends when the air's jet has come through the light gas, which no grid line can
-follow.  Source: [HaasSturtevant1987], table 2; the gases as flow solvers take them since
-[QuirkKarni1996], table 3.
+The problem measures the bubble's ends on the axis, its rearmost point, height and volume, and the
+shocks along axis and wall.  Straight-line fits to these give the velocities that experiment and
+computations have published.  Most of them change during the fit, so the window matters more than
+the scheme; the summary prints the windows.  Note: a straight seam runs from the surface to
+the box's corner, and its end on the surface decides how far the bubble may curl before it cuts the
+seam.  The run ends when the air jet has come through the light gas, which no grid line can follow.
+Source: [HaasSturtevant1987], table 2; the gases as flow solvers take them since [QuirkKarni1996],
+table 3.
 """
 
 from __future__ import annotations

@@ -1,21 +1,22 @@
 """Graphite in a conical target: an impact drives a shock into a cone, where it converges.
 
-An aluminium impactor hits a steel disc with lead around it, the front and the filling of a steel
-shell.  Behind the disc stands a cone of graphite in the lead, its base on the disc, its blunt tip
-ahead; all turns round the axis.  Shocks run faster in graphite than in lead and into the cone from
-its side: pressures rise towards the tip.  Steel slides on lead and graphite.  Where graphite,
-steel and lead meet the lines roll up; the line between graphite and lead goes unstable.
+An aluminium impactor hits a steel disc inside a ring of lead, which close a steel shell filled with
+lead.  Behind the disc, embedded in the lead, stands a cone of graphite, its base on the disc, its
+blunt tip downstream; the target is axisymmetric.  Shocks run faster in graphite than in lead and
+enter the cone from its side, so pressures rise towards the tip.  Steel slides on lead and graphite.
+Where graphite, steel and lead meet the lines roll up; the graphite-lead interface is unstable.
 
-The shape follows Charakhch'yan's third application.  His dimensions, speed and pressures are not to
-be had: those here are ours, and the outer wall of the shell is held by something rigid, since the
-rim of a free one throws a jet that these blocks do not follow.  Measured are the pressure at the
-impact face, at gauges in the graphite on the axis, the greatest pressure and its place in every
-material, the part of the graphite that has changed phase, where the shock is in the cone on its
-axis and along its side and the pressure behind it, how far the line between graphite and lead is
-from straight, and the growth of a ripple put on it.
+The shape follows Charakhch'yan's third application.  His dimensions, speed and pressures are not
+available: those here are ours.  A rigid wall holds the outside of the shell, because the rim of a
+free one throws a jet that these blocks cannot follow.
 
-Note: torn aluminium that slides on the impact face is pressed beyond all bounds where it closes
-up again; there, and on the cone's side, materials share the nodes of their line.
+The problem measures the pressure at the impact face and at gauges in the graphite on the axis, the
+greatest pressure and its place in every material, the fraction of graphite that has changed phase,
+position and pressure of the shock in the cone on its axis and along its side, how far the
+graphite-lead interface is from straight, and the growth of a ripple put on it.
+
+Note: failed aluminium that slides on the impact face is compressed without bound where it closes up
+again; there, and on the cone's side, materials share the nodes of their line.
 """
 
 from __future__ import annotations

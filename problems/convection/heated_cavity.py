@@ -1,15 +1,15 @@
-"""A cavity heated from the side: steady convection, beside the numbers of a spectral method.
+"""A cavity heated from the side: steady convection, compared with a spectral method.
 
 The box is 1 wide and `aspect` high; its left side is hot (1/2), its right side cold (-1/2), floor
-and ceiling are adiabatic, all walls hold the fluid.  Each side may be given otherwise: `left.flow`,
+and ceiling are adiabatic, all walls are no-slip.  Each side can be changed: `left.flow`,
 `left.heat`, `left.value` and so on.  Scales: width 1 m, diffusivity 1 m2/s, difference 1 K, so that
 velocities are in kappa/L and the heat through a wall is the Nusselt number.
 
-`method = "steady"` iterates Newton's method, a step an iteration; `"time"` marches from rest.  The
-grid is clustered at the walls unless `grid.kind` says otherwise: uniform, polevikov (after the
-speed), monitor (after gradients) or combined.  At N cells a side there are (N + 1)² nodes.
+`method = "steady"` uses Newton's method, one iteration per step; `"time"` integrates from rest.
+The grid is clustered at the walls unless `grid.kind` says otherwise: uniform, polevikov (follows
+the speed), monitor (follows gradients) or combined.  N cells a side have (N + 1)² nodes.
 
-Note: Polevikov's grid puts nodes where the speed is large; the step at a wall shrinks only as
+Note: Polevikov's grid puts nodes where the speed is large; the step at a wall decreases only as
 N^-1/2, so the Nusselt number is better on most other grids.
 """
 

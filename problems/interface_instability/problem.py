@@ -1,12 +1,13 @@
 """A shock hits a perturbed interface between two materials and makes it unstable.
 
 The shock runs through the first material towards larger x, driven by a piston that moves with the
-material behind it; the second material rests beyond the interface.  Each material is a block, the
-interface the grid line between them.  A second, stronger shock may follow.  Measured are the
-amplitude of the interface, its growth rate and how one-dimensional the far field stays; beside
-them stand linear compressible theory for the deck's own materials, and non-linear models.
+material behind it; the second material is at rest beyond the interface.  Each material is a block,
+the interface the grid line between them.  A second, stronger shock may follow.  The problem
+measures the amplitude of the interface, its growth rate and how one-dimensional the far field
+stays, and compares with linear compressible theory for the deck's materials and with non-linear
+models.
 
-Everything is in consistent units: SI for the materials of the library, or rho = p = 1.
+Use any consistent units: SI for the materials of the library, or rho = p = 1.
 """
 
 from __future__ import annotations

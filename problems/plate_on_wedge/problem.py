@@ -1,16 +1,16 @@
 """A driven plate is thrown onto a wedge: a contact point runs along its face, a jet follows.
 
-The plate lies on the flat edge of the wedge body; beside it the wedge's face falls away under
+The plate lies on the flat edge of the wedge body; beside it the wedge's face slopes away at
 `angle`.  A shock from the drive reaches the plate's free lower side, which flies into the gap
 with about twice the particle speed and closes it from the edge outwards: the contact point A
 runs along the face.  With a `gap` the plate starts above the edge: two bodies, whose contact closes
 and opens by itself.  Below a critical angle the oblique shocks stay attached to A and there is no
-jet; above it a jet runs ahead of A.  When A comes to the end B of the face the shocks detach and a
+jet; above it a jet runs ahead of A.  When A reaches the end B of the face the shocks detach and a
 thin jet leaves over B and bends round the end face.  Plate and wedge slide on each other; their
 common line is a grid line of both, with nodes that do not match.
 
-Phases and their times are recorded.  The run ends when the jet meets something (the end face, the
-base on which the wedge stands, the symmetry plane) or when the free surface meets itself.
+The history has the phases and their times.  The run ends when the jet meets something (the end
+face, the base on which the wedge stands, the symmetry plane) or when the free surface meets itself.
 References: shock polars of both materials, the critical angle, Birkhoff's jet.
 """
 

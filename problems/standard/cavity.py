@@ -1,16 +1,16 @@
 """A shock collapses a round void in a metal: a jet runs through it and hits the far side.
 
 A piston drives a shock along a channel of metal with a cylindrical void (plane flow) or a spherical
-one (axisymmetric), of which half is computed, beside the plane of symmetry or the axis.  The shock
-is released at the void's near side, which flies into the void faster and faster and becomes a jet
-on the line of symmetry.  It hits the far side; from there on the void's surface lies on itself in a
-contact that closed by itself (theory F16).  The run goes on until less than a part of the void
-(`closed`) is left.  Measured are the void's size, its width along the channel and the speeds of
-both its ends.  Beside them stand the time of the shock's arrival, the pressure behind it, and the
-speed of a plane free surface behind it, at which the near side sets out.
+one (axisymmetric); half of it is computed, beside the plane of symmetry or the axis.  The shock
+is released at the void's near side, which accelerates into the void and becomes a jet
+on the line of symmetry.  It hits the far side; from then on the void's surface meets itself in a
+contact that closes by itself (theory F16).  The run continues until less than the fraction `closed`
+of the void is left.  The problem measures the void's size, its width along the channel and the
+speeds of both its ends.  Theory gives the time of the shock's arrival, the pressure behind it, and
+the speed of a plane free surface behind it, which is the initial speed of the near side.
 
-Note: the jet's speed and the pressure where it hits grow with finer cells; the time at which
-the void is closed does not.
+Note: the jet's speed and the pressure of its impact increase with finer cells; the time at which
+the void is closed does not change.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
-"""A flyer across a gap onto a target: impact, release, parting, the free surface's speed.
+"""A flyer across a gap onto a target: impact, release, separation, the free surface's speed.
 
-Plates of given materials stand in a row with gaps between them; the first one comes with a speed.
-Where they meet a contact closes, and opens again where it would have to pull, so plates leave each
-other by themselves (theory F16).  Measured are the mean speed of every plate and the speed of the
-last plate's free surface, which a velocity interferometer would see.  Beside it stand the time of
-impact, and, by the Hugoniots and the isentrope of each material, pressure and speed at the impact,
-and for two plates when the shock comes out at the free surface, how fast that then is, and until
-when: the release from the flyer's back follows the shock.
+Plates of given materials stand in a row with gaps between them; the first one has a speed.  Where
+plates meet a contact closes; it opens again where it would go into tension, so plates separate by
+themselves (theory F16).  The problem measures the mean speed of every plate and the speed of the
+last plate's free surface, as a velocity interferometer sees it.  Theory gives the time of impact
+and, by the Hugoniots and the isentrope of each material, pressure and speed at the impact; for two
+plates also when the shock reaches the free surface, the speed of the surface then, and how long it
+lasts, because the release from the flyer's back follows the shock.
 
 Note: a release is sharp at low speeds, and the scheme spreads it over some cells; plates then
-leave each other a little early.  Take cells of an eightieth of the thinnest plate or less.
+separate a little early.  Use cells of an eightieth of the thinnest plate or less.
 """
 
 from __future__ import annotations

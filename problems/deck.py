@@ -178,6 +178,15 @@ class Gauge(DeckTable, kw_only=True):
     )
 
 
+class VoidFill(DeckTable, kw_only=True):
+    """The gas that a void holds from when bodies that meet close it off: p V^gamma stays."""
+
+    merges = True
+
+    pressure: key(float, "when it is closed off [Pa]; 0: nothing in it", ge=0, le=1e20) = 0.0
+    gamma: key(float, "of the gas", gt=1, le=100) = 1.4
+
+
 class Regrid(DeckTable, kw_only=True):
     """Which regridder rebuilds the blocks, and with what options."""
 

@@ -172,15 +172,18 @@ class Problem:
     def simulate(
         self, blocks: Sequence, links: Sequence = (), kind: Any = None, **options: Any
     ) -> Simulation:
-        """The flow of these blocks to the end time, with the deck's `run` and `regrid`.
+        """The flow of these blocks to the end time, with the deck's run, regrid and void_fill.
 
         kind: a class derived from Simulation.
         """
         from hydro.simulation import Simulation  # slow to load; a deck is not
 
         run, regrid = self.deck.run, getattr(self.deck, "regrid", None)
+        fill = getattr(self.deck, "void_fill", None)
         chosen: dict[str, Any] = {"t_end": self.t_end, "cfl": run.cfl, "threads": run.threads}
         chosen["small_cells"] = run.small_cells
+        if fill is not None:
+            chosen["void_fill"] = (fill.pressure, fill.gamma)
         if regrid is not None:
             chosen["make_regridder"] = lambda: regrid.make(threads=run.threads)
         return (kind or Simulation)(list(blocks), list(links), **(chosen | options))

@@ -72,6 +72,11 @@ class Voids:
                 f"void_fill = {fill!r}: the gas in voids has a pressure of 0 Pa or more and a "
                 "gamma above 1"
             )
+        for surface in surfaces if self.pressure > 0.0 else ():
+            if not surface.rigid and surface.segment.tension > 0.0:
+                raise BadInput(
+                    f"{surface}: void_fill: gas in voids is not beside lines under surface tension"
+                )
         self.curved, self.pairs = curved, list(pairs)
         self.surfaces = list(surfaces)
         self.planes: list[Plane] = []

@@ -19,6 +19,7 @@ from problems.deck import (
     Limiter,
     Regrid,
     RunControl,
+    VoidFill,
     compute_digests,
     key,
     place_file,
@@ -147,6 +148,7 @@ class BlocksDeck(Deck, kw_only=True):
         Literal["regrid", "fixed"], "regrid: grids follow moving sides; fixed: no node moves"
     ) = "regrid"
     limiter: Limiter = "van-leer"
+    void_fill: VoidFill = msgspec.field(default_factory=VoidFill)
     block: key(tuple[BlockTable, ...], "the blocks, [[block]] each", min_length=1) = msgspec.field(
         default_factory=make_default_blocks
     )

@@ -343,6 +343,7 @@ class Blocks(Problem):
             t_end=deck.run.t_end,
             cfl=deck.run.cfl,
             small_cells=deck.run.small_cells,
+            void_fill=(deck.void_fill.pressure, deck.void_fill.gamma),
             threads=deck.run.threads,
             mesh=deck.mesh,
             geometry=deck.geometry,

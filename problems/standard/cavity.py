@@ -25,7 +25,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
-from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
+from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, VoidFill, key
 from problems.problem import BlockPlan, Problem, Report, Row, draw_field
 from problems.references.hugoniot import make_isentrope, shock_with_particle_speed
 from regrid.errors import BadInput
@@ -48,6 +48,7 @@ class CavityDeck(Deck, kw_only=True):
     geometry: key(
         Literal["plane", "axisymmetric"], "plane: a cylindrical void; axisymmetric: a spherical one"
     ) = "plane"
+    void_fill: VoidFill = msgspec.field(default_factory=VoidFill)
     cells: key(int, "along half of the void's line", ge=16, le=MOST_CELLS) = 64
 
 

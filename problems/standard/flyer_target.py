@@ -26,7 +26,7 @@ from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos.materials import find_material
 from hydro.rows import P, U
-from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, key
+from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, VoidFill, key
 from problems.initial_states import make_plane_grid, put_walls
 from problems.problem import BlockPlan, Problem, Report, Row
 from problems.references.hugoniot import make_isentrope, shock_to_pressure
@@ -63,6 +63,7 @@ class FlyerTargetDeck(Deck, kw_only=True):
         msgspec.field(default_factory=make_default_plates)
     )
     rows: key(int, "cells along the plates", ge=2, le=MOST_CELLS) = 2
+    void_fill: VoidFill = msgspec.field(default_factory=VoidFill)
     bond: key(float, "tension that contacts hold [Pa]", ge=0, le=1e20) = 0.0
 
 

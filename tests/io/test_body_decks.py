@@ -34,6 +34,7 @@ def make_bonded(options, kind=FREE):
     return ONE.replace(FREE, f"{kind}, options = {{ {options} }}")
 
 
+FILL = "[void_fill]\npressure = 1e5\n"
 CASES = {
     "bond below 0": (
         [make_bonded("bond = -1e8")],
@@ -50,6 +51,19 @@ CASES = {
     "friction on a wall": (
         [make_bonded("friction = 0.2", 'kind = "wall"')],
         "side i_max: wall segment: 'friction' is given, and it has no options",
+    ),
+    "weld in words": ([make_bonded('weld = "yes"')], "weld = 'yes'; it is true or false"),
+    "weld on a piston": (
+        [make_bonded("weld = true", PISTON.format(300.0))],
+        "side i_max: piston segment: there is no option 'weld'",
+    ),
+    "gas in voids under tension": (
+        [FILL + make_bonded("tension = 0.1")],
+        "side i_max.*void_fill: gas in voids is not beside lines under surface tension",
+    ),
+    "gas without pressure": (
+        [FILL.replace("1e5", "-1") + ONE],
+        "void_fill.pressure = -1; it has to be a number at least 0",
     ),
     "misspelt": ([make_bonded("bnd = 1e8")], "no option 'bnd'; did you mean 'bond'"),
     "one in the other": (
@@ -94,6 +108,7 @@ def test_a_body_that_cannot_be_is_told_in_one_sentence(case, shockgrid, tmp_path
     [
         (("plates.0.gap=1e-4",), "nothing is before the first plate"),
         (("plates.1.gap=-1e-4",), "plates.1.gap = -0.0001; it has to be a number at least 0"),
+        (("void_fill.pressure=-1",), "void_fill.pressure = -1; it has to be a number at least 0"),
         (("bond=-1",), "bond = -1; it has to be a number at least 0"),
         (("plates=[{}]",), "plates"),
     ],
@@ -110,6 +125,11 @@ def test_plates_that_cannot_be(settings, words, shockgrid):
     [
         ("plate-on-wedge", "gap=-1e-3", "gap = -0.001; it has to be a number at least 0"),
         ("plate-on-wedge-apart", "refinement=2", "finer at A only where the plate lies"),
+        (
+            "cavity",
+            "void_fill.gamma=1",
+            "void_fill.gamma = 1; it has to be a number greater than 1",
+        ),
         ("cavity", "before=0.5", "before = 0.5; it has to be a number greater than 1"),
         ("cavity", "material=air", "has no such shock"),
         ("cavity", "speed=1e6", "speed = 1000000.0; it has to be a number"),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hydro.eos import JWL, IdealGas, MieGruneisen, PhaseTransition, StiffenedGas
+from hydro.eos.base import make_least_pressure
 from hydro.eos.materials import find_material
 from hydro.eos.phase_transition import hugoniot
 from regrid.errors import BadInput
@@ -63,6 +64,28 @@ def test_sound_speed_is_the_slope_of_the_isentrope(case):
 
 def test_numbers_and_signs(case):
     check_numbers(*case)
+
+
+@pytest.mark.parametrize(
+    "eos",
+    [
+        MieGruneisen(2707.0, 5386.0, 1.339, 1.97, strength=1e9),
+        PhaseTransition(strength=2e7),
+        JWL(strength=1e7),
+    ],
+    ids=lambda eos: eos.kind,
+)
+def test_torn_material_has_the_sound_of_its_pieces(eos):
+    """At the tension at which it tears, however little of it there is; continuous on the way."""
+    rho = eos.rho0 * np.array([0.001, 0.1, 0.98])
+    least = make_least_pressure(type(eos))(rho, eos.parameters)
+    assert least == pytest.approx(-eos.strength * rho / eos.rho0)  # of the part that pieces fill
+    torn = eos.sound_speed(rho, least)
+    whole = eos.sound_speed(eos.rho0, 0.0)
+    assert torn == pytest.approx(whole, rel=0.02)
+    p = 0.55 * np.linspace(-eos.strength, 0.0, 2001)
+    c = eos.sound_speed(0.55 * eos.rho0, p[p < -0.55 * 0.5 * eos.strength])
+    assert np.isfinite(c).all() and np.abs(np.diff(c)).max() < 0.01 * whole
 
 
 def test_metal_is_at_rest_at_its_reference():

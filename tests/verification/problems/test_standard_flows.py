@@ -6,10 +6,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from builders import box, collect_columns, march, march_measured
+from builders import box, collect_columns, march, march_measured, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
 from hydro.eos import IdealGas
+from hydro.eos.materials import find_material
+from hydro.eos.phase_transition import hugoniot
 from hydro.links.join import join
 from hydro.simulation import Simulation
 from problems.deck import RunControl
@@ -18,6 +20,7 @@ from problems.standard.detonation import Detonation, DetonationDeck
 from problems.standard.noh import Noh, NohDeck
 from problems.standard.sedov import Sedov, SedovDeck
 from problems.standard.vortex import FIXED_GRID_ERRORS, Vortex, VortexDeck
+from regrid.measure.corners import compute_centres
 
 N = 12
 
@@ -194,3 +197,59 @@ def test_a_square_lit_at_its_corner_has_no_spike_and_is_symmetric():
     assert 0.5 * problem.pressure < p.max() < problem.pressure
     assert np.abs(p - p.T).max() < 1e-6 * p.max()
     assert problem.errors(history)["cj_speed"] < 0.01
+
+
+GRAPHITE = find_material("graphite-diamond").eos
+
+
+def push_graphite(speed, t_end):
+    """Places and states of a bar of 0.1 m under a piston."""
+    block = Block(
+        "bar",
+        GRAPHITE,
+        box((0, 0), (0.1, 1e-3), (240, 3)),
+        2200.0,
+        0.0,
+        0.0,
+        0.0,
+        limiter="van-leer",
+    )
+    put(block, "i_min", "piston", velocity=(speed, 0.0))
+    wall_off(block)
+    simulation = Simulation([block], [], t_end=t_end, cfl=0.6)
+    simulation.clock.retry_dt = 1e-9
+    march(simulation)
+    return compute_centres(block.nodes)[0][:, 1], block.state[:, 1:-1, 2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("eta", [0.15, 0.47])
+def test_a_single_shock_in_graphite_has_the_pressure_of_the_hugoniot(eta):
+    """Below the onset and far above completion; eta is 1 - rho0/rho behind it."""
+    p = float(hugoniot(eta, GRAPHITE.parameters)[0])
+    speed = np.sqrt(p * eta / GRAPHITE.rho0)
+    x, (rho, u, _, pressure) = push_graphite(speed, 0.06 * eta / speed)
+    part = (x / 0.06 - eta) / (1.0 - eta)  # of the way from the piston to the front
+    behind = (part > 0.3) & (part < 0.8)
+    assert pressure[behind] == pytest.approx(p, rel=0.01)
+    assert rho[behind] == pytest.approx(GRAPHITE.rho0 / (1.0 - eta), rel=0.01)
+    assert u[behind] == pytest.approx(speed, rel=0.01)
+    assert x[np.flatnonzero(pressure > 0.5 * p)[-1]] == pytest.approx(0.06, rel=0.01)
+    assert (GRAPHITE.compute_second_part(rho[behind]) == (eta > 0.2)).all()
+
+
+@pytest.mark.slow
+def test_between_onset_and_completion_the_wave_splits():
+    """A precursor at the onset's pressure, behind it a slower wave into the mixed region."""
+    start, end = GRAPHITE.mixed_region
+    eta = 0.5 * (start + end)
+    p = float(hugoniot(eta, GRAPHITE.parameters)[0])
+    first = np.sqrt(GRAPHITE.onset / (GRAPHITE.rho0 * start))
+    x, (rho, _, _, pressure) = push_graphite(np.sqrt(p * eta / GRAPHITE.rho0), 0.09 / first)
+    plateau = np.abs(pressure / GRAPHITE.onset - 1.0) < 0.02
+    assert plateau.sum() >= 8, "a precursor many cells long"
+    assert GRAPHITE.compute_second_part(rho[plateau]).max() < 0.05
+    assert x[plateau].max() == pytest.approx(0.09, rel=0.03)
+    behind = x < x[plateau].min() - 0.005
+    assert (pressure[behind][10:] > 1.1 * GRAPHITE.onset).all()
+    assert (GRAPHITE.compute_second_part(rho[behind][10:]) > 0.3).all()

@@ -6,7 +6,7 @@ import pytest
 from builders import box, check_budget, march, wall_off
 from hydro.block import Block
 from hydro.boundary.registry import put
-from hydro.eos import IdealGas
+from hydro.eos import IdealGas, MieGruneisen
 from hydro.links.join import join, slide
 from hydro.simulation import Simulation
 
@@ -91,7 +91,7 @@ def test_shaken_grid_keeps_a_stream(contact, along):
     assert "total_momentum_y" not in rows[0], "radial momentum is not conserved"
 
 
-def make_tube(contact, sizes=(24, 31), metal=False):
+def make_tube(contact, sizes=(24, 31)):
     """A cylinder with a bent surface in a tube with a free outer surface, between pistons."""
 
     def line(x):
@@ -145,6 +145,44 @@ def test_budgets_of_a_shocked_tube(contact):
     assert rows[-1]["least_scaled_jacobian"] > 0.1
     moved = np.abs(blocks[0].state[2, 1:-1, 1:-1]).max()
     assert moved > 0.02, "there is radial motion"
+
+
+def make_piston_run(eos, rho, p, speed, geometry):
+    nodes = make_grid((40, 12), lambda x: 0.0, lambda x: 0.4, 0.0, 1.0)
+    block = Block("rod", eos, nodes, rho, 0.0, 0.0, p)
+    put(block, "j_min", "axis" if geometry == "axisymmetric" else "wall")
+    put(block, "i_min", "piston", velocity=(speed, 0.0))
+    wall_off(block)
+    simulation = Simulation([block], [], t_end=1e9, geometry=geometry)
+    check_budget([simulation.start_row(), *march(simulation, 60)])
+    return block.state[:, 1:-1, 1:-1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("eos", "rho", "p", "speed"), [(GAS, 1.0, 1.0, 3.0), (MieGruneisen(), 2707.0, 0.0, 2000.0)]
+)
+def test_a_plane_shock_along_the_axis_does_as_in_plane_flow(eos, rho, p, speed):
+    state, plane = (make_piston_run(eos, rho, p, speed, g) for g in ("axisymmetric", "plane"))
+    for value, other, size in zip(state, plane, (rho, speed, speed, state[3].max()), strict=True):
+        assert np.ptp(value, axis=1).max() < 1e-12 * size
+        assert np.abs(value - other).max() < 1e-11 * size
+
+
+@pytest.mark.slow
+def test_homologous_flow_near_the_axis():
+    """v = r/(1 + t) at uniform pressure is exact; averages know where in a cell they belong."""
+    edges = np.linspace(0.0, 1.0, 17)
+    nodes = make_grid((3, 16), lambda x: 0.0, lambda x: 1.0, 0.0, 0.2)
+    centre = 2.0 / 3.0 * np.diff(edges**3) / np.diff(edges**2)
+    block = Block("gas", GAS, nodes, 1.0, 0.0, np.broadcast_to(centre, (3, 16)), 1.0)
+    put(block, "j_min", "axis")
+    put(block, "j_max", "inflow", state=lambda t: ((1 + t) ** -2, 0, 1 / (1 + t), (1 + t) ** -2.8))
+    wall_off(block)
+    march(Simulation([block], [], t_end=0.2, mesh="fixed", geometry="axisymmetric"))
+    rho, _, v, _ = block.state[:, 1, 1:11]
+    assert np.abs(rho * 1.2**2 - 1.0).max() < 2e-3
+    assert np.abs(v * 1.2 / centre[:10] - 1.0).max() < 5e-3
 
 
 def measure_expansion(cells, mesh):

@@ -11,12 +11,14 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.special import jv, jvp, spherical_jn, spherical_yn, yv, yvp
 
 from builders import (
     beside_line,
     check_budget,
     collect_columns,
     find_unexplained,
+    march,
     march_measured,
     wall_off,
 )
@@ -31,12 +33,14 @@ from problems.standard.rayleigh_taylor import (
     RayleighTaylor,
     RayleighTaylorDeck,
 )
+from regrid.algebraic import fill_from_sides
 from regrid.measure.corners import compute_centres
 
 GAS = IdealGas(1.4)
 K = 2.0 * math.pi
 HEIGHT = 1e-3  # of waves
 PERIODS = 1.25  # two zeros of the amplitude and more
+BOX = 2.0  # radius of the wall around a drop of radius 1
 
 
 def find_frequency(t, amplitude) -> float:
@@ -133,6 +137,127 @@ def test_capillary_waves_swing_as_theory_says(cells, mach, rho, limiter):
     both = history["total_energy"] + surface
     if len(rho) == 2:
         assert abs(both - both[0]).max() < 0.02 * given
+
+
+def find_push(r, k, curved, wall=None):
+    """Pressure at r of the second mode of sound: slope 1 at radius 1, 0 at the wall, if any."""
+    values = (spherical_jn, spherical_yn) if curved else (jv, yv)
+
+    def slope(kind, r):
+        return k * (values[kind](2, k * r, True) if curved else (jvp, yvp)[kind](2, k * r))
+
+    part = slope(0, wall) / slope(1, wall) if wall else 0.0
+    value = values[0](2, k * r) - (part * values[1](2, k * r) if wall else 0.0)
+    return value / (slope(0, 1.0) - part * slope(1, 1.0))
+
+
+def compute_mode(angle, curved):
+    return 1.5 * np.cos(angle) ** 2 - 0.5 if curved else np.cos(2.0 * angle)
+
+
+def make_drop_grids(cells, squash, curved, uneven):
+    """A quarter of a drop, of three blocks, and of what is around it, of two, by name."""
+    part = np.linspace(0.0, 1.0, cells // 2 + 1)
+    spread = part + uneven * np.sin(2.0 * math.pi * part) / (2.0 * math.pi)
+    east = np.array([0.5 - 0.1 * part**2, 0.4 * part])
+    core = np.zeros((2, part.size, part.size))
+    core[0, :, 0] = core[1, 0] = 0.5 * part
+    core[:, -1], core[:, :, -1] = east, east[::-1]
+    fill_from_sides(core.copy(), core)
+    grids = {"core": core}
+    for turn, (name, curve) in enumerate((("east", east), ("north", east[::-1, ::-1]))):
+        angle = 0.25 * math.pi * (turn + spread)
+        ray = np.array([np.cos(angle), np.sin(angle)])
+        ray[np.abs(ray) < 1e-15] = 0.0
+        radius = 1.0 + squash * compute_mode(angle, curved)
+        way = np.linspace(0.0, 1.0, round(0.4 * cells) + 1)[:, None]
+        grids[name] = curve[:, None] * (1.0 - way) + (radius * ray)[:, None] * way
+        way = np.linspace(0.0, 1.0, round(math.log(BOX) * cells / (0.5 * math.pi)) + 1)[:, None]
+        grids[f"around-{name}"] = radius * (BOX / radius) ** way * ray[:, None]
+    return grids
+
+
+def make_drop(cells, mach, rho, squash, curved, uneven=0.0, periods=PERIODS):
+    """A quarter of a drop of radius 1 (1 + squash times its second mode); its frequency.
+
+    Theory is Rayleigh's (plane) or Lamb's (round an axis) with a round box and with sound.
+    cells: on the quarter; mach: 1 over the sound speed; uneven: of the nodes on the surface.
+    """
+    outside = max(rho) / mach**2 / 1.4
+    pressures = outside + (2.0 if curved else 1.0), outside
+    speeds = [math.sqrt(1.4 * p / d) for p, d in zip(pressures, rho, strict=True)]
+
+    def miss(omega):
+        pushes = (
+            find_push(1.0, omega / speeds[0], curved),
+            find_push(1.0, omega / speeds[1], curved, BOX),
+        )
+        return omega**2 * (rho[0] * pushes[0] - rho[1] * pushes[1]) - (4.0 if curved else 3.0)
+
+    omega = brentq(miss, 0.5, 4.0)
+    b, links = {}, []
+    for name, grid in make_drop_grids(cells, squash, curved, uneven).items():
+        around = name.startswith("around")
+        c, wall = speeds[around], BOX if around else None
+        x, y = compute_centres(grid)
+        push = find_push(np.hypot(x, y), omega / c, curved, wall)
+        push *= rho[around] * omega**2 * squash * compute_mode(np.arctan2(y, x), curved)
+        state = rho[around] + push / c**2, 0.0, 0.0, pressures[around] + push
+        material = "around" if around else "drop"
+        b[name] = Block(name, GAS, grid, *state, material=material, limiter="low-mach")
+        if "north" not in name:
+            put(b[name], "j_min", "axis" if curved else "wall")
+    for name in ("east", "north"):
+        pair = (b[name], "i_max"), (b[f"around-{name}"], "i_min")
+        links.append(join("interface", *pair, tension=1.0))
+    for one, two in (
+        ("core i_max", "east i_min"), ("core j_max", "north i_min"), ("east j_max", "north j_min"),
+        ("around-east j_max", "around-north j_min"),
+    ):  # fmt: skip
+        links.append(join("seam", *((b[n], side) for n, side in (one.split(), two.split()))))
+    for block in b.values():
+        wall_off(block)
+    options = {"geometry": "axisymmetric" if curved else "plane"}
+    return Simulation(
+        list(b.values()), links, t_end=periods * 2 * math.pi / omega, **options
+    ), omega
+
+
+def measure_drop(simulation, curved):
+    """Amplitude of the second mode of the surface."""
+    lines = [block.nodes[:, -1] for block in simulation.blocks if block.name in ("east", "north")]
+    x, y = np.concatenate([lines[0], lines[1][:, 1:]], axis=1)
+    radius, angle = np.hypot(x, y), np.arctan2(y, x)
+    steps, middle = np.diff(angle), 0.5 * (angle[1:] + angle[:-1])
+    mode = compute_mode(middle, curved)
+    weight = mode * steps * (np.sin(middle) if curved else 1.0)
+    return float(((0.5 * (radius[1:] + radius[:-1]) - 1.0) * weight).sum() / (mode * weight).sum())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("curved", [False, True], ids=["plane", "axisymmetric"])
+@pytest.mark.parametrize(("cells", "rho"), [(16, (1.0, 1.0)), (24, (1.0, 0.1)), (24, (0.2, 1.0))])
+def test_drops_swing_as_theory_says(cells, rho, curved):
+    simulation, omega = make_drop(cells, 0.3, rho, 0.01, curved)
+    found, history = march_amplitude(simulation, lambda: measure_drop(simulation, curved))
+    assert found == pytest.approx(omega, rel=5e-3 if cells == 16 else 3e-3)
+    check_budget(history, names=("energy",))
+    check_momentum(history)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("curved", [False, True], ids=["plane", "axisymmetric"])
+@pytest.mark.parametrize(("uneven", "periods"), [(0.5, 1.0), (0.0, 10.0)])
+def test_a_round_drop_rests(uneven, periods, curved):
+    """Its jump is that of Laplace on every face, however its nodes are spaced."""
+    simulation, _ = make_drop(8, 0.5, (1.0, 0.3), 0.0, curved, uneven, periods)
+    rows = march(simulation)
+    jump = np.concatenate([block.rim.jump for block in simulation.blocks])
+    assert (jump > 0.0).sum() == 8
+    assert jump[jump > 0.0] == pytest.approx(2.0 if curved else 1.0, rel=1e-12)
+    speed = max(float(np.abs(b.state[1:3, 1:-1, 1:-1]).max()) for b in simulation.blocks)
+    assert speed < 1e-12
+    assert rows[-1]["surface_energy"] == pytest.approx(rows[0]["surface_energy"], rel=1e-12)
 
 
 @pytest.mark.parametrize(("part", "grows"), [(0.95, True), (1.05, False)])

@@ -58,8 +58,8 @@ class Simulation:
     """Blocks marched together to `t_end`; obeys `problems.evolution.Evolution`.
 
     blocks with their segments put and joined; `links` of the joined segments; `mesh`: "regrid",
-    "fixed" or a law `(block name, t) -> nodes`; `make_regridder`: called once a block; `cfl`: part
-    of the stable step, the rate being summed over both grid directions (1 is the limit of the
+    "fixed" or a motion `(block name, t) -> nodes`; `make_regridder`: called once a block; `cfl`:
+    part of the stable step, the rate being summed over both grid directions (1 is the limit of the
     unsplit scheme); `source`: gravity or heating (`hydro.sources`); `geometry`:
     "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
     all integrals are then per radian); `measure_block`: gives the numbers of a block,
@@ -204,13 +204,13 @@ class Simulation:
 
         processors: as many are there for this rank, None for all that the process may use.  Raises
         BadInput where blocks are cut that a body source acts on, which is summed over whole blocks,
-        and where grid lines are added on the way.
+        and where grid lines are added during the run.
         """
         if ranks.cuts and self._flow.source.law is not None:
             raise BadInput("blocks that a body source acts on cannot be cut among ranks")
         if self.refining is not None and ranks.size > 1:
             raise BadInput(
-                "one process alone can add grid lines on the way; set refine = false, or run "
+                "only one process can add grid lines during a run; set refine = false, or run "
                 "without MPI"
             )
         cells = [(last - first) * self._blocks[n].nj for n, first, last in ranks.pieces]

@@ -172,7 +172,7 @@ class Gauge(DeckTable, kw_only=True):
     at: key(tuple[float, float], "place [x, y] [m], a line's first one")
     to: key(tuple[float, float], "a line's last place [x, y] [m]") | None = None
     count: key(int, "points of a line, evenly from `at` to `to`", ge=1, le=10000) = 1
-    moves: key(bool, "true: goes with the material; false: stays in space") = False
+    moves: key(bool, "true: moves with the material; false: fixed in space") = False
     fields: key(list[Field], "what is written down; c is the sound speed", min_length=1) = (
         msgspec.field(default_factory=lambda: ["rho", "u", "v", "p"])
     )
@@ -325,6 +325,6 @@ def check_digests(digests: Mapping[str, str]) -> None:
             raise BadInput(f"{name}, which the deck names, is gone")
         if compute_digests([name], {})[name] != digest:
             raise BadInput(
-                f"{name} has changed since this deck was kept (key digests): bring the file back, "
-                "or begin a new run"
+                f"{name} has changed since this deck was stored (key digests): restore the file, "
+                "or start a new run"
             )

@@ -59,7 +59,7 @@ class OwnSimulation(Problem):
             script = f" ({self.deck.script})" if self.deck.script else ""
             raise BadInput(
                 f"the blocks of this run were made in Python{script}, and only there can they be "
-                "made again: shockgrid.restart(directory, simulation=...) goes on with it"
+                "made again: continue it with shockgrid.restart(directory, simulation=...)"
             )
 
     def say_repeat(self) -> str:

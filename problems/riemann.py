@@ -1,16 +1,16 @@
 """Riemann problem: two states side by side, run against the exact solution.
 
 `case` names the states (Sod, 123, Toro 3, LeBlanc, two gammas, water against gas, impacts of
-metals), `left` and `right` give others.  With the contact "on-line" each state is a block of its
-own, the contact is the grid line between them, and the grids are rebuilt every step.  Where the
-lengths of the sides are given, by the deck or the case, the ends move with the undisturbed
-materials; otherwise lengths, grading, end time and the motion of the ends follow from the exact
-waves, so that each plateau has its share of the cells.  "captured" is one block of one material
-through which the contact runs, on a grid at rest or under a given smooth motion.
+metals); `left` and `right` give others.  With the contact "on-line" each state is a block, the
+contact is the grid line between them, and the grids are rebuilt every step.  If the deck or the
+case gives the lengths of the sides, the ends move with the undisturbed materials; otherwise the
+exact waves determine lengths, grading, end time and motion of the ends, so that each plateau has
+its share of the cells.  "captured" is one block of one material through which the contact runs, on
+a grid at rest or in a prescribed smooth motion.
 
-Measured are the error of the density, `sum |rho - exact| dx`, and the star states: means over the
-middle half of the plateaus beside the contact.  States that leave a vacuum between them are
-refused.  Note: a plateau a few cells wide, as in the 123 problem, holds what the start left at
+The problem measures the error of the density, `sum |rho - exact| dx`, and the star states: means
+over the middle half of the plateaus beside the contact.  States that leave a vacuum between them
+are refused.  Note: a plateau a few cells wide, as in the 123 problem, retains the start-up error at
 the contact; `grading` puts small cells there.
 """
 

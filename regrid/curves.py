@@ -586,7 +586,7 @@ def redistribute(
     count = line.shape[1]
     law = np.arange(count, dtype=np.float64) if law is None else np.ascontiguousarray(law)
     if law.shape != (count,):
-        raise BadInput(f"line: a law of {law.size} values cannot place {count} nodes")
+        raise BadInput(f"line: a spacing of {law.size} values cannot place {count} nodes")
     if shape not in SHAPES:
         raise BadInput(f"line: shape must be one of {', '.join(SHAPES)}, got '{shape}'")
     if not 0.0 <= relax <= 1.0:
@@ -607,6 +607,6 @@ def redistribute(
 def make_crossing(key: int) -> BadInput:
     """What is wrong where `fill_redistributed` fails after a key node."""
     return BadInput(
-        f"line: nodes coincide or the law does not increase after key node {key}; "
-        "every node needs a place of its own"
+        f"line: nodes coincide or the spacing does not increase after key node {key}; "
+        "every node needs its own position"
     )

@@ -180,7 +180,7 @@ def call_regridder(
         side = max(away, key=away.__getitem__)
         raise BadInput(
             f"{place}{',' if where else ':'} side {side}: it returned other nodes than it was "
-            f"given, up to {away[side]:.3g} m away; a regridder keeps the nodes of the sides, to "
-            "the last bit"
+            f"given, up to {away[side]:.3g} m away; a regridder must return the nodes of the "
+            "sides unchanged, bitwise"
         )
     return result

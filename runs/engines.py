@@ -261,7 +261,7 @@ def open_engine(name: str = "processes", jobs: int | None = None) -> Iterator[En
     if name != "mpi" and not (kind == "dask" and address):
         raise BadInput(f"--engine {name!r}: there are {', '.join(ENGINES)}")
     if jobs is not None:
-        raise BadInput(f"--jobs goes with --engine processes; {name} brings its own workers")
+        raise BadInput(f"--jobs needs --engine processes; {name} has its own workers")
 
     with open_mpi() if name == "mpi" else open_dask(address) as engine:
         yield engine

@@ -143,7 +143,9 @@ def check_hard_motion(make: Make, domain: str) -> None:
     bad = find_bad_cells(nodes)
     _demand(not len(bad), f"{domain}: {len(bad)} cells are not convex, and no RegridFailure")
     for side in SIDES:
-        _demand(np.array_equal(nodes[side], boundary[side]), f"{domain}: a side is not kept")
+        _demand(
+            np.array_equal(nodes[side], boundary[side]), f"{domain}: the nodes of a side changed"
+        )
 
 
 def check_folded_outline(make: Make) -> None:
@@ -170,7 +172,7 @@ def check_shapes(make: Make) -> None:
 
 
 REGRIDDER_PROMISES: dict[str, Callable[[Make], None]] = {
-    "cells are convex, sides are kept": check_cells_and_sides,
+    "cells are convex, side nodes are unchanged": check_cells_and_sides,
     "calls repeat": check_repeats,
     "inputs are left alone": check_inputs,
     **{f"domain {motion}": functools.partial(check_motion, motion=motion) for motion in MOTIONS},

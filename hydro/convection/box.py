@@ -110,7 +110,7 @@ def make_fluid(
     if size == 0.0:
         if rayleigh > 0.0:
             raise BadInput(
-                f"gravity is zero but Ra = {rayleigh:g} asks for buoyancy; take Ra = 0 or a gravity"
+                f"gravity is zero but Ra = {rayleigh:g} needs buoyancy; set Ra = 0 or give gravity"
             )
         return Fluid(prandtl, 1.0, (0.0, 0.0))
     strength = rayleigh * prandtl / size
@@ -169,7 +169,7 @@ def check_walls(walls: Mapping[str, Wall]) -> None:
     """Raise BadInput for walls that are missing, unknown, or contradict each other."""
     if set(walls) != set(SIDES):
         wrong = sorted(set(walls) ^ set(SIDES))
-        raise BadInput(f"a convection cell has the sides {', '.join(SIDES)}; look at {wrong[0]!r}")
+        raise BadInput(f"a convection cell has the sides {', '.join(SIDES)}; check {wrong[0]!r}")
     for side in SIDES:
         wall = walls[side]
         if wall.flow not in ("no-slip", "free", "periodic"):

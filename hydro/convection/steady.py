@@ -299,7 +299,7 @@ class SteadySolver:
         if self.factor < LEAST_FACTOR or self.exponent < -15.0:
             raise RunFailure(
                 f"convection: no steady state was found beyond {10.0**before:.3g} of the buoyancy "
-                "asked for; it may not exist or be unsteady: march in time, or take more cells",
+                "requested; it may not exist or be unsteady: march in time, or use more cells",
                 cause="not-steady",
             )
         self._begin_stage()

@@ -103,7 +103,7 @@ class CarriedSeam:
             if (order * np.diff(height) <= 0.0).any() or not (
                 (heights[0] >= least - slack) & (heights[0] <= most + slack)
             ).all():
-                raise BadInput(f"{seam} cannot be carried by {one} and {other}: it is not between")
+                raise BadInput(f"{seam} cannot move with {one} and {other}: it is not between them")
             count = np.arange(height.size)
             at = np.interp(heights[0], height[::order], count[::order])
             self.positions.append(at)

@@ -41,7 +41,7 @@ MeshLaw = Callable[[str, float], np.ndarray]
 
 
 class GridMotion(Sides):
-    """Moves the grid of all blocks: "regrid" (default), "fixed", or a law `(block, t) -> nodes`."""
+    """Moves the grids of blocks: "regrid" (default), "fixed" or a motion (block, t) -> nodes."""
 
     def __init__(
         self,
@@ -93,7 +93,7 @@ class GridMotion(Sides):
             )
 
     def follow_mesh(self, span: Span) -> None:
-        """Fill all new nodes of a mesh that is given; RegridFailure for a mesh law that tangles."""
+        """Fill all new nodes of a prescribed mesh; RegridFailure for a motion that tangles."""
         for block in (self.blocks[number] for number in self.blocks.own):
             if callable(self.mesh):
                 block.nodes_new[...] = self.mesh(block.name, span.t + span.dt)
@@ -103,26 +103,26 @@ class GridMotion(Sides):
 
     @staticmethod
     def _check_law(block: Block) -> None:
-        """The grid of a mesh law is convex; RegridFailure if not."""
+        """The grid of a prescribed motion is convex; RegridFailure if not."""
         bad = find_bad_cells(block.nodes_new)
         if len(bad):
             i, j = (int(index) for index in bad[0])
             raise RegridFailure(
-                f"mesh law: block {block.name!r}: {len(bad)} cells are not convex, the first "
+                f"mesh motion: block {block.name!r}: {len(bad)} cells are not convex, the first "
                 f"is i={i}, j={j}",
                 cause="mesh-law",
                 place=Place(block.name, (i, j)),
             )
 
     def _check_lines(self) -> None:
-        """The grids of a mesh law agree on linked sides; RegridFailure if not."""
+        """Grids of a prescribed motion agree on linked sides; RegridFailure if not."""
         for link in self.exchange.links:
             line = link.leader.line(link.leader.block.nodes_new)
             other = link.follower.line(link.follower.block.nodes_new)
             miss = np.abs(link.to_follower(line) - other).max()
             if miss > 1e-12 * np.ptp(line, axis=1).max():
                 raise RegridFailure(
-                    f"mesh law: {link.leader} and {link.follower} are {miss:.1e} m apart",
+                    f"mesh motion: {link.leader} and {link.follower} are {miss:.1e} m apart",
                     cause="mesh-law",
                     place=Place(link.leader.block.name),
                 )

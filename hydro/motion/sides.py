@@ -226,7 +226,7 @@ class Sides:
                 node = self._find_end(one, one.first if end == 0 else one.last - 1)
                 self.joints.append(Joint(node, (line, neighbour[0]), (end, neighbour[1])))
                 return
-        raise BadInput(f"{one} and {other} do not go on into each other smoothly")
+        raise BadInput(f"{one} and {other} do not continue each other smoothly")
 
     def carry(self, seam: Segment, one: Segment, other: Segment) -> None:
         """Let a seam go with two contacts (leading segments all); see `motion.constraints`."""
@@ -234,7 +234,7 @@ class Sides:
         for face in (seam.first, seam.last - 1):
             node = self._find_end(seam, face)
             if node.flowing or node.given or node.carried:
-                raise BadInput(f"{seam} cannot be carried: one of its ends is moved otherwise")
+                raise BadInput(f"{seam} cannot move with contacts: one of its ends moves otherwise")
             carried.ends.append(node)
         for node in carried.ends:
             node.carried = True

@@ -69,7 +69,7 @@ def sample_grid(old: np.ndarray, sides: dict[str, np.ndarray]) -> np.ndarray:
 
 
 PASSES = 3  # of the regridder over a new grid, as each brings it a step nearer to its own
-SAME = 1e-9  # of a grid's size: nodes of a law of time alone
+SAME = 1e-9  # of a grid's size: nodes that depend on time alone
 
 
 @dataclass(frozen=True)
@@ -223,7 +223,7 @@ def settle_grid(
 def _follow_law(
     blocks: list[Block], new_blocks: list[Block], law: MeshLaw, new_law: MeshLaw, t: float
 ) -> None:
-    """Grids of a mesh law at the old run's time; one that depends on the flow is sampled."""
+    """Grids of a prescribed motion at the old time; one that depends on the flow is sampled."""
     for one, other in zip(blocks, new_blocks, strict=True):
         size = np.ptp(one.nodes, axis=(1, 2)).max()
         if np.abs(law(one.name, t) - one.nodes).max() <= SAME * size:

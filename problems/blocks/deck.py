@@ -142,7 +142,7 @@ class BlocksDeck(Deck, kw_only=True):
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1e-3))
     regrid: Regrid = msgspec.field(default_factory=Regrid)
-    title: key(str, "a line for the closing screen") = ""
+    title: key(str, "a line for the summary") = ""
     geometry: key(Literal["plane", "axisymmetric"], "axisymmetric: y is the radius") = "plane"
     mesh: key(
         Literal["regrid", "fixed"], "regrid: grids follow moving sides; fixed: no node moves"
@@ -155,7 +155,7 @@ class BlocksDeck(Deck, kw_only=True):
     link: key(tuple[LinkTable, ...], "the links, [[link]] each") = ()
 
     digests: key(
-        dict[str, str], "sha256 of the files, as a run keeps them; no matter in a deck of one's own"
+        dict[str, str], "sha256 of the files, as a run stores them; not needed in your own deck"
     ) = msgspec.field(default_factory=dict)
 
     def find_files(self, folder: Path) -> BlocksDeck:

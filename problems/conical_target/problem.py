@@ -153,8 +153,8 @@ class ConicalTarget(Problem):
             if material.eos.kind == "jwl":
                 raise BadInput(
                     f"deck: {name} is {getattr(deck, name)!r}, an explosive; nothing burns in this "
-                    "problem and its law, that of what is left when it has burnt, is none for it "
-                    "unburnt; take an inert material"
+                    "problem and its equation of state is that of the burnt products; use an inert "
+                    "material"
                 )
             if not float(material.eos.sound_speed(material.rho0, 0.0)) > 0.0:
                 why = "which has no sound speed at p = 0; it must be a condensed material"

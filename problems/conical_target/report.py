@@ -1,4 +1,4 @@
-"""Closing screen and curves of `conical-target`: pressures, the shock, its side, ripples.
+"""Summary and curves of `conical-target`: pressures, the shock, its side, ripples.
 
 Each wave of a ripple has its own clock, which starts when the shock along the side is at its
 middle.  Theory is that of ripples of small slope behind shocks that cross a line; the speed of the
@@ -349,7 +349,7 @@ def measure_waves(problem, history) -> tuple[CrossedLine | None, list[WaveGrowth
 
 
 def make_ripple_lines(problem, history) -> list[str]:
-    """The growth of the ripple beside theory, as lines of the closing screen."""
+    """The growth of the ripple beside theory, as lines of the summary."""
     ripple = problem.ripple
     lines = [
         f"  ripple of {ripple.amplitude * MM:.3g} mm on waves of {ripple.wavelength * MM:.3g} mm "

@@ -1,17 +1,17 @@
 """Convection between vertical plates with a through-flow, against its exact profiles.
 
-Two plates, hot at x = 0 and cold at x = 1, stand in a slot that is closed far above and below:
-the fluid rises along the one and sinks along the other, v = Ra/12 x (1 - x)(1 - 2 x).  Suction and
+Two plates, hot at x = 0 and cold at x = 1, form a slot that is closed far above and below:
+the fluid rises along one and sinks along the other, v = Ra/12 x (1 - x)(1 - 2 x).  Suction and
 injection through the plates (`peclet`) blow the heat towards one of them, into a layer of thickness
 1/Pe.  `mean_speed` adds a flow along the slot.  The fluid starts at rest, and the run ends when
-nothing changes any more.
+the flow is steady.
 
 Scales: width of the slot 1 m, diffusivity 1 m2/s, 1 K between the plates.
 
-The grid may follow the speed as Polevikov's does, gradients, or both (`grid.kind`); the closing
-screen compares all of them at three sizes, and the schemes of the through-flow's flux, with the
-exact solution.  Note: Polevikov's grid has its longest steps at the plates, where they fall
-with the square root of the number of cells only: v is right to first order on it, not to second.
+The grid may follow the speed as Polevikov's does, gradients, or both (`grid.kind`); the summary
+compares all of them at three sizes, and the schemes of the through-flow's flux, with the exact
+solution.  Note: Polevikov's grid has its longest steps at the plates, where they decrease only with
+the square root of the number of cells: v is first order on it, not second.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ class AxisGrid(DeckTable, kw_only=True):
     strength: key(float, "of the gradient against the uniform grid in the monitor", ge=0) = 1.0
     share: key(float, "of polevikov's density of nodes in the combined one", ge=0, le=1) = 0.5
     walls: key(Literal["both", "low", "high"], "where a clustered grid is dense") = "both"
-    clustering: key(float, "strength of a clustered grid's tanh law", gt=0, le=20) = 2.0
+    clustering: key(float, "strength of a clustered grid's tanh spacing", gt=0, le=20) = 2.0
 
     def make(self, n: int, low: float = 0.0, high: float = 1.0) -> np.ndarray:
         """The first axis of n steps, shape (n + 1,)."""

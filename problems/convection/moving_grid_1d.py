@@ -1,17 +1,18 @@
-"""A viscous front on nodes placed after the step, by a speed law, or before the fluxes.
+"""A viscous front on nodes placed after the step, by a speed equation, or before the fluxes.
 
 Burgers' equation with fronts that run, and merge, between falling `levels`; the exact solution is
-known.  Four columns of as many cells solve it side by side in equal steps:
+known.  Four columns with the same number of cells solve it side by side in equal steps:
 
 - fixed: nodes at rest, evenly spaced;
 - after: nodes placed after each step; their speed in the fluxes is that of the step before;
-- law: nodes follow a law for their speed, integrated together with the flow;
-- first: nodes placed first, the fluxes of the same step know where they go (as in the flow solver).
+- law: an equation for the node speed, integrated together with the flow;
+- first: nodes placed first, and the fluxes of the same step use their motion (as in the flow
+  solver).
 
-The closing screen has error, order, lost sum and cost of the four at three sizes.  Note:
-`after` shifts the front, its profile stays smooth, and a single front at one speed hides the lag
-(nothing speeds up); and orders of grids with bounded neighbours look low because the bound helps
-the coarse ones most (`grid.ratio = 1000` shows the second order).
+The summary lists error, order, lost sum and cost of the four at three sizes.  Note: `after` shifts
+the front, its profile stays smooth, and a single front at one speed hides the lag (nothing
+accelerates); orders of grids with bounded neighbours look low because the bound helps the coarse
+ones most (`grid.ratio = 1000` shows the second order).
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ WORDS = {
     "law": "by a speed law",
     "first": "placed first",
 }
-PARTS = (4, 2)  # of the deck's cells, run again for the closing screen
+PARTS = (4, 2)  # of the deck's cells, run again for the summary
 
 
 def march(problem, cells: int) -> dict[str, dict[str, float]]:
@@ -174,7 +175,7 @@ class PlacingPart(DeckTable, kw_only=True):
     strength: key(float, "of the gradient: 2 gives two thirds of the nodes to it", ge=0) = 2.0
     ratio: key(float, "most of neighbouring steps; left out: usual", gt=1) | None = None
     relaxation: key(float, "part of a correction that is made", gt=0, le=1) = 0.7
-    tau: key(float, "time [s] in which the speed law follows", gt=0) = 0.005
+    tau: key(float, "relaxation time [s] of the node speed", gt=0) = 0.005
     start: key(
         Literal["moving", "rest"],
         "nodes placed after the step: their speed at t = 0 known, or none",

@@ -3,14 +3,14 @@
 The fluid lies between a hot floor (1/2) and a cold ceiling (-1/2), 1 above it.  `shape = "box"` has
 side walls at a distance `width`, adiabatic or conducting; `shape = "layer"` has periodic sides, by
 default a critical wavelength apart.  The run starts from the fluid at rest with its fastest
-disturbance, `amplitude` K large; above the onset that grows into rolls, below it decays.
-A layer has its rolls in any place along it, and rolls may turn either way: the disturbance taken is
-the part of exp(x/width + y) that grows at the largest rate (`stability.filter_disturbance`), so
-that every machine starts from the same one.
+disturbance, of `amplitude` K; above the onset it grows into rolls, below it decays.  A layer has
+its rolls at any position, and rolls may turn either way: the disturbance used is the part of
+exp(x/width + y) that grows at the largest rate (`stability.filter_disturbance`), so that every
+computer starts from the same one.
 
-The closing screen gives the Rayleigh number of the onset, bracketed by the sign of the largest
-growth rate of the discrete equations, beside linear theory, and the growth seen in time beside
-the eigenvalue.  Scales: height 1 m, diffusivity 1 m2/s, difference 1 K.
+The summary compares the Rayleigh number of the onset, bracketed by the sign of the largest growth
+rate of the discrete equations, with linear theory, and the growth in time with the eigenvalue.
+Scales: height 1 m, diffusivity 1 m2/s, difference 1 K.
 
 Note: near the onset everything is slow.  At one per cent above it a disturbance takes several
 diffusive times to grow by a factor e.
@@ -61,7 +61,7 @@ class RayleighBenardDeck(Deck, kw_only=True):
     prandtl: key(float, "viscosity over diffusivity", le=1e6) = PRANDTL
     tilt: key(float, "of gravity, anticlockwise from down [degrees]", gt=-90, lt=90) = 0.0
     amplitude: key(float, "of the first disturbance of the temperature [K]", gt=0, le=1) = 1e-3
-    onset: key(bool, "look for the onset at the end") = True
+    onset: key(bool, "search for the onset at the end") = True
     grid: AxisGrid = msgspec.field(default_factory=AxisGrid)
     longest_step: key(float, "of the march [s]; left out: 1/600 of its time", gt=0) | None = None
 

@@ -44,7 +44,7 @@ class LineMotion(DeckTable, kw_only=True):
     """How the interface's nodes are re-spaced along it."""
 
     shape: key(Literal["spline", "chord"], "curve between nodes when re-spaced") = "spline"
-    relax: key(float, "part of the way to the spacing law in a step", ge=0, le=1) = 0.02
+    relax: key(float, "fraction of the way to the target spacing in a step", ge=0, le=1) = 0.02
     thickness: (
         key(
             float,
@@ -90,7 +90,9 @@ class InterfaceDeck(Deck, kw_only=True):
     width: key(float, "width of the domain in wavelengths", gt=0) = 0.5
     sides: key(Literal["wall", "periodic"], "what bounds the domain along the interface") = "wall"
     cells: key(int, "cells a wavelength", ge=4, le=MOST_CELLS) = 64
-    refine: key(bool, "add grid lines on the way where the interface grows long or bends") = False
+    refine: key(bool, "add grid lines during the run where the interface grows long or bends") = (
+        False
+    )
     uniform: key(float, "evenly spaced zone on each side, in wavelengths", ge=0) = 1.0
     stretch: key(float, "growth of cells from one to the next beyond it", ge=1, le=1.5) = 1.01
     reach: key(float, "distance from the interface, in waves, where lines begin to bend", gt=0) = (
@@ -125,7 +127,7 @@ class InterfaceDeck(Deck, kw_only=True):
     line: LineMotion = msgspec.field(default_factory=LineMotion)
     regrid: Regrid = msgspec.field(default_factory=Regrid)
     digests: key(
-        dict[str, str], "sha256 of line_file, as a run keeps it; no matter in a deck of one's own"
+        dict[str, str], "sha256 of line_file, as a run stores it; not needed in your own deck"
     ) = msgspec.field(default_factory=dict)
 
     def find_files(self, folder: Path) -> InterfaceDeck:

@@ -1,4 +1,4 @@
-"""Closing screen and pictures of `interface-instability`: measured growth beside theory."""
+"""Summary and pictures of `interface-instability`: measured growth beside theory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Closing screen of `plate-on-wedge`: the contact point A against shock polars.
+"""Summary of `plate-on-wedge`: the contact point A against shock polars.
 
 The pressure behind A is a plateau found in the data, or none.  Nothing but A's path sets a length
 in the flow around A, so pressures at equal parts of the path behind A are compared: in every step

@@ -170,7 +170,7 @@ class PlateSetUp(Problem):
         if not self.foot > 0.2 * self.end[0]:
             raise BadInput(
                 f"deck: end_angle {deck.end_angle:g} undercuts the wedge by {-lean:g} m over its "
-                "depth; nothing would be left to stand on"
+                "depth; no base would remain"
             )
         if deck.right == "symmetry" and self.foot >= self.length:
             raise BadInput(

@@ -1,17 +1,17 @@
 """Programmed burn of an explosive: the speed, the peak and the wave behind the front.
 
-A bar of explosive burns from a plane at its left end on, or a square from its lower left corner.
-The front goes at the speed D of the material's Chapman–Jouguet state and brings its heat over a
-few cells.  Behind it, "wall": the products come to rest, the pressure has its peak, pCJ, at the
-front and falls behind it in Taylor's wave, known in full; "piston": the end is pushed at the CJ
+A bar of explosive burns from a plane at its left end, or a square from its lower left corner.  The
+front moves at the speed D of the material's Chapman–Jouguet state and releases its heat over a few
+cells.  Behind it, "wall": the products come to rest, the pressure peaks at pCJ at the front and
+falls behind it in Taylor's wave, which is known exactly; "piston": the end moves at the CJ
 particle speed and the state behind the front is the CJ state itself.  With `clock` below 1 the
-front is lit on that part of the way only and runs by itself from there.
+front is lit on that part of the path only and continues by itself.
 
-Measured are the place of the front where the pressure is half of pCJ, its speed over the last
-half of the way, the mean pressure behind it (piston) or its peak (wall, point), and the mean error
-of the pressure against Taylor's wave (wall).  Note: the peak of an unsupported wave is as sharp
-as the front is thin: it comes to pCJ from below, with the cells; behind a spreading front, where
-the pressure falls off like a square root, with order 1/2 only.
+The problem measures the position of the front, where the pressure is half of pCJ, its speed over
+the last half of the path, the mean pressure behind it (piston) or its peak (wall, point), and the
+mean error of the pressure against Taylor's wave (wall).  Note: the peak of an unsupported wave is
+as sharp as the front is thin, and converges to pCJ from below; behind a spreading front, where the
+pressure falls as a square root, with order 1/2 only.
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ from regrid.measure.corners import compute_centres
 
 WAY = 0.9  # of the length that the front goes, where no end time is given
 AMBIENT = 1e5  # pressure of the explosive at rest [Pa]
-ENDS = "piston: the left end goes at the CJ particle speed; wall: it rests; point: a square lit at "
+ENDS = (
+    "piston: the left end moves at the CJ particle speed; wall: it rests; point: a square lit at "
+)
 ENDS += "its corner, between walls"
 
 
@@ -49,7 +51,9 @@ class DetonationDeck(Deck, kw_only=True):
     length: key(float, "of the bar or square [m]", ge=1e-9, le=1e6) = 0.1
     cells: key(int, "cells along the length", ge=20, le=MOST_CELLS) = 200
     front: key(float, "width of the front in cells", ge=1, le=100) = 4.0
-    clock: key(float, "part of the way that is lit; then the front runs free", gt=0, le=1) = 1.0
+    clock: key(float, "part of the path that is lit; then the front runs by itself", gt=0, le=1) = (
+        1.0
+    )
     limiter: Limiter = "van-leer"
 
 

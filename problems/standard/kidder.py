@@ -1,14 +1,14 @@
 """Kidder's shell: isentropic compression of a slab, ring or sphere by given pressures.
 
 Gas with g = 1 + 2/n between the radii 0.9 and 1 is at rest, with pressure 0.1 inside and 10
-outside and the same entropy everywhere, p = s rho^g.  Under the pressures p(t) = p(0) h^-(n + 2) on
-its two free surfaces, h = sqrt(1 - t²/tau²), it shrinks in similarity: every radius is h times its
-first one, every density h^-n times.  n is the number of dimensions: 1 for a slab that moves towards
-the plane x = 0, 2 for a quarter of a ring, 3 for a quarter of a sphere's section beside the axis,
-in axisymmetric flow.  At the end, tau sqrt(3)/2, h is one half.  Measured are the radii of both
-surfaces, in the mean and at the worst ray, and the density.
+outside and uniform entropy, p = s rho^g.  Under the pressures p(t) = p(0) h^-(n + 2) on its two
+free surfaces, h = sqrt(1 - t²/tau²), it contracts self-similarly: every radius is h times its
+initial value, every density h^-n times.  n is the number of dimensions: 1 for a slab that moves
+towards the plane x = 0, 2 for a quarter of a ring, 3 for a quarter of a sphere's section beside the
+axis, in axisymmetric flow.  At the end, tau sqrt(3)/2, h is one half.  The problem measures the
+radii of both surfaces, mean and worst ray, and the density.
 
-Note: the surfaces are loaded by gas of their own pressure; a wrong pressure there shows as a
+Note: the surfaces are loaded by gas at their own pressure; a wrong pressure there shows as a
 first-order error of the outer radius.  Source: [Kidder1976], the shells n = 1, 2, 3.
 """
 

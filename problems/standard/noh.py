@@ -1,14 +1,13 @@
 """Noh's problem: cold gas runs into its centre and stops in a shock.
 
-Gas of density 1 moves with speed 1 towards the centre.  A shock runs out from there at
-(gamma - 1)/2; behind it the gas is at rest with density ((gamma + 1)/(gamma - 1))^n in n
-dimensions, ahead of it the density is (1 + t/r)^(n-1).  The grid is rectangular: a strip, a
-quarter of the plane, or for a sphere the quarter beside the axis.  Outer sides are open, with the
-exact state beyond.  Measured at the end is the relative error of the density out to twice the
-shock's radius.
+Gas of density 1 moves with speed 1 towards the centre.  A shock moves outwards at (gamma - 1)/2;
+behind it the gas is at rest with density ((gamma + 1)/(gamma - 1))^n in n dimensions, ahead of it
+the density is (1 + t/r)^(n-1).  The grid is rectangular: a strip, a quarter of the plane, or for a
+sphere the quarter beside the axis.  Outer sides are open, with the exact state beyond.  The problem
+measures the final relative error of the density out to twice the shock's radius.
 
-Note: the first gas at the centre is heated too much by any scheme that captures shocks ("wall
-heating"); its density stays too low.  Source: [Noh1987].
+Note: every shock-capturing scheme overheats the first gas at the centre ("wall heating"); its
+density remains too low.  Source: [Noh1987].
 """
 
 from __future__ import annotations

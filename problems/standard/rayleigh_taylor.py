@@ -3,15 +3,15 @@
 Half a wave in a box with walls, height 1 either side of y = 0, gravity 1 downwards, wavelength 1.
 Above "heavy": gas of density 2 over gas of density 1, a wave of small amplitude on the interface
 grows as cosh(rate t); without compression rate² = g k/3 tanh k, rate = 1.447197.  Above "nothing":
-a free surface under constant pressure, on which the wave swings with omega² = g k tanh k,
-omega = 2.506620.  Surface `tension` sigma lessens rate² by sigma k³/3 tanh k, so that from
-sigma = g/k² = 0.025330 on the wave swings, and adds sigma k³ tanh k to omega².  Both layers are
-isentropic, so that nothing but the interface can become unstable, and start in balance;
-`sound_speed` makes them nearly incompressible.
+a free surface under constant pressure, on which the wave oscillates with omega² = g k tanh k,
+omega = 2.506620.  Surface `tension` sigma reduces rate² by sigma k³/3 tanh k, so that from
+sigma = g/k² = 0.025330 on the wave oscillates, and adds sigma k³ tanh k to omega².  Both layers are
+isentropic, so that only the interface can become unstable, and start in equilibrium; `sound_speed`
+makes them nearly incompressible.
 
-The rate is found from the amplitude at three times a third of the run apart,
-a1 + a3 = 2 a2 cosh(rate T); omega from the times at which the amplitude is zero.  Note: gas
-that is not in balance at the start rings up and down, and the interface with it.
+The rate follows from the amplitude at three times a third of the run apart,
+a1 + a3 = 2 a2 cosh(rate T); omega from the times of zero amplitude.  Note: gas that does not start
+in equilibrium oscillates vertically, and the interface with it.
 """
 
 from __future__ import annotations

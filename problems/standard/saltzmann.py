@@ -2,14 +2,15 @@
 
 A piston at speed 1 drives a shock of infinite strength through gas at rest, g = 5/3, on a grid
 whose lines are bent by a tenth of the length: x = i/100 + (0.1 - j/100) sin(pi i/100).  The shock
-(D = 4/3) meets the wall at t = 0.75 and comes back to the piston at t = 0.9; the density behind it
-is 4, then 10, then 20.  Measured is the density between the wave and where it started, the middle
-seven tenths of that length: its mean, the root mean square and the worst cell's difference from
-the exact state.
+(D = 4/3) meets the wall at t = 0.75 and returns to the piston at t = 0.9; the density behind it
+is 4, then 10, then 20.  The problem measures the density between the wave and its origin, in the
+middle seven tenths of that length: mean, root mean square and worst cell's difference from the
+exact state.
 
 Note: gas at rest without pressure allows any time step, and one in which the shock leaves the
-piston through several cells at once leaves entropy there for ever.  The first steps are short.
-HLL on all faces, as there is no contact to keep: lines askew to the shock leave less in rows.
+piston through several cells at once leaves entropy there permanently; so the first steps are short.
+There is no contact to preserve, so HLL on all faces reduces the error in rows of cells that lines
+oblique to the shock leave.
 """
 
 from __future__ import annotations

@@ -1,14 +1,15 @@
 """Sedov's blast wave: the energy of a point in cold gas; plane, cylinder or sphere.
 
-All energy is at first in the cell at the centre (in the cells along the wall of a plane blast), as
-pressure, and such that the shock is at radius 1 at t = 1.  The grid is rectangular.  Its nodes go
-with the gas ("follow"), which takes the cells to where the gas is, or rest ("fixed").  Measured are
-the radius of the shock, the mean of where grid lines from the outside first meet half of the
-density's rise, and at the end the relative error of the density against the exact solution.
+All energy is initially in the cell at the centre (in the cells along the wall of a plane blast), as
+pressure, so that the shock is at radius 1 at t = 1.  The grid is rectangular.  Its nodes move
+with the gas ("follow"), which concentrates cells where the gas is, or rest ("fixed").  The problem
+measures the radius of the shock, the mean position where grid lines from the outside first reach
+half of the density's rise, and at the end the relative error of the density against the exact
+solution.
 
-Note: conservation of energy is half the test.  The sum over all cells drives the shock, and a
-scheme that gains a tenth is a fortieth out.  In the plane the whole centre is one cell of gas when
-nodes follow; the grid is better left at rest.  Source: [Sedov1959], [Kamm2000].
+Note: energy conservation is half the test.  The total over all cells drives the shock, and a scheme
+that gains a tenth has a radius error of a fortieth.  In the plane the whole centre is one cell of
+gas when nodes follow; use a grid at rest.  Source: [Sedov1959], [Kamm2000].
 """
 
 from __future__ import annotations

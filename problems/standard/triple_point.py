@@ -1,15 +1,15 @@
 """Triple point: three gases in a shock tube, whose contacts roll up into a vortex.
 
-A tube of 7 x 3: on the left gas under pressure 1 (rho 1, g 1.5), on the right pressure 0.1, below
-y = 1.5 rho 1 and g 1.4, above it rho 0.125 and g 1.5.  The shock runs faster through the light gas
-above than through the heavy one below; where the three gases meet, the contacts roll up.  Each gas
-is a block, its contacts are grid lines, and the point where all three meet is a node of all.
+A tube of 7 x 3: on the left gas at pressure 1 (rho 1, g 1.5), on the right pressure 0.1, below
+y = 1.5 rho 1 and g 1.4, above it rho 0.125 and g 1.5.  The shock is faster in the light gas above
+than in the heavy one below; where the three gases meet, the contacts roll up.  Each gas is a block,
+its contacts are grid lines, and the point where all three meet is a node of all.
 
-Measured are the states beside the left contact far from the point, against the plane Riemann
-problems left|bottom and left|top, and the mass of each gas.  Note: a contact of no thickness
-rolls up without end, and at the point a block's corner would open beyond a straight angle, where
-`hydro.motion.constraints` holds it; finer grids wind further, and where the point is does not
-converge.
+The problem measures the states beside the left contact far from the point, against the plane
+Riemann problems left|bottom and left|top, and the mass of each gas.  Note: a contact of zero
+thickness rolls up without end, and at the point a block's corner would open beyond a straight
+angle, which `hydro.motion.constraints` prevents; finer grids wind further, and the position of the
+point does not converge.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class TriplePointDeck(Deck, kw_only=True):
         key(float, "shorter waves of contacts decay; left out: 0.75 of a first cell", ge=0, le=1.0)
         | None
     ) = None
-    relax: key(float, "part of the way to even spacing of nodes in a step", ge=0, le=1) = 0.05
+    relax: key(float, "fraction of the way to even node spacing in a step", ge=0, le=1) = 0.05
     limiter: Limiter = "van-leer"
 
 

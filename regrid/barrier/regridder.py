@@ -90,7 +90,7 @@ class BarrierRegridder:
         self.curved = curves and self.family is None
         if first_grid is not None and (self.family != (1.0, 0.0) or method != "newton"):
             raise BadInput(
-                "barrier regridder: a first grid gives the laws of lines j = const; it needs "
+                "barrier regridder: a first grid gives the spacing of lines j = const; it needs "
                 'family = "i" and method = "newton"'
             )
         self.bend: np.ndarray | None = None

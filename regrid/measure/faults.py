@@ -314,7 +314,7 @@ def _find_fault(
         return "no-grid", what, side, (node,), None
     if previous is not None and compute_area(previous) * compute_area(boundary) <= 0.0:
         what = (
-            "the boundary runs round the other way than that of the previous grid; "
+            "the boundary has the opposite orientation to the previous grid; "
             "give its sides in the same order and direction"
         )
         return "no-grid", what, "i_min", (0, boundary.shape[2] - 1), None

@@ -46,7 +46,7 @@ from runs.ranks.started import is_for_ranks
 @click.option("--refine", metavar="KEY", help="The key of cells, for orders [cells].")
 @click.option("--retry", is_flag=True, help="Go on with runs that failed, too.")
 @click.option("--dry-run", is_flag=True, help="List the runs and what is there of each, and stop.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress, only the closing screen.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress, only the summary.")
 def study(deck, vary, settings, output, jobs, engine, shown, refine, retry, dry_run, quiet) -> int:
     """Run a deck at many points: table, orders and picture.
 
@@ -70,7 +70,7 @@ def cli(debug: bool) -> None:
     """Shock hydrodynamics on moving blocks whose grids are rebuilt every step.
 
     \b
-    shockgrid run interface-instability      compute, then look at the closing screen
+    shockgrid run interface-instability      compute, then look at the summary
     shockgrid plot out/interface-instability-1
     """
 
@@ -82,7 +82,7 @@ setting = click.option(
     metavar="KEY=VALUE",
     help="Change a key of the deck, such as run.t_end=1e-3; can be repeated.",
 )
-quiet = click.option("-q", "--quiet", is_flag=True, help="No progress, only the closing screen.")
+quiet = click.option("-q", "--quiet", is_flag=True, help="No progress, only the summary.")
 with_plot = click.option("--plot", "picture", is_flag=True, help="Draw pictures at the end.")
 threads = click.option("--threads", type=click.IntRange(1), help="Same as --set run.threads=N.")
 max_wall = click.option(
@@ -142,7 +142,7 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
         return 0
     if ranks is not None:
         raise BadInput(
-            f"--ranks goes with --dry-run; a run starts with mpiexec -n {ranks} before it"
+            f"--ranks needs --dry-run; start a run with mpiexec -n {ranks} shockgrid ..."
         )
     from runs.march.launching import start_runner
 
@@ -185,7 +185,9 @@ def restart(
         runner.limit, runner.world = limit, _find_world()
         return _finish(runner.go_on(), runner.directory, picture)
     if output is not None or force:
-        raise BadInput("restart: -o and --force go with --cells; else a run goes on where it is")
+        raise BadInput(
+            "restart: -o and --force need --cells; otherwise a run continues in its directory"
+        )
     world = _find_world()
     runner = continue_runner(opened, settings, quiet, at, _say, world)
     runner.limit, runner.world = limit, world
@@ -239,7 +241,7 @@ def schema(problem) -> None:
 
 @cli.command()
 @click.argument("path", metavar="DIR_OR_FILE")
-@click.option("--deck", is_flag=True, help="Print the deck that the (last) dump keeps.")
+@click.option("--deck", is_flag=True, help="Print the deck stored in the (last) dump.")
 def info(path, deck) -> int:
     """Say what a run or a dump holds and how well it kept.
 
@@ -415,7 +417,7 @@ def verify(problems, short, output, jobs) -> int:
     default="default",
     help="Whole commands: the default problem's; long: a mushroom, too; large: 25 minutes.",
 )
-@click.option("--json", "path", metavar="FILE", help="Keep the tables in this file, too.")
+@click.option("--json", "path", metavar="FILE", help="Also write the tables to this file.")
 @click.option("--peer", metavar="DIR", help="A built CloverLeaf_ref to measure beside.")
 def bench(cells, rounds, runs, path, peer) -> None:
     """Measure how fast this machine computes, and where the time goes.
@@ -488,7 +490,7 @@ def _main(arguments: list[str], world: object = None) -> int:
         known = {BadInput: BAD_INPUT, MemoryError: BAD_INPUT, RunFailure: FAILED}
         code = next((code for kind, code in known.items() if isinstance(error, kind)), INTERNAL)
         if code == INTERNAL and (mistake := describe_mistake(error)):
-            echo(f"shockgrid: {mistake}; --debug shows the way there", err=True)
+            echo(f"shockgrid: {mistake}; --debug shows the traceback", err=True)
             return BAD_INPUT
         if code == INTERNAL and (sentence := describe_outside(error)):
             echo_sentences(sentence)

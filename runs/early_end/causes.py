@@ -65,11 +65,13 @@ class Cause:
 
 
 SMALLER_CFL = Setting("run.cfl", "shorter steps", factor=0.5)
-MORE_BARRIER = Setting("regrid.epsilon", "more barrier keeps cells thicker", factor=10.0, most=0.1)
-MORE_SHARING = Setting("run.small_cells", "more cells share their states", value="0.1")
-GRID_AT_REST = Setting("mesh", "the grid rests, the gas goes through it", value="fixed")
-LESS_SHARING = Setting("run.small_cells", "fewer cells share their states", factor=0.5)
-THICKER = Setting("thickness", "keeps the shortest waves of lines away", factor=2.0)
+MORE_BARRIER = Setting(
+    "regrid.epsilon", "a stronger barrier keeps cells thicker", factor=10.0, most=0.1
+)
+MORE_SHARING = Setting("run.small_cells", "redistributes the states of more cells", value="0.1")
+GRID_AT_REST = Setting("mesh", "the grid is fixed, the gas flows through it", value="fixed")
+LESS_SHARING = Setting("run.small_cells", "redistributes the states of fewer cells", factor=0.5)
+THICKER = Setting("thickness", "damps the shortest waves of lines", factor=2.0)
 BARRIER = Setting("regrid.name", "the regridder that finds a grid most often", value="barrier")
 CHEAPEST = Setting("regrid.name", "the regridder that costs least", value="barrier")
 FEWER_CELLS = Setting("cells", "larger cells do not follow the finest folds", factor=0.5)
@@ -81,17 +83,18 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         "a failed cell is nearly empty, a shock meets vacuum, or a material with a phase "
         "transition is far below its Hugoniot, where no shock and no isentrope leads",
         (LESS_SHARING,),
-        "a material with a strength; end before the material tears (`run.t_end`)",
+        "a material with a strength; end before the material fails (`run.t_end`)",
         "state not positive"),
     "left-table": Cause(
-        "the state is outside the table", "a `tabular` material goes beyond its limits", (),
+        "the state is outside the table", "a `tabular` material leaves the limits of its table", (),
         "a larger table: where waves meet, the pressure can be twice that of the impact",
         "state outside its table"),
     "no-grid": Cause(
         "no valid grid was found, a cell folds",
         "the sides of a block moved so that its inside has no convex grid, or turn too sharply: a "
-        "hook's tip, a corner that goes to nothing", (BARRIER,),
-        f"other cells; {END}: corners are kept from opening too far, not from closing", "no grid"),
+        "hook's tip, a vanishing corner", (BARRIER,),
+        f"other cells; {END}: corners are prevented from opening too far, not from closing",
+        "no grid"),
     "flat-cell": Cause(
         "no grid was found: a cell is too flat for its equations to be solved",
         "a corner of a block, or a film between two lines, is so thin that the area of its cell is "
@@ -100,31 +103,31 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
     "lines-cross": Cause(
         "the line of a side crosses itself or another side",
         "a line curls back on itself, or closes on another: a material is cut in two",
-        (THICKER, FEWER_CELLS, SMALLER_CFL), f"lines that meet anew cannot be followed: {END}",
+        (THICKER, FEWER_CELLS, SMALLER_CFL), f"lines that reconnect cannot be followed: {END}",
         "lines cross"),
     "collapse": Cause(
         "the time step has collapsed",
         "cells become flat without end: in a neck, in a film, at the tip of a hook",
         (THICKER, FEWER_CELLS), END, "time step collapsed"),
     "line-torn": Cause(
-        "neighbouring nodes of a line would come too far in one step",
+        "neighbouring nodes of a line would separate too far in one step",
         "the flow parts two nodes of an interface or free surface faster than any step follows", (),
-        f"look where the line was cut (`shockgrid plot DIR --what interface`); {END}", "line torn"),
+        f"see where the line was cut (`shockgrid plot DIR --what interface`); {END}", "line cut"),
     "contact-lost": Cause(
-        "a sliding contact has shrunk to nothing, or takes all of a cell, or bodies that meet go "
-        "far into each other in one step",
+        "a sliding contact has shrunk to nothing, or takes all of a cell, or bodies that meet "
+        "penetrate far in one step",
         "the contact point has come to the end of its line, or the other block presses through "
         "the cells beside it", (),
         "`contact.impactor=joined` where the problem has it; other cells", "contact lost"),
     "blocks-overlap": Cause(
-        "two blocks lie on each other",
+        "two blocks overlap",
         "a body has run into another with sides that cannot meet: contacts close between free "
         "surfaces, and free surfaces and walls, of bodies without links between them", (),
         f"{END}, or make the sides that meet free surfaces; finer cells where one line has bent "
         "through the other", "blocks overlap"),
     "mesh-law": Cause(
-        "mesh law: cells are not convex, or blocks are apart",
-        "nodes are moved by a rule that knows no cells (`mesh=follow`: with the gas), and cross",
+        "mesh motion: cells are not convex, or blocks are apart",
+        "a prescribed motion that ignores cells (`mesh=follow`: with the gas) makes nodes cross",
         (GRID_AT_REST,), "", "no grid"),
     "pistons-part": Cause(
         "key node: two pistons move apart from each other",
@@ -144,18 +147,18 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         "implicit step not settled"),
     "singular": Cause(
         "a matrix is singular",
-        "the grid has cells without area, or the numbers of the deck are beyond all scales", (),
-        "look at the grid (`shockgrid plot DIR --what mesh`)", "singular matrix"),
+        "the grid has cells without area, or numbers of the deck are out of scale", (),
+        "see the grid (`shockgrid plot DIR --what mesh`)", "singular matrix"),
     "no-growth-rate": Cause(
         "no growth rate was found",
         "the iteration for the eigenvalue did not settle near the number that it started from", (),
         "more cells; a Rayleigh number farther from the critical one", "no growth rate"),
     "not-finite": Cause(
         "a number is not finite", "a formula was used beyond the range in which it holds", (),
-        "report it with the deck: an earlier sentence should have told of it", "number not finite"),
+        "report it with the deck: an earlier message should have caught it", "number not finite"),
     "remap": Cause(
         "remap: density or sound speed of a cell of the new grid is not positive",
-        "the state does not go onto these cells (`restart --cells`)", (),
+        "the state cannot be remapped to these cells (`restart --cells`)", (),
         "other cells, or an earlier restart point (`--at`)", "state not on new cells"),
 }  # fmt: skip
 
@@ -163,25 +166,25 @@ SLOW: dict[str, Cause] = {
     "flat-cells": Cause(
         "dt falls slowly, `dt_limit` is `sound`",
         "many cells become flat: behind the edge of a roll, in a film, in a neck; a few do not "
-        "matter, since they share their states", (MORE_SHARING, FEWER_CELLS)),
+        "matter, since their states are redistributed", (MORE_SHARING, FEWER_CELLS)),
     "closing-lines": Cause(
         "dt falls a hundredfold in few steps",
         "a line curls back on itself, or closes on another", (),
-        f"look at the picture: lines that meet anew cannot be followed; {END}"),
+        f"see the picture: lines that reconnect cannot be followed; {END}"),
     "retries": Cause(
         "`retries` in many steps",
         "steps are retried with shorter dt: no grid, or no positive state", (SMALLER_CFL,),
-        "look which block the log names"),
+        "see which block the log names"),
     "rescues": Cause(
         "`regrid_rescues` in many steps", "sides move so that the inside folds",
         (MORE_BARRIER, SMALLER_CFL)),
     "slow-regridder": Cause(
-        "steps are slow, dt is as usual",
-        "`ivanenko-charakhchyan`, `brackbill-saltzman` or `equidistribution` are chosen, or many "
+        "steps are slow, dt is normal",
+        "`ivanenko-charakhchyan`, `brackbill-saltzman` or `equidistribution` is used, or many "
         "Newton steps", (CHEAPEST,)),
     "moving-convection": Cause(
         "convection: a step in time on a moving grid is slow",
-        "matrices are factorised anew in every step", (),
+        "matrices are factorised in every step", (),
         "a grid at rest, if the layers do not move"),
 }  # fmt: skip
 

@@ -219,7 +219,7 @@ def settle(nodes, boundary, regridder, passes: int, words: str) -> Made:
     quality = measure_quality(nodes)
     count.nodes, count.sine = nodes, quality.least_scaled_jacobian
     count.aspect = quality.worst_aspect_ratio
-    note = f"begun from {words}; {count.done} pass{'es' * (count.done > 1)}"
+    note = f"started from {words}; {count.done} pass{'es' * (count.done > 1)}"
     note += f", {shortened} of them shortened" * (shortened > 0)
     note += f", the last one moved a node by {moved:.2g} cells"
     shown = nodes if count.folded is None else count.folded

@@ -110,7 +110,7 @@ def describe_fastest(history: History, blocks: Sequence[str]) -> str:
     alone = round(float(np.sum(over[known])))
     if alone > 1.02 * known.sum():
         most = count(int(np.nanmax(history.get("shared_cells", np.zeros(1)))), "cell")
-        told += f"; {most} at most shared their states, else {alone} steps"
+        told += f"; state redistribution in {most} at most, without it {alone} steps"
     return told
 
 
@@ -322,16 +322,17 @@ RULES = (
          "mean part of the faces that are computed at first order, where second gave no positive "
          "state"),
     Rule("voids", _most("voided_cells"), 0.0, "voids in {value:.0f} cells",
-         "most cells in a step that were torn and have a void"),
+         "most failed cells with a void in a step"),
     Rule("shared cells", _share_of_cells("shared_cells", 1.0), 0.03,
-         "{share} of the cells share their states",
-         "mean part of the cells that were too small for the step and share their states"),
+         "{share} of the cells redistribute their states",
+         "mean fraction of cells too small for the step, with state redistribution"),
     Rule("dt", measure_shrinkage, 100.0, "dt fell {value:.3g} times",
          "how many times dt fell below its largest value"),
-    Rule("drift", _measure_drift, 1e-10, "a conserved total drifts by {value:.1e}",
-         "largest relative drift of a mass, of energy or momentum: round-off is below the limit"),
-    Rule(WAVES, _count_cells_a_wave, 16.0, "{value:.3g} cells a wave of the shortest mode",
-         "cells a wave of the shortest mode of the deck: told below the limit", True),
+    Rule("drift", _measure_drift, 1e-10, "conservation error {value:.1e}",
+         "largest relative conservation error of mass, energy or momentum; round-off is below the "
+         "limit"),
+    Rule(WAVES, _count_cells_a_wave, 16.0, "{value:.3g} cells per wave of the shortest mode",
+         "cells per wave of the deck's shortest mode: reported below the limit", True),
 )  # fmt: skip
 
 

@@ -198,7 +198,7 @@ def _describe_verdict(run: RunData) -> list[str]:
 
 
 def _find_threads(run: RunData) -> list[str]:
-    """What the closing screen said of threads, where there is one."""
+    """What the summary said of threads, where there is one."""
     try:
         screen = run.directory.summary.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError):
@@ -317,7 +317,7 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
     try:
         file = h5py.File(path, "r")
     except OSError as error:
-        raise BadInput(f"{path} is no readable HDF5 file: torn, or of another kind") from error
+        raise BadInput(f"{path} is no readable HDF5 file: truncated, or of another kind") from error
     with file:
         try:
             yield file

@@ -197,7 +197,7 @@ def restart(
     if cells is not None:
         return _go_on_with(opened, cells, words, at, output, force, hooks, quiet)
     if output is not None or force:
-        raise BadInput("output and force are for cells; else a run goes on where it is")
+        raise BadInput("output and force need cells; otherwise a run continues in its directory")
     with said_in_python():
         if simulation is not None:
             case = continue_case(opened, simulation, words, measure)
@@ -216,7 +216,7 @@ def _go_on_with(opened, cells, words, at, output, force, hooks, quiet) -> OpenRu
     from runs.march.launching import remap_runner
 
     if hooks:
-        raise BadInput("hooks: a run that goes on with other cells has none; restart it once more")
+        raise BadInput("hooks: a restart on other cells has none; restart the result with hooks")
     number = ",".join(str(n) for n in ([cells] if isinstance(cells, int) else cells))
     place = None if output is None else str(output)
     with said_in_python():

@@ -269,7 +269,7 @@ class Case:
 
         directory: left out, out/<problem>-<n>.  dumps, max_steps: in place of the deck's.  hooks:
         functions of the case called after each step, or `Hook`s, or one of them.  force:
-        replace the run that is in the directory.  quiet: no progress and no closing screen.
+        replace the run that is in the directory.  quiet: no progress and no summary.
         Raises BadInput for a directory that is not empty and on several ranks of MPI, RunFailure
         where the physics fails, KeyboardInterrupt where it was stopped; then the directory can be
         restarted from.
@@ -287,7 +287,7 @@ class Case:
         if most is not None and 0 < self.step >= most:
             raise BadInput(
                 f"{self.name} has made {self.step} steps already, and max_steps = {most}: nothing "
-                "is left to do; give a larger one, or make it anew"
+                "is left to do; give a larger one, or make a new simulation"
             )
         with patience(quiet):
             check_memory(self.problem)

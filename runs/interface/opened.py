@@ -123,7 +123,7 @@ class OpenRun(RunData):
 
     @property
     def summary(self) -> str:
-        """The closing screen; of a run that did not end, what the problem says of it so far."""
+        """The summary; of a run that did not end, what the problem says of it so far."""
         if self.directory.summary.exists():
             return self.directory.summary.read_text(encoding="utf-8").rstrip("\n")
         return self.problem.summary(self.history, None) if len(self.history.get("t", ())) else ""

@@ -243,7 +243,7 @@ def remap_runner(
         for block in blocks
     )
     slivers = sum(block.slivers.count for block in blocks)
-    note = f"goes on from step {step} of {old} on other cells: {words}"
+    note = f"continues from step {step} of {old} on other cells: {words}"
     if slivers:
         note += f"; cells with slivers between the outlines: {slivers}"
     directory.note(note)
@@ -251,8 +251,8 @@ def remap_runner(
         say(f"{deck.problem} in {directory} {note}")
     if target.finished:
         say(
-            f"this run has finished ({target.finished}): its end is laid on the other cells; "
-            f"--set run.t_end=T with T > {target.t:.6g} goes on"
+            f"this run has finished ({target.finished}): its end is remapped to the other cells; "
+            f"continue with --set run.t_end=T, T > {target.t:.6g}"
         )
     runner = Runner(deck, directory, deck.make_problem(), target, quiet, gauges=gauges)
     runner.columns = columns

@@ -294,10 +294,10 @@ def closing_screen(
     lines += [
         "",
         f"in {directory}: {dumps}, history.csv, run.xmf (ParaView)",
-        f"look at it:  shockgrid plot {directory.quoted}    shockgrid info {directory.quoted}",
+        f"see it:      shockgrid plot {directory.quoted}    shockgrid info {directory.quoted}",
     ]
     if evolution.finished is None:
-        lines.append(f"go on:       {problem.say_restart(directory.quoted)}")
+        lines.append(f"continue:    {problem.say_restart(directory.quoted)}")
     return "\n".join(lines)
 
 

@@ -64,12 +64,12 @@ def find_restart_point(
             say(f"skipped: {error}")
     if not directory.list_points():
         raise BadInput(
-            f"nothing was computed yet in {directory}, so there is nothing to go on from; start it "
-            f"anew: shockgrid run {directory.quoted}/deck.toml -o {directory.quoted} --force"
+            f"nothing was computed yet in {directory}, so there is nothing to continue; start it "
+            f"again: shockgrid run {directory.quoted}/deck.toml -o {directory.quoted} --force"
         )
     for rows in found:
-        rows.check("no restart point is from before that; start the run anew")
-    raise BadInput(f"{directory} has no restart point that can be read; start the run anew")
+        rows.check("no restart point is earlier; start the run again")
+    raise BadInput(f"{directory} has no readable restart point; start the run again")
 
 
 def _drop_foreign(rows: Rows, step: int, path: Path) -> None:
@@ -160,12 +160,12 @@ def _refuse(found: Difference, directory: RunDirectory, deck: ReadDeck, kept: St
     key = found.key
     ours = any(setting.partition("=")[0].strip() == key for setting in deck.settings)
     where = "--set" if ours else str(directory.deck)
-    way = "begin a new run with it (shockgrid run)"
+    way = "start a new run with it (shockgrid run)"
     if key == CELLS:
-        way = f"shockgrid restart {directory.quoted} --cells {found.now} goes on with other cells"
+        way = f"shockgrid restart {directory.quoted} --cells {found.now} continues on other cells"
     return (
-        f"{where}: {key} is {_say(found.now)}, and {_say(found.before)} in {kept.path}: it shapes "
-        f"the state, so a restart keeps it; {way}"
+        f"{where}: {key} is {_say(found.now)}, and {_say(found.before)} in {kept.path}: it affects "
+        f"the state, so a restart cannot change it; {way}"
     )
 
 
@@ -187,8 +187,8 @@ def _keep_set_up(
         if run.t_set_up != made_for:
             raise BadInput(
                 f"{SET_UP} is {run.t_set_up!r}, and the run in {directory} was set up for "
-                f"{made_for!r} s: it shapes the state, so a restart keeps it; leave it out, or "
-                "begin a new run with it (shockgrid run)"
+                f"{made_for!r} s: it affects the state, so a restart cannot change it; leave it "
+                "out, or start a new run with it (shockgrid run)"
             )
         return deck
     moves = [one for one in found if one.key == "run.t_end" or "." not in one.key]

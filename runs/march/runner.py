@@ -290,7 +290,7 @@ class Runner:
             if self.evolution.finished:
                 say(
                     f"this run has finished ({self.evolution.finished}); "
-                    f"--set run.t_end=T with T > {self.evolution.t:.6g} goes on"
+                    f"continue with --set run.t_end=T, T > {self.evolution.t:.6g}"
                 )
             moved = self.directory.set_aside_after(step)
             if moved:

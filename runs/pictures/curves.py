@@ -332,7 +332,7 @@ def choose_abscissa(lineout: Lineout) -> tuple[Callable[[Lineout], np.ndarray], 
     for axis in (0, 1):
         if np.ptp(lineout.points[1 - axis]) == 0.0:
             return partial(_take_points, axis), axes[axis]
-    return attrgetter("way"), "way along the line"
+    return attrgetter("way"), "distance along the line"
 
 
 def _take_points(axis: int, lineout: Lineout) -> np.ndarray:

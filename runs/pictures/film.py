@@ -71,7 +71,7 @@ def make_film(
     run = RunData(directory)
     view = View(parse_zoom(zoom), mirror, mesh)
     if follow and view.zoom:
-        raise BadInput("--follow and --zoom: the window follows the interface or stands; take one")
+        raise BadInput("--follow and --zoom: the window follows the interface or is fixed; use one")
     path = choose_path(run, output, name := field or default_fields(run)[0])
     paths = [dump.path for dump in run.dumps]
     if len(paths) < 2:

@@ -182,9 +182,7 @@ def _watch(
         if number == signal.SIGTERM:
             time.sleep(PATIENCE)
             if not is_heard():
-                words = (
-                    "asked to stop, after this step; where a rank has died, there is no end of it: "
-                )
+                words = "stopping after this step; if a rank has died, this never ends: "
                 os.write(2, f"\nshockgrid: {words}{describe()}\n".encode())
 
 
@@ -197,7 +195,7 @@ NOTED = "ranks: "  # how the line of run.log begins; JSON follows
 
 
 def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str]:
-    """The line of the closing screen, none for a run in one process; all ranks have to be alive.
+    """The line of the summary, none for a run in one process; all ranks have to be alive.
 
     note: takes the line of run.log, the books of all ranks (`hydro.ranks.messages.Book.gather`).
     """
@@ -256,7 +254,7 @@ def write_on_ranks(
     """
     ranks = world.ranks
     if ranks is None:
-        raise ValueError("the ranks have not begun")
+        raise ValueError("the ranks have not started")
     tell(world.comm, WRITE)
     world.comm.bcast((str(path.absolute()), names, output), root=0)
     with _busy(ranks):

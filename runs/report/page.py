@@ -269,7 +269,7 @@ def list_states(run: RunData, last: Dump | None) -> list[tuple[str, bool]]:
 
 
 def find_verdict(run: RunData, screen: str) -> str:
-    """What the problem itself says beside theory: of its closing screen, or said again."""
+    """What the problem itself says beside theory: of its summary, or said again."""
     own = screen.split("\n\n")[1:-1]
     own = [part for part in own if not part.startswith(HEAD)]
     if screen or len(run.history.get("t", ())) < 2:

@@ -186,7 +186,7 @@ def find_fault(path: Path, part: StoredPart) -> str:
     if stored is not None and stored != part.crc:
         return f"its part {part.name} is of another dump (its checksum is {stored}, not {part.crc})"
     if stored is None or not is_sound(there):
-        return f"its part {part.name} is torn or damaged: its checksum is wrong"
+        return f"its part {part.name} is truncated or damaged: its checksum is wrong"
     return ""
 
 

@@ -9,7 +9,7 @@ Files of a run:
                    restart_000120.h5: restart points by wall time;
                    dump_000123.part-0-of-4.h5, ...: parts of a dump of several processes
     run.xmf        all dumps, for ParaView
-    summary.txt    the closing screen
+    summary.txt    the summary
     run.log        what was done here, and when
     verdict.json   how it ended, and what limits trust in it
     early-end.png  the place where a run ended early (exit code 3), early-end.txt: why, what helps
@@ -313,8 +313,8 @@ def open_directory(path: str | Path) -> RunDirectory:
         )
     if not directory.deck.exists() and holds_beginning(directory):
         raise BadInput(
-            f"{path} holds a run that ended before it began: nothing was computed, and its deck is "
-            f"not there yet; start it anew: shockgrid run PROBLEM_OR_DECK -o {directory.quoted} "
+            f"{path} holds a run that ended before its first step: nothing was computed, and it "
+            f"has no deck yet; start it again: shockgrid run PROBLEM_OR_DECK -o {directory.quoted} "
             "--force"
         )
     if not directory.deck.exists():

@@ -333,12 +333,12 @@ def open_dump(path: Path) -> h5py.File:
         raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is no file")
     sound = is_sound(path)
     if sound is False:
-        raise BadInput(f"{path} is torn or damaged: its checksum is wrong (shockgrid inspect)")
+        raise BadInput(f"{path} is truncated or damaged: its checksum is wrong (shockgrid inspect)")
     try:
         file = h5py.File(path, "r")
     except OSError as error:
         raise BadInput(
-            f"{path} is no readable HDF5 file: torn, damaged or of another kind"
+            f"{path} is no readable HDF5 file: truncated, damaged or of another kind"
         ) from error
     try:
         with damage_told(path, "its format"):
@@ -360,8 +360,7 @@ def _check_format(path: Path, file: h5py.File, sound: bool) -> None:
     if not isinstance(version, int | np.integer) or version < 1:
         told = "no format_version" if version is None else f"the format version {version!r}"
         raise BadInput(
-            f"{path} has {told}, so that nobody knows how to read it; dumps have one from 1 to "
-            f"{FORMAT_VERSION}"
+            f"{path} has {told}, which cannot be read; dumps have one from 1 to {FORMAT_VERSION}"
         )
     if version > FORMAT_VERSION:
         raise BadInput(

@@ -96,7 +96,7 @@ def check_not_of_a_run(path: Path) -> None:
         if known is None and path.parent.name != DUMPS:
             continue
         if (home / "deck.toml").exists() and (known is None or path.name in known):
-            raise BadInput(f"{path} is a file that the run in {home} keeps; give another name")
+            raise BadInput(f"{path} is a file of the run in {home}; give another name")
 
 
 def sync_folder(folder: Path) -> None:

@@ -1,6 +1,6 @@
-"""What does not fit together in a run's directory: its deck, closing screen, history and dumps.
+"""What does not fit together in a run's directory: its deck, summary, history and dumps.
 
-The log notes the digest of the deck at each start, and that of the closing screen at each end; a
+The log notes the digest of the deck at each start, and that of the summary at each end; a
 file that has none of the noted digests was edited or damaged.  Of a deck the dumps are the judge:
 the log itself is guarded by nothing.  Directories from before these notes are taken as they are.
 """
@@ -36,7 +36,7 @@ SHOWN = 3
 
 
 def note_summary(directory: RunDirectory, screen: str) -> None:
-    """Note the digest of a closing screen in the log, before it is written."""
+    """Note the digest of a summary in the log, before it is written."""
     directory.note(f"summary.txt: SHA-256 {hash_deck(screen)[:NOTED]}")
 
 
@@ -101,7 +101,7 @@ def _flatten(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, 
 
 
 def check_summary(directory: RunDirectory) -> str:
-    """Raise BadInput where summary.txt is no closing screen that the log knows; else ""."""
+    """Raise BadInput where summary.txt is no summary that the log knows; else ""."""
     noted = _find_digests(directory, SUMMARY)
     if noted and directory.summary.exists():
         text = directory.summary.read_bytes().decode("utf-8", "replace")
@@ -191,19 +191,19 @@ def _read_kept(directory: RunDirectory, strict: bool) -> ProblemFile:
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise BadInput(
             f"{directory}: {directory.problem_copy.name} or {directory.problem_note.name}, which "
-            "keep the file of its problem, is missing or damaged"
+            "store the file of its problem, is missing or damaged"
         ) from error
     if copy != digest:
         raise BadInput(
-            f"{directory.problem_copy} has changed since the run began; what it keeps is the file "
-            "of the problem as it was, which is lost"
+            f"{directory.problem_copy} has changed since the run started; it was the copy of the "
+            "file of the problem, which is lost"
         )
     if place.is_file() and compute_digest(place.read_bytes()) == digest:
         return read_problem_file(place)
     if strict and place.is_file():
         raise BadInput(
-            f"{place} has changed since the run in {directory} began, and a run goes on with the "
-            f"same file only: bring it back from {directory.problem_copy}, or begin a new run"
+            f"{place} has changed since the run in {directory} started, and a run continues only "
+            f"with the same file: restore it from {directory.problem_copy}, or start a new run"
         )
     return read_problem_file(directory.problem_copy, name=place.name, beside=place.parent)
 

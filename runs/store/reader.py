@@ -172,7 +172,7 @@ class RunData:
     """Lazy access to a run directory: `.deck`, `.history`, `.dumps`, `.problem`.
 
     What is damaged raises BadInput when it is asked for.  `lenient`: damaged dumps are left out and
-    a damaged deck or closing screen is taken as it is; the sentences stand in `skipped`.
+    a damaged deck or summary is taken as it is; the sentences stand in `skipped`.
     """
 
     def __init__(self, path: Path | str, lenient: bool = False):

@@ -1,4 +1,4 @@
-"""`shockgrid study`: from its words to the closing screen."""
+"""`shockgrid study`: from its words to the summary."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def study(
             made = _compute(definition, output, engine, jobs, refine, retry, progress, results)
         except KeyboardInterrupt as stop:  # by now all workers have stopped
             left = sum(result is None for result in results)
-            note(f"stopped with {count(left, 'run')} to do; the same command goes on")
+            note(f"stopped with {count(left, 'run')} to do; repeat the command to continue")
             if signal.SIGTERM in caught or signal.SIGTERM.name in str(stop):  # a run may catch it
                 return 128 + signal.SIGTERM
             return INTERRUPTED
@@ -203,7 +203,7 @@ class Progress:
 
 
 def describe_study(study: Study, progress: Progress, seconds: float) -> str:
-    """The closing screen: how many runs, what is shown of each, orders, failures."""
+    """The summary: how many runs, what is shown of each, orders, failures."""
     runs = len(study.results)
     lines = [
         f"{count(runs, 'run')}: {progress.done} computed now, {progress.there} there already, "

@@ -71,7 +71,7 @@ class Result(msgspec.Struct, kw_only=True):
     values: the problem's measurements in the last row of its history; computed, theory: the
     problem's results; errors: the problem's errors, and the computed results' relative to theory.
     failure: a sentence, "" where it ended well; stopped: it is to go on another time; cautions: the
-    sentences of the closing screen on where not to trust it.
+    sentences of the summary on where not to trust it.
     """
 
     digest: str

@@ -333,7 +333,7 @@ def is_study(source: str) -> Path | None:
             return path / FILE
         words = f"there is no {FILE} in it"
         if RunDirectory(path).deck.is_file():
-            words = f"it is a run; shockgrid restart {shlex.quote(source)} goes on with it"
+            words = f"it is a run; continue it with shockgrid restart {shlex.quote(source)}"
         raise BadInput(f"{source} is no study: {words}")
     if path.suffix != ".toml" or not path.is_file():
         return None

@@ -351,7 +351,7 @@ def study(
                 compute_results(definition, folder, opened, results=results)
         except KeyboardInterrupt:
             left = sum(result is None for result in results)
-            words = f"stopped with {count(left, 'run')} to do; study({str(output)!r}) goes on"
+            words = f"stopped with {count(left, 'run')} to do; study({str(output)!r}) continues"
             raise KeyboardInterrupt(words) from None
         made = Study(definition, folder, results, refine)
         made.write()

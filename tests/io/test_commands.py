@@ -109,13 +109,13 @@ def test_damaged_files_are_named(shockgrid, run):
     with h5py.File(bare, "r+") as file:
         del file.attrs["t"]
     code, _, error = shockgrid("plot", "run", "--dpi", "40")
-    assert code == 2 and f"{bare.name} is torn or damaged" in error
+    assert code == 2 and f"{bare.name} is truncated or damaged" in error
     code, text, _ = shockgrid("info", "run")
-    assert code == 2 and all(f"damaged: {path} is torn" in text for path in (torn, bare))
+    assert code == 2 and all(f"damaged: {path} is truncated" in text for path in (torn, bare))
     assert f"last restart point: step {run.dumps[-3].step}" in text
     for words in (("info", str(bare)), ("compare", "run", "run")):
         code, _, error = shockgrid(*words)
-        assert code == 2 and f"{bare.name} is torn or damaged" in error
+        assert code == 2 and f"{bare.name} is truncated or damaged" in error
     lines = run.directory.history.read_text().splitlines()
     lines[2] = ",".join(["x"] * (lines[2].count(",") + 1))
     run.directory.history.write_text("\n".join(lines) + "\n")

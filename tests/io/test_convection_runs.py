@@ -74,7 +74,7 @@ BAD = {
     "cells": (["cells=2"], "cells"),
     "flat": (["cells_up=2"], "cells_up"),
     "prandtl": (["prandtl=0"], "Pr = 0 must be positive"),
-    "no gravity": (["gravity=[0.0,0.0]"], "gravity is zero but Ra = 100000 asks for buoyancy"),
+    "no gravity": (["gravity=[0.0,0.0]"], "gravity is zero but Ra = 100000 needs buoyancy"),
     "two gravities": (["gravity=[0.0,-1.0]", "tilt=10"], "are both given"),
     "adiabatic value": (["top.value=1"], "top.value = 1 contradicts top.heat = 'adiabatic'"),
     "no steady state": (

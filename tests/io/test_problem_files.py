@@ -50,7 +50,7 @@ def test_restart_goes_on_with_the_same_file_only(file, shockgrid):
     file.write_text(FILE.replace("- 0.0", "- 1.0"))
     code, _, error = shockgrid("restart", "part", "--set", "run.max_steps=20", "-q")
     assert code == 2
-    assert len(error.splitlines()) == 1 and "has changed since the run in part began" in error
+    assert len(error.splitlines()) == 1 and "has changed since the run in part started" in error
     assert shockgrid("info", "part")[0] == 0  # by the copy
     assert shockgrid("plot", "part", "--what", "cooling")[0] == 0
     file.unlink()  # the copy is the file as it was
@@ -63,7 +63,7 @@ def test_a_damaged_copy_is_not_run(file, shockgrid):
     assert shockgrid("run", "my_heat.py", "-o", "run", "--set", "run.max_steps=2", "-q")[0] == 0
     (file.parent / "run" / "problem.py").write_text(FILE + "\n")
     code, _, error = shockgrid("restart", "run")
-    assert code == 2 and "problem.py has changed since the run began" in error
+    assert code == 2 and "problem.py has changed since the run started" in error
     (file.parent / "run" / "problem.json").write_text("{}")
     code, _, error = shockgrid("plot", "run", "--what", "cooling")
     assert code == 2 and "missing or damaged" in error

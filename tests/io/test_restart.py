@@ -73,9 +73,9 @@ def test_damaged_last_dump_is_skipped(shockgrid):
     path = points[-1][1]
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     code, text, _ = shockgrid("info", "run")
-    assert code == 2 and f"damaged: {path} is torn" in text
+    assert code == 2 and f"damaged: {path} is truncated" in text
     code, _, error = shockgrid("restart", "run", "-q")
-    assert code == 0 and f"skipped: {path}" in error and "torn" in error
+    assert code == 0 and f"skipped: {path}" in error and "truncated" in error
     assert shockgrid("compare", "whole", "run")[0] == 0
 
 
@@ -87,7 +87,7 @@ def test_flipped_bits_in_the_state_are_seen(shockgrid):
     place = content.rindex(heat)  # the state lies behind the blocks
     path.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
     code, _, error = shockgrid("restart", "run", "--at", "5")
-    assert code == 2 and f"{path} is torn or damaged: its checksum is wrong" in error
+    assert code == 2 and f"{path} is truncated or damaged: its checksum is wrong" in error
 
 
 def test_restart_from_an_earlier_step(shockgrid):

@@ -103,7 +103,7 @@ def test_a_run_goes_on_with_more_cells(shockgrid, half):
         "restart", "half", "--cells=20", "--set=run.max_steps=26", "-o", "finer"
     )
     assert code == 0, error
-    assert "goes on from step 20 of half on other cells: first" in error
+    assert "continues from step 20 of half on other cells: first" in error
     assert sum_files(half) == before, "the old run stays as it is"
     old, new = RunData("half"), RunData("finer")
     assert new.deck.cells == 20 and new.deck.mach == 2.0
@@ -145,8 +145,8 @@ def test_fewer_cells(shockgrid, half):
         (("--cells=16", "-o", "half"), "which stays as it is; name another directory"),
         (("--cells=16", "-o", "half/inside"), "which stays as it is; name another directory"),
         (("--cells=16", "--at=7", "-o", "new"), "half has no restart point of step 7; there are:"),
-        (("-o", "new"), "-o and --force go with --cells"),
-        (("--force",), "-o and --force go with --cells"),
+        (("-o", "new"), "-o and --force need --cells"),
+        (("--force",), "-o and --force need --cells"),
     ],
 )
 def test_bad_words_are_told_and_nothing_is_written(shockgrid, half, words, sentence):

@@ -51,9 +51,11 @@ def test_any_change_is_seen(shockgrid, dump, what):
     assert is_sound(dump) is False
     for words in (("info", str(dump)), ("compare", "run", "run"), ("plot", "run", "--dpi", "40")):
         code, _, error = shockgrid(*words)
-        assert code == 2 and f"{dump} is torn or damaged: its checksum is wrong" in error, words
+        assert code == 2 and f"{dump} is truncated or damaged: its checksum is wrong" in error, (
+            words
+        )
     code, text, _ = shockgrid("info", "run")
-    assert code == 2 and text.count("\ndamaged: ") == 1 and f"damaged: {dump} is torn" in text
+    assert code == 2 and text.count("\ndamaged: ") == 1 and f"damaged: {dump} is truncated" in text
     assert "checksum NOT AS STORED" in shockgrid("inspect", str(dump))[1]
     with pytest.raises(BadInput, match=r"checksum is wrong.*move it elsewhere"):
         _ = RunData("run").dumps
@@ -62,7 +64,7 @@ def test_any_change_is_seen(shockgrid, dump, what):
 @pytest.mark.parametrize(
     ("version", "words"),
     [
-        (None, "has no format_version, so that nobody knows how to read it"),
+        (None, "has no format_version, which cannot be read"),
         (0, "has the format version"),
         ("two", "has the format version"),
         (5, "has format version 5; this shockgrid reads up to 4"),
@@ -169,7 +171,7 @@ def test_a_history_without_a_point_before_its_damage_is_refused(shockgrid, whole
             path.unlink()
     drop(20, 22)
     code, _, error = shockgrid("restart", "run", "-q", "--set", "run.max_steps=34")
-    assert code == 2 and "no restart point is from before that" in error and "line 21" in error
+    assert code == 2 and "no restart point is earlier" in error and "line 21" in error
     code, _, error = shockgrid("restart", "run", "-q", "--at", "30")
     assert code == 2 and "choose an earlier restart point with --at" in error
 

@@ -105,7 +105,7 @@ def is_alive(note: Path) -> bool:
     [
         ("threads", None, "processes, mpi, dask://ADDRESS"),
         ("dask://", None, "processes, mpi, dask://ADDRESS"),
-        ("mpi", 2, "brings its own workers"),
+        ("mpi", 2, "has its own workers"),
     ],
 )
 def test_wrong_engines_are_told(name, jobs, words):

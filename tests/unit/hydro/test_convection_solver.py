@@ -141,7 +141,7 @@ BAD_FLUIDS = {
     "tilt": ({"rayleigh": 1.0, "prandtl": 1.0, "tilt": np.inf}, "is no angle"),
     "no gravity": (
         {"rayleigh": 1e5, "prandtl": 1.0, "gravity": (0.0, 0.0)},
-        r"gravity is zero but Ra = 100000 asks for buoyancy",
+        r"gravity is zero but Ra = 100000 needs buoyancy",
     ),
 }
 

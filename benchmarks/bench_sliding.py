@@ -19,9 +19,9 @@ import numpy as np
 from result_tables import Tables
 
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
-from hydro.links.join import join, slide
+from hydro.links import join, slide
 from hydro.simulation import Simulation
 from problems.plate_on_wedge.problem import PlateOnWedge
 from problems.plate_on_wedge.set_up import PlateOnWedgeDeck

@@ -67,7 +67,7 @@ def _check_name(name: object, what: str, other: str = "/,") -> None:
 
 class PerimeterPlan:
     """What the phases of a step need to know of a block's segments
-    (`hydro.boundary.segment.Segment`), made once.
+    (`hydro.boundary.Segment`), made once.
 
     `ghosts`, `speeds`, `fluxes`: the segments that fill these themselves; `walls` (n, 3), `opened`
     (n, 3): the others, for kernels, with their kinds and the rows of the states beyond; `pistons`:
@@ -197,7 +197,7 @@ class Block:
         self.body_acceleration: np.ndarray | None = None
         self.excess_volume = np.zeros(count)  # areas of polygon cells beyond their straight faces
         self.excess_volume_new = np.zeros(count)
-        self.segments: list[Any] = []  # `hydro.boundary.registry.put` adds them
+        self.segments: list[Any] = []  # `hydro.boundary.put` adds them
         self.set_geometry(PLANE)
 
     def set_geometry(self, geometry: Geometry) -> None:

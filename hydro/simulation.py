@@ -14,19 +14,19 @@ from hydro.contacts.meetings import Meetings
 from hydro.formulas.geometry import find_geometry
 from hydro.history import compute_columns
 from hydro.ledger import Ledger
-from hydro.links.link import Exchange, Link
+from hydro.links import Exchange, Link
 from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import Line, LineRule
 from hydro.motion.overlaps import Overlaps
 from hydro.motion.tension import SurfaceTension
 from hydro.ranks.blocks import Blocks
 from hydro.sliding.contact import SlidingContact
-from hydro.small_cells.small_cells import SmallCells
+from hydro.small_cells import SmallCells
 from hydro.sources import BodySource, SourceLaw
 from hydro.step import Flow, take_step
 from hydro.workers import Workers
 from regrid.errors import BadInput, Place, RunFailure
-from regrid.interpreting import is_interpreting
+from regrid.jit import is_interpreting
 
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
 SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
@@ -35,7 +35,7 @@ START_COLUMNS = ("total_", "surface_", "least", "worst", "cells")
 
 
 class Refining(Protocol):
-    """What adds and takes away grid lines; `hydro.remap.refinement` says how."""
+    """What adds and takes away grid lines; `hydro.remap.flow` says how."""
 
     rebuild: Callable[[list, list], tuple[list[Block], list, Callable[[], object] | None]]
 
@@ -64,7 +64,7 @@ class Simulation:
     "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
     all integrals are then per radian); `measure_block`: gives the numbers of a block,
     `measured_numbers` of them, that history columns want of the whole of it, found by whoever
-    computes it; `refining`: adds grid lines on the way (`hydro.remap.refinement`), None: the cells
+    computes it; `refining`: adds grid lines on the way (`hydro.remap.flow`), None: the cells
     stay as many as they are; `void_fill`: pressure [Pa] and gamma of the gas that a void between
     surfaces holds when it closes, None: nothing.  Raises BadInput for sides that are not covered
     once by segments, and for blocks that lie on each other.

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from hydro.clock import MOST_STRETCHING, Clock, Stopwatch
 from hydro.contacts.meetings import Meetings
 from hydro.ledger import Ledger
-from hydro.links.link import Exchange
+from hydro.links import Exchange
 from hydro.motion import sides as on_sides
 from hydro.motion.grid_motion import GridMotion
 from hydro.motion.sides import Sides, Span
 from hydro.motion.tension import SurfaceTension
 from hydro.perimeter.contacts import AT_CELLS, AT_FLUX, AT_TRACES
 from hydro.ranks.blocks import Blocks
-from hydro.small_cells.small_cells import SmallCells
+from hydro.small_cells import SmallCells
 from hydro.sources import BodySource
 from regrid.errors import RegridFailure, RunFailure
 

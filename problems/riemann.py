@@ -25,11 +25,11 @@ import msgspec
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
-from hydro.links.join import join
+from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import Fluid, make_plane_grid, put_walls
 from problems.problem import Problem, Report, compare, get_last

@@ -2,11 +2,15 @@
 
 numba's own cache looks at the file of the compiled function only: an edited helper in another
 module gives the old answer.  Here code is found by a digest of all that the kernel is made of.
+A deck is checked by a few calls on small arrays, which do not repay a minute of compiling: inside
+`interpreted` kernels run as the Python functions that they are.  Note: a simulation made there
+(`hydro.simulation.Simulation`) lacks what only a march needs, and cannot march.
 """
 
 from __future__ import annotations
 
 import contextlib
+import contextvars
 import functools
 import hashlib
 import io
@@ -29,13 +33,14 @@ from numba.core.environment import Environment, _rebuild_env, lookup_environment
 from numba.core.runtime import rtsys
 from numba.extending import register_jitable
 
-from regrid.interpreting import MOST_NUMBERS, is_interpreting
-
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("regrid", "hydro", "problems")
 TOOLCHAIN = ("numpy", "numba", "llvmlite", "math", "cmath", "operator", "builtins", "typing")
 VERSIONS = numba.__version__, llvmlite.__version__, np.__version__, sys.version
 KEPT_FILES = 6000  # of the cache: when there are more, half of them go
+MOST_NUMBERS = (
+    300_000  # interpreted, in a call's arrays: beyond, Python takes longer than compiling
+)
 KERNEL_CODES: set[int] = set()  # identities of all kernels' codes: a profiler tells calls by them
 
 
@@ -177,6 +182,22 @@ def _name_by_contents(function, options=()) -> None:
     if function.__closure__ or options or function.__module__.split(".")[0] not in PACKAGES:
         words = f"{compute_contents_digest(function)} {options}"
         function.__qualname__ += f"_{hashlib.sha256(words.encode()).hexdigest()[:10]}"
+
+
+_interpreting = contextvars.ContextVar("interpreting", default=False)
+is_interpreting = _interpreting.get  # is this inside a block of `interpreted`?
+
+
+@contextlib.contextmanager
+def interpreted():
+    """In this block kernels that this process has not used run as Python, on small arrays; those of
+    threads that are started in the block are compiled."""
+    before = _interpreting.set(True)
+    try:
+        with np.errstate(all="ignore"):  # kernels do not warn
+            yield
+    finally:
+        _interpreting.reset(before)
 
 
 def _compile_or_interpret(compiled: Dispatcher, *arguments):

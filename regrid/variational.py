@@ -46,6 +46,7 @@ import numpy as np
 from regrid.algebraic import displaced_grid
 from regrid.barrier import assembly as at
 from regrid.barrier.assembly import (
+    LineLaws,
     begin_columns,
     begin_row,
     end_row,
@@ -87,13 +88,11 @@ def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonalit
         keep = active[col]
         d = keep * area[col] + (1.0 - keep)
         wx, wy = ax - by, ay + bx
-        (
-            gax, gay, gbx, gby, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy,
-            ab_xx, ab_xy, ab_yx, ab_yy,
-        ) = corner_blocks(
-            wx * wx + wy * wy, (wx, wy), (wy, -wx), (by, -bx), (-ay, ax), 1.0,
-            ga, gb, 1.0 / d, 1.0, keep * smoothness, 0.0, 0.0,
-        )  # fmt: skip
+        v, g = ((wx, wy), (wy, -wx)), ((by, -bx), (-ay, ax))
+        scale = keep * smoothness, ga, gb
+        terms = corner_blocks(wx * wx + wy * wy, v, g, 1.0, 1.0 / d, 1.0, scale, (0.0, 0.0))
+        gax, gay, gbx, gby, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy = terms[:10]
+        ab_xx, ab_xy, ab_yx, ab_yy = terms[10:]
         kappa, mu = 2.0 * keep * volume[col], 2.0 * keep * orthogonality
         dot = ax * bx + ay * by
         kd, md = kappa * d, mu * dot
@@ -129,11 +128,12 @@ def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
     ni, low = nodes.shape[1] - 1, first - 1
     count = last - first + 1
     bend, way = np.zeros((ni + 1, nodes.shape[2])), np.zeros((2, nodes.shape[2]))
+    laws = LineLaws(along_i, along_j, blend_i, bend, way, 0.0, 0.0)
     begin_columns(nodes, along_j, blend_i, blend_j, 0.0, low, count, Z)
     for i in range(ni):
         now = H[i * at.NODE_ROWS : (i + 1) * at.NODE_ROWS]
         past = H[max(i - 1, 0) * at.NODE_ROWS : (max(i - 1, 0) + 1) * at.NODE_ROWS]
-        begin_row(nodes, i, along_i, along_j, blend_i, bend, way, 0.0, 0.0, low, count, Z)
+        begin_row(nodes, i, laws, low, count, Z)
         for col in range(count):
             ax, ay = Z[at.AX + col], Z[at.AY + col]
             ux, uy = Z[at.AX + col + 1], Z[at.AY + col + 1]

@@ -24,10 +24,10 @@ import numba
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import EquationOfState, IdealGas, MieGruneisen
 from hydro.history import PHASES
-from hydro.links.join import join
+from hydro.links import join
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
 from regrid.jit import KERNEL_CODES

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from hydro.block import Block
-    from hydro.boundary.registry import put
-    from hydro.boundary.segment import Segment
+    from hydro.boundary import Segment, put
     from hydro.eos import (
         JWL,
         EquationOfState,
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
         Tabular,
     )
     from hydro.eos.materials import find_material
-    from hydro.links.join import join, slide
+    from hydro.links import join, slide
     from hydro.simulation import Simulation
     from problems.deck import Deck, DeckTable, Output, Regrid, RunControl
     from problems.problem import Problem
@@ -73,7 +72,7 @@ MODULES = {
     "RegridFailure": "regrid.errors",
     "RunControl": "problems.deck",
     "RunFailure": "regrid.errors",
-    "Segment": "hydro.boundary.segment",
+    "Segment": "hydro.boundary",
     "Simulation": "hydro.simulation",
     "Study": "runs.study.study",
     "StiffenedGas": "hydro.eos.gases",
@@ -84,17 +83,17 @@ MODULES = {
     "grid": "runs.interface",
     "inlined": "regrid.jit",
     "inspect": "runs.interface.calls",
-    "join": "hydro.links.join",
+    "join": "hydro.links",
     "load": "runs.interface.case",
     "make_regridder": "regrid.registry",
     "open": "runs.interface.opened",
     "plot": "runs.interface.calls",
-    "put": "hydro.boundary.registry",
+    "put": "hydro.boundary",
     "register": "runs.interface.settings",
     "report": "runs.interface.calls",
     "restart": "runs.interface.calls",
     "run": "runs.interface.calls",
-    "slide": "hydro.links.join",
+    "slide": "hydro.links",
     "study": "runs.study.study",
     "testing": "shockgrid",
     "transfinite_grid": "regrid.algebraic",

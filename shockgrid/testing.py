@@ -18,8 +18,7 @@ import numpy as np
 
 from hydro import rim
 from hydro.block import Block
-from hydro.boundary.registry import SEGMENTS, put
-from hydro.boundary.segment import NodeMotion, Segment
+from hydro.boundary import SEGMENTS, NodeMotion, Segment, put
 from hydro.eos.base import EquationOfState, measure_inverse, measure_slopes, say_inverse, say_slope
 from hydro.eos.gases import IdealGas
 from hydro.rim import SIDES as SIDE_NAMES

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.registry import put
-from hydro.links.join import join
+from hydro.boundary import put
+from hydro.links import join
 
 ROOT = next(p for p in Path(__file__).resolve().parents if (p / "pyproject.toml").is_file())
 SIDES = ("i_min", "i_max", "j_min", "j_max")

@@ -17,14 +17,14 @@ import numpy as np
 
 from hydro import rim as on
 from hydro.block import Block
-from hydro.boundary.kinds import Piston
+from hydro.boundary import Piston
 from hydro.contacts.facet_states import make_add_facet_flux
 from hydro.contacts.pair import Pair, PlanePair
 from hydro.contacts.rows import AREAS, COVERED, FOLLOWER, LEADER
 from hydro.contacts.surface import Plane, Surface, find_planes, is_surface
 from hydro.contacts.voids import Voids
 from hydro.formulas.geometry import Geometry
-from hydro.links.link import Link
+from hydro.links import Link
 from hydro.motion.grid_motion import GridMotion
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import Place, RunFailure

@@ -8,8 +8,7 @@ import numpy as np
 
 from hydro import rim as on
 from hydro.block import Block
-from hydro.boundary.kinds import Axis, FreeSurface, Piston, Wall
-from hydro.boundary.segment import Segment
+from hydro.boundary import Axis, FreeSurface, Piston, Segment, Wall
 from hydro.contacts.facet_states import cover_surface
 from hydro.contacts.laying import fit_plane
 from hydro.contacts.rows import COVER_ROWS

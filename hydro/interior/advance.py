@@ -21,11 +21,17 @@ from hydro.formulas.reconstruction import DEFAULT_LIMITER, LOW_MACH
 from hydro.formulas.riemann import DEFAULT_FLUX
 from hydro.interior import scratch as at
 from hydro.interior.axisymmetric import clear_shift_after, make_push, make_source_pressure
-from hydro.interior.fluxes import find_hll, make_flux, make_hll_flux, make_upwind
+from hydro.interior.faces import (
+    find_hll,
+    make_faces,
+    make_flux,
+    make_hll_flux,
+    make_traces,
+    make_upwind,
+)
 from hydro.interior.reconstruction import make_row_phases
 from hydro.interior.scratch import copy_back, copy_row, copy_rows, prefetch_row, prefetch_rows
 from hydro.interior.slopes import fill_steps
-from hydro.interior.traces import make_faces, make_traces
 from hydro.interior.update import make_update
 from hydro.rows import (
     FIRST_ORDER,

@@ -86,7 +86,7 @@ def make_push(split, pressure, flux, node_a, node_b, area, push):
     """Phase that takes the pressure out of the radial momentum of a row of faces: `Geometry.split`.
 
     Scratch offsets: `pressure` in the fluxes; `flux`: of radial momentum; `node_a`, `node_b`: x of
-    the nodes at a face's ends, as in `hydro.interior.traces.make_faces`; `area`: the normals' y;
+    the nodes at a face's ends, as in `hydro.interior.faces.make_faces`; `area`: the normals' y;
     `push`: what is filled, and the row after it.
     """
 

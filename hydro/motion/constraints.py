@@ -34,7 +34,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.segment import Segment
+from hydro.boundary import Segment
 from hydro.motion.key_nodes import KeyNode
 from hydro.motion.line import Line
 from hydro.sliding.contact import SlidingContact

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hydro.block import Block
-from hydro.links.link import Exchange
+from hydro.links import Exchange
 from hydro.motion.line import LineRule
 from hydro.motion.sides import Sides, Span
 from hydro.ranks.blocks import Blocks

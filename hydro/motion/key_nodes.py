@@ -21,8 +21,8 @@ import numpy as np
 
 from hydro import rim as on
 from hydro.block import Block
-from hydro.boundary.segment import NodeMotion, Segment
-from hydro.links.link import Link
+from hydro.boundary import NodeMotion, Segment
+from hydro.links import Link
 from hydro.motion.line import Track
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import Place, RunFailure

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hydro import rim as on
-from hydro.boundary.segment import NodeMotion, Segment
+from hydro.boundary import NodeMotion, Segment
 from hydro.rim import SIDES
 from regrid.curves import (
     FREE_END,

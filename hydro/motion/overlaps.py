@@ -24,9 +24,8 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.kinds import Axis, Piston, Wall
-from hydro.boundary.segment import NodeMotion, Segment
-from hydro.links.link import Link
+from hydro.boundary import Axis, NodeMotion, Piston, Segment, Wall
+from hydro.links import Link
 from hydro.rim import SIDES
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import BadInput, Place, RunFailure

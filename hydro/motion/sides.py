@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.segment import NodeMotion, Segment
-from hydro.links.link import Exchange
+from hydro.boundary import NodeMotion, Segment
+from hydro.links import Exchange
 from hydro.motion.constraints import CarriedSeam, CornerGuard, Joint, SlaveMotion
 from hydro.motion.key_nodes import KeyNode, find_key_nodes
 from hydro.motion.line import (

@@ -21,8 +21,8 @@ import numpy as np
 
 from hydro import rim as on
 from hydro.block import Block
-from hydro.boundary.segment import Segment
-from hydro.links.link import Exchange
+from hydro.boundary import Segment
+from hydro.links import Exchange
 from hydro.motion.grid_motion import GridMotion
 from hydro.motion.line import Line
 from hydro.rows import RHO

@@ -15,8 +15,7 @@ import itertools
 import numpy as np
 
 from hydro import rim as on
-from hydro.boundary.kinds import Sliding
-from hydro.boundary.segment import NodeMotion
+from hydro.boundary import NodeMotion, Sliding
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.perimeter.contacts import AT_CELLS, AT_FLUX
 from hydro.rows import FLUX_ROWS
@@ -181,7 +180,7 @@ def _find_orders(segments: list[Sliding]) -> list[bool]:
 
 
 class SlidingContact:
-    """A master chain and the slave chain on it; made by `hydro.links.join.slide`."""
+    """A master chain and the slave chain on it; made by `hydro.links.slide`."""
 
     kind = "sliding"
 

@@ -20,10 +20,9 @@ from typing import Any
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.kinds import Linked
-from hydro.boundary.registry import SEGMENTS, put
+from hydro.boundary import SEGMENTS, Linked, put
 from hydro.eos.materials import Material, find_material, make_material
-from hydro.links.join import join, slide
+from hydro.links import join, slide
 from hydro.simulation import Simulation
 from problems.blocks.deck import LINKED, BlocksDeck, BlockSide, BlockTable, CurveTable
 from problems.deck import check_digests

@@ -26,8 +26,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hydro.boundary.registry import put
-from hydro.links.join import join, slide
+from hydro.boundary import put
+from hydro.links import join, slide
 from problems.problem import BlockPlan
 from problems.references.hugoniot import shock_with_particle_speed
 from problems.references.riemann import solve_riemann

@@ -20,9 +20,8 @@ from typing import ClassVar
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.registry import put
-from hydro.links.join import join
-from hydro.links.link import Link
+from hydro.boundary import put
+from hydro.links import Link, join
 from hydro.motion.line import THICK_CELLS, LineRule
 from hydro.rows import V
 from hydro.simulation import Simulation
@@ -436,7 +435,7 @@ class InterfaceInstability(Problem):
         del grids, states  # the blocks have them
         refining = None
         if deck.refine:
-            from hydro.remap.refinement import Refinement  # with scipy: slow to load
+            from hydro.remap.flow import Refinement  # with scipy: slow to load
 
             refining = Refinement(blocks, self.assemble)
         return self.simulate(

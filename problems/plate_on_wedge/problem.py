@@ -21,9 +21,9 @@ import functools
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos.materials import find_material
-from hydro.links.join import join, slide
+from hydro.links import join, slide
 from problems.plate_on_wedge.run import PlateRun
 from problems.plate_on_wedge.set_up import PlateSetUp
 from problems.problem import Report

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Meta
 
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos.materials import find_material
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, key
 from problems.problem import BlockPlan, Problem, check_memory

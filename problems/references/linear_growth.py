@@ -70,11 +70,12 @@ class Zone:
 
 
 @compiled_once
-def fill_rates(t, state, slopes, coefficients, sizes, edges, impedances, inner, slope, rates):
-    """t d/dt of p, u, v (3, points) at fixed x/t; `inner` zones lie on the first side.
+def fill_rates(t, state, zones, slope, rates):
+    """t d/dt of p, u, v (3, points) at fixed x/t; `zones` as `fill_velocities` has them.
 
     slope (3, n): scratch.
     """
+    slopes, coefficients, sizes, edges, impedances, inner = zones
     first = 0
     for zone in range(sizes.size):
         size = sizes[zone]
@@ -132,29 +133,15 @@ def fill_rates(t, state, slopes, coefficients, sizes, edges, impedances, inner, 
 
 
 @kernel
-def fill_velocities(
-    times,
-    step,
-    middle,
-    state,
-    slopes,
-    coefficients,
-    sizes,
-    edges,
-    impedances,
-    inner,
-    work,
-    velocities,
-    ends,
-):
+def fill_velocities(times, step, middle, state, zones, work, velocities, ends):
     """March `state` (3, points) by the classical Runge-Kutta rule in log t, `step` a step.
 
-    middle: exp(step / 2), from a time to the middle of the step;
-    slopes (zones, n, n): transposed matrices; work
-    (4, 3, points): scratch; velocities (n,): of the interface, at `times`; ends (2, 2, n): p
+    middle: exp(step / 2), from a time to the middle of the step; zones: their transposed matrices
+    (zones, n, n), coefficients, sizes, edges and impedances, and how many lie on the first side;
+    work (4, 3, points): scratch; velocities (n,): of the interface, at `times`; ends (2, 2, n): p
     and v at the outer ends of both sides.
     """
-    zones = slopes, coefficients, sizes, edges, impedances, inner
+    sizes, inner = zones[2], zones[5]
     cut = 0
     for zone in range(inner):
         cut += sizes[zone]
@@ -164,9 +151,9 @@ def fill_velocities(
         for stage in range(4):
             time = times[n] if stage == 0 else times[n] * middle if stage < 3 else times[n + 1]
             if stage == 0:
-                fill_rates(time, state, *zones, slope, rates)
+                fill_rates(time, state, zones, slope, rates)
             else:
-                fill_rates(time, trial, *zones, slope, rates)
+                fill_rates(time, trial, zones, slope, rates)
             way = step if stage == 2 else 0.5 * step
             weight = 2.0 if stage == 1 or stage == 2 else 1.0
             for q in range(3):
@@ -210,8 +197,9 @@ def march_layers(first: list[Zone], second: list[Zone], times, step: float) -> M
     velocities, ends = np.zeros(len(times)), np.zeros((2, 2, len(times)))
     ends[0, 1, 0], ends[1, 1, 0] = first[-1].start[V, -1], second[-1].start[V, -1]
     fill_velocities(
-        times, step, math.exp(0.5 * step), state, slopes, coefficients, sizes, edges, impedances,
-        len(first), np.empty((4, *state.shape)), velocities, ends,
+        times, step, math.exp(0.5 * step), state,
+        (slopes, coefficients, sizes, edges, impedances, len(first)),
+        np.empty((4, *state.shape)), velocities, ends,
     )  # fmt: skip
     return March(velocities, ends, np.split(state, np.cumsum(sizes)[:-1], axis=1))
 

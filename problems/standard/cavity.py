@@ -22,7 +22,7 @@ import msgspec
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, VoidFill, key

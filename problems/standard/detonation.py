@@ -24,7 +24,7 @@ import msgspec
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import JWL
 from hydro.eos.materials import find_material
 from hydro.sources import ProgrammedBurn

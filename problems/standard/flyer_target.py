@@ -23,7 +23,7 @@ import msgspec
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.rows import P, U
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, VoidFill, key

@@ -20,10 +20,10 @@ import msgspec
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import EquationOfState, IdealGas
 from hydro.eos.materials import find_material
-from hydro.links.join import join
+from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, RunControl, key
 from problems.problem import Problem, Report, Row
 from regrid.errors import BadInput

@@ -18,7 +18,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.links.join import join
+from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import average_points, swing_square
 from problems.problem import Problem, Report, Row, compare, draw_field

@@ -22,7 +22,7 @@ import msgspec
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key

@@ -23,7 +23,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.eos import IdealGas
-from hydro.links.join import join
+from hydro.links import join
 from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import make_plane_grid, put_walls

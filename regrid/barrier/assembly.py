@@ -12,6 +12,9 @@ triangles at the block's own corners depend on boundary nodes alone: they only m
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
 from numba import prange
 
 from regrid.barrier.functional import (
@@ -59,7 +62,20 @@ TERMS = 81 * SPAN  # what the four corners give: gradient in a and b, blocks aa,
 CORNER_2, CORNER_3, CORNER_4 = (TERMS + k * 14 * SPAN for k in (1, 2, 3))
 ROWS = TERMS + 4 * 14 * SPAN
 
+
 LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of its diagonal
+
+
+class LineLaws(NamedTuple):
+    """What of a `BarrierLaw` edges and straight lines need."""
+
+    along_i: np.ndarray
+    along_j: np.ndarray
+    blend_i: np.ndarray
+    bend: np.ndarray
+    way: np.ndarray
+    ki: float
+    kj: float
 
 
 @kernel(allocates=False)
@@ -90,8 +106,9 @@ def fill_side_edges(nodes, i, along_j, blend_i, weight, low, cells, Z):
 
 
 @kernel(allocates=False)
-def fill_line_edges(nodes, i, along_i, weight, bend, way, low, count, Z):
+def fill_line_edges(nodes, i, laws, low, count, Z):
     """Scaled edges along i between node rows i and i+1, and the straight-line flux along them."""
+    along_i, bend, way, weight = laws.along_i, laws.bend, laws.way, laws.ki
     x0, y0 = nodes[0, i, low : low + count], nodes[1, i, low : low + count]
     x1, y1 = nodes[0, i + 1, low : low + count], nodes[1, i + 1, low : low + count]
     length, length_change = along_i[LENGTH, i], along_i[LENGTH_CHANGE, i]
@@ -149,7 +166,7 @@ def begin_columns(nodes, along_j, blend_i, blend_j, weight, low, cells, Z):
 
 
 @kernel(allocates=False)
-def begin_row(nodes, i, along_i, along_j, blend_i, bend, way, ki, kj, low, cells, Z):
+def begin_row(nodes, i, laws, low, cells, Z):
     """Edges of cell row i: the far edges of the row before become the near ones (BX, LEFT_X on)."""
     for col in range(cells):
         Z[BX + col] = Z[CX + col]
@@ -159,8 +176,8 @@ def begin_row(nodes, i, along_i, along_j, blend_i, bend, way, ki, kj, low, cells
         Z[LEFT_X + col] = Z[RIGHT_X + col]
         Z[LEFT_Y + col] = Z[RIGHT_Y + col]
         Z[LEFT_Q + col] = Z[RIGHT_Q + col]
-    fill_side_edges(nodes, i + 1, along_j, blend_i, kj, low, cells, Z)
-    fill_line_edges(nodes, i, along_i, ki, bend, way, low, cells + 1, Z)
+    fill_side_edges(nodes, i + 1, laws.along_j, laws.blend_i, laws.kj, low, cells, Z)
+    fill_line_edges(nodes, i, laws, low, cells + 1, Z)
 
 
 @kernel(allocates=False)
@@ -311,11 +328,13 @@ def fill_own_blocks(cells, now, past, Z):
 
 
 @kernel
-def add_cost(x0, y0, x1, y1, sound, scale, weight, cells, now, Z):
+def add_cost(near, far, sound, scale, weight, cells, now, Z):
     """Add gradient and Hessian of P (R4.10, R4.12) to those of a row of cells (`fill_cell_blocks`).
 
-    Nodes of the two rows beside it, `sound` of its cells, `scale` = 2/R², `weight` = mu sigma.
+    x and y of the rows of nodes `near` and `far`, `sound` of its cells, `scale` = 2/R², `weight` =
+    mu sigma.
     """
+    (x0, y0), (x1, y1) = near, far
     for col in range(cells):
         ax = 0.5 * ((x1[col] - x0[col]) + (x1[col + 1] - x0[col + 1]))
         ay = 0.5 * ((y1[col] - y0[col]) + (y1[col + 1] - y0[col + 1]))
@@ -362,7 +381,7 @@ def make_corner(corner_terms):
     """The kernel for one corner of a row of cells."""
 
     @kernel(allocates=False)
-    def fill_corner(A, B, inverse, slope, weight, lam_c, flat, out):
+    def fill_corner(A, B, inverse, slope, weight, area, out):
         """Terms of one corner of a row of cells from its edges A along i and B along j.
 
         A kernel of its own, since its arguments are then different arrays to the compiler: rows
@@ -374,9 +393,9 @@ def make_corner(corner_terms):
                 gax, gay, gbx, gby, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy,
                 ab_xx, ab_xy, ab_yx, ab_yy,
             ) = corner_terms(
-                A[col], A[SPAN + col], A[2 * SPAN + col], A[3 * SPAN + col],
-                B[col], B[SPAN + col], B[2 * SPAN + col], B[3 * SPAN + col],
-                inverse[col], slope[col], weight[col], lam_c, flat,
+                (A[col], A[SPAN + col], A[2 * SPAN + col], A[3 * SPAN + col]),
+                (B[col], B[SPAN + col], B[2 * SPAN + col], B[3 * SPAN + col]),
+                inverse[col], slope[col], weight[col], area,
             )  # fmt: skip
             out[GRAD_AX + col] = gax
             out[GRAD_AY + col] = gay
@@ -414,14 +433,14 @@ def make_assembly(smooth):
         ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
         low = first - 1
         cells = last - first + 1
-        along_i, along_j, blend_i, ki, kj = law.along_i, law.along_j, law.blend_i, law.ki, law.kj
-        lam_c, flat = law.area_weight * law.area_target, law.area_weight / law.area_target
+        laws = LineLaws(law.along_i, law.along_j, law.blend_i, law.bend, law.way, law.ki, law.kj)
+        area = law.area_weight * law.area_target, law.area_weight / law.area_target
         full, most = 0.25 * law.sigma * law.epsilon, law.strengthening
-        begin_columns(nodes, along_j, blend_i, law.blend_j, kj, low, cells, Z)
+        begin_columns(nodes, law.along_j, law.blend_i, law.blend_j, law.kj, low, cells, Z)
         for i in range(ni):
             now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
             past = H[max(i - 1, 0) * NODE_ROWS : (max(i - 1, 0) + 1) * NODE_ROWS]
-            begin_row(nodes, i, along_i, along_j, blend_i, law.bend, law.way, ki, kj, low, cells, Z)
+            begin_row(nodes, i, laws, low, cells, Z)
             if law.curved:
                 bend_sides(law.curve, i + 1, low, cells, Z)
                 bend_lines(law.curve, i, low, cells + 1, Z)
@@ -466,7 +485,7 @@ def make_assembly(smooth):
                 if not smooth:
                     Z[SLOPE_1 + col] = law.stiffness if (m1 > 1.0) & (m1 < most) else 1.0
                 Z[WEIGHT + col] = full if smooth else full * m1
-            fill_fading(along_i[GROWTH, i], cells, Z)
+            fill_fading(law.along_i[GROWTH, i], cells, Z)
             for col in range(cells):
                 Z[WEIGHT + col] *= Z[FADING + col]
             for corner in range(4):
@@ -481,16 +500,17 @@ def make_assembly(smooth):
                 slope = Z[stiff_row : stiff_row + cells]
                 weight, out = Z[WEIGHT : WEIGHT + cells], Z[term : term + 14 * SPAN]
                 if smooth:
-                    fill_smoothed_corner(A, B, inverse, slope, weight, lam_c, flat, out)
+                    fill_smoothed_corner(A, B, inverse, slope, weight, area, out)
                 else:
-                    fill_barrier_corner(A, B, inverse, slope, weight, lam_c, flat, out)
+                    fill_barrier_corner(A, B, inverse, slope, weight, area, out)
             fill_cell_blocks(cells, now, Z)
             if not smooth and law.cost_weight > 0.0:
                 add_cost(
-                    nodes[0, i, low : low + cells + 1],
-                    nodes[1, i, low : low + cells + 1],
-                    nodes[0, i + 1, low : low + cells + 1],
-                    nodes[1, i + 1, low : low + cells + 1],
+                    (nodes[0, i, low : low + cells + 1], nodes[1, i, low : low + cells + 1]),
+                    (
+                        nodes[0, i + 1, low : low + cells + 1],
+                        nodes[1, i + 1, low : low + cells + 1],
+                    ),
                     law.sound[i, low : low + cells],
                     law.cost_scale,
                     law.cost_weight * law.sigma,

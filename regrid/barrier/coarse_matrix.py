@@ -128,7 +128,9 @@ def add_corners(near, far, a_g, b_g, law, count, Z):
         ax, ay, bx, by = ga * Z[near, k], ga * Z[near + 1, k], gb * Z[far, k], gb * Z[far + 1, k]
         inverse = 1.0 / (ax * by - ay * bx)
         _, _, _, _, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy = (
-            barrier_corner(ax, ay, 0.0, ga, bx, by, 0.0, gb, inverse, 1.0, Z[WEIGHT, k], lam_c, 0.0)
+            barrier_corner(
+                (ax, ay, 0.0, ga), (bx, by, 0.0, gb), inverse, 1.0, Z[WEIGHT, k], (lam_c, 0.0)
+            )
         )
         add_blocks(k, (aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy), Z)
 

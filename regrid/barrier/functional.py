@@ -65,16 +65,14 @@ def corner_slope(size, inverse, lam_c, flat):
 
 
 @inlined
-def corner_hessian(size, va, vb, g_a, g_b, off, inverse, stiff, lam_c):
+def corner_hessian(size, v, g, off, inverse, stiff, lam_c):
     """Blocks aa, bb (xx, xy, yy) and ab (xx, xy, yx, yy) of the Hessian times D/2 (R4.7, R4.18).
 
     Half the trace of aa is `share` b² D/2 of `corner_slope`, that of bb `share` a² D/2.  `off` is
     1 where `size` is w².
     """
-    vax, vay = va
-    vbx, vby = vb
-    gax, gay = g_a
-    gbx, gby = g_b
+    (vax, vay), (vbx, vby) = v
+    (gax, gay), (gbx, gby) = g
     mu = (0.5 * stiff) * (inverse * (size + lam_c))
     hax, hay = inverse * (vax - mu * gax), inverse * (vay - mu * gay)
     hbx, hby = inverse * (vbx - mu * gbx), inverse * (vby - mu * gby)
@@ -87,14 +85,16 @@ def corner_hessian(size, va, vb, g_a, g_b, off, inverse, stiff, lam_c):
 
 
 @inlined
-def corner_blocks(size, va, vb, g_a, g_b, off, ga, gb, inverse, stiff, weight, lam_c, flat):
+def corner_blocks(size, v, g, off, inverse, stiff, scale, area):
     """Slope in a and b, and the blocks aa, bb, ab of the Hessian, of one corner's weighted term.
 
-    With respect to edges as they are: `ga` and `gb` are their inverse conditional lengths.
+    With respect to edges as they are: `scale` has the weight and the inverse conditional lengths of
+    both edges, `area` lam c and lam/c.
     """
+    (va, vb), (g_a, g_b), (weight, ga, gb), (lam_c, flat) = v, g, scale, area
     m, _ = corner_slope(size, inverse, lam_c, flat)
     aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy = corner_hessian(
-        size, va, vb, g_a, g_b, off, inverse, stiff, lam_c
+        size, v, g, off, inverse, stiff, lam_c
     )
     twice = 2.0 * inverse
     wa, wb = weight * ga, weight * gb
@@ -108,22 +108,23 @@ def corner_blocks(size, va, vb, g_a, g_b, off, ga, gb, inverse, stiff, weight, l
 
 
 @inlined
-def barrier_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, stiff, weight, lam_c, flat):
-    """`corner_blocks` of the functional itself; `inverse` is 1/D, `stiff` S of (R4.18)."""
+def barrier_corner(a, b, inverse, stiff, weight, area):
+    """`corner_blocks` of the functional itself; `inverse` is 1/D, `stiff` S of (R4.18).
+
+    Of the edges a and b: x, y, length squared, inverse conditional length.
+    """
+    (ax, ay, _, ga), (bx, by, _, gb) = a, b
     wx, wy = ax - by, ay + bx
-    return corner_blocks(
-        wx * wx + wy * wy, (wx, wy), (wy, -wx), (by, -bx), (-ay, ax), 1.0,
-        ga, gb, inverse, stiff, weight, lam_c, flat,
-    )  # fmt: skip
+    v, g = ((wx, wy), (wy, -wx)), ((by, -bx), (-ay, ax))
+    return corner_blocks(wx * wx + wy * wy, v, g, 1.0, inverse, stiff, (weight, ga, gb), area)
 
 
 @inlined
-def smoothed_corner(ax, ay, a2, ga, bx, by, b2, gb, inverse, slope, weight, lam_c, flat):
+def smoothed_corner(a, b, inverse, slope, weight, area):
     """`corner_blocks` with D replaced by chi(D); `inverse` is 1/chi, `slope` is chi'(D)."""
-    return corner_blocks(
-        a2 + b2, (ax, ay), (bx, by), (slope * by, -slope * bx), (-slope * ay, slope * ax), 0.0,
-        ga, gb, inverse, 1.0, weight, lam_c, flat,
-    )  # fmt: skip
+    (ax, ay, a2, ga), (bx, by, b2, gb) = a, b
+    v, g = ((ax, ay), (bx, by)), ((slope * by, -slope * bx), (-slope * ay, slope * ax))
+    return corner_blocks(a2 + b2, v, g, 0.0, inverse, 1.0, (weight, ga, gb), area)
 
 
 @inlined
@@ -162,8 +163,12 @@ def cost_slope(ax, ay, bx, by, rho, sound, scale, weight):
 
 
 @inlined
-def cost_number(stiffness, cross, both, curve, p, g_p, q, g_q, d_p, d_q):
-    """One number of (R4.12), without the unit matrix, and of the square of the slope."""
+def cost_number(shares, one, other):
+    """One number of (R4.12), without the unit matrix, and of the square of the slope.
+
+    Of two components of A and B: each with the slopes of V and of rho in it.
+    """
+    (stiffness, cross, both, curve), (p, g_p, d_p), (q, g_q, d_q) = shares, one, other
     return stiffness * (both * (g_p * g_q) - cross * (p * g_q + g_p * q)) + curve * (d_p * d_q)
 
 
@@ -175,16 +180,14 @@ def cost_blocks(ax, ay, bx, by, slope):
     4 for the exact 3 before the last term of (R4.12).
     """
     first, curve, dax, day, dbx, dby, twice, share, inverse = slope
-    h, cross, both = first * twice, 2.0 * inverse, (4.0 * share) * inverse
+    h = first * twice
+    shares = h, 2.0 * inverse, (4.0 * share) * inverse, curve
+    a_x, a_y, b_x, b_y = (ax, by, dax), (ay, -bx, day), (bx, -ay, dbx), (by, ax, dby)
     return (
-        h + cost_number(h, cross, both, curve, ax, by, ax, by, dax, dax),
-        cost_number(h, cross, both, curve, ax, by, ay, -bx, dax, day),
-        h + cost_number(h, cross, both, curve, ay, -bx, ay, -bx, day, day),
-        h + cost_number(h, cross, both, curve, bx, -ay, bx, -ay, dbx, dbx),
-        cost_number(h, cross, both, curve, bx, -ay, by, ax, dbx, dby),
-        h + cost_number(h, cross, both, curve, by, ax, by, ax, dby, dby),
-        cost_number(h, cross, both, curve, ax, by, bx, -ay, dax, dbx),
-        cost_number(h, cross, both, curve, ax, by, by, ax, dax, dby),
-        cost_number(h, cross, both, curve, ay, -bx, bx, -ay, day, dbx),
-        cost_number(h, cross, both, curve, ay, -bx, by, ax, day, dby),
+        h + cost_number(shares, a_x, a_x), cost_number(shares, a_x, a_y),
+        h + cost_number(shares, a_y, a_y),
+        h + cost_number(shares, b_x, b_x), cost_number(shares, b_x, b_y),
+        h + cost_number(shares, b_y, b_y),
+        cost_number(shares, a_x, b_x), cost_number(shares, a_x, b_y),
+        cost_number(shares, a_y, b_x), cost_number(shares, a_y, b_y),
     )  # fmt: skip

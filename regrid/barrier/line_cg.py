@@ -71,12 +71,14 @@ def fill_product_row(now, past, count, Z):
 
 
 @kernel(allocates=False)
-def fill_product(direction, beta, z, old, first, last, H, out, totals, Z):
+def fill_product(directions, beta, first, last, H, out, totals, Z):
     """`direction = z + beta old`, `out = H direction` at columns first..last-1, and their product.
 
+    `directions` are all three: direction, z, old.
     All arrays (2, ni+1, nj+1) with zeros on the boundary, `totals` (nj+1).  Where `beta` is
     negative the direction is taken as it stands, boundary values included.
     """
+    direction, z, old = directions
     ni = z.shape[1] - 1
     count, low, high = last - first, first - 1, last + 1
     total = totals[first:last]
@@ -121,11 +123,13 @@ def fill_product(direction, beta, z, old, first, last, H, out, totals, Z):
 
 
 @kernel(allocates=False)
-def fill_line_solution(alpha, direction, product, x, r, z, first, last, H, totals):
+def fill_line_solution(alpha, step, vectors, first, last, H, totals):
     """Step `x += alpha p, r -= alpha Hp`, then `z` = line solve of r, and the sums of r·z.
 
-    Nothing is added where alpha is 0, so that the first call may find rubbish in `direction`.
+    `step` is p and Hp, `vectors` are x, r, z.  Nothing is added where alpha is 0, so that the first
+    call may find rubbish in `step`.
     """
+    (direction, product), (x, r, z) = step, vectors
     ni = x.shape[1] - 1
     count = last - first
     total = totals[first:last]
@@ -191,41 +195,35 @@ def make_solver(parallel):
     """The conjugate-gradient loop, over column chunks one after the other or on threads."""
 
     @kernel(parallel=parallel)
-    def solve(columns, H, x, r, z, p, p_old, product, totals, tolerance, floor, most, scratch):
+    def solve(columns, H, vectors, directions, totals, limits, scratch):
         """Solve `H x = r0` from the x whose residual is `r`; returns (iterations, rz0, rz).
 
-        `columns` (chunks + 1) are the first node columns of the chunks.  Stops when the residual's
-        square, in the norm of the preconditioner, is below `tolerance`² of its first value or
-        below `floor`, or after `most` iterations.
+        `columns` (chunks + 1) are the first node columns of the chunks, `vectors` x, r, z,
+        `directions` room for p, the one before it and Hp.  `limits`: it stops when the residual's
+        square, in the norm of the preconditioner, is below tolerance² of its first value or
+        below floor, or after so many iterations.
         """
+        (p, p_old, product), (tolerance, floor, most) = directions, limits
         chunks = columns.shape[0] - 1
         begin, end = columns[0], columns[chunks]
         for c in prange(chunks):
-            fill_line_solution(0.0, p, product, x, r, z, columns[c], columns[c + 1], H[c], totals)
+            fill_line_solution(0.0, (p, product), vectors, columns[c], columns[c + 1], H[c], totals)
         first = add_columns(totals, begin, end)
         rz, stop = first, max(floor, tolerance * tolerance * first)
         beta, done = 0.0, 0
         while done < most and rz > stop:
             for c in prange(chunks):
                 fill_product(
-                    p,
-                    beta,
-                    z,
-                    p_old,
-                    columns[c],
-                    columns[c + 1],
-                    H[c],
-                    product,
-                    totals,
+                    (p, vectors[2], p_old), beta, columns[c], columns[c + 1], H[c], product, totals,
                     scratch[c],
-                )
+                )  # fmt: skip
             curvature = add_columns(totals, begin, end)
             if not curvature > 0.0:
                 break
             alpha = rz / curvature
             for c in prange(chunks):
                 fill_line_solution(
-                    alpha, p, product, x, r, z, columns[c], columns[c + 1], H[c], totals
+                    alpha, (p, product), vectors, columns[c], columns[c + 1], H[c], totals
                 )
             done += 1
             previous, rz = rz, add_columns(totals, begin, end)

@@ -343,25 +343,25 @@ def keep_line_edges(cells, Z):
 
 
 @kernel(allocates=False)
-def estimate_residual(
-    nodes, old, law, bent, motion, moves, first, last, starts, sums, totals, found, Z
-):
-    """Estimate of the residual r·z of `nodes` in node columns first..last-1, into `totals` (nj+1).
+def estimate_residual(nodes, old, law, motion, moves, stretches, totals, chunk):
+    """Estimate of the residual r·z of `nodes` in a chunk's node columns into `totals` (nj+1).
 
-    Into `found` (5,), for all cells that have a corner at these columns, what the names above say;
-    corners are compared with those of `old`.  Way strayed: the most that `motion.reach` (nj+1), a
-    distance a column [m], is over the old cells' heights there, taken as the column's least area
-    over its longest edge.
+    `chunk`: its first column and the one after its last, found and scratch.  Into found (5,), for
+    all cells that have a corner at these columns, what the names above say; corners are compared
+    with those of `old`.  Way strayed: the most that `motion.reach` (nj+1), a distance a column [m],
+    is over the old cells' heights there, taken as the column's least area over its longest edge.
 
-    Both grids (2, ni+1, nj+1); where `moves`, `nodes` is written first, row by row, from `old`
-    and its sides' motion (`fill_moved_row`).  Columns are inner ones; `bent`: whether `law.bend` is
-    anything but zero, otherwise nothing strays; Z is scratch.  `starts` has the first node row of
-    each stretch of lines, and the last one: `sums` (2, stretches + 1, nj+1) then gets the sums over
-    them at these columns (`regrid.barrier.coarse_nodes`).
+    Both grids (2, ni+1, nj+1); where `moves`, `nodes` is written first, row by row, from `old` and
+    its sides' motion (`fill_moved_row`).  Columns are inner ones; where lines are not `law.bent`
+    nothing strays.  `stretches`: starts, the first node row of each stretch of lines, and the last
+    one, and sums (2, stretches + 1, nj+1), which gets the sums over them at these columns
+    (`regrid.barrier.coarse_nodes`).
     """
+    (starts, sums), (first, last, found, Z) = stretches, chunk
+    bent = law.bent
     ni = nodes.shape[1] - 1
     low, cells = first - 1, last - first + 1
-    stretches, stretch = starts.shape[0] - 1, 0
+    count, stretch = starts.shape[0] - 1, 0
     begin(nodes, low, cells, Z)
     for i in range(-1, ni):
         if moves:
@@ -369,7 +369,7 @@ def estimate_residual(
         take_side_edges(nodes, i + 1, law, low, cells, Z)
         if i < 0:
             continue
-        if stretches > 1:
+        if count > 1:
             keep_line_edges(cells + 1, Z)
         take_line_edges(nodes, i, law, low, cells + 1, Z)
         if bent:
@@ -385,7 +385,7 @@ def estimate_residual(
             for col in range(1, cells):
                 Z[PIVOT + col] = Z[PART_X + col] = Z[PART_Y + col] = Z[SUM + col] = 0.0
                 Z[WHOLE_X + col] = Z[WHOLE_Y + col] = 0.0
-        if stretches > 1:
+        if count > 1:
             here, end = starts[stretch], starts[stretch + 1]
             add_to_stretch((i - here) / (end - here), cells, Z)
             if i + 1 == end:
@@ -428,27 +428,26 @@ def make_look(parallel):
     """The look at a whole block, over its column chunks one after the other or on threads."""
 
     @kernel(parallel=parallel)
-    def look(nodes, old, law, bent, motion, moves, columns, starts, sums, totals, found, scratch):
+    def look(nodes, old, law, motion, moves, stretches, totals, chunks):
         """Estimate of the residual r·z, and marks of triangles at the block's corners.
 
-        `columns` (chunks + 1) are the first node columns of the chunks, `found` (chunks, 5) and
-        `scratch` (chunks, LOOK_ROWS or more) are theirs; `found[0]` then has what all found.  The
-        sum goes over columns in order.
+        `chunks`: their first node columns (chunks + 1), found (chunks, 5) and scratch (chunks,
+        LOOK_ROWS or more); found[0] then has what all found.  The sum goes over columns in order.
         """
-        chunks = columns.shape[0] - 1
-        for c in prange(chunks):
-            first, last = columns[c], columns[c + 1]
+        columns, found, scratch = chunks
+        count = columns.shape[0] - 1
+        for c in prange(count):
             estimate_residual(
-                nodes, old, law, bent, motion, moves, first, last, starts, sums, totals, found[c],
-                scratch[c],
+                nodes, old, law, motion, moves, stretches, totals,
+                (columns[c], columns[c + 1], found[c], scratch[c]),
             )  # fmt: skip
-        for c in range(1, chunks):
+        for c in range(1, count):
             found[0, LEAST_SCALED] = min(found[0, LEAST_SCALED], found[c, LEAST_SCALED])
             for k in (MOST_SHRUNK, STRAYED, COSECANT, ASPECT):
                 found[0, k] = max(found[0, k], found[c, k])
         found[0, COSECANT] = add_own_corners(nodes, found[0, COSECANT])
         marks = mark_triangles(nodes, scratch[0, :4])
-        return add_columns(totals, columns[0], columns[chunks]), marks
+        return add_columns(totals, columns[0], columns[count]), marks
 
     return look
 

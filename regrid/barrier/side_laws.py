@@ -31,7 +31,8 @@ class BarrierLaw(NamedTuple):
 
     The laws of the sides `along_i` (5, ni) and `along_j` (5, nj), rows as named above, in m and
     without unit; where lines lie between opposite sides, `blend_i` (ni+1) and `blend_j` (nj+1);
-    `bend` (ni+1, nj+1), by how much each line's own spacing law departs from the interpolated one,
+    `bend` (ni+1, nj+1), where `bent` not zero, by how much each line's own spacing law departs from
+    the interpolated one,
     `most_bend` (nj+1), the most of it on each line, and the `way` (2, nj+1) that it is a part of,
     from i_min to i_max in m;
     `curve` (2, ni+1, nj+1), the grid in m that lines are drawn to, times its weight, read where
@@ -49,6 +50,7 @@ class BarrierLaw(NamedTuple):
     along_j: np.ndarray
     blend_i: np.ndarray
     blend_j: np.ndarray
+    bent: bool
     bend: np.ndarray
     most_bend: np.ndarray
     way: np.ndarray
@@ -353,19 +355,19 @@ class Block(NamedTuple):
 
 
 @kernel
-def prepare(old, law, motion, bent, conditional, dear, check):
+def prepare(old, law, motion, conditional, dear, check):
     """All that a regrid takes from the sides: laws, the motion of the sides, the checks.
 
     `law` is a `BarrierLaw` whose arrays are filled, but for curved lines, `motion` a `SideMotion`
-    from the grid `old`; `bent`: does `law.bend` hold anything?  `dear`: the margin of R and the
-    least R; `check`: the scratch of `search_meeting`.
+    from the grid `old`; `dear`: the margin of R and the least R; `check`: the scratch of
+    `search_meeting`.
     """
     sides = motion.sides
-    prepare_motion(old, motion, law.most_bend, bent)
+    prepare_motion(old, motion, law.most_bend, law.bent)
     along_i, along_j, blend_i, blend_j = law.along_i, law.along_j, law.blend_i, law.blend_j
     sigma = fill_laws(sides, conditional, along_i, along_j, blend_i, blend_j)
     fill_growth(along_i, law.ki - law.kj)
-    if bent:
+    if law.bent:
         for k in range(2):
             for j in range(sides.shape[2]):
                 law.way[k, j] = sides[k, -1, j] - sides[k, 0, j]

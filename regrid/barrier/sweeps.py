@@ -94,10 +94,9 @@ def take_corner(Z, a, b):
     """Gradient in both edges, and blocks of the Hessian, of the corner of the edges at `a`, `b`."""
     ax, ay, a2, ga = Z[a], Z[a + SPAN], Z[a + 2 * SPAN], Z[a + 3 * SPAN]
     bx, by, b2, gb = Z[b], Z[b + SPAN], Z[b + 2 * SPAN], Z[b + 3 * SPAN]
-    return corner_blocks(
-        a2 + b2, (ax, ay), (bx, by), (by, -bx), (-ay, ax), 0.0, ga, gb,
-        1.0 / (ax * by - ay * bx), 1.0, 1.0, 0.0, 0.0,
-    )  # fmt: skip
+    v, g = ((ax, ay), (bx, by)), ((by, -bx), (-ay, ax))
+    inverse = 1.0 / (ax * by - ay * bx)
+    return corner_blocks(a2 + b2, v, g, 0.0, inverse, 1.0, (1.0, ga, gb), (0.0, 0.0))
 
 
 @inlined
@@ -206,17 +205,19 @@ def eliminate_row(i, weight, tolerance, lines, Z):
 
 
 @kernel
-def fill_directions(nodes, laws_i, laws_j, pull, weight, tolerance, boxes, kept, Z, out, per_line):
+def fill_directions(nodes, laws, numbers, boxes, kept, Z, out, per_line):
     """Direction D of (9) for the inner nodes of boxes of lines, into `out` (2, ni+1, nj+1).
 
     `boxes` (n, 4): first line, last line + 1, first row, last row + 1, at most WIDEST lines; nodes
-    outside have D = 0.  `pull` multiplies Q, `weight` is eps sigma / 4 (or what multiplies I/4).
-    `tolerance` is that of delta, squared.  `kept` holds KEPT numbers a row of nodes, Z is scratch.
+    outside have D = 0.  `laws` along i and j; `numbers`: pull, which multiplies Q, weight, eps
+    sigma / 4 (or what multiplies I/4), and the tolerance of delta, squared.  `kept` holds KEPT
+    numbers a row of nodes, Z is scratch.
     `per_line` (3, nj+1) gets sum |R|², first and last active row of each line.  Returns sum |R|²
     over the boxes and the number of active lines, line by line: no matter how boxes are cut.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     x, y = nodes[0], nodes[1]
+    (laws_i, laws_j), (pull, weight, tolerance) = laws, numbers
     total, active = 0.0, 0
     for b in range(boxes.shape[0]):
         j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
@@ -554,8 +555,9 @@ class _Block:
     def _direct(self, nodes, direction, per_line) -> tuple[float, int]:
         """Fill `direction` in the boxes; sum |R|², and how many lines are active."""
         return fill_directions(
-            nodes, self.laws_i, self.laws_j, self.pull, self.weight, self.options.tolerance**2,
-            self.boxes, self.kept, self.scratch, direction, per_line,
+            nodes, (self.laws_i, self.laws_j),
+            (self.pull, self.weight, self.options.tolerance**2), self.boxes, self.kept,
+            self.scratch, direction, per_line,
         )  # fmt: skip
 
     def _try(self, share: float) -> None:

@@ -30,6 +30,7 @@ from regrid.barrier.assembly import (
     RIGHT_X,
     RIGHT_Y,
     ROWS,
+    LineLaws,
     begin_columns,
     begin_row,
     bend_lines,
@@ -58,14 +59,14 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     cells = last - first
-    along_i, along_j, blend_i, ki, kj = law.along_i, law.along_j, law.blend_i, law.ki, law.kj
+    laws = LineLaws(law.along_i, law.along_j, law.blend_i, law.bend, law.way, law.ki, law.kj)
     c, lam, quarter = law.area_target, law.area_weight, 0.25 * law.sigma * law.epsilon
     for col in range(cells):
         Z[ENERGY + col] = 0.0
         Z[LEAST + col] = 1e300
-    begin_columns(nodes, along_j, blend_i, law.blend_j, kj, first, cells, Z)
+    begin_columns(nodes, law.along_j, law.blend_i, law.blend_j, law.kj, first, cells, Z)
     for i in range(ni):
-        begin_row(nodes, i, along_i, along_j, blend_i, law.bend, law.way, ki, kj, first, cells, Z)
+        begin_row(nodes, i, laws, first, cells, Z)
         if law.curved:
             bend_sides(law.curve, i + 1, first, cells, Z)
             bend_lines(law.curve, i, first, cells + 1, Z)
@@ -97,7 +98,7 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
                 Z[TERM_1 + corner] = 0.0
                 Z[LEAST_1 + corner] = 1e300
         inside = 1.0 if i < ni - 1 else 0.0
-        fill_fading(along_i[GROWTH, i], cells, Z)
+        fill_fading(law.along_i[GROWTH, i], cells, Z)
         parts = barrier[i, first:last]
         for col in range(cells):
             straight = Z[FX + col] * Z[FX + col] + Z[FY + col] * Z[FY + col]

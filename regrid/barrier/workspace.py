@@ -247,14 +247,15 @@ class Workspace:
                 fill_curves(self.sides, share_i, share_j, self.curve)
                 epsilon = max(epsilon, least)
         law = BarrierLaw(
-            self.along_i, self.along_j, self.blend_i, self.blend_j, self.bend, self.most_bend,
-            self.way, self.curve, share_i + share_j > 0.0, float(ki), float(kj), 0.0, 0.0, epsilon,
-            float(tuning.area_weight), float(tuning.least_sine), float(tuning.strengthening), 1.0,
-            self.sound, 0.0, float(tuning.cost_weight) if cost else 0.0,
+            self.along_i, self.along_j, self.blend_i, self.blend_j, self.bent, self.bend,
+            self.most_bend, self.way, self.curve, share_i + share_j > 0.0, float(ki), float(kj),
+            0.0, 0.0, epsilon, float(tuning.area_weight), float(tuning.least_sine),
+            float(tuning.strengthening), 1.0, self.sound, 0.0,
+            float(tuning.cost_weight) if cost else 0.0,
         )  # fmt: skip
         self.motion = SideMotion(self.sides, *self.motion_tables)
         self.block = prepare(
-            self.old, law, self.motion, self.bent, conditional,
+            self.old, law, self.motion, conditional,
             (float(tuning.cost_margin), float(self.least_dear_rate)), self.boundary_check.scratch,
         )  # fmt: skip
         _, _, _, self.sigma, self.area_target, scale = self.block
@@ -295,8 +296,8 @@ class Workspace:
             self._set_threads()
             look = look_threaded
         total, self.marks = look(
-            nodes, old, self.law, self.bent, self.motion, moves, self.columns,
-            self.coarse.starts_i, self.coarse.sums, self.totals, self.found, self.scratch,
+            nodes, old, self.law, self.motion, moves, (self.coarse.starts_i, self.coarse.sums),
+            self.totals, (self.columns, self.found, self.scratch),
         )  # fmt: skip
         found = self.found[0]
         good, shrunk = found[LEAST_SCALED] > 0.0, found[MOST_SHRUNK]
@@ -351,7 +352,7 @@ class Workspace:
             self.change[:] = guess
             for c in range(self.columns.size - 1):
                 fill_product(
-                    self.solution, -1.0, self.z, self.z, self.whole_columns[c],
+                    (self.solution, self.z, self.z), -1.0, self.whole_columns[c],
                     self.whole_columns[c + 1], self.H[c], self.product, self.totals,
                     self.scratch[c],
                 )  # fmt: skip
@@ -362,8 +363,8 @@ class Workspace:
             self._set_threads()
             solver = solve_threaded
         done, first, last = solver(
-            self.whole_columns, self.H, self.solution, self.r, self.z, self.p, self.p_old,
-            self.product, self.totals, tolerance, floor, most, self.scratch,
+            self.whole_columns, self.H, (self.solution, self.r, self.z),
+            (self.p, self.p_old, self.product), self.totals, (tolerance, floor, most), self.scratch,
         )  # fmt: skip
         self.iterations += done
         return done, first, last

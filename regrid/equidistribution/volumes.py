@@ -263,13 +263,14 @@ def assemble_planes(nodes, weight, residual, edges, products, first, last, Z):
 
 
 @inlined
-def eliminate(lines, past, low, high, own, factor, tau, link, before, upper):
+def eliminate(lines, past, edges, own, factor, tau, link, kept):
     """One node further along lines side by side: (own + tau L) d = factor times what they hold.
 
-    `lines` and `past` are x, y, z of this node and of the one before; `low`, `high` its edges,
-    `upper` and `before` what the elimination keeps of it and of the one before; `link` is 0 at the
-    first node, else tau.  `upper` may be `own`.
+    `lines` and `past` are x, y, z of this node and of the one before; `edges` its low and high one,
+    `kept` what the elimination keeps of the one before and of it; `link` is 0 at the first node,
+    else tau.  What is kept of it may be `own`.
     """
+    (low, high), (before, upper) = edges, kept
     x, y, z = lines
     px, py, pz = past
     for k in range(own.shape[0]):
@@ -301,7 +302,7 @@ def sweep_first(residual, edges, tau, work, start, stop):
                 own[k] = ((a[k] + b[k]) + (c[k] + d[k]) + (e[k] + e[k + 1])) * (1.0 / 6.0)
             lines = residual[0, i, j], residual[1, i, j], residual[2, i, j]
             past = residual[0, before, j], residual[1, before, j], residual[2, before, j]
-            eliminate(lines, past, a, b, own, tau, tau, link, upper[before, j], upper[i, j])
+            eliminate(lines, past, (a, b), own, tau, tau, link, (upper[before, j], upper[i, j]))
     for i in range(n - 2, -1, -1):
         for j in range(start, stop):
             for c in range(3):
@@ -322,7 +323,7 @@ def sweep_plane(residual, edges, tau, work, nodes, i, turned):
     for j in range(n):
         p, link = max(j - 1, 0), tau if j > 0 else 0.0
         lines, past = (x[j], y[j], z[j]), (x[p], y[p], z[p])
-        eliminate(lines, past, e2[j], e2[j + 1], scale[j], 0.0, tau, link, upper[p], upper[j])
+        eliminate(lines, past, (e2[j], e2[j + 1]), scale[j], 0.0, tau, link, (upper[p], upper[j]))
     for j in range(n - 2, -1, -1):
         for c in range(3):
             row, after, here = residual[c, i, j], residual[c, i, j + 1], upper[j]
@@ -339,7 +340,7 @@ def sweep_plane(residual, edges, tau, work, nodes, i, turned):
         lines = turned[0, k, :n], turned[1, k, :n], turned[2, k, :n]
         past, own = (turned[0, p, :n], turned[1, p, :n], turned[2, p, :n]), turned[SCALE, k, :n]
         low, high = turned[EDGE, k, :n], turned[EDGE, k + 1, :n]
-        eliminate(lines, past, low, high, own, 0.0, tau, link, turned[SCALE, p, :n], own)
+        eliminate(lines, past, (low, high), own, 0.0, tau, link, (turned[SCALE, p, :n], own))
     for k in range(m - 2, -1, -1):
         for c in range(3):
             row, after, here = turned[c, k], turned[c, k + 1], turned[SCALE, k]

@@ -130,8 +130,9 @@ def fill_volumes(Z, n, away, out):
 
 
 @formula
-def add_corner_force(Z, at, own, a, far, b, near, c, steep, p):
+def add_corner_force(Z, at, edges, shares, steep, p):
     """Add the gradient (R14.4) in one edge a of a corner, of product p, to its force."""
+    (a, b, c), (own, far, near) = edges, shares
     Z[at] += own * a[0] - (far * b[0] + near * c[0]) + steep * p[0]
     Z[at + SPAN] += own * a[1] - (far * b[1] + near * c[1]) + steep * p[1]
     Z[at + 2 * SPAN] += own * a[2] - (far * b[2] + near * c[2]) + steep * p[2]
@@ -154,9 +155,11 @@ def add_corner_value(Z, k, edges, forces, area_weight, e2):
     steep = weight * slope * (area_weight * (1.0 - inverse * inverse) - size * inverse * inverse)
     two = 2.0 * weight * inverse
     i, j, e = forces[0] + k, forces[1] + k, forces[2] + k
-    add_corner_force(Z, i, two * (1.0 + bb + cc), a, two * ab, b, two * ca, c, steep, p)
-    add_corner_force(Z, j, two * (1.0 + cc + aa), b, two * bc, c, two * ab, a, steep, q)
-    add_corner_force(Z, e, two * (1.0 + aa + bb), c, two * ca, a, two * bc, b, steep, r)
+    of_a, of_b, of_c = two * (1.0 + bb + cc), two * (1.0 + cc + aa), two * (1.0 + aa + bb)
+    ab, bc, ca = two * ab, two * bc, two * ca
+    add_corner_force(Z, i, (a, b, c), (of_a, ab, ca), steep, p)
+    add_corner_force(Z, j, (b, c, a), (of_b, bc, ab), steep, q)
+    add_corner_force(Z, e, (c, a, b), (of_c, ca, bc), steep, r)
 
 
 @formula
@@ -244,8 +247,9 @@ def fill_products(Z, n, area_weight, e2):
 
 
 @formula
-def turn_about(weight, own, a, b, c, ab, ca, half, t, p):
+def turn_about(weight, edges, shares, half, t, p):
     """Own block (xx, xy, xz, yy, yz, zz) of an edge a beside two others, of product p."""
+    (a, b, c), (own, ab, ca) = edges, shares
     u = t * (own * a[0] - (ab * b[0] + ca * c[0]) - half * p[0])
     v = t * (own * a[1] - (ab * b[1] + ca * c[1]) - half * p[1])
     w = t * (own * a[2] - (ab * b[2] + ca * c[2]) - half * p[2])
@@ -283,9 +287,9 @@ def fill_centre_blocks(Z, n, area_weight, e2):
         f = take_mean(Z, VI0 + k, VI0 + k + 1, VI1 + k, VI1 + k + 1)
         g = take_mean(Z, VJ0 + k, VJ0 + k + 1, VJ1 + k, VJ1 + k + 1)
         h = take_mean(Z, VK0 + k, VK1 + k, VK2 + k, VK3 + k)
-        x = turn_about(weight * f * f, 1.0 + bb + cc, a, b, c, ab, ca, half, t, p)
-        y = turn_about(weight * g * g, 1.0 + cc + aa, b, c, a, bc, ab, half, t, q)
-        z = turn_about(weight * h * h, 1.0 + aa + bb, c, a, b, ca, bc, half, t, r)
+        x = turn_about(weight * f * f, (a, b, c), (1.0 + bb + cc, ab, ca), half, t, p)
+        y = turn_about(weight * g * g, (b, c, a), (1.0 + cc + aa, bc, ab), half, t, q)
+        z = turn_about(weight * h * h, (c, a, b), (1.0 + aa + bb, ca, bc), half, t, r)
         put_six(Z, BLOCK + k, x)
         put_six(Z, BLOCKS + k, (*plus(plus(x[:3], y[:3]), z[:3]), *plus(plus(x[3:], y[3:]), z[3:])))
 

@@ -124,7 +124,7 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
 
     checked = deck_reading.read_deck(deck, _with_threads(settings, threads))
     if dry_run:
-        from regrid.interpreting import interpreted
+        from regrid.jit import interpreted
         from runs.forecast.cost import foretell, measure_size
         from runs.inspection.listing import describe_plan
         from runs.march.launching import check_deck_fully
@@ -215,7 +215,7 @@ def check(deck, settings, schema) -> None:
 
         echo(schema_text(checked.problem), nl=False)
         return
-    from regrid.interpreting import interpreted
+    from regrid.jit import interpreted
     from runs.deck.checking import describe_unset
     from runs.inspection.account import describe_cautions
     from runs.march.launching import check_deck_fully
@@ -311,10 +311,10 @@ def plot(
     the fields of the dumps: schlieren, pressure_gradient, vorticity, rate (of
     the cells; the largest limits dt).
     """
-    from runs.pictures.command import draw
+    from runs.pictures.command import Wanted, draw
 
-    words = fields, what, at, mesh, zoom, mirror, output, dpi, _say, beside, line, table
-    for path in draw(directory, *words, limits, colours):
+    wanted = Wanted(fields, what, at, mesh, zoom, mirror, beside, line, limits, colours)
+    for path in draw(directory, wanted, output, dpi, _say, table):
         echo(path)
 
 

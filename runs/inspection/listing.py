@@ -10,7 +10,7 @@ from problems.problem_file import is_problem_file
 from problems.registry import INSTALLED, PROBLEMS, read_docstring, summary_line
 from problems.registry import OWN as OWN_PROBLEMS
 from regrid.errors import BadInput
-from regrid.interpreting import interpreted
+from regrid.jit import interpreted
 from regrid.plug_ins import GROUPS, find_plug_ins
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
 
@@ -44,7 +44,7 @@ def describe_installed() -> list[str]:
     plug_ins = {group: find_plug_ins(group) for group in GROUPS}
     if not any(plug_ins.values()):
         return []
-    from hydro.boundary.registry import OWN as OWN_SEGMENTS
+    from hydro.boundary import OWN as OWN_SEGMENTS
     from hydro.eos import OWN as OWN_EQUATIONS
     from hydro.history import COLUMNS
     from regrid.registry import OWN as OWN_REGRIDDERS

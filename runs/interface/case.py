@@ -358,8 +358,9 @@ class Case:
         live = _LiveRun(self)
         fields, what = self._choose_picture(fields, what, live.dumps[0])
         return draw_picture(
-            live, fields, what, None, mesh, zoom, mirror, beside, line, limits, colours
-        )
+            live, fields, what, mesh=mesh, zoom=zoom, mirror=mirror, beside=beside, line=line,
+            limits=limits, colours=colours,
+        )  # fmt: skip
 
     def _choose_picture(
         self, fields: tuple[str, ...], what: str | None, state: Any

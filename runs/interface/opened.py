@@ -169,8 +169,9 @@ class OpenRun(RunData):
         if what is None and len(fields) == 1 and fields[0] in self.pictures:
             what, fields = fields[0], ()
         return draw_picture(
-            self, fields, what, at, mesh, zoom, mirror, beside, line, limits, colours
-        )
+            self, fields, what, at=at, mesh=mesh, zoom=zoom, mirror=mirror, beside=beside,
+            line=line, limits=limits, colours=colours,
+        )  # fmt: skip
 
     @property
     def pictures(self) -> list[str]:

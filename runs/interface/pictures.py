@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from regrid.errors import BadInput
-from runs.pictures.command import fill_figure, new_figure
+from runs.pictures.command import Wanted, fill_figure, new_figure
 from runs.pictures.fields import split_outline
 
 Times = float | str | Sequence[float] | None
@@ -37,29 +36,19 @@ class Curve(NamedTuple):
     t: float
 
 
-def draw_picture(
-    run: Any,
-    fields: tuple[str, ...],
-    what: str | None,
-    at: Times,
-    mesh: bool,
-    zoom: Sequence[float] | None,
-    mirror: str | None,
-    beside: str | Path | None = None,
-    line: Sequence[float] | None = None,
-    limits: Sequence[float] | None = None,
-    colours: str | None = None,
-) -> Figure:
+def draw_picture(run: Any, fields: tuple[str, ...], what: str | None, **words: Any) -> Figure:
     """What `shockgrid plot` draws, as a figure; `run` has what RunData has.
 
-    Raises BadInput for a field, a picture, a time or a part of the plane that is none.
+    words: of `Wanted`, but numbers for their texts.  Raises BadInput for a field, a picture, a time
+    or a part of the plane that is none.
     """
-    if mirror not in (None, "x", "y"):
-        raise BadInput(f"mirror = {mirror!r}: 'x' or 'y' is wanted")
+    if words["mirror"] not in (None, "x", "y"):
+        raise BadInput(f"mirror = {words['mirror']!r}: 'x' or 'y' is wanted")
     figure = new_figure(Picture)
-    other = None if beside is None else str(beside)
-    ways = say_numbers(zoom), mirror, None, other, say_numbers(line), say_numbers(limits), colours
-    fill_figure(figure, run, fields, what, _say_times(at), mesh, *ways)
+    words |= {name: say_numbers(words[name]) for name in ("zoom", "line", "limits")}
+    beside, at = words["beside"], _say_times(words.get("at"))
+    words |= {"beside": None if beside is None else str(beside), "at": at}
+    fill_figure(figure, run, Wanted(fields, what, **words))
     return figure
 
 

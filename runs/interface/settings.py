@@ -18,8 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 import tomli_w
 
-from hydro.boundary.registry import SEGMENTS
-from hydro.boundary.segment import Segment
+from hydro.boundary import SEGMENTS, Segment
 from hydro.eos import EQUATIONS_OF_STATE
 from hydro.eos.base import EquationOfState
 from problems.problem import Problem

@@ -13,7 +13,7 @@ from problems.deck import Deck, Output, Regrid
 from problems.evolution import Evolution
 from problems.problem import Problem, check_memory
 from regrid.errors import BadInput
-from regrid.interpreting import interpreted
+from regrid.jit import interpreted
 from runs.deck.checking import describe_runtime_keys, is_runtime_key, show
 from runs.deck.reading import ReadDeck, parse_value
 from runs.forecast.cost import check_disk, describe_cost, estimate_cost
@@ -212,7 +212,7 @@ def remap_runner(
     the step of the restart point, None the last; output, force: as for a new run.  Its `go_on`
     starts it.  Raises BadInput, before anything is written, for what cannot be gone on with.
     """
-    from hydro.remap.simulation import take_over  # with scipy: slow to load
+    from hydro.remap.flow import take_over  # with scipy: slow to load
 
     before = read_run_deck(old, strict=True, say=say)
     settle_deck(old, before, at)

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -100,31 +100,44 @@ PAD = 0.1  # inches around each panel: less cuts titles at the edge
 FIRST_CHOICE = ("rho", "p")
 
 
+class Wanted(NamedTuple):
+    """What picture, in the words of `shockgrid plot`.
+
+    fields: names, of derived fields too; what: fields, mesh, interface, history, line or one of the
+    problem's; at: times [s]; zoom: x0,x1,y0,y1 [m]; mirror: x or y; beside: another run, drawn to
+    the same scale; line: x0,y0,x1,y1 [m]; limits: low,high of the colours; colours: a colour map.
+    """
+
+    fields: tuple[str, ...] = ()
+    what: str | None = None
+    at: str | None = None
+    mesh: bool = False
+    zoom: str | None = None
+    mirror: str | None = None
+    beside: str | None = None
+    line: str | None = None
+    limits: str | None = None
+    colours: str | None = None
+
+
+DEFAULT = Wanted()
+
+
 def draw(
     directory: str,
-    fields: tuple[str, ...] = (),
-    what: str | None = None,
-    at: str | None = None,
-    mesh: bool = False,
-    zoom: str | None = None,
-    mirror: str | None = None,
+    wanted: Wanted = DEFAULT,
     output: str | None = None,
     dpi: int = 140,
     say: Callable[[str], None] | None = None,
-    beside: str | None = None,
-    line: str | None = None,
     table: str | None = None,
-    limits: str | None = None,
-    colours: str | None = None,
 ) -> list[Path]:
     """Write one picture of a run; returns its path, and that of the table of a line, if wished.
 
-    Words as for `make_picture`; table: a CSV file for the values along `line`.  Raises BadInput.
+    table: a CSV file for the values along a line; `say` takes remarks.  Raises BadInput for what is
+    not there.
     """
     run, figure = RunData(directory), new_figure()
-    stem, write_table = fill_figure(
-        figure, run, fields, what, at, mesh, zoom, mirror, say, beside, line, limits, colours
-    )
+    stem, write_table = fill_figure(figure, run, wanted, say)
     if table and not write_table:
         raise BadInput(f"--csv {table}: it is for the values along a line; --line says which")
     if table:
@@ -135,50 +148,14 @@ def draw(
     return paths + [write_table(Path(table))] if table and write_table else paths
 
 
-def make_picture(
-    directory: str,
-    fields: tuple[str, ...] = (),
-    what: str | None = None,
-    at: str | None = None,
-    mesh: bool = False,
-    zoom: str | None = None,
-    mirror: str | None = None,
-    beside: str | None = None,
-    line: str | None = None,
-    say: Callable[[str], None] | None = None,
-) -> Figure:
-    """One picture of the run in `directory` as a figure; the words are those of `shockgrid plot`.
-
-    fields: names, of derived fields too; what: fields, mesh, interface, history, line or one of the
-    problem's; at: times [s]; zoom: x0,x1,y0,y1 [m]; mirror: x or y; beside: another run, drawn to
-    the same scale; line: x0,y0,x1,y1 [m].  `say` takes remarks.  Raises BadInput for what is not
-    there.
-    """
-    figure = new_figure()
-    run = RunData(directory)
-    fill_figure(figure, run, fields, what, at, mesh, zoom, mirror, say, beside, line)
-    return figure
-
-
 def fill_figure(
-    figure: Figure,
-    run: RunData,
-    fields: tuple[str, ...] = (),
-    what: str | None = None,
-    at: str | None = None,
-    mesh: bool = False,
-    zoom: str | None = None,
-    mirror: str | None = None,
-    say: Callable[[str], None] | None = None,
-    beside: str | None = None,
-    line: str | None = None,
-    limits: str | None = None,
-    colours: str | None = None,
+    figure: Figure, run: RunData, wanted: Wanted, say: Callable[[str], None] | None = None
 ) -> tuple[str, Callable[[Path], Path] | None]:
-    """Draw one picture of a run into `figure`; words as for `make_picture`.
+    """Draw one picture of a run into `figure`; raises BadInput for what is not there.
 
     Returns the stem of a name for it, and what writes the table of a line's values, if it is one.
     """
+    fields, what, at, mesh, zoom, mirror, beside, line, limits, colours = wanted
     view = View(parse_zoom(zoom), mirror, mesh, parse_limits(limits), check_colours(colours))
     names = [name for entry in fields for name in entry.split(",") if name]
     what = what or ("line" if line else "fields")
@@ -252,7 +229,7 @@ def draw_all(directory: str, dpi: int = 140) -> list[Path]:
     """The pictures that a finished run gets: its fields and what its problem draws."""
     paths = draw(directory, dpi=dpi)
     for name in RunData(directory).problem.figures():
-        paths += draw(directory, what=name, dpi=dpi)
+        paths += draw(directory, Wanted(what=name), dpi=dpi)
     return paths
 
 

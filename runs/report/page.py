@@ -34,7 +34,14 @@ from runs.inspection.account import (
     pick_prefix,
 )
 from runs.inspection.info import describe_settings, other_name
-from runs.pictures.command import default_fields, find_deck_text, make_picture, write_figure
+from runs.pictures.command import (
+    Wanted,
+    default_fields,
+    fill_figure,
+    find_deck_text,
+    new_figure,
+    write_figure,
+)
 from runs.pictures.fields import list_fields, scale_times
 from runs.pictures.film import make_film
 from runs.pictures.history import choose_panels, find_units
@@ -313,7 +320,9 @@ def draw_pictures(run: RunData, dpi: int, left_out: list[str]) -> list[tuple[str
         path = Path(folder, "picture.png")
         for heading, words in wanted:
             try:
-                write_figure(make_picture(str(run.path), **words), path, dpi, "png", deck_text)
+                figure = new_figure()
+                fill_figure(figure, run, Wanted(**words))
+                write_figure(figure, path, dpi, "png", deck_text)
             except (BadInput, KeyError) as error:
                 left_out.append(f"{heading.format(field=field)} ({error})")
                 continue

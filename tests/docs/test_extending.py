@@ -14,8 +14,7 @@ from builders import ROOT, march
 from hydro import eos as eos_registry
 from hydro import history
 from hydro.block import Block
-from hydro.boundary import registry as segment_registry
-from hydro.boundary.registry import put
+from hydro.boundary import SEGMENTS, put
 from hydro.eos import IdealGas
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
@@ -37,7 +36,7 @@ REGISTRIES = {
     "PROBLEMS": problem_registry.PROBLEMS,
     "EQUATIONS_OF_STATE": eos_registry.EQUATIONS_OF_STATE,
     "REGRIDDERS": regridder_registry.REGRIDDERS,
-    "SEGMENTS": segment_registry.SEGMENTS,
+    "SEGMENTS": SEGMENTS,
     "COLUMNS": history.COLUMNS,
 }
 

@@ -50,7 +50,8 @@ def test_the_page_runs(place, monkeypatch, capsys):
     found = run_as_main(pieces, monkeypatch)
     out = capsys.readouterr().out
     assert "wide enough" in out and "t_end reached" in out
-    assert sorted(path.name for path in (place / "out").iterdir()) == ["linear", "tube", "watched"]
+    made = sorted(path.name for path in (place / "out").iterdir())
+    assert made == ["impact", "linear", "tube", "watched"]
     x = found["run"].interface().x  # Sod's contact: 0.927 m/s from x = 0.5
     assert x.mean() == pytest.approx(0.5 + 0.9275 * 0.2, rel=2e-3)
     assert found["marches"]["Even"].done == found["marches"]["Even"].steps

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hydro.boundary.registry import make_segment
+from hydro.boundary import make_segment
 from hydro.eos import EQUATIONS_OF_STATE
 from hydro.eos.materials import forget_read_files
 from problems.registry import PROBLEMS
@@ -15,7 +15,7 @@ from runs.store.reader import RunData
 MODULE = '''
 """A gas, a regridder, an outlet and a column of somebody else."""
 
-from hydro.boundary.kinds import Outflow
+from hydro.boundary import Outflow
 from hydro.eos.gases import IdealGas
 from regrid.algebraic import TransfiniteRegridder
 from toy_problem import Toy

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from builders import box, march, two_blocks, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
-from hydro.links.join import join
+from hydro.links import join
 from hydro.simulation import Simulation
 
 

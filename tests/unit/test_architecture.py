@@ -19,7 +19,7 @@ from runs.cli.main import cli
 ORDER = ("regrid", "hydro", "problems", "runs", "shockgrid")
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
 ROOMS = (
-    ("regrid.errors", "regrid.interpreting"),
+    ("regrid.errors",),
     ("regrid.jit", "regrid.plug_ins", "regrid.roots", "regrid.text_files", "regrid.work_arrays"),
     ("regrid.sides",),
     ("regrid.protocol",),

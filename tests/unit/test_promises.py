@@ -7,7 +7,7 @@ import pytest
 
 import shockgrid as sg
 from hydro import rim as on
-from hydro.boundary.kinds import FreeSurface, Outflow
+from hydro.boundary import FreeSurface, Outflow
 from hydro.eos import IdealGas, MieGruneisen
 from problems.standard.free_stream import FreeStream
 from problems.standard.vortex import Vortex

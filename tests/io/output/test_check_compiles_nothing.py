@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from builders import ROOT
-from regrid.interpreting import MOST_NUMBERS, interpreted
-from regrid.jit import kernel
+from regrid.jit import MOST_NUMBERS, interpreted, kernel
 from regrid.measure.quality import compute_corner_areas
 
 LOOK = """

@@ -5,9 +5,9 @@ import pytest
 
 from builders import box, march, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
-from hydro.links.join import join
+from hydro.links import join
 from hydro.motion.key_nodes import find_key_nodes
 from hydro.motion.line import Track
 from hydro.simulation import Simulation

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from builders import wall_off
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.formulas.geometry import (
     GEOMETRIES,
     compute_volumes,

@@ -5,10 +5,10 @@ import pytest
 
 from builders import SIDES, box, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.eos.materials import find_material
-from hydro.links.join import join
+from hydro.links import join
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
 

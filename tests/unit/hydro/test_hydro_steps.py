@@ -6,10 +6,10 @@ import pytest
 from builders import SIDES, box, march, two_blocks, wall_off
 from hydro import rim as on
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas, MieGruneisen
 from hydro.interior.advance import make_flow_kernels
-from hydro.links.join import join
+from hydro.links import join
 from hydro.motion import line, thickness
 from hydro.perimeter import contacts
 from hydro.perimeter.strips import make_side_kernels

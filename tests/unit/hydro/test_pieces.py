@@ -5,10 +5,10 @@ import pytest
 
 from builders import march
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas, StiffenedGas
 from hydro.formulas.geometry import find_geometry
-from hydro.links.join import join, slide
+from hydro.links import join, slide
 from hydro.rows import FLUX_ROWS, HOOP, MOMENTUM_Y, PUSH, RHO, V
 from hydro.simulation import Simulation
 from hydro.sliding.pieces import fill_pieces, fill_points, solve_pieces

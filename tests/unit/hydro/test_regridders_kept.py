@@ -6,7 +6,7 @@ import pytest
 
 from builders import box, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.simulation import Simulation
 from regrid.algebraic import TransfiniteRegridder

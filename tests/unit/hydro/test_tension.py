@@ -10,9 +10,9 @@ import pytest
 from builders import beside_line, march, two_blocks, wall_off
 from hydro import rim as on
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
-from hydro.links.join import join
+from hydro.links import join
 from hydro.motion.tension import compute_tangents
 from hydro.motion.thickness import fill_thickness_way
 from hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y

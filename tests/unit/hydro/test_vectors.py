@@ -11,7 +11,7 @@ from hydro.eos import IdealGas
 from hydro.formulas.geometry import GEOMETRIES, PLANE
 from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
 from hydro.formulas.riemann import FLUXES
-from hydro.interior import axisymmetric, fluxes, reconstruction, slopes, traces, update
+from hydro.interior import axisymmetric, faces, reconstruction, slopes, update
 from hydro.interior import scratch as at
 
 CURVED = GEOMETRIES["axisymmetric"]
@@ -34,25 +34,25 @@ PHASES = {  # how a phase is made, its arguments after the scratch and the numbe
     "geometry": (lambda: reconstruction.make_geometry(PLANE.volume), ()),
     "switch": (lambda: reconstruction.make_switch(*SWITCH[:3], True), GAS),
     "faces along i": (
-        lambda: traces.make_faces(PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I),
+        lambda: faces.make_faces(PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I),
         (0.1,),
     ),
     "faces along j": (
-        lambda: traces.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
+        lambda: faces.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
         (0.1,),
     ),
     "radial faces": (
-        lambda: traces.make_faces(CURVED.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
+        lambda: faces.make_faces(CURVED.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
         (0.1,),
     ),
     "slopes": (lambda: slopes.make_slopes(LIMIT, False, PLANE, SWITCH), (0.1, (1.4,))),
     "radial slopes": (lambda: slopes.make_slopes(LIMIT, True, CURVED, SWITCH), (0.1, (1.4,))),
-    "traces": (lambda: traces.make_traces(SOUND, True)[1], (1.0, (1.4,))),
-    "traces in": (lambda: traces.make_traces(SOUND, True)[0], (1.0, (1.4,))),
-    "upwind along i": (lambda: fluxes.make_upwind(*UPWIND_I, False, False), ()),
-    "upwind along j": (lambda: fluxes.make_upwind(*UPWIND_J, True, True), ()),
-    "flux": (lambda: fluxes.make_flux(ENERGY, at.AREA_X_J, at.FLUX_J_MASS, 0, False), GAS),
-    "HLL flux": (lambda: fluxes.make_hll_flux(ENERGY, *HLL), (16, (1.4,))),
+    "traces": (lambda: faces.make_traces(SOUND, True)[1], (1.0, (1.4,))),
+    "traces in": (lambda: faces.make_traces(SOUND, True)[0], (1.0, (1.4,))),
+    "upwind along i": (lambda: faces.make_upwind(*UPWIND_I, False, False), ()),
+    "upwind along j": (lambda: faces.make_upwind(*UPWIND_J, True, True), ()),
+    "flux": (lambda: faces.make_flux(ENERGY, at.AREA_X_J, at.FLUX_J_MASS, 0, False), GAS),
+    "HLL flux": (lambda: faces.make_hll_flux(ENERGY, *HLL), (16, (1.4,))),
     "gathering": (lambda: update.make_update(IdealGas, PLANE, False, True), STEP),
     "new states": (lambda: update.make_update(IdealGas, PLANE, True, False), STEP),
     "update": (lambda: update.make_update(IdealGas, PLANE, True, True), STEP),

@@ -98,7 +98,7 @@ def dense_matrix(spread):
         direction = np.zeros_like(zero)
         direction[:, 1:-1, 1:-1] = unit.reshape(2, NI - 1, NJ - 1)
         newton.fill_product(
-            direction, -1.0, zero, zero, 1, NJ, work.H[0], out, work.totals, work.scratch[0]
+            (direction, zero, zero), -1.0, 1, NJ, work.H[0], out, work.totals, work.scratch[0]
         )
         matrix[:, column] = out[:, 1:-1, 1:-1].ravel()
     return work, matrix
@@ -134,7 +134,7 @@ def test_line_solve_inverts_the_blocks_of_each_line():
     rest[:, 1:-1, 1:-1] = np.random.default_rng(5).normal(size=(2, NI - 1, NJ - 1))
     found, zero = np.zeros_like(rest), np.zeros_like(rest)
     newton.fill_line_solution(
-        0.0, zero, zero, zero.copy(), rest, found, 1, NJ, work.H[0], work.totals
+        0.0, (zero, zero), (zero.copy(), rest, found), 1, NJ, work.H[0], work.totals
     )
     places = np.arange(matrix.shape[0]).reshape(2, NI - 1, NJ - 1)
     for j in range(NJ - 1):

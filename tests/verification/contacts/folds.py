@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos.materials import find_material
-from hydro.links.join import join
+from hydro.links import join
 from hydro.simulation import Simulation
 
 ARM, HALF_GAP, THICK = 4e-3, 2e-4, 1e-3

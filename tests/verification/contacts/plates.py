@@ -8,7 +8,7 @@ import numpy as np
 
 from builders import box
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.rows import CONSERVED
 from hydro.simulation import Simulation

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from builders import box, check_budget, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import StiffenedGas
 from hydro.simulation import Simulation
 from runs.deck.reading import read_deck

@@ -6,7 +6,7 @@ from plates import advance, make_plate, make_stack
 
 from builders import box, check_budget, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos.materials import find_material
 
 INNER = 3e-3  # radius of the rings

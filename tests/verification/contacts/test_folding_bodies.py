@@ -8,7 +8,7 @@ from wave_diagram import find_impact
 
 from builders import box, check_budget, find_unexplained
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.rows import P
 

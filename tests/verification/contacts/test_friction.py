@@ -6,9 +6,9 @@ from plates import advance, make_stack, mean_speed
 
 from builders import SIDES, box, check_budget, find_unexplained
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos.materials import find_material
-from hydro.links.join import join
+from hydro.links import join
 from hydro.rows import CONSERVED, RHO, P, U, V
 from hydro.sources import make_gravity
 from regrid.errors import BadInput

@@ -8,7 +8,7 @@ from wedges import find_end, find_oblique_contact, make_wedge
 
 from builders import SIDES, box, check_budget
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.rows import P
 from hydro.simulation import Simulation

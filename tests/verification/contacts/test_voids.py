@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from builders import check_budget, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import StiffenedGas
 from regrid.errors import BadInput
 

@@ -6,7 +6,7 @@ from plates import advance, find_event, make_plate, make_stack, mean_speed, midd
 
 from builders import SIDES, box, check_budget, find_unexplained, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.eos.materials import find_material
 from hydro.rows import P, U

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from builders import tensor
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
 from problems.references.shock_polars import Body, ShockPolar

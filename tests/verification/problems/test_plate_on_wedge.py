@@ -10,9 +10,9 @@ import pytest
 
 from builders import collect_columns, march, tensor
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos.materials import find_material
-from hydro.links.join import slide
+from hydro.links import slide
 from hydro.simulation import Simulation
 from problems.plate_on_wedge.problem import PlateOnWedge
 from problems.plate_on_wedge.report import measure_behind, measure_contact_speed, measure_lead

@@ -8,11 +8,11 @@ import pytest
 
 from builders import box, collect_columns, march, march_measured, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.eos.materials import find_material
 from hydro.eos.phase_transition import hugoniot
-from hydro.links.join import join
+from hydro.links import join
 from hydro.simulation import Simulation
 from problems.deck import RunControl
 from problems.references.exact_flows import SedovBlast

@@ -5,9 +5,9 @@ import pytest
 
 from builders import march
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
-from hydro.links.join import join
+from hydro.links import join
 from hydro.simulation import Simulation
 from problems.standard.kidder import END, RADII
 from runs.deck.reading import read_deck

@@ -5,9 +5,9 @@ import pytest
 
 from builders import box, check_budget, march, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas, MieGruneisen
-from hydro.links.join import join, slide
+from hydro.links import join, slide
 from hydro.simulation import Simulation
 
 GAS = IdealGas(1.4)

@@ -5,9 +5,9 @@ import pytest
 
 from builders import march, tensor, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
-from hydro.links.join import join, slide
+from hydro.links import join, slide
 from hydro.motion.line import LineRule
 from hydro.simulation import Simulation
 from problems.standard.rayleigh_taylor import RayleighTaylor, RayleighTaylorDeck

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
-from hydro.links.join import join, slide
+from hydro.links import join, slide
 from hydro.simulation import Simulation
 
 DENSITIES = {"one": 1.0, "two": 3.0, "three": 0.4}

@@ -5,9 +5,9 @@ import pytest
 
 from builders import beside_line, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
-from hydro.links.join import join
+from hydro.links import join
 from hydro.simulation import Simulation
 
 NI, NJ = 14, 12

@@ -7,10 +7,10 @@ import pytest
 
 from builders import box, check_budget, march, tensor, unit_steps, wall_off
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
 from hydro.eos.materials import find_material
-from hydro.links.join import join
+from hydro.links import join
 from hydro.simulation import Simulation
 from problems.references.hugoniot import compute_free_surface_speed, shock_to_pressure
 from runs.deck.reading import read_deck

@@ -11,11 +11,11 @@ import pytest
 
 from builders import box
 from hydro.block import Block
-from hydro.boundary.registry import OWN, put
+from hydro.boundary import OWN, put
 from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
 from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
 from hydro.formulas.riemann import DEFAULT_FLUX
-from hydro.links.join import join, slide
+from hydro.links import join, slide
 from hydro.simulation import Simulation
 from reference_sliding import find_points, find_positions
 from reference_step import take_step

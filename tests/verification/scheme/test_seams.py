@@ -6,7 +6,7 @@ import pytest
 from builders import box, march, wall_off
 from hydro.block import Block
 from hydro.eos import IdealGas, MieGruneisen
-from hydro.links.join import join
+from hydro.links import join
 from hydro.simulation import Simulation
 
 NI, NJ = 40, 36

@@ -8,9 +8,9 @@ import pytest
 
 from builders import box, find_unexplained, march
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
-from hydro.links.join import join, slide
+from hydro.links import join, slide
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
 

@@ -32,7 +32,7 @@ def make_box(
     centres = 0.25 * (nodes[:, 1:, 1:] + nodes[:, :-1, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, :-1])
     block = Block("gas", eos, nodes, *state(*centres))
     if geometry == "axisymmetric":
-        from hydro.boundary.registry import put
+        from hydro.boundary import put
 
         put(block, "j_min", "axis")
     wall_off(block)

@@ -23,9 +23,9 @@ from builders import (
     wall_off,
 )
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
-from hydro.links.join import join
+from hydro.links import join
 from hydro.simulation import Simulation
 from problems.standard.rayleigh_taylor import (
     GRAVITY,

@@ -6,10 +6,10 @@ import numpy as np
 
 from builders import beside_line, find_unexplained, march
 from hydro.block import Block
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
-from hydro.links.join import join
-from hydro.remap.refinement import EVERY, Refinement
+from hydro.links import join
+from hydro.remap.flow import EVERY, Refinement
 from hydro.simulation import Simulation
 from problems.deck import RunControl
 from problems.interface_instability.deck import InterfaceDeck

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from builders import box, check_budget, march, two_blocks, wall_off
-from hydro.boundary.registry import put
+from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.formulas.geometry import GEOMETRIES, compute_volumes
 from hydro.remap.conserved import compute_conserved, is_state, remap_means, remap_state
+from hydro.remap.flow import take_over
 from hydro.remap.overlay import compute_cell_moments, lay_over, make_linear_fields
-from hydro.remap.simulation import take_over
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
 

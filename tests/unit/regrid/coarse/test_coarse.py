@@ -31,8 +31,8 @@ def fine_form(work, d):
     for c in range(work.columns.size - 1):
         first, last = work.whole_columns[c], work.whole_columns[c + 1]
         multiply_fine(
-            work.solution, -1.0, work.z, work.z, first, last, work.H[c], work.product, work.totals,
-            work.scratch[c],
+            (work.solution, work.z, work.z), -1.0, first, last, work.H[c], work.product,
+            work.totals, work.scratch[c],
         )  # fmt: skip
     total = (d * work.product[:, :, : work.nj + 1])[:, 1:-1, 1:-1].sum()
     return float(total)

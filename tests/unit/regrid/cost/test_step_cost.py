@@ -59,7 +59,7 @@ def dense(work):
         direction = np.zeros_like(zero)
         direction[:, 1:-1, 1:-1] = unit.reshape(2, NI - 1, NJ - 1)
         line_cg.fill_product(
-            direction, -1.0, zero, zero, 1, NJ, work.H[0], out, work.totals, work.scratch[0]
+            (direction, zero, zero), -1.0, 1, NJ, work.H[0], out, work.totals, work.scratch[0]
         )
         matrix[:, column] = out[:, 1:-1, 1:-1].ravel()
     return matrix

@@ -7,11 +7,12 @@ and written into both rims; nothing else of either block is touched.  A sliding 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from hydro.boundary.kinds import Linked, Seam
+from hydro.block import Block
+from hydro.boundary import Linked, Seam, Sliding, put
 from hydro.perimeter.contacts import (
     AT_TRACES,
     pass_seam,
@@ -107,3 +108,36 @@ class Exchange:
         """The step stands."""
         for contact in self.contacts:
             contact.accept()
+
+
+Faces = tuple[Block, str] | tuple[Block, str, int, int]
+
+
+def join(kind: str, leader: Faces, follower: Faces, **options: Any) -> Link:
+    """Link two runs of faces (block, side[, start, stop]) by segments of a linked kind.
+
+    Nodes must match (up to a shift for "periodic"), in either order; raises BadInput otherwise.
+    options: of the kind, such as `tension` [N/m] of an interface.
+    """
+    one, two = (
+        put(block, side, kind, *faces, **options) for block, side, *faces in (leader, follower)
+    )
+    if not isinstance(one, Linked) or not isinstance(two, Linked):
+        raise BadInput(f"segments of kind {kind!r} cannot be joined; use `put`")
+    if kind == "sliding":
+        raise BadInput("segments of kind 'sliding' are joined by `slide`, not by `join`")
+    return Link(one, two)
+
+
+def slide(master: Faces | list[Faces], slave: Faces | list[Faces]) -> SlidingContact:
+    """A sliding contact between two runs of faces (block, side[, start, stop]), or lists.
+
+    The slave's nodes lie on the master's line; the ends of the slave may lie anywhere on it.
+    Raises BadInput where they do not.
+    """
+    chains = []
+    for runs in (master, slave):
+        runs = runs if isinstance(runs, list) else [runs]
+        chain = [put(block, side, "sliding", *faces) for block, side, *faces in runs]
+        chains.append(cast("list[Sliding]", chain))
+    return SlidingContact(*chains)

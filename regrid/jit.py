@@ -21,7 +21,7 @@ import threading
 import time
 import uuid
 from pathlib import Path
-from types import CodeType, FunctionType, ModuleType
+from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 
 import llvmlite
 import numba
@@ -38,9 +38,7 @@ PACKAGES = ("regrid", "hydro", "problems")
 TOOLCHAIN = ("numpy", "numba", "llvmlite", "math", "cmath", "operator", "builtins", "typing")
 VERSIONS = numba.__version__, llvmlite.__version__, np.__version__, sys.version
 KEPT_FILES = 6000  # of the cache: when there are more, half of them go
-MOST_NUMBERS = (
-    300_000  # interpreted, in a call's arrays: beyond, Python takes longer than compiling
-)
+MOST_NUMBERS = 300_000  # in an interpreted call's arrays: beyond, compiling takes no longer
 KERNEL_CODES: set[int] = set()  # identities of all kernels' codes: a profiler tells calls by them
 
 
@@ -67,51 +65,51 @@ class _Contents(pickle.Pickler):
         for name in ("py_func", "_pyfunc", "_defn"):  # of what numba has compiled
             if isinstance(compiled := getattr(value, name, None), FunctionType):
                 return tuple, ((sorted(getattr(value, "targetoptions", {}).items()), compiled),)
-        if isinstance(value, CodeType):  # but for file and lines
+        if isinstance(value, CodeType):  # but for file and lines; sets have no order
             sets = [
                 sorted(map(repr, c)) if isinstance(c, frozenset) else c for c in value.co_consts
             ]
             counts = value.co_argcount, value.co_kwonlyargcount, value.co_flags
             names = value.co_name, value.co_names, value.co_varnames, value.co_freevars
             return tuple, ((value.co_code, value.co_exceptiontable, counts, names, sets),)
-        if isinstance(value, FunctionType | ModuleType | type) and not _is_known(value):
+        if _has_names(value):
             return tuple, (self.take(value, ()),)
-        if isinstance(value, FunctionType | ModuleType):
+        if isinstance(value, FunctionType | ModuleType):  # of the toolchain
             return tuple, ((getattr(value, "__module__", ""), value.__name__),)
         return NotImplemented
 
     def take(self, value, names):
         """Of a function all, of a module or class what `names` could mean, else the value."""
-        if not isinstance(value, FunctionType | ModuleType | type) or _is_known(value):
+        if not _has_names(value):
             return value
+        is_function = isinstance(value, FunctionType)
         where = getattr(value, "__module__", ""), value.__name__
-        key = (id(value), frozenset(() if isinstance(value, FunctionType) else names))
+        key = id(value), frozenset(() if is_function else names)
         if key in self.seen:
             return where, self.seen[key]
         self.seen[key] = len(self.seen)
-        if isinstance(value, FunctionType):
-            code, space, names = (
-                value.__code__,
-                dict(value.__globals__),
-                _list_names(value.__code__),
-            )
-            for name, cell in zip(code.co_freevars, value.__closure__ or (), strict=True):
+        if is_function:
+            names, space = _list_names(value.__code__), dict(value.__globals__)
+            for name, cell in zip(value.__code__.co_freevars, value.__closure__ or (), strict=True):
                 with contextlib.suppress(ValueError):  # empty
                     space[name] = cell.cell_contents
-            extra = (getattr(value, "compiled_as", ""), value.__defaults__, value.__kwdefaults__)
+            extra = getattr(value, "compiled_as", ""), value.__defaults__, value.__kwdefaults__
         else:
-            code, names = None, {*names, "_fields", "_field_defaults"}
+            names = {*names, "_fields", "_field_defaults"}
             space = {name: getattr(value, name) for name in names & vars(value).keys()}
             if extra := getattr(value, "class_type", None):  # compiled by numba
                 struct = [(name, str(kind)) for name, kind in extra.struct.items()]
                 extra = struct, dict(extra.methods), dict(extra.static_methods)
         named = {name: self.take(space[name], names) for name in sorted(names & space.keys())}
-        return where, code, extra, named
+        return where, getattr(value, "__code__", None), extra, named
 
 
-def _is_known(value) -> bool:
+def _has_names(value) -> bool:
+    """Is it a function, module or class, and none of the toolchain's?"""
+    if not isinstance(value, FunctionType | ModuleType | type):
+        return False
     where = value.__name__ if isinstance(value, ModuleType) else str(value.__module__)
-    return where.split(".")[0] in TOOLCHAIN
+    return where.split(".")[0] not in TOOLCHAIN
 
 
 def _list_names(code: CodeType) -> set[str]:
@@ -161,9 +159,8 @@ class _Reader(pickle.Unpickler):
     bring scipy, a quarter of a second.  Globals are looked up by code that calls Python alone."""
 
     def find_class(self, module, name):
-        if name == "_rebuild_env":
-            return _rebuild_environment
-        return super().find_class(module, name)
+        mine = name == "_rebuild_env"
+        return _rebuild_environment if mine else super().find_class(module, name)
 
 
 def _rebuild_environment(module: str, constants: list, name: str) -> Environment:
@@ -200,40 +197,26 @@ def interpreted():
         _interpreting.reset(before)
 
 
+# wall seconds of compiling and loading until now; when the present one began, 0 where there is none
+_compiling = SimpleNamespace(lock=threading.Lock(), seconds=0.0, begun=0.0)
+
+
 def _compile_or_interpret(compiled: Dispatcher, *arguments):
     numbers = sum(one.size for one in arguments if isinstance(one, np.ndarray))
     if is_interpreting() and numbers <= MOST_NUMBERS:
         return compiled.py_func
-    with _COMPILING:
-        return type(compiled)._compile_for_args(compiled, *arguments)
-
-
-class _Compiling:
-    """Wall seconds [s] in which at least one thread compiled or loaded kernels."""
-
-    def __init__(self) -> None:
-        self.seconds, self.threads, self.begun = 0.0, 0, 0.0
-        self._lock = threading.Lock()
-
-    def __enter__(self) -> None:
-        with self._lock:
-            if not self.threads:
-                self.begun = time.perf_counter()
-            self.threads += 1
-
-    def __exit__(self, *failure: object) -> None:
-        with self._lock:
-            self.threads -= 1
-            if not self.threads:
-                self.seconds += time.perf_counter() - self.begun
-
-
-_COMPILING = _Compiling()
+    with _compiling.lock:
+        _compiling.begun = time.perf_counter()
+        try:
+            return type(compiled)._compile_for_args(compiled, *arguments)
+        finally:
+            _compiling.seconds += time.perf_counter() - _compiling.begun
+            _compiling.begun = 0.0
 
 
 def read_clock() -> float:
     """Wall seconds [s] from some moment on; the clock stands while kernels are compiled."""
-    return (_COMPILING.begun if _COMPILING.threads else time.perf_counter()) - _COMPILING.seconds
+    return (_compiling.begun or time.perf_counter()) - _compiling.seconds
 
 
 def kernel(function=None, *, allocates=True, **options):

@@ -243,7 +243,7 @@ class Block:
 
     @property
     def plan(self) -> PerimeterPlan:
-        """What the phases need to know of the segments; made anew when there are others."""
+        """What the phases need to know of the segments; rebuilt when there are others."""
         if self._plan.segments != self.segments:
             self._plan = PerimeterPlan(self.segments, self.rim.faces)
         return self._plan

@@ -295,7 +295,7 @@ class Simulation:
         self.clock.rate = self.small_cells.find_first_rate()
 
     def _lay_cells(self, refining: Refining, count: int, states: list) -> None:
-        """Make the blocks anew with so many columns, on grids sampled from the first ones."""
+        """Rebuild the blocks with so many columns, on grids sampled from the first ones."""
         blocks, links, make_regridder = refining.rebuild(refining.make_first_nodes(count), states)
         self._connect(blocks, links, make_regridder)
         ledger, self.ledger = self.ledger, Ledger(blocks)
@@ -349,7 +349,7 @@ class Simulation:
     def measure_restored(self) -> dict:
         """Totals, and what came through the boundary, of a state that `set_state` took up.
 
-        Not for a run that goes on: its blocks sum anew, which may change their last bits.
+        Not for a continued run: its blocks sum again, which may change their last bits.
         """
         for block in self.blocks:
             block.update(0.0)

@@ -54,7 +54,7 @@ def make_gravity(acceleration_x: float, acceleration_y: float) -> SourceLaw:
 
 
 class BodySource:
-    """A source law applied to the blocks of a simulation; without a law nothing is done.
+    """A source term applied to the blocks of a simulation; without one nothing is done.
 
     `gained` (3,): momentum x, y [N s/m] and energy [J/m] that this step got from it.
     """
@@ -161,7 +161,7 @@ def compute_products_energy(eos: JWL, rho) -> np.ndarray:
 
 
 class ProgrammedBurn:
-    """A source law (`hydro.sources`) that burns all blocks of JWL material.
+    """A source term (`hydro.sources`) that burns all blocks of JWL material.
 
     origin (2,): a point of the front at t = 0 [m]; direction (2,): where a plane front goes, None
     for one that spreads from the point; width: of the front [m]; speed [m/s]: None for the CJ

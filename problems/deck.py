@@ -49,7 +49,7 @@ class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
     """A table of a deck: frozen (`msgspec.structs.replace` changes a copy), no unknown keys.
 
     Where a deck gives some keys of a table, the keys left out come from the problem's default table
-    if the class says `merges = True` (as for `run`), else from the class: a material given anew
+    if the class says `merges = True` (as for `run`), else from the class: a material given again
     must not inherit the density of the default one.  `keeps_defaults` may say so table by table.
 
     `runtime` names the keys that a restart may change, for they say how to march and not from

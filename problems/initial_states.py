@@ -177,7 +177,7 @@ def mix_states(eos, fraction: np.ndarray, first, second):
     fraction: (ni, nj) in [0, 1], from `regrid.measure.cells`; the states are (rho, u, v, p) of
     numbers or arrays (ni, nj), both of the material `eos`.  Density, momentum and total energy are
     mixed; the pressure is that of the mixed energy.  Returns four arrays (ni, nj); whole cells
-    (fraction 0 or 1) get their state unchanged to the last bit.
+    (fraction 0 or 1) keep their state bitwise.
     """
     fraction = np.asarray(fraction, dtype=float)
     conserved = []

@@ -1,8 +1,7 @@
 """A simulation that a script made of its own blocks: `shockgrid.run(simulation, "out/mine")`.
 
-The deck of such a run says what can be said without the script: how long it marches and what it
-leaves behind.  Blocks, materials and links are in the script alone, so that a restart is given them
-anew.
+The deck of such a run contains what does not need the script: how long it runs and what it writes.
+Blocks, materials and links are only in the script, so a restart needs them again.
 """
 
 from __future__ import annotations
@@ -100,6 +99,6 @@ class OwnSimulation(Problem):
         return dict(row)
 
     def say_restart(self, directory: str) -> str:
-        """The call by which it goes on."""
+        """The call that continues it."""
         more = ", measure=..." if self.own_measure else ""
         return f"in Python: shockgrid.restart({directory!r}, simulation=...{more})"

@@ -245,7 +245,7 @@ class Problem:
         return []
 
     def say_restart(self, directory: str) -> str:
-        """The command by which a stopped run in `directory`, quoted for a shell, goes on."""
+        """The command that continues a stopped run in `directory`, quoted for a shell."""
         return f"shockgrid restart {directory}"
 
     def say_repeat(self) -> str:

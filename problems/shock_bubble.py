@@ -417,7 +417,7 @@ def find_neighbours(blocks) -> dict[tuple[int, str], tuple[int, str, bool]]:
     """Which side of which block of the same material lies at a block's side, and if it runs back.
 
     Keys and values: index of the block, side; a side is known again by its nodes, which are the
-    neighbour's to the bit or nearly so.
+    neighbour's bitwise or nearly so.
     """
     lines = {}
     for number, block in enumerate(blocks):

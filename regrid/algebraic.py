@@ -4,7 +4,7 @@ Their regridders are quick and honest: a grid with a bad cell is not returned, t
 cells.  Note: only the four sides of the values are read.  "displacement" accumulates: its grid
 depends on all boundaries since the first, the others' on the present one alone.
 
-Transfinite interpolation blends by the sides' own arc-length spacing, carried into the block so
+Transfinite interpolation blends by the sides' own arc-length spacing, continued into the block so
 that line i is the straight line, in the unit square, between its places on the sides j_min and
 j_max, and line j likewise: lines of one family never cross, whatever the spacings, and nothing
 depends on which family is called i.
@@ -257,7 +257,7 @@ def displaced_grid(previous: np.ndarray, boundary: np.ndarray) -> np.ndarray:
 
 
 def begin_grid(previous: np.ndarray, boundary: np.ndarray, sign: float) -> tuple[np.ndarray, str]:
-    """The old grid carried along, where that is convex in the orientation `sign`, else transfinite
+    """The old grid moved along, where that is convex in the orientation `sign`, else transfinite
     interpolation; and which of the two it is."""
     nodes = displaced_grid(previous, boundary)
     if (sign * compute_corner_areas(nodes) > 0.0).all():
@@ -441,7 +441,7 @@ class QuasiOneDimensionalRegridder(AlgebraicRegridder):
 
 
 class TransfiniteRegridder(AlgebraicRegridder):
-    """Transfinite interpolation of the boundary's nodes, blended by the sides' own laws.
+    """Transfinite interpolation of the boundary's nodes, blended by the sides' own spacing.
 
     Theory R6.4.
     """

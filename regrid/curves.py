@@ -1,4 +1,4 @@
-"""Boundary lines: spacings, how a line bends, and nodes spread anew along it between key nodes.
+"""Boundary lines: spacings, how a line bends, and respacing of its nodes between key nodes.
 
 A spacing is an increasing sequence from 0 to 1 that says where the nodes of a line lie.
 Equidistribution (ED1, theory R10.1) makes weight times step equal on all steps.  Note: a weight
@@ -7,7 +7,7 @@ of the integral; interpolating the weight itself lets nodes cross.  A spacing by
 R9.2) puts nodes where a line bends: every segment may turn by TURN, and at least LEAST_EVEN of the
 nodes keep the first spacing.
 
-Nodes spread anew (theory R9) stay on the curve, a straight line stays straight to round-off, no
+Respaced nodes (theory R9) stay on the curve, a straight line stays straight to round-off, no
 node passes another.  Note: a spline through the whole line would round off a corner, so it breaks
 at key nodes; and where the line ends on a wall it must see its own mirror image, between periodic
 sides itself, or half a domain with walls differs from the whole one.
@@ -37,7 +37,7 @@ def uniform_law(count: int) -> np.ndarray:
 
 
 def arc_law(line: np.ndarray) -> np.ndarray:
-    """The law that the nodes of a polyline (2, n) have now, by arc length."""
+    """The present spacing of the nodes of a polyline (2, n), by arc length."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=1)))])
     if not arc[-1] > 0.0:
         return uniform_law(arc.size)
@@ -47,7 +47,7 @@ def arc_law(line: np.ndarray) -> np.ndarray:
 
 
 def geometric_law(count: int, ratio: float) -> np.ndarray:
-    """Law of `count` nodes whose steps grow by the factor `ratio` from one to the next."""
+    """Spacing of `count` nodes whose steps grow by the factor `ratio` from one to the next."""
     if not ratio > 0.0:
         raise BadInput(f"spacing: the growth ratio of steps must be positive, got {ratio}")
     # Powers of the larger end are kept below 1, so that no law overflows.
@@ -59,7 +59,7 @@ def geometric_law(count: int, ratio: float) -> np.ndarray:
 
 
 def clustered_law(count: int, first: float, at_end: bool = False) -> np.ndarray:
-    """Geometric law whose first step (last, if `at_end`) is the fraction `first` of the line."""
+    """Geometric spacing whose first step (last, if `at_end`) is `first` of the line."""
     steps = count - 1
     if not 0.0 < first < 1.0 or steps < 2:
         raise BadInput(
@@ -141,7 +141,7 @@ def fill_refined_law(least, length, at_end, law):
 def meeting_laws(
     counts: tuple[int, int], lengths: tuple[float, float], refinement: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Laws of two lines end to end whose steps are the same where they meet.
+    """Spacings of two lines end to end whose steps are the same where they meet.
 
     The line that would have the shorter steps is uniform.  On the other the step k from the
     meeting point is h (1 - (1 - h0/h) q^k): within about a fifth of its nodes the steps grow from
@@ -570,17 +570,17 @@ def redistribute(
     walls: tuple[tuple[float, float], tuple[float, float]] = (FREE_END, FREE_END),
     closed: bool = False,
 ) -> np.ndarray:
-    """Spread the nodes of a polyline along it by a spacing law; returns the new line (2, n).
+    """Respace the nodes of a polyline along it; returns the new line (2, n).
 
     `law` (n,) increases strictly (None: uniform between key nodes); between two key nodes its
     values are scaled to the arc length there.  `keys` are indices of inner nodes that stay; the
-    ends always do.  `relax` in 0..1 is the part of the way towards the law.  shape "chord" keeps
+    ends always do.  `relax` in 0..1 is the fraction of the way to the spacing.  shape "chord" keeps
     nodes on the polyline, "spline" on the cubic spline by chord length, which breaks at key nodes
     and, at an end with a wall (its unit normal in `walls`), continues its own mirror image.
     `closed`: the last node is the first or its periodic image; a spline without key nodes then goes
     on smoothly from one to the other.
 
-    Raises BadInput for a law that does not increase and for nodes that coincide.
+    Raises BadInput for a spacing that does not increase and for nodes that coincide.
     """
     line = np.ascontiguousarray(line, dtype=np.float64)
     count = line.shape[1]

@@ -1,6 +1,6 @@
-"""Whole marches: a regridder carries a grid along a boundary that is a function of time.
+"""Whole marches: a regridder follows a boundary that is a function of time.
 
-`march` calls the regridder once a step and keeps an account: the last grid, those on the way,
+`march` calls the regridder once a step and records: the last grid, those on the way,
 the report of every step, the worst cell of all.  Note: `boundary_at` is called once a step, in
 order, so it may hold a random generator; where the times of steps are found by `cells`
 (`choose_times`) it is called beforehand too, and has to be a function of time alone.
@@ -86,7 +86,7 @@ def march(
 
     One step a time of `times`; without them, steps over `span` in each of which no boundary node
     moves further than `cells` of the shortest edge at the sides of `start` (`choose_times`).  The
-    march ends at the first step without a grid, or with a cell that is not convex; either is told
+    march ends at the first step without a grid, or with a non-convex cell; either is reported
     in what is returned, and nothing is raised for it.  `start` may be of either orientation (i, j
     turning clockwise too).  `gap_sides`: names of the sides whose first line is measured.  Every
     `keep_every`-th grid is kept, with `start` as the first; 0 keeps none.  `sound_speed` (ni, nj)

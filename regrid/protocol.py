@@ -1,9 +1,9 @@
 """What a regridder is and returns: a protocol for all, and two for those that see the flow.
 
-A regridder carries a grid from step to step.  Most know geometry alone (`Regridder`).  A
+A regridder moves a grid from step to step.  Most know geometry alone (`Regridder`).  A
 `CostAwareRegridder` takes the cells' sound speeds as well, and opens cells that shorten the time
 step.  One that follows fields of the flow, or places nodes of sides by itself, is a
-`FlowAwareRegridder`: whoever marches a flow tells it the fields and the sides that are its own.
+`FlowAwareRegridder`: the flow passes it the fields and the sides that are its own.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class RegridReport:
     touched.  `sub_moves` is the number of extra parts the boundary's motion was cut into, `rescues`
     the number of times an untangling was needed.  `least_corner_ratio` is the least new corner area
     relative to the old one at the same corner.  `residual` is the size of the gradient at the
-    start, relative to the terms it is made of.  `start` names the grid that was begun from:
+    start, relative to the terms it is made of.  `start` names the initial guess:
     "previous", "displacement", "quasi-1d", "untangled", "halved".  `exempt_corners` counts corner
     triangles left out because the boundary's own nodes turn them over, `triangles` the block's
     corners that its sides make flat (`regrid.measure.corners`), `limited_nodes` the nodes whose
@@ -111,7 +111,7 @@ class FlowAwareRegridder(Regridder, Protocol):
         ...
 
     def take_step(self, fields: Mapping[str, np.ndarray], step_fraction: float) -> None:
-        """Be told the cells' fields by name, (ni, nj) each in SI units, and the step to come over
+        """Take the cells' fields by name, (ni, nj) each in SI units, and the next step over
         the stable one, at most 1."""
         ...
 

@@ -8,7 +8,7 @@ b are a corner's edges over their conditional lengths, D = a × b, c the mean of
 denominator no corner can be turned over.  The Hessian is that of the barrier for the first term,
 Gauss and Newton's for the other two; where w D is constant, what it leaves out adds up to nothing
 at inner nodes.  Note: w belongs to the cell here.  Where it is a function of position it has to be
-taken anew in every step, and J falls from step to step only as long as w stays.
+recomputed in every step, and J falls from step to step only as long as w stays.
 
 "brackbill-saltzman" minimises J by Newton's method.  "ivanenko-charakhchyan" is its first term
 alone with equal lengths: the barrier without straight lines and without conditional lengths.  The
@@ -21,7 +21,7 @@ more than three quarters of a corner's area.
 Every step begins from a valid grid: the old one moved along, or else the barrier's.  "Moved along"
 accumulates; a family whose result must not depend on the way has to iterate far enough.
 
-"node-speed": nodes that follow a law of speed, the residual of equidistribution relaxed in `tau`
+"node-speed": nodes that follow a speed equation, the residual of equidistribution relaxed in `tau`
 steps,
 
     dr/dt = d/tau,   H d = -∇J                                                    theory R13.1

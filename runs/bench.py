@@ -146,7 +146,7 @@ def describe_machine() -> str:
 
 
 class Tables:
-    """Rows by table; `path`: of the JSON file, or None; `say` is told each row at once."""
+    """Rows by table; `path`: of the JSON file, or None; `say` receives each row at once."""
 
     def __init__(self, path: str | None, command: str, say: Callable[[str], None]):
         self.path, self.command, self.say = Path(path) if path else None, command, say

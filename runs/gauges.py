@@ -1,6 +1,6 @@
 """The gauges of a run: their table gauges.csv, and points that go with the material.
 
-A point of the material is carried by Heun's method, of second order in dt: a step with the velocity
+A point of the material moves by Heun's method, of second order in dt: a step with the velocity
 at its start, then the mean of that and of the velocity in the new flow where the step ended.  It
 stays with its material: beside a block's side, by less than half a cell, it has what is
 extrapolated there.  Where it has left the flow (through an outflow), it is nan from then on.
@@ -46,7 +46,7 @@ class Places:
         self.part = np.zeros((2, count))
 
     def locate(self, blocks: Sequence[BlockView]) -> None:
-        """Find all points anew in the present grids, each first where it was last."""
+        """Find all points in the present grids, each first where it was last."""
         pending = np.isfinite(self.position).all(axis=0)
         last = self.block.copy()
         self.block[~pending] = NOWHERE

@@ -1,4 +1,4 @@
-"""The console command: looks whose packages Python finds, then hands over to `runs.cli`.
+"""The console command: checks whose packages Python finds, then calls `runs.cli`.
 
 It stands apart from `runs`, as another package of that name can hide the command line itself.
 """

@@ -56,7 +56,7 @@ def carry(make: Make, domain: str, steps: int = 3) -> tuple[np.ndarray, np.ndarr
 
 
 def check_cells_and_sides(make: Make) -> None:
-    """Cells are convex; the nodes of the sides are the boundary's to the bit."""
+    """Cells are convex; the nodes of the sides are bitwise the boundary's."""
     for domain in DOMAINS:
         previous, boundary = carry(make, domain)
         result = make().regrid(previous, boundary)

@@ -3,7 +3,7 @@
 Paired are all surfaces, each also with itself, and all with the planes that bound the whole.  A
 pair costs a comparison of two numbers a step as long as both lines are further apart than their
 nodes can have gone since their distance was measured.  All of it follows from nodes and states at
-the step's start, so a run that is started anew within an event has the same bits; only what is
+the step's start, so a restart within an event is bitwise the same; only what is
 counted is part of a restart point.
 """
 

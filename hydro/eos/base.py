@@ -1,4 +1,4 @@
-"""What an equation of state must offer, what is said of one that lacks it, and torn material.
+"""What an equation of state must offer, errors for one that lacks it, and failed material.
 
 An equation of state is a frozen dataclass of its parameters and three `inlined` formulas of plain
 arithmetic, so that the same text serves numpy arrays and compiled kernels.  Note: formulas may not
@@ -9,7 +9,7 @@ its waves run with c; formulas that disagree lose energy without a word.  Measur
 p(rho, e(rho, p)) is off p, and the slopes of the isentrope beside a state, between which c² has to
 lie.
 
-Torn condensed material is one rule for all with a strength: pieces with gaps between them pull with
+Failed condensed material is one rule for all with a strength: fragments with gaps pull with
 the tension of the pieces times the part of an area that they fill, rho/rho0, as in a porous body
 [CarrollHolt1972].  With the full strength a cell that holds a hundredth of its full mass would be
 pulled a hundred times as hard as the solid.

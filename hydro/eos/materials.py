@@ -118,7 +118,7 @@ def read_materials(path: Path) -> dict[str, Material]:
 
 
 def forget_read_files() -> None:
-    """Read material files anew when they are next asked for: they may have been written again."""
+    """Read material files again at their next use: they may have been rewritten."""
     _read_tables.cache_clear()
     _read_material.cache_clear()
 

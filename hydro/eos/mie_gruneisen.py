@@ -66,7 +66,7 @@ def sound_speed_squared(rho, p, parameters):
 
 @inlined
 def least_pressure(parameters):
-    """Pressure [Pa] below which the material is torn: minus its strength."""
+    """Pressure [Pa] below which the material fails: minus its strength."""
     return -parameters[STRENGTH]
 
 

@@ -98,7 +98,7 @@ def sound_speed_squared(rho, p, parameters):
 
 @inlined
 def least_pressure(parameters):
-    """Pressure [Pa] below which the material is torn: none, the table decides."""
+    """Pressure [Pa] below which the material fails: none, the table decides."""
     return -1e300
 
 

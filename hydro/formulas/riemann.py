@@ -2,7 +2,7 @@
 
 All are parts of kernels: scalars in, scalars out.  Every formula is written so that exchanging
 the two states and turning the normal gives exactly the negative flux: a mirrored flow stays the
-mirror image to the last bit.  HLLC and HLL work with speeds times the length of the face, which
+mirror image bitwise.  HLLC and HLL work with speeds times the length of the face, which
 saves the normalisation.  HLLC is cut into two parts, so that a row of faces can go through one
 after the other: their long chains of dependent operations then overlap between faces.
 """

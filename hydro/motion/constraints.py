@@ -22,7 +22,7 @@ triangle (`regrid.measure.corners.find_triangles`), until the flow closes the co
 Notes: both neighbours have to stay, or a corner on the other side of the same line opens instead,
 so the node is moved last; and a node taken further than onto the line would take area from its
 cells, without mass, where nothing is wrong.  Where lines slide on each other the node that carries
-them is moved, and what slides is laid on the moved line anew.  If the corner is one of the sliding
+them is moved, and what slides is laid on the moved line again.  If the corner is one of the sliding
 block's, its neighbour on that line goes part of the way with it, so that a straight angle takes a
 few rounds.  Source: [ProkopovND] §5, the projection of a bad node, here of the boundary's own.
 """

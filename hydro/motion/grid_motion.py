@@ -1,6 +1,6 @@
 """How the grid moves in a step: its sides (`hydro.motion.sides`), then every block's interior.
 
-The interior is rebuilt by the block's regridder, or all nodes are given by a mesh law.  Nothing is
+The inside is rebuilt by the block's regridder, or the nodes follow a prescribed motion.  Nothing is
 written but the new nodes, so that a step can still be rejected.
 """
 

@@ -1,4 +1,4 @@
-"""One segment's moving line: its track, its spacing law, how its nodes move.
+"""One segment's moving line: its track, its spacing, how its nodes move.
 
 A track is the polyline of a segment's first nodes, on which nodes of walls and open sides stay
 while they slide along it.  Where two tracks go on smoothly into one another at a key node (the end
@@ -306,7 +306,7 @@ class LineRule:
     """How moving lines are kept in shape.
 
     `shape` of the line between nodes when they are re-spaced, "chord" or "spline"; `relax`: part
-    of the way to the spacing law in a full step; `thickness` [m] of interfaces, see
+    of the way to the spacing in a full step; `thickness` [m] of interfaces, see
     `hydro.motion.thickness`, None: THICK_CELLS of their first cells.
     """
 
@@ -316,7 +316,7 @@ class LineRule:
 
 
 class Line:
-    """One segment's line: its spacing law and, where it slides, the track it stays on.
+    """One segment's line: its spacing and, where it slides, the track it stays on.
 
     `waits`: is it moved after the sliding contacts?  `respaced`: is it spread along itself?
     """
@@ -412,9 +412,9 @@ class Line:
         self.shortened = True
 
     def settle(self, fraction: float, dt: float = 0.0) -> float:
-        """Spread the moved nodes by the spacing law and write them between the new ends.
+        """Spread the moved nodes by the spacing and write them between the new ends.
 
-        A line that was cut is spread by its law at once, others gently, in proportion to
+        A line that was cut is spread at once, others gently, in proportion to
         `fraction`: dt over the stable step.  With a dt they are moved before; returns the
         stretching.
         """
@@ -460,10 +460,10 @@ class FlowLine(Line):
 
 
 class StraightLine(Line):
-    """A line that can lie straight between its ends, spread by the spacing law."""
+    """A line that can lie straight between its ends, spread by its spacing."""
 
     def lies_straight(self) -> bool:
-        """Does it, and need not be spread by another's law?"""
+        """Does it, and need not be spread by another line?"""
         return self.track.straight and not self.follows_contact
 
     def move(self, span):
@@ -477,7 +477,7 @@ class StraightLine(Line):
         self.moved[...] = new
 
     def spread_straight(self) -> None:
-        """New nodes by the spacing law on the straight line between the new ends."""
+        """New nodes by its spacing on the straight line between the new ends."""
         spread_straight(self.segment.block.nodes_new, self.span[None], self.law)
 
 
@@ -499,7 +499,7 @@ class GivenLine(StraightLine):
 
 
 class TrackLine(StraightLine):
-    """A line whose nodes stay on its track, spread between the ends by the spacing law."""
+    """A line whose nodes stay on its track, spread between the ends by its spacing."""
 
     def fill_moved(self, old, new, span):
         if self.track.straight:

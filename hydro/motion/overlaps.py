@@ -196,7 +196,7 @@ class Overlaps:
                         )
 
     def watch(self, everything: bool = False) -> None:
-        """From now on look at pairs without a link of which one moves by itself, or all of them."""
+        """From now on check pairs without a link of which one moves by itself, or all of them."""
         pairs = [
             (a, b)
             for a, b in self._pair(self.segments)

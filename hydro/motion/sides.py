@@ -1,7 +1,7 @@
 """The lines and key nodes along the sides of all blocks, and the passes over them in a step.
 
 The order of the passes is that of `SIDE_PASSES` in `hydro.step`.  Lines with moving faces follow
-the contact speeds and are re-spaced gently along themselves; lines at rest are spread anew between
+the contact speeds and are respaced gently along themselves; lines at rest are respaced between
 their moved ends.  Nothing is written but the new nodes, so that a step can still be rejected.
 """
 

@@ -2,7 +2,7 @@
 
 A side is a strip of three rows of cells.  It goes through the phases of the block's inside
 (`hydro.interior`) in the same scratch, turned so that its rows run inwards: what a face on a side
-gets is what it would get inside a block, to the bit.  Nothing here knows what lies beyond.
+has is bitwise what it would have inside a block.  Nothing here knows what lies beyond.
 Note: a strip along i_max or j_min runs against its side's numbering (a grid that is turned
 keeps its cells' orientation, one that is mirrored does not).
 """

@@ -1,13 +1,13 @@
 """Blocks that several ranks update: which are cut, where, and what their ranks tell each other.
 
 A block is cut in its update alone, into bands of whole rows of tiles; the first of its ranks, its
-home, regrids all of it and has all of its nodes, sums and failures.  A step regrids all blocks
+owner, regrids all of it and has all of its nodes, sums and failures.  A step regrids all blocks
 before it updates any, so that the two are shared out each by itself: the update as evenly as rows
 of tiles can be, and homes to the ranks that have the least to regrid.
 
 The others of a block's ranks have the rows of their band and GHOST_ROWS beyond it.  Rows travel
 from array to array, as they lie in memory.  What hangs together across bands - squeezed cells that
-share their states, the edge of crowding - is done by the home with the rows that it concerns, so
+share their states, the edge of crowding - is done by the owner with the rows that it concerns, so
 that a cut changes no bit.
 
 Note: all ranks of a block have to make the same calls, in the order of the blocks.
@@ -40,7 +40,7 @@ class Piece(NamedTuple):
 
 
 class Shares(NamedTuple):
-    """The ranks of each block, its home first, and the bounds of their bands, as rows of cells."""
+    """The ranks of each block, its owner first, and the bounds of their bands, as rows of cells."""
 
     places: list[tuple[int, ...]]
     bounds: list[tuple[int, ...]]
@@ -145,7 +145,7 @@ def sum_cells(cells: Sequence[tuple[int, int]], shares: Shares, ranks: int) -> l
 class CutBlock:
     """The part of a rank in a block that is cut.
 
-    group: the communicator of the block's ranks alone, the home first; bounds: of their bands.
+    group: the communicator of the block's ranks alone, the owner first; bounds: of their bands.
     """
 
     def __init__(self, group: Any, block: Block, bounds: Sequence[int]):
@@ -176,13 +176,13 @@ class CutBlock:
             request.Wait()
 
     def gather_rows(self, array: np.ndarray, rows: Rows | None = None) -> None:
-        """Let the home have these rows, all of them if None, of an array (ni, nj) or of a state."""
+        """Send the owner these rows, all of them if None, of an array (ni, nj) or of a state."""
         shift = _count_ghosts(array, self.block)
         rows = (0, self.block.ni) if rows is None else rows
         self.send_rows(array, _shift(self.bands, shift), _shift(self._for_home(rows), shift))
 
     def return_rows(self, array: np.ndarray, rows: Rows) -> None:
-        """Give these rows of the home back to the ranks in whose bands they lie."""
+        """Return these rows of the owner to the ranks in whose bands they lie."""
         shift = _count_ghosts(array, self.block)
         need = [_find_common(band, rows) for band in self.bands]
         need[0] = (0, 0)
@@ -194,18 +194,18 @@ class CutBlock:
     # --- phases of a step ----------------------------------------------------------------------
 
     def bring_sound_speeds(self) -> None:
-        """Let the home have the sound speeds of all cells at the start of the step."""
+        """Send the owner the sound speeds of all cells at the start of the step."""
         if not self.is_home:  # it computes its own when it regrids
             self.block.compute_sound_speed(self.block.start)
         self.gather_rows(self.block.rates_new)  # where they are computed
 
     def bring_fields(self) -> None:
-        """Let the home have the states of all cells at the start of the step."""
+        """Send the owner the states of all cells at the start of the step."""
         self.gather_rows(self.block.start)
         self.gather_rows(self.block.void_energy)
 
     def bring_states(self) -> None:
-        """Let the home have the present states of all cells."""
+        """Send the owner the present states of all cells."""
         self.gather_rows(self.block.state)
         self.gather_rows(self.block.void_energy)
 
@@ -225,13 +225,13 @@ class CutBlock:
             self.send_rows(array, _shift(self.bands, shift), _shift(need, shift))
 
     def bring_totals(self) -> None:
-        """Let the home have the totals of all tiles."""
+        """Send the owner the totals of all tiles."""
         totals, nj = self.block.tile_totals, self.block.nj
         tiles = [(count_tiles(a, nj), count_tiles(b, nj)) for a, b in self.bands]
         self.send_rows(totals, tiles, self._for_home((0, len(totals) - 1)))
 
     def bring_failed(self) -> None:
-        """Let the home have the new states of all cells, where they cannot stand."""
+        """Send the owner the new states of all cells, where they are not admissible."""
         good = self.is_home and sum_tiles(self.block.tile_totals, np.empty(TOTALS))
         if not self.group.bcast(good, root=0):
             self.gather_rows(self.block.state_new)

@@ -216,7 +216,7 @@ class Book:
         self.seconds += time.perf_counter() - self._began
 
     def gather(self) -> dict[str, Any]:
-        """The books of all ranks, for each of them: all have to call it.
+        """The message counts of all ranks, for each of them: all have to call it.
 
         `steps` and `ranks`, how many; `seconds`, of the steps, and `waited`, in their messages, one
         a rank; `calls` and `bytes` by kind, of the rank that has most.

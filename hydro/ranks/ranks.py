@@ -6,7 +6,7 @@ by its owner.  At two places of a step the owners tell what the others read of t
 new nodes along the sides, and the new states there.  Numbers that blocks are added up or compared
 by travel as rows, one a block, and every rank goes through them in the order of the blocks, so
 that any number of ranks gives the same bits.  A block may be cut: several ranks update it then
-(`hydro.ranks.cutting`), and its owner, its home, is the one that regrids it.
+(`hydro.ranks.cutting`), and its owner is the one that regrids it.
 
 A failure goes with these messages, too, so that a step that needs nothing else takes three: go,
 the nodes, the states.
@@ -65,9 +65,9 @@ class Ranks(Blocks):
     `Ibcast`, `bcast`, `Send` and `Recv`, and, where blocks are cut, `Split`, `allgather`,
     `Isend` and `Irecv`.
 
-    places: the ranks of each block, its home first (`hydro.ranks.cutting`); bounds: of their bands,
-    as rows of cells; left out: nearly as many rows for each; watched: by a block's
-    name indices of its states (rows, ni, nj), told to all ranks besides those along the sides.
+    places: the ranks of each block, its owner first (`hydro.ranks.cutting`); bounds: of their
+    bands, as rows of cells; left out: nearly as many rows for each; watched: by a block's
+    name indices of its states (rows, ni, nj), sent to all ranks besides those along the sides.
     """
 
     def __init__(

@@ -8,7 +8,7 @@ what lies between corners is then a state too, and so is any average of it.
 
 Slivers: along a curved side the polygons through other nodes differ by slivers between chords.
 What lies in old cells outside the new grid is given away, what new cells need beyond the old grid
-is borrowed at their own covered mean; each row of cells that begins at the nearest face of the new
+is filled with their own covered mean; each row of cells that begins at the nearest face of the new
 side takes the balance, by mass.  The cell at the side alone would take a relative change of density
 of an eighth of a face's angle of turn, in a metal many gigapascals.
 """
@@ -42,7 +42,7 @@ SIDES = {"i_min": (0, 0), "i_max": (0, -1), "j_min": (1, 0), "j_max": (1, -1)}  
 
 @dataclass(frozen=True)
 class Slivers:
-    """How much did not fit: cells with a sliver, volumes given away and borrowed [m² or m³/rad]."""
+    """How much did not fit: cells with a sliver, volumes removed and filled [m² or m³/rad]."""
 
     count: int
     given: float

@@ -5,7 +5,7 @@ its grids made inside them by its own regridders, and the states laid on these, 
 What is not refused holds for as long as blocks, sides and links are the same; slaves of sliding
 contacts have polygons for cells along their side, which do not fit any other grid.
 
-A side's nodes are spread anew along the chords between the old ones.  A new node has, between the
+A side's nodes are respaced along the chords between the old ones.  A new node has, between the
 old nodes around it, the place that its value of the spacing has between theirs: where the old line
 follows its spacing the new one does, and a line refined without a change of the spacing keeps the
 old nodes.  The chords are what the block's volume was made of: a smooth curve through the same

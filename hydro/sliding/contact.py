@@ -1,7 +1,7 @@
 """Sliding contacts: two lines of faces on each other whose nodes do not match.
 
 The master's line carries the geometry and moves with the contact; the slave's nodes are laid on it
-by their own spacing law.  Where the slave does not cover the master, the master is a free surface.
+by their own spacing.  Where the slave does not cover the master, the master is a free surface.
 Fluxes pass on the pieces of the common refinement, so that what one side gives the other takes to
 the bit; slave cells are polygons (`hydro.sliding.polygons`).  An end of the slave is fixed at an
 end of the master, or it is a contact point: the place where the free line that goes on from there

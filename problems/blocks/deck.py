@@ -1,4 +1,4 @@
-"""The deck of `blocks`: what a block, a side of it and a link are told by.
+"""The deck of `blocks`: how it describes a block, a side of it and a link.
 
 A number may be a formula, text such as "1e5*(1 + 0.1*sin(pi*x))": of x and y [m] in a state, of the
 time t [s] at a side, of the part s of the way from 0 to 1 along a curve.  Formulas are those of

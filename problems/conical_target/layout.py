@@ -14,7 +14,8 @@ within a wavelength to either side is fitted by a parabola and a sine and cosine
 weighted by a squared cosine that is nothing at the window's ends, and the amplitude is that of the
 latter two.  The window goes with the wave, which drifts after the shock's passage
 (`problems.references.shock_polars`).  In a window of one wavelength parabola and wave cannot be
-told apart; while the shock is within a window the line has a kink there, and the fit means nothing.
+distinguished; while the shock is within a window the line has a kink there, and the fit is
+meaningless.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ class AxisGrid(DeckTable, kw_only=True):
         return make_axis(self.kind, n, low, high, walls=self.walls, clustering=self.clustering)
 
     def options(self) -> dict[str, Any]:
-        """What `correct_axis` is to be told besides the kind."""
+        """What `correct_axis` needs besides the kind."""
         names = ("floor", "ratio", "strength", "share", "relaxation")
         return {name: getattr(self, name) for name in names}
 

@@ -1,4 +1,4 @@
-"""Smooth errors of large blocks: gradients summed up to coarse nodes, displacements carried back.
+"""Smooth errors of large blocks: gradients summed to coarse nodes, displacements interpolated back.
 
 A smooth displacement is given at coarse nodes, every few lines of a block, by how many cells alpha
 a node goes along its line j = const and how many, beta, along its line i = const.  Both are linear

@@ -2,7 +2,7 @@
 
     1 the moved grid (R6.5), as it is or after its smooth errors are taken away (R4.13)
     2 Newton steps from it, shortened where corners would lose too much (R4.8)
-    3 where it lost too much itself: the sides' motion carried inside by the old grid's Hessian
+    3 where it lost too much itself: the sides' motion extended inside by the old grid's Hessian
     4 where that folds: untangling (R5.1)
     5 half of the sides' motion at a time, then a map without folds from any start (R5.4)
 

@@ -1,10 +1,10 @@
 """The barrier regridder: one Newton step a time step, on a functional with a barrier.
 
-`regrid(previous, boundary)` carries a valid grid to new boundary nodes (theory R4):
+`regrid(previous, boundary)` moves a valid grid to new boundary nodes (theory R4):
 
     1 laws, lengths, family weights from the new boundary   4 where needed, Hessian and solve
-    2 boundary displacement carried inside                   5 corner areas against the old ones
-    3 look: corner areas, gradient, residual                 6 shorten, untangle, or halve the move
+    2 boundary displacement interpolated to the inside       5 corner areas against the old ones
+    3 residual check: corner areas, gradient, residual       6 shorten, untangle, or halve the move
 
 The promise: every grid handed back is convex, or RegridFailure names side and nodes.  Note:
 the result may depend on `previous` and `boundary` only, never on earlier calls.
@@ -44,7 +44,7 @@ class BarrierRegridder:
     the least number of Newton steps a call; blocks of `coarse_from` cells and more (9000; inf: no
     block) have their smooth errors taken away on coarse nodes (theory R4.13); these and all other
     numbers have their defaults from `tuning`.  With family "i"
-    lines keep the spacing laws that they have in `first_grid` (2, ni+1, nj+1); without it inner
+    lines keep the spacing that they have in `first_grid` (2, ni+1, nj+1); without it inner
     ones have means of the outer two's.
     """
 

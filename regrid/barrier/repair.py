@@ -6,7 +6,7 @@
                  between its two neighbours in that cell, and a little beyond (theory R7.1)
     untangling   the barrier on a smoothed denominator (`regrid.barrier.untangle`)
 
-The nodes of the sides stay.  What was done is counted.  Note: projection mends a node at a
+The nodes of the sides stay.  What was done is counted.  Note: projection repairs a node at a
 time and may only move the fold to the next cell; it is kept where it leaves fewer bad corners
 around the node, and what is still folded after a few rounds is for the untangling, which moves
 every inner node.

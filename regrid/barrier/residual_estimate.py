@@ -425,7 +425,7 @@ def add_own_corners(nodes, cosecant):
 
 
 def make_look(parallel):
-    """The look at a whole block, over its column chunks one after the other or on threads."""
+    """The residual check of a whole block, over its column chunks in turn or on threads."""
 
     @kernel(parallel=parallel)
     def look(nodes, old, law, motion, moves, stretches, totals, chunks):

@@ -152,7 +152,7 @@ def untangle(work, nodes, tuning: Tuning = DEFAULT) -> bool:
 
 
 def unfold(work, nodes, tuning: Tuning, spread_out: bool) -> bool:
-    """Unfold `nodes` (2, ni+1, nj+1) in place without straight lines and laws (theory R5.4).
+    """Unfold `nodes` (2, ni+1, nj+1) in place without straight lines and spacings (theory R5.4).
 
     Their sides are set first; with `spread_out` a nearly harmonic map is where it begins.
     """

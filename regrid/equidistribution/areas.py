@@ -303,7 +303,7 @@ def iterate_ed2(
 class EquidistributionRegridder(WeightedRegridder):
     """`weight`: see `equidistribution.weights`; `smoothing`: passes over what depends on fields.
 
-    `boundary` "given" keeps the sides' nodes to the bit; "equidistributed" places them along the
+    `boundary` "given" leaves the sides' nodes bitwise; "equidistributed" places them along the
     sides' polylines with the same weight (theory R10.9).  `iterations` and `tolerance` (of the
     residual over the fluxes) end the iteration.
     """

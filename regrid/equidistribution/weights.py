@@ -4,7 +4,7 @@ One design for all families that take a weight.  It is given as a number, an arr
 function of x and y, or a formula such as "1 + 10*y" or "1 + 5*|grad(rho)|/max" of
 
     x, y           cell centres of the grid as it is found: follows every iterate
-    rho, u, v, ...  fields of the flow, one value a cell, told before the step (`take_fields`):
+    rho, u, v, ...  fields of the flow, one value a cell, given before the step (`take_fields`):
                    they travel with the cells
     own            1 over the area of the old cells: the density of nodes that the grid has
     sides          the density of nodes that the block's sides ask for, 1 over the conditional
@@ -298,7 +298,7 @@ class Weight:
         return weigh_points(self.given, np.array([x, y]))
 
     def take_fields(self, fields: Mapping[str, np.ndarray]) -> None:
-        """Be told the fields of the cells, (ni, nj) each, that the next grids are to follow."""
+        """Take the fields of the cells, (ni, nj) each, that the next grids are to follow."""
         self.fields = fields
 
     def on(self, previous: np.ndarray, boundary: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
@@ -428,11 +428,11 @@ class WeightedRegridder:
 
     @property
     def sees_flow(self) -> bool:
-        """Is it to be told the fields of a flow and its steps?"""
+        """Does it need the fields of a flow and its steps?"""
         return self.weight.needs_fields or self.owns_sides
 
     def take_step(self, fields: Mapping[str, np.ndarray], step_fraction: float) -> None:
-        """Be told the cells' fields, (ni, nj) each, and the step to come over the stable one."""
+        """Take the cells' fields, (ni, nj) each, and the next step over the stable one."""
         self.weight.take_fields(fields)
         self.step_fraction = float(step_fraction)
 

@@ -1,7 +1,7 @@
 """The six faces of a block: what is asked of them, what follows from them, what is wrong with them.
 
 Lengths of edges, weights of the three families and the volume come from nodes of the faces alone.
-Faces are called i_min, i_max, j_min, j_max, k_min, k_max.  Their displacement is carried inside:
+Faces are called i_min, i_max, j_min, j_max, k_min, k_max.  Their displacement is interpolated:
 its affine part exactly, the rest by a boolean sum.  Faces that leave no valid grid have turned
 corners at the block's edges or folded quadrilaterals.
 

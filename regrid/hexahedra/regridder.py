@@ -1,6 +1,6 @@
 """The barrier regridder for blocks of hexahedra: straight lines, and a barrier against folding.
 
-`regrid(previous, boundary)` carries a valid grid to six new faces (theory R14), by Newton steps or
+`regrid(previous, boundary)` moves a valid grid to six new faces (theory R14), by Newton steps or
 in parts.  The promise: all eight corner tetrahedra of every hexahedron handed back have positive
 volume, or RegridFailure names face and node.  Note: this is less than a positive trilinear Jacobian
 everywhere in a cell; `regrid.measure.hexahedra` measures both.

@@ -1,4 +1,4 @@
-"""Corner triangles and centres of cells: exact signs, and the corners that no inner node can mend.
+"""Corner triangles and centres of cells: exact signs, and corners that no inner node can repair.
 
 The area in floating point decides where it is above its own error bound; elsewhere the sign is
 computed once more with rational numbers, which are exact.  The bound `(3 + 16 u) u (|left| +

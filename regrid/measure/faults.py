@@ -338,7 +338,7 @@ def _find_fault(
     if flat:
         what = (
             f"no grid was found near them: cell ({i}, {j}) is too flat for its equations to be "
-            "solved; mend the grid there first"
+            "solved; repair the grid there first"
         )
     else:
         what = (

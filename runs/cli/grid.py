@@ -138,7 +138,7 @@ def make(source, family, cells, weight, options, at, steps, passes, block, outpu
 @force
 @picture
 def regrid(file, family, weight, options, passes, block, outputs, force, picture) -> None:
-    """Make the inside of your own grid anew; its sides stay to the bit.
+    """Regenerate the inside of your own grid; its side nodes stay bitwise.
 
     A grid with cells that are not convex is untangled first.  A grid in space is
     equidistributed inside its faces (--weight, --option iterations=100).

@@ -50,9 +50,9 @@ from runs.ranks.started import is_for_ranks
 def study(deck, vary, settings, output, jobs, engine, shown, refine, retry, dry_run, quiet) -> int:
     """Run a deck at many points: table, orders and picture.
 
-    DECK may be a study file, or the folder of a study to go on with.  Each point is a run directory
-    in DIR/runs and is computed once, also where the study was killed; a changed deck computes anew
-    what has changed.  Runs that fail are listed and end nothing.
+    DECK may be a study file, or the folder of a study to continue.  Each point is a run directory
+    in DIR/runs and is computed once, also if the study was killed; after a change of the deck only
+    what has changed is computed.  Runs that fail are listed and end nothing.
     """
     from runs.study.command import study as compute
 
@@ -70,7 +70,7 @@ def cli(debug: bool) -> None:
     """Shock hydrodynamics on moving blocks whose grids are rebuilt every step.
 
     \b
-    shockgrid run interface-instability      compute, then look at the summary
+    shockgrid run interface-instability      compute, then print the summary
     shockgrid plot out/interface-instability-1
     """
 

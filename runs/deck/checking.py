@@ -2,7 +2,7 @@
 
 The JSON schema that editors are given says what a deck may hold, and jsonschema finds what breaks
 it; here each refusal becomes a sentence with the full key, where it was given, the value and what
-would be right, an unknown key gets the nearest known one, and all mistakes are told at once.
+would be right, an unknown key gets the nearest known one, and all mistakes are reported at once.
 
 Note: jsonschema takes 0.3 s to be imported.  A deck that msgspec takes, from whose types the
 schema is made, needs no words, and is not shown to it.

@@ -1,7 +1,7 @@
 """From a name or a TOML file and some `--set key=value` to a checked deck.
 
 The deck of a run is, in this order of strength: `--set`, the deck file, the defaults of the
-problem's Deck.  Each thing wrong with it is told in a sentence that names the key, the place, what
+problem's Deck.  Each error in it is reported in a sentence that names the key, the place, what
 was given and what would be right.
 """
 

@@ -1,7 +1,7 @@
 """What a run that ended early leaves behind: sentence, meaning, what has helped, a picture.
 
 Nothing that goes wrong in here may hide the sentence: each part is made by itself, and one that
-cannot be made is told of in its place.
+cannot be made is reported in its place.
 
 What happened there is measured on the outlines of the last dump: two places of one outline that are
 near each other, but far along it, have thin material between them, or a gap.  Below MET of the
@@ -57,7 +57,7 @@ class EarlyEnd:
 def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restart: str) -> EarlyEnd:
     """Write early-end.png and early-end.txt into `directory`, whose last dump shows the end.
 
-    restart: the command that goes on with the run.  The failure gets what was made as its
+    restart: the command that continues the run.  The failure gets what was made as its
     `early_end`, and the words as its notes.  Raises nothing that is an Exception.
     """
     made: dict[str, Any] = {}
@@ -161,7 +161,7 @@ def list_settings(cause: str, deck: ReadDeck) -> list[tuple[str, str]]:
 def make_command(
     setting: str, directory: RunDirectory, deck: ReadDeck, restart: str, point: int | None
 ) -> str:
-    """The command that goes on, or begins anew, with a setting."""
+    """The command that continues, or starts again, with a setting."""
     words = f"--set {shlex.quote(setting)}"
     if not restart.startswith("shockgrid "):  # by a script: blocks of one's own
         return f"{restart}, with {setting}"

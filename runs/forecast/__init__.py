@@ -1,4 +1,4 @@
-"""What a run costs: before it, while it goes on, and why its steps become short.
+"""What a run costs: before it, while it runs, and why its steps become short.
 
 May import: `runs.deck`, `runs.store`, `runs.inspection` and all below them.
 """

@@ -364,7 +364,7 @@ class Size:
 class Cost:
     """A size with steps and seconds as (low, likely, high), None where unknown, and disk [bytes].
 
-    free: bytes of the disk that are free, nan where that cannot be told; grows: may grid lines be
+    free: bytes of the disk that are free, nan where unknown; grows: may grid lines be
     added on the way, so that memory, dumps and steps are those of the beginning?
     """
 

@@ -2,7 +2,7 @@
 
 dt is compared with its largest value so far.  Each time that it has shrunk by another factor of
 FACTOR a mark is made: a line of run.log, and an entry of the verdict.  Once, when it has shrunk
-by MOST, the person is told what can be changed.
+by MOST, the user reads what can be changed.
 
 Steps that are short for other reasons do not count: the first five, the last two, those repeated
 with a smaller dt (`retries` has them).
@@ -110,7 +110,7 @@ class StepTrend:
         self._usual = [] if flow is None else [_find_usual(block) for block in flow.blocks]
 
     def resume(self, history: Mapping[str, np.ndarray]) -> None:
-        """Take up where a run that goes on was, from its history."""
+        """Continue where a restarted run was, from its history."""
         dts, limits = history.get("dt"), history.get("dt_limit")
         if dts is None or limits is None or dts.dtype.kind != "f":
             return

@@ -1,6 +1,6 @@
 """Making a grid: on a named domain by marching, on given sides by passes, in a block of space.
 
-Every family carries a valid grid to new sides, so sides given all at once need a first grid:
+Every family moves a valid grid to new sides, so sides given all at once need a first grid:
 transfinite interpolation, repaired where it is folded.
 Then the family is called again and again until its grid stays where it is.
 
@@ -172,7 +172,7 @@ def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> 
 
 
 def regrid_plane(nodes: np.ndarray, regridder, passes: int) -> Made:
-    """A user's plane grid made anew on its own sides; one that is not valid is untangled first."""
+    """A user's plane grid regenerated on its sides; one that is not valid is untangled first."""
     turned = _positive(nodes)
     try:
         repaired = repair_grid(turned)

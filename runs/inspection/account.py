@@ -1,10 +1,9 @@
 """What a run's history says in words, and the verdict on it: how it ended, what limits trust in it.
 
-Each rule of RULES measures
-one thing in the history and says from what value on it is told.  A verdict is plain data: `status`
-("finished", "stopped", "ended early", "unfinished"), `name` (the reason in a word or two), `reason`
-(its sentence), `trust` (a list of what the rules found, each with `rule`, `value`, `limit`,
-`words`), and `dt_trend` (marks of `runs.forecast.step_trend`).
+Each rule of RULES measures one thing in the history and says from what value on it is reported.  A
+verdict is plain data: `status` ("finished", "stopped", "ended early", "unfinished"), `name` (the
+reason in a word or two), `reason` (its sentence), `trust` (list of what the rules found, each with
+`rule`, `value`, `limit`, `words`), and `dt_trend` (marks of `runs.forecast.step_trend`).
 """
 
 from __future__ import annotations
@@ -251,9 +250,9 @@ OWN_REASONS = ("start", "t_end", "end", "dump", "retry")  # of a step's length: 
 
 
 class Rule(NamedTuple):
-    """What is measured (nan where the run has no such thing), the value above which it is told.
+    """What is measured (nan where the run has no such thing), the value above which it is reported.
 
-    words: with `{value}`, `{share}`; meaning: for the table in the pages; below: told below it.
+    words: with `{value}`, `{share}`; meaning: for the table in the pages; below: reported below it.
     """
 
     name: str

@@ -95,7 +95,7 @@ def other_name(block) -> str:
 
 
 def say_restart(run: RunData) -> str:
-    """How a run goes on; the usual command where its problem cannot be made."""
+    """How to continue a run; the usual command where its problem cannot be made."""
     try:
         return run.problem.say_restart(run.directory.quoted)
     except BadInput:
@@ -113,7 +113,7 @@ def describe_problem(run: RunData) -> str:
 
 
 def describe_directory(path: str) -> str:
-    """What was run, how far it came, how well it kept, and what there is to look at."""
+    """What was run, how far it came, its conservation errors, and what there is to see."""
     run = RunData(path, lenient=True)
     lines = [f"{run.path}: {run.problem_name}{describe_problem(run)}"]
     quoted = run.directory.quoted

@@ -51,7 +51,7 @@ def continue_case(
     settings: tuple[str, ...] = (),
     measure: Measure | None = None,
 ) -> Case:
-    """A case that goes on with the run in `directory` with blocks made anew by its script.
+    """A case that continues the run in `directory` with blocks rebuilt by its script.
 
     Raises BadInput for a run of something else, for a simulation that has marched already, and
     where its blocks have other materials.
@@ -185,7 +185,7 @@ def restart(
 ) -> OpenRun:
     """Go on with a run from its last restart point, or from that of step `at`; its data.
 
-    simulation: for a run of blocks of one's own, the same blocks made anew.  cells: the deck's key
+    simulation: for a run of your own blocks, the same blocks rebuilt.  cells: the deck's key
     of that name, where the state is to be laid on another grid; the run then goes on in `output`
     [out/<problem>-<n>], without hooks.  measure, hooks: as the run had them.  settings: keys
     of the deck that say how to march, such as run.t_end and output.*.  Raises BadInput where

@@ -1,4 +1,4 @@
-"""A problem with its deck, to look at, step, run and draw: what `shockgrid.load` gives.
+"""A problem with its deck, to inspect, step, run and draw: what `shockgrid.load` returns.
 
 Note: blocks are built when they are first asked for, which may compile kernels for a minute;
 their arrays are live (`runs.interface.case`).

@@ -97,7 +97,7 @@ INTERRUPTED = 130
 class OpenRun(RunData):
     """A run: `.deck`, `.history`, `.dumps[-1]["second"].rho`, `.problem`, and what follows.
 
-    Everything is read when it is first asked for; a run that is still marching is opened anew to
+    Everything is read at first use; a run that is still marching is opened again to
     see more of it.  `dumps` are in order of time; `reason` says why the run that was just made
     ended, and is "" where the directory was opened.
     """
@@ -123,7 +123,7 @@ class OpenRun(RunData):
 
     @property
     def summary(self) -> str:
-        """The summary; of a run that did not end, what the problem says of it so far."""
+        """The summary; of an unfinished run, what the problem says of it so far."""
         if self.directory.summary.exists():
             return self.directory.summary.read_text(encoding="utf-8").rstrip("\n")
         return self.problem.summary(self.history, None) if len(self.history.get("t", ())) else ""

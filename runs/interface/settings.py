@@ -208,7 +208,7 @@ def register(name: str, thing: type) -> None:
     """Make a class known by name: a problem, an equation of state, a boundary kind, a regridder.
 
     A regridder is a class with a method `regrid(previous, boundary)`.  The same name may be given
-    again by the same class, written anew.  Raises BadInput for another class, for a name that is
+    again by the same class, rewritten.  Raises BadInput for another class, for a name that is
     taken, and for one that is not of small letters, digits and hyphens.
     """
     if not isinstance(thing, type):

@@ -1,4 +1,4 @@
-"""Making the runner of a new run, or of one that goes on."""
+"""Making the runner of a new or a continued run."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def continue_runner(
     say: Callable[[str], None] = lambda text: None,
     world: World | None = None,
 ) -> Runner:
-    """A runner for the deck in `directory` with `settings`; its `resume` goes on.
+    """A runner for the deck in `directory` with `settings`; its `resume` continues.
 
     at: step of the restart point that `resume` will be asked for.  say: is told the cautions of a
     run that goes on beyond the end that it was set up for.  world: the ranks of MPI that are to

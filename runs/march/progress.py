@@ -166,7 +166,7 @@ class Progress:
         return ", ".join(words)
 
     def remaining(self, evolution: Evolution, now: float) -> str:
-        """Wall time left in words, a range where it is uncertain; anew once a second."""
+        """Wall time left in words, a range where it is uncertain; updated once a second."""
         since, words = self._left_said
         if now - since >= 1.0:
             found = self.left.foretell(self.steps, evolution.t, now)

@@ -35,7 +35,7 @@ def find_restart_point(
     """State and step of the last restart point that can be read, or of step `at`; rows of `tables`.
 
     tables: the history, and the table of gauges of a deck that has some.  Where one of them is
-    damaged, or ends before a point, the point is one from before that; at step 0 they begin anew.
+    damaged, or ends before a point, the point is one from before that; at step 0 they start again.
     """
     points = [entry for entry in directory.list_points() if not is_light(entry[1])]
     found = [read_rows(path) for path in tables]

@@ -3,7 +3,7 @@
 A run ends in one of five ways: finished (exit 0, or 3 where it has not reached what it is for),
 at its limit of wall time (a restart point is written, exit code 0), stopped by a signal (the same,
 exit code 130 or 143), failed in its physics (exit 3), or out of disk (exit 2).  In each the
-directory can be read and continued.  SIGUSR1 writes a restart point, and the run goes on.  Dumps
+directory can be read and continued.  SIGUSR1 writes a restart point, and the run continues.  Dumps
 fall on the first step past their time and never change dt.
 """
 
@@ -53,7 +53,7 @@ from runs.store.provenance import describe_provenance, find_provenance
 
 
 class Background:
-    """A file that is written while the run goes on, one at a time, by a thread.
+    """A file that a thread writes while the run continues, one at a time.
 
     What follows a file (older restart points go, the sidecar shows it) is done by the thread of the
     run, when that looks and the file is on the disk.  As a context it is left when that is so.

@@ -275,7 +275,7 @@ def choose_dumps(
 
     Without times of its own (iterations) a run is shown by its last state.
 
-    `say` is told of times that lie outside the run.
+    `say` receives a message for times outside the run.
     """
     if not run.dumps:
         words = f": {run.skipped[0]}" if run.skipped else ""

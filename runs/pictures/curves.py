@@ -250,7 +250,7 @@ def take_lineouts(
     view: View,
     say: Callable[[str], None] | None = None,
 ) -> list[Lineout]:
-    """The cells of the dumps along the line; `say` is told of dumps where it meets none.
+    """The cells of the dumps along the line; `say` reports dumps where it meets none.
 
     Raises BadInput where it meets no cell of any of them, or a field is missing.
     """

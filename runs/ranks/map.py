@@ -64,7 +64,7 @@ def read_costs() -> Mapping[str, float]:
 def foretell_speed(cells: Sequence[tuple[int, int]], shares: Shares, ranks: int) -> float:
     """The time of a step on one rank over that on `ranks`, of blocks with these cells (ni, nj).
 
-    A cut block is regridded by its home alone; what goes between its bands is left out.
+    Only its owner rank regrids a cut block; messages between its bands are left out.
     """
     cost = read_costs()
     faces = sum(2 * (ni + nj) for ni, nj in cells)
@@ -118,7 +118,7 @@ def describe_map(
 def estimate_memories(cells: Sequence[tuple[int, int]], shares: Shares, ranks: int) -> list[float]:
     """Bytes that each rank takes at its peak, of blocks with these cells (ni, nj).
 
-    The first rank and the home of a cut block have whole blocks; the others their bands and the
+    The first rank and the owner of a cut block have whole blocks; the others their bands and the
     rows along the sides of all.
     """
     ring = sum(

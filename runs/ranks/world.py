@@ -1,7 +1,7 @@
 """The ranks that `mpiexec -n N shockgrid run` has started, as the first one sees them.
 
 The first rank runs the command as it would alone: it reads the deck, prints, and writes all
-files.  The others wait to be told (`runs.ranks.world`): to build the flow, as the first one
+files.  The others wait for orders (`runs.ranks.world`): to build the flow, as the first one
 does at the same time, to begin, to make a step, to send what they have computed, to end.  MPI is
 asked for nothing unless the environment says that more than one rank was started.
 
@@ -57,7 +57,7 @@ class World:
     def build(self, deck: ReadDeck) -> None:
         """Let the other ranks build the evolution of a checked deck, while this one does so.
 
-        What fails there is told when they begin, if the first rank has not failed by then.
+        What fails there is reported when they begin, if the first rank has not failed by then.
         """
         if self._sent == (text := deck.to_toml()):
             return
@@ -153,7 +153,7 @@ PATIENCE = 0.05  # seconds: less than mpiexec has
 
 @contextlib.contextmanager
 def loss_told(several: bool, is_heard: Callable, describe: Callable[[], str]):
-    """In the block: SIGTERM that the main thread does not hear of is told on standard error.
+    """In the block: SIGTERM that the main thread misses is reported on standard error.
 
     several: are there other ranks at all?  is_heard: has the main thread's handler been called?
     describe: gives the end of the sentence.  Only a main thread can watch; others pass.
@@ -197,7 +197,8 @@ NOTED = "ranks: "  # how the line of run.log begins; JSON follows
 def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str]:
     """The line of the summary, none for a run in one process; all ranks have to be alive.
 
-    note: takes the line of run.log, the books of all ranks (`hydro.ranks.messages.Book.gather`).
+    note: takes the line of run.log, the message counts of all ranks
+    (`hydro.ranks.messages.Book.gather`).
     """
     if world is None or world.ranks is None:
         return []

@@ -133,7 +133,7 @@ def find_parts_by_name(path: Path) -> list[Path]:
 
 
 def find_unlisted_parts(folder: Path, indexes: Iterable[Path]) -> list[Path]:
-    """Parts in `folder` that no index lists; those of an index that cannot be read are not told."""
+    """Parts in `folder` that no index lists; those of an unreadable index are omitted."""
     parts = [path for path in folder.iterdir() if PART_NAME.fullmatch(path.name)]
     if not parts:
         return []

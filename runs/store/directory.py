@@ -112,7 +112,7 @@ class RunDirectory:
         return len(later)
 
     def forget_early_end(self) -> None:
-        """Remove what an early end has left, as the run goes on."""
+        """Remove what an early end has left, as the run continues."""
         for path in (self.early_picture, self.early_words):
             with disk_errors(path):
                 path.unlink(missing_ok=True)

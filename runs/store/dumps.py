@@ -179,7 +179,7 @@ def write_head(
 def find_shown(
     blocks: Sequence[BlockView], state: Mapping[str, Any]
 ) -> dict[str, str | tuple[str, ...]]:
-    """Arrays of a state that lie in the blocks, too, to the last bit: path of the whole or paths of
+    """Arrays of a state that lie in the blocks, too, bitwise: path of the whole or paths of
     its rows by key.  Of equal arrays that of the same block goes first."""
     shown: dict[tuple, list[tuple[str, np.ndarray]]] = {}
     for block in blocks:
@@ -327,7 +327,7 @@ def damage_told(path: Path, what: str) -> Iterator[None]:
 def open_dump(path: Path) -> h5py.File:
     """Open a dump for reading.
 
-    Raises BadInput where it is none, is torn or damaged, or of a format that is not known.
+    Raises BadInput where it is none, is truncated or damaged, or of a format that is not known.
     """
     if not path.is_file():
         raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is no file")

@@ -1,7 +1,7 @@
 """Writing a file so that a reader sees the old one or the new one, never half of one.
 
 Errors of the disk come out as BadInput with the file's name: a full disk, a folder that cannot be
-written, are for the person at the keyboard to mend.
+written, are for the user to repair.
 """
 
 from __future__ import annotations

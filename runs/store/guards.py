@@ -168,7 +168,7 @@ def read_run_deck(
     """The checked deck of a run, `settings` laid over it.
 
     strict: for going on; raises BadInput where the problem's file is no longer as it was.  say: is
-    then told what is wrong with the log alone.  Raises BadInput, too, for a deck or a
+    then given what is wrong with the log alone.  Raises BadInput, too, for a deck or a
     kept file that cannot be read.
     """
     if strict and (fault := check_deck(directory)):
@@ -244,7 +244,7 @@ def _sum(verdict: dict[str, Any]) -> str:
 
 
 def remove_verdict(directory: RunDirectory) -> None:
-    """Take the verdict away: the run goes on."""
+    """Remove the verdict: the run continues."""
     (directory.verdict).unlink(missing_ok=True)
 
 

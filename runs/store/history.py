@@ -1,7 +1,7 @@
 """history.csv: one row a step, appended and flushed, so that a kill leaves it readable.
 
 The first row is step 0, where only some columns have a value; an empty field reads as nan (as ""
-in a column of words).  A last line without its end is a torn write and is dropped on reading.
+in a column of words).  A last line without its end is an incomplete write; reading drops it.
 Numbers are written with `repr`, so that they read back to the same bits.
 
 The last column, `crc32`, is the CRC-32 of the file's first line, the step of the row before and
@@ -229,7 +229,7 @@ def _to_array(texts: tuple[str, ...]) -> np.ndarray:
 
 
 def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> None:
-    """Raise BadInput where a run that goes on would have other columns than the history at `path`.
+    """Raise BadInput where a continued run would have other columns than the history at `path`.
 
     measured: names of the columns that the deck and the problem add to those of the evolution.
     Columns that are missing are found in flows alone, which tell their rows before a step.
@@ -250,7 +250,7 @@ def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> 
 
 
 def truncate_history(path: Path, step: int, source: Rows | None = None) -> list[str] | None:
-    """Drop all rows after `step`, and a torn line; the columns, None if none are known.
+    """Drop all rows after `step`, and an incomplete line; the columns, None if none are known.
 
     source: rows of another file, which are put in place of those.  Raises BadInput where rows up to
     `step` are lost.

@@ -1,9 +1,9 @@
-"""One point of a study in its folder: computed from the start, gone on with, or there already.
+"""One point of a study in its folder: computed from the start, continued, or complete already.
 
-What is to be done is told from the folder alone.  `result.json` is written when a run has ended;
-it holds the digest of the deck and what the table takes.  Without it a run of the same deck goes on
-from its last restart point.  A run of another deck is moved to `superseded` and the point begins
-anew.  A run that was stopped, or that the disk failed, has no result; it goes on the next
+The folder alone determines what remains to be done.  `result.json` is written when a run has ended;
+it holds the digest of the deck and the values of the table.  Without it a run of the same deck
+continues from its last restart point.  A run of another deck is moved to `superseded` and the point
+starts again.  A run that was stopped, or that the disk failed, has no result; it continues the next
 time.
 """
 

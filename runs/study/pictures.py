@@ -54,7 +54,7 @@ def draw_study(study: Any) -> Figure:
 
 
 def save_figure(figure: Figure, path: Path, deck_text: str | None = None) -> None:
-    """Write the figure, its kind told by the ending; whole or not at all.
+    """Write the figure, in the format of the file ending; whole or not at all.
 
     deck_text: the study's definition as TOML, for the metadata.
     """

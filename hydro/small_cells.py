@@ -541,7 +541,7 @@ class BlockSharing:
         return left
 
     def share(self, limit: float, inverse_dt: float, rows: Rows) -> int:
-        """Mend the new state where cells of these rows were too small; how many have changed."""
+        """Redistribute the new state where cells of these rows were too small; how many changed."""
         block = self.block
         small = self._find_small(limit, rows)
         if len(small) == 0:
@@ -629,7 +629,7 @@ class SmallCells:
         self.fastest = Fastest(found[number][0], number, *found[number][1:3])
 
     def share_states(self, rate: float, dt: float) -> None:
-        """Mend the new states of cells above `rate`, the one that a step `dt` is stable for."""
+        """Redistribute the new states of cells above `rate`, that for which `dt` is stable."""
         self.changed = 0
         for sharing in self.sharing:
             sharing.block.shared_cells = 0  # of a step before, or of this one before a retry
@@ -653,5 +653,5 @@ class SmallCells:
 
 
 def _list_mended(block: Block) -> tuple[np.ndarray, ...]:
-    """The arrays that redistribution mends."""
+    """The arrays that redistribution changes."""
     return block.state_new, block.void_energy_new, block.rates_new

@@ -15,7 +15,7 @@ Refined on the way (`Refinement`) are blocks with the same lines j = const, whic
 interfaces from block to block.  Where a segment of an interface has grown long, or the line turns
 sharply beside it, the column of cells on both sides is split; where a line has become straight and
 its segments short, one goes (theory F12.6).  What is chosen depends on the nodes and the step
-alone, and simulation and blocks are made anew by the problem's own rules, with first grids that are
+alone, and simulation and blocks are rebuilt by the problem's own rules, with first grids that are
 the first ones sampled: a restart, which knows nothing but the nodes, comes to the same.
 """
 

@@ -346,16 +346,6 @@ class Simulation:
         row = self.compute_row("start", 0)
         return {name: row[name] for name in row if name.startswith(START_COLUMNS)}
 
-    def measure_restored(self) -> dict:
-        """Totals, and what came through the boundary, of a state that `set_state` took up.
-
-        Not for a continued run: its blocks sum again, which may change their last bits.
-        """
-        for block in self.blocks:
-            block.update(0.0)
-        row = self.compute_row("start", 0)
-        return {name: row[name] for name in row if name.startswith(("total_", "boundary_"))}
-
     def compute_row(self, limit: str, retries: int) -> dict:
         """The history row of the current state."""
         row = {

@@ -269,12 +269,8 @@ class Workspace:
             self.block.meeting, self.sides
         )
 
-    def take_first_grid(self, first) -> None:
-        """Keep the spacing law that each line j = const has in the grid `first`; theory R4.9."""
-        self.take_laws(find_bend(first))
-
     def take_laws(self, bend: np.ndarray) -> None:
-        """Keep the departures `bend` (ni+1, nj+1) of `find_bend`."""
+        """Keep the spacing law that each line j = const has: `bend` (ni+1, nj+1) of `find_bend`."""
         self.most_bend[:] = np.maximum(bend.max(axis=0), -bend.min(axis=0))
         self.bent = is_bent(bend)
         if self.bent:

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrid.errors import BadInput
-from regrid.jit import kernel
+from regrid.jit import inlined, kernel
 from regrid.measure.corners import (
     BOUND,
     UNDERFLOW,
@@ -54,20 +54,60 @@ class Quality:
     triangles: int = 0
 
 
+@inlined
+def take_edges(x0, y0, x1, y1, j):
+    """The edges of cell j between two rows of nodes: along i at j and at j + 1, then along j at
+    the first row and at the second."""
+    return (
+        (x1[j] - x0[j], y1[j] - y0[j]), (x1[j + 1] - x0[j + 1], y1[j + 1] - y0[j + 1]),
+        (x0[j + 1] - x0[j], y0[j + 1] - y0[j]), (x1[j + 1] - x1[j], y1[j + 1] - y1[j]),
+    )  # fmt: skip
+
+
+@inlined
+def square(edge):
+    return edge[0] * edge[0] + edge[1] * edge[1]
+
+
+@inlined
+def find_areas(low, high, near, far):
+    """Doubled areas of a cell's corner triangles, from its `take_edges`."""
+    return (
+        low[0] * near[1] - low[1] * near[0], high[0] * near[1] - high[1] * near[0],
+        high[0] * far[1] - high[1] * far[0], low[0] * far[1] - low[1] * far[0],
+    )  # fmt: skip
+
+
+@inlined
+def measure_cell(low, high, near, far):
+    """Least sine of a cell's corners, squared with its sign, so that one root serves a whole grid;
+    squares and product of the doubled mid-lines along i and along j."""
+    area_1, area_2, area_3, area_4 = find_areas(low, high, near, far)
+    low_2, high_2, near_2, far_2 = square(low), square(high), square(near), square(far)
+    sine_1 = area_1 * abs(area_1) / (low_2 * near_2)
+    sine_2 = area_2 * abs(area_2) / (high_2 * near_2)
+    sine_3 = area_3 * abs(area_3) / (high_2 * far_2)
+    sine_4 = area_4 * abs(area_4) / (low_2 * far_2)
+    low_sine = sine_1 if sine_1 < sine_2 else sine_2
+    high_sine = sine_3 if sine_3 < sine_4 else sine_4
+    mid, across = (low[0] + high[0], low[1] + high[1]), (near[0] + far[0], near[1] + far[1])
+    dot = mid[0] * across[0] + mid[1] * across[1]
+    sine = low_sine if low_sine < high_sine else high_sine
+    return sine, square(mid), square(across), dot
+
+
 @kernel
 def fill_corner_areas(nodes, out):
     """Signed areas of the four corner triangles of every cell into `out` (4, ni, nj)."""
     x, y = nodes[0], nodes[1]
     for i in range(out.shape[1]):
+        x0, y0, x1, y1 = x[i], y[i], x[i + 1], y[i + 1]
         for j in range(out.shape[2]):
-            low_x, low_y = x[i + 1, j] - x[i, j], y[i + 1, j] - y[i, j]
-            high_x, high_y = x[i + 1, j + 1] - x[i, j + 1], y[i + 1, j + 1] - y[i, j + 1]
-            near_x, near_y = x[i, j + 1] - x[i, j], y[i, j + 1] - y[i, j]
-            far_x, far_y = x[i + 1, j + 1] - x[i + 1, j], y[i + 1, j + 1] - y[i + 1, j]
-            out[0, i, j] = 0.5 * (low_x * near_y - low_y * near_x)
-            out[1, i, j] = 0.5 * (high_x * near_y - high_y * near_x)
-            out[2, i, j] = 0.5 * (high_x * far_y - high_y * far_x)
-            out[3, i, j] = 0.5 * (low_x * far_y - low_y * far_x)
+            area_1, area_2, area_3, area_4 = find_areas(*take_edges(x0, y0, x1, y1, j))
+            out[0, i, j] = 0.5 * area_1
+            out[1, i, j] = 0.5 * area_2
+            out[2, i, j] = 0.5 * area_3
+            out[3, i, j] = 0.5 * area_4
 
 
 @kernel
@@ -75,17 +115,15 @@ def fill_scaled_jacobians(nodes, out):
     """Sines of the four corner angles of every cell into `out` (4, ni, nj); NaN at a zero edge."""
     x, y = nodes[0], nodes[1]
     for i in range(out.shape[1]):
+        x0, y0, x1, y1 = x[i], y[i], x[i + 1], y[i + 1]
         for j in range(out.shape[2]):
-            low_x, low_y = x[i + 1, j] - x[i, j], y[i + 1, j] - y[i, j]
-            high_x, high_y = x[i + 1, j + 1] - x[i, j + 1], y[i + 1, j + 1] - y[i, j + 1]
-            near_x, near_y = x[i, j + 1] - x[i, j], y[i, j + 1] - y[i, j]
-            far_x, far_y = x[i + 1, j + 1] - x[i + 1, j], y[i + 1, j + 1] - y[i + 1, j]
-            low, high = low_x * low_x + low_y * low_y, high_x * high_x + high_y * high_y
-            near, far = near_x * near_x + near_y * near_y, far_x * far_x + far_y * far_y
-            out[0, i, j] = (low_x * near_y - low_y * near_x) / np.sqrt(low * near)
-            out[1, i, j] = (high_x * near_y - high_y * near_x) / np.sqrt(high * near)
-            out[2, i, j] = (high_x * far_y - high_y * far_x) / np.sqrt(high * far)
-            out[3, i, j] = (low_x * far_y - low_y * far_x) / np.sqrt(low * far)
+            low, high, near, far = take_edges(x0, y0, x1, y1, j)
+            area_1, area_2, area_3, area_4 = find_areas(low, high, near, far)
+            low_2, high_2, near_2, far_2 = square(low), square(high), square(near), square(far)
+            out[0, i, j] = area_1 / np.sqrt(low_2 * near_2)
+            out[1, i, j] = area_2 / np.sqrt(high_2 * near_2)
+            out[2, i, j] = area_3 / np.sqrt(high_2 * far_2)
+            out[3, i, j] = area_4 / np.sqrt(low_2 * far_2)
 
 
 # Rows of the scratch of `measure_rows`, and of its result (one value a row of cells).
@@ -102,35 +140,17 @@ def measure_rows(nodes, rows, worst, bad_cells):
     x, y = nodes[0], nodes[1]
     ni, nj = worst.shape[1], x.shape[1] - 1
     for i in range(ni):
+        x0, y0, x1, y1 = x[i], y[i], x[i + 1], y[i + 1]
         for j in range(nj):
-            low_x, low_y = x[i + 1, j] - x[i, j], y[i + 1, j] - y[i, j]
-            high_x, high_y = x[i + 1, j + 1] - x[i, j + 1], y[i + 1, j + 1] - y[i, j + 1]
-            near_x, near_y = x[i, j + 1] - x[i, j], y[i, j + 1] - y[i, j]
-            far_x, far_y = x[i + 1, j + 1] - x[i + 1, j], y[i + 1, j + 1] - y[i + 1, j]
-            area_1 = low_x * near_y - low_y * near_x
-            area_2 = high_x * near_y - high_y * near_x
-            area_3 = high_x * far_y - high_y * far_x
-            area_4 = low_x * far_y - low_y * far_x
-            low, high = low_x * low_x + low_y * low_y, high_x * high_x + high_y * high_y
-            near, far = near_x * near_x + near_y * near_y, far_x * far_x + far_y * far_y
-            # The sign goes through the squares, so that one root a row serves all corners.
-            sine_1 = area_1 * abs(area_1) / (low * near)
-            sine_2 = area_2 * abs(area_2) / (high * near)
-            sine_3 = area_3 * abs(area_3) / (high * far)
-            sine_4 = area_4 * abs(area_4) / (low * far)
+            edges = take_edges(x0, y0, x1, y1, j)
+            area_1, area_2, area_3, area_4 = find_areas(*edges)
+            sine, along, across, dot = measure_cell(*edges)
             low_area = area_1 if area_1 < area_2 else area_2
             high_area = area_3 if area_3 < area_4 else area_4
-            low_sine = sine_1 if sine_1 < sine_2 else sine_2
-            high_sine = sine_3 if sine_3 < sine_4 else sine_4
-            mid_x, mid_y = low_x + high_x, low_y + high_y
-            cross_x, cross_y = near_x + far_x, near_y + far_y
-            along = mid_x * mid_x + mid_y * mid_y
-            across = cross_x * cross_x + cross_y * cross_y
-            dot = mid_x * cross_x + mid_y * cross_y
             # Comparisons lose a NaN in one corner; the sum does not.
             spoiled = 0.0 * (area_1 + area_2 + area_3 + area_4)
             rows[AREA, j] = (low_area if low_area < high_area else high_area) + spoiled
-            rows[SINE, j] = low_sine if low_sine < high_sine else high_sine
+            rows[SINE, j] = sine
             rows[ASPECT, j] = along / across if along > across else across / along
             rows[SKEW, j] = dot * dot / (along * across)
         area, sine, aspect, skew, bad = rows[AREA, 0], rows[SINE, 0], 0.0, 0.0, 0
@@ -278,32 +298,13 @@ def reduce_worst(nodes, rows):
     for i in range(ni):
         x0, y0, x1, y1 = nodes[0, i], nodes[1, i], nodes[0, i + 1], nodes[1, i + 1]
         for j in range(nj):
-            low_x, low_y = x1[j] - x0[j], y1[j] - y0[j]
-            high_x, high_y = x1[j + 1] - x0[j + 1], y1[j + 1] - y0[j + 1]
-            near_x, near_y = x0[j + 1] - x0[j], y0[j + 1] - y0[j]
-            far_x, far_y = x1[j + 1] - x1[j], y1[j + 1] - y1[j]
-            area_1 = low_x * near_y - low_y * near_x
-            area_2 = high_x * near_y - high_y * near_x
-            area_3 = high_x * far_y - high_y * far_x
-            area_4 = low_x * far_y - low_y * far_x
-            low, high = low_x * low_x + low_y * low_y, high_x * high_x + high_y * high_y
-            near, far = near_x * near_x + near_y * near_y, far_x * far_x + far_y * far_y
-            # The sign goes through the squares, so that one root serves all corners.
-            sine_1 = area_1 * abs(area_1) / (low * near)
-            sine_2 = area_2 * abs(area_2) / (high * near)
-            sine_3 = area_3 * abs(area_3) / (high * far)
-            sine_4 = area_4 * abs(area_4) / (low * far)
-            mid_x, mid_y = low_x + high_x, low_y + high_y
-            cross_x, cross_y = near_x + far_x, near_y + far_y
-            along = mid_x * mid_x + mid_y * mid_y
-            across = cross_x * cross_x + cross_y * cross_y
+            edges = take_edges(x0, y0, x1, y1, j)
+            area_1, area_2, area_3, area_4 = find_areas(*edges)
+            sine, along, across, _ = measure_cell(*edges)
             longer = along if along > across else across
             shorter = across if along > across else along
             aspect = longer / shorter
             good = (area_1 > 0.0) & (area_2 > 0.0) & (area_3 > 0.0) & (area_4 > 0.0)
-            low_sine = sine_1 if sine_1 < sine_2 else sine_2
-            high_sine = sine_3 if sine_3 < sine_4 else sine_4
-            sine = low_sine if low_sine < high_sine else high_sine
             sines[j] = sine if sine < sines[j] else sines[j]
             aspects[j] = aspect if aspect > aspects[j] else aspects[j]
             bad[j] += 0.0 if good else 1.0
@@ -403,10 +404,3 @@ def measure_turns(line: np.ndarray) -> np.ndarray:
     before, after = np.diff(line[:, :-1], axis=1), np.diff(line[:, 1:], axis=1)
     cross = before[0] * after[1] - before[1] * after[0]
     return np.arctan2(cross, (before * after).sum(axis=0))
-
-
-def measure_edge_ratio(line: np.ndarray) -> float:
-    """The largest ratio of the lengths of neighbouring segments of a polyline (2, n)."""
-    lengths = np.hypot(*np.diff(line, axis=1))
-    ratios = lengths[1:] / lengths[:-1]
-    return float(np.maximum(ratios, 1.0 / ratios).max())

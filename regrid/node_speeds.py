@@ -24,6 +24,7 @@ ROUNDS = 24  # at most, in which nodes of folded cells go back to the new grid
 BLENDS = 12  # halvings of the way to the new grid that all nodes go where folds would not end
 LOOSE = 2.0  # times as far as others may go nodes of cells that would be sharpened otherwise
 ROUND_OFF = 1e-12  # relative, well above that of an area or a comparison
+FLAT = 0.01  # sine of an obtuse corner, below which it is nearly a straight line
 KEPT = 0.98  # of the lesser of a corner's areas, old and new, is left where a node is limited
 
 
@@ -64,13 +65,26 @@ def find_fast_rows(old, new, interpolated, most, first, last):
     return rows
 
 
+@inlined
+def measure_spacing(area, along, a, b, wide):
+    """Square of a corner's height over its longer edge; a, b: squares of the edges.
+
+    area, along: cross and scalar product of the edges.  wide: of a FLAT corner the shorter edge,
+    since a cell with a flat corner need not be thin.
+    """
+    if wide and along < 0.0 and area * area < FLAT * FLAT * a * b:
+        return min(a, b)
+    return area * area / max(a, b)
+
+
 @kernel
-def fill_limited(old, new, interpolated, most, first, last, out):
+def fill_limited(old, new, interpolated, most, first, last, wide, out):
     """Nodes of `new`, each at most `most` local spacings from where interpolation puts it.
 
     old, new, interpolated (displacements), out: (2, ni + 1, nj + 1), in m.  The local spacing is
     the least height of the four old corner triangles at the node over their longer edges: in a
     sheared sliver its thickness, where the shortest edge would let a node cross many cells.
+    wide: see `measure_spacing`.
     Only nodes from `first` to `last` (ni + 1) of a row are looked at, and both are brought to the
     nodes limited.  Returns the number of these.  Theory R8.2.
     """
@@ -91,10 +105,11 @@ def fill_limited(old, new, interpolated, most, first, last, out):
             dx, dy = x[i, j - 1] - x[i, j], y[i, j - 1] - y[i, j]
             a, b = ax * ax + ay * ay, bx * bx + by * by
             c, d = cx * cx + cy * cy, dx * dx + dy * dy
-            limit = (ax * by - ay * bx) ** 2 / max(a, b)
-            limit = min(limit, (bx * cy - by * cx) ** 2 / max(b, c))
-            limit = min(limit, (cx * dy - cy * dx) ** 2 / max(c, d))
-            limit = most * most * min(limit, (dx * ay - dy * ax) ** 2 / max(d, a))
+            limit = measure_spacing(ax * by - ay * bx, ax * bx + ay * by, a, b, wide)
+            limit = min(limit, measure_spacing(bx * cy - by * cx, bx * cx + by * cy, b, c, wide))
+            limit = min(limit, measure_spacing(cx * dy - cy * dx, cx * dx + cy * dy, c, d, wide))
+            limit = min(limit, measure_spacing(dx * ay - dy * ax, dx * ax + dy * ay, d, a, wide))
+            limit *= most * most
             if square > limit:
                 keep = (limit / square) ** 0.5
                 out[0, i, j] = x[i, j] + interpolated[0, i, j] + keep * excess_x
@@ -220,11 +235,12 @@ class MotionLimiter:
         fill_displacement(old, new, interpolated)
         if find_fast_rows(old, new, interpolated, most, first, last) == 0:
             return new, 0
-        count = fill_limited(old, new, interpolated, most, first, last, held)
+        count = fill_limited(old, new, interpolated, most, first, last, False, held)
         if count == 0:
             return new, 0
         self.far_first[:], self.far_last[:] = first, last
-        fill_limited(old, new, interpolated, LOOSE * most, self.far_first, self.far_last, far)
+        far_first, far_last = self.far_first, self.far_last
+        fill_limited(old, new, interpolated, LOOSE * most, far_first, far_last, True, far)
         for _ in range(HALVINGS):
             if relax_sharpened(old, far, held, first, last, self.loose) == 0:
                 break
@@ -235,7 +251,7 @@ class MotionLimiter:
         if len(find_bad_cells(held)) == 0:
             return held, count
         find_fast_rows(old, new, interpolated, most, first, last)
-        fill_limited(old, new, interpolated, most, first, last, held)
+        fill_limited(old, new, interpolated, most, first, last, False, held)
         for halvings in range(BLENDS, 0, -1):
             np.subtract(new, held, out=far)
             far *= 0.5**halvings

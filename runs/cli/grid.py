@@ -13,20 +13,20 @@ from runs.cli.terminal import Commands, echo
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 def grid() -> None:
-    """Make, regrid, judge and compare grids, without flow.
+    """Make, regrid, check and compare grids, without flow.
 
     \b
     shockgrid grid list                           named domains, blocks and families
     shockgrid grid make swan --plot               marched from a square to a swan
     shockgrid grid make curves.npz --cells 60x40  between your own boundary curves
     shockgrid grid regrid mine.vts -o better.vts  your own grid, on its own sides
-    shockgrid grid check mine.h5                  convex? where not, how good
+    shockgrid grid check mine.h5                  convexity and quality
     shockgrid grid compare swan --plot swan.png   every family on one domain, or in a file
 
     \b
     Your own curves: a file .npz or .h5 with four arrays, named
       left, right, bottom, top      (or i_min, i_max, j_min, j_max)
-    each of shape (n, 2) or (2, n), any number of points, running either way; the
+    each of shape (n, 2) or (2, n), any number of points, in either direction; the
     ends have to meet at four corners.  In Python:
       numpy.savez("curves.npz", left=..., right=..., bottom=..., top=...)
     A grid: arrays x and y (and z) of shape (ni+1, nj+1[, nk+1]), or nodes of
@@ -56,7 +56,7 @@ outputs = click.option(
     "outputs",
     multiple=True,
     metavar="FILE",
-    help="Where to: .h5 (with an .xdmf beside it), .vts or .npz; can be repeated.",
+    help="Output: .h5 (with an .xdmf beside it), .vts or .npz; can be repeated.",
 )
 force = click.option("--force", is_flag=True, help="Replace files that exist.")
 block = click.option("--block", metavar="NAME", help="Which block of an HDF5 file.")
@@ -64,7 +64,7 @@ passes = click.option(
     "--passes",
     type=click.IntRange(1, 10000),
     default=40,
-    help="On given sides: calls of the family at most [40].",
+    help="On given sides: most calls of the family [40].",
 )
 picture = click.option(
     "--plot", "picture", is_flag=True, help="Draw the grid: a .png beside the file."
@@ -75,7 +75,7 @@ picture = click.option(
 @click.option("--plot", "picture", metavar="FILE", help="Draw every domain into this picture.")
 @force
 def list_names(picture, force) -> None:
-    """List the named domains, the blocks in space and the families."""
+    """List the named domains, the 3D blocks and the families."""
     from runs.grids.commands import draw_every_domain, list_everything
 
     echo(list_everything())
@@ -86,7 +86,7 @@ def list_names(picture, force) -> None:
 @grid.command()
 @click.argument("source", metavar="DOMAIN_OR_FILE")
 @family
-@click.option("--cells", metavar="NIxNJ", help="60x40 [default of a domain], in space 20x20x20.")
+@click.option("--cells", metavar="NIxNJ", help="60x40 [default of a domain], in 3D 20x20x20.")
 @weight
 @options
 @click.option(
@@ -104,7 +104,7 @@ def list_names(picture, force) -> None:
 @force
 @picture
 def make(source, family, cells, weight, options, at, steps, passes, block, outputs, force, picture):
-    """Make a grid: of a named domain, between curves in a file, of a block in space.
+    """Make a grid: of a named domain, between curves in a file, of a 3D block.
 
     \b
     shockgrid grid make three-fingers --family barrier -o fingers.h5 -o fingers.vts
@@ -116,8 +116,8 @@ def make(source, family, cells, weight, options, at, steps, passes, block, outpu
     nodes are placed at equal distances along them, or, where --cells is left out and
     opposite curves have as many points, at their points; the first grid is
     transfinite interpolation, untangled if need be, and --family is called on it
-    until it stays.  Blocks in space get edges, faces and volume of equal weight
-    times size; --option sides=false leaves edges and faces, iterations=100.
+    until it no longer changes.  In 3D blocks weight times size is equal on edges,
+    on faces and in the volume; --option sides=false leaves edges and faces, iterations=100.
     """
     from runs.grids.commands import make_grid
 
@@ -140,7 +140,7 @@ def make(source, family, cells, weight, options, at, steps, passes, block, outpu
 def regrid(file, family, weight, options, passes, block, outputs, force, picture) -> None:
     """Regenerate the inside of your own grid; its side nodes stay bitwise.
 
-    A grid with cells that are not convex is untangled first.  A grid in space is
+    A grid with non-convex cells is untangled first.  A 3D grid is
     equidistributed inside its faces (--weight, --option iterations=100).
     """
     from runs.grids.commands import regrid_file
@@ -156,9 +156,9 @@ def regrid(file, family, weight, options, passes, block, outputs, force, picture
 @click.option("--plot", "picture", metavar="FILE", help="Draw it into this picture (.png, .pdf).")
 @force
 def check(file, block, picture, force) -> int:
-    """Judge a grid: convex? which cells not, corner sines, aspect ratios, histograms.
+    """Check a grid: non-convex cells, corner sines, aspect ratios, histograms.
 
-    The exit code is 1 where a cell is not convex.
+    The exit code is 1 if a cell is not convex.
     """
     from runs.grids.commands import check_file
 

@@ -40,19 +40,19 @@ from runs.ranks.started import is_for_ranks
     "--set", "settings", multiple=True, metavar="KEY=VALUE", help="A key of the deck for all runs."
 )
 @click.option("-o", "--output", metavar="DIR", help="Folder of the study.")
-@click.option("--jobs", type=click.IntRange(1), help="Runs at once [one a processor].")
+@click.option("--jobs", type=click.IntRange(1), help="Parallel runs [one per processor].")
 @click.option("--engine", default="processes", help="processes, mpi or dask://ADDRESS [processes].")
 @click.option("--of", "shown", multiple=True, metavar="NAME", help="Quantity to draw and print.")
 @click.option("--refine", metavar="KEY", help="The key of cells, for orders [cells].")
-@click.option("--retry", is_flag=True, help="Go on with runs that failed, too.")
-@click.option("--dry-run", is_flag=True, help="List the runs and what is there of each, and stop.")
+@click.option("--retry", is_flag=True, help="Also continue failed runs.")
+@click.option("--dry-run", is_flag=True, help="List the runs and the state of each, and stop.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress, only the summary.")
 def study(deck, vary, settings, output, jobs, engine, shown, refine, retry, dry_run, quiet) -> int:
     """Run a deck at many points: table, orders and picture.
 
     DECK may be a study file, or the folder of a study to continue.  Each point is a run directory
     in DIR/runs and is computed once, also if the study was killed; after a change of the deck only
-    what has changed is computed.  Runs that fail are listed and end nothing.
+    what has changed is computed.  Failed runs are listed; the study continues.
     """
     from runs.study.command import study as compute
 
@@ -88,7 +88,7 @@ threads = click.option("--threads", type=click.IntRange(1), help="Same as --set 
 max_wall = click.option(
     "--max-wall",
     metavar="TIME",
-    help="Stop with a restart point before so long (2h, 90m, 1:30:00).",
+    help="Stop with a restart point before this time (2h, 90m, 1:30:00).",
 )
 
 
@@ -109,8 +109,8 @@ def list_problems(name: str | None) -> None:
 @setting
 @click.option("-o", "--output", metavar="DIR", help="Run directory [out/<problem>-<n>].")
 @click.option("--force", is_flag=True, help="Replace the run that is in the output directory.")
-@click.option("--dry-run", is_flag=True, help="Check the deck, say its size, and stop.")
-@click.option("--ranks", type=click.IntRange(1), help="With --dry-run: as on N ranks of MPI.")
+@click.option("--dry-run", is_flag=True, help="Check the deck, print its size and cost, and stop.")
+@click.option("--ranks", type=click.IntRange(1), help="With --dry-run: as on N MPI ranks.")
 @threads
 @max_wall
 @with_plot
@@ -154,8 +154,8 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
 
 @cli.command()
 @click.argument("directory", metavar="DIR")
-@click.option("--at", type=click.IntRange(0), help="Go on from the restart point of this step.")
-@click.option("--cells", metavar="N[,M]", help="Go on with these cells, in another DIR.")
+@click.option("--at", type=click.IntRange(0), help="Continue from the restart point of this step.")
+@click.option("--cells", metavar="N[,M]", help="Continue with these cells, in another DIR.")
 @click.option("-o", "--output", metavar="DIR", help="With --cells: where [out/<problem>-<n>].")
 @click.option("--force", is_flag=True, help="With --cells: replace the run that is there.")
 @setting
@@ -166,12 +166,11 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
 def restart(
     directory, at, cells, output, force, settings, threads, max_wall, picture, quiet
 ) -> int:
-    """Go on with a run from its last restart point.
+    """Continue a run from its last restart point.
 
-    Of the deck, what says how to march may be changed (run.t_end, output.*,
-    ...; `shockgrid schema` marks those keys); with --cells
-    (or --set cells=N) the state is laid on another grid, and the run goes
-    on in a directory of its own.
+    Keys that do not affect the state may be changed (run.t_end, output.*, ...;
+    `shockgrid schema` marks them).  With --cells (or --set cells=N) the state is
+    remapped to another grid, and the run continues in a directory of its own.
     """
     from runs.march.launching import continue_runner, remap_runner, wants_other_cells
     from runs.march.runner import WallLimit
@@ -204,8 +203,8 @@ cli.add_command(study)
 def check(deck, settings, schema) -> None:
     """Check a deck and print it with every key resolved.
 
-    Keys without a value stand below it as comments, with what that means.
-    Where its results are not to be trusted, standard error says so.
+    Keys without a value follow as comments, with their meaning.  Cautions about
+    the results go to standard error.
     """
     from runs.deck import reading as deck_reading
 
@@ -243,9 +242,9 @@ def schema(problem) -> None:
 @click.argument("path", metavar="DIR_OR_FILE")
 @click.option("--deck", is_flag=True, help="Print the deck stored in the (last) dump.")
 def info(path, deck) -> int:
-    """Say what a run or a dump holds and how well it kept.
+    """Describe a run or a dump: contents, conservation errors, damage.
 
-    The exit code is 2 where a file of the run is damaged; a line names it.
+    The exit code is 2 if a file of the run is damaged; a line names it.
     """
     from runs.inspection.info import DAMAGED, describe, find_deck
 
@@ -261,9 +260,9 @@ def info(path, deck) -> int:
 @click.argument("file")
 @click.argument("other", required=False)
 def inspect(file, other) -> None:
-    """Show the tree of a dump: names, shapes, units, ranges, NaNs, checksums.
+    """Print a dump's contents: names, shapes, units, ranges, NaNs, checksums.
 
-    With OTHER, how that file differs from FILE, array by array.
+    With OTHER, print how that file differs from FILE, array by array.
     """
     from runs.inspection.info import inspect_differences, inspect_file
 
@@ -284,11 +283,11 @@ def inspect(file, other) -> None:
 @click.option("--mirror", type=click.Choice(["x", "y"]), help="Complete a half domain.")
 @click.option("--beside", metavar="DIR2", help="Another run, drawn to the same scale.")
 @click.option("--line", metavar="X0,Y0,X1,Y1", help="Values of the cells that this line [m] meets.")
-@click.option("--limits", metavar="LOW,HIGH", help="Of the colours, in SI units.")
+@click.option("--limits", metavar="LOW,HIGH", help="Limits of the colours, in SI units.")
 @click.option("--colours", metavar="NAME", help="A colour map of matplotlib, such as magma.")
 @click.option("--csv", "table", metavar="FILE", help="Write the values along --line, too.")
 @click.option("-o", "--output", metavar="FILE", help="Picture to write [DIR/<what>.png].")
-@click.option("--dpi", type=click.IntRange(20, 1200), default=140, help="Dots an inch [140].")
+@click.option("--dpi", type=click.IntRange(20, 1200), default=140, help="Dots per inch [140].")
 def plot(
     directory,
     fields,
@@ -335,12 +334,12 @@ def export(directory, output) -> None:
 @cli.command()
 @click.argument("directory", metavar="DIR")
 @click.argument("field", required=False)
-@click.option("--follow", is_flag=True, help="Let the window go with the interface.")
+@click.option("--follow", is_flag=True, help="Move the window with the interface.")
 @click.option("--zoom", metavar="X0,X1,Y0,Y1", help="Part of the plane [m] to show.")
 @click.option("--mesh", is_flag=True, help="Draw the grid over the field.")
 @click.option("--mirror", type=click.Choice(["x", "y"]), help="Complete a half domain.")
-@click.option("--fps", type=click.IntRange(1, 60), help="Frames a second [a film of 8 s].")
-@click.option("--dpi", type=click.IntRange(20, 600), default=110, help="Dots an inch [110].")
+@click.option("--fps", type=click.IntRange(1, 60), help="Frames per second [a film of 8 s].")
+@click.option("--dpi", type=click.IntRange(20, 600), default=110, help="Dots per inch [110].")
 @click.option("-o", "--output", metavar="FILE", help="Film [DIR/film-FIELD.mp4 or .gif].")
 def film(directory, field, follow, zoom, mesh, mirror, fps, dpi, output) -> None:
     """Make a film of a field over the dumps: mp4 with ffmpeg, else GIF."""
@@ -356,10 +355,10 @@ def film(directory, field, follow, zoom, mesh, mirror, fps, dpi, output) -> None
 @click.option("--film/--no-film", default=None, help="With a film [of a study's runs: no].")
 @click.option("--dpi", type=click.IntRange(20, 600), default=90, help="Of pictures [90].")
 def report(directory, output, film, dpi) -> None:
-    """Write one HTML file that tells a run: verdict, pictures, film, history.
+    """Write a report of a run as one HTML file: verdict, pictures, film, history.
 
-    All is in the file; it needs no network. That of a study links those of its
-    runs. Wants the extra: pip install 'shockgrid[report]'.
+    The file is complete and needs no network.  A study's report links those of its
+    runs.  Needs the extra: pip install 'shockgrid[report]'.
     """
     from runs.report.page import report as write_report
 
@@ -374,10 +373,9 @@ def report(directory, output, film, dpi) -> None:
 def compare(a, b, rtol, atol) -> int:
     """Compare two runs or two dumps.
 
-    The exit code is 1 if they differ. Wall times (columns seconds_*) do not
-    count.  A tolerance is relative to the largest size in an array.  Of runs
-    with other numbers of cells, or that did not march the same steps, dumps are paired by time,
-    and L1 norms are what tolerances hold for.
+    The exit code is 1 if they differ.  Wall times (columns seconds_*) do not
+    count.  A tolerance is relative to the largest size in an array.  If numbers
+    of cells or steps differ, dumps are paired by time, and tolerances apply to L1 norms.
     """
     from runs.inspection import compare as comparing
 
@@ -397,7 +395,7 @@ cli.add_command(grid)
 @click.argument("problems", nargs=-1)
 @click.option("--short", is_flag=True, help="One small size of each, a minute in all.")
 @click.option("-o", "--output", metavar="FILE", help="Write a table (FILE.md) and FILE.json.")
-@click.option("--jobs", type=click.IntRange(1), default=1, help="Runs at once [1].")
+@click.option("--jobs", type=click.IntRange(1), default=1, help="Parallel runs [1].")
 def verify(problems, short, output, jobs) -> int:
     """Run the standard problems (or PROBLEMS) at stated sizes: errors, orders, bars.
 
@@ -420,9 +418,9 @@ def verify(problems, short, output, jobs) -> int:
 @click.option("--json", "path", metavar="FILE", help="Also write the tables to this file.")
 @click.option("--peer", metavar="DIR", help="A built CloverLeaf_ref to measure beside.")
 def bench(cells, rounds, runs, path, peer) -> None:
-    """Measure how fast this machine computes, and where the time goes.
+    """Measure how fast this computer is, and where the time goes.
 
-    Other work on the machine counts: leave it alone meanwhile.
+    Run nothing else meanwhile: other work distorts the timings.
     """
     from runs.bench import bench as measure
 

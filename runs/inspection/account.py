@@ -78,7 +78,7 @@ def describe_run(history: History, cells: int, blocks: Sequence[str] = ()) -> li
         ("regridding: ", describe_regridding(history)),
         ("", describe_convexity(history)),
         ("", describe_contacts(history)),
-        ("conservation, largest drift: ", drifts),
+        ("largest conservation errors: ", drifts),
         ("speed: ", describe_speed(history, cells)),
     )
     return [head + words for head, words in lines if words]
@@ -381,5 +381,5 @@ def describe_verdict(verdict: Mapping[str, Any]) -> str:
         head = reason[0] if said else f"{status}, {reason[0]}"
     words = [str(one["words"]) for one in verdict["trust"]]
     if not words:
-        return f"verdict: {head}; no rule finds what would limit trust"
-    return f"verdict: {head}; trust is limited by: {', '.join(words)}"
+        return f"verdict: {head}; no warnings"
+    return f"verdict: {head}; warnings: {', '.join(words)}"

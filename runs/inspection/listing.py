@@ -31,7 +31,7 @@ def describe_all() -> str:
     lines += describe_installed()
     lines += [
         "",
-        "shockgrid run NAME; shockgrid list NAME says more; shockgrid check NAME, its keys",
+        "shockgrid run NAME; shockgrid list NAME: description; shockgrid check NAME: its keys",
     ]
     return "\n".join(lines)
 

@@ -183,7 +183,7 @@ def restart(
     quiet: bool = True,
     **settings: Any,
 ) -> OpenRun:
-    """Go on with a run from its last restart point, or from that of step `at`; its data.
+    """Continue a run from its last restart point, or from that of step `at`; its data.
 
     simulation: for a run of your own blocks, the same blocks rebuilt.  cells: the deck's key
     of that name, where the state is to be laid on another grid; the run then goes on in `output`

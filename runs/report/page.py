@@ -261,7 +261,7 @@ def describe_run_in_words(run: RunData, left_out: list[str]) -> dict[str, Any]:
 
 
 def list_states(run: RunData, last: Dump | None) -> list[tuple[str, bool]]:
-    """How it ended and how well it kept: sentences, and whether each is good."""
+    """How it ended and its conservation errors: sentences, and whether each is good."""
     if last is None:
         return [("there is no dump that can be read", False)]
     t = f"{describe_time(last.t, last.t_unit)} of {last.t_end:.6g}"
@@ -270,7 +270,7 @@ def list_states(run: RunData, last: Dump | None) -> list[tuple[str, bool]]:
         states.append((convexity, not convexity.startswith("NOT")))
     if drifts := measure_drifts(run.history):
         worst = max(drifts, key=drifts.__getitem__)
-        words = f"largest drift of a conserved total: {drifts[worst]:.1e}"
+        words = f"largest conservation error: {drifts[worst]:.1e}"
         states.append((f"{words} ({worst.replace('_', ' ')})", bool(np.isfinite(drifts[worst]))))
     return states
 

@@ -134,7 +134,7 @@ def test_blocks_of_a_script_have_all_that_problems_have(run, capsys):
     assert run.reason == "t_end reached" and run.final.t == 0.1
     assert run.dumps[0].t == 0.0 and len(run.dumps) == 5
     assert run.history.furthest[-1] > run.history.furthest[0] + 0.05
-    assert "conservation, largest drift" in run.summary
+    assert "largest conservation errors" in run.summary
     assert run.deck.materials["left"] == "left, ideal-gas 1.4"
     assert (run.path / "run.xmf").exists()
     assert main(["info", str(run.path)]) == 0

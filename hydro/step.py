@@ -30,18 +30,10 @@ MOST_RETRIES = 12
 # Each is left out where the list of this name is empty.
 SIDE_PASSES: tuple[tuple[Callable[[Sides, Span], None], str, str], ...] = (
     (on_sides.space_contact_points, "slaves", "spacing around contact points, by old lengths"),
-    (
-        on_sides.turn_mirrors,
-        "turning",
-        "walls at line ends in their present position, for mirrored damping",
-    ),
+    (on_sides.turn_mirrors, "turning", "walls at line ends as they lie, where damping mirrors"),
     (on_sides.damp_short_waves, "damped", "additional velocities of lines and their ends"),
     (on_sides.move_key_nodes, "key_nodes", "ends of lines first, by all faces that meet there"),
-    (
-        on_sides.move_lines,
-        "moving",
-        "between their ends; along themselves if nothing cuts them",
-    ),
+    (on_sides.move_lines, "moving", "between their ends; along themselves if nothing cuts them"),
     (on_sides.slide_joints, "joints", "ends inside a contact, along its moved lines"),
     (on_sides.move_carried_seams, "carried_seams", "their ends go with contacts, which have moved"),
     (on_sides.lay_slaves, "slaves", "on their masters' moved lines; cuts free lines"),
@@ -87,8 +79,8 @@ def take_step(flow: Flow) -> StepRecord:
     # 1 dt from the largest rate of all blocks; halved for as long as the step fails
     dt, record.limit = flow.clock.choose_dt()
     while reason := try_step(flow, dt):
-        if isinstance(reason, float):  # surfaces touch: the step ends with it
-            dt, record.limit = reason, "touch"
+        if isinstance(reason, Touch):
+            dt, record.limit = float(reason), "touch"
             continue
         record.reason = reason
         record.retries += 1
@@ -103,62 +95,63 @@ def take_step(flow: Flow) -> StepRecord:
     return record
 
 
-def try_step(flow: Flow, dt: float) -> RunFailure | float | None:
-    """Phases 2 to 6, into the new nodes and states; why the step does not stand, or None.
+class Touch(float):
+    """The shorter step [s] that ends where surfaces come to touch."""
 
-    Where surfaces come to touch: the shorter step that ends with it.
-    """
+
+def try_step(flow: Flow, dt: float) -> RunFailure | Touch | None:
+    """Phases 2 to 6, into the new nodes and states; why the step does not stand, or None."""
     blocks, exchange, motion, watch = flow.blocks, flow.exchange, flow.motion, flow.watch
     meetings, tension = flow.meetings, flow.tension
     touches, pulls = bool(meetings.pairs), bool(tension.lines)  # is there any of them?
     sides, agreed = watch("sides"), False  # agreed: do all ranks hear of what fails?
     t, middle = flow.clock.t, flow.clock.t + 0.5 * dt
-    fraction = flow.clock.compute_fraction(dt)
+    fraction = flow.clock.compute_fraction(dt)  # of the stable step
     try:
         with sides:
-            # 2 first half of the sources; cells and ghosts along the perimeters, mid-time states
-            exchange.cut_contacts()
-            flow.source.start_step(t, dt)
+            # 2 states beyond all sides; slopes and mid-time states of the cells along them
+            exchange.cut_contacts()  # sliding contacts: both lines cut into pieces
+            flow.source.start_step(t, dt)  # first half of gravity and heating
             for block in blocks:
-                block.gather(t)
+                block.gather(t)  # cells along the sides, mirrored in walls
             if pulls:
-                tension.fill_jumps(new=False)
-            exchange.solve(AT_CELLS, dt)
+                tension.fill_jumps(new=False)  # of the pressure, by surface tension
+            exchange.solve(AT_CELLS, dt)  # ghosts beyond links and sliding contacts
             for block in blocks:
-                block.fill_ghosts(t)
+                block.fill_ghosts(t)  # beyond open sides and free surfaces
             if touches:
-                meetings.fill_ghosts(t)
+                meetings.fill_ghosts(t)  # beyond facets of surfaces that touch
             for block in blocks:
                 block.predict(dt)
-            # 3 traces at the sides: Riemann problems, contact speeds
+            # 3 contact speeds of all sides that move with the flow, from traces at mid-time
             exchange.solve(AT_TRACES, dt)
             for block in blocks:
-                block.fill_speeds(middle)
+                block.fill_speeds(middle)  # free surfaces; states beyond inflow sides
             if touches:
                 meetings.fill_speeds(middle)
         with watch("regrid"):
-            # 4 key nodes and lines moved and spread again
+            # 4 nodes along the sides moved; surfaces that have come to touch laid on each other
             move_sides(motion, Span(t, dt, fraction))
             if touches and (shorter := meetings.meet(dt, dt / fraction)):
-                return shorter
+                return Touch(shorter)
             # 5 interiors regridded, convexity proved; the new nodes along all sides are shared
             agreed = True
             motion.regrid(fraction)
         with sides:
-            # 6 traces on the moved faces, fluxes through the perimeters; then the inside: slopes,
-            # traces, swept volumes, fluxes, update
+            # 6 fluxes through the sides, from traces on the moved faces
             for block in blocks:
-                block.trace(dt)
+                block.trace(dt)  # with the fluxes of walls and open sides
             if pulls:
                 tension.fill_jumps(new=True)
             for block in blocks:
-                block.fill_flux(middle)
-            exchange.solve(AT_FLUX, dt)
+                block.fill_flux(middle)  # of free surfaces
+            exchange.solve(AT_FLUX, dt)  # of links and sliding contacts
             if touches:
-                meetings.fill_flux(middle, dt)
+                meetings.fill_flux(middle, dt)  # of facets
             if pulls:
-                tension.add_rest()
+                tension.add_rest()  # what of surface tension is no jump of the pressure
         with watch("flow"):
+            # then the inside: slopes, traces, swept volumes, fluxes, new states; small cells share
             blocks.update(dt)
             flow.small_cells.share_states(flow.clock.cfl / dt, dt)
     except RunFailure as failure:

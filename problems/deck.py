@@ -94,9 +94,9 @@ class RunControl(DeckTable, kw_only=True):
     small_cells: (
         key(
             float,
-            "part of a block's cells that may be too small for a step and then "
-            "share their states with neighbours; 0: the fastest cell sets the step; left out: "
-            "0.05 where the grid is rebuilt in every step, else 0",
+            "fraction of a block's cells that may be too small for a step and then use state "
+            "redistribution; 0: the fastest cell sets the step; left out: 0.05 where the grid is "
+            "rebuilt in every step, else 0",
             ge=0,
             le=0.1,
         )
@@ -105,7 +105,7 @@ class RunControl(DeckTable, kw_only=True):
     threads: (
         key(
             int,
-            "threads; any number gives the same bits; left out: one a large block, "
+            "threads; results are bitwise the same for any number; left out: one a large block, "
             "as far as there are processors",
             ge=1,
             le=1024,
@@ -173,7 +173,7 @@ class Gauge(DeckTable, kw_only=True):
     to: key(tuple[float, float], "a line's last place [x, y] [m]") | None = None
     count: key(int, "points of a line, evenly from `at` to `to`", ge=1, le=10000) = 1
     moves: key(bool, "true: moves with the material; false: fixed in space") = False
-    fields: key(list[Field], "what is written down; c is the sound speed", min_length=1) = (
+    fields: key(list[Field], "what is recorded; c is the sound speed", min_length=1) = (
         msgspec.field(default_factory=lambda: ["rho", "u", "v", "p"])
     )
 
@@ -205,7 +205,7 @@ class Regrid(DeckTable, kw_only=True):
     weight: key(str, "where cells are to be small: a formula such as 1 + 5*|grad(rho)|/max") = ""
     options: key(
         dict[str, bool | int | float | str],
-        "further options of the regridder, passed on as they are",
+        "further options of the regridder, passed on unchanged",
     ) = msgspec.field(default_factory=dict)
 
     def check_weight(self, fields: tuple[str, ...] = FIELDS) -> None:
@@ -241,7 +241,7 @@ class Deck(DeckTable, kw_only=True):
 
     run: RunControl = msgspec.field(default_factory=RunControl)
     output: Output = msgspec.field(default_factory=Output)
-    gauge: key(list[Gauge], "points at which a flow is written down after every step") = (
+    gauge: key(list[Gauge], "points at which the flow is recorded after every step") = (
         msgspec.field(default_factory=list)
     )
 

@@ -78,7 +78,7 @@ class BlockSide(DeckTable, kw_only=True):
         "beyond an inflow: rho [kg/m3], u, v [m/s], p [Pa], formulas of t",
     ) = None
     options: key(
-        dict[str, bool | int | float | str], "further options of the kind, passed on as they are"
+        dict[str, bool | int | float | str], "further options of the kind, passed on unchanged"
     ) = msgspec.field(default_factory=dict)
 
 

@@ -62,7 +62,7 @@ def make_grid(deck: BlocksDeck, block: BlockTable) -> np.ndarray:
 def _take(nodes: np.ndarray, block: BlockTable, where: str) -> np.ndarray:
     """A plane grid as it is, i and j turned so that they go counter-clockwise."""
     if nodes.shape[0] != 2:
-        raise BadInput(f"{where}: a grid in space; blocks are plane")
+        raise BadInput(f"{where}: a 3D grid; blocks are 2D")
     cells = nodes.shape[1] - 1, nodes.shape[2] - 1
     if block.cells is not None and tuple(block.cells) != cells:
         raise BadInput(

@@ -269,7 +269,7 @@ class Convection1DDeck(Deck, kw_only=True):
     ) = 0.0
     scheme: key(
         Literal["exponential", "samarskii", "upwind", "central"],
-        "of the fluxes; central swings beyond a grid Péclet number of 2",
+        "of the fluxes; central oscillates beyond a grid Péclet number of 2",
     ) = "exponential"
     grid: AxisGrid = msgspec.field(default_factory=AxisGrid)
 

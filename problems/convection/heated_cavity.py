@@ -47,9 +47,11 @@ class AxisGrid(DeckTable, kw_only=True):
         "gradients; combined: after both",
     ) = "uniform"
     every: key(int, "steps between corrections of the grid", ge=1, le=2**63 - 1) = 1
-    relaxation: key(float, "part of a correction that is made", gt=0, le=1) = 0.7
-    ratio: key(float, "most of neighbouring steps; left out: usual", gt=1) | None = None
-    floor: key(float, "of the largest speed; a lower one counts as so much", gt=0, lt=1) = 0.02
+    relaxation: key(float, "fraction of a correction that is applied", gt=0, le=1) = 0.7
+    ratio: key(float, "largest ratio of neighbouring steps; left out: the default", gt=1) | None = (
+        None
+    )
+    floor: key(float, "least speed, as a fraction of the largest", gt=0, lt=1) = 0.02
     strength: key(float, "of the gradient against the uniform grid in the monitor", ge=0) = 1.0
     share: key(float, "of polevikov's density of nodes in the combined one", ge=0, le=1) = 0.5
     walls: key(Literal["both", "low", "high"], "where a clustered grid is dense") = "both"
@@ -77,8 +79,8 @@ class Side(DeckTable, kw_only=True):
 
     merges = True
 
-    flow: key(Literal["no-slip", "free"], "no-slip holds the fluid, free does not") = "no-slip"
-    heat: key(Literal["isothermal", "adiabatic", "flux"], "what the wall does to heat") = (
+    flow: key(Literal["no-slip", "free"], "no-slip or free-slip") = "no-slip"
+    heat: key(Literal["isothermal", "adiabatic", "flux"], "thermal condition at the wall") = (
         "adiabatic"
     )
     value: key(

@@ -173,8 +173,10 @@ class PlacingPart(DeckTable, kw_only=True):
     merges = True
 
     strength: key(float, "of the gradient: 2 gives two thirds of the nodes to it", ge=0) = 2.0
-    ratio: key(float, "most of neighbouring steps; left out: usual", gt=1) | None = None
-    relaxation: key(float, "part of a correction that is made", gt=0, le=1) = 0.7
+    ratio: key(float, "largest ratio of neighbouring steps; left out: the default", gt=1) | None = (
+        None
+    )
+    relaxation: key(float, "fraction of a correction that is applied", gt=0, le=1) = 0.7
     tau: key(float, "relaxation time [s] of the node speed", gt=0) = 0.005
     start: key(
         Literal["moving", "rest"],
@@ -216,7 +218,9 @@ class MovingGrid1D(Problem):
             raise BadInput(f"levels = {deck.levels}: from front to front u has to fall")
         positions = [0.0, *deck.fronts, 1.0]
         if not all(one < other for one, other in pairwise(positions)):
-            raise BadInput(f"fronts = {deck.fronts}: places have to rise and lie between 0 and 1")
+            raise BadInput(
+                f"fronts = {deck.fronts}: positions must increase and lie between 0 and 1"
+            )
         self.exact = BurgersFronts(deck.viscosity, tuple(deck.levels), tuple(deck.fronts))
 
     def make_race(self, cells: int) -> FrontRace:

@@ -61,10 +61,10 @@ def describe_outside(error: BaseException) -> str | None:
     """A sentence on an error of the system or of a file's name; None for any other error."""
     if isinstance(error, OSError) and error.errno is not None:
         if error.filename is None:
-            return f"a file or device that was given cannot be used: {os.strerror(error.errno)}"
+            return f"a given file or device cannot be used: {os.strerror(error.errno)}"
         return describe_disk_error(error, Path(os.fsdecode(error.filename)))
     if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
-        return "a name that was given is no text in UTF-8; rename it, or give another"
+        return "a given name is not valid UTF-8; rename it, or give another"
     words = str(error)
     if isinstance(error, RuntimeError) and words.startswith("Symlink loop from"):
         return f"{words.removeprefix('Symlink loop from ')} is a link that leads back to itself"

@@ -496,7 +496,7 @@ def check_disk(cost: Cost, folder: Path | None = None) -> list[str]:
     if not cost.disk > TIGHT * cost.free:
         return []
     return [
-        f"caution: the run will want about {describe_bytes(cost.disk)} of disk, where "
+        f"caution: the run will need about {describe_bytes(cost.disk)} of disk, where "
         f"{describe_bytes(cost.free)} are free ({where}): free some, or take fewer dumps "
         "(output.dumps) or lighter ones (output.fields, output.precision, output.compression)"
     ]
@@ -517,20 +517,20 @@ def describe_cost(cost: Cost) -> list[str]:
     """Lines for `run --dry-run` and for the first lines of a run."""
     size, steps = (
         cost.size,
-        "steps and time are known when it begins: there was no run of this flow",
+        "steps and time are unknown before the start: no earlier run of this flow",
     )
     if cost.steps is not None:
         low, likely, high = (_round(number) for number in cost.steps)
         steps = f"about {likely}{f' ({low} to {high})' * (low < high)} steps"
         if cost.seconds is None:
-            steps += "; how long one takes on this machine is not known yet"
+            steps += "; the time of a step on this computer is not known yet"
         else:
             steps += f", {describe_seconds_range(*cost.seconds)} of steps on this machine"
     told = [f"{name} {' x '.join(map(str, cells))}" for name, cells in size.blocks[:MOST_NAMED]]
     more = len(size.blocks) - len(told)
     cells = f"{size.cells} cells ({', '.join(told)}{f' and {more} more blocks' if more else ''})"
     if cost.grows:
-        cells += " at first, more where the interface comes to need them (refine)"
+        cells += " initially, more where the interface needs them later (refine)"
     free = "" if math.isnan(cost.free) else f", {describe_bytes(cost.free)} free"
     return [
         f"cost: {cells}; {steps}",

@@ -230,7 +230,7 @@ def describe_cautions(
     try:
         sentences = problem.cautions(told)
     except RunFailure as error:
-        sentences = [f"how far to trust this is not known: {error}"]
+        sentences = [f"cautions could not be computed: {error}"]
     return [HEAD + sentence for sentence in dict.fromkeys(sentences)]
 
 

@@ -177,7 +177,7 @@ def describe_makers(a: str, b: str) -> list[str]:
     if not names:
         return []
     words = ", ".join(f"{n} {one[n] or 'unknown'} and {other[n] or 'unknown'}" for n in names)
-    return [f"made by others: {words}"]
+    return [f"made by different versions: {words}"]
 
 
 def _find_maker(path: str) -> dict[str, str]:

@@ -190,7 +190,7 @@ def _describe_verdict(run: RunData) -> list[str]:
     try:
         if verdict is None and len(run.history.get("step", ())) > 1:
             cells = sum(math.prod(n - 1 for n in b.nodes.shape[1:]) for b in run.dumps[-1].blocks)
-            reason = "it marches on, or was ended by force"
+            reason = "it is still running, or was killed"
             verdict = judge("unfinished", reason, run.history, cells, run.problem)
         return [describe_verdict(verdict)] if verdict else []
     except (BadInput, IndexError) as error:
@@ -305,7 +305,7 @@ def inspect_differences(a: str, b: str) -> str:
     if stored:
         lines += ["stored in different ways:", *stored]
     if made:
-        lines += ["made by different things:", *(f"  {line.removeprefix(MADE)}" for line in made)]
+        lines += ["made by different versions:", *(f"  {line.removeprefix(MADE)}" for line in made)]
     return "\n".join(lines)
 
 

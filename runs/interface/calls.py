@@ -89,7 +89,7 @@ def _make(simulation, table: dict[str, Any], origin: str, settings, measure) -> 
         key = setting.partition("=")[0].strip()
         if not any(f"{key}.".startswith(f"{own}.") for own in OWN_KEYS):
             raise BadInput(
-                f"{key}: a simulation of one's own has all but {', '.join(OWN_KEYS)} from its "
+                f"{key}: your own simulation has all but {', '.join(OWN_KEYS)} from its "
                 "script; give it to shockgrid.Simulation or to its blocks"
             )
     table = {
@@ -156,7 +156,7 @@ def run(
     """
     check_single("shockgrid.run", "run DECK")
     if measure is not None and (isinstance(what, Case) or isinstance(what, str | Path)):
-        raise BadInput("measure is for a simulation of one's own; a problem has its own columns")
+        raise BadInput("measure is for your own simulation; a problem has its own columns")
     if isinstance(what, Case):
         if settings:
             names = ", ".join(settings)

@@ -70,7 +70,7 @@ def make(
     """A plane grid of a named domain, on the curves or sides in a file, or on those of an array.
 
     source: a domain of `shockgrid grid list`, a file, or nodes (2, ni+1, nj+1) of which the sides
-    count.  family: a name with `options`, or a regridder of one's own.  cells: along i and j, where
+    count.  family: a name with `options`, or your own regridder.  cells: along i and j, where
     the source leaves it open.  steps, at: of a domain's motion and the part of it that is made;
     passes: at most, on sides given at once.  weight: a formula, as `--weight`.  Raises BadInput for
     what there is not, RegridFailure where no valid grid was found.
@@ -84,7 +84,7 @@ def make(
             raise BadInput(f"at = {at}: a number from 0 to 1 is wanted")
         made = make_on_domain(name, _name(family), regridder, size, steps, at)
     elif name.replace("-", "_") in BLOCKS:
-        raise BadInput(f"{name} is a block in space; `shockgrid grid make {name}` makes its grid")
+        raise BadInput(f"{name} is a 3D block; `shockgrid grid make {name}` makes its grid")
     elif is_file_name(name):
         made = make_on_curves(read_sides(name, block, cells), regridder, passes, name)
     else:
@@ -174,7 +174,7 @@ def _find_family(family: Family, options: dict[str, Any], weight: str | None) ->
         )
     if options or weight is not None:
         words = ", ".join([*options, *(["weight"] if weight is not None else [])])
-        raise BadInput(f"{words}: a regridder of one's own has its options already")
+        raise BadInput(f"{words}: your own regridder has its options already")
     return family
 
 

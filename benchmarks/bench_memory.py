@@ -48,7 +48,7 @@ def run(across: int, steps: int, threads: int, solve: bool) -> Measured:
     words += ["--set", SOLVED] if solve else []
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "run"
-        command = [sys.executable, "-m", "runs.cli", "run", "interface-instability", *words]
+        command = [sys.executable, "-m", "shockgrid", "run", "interface-instability", *words]
         began = time.monotonic()
         child = subprocess.Popen([*command, "-q", "-o", str(out)], stdout=subprocess.DEVNULL)
         start = 0.0

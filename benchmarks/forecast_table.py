@@ -84,7 +84,7 @@ SHARES = (0.1, 0.25, 0.5)
 def run(deck: str, setting: str, folder: Path) -> tuple[RunData, int]:
     """Run a deck in a process of its own; its directory and peak memory [bytes]."""
     words = ["run", deck, "--set", setting, "--threads", "1", "-q", "-o", str(folder / deck)]
-    child = subprocess.Popen([sys.executable, "-m", "runs.cli", *words], cwd=ROOT,
+    child = subprocess.Popen([sys.executable, "-m", "shockgrid", *words], cwd=ROOT,
                              stdout=subprocess.DEVNULL)  # fmt: skip
     _, status, usage = os.wait4(child.pid, 0)
     if status:

@@ -65,7 +65,7 @@ REGION = re.compile(
     r"(<!-- generated: (?P<kind>\w+) (?P<arguments>.*?) -->\n)(.*?)(<!-- end generated -->)",
     re.DOTALL,
 )
-SHOCKGRID = [sys.executable, "-m", "runs.cli"]
+SHOCKGRID = [sys.executable, "-m", "shockgrid"]
 FIGURES = tomllib.loads((DOCS / "figures.toml").read_text(encoding="utf-8"))
 USUAL = ("steps", "sub-moves", "rescues", "least sine", "worst aspect", "largest drift")
 

@@ -23,7 +23,7 @@ DECK = ("triple-point", "--set", "cells=8")
 def start(size, *words):
     """A shockgrid command on ranks of MPI; skips where there is none."""
     return subprocess.Popen(
-        [*find_mpiexec(size), sys.executable, "-m", "runs.cli", *map(str, words)],
+        [*find_mpiexec(size), sys.executable, "-m", "shockgrid", *map(str, words)],
         cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)},
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
@@ -117,7 +117,7 @@ RANKS_DECK = ("interface-instability-mushroom", "--set", "cells=32", "--set", "r
 def run_on_ranks(size, *words):
     """Output of a shockgrid command on ranks of MPI; skips where there is none."""
     done = subprocess.run(
-        [*find_mpiexec(size), sys.executable, "-m", "runs.cli", *map(str, words)],
+        [*find_mpiexec(size), sys.executable, "-m", "shockgrid", *map(str, words)],
         cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)},
         capture_output=True, text=True,
     )  # fmt: skip

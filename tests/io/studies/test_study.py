@@ -164,7 +164,7 @@ def write_study(path: Path) -> None:
 
 def run_study(*words: str, before: tuple[str, ...] = ()) -> subprocess.CompletedProcess:
     return subprocess.run(
-        [*before, sys.executable, "-m", "runs.cli", "study", "study.toml", "-o", "s", *words],
+        [*before, sys.executable, "-m", "shockgrid", "study", "study.toml", "-o", "s", *words],
         capture_output=True, text=True,
     )  # fmt: skip
 

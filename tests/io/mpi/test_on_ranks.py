@@ -105,7 +105,7 @@ def test_a_killed_rank_ends_all_and_the_run_goes_on_from_its_restart_point(tmp_p
     ).stdout.split()
     os.kill(int(told[-1]), signal.SIGKILL)
     _, err, code = finish(process)
-    assert code != 0 and "where a rank has died" in err and "last restart point is step" in err
+    assert code != 0 and "if a rank has died" in err and "last restart point is step" in err
     steps = [step for step, _ in RunDirectory(out).list_points()]
     again = ("restart", str(out), "--set", f"run.max_steps={steps[-1] + 2}", "-q")
     assert main(list(again)) == 0

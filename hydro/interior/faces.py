@@ -79,34 +79,29 @@ def make_traces(sound_speed_squared_part, opens_voids):
         return (
             (Z[at.RHO_HALF + k], Z[at.U_HALF + k], Z[at.V_HALF + k], Z[at.P_HALF + k]),
             (
-                Z[at.RHO_X + k],
-                Z[at.RHO_Y + k],
-                Z[at.U_X + k],
-                Z[at.U_Y + k],
-                Z[at.V_X + k],
-                Z[at.V_Y + k],
-                Z[at.P_X + k],
-                Z[at.P_Y + k],
+                Z[at.RHO_X + k], Z[at.RHO_Y + k], Z[at.U_X + k], Z[at.U_Y + k],
+                Z[at.V_X + k], Z[at.V_Y + k], Z[at.P_X + k], Z[at.P_Y + k],
             ),
             (Z[at.RHO + k], Z[at.U + k], Z[at.V + k], Z[at.P + k], Z[at.C2 + k]),
             Z[at.TORN + k] if opens_voids else WHOLE,
             Z[at.X_CENTRE + k],
             Z[at.Y_CENTRE + k],
-        )
+        )  # fmt: skip
+
+    @inlined
+    def put(Z, rows, k, traced):
+        """A traced state into its rows; 1 where it is the cell's own."""
+        rho, u, v, p, c2 = rows
+        Z[rho + k], Z[u + k], Z[v + k], Z[p + k], Z[c2 + k], missed = traced
+        return missed
 
     @compiled_once(allocates=False)
     def fill_traces_in(Z, n, counted, parameters):
         """Traces towards -i; `counted`: 1 where the row is the tile's (fallbacks count), else 0."""
         for k in range(1, n + 1):
             half, gradients, own, torn, x, y = load(Z, k)
-            rho, u, v, p, c2, missed = trace(
-                half, gradients, own, torn, Z[at.X_I + k] - x, Z[at.Y_I + k] - y, parameters
-            )
-            Z[at.RHO_IN + k] = rho
-            Z[at.U_IN + k] = u
-            Z[at.V_IN + k] = v
-            Z[at.P_IN + k] = p
-            Z[at.C2_IN + k] = c2
+            dx, dy = Z[at.X_I + k] - x, Z[at.Y_I + k] - y
+            missed = put(Z, at.IN, k, trace(half, gradients, own, torn, dx, dy, parameters))
             Z[at.FIRST_ORDER + k] += counted * missed
 
     @compiled_once(allocates=False)
@@ -114,34 +109,16 @@ def make_traces(sound_speed_squared_part, opens_voids):
         """Traces towards +i, -j and +j; the faces towards +i must have taken their place."""
         for k in range(1, n + 1):
             half, gradients, own, torn, x, y = load(Z, k)
-            out_dx, out_dy = Z[at.X_I + k] - x, Z[at.Y_I + k] - y
+            dx, dy = Z[at.X_I + k] - x, Z[at.Y_I + k] - y
             down_dx, down_dy = Z[at.X_J + k] - x, Z[at.Y_J + k] - y
             up_dx, up_dy = Z[at.X_J + k + 1] - x, Z[at.Y_J + k + 1] - y
-            rho, u, v, p, c2, missed_out = trace(
-                half, gradients, own, torn, out_dx, out_dy, parameters
-            )
-            Z[at.RHO_OUT + k] = rho
-            Z[at.U_OUT + k] = u
-            Z[at.V_OUT + k] = v
-            Z[at.P_OUT + k] = p
-            Z[at.C2_OUT + k] = c2
-            rho, u, v, p, c2, missed_down = trace(
-                half, gradients, own, torn, down_dx, down_dy, parameters
-            )
-            Z[at.RHO_DOWN + k] = rho
-            Z[at.U_DOWN + k] = u
-            Z[at.V_DOWN + k] = v
-            Z[at.P_DOWN + k] = p
-            Z[at.C2_DOWN + k] = c2
-            rho, u, v, p, c2, missed_up = trace(
-                half, gradients, own, torn, up_dx, up_dy, parameters
-            )
-            Z[at.RHO_UP + k] = rho
-            Z[at.U_UP + k] = u
-            Z[at.V_UP + k] = v
-            Z[at.P_UP + k] = p
-            Z[at.C2_UP + k] = c2
-            Z[at.FIRST_ORDER + k] += counted * (missed_out + missed_down + missed_up)
+            out = trace(half, gradients, own, torn, dx, dy, parameters)
+            missed = put(Z, at.OUT, k, out)
+            down = trace(half, gradients, own, torn, down_dx, down_dy, parameters)
+            missed += put(Z, at.DOWN, k, down)
+            up = trace(half, gradients, own, torn, up_dx, up_dy, parameters)
+            missed += put(Z, at.UP, k, up)
+            Z[at.FIRST_ORDER + k] += counted * missed
 
     return fill_traces_in, fill_traces
 

@@ -41,7 +41,7 @@ _next = (LINE - 1 + SPAN * row for row in count())
 
 
 def _rows(number):
-    return [next(_next) for _ in range(number)]
+    return tuple(next(_next) for _ in range(number))
 
 
 # node rows: i (low), i + 1 (high) and i + 2, old and new
@@ -71,11 +71,11 @@ AREA_X_J, AREA_Y_J, SWEEP_J, X_J, Y_J = _rows(5)
 # between the two halves of HLLC: the upwind side of the contact, its wave, what s* is made of
 RHO_SIDE, U_SIDE, V_SIDE, P_SIDE, W_SIDE, FLOW_SIDE, S_SIDE, S_CUT = _rows(8)
 PUSH, DRAG, SQUARE, TORN_SIDE = _rows(4)
-# traces at the faces of the row: towards -i, +i, -j, +j
-RHO_IN, U_IN, V_IN, P_IN, C2_IN = _rows(5)
-RHO_OUT, U_OUT, V_OUT, P_OUT, C2_OUT = _rows(5)
-RHO_DOWN, U_DOWN, V_DOWN, P_DOWN, C2_DOWN = _rows(5)
-RHO_UP, U_UP, V_UP, P_UP, C2_UP = _rows(5)
+# traces at the faces of the row, rho, u, v, p and c²: towards -i, +i, -j, +j
+IN = RHO_IN, *_ = _rows(5)
+OUT = RHO_OUT, *_ = _rows(5)
+DOWN = RHO_DOWN, *_ = _rows(5)
+UP = RHO_UP, *_ = _rows(5)
 # fluxes through the faces towards -i and -j; conserved quantities waiting for the next i face
 FLUX_I_MASS, FLUX_I_X, FLUX_I_Y, FLUX_I_ENERGY, PUSH_I, HOOP_I = _rows(6)
 FLUX_J_MASS, FLUX_J_X, FLUX_J_Y, FLUX_J_ENERGY, PUSH_J, HOOP_J = _rows(6)

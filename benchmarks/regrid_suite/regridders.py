@@ -149,7 +149,9 @@ REGRIDDERS: dict[str, Entry] = {
     ),
     "thompson": Entry("Winslow with the sides' steps (R12.4)", OURS, own("winslow")),
     "winslow": Entry("Winslow's smooth grid (R12.3)", OURS, own("winslow", control="none")),
-    "displacement": Entry("the sides' motion carried inside (R6.5)", OURS, own("displacement")),
+    "displacement": Entry(
+        "the sides' motion interpolated to the inside (R6.5)", OURS, own("displacement")
+    ),
     "transfinite": Entry(
         "boolean sum in the indices, as in mapped grids of Clawpack",
         "formula, numpy",

@@ -124,15 +124,15 @@ class BarrierRegridder:
         previous: np.ndarray,
         boundary: np.ndarray,
         sound_speed: np.ndarray | None = None,
-        least_dear_rate: float = 0.0,
+        least_limiting_rate: float = 0.0,
         in_place: bool = False,
     ) -> RegridResult:
         """The grid inside `boundary` (2, ni+1, nj+1; only its sides are read), near `previous`.
 
         With `sound_speed` (ni, nj) [m/s], cells that would set the time step are opened (R4.10):
-        those crossed in less than 1/R, R the greater of this block's (`compute_dear_rate`) and
-        `least_dear_rate` [1/s], the greatest of the blocks that share the step.  `in_place` writes
-        the grid into `boundary`, if that is in order, and loses its inside in any case.
+        those crossed in less than 1/R, R the greater of this block's (`compute_limiting_rate`) and
+        `least_limiting_rate` [1/s], the greatest of the blocks that share the step.  `in_place`
+        writes the grid into `boundary`, if that is in order, and loses its inside in any case.
         Raises RegridFailure, naming side and nodes, when there is no valid grid or none is found.
         """
         if self._sweeps is not None:
@@ -156,7 +156,7 @@ class BarrierRegridder:
                     f"here {(previous.shape[1] - 1, previous.shape[2] - 1)}"
                 )
         work.take(previous, boundary, transposed, mirrored, sound_speed, into)
-        work.least_dear_rate = float(least_dear_rate)
+        work.least_limiting_rate = float(least_limiting_rate)
         move = NewtonMove(
             self.tuning, work, conditional=self.conditional, ki=float(ki), kj=float(kj),
             cost=sound_speed is not None, curved=self.curved,
@@ -176,14 +176,14 @@ class BarrierRegridder:
             report = replace(report, quality=None)
         return RegridResult(work.give(transposed, mirrored, into), report)
 
-    def compute_dear_rate(self, boundary: np.ndarray, sound_speed: np.ndarray) -> float:
+    def compute_limiting_rate(self, boundary: np.ndarray, sound_speed: np.ndarray) -> float:
         """R [1/s] of theory R4.11: the rate that these sides ask for, whatever is inside.
 
         `boundary` (2, ni+1, nj+1; only its sides are read), `sound_speed` (ni, nj) [m/s].
         """
         work = self._workspace(boundary.shape, False)
         work.take(None, boundary, False, compute_area(boundary) < 0.0, sound_speed)
-        work.least_dear_rate = 0.0
+        work.least_limiting_rate = 0.0
         work.begin(self.conditional, 1.0, 0.0, replace(self.tuning, cost_weight=1.0), cost=True)
         return float(np.sqrt(2.0 / work.law.cost_scale))
 

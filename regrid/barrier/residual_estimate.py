@@ -37,7 +37,7 @@ from regrid.measure.corners import mark_triangles
     LINE_X, LINE_Y, LINE_G, LINE_Q, NEAR_X, NEAR_Y, NEAR_G, NEAR_Q, FAR_X, FAR_Y, FAR_G, FAR_Q,
     LOW_X, LOW_Y, LOW_Q, UP_X, UP_Y, UP_Q, SIDE_X, SIDE_Y, SIDE_Q, RIGHT_X, RIGHT_Y, RIGHT_Q,
     FLUX_X, FLUX_Y, PIVOT, PART_X, PART_Y, PASSED, SUM,
-    SHRUNK, LEAST_AREA, SHARPEST, LONG, SHORT, OLD_AREA, LONG_LINE, LONG_SIDE, DEAR,
+    SHRUNK, LEAST_AREA, SHARPEST, LONG, SHORT, OLD_AREA, LONG_LINE, LONG_SIDE, LIMITING,
     WHOLE_X, WHOLE_Y, NEAR_SUM_I, NEAR_SUM_J, FAR_SUM_I, FAR_SUM_J, PAST_X, PAST_Y,
 ) = (k * SPAN for k in range(59))  # fmt: skip
 LOOK_ROWS = 59 * SPAN
@@ -154,7 +154,7 @@ def take_cell(col, numbers, Z):
     c1, c2 = c1 if c1 > c3 else c3, Z[SHARPEST + col]
     Z[SHARPEST + col] = c1 if c1 > c2 else c2
     weight = (full * weigh(c1, least_sine, most)) * fade(ratio, growth)
-    # Mid-lines, twice over: aspect ratio as a fraction, and is the cell dear?
+    # Mid-lines, twice over: aspect ratio as a fraction, and does the cell limit the step?
     mx, my, nx, ny = ax + ux, ay + uy, bx + rx, by + ry
     m2, n2 = mx * mx + my * my, nx * nx + ny * ny
     longer, shorter = m2 if m2 > n2 else n2, n2 if m2 > n2 else m2
@@ -162,7 +162,7 @@ def take_cell(col, numbers, Z):
     more = longer * short > long * shorter
     Z[LONG + col], Z[SHORT + col] = longer if more else long, shorter if more else short
     area = (a1 + a3) + (a2 + a4)
-    Z[DEAR + col] = (rate * (m2 + n2)) * (Z[SOUND + col] * Z[SOUND + col]) - area * area
+    Z[LIMITING + col] = (rate * (m2 + n2)) * (Z[SOUND + col] * Z[SOUND + col]) - area * area
     k1, s1 = corner_slope(pa + pb, i1, lam_c, flat)
     k2, s2 = corner_slope(pu + pb, i2, lam_c, flat)
     k3, s3 = corner_slope(pu + pr, i3, lam_c, flat)
@@ -215,8 +215,8 @@ def take_cells(old, i, law, bent, low, cells, Z):
             Z[OLD_1 if i == 0 else OLD_4] = OWN
         if low + cells == nj:
             Z[(OLD_2 if i == 0 else OLD_3) + cells - 1] = OWN
-    dearest = law.cost_weight > 0.0
-    if dearest:
+    with_cost = law.cost_weight > 0.0
+    if with_cost:
         sound = law.sound[i, low : low + cells]
         for col in range(cells):
             Z[SOUND + col] = sound[col]
@@ -226,12 +226,12 @@ def take_cells(old, i, law, bent, low, cells, Z):
         law.area_target,
     )  # fmt: skip
     take_row_of_cells(numbers, (cells + 7) // 8 * 8, Z)
-    if dearest:
-        dear = 0
+    if with_cost:
+        limiting = 0
         for col in range(cells):
-            dear += 1 if Z[DEAR + col] > 0.0 else 0
-        if dear > 0:
-            add_dear_shares(law.cost_scale, law.cost_weight * law.sigma, cells, Z)
+            limiting += 1 if Z[LIMITING + col] > 0.0 else 0
+        if limiting > 0:
+            add_limiting_shares(law.cost_scale, law.cost_weight * law.sigma, cells, Z)
 
 
 @kernel(allocates=False)
@@ -259,13 +259,13 @@ def measure_old_sides(x, y, cells, Z):
 
 
 @kernel(allocates=False)
-def add_dear_shares(scale, weight, cells, Z):
-    """What dear cells of a row give along their edges: gradient of P, half the trace of its blocks.
+def add_limiting_shares(scale, weight, cells, Z):
+    """What cells that limit the step give along edges: gradient of P, half the trace of its blocks.
 
     `scale` = 2/R², `weight` = mu sigma: see `cost_slope`.
     """
     for col in range(cells):
-        if Z[DEAR + col] > 0.0:
+        if Z[LIMITING + col] > 0.0:
             ax = 0.5 * (Z[LINE_X + col] + Z[LINE_X + col + 1])
             ay = 0.5 * (Z[LINE_Y + col] + Z[LINE_Y + col + 1])
             bx = 0.5 * (Z[NEAR_X + col] + Z[FAR_X + col])

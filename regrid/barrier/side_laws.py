@@ -316,7 +316,7 @@ def compute_mean_area(along_i, along_j, blend_i, blend_j):
 
 
 @kernel
-def compute_dear_rate(sound, along_i, along_j, blend_i, blend_j, area_target, margin):
+def compute_limiting_rate(sound, along_i, along_j, blend_i, blend_j, area_target, margin):
     """R [1/s]: `margin` times the largest c (2 (s_i² + s_j²))^½/(area_target s_i s_j) of all cells.
 
     `sound` (ni, nj) in m/s; laws, and `area_target`, the mean area of a cell over s_i s_j:
@@ -355,11 +355,11 @@ class Block(NamedTuple):
 
 
 @kernel
-def prepare(old, law, motion, conditional, dear, check):
+def prepare(old, law, motion, conditional, limits, check):
     """All that a regrid takes from the sides: laws, the motion of the sides, the checks.
 
     `law` is a `BarrierLaw` whose arrays are filled, but for curved lines, `motion` a `SideMotion`
-    from the grid `old`; `dear`: the margin of R and the least R; `check`: the scratch of
+    from the grid `old`; `limits`: the margin of R and the least R; `check`: the scratch of
     `search_meeting`.
     """
     sides = motion.sides
@@ -374,10 +374,10 @@ def prepare(old, law, motion, conditional, dear, check):
     area_target = sigma / compute_mean_area(along_i, along_j, blend_i, blend_j)
     scale = 0.0
     if law.cost_weight > 0.0:
-        rate = compute_dear_rate(
-            law.sound, along_i, along_j, blend_i, blend_j, area_target, dear[0]
+        rate = compute_limiting_rate(
+            law.sound, along_i, along_j, blend_i, blend_j, area_target, limits[0]
         )
-        rate = max(rate, dear[1])
+        rate = max(rate, limits[1])
         scale = 2.0 / (rate * rate) if rate > 0.0 else 0.0
     line, boxes, ways, ends, stack = check
     meeting, _ = search_meeting(sides, line, boxes, ways, ends, stack)

@@ -132,7 +132,7 @@ class Workspace:
             np.zeros((6, ni + 1)), np.zeros((6, nj + 1)), np.zeros((2, 5)), np.zeros((2, nj + 1)),
             np.zeros(nj + 1),
         )  # fmt: skip
-        self.least_dear_rate = 0.0
+        self.least_limiting_rate = 0.0
         self.coarse = CoarseCorrection(ni, nj, tuning)
         # what is of the block's size, by name: shape, and the column at which a cache line begins
         self.arrays = {
@@ -232,8 +232,8 @@ class Workspace:
     ) -> None:
         """Take the laws from `sides`, and the weights of the functional's terms.
 
-        `cost` needs the cells' sound speeds in `sound`; `least_dear_rate` [1/s] is the least R of
-        theory R4.11; `tuning` where it is not the workspace's own.  With `curved`, where both pairs
+        `cost` needs the cells' sound speeds in `sound`; `least_limiting_rate` [1/s] is the least R
+        of theory R4.11; `tuning` where it is not the workspace's own.  With `curved`, where both pairs
         of sides bend, lines take their shapes and the barrier is no weaker than (R4.17) has it.
         """
         tuning = tuning or self.tuning
@@ -256,7 +256,8 @@ class Workspace:
         self.motion = SideMotion(self.sides, *self.motion_tables)
         self.block = prepare(
             self.old, law, self.motion, conditional,
-            (float(tuning.cost_margin), float(self.least_dear_rate)), self.boundary_check.scratch,
+            (float(tuning.cost_margin), float(self.least_limiting_rate)),
+            self.boundary_check.scratch,
         )  # fmt: skip
         _, _, _, self.sigma, self.area_target, scale = self.block
         self.law = law._replace(sigma=self.sigma, area_target=self.area_target, cost_scale=scale)

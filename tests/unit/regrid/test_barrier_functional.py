@@ -192,7 +192,7 @@ def test_estimate_of_the_residual(epsilon):
         assert estimated == pytest.approx(found, rel=min(0.5, 1e-3 + 100.0 * epsilon))
 
 
-def test_dear_cells_enter_the_estimate():
+def test_limiting_cells_enter_the_estimate():
     nodes = shaken_grid(0.1)
     bump = 0.5 * np.sin(np.pi * np.arange(NI + 1) / NI) ** 2  # over it cells are half as high
     nodes[1] += bump[:, None] * np.linspace(1.0, 0.0, NJ + 1)
@@ -201,7 +201,9 @@ def test_dear_cells_enter_the_estimate():
     work.sound[:] = np.linspace(0.9, 1.0, NJ)
     work.begin(True, 1.0, 0.0, Tuning(cost_weight=1.0), cost=True)
     begun, found = look_and_solve(work, nodes)
-    assert 0.7 * found < begun < 2.0 * found  # of dear cells it knows half the trace only
+    assert (
+        0.7 * found < begun < 2.0 * found
+    )  # of cells that limit the step it knows half the trace only
     regridder = BarrierRegridder(
         family="i", cost_weight=1.0, floor=1e-9, tolerance=1e-6, max_iterations=60
     )

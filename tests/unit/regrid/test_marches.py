@@ -94,7 +94,7 @@ def march_both(cost_weight, joint):
     grids, gaps, top, moves = [march.start for march in marches], [0.0, 0.0], [], 0
     for step in range(1, marches[0].steps + 1):
         pairs = list(zip(regridders, marches, strict=True))
-        asked = [r.compute_dear_rate(m.boundary(step), m.sound[step]) for r, m in pairs]
+        asked = [r.compute_limiting_rate(m.boundary(step), m.sound[step]) for r, m in pairs]
         rates = []
         for k, (regridder, motion) in enumerate(pairs):
             sound, least = motion.sound[step], max(asked) if joint else 0.0

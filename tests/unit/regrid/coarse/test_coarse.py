@@ -9,7 +9,7 @@ from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
 
 
-def make_work(ni=64, nj=48, dear=False, seed=0):
+def make_work(ni=64, nj=48, limiting=False, seed=0):
     """A workspace that has looked at a sheared, graded, slightly noisy grid, and its Hessian."""
     random = np.random.default_rng(seed)
     i, j = np.mgrid[0 : ni + 1, 0 : nj + 1] / np.array([ni, nj])[:, None, None]
@@ -17,8 +17,8 @@ def make_work(ni=64, nj=48, dear=False, seed=0):
     nodes[:, 1:-1, 1:-1] += 0.02 / ni * random.normal(size=(2, ni - 1, nj - 1))
     work = Workspace(ni, nj, 1, Tuning(coarse_from=0))
     work.old[:] = work.sides[:] = nodes
-    work.sound[:] = 1.0 + 10.0 * np.exp(-20.0 * (i - 0.5) ** 2)[:-1, :-1] if dear else 1.0
-    work.begin(True, 0.9, 0.1, Tuning(epsilon=1e-1), cost=dear)
+    work.sound[:] = 1.0 + 10.0 * np.exp(-20.0 * (i - 0.5) ** 2)[:-1, :-1] if limiting else 1.0
+    work.begin(True, 0.9, 0.1, Tuning(epsilon=1e-1), cost=limiting)
     work.look(nodes, nodes)
     work.assemble(nodes)
     return work, nodes
@@ -38,9 +38,9 @@ def fine_form(work, d):
     return float(total)
 
 
-@pytest.mark.parametrize("dear", [False, True])
-def test_coarse_matrix_is_that_of_the_fine_cells(dear):
-    work, nodes = make_work(dear=dear)
+@pytest.mark.parametrize("limiting", [False, True])
+def test_coarse_matrix_is_that_of_the_fine_cells(limiting):
+    work, nodes = make_work(limiting=limiting)
     level = work.coarse.levels[-1]
     starts_i, starts_j = work.coarse.starts_i, level.starts_j
     assert cells.fill_coarse_matrix(nodes, work.law, starts_i, starts_j, level.matrix)

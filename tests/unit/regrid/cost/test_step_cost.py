@@ -8,7 +8,7 @@ from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
 
 NI, NJ = 7, 9
-FASTER = 3.5  # than R was made for: about half of all cells are dear
+FASTER = 3.5  # than R was made for: about half of all cells limit the step
 
 
 def shaken_grid(amplitude=0.3, seed=3):

@@ -233,8 +233,9 @@ class Workspace:
         """Take the laws from `sides`, and the weights of the functional's terms.
 
         `cost` needs the cells' sound speeds in `sound`; `least_limiting_rate` [1/s] is the least R
-        of theory R4.11; `tuning` where it is not the workspace's own.  With `curved`, where both pairs
-        of sides bend, lines take their shapes and the barrier is no weaker than (R4.17) has it.
+        of theory R4.11; `tuning` where it is not the workspace's own.  With `curved`, where both
+        pairs of sides bend, lines take their shapes and the barrier is no weaker than (R4.17) has
+        it.
         """
         tuning = tuning or self.tuning
         epsilon, share_i, share_j = float(tuning.epsilon), 0.0, 0.0

@@ -119,7 +119,8 @@ def main() -> None:
         kept = [r for r in document["rows"] if (r["case"], r["code"]) not in done]
         order = list(CASES)
         document["rows"] = sorted(kept + new, key=lambda r: order.index(r["case"]))
-        document["cases"][name] = {"title": case.title, "error": case.error_name}
+        cases = document["cases"] | {name: {"title": case.title, "error": case.error_name}}
+        document["cases"] = {known: cases[known] for known in order if known in cases}
     print("\n".join(write_tables(document)))
     if options.write:
         RESULTS.write_text(json.dumps(document, indent=1) + "\n")

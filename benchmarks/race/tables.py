@@ -63,7 +63,8 @@ def describe_time(rows: list[dict[str, Any]], code: str) -> str:
     seconds, measured = find_time(rows, code)
     if not math.isfinite(seconds):
         return "not reached"
-    number = f"{seconds:.2g}" if seconds < 1000 else f"{seconds:.1e}"
+    two_digits = f"{seconds:.2g}"
+    number = two_digits if seconds < 100 else f"{float(two_digits):,.0f}".replace(",", " ")
     return number if measured else f"({number})"
 
 

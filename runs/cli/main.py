@@ -9,6 +9,7 @@ itself (`--debug` shows where).
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 
@@ -144,12 +145,15 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
         raise BadInput(
             f"--ranks needs --dry-run; start a run with mpiexec -n {ranks} shockgrid ..."
         )
+    from runs.march.compiling import second_compiler
     from runs.march.launching import start_runner
 
     world = _find_world()
-    runner = start_runner(checked, output, force, quiet, _say, world)
-    runner.limit, runner.world = limit, world
-    return _finish(runner.start(), runner.directory, picture)
+    with second_compiler() if world is None else contextlib.nullcontext():
+        runner = start_runner(checked, output, force, quiet, _say, world)
+        runner.limit, runner.world = limit, world
+        end = runner.start()
+    return _finish(end, runner.directory, picture)
 
 
 @cli.command()
@@ -360,7 +364,7 @@ def report(directory, output, film, dpi) -> None:
     The file is complete and needs no network.  A study's report links those of its
     runs.  Needs the extra: pip install 'shockgrid[report]'.
     """
-    from runs.report.page import report as write_report
+    from runs.report import report as write_report
 
     echo(write_report(directory, output, film=film, dpi=dpi, say=_say))
 

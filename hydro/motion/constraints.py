@@ -47,6 +47,7 @@ MOST = 4.0  # spacings that a joint wants to slide at most, before `relax`
 OPPOSITE_PART = (0.05, 0.95)  # where the parts of a side opposite to a contact point may meet
 ARRIVAL = 1.5  # steps' motion before the master's end at which a contact point arrives there
 ROUNDS = 60  # at most, of moving a corner and laying on its lines what slides there
+NARROW = 0.1  # rad: corners at junctions stay as wide, or half as wide as at the start if less
 STRAIGHT_ENOUGH = 1e-13  # what a round moves, as part of the first one's, after which none follows
 
 
@@ -250,7 +251,9 @@ class CornerGuard:
     """Holds the corners that blocks have at one point, where the flow alone moves them.
 
     `node` is moved, `slaves` are those of the sliding contacts whose lines it carries, in the order
-    in which they are laid; their ends that are fixed at the node go with it.
+    in which they are laid; their ends that are fixed at the node go with it.  None opens beyond a
+    straight angle.  Where three blocks or more are linked none closes below `narrow` [rad] either:
+    there one material would be pinched off between two others.
     """
 
     def __init__(self, node: KeyNode, slaves: Sequence[SlaveMotion] = ()):
@@ -265,6 +268,10 @@ class CornerGuard:
                     if slave.key_nodes[end] not in nodes and _is_fixed_at(slave, end, nodes):
                         nodes.append(slave.key_nodes[end])
         self.corners = [member for n in nodes for member in n.members if _is_corner(*member)]
+        self.narrow = 0.0
+        if len(node.members) > 2 and all(segment.linked for segment, _ in node.ends):
+            first = [measure_angle(*find_corner(*corner, old=True)) for corner in self.corners]
+            self.narrow = min([NARROW, *(0.5 * abs(angle) for angle in first)])
 
     @classmethod
     def find(cls, nodes: list[KeyNode], slaves: Sequence[SlaveMotion] = ()) -> list[CornerGuard]:
@@ -280,12 +287,14 @@ class CornerGuard:
         ]
 
     def hold(self) -> float:
-        """Move the node where a corner has opened too far; returns how far [m]."""
+        """Move the node where a corner has opened or closed too far; returns how far [m]."""
         total = 0.0
         for _ in range(ROUNDS if self.slaves else 1):
             moved = 0.0
             for member in self.corners:
                 way = compute_way(*find_corner(*member))
+                if self.narrow > 0.0 and not way.any():
+                    way = compute_way_in(*find_corner(*member), self.narrow)
                 if way.any():
                     self.node.shift(way)
                     moved += float(np.hypot(*way))
@@ -314,10 +323,31 @@ def compute_way(position: np.ndarray, before: np.ndarray, after: np.ndarray) -> 
     return max(-float(away @ outwards), 0.0) * outwards
 
 
-def find_corner(block: Block, i: int, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def compute_way_in(
+    position: np.ndarray, before: np.ndarray, after: np.ndarray, narrow: float
+) -> np.ndarray:
+    """Way (2,) into a corner of an angle [rad] below `narrow`, until it is as wide; else zero."""
+    angle = measure_angle(position, before, after)
+    if not abs(angle) < narrow:
+        return np.zeros(2)
+    a, b = before - position, after - position
+    lengths = float(np.hypot(*a)), float(np.hypot(*b))
+    middle = a / lengths[0] + b / lengths[1]
+    return middle * (0.5 * min(lengths) * min(0.5, 1.0 - angle / narrow))
+
+
+def measure_angle(position: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
+    """Angle at a corner [rad], -pi to pi: below 0 or far open where it has turned over."""
+    a, b = before - position, after - position
+    return float(np.arctan2(b[0] * a[1] - b[1] * a[0], a @ b))
+
+
+def find_corner(
+    block: Block, i: int, j: int, old: bool = False
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """New positions (2,) of a block's corner node, of the nodes before and after on the sides."""
     along, up = 1 if i == 0 else -1, 1 if j == 0 else -1
-    nodes = block.nodes_new
+    nodes = block.nodes if old else block.nodes_new
     sides = nodes[:, i, j + up], nodes[:, i + along, j]
     return nodes[:, i, j].copy(), *(sides if along * up > 0 else sides[::-1])
 

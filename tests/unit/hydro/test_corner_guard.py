@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hydro.motion.constraints import compute_way, find_corner
+from hydro.motion.constraints import NARROW, compute_way, compute_way_in, find_corner
 from problems.deck import Regrid
 from problems.standard.triple_point import TriplePoint, TriplePointDeck
 from regrid.measure.corners import find_triangles
@@ -31,6 +31,22 @@ def test_a_corner_too_wide_is_taken_to_a_straight_angle(turn, part, height):
     along = (moved - place) @ (after - before)
     assert abs(along) < 1e-12, "the node moves across the line between its neighbours only"
     assert np.abs(compute_way(moved, before, after)).max() < 1e-15
+
+
+@pytest.mark.parametrize("angle", [0.05, 0.01, 0.0, -0.01])
+def test_a_corner_that_closes_keeps_an_angle(angle):
+    """By half of its shorter side at most in a step."""
+    place, after = np.array([1.0, 2.0]), np.array([1.1, 2.0])
+    before = place + 0.2 * np.array([math.cos(angle), math.sin(angle)])
+    moved = place.copy()
+    for _ in range(40):
+        way = compute_way_in(moved, before, after, NARROW)
+        assert np.hypot(*way) <= 0.5 * np.hypot(*(after - moved)) + 1e-15
+        moved += way
+    if angle > 0.0:
+        assert measure_angle(moved, before, after) == pytest.approx(NARROW, rel=1e-3)
+    wide = compute_way_in(place, place + np.array([0.0, 0.1]), after, NARROW)
+    assert not wide.any()
 
 
 def make_triple_point(cells=4):

@@ -20,6 +20,7 @@ from problems.conical_target.report import (
 )
 from problems.deck import RunControl
 from problems.references.hugoniot import shock_with_particle_speed
+from runs.deck.reading import read_deck
 
 
 def march_target(problem, steps=None):
@@ -107,6 +108,19 @@ def test_restart():
     state = again.get_state()
     for name, value in one.get_state().items():
         assert np.array_equal(value, state[name]), name
+
+
+@pytest.mark.slow
+def test_graphite_that_is_pinched_off_at_the_junction():
+    """At 1.4 times its speed the rippled deck goes on; its steps stay long."""
+    problem = read_deck("conical-target-rippled", ("speed=2800", "run.t_end=2e-6")).make_problem()
+    simulation = problem.build()
+    rows = []
+    while not simulation.finished:
+        rows.append(simulation.advance())
+    steps = [row["dt"] for row in rows[4:-1]]
+    assert simulation.finished == "t_end reached" and min(steps) > 1e-2 * max(steps)
+    assert max(row["cells_not_convex"] for row in rows) == 0
 
 
 def test_plan_is_what_is_built():

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hydro import rim as on
+from hydro import rows as of
 from hydro.eos import EquationOfState
 from hydro.eos.base import check_eos, check_formulas
 from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
@@ -30,17 +31,6 @@ from hydro.interior.update import sum_tiles
 from hydro.perimeter.contacts import fill_open_flux
 from hydro.perimeter.strips import make_side_kernels
 from hydro.rim import SIDES, make_rim
-from hydro.rows import (
-    CONSERVED,
-    LEAST_C2,
-    MOMENTUM_AND_ENERGY,
-    NO_C2,
-    RHO,
-    STATE_ROWS,
-    TOTALS,
-    VOIDED,
-    P,
-)
 from hydro.workers import LEAST_INSIDE
 from regrid.errors import BadInput, Place, RunFailure, suggest
 from regrid.measure.corners import compute_centres
@@ -153,7 +143,7 @@ class Block:
                 f"block {name!r}: {len(bad)} cells of the first grid are not convex or are turned "
                 f"over (the first is cell i={i}, j={j}); i and j must turn counter-clockwise"
             )
-        self.state = np.zeros((STATE_ROWS, self.ni + 2, self.nj + 2))
+        self.state = np.zeros((of.STATE_ROWS, self.ni + 2, self.nj + 2))
         for row, (label, value) in enumerate(
             zip(("rho", "u", "v", "p"), (rho, u, v, p), strict=True)
         ):
@@ -168,7 +158,7 @@ class Block:
                     f"the block has {self.ni} x {self.nj} cells"
                 ) from None
         check_first_state(name, eos, self.state[:, 1:-1, 1:-1])
-        check_formulas(name, eos, *self.state[[RHO, P], 1:-1, 1:-1])
+        check_formulas(name, eos, *self.state[[of.RHO, of.P], 1:-1, 1:-1])
         # how fast waves cross the cells (theory F7.1), and how many cells shared their new state
         self.rates = np.zeros((self.ni, self.nj))
         self.rates_new = np.zeros((self.ni, self.nj))
@@ -186,9 +176,9 @@ class Block:
         self.wave_law = eos.wave_law
         self.limiter, self.flux_name = limiter, flux
         # one row a tile, and one for what polygon cells of sliding contacts and sources add
-        self.tile_totals = np.zeros((count_tiles(self.ni, self.nj) + 1, TOTALS))
-        self.tile_totals[-1, LEAST_C2] = NO_C2
-        self.sums_array = np.zeros(TOTALS)  # of the tiles, and a list of them while it is true
+        self.tile_totals = np.zeros((count_tiles(self.ni, self.nj) + 1, of.TOTALS))
+        self.tile_totals[-1, of.LEAST_C2] = of.NO_C2
+        self.sums_array = np.zeros(of.TOTALS)  # of the tiles, and a list of them while it is true
         self._summed: list[float] | None = None
         self.scratch = allocate_scratch(1)
         count = 2 * (self.ni + self.nj)
@@ -320,7 +310,7 @@ class Block:
         self._summed = None
         if threads > 1 and self.scratch.shape[0] != threads:
             self.scratch = allocate_scratch(threads)
-        self.tile_totals[-1, LEAST_C2], self.tile_totals[-1, VOIDED] = NO_C2, 0.0
+        self.tile_totals[-1, of.LEAST_C2], self.tile_totals[-1, of.VOIDED] = of.NO_C2, 0.0
         advance = self.flow.advance_threaded if threads > 1 else self.flow.advance
         advance(
             self._old, self._new, self.rim.rows, dt, self.parameters, self.scratch, self.tiles,
@@ -385,7 +375,7 @@ class Block:
         if self.shared_cells and np.isfinite(totals).all() and not bad.any():
             return None  # the cells that failed have shared their states since
         i, j = (int(index) for index in np.argwhere(bad)[0]) if bad.any() else (0, 0)
-        rho, p = self.state_new[[RHO, P], i + 1, j + 1]
+        rho, p = self.state_new[[of.RHO, of.P], i + 1, j + 1]
         known = f", its pressure {p:.6g} Pa" if np.isfinite(p) else ""
         return RunFailure(
             f"flow: block {self.name!r}, cell i={i}, j={j}: {self.eos.failure}; "
@@ -402,8 +392,8 @@ class Block:
         """Count in what a redistribution of the new state has changed."""
         self._summed = None
         last = self.tile_totals[-1]
-        last[LEAST_C2] = min(last[LEAST_C2], least_c2)
-        last[VOIDED] += voided
+        last[of.LEAST_C2] = min(last[of.LEAST_C2], least_c2)
+        last[of.VOIDED] += voided
 
     @property
     def sums(self) -> list[float]:
@@ -434,8 +424,8 @@ class Block:
         self._summed = None
         last = self.tile_totals[-1]
         if not self.is_slave:  # else the polygons' part is there
-            last[CONSERVED] = 0.0
-        last[MOMENTUM_AND_ENERGY] += gained
+            last[of.CONSERVED] = 0.0
+        last[of.MOMENTUM_AND_ENERGY] += gained
 
     # --- what pictures and dumps see -----------------------------------------------------------
 

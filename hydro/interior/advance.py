@@ -16,6 +16,7 @@ import numba
 import numpy as np
 
 from hydro import rim as on
+from hydro import rows as of
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.formulas.reconstruction import DEFAULT_LIMITER, LOW_MACH
 from hydro.formulas.riemann import DEFAULT_FLUX
@@ -33,18 +34,6 @@ from hydro.interior.reconstruction import make_row_phases
 from hydro.interior.scratch import copy_back, copy_row, copy_rows, prefetch_row, prefetch_rows
 from hydro.interior.slopes import fill_steps
 from hydro.interior.update import make_update
-from hydro.rows import (
-    FIRST_ORDER,
-    FLUX_ROWS,
-    LEAST_C2,
-    STATE_ROWS,
-    TOTAL_ENERGY,
-    TOTAL_MASS,
-    TOTAL_MOMENTUM_X,
-    TOTAL_MOMENTUM_Y,
-    TOTALS,
-    VOIDED,
-)
 from regrid.jit import compiled_once, kernel
 
 TILE_ROWS = 32
@@ -188,11 +177,11 @@ def make_flow_kernels(
                 if row >= row0:
                     fill_traces_in(Z, n, counted, parameters)
             if row == 0:
-                for q in range(FLUX_ROWS):
+                for q in range(of.FLUX_ROWS):
                     for k in range(m):  # fluxes of a rim go outwards
                         Z[at.FLUX_I_MASS + q * at.SPAN + 1 + k] = -rim[on.MASS + q, ja + k]
             elif row == ni:
-                for q in range(FLUX_ROWS):
+                for q in range(of.FLUX_ROWS):
                     copy_row(rim, on.MASS + q, nj + ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
             elif row >= row0:
                 fill_upwind_i(Z, n)
@@ -216,10 +205,10 @@ def make_flow_kernels(
                 if curved:
                     fill_push_j(Z, n)
                 if j0 == 0:
-                    for q in range(FLUX_ROWS):
+                    for q in range(of.FLUX_ROWS):
                         Z[at.FLUX_J_MASS + q * at.SPAN + first] = -rim[on.MASS + q, 2 * nj + row]
                 if j1 == nj:
-                    for q in range(FLUX_ROWS):
+                    for q in range(of.FLUX_ROWS):
                         out = rim[on.MASS + q, 2 * nj + ni + row]
                         Z[at.FLUX_J_MASS + q * at.SPAN + last] = out
             if inside and row > row0:
@@ -229,7 +218,7 @@ def make_flow_kernels(
             elif row > row0:
                 fill_new_state(Z, n, dt, inverse_dt, parameters)
             if row > row0:
-                for q in range(STATE_ROWS):
+                for q in range(of.STATE_ROWS):
                     new = at.RHO_NEW + q * at.SPAN + first
                     copy_back(Z, new, j1 - j0, state_new[q], row, j0 + 1)
                 if opens_voids:
@@ -239,18 +228,18 @@ def make_flow_kernels(
             next_row(Z, n)
             row += 1
         least = 1e300
-        for q in range(TOTALS):
+        for q in range(of.TOTALS):
             tile_totals[tile, q] = 0.0
         for k in range(first, last):
             c2 = Z[at.LEAST_C2 + k]
             least = least if least < c2 else c2
-            tile_totals[tile, FIRST_ORDER] += Z[at.FIRST_ORDER + k]
-            tile_totals[tile, TOTAL_MASS] += Z[at.SUM_MASS + k]
-            tile_totals[tile, TOTAL_MOMENTUM_X] += Z[at.SUM_X + k]
-            tile_totals[tile, TOTAL_MOMENTUM_Y] += Z[at.SUM_Y + k]
-            tile_totals[tile, TOTAL_ENERGY] += Z[at.SUM_ENERGY + k]
-            tile_totals[tile, VOIDED] += Z[at.SUM_VOIDED + k]
-        tile_totals[tile, LEAST_C2] = least
+            tile_totals[tile, of.FIRST_ORDER] += Z[at.FIRST_ORDER + k]
+            tile_totals[tile, of.TOTAL_MASS] += Z[at.SUM_MASS + k]
+            tile_totals[tile, of.TOTAL_MOMENTUM_X] += Z[at.SUM_X + k]
+            tile_totals[tile, of.TOTAL_MOMENTUM_Y] += Z[at.SUM_Y + k]
+            tile_totals[tile, of.TOTAL_ENERGY] += Z[at.SUM_ENERGY + k]
+            tile_totals[tile, of.VOIDED] += Z[at.SUM_VOIDED + k]
+        tile_totals[tile, of.LEAST_C2] = least
 
     @kernel(allocates=False)
     def advance(old, new, rim, dt, parameters, scratch, tiles, tile_totals):

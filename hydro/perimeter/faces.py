@@ -6,23 +6,12 @@ Those beside the nodes of a sliding contact hold more, or less, than their strai
 from __future__ import annotations
 
 from hydro import rim as on
+from hydro import rows as of
 from hydro.eos.base import make_least_pressure
 from hydro.formulas.geometry import Geometry, compute_plane_face
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior.scratch import find_twist
 from hydro.rim import find_cell
-from hydro.rows import (
-    LEAST_C2,
-    NO_C2,
-    RHO,
-    TOTAL_ENERGY,
-    TOTAL_MASS,
-    TOTAL_MOMENTUM_X,
-    TOTAL_MOMENTUM_Y,
-    P,
-    U,
-    V,
-)
 from regrid.jit import compiled_once, inlined, kernel
 
 
@@ -135,7 +124,7 @@ def make_fill_polygons(eos_class, geometry: Geometry):
         ni = state.shape[1] - 2
         nj = state.shape[2] - 2
         totals[:] = 0.0
-        totals[LEAST_C2] = NO_C2
+        totals[of.LEAST_C2] = of.NO_C2
         for face in range(excess_volume.shape[0]):
             side, i, j = find_cell(face, ni, nj)
             old = excess_volume[face]
@@ -149,10 +138,10 @@ def make_fill_polygons(eos_class, geometry: Geometry):
             if old == 0.0 and new == 0.0:
                 continue
             volume = measure_volume(nodes_new, i, j, weigh)
-            rho, u = state_new[RHO, i + 1, j + 1], state_new[U, i + 1, j + 1]
-            v, p = state_new[V, i + 1, j + 1], state_new[P, i + 1, j + 1]
-            rho_old, u_old = state[RHO, i + 1, j + 1], state[U, i + 1, j + 1]
-            v_old, p_old = state[V, i + 1, j + 1], state[P, i + 1, j + 1]
+            rho, u = state_new[of.RHO, i + 1, j + 1], state_new[of.U, i + 1, j + 1]
+            v, p = state_new[of.V, i + 1, j + 1], state_new[of.P, i + 1, j + 1]
+            rho_old, u_old = state[of.RHO, i + 1, j + 1], state[of.U, i + 1, j + 1]
+            v_old, p_old = state[of.V, i + 1, j + 1], state[of.P, i + 1, j + 1]
             energy = energy_part(rho, p, parameters) + void_energy_new[i, j]
             energy += 0.5 * (u * u + v * v)
             energy_old = energy_part(rho_old, p_old, parameters) + void_energy[i, j]
@@ -173,16 +162,16 @@ def make_fill_polygons(eos_class, geometry: Geometry):
             if p < least:
                 p = least
                 void_energy_new[i, j] = energy - energy_part(rho, p, parameters)
-            state_new[RHO, i + 1, j + 1] = rho
-            state_new[U, i + 1, j + 1] = u
-            state_new[V, i + 1, j + 1] = v
-            state_new[P, i + 1, j + 1] = p
+            state_new[of.RHO, i + 1, j + 1] = rho
+            state_new[of.U, i + 1, j + 1] = u
+            state_new[of.V, i + 1, j + 1] = v
+            state_new[of.P, i + 1, j + 1] = p
             c2 = sound_speed_squared_part(rho, p, parameters)
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
-            totals[LEAST_C2] = totals[LEAST_C2] if totals[LEAST_C2] < c2 else c2
-            totals[TOTAL_MASS] += held
-            totals[TOTAL_MOMENTUM_X] += held * u_old
-            totals[TOTAL_MOMENTUM_Y] += held * v_old
-            totals[TOTAL_ENERGY] += held * energy_old
+            totals[of.LEAST_C2] = totals[of.LEAST_C2] if totals[of.LEAST_C2] < c2 else c2
+            totals[of.TOTAL_MASS] += held
+            totals[of.TOTAL_MOMENTUM_X] += held * u_old
+            totals[of.TOTAL_MOMENTUM_Y] += held * v_old
+            totals[of.TOTAL_ENERGY] += held * energy_old
 
     return fill_polygons

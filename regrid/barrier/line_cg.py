@@ -11,16 +11,7 @@ from __future__ import annotations
 
 from numba import prange
 
-from regrid.barrier.assembly import (
-    CROSS,
-    DIAGONAL,
-    EAST,
-    FACTOR,
-    NODE_ROWS,
-    NORTH,
-    OWN,
-    PIVOT,
-)
+from regrid.barrier import assembly as at
 from regrid.barrier.step_control import SPAN
 from regrid.jit import inlined, kernel
 
@@ -39,33 +30,33 @@ def fill_product_row(now, past, count, Z):
     """
     for col in range(1, count + 1):
         x, y = Z[HERE_X + col], Z[HERE_Y + col]
-        own = now[OWN + SPAN + col]
-        s_x = now[OWN + col] * x + own * y
-        s_y = own * x + now[OWN + 2 * SPAN + col] * y
+        own = now[at.OWN + SPAN + col]
+        s_x = now[at.OWN + col] * x + own * y
+        s_y = own * x + now[at.OWN + 2 * SPAN + col] * y
         u, v = Z[AFTER_X + col], Z[AFTER_Y + col]
-        s_x += now[EAST + col] * u + now[EAST + SPAN + col] * v
-        s_y += now[EAST + 2 * SPAN + col] * u + now[EAST + 3 * SPAN + col] * v
+        s_x += now[at.EAST + col] * u + now[at.EAST + SPAN + col] * v
+        s_y += now[at.EAST + 2 * SPAN + col] * u + now[at.EAST + 3 * SPAN + col] * v
         u, v = Z[BEFORE_X + col], Z[BEFORE_Y + col]
-        s_x += past[EAST + col] * u + past[EAST + 2 * SPAN + col] * v
-        s_y += past[EAST + SPAN + col] * u + past[EAST + 3 * SPAN + col] * v
+        s_x += past[at.EAST + col] * u + past[at.EAST + 2 * SPAN + col] * v
+        s_y += past[at.EAST + SPAN + col] * u + past[at.EAST + 3 * SPAN + col] * v
         u, v = Z[HERE_X + col + 1], Z[HERE_Y + col + 1]
-        s_x += now[NORTH + col] * u + now[NORTH + SPAN + col] * v
-        s_y += now[NORTH + 2 * SPAN + col] * u + now[NORTH + 3 * SPAN + col] * v
+        s_x += now[at.NORTH + col] * u + now[at.NORTH + SPAN + col] * v
+        s_y += now[at.NORTH + 2 * SPAN + col] * u + now[at.NORTH + 3 * SPAN + col] * v
         u, v = Z[HERE_X + col - 1], Z[HERE_Y + col - 1]
-        s_x += now[NORTH + col - 1] * u + now[NORTH + 2 * SPAN + col - 1] * v
-        s_y += now[NORTH + SPAN + col - 1] * u + now[NORTH + 3 * SPAN + col - 1] * v
+        s_x += now[at.NORTH + col - 1] * u + now[at.NORTH + 2 * SPAN + col - 1] * v
+        s_y += now[at.NORTH + SPAN + col - 1] * u + now[at.NORTH + 3 * SPAN + col - 1] * v
         u, v = Z[AFTER_X + col + 1], Z[AFTER_Y + col + 1]
-        s_x += now[DIAGONAL + col] * u + now[DIAGONAL + SPAN + col] * v
-        s_y += now[DIAGONAL + 2 * SPAN + col] * u + now[DIAGONAL + 3 * SPAN + col] * v
+        s_x += now[at.DIAGONAL + col] * u + now[at.DIAGONAL + SPAN + col] * v
+        s_y += now[at.DIAGONAL + 2 * SPAN + col] * u + now[at.DIAGONAL + 3 * SPAN + col] * v
         u, v = Z[BEFORE_X + col - 1], Z[BEFORE_Y + col - 1]
-        s_x += past[DIAGONAL + col - 1] * u + past[DIAGONAL + 2 * SPAN + col - 1] * v
-        s_y += past[DIAGONAL + SPAN + col - 1] * u + past[DIAGONAL + 3 * SPAN + col - 1] * v
+        s_x += past[at.DIAGONAL + col - 1] * u + past[at.DIAGONAL + 2 * SPAN + col - 1] * v
+        s_y += past[at.DIAGONAL + SPAN + col - 1] * u + past[at.DIAGONAL + 3 * SPAN + col - 1] * v
         u, v = Z[BEFORE_X + col + 1], Z[BEFORE_Y + col + 1]
-        s_x += past[CROSS + col] * u + past[CROSS + SPAN + col] * v
-        s_y += past[CROSS + 2 * SPAN + col] * u + past[CROSS + 3 * SPAN + col] * v
+        s_x += past[at.CROSS + col] * u + past[at.CROSS + SPAN + col] * v
+        s_y += past[at.CROSS + 2 * SPAN + col] * u + past[at.CROSS + 3 * SPAN + col] * v
         u, v = Z[AFTER_X + col - 1], Z[AFTER_Y + col - 1]
-        s_x += now[CROSS + col - 1] * u + now[CROSS + 2 * SPAN + col - 1] * v
-        s_y += now[CROSS + SPAN + col - 1] * u + now[CROSS + 3 * SPAN + col - 1] * v
+        s_x += now[at.CROSS + col - 1] * u + now[at.CROSS + 2 * SPAN + col - 1] * v
+        s_y += now[at.CROSS + SPAN + col - 1] * u + now[at.CROSS + 3 * SPAN + col - 1] * v
         Z[OUT_X + col] = s_x
         Z[OUT_Y + col] = s_y
 
@@ -110,8 +101,8 @@ def fill_product(directions, beta, first, last, H, out, totals, Z):
                 Z[AFTER_X + col] = new_x[col]
                 Z[AFTER_Y + col] = new_y[col]
         if i > 0:
-            now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
-            past = H[(i - 1) * NODE_ROWS : i * NODE_ROWS]
+            now = H[i * at.NODE_ROWS : (i + 1) * at.NODE_ROWS]
+            past = H[(i - 1) * at.NODE_ROWS : i * at.NODE_ROWS]
             fill_product_row(now, past, count, Z)
             out_x, out_y = out[0, i, first:last], out[1, i, first:last]
             for k in range(count):
@@ -151,18 +142,18 @@ def fill_line_solution(alpha, step, vectors, first, last, H, totals):
                 z_y[k] = r_y[k]
         else:
             b_x, b_y = z[0, i - 1, first:last], z[1, i - 1, first:last]
-            past = H[(i - 1) * NODE_ROWS : i * NODE_ROWS]
+            past = H[(i - 1) * at.NODE_ROWS : i * at.NODE_ROWS]
             for k in range(count):
                 col = k + 1
                 u, v = b_x[k], b_y[k]
-                z_x[k] = r_x[k] - (past[FACTOR + col] * u + past[FACTOR + 2 * SPAN + col] * v)
+                z_x[k] = r_x[k] - (past[at.FACTOR + col] * u + past[at.FACTOR + 2 * SPAN + col] * v)
                 z_y[k] = r_y[k] - (
-                    past[FACTOR + SPAN + col] * u + past[FACTOR + 3 * SPAN + col] * v
+                    past[at.FACTOR + SPAN + col] * u + past[at.FACTOR + 3 * SPAN + col] * v
                 )
     for k in range(count):
         total[k] = 0.0
     for i in range(ni - 1, 0, -1):
-        now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
+        now = H[i * at.NODE_ROWS : (i + 1) * at.NODE_ROWS]
         r_x, r_y = r[0, i, first:last], r[1, i, first:last]
         z_x, z_y = z[0, i, first:last], z[1, i, first:last]
         a_x, a_y = z[0, i + 1, first:last], z[1, i + 1, first:last]
@@ -170,12 +161,12 @@ def fill_line_solution(alpha, step, vectors, first, last, H, totals):
             col = k + 1
             u, v = z_x[k], z_y[k]
             p, q = a_x[k], a_y[k]
-            off = now[PIVOT + SPAN + col]
-            s_x = (now[PIVOT + col] * u + off * v) - (
-                now[FACTOR + col] * p + now[FACTOR + SPAN + col] * q
+            off = now[at.PIVOT + SPAN + col]
+            s_x = (now[at.PIVOT + col] * u + off * v) - (
+                now[at.FACTOR + col] * p + now[at.FACTOR + SPAN + col] * q
             )
-            s_y = (off * u + now[PIVOT + 2 * SPAN + col] * v) - (
-                now[FACTOR + 2 * SPAN + col] * p + now[FACTOR + 3 * SPAN + col] * q
+            s_y = (off * u + now[at.PIVOT + 2 * SPAN + col] * v) - (
+                now[at.FACTOR + 2 * SPAN + col] * p + now[at.FACTOR + 3 * SPAN + col] * q
             )
             z_x[k] = s_x
             z_y[k] = s_y

@@ -12,24 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from regrid.barrier import assembly as at
 from regrid.barrier.assembly import (
-    A2,
-    AX,
-    AY,
-    B2,
-    BX,
-    BY,
-    C2,
-    CX,
-    CY,
-    FADING,
-    FX,
-    FY,
-    QA,
-    RIGHT_Q,
-    RIGHT_X,
-    RIGHT_Y,
-    ROWS,
     LineLaws,
     begin_columns,
     begin_row,
@@ -44,10 +28,10 @@ from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.jit import kernel
 from regrid.sides import copy_sides
 
-TERM_1, TERM_2, TERM_3, TERM_4 = (ROWS + k * SPAN for k in range(4))
-LEAST_1, LEAST_2, LEAST_3, LEAST_4 = (ROWS + k * SPAN for k in range(4, 8))
-ENERGY, LEAST = ROWS + 8 * SPAN, ROWS + 9 * SPAN
-ENERGY_ROWS = ROWS + 10 * SPAN
+TERM_1, TERM_2, TERM_3, TERM_4 = (at.ROWS + k * SPAN for k in range(4))
+LEAST_1, LEAST_2, LEAST_3, LEAST_4 = (at.ROWS + k * SPAN for k in range(4, 8))
+ENERGY, LEAST = at.ROWS + 8 * SPAN, at.ROWS + 9 * SPAN
+ENERGY_ROWS = at.ROWS + 10 * SPAN
 
 
 @kernel
@@ -71,10 +55,10 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
             bend_sides(law.curve, i + 1, first, cells, Z)
             bend_lines(law.curve, i, first, cells + 1, Z)
         for col in range(cells):
-            ax, ay, a2 = Z[AX + col], Z[AY + col], Z[A2 + col]
-            ux, uy, u2 = Z[AX + col + 1], Z[AY + col + 1], Z[A2 + col + 1]
-            bx, by, b2 = Z[BX + col], Z[BY + col], Z[B2 + col]
-            rx, ry, r2 = Z[CX + col], Z[CY + col], Z[C2 + col]
+            ax, ay, a2 = Z[at.AX + col], Z[at.AY + col], Z[at.A2 + col]
+            ux, uy, u2 = Z[at.AX + col + 1], Z[at.AY + col + 1], Z[at.A2 + col + 1]
+            bx, by, b2 = Z[at.BX + col], Z[at.BY + col], Z[at.B2 + col]
+            rx, ry, r2 = Z[at.CX + col], Z[at.CY + col], Z[at.C2 + col]
             d1, d2 = ax * by - ay * bx, ux * by - uy * bx
             d3, d4 = ux * ry - uy * rx, ax * ry - ay * rx
             Z[LEAST_1 + col] = d1
@@ -101,18 +85,21 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
         fill_fading(law.along_i[GROWTH, i], cells, Z)
         parts = barrier[i, first:last]
         for col in range(cells):
-            straight = Z[FX + col] * Z[FX + col] + Z[FY + col] * Z[FY + col]
-            side = Z[RIGHT_X + col] * Z[RIGHT_X + col] + Z[RIGHT_Y + col] * Z[RIGHT_Y + col]
+            straight = Z[at.FX + col] * Z[at.FX + col] + Z[at.FY + col] * Z[at.FY + col]
+            side = (
+                Z[at.RIGHT_X + col] * Z[at.RIGHT_X + col]
+                + Z[at.RIGHT_Y + col] * Z[at.RIGHT_Y + col]
+            )
             terms = (Z[TERM_1 + col] + Z[TERM_2 + col]) + (Z[TERM_3 + col] + Z[TERM_4 + col])
             m1, m2, m3, m4 = Z[LEAST_1 + col], Z[LEAST_2 + col], Z[LEAST_3 + col], Z[LEAST_4 + col]
             m1 = m1 if m1 < m2 else m2
             m3 = m3 if m3 < m4 else m4
             m1 = m1 if m1 < m3 else m3
             least = Z[LEAST + col]
-            straight = straight / Z[QA + col] if Z[QA + col] > 0.0 else 0.0  # F = q dx
-            terms *= Z[FADING + col]
+            straight = straight / Z[at.QA + col] if Z[at.QA + col] > 0.0 else 0.0  # F = q dx
+            terms *= Z[at.FADING + col]
             Z[ENERGY + col] += (quarter * parts[col]) * terms + 0.5 * (
-                straight + inside * Z[RIGHT_Q + col] * side
+                straight + inside * Z[at.RIGHT_Q + col] * side
             )
             Z[LEAST + col] = m1 if m1 < least else least
         if spread == 0.0 and law.cost_weight > 0.0:

@@ -45,17 +45,6 @@ import numpy as np
 
 from regrid.algebraic import displaced_grid
 from regrid.barrier import assembly as at
-from regrid.barrier.assembly import (
-    LineLaws,
-    begin_columns,
-    begin_row,
-    end_row,
-    fill_cell_blocks,
-    fill_gradient,
-    fill_line_blocks,
-    fill_own_blocks,
-    fill_side_blocks,
-)
 from regrid.barrier.functional import corner_blocks
 from regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
 from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE
@@ -128,12 +117,12 @@ def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
     ni, low = nodes.shape[1] - 1, first - 1
     count = last - first + 1
     bend, way = np.zeros((ni + 1, nodes.shape[2])), np.zeros((2, nodes.shape[2]))
-    laws = LineLaws(along_i, along_j, blend_i, bend, way, 0.0, 0.0)
-    begin_columns(nodes, along_j, blend_i, blend_j, 0.0, low, count, Z)
+    laws = at.LineLaws(along_i, along_j, blend_i, bend, way, 0.0, 0.0)
+    at.begin_columns(nodes, along_j, blend_i, blend_j, 0.0, low, count, Z)
     for i in range(ni):
         now = H[i * at.NODE_ROWS : (i + 1) * at.NODE_ROWS]
         past = H[max(i - 1, 0) * at.NODE_ROWS : (max(i - 1, 0) + 1) * at.NODE_ROWS]
-        begin_row(nodes, i, laws, low, count, Z)
+        at.begin_row(nodes, i, laws, low, count, Z)
         for col in range(count):
             ax, ay = Z[at.AX + col], Z[at.AY + col]
             ux, uy = Z[at.AX + col + 1], Z[at.AY + col + 1]
@@ -159,13 +148,13 @@ def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
                 orthogonality,
                 Z[term : term + 14 * SPAN],
             )
-        fill_cell_blocks(count, now, Z)
-        fill_line_blocks(count, now, Z)
+        at.fill_cell_blocks(count, now, Z)
+        at.fill_line_blocks(count, now, Z)
         if i > 0:
-            fill_side_blocks(count, now, Z)
-            fill_gradient(gradient[0, i, first:last], gradient[1, i, first:last], Z)
-            fill_own_blocks(count, now, past, Z)
-        end_row(count, Z)
+            at.fill_side_blocks(count, now, Z)
+            at.fill_gradient(gradient[0, i, first:last], gradient[1, i, first:last], Z)
+            at.fill_own_blocks(count, now, past, Z)
+        at.end_row(count, Z)
 
 
 @kernel

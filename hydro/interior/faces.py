@@ -8,15 +8,8 @@ operations overlap between faces.
 
 from __future__ import annotations
 
+from hydro.formulas import riemann
 from hydro.formulas.reconstruction import WHOLE, choose_own, compute_face_state
-from hydro.formulas.riemann import (
-    compute_contact_speed,
-    compute_hll_flux,
-    compute_normal_speeds,
-    compute_star_flux,
-    compute_waves,
-    reduce_jump,
-)
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once, inlined
 
@@ -146,17 +139,17 @@ def make_upwind(left, right, face, torn, acoustic_weight, low_mach, opens_voids)
             area_x = Z[face + k]
             area_y = Z[face + at.SPAN + k]
             square = area_x * area_x + area_y * area_y
-            w_l, w_r = compute_normal_speeds(
+            w_l, w_r = riemann.compute_normal_speeds(
                 u_l, v_l, u_r, v_r, area_x, area_y, Z[face + 2 * at.SPAN + k]
             )
             if low_mach:
                 part_l = Z[acoustic_weight + k]
                 part_r = Z[at.ACOUSTIC + k]
-                w_l, w_r = reduce_jump(w_l, w_r, part_l if part_l > part_r else part_r)
-            s_l, s_r = compute_waves(
+                w_l, w_r = riemann.reduce_jump(w_l, w_r, part_l if part_l > part_r else part_r)
+            s_l, s_r = riemann.compute_waves(
                 w_l, Z[left + 4 * at.SPAN + k], w_r, Z[right + 4 * at.SPAN + k], square
             )
-            push, drag, flow_l, flow_r = compute_contact_speed(
+            push, drag, flow_l, flow_r = riemann.compute_contact_speed(
                 (rho_l, p_l, w_l, s_l), (rho_r, p_r, w_r, s_r), square
             )
             left_side = push <= 0.0
@@ -217,7 +210,7 @@ def make_flux(energy_part, face, target, pressure_row, opens_voids):
                 Z[at.W_SIDE + k], Z[at.FLOW_SIDE + k], Z[at.S_SIDE + k], Z[at.S_CUT + k],
                 Z[at.PUSH + k], Z[at.DRAG + k], Z[at.SQUARE + k],
             )  # fmt: skip
-            mass, momentum_x, momentum_y, energy, pressure = compute_star_flux(
+            mass, momentum_x, momentum_y, energy, pressure = riemann.compute_star_flux(
                 (rho, Z[at.U_SIDE + k], Z[at.V_SIDE + k], p, e),
                 wave,
                 (Z[face + k], Z[face + at.SPAN + k], Z[face + 2 * at.SPAN + k]),
@@ -260,7 +253,7 @@ def make_hll_flux(energy_part, faces, switch, torn, target, pressure_row, opens_
             u_l, v_l = Z[left + at.SPAN + k], Z[left + 2 * at.SPAN + k]
             u_r, v_r = Z[right + at.SPAN + k], Z[right + 2 * at.SPAN + k]
             c2_l, c2_r = Z[left + 4 * at.SPAN + k], Z[right + 4 * at.SPAN + k]
-            mass, momentum_x, momentum_y, energy, pressure = compute_hll_flux(
+            mass, momentum_x, momentum_y, energy, pressure = riemann.compute_hll_flux(
                 (rho_l, u_l, v_l, p_l, e_l, c2_l),
                 (rho_r, u_r, v_r, p_r, e_r, c2_r),
                 (Z[face + k], Z[face + at.SPAN + k], Z[face + 2 * at.SPAN + k]),

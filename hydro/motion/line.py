@@ -22,14 +22,7 @@ import numpy as np
 from hydro import rim as on
 from hydro.boundary import NodeMotion, Segment
 from hydro.rim import SIDES
-from regrid.curves import (
-    FREE_END,
-    arc_law,
-    fill_redistributed,
-    fill_turning,
-    fill_turning_law,
-    make_crossing,
-)
+from regrid import curves
 from regrid.jit import compiled_once, kernel
 
 CORNER = 0.35  # sine of the angle from which two tracks that meet make a corner
@@ -199,7 +192,7 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, spacing, walls):
     if relax < 0.0:
         return stretching, -1
     if shortest > 0.0 and relax > 0.0:
-        fill_turning_law(moved, law, turning, closed, walls[0], walls[1], shortest, turned)
+        curves.fill_turning_law(moved, law, turning, closed, walls[0], walls[1], shortest, turned)
     for end in range(2):
         k = end * (count - 1)
         i, j = find_node(side, start + k, ni, nj)
@@ -208,7 +201,7 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, spacing, walls):
     failed, out = -1, moved
     if relax > 0.0:
         out = work[6:]
-        failed = fill_redistributed(
+        failed = curves.fill_redistributed(
             moved, turned if shortest > 0.0 else law, np.array([0, count - 1]), spline, relax,
             periodic, walls[0], walls[1], work[:6], out,
         )  # fmt: skip
@@ -329,8 +322,8 @@ class Line:
         self.rule = rule
         line = np.ascontiguousarray(segment.line(segment.block.nodes))
         self.track = Track(line)
-        self.law = arc_law(line)
-        self.walls = [FREE_END, FREE_END]
+        self.law = curves.arc_law(line)
+        self.walls = [curves.FREE_END, curves.FREE_END]
         self.period: np.ndarray | None = None  # from the first node to the last, where they repeat
         self.neighbours: list[tuple[Line, int] | None] = [None, None]  # that go on, at which end
         self.damping = np.zeros_like(line)
@@ -359,7 +352,7 @@ class Line:
         """Let nodes go where the line bends more than now: before the first step."""
         self.shortest = shortest
         line = np.ascontiguousarray(self.segment.line(self.segment.block.nodes))
-        fill_turning(line, self.closed, *self.walls, self._turning)
+        curves.fill_turning(line, self.closed, *self.walls, self._turning)
 
     def damp(self, dt: float) -> None:
         """Fill `damping`, the velocities against a sliding line's shortest waves, for all nodes."""
@@ -442,7 +435,7 @@ class Line:
             tuple(self.walls),
         )  # fmt: skip
         if failed >= 0:
-            raise make_crossing(failed)
+            raise curves.make_crossing(failed)
         return stretching
 
 

@@ -11,14 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from hydro import rim as on
+from hydro.formulas import riemann
 from hydro.formulas.geometry import keep_flux, split_flux
-from hydro.formulas.riemann import (
-    compute_contact,
-    compute_hll_flux,
-    compute_hllc_flux,
-    compute_speed_at_pressure,
-    compute_wave_pressure,
-)
 from hydro.rows import FLUX_ROWS
 from regrid.jit import compiled_once, kernel
 
@@ -49,7 +43,7 @@ def solve_contact(rim, k, other, m, state, law, other_law):
     v_other, c, c_other = other[state + on.V, m], rim[state + on.C, k], other[state + on.C, m]
     jump = rim[on.JUMP, k]
     w, w_other = u * nx + v * ny, u_other * nx + v_other * ny
-    p, w = compute_contact(
+    p, w = riemann.compute_contact(
         (rho, w, rim[state + on.P, k], c, law),
         (rho_other, w_other, other[state + on.P, m], c_other, other_law),
         jump,
@@ -120,9 +114,9 @@ def let_pass(rim, k, other, m, beyond, hll, acoustic_weight, curved):
     )  # fmt: skip
     face = rim[on.AREA_X, k], rim[on.AREA_Y, k], rim[on.SWEPT, k]
     if hll > 0.0:
-        flux = compute_hll_flux(inside, outside, face)
+        flux = riemann.compute_hll_flux(inside, outside, face)
     else:
-        flux = compute_hllc_flux(inside, outside, face, acoustic_weight)
+        flux = riemann.compute_hllc_flux(inside, outside, face, acoustic_weight)
     rim[on.MASS, k], rim[on.MOMENTUM_X, k], momentum_y, rim[on.ENERGY, k], pressure = flux
     split_momentum(rim, k, momentum_y, pressure, curved)
 
@@ -261,7 +255,7 @@ def fill_free_surface(rim, spans, law, pressure, phase, curved):
             nx, ny = find_normal(rim, k)
             u, v = rim[state + on.U, k], rim[state + on.V, k]
             w = u * nx + v * ny
-            w_star = compute_speed_at_pressure(
+            w_star = riemann.compute_speed_at_pressure(
                 rim[state + on.RHO, k], w, rim[state + on.P, k], rim[state + on.C, k], law, inside
             )
             rim[on.W_STAR, k] = w_star
@@ -334,7 +328,7 @@ def press_on_walls(rim, walls, law, curved):
             x, y = rim[on.NX, k], rim[on.NY, k]
             length = (x * x + y * y) ** 0.5
             w = (rim[on.U_TRACE, k] * x + rim[on.V_TRACE, k] * y - rim[on.SWEEP, k]) / length
-            rim[on.P_STAR, k], _ = compute_wave_pressure(
+            rim[on.P_STAR, k], _ = riemann.compute_wave_pressure(
                 rim[on.RHO_TRACE, k], rim[on.P_TRACE, k], rim[on.C_TRACE, k], law, w
             )
             press(rim, k, curved)

@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 
 from hydro.block import Block
+from hydro.ranks import messages
 from hydro.ranks.blocks import NODE_ROW, STATE_ROW, Blocks, Row, Table
 from hydro.ranks.cutting import (
     GHOST_ROWS,
@@ -38,19 +39,6 @@ from hydro.ranks.cutting import (
     count_tile_rows,
     find_bounds,
     spread_evenly,
-)
-from hydro.ranks.messages import (
-    CELLS_DEEP,
-    NO_FAILURE,
-    Book,
-    Index,
-    Item,
-    Message,
-    Part,
-    find_part_of_ring,
-    find_ring,
-    find_ring_of_cells,
-    find_ring_of_nodes,
 )
 from hydro.rows import TOTALS
 from regrid.errors import RunFailure
@@ -76,10 +64,10 @@ class Ranks(Blocks):
         blocks: Sequence[Block],
         places: Sequence[tuple[int, ...]],
         bounds: Sequence[Sequence[int]] | None = None,
-        watched: Mapping[str, Sequence[Index]] = MappingProxyType({}),
+        watched: Mapping[str, Sequence[messages.Index]] = MappingProxyType({}),
     ):
         super().__init__(blocks)
-        self.book = Book(comm)
+        self.book = messages.Book(comm)
         self.comm, self.places = self.book.count("rows"), list(places)
         self.rank, self.size = int(comm.rank), int(comm.size)
         self.owners = [there[0] for there in places]
@@ -91,7 +79,7 @@ class Ranks(Blocks):
         self.cuts: dict[int, CutBlock] = {}
         self._find_pieces(comm)
         self._make_messages(watched)
-        self._starts: Message | None = None  # where a body source acts
+        self._starts: messages.Message | None = None  # where a body source acts
         self._pushes: list[np.ndarray] = []
         self.busy = False  # with what all ranks do together
         self._glancing = False
@@ -121,53 +109,55 @@ class Ranks(Blocks):
         for number, first, last in self.pieces:
             self[number].take_rows(first, last)
 
-    def _make_messages(self, watched: Mapping[str, Sequence[Index]]) -> None:
+    def _make_messages(self, watched: Mapping[str, Sequence[messages.Index]]) -> None:
         blocks, new, now = self, [], []
-        rings = [[(attrgetter("nodes_new"), find_ring_of_nodes(block))] for block in blocks]
+        rings = [
+            [(attrgetter("nodes_new"), messages.find_ring_of_nodes(block))] for block in blocks
+        ]
         self._nodes = self._make("nodes", rings, NODE_ROW)
         for number, block in enumerate(blocks):
             there, bounds = self.places[number], self.bounds[number]
             for rank, rows in zip(there, pairwise(bounds), strict=True):
-                at = find_ring_of_cells(block, watched.get(block.name, ()), rows)
-                ring = find_part_of_ring(block, CELLS_DEEP, rows)
+                at = messages.find_ring_of_cells(block, watched.get(block.name, ()), rows)
+                ring = messages.find_part_of_ring(block, messages.CELLS_DEEP, rows)
                 new.append(
-                    Item(
+                    messages.Item(
                         number,
                         rank,
                         [(attrgetter("state_new"), at), (attrgetter("void_energy_new"), ring)],
                     )
                 )
-                now.append(Item(number, rank, [(attrgetter("state"), at)]))
+                now.append(messages.Item(number, rank, [(attrgetter("state"), at)]))
             sums = [(_get_sums, np.arange(TOTALS))]
-            new.append(Item(number, there[0], sums, STATE_ROW))
-            now.append(Item(number, there[0], sums))
+            new.append(messages.Item(number, there[0], sums, STATE_ROW))
+            now.append(messages.Item(number, there[0], sums))
         comm = self.book.count("states")
-        self._new_states = Message(comm, blocks, new)
-        self._states = Message(comm, blocks, now)
+        self._new_states = messages.Message(comm, blocks, new)
+        self._states = messages.Message(comm, blocks, now)
         self._polygons = {
             number: self._make_polygons(number, cut)
             for number, cut in self.cuts.items()
             if cut.block.is_slave
         }
 
-    def _make_polygons(self, number: int, cut: CutBlock) -> Message:
+    def _make_polygons(self, number: int, cut: CutBlock) -> messages.Message:
         """A message among the ranks of a cut block alone."""
         parts = [_find_polygon_parts(cut.block, rows) for rows in cut.bands]
-        items = [Item(number, rank, part) for rank, part in enumerate(parts)]
-        return Message(cut.group, self, items)
+        items = [messages.Item(number, rank, part) for rank, part in enumerate(parts)]
+        return messages.Message(cut.group, self, items)
 
-    def _make(self, kind: str, parts: list, width: int = 0) -> Message:
+    def _make(self, kind: str, parts: list, width: int = 0) -> messages.Message:
         """A message in which homes tell of whole blocks."""
-        items = [Item(n, rank, parts[n], width) for n, rank in enumerate(self.owners)]
-        return Message(self.book.count(kind), self, items)
+        items = [messages.Item(n, rank, parts[n], width) for n, rank in enumerate(self.owners)]
+        return messages.Message(self.book.count(kind), self, items)
 
     # --- in a step ---------------------------------------------------------------------------
 
     def _exchange(
-        self, message: Message, rows: Sequence, number: int, failure: RunFailure | None
+        self, message: messages.Message, rows: Sequence, number: int, failure: RunFailure | None
     ) -> RunFailure | None:
         """Send a message; the failure of the least number on all ranks, where there is one."""
-        code = NO_FAILURE if failure is None else float(number + 1)
+        code = messages.NO_FAILURE if failure is None else float(number + 1)
         first = message.share(rows, code)
         if first is None:
             return None
@@ -204,7 +194,7 @@ class Ranks(Blocks):
     def share_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
         if self._starts is None:
             self._pushes = [np.zeros((2, block.rim.faces)) for block in self]
-            places = [(attrgetter("start"), find_ring_of_cells(b)) for b in self]
+            places = [(attrgetter("start"), messages.find_ring_of_cells(b)) for b in self]
             pushed = [(lambda _, push=push: push, np.arange(push.size)) for push in self._pushes]
             parts = [list(both) for both in zip(places, pushed, strict=True)]
             self._starts = self._make("sources", parts)
@@ -328,8 +318,11 @@ class Ranks(Blocks):
         if last > 0:
             first, last = max(first - GHOST_ROWS, 0), min(last + GHOST_ROWS, block.ni)
         parted = block.start is not block.state
-        rings = {"nodes": find_ring_of_nodes(block), "state": find_ring_of_cells(block)}
-        rings["void_energy"] = find_ring(block.ni, block.nj, CELLS_DEEP)
+        rings = {
+            "nodes": messages.find_ring_of_nodes(block),
+            "state": messages.find_ring_of_cells(block),
+        }
+        rings["void_energy"] = messages.find_ring(block.ni, block.nj, messages.CELLS_DEEP)
         for name in (*KEPT, *(f"{kept}_new" for kept in KEPT), "crowding"):
             array = getattr(block, name)
             if name.startswith("nodes") and block.is_here:
@@ -370,11 +363,11 @@ def _get_sums(block: Block) -> np.ndarray:
     return block.share_sums()
 
 
-def _find_polygon_parts(block: Block, rows: Rows) -> list[Part]:
+def _find_polygon_parts(block: Block, rows: Rows) -> list[messages.Part]:
     """What polygon cells read and change of an update."""
-    ring = find_part_of_ring(block, 1, rows)
+    ring = messages.find_part_of_ring(block, 1, rows)
     return [
-        (attrgetter("state_new"), find_ring_of_cells(block, (), rows, 1)),
+        (attrgetter("state_new"), messages.find_ring_of_cells(block, (), rows, 1)),
         *((attrgetter(name), ring) for name in ("void_energy_new", "rates_new", "crowding")),
     ]
 

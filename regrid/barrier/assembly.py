@@ -17,16 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import prange
 
-from regrid.barrier.functional import (
-    barrier_corner,
-    cell_rate,
-    cost_blocks,
-    cost_slope,
-    fade,
-    smooth_area,
-    smoothed_corner,
-    weigh,
-)
+from regrid.barrier import functional
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
 from regrid.barrier.step_control import SPAN
 from regrid.jit import inlined, kernel
@@ -203,7 +194,7 @@ def fill_fading(growth, cells, Z):
     """
     for col in range(cells):
         ratio = (Z[GA + col] + Z[GA + col + 1]) / (Z[GB + col] + Z[GC + col])
-        Z[FADING + col] = fade(ratio, growth)
+        Z[FADING + col] = functional.fade(ratio, growth)
 
 
 @inlined
@@ -340,12 +331,12 @@ def add_cost(near, far, sound, scale, weight, cells, now, Z):
         ay = 0.5 * ((y1[col] - y0[col]) + (y1[col + 1] - y0[col + 1]))
         bx = 0.5 * ((x0[col + 1] - x0[col]) + (x1[col + 1] - x1[col]))
         by = 0.5 * ((y0[col + 1] - y0[col]) + (y1[col + 1] - y1[col]))
-        rho = cell_rate(ax, ay, bx, by, sound[col], scale)
+        rho = functional.cell_rate(ax, ay, bx, by, sound[col], scale)
         if rho > 1.0:
-            slope = cost_slope(ax, ay, bx, by, rho, sound[col], scale, weight)
+            slope = functional.cost_slope(ax, ay, bx, by, rho, sound[col], scale, weight)
             first, _, dax, day, dbx, dby, _, _, _ = slope
-            aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy = cost_blocks(
-                ax, ay, bx, by, slope
+            aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy = (
+                functional.cost_blocks(ax, ay, bx, by, slope)
             )
             # Each of A and B is the mean of the cell's two edges that way.
             half = 0.5 * first
@@ -415,8 +406,8 @@ def make_corner(corner_terms):
     return fill_corner
 
 
-fill_barrier_corner = make_corner(barrier_corner)
-fill_smoothed_corner = make_corner(smoothed_corner)
+fill_barrier_corner = make_corner(functional.barrier_corner)
+fill_smoothed_corner = make_corner(functional.smoothed_corner)
 
 
 def make_assembly(smooth):
@@ -452,10 +443,10 @@ def make_assembly(smooth):
                 d1, d2 = ax * by - ay * bx, ux * by - uy * bx
                 d3, d4 = ux * ry - uy * rx, ax * ry - ay * rx
                 if smooth:
-                    d1, s1 = smooth_area(d1, spread * spread)
-                    d2, s2 = smooth_area(d2, spread * spread)
-                    d3, s3 = smooth_area(d3, spread * spread)
-                    d4, s4 = smooth_area(d4, spread * spread)
+                    d1, s1 = functional.smooth_area(d1, spread * spread)
+                    d2, s2 = functional.smooth_area(d2, spread * spread)
+                    d3, s3 = functional.smooth_area(d3, spread * spread)
+                    d4, s4 = functional.smooth_area(d4, spread * spread)
                     Z[SLOPE_1 + col] = s1
                     Z[SLOPE_2 + col] = s2
                     Z[SLOPE_3 + col] = s3
@@ -481,7 +472,7 @@ def make_assembly(smooth):
                 m1, m2, m3, m4 = Z[AREA_1 + col], Z[AREA_2 + col], Z[AREA_3 + col], Z[AREA_4 + col]
                 m1 = m1 if m1 > m2 else m2
                 m3 = m3 if m3 > m4 else m4
-                m1 = weigh(m1 if m1 > m3 else m3, law.least_sine, most)
+                m1 = functional.weigh(m1 if m1 > m3 else m3, law.least_sine, most)
                 if not smooth:
                     Z[SLOPE_1 + col] = law.stiffness if (m1 > 1.0) & (m1 < most) else 1.0
                 Z[WEIGHT + col] = full if smooth else full * m1

@@ -19,14 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.barrier.functional import (
-    barrier_corner,
-    cell_rate,
-    cost_blocks,
-    cost_slope,
-    fade,
-    weigh,
-)
+from regrid.barrier import functional
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
 from regrid.jit import inlined, kernel
 
@@ -110,8 +103,8 @@ def weigh_cells(law, growth, count, Z):
             max(u2 * r2 / (d3 * d3), a2 * r2 / (d4 * d4)),
         )
         ratio = (Z[LOW_G, k] + Z[UP_G, k]) / (Z[NEAR_G, k] + Z[FAR_G, k])
-        strength = weigh(square, law.least_sine, law.strengthening)
-        Z[WEIGHT, k] = full * strength * fade(ratio, growth)
+        strength = functional.weigh(square, law.least_sine, law.strengthening)
+        Z[WEIGHT, k] = full * strength * functional.fade(ratio, growth)
     return folded == 0
 
 
@@ -128,7 +121,7 @@ def add_corners(near, far, a_g, b_g, law, count, Z):
         ax, ay, bx, by = ga * Z[near, k], ga * Z[near + 1, k], gb * Z[far, k], gb * Z[far + 1, k]
         inverse = 1.0 / (ax * by - ay * bx)
         _, _, _, _, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy = (
-            barrier_corner(
+            functional.barrier_corner(
                 (ax, ay, 0.0, ga), (bx, by, 0.0, gb), inverse, 1.0, Z[WEIGHT, k], (lam_c, 0.0)
             )
         )
@@ -151,10 +144,10 @@ def add_costs(scale, weight, count, Z):
     for k in range(count):
         ax, ay = 0.5 * (Z[LOW_X, k] + Z[UP_X, k]), 0.5 * (Z[LOW_Y, k] + Z[UP_Y, k])
         bx, by = 0.5 * (Z[NEAR_X, k] + Z[FAR_X, k]), 0.5 * (Z[NEAR_Y, k] + Z[FAR_Y, k])
-        rho = cell_rate(ax, ay, bx, by, Z[SOUND, k], scale)
+        rho = functional.cell_rate(ax, ay, bx, by, Z[SOUND, k], scale)
         if rho > 1.0:
-            slope = cost_slope(ax, ay, bx, by, rho, Z[SOUND, k], scale, weight)
-            add_blocks(k, cost_blocks(ax, ay, bx, by, slope), Z)
+            slope = functional.cost_slope(ax, ay, bx, by, rho, Z[SOUND, k], scale, weight)
+            add_blocks(k, functional.cost_blocks(ax, ay, bx, by, slope), Z)
 
 
 @kernel

@@ -13,14 +13,6 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.barrier import assembly as at
-from regrid.barrier.assembly import (
-    LineLaws,
-    begin_columns,
-    begin_row,
-    bend_lines,
-    bend_sides,
-    fill_fading,
-)
 from regrid.barrier.functional import cell_rate, corner_value, cost_value, smooth_area
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP_CHANGE
 from regrid.barrier.step_control import SPAN
@@ -43,17 +35,17 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     cells = last - first
-    laws = LineLaws(law.along_i, law.along_j, law.blend_i, law.bend, law.way, law.ki, law.kj)
+    laws = at.LineLaws(law.along_i, law.along_j, law.blend_i, law.bend, law.way, law.ki, law.kj)
     c, lam, quarter = law.area_target, law.area_weight, 0.25 * law.sigma * law.epsilon
     for col in range(cells):
         Z[ENERGY + col] = 0.0
         Z[LEAST + col] = 1e300
-    begin_columns(nodes, law.along_j, law.blend_i, law.blend_j, law.kj, first, cells, Z)
+    at.begin_columns(nodes, law.along_j, law.blend_i, law.blend_j, law.kj, first, cells, Z)
     for i in range(ni):
-        begin_row(nodes, i, laws, first, cells, Z)
+        at.begin_row(nodes, i, laws, first, cells, Z)
         if law.curved:
-            bend_sides(law.curve, i + 1, first, cells, Z)
-            bend_lines(law.curve, i, first, cells + 1, Z)
+            at.bend_sides(law.curve, i + 1, first, cells, Z)
+            at.bend_lines(law.curve, i, first, cells + 1, Z)
         for col in range(cells):
             ax, ay, a2 = Z[at.AX + col], Z[at.AY + col], Z[at.A2 + col]
             ux, uy, u2 = Z[at.AX + col + 1], Z[at.AY + col + 1], Z[at.A2 + col + 1]
@@ -82,7 +74,7 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
                 Z[TERM_1 + corner] = 0.0
                 Z[LEAST_1 + corner] = 1e300
         inside = 1.0 if i < ni - 1 else 0.0
-        fill_fading(law.along_i[GROWTH, i], cells, Z)
+        at.fill_fading(law.along_i[GROWTH, i], cells, Z)
         parts = barrier[i, first:last]
         for col in range(cells):
             straight = Z[at.FX + col] * Z[at.FX + col] + Z[at.FY + col] * Z[at.FY + col]

@@ -77,9 +77,8 @@ def test_notebooks_are_short_and_keep_no_results(path):
         pytest.param("film", marks=pytest.mark.slow),
     ],
 )
-def test_notebooks_run(name, place, monkeypatch, capsys):
+def test_notebooks_run(name, place, monkeypatch):
     if name == "film":
         pytest.importorskip("IPython", reason="the notebook shows the film by IPython")
     path = next(path for path in NOTEBOOKS if path.stem == name)
     run_as_main(read_cells(path), monkeypatch)  # they hold what they assert
-    assert capsys.readouterr().out

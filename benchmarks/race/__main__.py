@@ -22,6 +22,7 @@ from benchmarks.race.compiled_peers import (
 from benchmarks.race.ours import run_ours
 from benchmarks.race.tables import BAR, NAMES, RESULTS, write_tables
 
+REFERENCE_CELLS = 256
 ROOT = Path(__file__).resolve().parents[2]
 PICTURE = ROOT / "docs" / "pictures" / "race.png"
 SCRIPT = Path(__file__).with_name("python_peers.py")
@@ -64,8 +65,8 @@ def race(case: Case, options: argparse.Namespace) -> list[dict[str, Any]]:
             found[code, n], seconds = run(n)
             rows.append({"case": case.name, "code": code, "cells": n, "cpu": seconds})
             print(f"{case.name}: {code}, {n} cells: {seconds:.2f} CPU s", flush=True)
-    if "amplitude" in case.numbers:  # the finest grid of this code is the reference
-        finest = found["shockgrid", max(n for code, n in found if code == "shockgrid")]
+    if "amplitude" in case.numbers:  # the reference is shockgrid's, too, and no row of the table
+        finest, _ = run_ours(case.name, case.numbers, REFERENCE_CELLS)
         case.numbers["amplitude"] = float(
             np.interp(case.numbers["times"][-1], finest["t"], finest["amplitude"])
         )

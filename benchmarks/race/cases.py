@@ -113,11 +113,11 @@ def make_mushroom() -> Case:
     numbers |= {"times": [15.0 / numbers["k_c"]], "amplitude": math.nan}
     return Case(
         "mushroom",
-        "a steep wave, Mach 1.2, 1 : 5.1, k a0 = 0.5, to k c t = 15",
-        "half the width of the interface, against 256 cells",
+        "large-amplitude growth, Mach 1.2, 1 : 5.1, k a0 = 0.5, to k c t = 15",
+        "half the width of the interface, against shockgrid on 256 cells",
         numbers,
         {
-            "shockgrid": (16, 32, 64, 256),
+            "shockgrid": (16, 32, 64, 128),
             "cloverleaf": (32, 64, 128, 256),
             "pyclaw": (32, 64, 128, 256),
             "pyro": (32, 64, 128),
@@ -140,7 +140,7 @@ def make_contact() -> Case:
     }
     return Case(
         "contact",
-        "a slab, ten times as dense as the gas about it, moves by ten widths",
+        "a dense slab (10 : 1) carried over ten of its widths",
         "L1 of the density",
         numbers,
         {"shockgrid": (8, 16), "pyclaw": (16, 32, 64, 128, 256), "pyro": (16, 32, 64, 128)},

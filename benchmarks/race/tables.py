@@ -22,6 +22,7 @@ NAMES = {
     "pennant": "PENNANT",
 }
 BAR = 0.01  # the error that times are compared at
+FARTHEST = 10.0  # times the longest run: so far times are extrapolated
 
 
 def fill_race(arguments: str) -> list[str]:
@@ -54,18 +55,20 @@ def find_time(rows: list[dict[str, Any]], code: str) -> tuple[float, bool]:
 
 
 def describe_time(rows: list[dict[str, Any]], code: str) -> str:
-    """CPU seconds to BAR, in parentheses if extrapolated; of a single grid its error and time."""
+    """CPU seconds to BAR, in parentheses if extrapolated; else the smallest error and its time."""
     mine = [r for r in rows if r["code"] == code]
     if not mine:
         return "-"
-    if len(mine) == 1 and abs(mine[0]["error"]) > BAR:
-        return f"{100.0 * abs(mine[0]['error']):.2g} % in {mine[0]['cpu']:.2g}"
+    best = min(mine, key=lambda r: abs(r["error"]))
     seconds, measured = find_time(rows, code)
-    if not math.isfinite(seconds):
-        return "not reached"
-    two_digits = f"{seconds:.2g}"
-    number = two_digits if seconds < 100 else f"{float(two_digits):,.0f}".replace(",", " ")
-    return number if measured else f"({number})"
+    if not seconds < FARTHEST * best["cpu"] and abs(best["error"]) > BAR:
+        return f"{100.0 * abs(best['error']):.2g} % in {say(best['cpu'])}"
+    return say(seconds) if measured else f"({say(seconds)})"
+
+
+def say(seconds: float) -> str:
+    """Two digits, without an exponent."""
+    return f"{seconds:.2g}" if seconds < 99.5 else f"{float(f'{seconds:.2g}'):.0f}"
 
 
 def write_summary(document: dict[str, Any]) -> list[str]:

@@ -69,6 +69,8 @@ class Meetings:
         self._sides: list[Surface] = []  # of the near pairs, and their walls
         self._walls: list[Surface] = []
         self._found = False  # the present grid's facets?
+        self._room = 0.0  # all lines are further apart; not above 0 if a pair is near
+        self._gone = self._most = 0.0  # clearances are less by what was gone since; in this step
         self._read: set[int] = set()  # surfaces whose lines are those of the present grid
         self._cuts = 0
         self.made = self.opened = 0
@@ -93,9 +95,8 @@ class Meetings:
                         cause="blocks-overlap",
                         place=Place(one.block.name, side=one.segment.side),
                     )
-        return {
-            frozenset((id(pair.leader.block), id(pair.follower.block))) for pair in self.touching
-        }
+        blocks = [(pair.leader.block, pair.follower.block) for pair in self.touching]
+        return {frozenset(map(id, both)) for both in blocks}
 
     # --- phases of a step ------------------------------------------------------------------------
 
@@ -133,7 +134,13 @@ class Meetings:
             regridder.meets_itself = False
         for surface in self.surfaces:
             surface.measure_way()
-        awake = [pair for pair in self.pairs if pair.may_touch(MOST_LONGER)]
+        self._most = 2.0 * max(surface.way for surface in self.surfaces)
+        awake = []
+        if MOST_LONGER * self._most >= self._room:
+            for pair in self.pairs:
+                pair.clearance -= self._gone
+            self._gone = 0.0
+            awake = [pair for pair in self.pairs if pair.may_touch(MOST_LONGER)]
         if not awake:
             self._cuts = 0
             return None
@@ -146,7 +153,8 @@ class Meetings:
         self._lay(self.touching, part_back)
         for surface in self._sides:
             surface.measure_way()
-        first = self._find_first(awake, 1.0 if self._cuts == 0 else MOST_LONGER)
+        stretch = 1.0 if self._cuts == 0 else MOST_LONGER
+        first = min(pair.find_touch(stretch) for pair in awake)
         least = LEAST_BESIDE if self.touching else LEAST_STEP
         other = max(first * dt, min(dt, least * stable_dt))
         misses = other < (1.0 - REACHED) * dt or (1.0 + REACHED) * dt < other <= MOST_LONGER * dt
@@ -155,7 +163,8 @@ class Meetings:
             return other
         self._cuts = 0
         if first < 1.0 + 2.0 * REACHED or self.touching:
-            self._find_first(awake, 1.0 + 2.0 * REACHED, cuts=False)
+            for pair in awake:
+                pair.find_touch(1.0 + 2.0 * REACHED, cuts=False)
         else:
             for pair in awake:
                 pair.forget_hits()
@@ -165,10 +174,6 @@ class Meetings:
         for regridder, pairs in self._folding:
             regridder.meets_itself = any(pair.touched or pair in self.touching for pair in pairs)
         return None
-
-    @staticmethod
-    def _find_first(pairs: list[Pair], stretch: float, cuts: bool = True) -> float:
-        return min(pair.find_touch(stretch, cuts) for pair in pairs)
 
     def _lay(self, pairs: list[Pair], part_back: float) -> None:
         for pair in pairs:
@@ -233,18 +238,21 @@ class Meetings:
         """The step stands: count what closed and opened, and how far lines may have come."""
         if not self.pairs:
             return
-        self.length = 0.0
+        self._found, self.length = False, 0.0
+        if MOST_LONGER * self._most < self._room:
+            self._room -= self._most
+            self._gone += self._most
+            return
         for pair in self.pairs:
             pair.clearance -= pair.leader.way + pair.follower.way
             stretches = 0
             if pair.is_near:
                 stretches, length = pair.measure_closed()
                 self.length += length
-            if stretches != pair.stretches:
-                self.made += max(0, stretches - pair.stretches)
-                self.opened += max(0, pair.stretches - stretches)
-                pair.stretches = stretches
-        self._found = False
+            self.made += max(0, stretches - pair.stretches)
+            self.opened += max(0, pair.stretches - stretches)
+            pair.stretches = stretches
+        self._room = min(0.0 if pair.is_near else pair.clearance for pair in self.pairs)
 
     # --- parts -----------------------------------------------------------------------------------
 
@@ -256,7 +264,7 @@ class Meetings:
 
     def _find(self, step: int = 0) -> None:
         self._read.clear()
-        for pair in self.pairs:
+        for pair in self.pairs if self._room <= 0.0 else ():
             if pair.is_near or pair.clearance <= 0.0:
                 self._read_lines((pair.follower, pair.leader))
                 pair.find()
@@ -312,18 +320,13 @@ class Meetings:
         """What is counted."""
         if not self.pairs:
             return {}
-        counts = np.array(
-            [self.made, self.opened, *(pair.stretches for pair in self.pairs)], dtype=np.int64
-        )
-        return {
-            "contacts/counts": counts,
-            "contacts/length": self.length,
-            **self.voids.get_state(),
-        }
+        numbers = [self.made, self.opened, *(pair.stretches for pair in self.pairs)]
+        counts = np.array(numbers, dtype=np.int64)
+        return {"contacts/counts": counts, "contacts/length": self.length} | self.voids.get_state()
 
     def set_state(self, state: Any) -> None:
         """Take up a state of `get_state`; a restart point without one had met nothing."""
-        self._found = False
+        self._found, self._room, self._gone = False, 0.0, 0.0
         for pair in self.pairs:
             pair.clearance, pair.is_near = 0.0, False
         self.voids.set_state(state)

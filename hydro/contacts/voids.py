@@ -236,9 +236,8 @@ class Voids:
             parents = [old for old in before if _share_faces(old, void)]
             if not parents:
                 void.gas = self.pressure * void.volume**self.gamma
-            children = [
-                v for v in self.found if any(_share_faces(old, v) for old in parents)
-            ]  # with the same pressure
+            # those with the same pressure
+            children = [v for v in self.found if any(_share_faces(old, v) for old in parents)]
             was = sum(old.volume for old in parents)
             now = sum(child.volume for child in children)
             for old in parents:

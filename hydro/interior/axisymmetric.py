@@ -124,6 +124,15 @@ def fill_smooth(Z, n):
         Z[at.SMOOTH + k] = (1.0 - jump) * (1.0 - jump) * (1.0 + 2.0 * jump)
 
 
+@inlined
+def find_mean(Z, rows, k):
+    """Mean over the corners of the old and the new cell k; `rows`: offsets of their rows."""
+    low, high, low_new, high_new = rows
+    old = (Z[low + k] + Z[low + k + 1]) + (Z[high + k] + Z[high + k + 1])
+    new = (Z[low_new + k] + Z[low_new + k + 1]) + (Z[high_new + k] + Z[high_new + k + 1])
+    return 0.125 * (old + new)
+
+
 def make_source_pressure(sound_speed_squared_part):
     """Phase that fills the pressure of the geometric source of a row's cells."""
 
@@ -135,26 +144,8 @@ def make_source_pressure(sound_speed_squared_part):
         pressure that is traced to both radial faces.
         """
         for k in range(1, n + 1):
-            x = 0.125 * (
-                (
-                    (Z[at.X_LOW + k] + Z[at.X_LOW + k + 1])
-                    + (Z[at.X_HIGH + k] + Z[at.X_HIGH + k + 1])
-                )
-                + (
-                    (Z[at.X_LOW_NEW + k] + Z[at.X_LOW_NEW + k + 1])
-                    + (Z[at.X_HIGH_NEW + k] + Z[at.X_HIGH_NEW + k + 1])
-                )
-            )
-            y = 0.125 * (
-                (
-                    (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1])
-                    + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
-                )
-                + (
-                    (Z[at.Y_LOW_NEW + k] + Z[at.Y_LOW_NEW + k + 1])
-                    + (Z[at.Y_HIGH_NEW + k] + Z[at.Y_HIGH_NEW + k + 1])
-                )
-            )
+            x = find_mean(Z, (at.X_LOW, at.X_HIGH, at.X_LOW_NEW, at.X_HIGH_NEW), k)
+            y = find_mean(Z, (at.Y_LOW, at.Y_HIGH, at.Y_LOW_NEW, at.Y_HIGH_NEW), k)
             dx = x - Z[at.X_CENTRE + k]
             dy = y - Z[at.Y_CENTRE + k]
             rho = Z[at.RHO_HALF + k] + (Z[at.RHO_X + k] * dx + Z[at.RHO_Y + k] * dy)

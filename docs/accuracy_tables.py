@@ -229,7 +229,7 @@ def doubt_polars(rows: Rows) -> list[str]:
     if past:
         told.append(
             f"- Past the critical angle there is no figure ({len(past)} runs): no attached shock "
-            "exists, and nothing but the jet's verdict stands beside theory."
+            "exists, and only the presence or absence of a jet is compared with theory."
         )
     died = [row for row in rows if row["behind A"] == "died"]
     if died:
@@ -248,7 +248,7 @@ def doubt_lines(rows: Rows) -> list[str]:
     """Where the place of a flat line depends on where in a cell the shock began."""
     told = []
     for key, bar, words, unit in (
-        ("unevenness", LINE_BAR, "whose last place is linear in s", "cell"),
+        ("unevenness", LINE_BAR, "whose end position is linear in the start distance s", "cell"),
         ("speed_scatter", SPEED_BAR, "whose late speed does not vary with s", "of the shock's"),
     ):
         over = sorted((row for row in rows if row[key] > bar), key=lambda row: -row[key])

@@ -129,7 +129,9 @@ class Block:
         try:
             self.nodes = np.array(nodes, dtype=np.float64, order="C")
         except (TypeError, ValueError) as error:
-            raise BadInput(f"block {name!r}: its nodes are no array of numbers ({error})") from None
+            raise BadInput(
+                f"block {name!r}: its nodes are not an array of numbers ({error})"
+            ) from None
         if self.nodes.ndim != 3 or self.nodes.shape[0] != 2 or min(self.nodes.shape[1:]) < 3:
             raise BadInput(
                 f"block {name!r}: nodes have shape {self.nodes.shape}; "

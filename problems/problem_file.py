@@ -142,7 +142,7 @@ def _describe_failure(path: Path, error: BaseException) -> str:
 def _describe_syntax(path: Path, error: Exception) -> str:
     line = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
     words = error.msg if isinstance(error, SyntaxError) else str(error)
-    return f"{path}{line}: this is no Python ({words})"
+    return f"{path}{line}: this is not valid Python ({words})"
 
 
 def _find_class(module: ModuleType, path: Path) -> type[Problem]:

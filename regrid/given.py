@@ -50,7 +50,7 @@ def read_source(name: str, block: str | None = None) -> np.ndarray | dict[str, n
     """
     path = Path(name)
     if not path.is_file():
-        raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is no file")
+        raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is not a file")
     ending = path.suffix.lower()
     if ending in (".vts", ".vtk"):
         return read_structured(path)
@@ -73,12 +73,12 @@ def read_grid(name: str, block: str | None = None) -> np.ndarray:
 
 def _read_npz(path: Path) -> dict[str, np.ndarray]:
     if not zipfile.is_zipfile(path):
-        raise BadInput(f"{path} is no readable npz file (it is no archive of arrays)")
+        raise BadInput(f"{path} is not a readable npz file (it is not an archive of arrays)")
     try:
         with np.load(path) as file:
             arrays = {key: file[key] for key in file.files}
     except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise BadInput(f"{path} is no readable npz file ({error})") from None
+        raise BadInput(f"{path} is not a readable npz file ({error})") from None
     wanted = ("nodes", "x", "y", "z", *SIDE_NAMES, *ALIASES)
     for key, array in arrays.items():
         if key in wanted and array.dtype.kind not in "fiu":
@@ -113,7 +113,7 @@ def _read_hdf5(path: Path, block: str | None) -> tuple[dict[str, np.ndarray], st
             chosen = block if block is not None else next(iter(known))
             arrays = {name: np.asarray(item[()]) for name, item in known[chosen].items()}
     except OSError as error:
-        raise BadInput(f"{path} is no readable HDF5 file ({error})") from None
+        raise BadInput(f"{path} is not a readable HDF5 file ({error})") from None
     return arrays, f"{path}, block '{chosen}'" if chosen else str(path)
 
 
@@ -178,7 +178,8 @@ def check_nodes(nodes: np.ndarray, where: str) -> np.ndarray:
     extent = np.ptp(nodes.reshape(nodes.shape[0], -1), axis=1)
     for name, size in zip("xyz", extent, strict=False):
         if not LEAST < size < MOST:
-            raise BadInput(f"{where}: the grid reaches over {size:g} in {name}, which is no extent")
+            words = f"{size:g}; it has to be between {LEAST:g} and {MOST:g}"
+            raise BadInput(f"{where}: the grid's extent in {name} is {words}")
     return nodes
 
 
@@ -298,7 +299,7 @@ def read_structured(path: Path) -> np.ndarray:
         head = file.read(64).lstrip()
     legacy = head.startswith(b"# vtk DataFile")
     if not legacy and head[:1] != b"<":
-        raise BadInput(f"{path} is no VTK file")
+        raise BadInput(f"{path} is not a VTK file")
     try:
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkObject
@@ -320,7 +321,7 @@ def read_structured(path: Path) -> np.ndarray:
     finally:
         vtkObject.SetGlobalWarningDisplay(shown)
     if not readable:
-        raise BadInput(f"{path} is no VTK file of a structured grid (StructuredGrid)")
+        raise BadInput(f"{path} is not a VTK file of a structured grid (StructuredGrid)")
     grid = reader.GetOutput()
     extent = grid.GetExtent()
     counts = tuple(extent[2 * k + 1] - extent[2 * k] + 1 for k in range(3))

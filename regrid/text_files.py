@@ -48,7 +48,7 @@ def check_regular(path: str | Path) -> None:
     """
     known = os.path.isdir(path) or os.path.isfile(path) or not os.path.exists(path)
     if not known and not str(path).startswith(PIPES):
-        raise BadInput(f"{path} is no file, but a device, a pipe or a socket")
+        raise BadInput(f"{path} is not a file but a device, a pipe or a socket")
 
 
 def load_toml(text: str) -> dict[str, Any]:

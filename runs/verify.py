@@ -188,7 +188,7 @@ CASES = (
              "experiment 73 m/s (from memory)"),
             ("upwind end to 400 us", "upwind end to 400 us", 0.02, "fixed grid 65.0 m/s"),
             ("downwind end's turn", "focus", 0.02, "fixed grid 200.8 us"),
-            ("downwind end, no bar: finer grids pierce farther", "downwind end", None,
+            ("downwind end, no threshold: finer grids pierce farther", "downwind end", None,
              "experiment 78 m/s (from memory), fixed grids 72, 78, 92 m/s"),
         )
     ),
@@ -228,7 +228,7 @@ CASES = (
 
 RunName = tuple[str, tuple[str, ...]]  # deck and settings
 
-HEADS = ("problem", "what", "size", "error", "order", "bar", "met", "CPU s", "others")
+HEADS = ("problem", "what", "size", "error", "order", "threshold", "met", "CPU s", "others")
 
 
 @dataclass(frozen=True)
@@ -403,9 +403,9 @@ def make_page(document: Mapping[str, Any]) -> str:
 
 
 def describe_bars(records: list[Mapping[str, Any]]) -> str:
-    """`44 of 44 bars met`."""
+    """`44 of 44 thresholds met`."""
     met = [record["met"] for record in records if record["met"] is not None]
-    return f"{sum(met)} of {len(met)} bars met"
+    return f"{sum(met)} of {len(met)} thresholds met"
 
 
 def format_table(records: list[Mapping[str, Any]]) -> list[str]:

@@ -157,7 +157,7 @@ def check_folded_outline(make: Make) -> None:
     except RegridFailure as failure:
         _demand("i_min" in str(failure), f"a folded outline: side i_min is not named: {failure}")
         return
-    raise AssertionError("an outline that crosses itself is no RegridFailure")
+    raise AssertionError("an outline that crosses itself does not raise RegridFailure")
 
 
 def check_shapes(make: Make) -> None:
@@ -167,7 +167,7 @@ def check_shapes(make: Make) -> None:
         make().regrid(moving.start, moving.start[:, 1:])
     except BadInput:
         return
-    raise AssertionError("a boundary of another shape than the grid is no BadInput")
+    raise AssertionError("a boundary of another shape than the grid does not raise BadInput")
 
 
 REGRIDDER_PROMISES: dict[str, Callable[[Make], None]] = {
@@ -392,7 +392,7 @@ def _check_problem(kind: type[Problem], deck: Deck, steps: int) -> None:
     last = one.measure(flow)
     _demand(list(first) == list(last), f"measure gives {list(first)}, then {list(last)}")
     numbers = all(isinstance(value, int | float | np.number) for value in last.values())
-    _demand(numbers, "measure gives what is no number")
+    _demand(numbers, "measure gives values that are not numbers")
     extra = set(one.units) - set(last)
     _demand(not extra, f"units names columns that measure does not give: {sorted(extra)}")
     again, third = kind(deck).build(), kind(deck).build()

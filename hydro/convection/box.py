@@ -99,12 +99,12 @@ def make_fluid(
         raise BadInput(
             f"Ra = {rayleigh:g} is negative; heat the other wall or turn gravity instead"
             if math.isfinite(rayleigh)
-            else f"Ra = {rayleigh} is no number"
+            else f"Ra = {rayleigh} is not a number"
         )
     if not (math.isfinite(prandtl) and prandtl > 0.0):
         raise BadInput(f"Pr = {prandtl:g} must be positive")
     if not math.isfinite(tilt):
-        raise BadInput(f"tilt = {tilt} is no angle in degrees")
+        raise BadInput(f"tilt = {tilt} is not an angle in degrees")
     x, y = turn_gravity(tilt) if gravity is None else gravity
     size = math.hypot(x, y)
     if size == 0.0:

@@ -141,7 +141,7 @@ def check_eos(block: str, eos: object) -> None:
         raise BadInput(f"{where} is of the class {kind.__name__}, which lacks {', '.join(missing)}")
     for name in PARTS:
         if not isinstance(inspect.getattr_static(kind, name), staticmethod):
-            raise BadInput(f"{where}: {kind.__name__}.{name} is no staticmethod({name})")
+            raise BadInput(f"{where}: {kind.__name__}.{name} is not a staticmethod({name})")
         if not hasattr(getattr(kind, name), "compiled_as"):
             raise BadInput(
                 f"{where}: {kind.__name__}.{name} is not marked with shockgrid.inlined, so that no "

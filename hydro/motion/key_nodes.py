@@ -138,7 +138,7 @@ class KeyNode:
                 cross = float(a[0] * b[1] - a[1] * b[0])
                 if abs(cross) < 1e-9 * math.hypot(*a) * math.hypot(*b):
                     raise RunFailure(
-                        f"key node: {first} and {other} move apart from each other",
+                        f"node: {first} and {other} have incompatible velocities",
                         cause="pistons-part",
                         place=Place(first.block.name),
                     )

@@ -150,7 +150,7 @@ def read_columns(path: Path) -> np.ndarray:
     Raises BadInput naming the file.
     """
     if not path.is_file():
-        raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is no file")
+        raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is not a file")
     try:
         text = read_text(path).replace(",", " ")
         lines = [line for line in text.splitlines() if line.partition("#")[0].strip()]
@@ -179,7 +179,7 @@ def evaluate(formula: float | str, values: dict[str, np.ndarray], where: str) ->
         at_words = ", ".join(
             f"{name} = {np.asarray(value)[at]:.6g}" for name, value in values.items()
         )
-        raise BadInput(f"{where} '{formula}': it is no finite number at {at_words}")
+        raise BadInput(f"{where} '{formula}': it is not a finite number at {at_words}")
     return found
 
 
@@ -290,7 +290,7 @@ class Blocks(Problem):
         found = RUN_OF_FACES.fullmatch(text.strip())
         if not found:
             raise BadInput(
-                f'deck: link: {text!r} is no side; write "block.i_max" or "block.i_max[0:8]"'
+                f'deck: link: {text!r} is not a side; write "block.i_max" or "block.i_max[0:8]"'
             )
         name, side = found["block"], found["side"]
         if name not in grids:
@@ -478,7 +478,7 @@ def _of_time(formulas: tuple, where: str) -> Callable[[float], tuple[float, ...]
         )
 
     if not np.isfinite(at(0.0)).all():
-        raise BadInput(f"{where}: {list(formulas)} is no finite number at t = 0")
+        raise BadInput(f"{where}: {list(formulas)} is not a finite number at t = 0")
     return at
 
 

@@ -190,14 +190,14 @@ def read_line(path: str, width: float) -> Perturbation:
     try:
         text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
-        words = getattr(error, "strerror", None) or "it is no text"
+        words = getattr(error, "strerror", None) or "it is not a text file"
         raise BadInput(f"{where} cannot be read: {words}") from error
     try:
         if not text.strip():
             raise ValueError("it is empty")
         table = np.loadtxt(io.StringIO(text.replace(",", " ")), ndmin=2)
     except ValueError as error:
-        raise BadInput(f"{where} is no table of numbers: {error}") from error
+        raise BadInput(f"{where} is not a table of numbers: {error}") from error
     if table.shape[1] not in (1, 2) or table.shape[0] < 4:
         raise BadInput(
             f"{where} has {table.shape[0]} rows of {table.shape[1]} numbers; wanted are at least "

@@ -295,7 +295,7 @@ def _draw_rates(problem, axes, kct, t, curves: list[_Curve], theory: bool) -> No
         shown = middle > 0.0
         passing = np.flatnonzero((middle <= 1.0) & ((speed < low) | (speed > high)))
         shown[: passing[-1] + 1 if passing.size else 0] = False
-        label = f"{curve.label}, shock past" if len(curves) <= MOST_NAMED else None
+        label = f"{curve.label} (after shock passage)" if len(curves) <= MOST_NAMED else None
         axes.plot(middle[shown], speed[shown], color=f"C{n}", label=label)
 
 

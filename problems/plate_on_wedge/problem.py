@@ -6,8 +6,8 @@ with about twice the particle speed and closes it from the edge outwards: the co
 runs along the face.  With a `gap` the plate starts above the edge: two bodies, whose contact closes
 and opens by itself.  Below a critical angle the oblique shocks stay attached to A and there is no
 jet; above it a jet runs ahead of A.  When A reaches the end B of the face the shocks detach and a
-thin jet leaves over B and bends round the end face.  Plate and wedge slide on each other; their
-common line is a grid line of both, with nodes that do not match.
+thin jet leaves over B and bends round the end face.  Plate and wedge slide on each other; both
+grids follow the contact line, with non-matching nodes.
 
 The history has the phases and their times.  The run ends when the jet meets something (the end
 face, the base on which the wedge stands, the symmetry plane) or when the free surface meets itself.

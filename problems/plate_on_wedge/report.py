@@ -419,15 +419,15 @@ def describe_verdict(problem, lead: float) -> str:
     """One sentence: is there a jet ahead of A, and does theory have one?"""
     attached, spacing = problem.collision.attached, problem.length / problem.deck.cells[0]
     if not math.isfinite(lead):
-        return "verdict: A has not run far enough to tell whether a jet runs ahead of it"
+        return "jet: A has not run far enough to tell whether one runs ahead of it"
     if lead > LEAST_LEAD * spacing:
-        words = "a jet ahead of A, " + ("against theory" if attached else "as by theory")
+        words = "one ahead of A, " + ("theory predicts none" if attached else "as predicted")
     elif attached:
-        words = "no jet ahead of A, as by theory"
+        words = "none ahead of A, as predicted"
     else:
-        words = "by theory a jet ahead of A, too thin to be seen in these cells"
-    ahead = f"at most {MM * lead:.2f} mm, {lead / spacing:.1f} cells," if lead > 0.0 else "nothing"
-    return f"verdict: {words}; {ahead} of plate ahead before {STEADY[1]:.0%} of the face"
+        words = "predicted ahead of A, but too thin to be resolved by these cells"
+    ahead = f"at most {MM * lead:.2f} mm ({lead / spacing:.1f} cells)" if lead > 0.0 else "none"
+    return f"jet: {words}; {ahead} of the plate is ahead before {STEADY[1]:.0%} of the face"
 
 
 def _line(words: str, computed: float, reference: float, unit: float) -> str:

@@ -60,7 +60,7 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     gap: key(
         float,
         "of the plate over the wedge's edge at the start [m]; above 0 they are two "
-        "bodies, which meet and part by themselves, and no node follows A",
+        "bodies, which collide and separate by themselves, and no node follows A",
         ge=0,
         le=1e3,
     ) = 0.0

@@ -302,6 +302,9 @@ class _Words:
             return f"{start}: {inner}: {key} is a value, not a table: {wanted}"
         if isinstance(value, float) and not math.isfinite(value):
             wanted += ", finite"
+        keys = resolve(self.schema, part).get("properties", {})
+        if isinstance(value, str) and "material" in keys:
+            wanted += f", such as {key} = {{ material = {show(value)} }}"
         return f"{self.where(key)}: {key} = {show(value)}; it has to be {wanted}"
 
 

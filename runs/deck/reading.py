@@ -288,7 +288,7 @@ def _keep_text(table: dict[str, Any], kind: type, key: str, text: str) -> None:
 
 def _list_entry(entries: list, name: str, key: str) -> Any:
     if not name.isdigit() or int(name) >= len(entries):
-        raise BadInput(f"--set {key}: {name} is no place in a list of {len(entries)} (from 0)")
+        raise BadInput(f"--set {key}: {name} is not an index (from 0) of a list of {len(entries)}")
     return entries[int(name)]
 
 
@@ -297,7 +297,7 @@ def parse_value(text: str) -> Any:
     try:
         table = load_toml(f"value = {text}")
     except TooMuch as error:
-        raise BadInput(f"--set: {cut(text.strip())} is no value: {error}") from error
+        raise BadInput(f"--set: {cut(text.strip())} is not a value: {error}") from error
     except tomllib.TOMLDecodeError as error:
         if text.strip()[:1] in ("[", "{"):
             raise BadInput(f"--set: {cut(text.strip())} is not valid TOML: {error}") from error

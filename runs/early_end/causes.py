@@ -97,8 +97,8 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         "no grid"),
     "flat-cell": Cause(
         "no grid was found: a cell is too flat for its equations to be solved",
-        "a corner of a block, or a film between two lines, is so thin that the area of its cell is "
-        "lost to round-off", (FEWER_CELLS,),
+        "a corner of a block, or a thin layer between two lines, is so thin that the area of its "
+        "cell is lost to round-off", (FEWER_CELLS,),
         f"{END}; what lies between the lines is thinner than can be computed", "no grid"),
     "lines-cross": Cause(
         "the line of a side crosses itself or another side",
@@ -107,7 +107,7 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         "lines cross"),
     "collapse": Cause(
         "the time step has collapsed",
-        "cells become flat without end: in a neck, in a film, at the tip of a hook",
+        "cells become ever thinner: in a neck, a thin layer or the tip of a hook",
         (THICKER, FEWER_CELLS), END, "time step collapsed"),
     "line-torn": Cause(
         "neighbouring nodes of a line would separate too far in one step",
@@ -130,7 +130,7 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         "a prescribed motion that ignores cells (`mesh=follow`: with the gas) makes nodes cross",
         (GRID_AT_REST,), "", "no grid"),
     "pistons-part": Cause(
-        "key node: two pistons move apart from each other",
+        "`node`: two adjacent sides have incompatible velocities",
         "two sides with given velocities meet in a node and are parallel there", (),
         "give both the same velocity, or put a wall between them", "pistons part"),
     "no-surface": Cause(
@@ -165,8 +165,8 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
 SLOW: dict[str, Cause] = {
     "flat-cells": Cause(
         "dt falls slowly, `dt_limit` is `sound`",
-        "many cells become flat: behind the edge of a roll, in a film, in a neck; a few do not "
-        "matter, since their states are redistributed", (MORE_SHARING, FEWER_CELLS)),
+        "many cells become very thin: behind the edge of a roll, in a thin layer or a neck; a few "
+        "do not matter, since their states are redistributed", (MORE_SHARING, FEWER_CELLS)),
     "closing-lines": Cause(
         "dt falls a hundredfold in few steps",
         "a line curls back on itself, or closes on another", (),

@@ -525,7 +525,9 @@ def describe_cost(cost: Cost) -> list[str]:
         if cost.seconds is None:
             steps += "; the time of a step on this computer is not known yet"
         else:
-            steps += f", {describe_seconds_range(*cost.seconds)} of steps on this machine"
+            steps += (
+                f"; time stepping will take {describe_seconds_range(*cost.seconds)} on this machine"
+            )
     told = [f"{name} {' x '.join(map(str, cells))}" for name, cells in size.blocks[:MOST_NAMED]]
     more = len(size.blocks) - len(told)
     cells = f"{size.cells} cells ({', '.join(told)}{f' and {more} more blocks' if more else ''})"

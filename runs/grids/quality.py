@@ -223,7 +223,7 @@ def check_free(path: Path, force: bool) -> None:
     if path.exists() and not force:
         raise BadInput(f"{path} exists; --force replaces it, -o chooses another name")
     if not path.parent.is_dir():
-        raise BadInput(f"{path.parent} is no folder to write {path.name} into")
+        raise BadInput(f"{path.parent} is not a folder, so {path.name} cannot be written")
 
 
 def write_grid(

@@ -109,7 +109,7 @@ def describe_fastest(history: History, blocks: Sequence[str]) -> str:
     alone = round(float(np.sum(over[known])))
     if alone > 1.02 * known.sum():
         most = count(int(np.nanmax(history.get("shared_cells", np.zeros(1)))), "cell")
-        told += f"; state redistribution in {most} at most, without it {alone} steps"
+        told += f"; state redistribution in up to {most} ({alone} steps would be needed without it)"
     return told
 
 
@@ -313,7 +313,8 @@ RULES = (
     Rule("cells not convex", _most("cells_not_convex"), 0.0, "{value:.0f} cells not convex",
          "most cells in a step that were not convex"),
     Rule("rescues", _share_of_steps("regrid_rescues"), 0.01,
-         "grids untangled in {share} of the steps", "steps in which a grid had to be untangled"),
+         "rescues (folded grids untangled) in {share} of the steps",
+         "steps in which a grid had to be untangled"),
     Rule("retries", _share_of_steps("retries"), 0.02, "{share} of the steps retried",
          "steps that were repeated with a shorter dt"),
     Rule("first-order faces", _share_of_cells("first_order_faces", 2.0), 0.01,

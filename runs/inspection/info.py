@@ -313,11 +313,13 @@ def inspect_differences(a: str, b: str) -> str:
 def open_hdf5(path: Path) -> Iterator[h5py.File]:
     """The file, open for reading; BadInput where it is missing, no HDF5, or its tree is damaged."""
     if not path.is_file():
-        raise BadInput(f"{path} is no file" if path.exists() else f"{path} does not exist")
+        raise BadInput(f"{path} is not a file" if path.exists() else f"{path} does not exist")
     try:
         file = h5py.File(path, "r")
     except OSError as error:
-        raise BadInput(f"{path} is no readable HDF5 file: truncated, or of another kind") from error
+        raise BadInput(
+            f"{path} is not a readable HDF5 file (truncated, damaged or a different format)"
+        ) from error
     with file:
         try:
             yield file

@@ -106,8 +106,8 @@ def _describe_march(simulation: Evolution) -> dict[str, Any]:
     """What the deck can say of how a simulation marches; BadInput where it is none."""
     if not isinstance(simulation, Evolution):
         raise BadInput(
-            f"a {type(simulation).__name__} is no simulation; give a shockgrid.Simulation, a case "
-            "of shockgrid.load, or the name of a problem or deck"
+            f"a {type(simulation).__name__} is not a simulation; give a shockgrid.Simulation, a "
+            "case of shockgrid.load, or the name of a problem or deck"
         )
     clock = getattr(simulation, "clock", None)
     march: dict[str, Any] = {"t_end": float(simulation.t_end)}
@@ -294,5 +294,5 @@ def _find_path(run: Run | Study) -> Path:
         return Path(run)
     path = getattr(run, "path", None)
     if not isinstance(path, Path):
-        raise BadInput(f"{run!r} is no run: its directory is wanted, or what shockgrid.run returns")
+        raise BadInput(f"{run!r} is not a run: give its directory, or what shockgrid.run returns")
     return path

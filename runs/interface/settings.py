@@ -214,7 +214,7 @@ def register(name: str, thing: type) -> None:
     if not isinstance(thing, type):
         raise BadInput(f"{name!r}: a class is registered, not a {type(thing).__name__}")
     if not NAME.fullmatch(name):
-        raise BadInput(f"{name!r} is no name: small letters, digits and hyphens are wanted")
+        raise BadInput(f"{name!r} is not a valid name: use lower-case letters, digits and hyphens")
     place = f"{thing.__module__}:{thing.__qualname__}"
     registry: MutableMapping[str, Any]
     value: Any
@@ -228,8 +228,8 @@ def register(name: str, thing: type) -> None:
         kind, registry, value = "regridder", REGRIDDERS, place
     else:
         raise BadInput(
-            f"{thing.__name__} is no problem, equation of state, boundary kind or regridder: it is "
-            "derived from none of them and has no method regrid"
+            f"{thing.__name__} is not a problem, equation of state, boundary kind or regridder: it "
+            "is derived from none of them and has no method regrid"
         )
     if "<locals>" in place:
         raise BadInput(f"{thing.__qualname__}: a class inside a function cannot be registered")

@@ -224,7 +224,7 @@ def remap_runner(
     target: Any = _build(deck, quiet)
     if not (_is_flow(source) and _is_flow(target)):
         raise BadInput(
-            f"--cells: {deck.problem} is no flow on blocks alone, and what it holds besides cannot "
+            f"--cells: {deck.problem} is not only a flow on blocks, and what else it holds cannot "
             "be laid on other cells; begin a new run with the cells wanted"
         )
     gauges = make_gauges(deck.deck, target)  # points of the material are those of the first state

@@ -119,7 +119,7 @@ def parse_duration(text: str) -> float:
     )
     if not 0.0 < seconds < float("inf"):
         raise BadInput(
-            f"--max-wall {text!r} is no time; write 2h, 90m, 1h30m, 1:30:00 or seconds, above 0"
+            f"--max-wall {text!r} is not a time; write 2h, 90m, 1h30m, 1:30:00 or seconds, above 0"
         )
     return seconds
 

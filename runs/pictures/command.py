@@ -247,7 +247,7 @@ def save(figure: Figure, path: Path, dpi: int, deck_text: str | None = None) -> 
     if path.suffix.lstrip(".").lower() not in known:
         raise BadInput(f"{path}: a picture's name has to end in .png, .pdf or .svg")
     if not path.parent.is_dir():
-        raise BadInput(f"{path.parent} is no folder to write {path.name} into")
+        raise BadInput(f"{path.parent} is not a folder, so {path.name} cannot be written")
     with disk_errors(path):
         write_figure(figure, path, dpi, path.suffix.lstrip(".").lower(), deck_text)
     return path

@@ -510,5 +510,5 @@ def scale_times(dumps: Sequence[Dump]) -> tuple[float, str]:
 
 def _note_following(figure, following: bool) -> None:
     if following:
-        words = "the panels follow the interface in a longer domain: zoom shows other parts"
+        words = "panels show only the region around the interface; use --zoom for the rest"
         figure.supxlabel(words, fontsize=8, color="0.4")

@@ -152,7 +152,7 @@ def choose_path(run: RunData, output: str | Path | None, field: str) -> Path:
     if path.suffix.lower() == ".mp4" and not has_ffmpeg:
         raise BadInput(f"{path}: an mp4 needs the program ffmpeg, which is not here; take a .gif")
     if not path.parent.is_dir():
-        raise BadInput(f"{path.parent} is no folder to write {path.name} into")
+        raise BadInput(f"{path.parent} is not a folder, so {path.name} cannot be written")
     return path
 
 

@@ -71,7 +71,7 @@ class World:
         """Raise BadInput for an evolution that cannot be computed on ranks."""
         if not isinstance(evolution, Simulation):
             raise BadInput(
-                f"{self.size} ranks of MPI were started, but this problem is no flow on blocks: "
+                f"{self.size} ranks of MPI were started, but this problem is not a flow on blocks: "
                 "run it without mpiexec"
             )
 
@@ -396,7 +396,7 @@ def begin(comm: Any, built: Evolution | Exception | None) -> tuple[Simulation, R
     if isinstance(built, Exception):
         raise built
     if not isinstance(built, Simulation):
-        raise TypeError("what was built is no flow on blocks")
+        raise TypeError("what was built is not a flow on blocks")
     evolution, state = built, receive_state(comm)
     if state:
         evolution.set_state(state)

@@ -206,7 +206,7 @@ def check_path(path: Path) -> None:
     if path.suffix.lower() not in (".html", ".htm"):
         raise BadInput(f"{path}: a report's name has to end in .html")
     if not path.parent.is_dir():
-        raise BadInput(f"{path.parent} is no folder to write {path.name} into")
+        raise BadInput(f"{path.parent} is not a folder, so {path.name} cannot be written")
 
 
 def load_template(name: str) -> Any:

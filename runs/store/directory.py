@@ -318,7 +318,7 @@ def open_directory(path: str | Path) -> RunDirectory:
             "--force"
         )
     if not directory.deck.exists():
-        raise BadInput(f"{path} is no run directory: it has no deck.toml")
+        raise BadInput(f"{path} is not a run directory: it has no deck.toml")
     for file in (directory.deck, directory.history, directory.summary, directory.log):
         check_regular(file)
     return directory

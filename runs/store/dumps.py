@@ -330,7 +330,7 @@ def open_dump(path: Path) -> h5py.File:
     Raises BadInput where it is none, is truncated or damaged, or of a format that is not known.
     """
     if not path.is_file():
-        raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is no file")
+        raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is not a file")
     sound = is_sound(path)
     if sound is False:
         raise BadInput(f"{path} is truncated or damaged: its checksum is wrong (shockgrid inspect)")
@@ -338,7 +338,7 @@ def open_dump(path: Path) -> h5py.File:
         file = h5py.File(path, "r")
     except OSError as error:
         raise BadInput(
-            f"{path} is no readable HDF5 file: truncated, damaged or of another kind"
+            f"{path} is not a readable HDF5 file (truncated, damaged or a different format)"
         ) from error
     try:
         with damage_told(path, "its format"):
@@ -356,7 +356,7 @@ def _check_format(path: Path, file: h5py.File, sound: bool) -> None:
     if kind == FORMAT_OF_PARTS:
         raise BadInput(f"{path} holds a part of a dump; the dump is what lists it, beside it")
     if kind != FORMAT:
-        raise BadInput(f"{path} is HDF5 but no shockgrid dump (its 'format' is {kind!r})")
+        raise BadInput(f"{path} is HDF5 but not a shockgrid dump (its 'format' is {kind!r})")
     if not isinstance(version, int | np.integer) or version < 1:
         told = "no format_version" if version is None else f"the format version {version!r}"
         raise BadInput(

@@ -87,7 +87,7 @@ def check_replaceable(path: Path) -> None:
         raise BadInput(f"{path} is a folder, a file is needed")
     within = path.is_absolute() and path.parts[1] in SYSTEM and path.parts[1:3] != ("dev", "shm")
     if within or (path.exists() and not path.is_file()):
-        raise BadInput(f"{path} is no file, but a device, a pipe or a socket; name a file")
+        raise BadInput(f"{path} is not a file but a device, a pipe or a socket; name a file")
 
 
 def check_not_of_a_run(path: Path) -> None:

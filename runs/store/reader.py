@@ -273,7 +273,7 @@ class RunData:
     def dump_at(self, t: float) -> Dump:
         """The dump nearest to time `t`; BadInput for what is no number."""
         if not isinstance(t, int | float | np.number) or not math.isfinite(t):
-            raise BadInput(f"{t!r} is no time; a number is wanted")
+            raise BadInput(f"{t!r} is not a time; give a number")
         if not self.dumps:
             raise BadInput(f"{self.path} has no dump that can be read")
         return min(self.dumps, key=lambda dump: abs(dump.t - t))

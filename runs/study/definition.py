@@ -85,7 +85,7 @@ def write_value(value: Any) -> str:
     try:
         text = tomli_w.dumps({"list": [0, _make_plain(value)]})  # in a list tables are in braces
     except TypeError as error:
-        raise BadInput(f"vary: {value!r} is no value of a deck") from error
+        raise BadInput(f"vary: {value!r} is not a value that a deck can hold") from error
     text = text[text.index("0,") + 2 : text.rindex("]")].strip().removesuffix(",")
     return re.sub(r"\n *", " ", text)  # a line's end within a text is written otherwise
 
@@ -334,7 +334,7 @@ def is_study(source: str) -> Path | None:
         words = f"there is no {FILE} in it"
         if RunDirectory(path).deck.is_file():
             words = f"it is a run; continue it with shockgrid restart {shlex.quote(source)}"
-        raise BadInput(f"{source} is no study: {words}")
+        raise BadInput(f"{source} is not a study: {words}")
     if path.suffix != ".toml" or not path.is_file():
         return None
     table = read_toml(path)

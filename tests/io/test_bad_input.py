@@ -96,7 +96,8 @@ def test_what_cannot_be_run_is_said_before_anything_is_written(shockgrid, words,
         (["run"], "Missing argument"),
         (["run", "toy", "--threads", "none"], "--threads"),
         (["info", "nowhere"], "nowhere does not exist"),
-        (["plot", "."], "no run directory"),
+        (["plot", "."], "not a run directory"),
+        (["check", "interface-instability", "--set", "first=Al"], 'first = { material = "Al" }'),
         (["restart", "nowhere"], "nowhere does not exist"),
         (["list", "tyo"], "did you mean 'toy'?"),
     ],
@@ -135,7 +136,7 @@ def test_foreign_and_newer_hdf5(shockgrid):
 
     with h5py.File("other.h5", "w") as file:
         file["x"] = 1
-    assert "no shockgrid dump" in shockgrid("info", "other.h5")[2]
+    assert "not a shockgrid dump" in shockgrid("info", "other.h5")[2]
     with h5py.File("newer.h5", "w") as file:
         file.attrs["format"], file.attrs["format_version"] = "shockgrid dump", 99
     code, _, error = shockgrid("info", "newer.h5")

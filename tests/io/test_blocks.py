@@ -107,7 +107,7 @@ REFUSED = [  # what the deck has, what stands there instead, what is said
     ('name = "right"', 'name = "left"', "2 blocks are called 'left'"),
     ('u = 150.0\nv = 20.0\nmaterial = { eos = "ideal-gas", gamma = 1.4 }\ncells',
      'u = "1/(x - x)"\nmaterial = "air"\ncells',
-     "block 'right', u '1/(x - x)': it is no finite number at x ="),
+     "block 'right', u '1/(x - x)': it is not a finite number at x ="),
     ('{ eos = "ideal-gas", gamma = 1.4 }\ncells', '"unobtainium"\ncells',
      "block 'right': there is no material"),
     ('x = "0.2 + 0.01*sin(3*pi*s)"', 'x = "0.2 + 0.01*sin(3*pi*t)"', "there is no 't' here"),

@@ -132,7 +132,10 @@ def test_vts_comes_back_to_the_bit(tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ('<?xml version="1.0"?>\n<VTKFile type="PolyData"/>', "no VTK file of a structured grid"),
+        (
+            '<?xml version="1.0"?>\n<VTKFile type="PolyData"/>',
+            "not a VTK file of a structured grid",
+        ),
         ("# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n", "of a structured grid"),
         ('<?xml version="1.0"?>\n<VTKFile type="StructuredGrid" version="1.0"><Struct', "a.vts"),
     ],

@@ -73,7 +73,7 @@ def test_a_damaged_copy_is_not_run(file, shockgrid):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("def f(:\n", "line 1: this is no Python"),
+        ("def f(:\n", "line 1: this is not valid Python"),
         ("x = 1\ny = undefined_name\n", "line 2: the file cannot be run (NameError"),
         ("import no_such_module_anywhere\n", "line 1: the file cannot be run (ModuleNotFoundError"),
         ("x = 1\n", "holds no problem: it needs a class derived from shockgrid.Problem"),

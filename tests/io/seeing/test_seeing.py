@@ -111,7 +111,7 @@ def test_a_film_that_fails_leaves_nothing_and_keeps_the_old(run_of_film, monkeyp
     [
         (("-o", "film.avi"), "has to end in .mp4 or .gif"),
         (("-o", "film.mp4"), "needs the program ffmpeg"),
-        (("-o", "nowhere/film.gif"), "is no folder"),
+        (("-o", "nowhere/film.gif"), "is not a folder"),
         (("--follow", "--zoom", "0,1,0,1"), "use one"),
         (("--zoom", "5,6,0,1"), "is outside the domain"),
         (("pressure",), "has no field 'pressure'; there are: rho, q"),

@@ -136,9 +136,9 @@ def uniform(equations: Equations, speed: float) -> tuple[np.ndarray, np.ndarray]
 
 BAD_FLUIDS = {
     "Ra < 0": ({"rayleigh": -1.0, "prandtl": 1.0}, "Ra = -1 is negative"),
-    "Ra nan": ({"rayleigh": np.nan, "prandtl": 1.0}, "Ra = nan is no number"),
+    "Ra nan": ({"rayleigh": np.nan, "prandtl": 1.0}, "Ra = nan is not a number"),
     "Pr": ({"rayleigh": 1.0, "prandtl": 0.0}, "Pr = 0 must be positive"),
-    "tilt": ({"rayleigh": 1.0, "prandtl": 1.0, "tilt": np.inf}, "is no angle"),
+    "tilt": ({"rayleigh": 1.0, "prandtl": 1.0, "tilt": np.inf}, "is not an angle"),
     "no gravity": (
         {"rayleigh": 1e5, "prandtl": 1.0, "gravity": (0.0, 0.0)},
         r"gravity is zero but Ra = 100000 needs buoyancy",

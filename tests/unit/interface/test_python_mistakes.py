@@ -80,7 +80,7 @@ class WithoutWaves(Half):
         (1.4, r"eos is 1.4; an equation of state is wanted, such as shockgrid.IdealGas\(1.4\)"),
         (sg.IdealGas, r"eos is the class IdealGas; one made of it is wanted, IdealGas\(...\)"),
         (WithoutParts(), "class WithoutParts, which lacks pressure_part, energy_part, sound_speed"),
-        (Half(), r"Half.least_pressure_part is no staticmethod\(least_pressure_part\)"),
+        (Half(), r"Half.least_pressure_part is not a staticmethod\(least_pressure_part\)"),
         (Plain(), "Plain.least_pressure_part is not marked with shockgrid.inlined"),
         (WithoutWaves(), "class WithoutWaves, which lacks wave_law"),
     ],

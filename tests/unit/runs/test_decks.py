@@ -41,7 +41,7 @@ def test_apply_setting_reaches_tables_and_lists():
     assert apply_setting(table, "run.t_end=2") == "run.t_end"
     apply_setting(table, "modes.1.n=5")
     assert table == {"modes": [{"n": 1}, {"n": 5}], "run": {"t_end": 2}}
-    with pytest.raises(BadInput, match="no place in a list of 2"):
+    with pytest.raises(BadInput, match="not an index"):
         apply_setting(table, "modes.2.n=5")
     with pytest.raises(BadInput, match=r"run\.t_end is a value, not a table"):
         apply_setting(table, "run.t_end.x=5")

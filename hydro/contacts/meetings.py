@@ -30,7 +30,7 @@ from hydro.sliding.contact import SlidingContact
 from regrid.errors import Place, RunFailure
 
 LEAST_STEP = 2e-3  # of the stable step: a touch that comes sooner is taken at its end
-LEAST_BESIDE = 1e-2  # the same where surfaces touch already
+LEAST_BESIDE = 5e-2  # the same where surfaces touch already
 CUTS = 5  # times that a step is cut to the first touch, and made a little longer again
 MOST_LONGER = 1.5  # a step that was cut too short
 REACHED = 1e-6  # of a step: a touch that comes so shortly before or after its end is at its end

@@ -171,9 +171,9 @@ def make_command(
 
 
 def describe_event(blocks: Sequence, place: Place | None) -> str:
-    """A sentence on the thinnest film, neck or gap at the place that failed; "" where none is thin.
+    """A sentence on the thinnest layer, neck or gap where it failed; "" where none is thin.
 
-    Where one of a film's sides is a seam inside one material, that is said: no material is cut.
+    Where one of a layer's sides is a seam inside one material, that is said: no material is cut.
 
     blocks: with `name` and `nodes` (2, ni + 1, nj + 1) [m]; without a place all are looked at.
     """
@@ -198,7 +198,7 @@ def describe_event(blocks: Sequence, place: Place | None) -> str:
             f"'{neighbour}', of the same material: what is left between them is {size}"
         )
     if inside:
-        return f"block '{name}' is a film: between its sides {one} and {other} it is {size}"
+        return f"block '{name}' is a thin layer: between its sides {one} and {other} it is {size}"
     whose = f"side {one} of '{name}' has" if one == other else f"sides {one} and {other} have"
     return f"{whose} met {'itself' if one == other else f'outside of {name!r}'}: the gap is {size}"
 

@@ -49,7 +49,9 @@ def test_a_neck_is_pinched_off():
     assert "block 'gas' is pinched off" in said and "j_min" in said
 
 
-@pytest.mark.parametrize("material, said", [("gas", "come to its seam"), ("air", "is a film")])
+@pytest.mark.parametrize(
+    "material, said", [("gas", "come to its seam"), ("air", "is a thin layer")]
+)
 def test_a_line_that_comes_to_a_seam_cuts_no_material(material, said):
     film = lay(lambda x: 0.0 * x, lambda x: 0.001 + (x - 0.5) ** 2)
     below = lay(lambda x: -1.0 + 0.0 * x, lambda x: 0.0 * x, name="below")

@@ -110,7 +110,7 @@ class PlateRun(Simulation):
         return self.problem.to_set_up(self.wedge.side_line(side, self.wedge.nodes))[:, ::-1]
 
     def measure_path(self) -> float:
-        """Path of A along the face [m]; NaN behind B where bodies collide and separate by themselves."""
+        """Path of A along the face [m]; NaN behind B where bodies move freely."""
         if not self.contact and math.isfinite(self.times["arrived"]):
             return math.nan
         return float(self.measure_along(self.find_contact_point() - self.start))

@@ -17,18 +17,19 @@ from collections.abc import Iterator
 from problems.grid_march import GridMarch, GridMarchDeck
 from runs.march.progress import watch_compiler
 
-LOOK_EVERY = 0.1  # wall seconds until the run is looked at again: does it compile anything?
+LOOK_EVERY = 0.1  # wall seconds until the run is looked at again: how much does it compile?
+MANY = 40  # beginnings and ends of compilations from which on a second process is worth its start
 STEPS = 3  # of the small grid: those that need no solve, and those that do
 
 
 @contextlib.contextmanager
 def second_compiler() -> Iterator[None]:
-    """In the block a second process compiles, too, from when this one compiles anything."""
+    """In the block a second process compiles, too, once this one has compiled some kernels."""
     done = threading.Event()
     with watch_compiler() as compiled:
 
         def compile_beside() -> None:
-            while not compiled:
+            while len(compiled) < MANY:
                 if done.wait(LOOK_EVERY):
                     return
             program = [sys.executable, "-m", "runs.march.compiling"]

@@ -18,7 +18,7 @@ from problems.grid_march import GridMarch, GridMarchDeck
 from runs.march.progress import watch_compiler
 
 LOOK_EVERY = 0.1  # wall seconds until the run is looked at again: how much does it compile?
-MANY = 40  # beginnings and ends of compilations from which on a second process is worth its start
+MANY = 10  # beginnings and ends of compilations from which on a second process is worth its start
 STEPS = 3  # of the small grid: those that need no solve, and those that do
 
 

@@ -2,7 +2,8 @@
 
 numba compiles one kernel at a time and keeps it on the disk.  A run first needs the kernels of its
 start and its flow.  Meanwhile a second process marches a small grid, and when the run comes to its
-own grid the kernels are there.  Only the time depends on it.
+own grid the kernels are there.  Only the time depends on it.  SHOCKGRID_COMPILERS=1 leaves the
+second process out.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ def second_compiler() -> Iterator[None]:
                 done.wait()
                 process.terminate()
 
-        if (os.cpu_count() or 1) > 1:
+        if (os.cpu_count() or 1) > 1 and os.environ.get("SHOCKGRID_COMPILERS") != "1":
             threading.Thread(target=compile_beside, daemon=True).start()
         try:
             yield

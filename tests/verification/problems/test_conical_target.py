@@ -13,7 +13,6 @@ from problems.conical_target.report import (
     AGES,
     STATIONS,
     find_peak,
-    find_rate,
     measure_growth,
     measure_passage,
     measure_waves,
@@ -158,7 +157,8 @@ def pair():
     """Runs with a ripple and with its mirror image: history, and the lines by time."""
     runs = []
     for phase in (0.0, math.pi):
-        problem = make_problem(ripple_phase=phase, run=RunControl(t_end=3.4e-6, cfl=0.8))
+        run = RunControl(t_end=3.4e-6, cfl=0.8)
+        problem = make_problem(cells=64, ripple_phase=phase, run=run)
         simulation = problem.build()
         rows, lines = [simulation.start_row() | {"t": 0.0} | problem.measure(simulation)], []
         while not simulation.finished:
@@ -191,11 +191,14 @@ def test_growth_is_that_of_the_impulse_and_the_slip(pair):
         places = middle + np.linspace(-1.05, 1.05, 400) * length
         one, two = (find_line(run[2], wave.passed + age, places, frame) for run in pair)
         grown.append(fit_wave(places, 0.5 * (one - two), middle, length))
-    rate = math.log(grown[1] / grown[0]) / (AGES[1] - AGES[0])
-    assert rate == pytest.approx(find_rate(ripple, crossed), rel=0.15)
     for age, amplitude in zip(AGES, grown, strict=True):
-        assert wave.get_amplitude(age) == pytest.approx(amplitude, rel=0.15), "from one run alone"
-        theory = wave.amplitude[0] * float(crossed.compute_growth(ripple.wavenumber, age))
-        assert amplitude == pytest.approx(theory, rel=0.2)
+        assert wave.get_amplitude(age) == pytest.approx(amplitude, rel=0.1), "from one run alone"
+    # of theory 92 and 99 %, at 96 cells 95 and 104 %: the impulse takes time, so it starts late;
+    # at the second age the impulse alone would give 91 %, the slip alone 69 %
+    early, late = (
+        amplitude / (wave.amplitude[0] * float(crossed.compute_growth(ripple.wavenumber, age)))
+        for age, amplitude in zip(AGES, grown, strict=True)
+    )
+    assert early == pytest.approx(1.0, abs=0.1) and late == pytest.approx(1.0, abs=0.05)
     text = problem.summary(history, simulation)
     assert "shocks cross the side at" in text and "theory of small slopes" in text

@@ -16,7 +16,7 @@ import numpy as np
 from hydro.remap.conserved import check_convex, remap_means
 from hydro.remap.overlay import compute_cell_moments
 from regrid.errors import BadInput
-from runs.store.reader import Dump, DumpBlock, RunData
+from runs.store.reader import BlockData, Dump, RunData
 
 
 @dataclass(frozen=True)
@@ -317,7 +317,7 @@ def measure_norms(one: Dump, other: Dump) -> list[FieldDifference]:
     return [row for block in one.blocks for row in _compare_blocks(block, other.block(block.name))]
 
 
-def _compare_blocks(one: DumpBlock, other: DumpBlock) -> list[FieldDifference]:
+def _compare_blocks(one: BlockData, other: BlockData) -> list[FieldDifference]:
     for block in (one, other):
         check_convex(block.name, block.nodes)
     curved = one.axes[1] == "r"

@@ -13,7 +13,13 @@ from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, read_toml, resolve_deck
 from runs.interface.case import Case, load
 from runs.interface.opened import OpenRun, finish
-from runs.interface.settings import Hooks, HooksGiven, check_options, make_settings, said_in_python
+from runs.interface.settings import (
+    HooksGiven,
+    check_options,
+    join_hooks,
+    make_settings,
+    said_in_python,
+)
 from runs.march.launching import check_changeable, read_restart_deck
 from runs.march.runner import Runner, check_output
 from runs.ranks.started import check_single
@@ -206,7 +212,7 @@ def restart(
             case = Case(read, read.make_problem())
         # the simulation says what is missing where the blocks are a script's
         check_output(case.read.deck.output, case.simulation)
-    after_step = Hooks(case, hooks)
+    after_step = join_hooks(case, hooks)
     runner = Runner(case.read, opened, case.problem, case.simulation, quiet, after_step=after_step)
     return case.march(runner, lambda: runner.resume(at), quiet)
 

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import sys
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,152 +26,81 @@ from problems.evolution import (
     is_axisymmetric,
 )
 from problems.problem import Problem, check_memory
-from regrid.errors import BadInput, find_nearest, suggest
-from regrid.measure.corners import compute_centres
+from regrid.errors import BadInput, suggest
 from runs.deck.reading import ReadDeck, read_deck, resolve_deck
 from runs.inspection.account import describe_cautions
+from runs.interface.opened import Drawn, OpenRun, finish
 from runs.interface.settings import (
-    Hooks,
     HooksGiven,
     is_count,
+    join_hooks,
     make_settings,
     make_table,
     said_in_python,
-    with_known_options,
 )
 from runs.march.launching import check_requests
 from runs.march.progress import patience
 from runs.march.runner import Runner
 from runs.ranks.started import check_single
 from runs.store.directory import create_directory
-from runs.store.reader import get_field
+from runs.store.reader import BlockData, Fields, Snapshot, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from runs.interface.opened import OpenRun
     from runs.interface.pictures import Curve
 
 
-def lock(values: np.ndarray) -> np.ndarray:
-    """A view of an array through which nothing can be written."""
-    view = values.view()
-    view.flags.writeable = False
-    return view
+def _view(block: BlockView, axes: tuple[str, str]) -> BlockData:
+    """A block of a flow in memory: each array is a view of now, and cannot be written to."""
+
+    def lock(values: np.ndarray) -> np.ndarray:
+        view = values.view()
+        view.flags.writeable = False
+        return view
+
+    def make_fields(get: Callable[[], Mapping[str, np.ndarray]]) -> Fields:
+        return Fields(f"block {block.name!r}", get(), lambda name: lock(get()[name]))
+
+    def get_rates() -> dict[str, np.ndarray]:
+        rates = getattr(block, "rates", None)
+        return {} if rates is None else {"rates": rates}
+
+    words = get_long_names(block)
+    return BlockData(
+        block.name,
+        get_material(block),
+        axes,
+        lambda: lock(block.nodes),
+        make_fields(lambda: block.cell_fields),
+        make_fields(lambda: get_node_fields(block)),
+        make_fields(get_rates),
+        block.units,
+        {name: words.get(name, name) for name in (*block.cell_fields, *get_node_fields(block))},
+    )
 
 
-class LockedFields(Mapping[str, np.ndarray]):
-    """Fields by name, each a view through which nothing can be written."""
-
-    def __init__(self, fields: Mapping[str, np.ndarray]):
-        self._fields = fields
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        return lock(self._fields[name])
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._fields)
-
-    def __len__(self) -> int:
-        return len(self._fields)
-
-
-class LiveBlock:
-    """One block: `nodes` (2, ni+1, nj+1) [m], and its fields `rho`, `u`, `v`, `p`, `e`, (ni, nj).
-
-    SI units; a field of another name is an attribute too.  An unknown name raises AttributeError
-    with those that there are.
-    """
-
-    def __init__(self, block: BlockView, axes: tuple[str, str] = ("x", "y")):
-        self._block = block
-        self.name: str = block.name
-        self.material: str = get_material(block)
-        self.axes = axes
-        self.units: Mapping[str, str] = block.units
-        fields = {*block.cell_fields, *get_node_fields(block)}
-        told = get_long_names(block)
-        self.long_names: Mapping[str, str] = {name: told.get(name, name) for name in fields}
-
-    @property
-    def nodes(self) -> np.ndarray:
-        """Nodes (2, ni+1, nj+1) [m], a view."""
-        return lock(self._block.nodes)
-
-    @property
-    def centres(self) -> np.ndarray:
-        """Middles of the cells (2, ni, nj) [m], computed now."""
-        return compute_centres(self._block.nodes)
-
-    @property
-    def cells(self) -> tuple[int, int]:
-        """Cells along i and along j."""
-        ni, nj = (size - 1 for size in self._block.nodes.shape[1:])
-        return ni, nj
-
-    @property
-    def cell_fields(self) -> Mapping[str, np.ndarray]:
-        """Fields of the cells by name, (ni, nj) each: views, and what is computed from them."""
-        return LockedFields(self._block.cell_fields)
-
-    @property
-    def node_fields(self) -> Mapping[str, np.ndarray]:
-        """Fields at the nodes by name, (ni+1, nj+1) each; none in most flows."""
-        return LockedFields(get_node_fields(self._block))
-
-    @property
-    def state_fields(self) -> Mapping[str, np.ndarray]:
-        """What is kept of the cells besides: their rates [1/s], (ni, nj), in flows."""
-        rates = getattr(self._block, "rates", None)
-        return LockedFields({} if rates is None else {"rates": rates})
-
-    def __getattr__(self, name: str) -> np.ndarray:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        return get_field(self, name)
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *self.cell_fields, *self.node_fields})
-
-    def __repr__(self) -> str:
-        ni, nj = self.cells
-        return f"<block {self.name}: {self.material}, {ni} x {nj} cells>"
-
-
-class Blocks(Mapping[str, LiveBlock]):
+class Blocks(dict[str, BlockData]):
     """The blocks of a flow by name, in their order; BadInput for a name that none has."""
 
-    def __init__(self, blocks: Sequence[BlockView], axes: tuple[str, str]):
-        self._blocks = {block.name: LiveBlock(block, axes) for block in blocks}
-
-    def __getitem__(self, name: str) -> LiveBlock:
-        try:
-            return self._blocks[name]
-        except KeyError:
-            raise BadInput(f"there is no block {name!r}{suggest(name, self._blocks)}") from None
-
-    def __contains__(self, name: Any) -> bool:
-        return name in self._blocks
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._blocks)
-
-    def __len__(self) -> int:
-        return len(self._blocks)
+    def __missing__(self, name: str) -> BlockData:
+        raise BadInput(f"there is no block {name!r}{suggest(str(name), self)}")
 
     def __repr__(self) -> str:
-        return f"<blocks: {', '.join(self._blocks)}>"
+        return f"<blocks: {', '.join(self)}>"
 
 
-LIVE_PICTURES = ("fields", "mesh", "interface", "line")  # of the state in memory
-
-
-class Case:
+class Case(Drawn):
     """One problem with one deck, at the time that it has been marched to."""
+
+    history = Table({}, "history of a case")  # with `skipped`: a case is drawn as a run is
+    skipped: tuple[str, ...] = ()
+    pictures = ("mesh", "interface", "line")
 
     def __init__(self, read: ReadDeck, problem: Problem):
         self.read = read
-        self.problem = problem
+        self.problem, self.problem_name = problem, read.label
+        self.path = Path(read.label)  # as it is named in messages
         self._runs = False
 
     @property
@@ -216,7 +144,15 @@ class Case:
 
         The arrays are views of live data, not to be written to: see `runs.interface.case`.
         """
-        return Blocks(self.simulation.blocks, self._axes)
+        axes = ("x", "r") if is_axisymmetric(self.simulation) else ("x", "y")
+        return Blocks({block.name: _view(block, axes) for block in self.simulation.blocks})
+
+    @property
+    def dumps(self) -> list[Snapshot]:
+        """The present state alone, as pictures take it."""
+        state = Snapshot(self.path, self.t, self.simulation.t_end, self.problem.t_unit, self.step)
+        state.blocks = list(self.blocks.values())
+        return [state]
 
     @property
     def t(self) -> float:
@@ -279,10 +215,14 @@ class Case:
         if self.finished:
             raise BadInput(f"{self.name} is at its end already: {self.finished}")
         check_single("Case.run", "run DECK")
-        after_step = Hooks(self, hooks)  # refused before there is a directory
-        output = {"dumps": dumps} if dumps is not None else {}
-        run = {"max_steps": max_steps} if max_steps is not None else {}
-        read = self._change({"output": output, "run": run})
+        after_step = join_hooks(self, hooks)  # refused before there is a directory
+        given = {"output.dumps": dumps, "run.max_steps": max_steps}
+        settings = make_settings({key: value for key, value in given.items() if value is not None})
+        read = self.read
+        if settings:
+            with said_in_python():
+                table = tomllib.loads(read.to_toml())
+                read = resolve_deck(table, read.origin, settings, read.file)
         most = read.deck.run.max_steps
         if most is not None and 0 < self.step >= most:
             raise BadInput(
@@ -304,8 +244,6 @@ class Case:
 
     def march(self, runner: Runner, start: Any, quiet: bool) -> OpenRun:
         """Let a runner of this case `start`, which gives an ending; the data of its directory."""
-        from runs.interface.opened import finish
-
         self._runs = True
         try:
             ending = start()
@@ -313,81 +251,26 @@ class Case:
             self._runs = False
         return finish(runner, ending, quiet)
 
-    def _change(self, keywords: dict[str, Any]) -> ReadDeck:
-        """The deck with other values for a run of the same blocks."""
-        settings = make_settings(keywords)
-        if not settings:
-            return self.read
-        with said_in_python():
-            return self._resolve(settings)
-
-    def _resolve(self, settings: tuple[str, ...]) -> ReadDeck:
-        table = tomllib.loads(self.read.to_toml())
-        return resolve_deck(table, self.read.origin, settings, self.read.file)
-
     def interface(self) -> Curve:
         """The curve between blocks of different materials now: arrays x, y [m], and t [s]."""
         from runs.interface.pictures import find_interface
 
         return find_interface(list(self.blocks.values()), self.t, self.name)
 
-    @with_known_options
-    def plot(
-        self,
-        *fields: str,
-        what: str | None = None,
-        mesh: bool = False,
-        zoom: Sequence[float] | None = None,
-        mirror: str | None = None,
-        beside: str | Path | None = None,
-        line: Sequence[float] | None = None,
-        limits: Sequence[float] | None = None,
-        colours: str | None = None,
-    ) -> Figure:
-        """The figure of the present state: fields (the density where none is named) or grids.
+    def plot(self, *fields: str, **options: Any) -> Figure:
+        """The figure of the present state; fields and options: `OpenRun.plot`.
 
-        what: "fields", "mesh", "interface" or "line"; a single word that is one of these may stand
-        in place of a field.  mesh: draw the grid over the fields; zoom: x0, x1, y0, y1 [m]; mirror:
-        "x" or "y" completes a half domain; beside: the directory of a run, its dump nearest in time
-        drawn to the same scale; line: x0, y0, x1, y1 [m], the fields along it are drawn; limits:
-        low, high of the colours in SI units; colours: a colour map.  Raises BadInput for what there
-        is not.
+        what: "fields", "mesh", "interface" or "line".  Raises BadInput for what there is not.
         """
-        from runs.interface.pictures import draw_picture
-
-        live = _LiveRun(self)
-        fields, what = self._choose_picture(fields, what, live.dumps[0])
-        return draw_picture(
-            live, fields, what, mesh=mesh, zoom=zoom, mirror=mirror, beside=beside, line=line,
-            limits=limits, colours=colours,
-        )  # fmt: skip
-
-    def _choose_picture(
-        self, fields: tuple[str, ...], what: str | None, state: Any
-    ) -> tuple[tuple[str, ...], str | None]:
-        """Fields and `what` of a picture; BadInput with the names there are for any other."""
-        from runs.pictures.fields import list_fields
-
-        known = list_fields(state)
-        if what is None and len(fields) == 1 and not set(fields[0].split(",")) <= set(known):
-            what, fields = fields[0], ()
-        if what is None or what in LIVE_PICTURES:
-            return fields, what
+        what = options.get("what") or (fields[0] if len(fields) == 1 else "")
         if what in ("history", "gauges") or what in self.problem.figures():
             raise BadInput(
                 f"{what!r} is a picture of a run's directory: run the case, and plot its data; "
-                f"the state in memory shows {', '.join(LIVE_PICTURES)}"
+                f"the state in memory shows fields, {', '.join(self.pictures)}"
             )
-        shown = ", ".join([*known, *LIVE_PICTURES])
-        nearest = find_nearest(what, [*known, *LIVE_PICTURES])
-        hint = f"; did you mean {nearest!r}?" if nearest else ""
-        raise BadInput(
-            f"there is no field or picture {what!r} of {self.name}; there are: {shown}{hint}"
-        )
-
-    @property
-    def _axes(self) -> tuple[str, str]:
-        return ("x", "r") if is_axisymmetric(self.simulation) else ("x", "y")
+        if options.get("at") is not None:
+            raise BadInput("at: the state in memory has one time; run the case, and plot its data")
+        return super().plot(*fields, **options)
 
     def __repr__(self) -> str:
         if "simulation" not in self.__dict__:
@@ -403,37 +286,7 @@ class Case:
             for name, block in self.blocks.items():
                 ni, nj = block.cells
                 rows.append((f"block {name}", f"{block.material}, {ni} x {nj} cells"))
-        rows += [(f"theory: {name}", f"{value:.6g}") for name, value in self.theory.items()]
-        return make_table(rows)
-
-
-@dataclass
-class _LiveDump:
-    """The present state with what pictures ask of a dump."""
-
-    path: str
-    t: float
-    t_end: float
-    step: int
-    t_unit: str
-    blocks: list[LiveBlock]
-    axes: tuple[str, str]
-    is_restart_point: bool = False
-
-    def field_names(self) -> list[str]:
-        return list(dict.fromkeys(name for block in self.blocks for name in block.cell_fields))
-
-
-class _LiveRun:
-    """A case with what pictures ask of a run."""
-
-    def __init__(self, case: Case):
-        simulation, blocks = case.simulation, list(case.blocks.values())
-        self.path, self.problem, self.problem_name = Path(case.name), case.problem, case.name
-        self.history: dict[str, Any] = {}
-        self.skipped: list[str] = []
-        state = case.t, simulation.t_end, case.step, case.problem.t_unit
-        self.dumps = [_LiveDump(case.name, *state, blocks, case._axes)]
+        return make_table(rows, self.theory)
 
 
 def load(deck: str | Path, **settings: Any) -> Case:

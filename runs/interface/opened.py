@@ -1,18 +1,13 @@
-"""A run's directory as data, with what a person asks of it: history, fields, curves, pictures."""
+"""A run's directory as data that can be drawn: what `shockgrid.open` and `shockgrid.run` return."""
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Mapping, Sequence
-from functools import cached_property
+from collections.abc import Sequence
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from problems.evolution import Evolution
-from regrid.errors import BadInput, suggest
+from problems.problem import Problem
 from runs.inspection.account import describe_time
 from runs.interface.settings import check_options, make_table, with_known_options
 from runs.march.runner import Ending, Runner
@@ -23,123 +18,19 @@ if TYPE_CHECKING:
 
     from runs.interface.pictures import Curve, Times
 
-
-class NoColumn(BadInput, KeyError):
-    """A column that the history does not have; the sentence names those that are like it."""
-
-    def __str__(self) -> str:
-        return str(self.args[0])
-
-
-class History(dict[str, np.ndarray]):
-    """Columns of the history by name, (steps + 1,) each; `history.t` is `history["t"]`.
-
-    Row 0 is the start, where only some columns have a value (nan, "" in a column of words).
-    `units` maps columns to their SI unit, as far as it is known.  An unknown name raises
-    AttributeError or, in brackets, BadInput, which here is a KeyError too.
-    """
-
-    def __init__(
-        self, columns: Mapping[str, np.ndarray], units: Mapping[str, str], name: str = "history"
-    ):
-        super().__init__(columns)
-        self.units = {key: unit for key, unit in units.items() if key in columns}
-        self.name = name
-
-    def __missing__(self, name: str) -> np.ndarray:
-        raise NoColumn(f"the history has no column {name!r}{suggest(name, self)}")
-
-    def __getattr__(self, name: str) -> np.ndarray:
-        try:
-            return self[name]
-        except KeyError as error:
-            raise AttributeError(str(error)) from None
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *self})
-
-    def __repr__(self) -> str:
-        rows = len(next(iter(self.values()), ()))
-        return f"<history of {self.name}: {rows} rows, {len(self)} columns: {', '.join(self)}>"
-
-    def to_xarray(self) -> Any:
-        """An xarray.Dataset over `step`, with `t` beside it and units as attributes.
-
-        Raises BadInput where xarray is not installed.
-        """
-        xarray = _load("xarray")
-        data = {
-            name: ("step", values, {"units": self.units[name]} if name in self.units else {})
-            for name, values in self.items()
-        }
-        return xarray.Dataset(data).set_coords(["step", "t"])
-
-    def to_pandas(self) -> Any:
-        """A pandas.DataFrame with a row a step, `step` being its index.
-
-        Raises BadInput where pandas is not installed.
-        """
-        return _load("pandas").DataFrame(dict(self)).set_index("step")
-
-
-def _load(package: str) -> ModuleType:
-    try:
-        return importlib.import_module(package)
-    except ImportError as error:
-        words = f"{package} is not installed here: python -m pip install {package}"
-        raise BadInput(f"to_{package} needs {package}, and {words}") from error
-
-
 FIRST_SIGNAL = 128  # exit codes from here on: stopped by a signal
 INTERRUPTED = 130
 
 
-class OpenRun(RunData):
-    """A run: `.deck`, `.history`, `.dumps[-1]["second"].rho`, `.problem`, and what follows.
+class Drawn:
+    """What can be drawn: the dumps of a run, or the present state of a case."""
 
-    Everything is read at first use; a run that is still marching is opened again to
-    see more of it.  `dumps` are in order of time; `reason` says why the run that was just made
-    ended, and is "" where the directory was opened.
-    """
-
-    reason: str = ""
-    final: Evolution | None = None  # the state in memory of the run that was just made
-
-    @cached_property
-    def history(self) -> History:
-        """Columns of the history by name and by attribute; empty where no step was made."""
-        return History(RunData(self.path).history, self._units, str(self.path))
+    problem: Problem
 
     @property
-    def _units(self) -> dict[str, str]:
-        from runs.pictures.history import find_units
-
-        return {"t": "s", "dt": "s"} | find_units(RunData(self.path))
-
-    @property
-    def theory(self) -> dict[str, float]:
-        """What the problem's references say for the deck, by name, SI units; {} for nothing."""
-        return self.problem.predict()
-
-    @property
-    def summary(self) -> str:
-        """The summary; of an unfinished run, what the problem says of it so far."""
-        if self.directory.summary.exists():
-            return self.directory.summary.read_text(encoding="utf-8").rstrip("\n")
-        return self.problem.summary(self.history, None) if len(self.history.get("t", ())) else ""
-
-    def interface(self, t: float | None = None) -> Curve:
-        """The curve between blocks of different materials in the dump nearest to `t` [s].
-
-        Arrays x and y [m], and the time t of that dump; without `t` the last.  Raises BadInput
-        where there is no dump, or no two materials touch.
-        """
-        from runs.interface.pictures import find_interface
-
-        if not self.dumps:
-            raise BadInput(f"{self.path} has no dump that can be read")
-        dump = self.dumps[-1] if t is None else self.dump_at(t)
-        return find_interface(dump.blocks, dump.t, str(dump.path))
+    def pictures(self) -> Sequence[str]:
+        """Words for `what` of `plot`."""
+        raise NotImplementedError
 
     @with_known_options
     def plot(
@@ -157,9 +48,10 @@ class OpenRun(RunData):
     ) -> Figure:
         """The figure that `shockgrid plot` draws: fields (the density where none is named), ...
 
-        what: "fields", "mesh", "interface", "history" (`fields` then are its columns), "gauges",
-        "line" or a picture of the problem's own; a single word that is one of these may stand in
-        place of a field.  at: times [s], "start" or "end"; mesh, zoom, mirror: see `Case.plot`;
+        what: "fields", "mesh", "interface", "line", of a run also "history" (`fields` then are its
+        columns), "gauges" or a picture of the problem's own; a single word that is one of these may
+        stand in place of a field.  at: times [s] of dumps, "start" or "end"; mesh: draw the grid
+        over the fields; zoom: x0, x1, y0, y1 [m]; mirror: "x" or "y" completes a half domain;
         beside: the directory of another run, drawn to the same scale; line: x0, y0, x1, y1 [m], the
         fields along it are drawn; limits: low, high of the colours in SI units; colours: a colour
         map.  Raises BadInput for what there is not.
@@ -169,13 +61,36 @@ class OpenRun(RunData):
         if what is None and len(fields) == 1 and fields[0] in self.pictures:
             what, fields = fields[0], ()
         return draw_picture(
-            self, fields, what, at=at, mesh=mesh, zoom=zoom, mirror=mirror, beside=beside,
+            self, fields, what=what, at=at, mesh=mesh, zoom=zoom, mirror=mirror, beside=beside,
             line=line, limits=limits, colours=colours,
         )  # fmt: skip
 
+
+class OpenRun(Drawn, RunData):
+    """A run: `.deck`, `.history`, `.dumps[-1]["second"].rho`, `.problem`, and what follows.
+
+    Everything is read at first use; a run that is still marching is opened again to
+    see more of it.  `dumps` are in order of time; `reason` says why the run that was just made
+    ended, and is "" where the directory was opened.
+    """
+
+    reason: str = ""
+    final: Evolution | None = None  # the state in memory of the run that was just made
+
+    def interface(self, t: float | None = None) -> Curve:
+        """The curve between blocks of different materials in the dump nearest to `t` [s].
+
+        Arrays x and y [m], and the time t of that dump; without `t` the last.  Raises BadInput
+        where there is no dump, or no two materials touch.
+        """
+        from runs.interface.pictures import find_interface
+
+        dump = self.dump_at(t)
+        return find_interface(dump.blocks, dump.t, str(dump.path))
+
     @property
     def pictures(self) -> list[str]:
-        """Names for `what` of `plot`."""
+        """Words for `what` of `plot`."""
         gauges = ["gauges"] if self.deck.gauge else []
         return ["mesh", "interface", "history", *gauges, *self.problem.figures()]
 
@@ -212,9 +127,8 @@ class OpenRun(RunData):
         if not self.dumps:
             return "no dump that can be read"
         last = self.dumps[-1]
-        return f"{self.reason or last.finished or 'not finished'}: step {last.step}, " + (
-            describe_time(last.t, last.t_unit)
-        )
+        ending = self.reason or last.finished or "not finished"
+        return f"{ending}: step {last.step}, {describe_time(last.t, last.t_unit)}"
 
     def __repr__(self) -> str:
         return f"<run of {self.problem_name} in {self.path}: {self._state}>"
@@ -222,8 +136,7 @@ class OpenRun(RunData):
     def _repr_html_(self) -> str:
         rows = [("run", str(self.path)), ("problem", self.problem_name), ("state", self._state)]
         rows.append(("dumps", str(len(self.dumps))))
-        rows += [(f"theory: {name}", f"{value:.6g}") for name, value in self.theory.items()]
-        return make_table(rows)
+        return make_table(rows, self.theory)
 
 
 def open_run(directory: str | Path) -> OpenRun:
@@ -233,13 +146,10 @@ def open_run(directory: str | Path) -> OpenRun:
 
 def finish(runner: Runner, ending: Ending, quiet: bool) -> OpenRun:
     """The data of a run that has ended; KeyboardInterrupt or SystemExit where it was stopped."""
+    if ending.exit_code == INTERRUPTED:
+        raise KeyboardInterrupt(f"{ending.reason}; {runner.directory} can be restarted from")
     if ending.exit_code >= FIRST_SIGNAL:
-        words = f"{ending.reason}; {runner.directory} can be restarted from"
-        raise (
-            KeyboardInterrupt(words)
-            if ending.exit_code == INTERRUPTED
-            else SystemExit(ending.exit_code)
-        )
+        raise SystemExit(ending.exit_code)
     if not quiet:
         print(ending.screen)
     run = OpenRun(runner.directory.path)

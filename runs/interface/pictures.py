@@ -36,7 +36,7 @@ class Curve(NamedTuple):
     t: float
 
 
-def draw_picture(run: Any, fields: tuple[str, ...], what: str | None, **words: Any) -> Figure:
+def draw_picture(run: Any, fields: tuple[str, ...], **words: Any) -> Figure:
     """What `shockgrid plot` draws, as a figure; `run` has what RunData has.
 
     words: of `Wanted`, but numbers for their texts.  Raises BadInput for a field, a picture, a time
@@ -44,12 +44,19 @@ def draw_picture(run: Any, fields: tuple[str, ...], what: str | None, **words: A
     """
     if words["mirror"] not in (None, "x", "y"):
         raise BadInput(f"mirror = {words['mirror']!r}: 'x' or 'y' is wanted")
-    figure = new_figure(Picture)
+    at, beside = words["at"], words["beside"]
+    if at is not None and not isinstance(at, str):
+        words["at"] = say_numbers(np.atleast_1d(np.asarray(at, float)))
+    words["beside"] = None if beside is None else str(beside)
     words |= {name: say_numbers(words[name]) for name in ("zoom", "line", "limits")}
-    beside, at = words["beside"], _say_times(words.get("at"))
-    words |= {"beside": None if beside is None else str(beside), "at": at}
-    fill_figure(figure, run, Wanted(fields, what, **words))
+    figure = new_figure(Picture)
+    fill_figure(figure, run, Wanted(fields, **words))
     return figure
+
+
+def say_numbers(numbers: Sequence[float] | np.ndarray | None) -> str | None:
+    """Numbers as an option of the command line gives them."""
+    return None if numbers is None else ",".join(repr(float(value)) for value in numbers)
 
 
 def find_interface(blocks: Sequence[Any], t: float, where: str) -> Curve:
@@ -57,29 +64,9 @@ def find_interface(blocks: Sequence[Any], t: float, where: str) -> Curve:
     lines, _ = split_outline(blocks)
     if not lines:
         raise BadInput(f"{where}: no two materials touch, so there is no interface")
-    pieces = _chain(lines)
-    gap = np.full((2, 1), np.nan)
-    parts = [part for piece in pieces for part in (gap, piece)][1:]
+    parts = [lines[0]]
+    for line in lines[1:]:
+        touches = np.array_equal(parts[-1][:, -1], line[:, 0])
+        parts += [line[:, 1:]] if touches else [np.full((2, 1), np.nan), line]
     x, y = np.concatenate(parts, axis=1)
     return Curve(x, y, t)
-
-
-def _chain(lines: list[np.ndarray]) -> list[np.ndarray]:
-    """Lines of which one ends where the next begins, put together; (2, n) each."""
-    pieces: list[np.ndarray] = []
-    for line in lines:
-        if pieces and np.array_equal(pieces[-1][:, -1], line[:, 0]):
-            pieces[-1] = np.concatenate([pieces[-1], line[:, 1:]], axis=1)
-        else:
-            pieces.append(line)
-    return pieces
-
-
-def _say_times(at: Times) -> str | None:
-    if at is None or isinstance(at, str):
-        return at
-    return ",".join(repr(float(t)) for t in np.atleast_1d(np.asarray(at, float)))
-
-
-def say_numbers(numbers: Sequence[float] | None) -> str | None:
-    return None if numbers is None else ",".join(repr(float(value)) for value in numbers)

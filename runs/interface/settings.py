@@ -12,11 +12,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any, Protocol
-
-import numpy as np
-import tomli_w
+from typing import Any
 
 from hydro.boundary import SEGMENTS, Segment
 from hydro.eos import EQUATIONS_OF_STATE
@@ -25,10 +21,12 @@ from problems.problem import Problem
 from problems.registry import PROBLEMS
 from regrid.errors import BadInput, suggest
 from regrid.registry import REGRIDDERS
+from runs.study.definition import flatten, write_settings
 
 
-def make_table(rows: Sequence[tuple[str, str]]) -> str:
-    """Two columns: what, and its value; both as plain text."""
+def make_table(rows: Sequence[tuple[str, str]], theory: Mapping[str, float]) -> str:
+    """HTML of two columns, what and its value, `theory` the last rows."""
+    rows = [*rows, *((f"theory: {name}", f"{value:.6g}") for name, value in theory.items())]
     lines = "".join(
         f"<tr><th style='text-align:left'>{html.escape(what)}</th>"
         f"<td style='text-align:left'>{html.escape(value)}</td></tr>"
@@ -42,7 +40,7 @@ def make_settings(keywords: Mapping[str, Any]) -> tuple[str, ...]:
 
     Raises BadInput for None and for values that no deck can hold.
     """
-    return tuple(f"{key}={_format(value, key)}" for key, value in _flatten(keywords, ""))
+    return write_settings(flatten(keywords))
 
 
 SAID = (  # on the command line, in Python
@@ -92,46 +90,6 @@ def with_known_options(call: Callable) -> Callable:
     return checked
 
 
-def _flatten(table: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flatten(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
-
-
-def _format(value: Any, key: str) -> str:
-    """A value as TOML writes it, on one line."""
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_format(entry, key) for entry in value) + "]"
-    if isinstance(value, Mapping):
-        inner = (f"{_format(str(k), key)} = {_format(v, key)}" for k, v in value.items())
-        return "{" + ", ".join(inner) + "}"
-    if value is None:
-        raise BadInput(f"{key} = None: a deck has no such value; leave the keyword out")
-    if isinstance(value, Path):
-        value = str(value)
-    if not isinstance(value, bool | int | float | str):
-        raise BadInput(f"{key}: a deck cannot hold a {type(value).__name__}; give a number or text")
-    return tomli_w.dumps({"value": value}).partition("=")[2].strip()
-
-
-class Marched(Protocol):
-    """What tells when a hook is due; `runs.interface.case.Case` is one."""
-
-    @property
-    def t(self) -> float:
-        """Time [s]."""
-        ...
-
-    @property
-    def step(self) -> int:
-        """Number of the last step."""
-        ...
-
-
 HookFunction = Callable[[Any], Any]  # of the case; None, or words on why to stop
 
 
@@ -163,7 +121,7 @@ class Hook:
             raise BadInput(f"time = {time!r} s of a hook: a positive number is wanted")
         self.function, self.steps, self.time = function, steps, time
 
-    def is_due(self, case: Marched, t_before: float) -> bool:
+    def is_due(self, case: Any, t_before: float) -> bool:
         """Is it to be called after the step from `t_before` to the time of the case?"""
         if self.time is not None:
             return math.floor(case.t / self.time) > math.floor(t_before / self.time)
@@ -173,23 +131,18 @@ class Hook:
 HooksGiven = Sequence[Hook | HookFunction] | Hook | HookFunction
 
 
-class Hooks:
-    """All hooks of a run; called after each step."""
+def join_hooks(case: Any, given: HooksGiven) -> Callable[[float], str | None]:
+    """What a runner calls after each step, from a time [s] on: all hooks that are due.
 
-    def __init__(self, case: Marched, hooks: HooksGiven):
-        self.case = case
-        if isinstance(hooks, Hook) or not isinstance(hooks, Sequence):
-            hooks = [hooks]
-        self.hooks = [hook if isinstance(hook, Hook) else Hook(hook) for hook in hooks]
+    It returns the first reason to stop, and raises BadInput where a hook returns neither None nor
+    text.
+    """
+    several = given if isinstance(given, Sequence) else [given]
+    hooks = [hook if isinstance(hook, Hook) else Hook(hook) for hook in several]
 
-    def __call__(self, t_before: float) -> str | None:
-        """Call those that are due after the step from `t_before` [s]; the first reason to stop.
-
-        Raises BadInput for what is neither None nor text.
-        """
-        due = [hook for hook in self.hooks if hook.is_due(self.case, t_before)]
-        for hook in due:
-            reason = hook.function(self.case)
+    def call(t_before: float) -> str | None:
+        for hook in [one for one in hooks if one.is_due(case, t_before)]:
+            reason = hook.function(case)
             if reason is not None and not isinstance(reason, str):
                 name = getattr(hook.function, "__name__", "hook")
                 raise BadInput(
@@ -198,6 +151,8 @@ class Hooks:
             if reason:
                 return reason
         return None
+
+    return call
 
 
 NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")

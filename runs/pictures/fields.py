@@ -18,7 +18,7 @@ from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 from regrid.sides import SIDE_NAMES, get_side
 from runs.inspection.account import pick_prefix
-from runs.store.reader import Dump, DumpBlock
+from runs.store.reader import BlockData, Dump
 
 CLOSE = 0.05  # of an edge: beyond the gap that chords of one curve leave between them
 
@@ -91,7 +91,7 @@ def _runs(line: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:
 class Derived:
     """How a field is made, its unit and words, what it needs, and how it is drawn."""
 
-    compute: Callable[[DumpBlock], np.ndarray]
+    compute: Callable[[BlockData], np.ndarray]
     unit: str
     words: str
     needs: tuple[str, ...]  # fields of the dump; "state/NAME": an array of the restart state
@@ -100,7 +100,7 @@ class Derived:
     marked: bool = False  # is the cell of the largest value marked?
 
 
-def compute_gradient(block: DumpBlock, name: str) -> np.ndarray:
+def compute_gradient(block: BlockData, name: str) -> np.ndarray:
     """Gradient (2, ni, nj) of a field of cells, in its unit per metre."""
     from hydro.formulas.reconstruction import compute_gradient as solve  # numba: loaded if wanted
 
@@ -111,12 +111,12 @@ def compute_gradient(block: DumpBlock, name: str) -> np.ndarray:
     return np.array(solve(along_i, along_j, (x_i, y_i), (x_j, y_j), inverse))
 
 
-def measure_gradient(block: DumpBlock, name: str) -> np.ndarray:
+def measure_gradient(block: BlockData, name: str) -> np.ndarray:
     """Size (ni, nj) of the gradient of a field, in its unit per metre."""
     return np.hypot(*compute_gradient(block, name))
 
 
-def compute_vorticity(block: DumpBlock) -> np.ndarray:
+def compute_vorticity(block: BlockData) -> np.ndarray:
     """Vorticity dv/dx - du/dy (ni, nj) [1/s], 2 omega in solid rotation; about the axis normal to
     the plane, also where y is a radius."""
     return compute_gradient(block, "v")[0] - compute_gradient(block, "u")[1]
@@ -139,7 +139,7 @@ DERIVED = {
 }  # fmt: skip
 
 
-def has_field(block: DumpBlock, name: str) -> bool:
+def has_field(block: BlockData, name: str) -> bool:
     """Is the field there, or can it be derived from what is?"""
     if name in block.cell_fields:
         return True
@@ -154,14 +154,14 @@ def has_field(block: DumpBlock, name: str) -> bool:
     )
 
 
-def get_field(block: DumpBlock, name: str) -> np.ndarray:
+def get_field(block: BlockData, name: str) -> np.ndarray:
     """A field of cells (ni, nj) in its SI unit, from the dump or derived; KeyError if neither."""
     if name in block.cell_fields:
         return block.cell_fields[name]
     return DERIVED[name].compute(block)
 
 
-def get_words(block: DumpBlock, name: str) -> tuple[str, str]:
+def get_words(block: BlockData, name: str) -> tuple[str, str]:
     """Unit and long name of a field that `has_field`."""
     if name in block.cell_fields:
         return block.units[name], block.long_names[name]

@@ -41,7 +41,7 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
             raise BadInput(f"{run.path} has no column {name!r}; there are: {', '.join(history)}")
         if history[name].dtype.kind not in "fi":
             raise BadInput(f"the column {name!r} of {run.path} holds words, no numbers")
-    units = find_units(run)
+    units = run.find_units()
     factor, unit = scale_times(run.dumps) if run.dumps else pick_prefix(history["t"][-1], "s")
     label = f"t [{unit}]"
     if run.dumps and run.dumps[-1].t_unit != "s":
@@ -107,15 +107,6 @@ def join_alike(
         else:
             panels.append([name])
     return panels
-
-
-def find_units(run: RunData) -> dict[str, str]:
-    """Units of the history's columns: seconds of wall time, and what the problem says."""
-    units = {name: "s" for name in run.history if name.startswith("seconds_")}
-    try:
-        return units | dict(run.problem.units)
-    except BadInput:  # a deck of another version can still be drawn
-        return units
 
 
 def _is_flat(values: np.ndarray) -> bool:

@@ -44,7 +44,7 @@ from runs.pictures.command import (
 )
 from runs.pictures.fields import list_fields, scale_times
 from runs.pictures.film import make_film
-from runs.pictures.history import choose_panels, find_units
+from runs.pictures.history import choose_panels
 from runs.store.directory import RunDirectory
 from runs.store.files import disk_errors, write_atomically
 from runs.store.reader import Dump, RunData
@@ -70,7 +70,7 @@ def make_history_plot(run: RunData) -> str:
     factor, unit = scale_times(run.dumps) if run.dumps else pick_prefix(history["t"][-1], "s")
     if run.dumps and run.dumps[-1].t_unit != "s":
         history = {name: values[1:] for name, values in history.items()}
-    units = find_units(run)
+    units = run.find_units()
     panels, constant = choose_panels(history, units)
     drawn = [make_panel(history, names, units) for names in panels]
     rows = -(-len(drawn) // COLUMNS)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import importlib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -26,32 +28,95 @@ from runs.store.guards import (
 from runs.store.history import read_columns, read_history
 
 
-class MissingField(BadInput, KeyError):
-    """A dump does not hold a field that is asked for."""
+class NotThere(BadInput, KeyError):
+    """A field or a column that is asked for and is not there."""
 
     def __str__(self) -> str:  # that of KeyError would put it in quotes
         return str(self.args[0])
 
 
-class Fields(Mapping[str, np.ndarray]):
-    """The fields of a block in a dump, by name; an array is read at its first use."""
+class Table(dict[str, np.ndarray]):
+    """Columns by name, one value a row; `table.t` is `table["t"]`.
 
-    def __init__(self, path: Path, block: str, names: Sequence[str], folder: str = "blocks"):
-        self._path, self._block, self._names = path, block, tuple(names)
-        self._folder = folder
-        self._read: dict[str, np.ndarray] = {}
+    `units` maps columns to their SI unit, as far as it is known.  An unknown name raises
+    AttributeError or, in brackets, BadInput, which here is a KeyError too.
+    """
+
+    def __init__(
+        self,
+        columns: Mapping[str, np.ndarray],
+        name: str = "table",
+        index: str = "",
+        find_units: Callable[[], Mapping[str, str]] = dict,
+    ):
+        super().__init__(columns)
+        self.name, self._index, self._find_units = name, index, find_units
+
+    @property
+    def units(self) -> dict[str, str]:
+        return {key: unit for key, unit in self._find_units().items() if key in self}
+
+    def __missing__(self, name: str) -> np.ndarray:
+        raise NotThere(f"the {self.name} has no column {name!r}{suggest(str(name), self)}")
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        try:
+            return self[name]
+        except KeyError as error:
+            raise AttributeError(str(error)) from None
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self})
+
+    def __repr__(self) -> str:
+        rows = len(next(iter(self.values()), ()))
+        return f"<{self.name}: {rows} rows, {len(self)} columns: {', '.join(self)}>"
+
+    def to_xarray(self) -> Any:
+        """An xarray.Dataset over the rows, units as attributes.
+
+        Raises BadInput where xarray is not installed.
+        """
+        units, index = self.units, self._index
+        data = {
+            name: (index or "row", values, {"units": units[name]} if name in units else {})
+            for name, values in self.items()
+        }
+        dataset = load_package("xarray", "to_xarray").Dataset(data)
+        return dataset.set_coords([name for name in (index, "t") if index and name in self])
+
+    def to_pandas(self) -> Any:
+        """A pandas.DataFrame, a row each; `step` is the index of a history.
+
+        Raises BadInput where pandas is not installed.
+        """
+        frame = load_package("pandas", "to_pandas").DataFrame(dict(self))
+        return frame.set_index(self._index) if self._index in self else frame
+
+
+def load_package(name: str, call: str) -> Any:
+    """An optional package; BadInput that says how to install it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        words = f"{call} needs {name}, which is not installed here: python -m pip install {name}"
+        raise BadInput(words) from error
+
+
+class Fields(Mapping[str, np.ndarray]):
+    """Fields of a block by name; an array is read when it is asked for."""
+
+    def __init__(self, where: str, names: Iterable[str], read: Callable[[str], np.ndarray]):
+        self._where, self._names, self._read = where, tuple(names), read
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self._names:
             there = ", ".join(self._names) or "none"
-            raise MissingField(
-                f"{self._path}: block {self._block!r} has no field {name!r}; there are: {there} "
-                "(output.fields of a deck chooses them)"
+            raise NotThere(
+                f"{self._where} has no field {name!r}; there are: {there} "
+                "(output.fields of a deck chooses those of dumps)"
             )
-        if name not in self._read:
-            with open_dump(self._path) as file, damage_told(self._path, f"{self._block}/{name}"):
-                self._read[name] = file[self._folder][self._block][name][()]
-        return self._read[name]
+        return self._read(name)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
@@ -60,74 +125,106 @@ class Fields(Mapping[str, np.ndarray]):
         return len(self._names)
 
 
-def get_field(block: Any, name: str) -> np.ndarray:
-    """A field of a block's cells or nodes; AttributeError that says which there are."""
-    for fields in (block.cell_fields, block.node_fields):
-        if name in fields:
-            return fields[name]
-    known = [*block.cell_fields, *block.node_fields]
-    raise AttributeError(f"block {block.name!r} has no field {name!r}{suggest(name, known)}")
+class BlockData:
+    """A block of a dump or of a flow in memory: `nodes` (2, ni+1, nj+1) [m], and its fields.
 
+    SI units.  `cell_fields` (ni, nj) and `node_fields` (ni+1, nj+1) by name; each is an attribute
+    too: `block.rho`.  An unknown name raises AttributeError with those that there are.
+    """
 
-class DumpBlock:
-    """A block in a dump; has what problems.evolution.BlockView asks for."""
+    def __init__(
+        self,
+        name: str,
+        material: str,
+        axes: tuple[str, str],
+        get_nodes: Callable[[], np.ndarray],
+        cell_fields: Fields,
+        node_fields: Fields,
+        state_fields: Fields,
+        units: Mapping[str, str],
+        long_names: Mapping[str, str],
+    ):
+        self.name, self.material = name, material
+        self.axes = axes  # their names on pictures: x and y, or x and r
+        self._get_nodes = get_nodes
+        self.cell_fields, self.node_fields = cell_fields, node_fields
+        self.state_fields = state_fields  # of the cells, beside what is drawn: `rates` [1/s]
+        self.units, self.long_names = units, long_names
 
-    def __init__(self, path: Path, group: Any):
-        self.name: str = group.name.rsplit("/", 1)[-1]
-        self.material: str = str(group.attrs["material"])
-        self.nodes = np.stack([group["x"][()], group["y"][()]])
-        radial = str(group["y"].attrs.get("long_name", "")).startswith("r ")
-        self.axes: tuple[str, str] = ("x", "r" if radial else "y")  # their names on pictures
-        fields = {n: d for n, d in group.items() if d.ndim == 2 and n not in ("x", "y")}
-        at_nodes = [n for n, d in fields.items() if d.shape == self.nodes.shape[1:]]
-        self.cell_fields = Fields(path, self.name, [n for n in fields if n not in at_nodes])
-        self.node_fields = Fields(path, self.name, at_nodes)
-        state = group.file.get(f"state/{self.name}", {})  # of the cells, beside what is drawn
-        cells = tuple(n - 1 for n in self.nodes.shape[1:])
-        stored = [n for n, d in state.items() if getattr(d, "shape", ()) == cells]
-        self.state_fields = Fields(path, self.name, stored, "state")
-        self.units = {name: str(data.attrs.get("units", "1")) for name, data in fields.items()}
-        self.long_names = {n: str(d.attrs.get("long_name", n)) for n, d in fields.items()}
+    @property
+    def nodes(self) -> np.ndarray:
+        """Nodes (2, ni+1, nj+1) [m]."""
+        return self._get_nodes()
 
     @property
     def centres(self) -> np.ndarray:
         """Middles of the cells (2, ni, nj) [m]."""
         return compute_centres(self.nodes)
 
+    @property
+    def cells(self) -> tuple[int, int]:
+        """Cells along i and along j."""
+        _, ni, nj = self.nodes.shape
+        return ni - 1, nj - 1
+
     def __getattr__(self, name: str) -> np.ndarray:
-        """A field by its name: `block.rho`; AttributeError with what there is."""
         if name.startswith("_") or "node_fields" not in self.__dict__:
             raise AttributeError(name)
-        return get_field(self, name)
+        for fields in (self.cell_fields, self.node_fields):
+            if name in fields:
+                return fields[name]
+        known = [*self.cell_fields, *self.node_fields]
+        raise AttributeError(f"block {self.name!r} has no field {name!r}{suggest(name, known)}")
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *self.cell_fields, *self.node_fields})
 
     def __repr__(self) -> str:
-        ni, nj = (size - 1 for size in self.nodes.shape[1:])
+        ni, nj = self.cells
         return f"<block {self.name}: {self.material}, {ni} x {nj} cells>"
 
 
-class Dump:
-    """One dump: `t`, `t_unit`, `step`, `problem`, `finished`, `deck_text`, lazily `blocks`."""
+def _read_block(path: Path, group: Any) -> BlockData:
+    """The block of a dump's group; an array is read at its first use."""
+    name: str = group.name.rsplit("/", 1)[-1]
+    nodes = np.stack([group["x"][()], group["y"][()]])
+    radial = str(group["y"].attrs.get("long_name", "")).startswith("r ")
+    fields = {n: d for n, d in group.items() if d.ndim == 2 and n not in ("x", "y")}
+    at_nodes = [n for n, d in fields.items() if d.shape == nodes.shape[1:]]
+    cells = tuple(n - 1 for n in nodes.shape[1:])
+    state = group.file.get(f"state/{name}", {})
+    stored = [n for n, d in state.items() if getattr(d, "shape", ()) == cells]
 
-    def __init__(self, path: Path | str):
-        self.path = Path(path)
-        with open_dump(self.path) as file, damage_told(self.path, "its attributes"):
-            self.t = float(file.attrs["t"])
-            self.t_end = float(file.attrs["t_end"])
-            self.t_unit = str(file.attrs.get("t_unit", "s"))
-            self.step = int(file.attrs["step"])
-            self.problem = str(file.attrs["problem"])
-            self.finished = str(file.attrs["finished"])
-            self.deck_text = str(file.attrs["deck"])
-            made = dict(file["provenance"].attrs) if "provenance" in file else {}
-        self.provenance = {name: str(words) for name, words in made.items()}  # what made it
+    def make_fields(names: Iterable[str], folder: str = "blocks") -> Fields:
+        @functools.cache
+        def read(field: str) -> np.ndarray:
+            with open_dump(path) as file, damage_told(path, f"{name}/{field}"):
+                return file[folder][name][field][()]
 
-    @cached_property
-    def blocks(self) -> list[DumpBlock]:
-        with open_dump(self.path) as file, damage_told(self.path, "its blocks"):
-            return [DumpBlock(self.path, group) for group in file["blocks"].values()]
+        return Fields(f"{path}: block {name!r}", names, read)
+
+    return BlockData(
+        name,
+        str(group.attrs["material"]),
+        ("x", "r" if radial else "y"),
+        lambda: nodes,
+        make_fields([n for n in fields if n not in at_nodes]),
+        make_fields(at_nodes),
+        make_fields(stored, "state"),
+        {n: str(data.attrs.get("units", "1")) for n, data in fields.items()},
+        {n: str(data.attrs.get("long_name", n)) for n, data in fields.items()},
+    )
+
+
+class Snapshot:
+    """A state at one time: `t`, `t_unit`, `t_end`, `step`, and its `blocks`; `state["gas"].rho`."""
+
+    is_restart_point = False  # by wall time, and no dump of the deck's?
+
+    def __init__(self, path: Path, t: float, t_end: float, t_unit: str, step: int):
+        self.path, self.t, self.t_end, self.t_unit, self.step = path, t, t_end, t_unit, step
+
+    blocks: list[BlockData]
 
     @property
     def axes(self) -> tuple[str, str]:
@@ -135,11 +232,11 @@ class Dump:
         return self.blocks[0].axes if self.blocks else ("x", "y")
 
     @property
-    def is_restart_point(self) -> bool:
-        """Is this no dump of the deck's, but a restart point by wall time?"""
-        return self.path.name.startswith("restart")
+    def cells(self) -> int:
+        """Cells of all blocks together."""
+        return sum(math.prod(block.cells) for block in self.blocks)
 
-    def block(self, name: str) -> DumpBlock:
+    def block(self, name: str) -> BlockData:
         """The block called `name`."""
         for block in self.blocks:
             if block.name == name:
@@ -147,25 +244,47 @@ class Dump:
         names = ", ".join(block.name for block in self.blocks)
         raise BadInput(f"{self.path} has no block {name!r}; there are: {names}")
 
+    def __getitem__(self, name: str) -> BlockData:
+        return self.block(name)
+
+    def field_names(self) -> list[str]:
+        """Names of the fields of cells that any block has, in their order."""
+        return list(dict.fromkeys(name for block in self.blocks for name in block.cell_fields))
+
+    def __repr__(self) -> str:
+        names = ", ".join(block.name for block in self.blocks)
+        return f"<state of step {self.step}, t = {self.t:.6g} {self.t_unit}, blocks {names}>"
+
+
+class Dump(Snapshot):
+    """One dump, besides a `Snapshot`: `problem`, `finished`, `deck_text`, `provenance`."""
+
+    def __init__(self, path: Path | str):
+        path = Path(path)
+        with open_dump(path) as file, damage_told(path, "its attributes"):
+            at = file.attrs
+            unit = str(at.get("t_unit", "s"))
+            super().__init__(path, float(at["t"]), float(at["t_end"]), unit, int(at["step"]))
+            self.problem = str(at["problem"])
+            self.finished = str(at["finished"])
+            self.deck_text = str(at["deck"])
+            made = dict(file["provenance"].attrs) if "provenance" in file else {}
+        self.provenance = {name: str(words) for name, words in made.items()}  # what made it
+        self.is_restart_point = path.name.startswith("restart")
+
+    @cached_property
+    def blocks(self) -> list[BlockData]:  # type: ignore[override]
+        with open_dump(self.path) as file, damage_told(self.path, "its blocks"):
+            return [_read_block(self.path, group) for group in file["blocks"].values()]
+
     @cached_property
     def has_state(self) -> bool:
         """Can a run go on from it?  Not so for light dumps."""
         return has_state(self.path)
 
-    def __getitem__(self, name: str) -> DumpBlock:
-        return self.block(name)
-
-    def __repr__(self) -> str:
-        names = ", ".join(block.name for block in self.blocks)
-        return f"<dump of step {self.step}, t = {self.t:.6g} {self.t_unit}, blocks {names}>"
-
     def state(self) -> dict[str, Any]:
         """The restart state."""
         return read_state(self.path)
-
-    def field_names(self) -> list[str]:
-        """Names of the fields of cells that any block has, in their order."""
-        return list(dict.fromkeys(name for block in self.blocks for name in block.cell_fields))
 
 
 class RunData:
@@ -207,14 +326,36 @@ class RunData:
         return self.read_deck.make_problem()
 
     @cached_property
-    def history(self) -> dict[str, np.ndarray]:
-        """Columns of the history; {} where no step was made.
+    def history(self) -> Table:
+        """Columns of the history, (steps + 1,) each; empty where no step was made.
 
+        Row 0 is the start, where only some columns have a value (nan, "" in a column of words).
         Raises BadInput where it is damaged, rows are cut out or it ends before the last dump.
         """
         found = read_rows_beside_dumps(self.directory)
         found.check(f"shockgrid restart {self.directory.quoted} cuts it back and computes it again")
-        return read_columns(found)
+        return Table(read_columns(found), "history", "step", self.find_units)
+
+    def find_units(self) -> dict[str, str]:
+        """Units of the history's columns: those of every run, and what the problem says."""
+        seconds = (name for name in self.history if name.startswith("seconds_"))
+        units = dict.fromkeys(("t", "dt", *seconds), "s")
+        try:
+            return units | dict(self.problem.units)
+        except BadInput:  # a deck of another version can still be drawn
+            return units
+
+    @property
+    def theory(self) -> dict[str, float]:
+        """What the problem's references say for the deck, by name, SI units; {} for nothing."""
+        return self.problem.predict()
+
+    @property
+    def summary(self) -> str:
+        """The summary; of an unfinished run, what the problem says of it so far."""
+        if self.directory.summary.exists():
+            return self.directory.summary.read_text(encoding="utf-8").rstrip("\n")
+        return self.problem.summary(self.history, None) if len(self.history.get("t", ())) else ""
 
     @cached_property
     def verdict(self) -> dict[str, Any] | None:
@@ -225,9 +366,9 @@ class RunData:
         return read_verdict(self.directory)
 
     @cached_property
-    def gauges(self) -> dict[str, np.ndarray]:
-        """Columns of the gauges' table; {} where the deck has no gauges."""
-        return read_history(self.directory.gauges)
+    def gauges(self) -> Table:
+        """Columns of the gauges' table; empty where the deck has no gauges."""
+        return Table(read_history(self.directory.gauges), "table of gauges", "step")
 
     @cached_property
     def outputs(self) -> list[Dump]:
@@ -270,10 +411,12 @@ class RunData:
                 self.skipped.append(str(error))
             return None
 
-    def dump_at(self, t: float) -> Dump:
-        """The dump nearest to time `t`; BadInput for what is no number."""
-        if not isinstance(t, int | float | np.number) or not math.isfinite(t):
-            raise BadInput(f"{t!r} is not a time; give a number")
+    def dump_at(self, t: float | None = None) -> Dump:
+        """The dump nearest to time `t`, else the last; BadInput for what is no number."""
         if not self.dumps:
             raise BadInput(f"{self.path} has no dump that can be read")
+        if t is None:
+            return self.dumps[-1]
+        if not isinstance(t, int | float | np.number) or not math.isfinite(t):
+            raise BadInput(f"{t!r} is not a time; give a number")
         return min(self.dumps, key=lambda dump: abs(dump.t - t))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import signal
 import sys
@@ -25,14 +26,7 @@ from runs.study.definition import (
     read_vary,
 )
 from runs.study.orders import describe_series
-from runs.study.study import (
-    Study,
-    check_study,
-    claim_folder,
-    compute_results,
-    describe_states,
-    terminate_softly,
-)
+from runs.study.study import Study, terminate_softly
 
 FAILED, INTERRUPTED = 3, 128 + 2
 MOST_CAUTIONS = 10  # on the screen
@@ -60,52 +54,34 @@ def study(
     signal.
     """
     definition, output = read_words(source, vary, settings, output, shown)
+    made, began = Study(definition, output, refine), time.monotonic()
     if dry_run:
-        check_study(definition, refine)
-        check_same_deck(Path(output), definition)
-        say(describe_plan(definition, Path(output)))
+        made.check()
+        check_same_deck(made.path, definition)
+        say(describe_plan(made))
         return 0
-    began = time.monotonic()
-    results: list[Result | None] = []
     progress = Progress(definition, quiet, note)
     with terminate_softly() as caught:
         try:
-            made = _compute(definition, output, engine, jobs, refine, retry, progress, results)
+            with open_engine(engine, jobs) as opened:
+                if opened is None:  # a rank of MPI that only computes
+                    return 0
+                made.check()
+                with made.claimed():
+                    progress.begin()
+                    made.compute(opened, progress.tell, retry)
         except KeyboardInterrupt as stop:  # by now all workers have stopped
-            left = sum(result is None for result in results)
-            note(f"stopped with {count(left, 'run')} to do; repeat the command to continue")
+            left = count(made.results.count(None), "run")
+            note(f"stopped with {left} to do; repeat the command to continue")
             if signal.SIGTERM in caught or signal.SIGTERM.name in str(stop):  # a run may catch it
                 return 128 + signal.SIGTERM
             return INTERRUPTED
         finally:
             progress.close()
-    if made is None:  # a rank of MPI that only computes
-        return 0
     paths = made.write()
     say(describe_study(made, progress, time.monotonic() - began))
     say("written: " + "  ".join(str(path) for path in paths))
     return FAILED if made.failures else 0
-
-
-def _compute(
-    definition: Definition,
-    output: str,
-    engine: str,
-    jobs: int | None,
-    refine: str | None,
-    retry: bool,
-    progress: Progress,
-    results: list[Result | None],
-) -> Study | None:
-    """The study, all computed; `results` is filled on the way.  None on a rank that computes."""
-    with open_engine(engine, jobs) as opened:
-        if opened is None:
-            return None
-        check_study(definition, refine)
-        with claim_folder(output, definition) as folder:
-            progress.begin()
-            compute_results(definition, folder, opened, progress.tell, retry, results)
-            return Study(definition, folder, results, refine)
 
 
 def read_words(
@@ -124,10 +100,7 @@ def read_words(
             raise BadInput(f"{given}: {source} is a study already; change {file} instead")
         definition = read_definition(file)
         if names:
-            definition = Definition(
-                definition.source, definition.settings, definition.points, definition.vary,
-                tuple(names),
-            )  # fmt: skip
+            definition = dataclasses.replace(definition, shown=tuple(names))
         output = output or (source if Path(source).is_dir() else None)
     else:
         pairs = [read_vary(text) for text in vary]
@@ -146,10 +119,11 @@ def read_words(
     return definition, output
 
 
-def describe_plan(definition: Definition, folder: Path) -> str:
+def describe_plan(study: Study) -> str:
     """What would be computed, a line a point."""
-    lines = [f"{count(len(definition.points), 'run')} of {definition.source} in {folder}/runs"]
-    for point, state in zip(definition.points, describe_states(definition, folder), strict=True):
+    points, source = study.definition.points, study.definition.source
+    lines = [f"{count(len(points), 'run')} of {source} in {study.path}/runs"]
+    for point, state in zip(points, study.describe_states(), strict=True):
         words = "to do" if state == "new" else STATES.get(state, state)
         lines.append(f"  {point.name}: {words}")
     return "\n".join([*lines, "nothing was run"])

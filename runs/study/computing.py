@@ -10,14 +10,15 @@ time.
 from __future__ import annotations
 
 import contextlib
-import functools
 import hashlib
 import inspect
+import itertools
 import math
 import os
+import re
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ import msgspec
 import numpy as np
 
 from hydro.workers import count_processors
+from problems.problem import Problem
 from problems.problem_file import describe_mistake
 from problems.registry import PROBLEMS
 from regrid.errors import BadInput, RunFailure
@@ -36,12 +38,7 @@ from runs.store.directory import RunDirectory
 from runs.store.files import disk_errors, write_atomically
 from runs.store.guards import read_run_deck
 from runs.store.history import read_history
-from runs.verify import CASES, Case
-
-
-@functools.cache
-def _find_problem(deck: str) -> str:
-    return deck if deck in PROBLEMS else str(read_toml(packaged_decks()[deck])["problem"])
+from runs.verify import CASES
 
 
 def find_error_columns(problem: str, measured: Iterable[str] = ()) -> tuple[str, ...]:
@@ -49,29 +46,25 @@ def find_error_columns(problem: str, measured: Iterable[str] = ()) -> tuple[str,
 
     And those of `measured` that begin with `error`.
     """
-    judged = (case.quantity for case in CASES if _find_problem(case.deck) == problem)
+
+    def find_problem(deck: str) -> str:
+        return deck if deck in PROBLEMS else str(read_toml(packaged_decks()[deck])["problem"])
+
+    judged = (case.quantity for case in CASES if find_problem(case.deck) == problem)
     named = (name for name in measured if name.startswith("error"))
     return tuple(dict.fromkeys([*judged, *named]))
-
-
-def find_case(deck: str, settings: tuple[str, ...], quantity: str) -> Case | None:
-    """The statement of `verify` on this quantity of this very deck, None where there is none."""
-    for case in CASES:
-        if (case.deck, case.quantity, set(case.settings)) == (deck, quantity, set(settings)):
-            return case
-    return None
 
 
 RESULT = "result.json"
 
 
 class Result(msgspec.Struct, kw_only=True):
-    """How a run ended; None stands for a number that there is not.
+    """How a run ended, and its numbers, None for one that there is not.
 
-    values: the problem's measurements in the last row of its history; computed, theory: the
-    problem's results; errors: the problem's errors, and the computed results' relative to theory.
-    failure: a sentence, "" where it ended well; stopped: it is to go on another time; cautions: the
-    sentences of the summary on where not to trust it.
+    failure: a sentence, "" where it ended well; stopped: it is to go on another time; values: by
+    column, in the order of the table: of a result `x` also `x_theory` and `x_error`, then the
+    problem's errors, then its measurements in the last row of the history; computed, errors: which
+    of them are results and errors; cautions: the sentences of the summary on where not to trust it.
     """
 
     digest: str
@@ -82,11 +75,16 @@ class Result(msgspec.Struct, kw_only=True):
     t: float = 0.0
     seconds: float = 0.0
     values: dict[str, float | None] = msgspec.field(default_factory=dict)
-    computed: dict[str, float | None] = msgspec.field(default_factory=dict)
-    theory: dict[str, float | None] = msgspec.field(default_factory=dict)
-    errors: dict[str, float | None] = msgspec.field(default_factory=dict)
+    computed: list[str] = msgspec.field(default_factory=list)
+    errors: list[str] = msgspec.field(default_factory=list)
     units: dict[str, str] = msgspec.field(default_factory=dict)
     cautions: list[str] = msgspec.field(default_factory=list)
+
+    def write(self, folder: Path) -> None:
+        """Write it into the folder of its point."""
+        with disk_errors(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+        write_atomically(folder / RESULT, msgspec.json.format(msgspec.json.encode(self), indent=1))
 
 
 @dataclass(frozen=True)
@@ -99,11 +97,16 @@ class Work:
 
     source: str
     settings: tuple[str, ...]
-    folder: str
+    folder: Path
     threads: int | None = None
     retry: bool = False
     function: Callable[..., Mapping[str, float]] | None = None
-    values: tuple[tuple[str, Any], ...] = ()
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def share(self) -> tuple[str, ...]:
+        """The processors as a setting."""
+        return () if self.threads is None else (f"run.threads={self.threads}",)
 
 
 def compute_digest(deck: ReadDeck) -> str:
@@ -125,29 +128,29 @@ def compute_digest_of(work: Work) -> str:
         text = inspect.getsource(work.function)
     except (OSError, TypeError):
         text = work.source
-    return hashlib.sha256(f"{text}\n{sorted(work.values)!r}".encode()).hexdigest()
+    return hashlib.sha256(f"{text}\n{sorted(work.values.items())!r}".encode()).hexdigest()
 
 
 def find_names(results: Sequence[Result | None]) -> tuple[list[str], list[str], list[str]]:
     """Names of the problem's results, of its errors and of its measurements, in their order."""
     known = [result for result in results if result is not None]
+    computed = dict.fromkeys(name for result in known for name in result.computed)
+    errors = dict.fromkeys(name for result in known for name in result.errors)
+    names = dict.fromkeys(name for result in known for name in result.values)
+    rest = [n for n in names if n not in (*computed, *errors) and n.removesuffix("_theory") == n]
+    return list(computed), list(errors), rest
 
-    def gather(part: str) -> list[str]:
-        return list(dict.fromkeys(name for result in known for name in getattr(result, part)))
 
-    return gather("computed"), gather("errors"), gather("values")
-
-
-def read_result(folder: str | Path, digest: str) -> Result | None:
+def read_result(folder: Path, digest: str) -> Result | None:
     """The result in a folder if it is of this deck and whole, else None."""
     try:
-        found = msgspec.json.decode(Path(folder, RESULT).read_bytes(), type=Result)
+        found = msgspec.json.decode((folder / RESULT).read_bytes(), type=Result)
     except (OSError, msgspec.DecodeError, RecursionError):
         return None
     return found if found.digest == digest else None
 
 
-def find_state(folder: str | Path, digest: str) -> str:
+def find_state(folder: Path, digest: str) -> str:
     """What a folder holds of a point: "done", "failed", "half", "other" (another deck) or "new"."""
     result = read_result(folder, digest)
     if result is not None:
@@ -181,10 +184,10 @@ def compute_point(work: Work) -> Result:
 def _call(work: Work) -> Result:
     """What a function of one's own gives at a point; what it raises is the point's failure."""
     assert work.function is not None
-    digest, begun = compute_digest_of(work), time.monotonic()
-    result = Result(digest=digest, reason="computed")
+    begun = time.monotonic()
+    result = Result(digest=compute_digest_of(work), reason="computed")
     try:
-        found = work.function(**dict(work.values))
+        found = work.function(**work.values)
         if not isinstance(found, Mapping):
             raise BadInput(f"{work.source} returned {found!r}; numbers by name are wanted (a dict)")
         result.values = {str(name): _number(value) for name, value in found.items()}
@@ -192,116 +195,91 @@ def _call(work: Work) -> Result:
         told = "" if isinstance(error, BadInput | RunFailure) else f"{type(error).__name__}: "
         result.failure = result.reason = f"{told}{error}"
     result.seconds = time.monotonic() - begun
-    folder = Path(work.folder)
-    with disk_errors(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-    write_atomically(folder / RESULT, msgspec.json.format(msgspec.json.encode(result), indent=1))
+    result.write(work.folder)
     return result
 
 
 def _compute(work: Work) -> Result:
-    settings = work.settings
-    deck = read_deck(work.source, settings)
-    digest = compute_digest(deck)
-    state = find_state(work.folder, digest)
-    known = read_result(work.folder, digest)
+    deck = read_deck(work.source, work.settings)
+    digest, directory = compute_digest(deck), RunDirectory(work.folder)
+    state, known = find_state(work.folder, digest), read_result(work.folder, digest)
     if known is not None and not (known.failure and work.retry):
         return known
-    directory = RunDirectory(work.folder)
-    if work.threads is not None and deck.deck.run.threads is None:
-        settings = (*settings, f"run.threads={work.threads}")
+    share = work.share if deck.deck.run.threads is None else ()
     if state == "other":
         _set_aside(directory)
     with disk_errors(directory.path):
         (directory.path / RESULT).unlink(missing_ok=True)
-    if state in ("half", "failed"):
-        share = settings[len(work.settings) :]
-        with contextlib.suppress(_Unusable):
-            return _finish(_go_on(directory, share), digest)
+    if state in ("half", "failed") and directory.list_points():
+        runner = continue_runner(directory, share, True)
+        if (result := _finish(runner, runner.resume, digest)) is not None:
+            return result
     if not directory.deck.exists():
         _drop_empty(directory)
-    runner = start_runner(
-        read_deck(work.source, settings), work.folder, True, True, lambda text: None
-    )
-    return _finish((runner, runner.start), digest)
+    deck = read_deck(work.source, (*work.settings, *share))
+    runner = start_runner(deck, str(work.folder), True, True, lambda text: None)
+    result = _finish(runner, runner.start, digest)
+    assert result is not None
+    return result
 
 
-class _Unusable(Exception):
-    """No restart point of a folder can be gone on from."""
-
-
-def _go_on(directory: RunDirectory, settings: tuple[str, ...]):
-    runner = continue_runner(directory, settings, True)
-    if not directory.list_points():
-        raise _Unusable
-    return runner, runner.resume
-
-
-def _finish(task, digest: str) -> Result:
-    """Run to the end and write the result down."""
-    runner, call = task
-    resumed = call == runner.resume
+def _finish(runner: Runner, call: Callable[[], Any], digest: str) -> Result | None:
+    """Run to the end and write the result; None where no restart point can be continued from."""
     result = Result(digest=digest)
     try:
         ending = call()
         result.reason, result.stopped = ending.reason, ending.exit_code >= 128
     except RunFailure as failure:
-        result.failure = result.reason = _cut(str(failure))
+        words = re.split("; last restart point is|; there is no restart point yet", str(failure))
+        result.failure = result.reason = words[0]
     except BadInput as error:
-        if resumed and runner.last_point is None and "is in use" not in str(error):
-            raise _Unusable from error  # it had not begun: a restart point that does not fit
+        if call == runner.resume and runner.last_point is None and "is in use" not in str(error):
+            return None
         raise
-    _read_numbers(result, runner)
-    if not result.stopped:
-        path = runner.directory.path / RESULT
-        write_atomically(path, msgspec.json.format(msgspec.json.encode(result), indent=1))
-    return result
-
-
-def _cut(sentence: str) -> str:
-    """A failure without the words on how to go on."""
-    for words in ("; last restart point is", "; there is no restart point yet"):
-        sentence = sentence.partition(words)[0]
-    return sentence
-
-
-def _read_numbers(result: Result, runner: Runner) -> None:
-    """What the table takes from a run that has ended, well or not."""
     problem, evolution = runner.problem, runner.evolution
     history = read_history(runner.directory.history)
     result.step, result.t = evolution.step, float(evolution.t)
-    if "seconds_step" in history:
-        result.seconds = float(np.nansum(history["seconds_step"]))
-    if result.failure or not len(history.get("t", ())):
-        return
-    result.units = dict(problem.units)
-    told = describe_cautions(problem, history)
-    result.cautions = [sentence.removeprefix(HEAD) for sentence in told]
-    measured = problem.measure(evolution)
-    result.values = {name: _last(history.get(name)) for name in measured}
-    results = problem.results(history)
-    result.computed = {name: _number(pair[0]) for name, pair in results.items()}
-    result.theory = {name: _number(pair[1]) for name, pair in results.items()}
-    errors = {name: _number(value) for name, value in problem.errors(history).items()}
-    for name in find_error_columns(runner.deck.problem, measured):
-        if name not in errors and name in history:
-            errors[name] = _last(history[name])
-            result.values.pop(name, None)
-    for name, (computed, theory) in results.items():
-        scale = theory if theory else 1.0
-        errors[f"{name}_error"] = _number((computed - theory) / scale)
-    result.errors = errors
+    result.seconds = float(np.nansum(history.get("seconds_step", 0.0)))
+    if not result.failure and len(history.get("t", ())):
+        result.units = dict(problem.units)
+        told = describe_cautions(problem, history)
+        result.cautions = [sentence.removeprefix(HEAD) for sentence in told]
+        fill_numbers(result, runner.deck.problem, problem, history, problem.measure(evolution))
+    if not result.stopped:
+        result.write(runner.directory.path)
+    return result
+
+
+def fill_numbers(
+    result: Result,
+    name: str,
+    problem: Problem,
+    history: Mapping[str, np.ndarray],
+    measured: Iterable[str],
+) -> None:
+    """What a history tells of the problem called `name`; `measured`: its own columns."""
+    pairs, values = problem.results(history), result.values
+    for key, (computed, theory) in pairs.items():
+        error = (computed - theory) / (theory or 1.0)
+        numbers = {"": computed, "_theory": theory, "_error": error}
+        values |= {key + ending: _number(number) for ending, number in numbers.items()}
+    errors = {key: _number(number) for key, number in problem.errors(history).items()}
+    columns = {key: _last(history[key]) for key in measured if key in history}
+    for key in find_error_columns(name, columns):
+        if key not in errors and key in history:
+            errors[key] = _last(history[key])
+    for key, last in (*errors.items(), *columns.items()):
+        values.setdefault(key, last)
+    result.computed, result.errors = list(pairs), [*errors, *(f"{key}_error" for key in pairs)]
 
 
 def _number(value: Any) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _last(column: np.ndarray | None) -> float | None:
+def _last(column: np.ndarray) -> float | None:
     """The last number of a column that is one."""
-    if column is None or column.dtype.kind not in "fi":
-        return None
-    known = column[np.isfinite(column)]
+    known = column[np.isfinite(column)] if column.dtype.kind in "fi" else np.zeros(0)
     return float(known[-1]) if known.size else None
 
 
@@ -310,29 +288,23 @@ def _set_aside(directory: RunDirectory) -> None:
     with directory.claimed(), disk_errors(directory.path):
         parent = directory.path.parent.parent / "superseded"
         parent.mkdir(exist_ok=True)
-        number = 1
-        while (parent / f"{directory.path.name}-{number}").exists():
-            number += 1
-        os.replace(directory.path, parent / f"{directory.path.name}-{number}")
+        names = (parent / f"{directory.path.name}-{number}" for number in itertools.count(1))
+        os.replace(directory.path, next(place for place in names if not place.exists()))
 
 
 def _drop_empty(directory: RunDirectory) -> None:
     """Remove what a run leaves that was killed before its deck was there: half of it, no dumps."""
+    notes = directory.problem_copy, directory.problem_note
+    torn = [path.with_name(f".{path.name}.part") for path in (directory.deck, *notes)]
     with contextlib.suppress(OSError):
-        directory.lock.unlink(missing_ok=True)
-        directory.problem_copy.unlink(missing_ok=True)
-        directory.problem_note.unlink(missing_ok=True)
-        for path in (directory.deck, directory.problem_copy, directory.problem_note):
-            path.with_name(f".{path.name}.part").unlink(missing_ok=True)
+        for path in (directory.lock, *notes, *torn):
+            path.unlink(missing_ok=True)
         directory.dumps_folder.rmdir()
 
 
 def warm_up(work: Work) -> None:
     """One step of a point in memory: its kernels are then compiled for all workers."""
-    settings = work.settings
-    if work.threads is not None:
-        settings = (*settings, f"run.threads={work.threads}")
-    problem = read_deck(work.source, settings).make_problem()
+    problem = read_deck(work.source, (*work.settings, *work.share)).make_problem()
     with contextlib.suppress(BadInput, RunFailure):  # it is told where the point is computed
         evolution = problem.build()
         if evolution.finished is None:

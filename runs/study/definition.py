@@ -45,16 +45,8 @@ MOST_WHOLE = 1e15  # floats from here on keep their exponent
 SHORT = 40  # a longer value is cut in a folder's name
 
 
-@dataclass(frozen=True)
-class Point:
+class Point(dict[str, Any]):
     """One point: the varied keys with their values, in order."""
-
-    values: tuple[tuple[str, Any], ...]
-
-    @property
-    def settings(self) -> tuple[str, ...]:
-        """The point as settings of a deck, `key=value`."""
-        return tuple(f"{key}={write_value(value)}" for key, value in self.values)
 
     @property
     def name(self) -> str:
@@ -62,7 +54,7 @@ class Point:
 
         It depends on this point alone, so that other points can come and go.
         """
-        name = ",".join(f"{key}={_shorten(value)}" for key, value in self.values)
+        name = ",".join(f"{key}={_shorten(value)}" for key, value in self.items())
         if len(name) > LONGEST_NAME:
             name = f"{name[:LONGEST_NAME]}-{_digest(name)}"
         return name or "deck"
@@ -80,25 +72,26 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:6]
 
 
-def write_value(value: Any) -> str:
+def write_value(value: Any, key: str = "vary") -> str:
     """A value as TOML in one place, tables in braces; BadInput for what TOML has no word for."""
     try:
         text = tomli_w.dumps({"list": [0, _make_plain(value)]})  # in a list tables are in braces
     except TypeError as error:
-        raise BadInput(f"vary: {value!r} is not a value that a deck can hold") from error
+        raise BadInput(f"{key} = {value!r}: a deck cannot hold this; give a number or text, or "
+                       "leave it out") from error  # fmt: skip
     text = text[text.index("0,") + 2 : text.rindex("]")].strip().removesuffix(",")
     return re.sub(r"\n *", " ", text)  # a line's end within a text is written otherwise
 
 
 def _make_plain(value: Any) -> Any:
-    """Numbers of numpy as those of Python."""
+    """Numbers of numpy as those of Python, paths as text."""
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     if isinstance(value, Mapping):
         return {str(key): _make_plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
         return [_make_plain(entry) for entry in value]
-    return value
+    return str(value) if isinstance(value, Path) else value
 
 
 def make_column(values: Sequence[Any]) -> np.ndarray:
@@ -182,27 +175,24 @@ def make_product(vary: Mapping[str, Sequence[Any]]) -> list[Point]:
     for key, values in vary.items():
         if not values:
             raise BadInput(f"vary: {key} has no values")
-        _check_different([Point(((key, value),)).name for value in values], "vary: there is")
-    return [
-        Point(tuple(zip(vary, values, strict=True))) for values in itertools.product(*vary.values())
-    ]
+        _check_different([Point({key: value}).name for value in values], "vary: there is")
+    return [Point(zip(vary, values, strict=True)) for values in itertools.product(*vary.values())]
 
 
 def list_points(points: Iterable[Mapping[str, Any]]) -> list[Point]:
     """Points given one by one; BadInput where one lacks a key of the others, or two are equal."""
-    points = list(points)
+    flat = []
     for number, point in enumerate(points, start=1):
         if not isinstance(point, Mapping):
             raise BadInput(
                 f"points: number {number} is {point!r}; it has to be a table of keys with values"
             )
-    flat = [flatten(point) for point in points]
+        flat.append(flatten(point))
     keys = list(dict.fromkeys(key for point in flat for key in point))
     for number, point in enumerate(flat, start=1):
-        missing = [key for key in keys if key not in point]
-        if missing:
+        if missing := [key for key in keys if key not in point]:
             raise BadInput(f"points: number {number} lacks {', '.join(missing)}")
-    made = [Point(tuple((key, point[key]) for key in keys)) for point in flat]
+    made = [Point({key: point[key] for key in keys}) for point in flat]
     _check_different([point.name for point in made], "points: there is")
     return made
 
@@ -214,7 +204,6 @@ def _check_different(texts: Sequence[str], words: str) -> None:
 
 
 FILE = STUDY_FILE
-MOST_POINTS = 1_000_000
 
 
 class StudyFile(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
@@ -231,25 +220,29 @@ class StudyFile(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class Definition:
-    """A study: `source` as `runs.deck.reading.read_deck` takes it, with `settings`.
+    """A study: `source` as `runs.deck.reading.read_deck` takes it, `fixed` keys of all points.
 
     vary: the values of each key, where the points are their product; {} where they are listed.
     shown: names of what pictures are of; () where the problem's results are.  function: computes a
-    point from its values and those that are `fixed`, in place of a deck.
+    point from its values and the fixed ones as keywords, in place of a deck.
     """
 
     source: str
-    settings: tuple[str, ...]
+    fixed: Mapping[str, Any]
     points: tuple[Point, ...]
     vary: Mapping[str, Sequence[Any]]
     shown: tuple[str, ...] = ()
     function: Callable[..., Mapping[str, float]] | None = None
-    fixed: tuple[tuple[str, Any], ...] = ()
 
     @property
     def keys(self) -> tuple[str, ...]:
         """What is varied."""
-        return tuple(key for key, _ in self.points[0].values)
+        return tuple(self.points[0])
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """The fixed keys as `read_deck` takes them."""
+        return write_settings(self.fixed)
 
     @property
     def deck(self) -> str:
@@ -259,30 +252,22 @@ class Definition:
 
     def to_toml(self) -> str:
         """A study file that means the same, its deck under its full path where it is a file."""
-        table: dict[str, Any] = {"deck": self.deck}
-        if self.shown:
-            table["shown"] = list(self.shown)
-        lines = [tomli_w.dumps(table)]
-        if not self.vary:
-            rows = (
-                ", ".join(f'"{key}" = {write_value(value)}' for key, value in point.values)
-                for point in self.points
-            )
-            lines.append("points = [\n" + "".join(f"  {{ {row} }},\n" for row in rows) + "]\n")
-        if self.settings:
-            pairs = (setting.partition("=") for setting in self.settings)
-            lines.append("[set]\n" + "".join(f'"{key.strip()}" = {v}\n' for key, _, v in pairs))
-        if self.vary:
-            rows = (f'"{key}" = {write_value(list(v))}\n' for key, v in self.vary.items())
-            lines.append("[vary]\n" + "".join(rows))
-        return "\n".join(lines)
+        points = [] if self.vary else self.points
+        parts = {"shown": self.shown, "points": points, "set": self.fixed, "vary": self.vary}
+        given = {name: _make_plain(part) for name, part in parts.items() if part}
+        return tomli_w.dumps({"deck": self.deck, **given})
+
+
+def write_settings(values: Mapping[str, Any]) -> tuple[str, ...]:
+    """Values by key as settings of a deck, `key=value`; BadInput for what no deck can hold."""
+    return tuple(f"{key}={write_value(value, key)}" for key, value in values.items())
 
 
 def make_definition(
     source: str | Callable[..., Mapping[str, float]],
     vary: Mapping[str, Any] | None = None,
     points: Sequence[Mapping[str, Any]] = (),
-    settings: Mapping[str, Any] | None = None,
+    fixed: Mapping[str, Any] | None = None,
     shown: Sequence[str] = (),
 ) -> Definition:
     """A study from Python values; BadInput where nothing or too much is varied.
@@ -295,22 +280,14 @@ def make_definition(
             "a study varies something: give either `vary` (--vary KEY=VALUES), whose product it "
             "computes, or `points`"
         )
-    count = 1
-    for values in vary.values():
-        count *= len(values)
-    if count > MOST_POINTS:
-        raise BadInput(f"vary: {count:.3g} points are too many, {MOST_POINTS:.0e} is the most")
-    made = list_points(points) if points else make_product(vary)
-    fixed = {key: write_value(value) for key, value in (settings or {}).items()}
-    both = [key for key, _ in made[0].values if key in fixed]
-    if both:
+    made, fixed = tuple(list_points(points) if points else make_product(vary)), dict(fixed or {})
+    if both := [key for key in made[0] if key in fixed]:
         raise BadInput(f"vary: {both[0]} is set, too; leave one of them out")
-    texts = tuple(f"{key}={text}" for key, text in fixed.items())
-    if not isinstance(source, str):
-        name = f"{source.__module__}:{getattr(source, '__qualname__', repr(source))}"
-        kept = tuple((settings or {}).items())
-        return Definition(name, texts, tuple(made), vary, tuple(shown), source, kept)
-    return Definition(source, texts, tuple(made), vary, tuple(shown))
+    if isinstance(source, str):
+        write_settings(fixed)  # refused here for what no deck can hold
+        return Definition(source, fixed, made, vary, tuple(shown))
+    name = f"{source.__module__}:{getattr(source, '__qualname__', repr(source))}"
+    return Definition(name, fixed, made, vary, tuple(shown), source)
 
 
 def _list_values(key: str, given: Any) -> list[Any]:
@@ -346,21 +323,14 @@ def check_same_deck(folder: Path, definition: Definition) -> None:
 
     A deck file that was moved and kept its name is the same.
     """
-    file = folder / FILE
-    if not file.is_file():
-        return
-    there = read_toml(file).get("deck")
+    file, given = folder / FILE, definition.deck
+    there = read_toml(file).get("deck") if file.is_file() else None
     if not isinstance(there, str):
         return
-    beside, given = folder / there, definition.deck
-    there = str(beside.resolve()) if beside.is_file() else there
-    if there == given:
-        return
-    if (
-        not Path(there).exists()
-        and Path(there).parent != Path()
-        and (Path(there).name == Path(given).name)
-    ):
+    if (folder / there).is_file():
+        there = str((folder / there).resolve())
+    moved = not Path(there).exists() and Path(there).parent != Path()
+    if there == given or (moved and Path(there).name == Path(given).name):
         return
     raise BadInput(
         f"{folder} holds a study of {there}, not of {given}; choose another folder with -o, or go "

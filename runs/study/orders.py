@@ -7,20 +7,16 @@ tube), does not part them.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from regrid.errors import BadInput, suggest
 from regrid.roots import find_root
-from runs.store.files import write_atomically
 from runs.study.computing import Result, find_names
 from runs.study.definition import Definition, write_value
 
@@ -37,15 +33,17 @@ class Refined:
     """What a series of grids shows of one quantity.
 
     kind: "monotone", "not monotone", "not asymptotic", "diverging", "round-off", "two grids" or
-    "one grid"; order: observed, NaN where there is none; extrapolated: value for h = 0
-    [theory F13.4], NaN where there is none; uncertainty: of the finest value, absolute
-    [theory F13.5, F13.6], NaN where nothing is known of it.
+    "one grid"; of errors "error", or why they have no order; order: observed, NaN where there is
+    none; orders: of errors, between neighbouring grids; extrapolated: value for h = 0
+    [theory F13.4]; uncertainty: of the finest value, absolute [theory F13.5, F13.6]; each NaN where
+    nothing is known of it.
     """
 
     kind: str
-    order: float
-    extrapolated: float
-    uncertainty: float
+    order: float = math.nan
+    extrapolated: float = math.nan
+    uncertainty: float = math.nan
+    orders: tuple[float, ...] = ()
 
 
 def find_orders(sizes: Sequence[float], errors: Sequence[float]) -> list[float]:
@@ -62,50 +60,46 @@ def find_orders(sizes: Sequence[float], errors: Sequence[float]) -> list[float]:
     return orders
 
 
-def judge_errors(sizes: Sequence[float], errors: Sequence[float]) -> str:
-    """Why errors have no order, "" where they have one.
+def judge_errors(sizes: Sequence[float], errors: Sequence[float]) -> Refined:
+    """The orders of errors, or why they have none.
 
     sizes: h, falling; errors: computed less exact, or norms.  "errors change sign": they pass
     through 0 between two grids, near which any order comes out; "not monotone": a finer grid has a
     larger error; "not asymptotic": an order is above MOST_CREDIBLE.
     """
     pairs = list(pairwise(errors))
+    orders = tuple(find_orders(sizes, errors))
     if any(coarse * fine < 0.0 for coarse, fine in pairs):
-        return "errors change sign"
+        return Refined("errors change sign")
     if any(abs(fine) > abs(coarse) for coarse, fine in pairs):
-        return "not monotone"
-    if any(order > MOST_CREDIBLE for order in find_orders(sizes, errors)):
-        return "not asymptotic"
-    return ""
+        return Refined("not monotone")
+    if any(order > MOST_CREDIBLE for order in orders):
+        return Refined("not asymptotic")
+    return Refined("error", orders[-1] if orders else math.nan, orders=orders)
 
 
 def refine(sizes: Sequence[float], values: Sequence[float]) -> Refined:
     """What the finest three grids show (two where there are no more); sizes h, falling."""
     known = [(h, v) for h, v in zip(sizes, values, strict=True) if math.isfinite(v)]
     if len(known) < 2:
-        return Refined("one grid", math.nan, math.nan, math.nan)
+        return Refined("one grid")
     if len(known) == 2:
         (h2, v2), (h1, v1) = known
         gain = (h2 / h1) ** ASSUMED - 1.0
-        uncertainty = SAFETY_TWO * abs(v2 - v1) / gain
-        return Refined("two grids", math.nan, math.nan, uncertainty)
+        return Refined("two grids", uncertainty=SAFETY_TWO * abs(v2 - v1) / gain)
     (h3, v3), (h2, v2), (h1, v1) = known[-3:]
     change_32, change_21 = v3 - v2, v2 - v1
-    scale = ROUND_OFF * max(abs(v1), abs(v2), abs(v3))
-    if abs(change_32) <= scale and abs(change_21) <= scale:
-        return Refined("round-off", math.nan, v1, max(abs(change_32), abs(change_21)))
+    largest = max(abs(change_32), abs(change_21))
+    if largest <= ROUND_OFF * max(abs(v1), abs(v2), abs(v3)):
+        return Refined("round-off", extrapolated=v1, uncertainty=largest)
     if change_32 * change_21 <= 0.0:
-        spread = max(v1, v2, v3) - min(v1, v2, v3)
-        return Refined("not monotone", math.nan, math.nan, 0.5 * spread)
+        return Refined("not monotone", uncertainty=0.5 * (max(v1, v2, v3) - min(v1, v2, v3)))
     order = find_order(h1, h2, h3, change_32 / change_21)
-    if math.isnan(order):
-        return Refined("diverging", math.nan, math.nan, math.nan)
-    if order > MOST_CREDIBLE:
-        return Refined("not asymptotic", math.nan, math.nan, math.nan)
+    if math.isnan(order) or order > MOST_CREDIBLE:
+        return Refined("diverging" if math.isnan(order) else "not asymptotic")
     ratio = h2 / h1
     extrapolated = v1 - change_21 / (ratio**order - 1.0)
-    trusted = min(order, MOST_TRUSTED)
-    uncertainty = SAFETY * abs(change_21) / (ratio**trusted - 1.0)
+    uncertainty = SAFETY * abs(change_21) / (ratio ** min(order, MOST_TRUSTED) - 1.0)
     return Refined("monotone", order, extrapolated, uncertainty)
 
 
@@ -138,9 +132,7 @@ HEADS = ("series", "quantity", "cells", "values", "orders", "kind", "order", "ex
 class Series:
     """A quantity over grids, coarse to fine: `cells` a direction, `values`.
 
-    error: are the values errors, with `orders` between neighbours?  Then `why_none` says why there
-    are none, "" where there are.  Else `refined` says what the grids show [theory F13].  theory:
-    what the values ought to be, NaN where nobody knows.
+    error: are the values errors?  theory: what the values ought to be, NaN where nobody knows.
     """
 
     words: str
@@ -148,17 +140,8 @@ class Series:
     cells: np.ndarray
     values: np.ndarray
     error: bool
-    orders: list[float]
-    refined: Refined | None
+    refined: Refined
     theory: float = math.nan
-    why_none: str = ""
-
-    @property
-    def order(self) -> float:
-        """The observed order: of the finest grids; NaN where there is none."""
-        if self.refined is not None:
-            return self.refined.order
-        return self.orders[-1] if self.orders else math.nan
 
 
 def count_cells(value: Any) -> float:
@@ -175,7 +158,7 @@ def find_refined_key(definition: Definition, wanted: str | None = None) -> str |
     if wanted is not None and wanted not in keys:
         raise BadInput(f"--refine {wanted}: it is not varied{suggest(wanted, keys)}")
     for key in (wanted,) if wanted else keys:
-        sizes = {count_cells(dict(point.values)[key]) for point in definition.points}
+        sizes = {count_cells(point[key]) for point in definition.points}
         numbers = not any(math.isnan(size) for size in sizes)
         if numbers and len(sizes) > 1 and (wanted or key.rsplit(".", 1)[-1] == CELLS):
             return key
@@ -186,7 +169,7 @@ def find_refined_key(definition: Definition, wanted: str | None = None) -> str |
 
 def find_groups(definition: Definition, key: str) -> dict[str, list[int]]:
     """Numbers of points by what is not refined, in words, each sorted from coarse to fine."""
-    rows = [dict(point.values) for point in definition.points]
+    rows = definition.points
     texts = [{k: write_value(value) for k, value in row.items()} for row in rows]
     parting = [k for k in definition.keys if k != key and not _goes_with(texts, key, k)]
     groups: dict[str, list[int]] = {}
@@ -206,65 +189,44 @@ def _goes_with(texts: Sequence[dict[str, str]], key: str, other: str) -> bool:
 
 def find_series(definition: Definition, results: Sequence[Result | None], key: str) -> list[Series]:
     """All series of results, errors and measurements; those without two grids are left out."""
-    computed, errors, values = find_names(results)
-    rest = [name for name in values if name not in computed]
-    cells = np.array([count_cells(dict(point.values)[key]) for point in definition.points])
+    computed, errors, rest = find_names(results)
+    cells = [count_cells(point[key]) for point in definition.points]
     found = []
     for words, numbers in find_groups(definition, key).items():
-        for part, names in (("computed", computed), ("errors", errors), ("values", rest)):
-            for name in names:
-                pairs = [
-                    (cells[n], value)
-                    for n in numbers
-                    if (result := results[n]) is not None
-                    and (value := getattr(result, part).get(name)) is not None
-                ]
-                if len(pairs) > 1:
-                    finest = results[numbers[-1]]
-                    theory = finest.theory.get(name) if finest and part == "computed" else None
-                    found.append(_make_series(words, name, pairs, part == "errors", theory))
+        finest = results[numbers[-1]]
+        for name in dict.fromkeys([*computed, *errors, *rest]):
+            pairs = [
+                (cells[n], value)
+                for n in numbers
+                if (result := results[n]) is not None
+                and (value := result.values.get(name)) is not None
+            ]
+            if len(pairs) > 1:
+                grids, values = np.array(pairs).T
+                sizes, theory = (1.0 / grids).tolist(), f"{name}_theory"
+                look = judge_errors if name in errors else refine
+                known = finest.values.get(theory) if finest else None
+                found.append(
+                    Series(
+                        words, name, grids, values, name in errors,
+                        look(sizes, values.tolist()), math.nan if known is None else known,
+                    )
+                )  # fmt: skip
     return found
 
 
-def _make_series(
-    words: str, name: str, pairs: list[tuple[float, float]], error: bool, theory: float | None
-) -> Series:
-    cells, values = np.array(pairs).T
-    sizes = (1.0 / cells).tolist()
-    if error:
-        why_none = judge_errors(sizes, values.tolist())
-        orders = [] if why_none else find_orders(sizes, values.tolist())
-        return Series(words, name, cells, values, True, orders, None, why_none=why_none)
-    refined = refine(sizes, values.tolist())
-    known = math.nan if theory is None else theory
-    return Series(words, name, cells, values, False, [], refined, known)
-
-
-def write_orders(path: Path, series: Sequence[Series]) -> None:
-    """All series as CSV, a line each; HEADS says what stands where."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(HEADS)
-    for one in series:
-        refined, last = one.refined, float(one.values[-1])
-        row: list[Any] = [one.words, one.quantity, _join(one.cells), _join(one.values)]
-        row += [_join(one.orders), refined.kind if refined else one.why_none or "error"]
-        row += [_say(one.order)]
-        if refined is None:
-            row += ["", "", ""]
-        else:
-            relative = refined.uncertainty / abs(last) if last else math.nan
-            row += [_say(refined.extrapolated), _say(refined.uncertainty), _say(relative)]
-        writer.writerow(row)
-    write_atomically(path, text.getvalue())
+def make_row(one: Series) -> list[str]:
+    """A series as a line of orders.csv; HEADS says what stands where."""
+    refined, last = one.refined, float(one.values[-1])
+    relative = refined.uncertainty / abs(last) if last else math.nan
+    numbers = refined.order, refined.extrapolated, refined.uncertainty, relative
+    lists = _join(one.cells), _join(one.values), _join(refined.orders)
+    told = ("" if math.isnan(number) else f"{number:.6g}" for number in numbers)
+    return [one.words, one.quantity, *lists, refined.kind, *told]
 
 
 def _join(values: Sequence[float] | np.ndarray) -> str:
     return " ".join(f"{float(value):.8g}" for value in values)
-
-
-def _say(value: float) -> str:
-    return "" if math.isnan(value) else f"{value:.6g}"
 
 
 def describe_series(series: Sequence[Series], shown: Sequence[str]) -> list[str]:
@@ -291,27 +253,19 @@ def write_apart(values: Sequence[float] | np.ndarray) -> list[str]:
 
 def describe_order(one: Series) -> str:
     """What the grids show, in words."""
-    if one.why_none:
-        return f"{one.why_none}, no order"
-    if one.refined is None:
-        known = [f"{order:.2f}" for order in one.orders if not math.isnan(order)]
-        return f"observed order {', '.join(known)}" if known else "no order"
-    kind, last = one.refined.kind, float(one.values[-1])
-    if kind == "monotone":
-        share = f" ({100.0 * one.refined.uncertainty / abs(last):.2g} %)" if last else ""
-        return (
-            f"observed order {one.refined.order:.2f}, for h = 0 {one.refined.extrapolated:.5g}, "
-            f"uncertainty of the finest (GCI) {one.refined.uncertainty:.2g}{share}"
-        )
-    if kind == "not monotone":
-        return f"not monotone, no order; half the range is {one.refined.uncertainty:.2g}"
-    if kind == "not asymptotic":
-        return f"not asymptotic (order above {MOST_CREDIBLE:g}): no order, no uncertainty"
-    if kind == "diverging":
-        return "changes do not fall with the cells: no order, no uncertainty"
-    if kind == "two grids":
-        return (
-            f"two grids only: uncertainty {one.refined.uncertainty:.2g} with order 1 taken for "
-            "granted and a factor of safety of 3"
-        )
-    return "the same to round-off"
+    refined, last = one.refined, float(one.values[-1])
+    share = f" ({100.0 * refined.uncertainty / abs(last):.2g} %)" if last else ""
+    if one.error:
+        known = [f"{order:.2f}" for order in refined.orders if not math.isnan(order)]
+        none = "no order" if refined.kind == "error" else f"{refined.kind}, no order"
+        return f"observed order {', '.join(known)}" if known else none
+    return {
+        "monotone": f"observed order {refined.order:.2f}, for h = 0 {refined.extrapolated:.5g}, "
+        f"uncertainty of the finest (GCI) {refined.uncertainty:.2g}{share}",
+        "not monotone": f"not monotone, no order; half the range is {refined.uncertainty:.2g}",
+        "not asymptotic": f"not asymptotic (order above {MOST_CREDIBLE:g}): no order, no "
+        "uncertainty",
+        "diverging": "changes do not fall with the cells: no order, no uncertainty",
+        "two grids": f"two grids only: uncertainty {refined.uncertainty:.2g} with order 1 taken "
+        "for granted and a factor of safety of 3",
+    }.get(refined.kind, "the same to round-off")

@@ -19,9 +19,9 @@ from matplotlib.ticker import FixedLocator, NullLocator
 
 from runs.pictures.command import write_figure
 from runs.store.files import write_atomically
-from runs.study.computing import find_case
 from runs.study.definition import make_column
 from runs.study.orders import Series
+from runs.verify import CASES
 
 MOST_LINES = 10  # in a panel with a legend
 LEAST_MAP = 4  # values of each key from which a map is drawn
@@ -215,15 +215,16 @@ def _draw_orders(axes, study: Any, name: str, series: list[Series]) -> None:
     axes.grid(alpha=0.3)
 
 
-def _name_series(one: Series, order: str) -> str:
-    return ", ".join(words for words in (one.words, order) if words)
+def _name_series(one: Series) -> str:
+    order, kind = one.refined.order, one.refined.kind.removeprefix("error")
+    told = f"order {order:.2f}" if np.isfinite(order) else kind
+    return ", ".join(words for words in (one.words, told) if words)
 
 
 def _draw_errors(axes, study: Any, name: str, series: list[Series]) -> None:
     """Both axes logarithmic; the bar of `shockgrid verify` where it has one for this deck."""
     for one, colour in zip(series, _make_colours(len(series)), strict=True):
-        order = f"order {one.order:.2f}" if np.isfinite(one.order) else one.why_none
-        label = _name_series(one, order)
+        label = _name_series(one)
         axes.plot(1.0 / one.cells, np.abs(one.values), "o-", color=colour, ms=5, label=label)
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -231,7 +232,8 @@ def _draw_errors(axes, study: Any, name: str, series: list[Series]) -> None:
     _mark(axes.xaxis, np.unique(np.concatenate([1.0 / one.cells for one in series])))
     axes.xaxis.set_major_formatter(lambda value, place: f"1/{1.0 / value:.4g}")
     _draw_slopes(axes, series)
-    case = find_case(study.definition.source, study.definition.settings, name)
+    this = study.definition.source, name, set(study.definition.settings)
+    case = next((c for c in CASES if (c.deck, c.quantity, set(c.settings)) == this), None)
     if case is not None and case.bar is not None and len(series) == 1:
         label = f"bar of shockgrid verify at {case.sizes[case.judged]} cells"
         axes.axhline(case.bar, color="C3", lw=1.0, ls=":", label=label)
@@ -249,18 +251,15 @@ def _draw_values(axes, study: Any, name: str, series: list[Series]) -> None:
     known = all(np.isfinite(one.theory) and one.theory for one in series)
     apart = apart and (known or all(ends))
     for one, colour in zip(series, _make_colours(len(series)), strict=True):
-        if one.refined is None:
-            continue
         scale = one.theory if known else float(one.values[-1])
 
         def show(value, scale=scale):
             return 100.0 * (value / scale - 1.0) if apart else value
 
-        order = f"order {one.order:.2f}" if np.isfinite(one.order) else one.refined.kind
         bars = np.zeros_like(one.values)
         bars[-1] = np.nan_to_num(one.refined.uncertainty)
         bars *= abs(100.0 / scale) if apart else 1.0
-        look = {"fmt": "o-", "color": colour, "capsize": 4, "label": _name_series(one, order)}
+        look = {"fmt": "o-", "color": colour, "capsize": 4, "label": _name_series(one)}
         axes.errorbar(1.0 / one.cells, show(one.values), yerr=bars, **look)
         if np.isfinite(one.theory) and not apart:
             axes.axhline(one.theory, color=colour, lw=1.0, ls="--")
@@ -274,7 +273,7 @@ def _draw_values(axes, study: Any, name: str, series: list[Series]) -> None:
         axes.axhline(0.0, color="k", lw=1.0, ls="--")
     if known:
         axes.plot([], [], "k--", lw=1.0, label="theory")
-    if any(one.refined and np.isfinite(one.refined.extrapolated) for one in series):
+    if any(np.isfinite(one.refined.extrapolated) for one in series):
         axes.plot([], [], "k*", ms=9, label="extrapolated to h = 0")
 
 

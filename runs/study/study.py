@@ -19,14 +19,14 @@ from __future__ import annotations
 
 import contextlib
 import csv
-import importlib
 import io
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
+from types import UnionType
 from typing import TYPE_CHECKING, Any
 
 import h5py
@@ -34,19 +34,20 @@ import numpy as np
 
 from problems.evolution import get_start_row
 from problems.problem import Problem
-from regrid.errors import BadInput, suggest
-from runs.deck.reading import read_deck
+from regrid.errors import BadInput
+from runs.deck.reading import ReadDeck, read_deck
 from runs.engines import Engine, open_engine
 from runs.inspection.account import count
 from runs.store.directory import RunDirectory
 from runs.store.files import disk_errors, write_atomically
 from runs.store.provenance import find_provenance
+from runs.store.reader import Table, load_package
 from runs.study.computing import (
     Result,
     Work,
     compute_digest_of,
     compute_point,
-    find_error_columns,
+    fill_numbers,
     find_names,
     find_state,
     read_result,
@@ -62,8 +63,9 @@ from runs.study.definition import (
     make_column,
     make_definition,
     read_definition,
+    write_settings,
 )
-from runs.study.orders import Series, find_refined_key, find_series, write_orders
+from runs.study.orders import HEADS, Series, find_refined_key, find_series, make_row
 
 if TYPE_CHECKING:
     import xarray
@@ -77,14 +79,6 @@ LONG_NAMES = {
     "seconds": "wall time of the steps",
 }  # fmt: skip
 MOST_ROWS = 30  # of the table on the screen
-Tell = Callable[[int, Result, bool], None]  # number of the point, its result, was it there already
-
-
-class Table(dict[str, np.ndarray]):
-    """Columns by name; the KeyError of a name that is none says which is nearest."""
-
-    def __missing__(self, name: str) -> np.ndarray:
-        raise KeyError(f"the table has no column {name!r}{suggest(str(name), self)}")
 
 
 class Study:
@@ -94,14 +88,9 @@ class Study:
     grids show where cells are varied (`refine` names their key where it is not `cells`).
     """
 
-    def __init__(
-        self,
-        definition: Definition,
-        path: Path | str,
-        results: Sequence[Result | None],
-        refine: str | None = None,
-    ):
-        self.definition, self.path, self.results = definition, Path(path), list(results)
+    def __init__(self, definition: Definition, path: Path | str, refine: str | None = None):
+        self.definition, self.path = definition, Path(path)
+        self.results: list[Result | None] = [None] * len(definition.points)
         self.refined_key = find_refined_key(definition, refine)
 
     def __repr__(self) -> str:
@@ -133,32 +122,17 @@ class Study:
 
         Units are those of the deck.  Of a result `x` there are `x`, `x_theory` and `x_error`.
         """
-        table, points, results = Table(), self.definition.points, self.results
-        for key in self.definition.keys:
-            table[key] = make_column([dict(point.values)[key] for point in points])
-        table["run"] = np.array([point.name for point in points], dtype=str)
-        table["state"] = np.array([_describe_state(result) for result in results], dtype=str)
-        cautions = [" | ".join(result.cautions) if result else "" for result in results]
-        table["cautions"] = np.array(cautions, dtype=str)
+        points, results = self.definition.points, self.results
+        table = {key: make_column([point[key] for point in points]) for key in self.definition.keys}
+        words = {"run": [point.name for point in points], "state": list(map(_say_state, results))}
+        words["cautions"] = [" | ".join(result.cautions) if result else "" for result in results]
+        table |= {name: np.array(column, dtype=str) for name, column in words.items()}
         for name, kind in (("step", np.int64), ("t", float), ("seconds", float)):
             table[name] = np.array([getattr(r, name) if r else 0 for r in results], dtype=kind)
-        computed, errors, values = find_names(results)
-        parts = [
-            (part, name, column)
-            for name in computed
-            for part, name, column in (
-                ("computed", name, name),
-                ("theory", name, f"{name}_theory"),
-                ("errors", f"{name}_error", f"{name}_error"),
-            )
-        ]
-        parts += [("errors", name, name) for name in errors]
-        parts += [("values", name, name) for name in values]
-        for part, name, column in parts:
-            if column not in table:
-                found = [getattr(r, part).get(name) if r is not None else None for r in results]
-                table[column] = np.array([np.nan if v is None else float(v) for v in found])
-        return table
+        for name in dict.fromkeys(name for result in results if result for name in result.values):
+            found = [result.values.get(name) if result else None for result in results]
+            table.setdefault(name, np.array(found, dtype=float))
+        return Table(table, find_units=lambda: self.units)
 
     @property
     def units(self) -> dict[str, str]:
@@ -171,14 +145,17 @@ class Study:
     @property
     def failures(self) -> dict[str, str]:
         """The sentence of each run that failed, by the name of its folder."""
-        pairs = zip(self.definition.points, self.results, strict=True)
-        return {point.name: r.failure for point, r in pairs if r is not None and r.failure}
+        return {name: r.failure for name, r in self._pairs if r is not None and r.failure}
 
     @property
     def cautions(self) -> dict[str, list[str]]:
         """Sentences on where not to trust a run, by the name of its folder; only runs with some."""
-        pairs = zip(self.definition.points, self.results, strict=True)
-        return {point.name: r.cautions for point, r in pairs if r is not None and r.cautions}
+        return {name: r.cautions for name, r in self._pairs if r is not None and r.cautions}
+
+    @property
+    def _pairs(self) -> list[tuple[str, Result | None]]:
+        names = (point.name for point in self.definition.points)
+        return list(zip(names, self.results, strict=True))
 
     @cached_property
     def orders(self) -> list[Series]:
@@ -214,11 +191,8 @@ class Study:
         return xarray.load_dataset(self.path / "study.h5", engine="h5netcdf")
 
     def to_pandas(self) -> Any:
-        """The table as a pandas.DataFrame, a row a point.
-
-        Raises BadInput where pandas is not installed.
-        """
-        return load_package("pandas", "to_pandas").DataFrame(dict(self.table))
+        """The table as a pandas.DataFrame, a row a point; BadInput where there is no pandas."""
+        return self.table.to_pandas()
 
     def plot(self, path: Path | str | None = None) -> Figure:
         """The figure of `shown`, written to `path` where there is one."""
@@ -235,31 +209,25 @@ class Study:
         Raises BadInput where the disk does not take them.
         """
         paths = [self.path / "study.csv", self.path / "study.h5"]
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(self.table)
-        for row in zip(*self.table.values(), strict=True):
-            writer.writerow([_say(value, repr, "") for value in row])
-        write_atomically(paths[0], text.getvalue())
+        rows = zip(*self.table.values(), strict=True)
+        write_csv(paths[0], list(self.table), ([_say(v, repr, "") for v in row] for row in rows))
         write_atomically(paths[1], self._make_hdf5())
         if self.orders:
             paths.append(self.path / "orders.csv")
-            write_orders(paths[-1], self.orders)
+            write_csv(paths[-1], HEADS, map(make_row, self.orders))
         if any(result is not None and not result.failure for result in self.results):
             paths.append(self.path / "study.png")
             self.plot(paths[-1])
         return paths
 
     def _make_hdf5(self) -> bytes:
-        definition, units = self.definition, self.units
+        definition, units = self.definition, self.units | {"t": "s", "seconds": "s"}
 
-        def write(file: h5py.File, name: str, values: np.ndarray) -> h5py.Dataset:
-            if values.dtype.kind == "U":
-                kind = h5py.string_dtype()
-                data = file.create_dataset(name, data=values.astype(object), dtype=kind)
-            else:
-                data = file.create_dataset(name, data=values)
-                data.attrs["units"] = "s" if name in ("t", "seconds") else units.get(name, "1")
+        def write(name: str, values: np.ndarray) -> h5py.Dataset:
+            kind = h5py.string_dtype() if values.dtype.kind == "U" else values.dtype
+            data = file.create_dataset(name, data=values.astype(kind), dtype=kind)
+            if values.dtype.kind != "U":
+                data.attrs["units"] = units.get(name, "1")
             data.attrs["long_name"] = LONG_NAMES.get(name, name.replace("_", " "))
             return data
 
@@ -270,24 +238,163 @@ class Study:
             scales = {key: make_column(list(values)) for key, values in definition.vary.items()}
             scales = scales or {"point": np.arange(len(definition.points))}
             for name, values in scales.items():
-                write(file, name, values).make_scale(name)
+                write(name, values).make_scale(name)
             shape = tuple(len(values) for values in scales.values())
             for name, values in self.table.items():
                 if name not in scales:
-                    data = write(file, name, values.reshape(shape))
+                    data = write(name, values.reshape(shape))
                     for axis, scale in enumerate(scales):
                         data.dims[axis].attach_scale(file[scale])
             file.flush()
             return file.id.get_file_image()
 
+    def check(self) -> None:
+        """Raise BadInput where no point can be begun, or a name of `shown` is in none.
 
-def load_package(name: str, call: str) -> Any:
-    """An optional package; BadInput that says how to install it."""
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        words = f"{call} needs {name}, which is not installed here: python -m pip install {name}"
-        raise BadInput(words) from error
+        A value that is wrong at some points fails these alone.
+        """
+        if self.definition.function is not None:
+            return
+        wrong: dict[str, str] = {}
+        for number, point in enumerate(self.definition.points):
+            try:
+                self._read_deck(number).make_problem()
+                break
+            except BadInput as error:
+                wrong[point.name] = str(error)
+        else:
+            name, sentence = next(iter(wrong.items()))
+            head = f"all {len(wrong)} points are wrong; {name}: "
+            raise BadInput(head * (len(set(wrong.values())) > 1) + sentence)
+        self._check_shown()
+
+    def _read_deck(self, number: int) -> ReadDeck:
+        values = {**self.definition.fixed, **self.definition.points[number]}
+        return read_deck(self.definition.source, write_settings(values))
+
+    def _check_shown(self) -> None:
+        """Raise BadInput for a name of `shown` that no kind of point has at its start.
+
+        Where a problem cannot say its names before its first step, nothing is refused.
+        """
+        missing, known = list(self.definition.shown), []
+        for number in self._find_kinds(range(len(self.results)), float):
+            if not missing:
+                return
+            try:
+                deck = self._read_deck(number)
+                known += _find_start_names(deck.problem, deck.make_problem())
+            except BadInput:
+                continue  # it fails by itself
+            except Exception:
+                return
+            missing = [name for name in missing if name not in known]
+        if missing:
+            words = f"; there are: {', '.join(dict.fromkeys(known))}" if known else ""
+            raise BadInput(f"--of {missing[0]}: no run has it{words}")
+
+    def _find_kinds(self, numbers: Iterable[int], plain: type | UnionType) -> list[int]:
+        """The first point of each kind: those of one kind differ in `plain` values alone."""
+        kinds: dict[tuple, int] = {}
+        for number in numbers:
+            values = self.definition.points[number].values()
+            kinds.setdefault(tuple(str(v) for v in values if not isinstance(v, plain)), number)
+        return list(kinds.values())
+
+    @contextlib.contextmanager
+    def claimed(self) -> Iterator[None]:
+        """In the block the folder is made and held for this process, with its study.toml.
+
+        BadInput where something else lies in it, or a study of another deck, or another study runs
+        there.
+        """
+        folder = self.path
+        if folder.exists() and not folder.is_dir():
+            raise BadInput(f"{folder} is a file, a study needs a folder; choose another with -o")
+        with disk_errors(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            strange = sorted(p.name for p in folder.iterdir() if p.name not in OWN)
+            if strange and not (folder / FILE).exists():
+                raise BadInput(
+                    f"the output folder {folder} holds something else ({', '.join(strange[:4])}); "
+                    "choose another with -o"
+                )
+        with RunDirectory(folder).claimed():
+            check_same_deck(folder, self.definition)
+            with disk_errors(folder):
+                (folder / "runs").mkdir(exist_ok=True)
+            write_atomically(folder / FILE, self.definition.to_toml())
+            yield
+
+    def compute(
+        self,
+        engine: Engine,
+        tell: Callable[[int, Result, bool], None] = lambda number, result, there: None,
+        retry: bool = False,
+    ) -> None:
+        """Compute what is not there yet in the folder, which is to be claimed.
+
+        tell: hears the number of a point, its result, and whether it was there already; retry:
+        failed runs go on from where they failed.  Raises KeyboardInterrupt where a signal stopped a
+        run.
+        """
+
+        def take(number: int, result: Result, there: bool = False) -> None:
+            self.results[number] = result
+            tell(number, result, there)
+
+        works: dict[int, Work] = {}
+        for number in range(len(self.results)):
+            work = self.make_work(number, share_processors(engine.workers), retry)
+            try:
+                known = read_result(work.folder, compute_digest_of(work))
+            except BadInput as error:
+                take(number, Result(digest="", failure=str(error)))
+                continue
+            if known is not None and not (known.failure and retry):
+                take(number, known, there=True)
+            else:
+                works[number] = work
+        if len(works) > 1 and engine.workers > 1 and self.definition.function is None:
+            # one step of one point of each kind, so that not every worker compiles the same
+            # kernels: these are made for materials, limiters and the like, for what is no number
+            first = [works[number] for number in self._find_kinds(works, int | float)]
+            for _ in engine.compute(warm_up, first):
+                pass  # what is wrong with a point is told where it is computed
+        numbers = list(works)
+        for place, found in engine.compute(compute_point, list(works.values())):
+            if isinstance(found, Exception):
+                found = Result(digest="", failure=_describe_error(found))
+            if found.stopped:
+                raise KeyboardInterrupt(found.reason)
+            take(numbers[place], found)
+
+    def make_work(self, number: int, threads: int | None = None, retry: bool = False) -> Work:
+        """What a worker needs for a point, all paths in full."""
+        definition, point = self.definition, self.definition.points[number]
+        folder, values = (self.path / "runs" / point.name).resolve(), {**definition.fixed, **point}
+        if definition.function is not None:
+            own = definition.function, values
+            return Work(definition.source, write_settings(point), folder, None, retry, *own)
+        return Work(definition.deck, write_settings(values), folder, threads, retry)
+
+    def describe_states(self) -> list[str]:
+        """What is there of each point: "done", "failed", "half", "other", "new", or a sentence."""
+        states = []
+        for number in range(len(self.results)):
+            work = self.make_work(number)
+            try:
+                states.append(find_state(work.folder, compute_digest_of(work)))
+            except BadInput as error:
+                states.append(str(error))
+        return states
+
+
+def write_csv(path: Path, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Write a table whole or not at all."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([heads, *rows])
+    write_atomically(path, text.getvalue())
 
 
 def _say(value: Any, write: Callable[[float], str] = "{:.6g}".format, none: str = "-") -> str:
@@ -296,11 +403,34 @@ def _say(value: Any, write: Callable[[float], str] = "{:.6g}".format, none: str 
     return str(value)
 
 
-def _describe_state(result: Result | None) -> str:
+def _say_state(result: Result | None) -> str:
     """How a run ended, in its own words; a failure in its sentence."""
     if result is None:
         return "not run"
     return f"failed: {result.failure}" if result.failure else result.reason
+
+
+def _describe_error(error: Exception) -> str:
+    """A sentence for what a worker raised."""
+    if isinstance(error, MemoryError):
+        return "not enough memory; fewer cells or fewer jobs need less"
+    died = type(error).__module__.startswith(("runs.", "distributed"))
+    if died or isinstance(error, BadInput):
+        return str(error)
+    return f"a mistake in shockgrid itself ({type(error).__name__}: {error})"
+
+
+def _find_start_names(problem_name: str, problem: Problem) -> list[str]:
+    """Names of results, errors and measurements, from a history that has its first row alone."""
+    evolution = problem.build()
+    measured = problem.measure(evolution)
+    row = {"step": evolution.step, "t": evolution.t, **get_start_row(evolution), **measured}
+    history = {name: np.array([value]) for name, value in row.items()}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # one row is little to compute with
+        found = Result(digest="")
+        fill_numbers(found, problem_name, problem, history, measured)
+    return [*found.values, *measured]
 
 
 def study(
@@ -341,209 +471,20 @@ def study(
         definition = make_definition(source, vary, points, fixed, shown)
     if not str(output):
         raise BadInput("study: the output folder is missing; name it with `output` (-o)")
+    made = Study(definition, output, refine)
     with open_engine(engine, jobs) as opened:
         if opened is None:
             return None
-        check_study(definition, refine)
-        results: list[Result | None] = []
+        made.check()
         try:
-            with claim_folder(output, definition) as folder:
-                compute_results(definition, folder, opened, results=results)
+            with made.claimed():
+                made.compute(opened)
         except KeyboardInterrupt:
-            left = sum(result is None for result in results)
-            words = f"stopped with {count(left, 'run')} to do; study({str(output)!r}) continues"
+            left = count(made.results.count(None), "run")
+            words = f"stopped with {left} to do; study({str(output)!r}) continues"
             raise KeyboardInterrupt(words) from None
-        made = Study(definition, folder, results, refine)
         made.write()
         return made
-
-
-def check_study(definition: Definition, refine: str | None = None) -> None:
-    """Raise BadInput where no point can be begun, or a name of `shown` is in none.
-
-    refine: the key of cells, as `--refine` names it.  A value that is wrong at some points fails
-    these alone.
-    """
-    find_refined_key(definition, refine)
-    if definition.function is not None:
-        return
-    sentences = []
-    for number in range(len(definition.points)):
-        try:
-            _make_problem(definition, number)
-            break
-        except BadInput as error:
-            sentences.append(str(error))
-    else:
-        many = len(set(sentences)) > 1
-        head = f"all {len(sentences)} points are wrong; {definition.points[0].name}: " * many
-        raise BadInput(head + sentences[0])
-    _check_shown(definition)
-
-
-def _make_problem(definition: Definition, number: int) -> tuple[str, Problem]:
-    """The problem of a point, with its name in decks; BadInput where the deck is wrong."""
-    settings = (*definition.settings, *definition.points[number].settings)
-    deck = read_deck(definition.source, settings)
-    return deck.problem, deck.make_problem()
-
-
-def _check_shown(definition: Definition) -> None:
-    """Raise BadInput for a name of `shown` that no kind of point has at its start.
-
-    Points of one kind differ in decimal numbers alone.  Where a problem cannot say its names before
-    its first step, nothing is refused.
-    """
-    missing, known, kinds = list(definition.shown), [], set()
-    for number, point in enumerate(definition.points):
-        kind = tuple(str(value) for _, value in point.values if not isinstance(value, float))
-        if not missing:
-            return
-        if kind in kinds:
-            continue
-        try:
-            names = _find_start_names(*_make_problem(definition, number))
-        except BadInput:
-            continue  # it fails by itself
-        except Exception:
-            return
-        kinds.add(kind)
-        known += names
-        missing = [name for name in missing if name not in names]
-    if missing:
-        words = f"; there are: {', '.join(dict.fromkeys(known))}" if known else ""
-        raise BadInput(f"--of {missing[0]}: no run has it{words}")
-
-
-def _find_start_names(problem_name: str, problem: Problem) -> list[str]:
-    """Names of results, errors and measurements, from a history that has its first row alone."""
-    evolution = problem.build()
-    measured = problem.measure(evolution)
-    row = {"step": evolution.step, "t": evolution.t, **get_start_row(evolution), **measured}
-    history = {name: np.array([value]) for name, value in row.items()}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # one row is little to compute with
-        results = list(problem.results(history))
-        errors = [*problem.errors(history), *find_error_columns(problem_name, measured)]
-    return [*results, *(f"{name}_error" for name in results), *errors, *measured]
-
-
-@contextlib.contextmanager
-def claim_folder(path: str | Path, definition: Definition) -> Iterator[Path]:
-    """The folder of a study, made and held for this process, with its study.toml.
-
-    BadInput where something else lies in it, or a study of another deck, or another study runs
-    there.
-    """
-    folder = Path(path)
-    if folder.exists() and not folder.is_dir():
-        raise BadInput(f"{folder} is a file, a study needs a folder; choose another with -o")
-    with disk_errors(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        strange = sorted(p.name for p in folder.iterdir() if p.name not in OWN)
-        if strange and not (folder / FILE).exists():
-            raise BadInput(
-                f"the output folder {folder} holds something else ({', '.join(strange[:4])}); "
-                "choose another with -o"
-            )
-    with RunDirectory(folder).claimed():
-        check_same_deck(folder, definition)
-        with disk_errors(folder):
-            (folder / "runs").mkdir(exist_ok=True)
-        write_atomically(folder / FILE, definition.to_toml())
-        yield folder
-
-
-def compute_results(
-    definition: Definition,
-    folder: Path,
-    engine: Engine,
-    tell: Tell = lambda number, result, there: None,
-    retry: bool = False,
-    results: list[Result | None] | None = None,
-) -> list[Result | None]:
-    """All results, those that are there and those that are not yet; one a point.
-
-    `tell` hears of each; `retry`: failed runs go on from where they failed; `results`: a list to
-    fill, for a caller who wants what there is when this ends early.  Raises KeyboardInterrupt where
-    a signal stopped a run.
-    """
-    results = [] if results is None else results
-    results[:] = [None] * len(definition.points)
-    works: dict[int, Work] = {}
-    for number in range(len(definition.points)):
-        work = make_work(definition, number, folder, share_processors(engine.workers), retry)
-        try:
-            known = read_result(work.folder, compute_digest_of(work))
-        except BadInput as error:
-            results[number] = wrong = Result(digest="", failure=str(error))
-            tell(number, wrong, False)
-            continue
-        if known is not None and not (known.failure and retry):
-            results[number] = known
-            tell(number, known, True)
-        else:
-            works[number] = work
-    if len(works) > 1 and engine.workers > 1 and definition.function is None:
-        # one step of one point of each kind, so that not every worker compiles the same kernels:
-        # these are made for materials, limiters and the like, for what is not a number in a deck
-        kinds: dict[tuple, Work] = {}
-        for number, work in works.items():
-            values = definition.points[number].values
-            kind = tuple(str(v) for _, v in values if not isinstance(v, int | float))
-            kinds.setdefault(kind, work)
-        for _ in engine.compute(warm_up, list(kinds.values())):
-            pass  # what is wrong with a point is told where it is computed
-    numbers = list(works)
-    for place, found in engine.compute(compute_point, list(works.values())):
-        number = numbers[place]
-        if isinstance(found, Exception):
-            found = Result(digest="", failure=_describe_error(found))
-        if found.stopped:
-            raise KeyboardInterrupt(found.reason)
-        results[number] = found
-        tell(number, found, False)
-    return results
-
-
-def make_work(
-    definition: Definition,
-    number: int,
-    folder: Path,
-    threads: int | None = None,
-    retry: bool = False,
-) -> Work:
-    """What a worker needs for a point, all paths in full."""
-    point, source = definition.points[number], Path(definition.source)
-    place = str((folder / "runs" / point.name).resolve())
-    if definition.function is not None:
-        own = definition.function, (*definition.fixed, *point.values)
-        return Work(definition.source, point.settings, place, None, retry, *own)
-    name = str(source.resolve()) if source.is_file() else definition.source
-    return Work(name, (*definition.settings, *point.settings), place, threads, retry)
-
-
-def _describe_error(error: Exception) -> str:
-    """A sentence for what a worker raised."""
-    if isinstance(error, BadInput):
-        return str(error)
-    if isinstance(error, MemoryError):
-        return "not enough memory; fewer cells or fewer jobs need less"
-    if type(error).__module__.startswith(("runs.", "distributed")):  # a worker died
-        return str(error)
-    return f"a mistake in shockgrid itself ({type(error).__name__}: {error})"
-
-
-def describe_states(definition: Definition, folder: Path) -> list[str]:
-    """What is there of each point: "done", "failed", "half", "other", "new", or a sentence."""
-    states = []
-    for number in range(len(definition.points)):
-        work = make_work(definition, number, folder)
-        try:
-            states.append(find_state(work.folder, compute_digest_of(work)))
-        except BadInput as error:
-            states.append(str(error))
-    return states
 
 
 @contextlib.contextmanager

@@ -29,7 +29,7 @@ DIGITS = 6  # of the numbers handed on
 
 def make_angles(deck: PlateOnWedgeDeck, below: Iterable[float]) -> list[PlateOnWedgeDeck]:
     """The deck at angles so many degrees below its critical angle; negative numbers are past it."""
-    critical = math.degrees(PlateOnWedge(deck).critical.angle)
+    critical = math.degrees(PlateOnWedge(deck).critical)
     angles = [round(critical - away, 3) for away in below]
     return [msgspec.structs.replace(deck, angle=angle) for angle in angles]
 
@@ -55,7 +55,7 @@ def measure_polar_point(deck: PlateOnWedgeDeck) -> dict:
         "speed": deck.drive.speed,
         "cells": list(deck.cells),
         "angle": deck.angle,
-        "critical angle": math.degrees(problem.critical.angle),
+        "critical angle": math.degrees(problem.critical),
         "attached": theory.attached,
         "refinement": problem.refinement,
         "steps": run.step,

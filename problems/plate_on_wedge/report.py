@@ -24,7 +24,7 @@ import msgspec
 import numpy as np
 
 from problems.plate_on_wedge.set_up import COLUMNS, EDGES, JET, WIDE_ZONE
-from problems.references.shock_polars import compute_birkhoff_jet
+from problems.references.shock_polars import compute_jet_speed
 
 RISEN = 0.9  # of the faces behind it: there the numerical rise is over
 NEXT = 8  # faces behind a face that say what it rises to
@@ -314,11 +314,10 @@ def make_summary(problem, history, final) -> str:
     jet = measure_jet_speed(history)
     if jet > 0.0:
         mass = float(np.asarray(history["jet_mass"], dtype=float)[-1])
-        birkhoff = compute_birkhoff_jet(problem.flying.rho, problem.plate_speed, problem.angle)
         lines.append(
             f"  {'behind B' if theory.attached else 'jet'}: fastest material {jet / 1e3:.3g} km/s "
             f"(median in time), {mass:.3g} kg/m at the end (incompressible theory on a rigid "
-            f"wedge: {birkhoff.jet_speed / 1e3:.3g} km/s)"
+            f"wedge: {compute_jet_speed(problem.plate_speed, problem.angle) / 1e3:.3g} km/s)"
         )
         if not theory.attached:
             lines.append(
@@ -338,7 +337,7 @@ def make_summary(problem, history, final) -> str:
 
 def describe_margin(problem) -> str:
     """The critical angle, how far this one is from it, and what theory says of it."""
-    critical = math.degrees(problem.critical.angle)
+    critical = math.degrees(problem.critical)
     away = critical - problem.deck.angle
     attached = problem.collision.attached
     return f"critical angle {critical:.2f} degrees, this one is {abs(away):.2f} " + (
@@ -352,7 +351,7 @@ def find_cautions(problem) -> list[str]:
     cells = deck.cells[0]
     if not problem.collision.attached or zone >= WIDE_ZONE or cells >= FINE_CELLS:
         return []
-    away = math.degrees(problem.critical.angle) - deck.angle
+    away = math.degrees(problem.critical) - deck.angle
     near = f"{away:.2g} degrees below the critical angle the pressure behind A"
     finer = f"cells=[{FINE_CELLS}, {math.ceil(FINE_CELLS * deck.cells[1] / cells)}]"
     if cells < COARSE_CELLS:

@@ -187,7 +187,6 @@ class PlateSetUp(Problem):
         solid = self.materials["wedge"]
         self.target = Body(solid.eos, solid.rho0)
         self.collision = solve_collision(self.flying, self.target, self.plate_speed, self.angle)
-        self.critical = find_critical_angle(self.flying, self.target, self.plate_speed)
         self.refinement = deck.refinement or self.find_refinement()
         self.coarse_spacing = deck.wedge_spacing * self.length / ni
         self.wedge_spacing = self.coarse_spacing / math.sqrt(self.refinement)
@@ -251,6 +250,11 @@ class PlateSetUp(Problem):
         solid = self.materials["plate"]
         shock = shock_with_particle_speed(solid.eos, solid.rho0, 0.0, self.find_particle_speed())
         return self.deck.thickness / shock.shock_speed
+
+    @functools.cached_property
+    def critical(self) -> float:
+        """The critical angle at the plate's speed [rad]."""
+        return find_critical_angle(self.flying, self.target, self.plate_speed)
 
     @functools.cached_property
     def zone(self) -> float:

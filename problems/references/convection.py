@@ -145,7 +145,6 @@ class VerticalPlates:
             "c2": c2,
             "slope": k / re,
             "shape": shape,
-            "reference": a - k / ra if ra else Decimal(0),
         }
 
     def sample(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -168,11 +167,6 @@ class VerticalPlates:
         with localcontext(DIGITS):
             c = self._constants()
             return float(c["p"] * c["a"])
-
-    def compute_reference(self) -> float:
-        """T0, the temperature of the fluid that would stand still under the pressure gradient."""
-        with localcontext(DIGITS):
-            return float(self._constants()["reference"])
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Exact flows: blast wave, wave behind a detonation, vortex, Kidder's shell, oblique shock."""
+"""Exact flows: blast wave, wave behind a detonation, vortex, Kidder's shell."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 
 from hydro.eos import JWL
 from regrid.errors import BadInput
-from regrid.roots import find_root
 
 DIMENSIONS = {"plane": 1, "cylindrical": 2, "spherical": 3}
 SHELLS = 4000  # points of the tabulated profile
@@ -267,29 +266,3 @@ class Shell:
         part = ((r / h) ** 2 - RADII[0] ** 2) / (RADII[1] ** 2 - RADII[0] ** 2)
         inner, outer = (rho**power for rho in self.densities)
         return ((1.0 - part) * inner + part * outer) ** (1.0 / power) / h**self.n
-
-
-def compute_wedge_deflection(mach: float, beta: float, gamma: float) -> float:
-    """Deflection [rad] of a gas by a shock at the angle `beta` [rad] to a flow at Mach `mach`.
-
-    Any text on gas dynamics, e.g. NACA report 1135 (1953), equation 148.
-    """
-    across = (mach * math.sin(beta)) ** 2
-    rise = 2.0 * (across - 1.0) / math.tan(beta)
-    return math.atan(rise / (mach**2 * (gamma + math.cos(2.0 * beta)) + 2.0))
-
-
-def find_shock_angle(mach: float, angle: float, gamma: float) -> float:
-    """Angle [rad] of the weak attached shock; BadInput where there is none."""
-    from scipy.optimize import minimize_scalar  # slow to load
-
-    ends = math.asin(1.0 / mach), 0.5 * math.pi
-    turn = lambda beta: compute_wedge_deflection(mach, beta, gamma)  # noqa: E731
-    exactly = {"method": "bounded", "options": {"xatol": 1e-10}}
-    best = minimize_scalar(lambda beta: -turn(beta), bounds=ends, **exactly).x
-    if angle >= turn(best):
-        raise BadInput(
-            f"deck: angle is {math.degrees(angle):g} degrees; at Mach {mach:g} the shock stays "
-            f"attached up to {math.degrees(turn(best)):.4g} degrees only"
-        )
-    return find_root(lambda beta: turn(beta) - angle, ends[0], best)

@@ -93,26 +93,55 @@ class GeneralIsentrope:
         with np.errstate(invalid="ignore"):
             self.c = float(eos.sound_speed(self.rho, self.p))
         self.least_pressure = -math.inf
-        self._pieces = {}
+        self._curves = {}
 
     def _extend(self, p_end: float):
         """Interpolant of (rho, velocity gain) between the first state and `p_end` or beyond."""
         down = p_end < self.p
-        piece = self._pieces.get(down)
-        if piece is not None and (piece.reach <= p_end if down else piece.reach >= p_end):
-            return piece
-        piece = _Piece(self, p_end)
-        self._pieces[down] = piece
-        return piece
+        reach, curve = self._curves.get(down, (self.p, None))
+        if p_end < reach if down else p_end > reach:
+            curve = self._integrate(p_end)
+            self._curves[down] = p_end, curve
+        return curve
+
+    def _integrate(self, p_end: float):
+        """The same, between the first state and `p_end` as it is."""
+        eos, rho, p = self.eos, self.rho, self.p
+        refusal = BadInput(
+            f"the isentrope from rho = {rho:g}, p = {p:g} does not reach p = {p_end:g}: the "
+            "equation of state has no sound speed there; ask for a higher pressure"
+        )
+
+        def slope(pressure, state):
+            c = float(eos.sound_speed(state[0], pressure))
+            if not (state[0] > 1e-3 * rho and c > 1e-3 * self.c):
+                raise refusal
+            return [1.0 / c**2, -1.0 / (state[0] * c)]
+
+        from scipy.integrate import solve_ivp  # slow to load
+
+        with np.errstate(all="ignore"):
+            run = solve_ivp(
+                slope,
+                (p, p_end),
+                [rho, 0.0],
+                method="DOP853",
+                rtol=TOLERANCE,
+                atol=[TOLERANCE * rho, TOLERANCE * self.c],
+                dense_output=True,
+                first_step=min(abs(p_end - p), 1e-3 * rho * self.c**2),
+            )
+        if not run.success or not np.all(np.isfinite(run.y)) or run.y[0, -1] <= 0.0:
+            raise refusal
+        return run.sol
 
     def _evaluate(self, p, row: int):
         p = np.asarray(p, dtype=float)
-        result = np.empty(p.shape)
-        for down in (True, False):
-            chosen = p < self.p if down else p >= self.p
+        result = np.full(p.shape, (self.rho, 0.0)[row])
+        for chosen, reduce in ((p < self.p, np.min), (p > self.p, np.max)):
             if chosen.any():
-                far = p[chosen].min() if down else p[chosen].max()
-                result[chosen] = self._extend(float(far))(p[chosen])[row]
+                inside = p[chosen]
+                result[chosen] = self._extend(float(reduce(inside)))(inside)[row]
         return result if result.ndim else float(result)
 
     def density(self, p):
@@ -143,56 +172,6 @@ class GeneralIsentrope:
         return 0.5 * (low + high)
 
 
-class _Piece:
-    """Interpolant of (rho, velocity gain) over the pressures from a first state to `reach`."""
-
-    def __init__(self, isentrope: GeneralIsentrope, p_end: float):
-        eos, rho, p = isentrope.eos, isentrope.rho, isentrope.p
-        scale = rho * isentrope.c**2
-        self.start, self.reach = p, p_end
-        self.first = np.array([rho, 0.0])
-        self.solution = None
-        if p_end == p:
-            return
-
-        def slope(pressure, state):
-            c = float(eos.sound_speed(state[0], pressure))
-            if not (state[0] > 1e-3 * rho and c > 1e-3 * isentrope.c):
-                raise _unreachable(rho, p, p_end)
-            return [1.0 / c**2, -1.0 / (state[0] * c)]
-
-        from scipy.integrate import solve_ivp  # slow to load
-
-        absolute = [TOLERANCE * rho, TOLERANCE * isentrope.c]
-        first_step = min(abs(p_end - p), 1e-3 * scale)
-        with np.errstate(all="ignore"):
-            run = solve_ivp(
-                slope,
-                (p, p_end),
-                self.first,
-                method="DOP853",
-                rtol=TOLERANCE,
-                atol=absolute,
-                dense_output=True,
-                first_step=first_step,
-            )
-        if not run.success or not np.all(np.isfinite(run.y)) or run.y[0, -1] <= 0.0:
-            raise _unreachable(rho, p, p_end)
-        self.solution = run.sol
-
-    def __call__(self, p):
-        if self.solution is None:
-            return np.broadcast_to(self.first[:, None], (2, p.size)).reshape(2, *p.shape)
-        return self.solution(p.ravel()).reshape(2, *p.shape)
-
-
-def _unreachable(rho: float, p: float, p_end: float) -> BadInput:
-    return BadInput(
-        f"the isentrope from rho = {rho:g}, p = {p:g} does not reach p = {p_end:g}: the "
-        "equation of state has no sound speed there; ask for a higher pressure"
-    )
-
-
 def release(eos, rho: float, p: float, p_end: float = 0.0) -> tuple[float, float]:
     """Density after an isentropic release from (rho, p) to `p_end`, and the speed gained.
 
@@ -205,16 +184,6 @@ def release(eos, rho: float, p: float, p_end: float = 0.0) -> tuple[float, float
             f"{isentrope.least_pressure:g}"
         )
     return float(isentrope.density(p_end)), float(isentrope.velocity_gain(p_end))
-
-
-def compute_free_surface_speed(
-    eos, rho: float, p: float, particle_speed: float, p_end: float = 0.0
-) -> float:
-    """Speed of a free surface when a shock state (rho, p, particle_speed) arrives at it.
-
-    `u_fs = up + integral of dp/(rho c)` from `p_end` to p; acoustically twice the particle speed.
-    """
-    return particle_speed + release(eos, rho, p, p_end)[1]
 
 
 VOLUME_STEPS = 200

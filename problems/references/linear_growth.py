@@ -37,7 +37,6 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,14 +58,22 @@ COEFFICIENTS = 10
 
 @dataclass(frozen=True)
 class Zone:
-    """A layer or a fan: derivative matrix (n, n), rows COEFFICIENTS (10, n), impedance z at its
-    outer end, what closes that end (None: the next zone does), first state (3, n)."""
+    """A layer or a fan of n points, from the interface outwards.
+
+    matrix: derivative (n, n); coefficients: rows COEFFICIENTS (10, n); z: impedance at its outer
+    end; edge: what closes that end (None: the next zone does); start: first state (3, n); speed
+    (n,): of the points away from the interface; slope (n,): d rho/d p at constant entropy there;
+    stiffness: its fastest rate.
+    """
 
     matrix: np.ndarray
     coefficients: np.ndarray
     z: float
     edge: tuple[float, float, float] | None
     start: np.ndarray
+    speed: np.ndarray
+    slope: np.ndarray
+    stiffness: float
 
 
 @compiled_once
@@ -169,56 +176,9 @@ def fill_velocities(times, step, middle, state, zones, work, velocities, ends):
         ends[1, 0, n + 1], ends[1, 1, n + 1] = state[P, count - 1], state[V, count - 1]
 
 
-@dataclass(frozen=True)
-class March:
-    """What a march found: `velocities` (n,) of the interface, p and v at the outer `ends` (2, 2, n)
-    of both sides at its times, and the last `states` (3, points) of all zones, in their order."""
-
-    velocities: np.ndarray
-    ends: np.ndarray
-    states: list[np.ndarray]
-
-
-def march_layers(first: list[Zone], second: list[Zone], times, step: float) -> March:
-    """March to the last of the `times` (n,), `step` apart in log t; p and u are 0 at the first.
-
-    first, second: the rows of zones from the interface outwards, on either side.
-    """
-    zones = [*first, *second]
-    sizes = np.array([zone.start.shape[1] for zone in zones])
-    slopes = np.zeros((len(zones), sizes.max(), sizes.max()))
-    coefficients = np.zeros((len(zones), COEFFICIENTS, sizes.max()))
-    for number, (zone, size) in enumerate(zip(zones, sizes, strict=True)):
-        slopes[number, :size, :size] = zone.matrix.T
-        coefficients[number, :, :size] = zone.coefficients
-    edges = np.array([zone.edge or (0.0, 0.0, 0.0) for zone in zones])
-    impedances = np.array([zone.z for zone in zones])
-    state = np.concatenate([zone.start for zone in zones], axis=1)
-    velocities, ends = np.zeros(len(times)), np.zeros((2, 2, len(times)))
-    ends[0, 1, 0], ends[1, 1, 0] = first[-1].start[V, -1], second[-1].start[V, -1]
-    fill_velocities(
-        times, step, math.exp(0.5 * step), state,
-        (slopes, coefficients, sizes, edges, impedances, len(first)),
-        np.empty((4, *state.shape)), velocities, ends,
-    )  # fmt: skip
-    return March(velocities, ends, np.split(state, np.cumsum(sizes)[:-1], axis=1))
-
-
 def compute_atwood_number(rho_first: float, rho_second: float) -> float:
     """`A = (rho2 - rho1)/(rho2 + rho1)`, positive when the second material is denser."""
     return (rho_second - rho_first) / (rho_second + rho_first)
-
-
-def compute_impulsive_rate(
-    wavenumber: float, amplitude: float, velocity: float, atwood: float
-) -> float:
-    """da/dt = k a u A+ after an impulsive acceleration [Richtmyer1960].
-
-    `atwood` A+ is that just after the shock and `velocity` that of the contact.  The `amplitude` a
-    is a+, just after the shock, where a shock is reflected, and the mean of a+ and that before the
-    shock where a rarefaction is [MeyerBlewett1972].
-    """
-    return wavenumber * amplitude * velocity * atwood
 
 
 def compute_pade_rate(wavenumber: float, amplitude: float, rate: float, atwood: float, t):
@@ -284,9 +244,24 @@ class PerturbedLayer:
     front: float
 
     def interpolate(self, speed: np.ndarray) -> np.ndarray:
-        """rho, u, v, p (4, m) at the speeds (m,), those of the ends beyond them."""
-        fields = np.array([self.rho, self.u, self.v, self.p])
-        return interpolate_zones(self.speed, fields, speed)
+        """rho, u, v, p (4, m) at the speeds (m,), those of the ends beyond them.
+
+        Each run of points up to one that stands twice is a zone with its own polynomial.
+        """
+        points, values = self.speed, np.array([self.rho, self.u, self.v, self.p])
+        ends = [0, *(np.flatnonzero(np.diff(points) == 0.0) + 1), points.size]
+        inside = np.clip(speed, points[0], points[-1])
+        found = np.empty((4, inside.size))
+        for start, stop in itertools.pairwise(ends):
+            here = (inside >= points[start]) & (inside <= points[stop - 1])
+            # barycentric formula for Chebyshev points of the second kind [Trefethen2000]
+            weight = (-1.0) ** np.arange(stop - start)
+            weight[[0, -1]] *= 0.5
+            away = inside[here, None] - points[None, start:stop]
+            exact = away == 0.0
+            terms = np.where(exact.any(axis=1)[:, None], exact, weight / np.where(exact, 1.0, away))
+            found[:, here] = (values[:, start:stop] @ terms.T) / terms.sum(axis=1)
+        return found
 
 
 @dataclass(frozen=True)
@@ -302,19 +277,20 @@ class PerturbedFlow:
 class LinearGrowth:
     """Linear growth after a shock, all in the caller's units.
 
-    `kt` (n,) is wavenumber times time since the shock met the mean interface [1/velocity],
-    `rate` (n,) is (da/dt)/(k a0) [velocity], a0 being the amplitude before the shock; `march`
-    computes both, and the shocks' shapes, when one is first asked for.
+    `kt` (n,) is wavenumber times time since the shock met the mean interface, up to `kt_end`
+    [1/velocity], `rate` (n,) is (da/dt)/(k a0) [velocity], a0 being the amplitude before the shock;
+    both, and the shocks' shapes, are computed when one is first asked for.
     `sides` are the layers that the perturbation lives in, `compute_fields` gives it.
     `compression` is a+/a0 just after it.  `impulsive` is the rate, in the units of `rate`, of the
-    model that `impulse` names: Richtmyer's, with a+, where a shock is reflected, and Meyer and
+    model that `impulse` names: Richtmyer's [Richtmyer1960], k a+ u A with the contact's velocity u
+    and the Atwood number A just after the shock, where a shock is reflected, and Meyer and
     Blewett's [MeyerBlewett1972], with the mean of a+ and a0, where a rarefaction is.
     `sound_speed` is that of the shocked second material: times are given as k c t with this c.
     `reflected` is "shock" or "rarefaction"; `base` is the flow of
     the plane interface, `incident` the shock that makes it.
     """
 
-    march: Callable[[], tuple[np.ndarray, np.ndarray, np.ndarray]]
+    kt_end: float
     sides: tuple[_Side, _Side]
     compression: float
     impulsive: float
@@ -326,7 +302,15 @@ class LinearGrowth:
 
     @functools.cached_property
     def _curve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.march()
+        """`kt`, `rate`, and amplitudes (2, n) of the shocks over a0."""
+        times, velocities, ends, _ = march_layers(*self.sides, self.kt_end)
+        shapes = zip(self.sides, ends[:, 1], (-1.0, 1.0), strict=True)
+        fronts = np.array([sign * v / (side.jump or math.nan) for side, v, sign in shapes])
+        return (
+            np.concatenate([[0.0], times]),
+            np.concatenate([[0.0], velocities]),
+            np.concatenate([fronts[:, :1], fronts], axis=1),
+        )
 
     @property
     def kt(self) -> np.ndarray:
@@ -339,8 +323,31 @@ class LinearGrowth:
         return self._curve[1]
 
     def compute_fields(self, kt: float) -> PerturbedFlow:
-        """The perturbed flow at wavenumber times time `kt` > 0 [1/velocity]."""
-        return _compute_fields(self.sides, self.compression, kt)
+        """The perturbed flow at wavenumber times time `kt` > 0 [1/velocity].
+
+        In a layer behind a shock particles rest beside the interface, each with the entropy that
+        the shock gave it when it passed: at a distance x it passed at t = x/width,
+
+            rho'(x, t) = p'(x, t)/c^2 + (d rho/d p of the Hugoniot - 1/c^2) p'_shock(x/width)
+
+        elsewhere no shock changes its entropy.
+        """
+        times, velocities, outer, states = march_layers(*self.sides, kt)
+        growth = 0.5 * np.sum(np.diff(times) * (velocities[1:] + velocities[:-1]))
+        layers = []
+        for side, ends, sign in zip(self.sides, outer, (-1.0, 1.0), strict=True):
+            count = len(side.zones)
+            p, u, v = np.concatenate(states[:count], axis=1)
+            del states[:count]
+            speed = np.concatenate([zone.speed for zone in side.zones])
+            slope = np.concatenate([zone.slope for zone in side.zones])
+            rho, front = slope * p, math.nan
+            if side.jump:
+                passed = np.interp(kt * speed / speed[-1], times, ends[0])
+                rho += (side.hugoniot - slope) * passed
+                front = sign * float(v[-1]) / side.jump
+            layers.append(PerturbedLayer(speed, rho, u, v, p, front))
+        return PerturbedFlow(self.compression + float(growth), *layers)
 
     def get_amplitude(self, wavenumber: float, t) -> np.ndarray:
         """a(t)/a0 at the times `t` (any shape) after the shock, none beyond the solution's end."""
@@ -397,26 +404,20 @@ def _chebyshev(points: int) -> tuple[np.ndarray, np.ndarray, float]:
 
 @dataclass(frozen=True)
 class _Side:
-    """Zones from the interface outwards, and the fastest rate in them.
+    """Zones from the interface outwards.
 
-    speeds: distances of each zone's points from the interface over the time [velocity]; slopes:
-    d rho/d p at constant entropy at each of them.  At the shock `jump` is the gain of velocity and
-    `hugoniot` the slope d rho/d p of the states behind it, both 0 where there is none.
+    At the shock `jump` is the gain of velocity and `hugoniot` the slope d rho/d p of the states
+    behind it, both 0 where there is none.
     """
 
     zones: list[Zone]
-    stiffness: float
-    speeds: list[np.ndarray]
-    slopes: list[np.ndarray]
     jump: float = 0.0
     hugoniot: float = 0.0
 
 
-def _make_layer(
-    points: int, rho: float, c: float, width: float, edge, v: float
-) -> tuple[Zone, float]:
-    """Uniform material between the interface and its outer edge at speed `width`, and its
-    stiffness; at first its perturbation is a transverse velocity `v`."""
+def _make_layer(points: int, rho: float, c: float, width: float, edge, v: float) -> Zone:
+    """Uniform material between the interface and its outer edge at speed `width`; at first its
+    perturbation is a transverse velocity `v`."""
     xi, matrix, radius = _chebyshev(points)
     coefficients = np.zeros((COEFFICIENTS, points))
     coefficients[CARRY] = xi
@@ -426,7 +427,8 @@ def _make_layer(
     coefficients[LIGHT] = 1.0 / rho
     start = np.zeros((3, points))
     start[V] = v
-    return Zone(matrix, coefficients, rho * c, edge, start), radius * (1.0 + c / width)
+    slope, stiffness = np.full(points, c**-2), radius * (1.0 + c / width)
+    return Zone(matrix, coefficients, rho * c, edge, start, width * xi, slope, stiffness)
 
 
 def _make_shock_side(eos, shock: Shock, tilt: float, points: int) -> _Side:
@@ -436,23 +438,9 @@ def _make_shock_side(eos, shock: Shock, tilt: float, points: int) -> _Side:
     speed_slope, front_slope = compute_hugoniot_slopes(eos, shock)
     edge = 1.0 / (1.0 + shock.rho * c * speed_slope), speed_slope, jump * front_slope
     width = shock.shock_speed - jump
-    layer, stiffness = _make_layer(points, shock.rho, c, width, edge, jump * tilt)
     # of rho = rho0 D/(D - jump), D the shock's speed
     hugoniot = shock.rho_ahead * (shock.shock_speed * speed_slope - jump * front_slope) / width**2
-    return _Side([layer], stiffness, *_list_speeds(width, c, points), jump, hugoniot)
-
-
-def _list_speeds(width: float, c: float, points: int) -> tuple[list, list]:
-    """`speeds` and `slopes` of a side of one layer."""
-    return [width * _chebyshev(points)[0]], [np.full(points, c**-2)]
-
-
-def _make_open_side(eos, rho: float, p: float, transverse: float, points: int) -> _Side:
-    """A layer bounded by a reflected wave so weak that sound passes it without reflection."""
-    c = float(eos.sound_speed(rho, p))
-    edge = 0.5, 1.0 / (rho * c), 0.0
-    layer, stiffness = _make_layer(points, rho, c, c, edge, transverse)
-    return _Side([layer], stiffness, *_list_speeds(c, c, points))
+    return _Side([_make_layer(points, shock.rho, c, width, edge, jump * tilt)], jump, hugoniot)
 
 
 def _make_fan_side(eos, base: RiemannSolution, ahead, incident_speed: float, points: int) -> _Side:
@@ -494,13 +482,11 @@ def _make_fan_side(eos, base: RiemannSolution, ahead, incident_speed: float, poi
     coefficients[SOURCE] = tilt
     start = np.zeros((3, fan_points))
     start[V] = transverse
-    layer, stiffness = _make_layer(points, base.rho_left, tail, tail, None, transverse[0])
-    at_rest = 0.0, 0.0, 0.0
-    fan = Zone(matrix, coefficients, float(rho[-1] * c[-1]), at_rest, start)
-    crossing = 2.0 * float(c.max()) / width
-    (speeds,), (slopes,) = _list_speeds(tail, tail, points)
-    stiffness = max(stiffness, radius * crossing)
-    return _Side([layer, fan], stiffness, [speeds, position], [slopes, c**-2])
+    at_rest, stiffness = (0.0, 0.0, 0.0), radius * (2.0 * float(c.max()) / width)
+    fan = Zone(
+        matrix, coefficients, float(rho[-1] * c[-1]), at_rest, start, position, c**-2, stiffness
+    )
+    return _Side([_make_layer(points, base.rho_left, tail, tail, None, transverse[0]), fan])
 
 
 def compute_linear_growth(
@@ -525,107 +511,61 @@ def compute_linear_growth(
             f"linear growth: the pressure behind the shock, {p_behind:g}, must be > {p:g}"
         )
     incident = shock_to_pressure(eos_first, rho_first, p, p_behind)
-    ahead = (incident.rho, incident.particle_speed, p_behind)
-    base = solve_riemann(eos_first, ahead, eos_second, (rho_second, 0.0, p))
-    sides, reflected = _make_sides(eos_first, eos_second, incident, ahead, base, rho_second, points)
-    c = float(eos_second.sound_speed(base.rho_right, base.p))
-    march = functools.partial(_march, *sides, kct_end / c)
-    compression = 1.0 - base.u / incident.shock_speed
-    atwood = compute_atwood_number(base.rho_left, base.rho_right)
-    amplitude, impulse = compression, "Richtmyer"
-    if reflected == "rarefaction":
-        amplitude, impulse = 0.5 * (1.0 + compression), "Meyer, Blewett"
-    impulsive = compute_impulsive_rate(1.0, amplitude, base.u, atwood)
-    return LinearGrowth(march, sides, compression, impulsive, impulse, c, reflected, incident, base)
-
-
-def _make_sides(eos_first, eos_second, incident, ahead, base, rho_second, points):
-    """The reflected and the transmitted side, and what the reflected wave is."""
-    rho, u, p = ahead
-    forward = shock_to_pressure(eos_second, rho_second, incident.p_ahead, base.p)
+    rho_ahead, u = incident.rho, incident.particle_speed
+    base = solve_riemann(eos_first, (rho_ahead, u, p_behind), eos_second, (rho_second, 0.0, p))
+    forward = shock_to_pressure(eos_second, rho_second, p, base.p)
     tilt = 1.0 - forward.shock_speed / incident.shock_speed
     transmitted = _make_shock_side(eos_second, forward, tilt, points)
-    wave = base.left_wave
-    change = base.u - u
-    if abs(change) < WEAK_WAVE * (u - wave.head):
-        tilt = -(1.0 - wave.head / incident.shock_speed)
-        side = _make_open_side(eos_first, base.rho_left, base.p, -change * tilt, points)
+    wave, change = base.left_wave, base.u - u
+    tilt = -(1.0 - wave.head / incident.shock_speed)
+    if abs(change) < WEAK_WAVE * (u - wave.head):  # so weak that sound passes it unreflected
+        rho, c = base.rho_left, float(eos_first.sound_speed(base.rho_left, base.p))
+        open_edge = 0.5, 1.0 / (rho * c), 0.0
+        side = _Side([_make_layer(points, rho, c, c, open_edge, -change * tilt)])
     elif wave.kind == "rarefaction":
+        ahead = rho_ahead, u, p_behind
         side = _make_fan_side(eos_first, base, ahead, incident.shock_speed, points)
     else:
-        tilt = -(1.0 - wave.head / incident.shock_speed)
-        side = _make_shock_side(
-            eos_first, shock_to_pressure(eos_first, rho, p, base.p), tilt, points
-        )
-    return (side, transmitted), wave.kind
-
-
-def _march(first: _Side, second: _Side, kt_end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times k t (n,), interface velocities and amplitudes (2, n) of the shocks (a0 = k = 1) from
-    the instant of the shock to `kt_end`."""
-    times, march = _march_fields(first, second, kt_end)
-    sides = zip((first, second), march.ends[:, 1], (-1.0, 1.0), strict=True)
-    fronts = np.array([sign * v / (side.jump or math.nan) for side, v, sign in sides])
-    return (
-        np.concatenate([[0.0], times]),
-        np.concatenate([[0.0], march.velocities]),
-        np.concatenate([fronts[:, :1], fronts], axis=1),
+        shock = shock_to_pressure(eos_first, rho_ahead, p_behind, base.p)
+        side = _make_shock_side(eos_first, shock, tilt, points)
+    c = float(eos_second.sound_speed(base.rho_right, base.p))
+    compression = 1.0 - base.u / incident.shock_speed
+    amplitude, impulse = compression, "Richtmyer"
+    if wave.kind == "rarefaction":
+        amplitude, impulse = 0.5 * (1.0 + compression), "Meyer, Blewett"
+    impulsive = amplitude * base.u * compute_atwood_number(base.rho_left, base.rho_right)
+    sides = side, transmitted
+    return LinearGrowth(
+        kct_end / c, sides, compression, impulsive, impulse, c, wave.kind, incident, base
     )
 
 
-def _march_fields(first: _Side, second: _Side, kt_end: float) -> tuple[np.ndarray, March]:
-    """Times k t (n,) after that instant, and the march over them."""
-    steps = math.ceil(-math.log(START) * max(first.stiffness, second.stiffness) / STABLE)
-    times = kt_end * START ** np.linspace(1.0, 0.0, steps + 1)
-    march = march_layers(first.zones, second.zones, times, -math.log(START) / steps)
-    if not np.isfinite(march.velocities).all():
+def march_layers(first: _Side, second: _Side, kt_end: float):
+    """March from just after the instant of the shock to `kt_end` (a0 = k = 1).
+
+    Returns times k t (n,), velocities (n,) of the interface, p and v at the outer ends (2, 2, n) of
+    both sides, and the last states (3, points) of all zones, in their order.
+    """
+    zones = [*first.zones, *second.zones]
+    steps = math.ceil(-math.log(START) * max(zone.stiffness for zone in zones) / STABLE)
+    times, step = kt_end * START ** np.linspace(1.0, 0.0, steps + 1), -math.log(START) / steps
+    sizes = np.array([zone.start.shape[1] for zone in zones])
+    slopes = np.zeros((len(zones), sizes.max(), sizes.max()))
+    coefficients = np.zeros((len(zones), COEFFICIENTS, sizes.max()))
+    for number, (zone, size) in enumerate(zip(zones, sizes, strict=True)):
+        slopes[number, :size, :size] = zone.matrix.T
+        coefficients[number, :, :size] = zone.coefficients
+    edges = np.array([zone.edge or (0.0, 0.0, 0.0) for zone in zones])
+    impedances = np.array([zone.z for zone in zones])
+    state = np.concatenate([zone.start for zone in zones], axis=1)
+    velocities, ends = np.zeros(len(times)), np.zeros((2, 2, len(times)))
+    ends[:, 1, 0] = first.zones[-1].start[V, -1], second.zones[-1].start[V, -1]
+    fill_velocities(
+        times, step, math.exp(0.5 * step), state,
+        (slopes, coefficients, sizes, edges, impedances, len(first.zones)),
+        np.empty((4, *state.shape)), velocities, ends,
+    )  # fmt: skip
+    if not np.isfinite(velocities).all():
         words = "linear growth: the solution left the range of numbers; give fewer points"
         raise RunFailure(words, cause="not-finite")
-    return times, march
-
-
-def _compute_fields(sides: tuple[_Side, _Side], compression: float, kt: float) -> PerturbedFlow:
-    """The perturbed flow at `kt`.
-
-    In a layer behind a shock particles rest beside the interface, each with the entropy that the
-    shock gave it when it passed: at a distance x it passed at t = x/width,
-
-        rho'(x, t) = p'(x, t)/c^2 + (d rho/d p of the Hugoniot - 1/c^2) p'_shock(x/width)
-
-    elsewhere no shock changes its entropy.
-    """
-    times, march = _march_fields(*sides, kt)
-    growth = 0.5 * np.sum(np.diff(times) * (march.velocities[1:] + march.velocities[:-1]))
-    layers, states = [], list(march.states)
-    for side, ends, sign in zip(sides, march.ends, (-1.0, 1.0), strict=True):
-        count = len(side.zones)
-        p, u, v = np.concatenate(states[:count], axis=1)
-        del states[:count]
-        speed, slope = np.concatenate(side.speeds), np.concatenate(side.slopes)
-        rho, front = slope * p, math.nan
-        if side.jump:
-            passed = np.interp(kt * speed / speed[-1], times, ends[0])
-            rho += (side.hugoniot - slope) * passed
-            front = sign * float(v[-1]) / side.jump
-        layers.append(PerturbedLayer(speed, rho, u, v, p, front))
-    return PerturbedFlow(compression + float(growth), *layers)
-
-
-def interpolate_zones(points: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Values (m, k) at `wanted` (k,) of functions (m, n) known at ascending `points` (n,).
-
-    Each run of points up to one that stands twice is a zone with its own polynomial.
-    """
-    ends = [0, *(np.flatnonzero(np.diff(points) == 0.0) + 1), points.size]
-    inside = np.clip(wanted, points[0], points[-1])
-    found = np.empty((values.shape[0], inside.size))
-    for start, stop in itertools.pairwise(ends):
-        here = (inside >= points[start]) & (inside <= points[stop - 1])
-        # barycentric formula for Chebyshev points of the second kind [Trefethen2000]
-        weight = (-1.0) ** np.arange(stop - start)
-        weight[[0, -1]] *= 0.5
-        away = inside[here, None] - points[None, start:stop]
-        exact = away == 0.0
-        terms = np.where(exact.any(axis=1)[:, None], exact, weight / np.where(exact, 1.0, away))
-        found[:, here] = (values[:, start:stop] @ terms.T) / terms.sum(axis=1)
-    return found
+    return times, velocities, ends, np.split(state, np.cumsum(sizes)[:-1], axis=1)

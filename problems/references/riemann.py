@@ -147,7 +147,7 @@ def solve_riemann(eos_left, left, eos_right, right, cavitation_pressure: float |
 
     if math.isfinite(least):
         if closing(least) <= 0.0:
-            return _part(sides, least)
+            return _join(sides, least, True)
         low = least
     else:
         low = _search_low(sides, closing)
@@ -157,10 +157,17 @@ def solve_riemann(eos_left, left, eos_right, right, cavitation_pressure: float |
         low, rise = high, 2.0 * rise
         high = low + rise
     p = low if closing(low) == 0.0 else find_root(closing, low, high, xtol=1e-300, rtol=RELATIVE)
-    u = 0.5 * (sides[0].velocity(p) + sides[1].velocity(p))
-    waves = sides[0].wave(p), sides[1].wave(p)
-    densities = sides[0].density(p), sides[1].density(p)
-    return RiemannSolution(p, u, u, *densities, *waves, False, sides)
+    return _join(sides, p, False)
+
+
+def _join(sides, p: float, gap: bool) -> RiemannSolution:
+    """The solution with the pressure p between the two sides."""
+    speeds = [side.velocity(p) for side in sides]
+    if not gap:
+        speeds = [0.5 * (speeds[0] + speeds[1])] * 2
+    densities = [side.density(p) for side in sides]
+    waves = [side.wave(p) for side in sides]
+    return RiemannSolution(p, *speeds, *densities, *waves, gap, sides)
 
 
 def _search_low(sides, closing) -> float:
@@ -180,14 +187,6 @@ def _search_low(sides, closing) -> float:
         f"riemann problem: the states pull apart and have no common pressure above p = {low:g}; "
         "give a cavitation pressure at which they may part"
     )
-
-
-def _part(sides, p: float) -> RiemannSolution:
-    """The solution with a gap at pressure p between the two sides."""
-    speeds = [side.velocity(p) for side in sides]
-    densities = [side.density(p) for side in sides]
-    waves = [side.wave(p) for side in sides]
-    return RiemannSolution(p, *speeds, *densities, *waves, True, sides)
 
 
 def compute_cell_averages(

@@ -1,6 +1,6 @@
 """Oblique waves of any material: shock polars, a shock along a line, a plate thrown onto a wedge.
 
-Shock polars and fans.  A flow at speed q meets a straight front at the angle phi (between oncoming
+Shock polars.  A flow at speed q meets a straight front at the angle phi (between oncoming
 flow and front).  The component along the front does not change, the component across it jumps like
 a plane shock whose speed is the oncoming normal component ([CourantFriedrichs1948] IV):
 
@@ -8,14 +8,8 @@ a plane shock whose speed is the oncoming normal component ([CourantFriedrichs19
 
 where theta is the deflection of the flow towards the front and (Us, up, p) lie on the Hugoniot of
 the state ahead.  With the pressure as parameter each point of the polar theta(p) is one plane
-shock; the polar ends at the normal shock Us = q, where theta = 0 again.  Expansion goes on below
-the pressure ahead ([LiepmannRoshko1957] ch. 4), along the isentrope and with q^2/2 + h
-constant (c is the sound speed):
-
-    d theta = sqrt(q^2/c^2 - 1) dp/(rho q^2).
-
-Note: a polar has two shocks of one deflection; the weak one, of lower pressure, is what a
-flow past a body chooses.
+shock; the polar ends at the normal shock Us = q, where theta = 0 again.  Note: a polar has two
+shocks of one deflection; the weak one, of lower pressure, is what a flow past a body chooses.
 
 A shock that runs along a line between two materials, and the ripple on it (`cross_line`).  Seen
 from the point where the shocks cross the line, both materials come along it with the speed W of
@@ -58,14 +52,15 @@ Jets of incompressible streams: [Birkhoff1948].  Angles are in radians, units SI
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from problems.references.hugoniot import (
     Shock,
-    make_isentrope,
     release,
     shock_to_pressure,
     shock_with_particle_speed,
@@ -76,7 +71,6 @@ from regrid.errors import BadInput
 from regrid.roots import find_root
 
 RELATIVE = 8.9e-16
-FAN_POINTS, FAN_WEIGHTS = np.polynomial.legendre.leggauss(40)
 
 
 @dataclass(frozen=True)
@@ -103,150 +97,119 @@ class Body:
         """Sound speed of the state ahead, m/s."""
         return float(self.eos.sound_speed(self.rho, self.p))
 
+    @functools.cached_property
+    def shock_to(self) -> Callable[[float], Shock]:
+        """The plane shock to a pressure, each found once."""
+        return functools.cache(functools.partial(shock_to_pressure, self.eos, self.rho, self.p))
+
 
 @dataclass(frozen=True)
 class ObliqueWave:
-    """One oblique wave and the state behind it.
+    """The state behind an oblique shock.
 
-    - `kind`: "shock", "fan" (expansion), or "none" (pressure as ahead);
     - `p`, `rho`: pressure Pa and density kg/m³ behind;
-    - `deflection`: angle by which the flow turns towards the wave, rad (negative in a fan);
-    - `wave_angle`: angle between the oncoming flow and the front (of a fan: its first Mach
-      line), rad;
-    - `speed_ahead`, `speed_behind`: flow speeds, m/s, in the frame where the wave is at rest;
+    - `deflection`: angle by which the flow turns towards the front, rad;
+    - `wave_angle`: angle between the oncoming flow and the front, rad;
+    - `speed_behind`: flow speed, m/s, in the frame where the front is at rest;
     - `mach_behind`: `speed_behind` over the sound speed behind.
     """
 
-    kind: str
     p: float
     rho: float
     deflection: float
     wave_angle: float
-    speed_ahead: float
     speed_behind: float
     mach_behind: float
 
 
-def compute_deflection(shock_speed, particle_speed, flow_speed):
-    """Deflection, rad, of a flow by an oblique shock of known `shock_speed`, `particle_speed`.
-
-    `atan(up cos(phi)/(q - up sin(phi)))` with `sin(phi) = Us/q`; arrays of shapes that broadcast.
-    nan where the flow is slower than the shock, so that no front stands in it.
-    """
-    with np.errstate(invalid="ignore"):
-        sine = np.divide(shock_speed, flow_speed)
-        cosine = np.sqrt(1.0 - sine * sine)
-        return np.arctan2(particle_speed * cosine, flow_speed - particle_speed * sine)
-
-
 class ShockPolar:
-    """All waves by which the flow of `body` at `flow_speed` can turn, by the pressure behind.
+    """All shocks by which the flow of `body` at `flow_speed` can turn, by the pressure behind.
 
-    Raises BadInput when the flow is not supersonic: no wave stands in it.
+    Raises BadInput when the flow is not supersonic: no shock stands in it.
     """
 
     def __init__(self, body: Body, flow_speed: float):
         self.body, self.flow_speed = body, float(flow_speed)
-        self.mach = self.flow_speed / body.sound_speed
-        if not self.mach > 1.0:
+        if not self.flow_speed > body.sound_speed:
             raise BadInput(
                 f"shock polar: the flow speed {flow_speed:g} is not above the sound speed "
                 f"{body.sound_speed:g}; no oblique shock stands in it"
             )
-        self._normal = None
 
-    def find_normal_shock(self) -> ObliqueWave:
-        """The strongest wave: the shock across the flow, phi = pi/2, no deflection."""
-        if self._normal is None:
-            body = self.body
-            shock = shock_with_speed(body.eos, body.rho, body.p, self.flow_speed)
-            self._normal = self._describe(shock)
-        return self._normal
+    @functools.cached_property
+    def normal_shock(self) -> ObliqueWave:
+        """The strongest shock, across the flow: phi = pi/2, no deflection."""
+        body = self.body
+        return self._describe(shock_with_speed(body.eos, body.rho, body.p, self.flow_speed))
 
     def deflection(self, p: float) -> float:
-        """Deflection, rad, of the wave to pressure `p`: nan above the normal shock."""
-        if p < self.body.p:
-            return self._expand(p)[0]
-        shock = shock_to_pressure(self.body.eos, self.body.rho, self.body.p, p)
-        return float(compute_deflection(shock.shock_speed, shock.particle_speed, self.flow_speed))
+        """Deflection, rad, of the shock to pressure `p`: nan above the normal shock."""
+        shock = self.body.shock_to(p)
+        if shock.shock_speed > self.flow_speed:
+            return math.nan
+        sine = shock.shock_speed / self.flow_speed
+        along = shock.particle_speed * math.sqrt(1.0 - sine * sine)
+        return float(np.arctan2(along, self.flow_speed - shock.particle_speed * sine))
 
-    def wave_to_pressure(self, p: float) -> ObliqueWave:
-        """The wave to pressure `p`; raises BadInput above the pressure of the normal shock."""
-        body = self.body
-        if p < body.p:
-            deflection, rho, speed = self._expand(p)
-            mach = speed / float(body.eos.sound_speed(rho, p))
-            angle = math.asin(1.0 / self.mach)
-            return ObliqueWave("fan", p, rho, deflection, angle, self.flow_speed, speed, mach)
-        shock = shock_to_pressure(body.eos, body.rho, body.p, p)
+    def shock_to(self, p: float) -> ObliqueWave:
+        """The shock to pressure `p`; raises BadInput above the pressure of the normal shock."""
+        shock = self.body.shock_to(p)
         if shock.shock_speed > self.flow_speed * (1.0 + 1e-12):
             raise BadInput(
-                f"oblique shock to p = {p:g}: above {self.find_normal_shock().p:g}, the pressure "
+                f"oblique shock to p = {p:g}: above {self.normal_shock.p:g}, the pressure "
                 f"of the normal shock at flow speed {self.flow_speed:g}"
             )
         return self._describe(shock)
 
-    def find_detachment(self) -> ObliqueWave:
-        """The shock of greatest deflection; a sharper turn detaches the shock."""
-        low, high = self.body.p, self.find_normal_shock().p
-        options = {"xatol": 1e-10 * (high - low)}
-        from scipy.optimize import minimize_scalar  # slow to load
-
-        found = minimize_scalar(
-            lambda p: -self.deflection(p), bounds=(low, high), method="bounded", options=options
-        )
-        return self.wave_to_pressure(float(found.x))
-
-    def sample(self, points: int = 100) -> tuple[np.ndarray, np.ndarray]:
-        """Deflections (rad) and pressures from the state ahead to the normal shock, for drawing.
-
-        The pressures crowd at both ends, where the curve is steep.
-        """
-        low, high = self.body.p, self.find_normal_shock().p
-        share = 0.5 * (1.0 - np.cos(np.linspace(0.0, math.pi, points)))
-        p = low + share * (high - low)
-        inner = [self.deflection(value) for value in p[1:-1]]
-        return np.array([0.0, *inner, 0.0]), p
-
     def _describe(self, shock: Shock) -> ObliqueWave:
         sine = min(shock.shock_speed / self.flow_speed, 1.0)
         along = self.flow_speed * math.sqrt(1.0 - sine * sine)
-        across = shock.shock_speed - shock.particle_speed
-        speed = math.hypot(along, across)
+        speed = math.hypot(along, shock.shock_speed - shock.particle_speed)
         deflection = math.atan2(
             shock.particle_speed * along,
             self.flow_speed**2 - shock.particle_speed * shock.shock_speed,
         )
         c = float(self.body.eos.sound_speed(shock.rho, shock.p))
-        kind = "shock" if shock.p > self.body.p else "none"
-        angle = math.asin(sine)
-        return ObliqueWave(
-            kind, shock.p, shock.rho, deflection, angle, self.flow_speed, speed, speed / c
-        )
+        return ObliqueWave(shock.p, shock.rho, deflection, math.asin(sine), speed, speed / c)
 
-    def _expand(self, p: float) -> tuple[float, float, float]:
-        """Deflection (negative), density and speed behind a fan down to pressure `p`.
 
-        Gauss quadrature in s, pressure = p + (p_ahead - p) s², which crowds points at the low end.
-        """
-        body = self.body
-        isentrope = make_isentrope(body.eos, body.rho, body.p)
-        if p < isentrope.least_pressure:
-            raise BadInput(
-                f"expansion fan to p = {p:g}: below the least pressure of the material, "
-                f"{isentrope.least_pressure:g}"
-            )
-        s = 0.5 * (1.0 + FAN_POINTS)
-        weights = (body.p - p) * s * FAN_WEIGHTS
-        pressures = np.append(p + (body.p - p) * s * s, p)
-        rho = isentrope.density(pressures)
-        enthalpy = body.eos.energy(rho, pressures) + pressures / rho
-        ahead = float(body.eos.energy(body.rho, body.p)) + body.p / body.rho
-        speed_squared = self.flow_speed**2 + 2.0 * (ahead - enthalpy)
-        c = body.eos.sound_speed(rho, pressures)
-        slope = np.sqrt(speed_squared / c**2 - 1.0) / (rho * speed_squared)
-        turn = -float(weights @ slope[:-1])
-        return turn, float(rho[-1]), math.sqrt(speed_squared[-1])
+def sum_deflections(polars: Sequence[ShockPolar], p: float) -> float:
+    """Sum of the deflections [rad] at pressure p; nan above the lowest of the normal shocks."""
+    return sum(polar.deflection(p) for polar in polars)
+
+
+def search_pressure(
+    polars: Sequence[ShockPolar], speed: float, angle: float = math.inf
+) -> tuple[float, float, float]:
+    """Pressures (low, high) between which the sum of deflections reaches `angle` on its way up,
+    and the sum at `high`; where it stays below, `high` is that of the greatest sum.
+
+    The sum rises to one maximum and falls (each polar is concave in p), so steps in pressure end
+    there or past the maximum: the first is the acoustic pressure of an impact at `speed`, each
+    other one 1.4 times the one before.
+    """
+    low = min(polar.body.p for polar in polars)
+    rise = speed / sum(1.0 / (polar.body.rho * polar.body.sound_speed) for polar in polars)
+    before, last, value = low, low, -math.inf
+    while True:
+        p = low + rise
+        total = sum_deflections(polars, p)
+        if total >= angle:
+            return last, p, total
+        if not total > value:
+            break
+        before, last, value, rise = last, p, total, 1.4 * rise
+    if math.isnan(total):
+        p = min(p, *(polar.normal_shock.p for polar in polars))
+    from scipy.optimize import minimize_scalar  # slow to load
+
+    found = minimize_scalar(
+        lambda p: -sum_deflections(polars, p),
+        bounds=(before, p),
+        method="bounded",
+        options={"xatol": 1e-10 * p},
+    )
+    return low, float(found.x), -float(found.fun)
 
 
 LEAST = 1e-3  # of the greatest pressure on both polars: they leave one point together
@@ -331,7 +294,7 @@ def cross_line(first: Body, second: Body, speed: float) -> CrossedLine:
     faster than sound in both, or when the polars do not cross.
     """
     one, two = ShockPolar(first, speed), ShockPolar(second, speed)
-    top = min(one.find_normal_shock().p, two.find_normal_shock().p)
+    top = min(one.normal_shock.p, two.normal_shock.p)
     low = max(first.p, second.p)
 
     def excess(share):
@@ -347,36 +310,18 @@ def cross_line(first: Body, second: Body, speed: float) -> CrossedLine:
         )
     at = int(found[0])
     p = low + find_root(excess, shares[at], shares[at + 1], xtol=1e-13) * (top - low)
-    return CrossedLine(float(speed), one.wave_to_pressure(p), two.wave_to_pressure(p))
-
-
-ATTACHED, SUBSONIC, DETACHED = "attached", "subsonic", "detached"
-SEARCH_ANGLES = 400
+    return CrossedLine(float(speed), one.shock_to(p), two.shock_to(p))
 
 
 @dataclass(frozen=True)
 class Collision:
-    """Flow near the contact point A in the frame of A.
+    """Flow near the contact point A, which runs along the face at `contact_speed` [m/s].
 
-    - `speed` V, m/s, and `angle` beta, rad, as given;
-    - `contact_speed`: speed of A along the face, V/sin(beta), also the flow speed of the wedge;
-    - `plate_flow_speed`: V/tan(beta);
-    - `plate_mach`, `wedge_mach`: flow speeds over the sound speeds ahead (0 for a rigid wedge,
-      which has none);
-    - `regime`: "attached", or why a jet forms: "subsonic" or "detached";
-    - `reason`: the same in one sentence, with numbers;
-    - `p`: pressure behind A, Pa; `plate` and `wedge`: the two waves.  None when a jet forms,
-      `wedge` None also for a rigid wedge.
+    - `p`: pressure behind A, Pa, None when a jet forms;
+    - `plate` and `wedge`: the two shocks, None when a jet forms, `wedge` also for a rigid wedge.
     """
 
-    speed: float
-    angle: float
     contact_speed: float
-    plate_flow_speed: float
-    plate_mach: float
-    wedge_mach: float
-    regime: str
-    reason: str
     p: float | None = None
     plate: ObliqueWave | None = None
     wedge: ObliqueWave | None = None
@@ -384,7 +329,7 @@ class Collision:
     @property
     def attached(self) -> bool:
         """True when shocks are attached to A and no jet forms."""
-        return self.regime == ATTACHED
+        return self.p is not None
 
 
 def release_driven_plate(plate: Body, particle_speed: float) -> tuple[Body, float]:
@@ -399,41 +344,11 @@ def release_driven_plate(plate: Body, particle_speed: float) -> tuple[Body, floa
 
 
 def solve_collision(plate: Body, wedge: Body | None, speed: float, angle: float) -> Collision:
-    """Weak attached solution of a plate moving at `speed` at `angle` to a wedge, or why none.
+    """Weak attached solution of a plate moving at `speed` at `angle` to a wedge, both at one
+    pressure ahead, or none: a jet forms.
 
-    `wedge` None is a rigid one.  With unequal pressures ahead the wave in one of the bodies may
-    be an expansion fan.  Raises BadInput for speed <= 0 or an angle outside 0 to 90 degrees.
+    `wedge` None is a rigid one.  Raises BadInput for speed <= 0 or angles beyond 0 to 90 degrees.
     """
-    _check_collision(speed, angle)
-    flow, contact_speed = speed / math.tan(angle), speed / math.sin(angle)
-    machs = flow / plate.sound_speed, contact_speed / wedge.sound_speed if wedge else 0.0
-    given = (speed, angle, contact_speed, flow, *machs)
-    bodies = [("plate", plate, flow)] + ([("wedge", wedge, contact_speed)] if wedge else [])
-    for name, body, q in bodies:
-        if q <= body.sound_speed:
-            reason = (
-                f"the flow of the {name} towards the contact point, {q:.5g}, is not above its "
-                f"sound speed {body.sound_speed:.5g}: no shock stands in it"
-            )
-            return Collision(*given, SUBSONIC, reason)
-    polars = [ShockPolar(body, q) for _, body, q in bodies]
-    bracket, greatest = _bracket_pressure(polars, speed, angle)
-    if bracket is None:
-        reason = (
-            f"both shocks together deflect by at most {math.degrees(greatest):.5g} degrees, "
-            f"less than the angle {math.degrees(angle):.5g}"
-        )
-        return Collision(*given, DETACHED, reason)
-    low, high = bracket
-    p = find_root(
-        lambda p: _sum_deflections(polars, p) - angle, low, high, xtol=1e-14 * high, rtol=RELATIVE
-    )
-    waves = [polar.wave_to_pressure(p) for polar in polars]
-    reason = "attached shocks turn both flows into one direction"
-    return Collision(*given, ATTACHED, reason, p, waves[0], waves[1] if wedge else None)
-
-
-def _check_collision(speed: float, angle: float) -> None:
     if not speed > 0.0:
         raise BadInput(f"oblique collision: the speed is {speed:g}; give one > 0")
     if not 0.0 < angle < 0.5 * math.pi:
@@ -441,168 +356,45 @@ def _check_collision(speed: float, angle: float) -> None:
             f"oblique collision: the angle is {math.degrees(angle):g} degrees; it must lie "
             "between 0 and 90"
         )
-
-
-def _sum_deflections(polars: list[ShockPolar], p: float) -> float:
-    """Sum of deflections at pressure p; nan above the lower one of the normal shocks."""
-    return sum(polar.deflection(p) for polar in polars)
-
-
-def _estimate_pressure(bodies: list[Body], speed: float) -> float:
-    """Acoustic pressure rise of the plane impact, below the true one."""
-    return speed / sum(1.0 / (body.rho * body.sound_speed) for body in bodies)
-
-
-def _bracket_pressure(polars, speed: float, angle: float):
-    """(low, high) around the weak solution and None, or None and the greatest sum of deflections.
-
-    The sum rises to one maximum and falls (each polar is concave in p), so steps of growing
-    length stop at a bracket or past the maximum.
-    """
-    low = min(polar.body.p for polar in polars)
-    rise = _estimate_pressure([polar.body for polar in polars], speed)
-    before, last, value = low, low, -math.inf
-    while True:
-        p = low + rise
-        total = _sum_deflections(polars, p)
-        if total >= angle:
-            return (last, p), None
-        if not total > value:
-            break
-        before, last, value, rise = last, p, total, 1.4 * rise
-    if math.isnan(total):
-        p = min(p, *(polar.find_normal_shock().p for polar in polars))
-    from scipy.optimize import minimize_scalar  # slow to load
-
-    found = minimize_scalar(
-        lambda p: -_sum_deflections(polars, p),
-        bounds=(before, p),
-        method="bounded",
-        options={"xatol": 1e-10 * p},
+    polars, contact_speed = _make_polars(plate, wedge, speed, angle), speed / math.sin(angle)
+    if not polars:
+        return Collision(contact_speed)
+    low, high, total = search_pressure(polars, speed, angle)
+    if total < angle:
+        return Collision(contact_speed)
+    p = find_root(
+        lambda p: sum_deflections(polars, p) - angle, low, high, xtol=1e-14 * high, rtol=RELATIVE
     )
-    greatest = -float(found.fun)
-    if greatest >= angle:
-        return (low, float(found.x)), None
-    return None, greatest
+    return Collision(contact_speed, p, *(polar.shock_to(p) for polar in polars))
 
 
-@dataclass(frozen=True)
-class CriticalAngle:
-    """Greatest angle with attached shocks at a given plate speed.
-
-    - `angle`: beta_c, rad: at greater angles a jet forms;
-    - `p`: pressure behind A there, Pa;
-    - `contact_speed`: V/sin(beta_c), m/s;
-    - `plate_mach`, `wedge_mach`: flow speeds over the sound speeds ahead (wedge 0 if rigid);
-    - `sonic_angle`: the angle at which one of the flows becomes sonic, above beta_c, rad.
-    """
-
-    angle: float
-    p: float
-    contact_speed: float
-    plate_mach: float
-    wedge_mach: float
-    sonic_angle: float
-
-
-def find_critical_angle(plate: Body, wedge: Body | None, speed: float) -> CriticalAngle:
-    """Critical angle beta_c of jet formation for a plate moving at `speed` onto `wedge`.
-
-    beta_c is the greatest beta for which some p has `theta_plate + theta_wedge >= beta`.  The
-    shocks do not depend on beta, only the flow speeds do, so the greatest beta of each p is found
-    without the equations of state, and then its maximum over p, which is single.
-    """
-    _check_collision(speed, 0.25 * math.pi)
-    bodies = [plate] + ([wedge] if wedge else [])
-    base = max(body.p for body in bodies)
-
-    def greatest_angle(p):
-        shocks = [shock_to_pressure(body.eos, body.rho, body.p, p) for body in bodies]
-        return _find_greatest_angle(shocks, speed)
-
-    rise = _estimate_pressure(bodies, speed)
-    pressures, angles = [base], [0.0]
-    while angles[-1] == 0.0 or angles[-1] >= angles[-2]:
-        pressures.append(base + rise)
-        angles.append(greatest_angle(pressures[-1]))
-        rise *= 1.2
-    from scipy.optimize import minimize_scalar  # slow to load
-
-    found = minimize_scalar(
-        lambda p: -greatest_angle(p),
-        bounds=(pressures[-3], pressures[-1]),
-        method="bounded",
-        options={"xatol": 1e-9 * pressures[-1]},
-    )
-    angle, p = -float(found.fun), float(found.x)
-    contact_speed = speed / math.sin(angle)
-    sonic_angle = math.atan(speed / plate.sound_speed)
+def _make_polars(plate: Body, wedge: Body | None, speed: float, angle: float) -> list[ShockPolar]:
+    """Polars of the flows in the frame of A; none where one of them is subsonic."""
+    flows = [(plate, speed / math.tan(angle))]
     if wedge:
-        sonic_angle = min(sonic_angle, math.asin(min(1.0, speed / wedge.sound_speed)))
-    return CriticalAngle(
-        angle,
-        p,
-        contact_speed,
-        speed / math.tan(angle) / plate.sound_speed,
-        contact_speed / wedge.sound_speed if wedge else 0.0,
-        sonic_angle,
-    )
+        flows.append((wedge, speed / math.sin(angle)))
+    supersonic = all(flow > body.sound_speed for body, flow in flows)
+    return [ShockPolar(body, flow) for body, flow in flows] if supersonic else []
 
 
-def _find_greatest_angle(shocks: list[Shock], speed: float) -> float:
-    """Greatest beta for which `shocks` (plate, wedge) of one pressure deflect by beta or more.
-
-    0 when there is none.  At the greatest beta possible one of the shocks is normal to its flow.
-    """
-    limit = math.atan(speed / shocks[0].shock_speed)
-    if len(shocks) > 1:
-        limit = min(limit, math.asin(min(1.0, speed / shocks[1].shock_speed)))
+def find_critical_angle(plate: Body, wedge: Body | None, speed: float) -> float:
+    """Greatest angle [rad] with attached shocks at this speed of the plate: beyond, a jet forms."""
 
     def excess(angle):
-        flows = speed / np.tan(angle), speed / np.sin(angle)
-        total = -angle
-        for shock, flow in zip(shocks, flows, strict=False):
-            total = total + compute_deflection(shock.shock_speed, shock.particle_speed, flow)
-        return total
+        polars = _make_polars(plate, wedge, speed, angle)
+        return (search_pressure(polars, speed)[2] if polars else 0.0) - angle
 
-    angles = limit * np.linspace(0.0, 1.0, SEARCH_ANGLES + 1)[1:-1]
-    enough = np.flatnonzero(excess(angles) >= 0.0)
-    if enough.size == 0:
-        return 0.0
-    last = angles[enough[-1]]
-    end = limit * (1.0 - 1e-14)
-    if enough[-1] + 1 < angles.size:
-        end = angles[enough[-1] + 1]
-    elif excess(end) >= 0.0:
-        return limit
-    return find_root(lambda angle: float(excess(angle)), last, end, xtol=1e-15, rtol=RELATIVE)
+    low = high = 0.49 * math.pi
+    while excess(low) < 0.0:
+        low, high = 0.7 * low, low
+    return find_root(excess, low, high)
 
 
-@dataclass(frozen=True)
-class BirkhoffJet:
-    """Jet of an incompressible plate on a rigid wall, or of two equal plates on their mid-plane.
+def compute_jet_speed(speed: float, angle: float) -> float:
+    """Birkhoff's jet: its speed [m/s] along the wall, of an incompressible plate that moves at
+    `speed` across itself at `angle` [rad] to a rigid wall.
 
-    - `jet_speed`: along the wall, in the frame of the wall, `V/tan(beta/2)`, m/s;
-    - `slug_speed`: speed of the rest, the slug, `V tan(beta/2)`, m/s, the same way;
-    - `jet_fraction`: share of the plate's mass (and thickness) in the jet, `(1 - cos beta)/2`;
-    - `stagnation_pressure`: `rho q²/2` at A, q = V/tan(beta), Pa.
+    In the frame of A, which runs at V/sin(beta), the jet leaves along the wall at the speed
+    V/tan(beta) of the oncoming stream, as Bernoulli wants on a free surface [Birkhoff1948].
     """
-
-    jet_speed: float
-    slug_speed: float
-    jet_fraction: float
-    stagnation_pressure: float
-
-
-def compute_birkhoff_jet(rho: float, speed: float, angle: float) -> BirkhoffJet:
-    """Birkhoff's jet of a plate that moves at `speed` across itself at `angle` to a rigid wall.
-
-    In the frame of A (which runs at V/sin(beta)) jet and slug leave along the wall in opposite
-    directions at the speed q = V/tan(beta) of the oncoming stream, as Bernoulli wants on a free
-    surface; mass and momentum along the wall then give the fraction [Birkhoff1948].
-    """
-    _check_collision(speed, angle)
-    half = math.tan(0.5 * angle)
-    flow = speed / math.tan(angle)
-    fraction = math.sin(0.5 * angle) ** 2
-    return BirkhoffJet(speed / half, speed * half, fraction, 0.5 * rho * flow**2)
+    return speed / math.tan(0.5 * angle)

@@ -22,7 +22,7 @@ from hydro.boundary import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.problem import Problem, Report, compare, draw_field, find_crossing
-from problems.references.exact_flows import find_shock_angle
+from problems.references.shock_polars import Body, ShockPolar, search_pressure, solve_collision
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
@@ -48,10 +48,16 @@ class ObliqueShock(Problem):
     def __init__(self, deck: ObliqueShockDeck):
         super().__init__(deck)
         self.angle = math.radians(deck.angle)
-        self.beta = find_shock_angle(deck.mach, self.angle, deck.gamma)
-        across = (deck.mach * math.sin(self.beta)) ** 2
         self.ahead = 1.0 / deck.gamma
-        self.pressure = self.ahead * (1.0 + 2.0 * deck.gamma / (deck.gamma + 1.0) * (across - 1.0))
+        gas, fall = Body(IdealGas(deck.gamma), 1.0, self.ahead), deck.mach * math.tan(self.angle)
+        found = solve_collision(gas, None, fall, self.angle)  # as a plate thrown onto a rigid wedge
+        if not found.attached:
+            most = math.degrees(search_pressure([ShockPolar(gas, deck.mach)], fall)[2])
+            raise BadInput(
+                f"deck: angle is {deck.angle:g} degrees; at Mach {deck.mach:g} the shock stays "
+                f"attached up to {most:.4g} degrees only"
+            )
+        self.beta, self.pressure = found.plate.wave_angle, found.p
         if math.tan(self.beta) * LENGTH >= HEIGHT:
             raise BadInput(
                 f"deck: the shock's angle is {math.degrees(self.beta):.3g} degrees; above "

@@ -10,8 +10,9 @@ from hydro.eos.materials import find_material
 from problems.references.shock_polars import (
     Body,
     ShockPolar,
-    compute_birkhoff_jet,
+    compute_jet_speed,
     find_critical_angle,
+    search_pressure,
     solve_collision,
 )
 
@@ -39,13 +40,6 @@ def deflect_gas(gamma, mach, angle):
     )
 
 
-def turn_gas(gamma, mach):
-    """The Prandtl-Meyer function."""
-    ratio = math.sqrt((gamma + 1.0) / (gamma - 1.0))
-    root = math.sqrt(mach**2 - 1.0)
-    return ratio * math.atan(root / ratio) - math.atan(root)
-
-
 @pytest.mark.parametrize("gamma", [1.2, 1.4, 5 / 3])
 @pytest.mark.parametrize("mach", [1.3, 2.0, 8.0])
 def test_gas_polar_is_the_closed_form(gamma, mach):
@@ -54,7 +48,7 @@ def test_gas_polar_is_the_closed_form(gamma, mach):
         angle = math.asin(1.0 / mach) * (1.0 - share) + 0.5 * math.pi * share
         normal = (mach * math.sin(angle)) ** 2
         p = 1.0 + 2.0 * gamma / (gamma + 1.0) * (normal - 1.0)
-        shock = polar.wave_to_pressure(p) if share < 1.0 else polar.find_normal_shock()
+        shock = polar.shock_to(p) if share < 1.0 else polar.normal_shock
         assert shock.p == pytest.approx(p)
         assert shock.deflection == pytest.approx(deflect_gas(gamma, mach, angle), abs=1e-7)
         if share < 1.0:
@@ -63,10 +57,10 @@ def test_gas_polar_is_the_closed_form(gamma, mach):
 
 def test_detachment_and_sonic_point_of_gas_at_mach_2():
     polar = ShockPolar(make_gas(), 2.0)
-    top = polar.find_detachment()
-    low, high = polar.body.p, polar.find_normal_shock().p
-    sonic = polar.wave_to_pressure(
-        brentq(lambda p: polar.wave_to_pressure(p).mach_behind - 1.0, low, high, rtol=1e-14)
+    top = polar.shock_to(search_pressure([polar], 0.7)[1])
+    low, high = polar.body.p, polar.normal_shock.p
+    sonic = polar.shock_to(
+        brentq(lambda p: polar.shock_to(p).mach_behind - 1.0, low, high, rtol=1e-14)
     )
     assert math.degrees(top.deflection) == pytest.approx(22.97353, abs=1e-5)
     assert math.degrees(top.wave_angle) == pytest.approx(64.669, abs=1e-3)
@@ -85,10 +79,10 @@ def test_detachment_and_sonic_point_of_gas_at_mach_2():
 )
 def test_oblique_shocks_conserve_mass_momentum_and_energy(body, speed):
     polar = ShockPolar(body, speed)
-    normal = polar.find_normal_shock()
+    normal = polar.normal_shock
     assert normal.deflection == pytest.approx(0.0, abs=1e-6)
     for share in (0.05, 0.4, 0.8, 0.99):
-        wave = polar.wave_to_pressure(body.p + share * (normal.p - body.p))
+        wave = polar.shock_to(body.p + share * (normal.p - body.p))
         across = speed * math.sin(wave.wave_angle)
         behind = wave.speed_behind * math.sin(wave.wave_angle - wave.deflection)
         flux = body.rho * across
@@ -102,18 +96,6 @@ def test_oblique_shocks_conserve_mass_momentum_and_energy(body, speed):
         ]
         assert total[1] == pytest.approx(total[0], rel=1e-10)
         assert polar.deflection(wave.p) == pytest.approx(wave.deflection, rel=1e-12)
-
-
-@pytest.mark.parametrize("ratio", [0.99, 0.5, 0.05])
-def test_fan_in_gas_is_the_prandtl_meyer_function(ratio):
-    gamma, mach = 1.4, 2.0
-    wave = ShockPolar(make_gas(gamma), mach).wave_to_pressure(ratio)
-    stagnation = (1.0 + 0.2 * mach**2) * ratio ** (-0.4 / 1.4)
-    behind = math.sqrt((stagnation - 1.0) / 0.2)
-    assert wave.kind == "fan"
-    assert wave.mach_behind == pytest.approx(behind, rel=1e-9)
-    assert -wave.deflection == pytest.approx(turn_gas(gamma, behind) - turn_gas(gamma, mach))
-    assert wave.wave_angle == pytest.approx(math.pi / 6.0)
 
 
 TABLE = {
@@ -133,7 +115,7 @@ LAST_DIGITS = {
 @pytest.mark.parametrize("speed, angle", TABLE)
 def test_attached_shocks_of_aluminium_on_steel(speed, angle):
     found = solve_collision(AL, STEEL, 1000.0 * speed, math.radians(angle))
-    assert found.attached and found.regime == "attached"
+    assert found.attached
     angles = (
         found.plate.deflection,
         found.wedge.deflection,
@@ -146,9 +128,8 @@ def test_attached_shocks_of_aluminium_on_steel(speed, angle):
     ):
         assert value == pytest.approx(wanted, abs=1.01 * digit)
     assert found.plate.p == found.wedge.p == found.p
-    assert found.plate.deflection + found.wedge.deflection == pytest.approx(found.angle, rel=1e-12)
-    assert found.contact_speed * math.sin(found.angle) == pytest.approx(found.speed)
-    assert found.plate_flow_speed * math.tan(found.angle) == pytest.approx(found.speed)
+    assert sum(angles[:2]) == pytest.approx(math.radians(angle), rel=1e-12)
+    assert found.contact_speed * math.sin(math.radians(angle)) == pytest.approx(1000.0 * speed)
 
 
 # The table of reference numbers has 20.682 for the last of aluminium on aluminium; a search on a
@@ -165,30 +146,19 @@ CRITICAL = {
 def test_critical_angle_of_aluminium_plate(pair, speed):
     wedge = PAIRS[pair]
     found = find_critical_angle(AL, wedge, 1000.0 * speed)
-    assert math.degrees(found.angle) == pytest.approx(CRITICAL[pair][speed - 1], abs=5e-4)
+    assert math.degrees(found) == pytest.approx(CRITICAL[pair][speed - 1], abs=5e-4)
     below, above = (
-        solve_collision(AL, wedge, 1000.0 * speed, factor * found.angle)
+        solve_collision(AL, wedge, 1000.0 * speed, factor * found)
         for factor in (1.0 - 1e-7, 1.0 + 1e-7)
     )
     assert below.attached and not above.attached
-    assert below.p == pytest.approx(found.p, rel=1e-3)
-    assert found.plate_mach == pytest.approx(below.plate_mach, rel=1e-6)
-    assert found.wedge_mach == pytest.approx(below.wedge_mach, rel=1e-6)
-    assert found.contact_speed == pytest.approx(below.contact_speed, rel=1e-6)
 
 
 @pytest.mark.parametrize("degrees", [5.0, 30.0, 60.0])
 def test_birkhoff_jet(degrees):
-    angle, speed, rho = math.radians(degrees), 2000.0, 2707.0
-    jet = compute_birkhoff_jet(rho, speed, angle)
-    assert jet.jet_speed == pytest.approx(speed / math.tan(0.5 * angle))
-    assert jet.jet_fraction == pytest.approx(0.5 * (1.0 - math.cos(angle)))
-    flow, contact = speed / math.tan(angle), speed / math.sin(angle)
-    assert jet.jet_speed - contact == pytest.approx(flow)
-    assert contact - jet.slug_speed == pytest.approx(flow)
-    assert jet.stagnation_pressure == pytest.approx(0.5 * rho * flow**2)
-    # in the frame of the wall the plate has no momentum along itself, and all of its energy stays
-    along = jet.jet_fraction * jet.jet_speed + (1.0 - jet.jet_fraction) * jet.slug_speed
-    assert along == pytest.approx(speed * math.sin(angle))
-    energy = jet.jet_fraction * jet.jet_speed**2 + (1.0 - jet.jet_fraction) * jet.slug_speed**2
-    assert energy == pytest.approx(speed**2)
+    """In the frame of the wall the plate has no momentum along itself, and keeps its energy."""
+    angle, speed = math.radians(degrees), 2000.0
+    jet, part = compute_jet_speed(speed, angle), math.sin(0.5 * angle) ** 2  # of the plate's mass
+    slug = 2.0 * speed / math.sin(angle) - jet  # as fast the other way in the frame of A
+    assert part * jet + (1.0 - part) * slug == pytest.approx(speed * math.sin(angle))
+    assert part * jet**2 + (1.0 - part) * slug**2 == pytest.approx(speed**2)

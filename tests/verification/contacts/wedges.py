@@ -12,7 +12,7 @@ from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
-from problems.references.shock_polars import Body, ShockPolar
+from problems.references.shock_polars import Body, ShockPolar, search_pressure, sum_deflections
 
 
 def find_oblique_contact(plate, base, speed, angle):
@@ -25,12 +25,8 @@ def find_oblique_contact(plate, base, speed, angle):
         ShockPolar(Body(material.eos, material.rho0), flow)
         for material, flow in ((plate, speed / math.sin(angle)), (base, speed / math.tan(angle)))
     ]
-    high = min(polar.find_detachment().p for polar in polars)
-
-    def excess(p):
-        return sum(polar.deflection(p) for polar in polars) - angle
-
-    return brentq(excess, 1e-4 * high, high)
+    high = search_pressure(polars, speed)[1]
+    return brentq(lambda p: sum_deflections(polars, p) - angle, 1e-4 * high, high)
 
 
 def make_wedge(angle, speed, *, height=10, length=60, gap=0.5, below=10, stretch=1.0, materials):

@@ -12,7 +12,7 @@ from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
 from hydro.eos.materials import find_material
 from hydro.links import join
 from hydro.simulation import Simulation
-from problems.references.hugoniot import compute_free_surface_speed, shock_to_pressure
+from problems.references.hugoniot import release, shock_to_pressure
 from runs.deck.reading import read_deck
 
 DENSITIES = (1.0, 3.0)
@@ -164,7 +164,7 @@ def test_release_has_the_speed_of_the_exact_isentrope(name, shocked_to, pressure
         before, t = plate.nodes[0, -1].copy(), simulation.t
         row = simulation.advance()
     speed = (plate.nodes[0, -1] - before) / (simulation.t - t)
-    exact = compute_free_surface_speed(eos, shock.rho, shock.p, up, pressure)
+    exact = up + release(eos, shock.rho, shock.p, pressure)[1]
     assert speed == pytest.approx(exact, rel=2e-3)
     assert np.ptp(speed) <= 1e-12 * exact, "it stays plane"
     # from the first moment on: the mean speed lacks little

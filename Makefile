@@ -2,7 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# Python compiles modules when they are first imported, most never
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 INSTALL := $(VENV)/.installed
 DEVELOP := $(VENV)/.developing
 DOCUMENT := $(VENV)/.documenting
@@ -30,25 +31,27 @@ help:
 
 setup: $(DEVELOP)
 
-$(INSTALL): pyproject.toml
+$(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
 	  echo "Python 3.11 or newer is needed, $(PYTHON) is $$($(PYTHON) --version 2>&1 | head -n 1);" \
 	       "name another with make PYTHON=python3.12 ..." >&2; exit 1; }
-	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { \
+	@$(PYTHON) -m venv $(VENV) || { \
 	  echo "$(PYTHON) -m venv failed: its venv module is missing (on Debian: python3-venv)" >&2; \
 	  rm -rf $(VENV); exit 1; }
+
+$(INSTALL): pyproject.toml | $(BIN)/python
 	@echo "installing into $(VENV) ..."
 	@$(PIP) --editable .
 	@touch $@
 
-$(DEVELOP): $(INSTALL)
-	@echo "installing what the tests need ..."
+$(DEVELOP): pyproject.toml | $(BIN)/python
+	@echo "installing into $(VENV), with what the tests need ..."
 	@$(PIP) $(WHEELS) --editable '.[dev,readers,mpi]' 2>/dev/null || { \
 	  $(PIP) --editable '.[dev]' && \
 	  for extra in readers mpi; do \
 	    $(PIP) $(WHEELS) --editable ".[$$extra]" 2>/dev/null || \
 	    echo "extra [$$extra] cannot be had here: its tests will be skipped"; done; }
-	@touch $@
+	@touch $(INSTALL) $@
 
 $(DOCUMENT): $(INSTALL)
 	@echo "installing what the site needs ..."

@@ -13,6 +13,9 @@ settings.register_profile("ci", derandomize=True, deadline=None, print_blob=True
 settings.register_profile("dev", deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "dev"))
 
+# runs that tests start compile in one process: pytest's workers have the other processors
+os.environ["SHOCKGRID_COMPILERS"] = "1"
+
 
 def pytest_addoption(parser):
     parser.addoption(

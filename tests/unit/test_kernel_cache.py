@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from builders import ROOT
 from regrid.jit import compute_contents_digest, kernel, read_clock
+from runs.march import compiling
 
 LAW = """
 from hydro.eos import IdealGas
@@ -162,6 +165,30 @@ def test_the_clock_of_steps_stands_while_a_kernel_is_compiled():
     began = read_clock()
     time.sleep(0.01)
     assert read_clock() - began >= 0.009
+
+
+@pytest.mark.parametrize(("compilers", "started"), [("", 1), ("1", 0)])
+def test_a_second_process_compiles_unless_only_one_may(monkeypatch, compilers, started):
+    threads, programs = [], []
+
+    def make_thread(target, **options):
+        return SimpleNamespace(start=lambda: threads.append(target))
+
+    def start_process(program, **options):
+        programs.append(program)
+        return contextlib.nullcontext(SimpleNamespace(terminate=lambda: None))
+
+    monkeypatch.setenv("SHOCKGRID_COMPILERS", compilers)
+    monkeypatch.setattr(compiling, "MANY", 0)
+    monkeypatch.setattr(compiling.os, "cpu_count", lambda: 2)
+    with monkeypatch.context() as patched:
+        patched.setattr(compiling.threading, "Thread", make_thread)
+        patched.setattr(compiling.subprocess, "Popen", start_process)
+        with compiling.second_compiler():
+            pass
+        for target in threads:
+            target()
+    assert programs == started * [[sys.executable, "-m", "runs.march.compiling"]]
 
 
 def test_code_that_uses_numpy_is_loaded_without_numba_np_and_scipy(tmp_path):

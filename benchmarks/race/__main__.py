@@ -13,6 +13,7 @@ import numpy as np
 
 from benchmarks.race.cases import CASES, Case
 from benchmarks.race.compiled_peers import (
+    build_amrclaw,
     build_cloverleaf,
     build_pennant,
     run_cloverleaf,
@@ -36,6 +37,16 @@ def run_python_peer(python: str, code: str, name: str, numbers: dict, cells: int
     return json.loads((home / "stdout").read_text().splitlines()[-1]), spent
 
 
+def run_amrclaw(python: str, program: Path, name: str, numbers: dict, cells: int) -> tuple:
+    """What AMRClaw found, and the CPU seconds of its program."""
+    command = [python, SCRIPT.with_name("amr_peer.py"), program, name, str(cells)]
+    done = subprocess.run(
+        command, input=json.dumps(numbers), capture_output=True, text=True, check=True
+    )
+    found = json.loads(done.stdout.splitlines()[-1])
+    return found, found["cpu"]
+
+
 def list_codes(options: argparse.Namespace, case: Case) -> dict[str, Any]:
     """Codes that were given and compute this case, each with a function of the cells."""
     codes: dict[str, Any] = {"shockgrid": partial(run_ours, case.name, case.numbers)}
@@ -46,6 +57,10 @@ def list_codes(options: argparse.Namespace, case: Case) -> dict[str, Any]:
         codes["pennant"] = partial(
             run_pennant, build_pennant(options.pennant), case.name, case.numbers
         )
+    if options.amrclaw and "amrclaw" in case.cells:
+        python = options.peer_python
+        program = build_amrclaw(options.amrclaw, python)
+        codes["amrclaw"] = partial(run_amrclaw, python, program, case.name, case.numbers)
     for code in ("pyclaw", "pyro"):
         if options.peer_python and code in case.cells:
             codes[code] = partial(
@@ -58,6 +73,8 @@ def race(case: Case, options: argparse.Namespace) -> list[dict[str, Any]]:
     """Rows of one case: code, cells, error, CPU seconds."""
     rows, found = [], {}
     for code, run in list_codes(options, case).items():
+        if code not in options.codes:
+            continue
         cells = [n for n in case.cells[code] if n <= options.most_cells]
         if code in ("shockgrid", "pyro"):
             run(cells[0])  # compiles what is not compiled yet
@@ -106,8 +123,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.race", description=__doc__)
     parser.add_argument("--cloverleaf", type=Path, help="checkout of UK-MAC/CloverLeaf_ref")
     parser.add_argument("--pennant", type=Path, help="checkout of lanl/PENNANT")
+    claw = "folder with checkouts of clawpack's amrclaw, classic, clawutil and riemann"
+    parser.add_argument("--amrclaw", type=Path, help=f"{claw}; needs --peer-python")
     parser.add_argument("--peer-python", help="interpreter with clawpack and pyro-hydro")
     parser.add_argument("--only", nargs="+", choices=CASES, default=list(CASES))
+    parser.add_argument("--codes", nargs="+", choices=NAMES, default=list(NAMES))
     parser.add_argument("--most-cells", type=int, default=10**6)
     keep = "keep the results in docs/results/race.json and draw their picture"
     parser.add_argument("--write", action="store_true", help=keep)

@@ -102,6 +102,7 @@ def make_growth() -> Case:
             "shockgrid": (16, 24, 32, 64, 128),
             "cloverleaf": (32, 64, 128, 256),
             "pyclaw": (32, 64, 128, 256),
+            "amrclaw": (64, 128, 256, 512),
             "pyro": (32, 64, 128),
         },
     )
@@ -120,6 +121,7 @@ def make_mushroom() -> Case:
             "shockgrid": (16, 32, 64, 128),
             "cloverleaf": (32, 64, 128, 256),
             "pyclaw": (32, 64, 128, 256),
+            "amrclaw": (64, 128, 256, 512),
             "pyro": (32, 64, 128),
         },
     )

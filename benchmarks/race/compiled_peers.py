@@ -1,4 +1,4 @@
-"""CloverLeaf_ref and PENNANT, built in a copy of their checkout and changed for a case's start.
+"""CloverLeaf_ref, PENNANT and AMRClaw, built in a copy of their checkout for a case's start.
 
 CloverLeaf_ref (staggered Lagrange step and second-order remap, compiled Fortran) has reflecting
 walls only.  An interface is computed in the frame of the shocked gas at the left wall, in a domain
@@ -7,6 +7,9 @@ with the shares of cut cells, and its dumps have more digits.
 
 PENNANT (staggered Lagrange on polygons, axisymmetric, compiled C++).  Changed: its last dump has
 the cells' centres and volumes beside the densities, and its walls are the case's.
+
+AMRClaw (PyClaw's method with adaptive refinement, compiled Fortran).  Its start is
+`amr_start.f90`; `amr_peer.py` runs it.
 """
 
 from __future__ import annotations
@@ -71,6 +74,28 @@ PENNANT_DUMP = """    Parallel::gatherv(&zp[0], numz, &gzp[0], &penumz[0]);
                  << zr[z] << " " << mesh->zvol[z] << endl;
     }
 """
+
+AMRCLAW_MAKE = """CLAW_PKG = amrclaw
+EXE = xamr
+AMRLIB = $(CLAW)/amrclaw/src/2d
+include $(AMRLIB)/Makefile.amr_2d
+EXCLUDE_SOURCES = $(AMRLIB)/qinit.f90 $(AMRLIB)/setprob.f90
+RIEMANN = $(CLAW)/riemann/src
+SOURCES = ./amr_start.f90 $(RIEMANN)/rpn2_euler_4wave.f90 $(RIEMANN)/rpt2_euler.f90
+include $(CLAW)/clawutil/src/Makefile.common
+"""
+
+
+def build_amrclaw(checkouts: Path, python: str) -> Path:
+    """The program, built in a copy of a folder with amrclaw, classic, clawutil and riemann."""
+    work = Path(tempfile.mkdtemp()) / "claw"
+    shutil.copytree(checkouts, work)
+    shutil.copy(Path(__file__).with_name("amr_start.f90"), work)
+    (work / "Makefile").write_text(AMRCLAW_MAKE)
+    flags = {"CLAW": str(work), "CLAW_PYTHON": python, "FFLAGS": "-O3 -march=native"}
+    environment = os.environ | flags
+    subprocess.run(["make", ".exe"], cwd=work, env=environment, check=True, capture_output=True)
+    return work / "xamr"
 
 
 def build_cloverleaf(checkout: Path, numbers: dict[str, Any]) -> Path:

@@ -18,6 +18,7 @@ NAMES = {
     "shockgrid": "shockgrid",
     "cloverleaf": "CloverLeaf_ref",
     "pyclaw": "PyClaw",
+    "amrclaw": "AMRClaw",
     "pyro": "pyro",
     "pennant": "PENNANT",
 }

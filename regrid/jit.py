@@ -24,13 +24,15 @@ from pathlib import Path
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 
 import llvmlite
+import llvmlite.binding
 import numba
 import numpy as np
 from numba.core import serialize
+from numba.core.codegen import CodeLibrary, JITCodeLibrary
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
 from numba.core.environment import Environment, _rebuild_env, lookup_environment
-from numba.core.runtime import rtsys
+from numba.core.runtime import _nrt_python
 from numba.extending import register_jitable
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -137,10 +139,12 @@ class KernelCache:
         return Path(folder, "kernels", name)
 
     def load_overload(self, types, context):
-        rtsys.initialize(context)
         with contextlib.suppress(OSError, EOFError, pickle.UnpicklingError):
             with self._find(types, context).open("rb") as file:
-                return CompileResult._rebuild(context, *_Reader(file).load())
+                parts = _Reader(file).load()
+            context.codegen().unserialize_library = functools.partial(_Loaded, context.codegen())
+            return CompileResult._rebuild(context, *parts)
+        _name_by_contents()  # it is compiled now
 
     def save_overload(self, types, result) -> None:
         with contextlib.suppress(OSError):  # where nothing can be written the run goes on without
@@ -152,6 +156,36 @@ class KernelCache:
             found = sorted(path.parent.iterdir(), key=os.path.getmtime)
             for old in found[: -KEPT_FILES // 2] if len(found) > KEPT_FILES else ():
                 old.unlink()
+
+
+class _Loaded(JITCodeLibrary):
+    """Machine code from the disk, which LLVM takes as it is.  Its bitcode, much slower to read, is
+    read when a kernel that calls it is compiled."""
+
+    def __init__(self, codegen, serialized):
+        name, _, (machine_code, self._bitcode) = serialized
+        CodeLibrary.__init__(self, codegen, name)  # without an empty module
+        self._finalized = self._disable_inspection = True
+        _name_runtime()
+        engine = codegen._engine._ee
+        engine.add_object_file(llvmlite.binding.ObjectFileRef.from_data(machine_code))
+        engine.finalize_object()
+
+    def get_pointer_to_function(self, name):
+        return self._codegen._engine.get_function_address(name)
+
+    @functools.cached_property
+    def _shared_module(self):
+        return llvmlite.binding.parse_bitcode(self._bitcode)
+
+    _final_module = property(lambda self: self._shared_module)
+
+
+@functools.cache
+def _name_runtime() -> None:
+    """Tell LLVM where numba's C functions are: what `rtsys.initialize` does before it compiles."""
+    for name, address in _nrt_python.c_helpers.items():
+        llvmlite.binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
 class _Reader(pickle.Unpickler):
@@ -172,11 +206,21 @@ def _rebuild_environment(module: str, constants: list, name: str) -> Environment
     return _rebuild_env(module, constants, name)
 
 
-def _name_by_contents(function, options=()) -> None:
-    """Give a function of which there may be variants (made by a factory, of a user's own, with
-    options) a name of its own variant: machine code is linked by name and types, and variants
-    cached by two processes and loaded by a third would pass for one another."""
+_unnamed: list[tuple[FunctionType, list]] = []  # that are not yet compiled, with their options
+
+
+def _has_variants(function, options=()) -> None:
+    """Remember a function of which there may be variants: made by a factory, of a user's own, with
+    options."""
     if function.__closure__ or options or function.__module__.split(".")[0] not in PACKAGES:
+        _unnamed.append((function, sorted(options)))
+
+
+def _name_by_contents() -> None:
+    """Give these functions names of their own: machine code is linked by name and types, and
+    variants cached by two processes and loaded by a third would pass for one another."""
+    while _unnamed:
+        function, options = _unnamed.pop()
         words = f"{compute_contents_digest(function)} {options}"
         function.__qualname__ += f"_{hashlib.sha256(words.encode()).hexdigest()[:10]}"
 
@@ -229,7 +273,7 @@ def kernel(function=None, *, allocates=True, **options):
     if function is None:
         return functools.partial(kernel, allocates=allocates, **options)
     options |= {} if allocates else {"_nrt": False}
-    _name_by_contents(function, sorted(options.items()))
+    _has_variants(function, options.items())
     compiled = numba.njit(nogil=True, error_model="numpy", **options)(function)
     if isinstance(compiled, Dispatcher):  # not so with NUMBA_DISABLE_JIT
         compiled._cache = KernelCache(compiled.py_func)
@@ -250,6 +294,6 @@ def compiled_once(function=None, *, allocates=True, **options):
         return functools.partial(compiled_once, allocates=allocates, **options)
     options |= {} if allocates else {"_nrt": False}
     function.compiled_as = sorted(options)
-    _name_by_contents(function)
+    _has_variants(function)
     wrappers = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return register_jitable(error_model="numpy", **wrappers, **options)(function)

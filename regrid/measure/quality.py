@@ -33,8 +33,6 @@ from regrid.measure.corners import (
 from regrid.measure.crossings import walk_boundary
 from regrid.sides import SIDE_NAMES
 
-SLAB = 128  # rows of cells that are judged at a time
-
 
 @dataclass(frozen=True)
 class Quality:
@@ -226,16 +224,9 @@ def find_bad_cells(nodes: np.ndarray) -> np.ndarray:
 
 
 def _are_surely_convex(nodes: np.ndarray) -> bool:
-    """Are all corner areas beyond their rounding error?  Some rows of cells at a time."""
-    least, edges = math.inf, 0.0
-    for first in range(0, nodes.shape[1] - 1, SLAB):
-        rows = nodes[:, first : first + SLAB + 1]
-        area = compute_corner_areas(rows).min()
-        if not area > 0.0:
-            return False
-        least = min(least, float(area))
-        edges = max(edges, *(_longest(np.diff(rows, axis=axis)) for axis in (1, 2)))
-    return least > 4.0 * BOUND * edges * edges + UNDERFLOW
+    """Are all sines of corners beyond their rounding error?  (Of edges above 1e-77 m.)"""
+    sine, _, bad = reduce_worst(_checked(nodes), np.empty((3, nodes.shape[2] - 1)))
+    return bad == 0 and sine > (8.0 * BOUND) ** 2
 
 
 def _longest(differences: np.ndarray) -> float:

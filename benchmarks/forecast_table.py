@@ -100,8 +100,8 @@ def make_past(deck: str, setting: str, folder: Path) -> Any:
     row = data.history
     first_dt = float(row["dt"][1]) / START_FACTORS[0]
     flow = name_flow(read.problem, read.deck)
-    last = data.dumps[-1].t_end
-    past = make_past_run(flow, read.problem, size.cells, last, size.finest, first_dt, row)
+    last = data.dumps[0].t_end
+    past = make_past_run(flow, size.cells, last, size.finest, first_dt, row)
     return msgspec.structs.replace(past, seconds=0.0)
 
 
@@ -120,7 +120,7 @@ def judge(deck: str, setting: str, folder: Path) -> dict[str, Any]:
     t, seconds = history["t"][1:], history["seconds_step"][1:].copy()
     seconds[0] = np.median(seconds)  # loading kernels
     wall = np.cumsum(drop_events(np.ones(len(seconds)), seconds))
-    left, found = TimeLeft(float(t[-1]), past.course if past else None), {}
+    left, found = TimeLeft(size.t_end, past.course if past else None), {}
     waiting = [share * wall[-1] for share in SHARES]
     for number, (now, when) in enumerate(zip(t, wall, strict=True), start=1):
         left.note(number, float(now), float(when))

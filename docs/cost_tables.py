@@ -13,7 +13,7 @@ from pathlib import Path
 
 from accuracy_tables import make_table
 
-from runs.forecast.step_trend import MEANINGS, describe_settings
+from runs.early_end.causes import SHORT_STEPS, describe_settings
 from runs.inspection.account import RULES
 
 RESULTS = Path(__file__).resolve().parent / "results"
@@ -73,5 +73,7 @@ def _list_rules() -> list[str]:
 
 
 def _list_meanings() -> list[str]:
-    rows = [[f"`{name}`", words, describe_settings(name)] for name, (words, _) in MEANINGS.items()]
+    rows = [
+        [f"`{name}`", words, describe_settings(name)] for name, (words, _) in SHORT_STEPS.items()
+    ]
     return make_table(["name", "what it says", "what can be changed"], rows)

@@ -13,7 +13,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     bench [FILE: ]TABLE         a table of results/bench.json, or of another file there
     accuracy PART...            a part of the page of `make accuracy`; see docs/accuracy_tables.py
     study NAME PART             a part of the results of a study; see docs/study_tables.py
-    causes ends|slow            why runs end early or slow down, of `runs.early_end.causes`
+    causes ends                 why runs end early, of `runs.early_end.causes`
     cost PART                   a table of docs/cost.md; see docs/cost_tables.py
     soak PART                   outcomes or defects of `make soak`; see docs/soak_table.py
     regrid_suite PART           a table of docs/regrid-suite.md; see docs/regrid_suite_table.py
@@ -56,7 +56,7 @@ from study_tables import fill_study, read_study  # noqa: E402
 
 from benchmarks.race.tables import fill_race  # noqa: E402
 from problems.registry import read_docstring  # noqa: E402
-from runs.early_end.causes import ENDS, SLOW  # noqa: E402
+from runs.early_end.causes import ENDS  # noqa: E402
 from runs.inspection.account import describe_convexity, measure_drifts  # noqa: E402
 from runs.store.reader import RunData  # noqa: E402
 from runs.verify import HEADS, describe_bars, format_record  # noqa: E402
@@ -247,10 +247,9 @@ def fill_bench(arguments: str) -> list[str]:
 
 
 def fill_causes(arguments: str) -> list[str]:
-    """Causes of early ends, or of runs that slow down: what is seen, why, what has helped."""
-    causes = {"ends": ENDS, "slow": SLOW}[arguments.strip()]
+    """Causes of early ends: what is seen, why, what has helped."""
     rows = []
-    for cause in causes.values():
+    for cause in ENDS.values():
         helped = "; ".join(f"{one.described}: {one.words}" for one in cause.settings)
         rows.append([cause.says, cause.means, helped or "-", cause.advice or "-"])
     return make_table(["what it says or shows", "cause", "settings that have helped", "else"], rows)

@@ -12,8 +12,9 @@ from benchmarks.regrid_suite.marches import March
 from benchmarks.regrid_suite.regridders import Entry
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells
-from runs.grids.pictures import BAD, LINE, frame, plot_lines, plot_sides
+from runs.grids.pictures import BAD, LINE, frame, plot_sides
 from runs.pictures.command import new_figure, save
+from runs.pictures.fields import draw_grid_lines
 
 PANEL = 2.9  # inches
 COLOURS = 64
@@ -51,7 +52,7 @@ def draw_outcome(axes, march: March, name: str, found: Outcome) -> None:
     last = march.boundary(found.done if found.whole else found.done + 1)
     nodes = found.nodes if found.whole or found.ended_by is None else found.ended_by
     if np.isfinite(nodes).all():
-        plot_lines(axes, nodes, LINE)
+        draw_grid_lines(axes, nodes, LINE)
         for i, j in find_bad_cells(nodes):
             corners = nodes[:, [i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
             axes.fill(*corners, facecolor=BAD, edgecolor=BAD, linewidth=1.2, zorder=3)

@@ -312,27 +312,32 @@ def draw_growth(problem, figure, run) -> None:
         axes.grid(alpha=0.3)
     dumps = run.dumps
     chosen = sorted({round((n + 1) * (len(dumps) - 1) / SHOWN) for n in range(SHOWN)})
-    fields = [find_shown(problem, dumps[number]) for number in chosen]
+    shown = [dumps[number] for number in chosen]
+    windows = find_windows(problem, shown)
+    fields = [find_shown(dump, window) for dump, window in zip(shown, windows, strict=True)]
     scale = min(f.min() for f in fields), max(f.max() for f in fields)
     panels = [figure.add_subplot(grid[1, column]) for column in range(len(chosen))]
-    for axes, number in zip(panels, chosen, strict=True):
-        mesh = _draw_grid(axes, problem, dumps[number], scale)
+    for axes, dump, window in zip(panels, shown, windows, strict=True):
+        mesh = _draw_grid(axes, problem, dump, window, scale)
     if panels:
         panels[0].set_ylabel("y [m]")
         figure.colorbar(mesh, ax=panels, label="density [kg/m3]")
 
 
-def find_window(problem, dump) -> tuple[float, float]:
-    """Least and greatest x [m] of the picture around the interface."""
-    x, y = dump.blocks[0].nodes[:, -1, :]
-    middle, half = 0.5 * (x.min() + x.max()), 0.5 * np.ptp(y)
-    reach = max(0.6 * np.ptp(x) + 0.05 * problem.deck.wavelength, half)
-    return middle - reach, middle + reach
+def find_windows(problem, dumps) -> list[tuple[float, float]]:
+    """Least and greatest x [m] around the interface for each dump, all as wide as the widest."""
+    lines = [dump.blocks[0].nodes[:, -1, :] for dump in dumps]
+    reach = max(
+        (max(0.6 * np.ptp(x) + 0.05 * problem.deck.wavelength, 0.5 * np.ptp(y)) for x, y in lines),
+        default=0.0,
+    )
+    middles = [0.5 * float(x.min() + x.max()) for x, _ in lines]
+    return [(middle - reach, middle + reach) for middle in middles]
 
 
-def find_shown(problem, dump) -> np.ndarray:
+def find_shown(dump, window) -> np.ndarray:
     """Densities of the cells that lie in the window of the dump's picture."""
-    low, high = find_window(problem, dump)
+    low, high = window
     shown = []
     for block in dump.blocks:
         x = compute_centres(block.nodes)[0]
@@ -340,7 +345,7 @@ def find_shown(problem, dump) -> np.ndarray:
     return np.concatenate(shown)
 
 
-def _draw_grid(axes, problem, dump, scale):
+def _draw_grid(axes, problem, dump, window, scale):
     """Both grids around the interface at one time, coloured by density on one scale.
 
     Returns what a colour bar needs.
@@ -361,7 +366,7 @@ def _draw_grid(axes, problem, dump, scale):
             linewidth=0.15,
         )
     axes.plot(line[0], line[1], color="C3", lw=1.2)
-    axes.set_xlim(*find_window(problem, dump))
+    axes.set_xlim(*window)
     axes.set(aspect="equal", xlabel="x [m]")
     axes.set_title(f"density and grid, k c t = {float(get_kct(problem, dump.t)):.1f}", fontsize=9)
     return mesh

@@ -86,34 +86,34 @@ def is_runtime_key(key: str, kind: type[Deck]) -> bool:
 
 
 def find_differences(before: Deck, now: Deck) -> list[Difference]:
-    """Where two decks of one problem differ, by the order of the keys of `before`."""
+    """Where two decks of one problem differ, by the order of the keys of `before`; files that they
+    name are the same where their digests are."""
     one, two = msgspec.to_builtins(before), msgspec.to_builtins(now)
-    known = [table.pop(DIGESTS, None) or {} for table in (one, two)]
-    return [
-        found for found in _walk(one, two, "") if not _is_same_file(found.before, found.now, *known)
-    ]
+    known, known_now = (table.pop(DIGESTS, None) or {} for table in (one, two))
+
+    def is_same_file(found: Difference) -> bool:
+        names = found.before, found.now
+        given = all(isinstance(name, str) for name in names) and names[0] in known
+        return given and known[names[0]] == known_now.get(names[1])
+
+    return [found for found in find_changes(one, two) if not is_same_file(found)]
 
 
-def _walk(before: Any, now: Any, key: str) -> Iterator[Difference]:
+def find_changes(before: Any, now: Any, key: str = "") -> Iterator[Difference]:
+    """Where two trees of plain tables, lists and values differ, and with which values."""
     if isinstance(before, dict) and isinstance(now, dict):
         for name in dict.fromkeys((*before, *now)):
             inner = f"{key}.{name}" if key else name
-            yield from _walk(before.get(name), now.get(name), inner)
+            yield from find_changes(before.get(name), now.get(name), inner)
     elif isinstance(before, list | tuple) and isinstance(now, list | tuple):
         if len(before) != len(now) or not any(isinstance(one, dict) for one in before):
             if list(before) != list(now):
                 yield Difference(key, before, now)
             return
         for place, (one, two) in enumerate(zip(before, now, strict=True)):
-            yield from _walk(one, two, f"{key}.{place}")
+            yield from find_changes(one, two, f"{key}.{place}")
     elif before != now:
         yield Difference(key, before, now)
-
-
-def _is_same_file(before: Any, now: Any, known: dict[str, str], known_now: dict[str, str]) -> bool:
-    if not (isinstance(before, str) and isinstance(now, str) and before in known):
-        return False
-    return known[before] == known_now.get(now)
 
 
 RUNTIME, MAY_CHANGE = "x-restart", "may change"  # marks keys in a schema; editors pass it over

@@ -18,14 +18,13 @@ from regrid.errors import RunFailure
 class Setting:
     """A key of the deck and how to change it; `words`: what that does.
 
-    `value`: as after `--set key=`; or `factor` on what the deck has, not beyond `least` and `most`.
+    `value`: as after `--set key=`; or `factor` on what the deck has, up to `most`.
     """
 
     key: str
     words: str
     value: str = ""
     factor: float = 1.0
-    least: float = 0.0
     most: float = float("inf")
 
     def choose(self, present: Any) -> str | None:
@@ -34,7 +33,7 @@ class Setting:
             return None if str(present).lower() == self.value.lower() else self.value
         if isinstance(present, bool) or not isinstance(present, int | float):
             return None
-        wished = min(max(present * self.factor, self.least), self.most)
+        wished = min(present * self.factor, self.most)
         wished = round(wished) if isinstance(present, int) else wished
         if wished == present or (wished > present) != (self.factor > 1.0):
             return None
@@ -73,7 +72,6 @@ GRID_AT_REST = Setting("mesh", "the grid is fixed, the gas flows through it", va
 LESS_SHARING = Setting("run.small_cells", "redistributes the states of fewer cells", factor=0.5)
 THICKER = Setting("thickness", "damps the shortest waves of lines", factor=2.0)
 BARRIER = Setting("regrid.name", "the regridder that finds a grid most often", value="barrier")
-CHEAPEST = Setting("regrid.name", "the regridder that costs least", value="barrier")
 FEWER_CELLS = Setting("cells", "larger cells do not follow the finest folds", factor=0.5)
 END = "end the run there (`run.t_end`)"
 
@@ -162,33 +160,29 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         "other cells, or an earlier restart point (`--at`)", "state not on new cells"),
 }  # fmt: skip
 
-SLOW: dict[str, Cause] = {
-    "flat-cells": Cause(
-        "dt falls slowly, `dt_limit` is `sound`",
-        "many cells become very thin: behind the edge of a roll, in a thin layer or a neck; a few "
-        "do not matter, since their states are redistributed", (MORE_SHARING, FEWER_CELLS)),
-    "closing-lines": Cause(
-        "dt falls a hundredfold in few steps",
-        "a line curls back on itself, or closes on another", (),
-        f"see the picture: lines that reconnect cannot be followed; {END}"),
-    "retries": Cause(
-        "`retries` in many steps",
-        "steps are retried with shorter dt: no grid, or no positive state", (SMALLER_CFL,),
-        "see which block the log names"),
-    "rescues": Cause(
-        "`regrid_rescues` in many steps", "sides move so that the inside folds",
-        (MORE_BARRIER, SMALLER_CFL)),
-    "slow-regridder": Cause(
-        "steps are slow, dt is normal",
-        "`ivanenko-charakhchyan`, `brackbill-saltzman` or `equidistribution` is used, or many "
-        "Newton steps", (CHEAPEST,)),
-    "moving-convection": Cause(
-        "convection: a step in time on a moving grid is slow",
-        "matrices are factorised in every step", (),
-        "a grid at rest, if the layers do not move"),
+_BESIDE = (MORE_SHARING, FEWER_CELLS)  # for cells that a line itself made flat
+_INSIDE = (MORE_SHARING, MORE_BARRIER, FEWER_CELLS)  # those that the inside of a grid made flat
+SHORT_STEPS: dict[str, tuple[str, tuple[Setting, ...]]] = {  # by what limits dt: words, what helps
+    "hot": ("fast waves: the material is hot or moves fast, the cell is no thinner than others",
+            (FEWER_CELLS,)),
+    "crushed": ("crushed: all cells of the block have become thin", (FEWER_CELLS,)),
+    "stretching": ("stretching: nodes of a line part fast", (SMALLER_CFL, FEWER_CELLS)),
+    "touch": ("touch: bodies come to touch, node by node", (FEWER_CELLS,)),
+    "tension": ("tension: the shortest capillary waves of a line are fast", (FEWER_CELLS,)),
+    "corner": ("corner: at a key node, where lines meet", _BESIDE),
+    "sliding": ("sliding contact: in the first cells beside it", _BESIDE),
+    "line": ("line: the first cells beside an interface or a surface are squeezed", _INSIDE),
+    "axis": ("axis: in the first cells beside the axis", _BESIDE),
+    "wall": ("wall: in the first cells beside a wall", _BESIDE),
+    "inside": ("inside: cells away from all lines are squeezed", _INSIDE),
 }  # fmt: skip
 
-CAUSES = {**ENDS, **SLOW}
+
+def describe_settings(limit: str) -> str:
+    """What can be changed where dt is short by one of SHORT_STEPS, in a line."""
+    _, settings = SHORT_STEPS.get(limit, ("", (FEWER_CELLS,)))
+    words = [f"{setting.described.replace('`', '')}: {setting.words}" for setting in settings]
+    return "; ".join([*words, "run.t_end ends the run before"])
 
 
 def name_failure(error: Exception) -> str:
@@ -203,8 +197,3 @@ def name_failure(error: Exception) -> str:
         return ""
     full = system.errno in (errno.ENOSPC, errno.EDQUOT)
     return "disk full" if full else "disk not writable"
-
-
-def settings_for(cause: str) -> tuple[Setting, ...]:
-    """Settings that have helped against a cause, the best first; none for an unknown id."""
-    return CAUSES[cause].settings if cause in CAUSES else ()

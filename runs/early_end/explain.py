@@ -10,9 +10,10 @@ distance of neighbouring nodes no grid resolves what lies between.
 
 from __future__ import annotations
 
+import contextlib
 import shlex
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,14 +22,16 @@ import msgspec
 import numpy as np
 
 from regrid.errors import BadInput, Place, RunFailure
+from regrid.measure.quality import compute_corner_areas
 from regrid.sides import get_side
 from runs.deck.checking import is_runtime_key
 from runs.deck.reading import ReadDeck, resolve_deck
-from runs.early_end.causes import CAUSES, settings_for
+from runs.early_end.causes import ENDS, Cause
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state
 from runs.store.files import write_atomically
 from runs.store.history import read_history
+from runs.store.reader import RunData
 
 MET = 0.1  # distances of neighbouring nodes: lines as near as this have met
 DETOUR = 6.0  # times their distance: two places of an outline less far apart along it are one
@@ -60,58 +63,57 @@ def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restar
     restart: the command that continues the run.  The failure gets what was made as its
     `early_end`, and the words as its notes.  Raises nothing that is an Exception.
     """
-    made: dict[str, Any] = {}
+    cause, made, lines = ENDS.get(failure.cause), {}, []
 
-    def tell_event() -> list[str]:
-        from runs.store.reader import RunData
-
+    def measure() -> str:
         outputs = RunData(directory.path).outputs
-        event = describe_event(outputs[-1].blocks, failure.place) if outputs else ""
-        return [f"what happened there: {event}"] if event else []
+        return describe_event(outputs[-1].blocks, failure.place) if outputs else ""
 
-    def choose_point() -> list[str]:
-        made["point"] = find_calm_point(directory)
-        return []
-
-    def choose_settings() -> list[str]:
-        found, point = list_settings(failure.cause, deck)[:SHOWN], made.get("point")
-        commands = [make_command(one, directory, deck, restart, point) for one, _ in found]
-        made["settings"], made["commands"] = tuple(one for one, _ in found), tuple(commands)
-        told = [f"  {one}   ({words})" for (_, words), one in zip(found, commands, strict=True)]
-        return ["what has helped in such runs:", *told] if found else []
-
-    def draw() -> list[str]:
-        from runs.early_end import picture
-        from runs.store.reader import RunData
+    def draw() -> Path:
+        from runs.early_end.picture import draw_early_end
 
         title = str(failure).partition("; last restart point is")[0]
         title = title.partition("; there is no restart point yet")[0]
-        run, point = RunData(directory.path), made.get("point")
-        made["picture"] = picture.draw_early_end(run, title, failure.place, point)
-        return [f"picture of the place: {made['picture']}"]
+        run = RunData(directory.path)
+        marked = find_marked(run.outputs[-1].blocks, failure.place)
+        return draw_early_end(run, title, failure.place, marked, made["point"])
 
-    cause, lines = CAUSES.get(failure.cause), []
-    if cause is not None:
-        lines.append(f"what it means: {cause.means.replace('`', '')}")
-    for part, otherwise in (
-        (tell_event, "the outlines could not be measured"),
-        (choose_point, "no restart point could be chosen"),
-        (choose_settings, "settings that have helped could not be looked up"),
-        (draw, "no picture of the place could be made"),
-    ):
+    def attempt(part: Callable[[], Any], otherwise: str) -> Any:
         try:
-            lines += part()
+            return part()
         except Exception as error:  # whatever it is: the sentence comes first
             lines.append(f"{otherwise}: {str(error).partition(chr(10))[0] or type(error).__name__}")
+            return None
+
+    if cause is not None:
+        lines.append(f"what it means: {cause.means.replace('`', '')}")
+    if event := attempt(measure, "the outlines could not be measured"):
+        lines.append(f"what happened there: {event}")
+    made["point"] = attempt(lambda: find_calm_point(directory), "no restart point could be chosen")
+    settings = attempt(
+        lambda: list_settings(cause, deck)[:SHOWN],
+        "settings that have helped could not be looked up",
+    )
+    if settings:
+        made["settings"] = tuple(one for one, _ in settings)
+        made["commands"] = tuple(
+            make_command(one, directory, deck, restart, made["point"]) for one in made["settings"]
+        )
+        lines.append("what has helped in such runs:")
+        lines += [
+            f"  {command}   ({words})"
+            for command, (_, words) in zip(made["commands"], settings, strict=True)
+        ]
+    if picture := attempt(draw, "no picture of the place could be made"):
+        made["picture"] = picture
+        lines.append(f"picture of the place: {picture}")
     if cause is not None and cause.advice:
         lines.append(f"what else can be done: {cause.advice.replace('`', '')}")
     failure.early_end = EarlyEnd(directory.path, failure.cause, **made, lines=tuple(lines))
     for line in lines:
         failure.add_note(line)
-    try:
+    with contextlib.suppress(BadInput, OSError):
         write_atomically(directory.early_words, "\n".join([str(failure), *lines]) + "\n")
-    except (BadInput, OSError):
-        pass
     return failure.early_end
 
 
@@ -139,22 +141,20 @@ def find_calm_point(directory: RunDirectory) -> int | None:
     return max((s for s in points if s <= last and s < int(steps[-1])), default=points[0])
 
 
-def list_settings(cause: str, deck: ReadDeck) -> list[tuple[str, str]]:
+def list_settings(cause: Cause | None, deck: ReadDeck) -> list[tuple[str, str]]:
     """(`key=value`, what it does) of the settings of a cause that this deck can take."""
     found = []
-    for setting in settings_for(cause):
+    for setting in cause.settings if cause else ():
         present: Any = msgspec.to_builtins(deck.deck)
         for name in setting.key.split("."):
             present = present.get(name) if isinstance(present, dict) else None
         if (value := setting.choose(present)) is None:
             continue
         words = f"{setting.key}={value}"
-        try:
+        with contextlib.suppress(BadInput):  # not for this problem, or with this deck
             table = tomllib.loads(deck.to_toml())
             resolve_deck(table, deck.origin, (words,), deck.file).make_problem()
-        except BadInput:  # not for this problem, or with this deck
-            continue
-        found.append((words, setting.words))
+            found.append((words, setting.words))
     return found
 
 
@@ -180,7 +180,9 @@ def describe_event(blocks: Sequence, place: Place | None) -> str:
     named = [block for block in blocks if place is not None and block.name == place.block]
     found = []
     for block in named or blocks:
-        event = find_thinnest(block.nodes, _find_centre(block.nodes, place) if named else None)
+        cell = find_cell(block.nodes, place) if named else None
+        centre = None if cell is None else block.nodes[:, cell[0], cell[1]]
+        event = find_thinnest(block.nodes, centre)
         found += [(event, block.name)] if event is not None else []
     (share, width, sides, x, y, inside), name = min(
         found, key=lambda one: one[0][0], default=((np.inf, 0.0, ("", ""), 0.0, 0.0, False), "")
@@ -269,12 +271,32 @@ def _trace_ring(nodes: np.ndarray) -> tuple[np.ndarray, list[str]]:
     return ring, [name for name, line in parts for _ in range(line.shape[1])]
 
 
-def _find_centre(nodes: np.ndarray, place: Place | None) -> np.ndarray | None:
-    """Where in the block a place is; None where it names no more than the block."""
-    if place is not None and place.cell is not None:
-        i, j = (min(max(k, 0), n - 1) for k, n in zip(place.cell, nodes.shape[1:], strict=True))
-        return nodes[:, i, j]
-    if place is not None and place.side and place.nodes:
-        line = get_side(nodes, place.side)
-        return line[:, min(place.nodes[0], line.shape[1] - 1)]
-    return None
+def find_cell(nodes: np.ndarray, place: Place | None) -> tuple[int, int] | None:
+    """The cell (i, j) of a block that a place means: for nodes of a side the one beside the first
+    of them; None where it names no more than the block."""
+    if place is None:
+        return None
+    most_i, most_j = (n - 2 for n in nodes.shape[1:])
+    if place.cell is not None:
+        i, j = place.cell
+    elif place.side and place.nodes:
+        along = place.nodes[0]
+        i = {"i_min": 0, "i_max": most_i}.get(place.side, along)
+        j = {"j_min": 0, "j_max": most_j}.get(place.side, along)
+    else:
+        return None
+    return min(max(i, 0), most_i), min(max(j, 0), most_j)
+
+
+def find_marked(blocks: Sequence, place: Place | None) -> tuple[Any, tuple[int, int]]:
+    """The block and the cell (i, j) that a place means.
+
+    Without a cell the smallest one of the block, without a place that of all blocks.
+    """
+    named = [block for block in blocks if place is not None and block.name == place.block]
+    candidates = named or list(blocks)
+    areas = [np.abs(compute_corner_areas(block.nodes).sum(axis=0)) for block in candidates]
+    number = int(np.argmin([float(area.min() / np.median(area)) for area in areas]))
+    i, j = np.unravel_index(areas[number].argmin(), areas[number].shape)
+    cell = find_cell(candidates[number].nodes, place) if named else None
+    return candidates[number], cell or (int(i), int(j))

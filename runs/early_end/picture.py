@@ -7,10 +7,10 @@ its neighbours' stands for it, and the picture says so.
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
 from matplotlib.patches import Polygon, Rectangle
 
 from problems.evolution import BlockView
@@ -22,10 +22,7 @@ from runs.pictures.command import new_figure, save
 from runs.pictures.fields import (
     View,
     choose_colours,
-    draw_lines,
-    draw_mesh,
-    draw_sheets,
-    dress,
+    draw_panel,
     find_extent,
     find_range,
     make_sheets,
@@ -38,11 +35,18 @@ MARK = "tab:red"
 DPI = 120
 
 
-def draw_early_end(run: RunData, sentence: str, place: Place | None, point: int | None) -> Path:
+def draw_early_end(
+    run: RunData,
+    sentence: str,
+    place: Place | None,
+    marked: tuple[BlockView, tuple[int, int]],
+    point: int | None,
+) -> Path:
     """Write DIR/early-end.png from the last dump of `run`; returns its path.
 
-    sentence: the title; place: what is marked; point: step of the restart point to be marked on the
-    curve of dt.  Raises BadInput where there is no dump, or where the disk is full.
+    sentence: the title; place: that of the failure; marked: the block and the cell (i, j) that
+    stand for it; point: step of the restart point to be marked on the curve of dt.  Raises BadInput
+    where the disk is full.
     """
     figure, dump = new_figure(), run.outputs[-1]
     figure.set_size_inches(13.0, 6.8)
@@ -50,28 +54,24 @@ def draw_early_end(run: RunData, sentence: str, place: Place | None, point: int 
     left, right = figure.subfigures(1, 2, width_ratios=(1.35, 1.0))
     near = left.subplots()
     whole, below = right.subplots(2, 1, height_ratios=(1.25, 1.0))
-    block, cell, corners = find_marked(dump.blocks, place)
+    block, (i, j) = marked
+    corners = block.nodes[:, [i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
     known = dump.field_names()
     names = ["rho"] if "rho" in known else known[:1]
     sheets = make_sheets(dump, names, View())
     extent = find_extent([sheets])
-    window = find_window(block.nodes, cell, extent)
+    window = find_window(block.nodes, (i, j), extent)
     scale, unit = pick_prefix(float(np.abs(extent).max()), "m")
-    title = name_cell(block.name, cell, place)
-    for axes, box, words, lines in (
-        (near, window, title, 0.8),
-        (whole, extent, "the whole domain", 0.3),
-    ):
-        for name in names:
-            look = choose_colours(dump, name, [find_range(sheets, name, box)])
-            image = draw_sheets(axes, sheets, name, *look[:3], scale)
-            axes.figure.colorbar(image, ax=axes, label=look[3], shrink=0.9)
-        draw_mesh(axes, sheets, scale, "k", lines)
-        draw_lines(axes, sheets, scale)
-        dress(axes, box, scale)
+    title = name_cell(block.name, (i, j), place)
+    for axes, box, words in ((near, window, title), (whole, extent, "the whole domain")):
+        name = names[0] if names else ""
+        look = choose_colours(dump, name, [find_range(sheets, name, box)]) if name else None
+        draw_panel(axes, sheets, name, look, scale, box)
+        if look:
+            bar = ScalarMappable(*look[:2])
+            axes.figure.colorbar(bar, ax=axes, label=look[3], shrink=0.9)
         axes.set_title(words, fontsize=10, color=MARK if axes is near else "k")
-        axes.set_xlabel(f"{dump.axes[0]} [{unit}]")
-        axes.set_ylabel(f"{dump.axes[1]} [{unit}]")
+        axes.set(xlabel=f"{dump.axes[0]} [{unit}]", ylabel=f"{dump.axes[1]} [{unit}]")
         axes.tick_params(labelsize=8)
         x, y = corners.mean(axis=1) * scale  # a ring is seen however flat the cell is
         ring = {"markersize": 16, "markeredgewidth": 1.8, "fillstyle": "none", "zorder": 6}
@@ -85,41 +85,6 @@ def draw_early_end(run: RunData, sentence: str, place: Place | None, point: int 
     whole.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, edgecolor=MARK, zorder=5))
     draw_steps(below, run, dump.step, point)
     return save(figure, run.directory.early_picture, DPI)
-
-
-def find_marked(
-    blocks: Sequence[BlockView], place: Place | None
-) -> tuple[BlockView, tuple[int, int], np.ndarray]:
-    """The block, the cell (i, j) and its corners (2, 4) [m] that a place means.
-
-    Nodes of a side mean the cell beside the first of them; without a cell the smallest one of the
-    block, without a place that of all blocks.
-    """
-    named = [block for block in blocks if place is not None and block.name == place.block]
-    candidates = named or list(blocks)
-    ways = [(x[:, 1:, 1:] - x[:, :-1, :-1], x[:, :-1, 1:] - x[:, 1:, :-1])
-            for x in (block.nodes for block in candidates)]  # fmt: skip
-    areas = [0.5 * np.abs(a[0] * b[1] - a[1] * b[0]) for a, b in ways]
-    number = int(np.argmin([float(area.min() / np.median(area)) for area in areas]))
-    block = candidates[number]
-    ni, nj = areas[number].shape
-    if named and place is not None and place.cell is not None:
-        i, j = (min(max(k, 0), n - 1) for k, n in zip(place.cell, (ni, nj), strict=True))
-    elif named and place is not None and place.side and place.nodes:
-        along = place.nodes[0]
-        i = {"i_min": 0, "i_max": ni - 1}.get(place.side, min(along, ni - 1))
-        j = {"j_min": 0, "j_max": nj - 1}.get(place.side, min(along, nj - 1))
-    else:
-        i, j = (int(k) for k in np.unravel_index(areas[number].argmin(), (ni, nj)))
-    x = block.nodes
-    corners = np.array([x[:, i, j], x[:, i + 1, j], x[:, i + 1, j + 1], x[:, i, j + 1]]).T
-    return block, (i, j), corners
-
-
-def measure_areas(nodes: np.ndarray) -> np.ndarray:
-    """Areas (ni, nj) [m2] of the cells, positive whichever way the block turns."""
-    one, other = nodes[:, 1:, 1:] - nodes[:, :-1, :-1], nodes[:, :-1, 1:] - nodes[:, 1:, :-1]
-    return 0.5 * np.abs(one[0] * other[1] - one[1] * other[0])
 
 
 def find_window(nodes: np.ndarray, cell: tuple[int, int], extent) -> tuple[float, ...]:

@@ -1,20 +1,17 @@
 """What a run will cost: before it starts, and how long it still takes while it marches.
 
-Steps come from the first stable dt, or where nothing is built yet from the width of the finest
-cells, and from how dt went in a past run of the same flow or problem.  The wall time of a step
-comes from runs that finished on this machine; where there was none, it is said to be unknown.
+Steps come from those of a past run of the same flow, scaled with the first stable dt, or where
+nothing is built yet with the width of the finest cells.  The wall time of a step comes from runs
+that finished on this machine; where there was none, it is said to be unknown.
 
 A past run is known by its flow: its problem and those keys of its deck that differ from the
 problem's defaults, without cells, `run`, `output` and gauges.  past_runs.json beside this file is
 delivered and knows steps alone; runs that finish here are kept in the cache directory, with the
 wall time of their steps.  A cache that cannot be read or written is none.
 
-While a run marches, what is left is the integral of what a second of the flow costs,
-
-    left = integral of cost rate (t') dt' from now to t_end,    log rate(t') = log rate + trend,
-
-with the trend fitted to the latter half of the steps, believed in for about as long as it has been
-seen, and that of a past run of the same deck, weighed by the part of the steps that is made.
+While a run marches, what is left is found in two ways: from the trend of the steps a second of the
+flow takes, believed in for about as long as it has been seen; and from the share of its steps and
+of its wall time that a past run of the same flow had taken by the same part of the end time.
 """
 
 from __future__ import annotations
@@ -35,6 +32,7 @@ import numpy as np
 from problems.deck import Output
 from problems.problem import BlockPlan, Problem, estimate_memory
 from regrid.errors import BadInput
+from runs.deck.checking import find_changes
 from runs.deck.reading import ReadDeck
 from runs.inspection.account import count
 from runs.store.directory import KEPT_RESTARTS
@@ -43,8 +41,8 @@ from runs.store.files import write_atomically
 DUMP_BYTES = 64  # a cell in a dump: nodes, five fields and a rate
 BLOCK_BYTES = 30_000  # of a block in a dump, for the form of the file; measured
 ROW_BYTES = 600  # of a step in history.csv; measured
-# steps over those foretold, at the least and most, by what they are foretold from
-RANGES = {"same": (0.75, 1.5), "like": (0.5, 5.0), "nothing": (0.5, 5.0)}
+# steps over those foretold, at the least and most: from a run of this flow to this time, or else
+SAME, LIKE = (0.75, 1.5), (0.5, 5.0)
 MOST_NAMED = 6  # blocks in a line
 TIGHT = 0.9  # part of the free disk that a run may be foretold to fill without a word
 
@@ -52,6 +50,7 @@ DELIVERED = Path(__file__).with_name("past_runs.json")
 KEPT = 300  # runs of this machine
 SURE = 1.4  # a step's wall time may be so many times what it was in runs before, or less
 UNSURE = 0.25  # power of the ratio of cells by which that grows
+WORK = 0.8  # power of the number of cells with which a step's wall time grows
 LEAST_STEPS = 40  # of a run that says something about others
 OTHER = ("run", "output", "gauge", "cells")  # keys of a deck that leave the flow as it is
 
@@ -61,18 +60,16 @@ STEEPEST = 4.0  # change of a logarithm, at most, that is foretold from a fit al
 UNUSUAL = 4.0  # times the usual wall time of a step: no speed, but an event
 POINTS = 200  # of the integral
 PARTS = 20  # of the time of a past run
-# what the cost left was, at its least and most, over what was foretold, at the very start of runs
-UNFORESEEN = {"fitted": (0.8, 3.0), "remembered": (0.65, 1.8)}
+# what was left over what was foretold, at its least and most, at the very start of runs
+FITTED, REMEMBERED = (0.8, 3.0), (0.65, 1.8)
 
 
 class Course(NamedTuple):
-    """How a past run went, in equal parts of the time from 0 to its end: means in each part.
+    """Shares of a past run's steps and wall time that were over at PARTS + 1 equal parts of t_end:
+    where it ended before, the last ones are 1."""
 
-    dt: over the first stable dt; work: wall time of a step over that of the first parts.
-    """
-
-    dt: tuple[float, ...]
-    work: tuple[float, ...]
+    steps: tuple[float, ...]
+    walls: tuple[float, ...]
 
 
 class Forecast(NamedTuple):
@@ -100,55 +97,42 @@ class TimeLeft:
 
     def foretell(self, step: int, t: float, wall: float) -> Forecast | None:
         """What is left after the step that has just ended; None where nothing is known yet."""
-        if not math.isfinite(self.t_end) or len(self.marks) < 3 or not t > self.marks[0][1]:
+        if not (self.marks and math.isfinite(self.t_end) and t > self.marks[0][1]):
             return None
         if step - self.marks[0][0] < FIRST_STEPS:
             return None
-        if t >= self.t_end:
-            return Forecast(0.0, 0.0, 0.0, 0.0)
         fresh = [(step, t, wall)] * (step > self.marks[-1][0])
         steps, times, walls = np.array([*self.marks, *fresh], dtype=float).T
         counts, seconds = np.diff(steps), drop_events(np.diff(steps), np.diff(walls))
-        half = int(np.searchsorted(steps, 0.5 * (steps[0] + steps[-1])))
-        part = slice(max(min(half, len(steps) - 4), 0), None)
-        middles = 0.5 * (times[1:] + times[:-1])[part] - t
-        rates = np.log(counts[part] / np.diff(times)[part])  # steps a second of the flow
-        level, slope = fit_line(middles, rates, counts[part])
-        a_step = seconds[part].sum() / counts[part].sum()
-        ahead, memory = np.linspace(0.0, self.t_end - t, POINTS), t - times[part][0]
+        half = slice(max(int(np.searchsorted(steps, steps.mean())) - 1, 0), None)
+        end, parts = self.t_end, np.linspace(0.0, 1.0, PARTS + 1)
+        if self.course is not None:  # a run may end before its end time
+            end *= parts[np.searchsorted(self.course.steps, 1.0)]
+        ahead, memory = np.linspace(0.0, max(end - t, 0.0), POINTS), t - times[half][0]
+        middles, flow = 0.5 * (times[1:] + times[:-1])[half] - t, np.diff(times)[half]
+        level, slope = fit_line(middles, np.log(counts[half] / flow), counts[half])
         gone = memory * (1.0 - np.exp(-ahead / memory))
 
         def follow(slope: float) -> float:
-            return _integrate(ahead, level + np.clip(slope * gone, -STEEPEST, STEEPEST))
+            logs = level + np.clip(slope * gone, -STEEPEST, STEEPEST)
+            return float(np.trapezoid(np.exp(logs), ahead))
 
-        kind, left = "fitted", follow(slope)
+        left, limits = follow(slope), FITTED
+        a_step = seconds[half].sum() / counts[half].sum()
         found = [left * a_step, follow(0.0) * a_step]
         if self.course is not None:
-            kind, share = "remembered", step / (step + self._remember(times, counts.sum(), False))
-            remembered = self._remember(times, seconds.sum(), True)
-            left = left**share * self._remember(times, counts.sum(), False) ** (1.0 - share)
-            found = [found[0] ** share * remembered ** (1.0 - share), remembered]
-        unknown = math.sqrt(1.0 - t / self.t_end)
-        limits = [found[0] * limit**unknown for limit in UNFORESEEN[kind]]
-        ends = found[0], min(*limits, *found), max(*limits, *found), left
-        return Forecast(*(float(end) for end in ends))
-
-    def _remember(self, times: np.ndarray, cost: float, work: bool) -> float:
-        """What is left of a cost (of steps, or of their work), as in a past run, of which the
-        stretch of `times` took `cost`."""
-        assert self.course is not None
-        past = np.log(self.course.work if work else np.ones(PARTS)) - np.log(self.course.dt)
-        parts = (np.arange(len(past)) + 0.5) / len(past)
-        done, left = (
-            _integrate(x := np.linspace(*ends, POINTS), np.interp(x / self.t_end, parts, past))
-            for ends in ((times[0], times[-1]), (times[-1], self.t_end))
-        )
-        return cost * left / done
-
-
-def _integrate(x: np.ndarray, logs: np.ndarray) -> float:
-    """The integral over x (n,) of what has the logarithms (n,)."""
-    return float(np.trapezoid(np.exp(logs), x))
+            ends = times[0] / self.t_end, t / self.t_end
+            known = [
+                cost * (1.0 - now) / max(now - first, 1e-9)
+                for cost, shares in zip((counts.sum(), seconds.sum()), self.course, strict=True)
+                for first, now in [np.interp(ends, parts, shares)]
+            ]
+            share, limits = step / (step + known[0]), REMEMBERED
+            left = left**share * known[0] ** (1.0 - share)
+            found = [found[0] ** share * known[1] ** (1.0 - share), known[1]]
+        unknown = math.sqrt(max(1.0 - t / self.t_end, 0.0))
+        ends = [*(found[0] * limit**unknown for limit in limits), *found]
+        return Forecast(float(found[0]), float(min(ends)), float(max(ends)), float(left))
 
 
 def fit_line(x: np.ndarray, y: np.ndarray, weights: np.ndarray) -> tuple[float, float]:
@@ -156,18 +140,12 @@ def fit_line(x: np.ndarray, y: np.ndarray, weights: np.ndarray) -> tuple[float, 
 
     The value is that of the last quarter of the weight: so a bend does not throw it off.
     """
-    total = weights.sum()
-    middle, mean = (weights @ x) / total, (weights @ y) / total
-    spread = float(weights @ (x - middle) ** 2)
-    if len(x) < 3 or spread <= 0.0:
+    if len(x) < 4:
         return float(y[-1]), 0.0
-    slope = float(weights @ ((x - middle) * (y - mean))) / spread
-    rest = y - mean - slope * (x - middle)
-    # neighbours are not independent: their number is taken as few
-    error = math.sqrt(float(weights @ rest**2) / spread / max(min(len(x), 8) - 2, 1))
-    late = weights * (weights.cumsum() >= 0.75 * total)
-    level = float((late @ (y - slope * x)) / late.sum())
-    return level, math.copysign(max(abs(slope) - error, 0.0), slope)
+    (slope, _), errors = np.polyfit(x, y, 1, w=np.sqrt(weights), cov=True)
+    slope = math.copysign(max(abs(slope) - math.sqrt(errors[0, 0]), 0.0), slope)
+    late = weights * (weights.cumsum() >= 0.75 * weights.sum())
+    return float(np.average(y - slope * x, weights=late)), float(slope)
 
 
 def drop_events(counts: np.ndarray, walls: np.ndarray) -> np.ndarray:
@@ -178,47 +156,27 @@ def drop_events(counts: np.ndarray, walls: np.ndarray) -> np.ndarray:
     return np.where(each <= UNUSUAL * usual, walls, usual * counts)
 
 
-def make_course(
-    steps: np.ndarray, times: np.ndarray, seconds: np.ndarray, first_dt: float
-) -> Course:
-    """The course of a whole run: steps, times [s] and wall times [s] of all rows (n,).
-
-    first_dt: its first stable dt [s].  A part's work is the median of its steps; parts that no step
-    ended in have that of their neighbours.
-    """
-    edges = np.linspace(0.0, times[-1], PARTS + 1)
-    counts = np.diff(np.interp(edges, times, steps))
-    part = np.clip(np.searchsorted(edges, times[1:]) - 1, 0, PARTS - 1)
-    known = np.unique(part)
-    medians = [np.median(seconds[1:][part == one]) for one in known]
-    work = np.maximum(np.interp(np.arange(PARTS), known, medians), 1e-9)
-    dt = edges[1] / np.maximum(counts, 1e-9) / first_dt
-    return Course(tuple(dt.tolist()), tuple((work / np.median(work[:4])).tolist()))
-
-
 class PastRun(msgspec.Struct, frozen=True):
     """One run: its flow and how it went.
 
-    finest: the least width [m] of a block over its cells; first_dt: the first stable step [s]; dt,
-    work: see `Course`; seconds: wall time [s] of a step here, 0 where it is of another machine;
-    kernels: what the wall time of a step depends on beside the cells.
+    finest: the least width [m] of a block over its cells; first_dt: the first stable step [s];
+    seconds: wall time [s] of a step here, 0 where it is of another machine; kernels: what the wall
+    time of a step depends on beside the cells.
     """
 
     flow: str
-    problem: str
     cells: int
     t_end: float
     finest: float
     first_dt: float
     steps: int
-    dt: tuple[float, ...]
-    work: tuple[float, ...]
+    course: Course
     seconds: float = 0.0
     kernels: str = ""
 
     @property
-    def course(self) -> Course:
-        return Course(self.dt, self.work)
+    def problem(self) -> str:
+        return self.flow.partition("; ")[0]
 
     def is_off(self, cells: int) -> float:
         """How far the number of cells is from another, as the size of a logarithm."""
@@ -231,20 +189,9 @@ def name_flow(problem: str, deck: Any) -> str:
         usual = msgspec.to_builtins(type(deck)())
     except (BadInput, TypeError):
         usual = {}
-
-    def list_changes(given: Mapping[str, Any], usual: Mapping[str, Any], head: str) -> list[str]:
-        changes = []
-        for key in sorted(given):
-            value, other = given[key], usual.get(key)
-            if not head and key in OTHER:
-                continue
-            if isinstance(value, dict) and isinstance(other, dict):
-                changes += list_changes(value, other, f"{head}{key}.")
-            elif value != other:
-                changes.append(f"{head}{key}={value}")
-        return changes
-
-    return "; ".join([problem, *list_changes(msgspec.to_builtins(deck), usual, "")])
+    changes = [one for one in find_changes(usual, msgspec.to_builtins(deck))
+               if one.key.partition(".")[0] not in OTHER]  # fmt: skip
+    return "; ".join([problem, *sorted(f"{one.key}={one.now}" for one in changes)])
 
 
 def name_kernels(evolution: Any) -> str:
@@ -265,9 +212,9 @@ def find_home() -> Path:
 
 
 @functools.cache
-def read_delivered() -> tuple[PastRun, ...]:
+def read_delivered() -> list[PastRun]:
     """The runs that come with shockgrid."""
-    return tuple(msgspec.json.decode(DELIVERED.read_bytes(), type=list[PastRun]))
+    return msgspec.json.decode(DELIVERED.read_bytes(), type=list[PastRun])
 
 
 def read_own() -> list[PastRun]:
@@ -290,58 +237,50 @@ def keep_run(run: PastRun) -> None:
 
 
 def find_past(flow: str, cells: int, own: bool = True) -> PastRun | None:
-    """The past run of a flow whose cells are nearest in number; `own`: this machine's first."""
-    for runs in (read_own() if own else [], read_delivered()):
-        if same := [run for run in runs if run.flow == flow]:
+    """The past run of a flow whose cells are nearest in number, of this machine (`own`) first; if
+    there is none, one of the same problem: with the deck of its defaults, if it is there."""
+    mine, problem = (read_own() if own else []), flow.partition("; ")[0]
+    for runs, name in (
+        (mine, flow),
+        (read_delivered(), flow),
+        ([*mine, *read_delivered()], problem),
+    ):
+        if same := [run for run in runs if run.flow == name]:
             return min(same, key=lambda run: run.is_off(cells))
-    return None
-
-
-def find_like(problem: str, cells: int, own: bool = True) -> PastRun | None:
-    """A past run of the same problem with another deck: the one of its defaults, if it is there."""
-    runs = [*(read_own() if own else []), *read_delivered()]
-    like = [run for run in runs if run.problem == problem]
-    like = [run for run in like if run.flow == problem] or like
+    like = [run for run in [*mine, *read_delivered()] if run.problem == problem]
     return min(like, key=lambda run: run.is_off(cells), default=None)
 
 
 def find_seconds(kernels: str, problem: str, cells: int) -> tuple[float, float] | None:
     """Wall time [s] of a step of so many cells on this machine, and a factor up and down to where
-    it may be; None where it is not known.
-
-    From runs of the same kernels, or else of the same problem: a power of the number of cells
-    through the nearest one and another of twice or half as many.
-    """
+    it may be, from runs of the same kernels, or else of the same problem; None without any."""
     runs = [run for run in read_own() if run.seconds > 0.0]
-    runs = [run for run in runs if run.kernels == kernels] or [
-        run for run in runs if run.problem == problem
-    ]
-    if not runs:
+    alike = [run for run in runs if run.kernels == kernels]
+    alike = alike or [run for run in runs if run.problem == problem]
+    if not alike:
         return None
-    first, *others = sorted(runs, key=lambda run: run.is_off(cells))
-    power = 0.8
-    for other in others:
-        if (apart := math.log(other.cells / first.cells)) and abs(apart) > math.log(2.0):
-            power = min(max(math.log(other.seconds / first.seconds) / apart, 0.2), 1.1)
-            break
-    seconds = first.seconds * (max(cells, 1) / first.cells) ** power
-    return seconds, SURE * math.exp(UNSURE * first.is_off(cells))
+    nearest = min(alike, key=lambda run: run.is_off(cells))
+    seconds = nearest.seconds * (max(cells, 1) / nearest.cells) ** WORK
+    return seconds, SURE * math.exp(UNSURE * nearest.is_off(cells))
 
 
 def make_past_run(
-    flow: str, problem: str, cells: int, t_end: float, finest: float, first_dt: float,
+    flow: str, cells: int, t_end: float, finest: float, first_dt: float,
     history: Mapping[str, np.ndarray], kernels: str = "",
 ) -> PastRun | None:  # fmt: skip
     """A past run from the history of a whole run; None where it is too short to say anything."""
     steps, times = history["step"], history["t"]
     if len(steps) < LEAST_STEPS or "seconds_step" not in history or not first_dt > 0.0:
         return None
-    seconds = np.nan_to_num(history["seconds_step"])
-    course = make_course(steps, times, seconds, first_dt)
-    dt, work = (tuple(round(v, 4) for v in course.dt), tuple(round(v, 3) for v in course.work))
-    usual, end = float(np.median(seconds[2:])), int(steps[-1])
+    seconds = drop_events(np.ones(len(steps)), np.nan_to_num(history["seconds_step"]))
+    parts = np.linspace(0.0, float(t_end), PARTS + 1)
+    shares = [
+        tuple((np.interp(parts, times, done) / max(done[-1], 1e-300)).round(4).tolist())
+        for done in (steps, seconds.cumsum())
+    ]
+    usual = float(np.median(seconds[2:]))
     return PastRun(
-        flow, problem, cells, float(t_end), finest, first_dt, end, dt, work, usual, kernels
+        flow, cells, float(t_end), finest, first_dt, int(steps[-1]), Course(*shares), usual, kernels
     )
 
 
@@ -388,7 +327,13 @@ def measure_size(problem: Problem, evolution: Any = None, blocks: Sequence[Any] 
     else:
         evolution = evolution or (None if blocks else problem.build())
         t_end = evolution.t_end if evolution is not None else math.nan
-        planned = [_plan_block(block) for block in blocks or evolution.blocks]
+        planned = [
+            BlockPlan(
+                block.name, tuple(n - 1 for n in size), tuple(x.min(axis=1)), tuple(x.max(axis=1))
+            )
+            for block in blocks or evolution.blocks
+            for size, x in [(block.nodes.shape[1:], block.nodes.reshape(len(block.nodes), -1))]
+        ]
     sizes = [math.prod(block.cells) for block in planned]
     widths = [
         (high - low) / number
@@ -401,12 +346,6 @@ def measure_size(problem: Problem, evolution: Any = None, blocks: Sequence[Any] 
     return Size(sum(sizes), named, finest, float(t_end), estimate_memory(sum(sizes), sizes), dump)
 
 
-def _plan_block(block: Any) -> BlockPlan:
-    flat = block.nodes.reshape(len(block.nodes), -1)
-    cells = tuple(size - 1 for size in block.nodes.shape[1:])
-    return BlockPlan(block.name, cells, tuple(flat.min(axis=1)), tuple(flat.max(axis=1)))
-
-
 def foretell_steps(
     read: ReadDeck, size: Size, first_dt: float | None, own: bool = True
 ) -> tuple[float, float, float] | None:
@@ -417,27 +356,22 @@ def foretell_steps(
     """
     if not math.isfinite(size.t_end) or size.t_end <= 0.0:
         return None
-    flow, kind = name_flow(read.problem, read.deck), "same"
+    flow, limits = name_flow(read.problem, read.deck), LIKE
     past = find_past(flow, size.cells, own)
-    other_flow = past is None  # its speeds are others: without a first step it tells nothing
-    if past is None:
-        past, kind = find_like(read.problem, size.cells, own), "like"
-    if past is None and first_dt is not None:
-        steps, kind = size.t_end / first_dt, "nothing"
-    elif past is None:
-        return None
-    elif first_dt is not None:
-        steps = size.t_end / first_dt * float(np.mean(1.0 / np.asarray(past.dt)))
-    elif not other_flow and size.finest > 0.0 and past.finest > 0.0:
+    if first_dt is not None:
+        steps = size.t_end / first_dt
+        if past is not None:
+            steps *= past.steps * past.first_dt / past.t_end
+    elif past is not None and past.flow == flow and size.finest > 0.0:
         steps = past.steps * (size.t_end / past.t_end) * (past.finest / size.finest)
-    else:
+    else:  # the speeds of another flow are others: without a first step it tells nothing
         return None
-    if past is not None and not 0.95 < size.t_end / past.t_end < 1.05:
-        kind = "like"
-    low, high = RANGES[kind]
+    if past is not None and past.flow == flow and 0.95 < size.t_end / past.t_end < 1.05:
+        limits = SAME
     bound = read.deck.run.max_steps
-    limit = math.inf if bound is None else float(bound)
-    return min(low * steps, limit), min(steps, limit), min(high * steps, limit)
+    most = math.inf if bound is None else float(bound)
+    low, likely, high = (min(factor * steps, most) for factor in (limits[0], 1.0, limits[1]))
+    return low, likely, high
 
 
 def count_dumps(output: Output, t_end: float) -> float:
@@ -515,18 +449,15 @@ def foretell(read: ReadDeck, output: str | None = None) -> list[str]:
 
 def describe_cost(cost: Cost) -> list[str]:
     """Lines for `run --dry-run` and for the first lines of a run."""
-    size, steps = (
-        cost.size,
-        "steps and time are unknown before the start: no earlier run of this flow",
-    )
+    size, steps = cost.size, "steps and time are unknown before the start: no run of this flow yet"
     if cost.steps is not None:
-        low, likely, high = (_round(number) for number in cost.steps)
-        steps = f"about {likely}{f' ({low} to {high})' * (low < high)} steps"
+        low, likely, high = (max(round(float(f"{number:.2g}")), 1) for number in cost.steps)
+        steps = f"about {likely}{f' ({low} to {high})' * (low < high)} steps; "
         if cost.seconds is None:
-            steps += "; the time of a step on this computer is not known yet"
+            steps += "the time of a step on this computer is not known yet"
         else:
             steps += (
-                f"; time stepping will take {describe_seconds_range(*cost.seconds)} on this machine"
+                f"time stepping will take {describe_seconds_range(*cost.seconds)} on this machine"
             )
     told = [f"{name} {' x '.join(map(str, cells))}" for name, cells in size.blocks[:MOST_NAMED]]
     more = len(size.blocks) - len(told)
@@ -540,12 +471,6 @@ def describe_cost(cost: Cost) -> list[str]:
         f"{describe_bytes(cost.disk)} ({count(round(cost.dumps), 'dump')} of "
         f"{describe_bytes(size.dump)}{free})",
     ]
-
-
-def _round(number: float) -> int:
-    """To two digits."""
-    scale = 10 ** max(math.floor(math.log10(max(number, 1.0))) - 1, 0)
-    return max(round(number / scale) * scale, 1)
 
 
 def describe_seconds_range(low: float, likely: float, high: float) -> str:

@@ -2,7 +2,7 @@
 
 dt is compared with its largest value so far.  Each time that it has shrunk by another factor of
 FACTOR a mark is made: a line of run.log, and an entry of the verdict.  Once, when it has shrunk
-by MOST, the user reads what can be changed.
+by so many factors, MOST, the user reads what can be changed.
 
 Steps that are short for other reasons do not count: the first five, the last two, those repeated
 with a smaller dt (`retries` has them).
@@ -12,48 +12,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from runs.early_end.causes import FEWER_CELLS, MORE_BARRIER, MORE_SHARING, SMALLER_CFL, Setting
-from runs.inspection.account import OWN_REASONS
+from runs.early_end.causes import SHORT_STEPS, describe_settings
+from runs.inspection.account import OWN_REASONS, measure_shrinkage
 
 FACTOR = math.sqrt(10.0)
-MOST = 100.0
+MOST = 4  # such factors: a hundredfold
 NEAR = 2  # cells: so near to a key node or a side is at it
 SAMPLED = 50_000  # cells of a block from which medians are taken
 SAME = 1e-6  # relative: so near to the step's rate is the rate of the cell that set it
 OF_LINES = ("stretching", "tension", "touch")  # what limits dt and is no cell
 
-_BESIDE = (MORE_SHARING, FEWER_CELLS)  # for cells that a line itself made flat
-_INSIDE = (MORE_SHARING, MORE_BARRIER, FEWER_CELLS)  # those that the inside of a grid made flat
-MEANINGS: dict[str, tuple[str, tuple[Setting, ...]]] = {  # what dt is limited by: words, what helps
-    "hot": ("fast waves: the material is hot or moves fast, the cell is no thinner than others",
-            (FEWER_CELLS,)),
-    "crushed": ("crushed: all cells of the block have become thin", (FEWER_CELLS,)),
-    "stretching": ("stretching: nodes of a line part fast", (SMALLER_CFL, FEWER_CELLS)),
-    "touch": ("touch: bodies come to touch, node by node", (FEWER_CELLS,)),
-    "tension": ("tension: the shortest capillary waves of a line are fast", (FEWER_CELLS,)),
-    "corner": ("corner: at a key node, where lines meet", _BESIDE),
-    "sliding": ("sliding contact: in the first cells beside it", _BESIDE),
-    "line": ("line: the first cells beside an interface or a surface are squeezed", _INSIDE),
-    "axis": ("axis: in the first cells beside the axis", _BESIDE),
-    "wall": ("wall: in the first cells beside a wall", _BESIDE),
-    "inside": ("inside: cells away from all lines are squeezed", _INSIDE),
-}  # fmt: skip
-
-
-def describe_settings(meaning: str) -> str:
-    """The settings for one of MEANINGS, in a line."""
-    _, settings = MEANINGS.get(meaning, ("", (FEWER_CELLS,)))
-    words = [f"{setting.described.replace('`', '')}: {setting.words}" for setting in settings]
-    return "; ".join([*words, "run.t_end ends the run before"])
-
 
 def classify(block: Any, i: int, j: int) -> str:
-    """Which of MEANINGS holds for a thin cell: by the segments of its block that it lies beside."""
+    """Which of SHORT_STEPS holds for a thin cell, by the segments that it lies beside."""
     ni, nj = block.nodes.shape[1] - 1, block.nodes.shape[2] - 1
     away = {"i_min": i, "i_max": ni - 1 - i, "j_min": j, "j_max": nj - 1 - j}
     along = {"i_min": j, "i_max": j, "j_min": i, "j_max": i}
@@ -69,8 +44,7 @@ def classify(block: Any, i: int, j: int) -> str:
     return next((kind for kind in ("sliding", "line", "axis", "wall") if kind in kinds), "inside")
 
 
-@dataclass(frozen=True)
-class Mark:
+class Mark(NamedTuple):
     """dt [s] at a step and its part of the largest so far; the cell, its centre [m], its meaning.
 
     block is "" where dt is limited by no cell.
@@ -89,7 +63,7 @@ class Mark:
 
     def describe(self) -> str:
         """One line for run.log and the screen."""
-        words, _ = MEANINGS.get(self.meaning, (self.meaning, ()))
+        words, _ = SHORT_STEPS.get(self.meaning, (self.meaning, ()))
         cell = f", {self.block} i={self.i}, j={self.j} at ({self.x:.4g}, {self.y:.4g}) m"
         return (
             f"dt is {self.shrunk:.3g} times below its largest: {self.dt:.3g} s at step "
@@ -102,44 +76,31 @@ class StepTrend:
 
     def __init__(self, evolution: Any, note: Callable[[str], None], say: Callable[[str], None]):
         self.evolution, self.note, self.say = evolution, note, say
-        self.largest = 0.0
+        self.largest, self.level = 0.0, 0  # level: times FACTOR below the largest
         self.marks: list[Mark] = []
-        self._next = 0.0
-        self._told = False
         flow = getattr(evolution, "flow", None)
         self._usual = [] if flow is None else [_find_usual(block) for block in flow.blocks]
 
     def resume(self, history: Mapping[str, np.ndarray]) -> None:
         """Continue where a restarted run was, from its history."""
-        dts, limits = history.get("dt"), history.get("dt_limit")
-        if dts is None or limits is None or dts.dtype.kind != "f":
-            return
-        counts = dts[np.isfinite(dts) & ~np.isin(limits, OWN_REASONS)]
-        if counts.size:
-            self.largest = float(counts.max())
-            shrunk = float((np.maximum.accumulate(counts) / counts).max())
-            passed = math.floor(math.log(shrunk) / math.log(FACTOR) + 1e-9)
-            self._next = self.largest / FACTOR ** (passed + 1)
-            self._told = shrunk >= MOST
+        if math.isfinite(shrunk := measure_shrinkage(history)):
+            counts = ~np.isin(history["dt_limit"], OWN_REASONS)
+            self.largest = float(np.nanmax(history["dt"][counts]))
+            self.level = count_factors(shrunk)
 
     def follow(self, row: Mapping[str, Any]) -> None:
         """Take note of a step's history row."""
         dt = row.get("dt")
-        if dt is None or (dt > self._next and dt <= self.largest):
+        if dt is None or row.get("dt_limit") in OWN_REASONS or not dt > 0.0:
             return
-        if row.get("dt_limit") in OWN_REASONS or not dt > 0.0:
+        self.largest = max(self.largest, dt)
+        before, level = self.level, count_factors(self.largest / dt)
+        if level <= before:
             return
-        if dt > self.largest:
-            deepest = self.largest / self._next if self._next else FACTOR
-            self.largest, self._next = dt, dt / deepest
-            return
-        mark = self._make_mark(row)
+        self.level, mark = level, self._make_mark(row)
         self.marks.append(mark)
-        while dt <= self._next:
-            self._next /= FACTOR
         self.note(mark.describe())
-        if mark.shrunk >= MOST and not self._told:
-            self._told = True
+        if level >= MOST > before:
             self.say(f"{mark.describe()}; what can be changed: {describe_settings(mark.meaning)}")
 
     def _make_mark(self, row: Mapping[str, Any]) -> Mark:
@@ -171,7 +132,12 @@ class StepTrend:
 
     def describe(self) -> list[dict[str, Any]]:
         """The marks as plain data."""
-        return [asdict(mark) for mark in self.marks]
+        return [mark._asdict() for mark in self.marks]
+
+
+def count_factors(ratio: float) -> int:
+    """How many times a ratio holds FACTOR."""
+    return math.floor(math.log(ratio) / math.log(FACTOR) + 1e-9)
 
 
 def _find_usual(block: Any) -> tuple[float, float]:
@@ -205,11 +171,8 @@ def find_limiting_cell(flow: Any) -> tuple[int, int, int]:
     Cells that share their states are faster than that: it is the one whose rate is the clock's, or
     the nearest below.
     """
-    rate, found = flow.clock.rate * (1.0 + SAME), (-1.0, 0, 0)
-    for number, block in enumerate(flow.blocks):
-        rates = np.where(block.rates <= rate, block.rates, -1.0)
-        place = int(rates.argmax())
-        if rates.flat[place] > found[0]:
-            found = float(rates.flat[place]), number, place
-    i, j = np.unravel_index(found[2], flow.blocks[found[1]].rates.shape)
-    return found[1], int(i), int(j)
+    most = flow.clock.rate * (1.0 + SAME)
+    rates = [np.where(block.rates <= most, block.rates, -1.0) for block in flow.blocks]
+    number = int(np.argmax([one.max() for one in rates]))
+    i, j = np.unravel_index(rates[number].argmax(), rates[number].shape)
+    return number, int(i), int(j)

@@ -19,6 +19,7 @@ from regrid.sides import get_sides
 from runs.grids.making import March
 from runs.grids.quality import Judgement
 from runs.pictures.command import new_figure, save
+from runs.pictures.fields import draw_grid_lines, lay_out
 
 LONG = 6.0  # a domain longer than this, in its widths, is shown in part
 LINE, BAD = "0.2", "tab:red"
@@ -41,7 +42,7 @@ def draw_grid(
     figure = new_figure()
     figure.set_size_inches(14.0, float(np.clip(4.6 * ratio + 1.0, 3.2, 9.0)))
     plain, coloured, bars = figure.subplots(1, 3, width_ratios=(1.0, 1.15, 0.6))
-    plot_lines(plain, nodes, LINE)
+    draw_grid_lines(plain, nodes, LINE)
     for i, j in judgement.bad_cells:
         corners = nodes[:, [i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
         plain.fill(*corners, facecolor=BAD, edgecolor=BAD, linewidth=0.8, zorder=3)
@@ -82,20 +83,15 @@ def draw_comparison(
     ratio = float(np.clip(height / width, 0.25, 2.0))
     wished = 7 if ratio > 1.2 else 5 if ratio > 0.7 else 4
     columns = min((wished, wished + 1), key=lambda number: -len(marches) % number)
-    columns = min(columns, len(marches))
-    rows = -(-len(marches) // columns)
-    figure = new_figure()
-    figure.set_size_inches(3.2 * columns, rows * (2.7 * ratio + 0.45) + 0.4)
-    panels = figure.subplots(rows, columns, squeeze=False)
-    for axes, (name, march, sides) in zip(panels.flat, marches, strict=False):
-        plot_lines(axes, march.nodes, LINE)
+    figure, columns = new_figure(), min(columns, len(marches))
+    panels = lay_out(figure, len(marches), columns, (3.2, 2.7 * ratio + 0.6))
+    for axes, (name, march, sides) in zip(panels, marches, strict=True):
+        draw_grid_lines(axes, march.nodes, LINE)
         if march.failure:
             plot_sides(axes, sides, BAD)
         frame(axes, march.nodes, everything)
         axes.set_title(name, fontsize=9)
         axes.tick_params(labelsize=7)
-    for axes in panels.flat[len(marches) :]:
-        axes.set_visible(False)
     figure.suptitle(title, fontsize=11)
     return save(figure, path, dpi)
 
@@ -103,29 +99,17 @@ def draw_comparison(
 def draw_gallery(marches: Sequence[tuple[str, March]], path: Path, dpi: int = 100) -> Path:
     """A panel for each named domain, with the worst corner sine and aspect ratio of its march."""
     figure = new_figure()
-    columns = 6
-    rows = -(-len(marches) // columns)
-    figure.set_size_inches(2.6 * columns, 2.9 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False)
-    for axes, (name, march) in zip(panels.flat, marches, strict=False):
-        plot_lines(axes, march.nodes, LINE)
+    panels = lay_out(figure, len(marches), 6, (2.6, 2.9))
+    for axes, (name, march) in zip(panels, marches, strict=True):
+        draw_grid_lines(axes, march.nodes, LINE)
         frame(axes, march.nodes)
         axes.set_title(f"{name}\nsine {march.sine:.2f}, aspect {march.aspect:.0f}", fontsize=9)
         axes.set_axis_off()
-    for axes in panels.flat[len(marches) :]:
-        axes.set_visible(False)
     return save(figure, path, dpi)
 
 
 def _outline(sides: np.ndarray) -> np.ndarray:
     return np.concatenate(get_sides(sides), axis=1)
-
-
-def plot_lines(axes, nodes: np.ndarray, colour: str) -> None:
-    """Every line of both families; thinner where they are many."""
-    width = float(np.clip(40.0 / max(nodes.shape[1:]), 0.12, 0.6))
-    lines = [*np.moveaxis(nodes, 0, -1), *np.moveaxis(nodes.transpose(0, 2, 1), 0, -1)]
-    axes.add_collection(LineCollection(lines, colors=colour, linewidths=width))
 
 
 def plot_sides(axes, sides: np.ndarray, colour: str) -> None:

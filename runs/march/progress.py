@@ -225,8 +225,9 @@ class Outlook:
 
     def find_course(self) -> Course | None:
         """How dt went in a past run of the same flow."""
-        past = find_past(self.flow, self.cells)
-        return past.course if past and math.isclose(past.t_end, self.evolution.t_end) else None
+        past, t_end = find_past(self.flow, self.cells), self.evolution.t_end
+        same = past is not None and past.flow == self.flow and math.isclose(past.t_end, t_end)
+        return past.course if same else None
 
     def follow(self, row: Mapping[str, Any]) -> None:
         """Take note of a step's history row."""
@@ -251,7 +252,7 @@ class Outlook:
         clock = getattr(self.evolution, "clock", None)
         if status == "finished" and clock is not None and not self.began:
             run = make_past_run(
-                self.flow, self.deck.problem, self.cells, self.evolution.t_end, self.finest,
+                self.flow, self.cells, self.evolution.t_end, self.finest,
                 clock.first_stable_dt, history, name_kernels(self.evolution),
             )  # fmt: skip
             if run is not None:

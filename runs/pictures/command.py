@@ -25,11 +25,10 @@ from regrid.text_files import escape_controls
 from runs.pictures.curves import (
     draw_interfaces,
     draw_lineouts,
-    parse_line,
     take_lineouts,
     write_csv,
 )
-from runs.pictures.fields import View, check_nodes, draw_fields, draw_meshes, time_titles
+from runs.pictures.fields import View, check_nodes, draw_fields, time_titles
 from runs.pictures.history import draw_gauges, draw_history
 from runs.store.files import check_not_of_a_run, check_replaceable, disk_errors
 from runs.store.provenance import describe_software, hash_deck
@@ -156,7 +155,13 @@ def fill_figure(
     Returns the stem of a name for it, and what writes the table of a line's values, if it is one.
     """
     fields, what, at, mesh, zoom, mirror, beside, line, limits, colours = wanted
-    view = View(parse_zoom(zoom), mirror, mesh, parse_limits(limits), check_colours(colours))
+    view = View(
+        parse_zoom(zoom),
+        mirror,
+        mesh,
+        limits and parse_numbers("--limits", limits, "low,high with low < high", rising=1),
+        check_colours(colours),
+    )
     names = [name for entry in fields for name in entry.split(",") if name]
     what = what or ("line" if line else "fields")
     stem, write_table = what, None
@@ -181,7 +186,7 @@ def fill_figure(
         stem = "-".join(["line", *names])
         write_table = partial(write_csv, lineouts=lineouts, names=names, runs=titles)
     elif what == "mesh":
-        draw_meshes(figure, choose_dumps(run, at, say=say), view)
+        draw_fields(figure, choose_dumps(run, at, say=say), (), view)
     elif what == "interface":
         dumps = choose_dumps(run, at, 12, say)
         for dump in dumps:
@@ -246,11 +251,16 @@ def save(figure: Figure, path: Path, dpi: int, deck_text: str | None = None) -> 
     known = figure.canvas.get_supported_filetypes()
     if path.suffix.lstrip(".").lower() not in known:
         raise BadInput(f"{path}: a picture's name has to end in .png, .pdf or .svg")
-    if not path.parent.is_dir():
-        raise BadInput(f"{path.parent} is not a folder, so {path.name} cannot be written")
+    check_folder(path)
     with disk_errors(path):
         write_figure(figure, path, dpi, path.suffix.lstrip(".").lower(), deck_text)
     return path
+
+
+def check_folder(path: Path) -> None:
+    """Raise BadInput where the folder of a file to be written does not exist."""
+    if not path.parent.is_dir():
+        raise BadInput(f"{path.parent} is not a folder, so {path.name} cannot be written")
 
 
 def find_deck_text(run: RunData) -> str | None:
@@ -286,7 +296,7 @@ def choose_dumps(
         numbers = np.unique(np.linspace(0, len(run.dumps) - 1, min(count, len(run.dumps))).round())
         return [run.dumps[int(k)] for k in numbers]
     words = {"start": run.dumps[0].t, "end": run.dumps[-1].t}
-    times = [words[w] if w in words else _number(w, f"--at {at}") for w in at.split(",")]
+    times = [words[w] if w in words else parse_number("--at", at, w) for w in at.split(",")]
     chosen = list(dict.fromkeys(run.dump_at(t) for t in times))
     first, last = words["start"], words["end"]
     slack = 1e-3 * (last - first)
@@ -323,27 +333,14 @@ def name_paths(runs: list[RunData]) -> list[str]:
     return [str(run.path) if same else run.path.name for run in runs]
 
 
-def parse_zoom(zoom: str | None) -> tuple[float, float, float, float] | None:
+def parse_zoom(zoom: str | None) -> tuple[float, ...] | None:
     """x0,x1,y0,y1 in metres."""
     if zoom is None:
         return None
-    numbers = [_number(word, f"--zoom {zoom}") for word in zoom.split(",")]
-    if len(numbers) != 4 or not (numbers[0] < numbers[1] and numbers[2] < numbers[3]):
-        raise BadInput(f"--zoom {zoom}: four numbers are wanted, x0,x1,y0,y1 with x0 < x1, y0 < y1")
-    x0, x1, y0, y1 = numbers
+    x0, x1, y0, y1 = parse_numbers("--zoom", zoom, "x0,x1,y0,y1 with x0 < x1, y0 < y1", rising=2)
     if not 1.0 / SLENDER <= (x1 - x0) / (y1 - y0) <= SLENDER:
         raise BadInput(f"--zoom {zoom}: one side is more than {SLENDER:g} times the other")
     return x0, x1, y0, y1
-
-
-def parse_limits(limits: str | None) -> tuple[float, float] | None:
-    """low,high of the colours in SI units."""
-    if limits is None:
-        return None
-    numbers = [_number(word, f"--limits {limits}") for word in limits.split(",")]
-    if len(numbers) != 2 or not numbers[0] < numbers[1]:
-        raise BadInput(f"--limits {limits}: two numbers are wanted, low,high with low < high")
-    return numbers[0], numbers[1]
 
 
 def check_colours(name: str | None) -> str | None:
@@ -353,11 +350,30 @@ def check_colours(name: str | None) -> str | None:
     return name
 
 
-def _number(word: str, whole: str) -> float:
+def parse_line(text: str) -> tuple[float, ...]:
+    """x0,y0,x1,y1 in metres; BadInput where these are no two points."""
+    x0, y0, x1, y1 = parse_numbers("--line", text, "x0,y0,x1,y1, two points in metres")
+    if (x0, y0) == (x1, y1):
+        raise BadInput(f"--line {text}: two points in metres are wanted, these are the same")
+    return x0, y0, x1, y1
+
+
+def parse_numbers(option: str, text: str, form: str, rising: int = 0) -> tuple[float, ...]:
+    """As many finite numbers as `form` names between its commas; the first `rising` pairs rise."""
+    wanted = form.partition(" ")[0].strip(",").count(",") + 1
+    numbers = tuple(parse_number(option, text, word) for word in text.split(","))
+    pairs = zip(numbers[0 : 2 * rising : 2], numbers[1 : 2 * rising : 2], strict=False)
+    if len(numbers) != wanted or not all(low < high for low, high in pairs):
+        raise BadInput(f"{option} {text}: {wanted} numbers are wanted, {form}")
+    return numbers
+
+
+def parse_number(option: str, text: str, word: str) -> float:
+    """A finite number, one of those in the `text` of an option."""
     try:
         number = float(word)
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise BadInput(f"{whole}: {word!r} is not a number")
+        raise BadInput(f"{option} {text}: {word!r} is not a number")
     return number

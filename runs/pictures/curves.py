@@ -22,8 +22,7 @@ from runs.pictures.fields import (
     check_fields,
     check_zoom,
     find_extent,
-    get_words,
-    has_field,
+    get_style,
     make_sheets,
     scale_times,
     split_outline,
@@ -307,10 +306,9 @@ def draw_lineouts(
     figure.set_size_inches(WIDTH, HEIGHT * len(names) + 0.8)
     panels = figure.subplots(len(names), 1, squeeze=False, sharex=True)[:, 0]
     for axes, name in zip(panels, names, strict=True):
-        block = next(block for block in first.dump.blocks if has_field(block, name))
-        si_unit, words = get_words(block, name)
+        style = get_style(first.dump, name)
         sizes = [np.nanmax(np.abs(one.values[name])) for run in lineouts for one in run]
-        factor, unit = pick_prefix(float(max(sizes)), si_unit)
+        factor, unit = pick_prefix(float(max(sizes)), style.unit)
         for run, style, title in zip(lineouts, STYLES, runs, strict=False):
             titles = time_titles([one.dump for one in run])
             for k, (one, when) in enumerate(zip(run, titles, strict=True)):
@@ -319,7 +317,7 @@ def draw_lineouts(
                 axes.plot(x, values, style, color=f"C{k % 10}", linewidth=1.1, label=named)
                 if style == "-":
                     axes.plot(x, values, ".", color=f"C{k % 10}", markersize=2.5)
-        axes.set_ylabel(f"{words} [{unit}]" if unit else words, fontsize=9)
+        axes.set_ylabel(f"{style.words} [{unit}]" if unit else style.words, fontsize=9)
         axes.grid(alpha=0.3)
         axes.tick_params(labelsize=8)
     panels[-1].set_xlabel(f"{label} [{length}]")
@@ -351,10 +349,7 @@ def write_csv(
 ) -> Path:
     """One row a cell: run, step, t, block, i, j, x, y, way, fields; the head has SI units."""
     first = lineouts[0][0]
-    words = []
-    for name in names:
-        block = next(block for block in first.dump.blocks if has_field(block, name))
-        words.append(f"{name} [{get_words(block, name)[0]}]")
+    words = [f"{name} [{get_style(first.dump, name).unit}]" for name in names]
     axes, t_unit = first.dump.axes, first.dump.t_unit
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
@@ -368,16 +363,3 @@ def write_csv(
                 table.writerow([*row, *(repr(float(number)) for number in numbers)])
     write_atomically(path, text.getvalue(), durable=False)
     return path
-
-
-def parse_line(text: str) -> Line:
-    """x0,y0,x1,y1 in metres; BadInput where these are no two points."""
-    words = text.split(",")
-    try:
-        numbers = [float(word) for word in words]
-    except ValueError:
-        numbers = []
-    if len(numbers) != 4 or not np.isfinite(numbers).all() or numbers[:2] == numbers[2:]:
-        raise BadInput(f"--line {text}: four numbers are wanted, x0,y0,x1,y1, two points in metres")
-    x0, y0, x1, y1 = numbers
-    return x0, y0, x1, y1

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize, PowerNorm
 
@@ -87,14 +89,13 @@ def _runs(line: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:
     return [line[:, a : b + 1] for a, b in zip(bounds[::2], bounds[1::2], strict=True)]
 
 
-@dataclass(frozen=True)
-class Derived:
-    """How a field is made, its unit and words, what it needs, and how it is drawn."""
+class Field(NamedTuple):
+    """How a field of cells is found in a block, its SI unit and words, and how it is drawn."""
 
     compute: Callable[[BlockData], np.ndarray]
     unit: str
     words: str
-    needs: tuple[str, ...]  # fields of the dump; "state/NAME": an array of the restart state
+    needs: tuple[str, ...] = ()  # fields of the dump; "state/NAME": an array of the restart state
     colours: str = ""  # a colour map of its own, from 0
     power: float = 1.0  # of the value that the colour follows
     marked: bool = False  # is the cell of the largest value marked?
@@ -123,67 +124,55 @@ def compute_vorticity(block: BlockData) -> np.ndarray:
 
 
 DERIVED = {
-    "schlieren": Derived(
+    "schlieren": Field(
         lambda block: measure_gradient(block, "rho"),
         "kg/m4", "density gradient, its size", ("rho",), "Greys", 0.4,
     ),
-    "pressure_gradient": Derived(
+    "pressure_gradient": Field(
         lambda block: measure_gradient(block, "p"),
         "Pa/m", "pressure gradient, its size", ("p",), "magma_r", 0.4,
     ),
-    "vorticity": Derived(compute_vorticity, "1/s", "vorticity", ("u", "v")),
-    "rate": Derived(
+    "vorticity": Field(compute_vorticity, "1/s", "vorticity", ("u", "v")),
+    "rate": Field(
         lambda block: block.state_fields["rates"],
         "1/s", "rate of the cells; the largest (marked) limits dt", ("state/rates",), marked=True,
     ),
 }  # fmt: skip
 
 
-def has_field(block: BlockData, name: str) -> bool:
-    """Is the field there, or can it be derived from what is?"""
+def find_field(block: BlockData, name: str) -> Field | None:
+    """A field that the block has or that can be derived from what it has; None for any other."""
     if name in block.cell_fields:
-        return True
-    derived = DERIVED.get(name)
-    if derived is None or min(block.nodes.shape[1:]) < 3:
-        return False
-    return all(
-        need.removeprefix("state/") in block.state_fields
-        if need.startswith("state/")
-        else need in block.cell_fields
-        for need in derived.needs
-    )
+        words = block.units[name], block.long_names[name]
+        return Field(lambda block: block.cell_fields[name], *words)
+    if name not in DERIVED or min(block.nodes.shape[1:]) < 3:
+        return None
+    known = {*block.cell_fields, *(f"state/{one}" for one in block.state_fields)}
+    return DERIVED[name] if known.issuperset(DERIVED[name].needs) else None
 
 
 def get_field(block: BlockData, name: str) -> np.ndarray:
     """A field of cells (ni, nj) in its SI unit, from the dump or derived; KeyError if neither."""
-    if name in block.cell_fields:
-        return block.cell_fields[name]
-    return DERIVED[name].compute(block)
+    if (field := find_field(block, name)) is None:
+        raise KeyError(name)
+    return field.compute(block)
 
 
-def get_words(block: BlockData, name: str) -> tuple[str, str]:
-    """Unit and long name of a field that `has_field`."""
-    if name in block.cell_fields:
-        return block.units[name], block.long_names[name]
-    return DERIVED[name].unit, DERIVED[name].words
-
-
-def get_style(dump: Dump, name: str) -> Derived | None:
-    """The line of the table for a field that is derived in this dump."""
-    stored = any(name in block.cell_fields for block in dump.blocks)
-    return None if stored else DERIVED.get(name)
+def get_style(dump: Dump, name: str) -> Field:
+    """The field as the first block has it that has it."""
+    return next(field for block in dump.blocks if (field := find_field(block, name)))
 
 
 def list_fields(dump: Dump) -> list[str]:
     """Names of all fields of the dump, then of those that can be derived."""
-    derived = [n for n in DERIVED if any(has_field(block, n) for block in dump.blocks)]
+    derived = [n for n in DERIVED if any(find_field(block, n) for block in dump.blocks)]
     return list(dict.fromkeys([*dump.field_names(), *derived]))
 
 
 WIDTH, PAGE = 12.0, 6.5  # inches: of every picture, wished for
 TALLEST, TALLEST_ALONE = 16.0, 8.0  # at most, at most of one panel
 LONG = 4.0  # in a domain longer than this, in its heights, the panels follow the interface
-MARGIN = 1.2  # heights shown on both sides of it
+AROUND = 0.6  # of the interface's size: what is shown on each side of it
 DECADES = 1.7
 FLIPPED = {  # what changes sign in the mirror
     "x": ("u", "u_node", "vorticity"),
@@ -219,7 +208,7 @@ def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
     check_nodes(dump)
     sheets = []
     for block in dump.blocks:
-        fields = {name: get_field(block, name) for name in names if has_field(block, name)}
+        fields = {name: get_field(block, name) for name in names if find_field(block, name)}
         sheets.append(Sheet(block.nodes, block.material, block.name, fields))
     if view.mirror:
         axis = "xy".index(view.mirror)
@@ -247,26 +236,11 @@ def check_nodes(dump: Dump) -> None:
             )
 
 
-def draw_sheets(axes, sheets: Sequence[Sheet], name: str, norm, colours, factor, scale):
-    """The cells of all blocks that have the field, in colour; returns the last mesh, or None."""
-    image = None
-    for sheet in sheets:
-        if name in sheet.fields:
-            image = axes.pcolormesh(
-                *(sheet.nodes * scale),
-                sheet.fields[name] * factor,
-                norm=norm,
-                cmap=colours,
-                rasterized=True,
-            )
-    return image
-
-
 def check_fields(dumps: Sequence[Dump], names: Sequence[str]) -> None:
     """Raise BadInput where a dump has no such field and none can be derived."""
     for dump in dumps:
         for name in names:
-            if not any(has_field(block, name) for block in dump.blocks):
+            if not any(find_field(block, name) for block in dump.blocks):
                 known = ", ".join(list_fields(dump))
                 raise BadInput(f"{dump.path} has no field {name!r}; there are: {known}")
 
@@ -274,27 +248,52 @@ def check_fields(dumps: Sequence[Dump], names: Sequence[str]) -> None:
 def draw_fields(
     figure, dumps: Sequence[Dump], names: Sequence[str], view: View, titles: Sequence[str] = ()
 ) -> None:
-    """Fill `figure` with a panel for each field and each dump; titles: in place of the times."""
+    """Fill `figure` with a panel for each field and each dump; titles: in place of the times.
+
+    Without names the grids are drawn, a colour for each block.
+    """
     check_fields(dumps, names)
     moments = [make_sheets(dump, names, view) for dump in dumps]
-    boxes, following = choose_boxes(moments, view)
-    scale, lengths = _label_lengths(dumps[0], boxes)
-    panels = make_panels(figure, boxes[0], len(names), len(dumps), lengths, following)
+    boxes, following = choose_boxes([measure_extent(sheets) for sheets in moments], view)
+    scale, unit = pick_prefix(np.abs(boxes).max(), "m")
+    lengths = [f"{name} [{unit}]" for name in dumps[0].axes]
+    panels = make_panels(figure, boxes[0], max(len(names), 1), len(dumps), lengths, following)
     titles = titles or time_titles(dumps)
-    for k, name in enumerate(names):
-        norm, colours, factor, label = find_colours(dumps[0], moments, name, boxes, view)
-        image = None
+    for k, name in enumerate(names or ("",)):
+        look = find_colours(dumps[0], moments, name, boxes, view) if name else None
         for axes, sheets, box, title in zip(panels[k], moments, boxes, titles, strict=True):
-            image = draw_sheets(axes, sheets, name, norm, colours, factor, scale) or image
-            if view.mesh:
-                draw_mesh(axes, sheets, scale, "k", 0.35)
-            draw_lines(axes, sheets, scale)
-            if (style := get_style(dumps[0], name)) and style.marked:
+            draw_panel(axes, sheets, name, look, scale, box, view.mesh)
+            if name and get_style(dumps[0], name).marked:
                 mark_largest(axes, sheets, name, scale, box)
-            dress(axes, box, scale)
             axes.set_title(title, fontsize=10)
-        figure.colorbar(image, ax=panels[k], label=label, shrink=0.9, pad=0.015)
-    _note_following(figure, following)
+        if look:
+            bar = ScalarMappable(*look[:2])
+            figure.colorbar(bar, ax=panels[k], label=look[3], shrink=0.9, pad=0.015)
+    if following:
+        words = "panels show only the region around the interface; use --zoom for the rest"
+        figure.supxlabel(words, fontsize=8, color="0.4")
+
+
+def draw_panel(
+    axes, sheets: Sequence[Sheet], name: str, look, scale: float, box, mesh=True
+) -> None:
+    """A field (or "": the grids in the blocks' colours) with the lines about it, over the box.
+
+    look: (norm, colour map, factor, label); mesh: draw the grid over the field.
+    """
+    for sheet in sheets:
+        if name in sheet.fields:
+            norm, colours, factor, _ = look
+            nodes, values = sheet.nodes * scale, sheet.fields[name] * factor
+            axes.pcolormesh(*nodes, values, norm=norm, cmap=colours, rasterized=True)
+    if mesh or not name:
+        draw_mesh(axes, sheets, scale, *(("k", 0.35) if name else (None, 1.0)))
+    interfaces, outer = split_outline(sheets)
+    axes.add_collection(LineCollection([line.T * scale for line in outer], **OUTLINE))
+    axes.add_collection(LineCollection([line.T * scale for line in interfaces], **INTERFACE))
+    axes.set_aspect("equal")
+    axes.set_xlim(box[0] * scale, box[1] * scale)
+    axes.set_ylim(box[2] * scale, box[3] * scale)
 
 
 def mark_largest(axes, sheets: Sequence[Sheet], name: str, scale: float, box) -> None:
@@ -311,88 +310,74 @@ def mark_largest(axes, sheets: Sequence[Sheet], name: str, scale: float, box) ->
     axes.text(0.01, 0.98, words, transform=at, va="top", fontsize=8, color="tab:red", bbox=frame)
 
 
-def draw_meshes(figure, dumps: Sequence[Dump], view: View) -> None:
-    """Fill `figure` with the grids of the dumps, a colour for each block."""
-    moments = [make_sheets(dump, (), view) for dump in dumps]
-    boxes, following = choose_boxes(moments, view)
-    scale, lengths = _label_lengths(dumps[0], boxes)
-    panels = make_panels(figure, boxes[0], 1, len(dumps), lengths, following)[0]
-    for axes, title, sheets, box in zip(panels, time_titles(dumps), moments, boxes, strict=True):
-        draw_mesh(axes, sheets, scale, None, 1.0)
-        draw_lines(axes, sheets, scale)
-        dress(axes, box, scale)
-        axes.set_title(title, fontsize=10)
-    _note_following(figure, following)
-
-
-def _label_lengths(dump: Dump, boxes) -> tuple[float, tuple[str, str]]:
-    """Factor for lengths, and the labels of both axes with their unit."""
-    scale, unit = pick_prefix(np.abs(boxes).max(), "m")
-    return scale, tuple(f"{name} [{unit}]" for name in dump.axes)
-
-
-def draw_lines(axes, sheets: Sequence[Sheet], scale: float) -> None:
-    """The interfaces between materials as strong lines, the outline as thin ones."""
-    interfaces, outer = split_outline(sheets)
-    axes.add_collection(LineCollection([line.T * scale for line in outer], **OUTLINE))
-    axes.add_collection(LineCollection([line.T * scale for line in interfaces], **INTERFACE))
-
-
-def draw_mesh(axes, sheets, scale, colour, alpha) -> None:
-    density = max(
-        max(sheet.nodes.shape[1:]) for sheet in sheets
-    )  # thinner lines where they are many
-    width = float(np.clip(40.0 / density, 0.12, 0.6))
-    colours: dict[str, str] = {}
+def draw_mesh(
+    axes, sheets: Sequence[Sheet], scale: float, colour: str | None, alpha: float
+) -> None:
+    """All grid lines, in one colour or in one of their own for each block."""
+    names = list(dict.fromkeys(sheet.name.removesuffix(" mirrored") for sheet in sheets))
     for sheet in sheets:
-        name = sheet.name.removesuffix(" mirrored")
-        drawn = colour or colours.setdefault(name, f"C{len(colours) % 10}")
-        lines = [
-            *np.moveaxis(sheet.nodes, 0, -1),
-            *np.moveaxis(sheet.nodes.transpose(0, 2, 1), 0, -1),
-        ]
-        axes.add_collection(
-            LineCollection(
-                [line * scale for line in lines], colors=drawn, linewidths=width, alpha=alpha
-            )
-        )
+        own = f"C{names.index(sheet.name.removesuffix(' mirrored')) % 10}"
+        draw_grid_lines(axes, sheet.nodes * scale, colour or own, alpha)
 
 
-def choose_boxes(moments: Sequence[Sequence[Sheet]], view: View):
-    """((x0, x1, y0, y1) in metres for each moment, whether they follow the interface).
+def draw_grid_lines(axes, nodes: np.ndarray, colour: str, alpha: float = 1.0) -> None:
+    """Every line of both families; thinner where they are many."""
+    width = float(np.clip(40.0 / max(nodes.shape[1:]), 0.12, 0.6))
+    lines = [*np.moveaxis(nodes, 0, -1), *np.moveaxis(nodes.transpose(0, 2, 1), 0, -1)]
+    axes.add_collection(LineCollection(lines, colors=colour, linewidths=width, alpha=alpha))
 
-    All are of one size.  They differ only in a long domain, where each is about its interfaces.
+
+Box = tuple[float, float, float, float]  # x0, x1, y0, y1 [m]
+
+
+def measure_extent(sheets: Sequence[Sheet], follow: bool = True) -> tuple[Box, Box | None]:
+    """What all sheets and what the interfaces in them take up; None: there are none, or they are
+    not wanted (`follow`)."""
+    every = np.concatenate([sheet.nodes.reshape(2, -1) for sheet in sheets], axis=1)
+    lines = split_outline(sheets)[0] if follow else []
+    return _bound(every), _bound(np.concatenate(lines, axis=1)) if lines else None
+
+
+def _bound(points: np.ndarray) -> Box:
+    (x0, y0), (x1, y1) = points.min(axis=1).tolist(), points.max(axis=1).tolist()
+    return x0, x1, y0, y1
+
+
+def find_extent(moments: Sequence[Sequence[Sheet]]) -> Box:
+    """What is drawn at any of the times takes up."""
+    return _join_boxes([measure_extent(sheets, False)[0] for sheets in moments])
+
+
+def _join_boxes(boxes: Sequence[Box]) -> Box:
+    (x0, _, y0, _), (_, x1, _, y1) = np.min(boxes, axis=0).tolist(), np.max(boxes, axis=0).tolist()
+    return x0, x1, y0, y1
+
+
+def choose_boxes(
+    extents: Sequence[tuple[Box, Box | None]], view: View, follow: bool = False
+) -> tuple[list[Box], bool]:
+    """(What is shown at each time, of one size; does it go with the interface?), from what
+    `measure_extent` found at each.
+
+    It does if told to `follow`, and in a long domain; there what lies about the interface is shown.
     """
-    whole = find_extent(moments)
+    whole = _join_boxes([box for box, _ in extents])
     if view.zoom is not None:
         check_zoom(view.zoom, whole)
-        return [view.zoom] * len(moments), False
-    size = np.array([whole[1] - whole[0], whole[3] - whole[2]])
-    long = int(np.argmax(size))
-    spans = []
-    for moment in moments:
-        lines = split_outline(moment)[0]
-        if lines:
-            spans.append([min(x[long].min() for x in lines), max(x[long].max() for x in lines)])
-    if size[long] <= LONG * size[1 - long] or len(spans) < len(moments):
-        return [whole] * len(moments), False
-    half = 0.5 * max(last - first for first, last in spans) + MARGIN * size[1 - long]
-    if 2.0 * half >= size[long]:
-        return [whole] * len(moments), False
-    boxes = []
-    for first, last in spans:
-        box = list(whole)
-        box[2 * long], box[2 * long + 1] = 0.5 * (first + last) - half, 0.5 * (first + last) + half
-        boxes.append(tuple(box))
-    return boxes, True
-
-
-def find_extent(moments: Sequence[Sequence[Sheet]]) -> tuple[float, float, float, float]:
-    """x0, x1, y0, y1 of all that is drawn at any of the times, in metres."""
-    sheets = [sheet for moment in moments for sheet in moment]
-    low = np.min([sheet.nodes.min(axis=(1, 2)) for sheet in sheets], axis=0)
-    high = np.max([sheet.nodes.max(axis=(1, 2)) for sheet in sheets], axis=0)
-    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+        return [view.zoom] * len(extents), False
+    low, high = np.array(whole[::2]), np.array(whole[1::2])
+    size, spans = high - low, [np.reshape(span, (2, 2)) for _, span in extents if span]
+    long = size.max() > LONG * size.min()
+    if len(spans) < len(extents) or not (follow or long):
+        return [whole] * len(extents), False
+    widest = np.max([np.ptp(span, axis=1) for span in spans], axis=0)
+    wanted = np.minimum(widest + 2.0 * AROUND * max(widest.max(), 0.5 * size.min()), size)
+    starts = [np.clip(span.mean(axis=1) - 0.5 * wanted, low, high - wanted) for span in spans]
+    boxes = [
+        (x, x + float(wanted[0]), y, y + float(wanted[1]))
+        for x, y in map(np.ndarray.tolist, starts)
+    ]
+    return boxes, bool(np.any(wanted < size))
 
 
 def check_zoom(zoom, whole) -> None:
@@ -406,42 +391,51 @@ def check_zoom(zoom, whole) -> None:
         )
 
 
+def lay_out(figure, number: int, columns: int, panel: tuple[float, float], **words) -> list:
+    """So many axes in rows of `columns`, each of the size `panel` [inches] with what is about it.
+
+    words: for `Figure.subplots`; with sharex the lowest of each column has the labels.
+    """
+    rows = -(-number // columns)
+    figure.set_size_inches(panel[0] * columns, panel[1] * rows)
+    grid = list(figure.subplots(rows, columns, squeeze=False, **words).flat)
+    for axes in grid[max(0, number - columns) : number]:
+        axes.tick_params(labelbottom=True)
+    for axes in grid[number:]:
+        axes.set_visible(False)
+    return grid[:number]
+
+
 def make_panels(
-    figure, box, fields: int, times: int, lengths: tuple[str, str], apart: bool
+    figure, box: Box, fields: int, times: int, lengths: Sequence[str], apart: bool
 ) -> list[list]:
     """Axes `[field][time]`, labelled with `lengths` at the edges; a single field fills the page."""
     ratio = (box[3] - box[2]) / (box[1] - box[0])
-    across = ratio >= 0.6
+    words = 0.75 if apart else 0.45  # above and below a panel
 
-    def height_of(columns: int, rows: int) -> float:
-        words = 0.75 if apart else 0.45  # above and below a panel
+    def measure_height(columns: int, rows: int) -> float:
         return rows * (WIDTH / columns * 0.85 * ratio + words) + 0.3
 
+    across = ratio >= 0.6
     columns, rows = (times, fields) if across else (fields, times)
     if fields == 1:
         pages = [(n, times // n) for n in range(1, times + 1) if times % n == 0]  # none is empty
-        columns, rows = min(pages, key=lambda page: abs(np.log(height_of(*page) / PAGE)))
-    height = height_of(columns, rows)
+        columns, rows = min(pages, key=lambda page: abs(np.log(measure_height(*page) / PAGE)))
+    height = measure_height(columns, rows)
     shrink = min(1.0, (TALLEST if fields * times > 1 else TALLEST_ALONE) / height)
-    figure.set_size_inches(max(WIDTH * shrink, 5.0), max(height * shrink, 2.2))
-    grid = figure.subplots(rows, columns, squeeze=False)
-    for number, axes in enumerate(grid.flat):
-        axes.set_visible(number < fields * times)
-        lowest = apart or number + columns >= fields * times
-        first = number % columns == 0
-        axes.tick_params(labelsize=8, labelbottom=lowest, labelleft=first)
-        axes.set_xlabel(lengths[0] if lowest else "")
-        axes.set_ylabel(lengths[1] if first else "")
+    size = max(WIDTH * shrink, 5.0) / columns, max(height * shrink, 2.2) / rows
+    grid = np.reshape(lay_out(figure, fields * times, columns, size), (rows, columns))
+    for axes in grid.flat:
+        axes.tick_params(labelsize=8)
+        axes.set(xlabel=lengths[0], ylabel=lengths[1])
+        if not apart:
+            axes.label_outer(remove_inner_ticks=False)
+        elif axes not in grid[:, 0]:
+            axes.tick_params(labelleft=False)
+            axes.set_ylabel("")
     if fields == 1:
-        return [list(grid.flat)[:times]]
-    return [[grid[k, m] if across else grid[m, k] for m in range(times)] for k in range(fields)]
-
-
-def dress(axes, box, scale: float) -> None:
-    """Equal aspect and limits."""
-    axes.set_aspect("equal")
-    axes.set_xlim(box[0] * scale, box[1] * scale)
-    axes.set_ylim(box[2] * scale, box[3] * scale)
+        return [list(grid.flat)]
+    return (grid if across else grid.T).tolist()
 
 
 def find_colours(dump: Dump, moments, name: str, boxes, view: View):
@@ -469,17 +463,16 @@ def choose_colours(dump: Dump, name: str, ranges: Sequence[tuple[float, float]])
     low, high = min(one[0] for one in ranges), max(one[1] for one in ranges)
     if low > high:
         low, high = 0.0, 1.0
-    block = next(block for block in dump.blocks if has_field(block, name))
-    si_unit, words = get_words(block, name)
-    factor, unit = pick_prefix(max(abs(low), abs(high)), si_unit)
-    label = f"{words} [{unit}]" if unit else words
-    if (style := get_style(dump, name)) and style.colours:
+    style = get_style(dump, name)
+    factor, unit = pick_prefix(max(abs(low), abs(high)), style.unit)
+    label = f"{style.words} [{unit}]" if unit else style.words
+    if style.colours:
         norm = PowerNorm(style.power, 0.0, high * factor or 1.0)
         return norm, style.colours, factor, label
     if low < 0 < high and min(-low, high) > 0.05 * max(-low, high):
         reach = max(-low, high) * factor
         return Normalize(-reach, reach), "RdBu_r", factor, label
-    velocity = si_unit == "m/s"  # zero is its middle, whatever it is in this picture
+    velocity = style.unit == "m/s"  # zero is its middle, whatever it is in this picture
     if low > 0 and not velocity and np.log10(high / low) > DECADES:
         return LogNorm(low * factor, high * factor), "viridis", factor, label
     if low == high:
@@ -506,9 +499,3 @@ def time_titles(dumps: Sequence[Dump]) -> list[str]:
 def scale_times(dumps: Sequence[Dump]) -> tuple[float, str]:
     """Factor and unit for the times of `dumps`."""
     return pick_prefix(max(dump.t for dump in dumps), dumps[-1].t_unit)
-
-
-def _note_following(figure, following: bool) -> None:
-    if following:
-        words = "panels show only the region around the interface; use --zoom for the rest"
-        figure.supxlabel(words, fontsize=8, color="0.4")

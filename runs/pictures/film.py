@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import subprocess
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,21 +19,22 @@ from tqdm import tqdm
 
 from regrid.errors import BadInput
 from runs.inspection.account import pick_prefix
-from runs.pictures.command import clean_words, default_fields, new_figure, parse_zoom
+from runs.pictures.command import (
+    check_folder,
+    clean_words,
+    default_fields,
+    new_figure,
+    parse_zoom,
+)
 from runs.pictures.fields import (
-    LONG,
     View,
     check_fields,
-    check_zoom,
+    choose_boxes,
     choose_colours,
-    draw_lines,
-    draw_mesh,
-    draw_sheets,
-    dress,
-    find_extent,
+    draw_panel,
     find_range,
     make_sheets,
-    split_outline,
+    measure_extent,
     time_titles,
 )
 from runs.store.files import disk_errors
@@ -45,9 +45,7 @@ SECONDS = 8.0  # that a film takes, within the rates of frames below
 SLOWEST, FASTEST = 3, 25
 WIDTH, LOWEST, TALLEST = 9.0, 2.4, 8.0  # inches
 SLENDER = 0.3  # height over width of a window below which the colours stand under it
-AROUND = 0.6  # of the interface's size: what is shown on each side of it
 KINDS = (".mp4", ".gif")
-Box = tuple[float, float, float, float]  # x0, x1, y0, y1 [m]
 
 
 def make_film(
@@ -76,7 +74,10 @@ def make_film(
     paths = [dump.path for dump in run.dumps]
     if len(paths) < 2:
         raise BadInput(f"{run.path} has {len(paths)} dump: a film needs two or more")
-    boxes = choose_windows(paths, view, follow)
+    extents = [measure_extent(make_sheets(Dump(one), (), view), view.zoom is None) for one in paths]
+    if follow and not all(span for _, span in extents):
+        raise BadInput(f"--follow: no two materials touch in {paths[0]}, there is no interface")
+    boxes, _ = choose_boxes(extents, view, follow)
     check_fields([Dump(paths[0])], [name])
     ranges = [
         find_range(make_sheets(Dump(one), [name], view), name, box)
@@ -113,16 +114,16 @@ class Frames:
         self.paths, self.name, self.view, self.boxes = [d.path for d in dumps], name, view, boxes
         self.titles = time_titles(dumps)
         first = Dump(self.paths[0])
-        self.norm, self.colours, self.factor, label = choose_colours(first, name, ranges)
+        self.look = choose_colours(first, name, ranges)
         self.scale, unit = pick_prefix(float(np.abs(boxes).max()), "m")
         self.labels = [f"{axis} [{unit}]" for axis in first.axes]
         self.figure, self.axes = figure, figure.subplots()
-        bar = ScalarMappable(self.norm, self.colours)
+        bar = ScalarMappable(*self.look[:2])
         box = boxes[0]
         place = {"shrink": 0.9, "pad": 0.015}
         if box[3] - box[2] < SLENDER * (box[1] - box[0]):  # no room for words at the side
             place = {"location": "bottom", "aspect": 50}
-        figure.colorbar(bar, ax=self.axes, label=label, **place)
+        figure.colorbar(bar, ax=self.axes, label=self.look[3], **place)
         self.draw(0)
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # the same frame in every picture
@@ -132,14 +133,11 @@ class Frames:
         axes = self.axes
         axes.clear()
         sheets = make_sheets(Dump(self.paths[number]), [self.name], self.view)
-        draw_sheets(axes, sheets, self.name, self.norm, self.colours, self.factor, self.scale)
-        if self.view.mesh:
-            draw_mesh(axes, sheets, self.scale, "k", 0.35)
-        draw_lines(axes, sheets, self.scale)
-        dress(axes, self.boxes[number], self.scale)
+        draw_panel(
+            axes, sheets, self.name, self.look, self.scale, self.boxes[number], self.view.mesh
+        )
         axes.set_title(self.titles[number], fontsize=10)
-        axes.set_xlabel(self.labels[0])
-        axes.set_ylabel(self.labels[1])
+        axes.set(xlabel=self.labels[0], ylabel=self.labels[1])
 
 
 def choose_path(run: RunData, output: str | Path | None, field: str) -> Path:
@@ -151,8 +149,7 @@ def choose_path(run: RunData, output: str | Path | None, field: str) -> Path:
         raise BadInput(f"{path}: a film's name has to end in .mp4 or .gif")
     if path.suffix.lower() == ".mp4" and not has_ffmpeg:
         raise BadInput(f"{path}: an mp4 needs the program ffmpeg, which is not here; take a .gif")
-    if not path.parent.is_dir():
-        raise BadInput(f"{path.parent} is not a folder, so {path.name} cannot be written")
+    check_folder(path)
     return path
 
 
@@ -174,34 +171,3 @@ class CommentedGif(animation.PillowWriter):
         for frame in self._frames[:1]:
             frame.info["comment"] = self.metadata["comment"].encode()
         super().finish()
-
-
-def choose_windows(paths: Sequence[Path], view: View, follow: bool) -> list[Box]:
-    """x0, x1, y0, y1 [m] of what each frame shows, all of one size."""
-    plain = replace(view, mesh=False)
-    extents, spans = [], []
-    for path in paths:
-        sheets = make_sheets(Dump(path), (), plain)
-        extents.append(find_extent([sheets]))
-        if view.zoom is None and (lines := split_outline(sheets)[0]):
-            points = np.concatenate(lines, axis=1)
-            spans.append((points.min(axis=1), points.max(axis=1)))
-    low, high = (np.array(extents)[:, k::2] for k in (0, 1))
-    low, high = low.min(axis=0), high.max(axis=0)
-    whole = (float(low[0]), float(high[0]), float(low[1]), float(high[1]))
-    if view.zoom is not None:
-        check_zoom(view.zoom, whole)
-        return [view.zoom] * len(paths)
-    size = high - low
-    if follow and len(spans) < len(paths):
-        raise BadInput(f"--follow: no two materials touch in {paths[0]}, there is no interface")
-    if len(spans) < len(paths) or not (follow or size.max() > LONG * size.min()):
-        return [whole] * len(paths)
-    widest = np.max([last - first for first, last in spans], axis=0)
-    wanted = np.minimum(widest + 2.0 * AROUND * max(widest.max(), 0.5 * size.min()), size)
-    boxes = []
-    for first, last in spans:
-        start = np.clip(0.5 * (first + last - wanted), low, high - wanted)
-        end = start + wanted
-        boxes.append((float(start[0]), float(end[0]), float(start[1]), float(end[1])))
-    return boxes

@@ -15,7 +15,7 @@ from matplotlib import colormaps
 from problems.deck import place_gauges
 from regrid.errors import BadInput
 from runs.inspection.account import compute_drifts, pick_prefix
-from runs.pictures.fields import scale_times
+from runs.pictures.fields import lay_out, scale_times
 from runs.store.reader import RunData
 
 FLAT = 1e-9  # relative variation of what is called constant
@@ -25,7 +25,7 @@ SHARED = 30.0  # columns in one panel are of one size within this factor
 MOST = 4  # of them
 LOGARITHMIC = ("residual", "change", "error")  # words of names of what falls by decades
 DECADES = 1e3
-WIDTH, HEIGHT = 13.5, 2.1  # inches: of the picture, of a row
+WIDTH, HEIGHT = 13.5, 2.4  # inches: of the picture, of a row
 LETTERS = 12.0  # an inch, of the line below the panels
 HEADROOM = 0.8  # of the range of the conserved totals, above them: for the legend
 Panel = list[str]  # names of columns; "dt" and "drift" are drawn their own way
@@ -52,15 +52,10 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
         panels, constant = choose_panels(history, units)
     number = len(panels)
     columns = min(min((4, 3, 5), key=lambda n: -number % n), number)  # the fewest empty places
-    rows = -(-number // columns)
-    figure.set_size_inches(max(WIDTH * columns / max(columns, 3), 6.0), HEIGHT * rows + 0.8)
-    grid = list(figure.subplots(rows, columns, squeeze=False, sharex=True).flat)
-    for axes, chosen in zip(grid, panels, strict=False):
+    grid = lay_out(figure, number, columns, (max(WIDTH / max(columns, 3), 6.0 / columns), HEIGHT),
+                   sharex=True)  # fmt: skip
+    for axes, chosen in zip(grid, panels, strict=True):
         _draw_panel(axes, history["t"] * factor, history, chosen, units)
-    for axes in grid[number:]:
-        axes.set_visible(False)
-    for axes in grid[max(0, number - columns) : number]:
-        axes.tick_params(labelbottom=True)
     if constant:
         words = ", ".join(f"{_say(name)} {np.nanmax(history[name]):.4g}" for name in constant)
         letters = int(LETTERS * figure.get_size_inches()[0])
@@ -175,7 +170,7 @@ WORDS = {
 MOST_NAMED = 10  # gauges with a line in the legend; more are told apart by a row of colours
 MOST_EMPTY = 3  # gauges without values that a panel names
 COLUMNS = 3
-GAUGES_WIDTH, GAUGES_HEIGHT = 4.4, 2.8  # inches of a panel
+GAUGES_WIDTH, GAUGES_HEIGHT = 4.4, 3.0  # inches of a panel
 
 
 def draw_gauges(figure, run: RunData, names: list[str]) -> None:
@@ -200,10 +195,9 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
     factor, unit = scale_times(run.dumps) if run.dumps else pick_prefix(table["t"][-1], "s")
     colours = colormaps["turbo"](np.linspace(0.05, 0.95, len(chosen)))
     columns = min(COLUMNS, len(fields))
-    rows = -(-len(fields) // columns)
-    figure.set_size_inches(max(GAUGES_WIDTH * columns, 7.0), GAUGES_HEIGHT * rows + 0.6)
-    grid = list(figure.subplots(rows, columns, squeeze=False, sharex=True).flat)
-    for axes, field in zip(grid, fields, strict=False):
+    size = max(GAUGES_WIDTH, 7.0 / columns), GAUGES_HEIGHT
+    grid = lay_out(figure, len(fields), columns, size, sharex=True)
+    for axes, field in zip(grid, fields, strict=True):
         writers = [(k, p) for k, p in enumerate(chosen) if field in p.fields]
         values = {p.name: np.asarray(table[f"{p.name}_{field}"], dtype=float) for _, p in writers}
         sizes = [np.abs(v[np.isfinite(v)]).max(initial=0.0) for v in values.values()]
@@ -216,10 +210,6 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
         axes.set_title(f"{WORDS[field]} [{field_unit}]", fontsize=9)
         axes.tick_params(labelsize=8)
         axes.grid(alpha=0.3)
-    for axes in grid[len(fields) :]:
-        axes.set_visible(False)
-    for axes in grid[max(0, len(fields) - columns) : len(fields)]:
-        axes.tick_params(labelbottom=True)
     moving = "; dashed: moves with the material" * any(point.moves for point in chosen)
     figure.supxlabel(f"t [{unit}]{moving}", fontsize=9)
     named = chosen

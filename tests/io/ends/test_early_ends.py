@@ -11,7 +11,7 @@ import pytest
 
 from regrid.errors import Place, RunFailure
 from runs.deck.reading import read_deck
-from runs.early_end.causes import CAUSES, ENDS, Setting
+from runs.early_end.causes import ENDS, Setting
 from runs.early_end.explain import find_calm_point
 from runs.march.launching import start_runner
 from runs.store.directory import RunDirectory
@@ -52,7 +52,7 @@ def test_the_last_state_can_be_drawn_and_the_restart_points_are_as_before(shockg
 def test_the_settings_of_the_cause_are_told_with_commands_that_work(shockgrid, monkeypatch):
     helped = (Setting("run.cfl", "shorter steps", factor=0.5), Setting("no.such", "x", value="1"))
     cause = ENDS["no-state"].__class__("density -1", "the toy was told to", helped, "`fail_at=-1`")
-    monkeypatch.setitem(CAUSES, "toy", cause)
+    monkeypatch.setitem(ENDS, "toy", cause)
     failure = functools.partial(RunFailure, cause="toy", place=Place("left", (1, 2)))
     monkeypatch.setattr("toy_problem.RunFailure", failure)
     code, _, error = run_toy(shockgrid)

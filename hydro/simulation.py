@@ -66,8 +66,9 @@ class Simulation:
     `measured_numbers` of them, that history columns want of the whole of it, found by whoever
     computes it; `refining`: adds grid lines on the way (`hydro.remap.flow`), None: the cells
     stay as many as they are; `void_fill`: pressure [Pa] and gamma of the gas that a void between
-    surfaces holds when it closes, None: nothing.  Raises BadInput for sides that are not covered
-    once by segments, and for blocks that lie on each other.
+    surfaces holds when it closes, None: nothing; `find_end`: called after every step, gives words
+    for a run that has come to its end before `t_end`.  Raises BadInput for sides that are not
+    covered once by segments, and for blocks that lie on each other.
     """
 
     def __init__(
@@ -88,6 +89,7 @@ class Simulation:
         measured_numbers: int = 1,
         refining: Refining | None = None,
         void_fill: tuple[float, float] | None = None,
+        find_end: Callable[[Simulation], str | None] | None = None,
     ):
         self.geometry = find_geometry(geometry)
         _check_parts(blocks, links)
@@ -101,7 +103,7 @@ class Simulation:
         self._mesh = mesh
         self._line_rule = line_rule or LineRule()
         self._source = source
-        self._void_fill = void_fill
+        self._void_fill, self._find_end = void_fill, find_end or (lambda simulation: None)
         self.refining, self._counts_cells = refining, refining is not None
         self._connect(blocks, links, make_regridder)
         self._overlaps.check_pistons(float(t_end))
@@ -272,6 +274,7 @@ class Simulation:
             own = [self._measure_block(self._blocks[number]) for number in ranks.own]
             self._measured = list(ranks.share_rows(own, self._measured_numbers))
         ranks.end_step()
+        self.finished = self.finished or self._find_end(self)
         return row
 
     def _refine(self, refining: Refining) -> None:
@@ -410,6 +413,7 @@ class Simulation:
             block.void_energy[...] = state[f"{block.name}/void_energy"]
             block.rates[...] = state[f"{block.name}/rates"]
         self.small_cells.find_fastest()
+        self.finished = self.finished or self._find_end(self)
 
 
 def _find_smallest(block: Block) -> tuple[int, int]:

@@ -8,7 +8,7 @@ for editors is made from them.  Note: msgspec checks bounds and types when a dec
 A problem's own deck reads:
 
     class MyDeck(Deck, kw_only=True):
-        run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1e-3))
+        run: RunControl = RunControl(t_end=1e-3)
         mach: key(float, "Mach number of the shock", gt=1) = 1.2
 """
 
@@ -18,7 +18,7 @@ import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union, get_args
 
 import msgspec
 from msgspec import Meta
@@ -41,8 +41,14 @@ Limiter = Annotated[  # the names of hydro.formulas.reconstruction.LIMITERS
 
 
 def key(kind: Any, description: str, **bounds: Any) -> Any:
-    """The annotation of a deck's key: its type, its description in the schema, its bounds."""
-    return Annotated[kind, Meta(description=description, **bounds)]
+    """The annotation of a deck's key: its type, its description in the schema, its bounds.
+
+    Of a type such as `float | None` the bounds are those of the number.
+    """
+    parts = [one for one in get_args(kind) if one is not type(None)]
+    if len(parts) == len(get_args(kind)):
+        return Annotated[kind, Meta(description=description, **bounds)]
+    return key(Union[tuple(parts)], description, **bounds) | None  # noqa: UP007
 
 
 class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -239,8 +245,8 @@ class Regrid(DeckTable, kw_only=True):
 class Deck(DeckTable, kw_only=True):
     """What every problem's deck has."""
 
-    run: RunControl = msgspec.field(default_factory=RunControl)
-    output: Output = msgspec.field(default_factory=Output)
+    run: RunControl = RunControl()
+    output: Output = Output()
     gauge: key(list[Gauge], "points at which the flow is recorded after every step") = (
         msgspec.field(default_factory=list)
     )

@@ -17,7 +17,6 @@ import time
 from collections.abc import Mapping
 from typing import Literal
 
-import msgspec
 import numpy as np
 
 from problems.deck import Deck, Regrid, RunControl, key
@@ -41,7 +40,7 @@ FAR_HEIGHT = 5.0  # of the strip's widths: lines beyond are to stay straight
 class GridMarchDeck(Deck, kw_only=True):
     """A domain, its cells, how fast and how rough its motion is, and the regridder."""
 
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1.0))
+    run: RunControl = RunControl(t_end=1.0)
     domain: key(DomainName, "shape of the domain and its motion") = "three_fingers"
     ni: key(int, "cells away from the deforming side", ge=2, le=4000) = 60
     nj: key(int, "cells along the deforming side", ge=2, le=4000) = 40
@@ -54,7 +53,7 @@ class GridMarchDeck(Deck, kw_only=True):
     speed_factor: key(
         float, "inner nodes at most so many times as fast as the boundary; 0: any", ge=0
     ) = 0.0
-    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    regrid: Regrid = Regrid()
 
 
 class GridBlock:

@@ -24,15 +24,18 @@ from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
 from hydro.step import take_step
 from problems.deck import DeckTable, key
-from problems.problem import draw_field
+from problems.pictures import draw_field
+from problems.problem import find_crossing
 from problems.references.hugoniot import Shock
 from regrid.errors import BadInput
 from regrid.measure.cells import compute_area_fractions
 from regrid.measure.corners import compute_centres
 from regrid.sides import SIDE_NAMES
 
+Symmetry = Literal["plane", "cylindrical", "spherical"]
 STRIP = 4  # cells across the strip of plane flow
 POINTS = 6  # for means over a cell, each way
+LEAST_RISE = 1e-3  # of the density over that of the cold gas: less is no shock
 
 
 class Fluid(DeckTable, kw_only=True):
@@ -91,6 +94,22 @@ def put_walls(block: Block, *sides: str) -> None:
         put(block, side, "wall")
 
 
+def follow_gas(block: Block, dt: float) -> np.ndarray:
+    """Nodes after dt [s] that move with the mean velocity of the four cells around, by impedance.
+
+    Weights rho c, as in a contact between sound waves: cold gas has no say before the shock.  With
+    the masses as weights the nodes at the shock's foot set off late.
+    """
+    rho, u, v, p = block.state[:, 1:-1, 1:-1]
+    impedance = rho * block.eos.sound_speed(rho, p)
+    around = np.array([impedance, impedance * u, impedance * v])
+    around = np.pad(around, ((0, 0), (1, 1), (1, 1)), mode="edge")
+    around[1, [0, -1]] *= -1.0  # mirror images beyond the sides
+    around[2][:, [0, -1]] *= -1.0
+    total = (around[:, 1:, 1:] + around[:, :-1, :-1]) + (around[:, 1:, :-1] + around[:, :-1, 1:])
+    return block.nodes + dt * (total[1:] / total[0])
+
+
 def average_points(nodes: np.ndarray, places, function: Callable) -> np.ndarray:
     """Means over the cells of `function(points) -> (values, weights)`, at `places` in 0..1 each
     way with their weights; points (2, ni, nj) lie on the bilinear cells of `nodes`."""
@@ -114,7 +133,7 @@ class RadialFlow:
     quarter between the axis and the plane of symmetry, in axisymmetric flow.
     """
 
-    symmetry: Literal["plane", "cylindrical", "spherical"]
+    symmetry: Symmetry
 
     @property
     def geometry(self) -> str:
@@ -154,6 +173,20 @@ class RadialFlow:
         weight = block.volume * (self.compute_radii(compute_centres(block.nodes)) < within)
         error = np.abs(block.state[0, 1:-1, 1:-1] - exact)
         return float((error * weight).sum() / (exact * weight).sum())
+
+    def find_shock(self, block: Block) -> float:
+        """Mean radius [m] of a shock that runs outwards into gas of density 1.
+
+        On every grid line that crosses it, inwards from the far side, where the density first is
+        half way from 1 to the greatest of all; in a straight line between centres.  0 where nothing
+        is denser than the cold gas.
+        """
+        r, rho = self.compute_radii(compute_centres(block.nodes)), block.state[0, 1:-1, 1:-1]
+        level = 0.5 * (1.0 + float(rho.max()))
+        lines = [*zip(r.T, rho.T, strict=True), *zip(r, rho, strict=True)]
+        found = np.array([find_crossing(*line, level) for line in lines])
+        known = np.isfinite(found)
+        return float(found[known].mean()) if level > 1.0 + 0.5 * LEAST_RISE and known.any() else 0.0
 
     def draw(self, figure, dump, exact, reach: float, **options) -> None:
         """Density out to `reach` [m], and of every cell against its radius beside `exact(r)`."""

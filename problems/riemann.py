@@ -21,7 +21,6 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
-import msgspec
 import numpy as np
 
 from hydro.block import Block
@@ -202,7 +201,7 @@ class SideState(Fluid, kw_only=True):
 class RiemannDeck(Deck, kw_only=True):
     """Deck of `riemann`; the defaults are Sod's problem, contact on a grid line."""
 
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
+    run: RunControl = RunControl(cfl=0.8)
     case: key(str, "named states: " + ", ".join(CASES)) = "sod"
     left: SideState | None = None
     right: SideState | None = None
@@ -235,7 +234,7 @@ class RiemannDeck(Deck, kw_only=True):
         | None
     ) = None
     limiter: Limiter | None = None  # None: the case's
-    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    regrid: Regrid = Regrid()
 
 
 class Riemann(Problem):

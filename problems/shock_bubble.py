@@ -19,11 +19,10 @@ table 3.
 
 from __future__ import annotations
 
-import functools
 import math
+from collections.abc import Mapping
 from typing import ClassVar, Literal, NamedTuple
 
-import msgspec
 import numpy as np
 
 from hydro.block import Block
@@ -33,13 +32,14 @@ from hydro.links import join
 from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Output, Regrid, RunControl, key
 from problems.initial_states import make_plane_grid, mix_states, put_walls
-from problems.problem import Problem, Report, Row, draw_grid, get_last
+from problems.pictures import draw_grid, find_dump
+from problems.problem import Problem, Report, Row, align, get_last
 from problems.references.hugoniot import shock_with_mach
 from problems.references.riemann import solve_riemann
 from regrid.algebraic import fill_from_sides
 from regrid.measure.cells import compute_area_fractions
 from regrid.measure.corners import compute_centres
-from regrid.sides import SIDE_NAMES, get_side
+from regrid.sides import get_side
 
 MICRO = 1e-6
 PRESSURE, AIR_DENSITY, AIR = 101325.0, 1.225, IdealGas(1.4)
@@ -102,23 +102,36 @@ FEATURES = {
 # When the heavy bubble's downwind end, which the shock in the air had pushed upwind, turns:
 # microseconds after the shock's arrival, on the fixed grid.
 FOCUS = {"R22": 200.8}
+LINKS = (
+    ("seam", "west", "i_max", "core", "i_min"),
+    ("seam", "east", "i_min", "core", "i_max"),
+    ("interface", "west", "i_min", "air-west", "i_max"),
+    ("interface", "east", "i_max", "air-east", "i_min"),
+    ("seam", "north", "i_min", "core", "j_max"),
+    ("interface", "north", "i_max", "air-north", "i_min"),
+    ("seam", "upwind", "i_max", "air-west", "i_min"),
+    ("seam", "air-east", "i_max", "downwind", "i_min"),
+    ("seam", "west", "j_max", "north", "j_max"),
+    ("seam", "north", "j_min", "east", "j_max"),
+    ("seam", "air-west", "j_max", "air-north", "j_max"),
+    ("seam", "air-north", "j_min", "air-east", "j_max"),
+)
+AXIS = ("upwind", "air-west", "west", "core", "east", "air-east", "downwind")
+WALLS = {name: ("j_min",) for name in AXIS} | {
+    "upwind": ("j_min", "j_max"), "downwind": ("j_min", "j_max", "i_max"), "air-north": ("i_max",),
+}  # fmt: skip
+OUTLINE = {"west": 0, "north": -1, "east": -1}  # the row of nodes on the bubble's surface
 
 
 class ShockBubbleDeck(Deck, kw_only=True):
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
-    output: Output = msgspec.field(default_factory=lambda: Output(dumps=40))
-    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    run: RunControl = RunControl(cfl=0.8)
+    output: Output = Output(dumps=40)
+    regrid: Regrid = Regrid()
     gas: key(Literal["helium", "R22"], "in the bubble") = "helium"
     mach: key(float, "Mach number of the shock in air", ge=1.001, le=5) = 1.22
     cells: key(int, "cells along 45 degrees of the bubble's surface", ge=4, le=MOST_CELLS) = 12
-    thickness: (
-        key(
-            float,
-            "shorter waves of the surface decay [m]; left out: .75 of a first cell",
-            ge=0,
-            le=1,
-        )
-        | None
+    thickness: key(
+        float | None, "shorter waves of the surface decay [m]; left out: .75 of a cell", ge=0, le=1
     ) = None
     limiter: Limiter = "van-leer"
 
@@ -212,14 +225,8 @@ class ShockBubble(Problem):
         return {name: np.ascontiguousarray(nodes) for name, nodes in grids.items()}
 
     def estimate_cells(self) -> int:
-        """The cells of `make_grids`, counted."""
-        n, joint = self.deck.cells, math.radians(JOINT[self.deck.gas])
-        size = CORE * RADIUS / n
-        up = 1 + math.ceil(n * joint / (0.25 * math.pi))
-        columns = max(4, math.ceil(1.2 * RADIUS * (math.pi - 2.0 * joint) / size))
-        across = (RADIUS - CORE * RADIUS + 1.2 * (HALF_HEIGHT - RADIUS)) / size + 2.0
-        tube = 0.5 * (UPWIND + DOWNWIND) / size + 2.0
-        return columns * up + math.ceil(across * (2 * up + columns) + tube * up)
+        """Those of the largest deck with `make_grids`, and somewhat more."""
+        return 34 * (self.deck.cells + 2) ** 2
 
     def build(self):
         deck, blocks = self.deck, {}
@@ -230,40 +237,25 @@ class ShockBubble(Problem):
                 part = compute_area_fractions(nodes, -RADIUS - GAP * RADIUS)
                 eos, state, material = AIR, mix_states(AIR, part, self.behind, ahead), "air"
             blocks[name] = Block(name, eos, nodes, *state, material=material, limiter=deck.limiter)
-
-        def link(kind, one, side, other, other_side):
-            return join(kind, (blocks[one], side), (blocks[other], other_side))
-
-        seams = [link("seam", "west", "i_max", "core", "i_min")]
-        seams.append(link("seam", "east", "i_min", "core", "i_max"))
-        surfaces = [link("interface", "west", "i_min", "air-west", "i_max")]
-        surfaces.append(link("interface", "east", "i_max", "air-east", "i_min"))
-        north = link("seam", "north", "i_min", "core", "j_max")
-        top = link("interface", "north", "i_max", "air-north", "i_min")
-        links = [*seams, *surfaces, north, top]
-        links.append(link("seam", "upwind", "i_max", "air-west", "i_min"))
-        links.append(link("seam", "air-east", "i_max", "downwind", "i_min"))
-        for air in ("", "air-"):
-            links.append(link("seam", air + "west", "j_max", air + "north", "j_max"))
-            links.append(link("seam", air + "north", "j_min", air + "east", "j_max"))
-        for name in ("core", "west", "east", "air-west", "air-east", "upwind", "downwind"):
-            put_walls(blocks[name], "j_min")
-        put_walls(blocks["air-north"], "i_max")
-        put_walls(blocks["upwind"], "j_max")
-        put_walls(blocks["downwind"], "j_max", "i_max")
+            if name in WALLS:
+                put_walls(blocks[name], *WALLS[name])
         put(blocks["upwind"], "i_min", "inflow", state=self.behind)
+        links = [
+            join(kind, (blocks[one], side), (blocks[other], other_side))
+            for kind, one, side, other, other_side in LINKS
+        ]
         simulation = self.simulate(
             blocks.values(),
             links,
             line_rule=LineRule(thickness=deck.thickness),
             measure_block=lambda block: (float(block.volume.sum()),),
         )
-        west, east = (surface.leader for surface in surfaces)
+        west_seam, east_seam, west, east, _, top = (link.leader for link in links[:6])
         for side in (west, east):  # else the vortex takes these points into the fold of the jet
-            simulation.motion.let_slide(side, top.leader)
+            simulation.motion.let_slide(side, top)
         # left to the gas, the middle square would be run over by the jet
-        for seam in seams:
-            simulation.motion.carry(seam.leader, west, east)
+        for seam in (west_seam, east_seam):
+            simulation.motion.carry(seam, west, east)
         return simulation
 
     def measure(self, evolution) -> dict[str, float]:
@@ -275,10 +267,8 @@ class ShockBubble(Problem):
         """
         blocks = {block.name: block for block in evolution.blocks}
         volumes = dict(zip(blocks, evolution.measured, strict=True))
-        west, north, east = (blocks[name] for name in ("west", "north", "east"))
-        lines = (west.nodes[:, 0], north.nodes[:, -1], east.nodes[:, -1])
-        names = ("upwind", "air-west", "west", "core", "east", "air-east", "downwind")
-        axis = [(blocks[name].nodes[0, :, 0], blocks[name].state[3, 1:-1, 1]) for name in names]
+        lines = west, _, east = [blocks[name].nodes[:, row] for name, row in OUTLINE.items()]
+        axis = [(blocks[name].nodes[0, :, 0], blocks[name].state[3, 1:-1, 1]) for name in AXIS]
         lid = blocks["air-north"]
         wall = [
             (blocks["upwind"].nodes[0, :, -1], blocks["upwind"].state[3, 1:-1, -2]),
@@ -286,8 +276,8 @@ class ShockBubble(Problem):
             (blocks["downwind"].nodes[0, :, -1], blocks["downwind"].state[3, 1:-1, -2]),
         ]
         return {
-            "upwind": float(west.nodes[0, 0, 0]),
-            "downwind": float(east.nodes[0, -1, 0]),
+            "upwind": float(west[0, 0]),
+            "downwind": float(east[0, 0]),
             "rear": min(float(line[0].min()) for line in lines),
             "height": max(float(line[1].max()) for line in lines),
             "volume": sum(volumes[name][0] for name in BUBBLE),
@@ -351,7 +341,7 @@ class ShockBubble(Problem):
         """Those of the gas, where the Mach number is that of the experiment."""
         return FEATURES[self.deck.gas] if self.deck.mach == self.Deck().mach else ()
 
-    def _list_errors(self, history) -> list[Row]:
+    def list_errors(self, history) -> list[Row]:
         """Relative differences of velocities from the experiment's, by the features' names.
 
         Those that the experiment has not are compared with the fixed grid's.  `upwind_speed`: of
@@ -378,23 +368,15 @@ class ShockBubble(Problem):
             f"shock-bubble, {deck.gas} in air, Mach {deck.mach:g}, "
             f"t = {(t[-1] - self.arrival) / MICRO:.4g} us after the shock's arrival:"
         ]
-        source = "" if deck.gas == "helium" else " (published ones from memory)"
-        head = f"  velocities [m/s]{'':14s}here  fixed grid  measured  computed   window [us]"
+        table = [["velocities [m/s]", "here", "fixed grid", "measured", "computed", "window [us]"]]
         for feature in self.features:
-            window = self.compute_window(history, feature)
-            if window is None:
-                continue
-            if len(lines) == 1:
-                lines.append(head + source)
-            start, end = ((time - self.arrival) / MICRO for time in window)
-            others = [
-                "" if math.isnan(speed) else f"{speed:g}"
-                for speed in (feature.fixed_grid, feature.measured, feature.computed)
-            ]
-            lines.append(
-                f"  {feature.words:24s}{self.fit_velocity(history, feature):10.1f}"
-                f"{others[0]:>12s}{others[1]:>10s}{others[2]:>10s}   {start:.0f}-{end:.0f}"
-            )
+            if window := self.compute_window(history, feature):
+                start, end = ((time - self.arrival) / MICRO for time in window)
+                others = feature.fixed_grid, feature.measured, feature.computed
+                words = ["" if math.isnan(speed) else f"{speed:g}" for speed in others]
+                here = f"{self.fit_velocity(history, feature):.1f}"
+                table.append([feature.words, here, *words, f"{start:.0f}-{end:.0f}"])
+        lines += align(table) if len(table) > 1 else []
         ends = [1e3 * get_last(history, name) for name in ("upwind", "downwind", "height")]
         notes = [
             f"plane waves: shock {self.shock.shock_speed:.1f}, refracted shock "
@@ -403,160 +385,123 @@ class ShockBubble(Problem):
             f"bubble from x = {ends[0]:.2f} to {ends[1]:.2f} mm on the axis, {ends[2]:.2f} mm "
             f"high, {volume[-1] / volume[0]:.4f} of its first volume",
         ]
-        return Report("\n".join(lines), self._list_errors(history), notes)
+        if deck.gas != "helium" and len(table) > 1:
+            notes.append("published velocities from memory")
+        return Report("\n".join(lines), self.list_errors(history), notes)
 
     def figures(self):
-        draw = functools.partial
-        return {
-            "shock-bubble": draw(draw_shadowgraphs, self),
-            "space-time": draw(draw_space_time, self),
+        return {"shock-bubble": self.draw_shadowgraphs, "space-time": self.draw_space_time}
+
+    def choose_dumps(self, run_data) -> list:
+        """Dumps nearest to the times of the experiment's photographs, each once, and the last."""
+        last, chosen = run_data.dumps[-1], {}
+        for time in PHOTOGRAPHS[self.deck.gas]:
+            wanted = self.arrival + time * MICRO
+            dump = find_dump(run_data, wanted)
+            if dump.t > self.arrival and wanted <= last.t * (1.0 + 1e-12):
+                chosen[dump.t] = dump
+        return list({**chosen, last.t: last}.values())
+
+    def draw_shadowgraphs(self, figure, run_data) -> None:
+        """Density gradients as a shadowgraph shows them, the grid mirrored below, at six times."""
+        dumps = self.choose_dumps(run_data)
+        columns = min(3, len(dumps))
+        rows = -(-len(dumps) // columns)
+        figure.set_size_inches(4.2 * columns, 3.9 * rows)
+        panels = figure.subplots(rows, columns, squeeze=False)
+        for axis in panels.ravel()[len(dumps) :]:
+            axis.remove()
+        for number, (axis, dump) in enumerate(zip(panels.ravel(), dumps, strict=False)):
+            draw_shadowgraph(axis, self.deck.gas, dump)
+            axis.set_title(f"{(dump.t - self.arrival) / MICRO:.0f} µs", fontsize="medium")
+            axis.set_xlabel("x [mm]")
+            if number % columns == 0:
+                axis.set_ylabel("y [mm]")
+
+    def draw_space_time(self, figure, run_data) -> None:
+        """Places of the bubble's ends and of the shocks over time, and the measured velocities."""
+        history, axis = run_data.history, figure.subplots()
+        figure.set_size_inches(7.5, 6.0)
+        t = (history["t"] - self.arrival) / MICRO
+        inside = history["axis_front"] < self.far_end - 1e-3
+        columns = {
+            "upwind": ("upwind end, then jet", "C3"),
+            "rear": ("rearmost point", "C1"),
+            "downwind": ("downwind end", "C0"),
+            "axis_front": ("shock on the axis", "C2"),
+            "wall_front": ("shock at the wall", "0.5"),
         }
-
-
-def find_neighbours(blocks) -> dict[tuple[int, str], tuple[int, str, bool]]:
-    """Which side of which block of the same material lies at a block's side, and if it runs back.
-
-    Keys and values: index of the block, side; a side is known again by its nodes, which are the
-    neighbour's bitwise or nearly so.
-    """
-    lines = {}
-    for number, block in enumerate(blocks):
-        for side in SIDE_NAMES:
-            lines[number, side] = get_side(block.nodes, side)
-    found = {}
-    for one, line in lines.items():
-        for other, there in lines.items():
-            same = blocks[one[0]].material == blocks[other[0]].material
-            if one == other or not same or line.shape != there.shape:
+        for name, (words, colour) in columns.items():
+            places = np.where(inside, history[name], np.nan) if "front" in name else history[name]
+            axis.plot(1e3 * places, t, color=colour, label=words)
+        for feature in self.features:
+            window = self.compute_window(history, feature)
+            if window is None or math.isnan(feature.measured):
                 continue
-            for back in (False, True):
-                if np.allclose(line, there[:, ::-1] if back else there, rtol=0.0, atol=1e-9):
-                    found[one] = (*other, back)
-    return found
+            ends = np.array(window)
+            at = np.interp(np.linspace(*window, 101), history["t"], history[feature.column]).mean()
+            places = at + feature.measured * (ends - ends.mean())
+            axis.plot(1e3 * places, (ends - self.arrival) / MICRO, "k--", lw=1.0)
+        axis.plot([], [], "k--", lw=1.0, label="measured velocities")
+        far = 1e3 * max(float(history["downwind"].max()) + 0.03, 0.08)
+        axis.set(xlim=(-40.0, far), ylim=(min(t[0], 0.0), t[-1]))
+        axis.set(xlabel="x [mm]", ylabel="time after the shock's arrival [µs]")
+        axis.legend(loc="lower right", frameon=False)
+        axis.set_title(f"{self.deck.gas}, {self.deck.cells} cells", fontsize="medium")
 
 
-def pad_over_seams(fields: list[np.ndarray], neighbours: dict) -> list[np.ndarray]:
-    """Fields (ni, nj) of all blocks in frames (ni + 2, nj + 2).
+def pad_over_seams(blocks: Mapping, fields: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Fields (k, ni, nj) of blocks by name in frames (k, ni + 2, nj + 2).
 
     At a seam the frame is the neighbour's row, elsewhere the block's own again.
     """
-    wide = [np.pad(field, 1, mode="edge") for field in fields]
-    for (number, side), (other, there, back) in neighbours.items():
-        row = np.moveaxis(fields[other], "ij".index(there[0]), 0)[
-            0 if there.endswith("min") else -1
-        ]
-        frame = np.moveaxis(wide[number], "ij".index(side[0]), 0)
-        frame[0 if side.endswith("min") else -1, 1:-1] = row[::-1] if back else row
-    return wide
+    frames = {name: np.pad(f, ((0, 0), (1, 1), (1, 1)), mode="edge") for name, f in fields.items()}
+    for kind, one, side, other, there in LINKS:
+        if kind == "seam":
+            line, opposite = get_side(blocks[one].nodes, side), get_side(blocks[other].nodes, there)
+            back = (
+                -1 if np.abs(line - opposite).max() > np.abs(line[:, ::-1] - opposite).max() else 1
+            )
+            get_side(frames[one], side)[:, 1:-1] = get_side(fields[other], there)[:, ::back]
+            get_side(frames[other], there)[:, 1:-1] = get_side(fields[one], side)[:, ::back]
+    return frames
 
 
-def compute_shadows(blocks) -> list[np.ndarray]:
+def compute_shadows(blocks: Mapping) -> dict[str, np.ndarray]:
     """Size of the gradient of the density's logarithm at the nodes (ni+1, nj+1) of blocks [1/m].
 
     Differences over both neighbours of a cell, of a seam's other side too, over one at a wall or
     an interface; then means over the cells around a node: a jump at a contact is not in it.
     """
-    neighbours = find_neighbours(blocks)
-    centres = [compute_centres(block.nodes) for block in blocks]
-    logs = [np.log(block.cell_fields["rho"]) for block in blocks]
-    x, y, rho = (
-        pad_over_seams(list(fields), neighbours)
-        for fields in ([c[0] for c in centres], [c[1] for c in centres], logs)
-    )
-    sizes = []
-    for x_wide, y_wide, rho_wide in zip(x, y, rho, strict=True):
-        (x_i, y_i, rho_i), (x_j, y_j, rho_j) = (
-            [field[2:, 1:-1] - field[:-2, 1:-1] for field in (x_wide, y_wide, rho_wide)],
-            [field[1:-1, 2:] - field[1:-1, :-2] for field in (x_wide, y_wide, rho_wide)],
-        )
-        area = x_i * y_j - x_j * y_i
-        sizes.append(
-            np.hypot((rho_i * y_j - rho_j * y_i) / area, (rho_j * x_i - rho_i * x_j) / area)
-        )
-    return [compute_centres(wide) for wide in pad_over_seams(sizes, neighbours)]
+    fields, sizes = {}, {}
+    for name, block in blocks.items():
+        rho = np.log(block.cell_fields["rho"])
+        fields[name] = np.array([*compute_centres(block.nodes), rho])
+    for name, wide in pad_over_seams(blocks, fields).items():
+        x_i, y_i, rho_i = wide[:, 2:, 1:-1] - wide[:, :-2, 1:-1]
+        x_j, y_j, rho_j = wide[:, 1:-1, 2:] - wide[:, 1:-1, :-2]
+        slopes = np.array([rho_i * y_j - rho_j * y_i, rho_j * x_i - rho_i * x_j])
+        sizes[name] = np.hypot(*slopes / (x_i * y_j - x_j * y_i))[None]
+    frames = pad_over_seams(blocks, sizes)
+    return {name: compute_centres(frame[0]) for name, frame in frames.items()}
 
 
-def choose_dumps(problem, run_data) -> list:
-    """Dumps nearest to the times of the experiment's photographs, each once, and the last."""
-    last = run_data.dumps[-1]
-    chosen = {}
-    for time in PHOTOGRAPHS[problem.deck.gas]:
-        wanted = problem.arrival + time * MICRO
-        dump = min(run_data.dumps, key=lambda dump, t=wanted: abs(dump.t - t))
-        if dump.t > problem.arrival and wanted <= last.t * (1.0 + 1e-12):
-            chosen[dump.t] = dump
-    chosen[last.t] = last
-    return list(chosen.values())
-
-
-def draw_shadowgraphs(problem, figure, run_data) -> None:
-    """Density gradients as a shadowgraph shows them, the grid mirrored below, at six times."""
-    dumps = choose_dumps(problem, run_data)
-    columns = min(3, len(dumps))
-    rows = -(-len(dumps) // columns)
-    figure.set_size_inches(4.2 * columns, 3.9 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False)
-    for axis in panels.ravel()[len(dumps) :]:
-        axis.remove()
-    for number, (axis, dump) in enumerate(zip(panels.ravel(), dumps, strict=False)):
-        draw_shadowgraph(axis, problem, dump)
-        axis.set_title(f"{(dump.t - problem.arrival) / MICRO:.0f} µs", fontsize="medium")
-        axis.set_xlabel("x [mm]")
-        if number % columns == 0:
-            axis.set_ylabel("y [mm]")
-
-
-def draw_shadowgraph(axis, problem, dump) -> None:
+def draw_shadowgraph(axis, gas: str, dump) -> None:
     """One time: gradients above the axis, the grid below it, the bubble's surface around."""
-    gas = problem.deck.gas
-    shadows = compute_shadows(dump.blocks)
-    most = float(np.percentile(np.concatenate([shadow.ravel() for shadow in shadows]), 99.0))
-    for block, shadow in zip(dump.blocks, shadows, strict=True):
+    blocks = {block.name: block for block in dump.blocks}
+    shadows = compute_shadows(blocks)
+    most = float(np.percentile(np.concatenate([one.ravel() for one in shadows.values()]), 99.0))
+    for name, block in blocks.items():
         x, y = 1e3 * block.nodes
-        dark = np.log10(np.maximum(shadow / most, 1e-9))
+        dark = np.log10(np.maximum(shadows[name] / most, 1e-9))
         axis.pcolormesh(
             x, y, dark, cmap="Greys", shading="gouraud", vmin=-DECADES, vmax=0.2, rasterized=True
         )
-        colour = "C0" if block.material == gas else "0.6"
-        draw_grid(axis, np.array([x, -y]), color=colour)
-    for name, row in (("west", 0), ("north", -1), ("east", -1)):
-        x, y = 1e3 * dump.block(name).nodes[:, row]
+        draw_grid(axis, np.array([x, -y]), color="C0" if block.material == gas else "0.6")
+    lines = [1e3 * blocks[name].nodes[:, row] for name, row in OUTLINE.items()]
+    for x, y in lines:
         axis.plot(x, y, color="k", lw=1.0)
         axis.plot(x, -y, color="k", lw=1.0)
-    ends = [1e3 * dump.block(name).nodes[0] for name in ("west", "north", "east")]
-    middle = 0.5 * (min(x.min() for x in ends) + max(x.max() for x in ends))
+    ends = np.concatenate(lines, axis=1)[0]
+    middle = 0.5 * (ends.min() + ends.max())
     axis.set(aspect="equal", xlim=(middle - 48.0, middle + 48.0), ylim=(-44.5, 44.5))
-
-
-def draw_space_time(problem, figure, run_data) -> None:
-    """Places of the bubble's ends and of the shocks over time, with the measured velocities."""
-    history = run_data.history
-    axis = figure.subplots()
-    figure.set_size_inches(7.5, 6.0)
-    t = (history["t"] - problem.arrival) / MICRO
-    inside = history["axis_front"] < problem.far_end - 1e-3
-    columns = (
-        ("upwind", "upwind end, then jet", "C3"),
-        ("rear", "rearmost point", "C1"),
-        ("downwind", "downwind end", "C0"),
-        ("axis_front", "shock on the axis", "C2"),
-        ("wall_front", "shock at the wall", "0.5"),
-    )
-    for name, words, colour in columns:
-        positions = np.where(inside, history[name], np.nan) if "front" in name else history[name]
-        axis.plot(1e3 * positions, t, color=colour, label=words)
-    for feature in problem.features:
-        window = problem.compute_window(history, feature)
-        if window is None or math.isnan(feature.measured):
-            continue
-        ends = np.array(window)
-        middle = ends.mean()
-        at = np.interp(np.linspace(*window, 101), history["t"], history[feature.column]).mean()
-        positions = at + feature.measured * (ends - middle)
-        axis.plot(1e3 * positions, (ends - problem.arrival) / MICRO, "k--", lw=1.0)
-    axis.plot([], [], "k--", lw=1.0, label="measured velocities")
-    far = 1e3 * max(float(history["downwind"].max()) + 0.03, 0.08)
-    axis.set(xlim=(-40.0, far), ylim=(min(t[0], 0.0), t[-1]))
-    axis.set(xlabel="x [mm]", ylabel="time after the shock's arrival [µs]")
-    axis.legend(loc="lower right", frameon=False)
-    axis.set_title(f"{problem.deck.gas}, {problem.deck.cells} cells", fontsize="medium")

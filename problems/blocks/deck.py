@@ -140,15 +140,15 @@ def make_default_blocks() -> tuple[BlockTable, ...]:
 class BlocksDeck(Deck, kw_only=True):
     """Deck of `blocks`."""
 
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1e-3))
-    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    run: RunControl = RunControl(t_end=1e-3)
+    regrid: Regrid = Regrid()
     title: key(str, "a line for the summary") = ""
     geometry: key(Literal["plane", "axisymmetric"], "axisymmetric: y is the radius") = "plane"
     mesh: key(
         Literal["regrid", "fixed"], "regrid: grids follow moving sides; fixed: no node moves"
     ) = "regrid"
     limiter: Limiter = "van-leer"
-    void_fill: VoidFill = msgspec.field(default_factory=VoidFill)
+    void_fill: VoidFill = VoidFill()
     block: key(tuple[BlockTable, ...], "the blocks, [[block]] each", min_length=1) = msgspec.field(
         default_factory=make_default_blocks
     )

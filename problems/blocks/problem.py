@@ -26,7 +26,8 @@ from hydro.links import join, slide
 from hydro.simulation import Simulation
 from problems.blocks.deck import LINKED, BlocksDeck, BlockSide, BlockTable, CurveTable
 from problems.deck import check_digests
-from problems.problem import BlockPlan, Problem, Report, check_memory, draw_field
+from problems.pictures import draw_field
+from problems.problem import BlockPlan, Problem, Report, check_memory
 from regrid.domains import distribute_by_arc_length
 from regrid.equidistribution.weights import Expression
 from regrid.errors import BadInput, RegridFailure, suggest

@@ -21,7 +21,6 @@ import math
 from collections.abc import Mapping
 from typing import Literal
 
-import msgspec
 import numpy as np
 
 from hydro.convection.columns import (
@@ -34,9 +33,9 @@ from hydro.convection.columns import (
     to_nodes,
 )
 from hydro.convection.tensor_grids import KINDS, compute_grid_reynolds, make_axis
-from problems.convection.heated_cavity import AxisGrid
+from problems.convection.boxes import AxisGrid
 from problems.deck import Deck, Output, RunControl, key
-from problems.problem import Problem, Report
+from problems.problem import Problem, Report, align
 from problems.references.convection import VerticalPlates
 from regrid.errors import BadInput
 
@@ -44,6 +43,193 @@ SIZES = (1, 2, 4)  # times the deck's cells, in the table of grids
 GRIDS = {kind: (kind, {}) for kind in KINDS}  # name -> kind and what differs from the deck's grid
 GRIDS["combined, 1/4"] = ("combined", {"share": 0.25})
 NOTHING = 1e-12  # relative: differences below are rounding, no swing
+LASTING = 50.0  # slowest diffusive times that a run may take: steady long before
+ERRORS = ("error_T", "error_v", "swings_T", "swings_v")
+
+
+class Convection1DDeck(Deck, kw_only=True):
+    """Deck of `convection-1d`."""
+
+    output: Output = Output(dumps=4)
+    run: RunControl = RunControl()
+    cells: key(int, "cells across the slot", ge=3, le=20000) = 40
+    rayleigh: key(float, "Rayleigh number of the slot's width", ge=0, le=1e12) = 1e4
+    prandtl: key(float, "viscosity over diffusivity", ge=1e-6, le=1e6) = 0.71
+    peclet: key(float, "Péclet number of the flow from hot to cold plate", ge=-1e6, le=1e6) = 0.0
+    mean_speed: key(float, "along the slot [m/s]; 0: closed far away", ge=-1e6, le=1e6) = 0.0
+    scheme: key(
+        Literal["exponential", "samarskii", "upwind", "central"],
+        "of the fluxes; central oscillates beyond a grid Péclet number of 2",
+    ) = "exponential"
+    grid: AxisGrid = AxisGrid()
+
+
+class Convection1D(Problem):
+    """One column of cells."""
+
+    Deck = Convection1DDeck
+    units: Mapping[str, str] = {"least_step": "m", "flow": "m2/s", "reference_temperature": "K"}
+
+    def __init__(self, deck: Convection1DDeck):
+        super().__init__(deck)
+        if deck.rayleigh == 0.0 and deck.mean_speed == 0.0:
+            raise BadInput(
+                "rayleigh = 0 and mean_speed = 0: nothing would rise or sink; give one of them"
+            )
+        if not (math.isfinite(deck.mean_speed) and math.isfinite(deck.rayleigh)):
+            raise BadInput("rayleigh and mean_speed must be finite numbers")
+        self.exact = VerticalPlates(deck.rayleigh, deck.prandtl, deck.peclet, deck.mean_speed)
+
+    def make_column(self, scheme: str | None = None) -> Column:
+        """The fluid and its walls, with the deck's scheme or another."""
+        deck = self.deck
+        return Column(
+            viscosity=deck.prandtl,
+            diffusivity=1.0,
+            buoyancy=deck.rayleigh * deck.prandtl,
+            through_flow=deck.peclet,
+            mean_speed=deck.mean_speed,
+            scheme=scheme or deck.scheme,
+        )
+
+    def build(self) -> ColumnMarch:
+        deck, grid = self.deck, self.deck.grid
+        t_end = deck.run.t_end or LASTING * max(1.0, 1.0 / deck.prandtl)
+        kind = t_end, grid.kind, grid.every
+        return ColumnMarch(self.make_column(), grid.make(deck.cells), *kind, **grid.options())
+
+    def measure(self, evolution: ColumnMarch) -> dict[str, float]:
+        """Errors and swings against the exact steady profiles, at the end only."""
+        if evolution.finished is None:
+            return dict.fromkeys(ERRORS, math.nan)
+        return measure_errors(self.exact, evolution.x, evolution.temperature, evolution.velocity)
+
+    def settle_grid(self, name: str, cells: int) -> tuple[np.ndarray, dict[str, float]]:
+        """Axis and errors of the grid `name` of GRIDS with so many cells, settled; `reynolds` is
+        the largest grid Reynolds number of its steps, through-flow included."""
+        grid, (kind, change), column = self.deck.grid, GRIDS[name], self.make_column()
+        first = make_axis(kind, cells, walls=grid.walls, clustering=grid.clustering)
+        x, *found = settle_column(column, kind, first, **{**grid.options(), **change})[:3]
+        speed = np.hypot(to_nodes(x, found[1], (0.0, 0.0)), column.through_flow)
+        reynolds = float(compute_grid_reynolds(x, speed, column.viscosity).max())
+        return x, measure_errors(self.exact, x, *found) | {"reynolds": reynolds}
+
+    def report(self, history, final=None) -> Report:
+        return Report(lambda: self.make_summary(history))
+
+    def make_summary(self, history) -> str:
+        """Errors of this run, of all kinds of grid at three sizes, and of the schemes."""
+        deck = self.deck
+        error_t, error_v, change = (history[n][-1] for n in ("error_T", "error_v", "change"))
+        where = f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}"
+        if math.isnan(error_v):
+            return f"{where}: the profiles are compared at the end, which was not reached"
+        lines = [
+            f"{where}, {deck.cells} cells, grid {deck.grid.kind}, scheme {deck.scheme}:",
+            f"  largest error of T {error_t:.2e} K, of v {error_v:.2e} of its largest; "
+            f"heat {history['nusselt'][-1]:.9g}, exact {self.exact.compute_nusselt():.9g}",
+        ]
+        if not change < SETTLED:
+            lines.append(
+                f"  NOT STEADY: the state still changes by {change:.1e} in a diffusive time, and "
+                "the exact profiles are the steady ones; a longer time (run.t_end)"
+            )
+        lines += ["", *align(self.tabulate_grids())]
+        if deck.peclet != 0.0:
+            local = abs(deck.peclet) / deck.cells
+            lines += ["", f"  uniform grid, grid Péclet number {local:.3g}"]
+            lines += align(self.tabulate_schemes())
+        return "\n".join(lines)
+
+    def tabulate_grids(self) -> list[list[str]]:
+        """All kinds of grid at SIZES times the deck's cells: error of v, its order and more."""
+        counts = [size * self.deck.cells for size in SIZES]
+        head = ["grid (settled)  error of v on", *map(str, counts), "order", "of T there"]
+        table = [[*head, "shortest step", "most grid Re"]]
+        for name in GRIDS:
+            axes, found = zip(*(self.settle_grid(name, count) for count in counts), strict=True)
+            errors, last = [row["error_v"] for row in found], found[-1]
+            order, least = math.log2(errors[-2] / errors[-1]), np.diff(axes[-1]).min()
+            row = [f"{order:.2f}", f"{last['error_T']:.1e}", f"{least:.2e}"]
+            table.append(
+                [name, *(f"{error:.2e}" for error in errors), *row, f"{last['reynolds']:.3g}"]
+            )
+        return table
+
+    def tabulate_schemes(self) -> list[list[str]]:
+        """All schemes of the flux on a uniform grid of the deck's cells."""
+        x, table = make_axis("uniform", self.deck.cells), []
+        for scheme in SCHEMES:
+            found = measure_errors(self.exact, x, *solve_column(self.make_column(scheme), x)[:2])
+            sizes = (f"{found[name]:{'.1e' if 'error' in name else '.0f'}}" for name in ERRORS)
+            table.append([f"  {scheme}", *sizes])
+        return [["  scheme", "error of T", "of v", "turns too many of T", "of v"], *table]
+
+    def figures(self):
+        return {"profiles": self.draw_profiles, "grids": self.draw_grids}
+
+    def draw_profiles(self, figure, run_data) -> None:
+        """Temperature and velocity in the last dump over the exact profiles, nodes below.
+
+        A thin layer at a wall has a second row of panels to itself.
+        """
+        deck, dump = self.deck, run_data.dumps[-1]
+        (block,) = dump.blocks
+        x = block.nodes[0, :, 0]
+        windows = [(0.0, 1.0)]
+        if abs(deck.peclet) > 20.0:
+            last = -1 if deck.peclet > 0.0 else 0  # the step at the wall of the layer
+            width = 8.0 * max(1.0, deck.prandtl) / abs(deck.peclet)
+            width = max(width, 3.0 * np.diff(x)[last])
+            windows.append((1.0 - width, 1.0) if last else (0.0, width))
+        figure.set_size_inches(9.0, 3.8 * len(windows))
+        panels = figure.subplots(len(windows), 2, squeeze=False)
+        for row, window in zip(panels, windows, strict=True):
+            self._draw_window(row, block, x, window)
+        figure.suptitle(
+            f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}, {deck.cells} cells, "
+            f"grid {deck.grid.kind}, t = {dump.t:.3g} s",
+            fontsize="medium",
+        )
+
+    def _draw_window(self, panels, block, x: np.ndarray, window: tuple[float, float]) -> None:
+        centres, fine = 0.5 * (x[1:] + x[:-1]), np.linspace(*window, 501)
+        labels = {"T": "temperature [K]", "v": "velocity along the plates [m/s]"}
+        shown = (centres >= window[0]) & (centres <= window[1])
+        nodes = x[(x >= window[0]) & (x <= window[1])]
+        for axes, exact, name in zip(panels, self.exact.sample(fine), labels, strict=True):
+            found = block.cell_fields[name][shown, 0]
+            axes.plot(fine, exact, color="0.6", lw=1.2, label="exact")
+            axes.plot(centres[shown], found, ".", ms=4, label="computed")
+            values = np.concatenate([exact, found])
+            position = values.min() - 0.07 * (np.ptp(values) or 1.0)
+            axes.plot(nodes, np.full_like(nodes, position), "|", color="k", ms=7, mew=0.6)
+            axes.set_xlabel("x [m], nodes below")
+            axes.set_title(labels[name], fontsize="medium")
+            axes.legend(fontsize="small")
+
+    def draw_grids(self, figure, run_data) -> None:
+        """Steps of all kinds of grid, settled, and how their error of v falls with the cells."""
+        cells = self.deck.cells
+        figure.set_size_inches(9.0, 4.2)
+        steps, errors = figure.subplots(1, 2)
+        counts = np.array([max(3, int(size * cells)) for size in (0.5, *SIZES)])
+        for name in GRIDS:
+            axes, found = zip(*(self.settle_grid(name, int(n)) for n in counts), strict=True)
+            x, found = axes[1], [row["error_v"] for row in found]
+            steps.plot(0.5 * (x[1:] + x[:-1]), np.diff(x), ".-", ms=3, lw=0.7, label=name)
+            errors.loglog(counts, found, "o-", ms=3, lw=0.9, label=name)
+        for order, style in ((1, ":"), (2, "--")):
+            base = found[0] * (counts[0] / counts) ** order
+            errors.loglog(counts, base, style, color="0.5", lw=0.8, label=f"order {order}")
+        steps.set_yscale("log")
+        steps.set_xlabel("x [m]")
+        steps.set_title(f"steps of {cells} cells [m]", fontsize="medium")
+        errors.set_xticks(counts, [str(count) for count in counts])
+        errors.xaxis.set_minor_formatter("")
+        errors.set_xlabel("cells")
+        errors.set_title("largest error of v over its largest", fontsize="medium")
+        errors.legend(fontsize="x-small")
 
 
 def count_turns(values: np.ndarray) -> int:
@@ -82,249 +268,3 @@ def count_exact_turns(exact: VerticalPlates) -> tuple[int, int]:
         count_turns(one)
         for one in exact.sample(np.concatenate([[0.0], near, 1.0 - near[-2::-1], [1.0]]))
     )
-
-
-def tabulate_grids(problem, sizes=SIZES) -> dict[str, list[dict[str, float]]]:
-    """For each kind of grid the errors at `sizes` times the deck's cells, on settled grids."""
-    deck, column = problem.deck, problem.make_column()
-    table = {}
-    for name in GRIDS:
-        table[name] = []
-        for size in sizes:
-            x, temperature, velocity = settle_grid(problem, column, name, size * deck.cells)
-            table[name].append(
-                measure_errors(problem.exact, x, temperature, velocity)
-                | {"least": float(np.diff(x).min())}
-                | {"reynolds": find_reynolds(column, x, velocity)}
-            )
-    return table
-
-
-def settle_grid(problem, column: Column, name: str, cells: int) -> tuple[np.ndarray, ...]:
-    """Axis, temperature and velocity of the grid `name` of GRIDS with so many cells, settled."""
-    grid, (kind, change) = problem.deck.grid, GRIDS[name]
-    first = make_axis(kind, cells, walls=grid.walls, clustering=grid.clustering)
-    return settle_column(column, kind, first, **{**grid.options(), **change})[:3]
-
-
-def find_reynolds(column: Column, x: np.ndarray, velocity: np.ndarray) -> float:
-    """The largest grid Reynolds number of the steps, through-flow included."""
-    speed = np.hypot(to_nodes(x, velocity, (0.0, 0.0)), column.through_flow)
-    return float(compute_grid_reynolds(x, speed, column.viscosity).max())
-
-
-def make_summary(problem, history) -> str:
-    """Errors of this run, of all kinds of grid at three sizes, and of the schemes."""
-    deck = problem.deck
-    error_t, error_v = history["error_T"][-1], history["error_v"][-1]
-    where = f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}"
-    if math.isnan(error_v):
-        return f"{where}: the profiles are compared at the end, which was not reached"
-    nusselt = problem.exact.compute_nusselt()
-    counts = [size * deck.cells for size in SIZES]
-    lines = [
-        f"{where}, {deck.cells} cells, grid {deck.grid.kind}, scheme {deck.scheme}:",
-        f"  largest error of T {error_t:.2e} K, of v {error_v:.2e} of its largest; "
-        f"heat {history['nusselt'][-1]:.9g}, exact {nusselt:.9g}",
-        *note_unsteady(history),
-        "",
-        "  grid (settled)  error of v on"
-        + "".join(f"{count:>10d}" for count in counts)
-        + "    order      of T there  shortest step  most grid Re",
-    ]
-    for name, rows in tabulate_grids(problem).items():
-        errors = [row["error_v"] for row in rows]
-        order = math.log2(errors[-2] / errors[-1])
-        lines.append(
-            f"  {name:29}"
-            + "".join(f"{error:10.2e}" for error in errors)
-            + f"{order:9.2f}{rows[-1]['error_T']:16.1e}{rows[-1]['least']:15.2e}"
-            + f"{rows[-1]['reynolds']:14.3g}"
-        )
-    if deck.peclet != 0.0:
-        lines += ["", *tabulate_schemes(problem)]
-    return "\n".join(lines)
-
-
-def note_unsteady(history) -> list[str]:
-    """A line for a run that ended before nothing changed any more."""
-    change = float(history["change"][-1])
-    if change < SETTLED:
-        return []
-    return [
-        f"  NOT STEADY: the state still changes by {change:.1e} in a diffusive time, and the exact "
-        "profiles are the steady ones; a longer time (run.t_end)"
-    ]
-
-
-def tabulate_schemes(problem) -> list[str]:
-    """Lines on all schemes of the flux on a uniform grid of the deck's cells."""
-    deck = problem.deck
-    x = make_axis("uniform", deck.cells)
-    local = abs(deck.peclet) / deck.cells
-    lines = [
-        f"  uniform grid, grid Péclet number {local:.3g}: error of T, of v, turns too many of each"
-    ]
-    for scheme in SCHEMES:
-        temperature, velocity, _ = solve_column(problem.make_column(scheme), x)
-        found = measure_errors(problem.exact, x, temperature, velocity)
-        lines.append(
-            f"    {scheme:12}{found['error_T']:10.1e}{found['error_v']:10.1e}"
-            f"{found['swings_T']:6.0f}{found['swings_v']:6.0f}"
-        )
-    return lines
-
-
-def draw_profiles(problem, figure, run_data) -> None:
-    """Temperature and velocity in the last dump over the exact profiles, nodes below.
-
-    A thin layer at a wall has a second row of panels to itself.
-    """
-    deck, dump = problem.deck, run_data.dumps[-1]
-    (block,) = dump.blocks
-    x = block.nodes[0, :, 0]
-    windows = [(0.0, 1.0)]
-    if abs(deck.peclet) > 20.0:
-        steps = np.diff(x)
-        width = 8.0 * max(1.0, deck.prandtl) / abs(deck.peclet)
-        if deck.peclet > 0.0:
-            windows.append((1.0 - max(width, 3.0 * steps[-1]), 1.0))
-        else:
-            windows.append((0.0, max(width, 3.0 * steps[0])))
-    figure.set_size_inches(9.0, 3.8 * len(windows))
-    panels = figure.subplots(len(windows), 2, squeeze=False)
-    for row, window in zip(panels, windows, strict=True):
-        draw_window(problem, row, block, x, window)
-    figure.suptitle(
-        f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}, {deck.cells} cells, "
-        f"grid {deck.grid.kind}, t = {dump.t:.3g} s",
-        fontsize="medium",
-    )
-
-
-def draw_window(problem, panels, block, x: np.ndarray, window: tuple[float, float]) -> None:
-    """Both profiles over the part of the slot in `window`, into two panels."""
-    centres = 0.5 * (x[1:] + x[:-1])
-    fine = np.linspace(*window, 501)
-    labels = (("T", "temperature [K]"), ("v", "velocity along the plates [m/s]"))
-    for axes, right, (name, label) in zip(panels, problem.exact.sample(fine), labels, strict=True):
-        found = block.cell_fields[name][:, 0]
-        shown = (centres >= window[0]) & (centres <= window[1])
-        nodes = x[(x >= window[0]) & (x <= window[1])]
-        axes.plot(fine, right, color="0.6", lw=1.2, label="exact")
-        axes.plot(centres[shown], found[shown], ".", ms=4, label="computed")
-        values = np.concatenate([right, found[shown]])
-        position = values.min() - 0.07 * (np.ptp(values) or 1.0)
-        axes.plot(nodes, np.full_like(nodes, position), "|", color="k", ms=7, mew=0.6)
-        axes.set_xlabel("x [m], nodes below")
-        axes.set_title(label, fontsize="medium")
-        axes.legend(fontsize="small")
-
-
-def draw_grids(problem, figure, run_data) -> None:
-    """Steps of all kinds of grid, settled, and how their error of v falls with the cells."""
-    deck = problem.deck
-    figure.set_size_inches(9.0, 4.2)
-    steps, errors = figure.subplots(1, 2)
-    column = problem.make_column()
-    sizes = (0.5, 1, 2, 4)
-    counts = np.array([max(3, int(size * deck.cells)) for size in sizes])
-    for name in GRIDS:
-        found = []
-        for count in counts:
-            x, *solution = settle_grid(problem, column, name, int(count))
-            found.append(measure_errors(problem.exact, x, *solution)["error_v"])
-            if count == deck.cells:
-                steps.plot(0.5 * (x[1:] + x[:-1]), np.diff(x), ".-", ms=3, lw=0.7, label=name)
-        errors.loglog(counts, found, "o-", ms=3, lw=0.9, label=name)
-    for order, style in ((1, ":"), (2, "--")):
-        base = found[0] * (counts[0] / counts) ** order
-        errors.loglog(counts, base, style, color="0.5", lw=0.8, label=f"order {order}")
-    steps.set_yscale("log")
-    steps.set_xlabel("x [m]")
-    steps.set_title(f"steps of {deck.cells} cells [m]", fontsize="medium")
-    errors.set_xticks(counts, [str(count) for count in counts])
-    errors.xaxis.set_minor_formatter("")
-    errors.set_xlabel("cells")
-    errors.set_title("largest error of v over its largest", fontsize="medium")
-    errors.legend(fontsize="x-small")
-
-
-LASTING = 50.0  # slowest diffusive times that a run may take: steady long before
-
-
-class Convection1DDeck(Deck, kw_only=True):
-    """Deck of `convection-1d`."""
-
-    output: Output = msgspec.field(default_factory=lambda: Output(dumps=4))
-    run: RunControl = msgspec.field(default_factory=RunControl)
-    cells: key(int, "cells across the slot", ge=3, le=20000) = 40
-    rayleigh: key(float, "Rayleigh number of the slot's width", ge=0, le=1e12) = 1e4
-    prandtl: key(float, "viscosity over diffusivity", ge=1e-6, le=1e6) = 0.71
-    peclet: key(float, "Péclet number of the through-flow, hot to cold plate", ge=-1e6, le=1e6) = (
-        0.0
-    )
-    mean_speed: key(
-        float, "mean speed along the slot [m/s]; 0: closed far away", ge=-1e6, le=1e6
-    ) = 0.0
-    scheme: key(
-        Literal["exponential", "samarskii", "upwind", "central"],
-        "of the fluxes; central oscillates beyond a grid Péclet number of 2",
-    ) = "exponential"
-    grid: AxisGrid = msgspec.field(default_factory=AxisGrid)
-
-
-class Convection1D(Problem):
-    """One column of cells."""
-
-    Deck = Convection1DDeck
-    units: Mapping[str, str] = {"least_step": "m", "flow": "m2/s", "reference_temperature": "K"}
-
-    def __init__(self, deck: Convection1DDeck):
-        super().__init__(deck)
-        if deck.rayleigh == 0.0 and deck.mean_speed == 0.0:
-            raise BadInput(
-                "rayleigh = 0 and mean_speed = 0: nothing would rise or sink; give one of them"
-            )
-        if not (math.isfinite(deck.mean_speed) and math.isfinite(deck.rayleigh)):
-            raise BadInput("rayleigh and mean_speed must be finite numbers")
-        self.exact = VerticalPlates(deck.rayleigh, deck.prandtl, deck.peclet, deck.mean_speed)
-
-    def make_column(self, scheme: str | None = None) -> Column:
-        """The fluid and its walls, with the deck's scheme or another."""
-        deck = self.deck
-        return Column(
-            viscosity=deck.prandtl,
-            diffusivity=1.0,
-            buoyancy=deck.rayleigh * deck.prandtl,
-            through_flow=deck.peclet,
-            mean_speed=deck.mean_speed,
-            scheme=scheme or deck.scheme,
-        )
-
-    def build(self) -> ColumnMarch:
-        deck = self.deck
-        t_end = deck.run.t_end or LASTING * max(1.0, 1.0 / deck.prandtl)
-        return ColumnMarch(
-            self.make_column(),
-            deck.grid.make(deck.cells),
-            t_end,
-            deck.grid.kind,
-            deck.grid.every,
-            **deck.grid.options(),
-        )
-
-    def measure(self, evolution: ColumnMarch) -> dict[str, float]:
-        """Errors and swings against the exact steady profiles, at the end only."""
-        if evolution.finished is None:
-            return dict.fromkeys(("error_T", "error_v", "swings_T", "swings_v"), math.nan)
-        return measure_errors(self.exact, evolution.x, evolution.temperature, evolution.velocity)
-
-    def report(self, history, final=None) -> Report:
-        return Report(lambda: make_summary(self, history))
-
-    def figures(self):
-        return {
-            "profiles": functools.partial(draw_profiles, self),
-            "grids": functools.partial(draw_grids, self),
-        }

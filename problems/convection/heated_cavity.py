@@ -15,63 +15,30 @@ N^-1/2, so the Nusselt number is better on most other grids.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Literal
 
-import msgspec
-import numpy as np
-
+from hydro.convection import measure
+from hydro.convection.box import Wall, make_fluid
+from hydro.convection.steady import SteadySolver, make_rest
+from problems.convection.boxes import AxisGrid, BoxProblem, SteadyEvolution
 from problems.deck import Deck, DeckTable, Output, RunControl, key
-from problems.problem import BlockPlan, Problem
+from problems.problem import Report, compare, get_last
 from problems.references.convection import PRANDTL, STATES, CavityState
 from regrid.errors import BadInput
 
-if TYPE_CHECKING:
-    from hydro.convection.box import Fluid
-    from hydro.convection.equations import Equations
-
-
-AxisKind = Literal["uniform", "clustered", "polevikov", "monitor", "combined"]
-
-
-class AxisGrid(DeckTable, kw_only=True):
-    """Where the nodes of an axis lie, and after what they move."""
-
-    merges = True
-
-    kind: key(
-        AxisKind,
-        "uniform; clustered at walls; polevikov: after the speed; monitor: after "
-        "gradients; combined: after both",
-    ) = "uniform"
-    every: key(int, "steps between corrections of the grid", ge=1, le=2**63 - 1) = 1
-    relaxation: key(float, "fraction of a correction that is applied", gt=0, le=1) = 0.7
-    ratio: key(float, "largest ratio of neighbouring steps; left out: the default", gt=1) | None = (
-        None
-    )
-    floor: key(float, "least speed, as a fraction of the largest", gt=0, lt=1) = 0.02
-    strength: key(float, "of the gradient against the uniform grid in the monitor", ge=0) = 1.0
-    share: key(float, "of polevikov's density of nodes in the combined one", ge=0, le=1) = 0.5
-    walls: key(Literal["both", "low", "high"], "where a clustered grid is dense") = "both"
-    clustering: key(float, "strength of a clustered grid's tanh spacing", gt=0, le=20) = 2.0
-
-    def make(self, n: int, low: float = 0.0, high: float = 1.0) -> np.ndarray:
-        """The first axis of n steps, shape (n + 1,)."""
-        from hydro.convection.tensor_grids import make_axis  # scipy is slow to load
-
-        return make_axis(self.kind, n, low, high, walls=self.walls, clustering=self.clustering)
-
-    def options(self) -> dict[str, Any]:
-        """What `correct_axis` needs besides the kind."""
-        names = ("floor", "ratio", "strength", "share", "relaxation")
-        return {name: getattr(self, name) for name in names}
-
-
 TIME = 0.2  # of a march in time: past the swings of the start
-LONGEST_PART = 1 / 400  # of the time, in one step
 STEADY_ITERATIONS = 200
+ROWS = {
+    "nusselt": "Nu mean, left wall",
+    "u_max": "greatest u on x = 1/2",
+    "u_max_y": "  at y [m]",
+    "v_max": "greatest v on y = 1/2",
+    "v_max_x": "  at x [m]",
+    "nusselt_max": "greatest Nu, left wall",
+    "nusselt_max_y": "  at y [m]",
+}
 
 
 class Side(DeckTable, kw_only=True):
@@ -84,16 +51,11 @@ class Side(DeckTable, kw_only=True):
         "adiabatic"
     )
     value: key(
-        float,
-        "temperature [K] of an isothermal wall, or flux into the fluid [K m/s]",
-        ge=-1e6,
-        le=1e6,
+        float, "temperature [K] of an isothermal wall, or flux in [K m/s]", ge=-1e6, le=1e6
     ) = 0.0
 
     def make(self, name: str):
         """The wall for the solver; BadInput where heat and value contradict."""
-        from hydro.convection.box import Wall
-
         if self.heat == "adiabatic":
             if self.value != 0.0:
                 raise BadInput(
@@ -109,76 +71,51 @@ class Side(DeckTable, kw_only=True):
 class HeatedCavityDeck(Deck, kw_only=True):
     """Deck of `heated-cavity`."""
 
-    output: Output = msgspec.field(default_factory=lambda: Output(dumps=4))
-    run: RunControl = msgspec.field(default_factory=RunControl)
+    output: Output = Output(dumps=4)
+    run: RunControl = RunControl()
     method: key(Literal["steady", "time"], "Newton's iteration, or a march from rest") = "steady"
     cells: key(int, "cells across the box", ge=3, le=2000) = 40
-    cells_up: key(int, "cells up; left out: cells times aspect", ge=3, le=2000) | None = None
+    cells_up: key(int | None, "cells up; left out: cells times aspect", ge=3, le=2000) = None
     aspect: key(float, "height over width", ge=0.01, le=100) = 1.0
     rayleigh: key(float, "Rayleigh number of the width", le=1e12) = 1e5
     prandtl: key(float, "viscosity over diffusivity", le=1e6) = PRANDTL
     tilt: key(
         float, "gravity turned anticlockwise from straight down [degrees]", ge=-360, le=360
     ) = 0.0
-    gravity: key(list[float], "its direction x, y", min_length=2, max_length=2) | None = None
-    left: Side = msgspec.field(default_factory=lambda: Side(heat="isothermal", value=0.5))
-    right: Side = msgspec.field(default_factory=lambda: Side(heat="isothermal", value=-0.5))
-    bottom: Side = msgspec.field(default_factory=Side)
-    top: Side = msgspec.field(default_factory=Side)
-    grid: AxisGrid = msgspec.field(default_factory=lambda: AxisGrid(kind="clustered"))
+    gravity: key(list[float] | None, "its direction x, y", min_length=2, max_length=2) = None
+    left: Side = Side(heat="isothermal", value=0.5)
+    right: Side = Side(heat="isothermal", value=-0.5)
+    bottom: Side = Side()
+    top: Side = Side()
+    grid: AxisGrid = AxisGrid(kind="clustered")
     tolerance: key(float, "relative change at which a state is steady", gt=0, le=0.1) = 1e-10
-    longest_step: key(float, "of the march [s]; left out: 1/400 of its time", gt=0) | None = None
+    longest_step: key(float | None, "of the march [s]; left out: 1/400 of its time", gt=0) = None
 
 
-class HeatedCavity(Problem):
+class HeatedCavity(BoxProblem):
     """One box."""
 
     Deck = HeatedCavityDeck
     name = "heated-cavity"
+    longest_part = 1 / 400
     units: Mapping[str, str] = {
         "u_max": "m/s", "v_max": "m/s", "u_max_y": "m", "v_max_x": "m", "nusselt_max_y": "m",
     }  # fmt: skip
 
     def __init__(self, deck: HeatedCavityDeck):
         super().__init__(deck)
-        self.fluid = self.make_fluid()
-        self.walls = self.make_walls()
-        known = deck.left.heat == "isothermal" and deck.right.heat == "isothermal"
-        # the scale of the Nusselt number: the difference of the sides, or 1 K without one
-        self.scale = abs(deck.left.value - deck.right.value) if known else 1.0
-        self.scale = self.scale or 1.0
-
-    def make_fluid(self) -> Fluid:
-        """The fluid of the deck's numbers; BadInput for a bad one."""
-        from hydro.convection.box import make_fluid
-
-        deck = self.deck
         if deck.gravity is not None and deck.tilt != 0.0:
             raise BadInput(
                 f"tilt = {deck.tilt:g} and gravity are both given; leave one of them out"
             )
         direction = None if deck.gravity is None else tuple(deck.gravity)
-        return make_fluid(deck.rayleigh, deck.prandtl, deck.tilt, direction)
-
-    def make_walls(self):
-        """The four walls by the solver's names."""
-        deck = self.deck
-        return {
-            "i_min": deck.left.make("left"),
-            "i_max": deck.right.make("right"),
-            "j_min": deck.bottom.make("bottom"),
-            "j_max": deck.top.make("top"),
-        }
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Cells across and up."""
-        deck = self.deck
-        return deck.cells, deck.cells_up or max(3, round(deck.cells * deck.aspect))
-
-    def plan(self) -> tuple[float, list[BlockPlan]]:
-        """Time, or most iterations, and the box."""
-        return self.t_end, [BlockPlan("box", self.size, (0.0, 0.0), (1.0, self.deck.aspect))]
+        self.fluid = make_fluid(deck.rayleigh, deck.prandtl, deck.tilt, direction)
+        self.extent = 1.0, deck.aspect
+        names = {"i_min": "left", "i_max": "right", "j_min": "bottom", "j_max": "top"}
+        self.walls = {side: getattr(deck, name).make(name) for side, name in names.items()}
+        known = deck.left.heat == "isothermal" and deck.right.heat == "isothermal"
+        # the scale of the Nusselt number: the difference of the sides, or 1 K without one
+        self.scale = (abs(deck.left.value - deck.right.value) if known else 1.0) or 1.0
 
     @property
     def t_end(self) -> float:
@@ -189,38 +126,17 @@ class HeatedCavity(Problem):
     def t_unit(self) -> str:
         return "iterations" if self.deck.method == "steady" else "s"
 
-    def make_equations(self, x: np.ndarray, y: np.ndarray) -> Equations:
-        """The discrete equations on nodes x, y."""
-        from hydro.convection.equations import Equations
-
-        return Equations(x, y, self.walls)
-
     def build(self):
-        from hydro.convection.march import March
-        from hydro.convection.steady import GridControl, SteadySolver, make_rest
-        from problems.convection.boxes import SteadyEvolution, TimeEvolution
-
-        deck = self.deck
-        across, up = self.size
-        equations = self.make_equations(
-            deck.grid.make(across), deck.grid.make(up, 0.0, deck.aspect)
-        )
-        grid = GridControl(deck.grid.kind, deck.grid.every, options=deck.grid.options())
+        deck, equations = self.deck, self.make_first_equations()
         if deck.method == "steady":
-            solver = SteadySolver(equations, self.fluid, grid, deck.tolerance)
+            solver = SteadySolver(equations, self.fluid, self.make_grid_control(), deck.tolerance)
             return SteadyEvolution("box", solver, self.t_end)
-        longest = deck.longest_step or LONGEST_PART * (deck.run.t_set_up or self.t_end)
-        march = March(
-            equations, self.fluid, *make_rest(equations), cfl=deck.run.cfl, longest=longest
-        )
         sides = (deck.left, deck.right, deck.bottom, deck.top)
         coldest = min((s.value for s in sides if s.heat == "isothermal"), default=0.0)
-        return TimeEvolution("box", march, grid, self.t_end, coldest)
+        return self.make_march(equations, *make_rest(equations), coldest)
 
     def measure(self, evolution) -> dict[str, float]:
         """Nusselt numbers and greatest speeds, with their places."""
-        from hydro.convection import measure
-
         equations, fluid = evolution.equations, evolution.fluid
         state = (equations, fluid, evolution.temperature)
         peak, position = measure.find_nusselt_maximum(*state, "i_min", self.scale)
@@ -249,16 +165,31 @@ class HeatedCavity(Problem):
             return None
         return STATES.get(deck.rayleigh)
 
-    def report(self, history, final=None):
-        from problems.convection.boxes import report_cavity
-
-        return report_cavity(self, history)
-
-    def figures(self):
-        from problems.convection import boxes as pictures
-
-        return {
-            "flow": functools.partial(pictures.draw_flow, self),
-            "nusselt": functools.partial(pictures.draw_nusselt, self, ("i_min", "i_max")),
-            "grid": pictures.draw_grid,
-        }
+    def report(self, history, final=None) -> Report:
+        """The quantities of the reference, with its values where there are any."""
+        deck, reference, (across, up) = self.deck, self.find_reference(), self.size
+        head = (
+            f"Ra = {deck.rayleigh:g}, Pr = {deck.prandtl:g}, {across} x {up} cells, "
+            f"grid {deck.grid.kind}"
+        )
+        rows = [
+            compare(history, name, getattr(reference, name, math.nan), words)
+            for name, words in ROWS.items()
+        ]
+        if not history:
+            return Report(head, rows)
+        notes = [] if reference else ["there is no reference for this deck"]
+        passes = deck.bottom.heat == deck.top.heat == "adiabatic"
+        if passes and history["nusselt"][-1] != 0.0:
+            balance = history["nusselt_right"][-1] / history["nusselt"][-1] - 1.0
+            notes.append(f"heat out at the right over heat in at the left, less 1: {balance:.1e}")
+        notes.append(self.say_lost_volume(history))
+        if deck.method == "steady":
+            part, change = get_last(history, "buoyancy"), get_last(history, "change")
+            if part < 1.0 or change > deck.tolerance:
+                head += (
+                    f"\nNOT STEADY: these are iterates at Ra = {part * deck.rayleigh:.3g} that "
+                    f"still change by {change:.1e}; more iterations (run.t_end) or method = 'time'"
+                )
+            notes.append(f"last change of Newton's iteration: {change:.1e}")
+        return Report(head, rows, notes)

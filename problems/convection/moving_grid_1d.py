@@ -17,7 +17,6 @@ ones most (`grid.ratio = 1000` shows the second order).
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping
 from itertools import pairwise
@@ -28,7 +27,7 @@ import numpy as np
 
 from hydro.convection.columns import FAMILIES, HEIGHT, FrontRace, Placing
 from problems.deck import Deck, DeckTable, RunControl, key
-from problems.problem import BlockPlan, Problem, Report
+from problems.problem import BlockPlan, Problem, Report, align
 from problems.references.convection import BurgersFronts
 from regrid.errors import BadInput
 
@@ -38,27 +37,8 @@ WORDS = {
     "law": "by a speed law",
     "first": "placed first",
 }
+COLOURS = dict(zip(FAMILIES, ("0.3", "C3", "C1", "C0"), strict=True))
 PARTS = (4, 2)  # of the deck's cells, run again for the summary
-
-
-def march(problem, cells: int) -> dict[str, dict[str, float]]:
-    """Error, lost part of the sum and CPU seconds of each family after a whole run."""
-    race = problem.make_race(cells)
-    start = race.start_row()
-    seconds = dict.fromkeys(FAMILIES, 0.0)
-    while race.finished is None:
-        row = race.advance()
-        for family in FAMILIES:
-            seconds[family] += row[f"seconds_{family}"]
-    errors = race.measure_errors()
-    return {
-        family: {
-            "error": errors[f"error_{family}"],
-            "lost": find_loss(family, start, row),
-            "seconds": seconds[family],
-        }
-        for family in FAMILIES
-    }
 
 
 def find_loss(family: str, start, end) -> float:
@@ -68,135 +48,38 @@ def find_loss(family: str, start, end) -> float:
     return abs(change) / max(abs(end[total]), abs(start[total]))
 
 
-def make_summary(problem, history) -> str:
-    """The table of the four families at a quarter, a half and all of the cells."""
-    deck = problem.deck
-    if history["t"][-1] < 0.999999 * (deck.run.t_end or 1.0):
-        return "moving-grid-1d: the families are compared at the end time, which was not reached"
-    rows = {name: np.asarray(values) for name, values in history.items()}
-    start = {name: values[0] for name, values in rows.items() if values.dtype.kind == "f"}
-    end = {name: values[-1] for name, values in rows.items() if values.dtype.kind == "f"}
-    counts = sorted({max(16, deck.cells // part) for part in PARTS} - {deck.cells})
-    coarse = [march(problem, count) for count in counts]
-    counts.append(deck.cells)
-    steps = int(rows["step"][-1])
-    fronts = f"{len(deck.fronts)} front" + "s" * (len(deck.fronts) > 1)
-    lines = [
-        f"{fronts}, viscosity {deck.viscosity:g} m2/s, {steps} steps; mean |u - exact| on",
-        f"  {'':22}"
-        + "".join(f"{count:>10d}" for count in counts)
-        + "   order  worst in time   sum lost   CPU ms/step",
-    ]
-    for family in FAMILIES:
-        errors = [one[family]["error"] for one in coarse] + [end[f"error_{family}"]]
-        order = math.nan
-        if len(errors) > 1:
-            order = math.log2(errors[-2] / errors[-1]) / math.log2(counts[-1] / counts[-2])
-        seconds = float(np.nansum(rows[f"seconds_{family}"]))
-        lines.append(
-            f"  {WORDS[family]:22}"
-            + "".join(f"{error:10.2e}" for error in errors)
-            + f"{order:8.2f}{np.nanmax(rows[f'error_{family}']):15.2e}"
-            + f"{find_loss(family, start, end):11.1e}{1e3 * seconds / max(1, steps):14.2f}"
-        )
-    return "\n".join(lines)
-
-
-def draw_fronts(problem, figure, run_data) -> None:
-    """u about the steepest front at the end, its error, and the ways of the nodes."""
-    dump = run_data.dumps[-1]
-    figure.set_size_inches(10.0, 7.0)
-    grid = figure.add_gridspec(2, 6)
-    profile, wrong = figure.add_subplot(grid[0, :3]), figure.add_subplot(grid[0, 3:])
-    fine = np.linspace(0.0, 1.0, 4001)
-    exact = problem.exact.compute_values(fine, dump.t)
-    middle = fine[np.abs(np.diff(exact)).argmax()]
-    half = max(20.0 * problem.deck.viscosity / np.ptp(exact), 2.0 / problem.deck.cells)
-    shown = np.abs(fine - middle) < half
-    profile.plot(fine[shown], exact[shown], color="0.5", lw=1.5, label="exact")
-    for block, colour in zip(dump.blocks, ("0.3", "C3", "C1", "C0"), strict=True):
-        x, u = block.nodes[0, :, 0], block.cell_fields["u"][:, 0]
-        centres = 0.5 * (x[1:] + x[:-1])
-        near = np.abs(centres - middle) < half
-        style = {"ms": 4, "color": colour, "label": WORDS[block.name]}
-        profile.plot(centres[near], u[near], ".", **style)
-        error = np.abs(u - problem.exact.compute_cell_averages(x, dump.t))
-        wrong.semilogy(centres, np.maximum(error, 1e-12), ".-", lw=0.5, **(style | {"ms": 2.5}))
-    profile.set_title(f"u [m/s] about the front, t = {dump.t:.3g} s", fontsize="medium")
-    profile.legend(fontsize="small")
-    wrong.set_title("|u - exact| [m/s]", fontsize="medium")
-    wrong.set_ylim(1e-9, 2.0)
-    for axes in (profile, wrong):
-        axes.set_xlabel("x [m]")
-    for k, family in enumerate(FAMILIES[1:]):
-        axes = figure.add_subplot(grid[1, 2 * k : 2 * k + 2])
-        ways = np.array([one.block(family).nodes[0, :, 0] for one in run_data.dumps])
-        times = [one.t for one in run_data.dumps]
-        axes.plot(ways, times, color="0.2", lw=0.4)
-        axes.set_title(f"ways of the nodes, {WORDS[family]}", fontsize="medium")
-        axes.set_xlabel("x [m]")
-    figure.axes[2].set_ylabel("t [s]")
-
-
-def draw_errors(problem, figure, run_data) -> None:
-    """Errors over time, and error against cost at several sizes."""
-    figure.set_size_inches(9.0, 4.2)
-    over_time, over_cost = figure.subplots(1, 2)
-    history = run_data.history
-    counts = sorted({max(16, int(part * problem.deck.cells)) for part in (0.125, 0.25, 0.5, 1)})
-    runs = [march(problem, count) for count in counts]
-    for family, colour in zip(FAMILIES, ("0.3", "C3", "C1", "C0"), strict=True):
-        over_time.semilogy(
-            history["t"], history[f"error_{family}"], color=colour, lw=1.0, label=WORDS[family]
-        )
-        over_cost.loglog(
-            [one[family]["seconds"] for one in runs],
-            [one[family]["error"] for one in runs],
-            "o-",
-            ms=3.5,
-            lw=0.9,
-            color=colour,
-        )
-    over_time.set_xlabel("t [s]")
-    over_time.set_title(f"mean |u - exact|, {problem.deck.cells} cells", fontsize="medium")
-    over_time.legend(fontsize="small")
-    over_cost.xaxis.set_minor_formatter("")
-    over_cost.set_xlabel("CPU seconds of the run")
-    over_cost.set_title(
-        f"mean |u - exact| at the end, {counts[0]} to {counts[-1]} cells", fontsize="medium"
-    )
-
-
 class PlacingPart(DeckTable, kw_only=True):
     """How the nodes of the moving columns are placed."""
 
     merges = True
 
     strength: key(float, "of the gradient: 2 gives two thirds of the nodes to it", ge=0) = 2.0
-    ratio: key(float, "largest ratio of neighbouring steps; left out: the default", gt=1) | None = (
+    ratio: key(float | None, "largest ratio of neighbouring steps; left out: the default", gt=1) = (
         None
     )
     relaxation: key(float, "fraction of a correction that is applied", gt=0, le=1) = 0.7
     tau: key(float, "relaxation time [s] of the node speed", gt=0) = 0.005
     start: key(
-        Literal["moving", "rest"],
-        "nodes placed after the step: their speed at t = 0 known, or none",
+        Literal["moving", "rest"], "nodes placed after the step: their speed at t = 0 known, or 0"
     ) = "moving"
 
 
 class MovingGrid1DDeck(Deck, kw_only=True):
     """Deck of `moving-grid-1d`."""
 
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=1.0, cfl=0.5))
+    run: RunControl = RunControl(t_end=1.0, cfl=0.5)
     cells: key(int, "cells of each column", ge=16, le=10000) = 160
     viscosity: key(float, "viscosity [m2/s]; the column is 1 m", gt=0, le=10) = 5e-3
-    levels: key(list[float], "falling values of u [m/s] before and after the fronts") = (
-        msgspec.field(default_factory=lambda: [1.0, 0.5, 0.0])
+    levels: key(tuple[float, ...], "falling values of u [m/s] before and after the fronts") = (
+        1.0,
+        0.5,
+        0.0,
     )
-    fronts: key(list[float], "places [m] of the fronts between the levels at t = 0") = (
-        msgspec.field(default_factory=lambda: [0.2, 0.5])
+    fronts: key(tuple[float, ...], "places [m] of the fronts between the levels at t = 0") = (
+        0.2,
+        0.5,
     )
-    grid: PlacingPart = msgspec.field(default_factory=PlacingPart)
+    grid: PlacingPart = PlacingPart()
 
 
 class MovingGrid1D(Problem):
@@ -215,33 +98,24 @@ class MovingGrid1D(Problem):
         if not all(math.isfinite(u) for u in deck.levels) or any(
             ahead >= behind for behind, ahead in pairwise(deck.levels)
         ):
-            raise BadInput(f"levels = {deck.levels}: from front to front u has to fall")
+            raise BadInput(f"levels = {list(deck.levels)}: from front to front u has to fall")
         positions = [0.0, *deck.fronts, 1.0]
         if not all(one < other for one, other in pairwise(positions)):
             raise BadInput(
-                f"fronts = {deck.fronts}: positions must increase and lie between 0 and 1"
+                f"fronts = {list(deck.fronts)}: positions must increase and lie between 0 and 1"
             )
         self.exact = BurgersFronts(deck.viscosity, tuple(deck.levels), tuple(deck.fronts))
 
     def make_race(self, cells: int) -> FrontRace:
         """The race with another number of cells, at the same part of the stable step."""
-        deck = self.deck
-        fastest = max(abs(u) for u in deck.levels)
-        placing = Placing(
-            strength=deck.grid.strength,
-            ratio=deck.grid.ratio,
-            relaxation=deck.grid.relaxation,
-            tau=deck.grid.tau,
-            start=deck.grid.start,
-        )
-        dt = deck.run.cfl / (cells * fastest)
-        return FrontRace(self.exact, cells, dt, deck.run.t_end or 1.0, placing)
+        placing = Placing(**msgspec.structs.asdict(self.deck.grid))
+        dt = self.deck.run.cfl / (cells * max(abs(u) for u in self.deck.levels))
+        return FrontRace(self.exact, cells, dt, self.t_end, placing)
 
     def plan(self) -> tuple[float, list[BlockPlan]]:
         """End time and the four columns."""
         size = (self.deck.cells, 1)
-        plans = [BlockPlan(name, size, (0.0, 0.0), (1.0, HEIGHT)) for name in FAMILIES]
-        return self.deck.run.t_end or 1.0, plans
+        return self.t_end, [BlockPlan(name, size, (0.0, 0.0), (1.0, HEIGHT)) for name in FAMILIES]
 
     def build(self) -> FrontRace:
         return self.make_race(self.deck.cells)
@@ -250,11 +124,99 @@ class MovingGrid1D(Problem):
         """Mean errors of the four."""
         return evolution.measure_errors()
 
+    def repeat(self, cells: int) -> dict[str, tuple[float, float]]:
+        """Error and CPU seconds of each family after a whole run with so many cells."""
+        race, seconds = self.make_race(cells), dict.fromkeys(FAMILIES, 0.0)
+        while race.finished is None:
+            row = race.advance()
+            for family in FAMILIES:
+                seconds[family] += row[f"seconds_{family}"]
+        errors = race.measure_errors()
+        return {family: (errors[f"error_{family}"], seconds[family]) for family in FAMILIES}
+
     def report(self, history, final=None) -> Report:
-        return Report(lambda: make_summary(self, history))
+        return Report(lambda: self.make_summary(history))
+
+    def make_summary(self, history) -> str:
+        """The table of the four families at a quarter, a half and all of the cells."""
+        deck = self.deck
+        if history["t"][-1] < 0.999999 * self.t_end:
+            return "moving-grid-1d: the families are compared at the end time, which is not reached"
+        start, end = ({name: history[name][k] for name in history} for k in (0, -1))
+        counts = sorted({max(16, deck.cells // part) for part in PARTS} - {deck.cells})
+        coarse = [self.repeat(count) for count in counts]
+        counts.append(deck.cells)
+        steps = int(end["step"])
+        fronts = f"{len(deck.fronts)} front" + "s" * (len(deck.fronts) > 1)
+        head = f"{fronts}, viscosity {deck.viscosity:g} m2/s, {steps} steps; mean |u - exact| on"
+        words = ["order", "worst in time", "sum lost", "CPU ms/step"]
+        table = [["", *map(str, counts), *words]]
+        for family in FAMILIES:
+            errors = [run[family][0] for run in coarse] + [end[f"error_{family}"]]
+            order = math.nan
+            if len(errors) > 1:
+                order = math.log2(errors[-2] / errors[-1]) / math.log2(counts[-1] / counts[-2])
+            seconds = float(np.nansum(history[f"seconds_{family}"])) / max(1, steps)
+            worst, lost = np.nanmax(history[f"error_{family}"]), find_loss(family, start, end)
+            row = [f"{order:.2f}", f"{worst:.2e}", f"{lost:.1e}", f"{1e3 * seconds:.2f}"]
+            table.append([WORDS[family], *(f"{error:.2e}" for error in errors), *row])
+        return "\n".join([head, *align(table)])
 
     def figures(self):
-        return {
-            "fronts": functools.partial(draw_fronts, self),
-            "errors": functools.partial(draw_errors, self),
-        }
+        return {"fronts": self.draw_fronts, "errors": self.draw_errors}
+
+    def draw_fronts(self, figure, run_data) -> None:
+        """The steepest front at the end with its error, and the ways of the nodes."""
+        dump = run_data.dumps[-1]
+        figure.set_size_inches(10.0, 7.0)
+        grid = figure.add_gridspec(2, 6)
+        profile, wrong = figure.add_subplot(grid[0, :3]), figure.add_subplot(grid[0, 3:])
+        fine = np.linspace(0.0, 1.0, 4001)
+        exact = self.exact.compute_values(fine, dump.t)
+        middle = fine[np.abs(np.diff(exact)).argmax()]
+        half = max(20.0 * self.deck.viscosity / np.ptp(exact), 2.0 / self.deck.cells)
+        shown = np.abs(fine - middle) < half
+        profile.plot(fine[shown], exact[shown], color="0.5", lw=1.5, label="exact")
+        for block in dump.blocks:
+            x, u = block.nodes[0, :, 0], block.cell_fields["u"][:, 0]
+            centres = 0.5 * (x[1:] + x[:-1])
+            near = np.abs(centres - middle) < half
+            style = {"color": COLOURS[block.name], "label": WORDS[block.name]}
+            profile.plot(centres[near], u[near], ".", ms=4, **style)
+            error = np.abs(u - self.exact.compute_cell_averages(x, dump.t))
+            wrong.semilogy(centres, np.maximum(error, 1e-12), ".-", lw=0.5, ms=2.5, **style)
+        profile.set_title(f"u [m/s] about the front, t = {dump.t:.3g} s", fontsize="medium")
+        profile.legend(fontsize="small")
+        wrong.set_title("|u - exact| [m/s]", fontsize="medium")
+        wrong.set_ylim(1e-9, 2.0)
+        times = [one.t for one in run_data.dumps]
+        for k, family in enumerate(FAMILIES[1:]):
+            axes = figure.add_subplot(grid[1, 2 * k : 2 * k + 2])
+            ways = np.array([one.block(family).nodes[0, :, 0] for one in run_data.dumps])
+            axes.plot(ways, times, color="0.2", lw=0.4)
+            axes.set_title(f"ways of the nodes, {WORDS[family]}", fontsize="medium")
+        for axes in figure.axes:
+            axes.set_xlabel("x [m]")
+        figure.axes[2].set_ylabel("t [s]")
+
+    def draw_errors(self, figure, run_data) -> None:
+        """Errors over time, and error against cost at several sizes."""
+        figure.set_size_inches(9.0, 4.2)
+        over_time, over_cost = figure.subplots(1, 2)
+        history, cells = run_data.history, self.deck.cells
+        counts = sorted({max(16, int(part * cells)) for part in (0.125, 0.25, 0.5, 1)})
+        runs = [self.repeat(count) for count in counts]
+        for family, colour in COLOURS.items():
+            style = {"color": colour, "lw": 1.0}
+            over_time.semilogy(
+                history["t"], history[f"error_{family}"], label=WORDS[family], **style
+            )
+            errors, seconds = zip(*(run[family] for run in runs), strict=True)
+            over_cost.loglog(seconds, errors, "o-", ms=3.5, **style)
+        over_time.set_xlabel("t [s]")
+        over_time.set_title(f"mean |u - exact|, {cells} cells", fontsize="medium")
+        over_time.legend(fontsize="small")
+        over_cost.xaxis.set_minor_formatter("")
+        over_cost.set_xlabel("CPU seconds of the run")
+        sizes = f"{counts[0]} to {counts[-1]} cells"
+        over_cost.set_title(f"mean |u - exact| at the end, {sizes}", fontsize="medium")

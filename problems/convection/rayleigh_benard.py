@@ -18,17 +18,17 @@ diffusive times to grow by a factor e.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-import msgspec
 import numpy as np
 
-from problems.convection.heated_cavity import AxisGrid
+from hydro.convection import measure
+from hydro.convection.box import PERIODIC, adiabatic, isothermal, make_fluid
+from problems.convection.boxes import AxisGrid, BoxProblem
 from problems.deck import Deck, Output, RunControl, key
-from problems.problem import BlockPlan, Problem, Report, Row
+from problems.problem import Report, Row, compare
 from problems.references.convection import (
     BOX_ONSETS,
     FREE_LAYER_ONSET,
@@ -36,25 +36,26 @@ from problems.references.convection import (
     LAYER_ONSET,
     LAYER_WAVENUMBER,
     PRANDTL,
+    compute_layer_growth,
 )
 from regrid.errors import BadInput
 
-if TYPE_CHECKING:
-    from hydro.convection.equations import Equations
-
 TIME = 1.5
-LONGEST_PART = 1 / 600  # of the time, in one step
+SMALL = 1e-2  # of the last kinetic energy: below it a disturbance grows by linear theory
+ONSET_BRACKET = (0.3, 3.0)  # of the reference, or of the deck's Rayleigh number
+STILL = 1e-9  # kinetic energy over the squared disturbance: less is no flow [m4/s2/K2]
+WIDENINGS = 3  # of the bracket, tenfold both ways
 
 
 class RayleighBenardDeck(Deck, kw_only=True):
-    output: Output = msgspec.field(default_factory=lambda: Output(dumps=6))
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=TIME))
+    output: Output = Output(dumps=6)
+    run: RunControl = RunControl(t_end=TIME)
     shape: key(Literal["box", "layer"], "side walls, or periodic sides") = "box"
     sides: key(Literal["adiabatic", "conducting"], "side walls of a box") = "adiabatic"
     walls: key(Literal["no-slip", "free"], "floor and ceiling hold the fluid, or not") = "no-slip"
     cells: key(int, "cells across", ge=3, le=2000) = 40
     cells_up: key(int, "cells up", ge=3, le=2000) = 40
-    width: key(float, "over the height; left out: 1, layer: critical", ge=0.01, le=100) | None = (
+    width: key(float | None, "over the height; left out: 1, layer: critical", ge=0.01, le=100) = (
         None
     )
     rayleigh: key(float, "Rayleigh number of the height", le=1e12) = 5000.0
@@ -62,8 +63,8 @@ class RayleighBenardDeck(Deck, kw_only=True):
     tilt: key(float, "of gravity, anticlockwise from down [degrees]", gt=-90, lt=90) = 0.0
     amplitude: key(float, "of the first disturbance of the temperature [K]", gt=0, le=1) = 1e-3
     onset: key(bool, "search for the onset at the end") = True
-    grid: AxisGrid = msgspec.field(default_factory=AxisGrid)
-    longest_step: key(float, "of the march [s]; left out: 1/600 of its time", gt=0) | None = None
+    grid: AxisGrid = AxisGrid()
+    longest_step: key(float | None, "of the march [s]; left out: 1/600 of its time", gt=0) = None
 
 
 def conduct(y: np.ndarray) -> np.ndarray:
@@ -71,17 +72,16 @@ def conduct(y: np.ndarray) -> np.ndarray:
     return 0.5 - y
 
 
-class RayleighBenard(Problem):
+class RayleighBenard(BoxProblem):
     """One box, or one period of a layer."""
 
     Deck = RayleighBenardDeck
+    longest_part = 1 / 600
+    hot_and_cold = ("j_min", "j_max")
     units: Mapping[str, str] = {"kinetic_energy": "m4/s2", "growth": "1/s", "u_max": "m/s"}
-    scale = 1.0  # of the Nusselt number
 
     def __init__(self, deck: RayleighBenardDeck):
         super().__init__(deck)
-        from hydro.convection.box import make_fluid
-
         if deck.shape == "layer" and deck.sides != "adiabatic":
             raise BadInput(
                 f"sides = {deck.sides!r} contradicts shape = 'layer', whose sides are periodic; "
@@ -92,60 +92,24 @@ class RayleighBenard(Problem):
         self.critical = FREE_LAYER_WAVENUMBER if free else LAYER_WAVENUMBER
         usual = 1.0 if deck.shape == "box" else 2.0 * math.pi / self.critical
         self.width = deck.width or usual
+        self.extent, side = (self.width, 1.0), PERIODIC
+        if deck.shape == "box":
+            side = adiabatic() if deck.sides == "adiabatic" else isothermal(conduct)
+        floor, ceiling = (isothermal(heat, deck.walls) for heat in (0.5, -0.5))
+        self.walls = {"i_min": side, "i_max": side, "j_min": floor, "j_max": ceiling}
 
     @property
     def t_end(self) -> float:
         return self.deck.run.t_end or TIME
 
-    def plan(self):
-        size = self.deck.cells, self.deck.cells_up
-        return self.t_end, [BlockPlan("box", size, (0.0, 0.0), (self.width, 1.0))]
-
-    def make_equations(self, x: np.ndarray, y: np.ndarray) -> Equations:
-        """The discrete equations on nodes x, y."""
-        from hydro.convection.box import PERIODIC, adiabatic, isothermal
-        from hydro.convection.equations import Equations
-
-        deck = self.deck
-        side = PERIODIC
-        if deck.shape == "box":
-            side = adiabatic() if deck.sides == "adiabatic" else isothermal(conduct)
-        walls = {"i_min": side, "i_max": side}
-        walls |= {"j_min": isothermal(0.5, deck.walls), "j_max": isothermal(-0.5, deck.walls)}
-        return Equations(x, y, walls)
-
-    def make_first_equations(self) -> Equations:
-        """The equations on the first grid."""
-        deck = self.deck
-        return self.make_equations(
-            deck.grid.make(deck.cells, 0.0, self.width), deck.grid.make(deck.cells_up)
-        )
-
     def build(self):
-        from hydro.convection.march import March
-        from hydro.convection.measure import compute_growth, solve_rest
-        from hydro.convection.steady import GridControl
-        from problems.convection.boxes import TimeEvolution
-
-        deck = self.deck
-        equations = self.make_first_equations()
-        grid = GridControl(deck.grid.kind, deck.grid.every, options=deck.grid.options())
-        psi, temperature = solve_rest(equations, self.fluid)
-        _, flow, heat = compute_growth(equations, self.fluid, psi, temperature)
-        march = March(
-            equations,
-            self.fluid,
-            psi + deck.amplitude * flow,
-            temperature + deck.amplitude * heat,
-            cfl=deck.run.cfl,
-            longest=deck.longest_step or LONGEST_PART * (deck.run.t_set_up or self.t_end),
-        )
-        return TimeEvolution("box", march, grid, self.t_end, coldest=-0.5)
+        equations, size = self.make_first_equations(), self.deck.amplitude
+        psi, temperature = measure.solve_rest(equations, self.fluid)
+        _, flow, heat = measure.compute_growth(equations, self.fluid, psi, temperature)
+        return self.make_march(equations, psi + size * flow, temperature + size * heat, -0.5)
 
     def measure(self, evolution) -> dict[str, float]:
         """Nusselt numbers of floor and ceiling, kinetic energy, greatest velocity across."""
-        from hydro.convection import measure
-
         equations = evolution.equations
         state = (equations, evolution.fluid, evolution.temperature)
         return {
@@ -164,23 +128,96 @@ class RayleighBenard(Problem):
             critical = math.isclose(self.width * self.critical, 2.0 * math.pi, rel_tol=1e-3)
             onset = FREE_LAYER_ONSET if deck.walls == "free" else LAYER_ONSET
             return onset if critical else None
-        if self.width != 1.0 or deck.walls == "free":
-            return None
-        return BOX_ONSETS[deck.sides]
+        return None if self.width != 1.0 or deck.walls == "free" else BOX_ONSETS[deck.sides]
+
+    def find_onset(self) -> float | None:
+        """Ra at which growth of the discrete equations begins; None where none is found."""
+        deck, equations = self.deck, self.make_first_equations()
+        about = self.find_onset_reference() or max(deck.rayleigh, 1.0)
+        fluid = make_fluid(1.0, deck.prandtl, deck.tilt)
+        low, high = (part * about for part in ONSET_BRACKET)
+        for _ in range(WIDENINGS):
+            try:
+                return measure.find_onset(equations, fluid, low, high)
+            except BadInput:  # both ends grow, or both decay
+                low, high = 0.1 * low, 10.0 * high
+        return None
+
+    def compute_rate(self) -> float:
+        """The largest growth rate [1/s] of the discrete equations on the first grid."""
+        equations = self.make_first_equations()
+        rest = measure.solve_rest(equations, self.fluid)
+        return measure.compute_growth(equations, self.fluid, *rest)[0]
 
     def report(self, history, final=None) -> Report:
-        from problems.convection.boxes import report_benard
-
         onset = self.find_onset_reference()
         rows = [] if onset is None else [Row("onset", theory=onset)]
-        return Report((lambda: str(report_benard(self, history))) if history else "", rows)
+        return Report((lambda: str(self.compute_report(history))) if history else "", rows)
+
+    def compute_report(self, history) -> Report:
+        """Onset and growth rate beside linear theory, heat transported at the end."""
+        deck, rows, notes = self.deck, [], []
+        if deck.onset and deck.tilt == 0.0:
+            found = self.find_onset()
+            if found is None:
+                notes.append("onset: none was found")
+            else:
+                theory = self.find_onset_reference() or math.nan
+                rows.append(Row("onset", found, theory, "onset, Ra"))
+        if deck.tilt == 0.0:
+            rate, theory = self.compute_rate(), math.nan
+            if deck.shape == "layer":
+                numbers = deck.rayleigh, deck.prandtl, 2.0 * math.pi / self.width
+                theory = compute_layer_growth(*numbers, deck.walls == "free")
+            rows.append(Row("eigenvalue", rate, theory, "growth rate, eigenvalue [1/s]"))
+            seen = measure_growth(history["t"], history["kinetic_energy"])
+            if history["kinetic_energy"][0] < STILL * deck.amplitude**2:
+                notes.append("the disturbance that decays most slowly is heat alone: nothing moves")
+            elif math.isfinite(seen):
+                rows.append(Row("growth", seen, rate, "growth rate, in time [1/s]"))
+                notes.append("growth in time: beside the eigenvalue")
+        rows.append(compare(history, "nusselt", label="Nu, floor"))
+        rows.append(compare(history, "nusselt_top", label="Nu, ceiling"))
+        head = (
+            f"{deck.shape}, Ra = {deck.rayleigh:g}, Pr = {deck.prandtl:g}, {deck.cells} x "
+            f"{deck.cells_up} cells, grid {deck.grid.kind}"
+        )
+        return Report(head, rows, [*notes, self.say_lost_volume(history)])
 
     def figures(self):
-        from problems.convection import boxes as pictures
+        return {**super().figures(), "growth": self.draw_growth}
 
-        return {
-            "flow": functools.partial(pictures.draw_flow, self),
-            "nusselt": functools.partial(pictures.draw_nusselt, self, ("j_min", "j_max")),
-            "growth": functools.partial(pictures.draw_growth, self),
-            "grid": pictures.draw_grid,
-        }
+    def draw_growth(self, figure, run_data) -> None:
+        """Kinetic energy and Nusselt number against time, with the growth of the eigenvalue."""
+        t, energy = run_data.history["t"], run_data.history["kinetic_energy"]
+        figure.set_size_inches(10.0, 4.4)
+        left, right = figure.subplots(1, 2)
+        left.semilogy(t, energy, lw=1.4, label="kinetic energy")
+        if self.deck.tilt == 0.0:
+            rate = self.compute_rate()
+            line = energy[0] * np.exp(2.0 * rate * (t - t[0]))
+            shown = line <= 3.0 * energy.max()
+            left.semilogy(t[shown], line[shown], "k--", lw=0.9, label=f"exp(2 · {rate:.4g} t)")
+        left.set(xlabel="t [s]", ylabel="kinetic energy over density [m4/s2]")
+        right.plot(t, run_data.history["nusselt"], lw=1.2, label="floor")
+        right.plot(t, run_data.history["nusselt_top"], "--", lw=1.2, label="ceiling")
+        right.set(xlabel="t [s]", ylabel="Nusselt number")
+        for axis in (left, right):
+            axis.legend(fontsize="small")
+            axis.grid(alpha=0.3)
+
+
+def measure_growth(t: np.ndarray, energy: np.ndarray) -> float:
+    """Growth rate [1/s] from the time and kinetic energy (n,) of a disturbance.
+
+    Median of the slopes of log(energy)/2 while the energy is small and after the first steps; NaN
+    where too few steps are small.
+    """
+    known = np.isfinite(energy) & (energy > 0.0)
+    t, energy = t[known], energy[known]
+    decays = energy[-1] < energy[0]
+    small = energy < (np.inf if decays else SMALL * energy.max())
+    end = int(np.argmin(small)) if not small.all() else small.size
+    if end < 12:
+        return math.nan
+    return float(np.median(0.5 * np.diff(np.log(energy[4:end])) / np.diff(t[4:end])))

@@ -18,26 +18,23 @@ from __future__ import annotations
 import math
 from typing import ClassVar, Literal
 
-import msgspec
 import numpy as np
 
 from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos.materials import find_material
-from hydro.simulation import Simulation
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, VoidFill, key
-from problems.problem import BlockPlan, Problem, Report, Row, draw_field
-from problems.references.hugoniot import make_isentrope, shock_with_particle_speed
+from problems.pictures import draw_columns, draw_field, find_dump
+from problems.problem import BlockPlan, Problem, Report, Row, find_time
+from problems.references.hugoniot import compute_free_surface_speed, shock_with_particle_speed
 from regrid.errors import BadInput
 
 FINEST = 0.5  # of the rows' mean height: the height of those at the void
 
 
 class CavityDeck(Deck, kw_only=True):
-    """Deck of `cavity`."""
-
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
-    regrid: Regrid = msgspec.field(default_factory=lambda: Regrid(epsilon=3e-2))
+    run: RunControl = RunControl(cfl=0.8)
+    regrid: Regrid = Regrid(epsilon=3e-2)
     material: key(str, "of the body, name or FILE.toml:NAME") = "Al1100"
     speed: key(float, "of the piston [m/s]", gt=0, le=1e5) = 1000.0
     radius: key(float, "of the void [m]", gt=0, le=1e3) = 1e-3
@@ -48,40 +45,8 @@ class CavityDeck(Deck, kw_only=True):
     geometry: key(
         Literal["plane", "axisymmetric"], "plane: a cylindrical void; axisymmetric: a spherical one"
     ) = "plane"
-    void_fill: VoidFill = msgspec.field(default_factory=VoidFill)
+    void_fill: VoidFill = VoidFill()
     cells: key(int, "along half of the void's line", ge=16, le=MOST_CELLS) = 64
-
-
-class CavityRun(Simulation):
-    """The flow, which ends when the void is closed."""
-
-    def __init__(self, blocks, links, closed: float, **options):
-        super().__init__(blocks, links, **options)
-        self.closed, self.first_size = closed, self.measure_size()
-
-    def measure_size(self) -> float:
-        """Area of the half void, or its volume per radian."""
-        x, y = self.blocks[0].nodes[:, :, 0]
-        if self.geometry.curved:
-            return float((np.diff(x) * (y[1:] ** 2 + y[1:] * y[:-1] + y[:-1] ** 2)).sum()) / 6.0
-        return float((np.diff(x) * (y[1:] + y[:-1])).sum()) / 2.0
-
-    def find_end(self) -> str | None:
-        """The words for a run whose void is closed."""
-        if self.measure_size() < self.closed * self.first_size:
-            return f"the void is closed but for {100.0 * self.closed:g} % of its size"
-        return None
-
-    def advance(self) -> dict:
-        """One step; then looks whether the void is closed."""
-        row = super().advance()
-        self.finished = self.finished or self.find_end()
-        return row
-
-    def set_state(self, state) -> None:
-        """Take up a state of `get_state`."""
-        super().set_state(state)
-        self.finished = self.finished or self.find_end()
 
 
 class Cavity(Problem):
@@ -96,28 +61,26 @@ class Cavity(Problem):
 
     def __init__(self, deck: CavityDeck):
         super().__init__(deck)
-        self.material = find_material(deck.material)
+        self.material, self.curved = find_material(deck.material), deck.geometry == "axisymmetric"
         eos, rho = self.material.eos, self.material.rho0
         try:
-            self.shock = shock_with_particle_speed(eos, rho, 0.0, deck.speed)
-            gain = float(make_isentrope(eos, self.shock.rho, self.shock.p).velocity_gain(0.0))
+            self.shock = shock = shock_with_particle_speed(eos, rho, 0.0, deck.speed)
+            self.near_speed = compute_free_surface_speed(eos, shock.rho, shock.p, deck.speed)
         except (BadInput, ValueError) as error:
             raise BadInput(
                 f"deck: speed is {deck.speed:g} m/s: {deck.material} has no such shock ({error})"
             ) from None
-        self.near_speed = deck.speed + gain
-        self.arrival = (deck.before - 1.0) * deck.radius / self.shock.shock_speed
+        self.arrival = (deck.before - 1.0) * deck.radius / shock.shock_speed
 
     @property
     def t_end(self) -> float:
         """The deck's, or time enough for the void to close and the jet's shock to run on."""
-        radius = self.deck.radius
-        return self.deck.run.t_end or self.arrival + 2.0 * radius / self.near_speed + (
-            1.5 * radius / self.shock.shock_speed
-        )
+        closing = 2.0 / self.near_speed + 1.5 / self.shock.shock_speed
+        return self.deck.run.t_end or self.arrival + closing * self.deck.radius
 
-    def make_grid(self) -> np.ndarray:
-        """Nodes (2, ni + 1, nj + 1): i along the void from its near to its far side, j outwards."""
+    def make_grid(self) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes (2, ni + 1, nj + 1): i along the void from its near to its far side, j outwards;
+        and the numbers of the nodes at the channel's corners."""
         deck, radius = self.deck, self.deck.radius
         before, behind, width = (radius * part for part in (deck.before, deck.behind, deck.width))
         corners = np.array([[-before, 0.0], [-before, width], [behind, width], [behind, 0.0]]).T
@@ -125,7 +88,6 @@ class Cavity(Problem):
         turn = np.unwrap(np.arctan2(corners[1], corners[0]))
         counts = np.maximum(3, np.rint(deck.cells * -np.diff(turn) / math.pi).astype(int))
         at = np.concatenate([[0], np.cumsum(counts)])
-        self.corners = at
         outer = np.array([np.interp(np.arange(at[-1] + 1), at, row) for row in corners])
         angle = np.pi * (1.0 - np.linspace(0.0, 1.0, at[-1] + 1))
         inner = radius * np.array([np.cos(angle), np.sin(angle)])
@@ -133,44 +95,43 @@ class Cavity(Problem):
         rows = max(6, round(deck.cells / math.pi * 0.5 * (deck.before + deck.width - 2.0)))
         part = np.linspace(0.0, 1.0, rows + 1)
         part = FINEST * part + (1.0 - FINEST) * part**2
-        return inner[:, :, None] * (1.0 - part) + outer[:, :, None] * part
+        return inner[:, :, None] * (1.0 - part) + outer[:, :, None] * part, at
 
     def estimate_cells(self) -> int:
         deck = self.deck
         return round(deck.cells**2 / math.pi * 0.5 * (deck.before + deck.width)) + 6 * deck.cells
 
     def plan(self):
-        """End time and the block."""
-        nodes = self.make_grid()
-        low, high = nodes.min(axis=(1, 2)), nodes.max(axis=(1, 2))
-        cells = (nodes.shape[1] - 1, nodes.shape[2] - 1)
-        return self.t_end, [
-            BlockPlan("metal", cells, tuple(map(float, low)), tuple(map(float, high)))
-        ]
+        nodes, _ = self.make_grid()
+        low, high = (tuple(map(float, find(nodes, axis=(1, 2)))) for find in (np.min, np.max))
+        return self.t_end, [BlockPlan("metal", (nodes.shape[1] - 1, nodes.shape[2] - 1), low, high)]
 
     def build(self):
-        deck, nodes = self.deck, self.make_grid()
-        block = Block(
-            "metal", self.material.eos, nodes, self.material.rho0, 0.0, 0.0, 0.0,
-            material=deck.material.rpartition(":")[2],
-        )  # fmt: skip
-        line = "wall" if deck.geometry == "plane" else "axis"
+        deck, (nodes, corners) = self.deck, self.make_grid()
+        state, material = (self.material.rho0, 0.0, 0.0, 0.0), deck.material.rpartition(":")[2]
+        block = Block("metal", self.material.eos, nodes, *state, material=material)
         for side in ("i_min", "i_max"):
-            put(block, side, line)
+            put(block, side, "axis" if self.curved else "wall")
         put(block, "j_min", "free-surface")
-        first, second, third, last = (int(k) for k in self.corners)
+        first, second, third, last = (int(k) for k in corners)
         put(block, "j_max", "piston", first, second, velocity=(deck.speed, 0.0))
         put(block, "j_max", "wall", second, third)
         put(block, "j_max", "free-surface", third, last)
-        return self.simulate([block], kind=CavityRun, closed=deck.closed, geometry=deck.geometry)
+        least = deck.closed * measure_void(nodes, self.curved)
 
-    def measure(self, evolution: CavityRun) -> dict[str, float]:
+        def find_end(simulation):
+            if measure_void(simulation.blocks[0].nodes, self.curved) >= least:
+                return None
+            return f"the void is closed but for {100.0 * deck.closed:g} % of its size"
+
+        return self.simulate([block], geometry=deck.geometry, find_end=find_end)
+
+    def measure(self, evolution) -> dict[str, float]:
         """Size and width of the void, speeds of the cells at its ends, greatest pressure."""
         (block,) = evolution.blocks
-        x = block.nodes[0, :, 0]
-        u, p = block.state[1, 1:-1, 1:-1], block.state[3, 1:-1, 1:-1]
+        x, (_, u, _, p) = block.nodes[0, :, 0], block.state[:, 1:-1, 1:-1]
         return {
-            "void_size": evolution.measure_size(),
+            "void_size": measure_void(block.nodes, self.curved),
             "void_width": float(x[-1] - x[0]),
             "jet_speed": float(u[0, 0]),
             "far_speed": float(u[-1, 0]),
@@ -179,52 +140,44 @@ class Cavity(Problem):
 
     def find_closing(self, history) -> float:
         """When the jet has come to the far side [s], NaN where it has not."""
-        width, t = history["void_width"], history["t"]
-        met = np.flatnonzero(width <= 1e-6 * self.deck.radius)
-        return float(t[met[0]]) if met.size else math.nan
+        return find_time(history, history["void_width"] <= 1e-6 * self.deck.radius)
 
     def report(self, history, final=None) -> Report:
-        deck, near = self.deck, self.near_speed
+        deck, near, t, notes = self.deck, self.near_speed, math.nan, []
+        if history:
+            jet, size = history["jet_speed"], history["void_size"]
+            t = find_time(history, jet > 0.5 * near)
+            notes = [
+                f"jet: up to {float(np.nanmax(jet)):.5g} m/s; behind this shock a plane free "
+                f"surface goes at {near:.5g} m/s"
+            ]
+            if math.isfinite(closing := self.find_closing(history)):
+                most = float(np.nanmax(history["most_pressure"]))
+                notes.append(
+                    f"it hits the far side at t = {closing:.4g} s; greatest pressure then "
+                    f"{1e-9 * most:.4g} GPa, behind the shock {1e-9 * self.shock.p:.4g} GPa"
+                )
+            left = 100.0 * max(float(size[-1]), 0.0) / float(size[0])
+            notes.append(f"the void has {left:.2g} % of its size in the end")
+        rows = [
+            Row("shock_pressure", theory=self.shock.p),
+            Row("arrival", t, self.arrival, "shock at the void [s]", digits=5),
+            Row("near_speed", theory=near),
+        ]
         head = (
             f"cavity: void of {1e3 * deck.radius:g} mm radius in {deck.material}, piston at "
             f"{deck.speed:g} m/s, {deck.cells} cells along the void"
         )
-        rows = [
-            Row("shock_pressure", theory=self.shock.p),
-            Row("arrival", theory=self.arrival),
-            Row("near_speed", theory=near),
-        ]
-        if not history:
-            return Report(head, rows)
-        jet, size, notes = history["jet_speed"], history["void_size"], []
-        begun = np.flatnonzero(jet > 0.5 * near)
-        if begun.size:
-            words, t = "shock at the void [s]", float(history["t"][begun[0]])
-            rows[1] = Row("arrival", t, self.arrival, words, digits=5)
-        notes.append(
-            f"jet: up to {float(np.nanmax(jet)):.5g} m/s; behind this shock a plane free surface "
-            f"goes at {near:.5g} m/s"
-        )
-        closing = self.find_closing(history)
-        if math.isfinite(closing):
-            notes.append(
-                f"it hits the far side at t = {closing:.4g} s; greatest pressure then "
-                f"{1e-9 * float(np.nanmax(history['most_pressure'])):.4g} GPa, behind the shock "
-                f"{1e-9 * self.shock.p:.4g} GPa"
-            )
-        left = 100.0 * max(float(size[-1]), 0.0) / float(size[0])
-        notes.append(f"the void has {left:.2g} % of its size in the end")
         return Report(head, rows, notes)
 
     def draw(self, figure, run_data) -> None:
         """Pressure and grid at four times, size of the void and speed of the jet over time."""
         figure.set_size_inches(12.0, 5.6)
-        history, deck = run_data.history, self.deck
+        history, deck, last = run_data.history, self.deck, run_data.history["t"][-1]
         closing = self.find_closing(history)
-        end = closing if math.isfinite(closing) else float(history["t"][-1])
-        times = (self.arrival, 0.5 * (self.arrival + end), end, float(history["t"][-1]))
-        axes = figure.subplots(2, 3)
-        dumps = [min(run_data.dumps, key=lambda dump: abs(dump.t - time)) for time in times]
+        end = closing if math.isfinite(closing) else last
+        times = (self.arrival, 0.5 * (self.arrival + end), end, last)
+        dumps, axes = [find_dump(run_data, t) for t in times], figure.subplots(2, 3)
         high = max(float(np.quantile(d.blocks[0].cell_fields["p"], 0.995)) for d in dumps)
         for axis, dump in zip((*axes[0, :2], *axes[1, :2]), dumps, strict=True):
             pressure = lambda block: 1e-9 * block.cell_fields["p"]  # noqa: E731
@@ -232,13 +185,17 @@ class Cavity(Problem):
             axis.set(xlim=(-1.6 * deck.radius, 2.4 * deck.radius), ylim=(0.0, 2.0 * deck.radius))
             axis.set_title(f"t = {1e6 * dump.t:.3f} µs", fontsize="medium")
         figure.colorbar(picture, ax=axes[:, :2], shrink=0.7, label="pressure [GPa]")
-        t = 1e6 * history["t"]
-        axes[0, 2].plot(t, history["void_size"] / history["void_size"][0])
-        axes[0, 2].set_ylabel("size of the void, of its first one")
-        axes[1, 2].plot(t, history["jet_speed"], label="near side, jet")
-        axes[1, 2].plot(t, history["far_speed"], label="far side")
+        part = {**history, "part": history["void_size"] / history["void_size"][0]}
+        draw_columns(axes[0, 2], part, {"part": ""}, "size of the void, of its first one", "µs")
+        speeds = {"jet_speed": "near side, jet", "far_speed": "far side"}
+        draw_columns(axes[1, 2], history, speeds, "speed [m/s]", "µs")
         axes[1, 2].axhline(self.near_speed, color="k", lw=0.8, ls="--", label="plane free surface")
-        axes[1, 2].set_ylabel("speed [m/s]")
         axes[1, 2].legend()
-        for axis in axes[:, 2]:
-            axis.set_xlabel("t [µs]")
+
+
+def measure_void(nodes: np.ndarray, curved: bool) -> float:
+    """Area of the half void [m2], or its volume per radian."""
+    x, y = nodes[:, :, 0]
+    if curved:
+        return float((np.diff(x) * (y[1:] ** 2 + y[1:] * y[:-1] + y[:-1] ** 2)).sum()) / 6.0
+    return float((np.diff(x) * (y[1:] + y[:-1])).sum()) / 2.0

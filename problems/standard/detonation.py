@@ -20,7 +20,6 @@ import functools
 import math
 from typing import ClassVar, Literal
 
-import msgspec
 import numpy as np
 
 from hydro.block import Block
@@ -30,30 +29,29 @@ from hydro.eos.materials import find_material
 from hydro.sources import ProgrammedBurn
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import make_plane_grid, put_walls
-from problems.problem import Problem, Report, Row, compare, draw_field, find_crossing, get_last
+from problems.pictures import draw_field, spread_dumps
+from problems.problem import Problem, Report, Row, compare, find_crossing, get_last
 from problems.references.exact_flows import compute_taylor_wave
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
 WAY = 0.9  # of the length that the front goes, where no end time is given
 AMBIENT = 1e5  # pressure of the explosive at rest [Pa]
-ENDS = (
-    "piston: the left end moves at the CJ particle speed; wall: it rests; point: a square lit at "
-)
-ENDS += "its corner, between walls"
 
 
 class DetonationDeck(Deck, kw_only=True):
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.6))
-    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    run: RunControl = RunControl(cfl=0.6)
+    regrid: Regrid = Regrid()
     explosive: key(str, "a JWL material of the library") = "TNT"
-    behind: key(Literal["piston", "wall", "point"], ENDS) = "piston"
+    behind: key(
+        Literal["piston", "wall", "point"],
+        "piston: the left end moves at the CJ particle speed; wall: it rests; point: a square lit "
+        "at its corner, between walls",
+    ) = "piston"
     length: key(float, "of the bar or square [m]", ge=1e-9, le=1e6) = 0.1
     cells: key(int, "cells along the length", ge=20, le=MOST_CELLS) = 200
     front: key(float, "width of the front in cells", ge=1, le=100) = 4.0
-    clock: key(float, "part of the path that is lit; then the front runs by itself", gt=0, le=1) = (
-        1.0
-    )
+    clock: key(float, "part of the path that is lit; the front then goes on", gt=0, le=1) = 1.0
     limiter: Limiter = "van-leer"
 
 
@@ -168,7 +166,7 @@ class Detonation(Problem):
             field = lambda block: block.cell_fields["p"] / 1e9  # noqa: E731
             draw_field(left, run_data.dumps[-1], field, every=10, bar="pressure [GPa]", title="t")
         else:
-            self._draw_profiles(left, run_data)
+            self._draw_profiles(left, spread_dumps(run_data, 5))
         t, front = run_data.history["t"], run_data.history["front"]
         size = 1e3 * self.deck.length / self.deck.cells
         right.plot(1e6 * t, 1e3 * (self.speed * t - front), lw=1.2, label="D t - front")
@@ -177,9 +175,8 @@ class Detonation(Problem):
         right.set_ylim(bottom=min(0.0, right.get_ylim()[0]))
         right.legend(loc="best", frameon=False)
 
-    def _draw_profiles(self, axis, run_data) -> None:
-        label = "Taylor's wave"
-        for dump in run_data.dumps[-1 :: -max(1, len(run_data.dumps) // 5)][4::-1]:
+    def _draw_profiles(self, axis, dumps) -> None:
+        for dump in dumps:
             (block,) = dump.blocks
             x = 1e3 * compute_centres(block.nodes)[0][:, 0]
             axis.plot(x, block.cell_fields["p"][:, 0] / 1e9, lw=1.4, label=f"{1e6 * dump.t:.3g} µs")
@@ -187,8 +184,8 @@ class Detonation(Problem):
                 wave, t = self.taylor_wave, 1e3 * dump.t
                 exact = np.concatenate([wave.p[:1], wave.p, [0.0]])
                 places = np.concatenate([[0.0], wave.pace * t, [self.speed * t]])
+                label = "Taylor's wave" if dump is dumps[-1] else None
                 axis.plot(places, exact / 1e9, "k", lw=0.7, label=label)
-                label = None
         axis.axhline(self.pressure / 1e9, color="k", ls="--", lw=0.8, label="pCJ")
         axis.set(xlabel="x [mm]", ylabel="pressure [GPa]")
         axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)

@@ -16,7 +16,6 @@ import math
 import struct
 from typing import Literal
 
-import msgspec
 import numpy as np
 
 from hydro.block import Block
@@ -25,6 +24,7 @@ from hydro.eos import EquationOfState, IdealGas
 from hydro.eos.materials import find_material
 from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, RunControl, key
+from problems.initial_states import make_plane_grid
 from problems.problem import Problem, Report, Row
 from regrid.errors import BadInput
 
@@ -33,12 +33,10 @@ PRESSURE = 1e5
 
 
 class FreeStreamDeck(Deck, kw_only=True):
-    """Deck of `free-stream`; the defaults are two gases at Mach 0.6 between open sides."""
+    """The defaults are two gases at Mach 0.6 between open sides."""
 
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(max_steps=100, t_end=1e9))
-    materials: key(
-        tuple[str, str], 'of the two blocks: "gas" or a name of the material library'
-    ) = ("gas", "gas")
+    run: RunControl = RunControl(max_steps=100, t_end=1e9)
+    materials: key(tuple[str, str], '"gas" or a name of the material library') = ("gas", "gas")
     contact: key(Literal["interface", "seam"], "what joins the two blocks") = "interface"
     sides: key(Literal["periodic", "inflow"], "the sides below and above") = "periodic"
     mach: key(float, "speed of the stream over the sound speed", ge=0, le=1000) = 0.6
@@ -56,21 +54,17 @@ class FreeStream(Problem):
 
     def __init__(self, deck: FreeStreamDeck):
         super().__init__(deck)
-        self.fluids = {
-            name: _make_fluid(material)
-            for name, material in zip(("left", "right"), deck.materials, strict=True)
-        }
+        self.fluids = dict(zip(("left", "right"), map(_make_fluid, deck.materials), strict=True))
         if deck.contact == "seam" and deck.materials[0] != deck.materials[1]:
             raise BadInput("deck: a seam joins blocks of one material; give both the same")
         eos, rho = self.fluids["left"]
         turn, speed = math.radians(deck.angle), deck.mach * float(eos.sound_speed(rho, PRESSURE))
-        self.velocity = (speed * math.cos(turn), speed * math.sin(turn))
+        self.velocity = speed * math.cos(turn), speed * math.sin(turn)
 
     def make_nodes(self, t: float) -> np.ndarray:
         """All nodes (2, 2 cells + 1, cells + 1) at time t; a function of t, deck and seed alone."""
         deck, n = self.deck, self.deck.cells
-        x, y = np.meshgrid(np.linspace(-1.0, 1.0, 2 * n + 1), np.linspace(0.0, 1.0, n + 1))
-        x, y = x.T, y.T
+        x, y = make_plane_grid(np.linspace(-1.0, 1.0, 2 * n + 1), np.linspace(0.0, 1.0, n + 1))
         nodes = np.array([x + BEND * (1.0 - x * x) * np.sin(2.0 * math.pi * y), y])
         (bits,) = struct.unpack("<Q", struct.pack("<d", t))
         random = np.random.default_rng([deck.seed, bits])
@@ -96,17 +90,15 @@ class FreeStream(Problem):
             stream = rho, *self.velocity, PRESSURE
             material = "all" if deck.contact == "seam" else name
             block = Block(name, eos, self.make_block_nodes(name, 0.0), *stream, material=material)
-            open_sides = ["i_min" if name == "left" else "i_max"]
             if deck.sides == "periodic":
                 links.append(join("periodic", (block, "j_min"), (block, "j_max")))
-            else:
-                open_sides += ["j_min", "j_max"]
-            for side in open_sides:
+            across = ("j_min", "j_max") if deck.sides == "inflow" else ()
+            for side in ("i_min" if name == "left" else "i_max", *across):
                 put(block, side, "inflow", state=stream)
             blocks.append(block)
         links.insert(0, join(deck.contact, (blocks[0], "i_max"), (blocks[1], "i_min")))
-        mesh, deviation = self.make_block_nodes, self.measure_deviation
-        return self.simulate(blocks, links, mesh=mesh, measure_block=deviation)
+        found = {"mesh": self.make_block_nodes, "measure_block": self.measure_deviation}
+        return self.simulate(blocks, links, **found)
 
     def measure(self, evolution) -> dict[str, float]:
         """Largest deviation from the stream, over sizes of density, sound speed and pressure."""
@@ -117,20 +109,19 @@ class FreeStream(Problem):
         eos, density = self.fluids[block.name]
         c = float(eos.sound_speed(density, PRESSURE))
         stiffness = PRESSURE if eos.kind == "ideal-gas" else density * c * c
-        exact, sizes = (density, *self.velocity, PRESSURE), (density, c, c, stiffness)
-        state = block.state[:, 1:-1, 1:-1]
-        parts = zip(state, exact, sizes, strict=True)
-        return (max(float(np.abs(value - wanted).max()) / size for value, wanted, size in parts),)
+        exact = np.reshape((density, *self.velocity, PRESSURE), (4, 1, 1))
+        off = np.abs(block.state[:, 1:-1, 1:-1] - exact).max(axis=(1, 2))
+        return (float((off / (density, c, c, stiffness)).max()),)
 
     def report(self, history, final=None) -> Report:
         deck, deviations = self.deck, history.get("deviation", [math.nan])
         words = f"largest deviation, {len(deviations) - 1} steps"
-        return Report(
+        row = Row("largest_deviation", float(np.nanmax(deviations)), label=words, digits=3)
+        head = (
             f"uniform stream, Mach {deck.mach:g}, {' | '.join(deck.materials)}, {deck.contact}, "
-            f"{deck.sides} sides, nodes shaken by {deck.shake:g} cells at every step:",
-            [Row("largest_deviation", float(np.nanmax(deviations)), label=words, digits=3)],
-            ["round-off makes 1e-13 in 100 steps"],
+            f"{deck.sides} sides, nodes shaken by {deck.shake:g} cells at every step:"
         )
+        return Report(head, [row], ["round-off makes 1e-13 in 100 steps"])
 
 
 def _make_fluid(name: str) -> tuple[EquationOfState, float]:

@@ -17,14 +17,14 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-import msgspec
 import numpy as np
 
 from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
-from problems.problem import Problem, Report, compare, draw_field, get_last
+from problems.pictures import draw_field
+from problems.problem import Problem, Report, compare, get_last
 from problems.references.exact_flows import RADII, Shell
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
@@ -34,13 +34,11 @@ SHAPES = {1: "slab", 2: "ring", 3: "sphere"}
 
 
 class KidderDeck(Deck, kw_only=True):
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.6))
-    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    run: RunControl = RunControl(cfl=0.6)
+    regrid: Regrid = Regrid()
     n: key(Literal[1, 2, 3], "dimensions; 1: slab, 2: ring, 3: sphere at an axis") = 2
     cells: key(int, "cells through the shell", ge=4, le=MOST_CELLS) = 20
-    rays: key(
-        int, "cells along the shell, a quarter of a ring or 1 m of a slab", ge=4, le=MOST_CELLS
-    ) = 60
+    rays: key(int, "cells along a quarter of the shell, 1 m of a slab", ge=4, le=MOST_CELLS) = 60
 
 
 class Kidder(Problem):

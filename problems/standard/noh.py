@@ -16,7 +16,6 @@ import functools
 import math
 from typing import Literal
 
-import msgspec
 import numpy as np
 
 from hydro.block import Block
@@ -39,7 +38,7 @@ PEERS = {
 class NohDeck(Deck, kw_only=True):
     """Deck of `noh`."""
 
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=0.6, cfl=0.8))
+    run: RunControl = RunControl(t_end=0.6, cfl=0.8)
     geometry: key(Literal["plane", "cylindrical", "spherical"], "shape of the flow") = "cylindrical"
     cells: key(int, "cells along each side, 1 long", ge=8, le=MOST_CELLS) = 100
     gamma: key(float, "ratio of specific heats", ge=1.01) = 5.0 / 3.0

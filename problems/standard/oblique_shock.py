@@ -14,14 +14,14 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
-import msgspec
 import numpy as np
 
 from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.problem import Problem, Report, compare, draw_field, find_crossing
+from problems.pictures import draw_field
+from problems.problem import Problem, Report, compare, find_crossing
 from problems.references.shock_polars import Body, ShockPolar, search_pressure, solve_collision
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
@@ -30,7 +30,7 @@ LENGTH, BEFORE, HEIGHT = 1.0, 0.25, 1.0
 
 
 class ObliqueShockDeck(Deck, kw_only=True):
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=3.0, cfl=0.8))
+    run: RunControl = RunControl(t_end=3.0, cfl=0.8)
     mach: key(float, "Mach number of the stream", ge=1.001, le=100) = 2.5
     angle: key(float, "of the wedge [degrees]", ge=0.1, lt=60) = 15.0
     gamma: key(float, "ratio of specific heats", ge=1.01) = 1.4
@@ -80,8 +80,8 @@ class ObliqueShock(Problem):
     def build(self):
         deck, state = self.deck, (1.0, self.deck.mach, 0.0, self.ahead)
         block = Block("gas", IdealGas(deck.gamma), self.make_grid(), *state, limiter=deck.limiter)
-        put(block, "i_min", "inflow", state=state)
-        put(block, "j_max", "inflow", state=state)
+        for side in ("i_min", "j_max"):
+            put(block, side, "inflow", state=state)
         put(block, "i_max", "outflow")
         put(block, "j_min", "wall")
         return self.simulate([block], mesh="fixed")
@@ -93,8 +93,7 @@ class ObliqueShock(Problem):
         p, x = block.state[3, 1:-1, 1:-1], x[:, 0]
         level = 0.5 * (self.ahead + self.pressure)
         heights = np.array([find_crossing(*column, level) for column in zip(y, p, strict=True)])
-        chosen = (x > 0.3 * LENGTH) & (x < 0.9 * LENGTH) & np.isfinite(heights)
-        slope = math.nan
+        chosen, slope = (x > 0.3 * LENGTH) & (x < 0.9 * LENGTH) & np.isfinite(heights), math.nan
         if chosen.sum() > 2:
             slope = math.degrees(math.atan(np.polyfit(x[chosen], heights[chosen], 1)[0]))
         return {
@@ -104,17 +103,15 @@ class ObliqueShock(Problem):
         }
 
     def report(self, history, final=None) -> Report:
-        deck, beta, words = self.deck, math.degrees(self.beta), "pressure on the wall over exact"
-        return Report(
-            f"oblique-shock, Mach {deck.mach:g} on {deck.angle:g} degrees, {deck.cells} cells",
-            [
-                compare(
-                    history, "shock_angle", beta, "angle of the shock [degrees]", error="angle"
-                ),
-                compare(history, "wall_pressure_ratio", 1.0, words, error="pressure"),
-            ],
-            [f"exact pressure: {self.pressure / self.ahead:.5g} of the stream's"],
-        )
+        deck, beta = self.deck, math.degrees(self.beta)
+        words = "angle of the shock [degrees]", "pressure on the wall over exact"
+        rows = [
+            compare(history, "shock_angle", beta, words[0], error="angle"),
+            compare(history, "wall_pressure_ratio", 1.0, words[1], error="pressure"),
+        ]
+        head = f"oblique-shock, Mach {deck.mach:g} on {deck.angle:g} degrees, {deck.cells} cells"
+        exact = f"exact pressure: {self.pressure / self.ahead:.5g} of the stream's"
+        return Report(head, rows, [exact])
 
     def draw(self, figure, run_data) -> None:
         """Pressure with the grid and the exact shock, and pressure along the wall."""

@@ -19,7 +19,6 @@ from __future__ import annotations
 import math
 from typing import ClassVar, Literal
 
-import msgspec
 import numpy as np
 
 from hydro.block import Block
@@ -29,7 +28,8 @@ from hydro.links import join
 from hydro.sources import make_gravity
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
 from problems.initial_states import put_walls
-from problems.problem import Problem, Report, Row, compare, draw_field
+from problems.pictures import draw_columns, draw_field, spread_dumps
+from problems.problem import Problem, Report, Row, compare
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
@@ -48,13 +48,11 @@ def compute_square(above: str, tension: float) -> float:
 
 
 class RayleighTaylorDeck(Deck, kw_only=True):
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
-    regrid: Regrid = msgspec.field(default_factory=Regrid)
-    above: key(Literal["heavy", "nothing"], "heavy gas above the light one, or a free surface") = (
-        "heavy"
-    )
+    run: RunControl = RunControl(cfl=0.8)
+    regrid: Regrid = Regrid()
+    above: key(Literal["heavy", "nothing"], "a heavy gas, or a free surface") = "heavy"
     cells: key(int, "cells in a wavelength", ge=8, le=MOST_CELLS) = 64
-    amplitude: key(float, "first amplitude [m]; left out: small", ge=1e-8, lt=0.2) | None = None
+    amplitude: key(float | None, "first amplitude [m]; left out: small", ge=1e-8, lt=0.2) = None
     sound_speed: key(float, "of the lower gas at the interface [m/s]", gt=0, le=1000) = 10.0
     tension: key(float, "of the surface [N/m]", ge=0, le=1000) = 0.0
 
@@ -131,10 +129,10 @@ class RayleighTaylor(Problem):
         """Amplitude of the wave (its first Fourier coefficient) and height of the mean."""
         x, y = evolution.blocks[0].nodes[:, :, -1]
         steps, height = np.diff(x), 0.5 * (y[1:] + y[:-1])
-        mean = float((height * steps).sum()) / 0.5
+        mean = float(np.average(height, weights=steps))
         wave = np.cos(WAVE_NUMBER * (0.5 * (x[1:] + x[:-1])))
-        amplitude = float(((height - mean) * wave * steps).sum())
-        return {"amplitude": amplitude / float((wave * wave * steps).sum()), "interface_mean": mean}
+        amplitude = ((height - mean) * wave * steps).sum() / (wave * wave * steps).sum()
+        return {"amplitude": float(amplitude), "interface_mean": mean}
 
     def find_rate(self, t: np.ndarray, amplitude: np.ndarray) -> float:
         """Growth rate or angular frequency [1/s] from the history; NaN if it is too short."""
@@ -165,15 +163,14 @@ class RayleighTaylor(Problem):
         """Amplitude against theory, the interface, and the velocity upwards with the grid."""
         figure.set_size_inches(12.0, 4.6)
         left, middle, right = figure.subplots(1, 3, width_ratios=(1.5, 1.2, 0.9))
-        t, amplitude = run_data.history["t"], run_data.history["amplitude"]
-        left.plot(t, amplitude, label="computed")
+        t = run_data.history["t"]
+        draw_columns(left, run_data.history, {"amplitude": "computed"}, "amplitude [m]")
         theory, name = (np.cosh, "cosh(rate t)") if self.grows else (np.cos, "cos(omega t)")
         left.plot(t, self.amplitude * theory(self.exact * t), "k--", lw=0.9, label=f"a0 {name}")
         if self.grows:
             left.set_yscale("log")
-        left.set(xlabel="t [s]", ylabel="amplitude [m]")
         left.legend(loc="upper left")
-        for dump in run_data.dumps[-1 :: -max(1, len(run_data.dumps) // 4)][3::-1]:
+        for dump in spread_dumps(run_data, 4):
             x, y = dump.blocks[0].nodes[:, :, -1]
             middle.plot(x, y, ".-", ms=3, lw=0.8, label=f"{dump.t:.3g} s")
         middle.set(xlabel="x [m]", ylabel="height of the interface [m]")

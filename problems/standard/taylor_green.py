@@ -16,14 +16,14 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-import msgspec
 import numpy as np
 
 from hydro.block import Block
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import make_square, put_walls
-from problems.problem import Problem, Report, compare, draw_field
+from problems.pictures import draw_field, find_dump
+from problems.problem import Problem, Report, compare
 from regrid.measure.corners import compute_centres
 
 GAMMA = 5.0 / 3.0
@@ -33,12 +33,9 @@ PATH_STEPS = 12  # of Runge and Kutta along the paths that nodes follow
 
 def compute_flow(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """u, v [m/s] and p [Pa] of the steady flow."""
-    pi = math.pi
-    return (
-        np.sin(pi * x) * np.cos(pi * y),
-        -np.cos(pi * x) * np.sin(pi * y),
-        1.0 + 0.25 * (np.cos(2.0 * pi * x) + np.cos(2.0 * pi * y)),
-    )
+    a, b = math.pi * x, math.pi * y
+    p = 1.0 + 0.25 * (np.cos(2.0 * a) + np.cos(2.0 * b))
+    return np.sin(a) * np.cos(b), -np.cos(a) * np.sin(b), p
 
 
 def compute_velocity(nodes: np.ndarray) -> np.ndarray:
@@ -56,12 +53,11 @@ def heat(block, x, y, t, dt):
 
 
 class TaylorGreenDeck(Deck, kw_only=True):
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=0.75, cfl=0.8))
+    run: RunControl = RunControl(t_end=0.75, cfl=0.8)
     cells: key(int, "cells along each side of the unit square", ge=4, le=MOST_CELLS) = 32
-    mesh: key(
-        Literal["swing", "follow", "fixed"],
-        "grid swinging smoothly, following the flow, or at rest",
-    ) = "swing"
+    mesh: key(Literal["swing", "follow", "fixed"], "grid swings, follows the flow, or rests") = (
+        "swing"
+    )
     amplitude: key(float, "of the swinging nodes; the square is 1 wide", ge=0, le=0.2) = 0.1
     limiter: Limiter = "monotonised-central"
 
@@ -75,17 +71,17 @@ class TaylorGreen(Problem):
     def make_block_nodes(self, name: str, t: float) -> np.ndarray:
         """Nodes at time t, swinging as the vortex turns, back and forth, or on the paths of gas."""
         nodes = make_square(self.deck.cells, 0.0, 1.0)
-        if self.deck.mesh == "follow":
-            step = t / PATH_STEPS
-            for _ in range(PATH_STEPS):
-                first = compute_velocity(nodes)
-                second = compute_velocity(nodes + 0.5 * step * first)
-                third = compute_velocity(nodes + 0.5 * step * second)
-                fourth = compute_velocity(nodes + step * third)
-                nodes = nodes + step / 6.0 * ((first + fourth) + 2.0 * (second + third))
-            return nodes
-        swing = self.deck.amplitude * math.sin(2.0 * math.pi * t / PERIOD)
-        return nodes + swing * compute_velocity(nodes)
+        if self.deck.mesh != "follow":
+            swing = self.deck.amplitude * math.sin(2.0 * math.pi * t / PERIOD)
+            return nodes + swing * compute_velocity(nodes)
+        step = t / PATH_STEPS
+        for _ in range(PATH_STEPS):
+            first = compute_velocity(nodes)
+            second = compute_velocity(nodes + 0.5 * step * first)
+            third = compute_velocity(nodes + 0.5 * step * second)
+            fourth = compute_velocity(nodes + step * third)
+            nodes = nodes + step / 6.0 * ((first + fourth) + 2.0 * (second + third))
+        return nodes
 
     def estimate_cells(self) -> int:
         return self.deck.cells**2
@@ -103,17 +99,16 @@ class TaylorGreen(Problem):
         (block,) = evolution.blocks
         u, v, p = compute_flow(*compute_centres(block.nodes))
         _, u_cell, v_cell, p_cell = block.state[:, 1:-1, 1:-1]
-        velocity = (np.hypot(u_cell - u, v_cell - v) * block.volume).sum()
-        pressure = (np.abs(p_cell - p) * block.volume).sum()
-        return {"error_velocity": float(velocity), "error_p": float(pressure)}
+        errors = {"error_velocity": np.hypot(u_cell - u, v_cell - v), "error_p": np.abs(p_cell - p)}
+        return {name: float((e * block.volume).sum()) for name, e in errors.items()}
 
     def report(self, history, final=None) -> Report:
         n, t = self.deck.cells, f", t = {history['t'][-1]:.3g}" if history else ""
-        words = {
-            "error_velocity": "mean error of the velocity",
-            "error_p": "mean error of the pressure",
-        }
-        rows = [compare(history, name, label=words[name], digits=3) for name in words]
+        what = {"error_velocity": "the velocity", "error_p": "the pressure"}
+        rows = [
+            compare(history, name, label=f"mean error of {words}", digits=3)
+            for name, words in what.items()
+        ]
         return Report(f"taylor-green, {n} x {n}, grid {self.deck.mesh}{t}", rows)
 
     def draw(self, figure, run_data) -> None:
@@ -121,14 +116,14 @@ class TaylorGreen(Problem):
         figure.set_size_inches(13.0, 4.2)
         *panels, right = figure.subplots(1, 3)
         last, every = run_data.dumps[-1], max(1, self.deck.cells // 16)
+        options = {"every": every, "title": "t"}
         for axis, part in zip(panels, (0.25, 1.0), strict=True):
-            dump = min(run_data.dumps, key=lambda d, t=part * last.t: abs(d.t - t))
-            words = {"bar": "pressure [Pa]", "title": "t"}
-            draw_field(axis, dump, "p", low=0.5, high=1.5, every=every, **words)
+            dump = find_dump(run_data, part * last.t)
+            draw_field(axis, dump, "p", low=0.5, high=1.5, bar="pressure [Pa]", **options)
 
         def compute_error(block):
             u, v, _ = compute_flow(*compute_centres(block.nodes))
             return np.hypot(block.cell_fields["u"] - u, block.cell_fields["v"] - v)
 
-        words = {"bar": "error of the velocity [m/s]", "title": "t"}
-        draw_field(right, last, compute_error, colours="magma_r", low=0.0, every=every, **words)
+        options |= {"bar": "error of the velocity [m/s]", "colours": "magma_r"}
+        draw_field(right, last, compute_error, low=0.0, **options)

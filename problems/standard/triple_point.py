@@ -18,7 +18,6 @@ import functools
 import math
 from typing import ClassVar
 
-import msgspec
 import numpy as np
 
 from hydro.block import Block
@@ -27,7 +26,8 @@ from hydro.links import join
 from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import make_plane_grid, put_walls
-from problems.problem import BlockPlan, Problem, Report, Row, draw_field, draw_grid, get_last
+from problems.pictures import draw_field, draw_grid
+from problems.problem import BlockPlan, Problem, Report, Row, get_last
 from problems.references.riemann import solve_riemann
 from regrid.errors import BadInput
 
@@ -41,14 +41,11 @@ EARLY = 0.25  # until then the states beside the walls have not felt the point
 
 
 class TriplePointDeck(Deck, kw_only=True):
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=5.0, cfl=0.8))
-    regrid: Regrid = msgspec.field(
-        default_factory=lambda: Regrid(epsilon=0.1, options={"strengthening": 1.0, "curves": False})
-    )
+    run: RunControl = RunControl(t_end=5.0, cfl=0.8)
+    regrid: Regrid = Regrid(epsilon=0.1, options={"strengthening": 1.0, "curves": False})
     cells: key(int, "cells in a length of 1, an even number", ge=4, le=MOST_CELLS) = 10
-    thickness: (
-        key(float, "shorter waves of contacts decay; left out: 0.75 of a first cell", ge=0, le=1.0)
-        | None
+    thickness: key(
+        float | None, "shorter waves of contacts decay; left out: 0.75 of a first cell", ge=0, le=1
     ) = None
     relax: key(float, "fraction of the way to even node spacing in a step", ge=0, le=1) = 0.05
     limiter: Limiter = "van-leer"

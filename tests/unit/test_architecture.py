@@ -45,7 +45,7 @@ ROOMS = (
     ("hydro.history",),
     ("hydro.simulation",),
     ("hydro.remap",),
-    ("problems.deck", "problems.evolution"),
+    ("problems.deck", "problems.evolution", "problems.pictures"),
     ("problems.problem",),
     ("problems.problem_file", "problems.own_simulation"),
     ("problems.registry", "problems.grid_march"),

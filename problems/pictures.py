@@ -1,0 +1,71 @@
+"""Parts of pictures that problems share: fields of a dump, grids, columns of the history over time.
+
+`run_data` is runs.store.reader.RunData: `.deck`, `.history` (dict of arrays), `.dumps`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+UNITS = {"s": 1.0, "ms": 1e3, "µs": 1e6}  # of a time axis, in a second
+
+
+def find_dump(run_data, t: float):
+    """The dump nearest to time t [s]."""
+    return min(run_data.dumps, key=lambda dump: abs(dump.t - t))
+
+
+def spread_dumps(run_data, count: int) -> list:
+    """At most so many dumps, evenly spread over the run up to the last one."""
+    return run_data.dumps[-1 :: -max(1, len(run_data.dumps) // count)][count - 1 :: -1]
+
+
+def draw_field(
+    axis, dump, values, *, colours="viridis", low=None, high=None, every=0, lines=(), bar="",
+    title="",
+):  # fmt: skip
+    """Draw a field of all blocks of a dump on an axis; returns the picture for a colour bar.
+
+    values: a name of `cell_fields` or a function `block -> (ni, nj)`; every: draw each so many
+    grid lines, 0 none; lines: polylines (2, n) drawn over it; bar: words at a colour bar, none
+    without; title: above the panel, "t" for the time.
+    """
+    make = values if callable(values) else (lambda block: block.cell_fields[values])
+    fields = [make(block) for block in dump.blocks]
+    low = min(float(np.nanmin(field)) for field in fields) if low is None else low
+    high = max(float(np.nanmax(field)) for field in fields) if high is None else high
+    picture = None
+    for block, found in zip(dump.blocks, fields, strict=True):
+        x, y = block.nodes
+        picture = axis.pcolormesh(x, y, found, cmap=colours, vmin=low, vmax=high, rasterized=True)
+        if every:
+            draw_grid(axis, block.nodes, every)
+    for line in lines:
+        axis.plot(line[0], line[1], color="w", lw=0.8)
+    axis.set_aspect("equal")
+    axis.set(**dict(zip(("xlabel", "ylabel"), (f"{name} [m]" for name in dump.axes), strict=True)))
+    if bar:
+        axis.figure.colorbar(picture, ax=axis, shrink=0.8, label=bar)
+    if title:
+        words = f"t = {dump.t:.3g} s" if title == "t" else title
+        axis.set_title(words, fontsize="medium")
+    return picture
+
+
+def draw_grid(axis, nodes: np.ndarray, every: int = 1, color="k", lw=0.2) -> None:
+    """Each so many grid lines of a block's nodes (2, ni + 1, nj + 1)."""
+    x, y = nodes
+    axis.plot(x[::every].T, y[::every].T, color=color, lw=lw)
+    axis.plot(x[:, ::every], y[:, ::every], color=color, lw=lw)
+
+
+def draw_columns(axis, history, labels: Mapping[str, str], words: str = "", unit="s") -> None:
+    """Columns of a history over time [unit], with a legend of their labels that are not empty."""
+    t = UNITS[unit] * history["t"]
+    for name, label in labels.items():
+        axis.plot(t, history[name], label=label)
+    axis.set(xlabel=f"t [{unit}]", ylabel=words)
+    if any(labels.values()):
+        axis.legend()

@@ -11,7 +11,7 @@ import math
 from typing import NamedTuple
 
 from hydro.eos.materials import Material
-from problems.references.hugoniot import compute_free_surface_speed
+from problems.references.hugoniot import release
 from problems.references.riemann import solve_riemann
 
 
@@ -38,7 +38,7 @@ def compute_plate_impact(
     """A flyer of `thickness` [m] at `speed` [m/s], first `gap` [m] before a target of `depth`."""
     bodies = (flyer.eos, (flyer.rho0, speed, 0.0)), (target.eos, (target.rho0, 0.0, 0.0))
     hit = solve_riemann(*bodies[0], *bodies[1])
-    free = compute_free_surface_speed(target.eos, hit.rho_right, hit.p, hit.u)
+    free = hit.u + release(target.eos, hit.rho_right, hit.p)[1]
     impact = gap / speed
     out = impact + depth / hit.right_wave.head
     z_flyer = hit.rho_left * float(flyer.eos.sound_speed(hit.rho_left, hit.p))

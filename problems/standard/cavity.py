@@ -26,7 +26,7 @@ from hydro.eos.materials import find_material
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, VoidFill, key
 from problems.pictures import draw_columns, draw_field, find_dump
 from problems.problem import BlockPlan, Problem, Report, Row, find_time
-from problems.references.hugoniot import compute_free_surface_speed, shock_with_particle_speed
+from problems.references.hugoniot import release, shock_with_particle_speed
 from regrid.errors import BadInput
 
 FINEST = 0.5  # of the rows' mean height: the height of those at the void
@@ -65,7 +65,7 @@ class Cavity(Problem):
         eos, rho = self.material.eos, self.material.rho0
         try:
             self.shock = shock = shock_with_particle_speed(eos, rho, 0.0, deck.speed)
-            self.near_speed = compute_free_surface_speed(eos, shock.rho, shock.p, deck.speed)
+            self.near_speed = deck.speed + release(eos, shock.rho, shock.p)[1]
         except (BadInput, ValueError) as error:
             raise BadInput(
                 f"deck: speed is {deck.speed:g} m/s: {deck.material} has no such shock ({error})"

@@ -173,7 +173,7 @@ def fill_displacement(previous, boundary, out):
 
 
 class SideMotion(NamedTuple):
-    """How the sides of a grid move, for `fill_moved_row`, and the new `sides` (2, ni+1, nj+1) [m].
+    """How the sides of a grid move, and the new `sides` (2, ni+1, nj+1) [m].
 
     `along_i`, `along_j` and `corners` are those of `fill_tables`.  Lines j = const that keep
     spacing laws of their own (theory R4.9) take their part of the change `turn` (2, nj+1) of their
@@ -204,44 +204,6 @@ def prepare_motion(old, motion, most_bend, bent):
                 turn[k, j] = way - (old[k, ni, j] - old[k, 0, j])
             square = turn[0, j] * turn[0, j] + turn[1, j] * turn[1, j]
             motion.reach[j] = most_bend[j] * np.sqrt(square)
-
-
-@inlined
-def fill_moved_row(old, i, motion, bend, bent, low, count, out):
-    """Row i of the grid moved with its sides (R6.5), `count` columns from `low` on, into `out`."""
-    ni, nj, sides, along_j = out.shape[1] - 1, out.shape[2] - 1, motion.sides, motion.along_j
-    if i == 0 or i == ni:
-        for j in range(low, low + count):
-            out[0, i, j], out[1, i, j] = sides[0, i, j], sides[1, i, j]
-        return
-    # Sides may be those of `out` itself: inner nodes alone are computed.
-    first, last = max(low, 1), min(low + count, nj)
-    row_x, row_y = out[0, i, first:last], out[1, i, first:last]
-    here = take_blend(i, motion.along_i, motion.corners)
-    old_x, old_y = old[0, i, first:last], old[1, i, first:last]
-    laws, bends = along_j[LAW, first:last], along_j[LAW_CHANGE, first:last]
-    value_x, value_y = along_j[VALUE_X, first:last], along_j[VALUE_Y, first:last]
-    change_x, change_y = along_j[CHANGE_X, first:last], along_j[CHANGE_Y, first:last]
-    for col in range(last - first):
-        x, y = blend(
-            here, laws[col], bends[col], value_x[col], value_y[col], change_x[col], change_y[col]
-        )
-        row_x[col] = old_x[col] + x
-        row_y[col] = old_y[col] + y
-    if bent:
-        for j in range(first, last):
-            out[0, i, j] += bend[i, j] * motion.turn[0, j]
-            out[1, i, j] += bend[i, j] * motion.turn[1, j]
-    for j in (0, nj):
-        if low <= j < low + count:
-            out[0, i, j], out[1, i, j] = sides[0, i, j], sides[1, i, j]
-
-
-@kernel
-def fill_moved(old, motion, bend, bent, out):
-    """The grid `old` moved with its sides (R6.5) into `out`, both (2, ni+1, nj+1)."""
-    for i in range(out.shape[1]):
-        fill_moved_row(old, i, motion, bend, bent, 0, out.shape[2], out)
 
 
 def displaced_grid(previous: np.ndarray, boundary: np.ndarray) -> np.ndarray:

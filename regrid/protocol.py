@@ -148,12 +148,14 @@ def call_regridder(
     """What `regridder.regrid` returns, if it keeps its word about the shape and the sides.
 
     Nodes of sides that a regridder places itself (`free_sides`) are its own.  `where`: words for a
-    message, "block 'gas'"; `in_place`: the grid may be written into `boundary`.  Raises BadInput
-    for other sides or no grid at all, and what `regrid` raises.
+    message, "block 'gas'"; `in_place`: the grid may be written into `boundary`, whose sides who
+    `works_in_place` leaves alone.  Raises BadInput for other sides or no grid at all, and what
+    `regrid` raises.
     """
+    if in_place and hasattr(regridder, "works_in_place"):
+        return regridder.regrid(previous, boundary, *more, in_place=True)  # type: ignore[call-arg]
     given = np.concatenate(get_sides(boundary), axis=1)
-    options = {"in_place": True} if in_place and hasattr(regridder, "works_in_place") else {}
-    result = regridder.regrid(previous, boundary, *more, **options)
+    result = regridder.regrid(previous, boundary, *more)
     name = f"regridder {type(regridder).__name__}"
     place = f"{name}: {where}" if where else name
     nodes = getattr(result, "nodes", None)

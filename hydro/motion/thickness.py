@@ -192,6 +192,45 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
             out[c, k] = way[k % count] * normal[c, k % count]
 
 
+@compiled_once(allocates=False)
+def sum_evenly(values, weights):
+    """The sum of products (n,), the same from either end."""
+    total = 0.0
+    for k in range(values.shape[0]):
+        total += values[k] * weights[k] + values[-1 - k] * weights[-1 - k]
+    return 0.5 * total
+
+
+@kernel
+def measure_line_speed(nodes, faces, walls):
+    """Mean over a line of the slip and of its faces' speed beside their mean [m/s].
+
+    nodes (2, n + 1); faces (3, n): velocity of the contact and slip.  Walls at the ends as in
+    `fill_thickness_way`: across them the line and its images have their own speed for a mean.
+    """
+    count = faces.shape[1]
+    lengths, sizes = np.empty(count), np.ones(count)
+    for k in range(count):
+        step_x, step_y = nodes[0, k + 1] - nodes[0, k], nodes[1, k + 1] - nodes[1, k]
+        lengths[k] = (step_x * step_x + step_y * step_y) ** 0.5
+    lengths /= sum_evenly(sizes, lengths)
+    mean_x, mean_y = sum_evenly(faces[0], lengths), sum_evenly(faces[1], lengths)
+    end_x, end_y, ends = 0.0, 0.0, 0
+    for (nx, ny), at, beside in ((walls[0], 0, 1), (walls[1], -1, -2)):
+        if nx != 0.0 or ny != 0.0:
+            end_x += 1.5 * faces[0, at] - 0.5 * faces[0, beside]
+            end_y += 1.5 * faces[1, at] - 0.5 * faces[1, beside]
+            ends += 1
+    for nx, ny in walls:
+        if nx != 0.0 or ny != 0.0:
+            across = (end_x / ends - mean_x) * nx + (end_y / ends - mean_y) * ny
+            mean_x, mean_y = mean_x + across * nx, mean_y + across * ny
+    for k in range(count):
+        u, v = faces[0, k] - mean_x, faces[1, k] - mean_y
+        sizes[k] = abs(faces[2, k]) + (u * u + v * v) ** 0.5
+    return sum_evenly(sizes, lengths)
+
+
 class ThickContact:
     """A contact whose shortest waves decay: one line, or lines that go on smoothly into each other.
 
@@ -203,7 +242,7 @@ class ThickContact:
         self.parts, self.closed = parts, closed
         self.counts = np.cumsum([0] + [line.damping.shape[1] - 1 for line, _ in parts])
         self.nodes = np.empty((2, int(self.counts[-1]) + 1))
-        self.way = np.empty_like(self.nodes)
+        self.way, self.faces = np.empty_like(self.nodes), np.empty((3, int(self.counts[-1])))
         first = [length for line, _ in parts for length in np.hypot(*np.diff(line.track.nodes))]
         thickness = parts[0][0].rule.thickness
         self.thickness = THICK_CELLS * float(np.mean(first)) if thickness is None else thickness
@@ -212,28 +251,6 @@ class ThickContact:
             if len(parts) == 1 and (closed or FREE_END not in line.walls):
                 # where lines meet their steps would jump
                 line.space_by_turning(SHORTEST * self.thickness)
-
-    def compute_speed(self) -> float:
-        """Mean over the line of the slip and of the faces' speed beside their mean [m/s]."""
-        rows = []
-        for line, backwards in self.parts:
-            segment = line.segment
-            faces = segment.rim.rows[:, : line.damping.shape[1] - 1]
-            rows.append(faces[[on.U_STAR, on.V_STAR, on.SLIP], :: -1 if backwards else 1])
-        u, v, slip = np.concatenate(rows, axis=1)
-        lengths = np.hypot(*np.diff(self.nodes))
-        lengths /= sum_evenly(lengths)
-        mean = np.array([sum_evenly(u * lengths), sum_evenly(v * lengths)])
-        walls = self.find_walls()
-        ends = [
-            [1.5 * row[at] - 0.5 * row[beside] for row in (u, v)]
-            for normal, at, beside in zip(walls, (0, -1), (1, -2), strict=True)
-            if any(normal)
-        ]
-        for normal in walls:  # across walls the line and its images have their speed for a mean
-            if any(normal):
-                mean += ((np.mean(ends, axis=0) - mean) @ normal) * np.array(normal)
-        return float(sum_evenly((np.abs(slip) + np.hypot(u - mean[0], v - mean[1])) * lengths))
 
     def find_walls(self) -> tuple:
         """Unit normals of the walls at both ends, (0, 0) where there is none."""
@@ -244,23 +261,20 @@ class ThickContact:
         """Fill the velocities of the lines' nodes that let short waves decay."""
         for (line, backwards), start in zip(self.parts, self.counts, strict=False):
             nodes = line.segment.line(line.segment.block.nodes)
-            end = start + nodes.shape[1]
-            self.nodes[:, start:end] = nodes[:, :: -1 if backwards else 1]
-        strength = self.compute_speed() * self.thickness**3 * dt
+            end, step = start + nodes.shape[1], -1 if backwards else 1
+            self.nodes[:, start:end] = nodes[:, ::step]
+            rows = line.segment.rim.rows[:, : nodes.shape[1] - 1]
+            for face, row in zip(self.faces, (on.U_STAR, on.V_STAR, on.SLIP), strict=True):
+                face[start : end - 1] = rows[row, ::step]
+        walls = self.find_walls()
+        strength = measure_line_speed(self.nodes, self.faces, walls) * self.thickness**3 * dt
         if strength > 0.0:
-            fill_thickness_way(
-                self.nodes, self.closed, *self.find_walls(), strength, self.way,
-            )  # fmt: skip
+            fill_thickness_way(self.nodes, self.closed, *walls, strength, self.way)
         else:
             self.way[...] = 0.0
         for (line, backwards), start in zip(self.parts, self.counts, strict=False):
             way = self.way[:, start : start + line.damping.shape[1]]
             line.damping[...] = way[:, :: -1 if backwards else 1] / dt
-
-
-def sum_evenly(values: np.ndarray) -> float:
-    """The sum (n,), the same from either end."""
-    return 0.5 * float((values + values[::-1]).sum())
 
 
 def find_thick_contacts(lines: list[Line]) -> list[ThickContact]:

@@ -112,7 +112,7 @@ class BarrierRegridder:
                 edge_lengths=edge_lengths, family=family, threads=threads,
             )  # fmt: skip
 
-    works_in_place = True  # may it be asked to write the grid into `boundary`?
+    works_in_place = True  # into `boundary`, whose sides stay bitwise
 
     @property
     def sees_cost(self) -> bool:

@@ -20,27 +20,32 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from regrid.algebraic import fill_moved_row, take_curve, take_curve_sides
+from regrid.algebraic import blend, take_blend, take_curve, take_curve_sides
 from regrid.barrier.coarse_nodes import end_stretch
 from regrid.barrier.functional import cell_rate, corner_slope, cost_slope, fade, weigh
 from regrid.barrier.line_cg import add_columns
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
-from regrid.barrier.step_control import EDGE_X, EDGE_Y, NOTHING, SPAN, fill_areas
+from regrid.barrier.step_control import NOTHING, SPAN, find_areas, round_up, take_edges
 from regrid.jit import inlined, kernel
 from regrid.measure.corners import mark_triangles
 
-# Scratch: one row each.  Edges as they are (X, Y), their inverse conditional lengths (G) and their
+# Scratch: one row each.  The first ones hold node rows i and i + 1 of the old grid and of this one;
+# then what a chunk takes of the tables along j, inverse conditional lengths of edges (G) and their
 # weights as parts of straight lines (Q): along i, along j of the near and of the far row of nodes.
-# The first two rows are those of `fill_areas`.
 (
-    _, _, OLD_1, OLD_2, OLD_3, OLD_4, SOUND, V, BEND, TURN_X, TURN_Y,
-    LINE_X, LINE_Y, LINE_G, LINE_Q, NEAR_X, NEAR_Y, NEAR_G, NEAR_Q, FAR_X, FAR_Y, FAR_G, FAR_Q,
+    OLD_X, OLD_Y, OLD_NEXT_X, OLD_NEXT_Y, HERE_X, HERE_Y, NEXT_X, NEXT_Y,
+    LAW, LAW_CHANGE, VALUE_X, VALUE_Y, CHANGE_X, CHANGE_Y, V, BLEND,
+    SIDE_LENGTH, SIDE_LENGTH_CHANGE, SIDE_STEP, SIDE_STEP_CHANGE,
+    OLD_1, OLD_2, OLD_3, OLD_4, SOUND, BEND, TURN_X, TURN_Y,
+    LINE_G, LINE_Q, NEAR_G, NEAR_Q, FAR_G, FAR_Q,
     LOW_X, LOW_Y, LOW_Q, UP_X, UP_Y, UP_Q, SIDE_X, SIDE_Y, SIDE_Q, RIGHT_X, RIGHT_Y, RIGHT_Q,
     FLUX_X, FLUX_Y, PIVOT, PART_X, PART_Y, PASSED, SUM,
     SHRUNK, LEAST_AREA, SHARPEST, LONG, SHORT, OLD_AREA, LONG_LINE, LONG_SIDE, LIMITING,
     WHOLE_X, WHOLE_Y, NEAR_SUM_I, NEAR_SUM_J, FAR_SUM_I, FAR_SUM_J, PAST_X, PAST_Y,
-) = (k * SPAN for k in range(59))  # fmt: skip
-LOOK_ROWS = 59 * SPAN
+) = range(0, 70 * SPAN, SPAN)  # fmt: skip
+LOOK_ROWS = 70 * SPAN
+OLD_ROWS = OLD_X, OLD_Y, OLD_NEXT_X, OLD_NEXT_Y
+ROWS = HERE_X, HERE_Y, NEXT_X, NEXT_Y
 OWN = -NOTHING
 # What a look finds in a chunk of columns, and in the block: the most that a corner has shrunk, the
 # least scaled corner area, how far nodes are from interpolated places, the largest squared inverse
@@ -49,34 +54,100 @@ MOST_SHRUNK, LEAST_SCALED, STRAYED, COSECANT, ASPECT = range(5)
 
 
 @kernel(allocates=False)
-def begin(nodes, low, cells, Z):
-    """Sums and extremes of nothing, before the first row of cells."""
-    nj = nodes.shape[2] - 1
-    for k in range(0, LOOK_ROWS, SPAN):
-        for col in range(SPAN):
-            Z[k + col] = 0.0
+def begin(law, motion, low, cells, Z):
+    """Sums and extremes of nothing, and the tables along j, before the first row of cells."""
+    nj = law.along_j.shape[1]
+    for k in range(LOOK_ROWS):
+        Z[k] = 0.0
     for col in range(cells):
         Z[LEAST_AREA + col] = Z[OLD_AREA + col] = NOTHING
         Z[SHORT + col] = 1.0
+        for k in range(4):
+            Z[SIDE_LENGTH + k * SPAN + col] = law.along_j[k, low + col]
     for col in range(cells + 1):
         Z[V + col] = (low + col) / nj
+        Z[BLEND + col] = law.blend_j[low + col]
+        for k in range(6):
+            Z[LAW + k * SPAN + col] = motion.along_j[k, low + col]
 
 
 @inlined
-def take_line_edges(nodes, i, law, low, count, Z):
-    """The edges along i between node rows i and i + 1."""
-    x0, y0 = nodes[0, i, low : low + count], nodes[1, i, low : low + count]
-    x1, y1 = nodes[0, i + 1, low : low + count], nodes[1, i + 1, low : low + count]
-    length, length_change = law.along_i[LENGTH, i], law.along_i[LENGTH_CHANGE, i]
-    step, step_change = law.along_i[STEP, i], law.along_i[STEP_CHANGE, i]
-    blend, ki = law.blend_j[low : low + count], law.ki
+def take_old_row(old, i, low, count, Z):
+    """Row i of the old grid; what were the next rows of both grids are no more."""
+    x, y = old[0, i, low : low + count], old[1, i, low : low + count]
     for col in range(count):
-        s, t = length + blend[col] * length_change, step + Z[V + col] * step_change
+        Z[OLD_X + col] = Z[OLD_NEXT_X + col]
+        Z[OLD_Y + col] = Z[OLD_NEXT_Y + col]
+        Z[HERE_X + col] = Z[NEXT_X + col]
+        Z[HERE_Y + col] = Z[NEXT_Y + col]
+        Z[OLD_NEXT_X + col] = x[col]
+        Z[OLD_NEXT_Y + col] = y[col]
+
+
+@inlined
+def take_new_row(nodes, i, low, count, Z):
+    """Row i of a grid, `count` columns from `low` on."""
+    x, y = nodes[0, i, low : low + count], nodes[1, i, low : low + count]
+    for col in range(count):
+        Z[NEXT_X + col] = x[col]
+        Z[NEXT_Y + col] = y[col]
+
+
+@kernel(allocates=False)
+def move_row(here, count, Z):
+    """The old row moved with its sides (R6.5); `here` is what `take_blend` gives of it."""
+    for col in range(round_up(count)):
+        x, y = blend(
+            here, Z[LAW + col], Z[LAW_CHANGE + col], Z[VALUE_X + col], Z[VALUE_Y + col],
+            Z[CHANGE_X + col], Z[CHANGE_Y + col],
+        )  # fmt: skip
+        Z[NEXT_X + col] = Z[OLD_NEXT_X + col] + x
+        Z[NEXT_Y + col] = Z[OLD_NEXT_Y + col] + y
+
+
+@inlined
+def make_new_row(i, law, motion, low, count, nodes, Z):
+    """Row i of the moved grid: inner columns into `nodes`, too, whose sides may be the motion's."""
+    ni, nj, sides = nodes.shape[1] - 1, nodes.shape[2] - 1, motion.sides
+    first, last = (low, low + count) if i == 0 or i == ni else (max(low, 1), min(low + count, nj))
+    if i == 0 or i == ni:
+        take_new_row(sides, i, low, count, Z)
+    else:
+        move_row(take_blend(i, motion.along_i, motion.corners), count, Z)
+        if law.bent:
+            for j in range(first, last):
+                Z[NEXT_X + j - low] += law.bend[i, j] * motion.turn[0, j]
+                Z[NEXT_Y + j - low] += law.bend[i, j] * motion.turn[1, j]
+        for j in (0, nj):
+            if low <= j < low + count:
+                Z[NEXT_X + j - low] = nodes[0, i, j] = sides[0, i, j]
+                Z[NEXT_Y + j - low] = nodes[1, i, j] = sides[1, i, j]
+    x, y = nodes[0, i, first:last], nodes[1, i, first:last]
+    for col in range(last - first):
+        x[col] = Z[NEXT_X + first - low + col]
+        y[col] = Z[NEXT_Y + first - low + col]
+
+
+@kernel(allocates=False)
+def take_laws(line, side, count, Z):
+    """Inverse lengths and weights of the edges along i to the next row and along j in it.
+
+    `line` and `side` have the numbers of a law, the latter's rows lie in Z; the far edges become
+    near ones.
+    """
+    (length, length_change, step, step_change, ki), (blend, u, kj) = line, side
+    for col in range(round_up(count)):
+        s, t = length + Z[BLEND + col] * length_change, step + Z[V + col] * step_change
         inverse = 1.0 / (s * t)
         Z[LINE_G + col] = t * inverse
         Z[LINE_Q + col] = ki * (s * inverse)
-        Z[LINE_X + col] = x1[col] - x0[col]
-        Z[LINE_Y + col] = y1[col] - y0[col]
+        Z[NEAR_G + col] = Z[FAR_G + col]
+        Z[NEAR_Q + col] = Z[FAR_Q + col]
+        s = Z[SIDE_LENGTH + col] + blend * Z[SIDE_LENGTH_CHANGE + col]
+        t = Z[SIDE_STEP + col] + u * Z[SIDE_STEP_CHANGE + col]
+        inverse = 1.0 / (s * t)
+        Z[FAR_G + col] = t * inverse
+        Z[FAR_Q + col] = kj * (s * inverse)
 
 
 @inlined
@@ -92,27 +163,6 @@ def take_turn(law, i, low, count, Z):
 
 
 @inlined
-def take_side_edges(nodes, i, law, low, cells, Z):
-    """The edges along j of node row i into the far rows; the far ones become near."""
-    x, y = nodes[0, i, low : low + cells + 1], nodes[1, i, low : low + cells + 1]
-    columns = slice(low, low + cells)
-    length, length_change = law.along_j[LENGTH, columns], law.along_j[LENGTH_CHANGE, columns]
-    step, step_change = law.along_j[STEP, columns], law.along_j[STEP_CHANGE, columns]
-    u, blend, kj = i / (nodes.shape[1] - 1), law.blend_i[i], law.kj
-    for col in range(cells):
-        Z[NEAR_X + col] = Z[FAR_X + col]
-        Z[NEAR_Y + col] = Z[FAR_Y + col]
-        Z[NEAR_G + col] = Z[FAR_G + col]
-        Z[NEAR_Q + col] = Z[FAR_Q + col]
-        s, t = length[col] + blend * length_change[col], step[col] + u * step_change[col]
-        inverse = 1.0 / (s * t)
-        Z[FAR_G + col] = t * inverse
-        Z[FAR_Q + col] = kj * (s * inverse)
-        Z[FAR_X + col] = x[col + 1] - x[col]
-        Z[FAR_Y + col] = y[col + 1] - y[col]
-
-
-@inlined
 def take_cell(col, numbers, Z):
     """What the four corners of a cell give to gradient and matrix along its edges; its quality.
 
@@ -120,8 +170,7 @@ def take_cell(col, numbers, Z):
     compared nor the weight, and has its area from `given`.
     """
     full, growth, least_sine, most, lam_c, flat, rate, given = numbers
-    ax, ay, ux, uy = Z[LINE_X + col], Z[LINE_Y + col], Z[LINE_X + col + 1], Z[LINE_Y + col + 1]
-    bx, by, rx, ry = Z[NEAR_X + col], Z[NEAR_Y + col], Z[FAR_X + col], Z[FAR_Y + col]
+    ax, ay, ux, uy, bx, by, rx, ry = take_edges(ROWS, col, Z)
     ga, gu, gb, gr = Z[LINE_G + col], Z[LINE_G + col + 1], Z[NEAR_G + col], Z[FAR_G + col]
     a1, a2 = ax * by - ay * bx, ux * by - uy * bx
     a3, a4 = ux * ry - uy * rx, ax * ry - ay * rx
@@ -191,25 +240,31 @@ def take_cell(col, numbers, Z):
 
 
 @kernel(allocates=False)
-def take_row_of_cells(numbers, count, Z):
-    """`take_cell` for the first `count` cells."""
-    for col in range(count):
+def take_row_of_cells(numbers, cells, Z):
+    """`take_cell` for so many cells."""
+    for col in range(round_up(cells)):
         take_cell(col, numbers, Z)
 
 
+@kernel(allocates=False)
+def fill_old_areas(cells, Z):
+    """Doubled corner areas of a row of old cells."""
+    for col in range(round_up(cells)):
+        Z[OLD_1 + col], Z[OLD_2 + col], Z[OLD_3 + col], Z[OLD_4 + col] = find_areas(
+            OLD_ROWS, col, Z
+        )
+
+
 @inlined
-def take_cells(old, i, law, bent, low, cells, Z):
+def take_cells(i, law, shape, low, cells, Z):
     """`take_cell` for row i of cells.
 
     Whole vectors of columns, as in `add_row`: what lies behind the last cell stays by itself.
     """
-    ni, nj, high = old.shape[1] - 1, old.shape[2] - 1, low + cells + 1
-    fill_areas(
-        old[0, i, low:high], old[1, i, low:high], old[0, i + 1, low:high], old[1, i + 1, low:high],
-        OLD_1, cells, Z,
-    )  # fmt: skip
-    if bent:
-        measure_old(old[0, i, low:high], old[1, i, low:high], cells, Z)
+    ni, nj = shape
+    fill_old_areas(cells, Z)
+    if law.bent:
+        measure_old(cells, Z)
     if i == 0 or i == ni - 1:
         if low == 0:
             Z[OLD_1 if i == 0 else OLD_4] = OWN
@@ -225,7 +280,7 @@ def take_cells(old, i, law, bent, low, cells, Z):
         law.area_weight * law.area_target, law.area_weight / law.area_target, 4.0 * law.cost_scale,
         law.area_target,
     )  # fmt: skip
-    take_row_of_cells(numbers, (cells + 7) // 8 * 8, Z)
+    take_row_of_cells(numbers, cells, Z)
     if with_cost:
         limiting = 0
         for col in range(cells):
@@ -235,7 +290,7 @@ def take_cells(old, i, law, bent, low, cells, Z):
 
 
 @kernel(allocates=False)
-def measure_old(x, y, cells, Z):
+def measure_old(cells, Z):
     """Least old corner area and longest old edges by columns, squared, for the way nodes stray."""
     for col in range(cells):
         a1, a2 = Z[OLD_1 + col], Z[OLD_2 + col]
@@ -243,18 +298,11 @@ def measure_old(x, y, cells, Z):
         a1, a3 = a1 if a1 < a2 else a2, a3 if a3 < a4 else a4
         a1, a2 = a1 if a1 < a3 else a3, Z[OLD_AREA + col]
         Z[OLD_AREA + col] = a1 if a1 < a2 else a2
-        line = Z[EDGE_X + col] * Z[EDGE_X + col] + Z[EDGE_Y + col] * Z[EDGE_Y + col]
-        longest = Z[LONG_LINE + col]
+        ax, ay, _, _, bx, by, rx, ry = take_edges(OLD_ROWS, col, Z)
+        line, longest = ax * ax + ay * ay, Z[LONG_LINE + col]
         Z[LONG_LINE + col] = line if line > longest else longest
-    measure_old_sides(x, y, cells, Z)
-
-
-@kernel(allocates=False)
-def measure_old_sides(x, y, cells, Z):
-    """Longest old edges along j of a row of nodes, squared, by columns."""
-    for col in range(cells):
-        dx, dy = x[col + 1] - x[col], y[col + 1] - y[col]
-        side, longest = dx * dx + dy * dy, Z[LONG_SIDE + col]
+        side, far, longest = bx * bx + by * by, rx * rx + ry * ry, Z[LONG_SIDE + col]
+        side = side if side > far else far
         Z[LONG_SIDE + col] = side if side > longest else longest
 
 
@@ -266,10 +314,8 @@ def add_limiting_shares(scale, weight, cells, Z):
     """
     for col in range(cells):
         if Z[LIMITING + col] > 0.0:
-            ax = 0.5 * (Z[LINE_X + col] + Z[LINE_X + col + 1])
-            ay = 0.5 * (Z[LINE_Y + col] + Z[LINE_Y + col + 1])
-            bx = 0.5 * (Z[NEAR_X + col] + Z[FAR_X + col])
-            by = 0.5 * (Z[NEAR_Y + col] + Z[FAR_Y + col])
+            ax, ay, ux, uy, bx, by, rx, ry = take_edges(ROWS, col, Z)
+            ax, ay, bx, by = 0.5 * (ax + ux), 0.5 * (ay + uy), 0.5 * (bx + rx), 0.5 * (by + ry)
             rho = cell_rate(ax, ay, bx, by, Z[SOUND + col], scale)
             first, curve, dax, day, dbx, dby, twice, share, inverse = cost_slope(
                 ax, ay, bx, by, rho, Z[SOUND + col], scale, weight
@@ -294,10 +340,11 @@ def add_row(cells, Z):
 
     Whole vectors of columns: those behind the last inner node are rubbish and stay by themselves.
     """
-    for col in range(1, 1 + (cells + 6) // 8 * 8):
+    for col in range(1, 1 + round_up(cells - 1)):
         q, last_q = Z[LINE_Q + col], Z[PASSED + col]
-        flux_x = q * (Z[LINE_X + col] - Z[TURN_X + col]) + (Z[LOW_X + col] + Z[UP_X + col - 1])
-        flux_y = q * (Z[LINE_Y + col] - Z[TURN_Y + col]) + (Z[LOW_Y + col] + Z[UP_Y + col - 1])
+        line_x, line_y = Z[NEXT_X + col] - Z[HERE_X + col], Z[NEXT_Y + col] - Z[HERE_Y + col]
+        flux_x = q * (line_x - Z[TURN_X + col]) + (Z[LOW_X + col] + Z[UP_X + col - 1])
+        flux_y = q * (line_y - Z[TURN_Y + col]) + (Z[LOW_Y + col] + Z[UP_Y + col - 1])
         q += Z[LOW_Q + col] + Z[UP_Q + col - 1]
         x = (Z[FLUX_X + col] - flux_x) + (Z[SIDE_X + col - 1] - Z[SIDE_X + col])
         y = (Z[FLUX_Y + col] - flux_y) + (Z[SIDE_Y + col - 1] - Z[SIDE_Y + col])
@@ -323,23 +370,18 @@ def add_to_stretch(w, cells, Z):
     The gradient along the lines through a node (theory R4.13).  Whole vectors of columns, as in
     `add_row`.
     """
-    for col in range(1, 1 + (cells + 6) // 8 * 8):
+    for col in range(1, 1 + round_up(cells - 1)):
         x, y = 0.5 * Z[WHOLE_X + col], 0.5 * Z[WHOLE_Y + col]
-        along_i = x * (Z[PAST_X + col] + Z[LINE_X + col]) + y * (Z[PAST_Y + col] + Z[LINE_Y + col])
-        along_j = x * (Z[NEAR_X + col - 1] + Z[NEAR_X + col])
-        along_j += y * (Z[NEAR_Y + col - 1] + Z[NEAR_Y + col])
+        line_x, line_y = Z[NEXT_X + col] - Z[HERE_X + col], Z[NEXT_Y + col] - Z[HERE_Y + col]
+        along_i = x * (Z[PAST_X + col] + line_x) + y * (Z[PAST_Y + col] + line_y)
+        along_j = x * (Z[HERE_X + col + 1] - Z[HERE_X + col - 1])
+        along_j += y * (Z[HERE_Y + col + 1] - Z[HERE_Y + col - 1])
+        Z[PAST_X + col] = line_x
+        Z[PAST_Y + col] = line_y
         Z[NEAR_SUM_I + col] += (1.0 - w) * along_i
         Z[NEAR_SUM_J + col] += (1.0 - w) * along_j
         Z[FAR_SUM_I + col] += w * along_i
         Z[FAR_SUM_J + col] += w * along_j
-
-
-@kernel(allocates=False)
-def keep_line_edges(cells, Z):
-    """The edges along i taken last, which the next ones are to follow."""
-    for col in range(cells):
-        Z[PAST_X + col] = Z[LINE_X + col]
-        Z[PAST_Y + col] = Z[LINE_Y + col]
 
 
 @kernel(allocates=False)
@@ -352,31 +394,32 @@ def estimate_residual(nodes, old, law, motion, moves, stretches, totals, chunk):
     is over the old cells' heights there, taken as the column's least area over its longest edge.
 
     Both grids (2, ni+1, nj+1); where `moves`, `nodes` is written first, row by row, from `old` and
-    its sides' motion (`fill_moved_row`).  Columns are inner ones; where lines are not `law.bent`
+    its sides' motion (`make_new_row`).  Columns are inner ones; where lines are not `law.bent`
     nothing strays.  `stretches`: starts, the first node row of each stretch of lines, and the last
     one, and sums (2, stretches + 1, nj+1), which gets the sums over them at these columns
     (`regrid.barrier.coarse_nodes`).
     """
     (starts, sums), (first, last, found, Z) = stretches, chunk
-    bent = law.bent
-    ni = nodes.shape[1] - 1
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     low, cells = first - 1, last - first + 1
     count, stretch = starts.shape[0] - 1, 0
-    begin(nodes, low, cells, Z)
+    begin(law, motion, low, cells, Z)
     for i in range(-1, ni):
+        take_old_row(old, i + 1, low, cells + 1, Z)
         if moves:
-            fill_moved_row(old, i + 1, motion, law.bend, bent, low, cells + 1, nodes)
-        take_side_edges(nodes, i + 1, law, low, cells, Z)
+            make_new_row(i + 1, law, motion, low, cells + 1, nodes, Z)
+        else:
+            take_new_row(nodes, i + 1, low, cells + 1, Z)
+        row = law.along_i[:, max(i, 0)]
+        line = row[LENGTH], row[LENGTH_CHANGE], row[STEP], row[STEP_CHANGE], law.ki
+        take_laws(line, (law.blend_i[i + 1], (i + 1) / ni, law.kj), cells + 1, Z)
         if i < 0:
             continue
-        if count > 1:
-            keep_line_edges(cells + 1, Z)
-        take_line_edges(nodes, i, law, low, cells + 1, Z)
-        if bent:
+        if law.bent:
             take_turn(law, i + 1, low, cells + 1, Z)
         if law.curved:
             take_curve(law.curve, i + 1, low, cells + 1, TURN_X, TURN_Y, Z)
-        take_cells(old, i, law, bent, low, cells, Z)
+        take_cells(i, law, (ni, nj), low, cells, Z)
         if law.curved:
             take_curve_sides(law.curve, i, low, cells, NEAR_Q, SIDE_X, SIDE_Y, Z)
         add_row(cells, Z)
@@ -400,8 +443,7 @@ def estimate_residual(nodes, old, law, motion, moves, stretches, totals, chunk):
         found[LEAST_SCALED] = min(found[LEAST_SCALED], Z[LEAST_AREA + col])
         found[COSECANT] = max(found[COSECANT], Z[SHARPEST + col])
         found[ASPECT] = max(found[ASPECT], Z[LONG + col] / Z[SHORT + col])
-    if bent:
-        measure_old_sides(old[0, ni, low:], old[1, ni, low:], cells, Z)
+    if law.bent:
         for col in range(1, cells):
             longest = max(Z[LONG_LINE + col], Z[LONG_SIDE + col - 1], Z[LONG_SIDE + col])
             height = min(Z[OLD_AREA + col - 1], Z[OLD_AREA + col]) / np.sqrt(longest)

@@ -18,33 +18,48 @@ SPAN = 136  # length of a row of scratch: a multiple of 8, not a power of two
 WIDEST = 128  # nodes of one chunk of columns; the halo is one node on either side
 NOTHING = 1e300
 
-EDGE_X, EDGE_Y, EDGE_OLD_X, EDGE_OLD_Y = (k * SPAN for k in range(4))
-AREA_1, AREA_2, AREA_3, AREA_4, OLD_1, OLD_2, OLD_3, OLD_4 = (k * SPAN for k in range(4, 12))
-LEAST_RATIO, LEAST_AREA, NOT_A_NUMBER = (k * SPAN for k in range(12, 15))
-ROWS = 15 * SPAN
+# Scratch: rows i and i + 1 of both grids' nodes, then what is computed of the cells between them.
+NEW_ROWS, OLD_ROWS = (tuple((first + k) * SPAN for k in range(4)) for first in (0, 4))
+AREA_1, AREA_2, AREA_3, AREA_4, OLD_1, OLD_2, OLD_3, OLD_4 = (k * SPAN for k in range(8, 16))
+LEAST_RATIO, LEAST_AREA, NOT_A_NUMBER = (k * SPAN for k in range(16, 19))
+ROWS = 19 * SPAN
 
 FRACTION, FAILS = range(2)  # rows of a shortening: part of the step kept, last failing round
 HALVINGS = 8  # after this many, a node that still offends stays where it was
 
 
 @inlined
-def fill_areas(x0, y0, x1, y1, first, cells, Z):
-    """Doubled corner areas of the cells of one row, into four rows of Z that begin at `first`.
+def take_edges(rows, col, Z):
+    """Edges of a cell between two rows of nodes: x, y along i (near, far), then along j.
+
+    `rows`: where x and y of the first row lie in Z, and of the next one.
+    """
+    x0, y0, x1, y1 = rows
+    return (
+        Z[x1 + col] - Z[x0 + col], Z[y1 + col] - Z[y0 + col],
+        Z[x1 + col + 1] - Z[x0 + col + 1], Z[y1 + col + 1] - Z[y0 + col + 1],
+        Z[x0 + col + 1] - Z[x0 + col], Z[y0 + col + 1] - Z[y0 + col],
+        Z[x1 + col + 1] - Z[x1 + col], Z[y1 + col + 1] - Z[y1 + col],
+    )  # fmt: skip
+
+
+@inlined
+def find_areas(rows, col, Z):
+    """Doubled corner areas of a cell between two rows of nodes, as in `take_edges`.
 
     Corners are numbered as in theory R2: 1 (i,j), 2 (i,j+1), 3 (i+1,j+1), 4 (i+1,j).
     """
-    for col in range(cells + 1):
-        Z[EDGE_X + col] = x1[col] - x0[col]
-        Z[EDGE_Y + col] = y1[col] - y0[col]
-    for col in range(cells):
-        left_x, left_y = x0[col + 1] - x0[col], y0[col + 1] - y0[col]
-        right_x, right_y = x1[col + 1] - x1[col], y1[col + 1] - y1[col]
-        low_x, low_y = Z[EDGE_X + col], Z[EDGE_Y + col]
-        up_x, up_y = Z[EDGE_X + col + 1], Z[EDGE_Y + col + 1]
-        Z[first + col] = low_x * left_y - low_y * left_x
-        Z[first + SPAN + col] = up_x * left_y - up_y * left_x
-        Z[first + 2 * SPAN + col] = up_x * right_y - up_y * right_x
-        Z[first + 3 * SPAN + col] = low_x * right_y - low_y * right_x
+    low_x, low_y, up_x, up_y, left_x, left_y, right_x, right_y = take_edges(rows, col, Z)
+    return (
+        low_x * left_y - low_y * left_x, up_x * left_y - up_y * left_x,
+        up_x * right_y - up_y * right_x, low_x * right_y - low_y * right_x,
+    )  # fmt: skip
+
+
+@inlined
+def round_up(count):
+    """So many columns that they fill whole vectors of the processor."""
+    return (count + 7) // 8 * 8
 
 
 @kernel(allocates=False)
@@ -60,15 +75,18 @@ def measure_corners(trial, old, first, last, Z):
         Z[LEAST_AREA + col] = NOTHING
         Z[NOT_A_NUMBER + col] = 0.0
     for i in range(ni):
-        for source, rows in ((trial, AREA_1), (old, OLD_1)):
-            fill_areas(
-                source[0, i, first : last + 1],
-                source[1, i, first : last + 1],
-                source[0, i + 1, first : last + 1],
-                source[1, i + 1, first : last + 1],
-                rows,
-                cells,
-                Z,
+        for k in range(4):
+            row = slice(first, last + 1)
+            new, before = trial[k % 2, i + k // 2, row], old[k % 2, i + k // 2, row]
+            for col in range(cells + 1):
+                Z[NEW_ROWS[k] + col] = new[col]
+                Z[OLD_ROWS[k] + col] = before[col]
+        for col in range(round_up(cells)):
+            Z[AREA_1 + col], Z[AREA_2 + col], Z[AREA_3 + col], Z[AREA_4 + col] = find_areas(
+                NEW_ROWS, col, Z
+            )
+            Z[OLD_1 + col], Z[OLD_2 + col], Z[OLD_3 + col], Z[OLD_4 + col] = find_areas(
+                OLD_ROWS, col, Z
             )
         corner_low, corner_up = (AREA_1, AREA_2) if i == 0 else (AREA_4, AREA_3)
         if i == 0 or i == ni - 1:

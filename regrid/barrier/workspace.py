@@ -14,7 +14,7 @@ import math
 import numba
 import numpy as np
 
-from regrid.algebraic import SideMotion, fill_curves, fill_moved
+from regrid.algebraic import SideMotion, fill_blend, fill_curves
 from regrid.barrier.assembly import (
     NODE_ROWS,
     assemble_barrier,
@@ -280,7 +280,12 @@ class Workspace:
 
     def fill_moved(self) -> None:
         """`base` = the old grid moved along with its sides (R6.5)."""
-        fill_moved(self.old, self.motion, self.bend, self.bent, self.base)
+        motion, inside = self.motion, np.s_[:, 1:-1, 1:-1]
+        fill_blend(motion.along_i, motion.along_j, motion.corners, self.base)
+        self.base[inside] += self.old[inside]
+        if self.bent:
+            self.base[inside] += (self.bend * motion.turn[:, None])[inside]
+        copy_sides(self.sides, self.base)
 
     def look(self, nodes, old, moves: bool = False) -> tuple[float, float, float]:
         """Least ratio of corner areas to those of `old`, an estimate of the residual in cells, and

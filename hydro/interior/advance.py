@@ -104,7 +104,7 @@ def make_flow_kernels(
         ja = max(0, j0 - 1)  # reconstructed columns ja..jb - 1
         jb = min(nj, j1 + 1)
         m = jb - ja
-        n = at.count_padded(m)
+        n, w = at.count_padded(m), at.count_whole(m)  # with the neighbour after the cells, without
         # scratch entry k is column ja + k - 1; node columns from node0 on are there
         node0 = max(0, ja - 1)
         shift = node0 - (ja - 1)
@@ -136,8 +136,8 @@ def make_flow_kernels(
         copy_rows(nodes, row + 1, node0, node_count, Z, at.X_NEXT + shift)
         measure_after(Z, n)
         copy_rows(state, row + 1, ja, m + 2, Z, at.RHO_AFTER)
-        fill_steps(Z, n)
-        fill_faces_i(Z, n, inverse_dt)
+        fill_steps(Z, w)
+        fill_faces_i(Z, w, inverse_dt)
         next_row(Z, n)
         # cells whose HLL switch is on: of this row, of the row before
         first_hll, last_hll = m + 1, 0
@@ -175,7 +175,7 @@ def make_flow_kernels(
                 if curved:
                     fill_source_pressure(Z, n, parameters)
                 if row >= row0:
-                    fill_traces_in(Z, n, counted, parameters)
+                    fill_traces_in(Z, w, counted, parameters)
             if row == 0:
                 for q in range(of.FLUX_ROWS):
                     for k in range(m):  # fluxes of a rim go outwards
@@ -184,8 +184,8 @@ def make_flow_kernels(
                 for q in range(of.FLUX_ROWS):
                     copy_row(rim, on.MASS + q, nj + ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
             elif row >= row0:
-                fill_upwind_i(Z, n)
-                fill_flux_i(Z, n, parameters)
+                fill_upwind_i(Z, w)
+                fill_flux_i(Z, w, parameters)
                 first_face = min(first_hll, first_hll_before)
                 last_face = max(last_hll, last_hll_before)
                 if first_face <= last_face:
@@ -194,12 +194,12 @@ def make_flow_kernels(
                     fill_push_i(Z, n)
             if row < row1:
                 # the faces towards +i take the place of those towards -i, whose fluxes are known
-                fill_faces_i(Z, n, inverse_dt)
+                fill_faces_i(Z, w, inverse_dt)
                 fill_faces_j(Z, n, inverse_dt)
-                fill_traces(Z, n, counted, parameters)
+                fill_traces(Z, w, counted, parameters)
             if inside:
-                fill_upwind_j(Z, n)
-                fill_flux_j(Z, n, parameters)
+                fill_upwind_j(Z, w)
+                fill_flux_j(Z, w, parameters)
                 if first_hll <= last_hll:
                     use_hll_j(Z, first_hll, last_hll + 1, parameters)
                 if curved:
@@ -212,11 +212,11 @@ def make_flow_kernels(
                         out = rim[on.MASS + q, 2 * nj + ni + row]
                         Z[at.FLUX_J_MASS + q * at.SPAN + last] = out
             if inside and row > row0:
-                update_rows(Z, n, dt, inverse_dt, parameters)
+                update_rows(Z, w, dt, inverse_dt, parameters)
             elif inside:
-                gather_flux(Z, n, dt, inverse_dt, parameters)
+                gather_flux(Z, w, dt, inverse_dt, parameters)
             elif row > row0:
-                fill_new_state(Z, n, dt, inverse_dt, parameters)
+                fill_new_state(Z, w, dt, inverse_dt, parameters)
             if row > row0:
                 for q in range(of.STATE_ROWS):
                     new = at.RHO_NEW + q * at.SPAN + first

@@ -147,7 +147,7 @@ def make_row_phases(eos_class, limiter: str, geometry: Geometry, flux: str) -> R
 
     @compiled_once(allocates=False)
     def reconstruct(Z, m, n, length_below, length_above, half_dt, parameters):
-        """Gradients and the state at mid-time of the current row's m cells, n in whole vectors.
+        """Gradients and the state at mid-time of the current row's m cells; n: `count_padded`.
 
         The rows before and after it must be there.  length_below, length_above: of the cells
         beyond the row's ends; negative where these are no ghosts, and their nodes are there.
@@ -167,7 +167,7 @@ def make_row_phases(eos_class, limiter: str, geometry: Geometry, flux: str) -> R
         if curved:
             fill_switch(Z, n, parameters)
             fill_smooth(Z, n)
-        fill_slopes(Z, n, half_dt, parameters)
+        fill_slopes(Z, at.count_whole(m), half_dt, parameters)
 
     return RowPhases(
         measure_after, next_row, reconstruct, make_extrapolation(limit, geometry, sound)

@@ -11,7 +11,8 @@ A loop that reads entries k - 1 or k + 1 of a row and writes one of the next two
 rows is not vectorised (it might wait for its own stores); its results stand before what it reads.
 
 The phases of a step are loops over the entries 1..n of rows of the flat scratch `Z`, the m cells of
-a chunk in whole vectors.  A row's input must be in the scratch before a phase runs, and only
+a chunk in whole vectors, with the neighbour after them only where somebody reads what is found of
+it.  A row's input must be in the scratch before a phase runs, and only
 `copy_*` touch other arrays; a loop with a long chain of dependent operations waits for itself, two
 loops over its halves do not.  Rows are copied by the machine's own `memcpy`, a third of the time of
 a loop that must first see that nothing overlaps, and rows that the next phases copy are brought
@@ -105,6 +106,12 @@ LEAN_I, LEAN_J = (LEAN_I_X, LEAN_I_Y), (LEAN_J_X, LEAN_J_Y)
 def count_padded(m):
     """Length of the loops over m cells and the neighbour after them, in whole vectors."""
     return (m + LANES) // LANES * LANES
+
+
+@compiled_once(allocates=False)
+def count_whole(m):
+    """Length of the loops over m cells alone, in whole vectors."""
+    return count_padded(m - 1)
 
 
 def allocate(threads: int) -> np.ndarray:

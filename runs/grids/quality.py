@@ -258,6 +258,8 @@ def _make_image(nodes, fields, made_by) -> bytes:
         made = file.create_group("provenance", track_order=True)
         made.attrs.update(find_provenance())
         group = file.create_group("blocks").create_group("grid", track_order=True)
-        write_block(group, GridBlock(nodes, fields))
+        write_block(
+            group, GridBlock(nodes, fields), [*zip("xyz", nodes, strict=False), *fields.items()]
+        )
         file.flush()
         return file.id.get_file_image()

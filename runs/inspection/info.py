@@ -28,7 +28,7 @@ from runs.inspection.account import (
 )
 from runs.inspection.compare import find_differences
 from runs.store.checksum import NAME as CHECKSUM
-from runs.store.checksum import PARTS, find_fault, is_sound, read_parts
+from runs.store.checksum import PARTS, find_fault, find_sum, read_parts
 from runs.store.directory import RunDirectory
 from runs.store.guards import read_stored_deck
 from runs.store.provenance import describe_provenance
@@ -255,8 +255,7 @@ def describe_history(history: dict[str, np.ndarray]) -> list[str]:
 
 
 LONGEST = 60  # characters of a text that are shown
-SAID = ("units", "long_name", "crc32")  # attributes that a dataset's own line tells
-SUMS = ("crc32", CHECKSUM)
+SAID = ("units", "long_name")  # attributes that a dataset's own line tells
 SCALES = ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid")  # HDF5's own
 VERSION = " @format_version"  # one of dumps in one file, one of those in parts
 MADE = "/provenance"  # differs between machines and versions without any other difference
@@ -269,8 +268,8 @@ def inspect_file(path: str) -> str:
     """
     with open_hdf5(Path(path)) as file:
         lines = [f"{path}: {Path(path).stat().st_size} bytes"]
-        if (sound := is_sound(Path(path))) is not None:
-            lines[0] += f", checksum {'as stored' if sound else 'NOT AS STORED'}"
+        if (found := find_sum(Path(path))) is not None:
+            lines[0] += f", checksum {'as stored' if found else 'NOT AS STORED'}"
         lines += [f"  {words}" for words in _describe_parts(Path(path), file)]
         lines += [f"  @{name} = {words}" for name, words in describe_attributes(file)]
         lines += _describe_items(file)
@@ -324,7 +323,7 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
         try:
             yield file
         except (RuntimeError, OSError, KeyError, ValueError, TypeError) as error:  # of the library
-            if is_sound(path):
+            if find_sum(path):
                 raise
             told = str(error).partition("\n")[0]
             raise BadInput(f"{path} is damaged: its tree cannot be read ({told})") from error
@@ -353,9 +352,8 @@ def _count_parts(*files: tuple[str, h5py.File]) -> list[tuple[str, str]]:
 
 def _describe_parts(path: Path, file: h5py.File) -> Iterator[str]:
     """A line a part of an index, which says what is wrong with it."""
-    for part in read_parts(file):
-        fault = find_fault(path, part)
-        yield f"{part.name}: {part.size} bytes, {fault or 'checksum as stored'}"
+    for part, crc in read_parts(file).items():
+        yield f"{part}: {find_fault(path, part, crc) or 'checksum as stored'}"
 
 
 def describe_attributes(item: h5py.Group | h5py.Dataset) -> Iterator[tuple[str, str]]:
@@ -380,7 +378,7 @@ def describe_array(data: h5py.Dataset) -> str:
         " ".join(word for word in words if word),
         name,
         _say_bad(values),
-        _say_sum(data, values),
+        _say_sum(values),
     ]
     return ", ".join(word for word in told if word)
 
@@ -434,19 +432,15 @@ def _say_bad(values: np.ndarray) -> str:
     return ", ".join(words)
 
 
-def _say_sum(data: h5py.Dataset, values: np.ndarray) -> str:
+def _say_sum(values: np.ndarray) -> str:
     if values.dtype.kind not in "fiub":
         return ""
-    found = zlib.crc32(np.ascontiguousarray(values).data)
-    stored = data.attrs.get("crc32")
-    if stored is None:
-        return f"crc32 {found:08x}"
-    return f"crc32 {found:08x} as stored" if found == stored else f"crc32 {found:08x} NOT AS STORED"
+    return f"crc32 {zlib.crc32(np.ascontiguousarray(values).data):08x}"
 
 
 def _compare_attributes(one: h5py.Group | h5py.Dataset, other) -> list[str]:
     left, right = (
-        {name: words for name, words in describe_attributes(item) if name not in SUMS}
+        {name: words for name, words in describe_attributes(item) if name != CHECKSUM}
         for item in (one, other)  # the array's own line tells of its sum
     )
     return [

@@ -44,7 +44,7 @@ from runs.inspection.account import (
     judge,
 )
 from runs.store.directory import RunDirectory
-from runs.store.guards import remove_verdict, write_verdict
+from runs.store.guards import write_verdict
 from runs.store.history import read_history
 
 PATIENCE = 3.0  # wall seconds before a person is told what takes so long
@@ -219,7 +219,7 @@ class Outlook:
         self.flow, self.cells = name_flow(deck.problem, deck.deck), count_cells(evolution)
         self.finest = measure_size(problem, evolution).finest
         self.trend = StepTrend(evolution, directory.note, say)
-        remove_verdict(directory)
+        directory.verdict.unlink(missing_ok=True)
         if self.began:
             self.trend.resume(read_history(directory.history))
 

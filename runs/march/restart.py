@@ -23,10 +23,7 @@ from runs.deck.reading import ReadDeck, resolve_deck
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state, open_dump, read_state
 from runs.store.guards import StoredDeck, read_stored_deck
-from runs.store.history import (
-    Rows,
-    read_rows,
-)
+from runs.store.history import Rows, read_rows
 
 
 def find_restart_point(
@@ -38,12 +35,8 @@ def find_restart_point(
     damaged, or ends before a point, the point is one from before that; at step 0 they start again.
     """
     points = [entry for entry in directory.list_points() if not is_light(entry[1])]
-    found = [read_rows(path) for path in tables]
     newest = points[-1][0] if points else 0
-    for rows in found:
-        if not rows.fault and newest and rows.last < newest:
-            there = f"ends at step {rows.last}" if rows.rows else "is missing or empty"
-            rows.fault = f"{there}, while there is a restart point of step {newest}"
+    found = [read_rows(path, newest) for path in tables]
     if at is not None:
         steps = ", ".join(str(step) for step in sorted({step for step, _ in points})) or "none"
         points = [entry for entry in points if entry[0] == at]

@@ -37,18 +37,13 @@ from runs.march.progress import Outlook, Progress, closing_screen, patience
 from runs.march.restart import find_restart_point, is_light, restore
 from runs.ranks.map import check_cut
 from runs.ranks.world import World, describe_ranks, loss_told, write_on_ranks
+from runs.store.checksum import write_sealed
 from runs.store.directory import RunDirectory
-from runs.store.dumps import (
-    choose_arrays,
-    make_image,
-    make_light_image,
-    write_sealed,
-)
+from runs.store.dumps import Names, make_image
 from runs.store.files import write_atomically
-from runs.store.guards import keep_problem_file, note_summary
+from runs.store.guards import keep_problem_file, write_noted
 from runs.store.history import HistoryWriter, check_columns, read_history, truncate_history
 from runs.store.paraview import Sidecar
-from runs.store.parts import Moment
 from runs.store.provenance import describe_provenance, find_provenance
 
 
@@ -311,9 +306,9 @@ class Runner:
 
     def _keep_deck(self) -> None:
         """Write the deck of a new directory, and the file that its problem is in."""
+        write_atomically(self.directory.deck, self.deck_text)
         if self.deck.file:
             keep_problem_file(self.directory, self.deck.file)
-        write_atomically(self.directory.deck, self.deck_text)
 
     def _note_start(self, what: str) -> None:
         made, deck = describe_provenance(find_provenance(self.deck_text))
@@ -387,8 +382,7 @@ class Runner:
         if code == 3:
             told = self._explain(RunFailure(reason, cause=MISSED)).early_end.lines
             screen = "\n".join([screen, *told])
-        note_summary(self.directory, screen + "\n")
-        write_atomically(self.directory.summary, screen + "\n")
+        write_noted(self.directory, self.directory.summary, screen + "\n")
         return Ending(reason, code, screen)
 
     def _march(self) -> str:
@@ -494,12 +488,10 @@ class Runner:
         output, evolution = self.deck.deck.output, self.evolution
         path = self.directory.dump_path(evolution.step)
         self._sync()
-        names = self.deck.problem, self.deck_text, self.problem.t_unit
         if self._ranked:
-            self.sidecar.add(path, write_on_ranks(self._ranked, path, evolution, names, {}, output))
+            write_on_ranks(self._ranked, path, evolution, self._names, {}, output)
         else:
-            write_sealed(path, make_light_image(evolution, *names, output))
-            self.sidecar.add(path, evolution, lambda block: choose_arrays(block, output))
+            write_sealed(path, make_image(evolution, self._names, {}, output))
         self.sidecar.write([path for _, path in self.directory.list_files("dump")])
 
     def _write_restart_point(self, wait: bool = True) -> None:
@@ -517,7 +509,6 @@ class Runner:
         """
         began = time.monotonic()
         self._sync()
-        names = self.deck.problem, self.deck_text, self.problem.t_unit
         besides, step = self.gauges.get_state(), self.evolution.step
 
         def follow() -> None:
@@ -527,12 +518,10 @@ class Runner:
             then()
 
         if self._ranked:
-            moment = write_on_ranks(self._ranked, path, self.evolution, names, besides)
-            self._describe(path, moment)
+            write_on_ranks(self._ranked, path, self.evolution, self._names, besides)
             follow()
             return
-        image = make_image(self.evolution, *names, besides)
-        self._describe(path, self.evolution)
+        image = make_image(self.evolution, self._names, besides)
         self.writing.start(lambda: write_sealed(path, image), follow)
 
     @property
@@ -540,10 +529,9 @@ class Runner:
         """The ranks that write a dump together; None in one process, and before they begin."""
         return self.world if self.world is not None and self.world.ranks is not None else None
 
-    def _describe(self, path: Path, moment: Evolution | Moment) -> None:
-        """Tell the sidecar of a dump of this step; it shows no restart points."""
-        if path == self.directory.dump_path(self.evolution.step):
-            self.sidecar.add(path, moment)
+    @property
+    def _names(self) -> Names:
+        return Names(self.deck.problem, self.deck_text, self.problem.t_unit)
 
     def _sync(self) -> None:
         """Force all rows to the disk: a dump must not outlive them."""

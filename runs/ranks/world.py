@@ -21,11 +21,9 @@ import sys
 import threading
 import time
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TextIO
-
-import numpy as np
 
 from hydro.ranks.ranks import COLLECT, COUNT, END, STEP, Ranks, hear, tell
 from hydro.simulation import Simulation
@@ -38,7 +36,8 @@ from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck, resolve_deck
 from runs.ranks.map import describe_shares, share_evolution
 from runs.ranks.started import count_started, find_rank
-from runs.store.parts import Moment, Share, write_dump_in_parts, write_light_dump_in_parts
+from runs.store.dumps import EMPTY, Names
+from runs.store.parts import Share, write_dump_in_parts
 
 BUILD = END + 1  # told first: the deck follows
 BEGIN = END + 2  # told once: who has what and, of a run that goes on, the state follow
@@ -89,7 +88,7 @@ class World:
         self._beginning = True
         tell(self.comm, BEGIN)
         self.comm.bcast((shares, watched), root=0)
-        send_state(self.comm, state)
+        share_state(self.comm, state)
         self.ranks = Ranks(self.comm, evolution.blocks, *shares, watched)
         evolution.spread(self.ranks, count_own_processors(self.comm))
         self._beginning = False
@@ -108,22 +107,10 @@ class World:
         tell(self.comm, END, code)
 
 
-def send_state(comm: Any, state: dict[str, Any]) -> None:
-    """Send a state of the first rank to all, array by array; nothing for an empty one."""
-    arrays = {k: np.ascontiguousarray(v) for k, v in state.items() if isinstance(v, np.ndarray)}
-    forms = {key: (array.shape, array.dtype.str) for key, array in arrays.items()}
-    comm.bcast((forms, {k: v for k, v in state.items() if k not in arrays}), root=0)
-    for array in arrays.values():
-        comm.Bcast(array, root=0)
-
-
-def receive_state(comm: Any) -> dict[str, Any]:
-    """What `send_state` of the first rank sends."""
-    forms, state = comm.bcast(None, root=0)
-    for key, (shape, kind) in forms.items():
-        state[key] = np.empty(shape, dtype=kind)
-        comm.Bcast(state[key], root=0)
-    return state
+def share_state(comm: Any, state: State = EMPTY) -> dict[str, Any]:
+    """The state of the first rank on all ranks, sent array by array."""
+    keys = comm.bcast(list(state), root=0)
+    return {key: comm.bcast(state.get(key), root=0) for key in keys}
 
 
 def open_world() -> Any:
@@ -164,7 +151,16 @@ def loss_told(several: bool, is_heard: Callable, describe: Callable[[], str]):
     ours, theirs = socket.socketpair()
     theirs.setblocking(False)
     before = signal.set_wakeup_fd(theirs.fileno(), warn_on_full_buffer=False)
-    watch = threading.Thread(target=_watch, args=(ours, is_heard, describe), daemon=True)
+
+    def listen() -> None:
+        while numbers := ours.recv(64):
+            if signal.SIGTERM in numbers:
+                time.sleep(PATIENCE)
+                if not is_heard():
+                    words = "stopping after this step; if a rank has died, this never ends: "
+                    os.write(2, f"\nshockgrid: {words}{describe()}\n".encode())
+
+    watch = threading.Thread(target=listen, daemon=True)
     watch.start()
     try:
         yield
@@ -173,25 +169,6 @@ def loss_told(several: bool, is_heard: Callable, describe: Callable[[], str]):
         theirs.close()
         watch.join()
         ours.close()
-
-
-def _watch(
-    ours: socket.socket, is_heard: Callable[[], object], describe: Callable[[], str]
-) -> None:
-    for number in _read(ours):
-        if number == signal.SIGTERM:
-            time.sleep(PATIENCE)
-            if not is_heard():
-                words = "stopping after this step; if a rank has died, this never ends: "
-                os.write(2, f"\nshockgrid: {words}{describe()}\n".encode())
-
-
-def _read(ours: socket.socket) -> Iterator[int]:
-    while numbers := ours.recv(64):
-        yield from numbers
-
-
-NOTED = "ranks: "  # how the line of run.log begins; JSON follows
 
 
 def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str]:
@@ -203,7 +180,7 @@ def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str
     if world is None or world.ranks is None:
         return []
     books = world.ranks.count()
-    note(NOTED + json.dumps(books))
+    note(f"ranks: {json.dumps(books)}")
     return [f"messages of ranks: {describe_books(books)}"]
 
 
@@ -225,77 +202,48 @@ def describe_books(books: Mapping[str, Any]) -> str:
     return "; ".join(words) or "none"
 
 
-def read_books(log: str) -> dict[str, Any] | None:
-    """The last line of a run.log about ranks as `describe_ranks` noted it; None without any."""
-    found = [line for line in log.splitlines() if NOTED + "{" in line]
-    return json.loads(found[-1].split(NOTED, 1)[1]) if found else None
-
-
 WRITE = BEGIN + 1  # told; where to, and the words of the dump, follow
-
-
-def make_share(comm: Any, ranks: Ranks) -> Share:
-    """The rows of blocks that this rank of an mpi4py communicator updates."""
-    rows = {ranks[number].name: (first, last) for number, first, last in ranks.pieces}
-    return Share(ranks.rank, ranks.size, rows, comm.allgather)
 
 
 def write_on_ranks(
     world: World,
     path: Path,
     evolution: Any,
-    names: tuple[str, str, str],
+    names: Names,
     besides: State,
     output: Output | None = None,
-) -> Moment:
-    """Write a dump with all ranks; what its index tells.  For the first rank, between two steps.
+) -> None:
+    """Write a dump with all ranks.  For the first rank, between two steps.
 
-    names: problem, text of the deck, unit of time; besides: see `write_dump_in_parts`; output: says
-    what is in a light dump, None for a whole one.  Raises BadInput where a disk has refused it.
+    besides, output: as of `make_image`.  Raises BadInput where a disk has refused it.
     """
-    ranks = world.ranks
-    if ranks is None:
+    if world.ranks is None:
         raise ValueError("the ranks have not started")
     tell(world.comm, WRITE)
-    world.comm.bcast((str(path.absolute()), names, output), root=0)
-    with _busy(ranks):
-        moment = _write(world.comm, ranks, path, evolution, names, besides, output)
-    if moment is None:
-        raise ValueError("this is not the first rank")
-    return moment
+    write_share(world.comm, world.ranks, evolution, (str(path.absolute()), names, output), besides)
 
 
-def follow_in_writing(comm: Any, evolution: Simulation, ranks: Ranks) -> None:
-    """The part of another rank, when it has heard WRITE."""
-    path, names, output = comm.bcast(None, root=0)
-    with _busy(ranks), contextlib.suppress(BadInput):  # the first rank tells it
-        _write(comm, ranks, Path(path), evolution, names, {}, output)
-
-
-def _write(
+def write_share(
     comm: Any,
     ranks: Ranks,
-    path: Path,
-    evolution: Any,
-    names: tuple[str, str, str],
-    besides: State,
-    output: Output | None,
-) -> Moment | None:
-    share = make_share(comm, ranks)
-    if output is not None:
-        return write_light_dump_in_parts(path, evolution, *names, output, share)
-    return write_dump_in_parts(path, evolution, *names, besides, share)
+    evolution: Simulation,
+    order: tuple[str, Names, Output | None] | None = None,
+    besides: State = EMPTY,
+) -> None:
+    """Write what is this rank's own of a dump; the first rank, which has the `order`, its index.
 
-
-@contextlib.contextmanager
-def _busy(ranks: Ranks) -> Iterator[None]:
-    """Until they have agreed that it has been written or has failed, all ranks are at it."""
+    Until they have agreed that it has been written or has failed, all ranks are busy.
+    """
+    path, names, output = comm.bcast(order, root=0)
+    rows = {ranks[number].name: (first, last) for number, first, last in ranks.pieces}
+    share = Share(ranks.rank, ranks.size, rows, comm.allgather)
     ranks.busy = True
     try:
-        yield
+        write_dump_in_parts(Path(path), evolution, names, besides, output, share)
     except BadInput:
-        ranks.busy = False
-        raise
+        if order:  # the first rank tells it
+            ranks.busy = False
+            raise
     ranks.busy = False
 
 
@@ -362,7 +310,7 @@ def follow(comm: Any, screen: TextIO) -> int:
             elif word == COLLECT:
                 ranks.collect()
             elif word == WRITE:
-                follow_in_writing(comm, evolution, ranks)
+                write_share(comm, ranks, evolution)
             elif word == COUNT:
                 ranks.count()
     except BaseException as error:
@@ -397,7 +345,7 @@ def begin(comm: Any, built: Evolution | Exception | None) -> tuple[Simulation, R
         raise built
     if not isinstance(built, Simulation):
         raise TypeError("what was built is not a flow on blocks")
-    evolution, state = built, receive_state(comm)
+    evolution, state = built, share_state(comm)
     if state:
         evolution.set_state(state)
     ranks = Ranks(comm, evolution.blocks, *shares, watched)

@@ -1,26 +1,11 @@
 """A run directory: what lies where, and who may write there.
 
-Files of a run:
-
-    deck.toml      the resolved deck
-    history.csv    one row a step
-    gauges.csv     one row a step of the deck's gauges, where it has some
-    dumps/         dump_000123.h5: pictures and restart points, evenly over the run;
-                   restart_000120.h5: restart points by wall time;
-                   dump_000123.part-0-of-4.h5, ...: parts of a dump of several processes
-    run.xmf        all dumps, for ParaView
-    summary.txt    the summary
-    run.log        what was done here, and when
-    verdict.json   how it ended, and what limits trust in it
-    early-end.png  the place where a run ended early (exit code 3), early-end.txt: why, what helps
-    problem.py     the file of a problem of one's own as it was, and problem.json: whence, digest
+docs/files.md lists the files of a run.
 """
 
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import json
 import os
 import re
 import shlex
@@ -29,7 +14,7 @@ from pathlib import Path
 
 from regrid.errors import BadInput
 from regrid.text_files import check_regular, escape_controls
-from runs.store.checksum import PART_NAME, find_parts_by_name, find_unlisted_parts
+from runs.store.checksum import PART_NAME, find_parts_by_name
 from runs.store.files import (
     DUMPS,
     KEEPS_OPEN_FILES,
@@ -43,7 +28,7 @@ from runs.store.files import (
 
 KEPT_RESTARTS = 2
 STUDY_FILE = "study.toml"  # what a study is known by; its runs lie in its folder `runs`
-_PART = re.compile(r"\.(.+)\.part")
+_TEMPORARY = re.compile(r"\.(.+)\.part")
 _NAME = re.compile(r"(dump|restart)_(\d+)\.h5")
 
 
@@ -134,15 +119,6 @@ class RunDirectory:
         with disk_errors(self.log), open(self.log, "a", encoding="utf-8") as file:
             file.write(f"{stamp}  {escape_controls(text)}\n")
 
-    def _drop_parts(self) -> None:
-        """Remove what a killed run left of files that it was writing.
-
-        Those of other commands (a picture, a table) are theirs, who may be at it.
-        """
-        for path in _find_parts(self):
-            with contextlib.suppress(OSError):
-                path.unlink()
-
     @contextlib.contextmanager
     def claimed(self):
         """Hold the directory for one process; BadInput when another has it already.
@@ -160,7 +136,9 @@ class RunDirectory:
                 raise in_use
             if not _is_at(file.fileno(), self.lock):  # who had it ended meanwhile and removed it
                 raise in_use
-            self._drop_parts()
+            for path in _find_leftovers(self):  # those of other commands are theirs
+                with contextlib.suppress(OSError):
+                    path.unlink()
             try:
                 yield self
             finally:
@@ -230,73 +208,40 @@ def _next_free(problem: str) -> RunDirectory:
 
 
 def _remove_run(directory: RunDirectory) -> None:
-    if not directory.deck.exists() and not holds_beginning(directory):
+    if not directory.deck.exists() and not _holds_beginning(directory):
         raise BadInput(
             f"{directory} holds no run (no deck.toml), so --force does not clear it; "
             "choose another directory with -o"
         )
     with directory.claimed(), disk_errors(directory.path):
         for _, path in directory.list_points():
-            path.unlink()  # then its parts are listed nowhere, and among the leftovers
-        for path in _find_parts(directory):
+            path.unlink()  # then its parts have no index, and are among the leftovers
+        for path in _find_leftovers(directory):
             path.unlink()
         for name in KEPT_NAMES:
             (directory.path / name).unlink(missing_ok=True)
 
 
-def _find_parts(directory: RunDirectory) -> list[Path]:
-    """Files that a killed run was about to write."""
+def _find_leftovers(directory: RunDirectory) -> list[Path]:
+    """Files that a killed run was about to write, and parts of dumps without an index."""
     found = [part for name in KEPT_NAMES if (part := get_part(directory.path / name)).is_file()]
     if directory.dumps_folder.is_dir():
         for path in directory.dumps_folder.iterdir():
-            if path.is_file() and (match := _PART.fullmatch(path.name)):
-                found += [path] * bool(_NAME.fullmatch(_name_dump(match[1])))
-        points = [path for _, path in directory.list_points()]
-        unlisted = find_unlisted_parts(directory.dumps_folder, points)
-        found += [path for path in unlisted if _NAME.fullmatch(_name_dump(path.name))]
+            temporary = _TEMPORARY.fullmatch(path.name)
+            name = temporary[1] if temporary else path.name
+            of_dump = PART_NAME.fullmatch(name)
+            dump = path.with_name(f"{of_dump[1]}.h5" if of_dump else name)
+            if _NAME.fullmatch(dump.name) and (temporary or not dump.exists()):
+                found.append(path)
     return found
 
 
-def _name_dump(name: str) -> str:
-    """The name of the dump that a part belongs to; that of a whole dump as it is."""
-    match = PART_NAME.fullmatch(name)
-    return f"{match[1]}.h5" if match else name
-
-
-def holds_beginning(directory: RunDirectory) -> bool:
-    """Is this what a run leaves that was killed before its deck was written, and nothing else?
-
-    The copy of a problem's file counts only with the note whose digest is its own: another
-    problem.py is somebody's.
-    """
-    if not directory.path.is_dir():
-        return False
-    parts = set(_find_parts(directory))
-    copy = [directory.problem_copy] * _is_noted_copy(directory)
-    own = {directory.dumps_folder, directory.lock, *parts, *copy}
-    if copy or (_read_note(directory) and not directory.problem_copy.exists()):
-        own.add(directory.problem_note)
+def _holds_beginning(directory: RunDirectory) -> bool:
+    """Is this what a run leaves that was killed before its deck was written, and nothing else?"""
+    dumps = directory.dumps_folder
+    own = {dumps, directory.lock, get_part(directory.deck)}
     there = set(directory.path.iterdir())
-    if directory.dumps_folder not in there or not there <= own:
-        return False
-    return directory.dumps_folder.is_dir() and set(directory.dumps_folder.iterdir()) <= parts
-
-
-def _read_note(directory: RunDirectory) -> dict[str, str]:
-    """The note beside the copy of a problem's file; {} where it is none of ours."""
-    try:
-        note = json.loads(directory.problem_note.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return note if isinstance(note, dict) and set(note) == {"file", "sha256"} else {}
-
-
-def _is_noted_copy(directory: RunDirectory) -> bool:
-    try:
-        digest = hashlib.sha256(directory.problem_copy.read_bytes()).hexdigest()
-    except OSError:
-        return False
-    return _read_note(directory).get("sha256") == digest
+    return dumps.is_dir() and there <= own and not any(dumps.iterdir())
 
 
 def open_directory(path: str | Path) -> RunDirectory:
@@ -311,7 +256,7 @@ def open_directory(path: str | Path) -> RunDirectory:
             f"{path} is a study, no run: its runs lie in {directory.path / 'runs'}; its table: "
             f"shockgrid study {directory.quoted}"
         )
-    if not directory.deck.exists() and holds_beginning(directory):
+    if not directory.deck.exists() and _holds_beginning(directory):
         raise BadInput(
             f"{path} holds a run that ended before its first step: nothing was computed, and it "
             f"has no deck yet; start it again: shockgrid run PROBLEM_OR_DECK -o {directory.quoted} "

@@ -6,8 +6,8 @@ written, are for the user to repair.
 
 from __future__ import annotations
 
+import contextlib
 import errno
-import importlib
 import os
 import time
 from collections.abc import Iterable
@@ -16,6 +16,13 @@ from pathlib import Path
 from typing import IO, Any
 
 from regrid.errors import BadInput
+
+fcntl: Any = None  # on Windows
+msvcrt: Any = None  # everywhere else
+with contextlib.suppress(ImportError):
+    import fcntl
+with contextlib.suppress(ImportError):
+    import msvcrt
 
 TRIES, PAUSE = 20, 0.05  # s
 SYSTEM = ("dev", "proc", "sys")  # folders at the root that hold no files of people
@@ -138,15 +145,6 @@ def describe_disk_error(error: OSError, path: Path) -> str:
     return f"{path}: {error.strerror or error}"
 
 
-def _import_here(name: str) -> Any:
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        return None
-
-
-fcntl = _import_here("fcntl")  # None on Windows
-msvcrt = _import_here("msvcrt")  # None everywhere else
 KEEPS_OPEN_FILES = os.name == "nt"  # a file that is open cannot be removed there
 
 

@@ -1,43 +1,51 @@
-"""What does not fit together in a run's directory: its deck, summary, history and dumps.
+"""What does not fit together in a run's directory: its deck, summary, verdict and dumps.
 
-The log notes the digest of the deck at each start, and that of the summary at each end; a
+The log notes the digest of the deck at each start, and those of summary and verdict at each end; a
 file that has none of the noted digests was edited or damaged.  Of a deck the dumps are the judge:
-the log itself is guarded by nothing.  Directories from before these notes are taken as they are.
+the log itself is guarded by nothing.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
-import math
 import re
 import shlex
 import tomllib
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from problems.problem_file import ProblemFile, compute_digest, is_problem_file, read_problem_file
 from problems.registry import is_problem, load_problem
 from regrid.errors import BadInput
-from regrid.text_files import cut
+from runs.deck.checking import show
 from runs.deck.reading import ReadDeck, read_toml, resolve_deck
 from runs.store.directory import RunDirectory
 from runs.store.dumps import open_dump
 from runs.store.files import write_atomically
-from runs.store.history import Rows, read_rows
-from runs.store.provenance import hash_deck
+from runs.store.provenance import NOTED, hash_deck
 
-NOTED = 16  # digits of a digest that the log has
-DECK = re.compile(r"deck: SHA-256 ([0-9a-f]{16})")
-SUMMARY = re.compile(r"summary\.txt: SHA-256 ([0-9a-f]{16})")
 SHOWN = 3
 
 
-def note_summary(directory: RunDirectory, screen: str) -> None:
-    """Note the digest of a summary in the log, before it is written."""
-    directory.note(f"summary.txt: SHA-256 {hash_deck(screen)[:NOTED]}")
+def write_noted(directory: RunDirectory, path: Path, text: str) -> None:
+    """Write a file of the run whose digest the log notes first; see `is_noted`."""
+    directory.note(f"{path.stem}: SHA-256 {hash_deck(text)[:NOTED]}")
+    write_atomically(path, text)
+
+
+def is_noted(directory: RunDirectory, path: Path) -> bool:
+    """Has a file one of the digests that the log has noted of it?  True where it has none."""
+    try:
+        log = directory.log.read_text(encoding="utf-8", errors="replace")
+        noted = re.findall(rf"\b{path.stem}: SHA-256 ([0-9a-f]{{{NOTED}}})", log)
+        return not noted or hashlib.sha256(path.read_bytes()).hexdigest()[:NOTED] in noted
+    except OSError:  # told of where it is read
+        return True
 
 
 def check_deck(directory: RunDirectory) -> str:
@@ -46,16 +54,12 @@ def check_deck(directory: RunDirectory) -> str:
     Key by key the dump is the judge, since its checksum guards it.  Returns a sentence where it
     says that the deck is right and the log knows it not; "" where all agree.
     """
-    try:
-        text = directory.deck.read_bytes().decode("utf-8")
-    except (OSError, UnicodeDecodeError):
-        text = None
-    noted = _find_digests(directory, DECK)
-    if not noted or (text is not None and hash_deck(text)[:NOTED] in noted):
+    if is_noted(directory, directory.deck):
         return ""
     found, told, way = read_stored_deck(directory), "", "no dump that can be read has it"
     if found is not None:
-        differences = None if text is None else find_changes(text, found.text)
+        text = directory.deck.read_text(encoding="utf-8", errors="replace")
+        differences = _find_changes(text, found.text)
         if differences == []:
             return (
                 f"{directory.log} has no start with the digest of {directory.deck.name}, whose "
@@ -75,21 +79,17 @@ def check_deck(directory: RunDirectory) -> str:
     )
 
 
-def find_changes(text: str, stored: str) -> list[str] | None:
+def _find_changes(text: str, stored: str) -> list[str] | None:
     """Keys of two decks that differ, in words; None where one is no TOML."""
     try:
         now, was = (dict(_flatten(tomllib.loads(words))) for words in (text, stored))
     except tomllib.TOMLDecodeError:
         return None
-
-    def show(name: str, table: Mapping[str, Any]) -> str:
-        """Cut where it is long: texts in quotes, so that an empty one is seen."""
-        if name not in table:
-            return "missing"
-        return cut(json.dumps(table[name], ensure_ascii=False, default=str))
-
-    names = [name for name in {**was, **now} if now.get(name) != was.get(name)]
-    return [f"{name} is {show(name, now)}, was {show(name, was)}" for name in names]
+    changed = [name for name in {**was, **now} if now.get(name) != was.get(name)]
+    told = [
+        [show(deck[name]) if name in deck else "missing" for deck in (now, was)] for name in changed
+    ]
+    return [f"{name} is {new}, was {old}" for name, (new, old) in zip(changed, told, strict=True)]
 
 
 def _flatten(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -102,11 +102,8 @@ def _flatten(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, 
 
 def check_summary(directory: RunDirectory) -> str:
     """Raise BadInput where summary.txt is no summary that the log knows; else ""."""
-    noted = _find_digests(directory, SUMMARY)
-    if noted and directory.summary.exists():
-        text = directory.summary.read_bytes().decode("utf-8", "replace")
-        if hash_deck(text)[:NOTED] not in noted:
-            raise BadInput(f"{directory.summary} is not as it was written: edited or damaged")
+    if not is_noted(directory, directory.summary):
+        raise BadInput(f"{directory.summary} is not as it was written: edited or damaged")
     return ""
 
 
@@ -130,24 +127,6 @@ def read_stored_deck(directory: RunDirectory, at: int | None = None) -> StoredDe
         except (BadInput, KeyError, OSError):  # told of where its state is read
             continue
     return None
-
-
-def read_rows_beside_dumps(directory: RunDirectory) -> Rows:
-    """The rows of the history, with a fault where it ends before the last dump."""
-    points = directory.list_points()  # first: the history is ahead of them, also in a live run
-    found = read_rows(directory.history)
-    last = points[-1][0] if points else 0
-    if not found.fault and 0 < last and found.last < last:
-        there = f"ends at step {found.last}" if found.rows else "is empty"
-        found.fault = f"{there if found.columns else 'is missing'}, the dumps go to step {last}"
-    return found
-
-
-def _find_digests(directory: RunDirectory, pattern: re.Pattern[str]) -> set[str]:
-    try:
-        return set(pattern.findall(directory.log.read_text(encoding="utf-8", errors="replace")))
-    except OSError:
-        return set()
 
 
 def keep_problem_file(directory: RunDirectory, file: ProblemFile) -> None:
@@ -191,7 +170,8 @@ def _read_kept(directory: RunDirectory, strict: bool) -> ProblemFile:
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise BadInput(
             f"{directory}: {directory.problem_copy.name} or {directory.problem_note.name}, which "
-            "store the file of its problem, is missing or damaged"
+            "store the file of its problem, is missing or damaged; start it again: shockgrid run "
+            f"PROBLEM_FILE -o {directory.quoted} --force"
         ) from error
     if copy != digest:
         raise BadInput(
@@ -208,49 +188,24 @@ def _read_kept(directory: RunDirectory, strict: bool) -> ProblemFile:
     return read_problem_file(directory.problem_copy, name=place.name, beside=place.parent)
 
 
-SUM = "crc32"
-KEYS = ("status", "name", "reason", "trust")
-
-
 def write_verdict(directory: RunDirectory, verdict: dict[str, Any]) -> None:
     """Write a verdict; numbers that are not finite become null, which JSON has."""
-    plain = _make_plain(verdict)
-    text = json.dumps(plain | {SUM: _sum(plain)}, indent=1, ensure_ascii=False)
-    write_atomically(directory.verdict, text + "\n")
+    plain = msgspec.json.encode(verdict, enc_hook=lambda value: value.item())
+    text = msgspec.json.format(plain, indent=1).decode("utf-8")
+    write_noted(directory, directory.verdict, text + "\n")
 
 
 def read_verdict(directory: RunDirectory) -> dict[str, Any] | None:
     """The verdict of a run; None where it has not ended, or was ended by force.
 
-    Raises BadInput for a file that is no verdict, or not as it was written.
+    Raises BadInput for a file that is not as it was written.
     """
     path = directory.verdict
-    try:
-        verdict = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    if not path.exists():
         return None
-    except (OSError, ValueError, RecursionError) as error:
-        raise BadInput(f"{path} is damaged: it cannot be read") from error
-    if not isinstance(verdict, dict) or not all(key in verdict for key in KEYS):
-        raise BadInput(f"{path} is damaged: a verdict has {', '.join(KEYS)}")
-    if verdict.pop(SUM, None) != _sum(verdict):
+    if not is_noted(directory, path):
         raise BadInput(f"{path} is not as it was written: edited or damaged")
-    return verdict
-
-
-def _sum(verdict: dict[str, Any]) -> str:
-    text = json.dumps(verdict, sort_keys=True, separators=(",", ":"))
-    return f"{zlib.crc32(text.encode('ascii')):08x}"
-
-
-def remove_verdict(directory: RunDirectory) -> None:
-    """Remove the verdict: the run continues."""
-    (directory.verdict).unlink(missing_ok=True)
-
-
-def _make_plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _make_plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_make_plain(one) for one in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    try:
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError, RecursionError) as error:
+        raise BadInput(f"{path} is damaged: it cannot be read") from error

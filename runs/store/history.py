@@ -7,7 +7,6 @@ Numbers are written with `repr`, so that they read back to the same bits.
 The last column, `crc32`, is the CRC-32 of the file's first line, the step of the row before and
 the row's text: so a row that was changed is seen, and so is one that lacks the row before it.  What
 follows the first such row is not trusted: a restart cuts the file there and computes it again.
-Files without that column, from before it was there, are judged by their steps alone.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ class Rows:
     """What a history file holds.
 
     columns: names without that of the sums, None where the first line is lost or there is no file;
-    rows: step and text without its sum, up to what is damaged; fault: what that is, "" for nothing.
+    rows: step and line, up to what is damaged; fault: what that is, "" for nothing.
     """
 
     path: Path
@@ -55,62 +54,49 @@ class Rows:
             raise BadInput("; ".join([f"{self.path} {self.fault}", *filter(None, [words])]))
 
 
-def read_rows(path: Path) -> Rows:
-    """The rows of a file up to the first that is damaged; BadInput where it cannot be opened."""
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        return Rows(path)
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}") from error
-    lines = content.split(b"\n")[:-1]  # what follows the last line's end is torn
-    if not lines:
-        return Rows(path)
+def read_rows(path: Path, newest: int = 0) -> Rows:
+    """The rows of a file up to the first that is damaged; BadInput where it cannot be opened.
+
+    newest: step of the last dump, up to which there have to be rows.
+    """
+    found = Rows(path)
+    with disk_errors(path):
+        lines = path.read_bytes().split(b"\n")[:-1] if path.exists() else []  # the last is torn
+    if lines:
+        _read_lines(found, lines)
+    if not found.fault and newest and found.last < newest:
+        there = (
+            f"ends at step {found.last}" if found.rows else "is empty" if lines else "is missing"
+        )
+        found.fault = f"{there}, the dumps go to step {newest}"
+    return found
+
+
+def _read_lines(found: Rows, lines: Sequence[bytes]) -> None:
     names = lines[0].decode("utf-8", "replace").split(",")
-    sealed = names[-1] == SUM
-    nearly = len(names[-1]) == len(SUM) and sum(map(str.__eq__, names[-1], SUM)) >= 3
-    if "step" not in names or (nearly and not sealed):
-        return Rows(path, fault="is damaged in its first line, that of the names")
-    while not sealed and lines[-1].count(b",") != len(names) - 1:
-        lines.pop()  # torn, without a sum to tell
-    found = Rows(path, names[:-1] if sealed else names)
+    if "step" not in names or names[-1] != SUM:
+        found.fault = "is damaged in its first line, that of the names"
+        return
+    found.columns = names[:-1]
     start, where, last = zlib.crc32(lines[0]), names.index("step"), None
     for number, line in enumerate(lines[1:], start=2):
-        text, _, digits = line.rpartition(b",") if sealed else (line, b"", b"")
+        text, _, digits = line.rpartition(b",")
         try:
+            good = int(digits) == _sum(start, last, text)
             step = int(text.split(b",")[where])
-            if sealed:
-                good = int(digits) == _sum(start, last, text)
-            else:
-                good = text.count(b",") == len(names) - 1 and last in (None, step - 1)
         except (ValueError, IndexError):
             good = False
         if not good:
             after = "its names" if last is None else f"step {last}"
             found.fault = f"is damaged, or lacks rows, from line {number} on (after {after})"
-            break
-        found.rows.append((step, text.decode("utf-8", "replace")))
+            return
+        found.rows.append((step, line.decode("utf-8", "replace")))
         last = step
-    return found
 
 
 def _sum(start: int, after: int | None, text: bytes) -> int:
     before = b"" if after is None else str(after).encode("ascii")
     return zlib.crc32(before + b":" + text, start)
-
-
-def seal_rows(columns: Sequence[str], rows: Iterable[tuple[int, str]]) -> Iterable[str]:
-    """The lines of a file, its first one included, each row with its checksum."""
-    head = ",".join([*columns, SUM])
-    return [head, *_seal_more(head, rows, None)]
-
-
-def _seal_more(head: str, rows: Iterable[tuple[int, str]], after: int | None) -> Iterable[str]:
-    """Lines for rows that follow the one of step `after` in a file with this first line."""
-    start = zlib.crc32(head.encode("utf-8"))
-    for step, text in rows:
-        yield f"{text},{_sum(start, after, text.encode('utf-8'))}"
-        after = step
 
 
 class HistoryWriter:
@@ -120,8 +106,8 @@ class HistoryWriter:
         self.path = path
         self.columns = columns
         self._waiting: list[dict[str, Any]] = []
-        self._last = None if columns is None else read_rows(path).last  # step of the last row
-        self._order: tuple[str, ...] = ()  # names of the row that was checked last
+        # step of the last row
+        self._last: int | None = None if columns is None else read_rows(path).last
         with disk_errors(path):
             self._file = open(path, "a", encoding="utf-8", newline="")
 
@@ -131,20 +117,19 @@ class HistoryWriter:
 
     def append(self, row: Mapping[str, Any]) -> None:
         """Write one step and flush; raises BadInput when the columns have changed."""
-        rows, head = [row], []
+        rows, lines = [row], []
         if self.columns is None:
             first = [name for one in self._waiting for name in one if name not in row]
             self.columns = [*row, *dict.fromkeys(first)]
             rows, self._waiting = [*self._waiting, row], []
-            head = [",".join([*self.columns, SUM])]
-        elif tuple(row) != self._order and (
-            len(row) != len(self.columns) or any(name not in row for name in self.columns)
-        ):
+            lines = [",".join([*self.columns, SUM])]
+        elif len(row) != len(self.columns) or any(name not in row for name in self.columns):
             raise BadInput(f"{self.path}: {describe_change(self.columns, row)}")
-        self._order = tuple(row)
-        texts = [(int(one["step"]), format_row(self.columns, one)) for one in rows]
-        lines = [*head, *_seal_more(",".join([*self.columns, SUM]), texts, self._last)]
-        self._last = texts[-1][0]
+        start = zlib.crc32(",".join([*self.columns, SUM]).encode("utf-8"))
+        for one in rows:
+            text = format_row(self.columns, one)
+            lines.append(f"{text},{_sum(start, self._last, text.encode('utf-8'))}")
+            self._last = int(one["step"])
         with disk_errors(self.path):
             self._file.write("\n".join(lines) + "\n")
             self._file.flush()
@@ -203,12 +188,13 @@ def read_columns(found: Rows) -> dict[str, np.ndarray]:
     """The columns of those rows of a history that are whole, without their checksums."""
     if found.columns is None:
         return {}
-    names, rows = found.columns, list(csv.reader(text for _, text in found.rows))
+    names, rows = [*found.columns, SUM], list(csv.reader(line for _, line in found.rows))
     for (step, _), row in zip(found.rows, rows, strict=True):
         if len(row) != len(names):
             raise BadInput(f"{found.path}, step {step}: {len(row)} values for {len(names)} columns")
     columns = zip(*rows, strict=True) if rows else [()] * len(names)
-    history = {name: _to_array(column) for name, column in zip(names, columns, strict=True)}
+    named = zip(found.columns, columns, strict=False)
+    history = {name: _to_array(column) for name, column in named}
     for name in ("step", "t"):
         if name not in history or history[name].dtype.kind not in "fi":
             raise BadInput(
@@ -265,6 +251,6 @@ def truncate_history(path: Path, step: int, source: Rows | None = None) -> list[
             f"{found.path} ends at step {found.last}, before the restart point of step {step}; "
             "choose an earlier one with --at"
         )
-    kept = [(number, text) for number, text in found.rows if number <= step]
-    write_atomically(path, "\n".join([*seal_rows(found.columns, kept), ""]))
+    kept = [line for number, line in found.rows if number <= step]
+    write_atomically(path, "\n".join([",".join([*found.columns, SUM]), *kept, ""]))
     return found.columns

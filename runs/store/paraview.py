@@ -7,20 +7,19 @@ vectors and `3DSMesh` lose data silently there).
 
 from __future__ import annotations
 
-import functools
+import contextlib
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-from problems.evolution import Evolution
 from regrid.errors import BadInput
-from runs.store.dumps import list_arrays, open_dump
+from runs.store.checksum import find_sum
+from runs.store.dumps import damage_told, open_dump
 from runs.store.files import write_atomically
-from runs.store.parts import Moment
 from runs.store.provenance import describe_software
 
 
@@ -57,75 +56,51 @@ HEAD = '<?xml version="1.0" ?>\n<Xdmf Version="3.0"><Domain>\n'
 TAIL = "</Domain></Xdmf>\n"
 
 
-_list_kinds = functools.partial(list_arrays, computed=True)  # no numbers are needed
-
-
 class Sidecar:
-    """The XDMF file at `path`; each dump is described once, when it is added or first listed."""
+    """The XDMF file at `path`; each dump is described once, when it is first listed."""
 
     def __init__(self, path: Path):
         self.path = path
-        self._known: dict[Path, str] = {}
-
-    def add(self, dump: Path, evolution: Evolution | Moment, list_stored=_list_kinds) -> None:
-        """Describe a dump of the present state, or of a moment, without opening it again.
-
-        list_stored: gives names and arrays of a block as the dump has them.
-        """
-        reference = os.path.relpath(dump, self.path.parent)
-        self._known[dump] = _describe_moment(
-            float(evolution.t),
-            [
-                describe_arrays(f"/blocks/{block.name}", dict(list_stored(block)), reference)
-                for block in evolution.blocks
-            ],
-        )
+        self._known: dict[tuple[Path, str | None], str] = {}  # by path and checksum
 
     def write(self, dumps: list[Path]) -> None:
         """Show `dumps`, one after another in time; one that cannot be read is left out."""
+        steps = []
         for dump in dumps:
-            if dump not in self._known:
-                try:
-                    with open_dump(dump) as file:
-                        reference = os.path.relpath(dump, self.path.parent)
-                        self._known[dump] = describe_dump(file, reference)
-                except (BadInput, KeyError, OSError):
-                    self._known[dump] = ""
-        steps = "".join(self._known[dump] for dump in dumps)
+            with contextlib.suppress(BadInput):
+                key = dump, find_sum(dump)
+                if key not in self._known:
+                    with open_dump(dump) as file, damage_told(dump, "its blocks"):
+                        self._known[key] = self._describe(dump, file)
+                steps.append(self._known[key])
         grid = '<Grid Name="run" GridType="Collection" CollectionType="Temporal">\n'
-        write_atomically(self.path, HEAD + grid + steps + "</Grid>\n" + TAIL, durable=False)
+        content = "".join([HEAD, grid, *steps, "</Grid>\n", TAIL])
+        write_atomically(self.path, content, durable=False)
 
-
-def describe_dump(file: h5py.File, reference: str) -> str:
-    """One moment: a spatial collection of all blocks of the dump, which lies at `reference`."""
-    blocks = [describe_block(group, reference) for group in file["blocks"].values()]
-    return _describe_moment(float(file.attrs["t"]), blocks)
-
-
-def _describe_moment(t: float, blocks: Iterable[str]) -> str:
-    return (
-        '<Grid Name="blocks" GridType="Collection" CollectionType="Spatial">\n'
-        f'<Time Value="{t!r}"/>\n{"".join(blocks)}</Grid>\n'
-    )
+    def _describe(self, dump: Path, file: h5py.File) -> str:
+        """One moment: a spatial collection of all blocks of the dump."""
+        reference = os.path.relpath(dump, self.path.parent)
+        blocks = "".join(describe_block(group, reference) for group in file["blocks"].values())
+        return (
+            '<Grid Name="blocks" GridType="Collection" CollectionType="Spatial">\n'
+            f'<Time Value="{float(file.attrs["t"])!r}"/>\n{blocks}</Grid>\n'
+        )
 
 
 def describe_block(group: h5py.Group, reference: str) -> str:
-    """The grid of one block, plane or in space, whose file lies at `reference`."""
-    return describe_arrays(group.name, dict(group.items()), reference)
+    """The grid of one block, plane or in space, whose file lies at `reference`.
 
-
-def describe_arrays(
-    group: str, arrays: Mapping[str, h5py.Dataset | np.ndarray], reference: str
-) -> str:
-    """The grid of a block whose arrays lie in a group of this path; only their shapes are read."""
+    Only the shapes of its arrays are read.
+    """
+    arrays = dict(group.items())
 
     def item(name: str) -> str:
         data = arrays[name]
         kind = "Float" if data.dtype.kind == "f" else "Int"
         size = " ".join(str(n) for n in data.shape)
         return (
-            f'<DataItem Dimensions="{size}" NumberType="{kind}" '
-            f'Precision="{data.dtype.itemsize}" Format="HDF">{reference}:{group}/{name}</DataItem>'
+            f'<DataItem Dimensions="{size}" NumberType="{kind}" Format="HDF" '
+            f'Precision="{data.dtype.itemsize}">{reference}:{group.name}/{name}</DataItem>'
         )
 
     nodes = arrays["x"].shape
@@ -133,7 +108,7 @@ def describe_arrays(
     size = " ".join(str(n) for n in nodes)
     geometry = "_".join(components).upper()
     lines = [
-        f'<Grid Name="{escape(group.rsplit("/", 1)[-1])}" GridType="Uniform">',
+        f'<Grid Name="{escape(group.name.rsplit("/", 1)[-1])}" GridType="Uniform">',
         f'<Topology TopologyType="{len(nodes)}DSMesh" Dimensions="{size}"/>',
         f'<Geometry GeometryType="{geometry}">{"".join(map(item, components))}</Geometry>',
     ]

@@ -17,6 +17,7 @@ from pathlib import Path
 
 HOME = Path(__file__).resolve().parents[2]  # the folder in which the packages lie
 DISTRIBUTION = "shockgrid"
+NOTED = 16  # digits of a digest that screens and logs show
 PACKAGES = ("numpy", "numba", "scipy", "h5py")
 
 
@@ -43,7 +44,7 @@ def describe_provenance(provenance: dict[str, str]) -> list[str]:
         made.append(f"commit {known['commit']}")
     lines = [f"made by: {', '.join([*made, *packages])}; {known.get('platform', '?')}"]
     if "deck_sha256" in known:
-        lines.append(f"deck: SHA-256 {known['deck_sha256'][:16]}")
+        lines.append(f"deck: SHA-256 {known['deck_sha256'][:NOTED]}")
     return lines
 
 
@@ -78,19 +79,10 @@ def find_commit(home: Path) -> str:
     Of a checkout by git; of an installed package what its installer noted (PEP 610).
     """
     if (home / ".git").exists():
-        command = [
-            "git",
-            "--no-optional-locks",
-            "-C",
-            str(home),
-            "describe",
-            "--always",
-            "--dirty",
-            "--abbrev=12",
-        ]
+        command = ["git", "--no-optional-locks", "-C", str(home), "describe", "--always", "--dirty"]
         try:
             done = subprocess.run(
-                [*command, "--exclude=*"], capture_output=True, text=True, timeout=20
+                [*command, "--abbrev=12", "--exclude=*"], capture_output=True, text=True, timeout=20
             )
         except (OSError, subprocess.SubprocessError):
             return ""

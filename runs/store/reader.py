@@ -18,14 +18,8 @@ from regrid.measure.corners import compute_centres
 from runs.deck.reading import ReadDeck, read_toml
 from runs.store.directory import RunDirectory, open_directory
 from runs.store.dumps import damage_told, has_state, open_dump, read_state
-from runs.store.guards import (
-    check_deck,
-    check_summary,
-    read_rows_beside_dumps,
-    read_run_deck,
-    read_verdict,
-)
-from runs.store.history import read_columns, read_history
+from runs.store.guards import check_deck, check_summary, read_run_deck, read_verdict
+from runs.store.history import read_columns, read_history, read_rows
 
 
 class NotThere(BadInput, KeyError):
@@ -332,7 +326,8 @@ class RunData:
         Row 0 is the start, where only some columns have a value (nan, "" in a column of words).
         Raises BadInput where it is damaged, rows are cut out or it ends before the last dump.
         """
-        found = read_rows_beside_dumps(self.directory)
+        points = self.directory.list_points()  # first: of a live run the history is ahead of them
+        found = read_rows(self.directory.history, points[-1][0] if points else 0)
         found.check(f"shockgrid restart {self.directory.quoted} cuts it back and computes it again")
         return Table(read_columns(found), "history", "step", self.find_units)
 

@@ -96,7 +96,8 @@ def test_vtk_reads_the_sidecar(run):
 def test_state_comes_back_as_it_went(tmp_path):
     import toy_problem
 
-    from runs.store.dumps import make_image, read_state, write_sealed
+    from runs.store.checksum import write_sealed
+    from runs.store.dumps import Names, make_image, read_state
 
     evolution = toy_problem.ToyEvolution(toy_problem.ToyDeck())
     evolution.advance()
@@ -108,7 +109,7 @@ def test_state_comes_back_as_it_went(tmp_path):
         "deep/er/number": 0.1,
     }
     evolution.get_state = lambda: state
-    write_sealed(tmp_path / "d.h5", make_image(evolution, "toy", ""))
+    write_sealed(tmp_path / "d.h5", make_image(evolution, Names("toy", "")))
     back = read_state(tmp_path / "d.h5")
     assert set(back) == set(state)
     for key, value in state.items():

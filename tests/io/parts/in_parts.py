@@ -9,7 +9,7 @@ import pytest
 
 import runs.march.runner as runner
 from runs.cli.main import main
-from runs.store.parts import Share, write_dump_in_parts, write_light_dump_in_parts
+from runs.store.parts import Share, write_dump_in_parts
 
 names_of_open_files = pytest.mark.skipif(
     not os.path.isdir("/proc/self/fd"), reason="needs a system that tells names of open files"
@@ -55,25 +55,14 @@ class Gatherings:
         return gather
 
 
-def write_by_turns(write, path, evolution, *names, rows: list[dict]):
-    """What the first process gets when all have written."""
-    gatherings, parts, moment = Gatherings(), len(rows), None
-    for k in reversed(range(parts)):
-        share = Share(k, parts, rows[k], gatherings.of(k))
-        moment = write(path, evolution, *names, share)
-    return moment
-
-
 def write_in_parts(monkeypatch, parts: int, cut) -> None:
     """From now on runs write their dumps in parts, cut by `cut(evolution, parts)`."""
 
     def write(world, path, evolution, names, besides, output=None):
-        rows = cut(evolution, parts)
-        if output is None:
-            given = write_dump_in_parts, path, evolution, *names, besides
-        else:
-            given = write_light_dump_in_parts, path, evolution, *names, output
-        return write_by_turns(*given, rows=rows)
+        rows, gatherings = cut(evolution, parts), Gatherings()
+        for k in reversed(range(parts)):
+            share = Share(k, parts, rows[k], gatherings.of(k))
+            write_dump_in_parts(path, evolution, names, besides, output, share)
 
     monkeypatch.setattr(runner, "write_on_ranks", write)
     monkeypatch.setattr(runner.Runner, "_ranked", True)

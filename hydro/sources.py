@@ -49,7 +49,7 @@ SourceLaw = Callable[[Block, np.ndarray, np.ndarray, float, float], tuple]
 
 
 def make_gravity(acceleration_x: float, acceleration_y: float) -> SourceLaw:
-    """A constant acceleration of all blocks [m/s²]."""
+    """A constant acceleration of all blocks [m/s²], for `source` of a `Simulation`."""
     return lambda block, x, y, t, dt: (acceleration_x, acceleration_y, 0.0)
 
 

@@ -12,7 +12,7 @@ that runs outwards from a contact.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -21,12 +21,13 @@ from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
+from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.simulation import Simulation
 from hydro.step import take_step
 from problems.deck import DeckTable, key
 from problems.pictures import draw_field
 from problems.problem import find_crossing
-from problems.references.hugoniot import Shock
+from problems.references.hugoniot import Shock, shock_with_mach
 from regrid.errors import BadInput
 from regrid.measure.cells import compute_area_fractions
 from regrid.measure.corners import compute_centres
@@ -278,12 +279,32 @@ def settle_front(front: Front, *, cfl: float, limiter: str) -> SettledFront:
 
     The shock's place is that of the mass in these cells.
     """
-    strip = _Strip(front, cfl, limiter)
-    shift = 0.0
+    nodes, place, contact = front.nodes, front.place, front.behind[1]
+    size, lowest = nodes[1] - nodes[0], place - RUN_IN - MARGIN  # number of the strip's first node
+    numbers = np.arange(lowest, min(place + AHEAD + 4, nodes.size - 1) + 1)
+    first = np.where(numbers < 0, numbers * size, nodes[np.clip(numbers, 0, nodes.size - 1)])
+    begin, relative = first[MARGIN], front.speed - contact
+    rate = beyond = (front.end_speed - contact) / nodes[-1]
+    if begin < 0.0:  # cells beyond the contact go on as those before it, but let a shock pass
+        beyond = max(rate, SLOWEST * relative / begin)
+    stretch = np.where(first < 0.0, beyond, rate)
+    duration = (nodes[place] - begin) / (relative - begin * beyond)
+
+    def place_nodes(t):
+        since = t - duration
+        return contact * since + first * (1.0 + stretch * since)
+
+    states = [(rho, 0.0, u, p) for rho, u, p in (front.behind, front.ahead)]
+    ends = [{"kind": "inflow", "state": state} for state in states]
+    kept, last, shift = slice(place - KEPT - lowest, None), place_nodes(duration), 0.0
     for _ in range(2):  # what the shock's start leaves behind moves its place
-        rho, u, p, nodes = strip.run(shift)
-        shift -= strip.measure_shift(rho, nodes)
-    return strip.cut(rho, u, p)
+        strip = nodes[place] - front.speed * duration + shift, states, ends, duration
+        rho, u, p = run_strip(front.eos, place_nodes, size, *strip, cfl=cfl, limiter=limiter)
+        excess = ((rho - front.ahead[0]) * np.diff(last))[kept].sum()
+        shift -= excess / (front.behind[0] - front.ahead[0]) - (nodes[place] - last[kept][0])
+    start = max(0, place - KEPT)
+    part = slice(start - lowest, None)
+    return SettledFront(start, rho[part], u[part], p[part])
 
 
 def run_strip(
@@ -309,72 +330,11 @@ def run_strip(
         put(block, side, **end)
     for side in ("i_min", "i_max"):
         put(block, side, "wall")
-    strip = Simulation([block], [], t_end=duration, cfl=cfl, small_cells=0.0, mesh=lay_nodes)
-    flow = strip.flow
+    flow = Simulation([block], [], t_end=duration, cfl=cfl, small_cells=0.0, mesh=lay_nodes).flow
     while not take_step(flow).last:
         pass
     rho, _, u, p = block.state[:, 1, 1:-1].copy()
     return rho, u, p
-
-
-class _Strip:
-    def __init__(self, front: Front, cfl: float, limiter: str):
-        self.front, self.cfl, self.limiter = front, cfl, limiter
-        nodes, place = front.nodes, front.place
-        size = nodes[1] - nodes[0]
-        self.lowest = place - RUN_IN - MARGIN  # number of the strip's first node
-        numbers = np.arange(self.lowest, min(place + AHEAD + 4, nodes.size - 1) + 1)
-        self.first = np.where(
-            numbers < 0, numbers * size, nodes[np.clip(numbers, 0, nodes.size - 1)]
-        )
-        self.size = size
-        self.contact_speed = front.behind[1]
-        self.relative = front.speed - self.contact_speed
-        self.rate = (front.end_speed - self.contact_speed) / nodes[-1]
-        begin = self.first[numbers == place - RUN_IN][0]
-        # cells beyond the contact move on as those before it, but not so that no shock could pass
-        self.rate_beyond = self.rate
-        if begin < 0.0:
-            self.rate_beyond = max(self.rate, SLOWEST * self.relative / begin)
-        rate = self.rate_beyond if begin < 0.0 else self.rate
-        self.stretch = np.where(self.first < 0.0, self.rate_beyond, self.rate)
-        self.duration = (nodes[place] - begin) / (self.relative - begin * rate)
-
-    def place_nodes(self, t: float) -> np.ndarray:
-        """Places of the nodes along the strip."""
-        since = t - self.duration
-        return self.contact_speed * since + self.first * (1.0 + self.stretch * since)
-
-    def run(self, shift: float):
-        front = self.front
-        begin = front.nodes[front.place] - front.speed * self.duration + shift
-        ends = [
-            {"kind": "inflow", "state": (rho, 0.0, u, p)}
-            for rho, u, p in (front.behind, front.ahead)
-        ]
-        states = [end["state"] for end in ends]
-        strip = begin, states, ends, self.duration
-        rho, u, p = run_strip(
-            front.eos, self.place_nodes, self.size, *strip, cfl=self.cfl, limiter=self.limiter
-        )
-        return rho, u, p, self.place_nodes(self.duration)
-
-    @property
-    def kept(self) -> slice:
-        return slice(self.front.place - KEPT - self.lowest, None)
-
-    def measure_shift(self, rho: np.ndarray, nodes: np.ndarray) -> float:
-        """How far the shock is beyond its place [m], by the mass of the cells that are kept."""
-        front = self.front
-        behind, ahead = front.behind[0], front.ahead[0]
-        excess = ((rho - ahead) * np.diff(nodes))[self.kept].sum()
-        there = front.nodes[front.place] - nodes[self.kept][0]
-        return excess / (behind - ahead) - there
-
-    def cut(self, rho: np.ndarray, u: np.ndarray, p: np.ndarray) -> SettledFront:
-        first = max(0, self.front.place - KEPT)
-        part = slice(first - self.lowest, None)
-        return SettledFront(first, rho[part], u[part], p[part])
 
 
 ROOM = 0.8  # part of the room between piston and shock that it may use
@@ -466,3 +426,27 @@ def settle_shock(
     front = max(0, cell - min(MOST_KEPT, int(CLEAN * spot)))
     rho[:front], u[:front], p[:front] = shock.rho, shock.particle_speed, shock.p
     return SettledShock(eos, line, rho, u, p)
+
+
+@dataclass(frozen=True)
+class MovingShock(Shock):
+    """A plane shock in gas at rest that runs towards larger x."""
+
+    eos: EquationOfState
+
+    def start(self, nodes, position: float, *, cfl: float = 0.8, limiter: str = DEFAULT_LIMITER):
+        """rho, u, v, p (ni, nj) of a block with the shock, settled, at x = `position` [m].
+
+        nodes: (2, ni + 1, nj + 1) of a block that a piston at i_min pushes, `velocity=(shock.
+        particle_speed, 0.0)`; its lines i = const are upright, or nearly so.
+        """
+        x = nodes[0].mean(axis=1)
+        line = settle_shock(self.eos, x, position, self, cfl=cfl, limiter=limiter)
+        rho, u, p = line.lay_on(nodes)
+        return rho, u, np.zeros_like(u), p
+
+
+def shock(eos: EquationOfState, ahead: tuple[float, float], mach: float) -> MovingShock:
+    """The shock of a Mach number into material at rest, `ahead` its density [kg/m3] and pressure
+    [Pa]; BadInput where there is none."""
+    return MovingShock(**asdict(shock_with_mach(eos, *ahead, mach)), eos=eos)

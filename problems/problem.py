@@ -143,6 +143,16 @@ def find_crossing(x: np.ndarray, values: np.ndarray, level: float) -> float:
     return float(x[i] + part * (x[i + 1] - x[i]))
 
 
+def average_plateau(edges: np.ndarray, values: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
+    """Means (k,) of `values` (k, n) over the cells between `edges` (n + 1) with their centres in
+    the middle half of a plateau that reaches from one of `ends` to the other; NaN without any."""
+    middle, length = 0.5 * (ends[0] + ends[1]), abs(ends[1] - ends[0])
+    inside = np.abs(0.5 * (edges[1:] + edges[:-1]) - middle) < 0.25 * length
+    if not inside.any():
+        return np.full(len(values), math.nan)
+    return np.average(np.asarray(values)[:, inside], axis=1, weights=np.diff(edges)[inside])
+
+
 def compare(
     history: History, name: str, theory: float = math.nan, label: str = "", **more: Any
 ) -> Row:

@@ -31,7 +31,7 @@ from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import Fluid, make_plane_grid, put_walls
-from problems.problem import Problem, Report, compare, get_last
+from problems.problem import Problem, Report, average_plateau, compare, get_last
 from problems.references.riemann import (
     RiemannSolution,
     compute_cell_averages,
@@ -199,18 +199,15 @@ class SideState(Fluid, kw_only=True):
 
 
 class RiemannDeck(Deck, kw_only=True):
-    """Deck of `riemann`; the defaults are Sod's problem, contact on a grid line."""
+    """The defaults are Sod's problem, contact on a grid line."""
 
     run: RunControl = RunControl(cfl=0.8)
     case: key(str, "named states: " + ", ".join(CASES)) = "sod"
     left: SideState | None = None
     right: SideState | None = None
-    lengths: (
-        key(
-            tuple[float, float],
-            "lengths of the two sides [m]; left out: the case's, or by the waves, 1 m in all",
-        )
-        | None
+    lengths: key(
+        tuple[float, float] | None,
+        "lengths of the two sides [m]; left out: the case's, or by the waves, 1 m in all",
     ) = None
     contact: key(
         Literal["on-line", "captured"],
@@ -223,15 +220,11 @@ class RiemannDeck(Deck, kw_only=True):
     ) = "fixed"
     cells: key(int, "cells along x", ge=8, le=MOST_CELLS) = 100
     rows: key(int, "cells across", ge=2, le=MOST_CELLS) = 4
-    grading: (
-        key(
-            float,
-            "growth of cells from one to the next off a contact on a line; left out: the case's, "
-            "or by the waves",
-            ge=1,
-            le=1.2,
-        )
-        | None
+    grading: key(
+        float | None,
+        "growth of cells off a contact on a line; left out: the case's, or by the waves",
+        ge=1,
+        le=1.2,
     ) = None
     limiter: Limiter | None = None  # None: the case's
     regrid: Regrid = Regrid()
@@ -262,9 +255,8 @@ class Riemann(Problem):
             parting = case.right[1] - case.left[1]
             raise BadInput(
                 f"deck: the two gases part and leave a vacuum between x/t = {exact.u_left:.6g} and "
-                f"{exact.u_right:.6g} m/s, so there is no contact; the right one leaves the left "
-                f"one with {parting:.6g} m/s, make that less than "
-                f"{parting - (exact.u_right - exact.u_left):.6g} m/s"
+                f"{exact.u_right:.6g} m/s, so there is no contact; they part with {parting:.6g} "
+                f"m/s, make that less than {parting - (exact.u_right - exact.u_left):.6g} m/s"
             )
 
     def _make_case(self) -> Case:
@@ -287,32 +279,27 @@ class Riemann(Problem):
 
     @functools.cached_property
     def domain(self) -> Domain:
-        """Lengths, growths and end time: the deck's, the case's, or by the waves."""
-        deck, case = self.deck, self.case
+        """Lengths, growths and end time: the deck's, the case's, or by the waves, of which one is
+        WAY of the way to its end where nothing else gives the end time."""
+        deck, case, exact = self.deck, self.case, self.exact
+        grading, on_line = deck.grading, deck.contact == "on-line"
         if case.lengths is not None:
-            growth = deck.grading or case.grading
-            ends, t_end = (case.left[1], case.right[1]), self._find_end(case.lengths)
-            return Domain(case.lengths, (growth, growth), ends, t_end, sum(case.lengths))
+            ends = (case.left[1], case.right[1]) if on_line else (0.0, 0.0)
+            speeds = ends[0] - exact.left_wave.head, exact.right_wave.head - ends[1]
+            ways = zip(case.lengths, speeds, strict=True)
+            t = WAY * min(length / speed for length, speed in ways if speed > 0.0)
+            t_end = deck.run.t_end or case.t_end or t
+            growths = (grading or case.grading,) * 2
+            return Domain(case.lengths, growths, ends, t_end, sum(case.lengths))
         made_for = deck.run.t_set_up or deck.run.t_end
-        if deck.contact == "captured":
-            speed = self.exact.u if deck.mesh == "follow" else 0.0
-            domain = choose_captured_domain(self.exact, speed, made_for)
-        else:
+        if on_line:
             cells = deck.cells // 2, deck.cells - deck.cells // 2
-            domain = choose_domain(self.exact, cells, made_for)
-        growths = (deck.grading,) * 2 if deck.grading is not None else domain.growths
+            domain = choose_domain(exact, cells, made_for)
+        else:
+            speed = exact.u if deck.mesh == "follow" else 0.0
+            domain = choose_captured_domain(exact, speed, made_for)
+        growths = domain.growths if grading is None else (grading,) * 2
         return replace(domain, t_end=deck.run.t_end or domain.t_end, growths=growths)
-
-    def _find_end(self, lengths: tuple[float, float]) -> float:
-        """End time: the deck's, the case's, or when a wave is WAY of the way to its end."""
-        given = self.deck.run.t_end if self.deck.run.t_end is not None else self.case.t_end
-        if given is not None:
-            return given
-        case, moving = self.case, self.deck.contact == "on-line"
-        left = (case.left[1] if moving else 0.0) - self.exact.left_wave.head
-        right = self.exact.right_wave.head - (case.right[1] if moving else 0.0)
-        pairs = zip(lengths, (left, right), strict=True)
-        return WAY * min(length / speed for length, speed in pairs if speed > 0.0)
 
     @property
     def t_end(self) -> float:
@@ -334,20 +321,17 @@ class Riemann(Problem):
 
     def _build_on_line(self):
         case, domain, half = self.case, self.domain, self.deck.cells // 2
-        sides = (
-            ("left", "i_min", case.left_eos, case.left, -grade(half, domain.growths[0])[::-1]),
-            ("right", "i_max", case.right_eos, case.right,
-             grade(self.deck.cells - half, domain.growths[1])),
-        )  # fmt: skip
-        blocks = []
-        for n, (name, side, eos, (rho, u, p), x) in enumerate(sides):
-            grid, state = self.make_grid(domain.lengths[n] * x), (rho, u, 0.0, p)
-            block = Block(name, eos, grid, *state, limiter=self.limiter)
-            speed = (domain.ends[n], 0.0)
-            if case.lengths is not None:
-                put(block, side, "piston", velocity=speed)
-            else:  # ends that do not go with the materials
-                put(block, side, "inflow", state=state, velocity=speed)
+        left = -grade(half, domain.growths[0])[::-1]
+        right, blocks = grade(self.deck.cells - half, domain.growths[1]), []
+        for name, side, eos, (rho, u, p), x, length, speed in zip(
+            ("left", "right"), ("i_min", "i_max"), (case.left_eos, case.right_eos),
+            (case.left, case.right), (left, right), domain.lengths, domain.ends, strict=True,
+        ):  # fmt: skip
+            state = rho, u, 0.0, p
+            block = Block(name, eos, self.make_grid(length * x), *state, limiter=self.limiter)
+            # ends that the waves give do not go with the materials
+            end = {"kind": "piston"} if case.lengths else {"kind": "inflow", "state": state}
+            put(block, side, velocity=(speed, 0.0), **end)
             put_walls(block, "j_min", "j_max")
             blocks.append(block)
         link = join("interface", (blocks[0], "i_max"), (blocks[1], "i_min"))
@@ -391,13 +375,11 @@ class Riemann(Problem):
             edges = block.nodes[0, :, 0]
             rho, u, _, p = block.state[:, 1:-1, 1]
             row["l1_rho"] += compute_l1_error(rho, compute_cell_averages(exact, edges, t)[0], edges)
-            middle, lengths = 0.5 * (edges[1:] + edges[:-1]) / t, np.diff(edges)
             for side, wave in (("left", exact.left_wave), ("right", exact.right_wave)):
-                width = abs(wave.tail - exact.u)
-                inside = np.abs(middle - 0.5 * (wave.tail + exact.u)) < 0.25 * width
-                for name, values in (("rho", rho), ("u", u), ("p", p)) if inside.any() else ():
-                    mean = np.average(values[inside], weights=lengths[inside])
-                    row[f"star_{name}_{side}"] = float(mean)
+                means = average_plateau(edges, (rho, u, p), (exact.u * t, wave.tail * t))
+                for name, mean in zip(("rho", "u", "p"), means, strict=True):
+                    if not math.isnan(mean):
+                        row[f"star_{name}_{side}"] = float(mean)
         return row
 
     def star_states(self) -> dict[str, tuple[float, float]]:
@@ -422,7 +404,7 @@ class Riemann(Problem):
         return float(np.max([abs(row[f"star_{n}"] - exact) / size for n, (exact, size) in stars]))
 
     def report(self, history, final=None) -> Report:
-        deck = self.deck
+        deck, exact, t = self.deck, self.exact, get_last(history, "t")
         where = "on a grid line" if deck.contact == "on-line" else f"captured, grid {deck.mesh}"
         rows = [
             compare(
@@ -431,22 +413,17 @@ class Riemann(Problem):
             )
             for name, (value, size) in self.star_states().items()
         ]  # fmt: skip
-        return Report(
+        notes = [
+            f"the {side} plateau, {abs(wave.tail - exact.u) * t:.3g} m wide, has no cell in its "
+            "middle half: more cells, lengths left out, or a larger grading"
+            for side, wave in (("left", exact.left_wave), ("right", exact.right_wave))
+            if history and math.isnan(history[f"star_p_{side}"][-1])
+        ]
+        head = (
             f"riemann problem {self.name!r}, {deck.cells} cells, contact {where}: L1(rho) = "
-            f"{get_last(history, 'l1_rho'):.3g} kg/m2; star states beside the contact:",
-            rows,
-            list(self._explain_empty(history)) if history else (),
+            f"{get_last(history, 'l1_rho'):.3g} kg/m2; star states beside the contact:"
         )
-
-    def _explain_empty(self, history):
-        """A line for each plateau that has no cell in its middle half."""
-        t, exact = float(history["t"][-1]), self.exact
-        for side, wave in (("left", exact.left_wave), ("right", exact.right_wave)):
-            if math.isnan(history[f"star_p_{side}"][-1]):
-                yield (
-                    f"the {side} plateau, {abs(wave.tail - exact.u) * t:.3g} m wide, has no cell "
-                    "in its middle half: more cells, lengths left out, or a larger grading"
-                )
+        return Report(head, rows, notes)
 
     def draw(self, figure, run_data) -> None:
         """Density, velocity and pressure along x in the last dump over the exact solution."""

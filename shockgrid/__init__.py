@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from hydro.eos.materials import find_material
     from hydro.links import join, slide
     from hydro.simulation import Simulation
+    from hydro.sources import make_gravity as gravity
     from problems.deck import Deck, DeckTable, Output, Regrid, RunControl
+    from problems.initial_states import shock
     from problems.problem import Problem
     from regrid.algebraic import AlgebraicRegridder, transfinite_grid
     from regrid.barrier.regridder import BarrierRegridder
@@ -80,6 +82,7 @@ MODULES = {
     "compare": "runs.interface.calls",
     "film": "runs.interface.calls",
     "find_material": "hydro.eos.materials",
+    "gravity": "hydro.sources",
     "grid": "runs.interface",
     "inlined": "regrid.jit",
     "inspect": "runs.interface.calls",
@@ -93,13 +96,14 @@ MODULES = {
     "report": "runs.interface.calls",
     "restart": "runs.interface.calls",
     "run": "runs.interface.calls",
+    "shock": "problems.initial_states",
     "slide": "hydro.links",
     "study": "runs.study.study",
     "testing": "shockgrid",
     "transfinite_grid": "regrid.algebraic",
     "verify": "runs.interface.calls",
 }
-ELSEWHERE = {"open": "open_run"}  # names that a module of ours cannot have
+ELSEWHERE = {"gravity": "make_gravity", "open": "open_run"}  # names in the module, where others
 SUBMODULES = ("grid", "testing")  # names that are modules themselves
 
 __all__ = [
@@ -132,6 +136,7 @@ __all__ = [
     "compare",
     "film",
     "find_material",
+    "gravity",
     "grid",
     "inlined",
     "inspect",
@@ -145,6 +150,7 @@ __all__ = [
     "report",
     "restart",
     "run",
+    "shock",
     "slide",
     "study",
     "testing",

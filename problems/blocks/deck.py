@@ -147,6 +147,10 @@ class BlocksDeck(Deck, kw_only=True):
     mesh: key(
         Literal["regrid", "fixed"], "regrid: grids follow moving sides; fixed: no node moves"
     ) = "regrid"
+    gravity: key(tuple[float, float], "acceleration of all blocks along x and y [m/s2]") = (
+        0.0,
+        0.0,
+    )
     limiter: Limiter = "van-leer"
     void_fill: VoidFill = VoidFill()
     block: key(tuple[BlockTable, ...], "the blocks, [[block]] each", min_length=1) = msgspec.field(

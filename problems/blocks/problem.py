@@ -24,6 +24,7 @@ from hydro.boundary import SEGMENTS, Linked, put
 from hydro.eos.materials import Material, find_material, make_material
 from hydro.links import join, slide
 from hydro.simulation import Simulation
+from hydro.sources import make_gravity
 from problems.blocks.deck import LINKED, BlocksDeck, BlockSide, BlockTable, CurveTable
 from problems.deck import check_digests
 from problems.pictures import draw_field
@@ -255,8 +256,12 @@ class Blocks(Problem):
             if names.count(name) > 1:
                 raise BadInput(f"deck: {names.count(name)} blocks are called {name!r}")
         self.materials = {block.name: find_block_material(block) for block in deck.block}
-        if deck.regrid.weight:
-            deck.regrid.check_weight()
+        deck.regrid.check_weight()
+        if deck.geometry == "axisymmetric" and deck.gravity[1]:
+            raise BadInput(
+                f"deck: gravity = {list(deck.gravity)}: in axisymmetric flow y is the radius; "
+                "gravity is along x, the axis"
+            )
         for link in deck.link:
             if link.tension and link.kind != "interface":
                 raise BadInput(
@@ -337,17 +342,12 @@ class Blocks(Problem):
             links.append(
                 slide(one, two) if link.kind == "slide" else join(link.kind, one, two, **options)
             )
-        return Simulation(
-            list(blocks.values()),
+        return self.simulate(
+            blocks.values(),
             links,
-            t_end=deck.run.t_end,
-            cfl=deck.run.cfl,
-            small_cells=deck.run.small_cells,
-            void_fill=(deck.void_fill.pressure, deck.void_fill.gamma),
-            threads=deck.run.threads,
             mesh=deck.mesh,
             geometry=deck.geometry,
-            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads),
+            source=make_gravity(*deck.gravity) if any(deck.gravity) else None,
             measure_block=measure_means,
             measured_numbers=len(MEASURED),
         )

@@ -27,7 +27,7 @@ from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import make_plane_grid, put_walls
 from problems.pictures import draw_field, draw_grid
-from problems.problem import BlockPlan, Problem, Report, Row, get_last
+from problems.problem import BlockPlan, Problem, Report, Row, average_plateau, get_last
 from problems.references.riemann import solve_riemann
 from regrid.errors import BadInput
 
@@ -116,28 +116,23 @@ class TriplePoint(Problem):
         for name, block, j in (("bottom", bottom, 0), ("top", top, -1)):
             exact, t = self.exact[name], evolution.t
             far = max(abs(exact.left_wave.head), exact.right_wave.head) * t
-            known, x = 0.1 < t < EARLY and far < 0.9, 1.0 + exact.u * t
             for side, gas, wave in (("l", left, exact.left_wave), ("r", block, exact.right_wave)):
-                edges = gas.nodes[0, :, j]
-                width = abs(wave.tail - exact.u) * t
-                position = x + (0.5 if side == "r" else -0.5) * width
-                inside = np.abs(0.5 * (edges[1:] + edges[:-1]) - position) < 0.25 * width
-                known = known and bool(inside.any())
-                for q, label in ((0, "rho"), (1, "u"), (3, "p")):
-                    value = gas.state[q, 1:-1, j - 1 if j < 0 else 1]
-                    mean = float(value[inside].mean()) if known else math.nan
-                    row[f"{label}_{name}_{side}"] = mean
+                edges, cells = gas.nodes[0, :, j] - 1.0, gas.state[[0, 1, 3], 1:-1, 1:-1][..., j]
+                means = average_plateau(edges, cells, (exact.u * t, wave.tail * t))
+                known = 0.1 < t < EARLY and far < 0.9
+                for q, mean in zip(("rho", "u", "p"), means, strict=True):
+                    row[f"{q}_{name}_{side}"] = float(mean) if known else math.nan
         return row
 
     def report(self, history, final=None) -> Report:
-        known = np.isfinite(history.get("p_top_r", [])) & np.isfinite(history.get("p_bottom_r", []))
-        last = int(np.flatnonzero(known)[-1]) if known.any() else None
-        rows = []
-        for name, theory in self.list_stars().items():
+        stars, rows = self.list_stars(), []
+        known = np.isfinite([history[name] for name in stars]).all(axis=0) if history else []
+        last = int(np.flatnonzero(known)[-1]) if np.any(known) else None
+        for name, theory in stars.items():
             q, gas, side = name.split("_")
-            label = f"{q} {gas}, {'left' if side == 'l' else 'right'}"
+            label = "" if last is None else f"{q} {gas}, {'left' if side == 'l' else 'right'}"
             found = math.nan if last is None else float(history[name][last])
-            rows.append(Row(name, found, theory, label if last is not None else "", digits=5))
+            rows.append(Row(name, found, theory, label, digits=5))
         off = [abs(row.difference) for row in rows if row.name[0] in "pu"]
         masses = [np.asarray(history.get(f"total_mass_{name}", [math.nan])) for name in GASES]
         lost = max(float(np.ptp(mass) / mass[0]) for mass in masses)

@@ -37,8 +37,8 @@ def test_import_loads_nothing_heavy():
 PUBLIC = """
 AlgebraicRegridder BadInput BarrierRegridder Block Case Deck DeckTable EquationOfState Hook IdealGas
 JWL MieGruneisen OpenRun Output PhaseTransition Problem Regrid RegridFailure RunControl RunFailure
-Segment Simulation StiffenedGas Study Tabular __version__ compare find_material grid inlined join
-load make_regridder open plot put register restart run slide study testing
+Segment Simulation StiffenedGas Study Tabular __version__ compare find_material gravity grid
+inlined join load make_regridder open plot put register restart run shock slide study testing
 transfinite_grid verify film inspect report
 """
 

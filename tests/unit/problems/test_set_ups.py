@@ -8,6 +8,8 @@ import pytest
 
 from benchmarks.random_pairs import make_random_pair
 from builders import march
+from problems.blocks.deck import BlocksDeck
+from problems.blocks.problem import Blocks
 from problems.grid_march import GridMarch, GridMarchDeck
 from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.problem import InterfaceInstability
@@ -143,3 +145,27 @@ def test_the_zone_of_constant_states_ends_where_the_flow_behind_is_sonic():
         assert (problem.zone > 0.0) == (min(machs) > 1.0)
         zones.append(problem.zone)
     assert sorted(zones) == zones
+
+
+def make_falling(**options) -> Blocks:
+    """A square of aluminium between free surfaces, under gravity."""
+    sides = [
+        {"side": side, "kind": "free-surface"} for side in ("i_min", "i_max", "j_min", "j_max")
+    ]
+    lines = {"i_min": ((0, 1), (0, 2)), "i_max": ((1, 1), (1, 2)), "j_min": ((0, 1), (1, 1))}
+    block = {
+        "name": "plate", "material": "Al1100", "p": 0.0, "cells": (4, 4), "side": sides,
+        "curves": {**lines, "j_max": ((0, 2), (1, 2))},
+    }  # fmt: skip
+    return Blocks(msgspec.convert({"block": [block], **options}, BlocksDeck))
+
+
+def test_blocks_of_a_deck_fall_under_gravity():
+    problem = make_falling(gravity=(3.0, -9.81))
+    flow = problem.build()
+    march(flow, 5)
+    row = problem.measure(flow)
+    assert row["v_mean_plate"] == pytest.approx(-9.81 * flow.t, rel=1e-9)
+    assert row["u_mean_plate"] == pytest.approx(3.0 * flow.t, rel=1e-9)
+    with pytest.raises(BadInput, match="y is the radius"):
+        make_falling(gravity=(0.0, -9.81), geometry="axisymmetric")

@@ -7,6 +7,8 @@ import functools
 import numpy as np
 import pytest
 
+import shockgrid as sg
+from builders import march
 from hydro.eos import IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
 from problems.initial_states import KEPT, SettledShock, settle_shock
@@ -93,3 +95,29 @@ def test_a_profile_of_few_cells_at_its_place(name, part):
     assert level.max() < 1.03 and level.min() > -1e-6
     first = np.flatnonzero(level < 0.9)[0]
     assert (np.diff(level[first:]) < 1e-6).all(), "falls all the way ahead of it"
+
+
+def push(shock, state, nodes):
+    """The density of a row of cells after a shock in a tube has gone 0.2 on, pushed by a piston."""
+    gas = sg.Block("gas", shock.eos, nodes, *state)
+    sg.put(gas, "i_min", "piston", velocity=(shock.particle_speed, 0.0))
+    for side in ("i_max", "j_min", "j_max"):
+        sg.put(gas, side, "wall")
+    tube = sg.Simulation([gas], [], t_end=0.2 / shock.shock_speed)
+    march(tube)
+    x = 0.5 * (gas.nodes[0, 1:, 0] + gas.nodes[0, :-1, 0])
+    return gas.state[0, 1:-1, 1][x < 0.64]  # the shock is at 0.7, its foot some cells wide
+
+
+def test_a_shock_that_starts_settled_leaves_no_spot_behind():
+    shock = sg.shock(IdealGas(1.4), (1.2, 1e5), 3.0)
+    nodes = np.array(np.meshgrid(np.linspace(0.0, 1.0, 101), [0.0, 0.01, 0.02], indexing="ij"))
+    settled = push(shock, shock.start(nodes, 0.5), nodes)
+    behind = np.linspace(0.005, 0.995, 100)[:, None] < 0.5 + np.zeros((1, 2))
+    jump = [
+        np.where(behind, shock.rho, 1.2), np.where(behind, shock.particle_speed, 0.0), 0.0,
+        np.where(behind, shock.p, 1e5),
+    ]  # fmt: skip
+    plain = push(shock, jump, nodes)
+    off, spot = (float(np.abs(rho / shock.rho - 1.0).max()) for rho in (settled, plain))
+    assert off < 5e-3 and spot > 4.0 * off

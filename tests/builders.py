@@ -9,6 +9,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.boundary import put
+from hydro.eos.materials import find_material
 from hydro.links import join
 
 ROOT = next(p for p in Path(__file__).resolve().parents if (p / "pyproject.toml").is_file())
@@ -45,11 +46,22 @@ def beside_line(front, cells, ends=(0.0, 1.0)) -> tuple[np.ndarray, np.ndarray]:
     return np.array([-1.0 + (x + 1.0) * part, rows]), np.array([x + (1.0 - x) * part, rows])
 
 
-def wall_off(block, *sides) -> None:
+def make_body(name, substance, nodes, u=0.0, v=0.0, p=0.0, **options) -> Block:
+    """A block of a material of the library, with its density at rest."""
+    found = find_material(substance)
+    return Block(name, found.eos, nodes, found.rho0, u, v, p, **options)
+
+
+def wall_off(block, *sides, kind="wall", **options) -> None:
     """Walls on the sides; without any named, on all those that have no segment yet."""
     taken = {segment.side for segment in block.segments}
     for side in sides or [side for side in SIDES if side not in taken]:
-        put(block, side, "wall")
+        put(block, side, kind, **options)
+
+
+def free(block, *sides, **options) -> None:
+    """Free surfaces where `wall_off` has walls."""
+    wall_off(block, *sides, kind="free-surface", **options)
 
 
 def two_blocks(front, cells, gases, states, kind="interface", ends=(0.0, 1.0)):
@@ -67,6 +79,39 @@ def march(evolution, steps=None) -> list[dict]:
     while len(rows) != steps and not (steps is None and evolution.finished):
         rows.append(evolution.advance())
     return rows
+
+
+def march_whole(evolution, until=lambda rows: False) -> list[dict]:
+    """March to the end or until something is so of the rows: the start and each step's."""
+    rows = [evolution.start_row() | {"t": evolution.t}]
+    while not evolution.finished and not until(rows):
+        rows.append(evolution.advance())
+    return rows
+
+
+def get_bits(state) -> dict:
+    """What a simulation, or the state of one, holds: to be compared with another's."""
+    state = state if isinstance(state, dict) else state.get_state()
+    return {name: np.asarray(value).tobytes() for name, value in state.items()}
+
+
+def check_restarts(make, places, columns=("t", "total_energy"), steps=3) -> None:
+    """Simulations that take up the states at `places` have the bits of the one that had them.
+
+    places: numbers of steps, or a function that finds them from rows and states of a whole march.
+    """
+    whole, rows, states = make(), [], []
+    last = None if callable(places) else max(places) + steps
+    while not whole.finished and len(rows) != last:
+        rows.append(whole.advance())
+        states.append(whole.get_state())
+    for at in places(rows, states) if callable(places) else [step - 1 for step in places]:
+        again = make()
+        again.set_state(states[at])
+        for row, state in zip(rows[at + 1 :][:steps], states[at + 1 :], strict=False):
+            found = again.advance()
+            assert [found[name] for name in columns] == [row[name] for name in columns], at
+            assert get_bits(again) == get_bits(state), at
 
 
 def march_measured(problem, evolution, steps=None) -> dict[str, np.ndarray]:

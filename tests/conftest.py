@@ -44,6 +44,7 @@ RARE_KERNELS = (
     "unit/hydro/test_burn.py::*what_its_state_lacks",
     "unit/hydro/test_pieces.py::*partial_cover",
     "unit/problems/test_interface_starts.py::*alumini*",
+    "unit/problems/test_interface_starts.py::*[[]stiffened]",
     "unit/problems/test_settled_shock.py::*stiffened gas]",
     "verification/contacts/test_plates_that_meet.py::*[[]gas-water]",
     "verification/problems/test_flat_lines.py::*between_metals",

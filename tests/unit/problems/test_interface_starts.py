@@ -154,13 +154,7 @@ def make_of_start(name: str = "reflected shock", perturbation=None, **deck) -> I
     return InterfaceInstability(InterfaceDeck(**keys), perturbation)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.kernels) if name == "stiffened" else name
-        for name in STARTS
-    ],
-)
+@pytest.mark.parametrize("name", STARTS)
 def test_every_deck_begins_and_goes_on(name):
     problem = make_of_start(name)
     flow = problem.build()

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from plates import advance, make_plate, make_stack
+from plates import make_plate
 
-from builders import box, check_budget, wall_off
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos.materials import find_material
+from builders import box, check_budget, free, make_body, march_whole, wall_off
+from hydro.simulation import Simulation
+from regrid.measure.corners import compute_centres
 
 INNER = 3e-3  # radius of the rings
 
@@ -18,14 +17,14 @@ def make_rings(geometry, speeds, gap=0.0):
         make_plate("flyer", "Al1100", (0.0, 1e-3), 30, speeds[0], 3, low=INNER),
         make_plate("target", "SS304", (1e-3 + gap, 2.5e-3), 40, speeds[1], 2, low=INNER),
     ]
-    return blocks, make_stack(blocks, 2.5e-7, geometry=geometry)
+    return blocks, Simulation(blocks, [], t_end=2.5e-7, geometry=geometry)
 
 
 def test_an_impact_of_rings_is_that_of_plates():
     """Along the axis all is as in plane flow, to 1e-9; mass and energy are kept to 1e-12."""
     plates, plane = make_rings("plane", (1000.0, 0.0), 5e-5)
     rings, curved = make_rings("axisymmetric", (1000.0, 0.0), 5e-5)
-    rows, rows_of_rings = advance(plane), advance(curved)
+    rows, rows_of_rings = march_whole(plane), march_whole(curved)
     assert rows_of_rings[-1]["contacts_made"] == 1
     assert rows_of_rings[-1]["contact_length"] == pytest.approx(1e-3, rel=1e-9)
     for plate, ring in zip(plates, rings, strict=True):
@@ -42,7 +41,7 @@ def test_free_stream(gap):
     """Rings that go side by side, touching or not, are not changed: 1e-12."""
     blocks, simulation = make_rings("axisymmetric", (300.0, 300.0), gap)
     first = [block.nodes.copy() for block in blocks]
-    rows = advance(simulation)
+    rows = march_whole(simulation)
     way = np.array([300.0 * simulation.t, 0.0])[:, None, None]
     for block, nodes in zip(blocks, first, strict=True):
         rho, u, v, p = block.state[:, 1:-1, 1:-1]
@@ -55,22 +54,18 @@ def test_free_stream(gap):
 
 def make_liner(speed=1000.0, cells=(12, 24), inner=4e-4, outer=1.6e-3, t_end=6e-7):
     """A tube between walls across the axis that comes in; bulged so that its middle is first."""
-    copper = find_material("Cu")
     nodes = box((-1e-3, inner), (1e-3, outer), cells)
     nodes[1] += 5e-5 * (nodes[0] / 1e-3) ** 2
-    tube = Block("tube", copper.eos, nodes, copper.rho0, 0.0, 0.0, 0.0)
-    y = 0.25 * (nodes[1, 1:, 1:] + nodes[1, :-1, 1:] + nodes[1, 1:, :-1] + nodes[1, :-1, :-1])
-    tube.state[2, 1:-1, 1:-1] = -speed * inner / y
-    for side in ("j_min", "j_max"):
-        put(tube, side, "free-surface")
+    tube = make_body("tube", "Cu", nodes, 0.0, -speed * inner / compute_centres(nodes)[1])
+    free(tube, "j_min", "j_max")
     wall_off(tube)
-    return tube, make_stack([tube], t_end, geometry="axisymmetric")
+    return tube, Simulation([tube], [], t_end=t_end, geometry="axisymmetric")
 
 
 def test_a_liner_closes_on_the_axis():
     """Symmetric after closing, 1e-10; all nodes on the axis; mass and energy to 1e-12."""
     tube, simulation = make_liner()
-    rows = advance(simulation)
+    rows = march_whole(simulation)
     assert rows[-1]["contacts_made"] >= 1
     length = max(row["contact_length"] for row in rows[1:])
     assert length == pytest.approx(2e-3, rel=1e-9)

@@ -2,18 +2,66 @@
 
 import numpy as np
 import pytest
-from folds import THICK, make_u
-from plates import make_stack
 from wave_diagram import find_impact
 
-from builders import box, check_budget, find_unexplained
-from hydro.block import Block
+from builders import (
+    box,
+    check_budget,
+    check_restarts,
+    find_unexplained,
+    free,
+    make_body,
+    march_whole,
+)
 from hydro.boundary import put
 from hydro.eos.materials import find_material
+from hydro.links import join
 from hydro.rows import P
+from hydro.simulation import Simulation
+from regrid.measure.corners import compute_centres
 
 CELL = 1e-4  # of the U's arms
-AL = find_material("Al1100")
+ARM, HALF_GAP, THICK = 4e-3, 2e-4, 1e-3
+
+
+def make_half(cells, bend, layers, sign=1.0):
+    """The upper half of a U (the lower one where sign is -1), from its arm's tip to the bend."""
+    x = np.linspace(0.0, ARM, cells + 1)[:-1]
+    angle = np.linspace(0.5 * np.pi, 0.0, bend + 1)
+    line = np.concatenate([
+        [x, np.full(x.size, HALF_GAP)],
+        [ARM + HALF_GAP * np.cos(angle), HALF_GAP * np.sin(angle)],
+    ], axis=1)  # fmt: skip
+    normal = np.concatenate([[0.0 * x, 0.0 * x + 1.0], [np.cos(angle), np.sin(angle)]], axis=1)
+    normal[:, -1] = 1.0, 0.0
+    line[1, -1] = 0.0
+    nodes = line[:, :, None] + normal[:, :, None] * np.linspace(0.0, THICK, layers + 1)
+    nodes[1] *= sign
+    return nodes
+
+
+def make_u(kind="whole", speed=400.0, cells=40, bend=6, layers=8, t_end=1.5e-6):
+    """`kind`: "whole", one block; "linked", two with a seam; "half", the upper one on a wall.
+
+    The arms turn towards each other about the bend.
+    """
+    upper, lower = make_half(cells, bend, layers), make_half(cells, bend, layers, -1.0)
+    grids = {
+        "whole": {"u": np.concatenate([upper, lower[:, -2::-1]], axis=1)},
+        "linked": {"upper": upper, "lower": lower[:, ::-1]},
+        "half": {"upper": upper},
+    }
+    blocks, links = [], []
+    for name, nodes in grids[kind].items():
+        x, y = compute_centres(nodes)
+        turning = -speed * np.sign(y) * np.clip(1.0 - x / ARM, 0.0, 1.0)
+        blocks.append(make_body(name, "Al1100", nodes, 0.0, turning, material="metal"))
+        free(blocks[-1], "j_min", "j_max")
+    put(blocks[0], "i_min", "wall")
+    if kind == "linked":
+        links.append(join("seam", (blocks[0], "i_max"), (blocks[1], "i_min")))
+    put(blocks[-1], "i_max", "wall")
+    return blocks, Simulation(blocks, links, t_end=t_end)
 
 
 @pytest.fixture(scope="module")
@@ -22,10 +70,7 @@ def folded():
     found = {}
     for kind in ("whole", "linked", "half"):
         blocks, simulation = make_u(kind, t_end=1e-6)
-        rows = [simulation.start_row() | {"t": 0.0}]
-        while not simulation.finished:
-            rows.append(simulation.advance())
-        found[kind] = blocks, rows
+        found[kind] = blocks, march_whole(simulation)
     return found
 
 
@@ -61,20 +106,13 @@ def test_arms_meet_as_on_a_wall(folded, kind):
 
 
 def test_restarts_while_a_body_meets_itself():
-    _, one = make_u(cells=24, layers=4, t_end=8e-7)
-    states, rows = [], []
-    while not one.finished:
-        rows.append(one.advance())
-        states.append(one.get_state())
-    met = next(k for k, row in enumerate(rows) if row["contacts_made"])
-    for at in (met - 1, met, met + 2):
-        _, other = make_u(cells=24, layers=4, t_end=8e-7)
-        other.set_state(states[at])
-        for k in range(at + 1, at + 4):
-            assert other.advance()["contact_length"] == rows[k]["contact_length"]
-            new = other.get_state()
-            for name, array in states[k].items():
-                assert np.array_equal(new[name], array), name
+    def find_places(rows, states):
+        met = next(k for k, row in enumerate(rows) if row["contacts_made"])
+        return met - 1, met, met + 2
+
+    check_restarts(
+        lambda: make_u(cells=24, layers=4, t_end=8e-7)[1], find_places, ["contact_length"]
+    )
 
 
 @pytest.mark.parametrize("geometry", ["plane", "axisymmetric"])
@@ -83,26 +121,21 @@ def test_a_wall_goes_on_beyond_its_end(geometry):
 
     In plane flow with the pressure of its mirror image, to .2 %; the axis takes no momentum.
     """
-    speed, gap, material = 500.0, 1e-4, find_material("Cu")
-    base = Block("base", AL.eos, box((-3e-3, 0.0), (-1e-3, 1e-3), (4, 4)), AL.rho0, 0.0, 0.0, 0.0)
+    speed, gap = 500.0, 1e-4
+    base = make_body("base", "Al1100", box((-3e-3, 0.0), (-1e-3, 1e-3), (4, 4)))
     put(base, "j_min", "axis" if geometry == "axisymmetric" else "wall")
-    for side in ("i_min", "i_max", "j_max"):
-        put(base, side, "free-surface")
-    nodes = box((0.0, gap), (4e-3, gap + 2e-3), (20, 40))
-    block = Block("block", material.eos, nodes, material.rho0, 0.0, -speed, 0.0)
-    for side in ("i_min", "i_max", "j_min", "j_max"):
-        put(block, side, "free-surface")
-    simulation = make_stack([base, block], gap / speed + 2e-7, geometry=geometry)
-    rows = [simulation.start_row() | {"t": 0.0}]
-    while not simulation.finished:
-        rows.append(simulation.advance())
+    block = make_body("block", "Cu", box((0.0, gap), (4e-3, gap + 2e-3), (20, 40)), 0.0, -speed)
+    for body in (base, block):
+        free(body)
+    simulation = Simulation([base, block], [], t_end=gap / speed + 2e-7, geometry=geometry)
+    rows = march_whole(simulation)
     met = next(k for k, row in enumerate(rows[1:], 1) if row["contacts_made"])
     assert rows[-1]["contacts_made"] == 1 and rows[-1]["contact_length"] > 4e-3
     assert block.nodes[1].min() == 0.0
     assert rows[-1]["cells_not_convex"] == 0
     if geometry == "plane":
         assert rows[met - 1]["t"] == pytest.approx(gap / speed, rel=1e-6)
-        copper = material.eos, material.rho0
+        copper = block.eos, find_material("Cu").rho0
         shock, _ = find_impact(copper, copper, 2.0 * speed)
         middle = block.state[P, 10, 3:8]
         assert float(middle.mean()) == pytest.approx(shock.p, rel=2e-3)

@@ -2,14 +2,21 @@
 
 import numpy as np
 import pytest
-from plates import advance, make_stack, mean_speed
+from plates import mean_speed
 
-from builders import SIDES, box, check_budget, find_unexplained
-from hydro.block import Block
-from hydro.boundary import put
+from builders import (
+    box,
+    check_budget,
+    find_unexplained,
+    free,
+    make_body,
+    march_whole,
+    wall_off,
+)
 from hydro.eos.materials import find_material
 from hydro.links import join
 from hydro.rows import CONSERVED, RHO, P, U, V
+from hydro.simulation import Simulation
 from hydro.sources import make_gravity
 from regrid.errors import BadInput
 
@@ -19,18 +26,15 @@ LENGTH, HEIGHT = 2e-3, 1e-3
 
 def make_layer(name, material, low, cells, speed, pressure=(0.0, 0.0), p=0.0, **options):
     """A periodic layer from y = low up, free below and above; its block and the link."""
-    nodes = box((0.0, low), (LENGTH, low + HEIGHT), cells)
-    block = Block(name, material.eos, nodes, material.rho0, speed, 0.0, p)
-    put(block, "j_min", "free-surface", pressure=pressure[0], **options)
-    put(block, "j_max", "free-surface", pressure=pressure[1], **options)
+    block = make_body(name, material, box((0.0, low), (LENGTH, low + HEIGHT), cells), speed, p=p)
+    free(block, "j_min", pressure=pressure[0], **options)
+    free(block, "j_max", pressure=pressure[1], **options)
     return block, join("periodic", (block, "i_min"), (block, "i_max"))
 
 
 def make_floor():
-    nodes = box((0.0, -HEIGHT), (LENGTH, 0.0), (7, 2))
-    floor = Block("floor", AL.eos, nodes, AL.rho0, 0.0, 0.0, 0.0)
-    for side in SIDES:
-        put(floor, side, "wall")
+    floor = make_body("floor", "Al1100", box((0.0, -HEIGHT), (LENGTH, 0.0), (7, 2)))
+    wall_off(floor)
     return floor
 
 
@@ -38,17 +42,17 @@ def make_floor():
 def test_a_layer_on_an_incline(friction):
     """It is held back by mu g cos, to .5 %; all the work that it does is heat of the layer."""
     g, tilt, speed, t_end = 1e7, 0.5, 100.0, 1.2e-6
-    layer, link = make_layer("layer", CU, 0.0, (10, 8), speed, friction=friction)
+    layer, link = make_layer("layer", "Cu", 0.0, (10, 8), speed, friction=friction)
     y = 0.5 * (layer.nodes[1, 1:, 1:] + layer.nodes[1, :-1, :-1])
     layer.state[P, 1:-1, 1:-1] = CU.rho0 * g * np.cos(tilt) * (HEIGHT - y)
     layer.state[RHO, 1:-1, 1:-1] += (
         layer.state[P, 1:-1, 1:-1] / float(CU.eos.sound_speed(CU.rho0, 0.0)) ** 2
     )
-    simulation = make_stack(
-        [layer, make_floor()], t_end, links=[link],
+    simulation = Simulation(
+        [layer, make_floor()], [link], t_end=t_end,
         source=make_gravity(g * np.sin(tilt), -g * np.cos(tilt)),
     )  # fmt: skip
-    rows = advance(simulation)
+    rows = march_whole(simulation)
     assert rows[-1]["contacts_made"] == 1 and rows[-1]["contacts_opened"] == 0
     held = g * np.sin(tilt) - (mean_speed(layer) - speed) / t_end
     assert held == pytest.approx(friction * g * np.cos(tilt), rel=5e-3, abs=1e-9 * g)
@@ -57,12 +61,12 @@ def test_a_layer_on_an_incline(friction):
 
 def make_layers(friction=0.0, weld=False, p=2e8, speed=100.0):
     options = {"friction": friction} if not weld else {"weld": True}
-    low, one = make_layer("low", AL, 0.0, (8, 8), -speed, (p, 0.0), p, **options)
-    high, other = make_layer("high", CU, HEIGHT, (10, 6), speed, (0.0, p), p, **options)
+    low, one = make_layer("low", "Al1100", 0.0, (8, 8), -speed, (p, 0.0), p, **options)
+    high, other = make_layer("high", "Cu", HEIGHT, (10, 6), speed, (0.0, p), p, **options)
     for block in (low, high):
         rho, c = block.state[RHO, 1, 1], float(block.eos.sound_speed(block.state[RHO, 1, 1], 0.0))
         block.state[RHO, 1:-1, 1:-1] = rho + p / c**2
-    return (low, high), make_stack([low, high], 4e-7, links=[one, other])
+    return (low, high), Simulation([low, high], [one, other], t_end=4e-7)
 
 
 def measure_heat(block):
@@ -78,7 +82,7 @@ def test_layers_rub_on_each_other():
     heat = [measure_heat(block) for block in (low, high)]
     speeds = [mean_speed(block) for block in (low, high)]
     masses = [block.sums[CONSERVED][0] for block in (low, high)]
-    rows = advance(simulation)
+    rows = march_whole(simulation)
     for block, speed, mass, sign in zip((low, high), speeds, masses, (1.0, -1.0), strict=True):
         push = mass * (mean_speed(block) - speed) / (4e-7 * LENGTH)
         assert push == pytest.approx(sign * 0.2 * 2e8, rel=1e-2)
@@ -96,7 +100,7 @@ def test_layers_rub_on_each_other():
 def test_welded_layers_do_not_slip():
     """The cells beside the weld go together after a few steps."""
     (low, high), simulation = make_layers(weld=True)
-    rows = advance(simulation)
+    rows = march_whole(simulation)
     slip = high.state[U, 1:-1, 1].mean() - low.state[U, 1:-1, -2].mean()
     assert abs(slip) < 1.0
     check_budget(rows, names=("energy",))
@@ -105,12 +109,12 @@ def test_welded_layers_do_not_slip():
 def test_a_layer_at_rest_sticks():
     """Below the angle of friction the cells on the floor stay where they are."""
     g, tilt = 1e7, 0.2
-    layer, link = make_layer("layer", CU, 0.0, (6, 2), 0.0, friction=0.4)
-    simulation = make_stack(
-        [layer, make_floor()], 5e-7, links=[link],
+    layer, link = make_layer("layer", "Cu", 0.0, (6, 2), 0.0, friction=0.4)
+    simulation = Simulation(
+        [layer, make_floor()], [link], t_end=5e-7,
         source=make_gravity(g * np.sin(tilt), -g * np.cos(tilt)),
     )  # fmt: skip
-    advance(simulation)
+    march_whole(simulation)
     assert np.abs(layer.state[U, 1:-1, 1]).max() < 0.05 * g * np.sin(tilt) * 5e-7
 
 
@@ -120,28 +124,25 @@ def test_a_layer_at_rest_sticks():
 )
 def test_nonsense_is_bad_input(options, words):
     with pytest.raises(BadInput, match=rf"block 'layer', side j_min.*{words}"):
-        make_layer("layer", CU, 0.0, (4, 2), 0.0, **options)
+        make_layer("layer", "Cu", 0.0, (4, 2), 0.0, **options)
 
 
 def test_friction_on_a_wall_is_bad_input():
-    block = Block("b", CU.eos, box((0.0, 0.0), (1.0, 1.0), (2, 2)), CU.rho0, 0.0, 0.0, 0.0)
+    block = make_body("b", "Cu", box((0.0, 0.0), (1.0, 1.0), (2, 2)))
     with pytest.raises(BadInput, match=r"block 'b', side j_min: wall segment: 'friction' is given"):
-        put(block, "j_min", "wall", friction=0.1)
+        wall_off(block, "j_min", friction=0.1)
 
 
 def test_a_block_slides_off_the_end_of_another():
     """Without weight it goes on as it was; after the end it flies freely: 1e-10."""
     speed, length = 1000.0, 1e-3
-    low = Block("low", AL.eos, box((0.0, -1e-3), (2e-3, 0.0), (20, 10)), AL.rho0, 0.0, 0.0, 0.0)
-    high = Block(
-        "high", CU.eos, box((8e-4, 0.0), (8e-4 + length, 5e-4), (11, 5)), CU.rho0, speed, 0.0, 0.0
-    )
+    low = make_body("low", "Al1100", box((0.0, -1e-3), (2e-3, 0.0), (20, 10)))
+    high = make_body("high", "Cu", box((8e-4, 0.0), (8e-4 + length, 5e-4), (11, 5)), speed)
     for block in (low, high):
-        for side in SIDES:
-            put(block, side, "free-surface")
+        free(block)
     first = [block.nodes.copy() for block in (low, high)]
-    simulation = make_stack([low, high], 1.6e-6)
-    rows = advance(simulation)
+    simulation = Simulation([low, high], [], t_end=1.6e-6)
+    rows = march_whole(simulation)
     assert max(row["contact_length"] for row in rows[1:]) == pytest.approx(length, rel=1e-2)
     assert rows[-1]["contact_length"] == 0.0
     t = simulation.t

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import check_budget
+from builders import check_budget, march_measured
 from problems.plate_on_wedge.report import measure_contact_speed
 from runs.deck.reading import read_deck
 
@@ -23,15 +23,11 @@ def test_a_plate_that_starts_above_the_wedge(deck, settings, bar):
     """A runs as theory says; cells stay convex, steps long, all is conserved to the end."""
     problem = read_deck(deck, settings).make_problem()
     run = problem.build()
-    rows = [run.start_row() | {"t": 0.0}]
-    while not run.finished:
-        row = run.advance()
-        rows.append({**row, **problem.measure(run)})
-    history = {name: np.array([row[name] for row in rows[1:]]) for name in ("t", "contact_path")}
-    speed, _ = measure_contact_speed(problem, history)
+    history = march_measured(problem, run)
+    late = {name: values[1:] for name, values in history.items()}
+    speed, _ = measure_contact_speed(problem, late)
     assert speed == pytest.approx(problem.collision.contact_speed, rel=bar)
     assert np.isfinite(run.times["arrived"]) and run.finished != "t_end reached"
-    assert max(row["cells_not_convex"] for row in rows) == 0
-    dts = np.array([row["dt"] for row in rows[4:-1]])
-    assert dts.min() > 1e-4 * dts.max()
-    check_budget(rows, names=("momentum_y", "energy"))
+    assert late["cells_not_convex"].max() == 0
+    assert late["dt"][3:-1].min() > 1e-4 * late["dt"].max()
+    check_budget(history, names=("momentum_y", "energy"))

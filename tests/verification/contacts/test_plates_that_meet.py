@@ -2,21 +2,14 @@
 
 import numpy as np
 import pytest
-from plates import (
-    advance,
-    find_event,
-    make_plate,
-    make_stack,
-    mean_speed,
-    middle_row,
-    take_plateau,
-)
+from plates import find_event, make_plate, mean_speed, middle_row, take_plateau
 from wave_diagram import find_impact, find_parting
 
-from builders import check_budget
+from builders import check_budget, march_whole
 from hydro.eos import IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
 from hydro.rows import P, U
+from hydro.simulation import Simulation
 
 GAP = 1e-3
 GAS = IdealGas(1.4), 1.2
@@ -46,8 +39,7 @@ def test_impact_over_a_gap(flyer, target, speed, cells, p, after):
     """
     one = make_plate("flyer", flyer, (0.0, 3e-3), cells[0], speed, 3, p=p)
     other = make_plate("target", target, (3e-3 + GAP, 7e-3), cells[1], p=p)
-    simulation = make_stack([one, other], GAP / speed + after)
-    rows = advance(simulation)
+    rows = march_whole(Simulation([one, other], [], t_end=GAP / speed + after))
     assert find_event(rows, "contacts_made") == pytest.approx(GAP / speed, rel=1e-6)
     assert rows[-1]["contacts_made"] == 1 and rows[-1]["contacts_opened"] == 0
     assert rows[-1]["contact_length"] == pytest.approx(1e-3, rel=1e-9)
@@ -68,8 +60,7 @@ def test_equal_plates():
     one = make_plate("flyer", "Cu", (0.0, thickness), 100, speed)
     other = make_plate("target", "Cu", (thickness + 1e-4, 2 * thickness + 1e-4), 100)
     impact = 1e-4 / speed
-    simulation = make_stack([one, other], impact + 1.5 * parting.time)
-    rows = advance(simulation)
+    rows = march_whole(Simulation([one, other], [], t_end=impact + 1.5 * parting.time))
     assert find_event(rows, "contacts_opened") - impact == pytest.approx(parting.time, rel=1e-2)
     assert (rows[-1]["contacts_made"], rows[-1]["contacts_opened"]) == (1, 1)
     assert mean_speed(one) == pytest.approx(parting.flyer_speed, abs=3e-3 * speed)
@@ -83,8 +74,7 @@ def test_thin_soft_flyer_leaves_a_stiff_target():
     parting = find_parting(take("Al1100"), take("SS304"), speed, thickness)
     one = make_plate("flyer", "Al1100", (0.0, thickness), 100, speed)
     other = make_plate("target", "SS304", (thickness + 1e-4, 4e-3), 150)
-    simulation = make_stack([one, other], 1e-7 + 1.3 * parting.time)
-    rows = advance(simulation)
+    rows = march_whole(Simulation([one, other], [], t_end=1e-7 + 1.3 * parting.time))
     assert find_event(rows, "contacts_opened") - 1e-7 == pytest.approx(parting.time, rel=1e-2)
     assert mean_speed(one) == pytest.approx(parting.flyer_speed, rel=5e-3)
     check_budget(rows)
@@ -108,8 +98,7 @@ def test_three_plates(cells, bar):
         )
         for k, name in enumerate(("first", "second", "third"))
     ]  # fmt: skip
-    simulation = make_stack(blocks, 2.0 * gap / speed + 1.4e-6)
-    rows = advance(simulation)
+    rows = march_whole(Simulation(blocks, [], t_end=2.0 * gap / speed + 1.4e-6))
     assert rows[-1]["contacts_made"] == 2 and rows[-1]["contacts_opened"] == 2
     left = find_parting(take("Cu"), None, speed, thickness).flyer_speed
     for block, wanted in zip(blocks, (left, left, speed - 2.0 * left), strict=True):
@@ -129,9 +118,9 @@ def test_free_stream(gap):
     """Bodies that go side by side, touching or not, are not changed: 1e-12."""
     blocks = make_touching((300.0, 300.0))
     blocks[1].nodes[0] += gap
-    simulation = make_stack(blocks, 1e-6)
+    simulation = Simulation(blocks, [], t_end=1e-6)
     first = [block.nodes.copy() for block in blocks]
-    rows = advance(simulation)
+    rows = march_whole(simulation)
     for block, nodes in zip(blocks, first, strict=True):
         rho, u, v, p = block.state[:, 1:-1, 1:-1]
         assert np.abs(rho / rho[0, 0] - 1.0).max() < 1e-12
@@ -144,7 +133,7 @@ def test_free_stream(gap):
 
 def test_bodies_that_part_leave_at_once():
     blocks = make_touching((-50.0, 50.0))
-    rows = advance(make_stack(blocks, 2e-7))
+    rows = march_whole(Simulation(blocks, [], t_end=2e-7))
     for block, speed in zip(blocks, (-50.0, 50.0), strict=True):
         assert np.abs(block.state[U, 1:-1, 1:-1] - speed).max() < 1e-12 * 5000.0
     assert rows[-1]["contact_length"] == 0.0

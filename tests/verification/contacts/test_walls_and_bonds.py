@@ -2,27 +2,36 @@
 
 import numpy as np
 import pytest
-from plates import advance, find_event, make_plate, make_stack, mean_speed, middle_row
+from plates import find_event, make_plate, mean_speed, middle_row
 
-from builders import SIDES, box, check_budget, find_unexplained, wall_off
+from builders import (
+    box,
+    check_budget,
+    check_restarts,
+    find_unexplained,
+    free,
+    get_bits,
+    make_body,
+    march,
+    march_whole,
+    wall_off,
+)
 from hydro.block import Block
-from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.eos.materials import find_material
 from hydro.rows import P, U
+from hydro.simulation import Simulation
 from regrid.errors import BadInput
+from thread_ranks import march_on_ranks
 
 AL = find_material("Al1100")
 
 
 def make_base(height):
     """A block of two cells whose side at x = 0 is a rigid wall."""
-    steel = find_material("SS304")
-    nodes = box((-2e-2, -1e-3), (0.0, height), (2, 3))
-    block = Block("base", steel.eos, nodes, steel.rho0, 0.0, 0.0, 0.0)
-    for side in SIDES:
-        put(block, side, "wall")
-    return block
+    base = make_body("base", "SS304", box((-2e-2, -1e-3), (0.0, height), (2, 3)))
+    wall_off(base)
+    return base
 
 
 @pytest.mark.parametrize(
@@ -45,11 +54,10 @@ def test_a_gas_bounces_off_a_wall(mach, cells, kept):
     speed, gap = mach * c, 2e-4
     nodes = box((gap, 0.0), (gap + 1e-2, 2e-2), (cells, 2))
     ball = Block("ball", gas, nodes, 1.2, -speed, 0.0, 1e5)
-    for side in ("i_min", "i_max"):
-        put(ball, side, "free-surface", pressure=1e5)
+    free(ball, "i_min", "i_max", pressure=1e5)
     wall_off(ball)
-    simulation = make_stack([ball, make_base(3e-2)], gap / speed + 2.6e-2 / c)
-    rows = advance(simulation)
+    t_end = gap / speed + 2.6e-2 / c
+    rows = march_whole(Simulation([ball, make_base(3e-2)], [], t_end=t_end))
     met = find_event(rows, "contacts_made")
     assert met == pytest.approx(gap / speed, rel=1e-6)
     assert find_event(rows, "contacts_opened") - met == pytest.approx(2e-2 / c, rel=0.02 + mach)
@@ -65,7 +73,7 @@ def make_pair(bonds, speed=10.0):
             ("left", "right"), ((0.0, 1e-3), (1e-3, 2e-3)), (-1, 1), bonds, strict=True
         )
     ]
-    return blocks, make_stack(blocks, 1e-7)
+    return blocks, Simulation(blocks, [], t_end=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -74,7 +82,7 @@ def make_pair(bonds, speed=10.0):
 def test_a_bond_holds_the_tension_it_can(bonds, holds):
     """Plates that would part at 2 x 10 m/s pull at each other with rho c 10 m/s = 146 MPa."""
     blocks, simulation = make_pair(bonds)
-    rows = advance(simulation)
+    rows = march_whole(simulation)
     tension = AL.rho0 * float(AL.eos.sound_speed(AL.rho0, 0.0)) * 10.0
     p, u = (middle_row(blocks[0], row)[-5:] for row in (P, U))
     if holds:
@@ -93,31 +101,34 @@ def test_nonsense_bonds_are_bad_input(bond):
         make_plate("plate", "Al1100", (0.0, 1e-3), 4, bond=bond)
 
 
-def make_flight():
+def make_flight(t_end=4e-7):
     blocks = [
         make_plate("flyer", "Al1100", (0.0, 5e-4), 20, 1000.0, 3),
         make_plate("target", "SS304", (5.5e-4, 2e-3), 30),
     ]
-    return blocks, make_stack(blocks, 4e-7)
+    return Simulation(blocks, [], t_end=t_end)
+
+
+COLUMNS = ("t", "dt_limit", "total_energy", "contacts_made", "contacts_opened", "contact_length")
 
 
 def test_restarts_within_an_event_have_the_same_bits():
-    """Started anew at every step from the touch on, up to and beyond the opening."""
-    _, one = make_flight()
-    states, rows = [], []
-    while not one.finished:
-        rows.append(one.advance())
-        states.append(one.get_state())
-    assert rows[-1]["contacts_opened"] == 1
-    touch = next(k for k, row in enumerate(rows) if row["dt_limit"] == "touch")
-    opened = next(k for k, row in enumerate(rows) if row["contacts_opened"])
-    for at in (touch - 1, touch, touch + 1, opened - 1, opened, opened + 1):
-        _, other = make_flight()
-        other.set_state(states[at])
-        for k in range(at + 1, min(at + 4, len(rows))):
-            row = other.advance()
-            for name in ("t", "total_energy", "contacts_made", "contacts_opened", "contact_length"):
-                assert row[name] == rows[k][name]
-            new = other.get_state()
-            for name, array in states[k].items():
-                assert np.array_equal(new[name], array), name
+    """Started anew at steps from the touch on, up to and beyond the opening."""
+
+    def find_places(rows, states):
+        touch = next(k for k, row in enumerate(rows) if row["dt_limit"] == "touch")
+        opened = next(k for k, row in enumerate(rows) if row["contacts_opened"])
+        return touch - 1, touch, touch + 1, opened - 1, opened, opened + 1
+
+    check_restarts(make_flight, find_places, COLUMNS)
+
+
+def test_ranks_have_the_same_bits():
+    """Through the touch and after it."""
+    alone = make_flight()
+    rows = march(alone, 40)
+    assert any(row["dt_limit"] == "touch" for row in rows) and rows[-1]["contact_length"] > 0.0
+    found, there = march_on_ranks(2, make_flight, 40)
+    for one, other in zip(rows, found, strict=True):
+        assert [one[name] for name in COLUMNS] == [other[name] for name in COLUMNS]
+    assert get_bits(there) == get_bits(alone)

@@ -23,8 +23,7 @@ from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.links import join, slide
 from hydro.simulation import Simulation
-from problems.plate_on_wedge.problem import PlateOnWedge
-from problems.plate_on_wedge.set_up import PlateOnWedgeDeck
+from problems.plate_on_wedge.problem import PlateOnWedge, PlateOnWedgeDeck
 
 CASES = ("interface", "sliding, equal nodes", "sliding")
 

@@ -14,14 +14,13 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
-from problems.plate_on_wedge.problem import PlateOnWedge
+from problems.plate_on_wedge.problem import PlateOnWedge, PlateOnWedgeDeck
 from problems.plate_on_wedge.report import (
     measure_behind,
     measure_contact_speed,
     measure_lead,
     measure_plateau,
 )
-from problems.plate_on_wedge.set_up import PlateOnWedgeDeck
 from regrid.errors import RunFailure
 
 DIGITS = 6  # of the numbers handed on

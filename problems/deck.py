@@ -27,6 +27,7 @@ from regrid.equidistribution.weights import FIELDS, GEOMETRY, Expression
 from regrid.errors import BadInput
 
 if TYPE_CHECKING:
+    from hydro.eos.materials import Material
     from regrid.protocol import Regridder
 
 MOST_CELLS = 100_000  # along a side: arrays of one line stay small, whatever a deck says
@@ -334,3 +335,18 @@ def check_digests(digests: Mapping[str, str]) -> None:
                 f"{name} has changed since this deck was stored (key digests): restore the file, "
                 "or start a new run"
             )
+
+
+def check_solid(key: str, label: str, material: Material) -> None:
+    """Raise BadInput for a body's material that burns, or has no sound speed at p = 0."""
+    eos, rho = material.eos, material.rho0
+    if eos.kind == "jwl":
+        raise BadInput(
+            f"deck: {key} is {label!r}, an explosive; nothing burns in this problem and its "
+            "equation of state is that of the burnt products; use an inert material"
+        )
+    if not float(eos.sound_speed(rho, 0.0)) > 0.0:
+        why = "which has no sound speed at p = 0; it must be a condensed material"
+        if eos.kind == "tabular":
+            why = f"whose table must hold p = 0 at its density, {rho:g} kg/m3"
+        raise BadInput(f"deck: {key} is {label!r}, {why}")

@@ -24,28 +24,29 @@ def spread_dumps(run_data, count: int) -> list:
 
 def draw_field(
     axis, dump, values, *, colours="viridis", low=None, high=None, every=0, lines=(), bar="",
-    title="",
+    title="", mm=False,
 ):  # fmt: skip
     """Draw a field of all blocks of a dump on an axis; returns the picture for a colour bar.
 
     values: a name of `cell_fields` or a function `block -> (ni, nj)`; every: draw each so many
     grid lines, 0 none; lines: polylines (2, n) drawn over it; bar: words at a colour bar, none
-    without; title: above the panel, "t" for the time.
+    without; title: above the panel, "t" for the time; mm: lengths in millimetres.
     """
     make = values if callable(values) else (lambda block: block.cell_fields[values])
     fields = [make(block) for block in dump.blocks]
     low = min(float(np.nanmin(field)) for field in fields) if low is None else low
     high = max(float(np.nanmax(field)) for field in fields) if high is None else high
-    picture = None
+    picture, scale, unit = None, 1e3 if mm else 1.0, "mm" if mm else "m"
     for block, found in zip(dump.blocks, fields, strict=True):
-        x, y = block.nodes
+        x, y = nodes = scale * block.nodes
         picture = axis.pcolormesh(x, y, found, cmap=colours, vmin=low, vmax=high, rasterized=True)
         if every:
-            draw_grid(axis, block.nodes, every)
+            draw_grid(axis, nodes, every)
     for line in lines:
-        axis.plot(line[0], line[1], color="w", lw=0.8)
+        axis.plot(scale * line[0], scale * line[1], color="w", lw=0.8)
     axis.set_aspect("equal")
-    axis.set(**dict(zip(("xlabel", "ylabel"), (f"{name} [m]" for name in dump.axes), strict=True)))
+    xlabel, ylabel = (f"{name} [{unit}]" for name in dump.axes)
+    axis.set(xlabel=xlabel, ylabel=ylabel)
     if bar:
         axis.figure.colorbar(picture, ax=axis, shrink=0.8, label=bar)
     if title:

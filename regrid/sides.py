@@ -31,6 +31,12 @@ def get_side(nodes: np.ndarray, name: str) -> np.ndarray:
     return nodes[SLICES[name]]
 
 
+def trace_outline(nodes: np.ndarray) -> np.ndarray:
+    """The four sides as one closed polyline (2, n), from j_min on through i_max."""
+    i_min, i_max, j_min, j_max = get_sides(nodes)
+    return np.concatenate((j_min, i_max, j_max[:, ::-1], i_min[:, ::-1]), axis=1)
+
+
 @kernel
 def compute_area(sides):
     """Signed area inside the polygon of the four sides, positive when i, j turn anticlockwise."""

@@ -34,22 +34,17 @@ from hydro.block import Block
 from hydro.eos.materials import Material, find_material, make_material
 from hydro.simulation import Simulation
 from problems.conical_target.layout import MATERIALS, Layout, Ripple
-from problems.conical_target.pictures import draw_configuration, draw_graphite
 from problems.conical_target.report import (
     GAUGES,
     MEASURED_NUMBERS,
     MIDDLE,
     PEAK_UNITS,
-    draw_gauges,
-    draw_ripple,
-    draw_shock,
-    draw_side,
     find_peaks,
-    make_summary,
+    make_report,
     measure_block,
     measure_departure,
 )
-from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, key
+from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, check_solid, key
 from problems.problem import BlockPlan, Problem, Report, Row, check_memory, find_crossing
 from problems.references.hugoniot import find_rise, shock_to_pressure
 from regrid.errors import BadInput
@@ -150,17 +145,7 @@ class ConicalTarget(Problem):
             name: _find_material(deck, name) for name in ("impactor", "shell", "target", "filling")
         }
         for name, material in self.materials.items():
-            if material.eos.kind == "jwl":
-                raise BadInput(
-                    f"deck: {name} is {getattr(deck, name)!r}, an explosive; nothing burns in this "
-                    "problem and its equation of state is that of the burnt products; use an inert "
-                    "material"
-                )
-            if not float(material.eos.sound_speed(material.rho0, 0.0)) > 0.0:
-                why = "which has no sound speed at p = 0; it must be a condensed material"
-                if material.eos.kind == "tabular":
-                    why = f"whose table must hold p = 0 at its density, {material.rho0:g} kg/m3"
-                raise BadInput(f"deck: {name} is {getattr(deck, name)!r}, {why}")
+            check_solid(name, getattr(deck, name), material)
         for low, high, what in (
             ("tip", "base", "the cone narrows from its base to its tip"),
             ("base", "radius", "there must be lead between the cone and the shell"),
@@ -297,27 +282,16 @@ class ConicalTarget(Problem):
         first, last = PLATEAU
         return first * self.impact[2], last * self.impact[2]
 
-    def find_plateau(self, history) -> float:
-        """Mean pressure of the face's second cell of steel during `plateau` [Pa]; 0 before."""
-        t = np.asarray(history["t"])
-        chosen = (t > self.plateau[0]) & (t < self.plateau[1])
-        return float(np.asarray(history["pressure_impact"])[chosen].mean()) if chosen.any() else 0.0
-
     def report(self, history, final=None) -> Report:
         if not history:
             return Report(rows=[Row("impact", theory=self.impact[0])])
-        impact = Row("impact", self.find_plateau(history), self.impact[0], error="impact")
-        return Report(lambda: make_summary(self, history), [impact])
+        return make_report(self, history)
 
     def figures(self):
-        ripple = {"ripple": functools.partial(draw_ripple, self)} if self.ripple else {}
-        return ripple | {
-            "conical-target": functools.partial(draw_configuration, self),
-            "gauges": functools.partial(draw_gauges, self),
-            "graphite": functools.partial(draw_graphite, self),
-            "converging-shock": functools.partial(draw_shock, self),
-            "cone-side": functools.partial(draw_side, self),
-        }
+        from problems.conical_target.pictures import FIGURES, draw_ripple
+
+        draws = ({"ripple": draw_ripple} if self.ripple else {}) | FIGURES
+        return {name: functools.partial(draw, self) for name, draw in draws.items()}
 
 
 def _find_material(deck: ConicalTargetDeck, name: str) -> Material:

@@ -1,4 +1,4 @@
-"""Summary and curves of `conical-target`: pressures, the shock, its side, ripples.
+"""Report of `conical-target`: pressures, the shock, the cone's side, ripples.
 
 Each wave of a ripple has its own clock, which starts when the shock along the side is at its
 middle.  Theory is that of ripples of small slope behind shocks that cross a line; the speed of the
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydro.block import Block
+from problems.problem import Report, Row
 from problems.references.shock_polars import CrossedLine
 from regrid.measure.corners import compute_centres
 
@@ -62,27 +63,10 @@ def find_peak(history, part: str) -> tuple[float, float, float, float]:
     return tuple(float(history[name][k]) for name in names)
 
 
-def make_peak_lines(deck, history) -> list[str]:
-    """The greatest pressure of all, and each material's, as lines of text."""
-    peaks = {part: find_peak(history, part) for part in PARTS}
-    first = max(PARTS, key=lambda part: peaks[part][0])
-    lines = [f"  greatest pressure of all: {format_peak(peaks[first])}, in {getattr(deck, first)}"]
-    for part in PARTS:
-        lines.append(f"    {part}, {getattr(deck, part)}: {format_peak(peaks[part])}")
-    return lines
-
-
-def format_peak(peak: tuple[float, float, float, float]) -> str:
-    """Pressure [Pa], time [s] and position x, y [m] of a peak in GPa, us and mm."""
-    p, t, x, y = peak
-    return f"{p * GPA:.3g} GPa at {t * US:.3g} us, x = {x * MM:.3g}, r = {y * MM:.3g} mm"
-
-
 GAUGES = (0.1, 0.5, 0.9)  # of the length of the graphite's axis, as it is at the time
 STATIONS = (0.25, 0.5, 0.75)  # of the cone's length at first: where the shock's speed is told
 WIDTH = 0.1  # of that length, to either side: the stretch over which a speed is fitted
 MIDDLE = (0.1, 0.9)  # of the cone's side by its length: its ends are drawn into roll-ups
-SHOWN = 6  # dumps in the picture of the side
 GROWTH = 0.5  # of the time from the first bend to the end: the latest stage
 
 
@@ -149,147 +133,6 @@ def measure_growth(history) -> tuple[float, float, float]:
     return float(t[begin]), *slopes
 
 
-def make_summary(problem, history) -> str:
-    """What was computed, beside theory where there is one, as lines of text."""
-    deck = problem.deck
-    peak = int(np.nanargmax(history["greatest_pressure"]))
-    plateau = problem.find_plateau(history)
-    face, off = "", ""
-    if plateau > 0.0:  # 0 before the shock is through the first cells
-        first, last = (US * t for t in problem.plateau)
-        face = f"{plateau * GPA:.5g} GPa, mean from {first:.2f} to {last:.2f} us, "
-        off = f" ({100.0 * (plateau / problem.impact[0] - 1.0):+.2f} %)"
-    changed = 100.0 * float(np.nanmax(history["transformed"]))
-    gauges = ", ".join(
-        f"{np.nanmax(history[f'pressure_gauge_{number}']) * GPA:.3g} GPa at {part:g}"
-        for number, part in enumerate(GAUGES)
-    )
-    lines = [
-        f"conical-target: {deck.impactor} at {deck.speed:g} m/s on {deck.shell}, "
-        f"{deck.filling} in {deck.target}, {deck.cells} cells to the shell",
-        f"  impact face: {face}impedances match at {problem.impact[0] * GPA:.5g} GPa{off}",
-        f"  greatest pressure in the cone {history['greatest_pressure'][peak] * GPA:.3g} GPa "
-        f"at t = {history['t'][peak] * US:.3g} us, x = {history['greatest_x'][peak] * MM:.3g}, "
-        f"r = {history['greatest_y'][peak] * MM:.2g} mm",
-        f"  on the axis at most {gauges} of its length",
-        f"  in the second phase at most {changed:.2g} % of it, "
-        f"{100.0 * history['transformed'][-1]:.2g} % at the end",
-    ]
-    for name, words in (("axis", "on its axis"), ("side", "along its side")):
-        passage = measure_passage(problem, history, name)
-        if np.isfinite(passage).any():
-            lines.append(f"  shock {words}:")
-            for station, (t, speed, p) in zip(STATIONS, passage, strict=True):
-                if math.isfinite(t):
-                    position = MM * (deck.front + station * deck.cone)
-                    lines.append(
-                        f"    x = {position:.4g} mm at {t * US:.3f} us, {speed / 1e3:.3g} km/s, "
-                        f"{p * GPA:.3g} GPa behind it"
-                    )
-    peaks = make_peak_lines(deck, history)
-    if problem.ripple:
-        return "\n".join([*lines, *peaks, *make_ripple_lines(problem, history)])
-    begin, first, late = measure_growth(history)
-    widest = int(np.nanargmax(history["line_amplitude"]))
-    lines.append(
-        f"  its side is {history['line_amplitude'][-1] * MM:.2g} mm (half of peak to peak) off its "
-        f"own straight line at the end, {history['line_bend'][-1] * MM:.2g} mm off its chord, and "
-        f"{history['line_length'][-1] / history['line_length'][0]:.3f} times as long as at first"
-    )
-    if math.isfinite(begin) and math.isfinite(first):
-        lines.append(
-            f"    it bends from {begin * US:.2f} us on, by {first:.3g} m/s at first and by "
-            f"{late:.3g} m/s in the latest half; most is "
-            f"{history['line_amplitude'][widest] * MM:.2g} mm at {history['t'][widest] * US:.2f} us"
-        )
-    return "\n".join([*lines, *peaks])
-
-
-def draw_gauges(problem, figure, run_data) -> None:
-    """Pressures over time: gauges on the axis, the greatest one and its place, the impact face."""
-    figure.set_size_inches(11.0, 4.2)
-    axis, peak_axes = figure.subplots(1, 2)
-    history = run_data.history
-    t = US * history["t"]
-    for number, part in enumerate(GAUGES):
-        p = history[f"pressure_gauge_{number}"]
-        axis.plot(t, p * GPA, label=f"axis, {part:g} of the cone")
-    axis.plot(t, history["greatest_pressure"] * GPA, "k:", label="greatest in the cone")
-    axis.plot(t, history["pressure_impact"] * GPA, color="0.6", label="impact face")
-    axis.axhline(problem.impact[0] * GPA, color="0.6", lw=0.6)
-    axis.set_ylabel("pressure, GPa")
-    inside = history["greatest_pressure"] > 0.01 * problem.impact[0]
-    for column, words, colour in (("x", "x", "k"), ("y", "r", "tab:red")):
-        values = np.where(inside, MM * history[f"greatest_{column}"], np.nan)
-        peak_axes.plot(t, values, ".", ms=2.0, color=colour, label=words)
-    peak = int(np.nanargmax(history["greatest_pressure"]))
-    peak_axes.axvline(t[peak], color="0.7", lw=0.8)
-    peak_axes.text(t[peak], 0.5, " peak", color="0.4", fontsize="small", va="bottom")
-    peak_axes.set_ylabel("place of the greatest pressure in the cone, mm")
-    for panel in (axis, peak_axes):
-        panel.set(xlabel="t, us", xlim=(0.0, t[-1]), ylim=(0.0, None))
-        panel.legend(
-            fontsize="small", frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0)
-        )
-    figure.set_layout_engine("constrained")
-
-
-def draw_shock(problem, figure, run_data) -> None:
-    """Place of the shock in the cone over time, pressure behind it and its speed over the place."""
-    figure.set_size_inches(11.0, 3.8)
-    path, pressure, speed = figure.subplots(1, 3)
-    for name, words in (("axis", "on the axis"), ("side", "along the side")):
-        t, x, p = get_shock_path(run_data.history, name)
-        path.plot(US * t, MM * x, label=words)
-        pressure.plot(MM * x, GPA * p, label=words)
-        positions = np.linspace(*x[[0, -1]], 40)[1:-1] if x.size > 8 else np.empty(0)
-        reach = WIDTH * problem.deck.cone
-        slopes = [_fit_slope(t, x, position, reach) for position in positions]
-        speed.plot(MM * positions, 1e-3 * np.array(slopes), label=words)
-    for axis, label in ((pressure, "greatest pressure just behind, GPa"), (speed, "speed, km/s")):
-        axis.set(xlabel="x of the shock, mm", ylabel=label)
-    path.set(xlabel="t, us", ylabel="x of the shock, mm")
-    path.legend(fontsize="small")
-    figure.set_layout_engine("constrained")
-
-
-def draw_side(problem, figure, run_data) -> None:
-    """The line between graphite and lead, its departure from its own straight line, growth."""
-    figure.set_size_inches(13.5, 4.0)
-    shape, away, growth = figure.subplots(1, 3)
-    dumps = run_data.dumps
-    chosen = np.unique(np.linspace(0, len(dumps) - 1, SHOWN).round().astype(int))
-    for dump in (dumps[number] for number in chosen):
-        line = _find_cone(dump).nodes[:, :, -1]
-        departure, part = measure_departure(line)
-        label = f"{US * dump.t:.2g} us"
-        shape.plot(*(MM * line), lw=1.0, label=label)
-        away.plot(part, MM * departure, lw=1.0, label=label)
-    shape.set(aspect="equal", xlabel="x, mm", ylabel="r, mm")
-    away.set(
-        xlabel="part of the side's length, from the base", ylabel="off its own straight line, mm"
-    )
-    for end in MIDDLE:
-        away.axvline(end, color="0.7", lw=0.6)
-    away.legend(fontsize="x-small")
-    history = run_data.history
-    t = US * history["t"]
-    growth.plot(t, MM * history["line_amplitude"], label="amplitude: half of peak to peak")
-    growth.plot(t, MM * history["line_bend"], ls="--", label="greatest distance from the chord")
-    growth.set(xlabel="t, us", ylabel="mm")
-    growth.legend(fontsize="small")
-    figure.set_layout_engine("constrained")
-
-
-def _find_cone(dump):
-    return next(block for block in dump.blocks if block.name == "cone")
-
-
-def _fit_slope(t: np.ndarray, x: np.ndarray, position: float, reach: float) -> float:
-    near = np.abs(x - position) < reach
-    return float(np.polyfit(t[near], x[near], 1)[0]) if near.sum() > 3 else math.nan
-
-
 AGES = (0.5e-6, 1.2e-6)  # after the passage: between them the rate of growth is told [s]
 COMPARABLE = 10.6  # cells a wave, 48 to the shell: growth of shorter ones is damped too much
 
@@ -348,125 +191,111 @@ def measure_waves(problem, history) -> tuple[CrossedLine | None, list[WaveGrowth
     return problem.ripple.cross(speed), waves
 
 
-def make_ripple_lines(problem, history) -> list[str]:
-    """The growth of the ripple beside theory, as lines of the summary."""
-    ripple = problem.ripple
-    lines = [
-        f"  ripple of {ripple.amplitude * MM:.3g} mm on waves of {ripple.wavelength * MM:.3g} mm "
-        f"on its side, k a = {ripple.wavenumber * ripple.amplitude:.3g}"
-    ]
-    if ripple.cells_a_wave < COMPARABLE:
-        wanted = math.ceil(problem.deck.cells * COMPARABLE / ripple.cells_a_wave)
-        lines.append(
-            f"    {ripple.cells_a_wave:.3g} cells a wave are too few to compare growth with "
-            f"theory: the thickness of the interface holds it back; cells={wanted} or more would do"
-        )
-    crossed, waves = measure_waves(problem, history)
-    if crossed is not None:
-        rates = crossed.compute_rates(ripple.wavenumber)
-        lines += [
-            f"    shocks cross the side at {crossed.speed / 1e3:.3g} km/s; polars: "
-            f"{crossed.p * GPA:.3g} GPa behind, the line turned by "
-            f"{math.degrees(crossed.deflection):.3g} degrees and moved across itself at "
-            f"{crossed.normal_speed:.3g} m/s",
-            f"    slip {crossed.slip:.3g} m/s, Atwood number {crossed.atwood:.3g}; rates of the "
-            f"impulse {rates[0] / US:.3g} and of the slip {rates[1] / US:.3g} a us",
-        ]
-    for number, wave in enumerate(waves):
-        told = f"    wave {number + 1}, passed at {wave.passed * US:.2f} us"
-        rate = wave.measure_rate()
-        if math.isfinite(rate):
-            told += f", grows by {rate / US:.3g} a us"
-            if crossed is not None:
-                told += f" (theory of small slopes {find_rate(ripple, crossed) / US:.3g})"
-            grown = wave.get_amplitude(AGES[1]) / wave.amplitude[0]
-            told += f" to {grown:.3g} times at {AGES[1] * US:.2g} us"
-        if np.isfinite(wave.amplitude).any():
-            top = int(np.nanargmax(wave.amplitude))
-            told += (
-                f"; at most {wave.amplitude[top] * MM:.3g} mm, k a = "
-                f"{ripple.wavenumber * wave.amplitude[top]:.2g}, at {history['t'][top] * US:.2f} us"
-            )
-        lines.append(told)
-    return lines
-
-
 def find_rate(ripple, crossed: CrossedLine) -> float:
     """Theory of `WaveGrowth.measure_rate` [1/s]."""
     first, last = crossed.compute_growth(ripple.wavenumber, np.array(AGES))
     return float(np.log(last / first)) / (AGES[1] - AGES[0])
 
 
-def draw_ripple(problem, figure, run_data) -> None:
-    """The rippled side at several times; amplitude over time and growth over age, with theory."""
-    figure.set_size_inches(11.0, 7.2)
-    grid = figure.add_gridspec(2, 2, height_ratios=(1.25, 1.0))
-    shape = figure.add_subplot(grid[0, :])
-    amplitude, growth = (figure.add_subplot(grid[1, column]) for column in (0, 1))
-    dumps, ripple = run_data.dumps, problem.ripple
-    chosen = np.unique(np.linspace(0, len(dumps) - 1, SHOWN).round().astype(int))
-    shades = _get_shades(len(chosen))
-    for shade, number in zip(shades, chosen, strict=True):
-        line = next(b for b in dumps[number].blocks if b.name == "cone").nodes[:, :, -1]
-        shape.plot(*(MM * line), color=shade, lw=1.4, label=f"{US * dumps[number].t:.2g} us")
-    shape.set(aspect="equal", xlabel="x, mm", ylabel="r, mm")
-    shape.set_title("line between graphite and lead", fontsize="medium")
-    shape.legend(fontsize="small", frameon=False, loc="upper right")
-    history = run_data.history
-    crossed, waves = measure_waves(problem, history)
-    t = np.asarray(history["t"], dtype=float)
-    for number, wave in enumerate(waves):
-        colour = f"C{number}"
-        amplitude.plot(US * t, MM * wave.amplitude, color=colour, label=f"wave {number + 1}")
-        grown = wave.age > 0.0
-        growth.plot(
-            US * wave.age[grown], wave.amplitude[grown] / wave.amplitude[0], color=colour,
-            label=f"wave {number + 1}",
-        )  # fmt: skip
-        if crossed is not None:
-            theory = wave.amplitude[0] * crossed.compute_growth(ripple.wavenumber, wave.age)
-            steep = MM * theory < 1.5 * np.nanmax(MM * _stack(waves))
-            amplitude.plot(US * t[steep], MM * theory[steep], "--", color=colour, lw=0.9)
-    amplitude.axhline(MM / ripple.wavenumber, color="0.6", lw=0.7)
-    amplitude.text(
-        0.05, MM / ripple.wavenumber, "k a = 1", color="0.4", fontsize="small", va="bottom"
+def measure_plateau(problem, history) -> float:
+    """Mean pressure of the face's second cell of steel during the plateau [Pa]; NaN before."""
+    t, (first, last) = np.asarray(history["t"]), problem.plateau
+    chosen = (t > first) & (t < last)
+    return (
+        float(np.asarray(history["pressure_impact"])[chosen].mean()) if chosen.any() else math.nan
     )
+
+
+def make_report(problem, history) -> Report:
+    """What was computed, beside theory where there is one."""
+    deck, gauges = problem.deck, enumerate(GAUGES)
+    words = "mean from {:.2f} to {:.2f} us; impedances match".format(
+        *(US * t for t in problem.plateau)
+    )
+    impact, label = measure_plateau(problem, history), "pressure on the impact face [GPa]"
+    rows = [Row("impact", impact, problem.impact[0], label, 1e9, 5, "impact", source=words)]
+
+    def tell(name: str, computed: float, label: str, unit: float = 1.0, source: str = "") -> None:
+        rows.append(Row(name, float(computed), label=label, unit=unit, digits=3, source=source))
+
+    for part in PARTS:
+        p, t, x, y = find_peak(history, part)
+        words = f"at {t * US:.3g} us, x = {x * MM:.3g}, r = {y * MM:.2g} mm"
+        label = f"greatest pressure in the {part}, {getattr(deck, part)} [GPa]"
+        tell(f"peak_{part}", p, label, 1e9, words)
+    for number, part in gauges:
+        p = np.nanmax(history[f"pressure_gauge_{number}"])
+        tell(f"gauge_{number}", p, f"the same on the axis at {part:g} of the cone [GPa]", 1e9)
+    words = f"{100.0 * history['transformed'][-1]:.2g} % at the end"
+    most = np.nanmax(history["transformed"])
+    tell("transformed", most, "most of the cone in the second phase [%]", 0.01, words)
+    for name, where in (("axis", "on the axis"), ("side", "along the side")):
+        for station, passage in zip(STATIONS, measure_passage(problem, history, name), strict=True):
+            t, speed, p = passage
+            if math.isfinite(t):
+                x = MM * (deck.front + station * deck.cone)
+                label = f"shock {where} at x = {x:.4g} mm [km/s]"
+                words = f"at {t * US:.3f} us, {p * GPA:.3g} GPa behind it"
+                tell(f"shock_{name}_{station:g}", speed, label, 1e3, words)
+    head = (
+        f"conical-target: {deck.impactor} at {deck.speed:g} m/s on {deck.shell}, "
+        f"{deck.filling} in {deck.target}, {deck.cells} cells to the shell"
+    )
+    if problem.ripple:
+        waves, notes = compare_waves(problem, history)
+        return Report(head, rows + waves, notes)
+    begin, first, late = measure_growth(history)
+    widest = int(np.nanargmax(history["line_amplitude"]))
+    top, when = (history[name][widest] for name in ("line_amplitude", "t"))
+    words = f"half of peak to peak at the end; at most {top * MM:.2g} mm at {when * US:.2f} us"
+    label = "side off its own straight line [mm]"
+    tell("line_amplitude", history["line_amplitude"][-1], label, 1e-3, words)
+    words = (
+        f"{history['line_length'][-1] / history['line_length'][0]:.3f} times as long as at first"
+    )
+    tell("line_bend", history["line_bend"][-1], "side off its chord at the end [mm]", 1e-3, words)
+    if math.isfinite(first):
+        words = f"from {begin * US:.2f} us on; {late:.3g} m/s in the latest half"
+        tell("line_growth", first, "growth of the side's amplitude at first [m/s]", 1.0, words)
+    return Report(head, rows)
+
+
+def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
+    """The growth of every wave of the ripple beside theory, and what it rests on."""
+    ripple, rows = problem.ripple, []
+    k, crossed, waves = ripple.wavenumber, *measure_waves(problem, history)
+    notes = [
+        f"ripple of {ripple.amplitude * MM:.3g} mm on waves of {ripple.wavelength * MM:.3g} mm on "
+        f"the cone's side, k a = {k * ripple.amplitude:.3g}"
+    ]
+    if ripple.cells_a_wave < COMPARABLE:
+        wanted = math.ceil(problem.deck.cells * COMPARABLE / ripple.cells_a_wave)
+        notes.append(
+            f"{ripple.cells_a_wave:.3g} cells a wave are too few to compare growth with theory: "
+            f"the thickness of the interface holds it back; cells={wanted} or more would do"
+        )
     if crossed is not None:
-        _draw_theory(growth, crossed, ripple.wavenumber, waves)
-    amplitude.set(xlabel="t, us", ylabel="amplitude, mm")
-    amplitude.legend(fontsize="small", frameon=False)
-    amplitude.set_title("dashed: theory of small slopes", fontsize="medium")
-    growth.set(xlabel="time since the shock was at the wave, us", ylabel="a / a0")
-    growth.legend(fontsize="small", frameon=False, ncols=2)
-    figure.set_layout_engine("constrained")
-
-
-def _draw_theory(axis, crossed: CrossedLine, wavenumber: float, waves) -> None:
-    """Impulse and slip together, and each alone, over the age."""
-    age = np.linspace(0.0, max(wave.age[-1] for wave in waves), 200)
-    impulse, shear = crossed.compute_rates(wavenumber)
-    plus = crossed.compression
-    axis.plot(US * age, crossed.compute_growth(wavenumber, age), "k--", lw=1.0, label="theory")
-    axis.plot(
-        US * age, plus * (1.0 + impulse * age), "-.", color="0.5", lw=0.8, label="impulse alone"
-    )
-    axis.plot(US * age, plus * np.cosh(shear * age), ":", color="0.5", lw=1.0, label="slip alone")
-    axis.set_yscale("log")
-    ticks = (0.8, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0)
-    axis.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
-    axis.set_yticks([], minor=True)
-    axis.set_ylim(0.75, 2.0 * np.nanmax(_stack(waves)) / _first(waves))
-
-
-def _stack(waves) -> np.ndarray:
-    return np.concatenate([wave.amplitude for wave in waves])
-
-
-def _first(waves) -> float:
-    return float(np.nanmean([wave.amplitude[0] for wave in waves]))
-
-
-def _get_shades(count: int) -> np.ndarray:
-    from matplotlib import colormaps
-
-    return colormaps["viridis"](np.linspace(0.0, 0.9, count))
+        impulse, slip = crossed.compute_rates(k)
+        notes += [
+            f"shocks cross the side at {crossed.speed / 1e3:.3g} km/s; polars: "
+            f"{crossed.p * GPA:.3g} GPa behind, the line turned by "
+            f"{math.degrees(crossed.deflection):.3g} degrees and moved across itself at "
+            f"{crossed.normal_speed:.3g} m/s",
+            f"slip {crossed.slip:.3g} m/s, Atwood number {crossed.atwood:.3g}; rates of the "
+            f"impulse {impulse / US:.3g} and of the slip {slip / US:.3g} a us",
+        ]
+    theory = find_rate(ripple, crossed) if crossed is not None else math.nan
+    for number, wave in enumerate(waves):
+        if not np.isfinite(wave.amplitude).any():
+            continue
+        words, top = [], int(np.nanargmax(wave.amplitude))
+        rate, grown = wave.measure_rate(), wave.get_amplitude(AGES[1]) / wave.amplitude[0]
+        if math.isfinite(rate):
+            words = ["theory of small slopes", f"a/a0 = {grown:.3g} at {AGES[1] * US:.2g} us"]
+        most = wave.amplitude[top]
+        words.append(
+            f"at most {most * MM:.3g} mm, k a = {k * most:.2g}, at {history['t'][top] * US:.2f} us"
+        )
+        label = f"wave {number + 1}, passed at {wave.passed * US:.2f} us: growth [1/us]"
+        rows.append(Row(f"growth_{number}", rate, theory, label, US, 3, source="; ".join(words)))
+    return rows, notes

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from problems.plate_on_wedge.report import MM, STEADY, choose_rows
-from problems.plate_on_wedge.set_up import PHASES
-from regrid.sides import get_sides
+from problems.plate_on_wedge.report import MM, PHASES, STEADY, choose_rows
+from problems.pictures import draw_field
+from regrid.sides import trace_outline
 
 PANELS = 6  # of the pictures that show phases
 SHADES = ("#c9d4e2", "#8c99a8", "#e2cfa9")
@@ -44,151 +44,107 @@ def _choose_dumps(run) -> list[tuple[str, object]]:
     return named
 
 
-def _frame(problem, chosen) -> list[tuple[float, float]]:
-    """Limits of x and y in mm that hold all bodies of the chosen dumps."""
-    corners = []
-    for _, dump in chosen:
-        for block in dump.blocks:
-            nodes = MM * problem.to_set_up(block.nodes)
-            corners += [nodes.min(axis=(1, 2)), nodes.max(axis=(1, 2))]
-    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
-    margin = 0.03 * (high - low).max()
-    return list(zip(low - margin, high + margin, strict=True))
-
-
-def _make_panels(problem, figure, chosen, room: float):
-    """Axes of equal frames in rows of three, only the outer ones with labels; `room`: to the right.
+def _make_panels(figure, chosen, room: float):
+    """Axes of equal frames that hold all bodies, in rows of three; `room` [inch]: to the right.
 
     The figure is made as high as the frames need.
     """
-    frame = _frame(problem, chosen)
+    nodes = [block.nodes.reshape(2, -1) for _, dump in chosen for block in dump.blocks]
+    places = MM * np.concatenate(nodes, axis=1)
+    low, high = places.min(axis=1), places.max(axis=1)
+    margin, width = 0.03 * (high - low).max(), 4.6
+    low, high = low - margin, high + margin
     columns = min(3, len(chosen))
     rows = -(-len(chosen) // columns)
-    (left, right), (low, high) = frame
-    width = 4.6
-    figure.set_size_inches(
-        width * columns + room, (width * (high - low) / (right - left) + 0.25) * rows + 0.35
-    )
-    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    figure.set_layout_engine("constrained", h_pad=0.08)
-    for number, panel in enumerate(axes.flat):
-        if number >= len(chosen):
-            panel.set_visible(False)
-            continue
-        panel.set_title(chosen[number][0], fontsize=10)
-        panel.set_aspect("equal")
-        panel.set_xlim(*frame[0])
-        panel.set_ylim(*frame[1])
-        if number + columns >= len(chosen):
-            panel.set_xlabel("x [mm]")
-            panel.tick_params(labelbottom=True)
-        if number % columns == 0:
-            panel.set_ylabel("y [mm]")
-    return list(axes.flat)[: len(chosen)]
+    height = width * (high[1] - low[1]) / (high[0] - low[0]) + 0.25
+    figure.set_size_inches(width * columns + room, height * rows + 0.35)
+    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for panel, (title, _) in zip(axes, chosen, strict=False):
+        panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+        panel.set_title(title, fontsize=10)
+    for panel in axes[len(chosen) :]:
+        panel.set_visible(False)
+    return axes[: len(chosen)]
 
 
-def _draw_pressure(axes, problem, dump, top: float, mesh: bool):
-    """Pressure of all blocks in the set-up's frame, in mm and GPa; returns what a bar needs."""
-    for block in dump.blocks:
-        x, y = MM * problem.to_set_up(block.nodes)
-        style = {"edgecolors": (0.0, 0.0, 0.0, 0.35), "linewidth": 0.15} if mesh else {}
-        image = axes.pcolormesh(
-            x, y, block.cell_fields["p"] / 1e9, vmin=0.0, vmax=top, cmap="turbo", **style
-        )
-        for line in get_sides(np.array([x, y])):
-            axes.plot(*line, color="k", lw=0.8)
-    return image
-
-
-def _top_pressure(problem, run) -> float:
+def _draw_pressure(axes, problem, run, dump, **more):
+    """Pressure [GPa] of all blocks with the grid, on one scale for the whole run."""
     if problem.collision.attached:
-        return 1.1 * problem.collision.p / 1e9
-    return max(float(np.percentile(b.cell_fields["p"], 99.5)) for b in run.dumps[-1].blocks) / 1e9
+        top = 1.1 * problem.collision.p / 1e9
+    else:
+        last = run.dumps[-1].blocks
+        top = max(float(np.percentile(block.cell_fields["p"], 99.5)) for block in last) / 1e9
+    style = {"colours": "turbo", "low": 0.0, "high": top, "every": 1, "mm": True}
+    return draw_field(axes, dump, lambda block: block.cell_fields["p"] / 1e9, **style, **more)
 
 
 def draw_phases(problem, figure, run) -> None:
     """Pressure with the grid at the phases, side by side, all in one frame."""
     chosen = _choose_dumps(run)
-    panels = _make_panels(problem, figure, chosen, 0.9)
-    top = _top_pressure(problem, run)
+    panels = _make_panels(figure, chosen, 0.9)
     for axes, (_, dump) in zip(panels, chosen, strict=True):
-        image = _draw_pressure(axes, problem, dump, top, True)
+        image = _draw_pressure(axes, problem, run, dump)
+        axes.label_outer()
     figure.colorbar(image, ax=panels, label="pressure [GPa]", extend="max", pad=0.01)
 
 
 def draw_contact(problem, figure, run) -> None:
     """Zooms at the contact point and at the end of the face; A's path and speed against theory."""
-    history = run.history
+    history, theory = run.history, problem.collision.contact_speed
     figure.set_size_inches(12.0, 8.5)
-    axes = [figure.add_subplot(2, 2, number + 1) for number in range(4)]
-    top = _top_pressure(problem, run)
-    t, x, y = (np.asarray(history[name], dtype=float) for name in ("t", "contact_x", "contact_y"))
+    zooms, (paths, speeds) = figure.subplots(2, 2)
+    t, path = (np.asarray(history[name], dtype=float) for name in ("t", "contact_path"))
     rows = choose_rows(problem, history, STEADY)
     times = np.array([dump.t for dump in run.dumps])
-    middle = t[rows].mean() if rows.any() else t[len(t) // 2]
-    near, last = int(np.abs(times - middle).argmin()), len(times) - 1
+    near = int(np.abs(times - (t[rows].mean() if rows.any() else t[len(t) // 2])).argmin())
     size = 0.2 * problem.deck.face * MM
-    for panel, number, words in ((0, near, "contact point A"), (1, last, "end of the contact, B")):
+    for axes, number, words in (
+        (zooms[0], near, "contact point A"),
+        (zooms[1], -1, "end of the contact, B"),
+    ):
         dump = run.dumps[number]
-        image = _draw_pressure(axes[panel], problem, dump, top, True)
-        at_x, at_y = MM * np.interp(dump.t, t, x), MM * np.interp(dump.t, t, y)
-        axes[panel].set_xlim(at_x - size, at_x + size)
-        axes[panel].set_ylim(at_y - 0.8 * size, at_y + 0.8 * size)
-        axes[panel].set_title(f"{words}, t = {1e6 * dump.t:.2f} us", fontsize=10)
-        axes[panel].set_aspect("equal")
-        axes[panel].set_xlabel("x [mm]")
-        axes[panel].set_ylabel("y [mm]")
-        figure.colorbar(image, ax=axes[panel], label="pressure [GPa]", extend="max")
-    path = np.asarray(history["contact_path"], dtype=float)
-    axes[2].plot(1e6 * t, MM * path, label="computed")
+        title = f"{words}, t = {1e6 * dump.t:.2f} us"
+        _draw_pressure(axes, problem, run, dump, bar="pressure [GPa]", title=title)
+        place = [np.interp(dump.t, t, history[name]) for name in ("contact_x", "contact_y")]
+        x, y = MM * problem.frame @ place
+        axes.set(xlim=(x - size, x + size), ylim=(y - 0.8 * size, y + 0.8 * size))
+    paths.plot(1e6 * t, MM * path, label="computed")
     rows = choose_rows(problem, history, (0.02, 1.0))
     if rows.any():
-        start = t[rows][0] - path[rows][0] / problem.collision.contact_speed
-        line = (t - start) * problem.collision.contact_speed
+        line = (t - t[rows][0]) * theory + path[rows][0]
         inside = (line > 0.0) & (line < problem.deck.face)
-        axes[2].plot(1e6 * t[inside], MM * line[inside], "k--", label="V / sin(angle)")
+        paths.plot(1e6 * t[inside], MM * line[inside], "k--", label="V / sin(angle)")
         speed = np.gradient(path[rows], t[rows]) / 1e3
-        axes[3].plot(MM * path[rows], speed, lw=0.7, alpha=0.5, label="computed, step by step")
+        speeds.plot(MM * path[rows], speed, lw=0.7, alpha=0.5, label="computed, step by step")
         ends = np.linspace(path[rows][0], path[rows][-1], 16)
         mean = np.diff(ends) / np.diff(np.interp(ends, path[rows], t[rows])) / 1e3
         middles = 0.5 * MM * (ends[1:] + ends[:-1])
-        axes[3].plot(middles, mean, "o-", ms=3, label="mean over a fifteenth of the path")
-        axes[3].axhline(problem.collision.contact_speed / 1e3, color="k", ls="--", label="theory")
-        axes[3].set_ylim(0.8 * speed.min(), 1.1 * np.percentile(speed, 98.0))
-    axes[2].set_xlabel("t [us]")
-    axes[2].set_ylabel("path of A along the face [mm]")
-    axes[3].set_xlabel("path of A along the face [mm]")
-    axes[3].set_ylabel("speed of A [km/s]")
-    for panel in axes[2:]:
-        panel.grid(alpha=0.3)
-        if panel.lines:
-            panel.legend(frameon=False, fontsize=8)
+        speeds.plot(middles, mean, "o-", ms=3, label="mean over a fifteenth of the path")
+        speeds.axhline(theory / 1e3, color="k", ls="--", label="theory")
+        speeds.set_ylim(0.8 * speed.min(), 1.1 * np.percentile(speed, 98.0))
+        speeds.legend(frameon=False, fontsize=8)
+    paths.set(xlabel="t [us]", ylabel="path of A along the face [mm]")
+    speeds.set(xlabel="path of A along the face [mm]", ylabel="speed of A [km/s]")
+    paths.legend(frameon=False, fontsize=8)
+    for axes in (paths, speeds):
+        axes.grid(alpha=0.3)
 
 
 def draw_configuration(problem, figure, run) -> None:
     """Outlines of all bodies at several times, as the paper draws them (its Fig 6)."""
-    chosen = _choose_dumps(run)
-    panels = _make_panels(problem, figure, chosen, 0.0)
+    chosen, deck = _choose_dumps(run), problem.deck
+    materials = {"plate": deck.plate, "wedge": deck.wedge, "flyer": deck.drive.material}
+    panels = _make_panels(figure, chosen, 0.0)
     for axes, (_, dump) in zip(panels, chosen, strict=True):
         for block, shade in zip(dump.blocks, SHADES, strict=False):
-            x, y = MM * problem.to_set_up(block.nodes)
-            parts = [
-                (x[:, 0], y[:, 0]),
-                (x[-1], y[-1]),
-                (x[::-1, -1], y[::-1, -1]),
-                (x[0, ::-1], y[0, ::-1]),
-            ]
-            outline = np.concatenate([np.array(part) for part in parts], axis=1)
-            label = f"{block.name} ({_material(problem, block.name)})"
+            label = f"{block.name} ({materials[block.name]})"
+            outline = MM * trace_outline(block.nodes)
             axes.fill(*outline, facecolor=shade, edgecolor="k", lw=0.9, label=label)
+        axes.set(xlabel="x [mm]", ylabel="y [mm]")
+        axes.label_outer()
     figure.set_figheight(figure.get_figheight() + 0.35)
     handles = panels[0].get_legend_handles_labels()[0]
     figure.legend(handles=handles, frameon=False, ncols=3, loc="outside lower center")
-
-
-def _material(problem, name: str) -> str:
-    deck = problem.deck
-    return {"plate": deck.plate, "wedge": deck.wedge, "flyer": deck.drive.material}[name]
 
 
 FIGURES = {"phases": draw_phases, "contact": draw_contact, "configuration": draw_configuration}

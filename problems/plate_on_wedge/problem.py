@@ -17,25 +17,374 @@ References: shock polars of both materials, the critical angle, Birkhoff's jet.
 from __future__ import annotations
 
 import functools
+import itertools
+import math
+from typing import Annotated, ClassVar, Literal
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.links import join, slide
+from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, check_solid, key
+from problems.plate_on_wedge.report import COLUMNS, WIDE_ZONE, find_cautions, make_report
 from problems.plate_on_wedge.run import PlateRun
-from problems.plate_on_wedge.set_up import PlateSetUp
-from problems.problem import Report
+from problems.problem import BlockPlan, Problem, Report, check_memory
+from problems.references.hugoniot import shock_to_pressure, shock_with_particle_speed
+from problems.references.riemann import solve_riemann
+from problems.references.shock_polars import (
+    Body,
+    find_critical_angle,
+    release_driven_plate,
+    solve_collision,
+)
+from regrid.curves import arc_law, clustered_law, meeting_laws
+from regrid.errors import BadInput
 
+
+class Drive(DeckTable, kw_only=True):
+    """What sets the plate in motion."""
+
+    kind: key(
+        Literal["piston", "pressure", "flyer", "moving"],
+        "piston: its back is pushed at `speed`; pressure: `pressure` acts on its "
+        "back; flyer: another plate hits its back at `speed`; moving: the whole plate comes "
+        "in at `speed`, the test of shock polars",
+    ) = "piston"
+    speed: key(float, "speed of piston, flyer or plate [m/s]", gt=0) = 2500.0
+    pressure: key(float, "driving pressure [Pa]", gt=0) = 50e9
+    history: key(
+        tuple[tuple[float, Annotated[float, Meta(ge=0)]], ...],
+        "pairs of time [s] and part (0..1) of speed or pressure; straight between",
+    ) = ()
+    material: key(str, "of the flyer") = "SS304"
+    thickness: key(float, "of the flyer [m]", gt=0) = 5e-3
+
+
+class PlateOnWedgeDeck(Deck, kw_only=True):
+    """Deck of `plate-on-wedge`; the default is the paper's scenario, its sizes are ours."""
+
+    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
+    # a stronger barrier than elsewhere: the plate's grid bends by 300 degrees around B
+    regrid: Regrid = msgspec.field(default_factory=lambda: Regrid(epsilon=3e-2))
+    plate: key(str, "material of the plate") = "Al1100"
+    thickness: key(float, "of the plate [m]", gt=0) = 10e-3
+    wedge: key(str, "material of the wedge body") = "SS304"
+    angle: key(float, "between plate and wedge face [degrees]", ge=0.5, le=75) = 20.0
+    gap: key(
+        float,
+        "of the plate over the wedge's edge at the start [m]; above 0 they are two "
+        "bodies, which collide and separate by themselves, and no node follows A",
+        ge=0,
+        le=1e3,
+    ) = 0.0
+    face: key(float, "length of the wedge's face [m]", gt=0) = 30e-3
+    edge: key(float, "length of the flat edge on which the plate lies [m]", gt=0) = 10e-3
+    overhang: key(float, "of the plate beyond the end of the face [m]", gt=0) = 10e-3
+    depth: key(float, "height of the face's end over the base [m]", gt=0) = 12e-3
+    end_angle: key(float, "of the wedge's end face; 90: upright [degrees]", gt=30, lt=150) = 90.0
+    right: key(
+        Literal["symmetry", "free"], "the plate's far end: a plane of symmetry, or a free end face"
+    ) = "symmetry"
+    drive: Drive = msgspec.field(default_factory=Drive)
+    cells: key(
+        tuple[Annotated[int, Meta(ge=1, le=MOST_CELLS)], Annotated[int, Meta(ge=1, le=MOST_CELLS)]],
+        "cells of the plate along and across it",
+    ) = (80, 24)
+    contact_cells: key(float, "part of the plate's cells that lie on the wedge", gt=0.1, lt=0.9) = (
+        0.6
+    )
+    refinement: (
+        key(
+            float,
+            "how many times finer the cells are at the contact point A; left out: "
+            "for a moving plate by the distance from the critical angle, 1 (far) to 3 (near)",
+            ge=1,
+            le=8,
+        )
+        | None
+    ) = None
+    wedge_spacing: key(float, "spacing of the wedge's nodes over the plate's", gt=0.2, lt=5) = 1.0
+    until: key(
+        Literal["auto", "arrival", "end"],
+        "end of the run: A's arrival at the end B of the face, or what comes "
+        "later; auto: arrival where cells at A are refined",
+    ) = "auto"
+    turn: key(float, "turn of the whole set-up [degrees]") = 0.0
+    mirror: key(bool, "run the mirror image of the set-up") = False
+
+
+MOST_REFINED = 3.0  # times finer cells at A where the zone of constant states behind A is short
+FINER_ROWS = 0.75  # power of the refinement by which rows are finer: torn cells get too thin at 1
+CLOSEST = 0.85  # of the compression at which a Mie-Grueneisen Hugoniot's pressure is infinite
 # Less than elsewhere: cells of the wedge's tongue behind B are as thin as its sides make them.
 COST_WEIGHT = 0.3
 
 
-class PlateOnWedge(PlateSetUp):
-    """Plate, wedge, drive: how they are built, run and measured."""
+class PlateOnWedge(Problem):
+    """Plate, wedge, drive: checked, built, run and measured, with their shock polars."""
 
     measures_sides = True  # jet and shocks are found by who has the block
+    Deck = PlateOnWedgeDeck
+    units: ClassVar = {
+        "contact_x": "m",
+        "contact_y": "m",
+        "contact_path": "m",
+        "contact_pressure": "Pa",
+        "interface_angle": "degrees",
+        "shock_angle_plate": "degrees",
+        "shock_angle_wedge": "degrees",
+        "surface_speed": "m/s",
+        "lead": "m",
+        **dict.fromkeys(COLUMNS, "Pa"),
+        "jet_speed": "m/s",
+        "jet_mass": "kg/m",
+    }
+
+    def __init__(self, deck: PlateOnWedgeDeck):
+        super().__init__(deck)
+        self.materials = {
+            name: find_material(label)
+            for name, label in (("plate", deck.plate), ("wedge", deck.wedge))
+        }
+        for name, material in self.materials.items():
+            check_solid(name, getattr(deck, name), material)
+        ni, nj = deck.cells
+        self.contact = round(deck.contact_cells * ni)
+        if min(self.contact, ni - self.contact) < 4 or nj < 4:
+            raise BadInput(
+                f"deck: cells is ({ni}, {nj}), which are {self.contact} on the wedge, "
+                f"{ni - self.contact} beyond it and {nj} across; the plate needs at least 4 of each"
+            )
+        self.angle = math.radians(deck.angle)
+        self.end = np.array(
+            [deck.edge + deck.face * math.cos(self.angle), -deck.face * math.sin(self.angle)]
+        )
+        self.length = float(self.end[0]) + deck.overhang
+        self.base = float(self.end[1]) - deck.depth
+        lean = deck.depth / math.tan(math.radians(deck.end_angle))
+        self.foot = float(self.end[0]) + lean
+        if not self.foot > 0.2 * self.end[0]:
+            raise BadInput(
+                f"deck: end_angle {deck.end_angle:g} undercuts the wedge by {-lean:g} m over its "
+                "depth; no base would remain"
+            )
+        if deck.right == "symmetry" and self.foot >= self.length:
+            raise BadInput(
+                f"deck: the end face reaches x = {self.foot:g} m, beyond the symmetry plane at "
+                f"{self.length:g} m; enlarge overhang or end_angle"
+            )
+        if deck.gap and deck.refinement:
+            raise BadInput(
+                f"deck: refinement is {deck.refinement:g} and gap {deck.gap:g} m: cells are finer "
+                "at A only where the plate lies on the wedge from the start; leave one of them out"
+            )
+        times = [time for time, _ in deck.drive.history]
+        if any(b <= a for a, b in itertools.pairwise(times)):
+            raise BadInput("deck: drive.history: its times must increase")
+        self.plate_speed, self.flying = self.find_plate_speed()
+        solid = self.materials["wedge"]
+        self.target = Body(solid.eos, solid.rho0)
+        self.collision = solve_collision(self.flying, self.target, self.plate_speed, self.angle)
+        self.refinement = deck.refinement or self.find_refinement()
+        self.coarse_spacing = deck.wedge_spacing * self.length / ni
+        self.wedge_spacing = self.coarse_spacing / math.sqrt(self.refinement)
+
+    # --- references ----------------------------------------------------------------------------
+
+    def find_particle_speed(self) -> float:
+        """Velocity behind the drive's first shock in the plate [m/s]; BadInput without one."""
+        drive, solid = self.deck.drive, self.materials["plate"]
+        try:
+            if drive.kind == "piston":
+                shock = shock_with_particle_speed(solid.eos, solid.rho0, 0.0, drive.speed)
+                found = shock.particle_speed
+            elif drive.kind == "pressure":
+                shock = shock_to_pressure(solid.eos, solid.rho0, 0.0, drive.pressure)
+                found = shock.particle_speed
+            else:
+                flyer = find_material(drive.material)
+                impact = solve_riemann(
+                    flyer.eos, (flyer.rho0, drive.speed, 0.0), solid.eos, (solid.rho0, 0.0, 0.0)
+                )
+                found = impact.u
+        except (BadInput, ValueError) as error:
+            raise BadInput(
+                f"deck: drive: the equation of state of {self.deck.plate} allows no such shock "
+                f"({error}); take a slower or weaker drive"
+            ) from None
+        if solid.eos.kind == "mie-gruneisen":
+            most = CLOSEST / (1.0 - CLOSEST) * solid.eos.c0 / solid.eos.s
+            if found > most:
+                raise BadInput(
+                    f"deck: drive: it sets the plate in motion at {found:g} m/s; the equation of "
+                    f"state of {self.deck.plate} allows at most {most:.0f}, near its greatest "
+                    "compression; take a slower or weaker drive"
+                )
+        return found
+
+    def find_plate_speed(self) -> tuple[float, Body]:
+        """Speed V of the flying lower side [m/s], and the plate's material as it flies."""
+        solid = self.materials["plate"]
+        body = Body(solid.eos, solid.rho0)
+        if self.deck.drive.kind == "moving":
+            return self.deck.drive.speed, body
+        flying, speed = release_driven_plate(body, self.find_particle_speed())
+        return speed, flying
+
+    def find_arrival(self) -> float:
+        """Time at which the drive's shock reaches the plate's lower side [s]."""
+        if self.deck.drive.kind == "moving":
+            return 0.0
+        solid = self.materials["plate"]
+        shock = shock_with_particle_speed(solid.eos, solid.rho0, 0.0, self.find_particle_speed())
+        return self.deck.thickness / shock.shock_speed
+
+    @functools.cached_property
+    def critical(self) -> float:
+        """The critical angle at the plate's speed [rad]."""
+        return find_critical_angle(self.flying, self.target, self.plate_speed)
+
+    @functools.cached_property
+    def zone(self) -> float:
+        """Length of the zone of constant states behind A over A's path; NaN where a jet forms.
+
+        Nothing but A sets a length in the flow around it, so all grows with A's path s.  Sound from
+        the edge of the wedge follows A at the sound speed c relative to the material, which leaves
+        A at q: the zone that it has not reached is (q - c) s / (V / sin beta) long, in each body.
+        Below 0, where a flow behind A is subsonic, there is none: states change from A on.
+        """
+        theory = self.collision
+        if theory.plate is None or theory.wedge is None:
+            return math.nan
+        waves = (theory.plate, theory.wedge)
+        return min(
+            wave.speed_behind * (1.0 - 1.0 / wave.mach_behind) / theory.contact_speed
+            for wave in waves
+        )
+
+    def find_refinement(self) -> float:
+        """How many times finer the cells at A are, by the length of the zone behind A.
+
+        1 for a driven plate: its run goes on behind B, where material tears in thin cells.
+        """
+        if self.deck.gap or self.deck.drive.kind != "moving" or not self.collision.attached:
+            return 1.0
+        zone = max(self.zone, 1e-3 * WIDE_ZONE)
+        return min(max((WIDE_ZONE / zone) ** 1.5, 1.0), MOST_REFINED)
+
+    @property
+    def ends_at_arrival(self) -> bool:
+        """Does the run end when A arrives at B?"""
+        until = self.deck.until
+        return until == "arrival" or (until == "auto" and self.refinement > 1.0)
+
+    @property
+    def t_end(self) -> float:
+        """The deck's end time, or time enough for a jet to reach the base."""
+        path = self.deck.face * math.sin(self.angle) / self.plate_speed
+        fall = self.deck.gap + self.deck.depth / 1.2
+        return self.deck.run.t_end or self.find_arrival() + 2.5 * path + fall / self.plate_speed
+
+    # --- set-up --------------------------------------------------------------------------------
+
+    def make_lines(self) -> tuple[np.ndarray, np.ndarray, int]:
+        """Nodes of the plate's lower side and of the wedge's top; faces of the wedge's edge."""
+        deck = self.deck
+        ni = deck.cells[0]
+        lengths = (deck.edge, self.length - deck.edge)
+        counts = (self.contact + 1, ni - self.contact + 1)
+        law, free_law = meeting_laws(counts, lengths, self.refinement)
+        x = np.concatenate((lengths[0] * law, deck.edge + lengths[1] * free_law[1:]))
+        if deck.gap:  # nodes stay with the plate
+            x = np.linspace(0.0, self.length, ni + 1)
+        spacing = self.wedge_spacing
+        on_edge, on_face = (max(3, round(part / spacing)) for part in (deck.edge, deck.face))
+        along = np.concatenate(
+            (np.linspace(0.0, 1.0, on_edge + 1), 1.0 + np.linspace(0.0, 1.0, on_face + 1)[1:])
+        )
+        top = np.array(
+            [
+                np.interp(along, (0.0, 1.0, 2.0), (0.0, deck.edge, self.end[0])),
+                np.interp(along, (0.0, 1.0, 2.0), (0.0, 0.0, self.end[1])),
+            ]
+        )
+        return x, top, on_edge
+
+    def make_grids(self) -> tuple[np.ndarray, np.ndarray, int]:
+        """First grids of plate and wedge, as they stand; faces of the wedge's edge."""
+        deck = self.deck
+        x, top, on_edge = self.make_lines()
+        y = deck.gap + self.lay_rows(deck.cells[1], deck.thickness)
+        plate = np.array(np.meshgrid(x, y, indexing="ij"))
+        rows = max(6, round(deck.depth / self.coarse_spacing))
+        bottom = np.array([arc_law(top) * self.foot, np.full(top.shape[1], self.base)])
+        part = self.lay_rows(rows, 1.0, from_end=True)
+        wedge = bottom[:, :, None] * (1.0 - part) + top[:, :, None] * part
+        return plate, wedge, on_edge
+
+    def lay_rows(self, rows: int, length: float, from_end: bool = False) -> np.ndarray:
+        """Places (rows + 1,) of grid lines across a body from 0 to `length`, finer at one end."""
+        if self.refinement <= 1.0:
+            return np.linspace(0.0, length, rows + 1)
+        return length * clustered_law(
+            rows + 1, 1.0 / (rows * self.refinement**FINER_ROWS), from_end
+        )
+
+    def estimate_cells(self) -> int:
+        """Cells of the plate and of the wedge, counted from the sizes that the deck asks for."""
+        (ni, nj), deck = self.deck.cells, self.deck
+        along = 6.0 + (deck.edge + deck.face) / self.wedge_spacing
+        return ni * nj + math.ceil(along * max(6.0, 1.0 + deck.depth / self.coarse_spacing))
+
+    def plan(self):
+        """End time and sizes of the blocks, whose grids are made."""
+        check_memory(self)
+        plate, wedge, _ = self.make_grids()
+        plans = []
+        for name, nodes in (("plate", plate), ("wedge", wedge)):
+            cells = (nodes.shape[1] - 1, nodes.shape[2] - 1)
+            low, high = nodes.min(axis=(1, 2)), nodes.max(axis=(1, 2))
+            plans.append(BlockPlan(name, cells, tuple(map(float, low)), tuple(map(float, high))))
+        return self.t_end, plans
+
+    @functools.cached_property
+    def frame(self) -> np.ndarray:
+        """Matrix (2, 2) from the set-up as described here to the deck's (turned, mirrored)."""
+        turn = math.radians(self.deck.turn)
+        matrix = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+        return matrix @ np.diag([-1.0, 1.0]) if self.deck.mirror else matrix
+
+    def make_block(self, name: str, nodes: np.ndarray, velocity=(0.0, 0.0), material=None) -> Block:
+        """Block of a part of the set-up in the deck's frame; material at rest at p = 0."""
+        solid = material or self.materials[name]
+        nodes = np.einsum("ab,bij->aij", self.frame, nodes)
+        if self.deck.mirror:
+            nodes = nodes[:, ::-1]
+        u, v = self.frame @ velocity
+        return Block(name, solid.eos, nodes, solid.rho0, u, v, 0.0)
+
+    def turn_faces(self, block: Block, side: str, start: int = 0, stop: int | None = None):
+        """(block, side, start, stop) of faces counted in the set-up as described here."""
+        if not self.deck.mirror:
+            return block, side, start, stop
+        if side in ("i_min", "i_max"):
+            return block, {"i_min": "i_max", "i_max": "i_min"}[side], start, stop
+        return block, side, block.ni - (block.ni if stop is None else stop), block.ni - start
+
+    def put(self, kind: str, block: Block, side: str, start=0, stop=None, **options) -> None:
+        """Put a segment on faces of the set-up as described here."""
+        block, side, start, stop = self.turn_faces(block, side, start, stop)
+        put(block, side, kind, start, stop, **options)
+
+    def to_set_up(self, points: np.ndarray) -> np.ndarray:
+        """Points (2, ...) of the deck's frame in the set-up as described here."""
+        return np.einsum("ba,b...->a...", self.frame, points)
+
+    # --- run -----------------------------------------------------------------------------------
 
     def build(self) -> PlateRun:
         deck, drive = self.deck, self.deck.drive
@@ -105,14 +454,10 @@ class PlateOnWedge(PlateSetUp):
         return evolution.measure()
 
     def cautions(self, history=None) -> list[str]:
-        from problems.plate_on_wedge.report import find_cautions
-
         return find_cautions(self)
 
     def report(self, history, final=None) -> Report:
-        from problems.plate_on_wedge.report import make_summary
-
-        return Report((lambda: make_summary(self, history, final)) if history else "")
+        return make_report(self, history, final) if history else Report()
 
     def figures(self):
         from problems.plate_on_wedge.pictures import FIGURES

@@ -15,17 +15,28 @@ each, and a mean over so few faces may pass for a plateau of the wrong pressure.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 
-from problems.plate_on_wedge.set_up import COLUMNS, EDGES, JET, WIDE_ZONE
+from problems.problem import Report, Row
 from problems.references.shock_polars import compute_jet_speed
 
+# thousandths of A's path behind A between which pressures are averaged
+EDGES = (*range(10, 100, 10), 100, 125, 150, 175, 200, 250, 300, 350, 400, 450, 500)
+COLUMNS = tuple(f"behind_{edge}" for edge in EDGES[:-1])
+JET = 1.3  # material faster than this many times the plate's speed V belongs to a jet
+WIDE_ZONE = 0.15  # of A's path: the length of that zone from which no finer cells are needed
+PHASES = {
+    "attached": "contact point runs",
+    "arrived": "arrives at the face's end B",
+    "jet": "jet",
+    "closed": "closed",
+}
 RISEN = 0.9  # of the faces behind it: there the numerical rise is over
 NEXT = 8  # faces behind a face that say what it rises to
 RINGING = 4  # faces from there on that belong to its crest and dip
@@ -113,18 +124,14 @@ def find_plateau(profiles: np.ndarray, mach: float = 1.0) -> Plateau:
         weight = width[:flat]
         level = float(p[:flat] @ weight / weight.sum())
         miss = profiles[:, :flat] / level - 1.0
-        end = float(high[flat - 1])
-        return Plateau(level, _measure_scatter(miss), float(low[0]), end, True, 0.0)
+        scatter = float(np.sqrt(np.nanmean(miss**2)))
+        return Plateau(level, scatter, float(low[0]), float(high[flat - 1]), True, 0.0)
     share = min(max((1.0 - mach) / SUBSONIC, 0.0), 1.0)
     level = (1.0 - share) * broken.level + share * curved.level
     fit = (1.0 - share) * broken.values + share * curved.values
     miss = (profiles[:, :count] - fit) / level
     end, fall = float(high[count - 1]), 1.0 - float(fit[-1]) / level
-    return Plateau(level, _measure_scatter(miss), float(low[0]), end, False, fall)
-
-
-def _measure_scatter(miss: np.ndarray) -> float:
-    return math.sqrt(float(np.nanmean(miss * miss)))
+    return Plateau(level, float(np.sqrt(np.nanmean(miss**2))), float(low[0]), end, False, fall)
 
 
 class _Fit(NamedTuple):
@@ -135,28 +142,22 @@ class _Fit(NamedTuple):
     misfit: float
 
 
-def _fit(basis: np.ndarray, p: np.ndarray, width: np.ndarray) -> _Fit | None:
+def _fit(p: np.ndarray, width: np.ndarray, *basis: np.ndarray) -> _Fit | None:
     """The nearest sum of a constant and the rows of `basis`; None where it rises from A on."""
-    columns, root = np.vstack((np.ones_like(p), basis)), np.sqrt(width / width.sum())
+    columns, root = np.vstack((np.ones_like(p), *basis)), np.sqrt(width / width.sum())
     factors, *_ = np.linalg.lstsq((columns * root).T, p * root)
-    if factors[1] > 0.0:
+    if (factors[1:2] > 0.0).any():
         return None
     values = factors @ columns
     misfit = float(((p - values) * root) @ ((p - values) * root))
     return _Fit(float(factors[0]), values, misfit + LEAST_MISFIT * float(p.max()) ** 2)
 
 
-def _fit_level(p: np.ndarray, width: np.ndarray) -> _Fit:
-    level = float(p @ width / width.sum())
-    misfit = float((p - level) ** 2 @ width / width.sum())
-    return _Fit(level, np.full_like(p, level), misfit + LEAST_MISFIT * level**2)
-
-
 def _fit_broken_line(x, p, width) -> tuple[_Fit, float]:
     """Flat as far as a bend, straight from there; also the bend, of all that are tried the best."""
-    best, place = _fit_level(p, width), float("inf")
+    best, place = _fit(p, width), math.inf
     for bend in np.linspace(x[1], x[-1], BENDS + 1)[:-1]:  # nearer to A none can be seen
-        found = _fit(np.maximum(0.0, x - bend)[None], p, width)
+        found = _fit(p, width, np.maximum(0.0, x - bend))
         if found is not None and found.misfit < best.misfit:
             best, place = found, float(bend)
     return best, place
@@ -167,14 +168,14 @@ def _fit_parabola(x, p, width) -> _Fit:
 
     Steeper towards A would be the crest of the numerical rise, continued.
     """
-    found = _fit(np.array([x, x * x]), p, width) if x.size > LEAST_PARTS else None
+    found = _fit(p, width, x, x * x) if x.size > LEAST_PARTS else None
     if found is not None and np.interp(0.5 * (x[0] + x[-1]), x, found.values) > 0.5 * (
         found.values[0] + found.values[-1]
     ):
         return found
-    steep, level = _fit(x[None], p, width), _fit((x * x)[None], p, width)
+    steep, level = _fit(p, width, x), _fit(p, width, x * x)
     if steep is None or level is None:
-        return _fit_level(p, width)
+        return _fit(p, width)
     return min(steep, level, key=lambda fit: fit.misfit)
 
 
@@ -186,13 +187,6 @@ FINE_CELLS = 160  # along the plate: from there on the pressure behind A is righ
 NEAR_CRITICAL = 0.6  # degrees below the critical angle within which fewer refined cells do not do
 SHORT_ZONE = 0.05  # of A's path: a zone of constant states that only finer cells at A resolve
 LEAST_LEAD = 0.5  # spacings of the plate by which a jet is ahead of A
-NAMES = {
-    "attached": "contact point runs",
-    "arrived": "arrives at the face's end B",
-    "jet": "jet",
-    "closed": "closed",
-}
-ANGLES = ("interface_angle", "shock_angle_plate", "shock_angle_wedge")
 MM = 1e3
 
 
@@ -238,16 +232,16 @@ def reduce_known(reduce: Callable[[np.ndarray], np.floating], values: np.ndarray
 def measure_behind(problem, history) -> dict[str, float]:
     """Pressure behind A, both deflections and shock angles [rad] on the face's last part."""
     rows = choose_rows(problem, history, STEADY)
-    if not rows.any():
-        names = ("p", "theta_plate", "theta_wedge", "shock_plate", "shock_wedge")
-        return dict.fromkeys(names, math.nan)
-    means = {name: reduce_known(np.nanmean, history[name][rows]) for name in ANGLES}
+    turn, plate, wedge = (
+        math.radians(reduce_known(np.nanmean, history[name][rows]))
+        for name in ("interface_angle", "shock_angle_plate", "shock_angle_wedge")
+    )
     return {
         "p": measure_plateau(problem, history).p,
-        "theta_plate": math.radians(means["interface_angle"]),
-        "theta_wedge": problem.angle - math.radians(means["interface_angle"]),
-        "shock_plate": math.radians(means["shock_angle_plate"]),
-        "shock_wedge": math.radians(means["shock_angle_wedge"]),
+        "theta_plate": turn,
+        "theta_wedge": problem.angle - turn,
+        "shock_plate": plate,
+        "shock_wedge": wedge,
     }
 
 
@@ -275,64 +269,62 @@ def measure_lead(problem, history) -> float:
     return reduce_known(np.nanmax, history["lead"][rows])
 
 
-def make_summary(problem, history, final) -> str:
-    """What was computed and how far it is from theory, as lines of text."""
+def make_report(problem, history, final) -> Report:
+    """What was computed and how far it is from theory."""
     deck, theory = problem.deck, problem.collision
+    rows, notes = [], [describe_verdict(problem, measure_lead(problem, history))]
+    chosen = choose_rows(problem, history, (0.2, 0.8))
+    if deck.drive.kind != "moving" and chosen.any():
+        speed = float(np.median(history["surface_speed"][chosen]))
+        words = "speed of the free surface [km/s]"
+        rows.append(Row("plate_speed", speed, problem.plate_speed, words, 1e3, 5))
+    speed, spread = measure_contact_speed(problem, history)
+    words, source = "speed of A on the face [km/s]", ""
+    if math.isfinite(spread):
+        source = f"constant within {100.0 * spread:.2f} % over fifths of its path"
+    if not theory.attached:
+        words, source = "speed of A, the jet's tip [km/s]", "where the plate would meet the face"
+    rows.append(Row("contact_speed", speed, theory.contact_speed, words, 1e3, 5, source=source))
+    if theory.attached:
+        found, degree = measure_behind(problem, history), math.pi / 180.0
+        source = describe_plateau(measure_plateau(problem, history))
+        words = "pressure behind A [GPa]"
+        rows.append(Row("pressure", found["p"], theory.p, words, 1e9, 5, source=source))
+        for name, wave in (("plate", theory.plate), ("wedge", theory.wedge)):
+            turn, words = found[f"theta_{name}"], f"deflection of the {name} [deg]"
+            rows.append(Row(f"theta_{name}", turn, wave.deflection, words, degree, 5))
+            angle, words = found[f"shock_{name}"], f"shock angle in the {name} [deg]"
+            rows.append(Row(f"shock_{name}", angle, wave.wave_angle, words, degree, 5))
+    jet, whose = measure_jet_speed(history), "behind B" if theory.attached else "jet"
+    ideal = compute_jet_speed(problem.plate_speed, problem.angle)
+    if jet > 0.0:
+        notes.append(
+            f"{whose}: fastest material {jet / 1e3:.3g} km/s (median in time), "
+            f"{history['jet_mass'][-1]:.3g} kg/m at the end (incompressible theory on a rigid "
+            f"wedge: {ideal / 1e3:.3g} km/s)"
+        )
+        if not theory.attached:
+            notes.append(
+                "the jet ahead of A is thinner than a cell at first: its speed and mass are rough"
+            )
+    else:
+        notes.append(f"no material faster than {JET:g} V")
+    if final is not None:
+        known = {phase: time for phase, time in final.times.items() if math.isfinite(time)}
+        words = (f"{PHASES[phase]} {1e6 * time:.3f} us" for phase, time in known.items())
+        notes.append("phases: " + "; ".join(words))
+    return Report(functools.partial(describe_deck, problem), rows, notes)
+
+
+def describe_deck(problem) -> str:
+    """The head of the report: what collides, and what theory says of it."""
+    deck = problem.deck
     lines = [
         f"{deck.plate} plate on {deck.wedge} wedge at {deck.angle:g} degrees; drive: "
         f"{deck.drive.kind}; {deck.cells[0]} x {deck.cells[1]} cells in the plate",
         f"  theory for V = {problem.plate_speed / 1e3:.4g} km/s: {describe_margin(problem)}",
-        *describe_nearness(problem),
-        "                                     computed     theory   difference",
     ]
-    if deck.drive.kind != "moving":
-        rows = choose_rows(problem, history, (0.2, 0.8))
-        if rows.any():
-            speed = float(np.median(history["surface_speed"][rows]))
-            lines.append(_line("speed of the free surface [km/s]", speed, problem.plate_speed, 1e3))
-    speed, spread = measure_contact_speed(problem, history)
-    label = "speed of A on the face [km/s]"
-    if not theory.attached:
-        label = "speed of A, the jet's tip [km/s]"
-    lines.append(_line(label, speed, theory.contact_speed, 1e3))
-    if not theory.attached:
-        lines.append("    (theory: the point where the undisturbed plate would meet the face)")
-    if math.isfinite(spread):
-        lines.append(f"    constant within {100.0 * spread:.2f} % over fifths of its path")
-    behind = measure_behind(problem, history)
-    if theory.attached:
-        lines.append(_line("pressure behind A [GPa]", behind["p"], theory.p, 1e9))
-        lines.append(f"    {describe_plateau(measure_plateau(problem, history))}")
-        for words, name, reference in (
-            ("deflection of the plate [deg]", "theta_plate", theory.plate.deflection),
-            ("deflection of the wedge [deg]", "theta_wedge", theory.wedge.deflection),
-            ("shock angle in the plate [deg]", "shock_plate", theory.plate.wave_angle),
-            ("shock angle in the wedge [deg]", "shock_wedge", theory.wedge.wave_angle),
-        ):
-            lines.append(_line(words, behind[name], reference, math.pi / 180.0))
-    lines.append(f"  {describe_verdict(problem, measure_lead(problem, history))}")
-    jet = measure_jet_speed(history)
-    if jet > 0.0:
-        mass = float(np.asarray(history["jet_mass"], dtype=float)[-1])
-        lines.append(
-            f"  {'behind B' if theory.attached else 'jet'}: fastest material {jet / 1e3:.3g} km/s "
-            f"(median in time), {mass:.3g} kg/m at the end (incompressible theory on a rigid "
-            f"wedge: {compute_jet_speed(problem.plate_speed, problem.angle) / 1e3:.3g} km/s)"
-        )
-        if not theory.attached:
-            lines.append(
-                "  the jet ahead of A is thinner than a cell at first: its speed and mass are rough"
-            )
-    else:
-        lines.append(f"  no material faster than {JET:g} V")
-    if final is not None:
-        words = [
-            f"{NAMES[phase]} {1e6 * time:.3f} us"
-            for phase, time in final.times.items()
-            if math.isfinite(time)
-        ]
-        lines.append("  phases: " + "; ".join(words))
-    return "\n".join(lines)
+    return "\n".join(lines + describe_nearness(problem))
 
 
 def describe_margin(problem) -> str:
@@ -382,16 +374,12 @@ def describe_nearness(problem) -> list[str]:
         f"  near critical: the flow leaves A at Mach {theory.plate.mach_behind:.2f} in the plate, "
         f"{theory.wedge.mach_behind:.2f} in the wedge; {words}"
     ]
-    finer, (_, plans) = problem.refinement, problem.plan()
+    finer = problem.refinement
     ending = "; such a run ends at B" if problem.deck.until == "auto" else ""
     if finer > 1.0:
-        cells = sum(ni * nj for ni, nj in (plan.cells for plan in plans))
-        plain = msgspec.structs.replace(problem.deck, refinement=1.0)
-        _, coarse = type(problem)(plain).plan()
-        more = cells / sum(ni * nj for ni, nj in (plan.cells for plan in coarse)) - 1.0
         lines.append(
-            f"    so the cells at A are {finer:.3g} times finer: {100.0 * more:.0f} % more cells, "
-            f"about {finer:.2g} times the steps (refinement=1: none of it){ending}"
+            f"    so the cells at A are {finer:.3g} times finer, at as many times the steps "
+            f"(refinement=1: none of it){ending}"
         )
     else:
         lines.append(
@@ -427,10 +415,3 @@ def describe_verdict(problem, lead: float) -> str:
         words = "predicted ahead of A, but too thin to be resolved by these cells"
     ahead = f"at most {MM * lead:.2f} mm ({lead / spacing:.1f} cells)" if lead > 0.0 else "none"
     return f"jet: {words}; {ahead} of the plate is ahead before {STEADY[1]:.0%} of the face"
-
-
-def _line(words: str, computed: float, reference: float, unit: float) -> str:
-    if not math.isfinite(computed):
-        return f"  {words:34s} {'-':>9s}  {reference / unit:9.5g}"
-    difference = 100.0 * (computed / reference - 1.0)
-    return f"  {words:34s} {computed / unit:9.5g}  {reference / unit:9.5g}  {difference:+8.2f} %"

@@ -1,7 +1,6 @@
 """The run of a plate on a wedge: where the contact point is, which phase it is, when it ends.
 
-All places and angles are those of the set-up as `problems.plate_on_wedge.set_up` describes it,
-whatever way the deck turns it.
+All places and angles are those of the set-up before the deck turns or mirrors it.
 """
 
 from __future__ import annotations
@@ -16,8 +15,14 @@ from hydro.motion.overlaps import is_inside
 from hydro.simulation import Simulation
 from hydro.sliding.contact import SlidingContact
 from hydro.sliding.pieces import project
-from problems.plate_on_wedge.report import COLUMNS, REFINED_RINGING, RINGING, measure_profile
-from problems.plate_on_wedge.set_up import JET, PHASES, PlateSetUp
+from problems.plate_on_wedge.report import (
+    COLUMNS,
+    JET,
+    PHASES,
+    REFINED_RINGING,
+    RINGING,
+    measure_profile,
+)
 from regrid.curves import compute_arc_lengths
 
 LEAST_JET = 3  # cells that make a jet
@@ -31,7 +36,7 @@ APART = 6  # nodes along a line that do not count as another part of it
 class PlateRun(Simulation):
     """The flow, its phases and its end; the phases' times belong to the state."""
 
-    def __init__(self, problem: PlateSetUp, blocks, links, **options):
+    def __init__(self, problem, blocks, links, **options):
         super().__init__(
             blocks, links, measure_block=self.measure_block, measured_numbers=4, **options
         )

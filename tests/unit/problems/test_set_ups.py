@@ -13,8 +13,7 @@ from problems.blocks.problem import Blocks
 from problems.grid_march import GridMarch, GridMarchDeck
 from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.problem import InterfaceInstability
-from problems.plate_on_wedge.problem import PlateOnWedge
-from problems.plate_on_wedge.set_up import PlateOnWedgeDeck
+from problems.plate_on_wedge.problem import PlateOnWedge, PlateOnWedgeDeck
 from problems.riemann import BEYOND, MOST_GROWTH, SHARE, Riemann, RiemannDeck, SideState, grade
 from regrid.curves import RATIO, meeting_laws
 from regrid.errors import BadInput

@@ -14,9 +14,8 @@ from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.links import slide
 from hydro.simulation import Simulation
-from problems.plate_on_wedge.problem import PlateOnWedge
+from problems.plate_on_wedge.problem import PlateOnWedge, PlateOnWedgeDeck
 from problems.plate_on_wedge.report import measure_behind, measure_contact_speed, measure_lead
-from problems.plate_on_wedge.set_up import PlateOnWedgeDeck
 from problems.references.hugoniot import release, shock_to_pressure
 from regrid.measure.quality import least_corner_area
 from runs.cli.main import main

@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from regrid.errors import BadInput
 
@@ -39,6 +41,31 @@ def read_text(path: str | Path) -> str:
     if len(content) > MOST_BYTES:
         raise BadInput(f"{path} is larger than {MOST_BYTES // 10**6} MB, which no such file is")
     return content.decode("utf-8-sig")
+
+
+def read_columns(path: str | Path, counts: Sequence[int] = (2,), where: str = "") -> np.ndarray:
+    """Columns (k, n) of finite numbers in a text file, k one of `counts`, n at least 2.
+
+    Numbers are parted by blanks or commas; # begins a comment.  Raises BadInput naming the file,
+    as `where` does if it is given.
+    """
+    where = where or str(path)
+    try:
+        text = read_text(path).replace(",", " ")
+        lines = [line for line in text.splitlines() if line.partition("#")[0].strip()]
+        values = np.loadtxt(lines, ndmin=2) if lines else np.empty((0, 2))
+    except OSError as error:
+        raise BadInput(f"{where} cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise BadInput(f"{where}: columns of numbers are wanted ({error})") from None
+    if values.shape[1] not in counts or values.shape[0] < 2:
+        raise BadInput(
+            f"{where}: {' or '.join(map(str, counts))} columns of at least two numbers are wanted; "
+            f"it has {values.shape[0]} lines of {values.shape[1]}"
+        )
+    if not np.isfinite(values).all():
+        raise BadInput(f"{where} holds numbers that are not finite")
+    return np.ascontiguousarray(values.T)
 
 
 def check_regular(path: str | Path) -> None:

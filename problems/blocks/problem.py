@@ -14,7 +14,6 @@ import functools
 import math
 import re
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,7 +36,7 @@ from regrid.measure.corners import compute_centres
 from regrid.measure.quality import find_bad_cells
 from regrid.protocol import call_regridder
 from regrid.sides import SIDE_NAMES, compute_area, get_sides
-from regrid.text_files import read_text
+from regrid.text_files import read_columns
 
 SAMPLES = 1025  # points on a curve given by formulas
 PASSES, SETTLED = 20, 1e-3  # of the regridder; the last moves no node by more cells than that
@@ -101,7 +100,7 @@ def read_curve(block: BlockTable, side: str) -> np.ndarray:
         ]
         return make_polyline(np.array(values), side, where)
     if isinstance(curve, str):
-        return make_polyline(read_columns(Path(curve)), side, curve)
+        return make_polyline(read_columns(curve), side, curve)
     return make_polyline(np.array(curve).T, side, where)
 
 
@@ -144,27 +143,6 @@ def place_nodes(
         else:
             placed[side] = distribute_by_arc_length(line, count + 1)
     return placed
-
-
-def read_columns(path: Path) -> np.ndarray:
-    """Points (2, n) of a text file with two columns, x and y [m]; # begins a comment.
-
-    Raises BadInput naming the file.
-    """
-    if not path.is_file():
-        raise BadInput(f"{path} does not exist" if not path.exists() else f"{path} is not a file")
-    try:
-        text = read_text(path).replace(",", " ")
-        lines = [line for line in text.splitlines() if line.partition("#")[0].strip()]
-        values = np.loadtxt(lines, ndmin=2) if lines else np.empty((0, 2))
-    except (ValueError, OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"{path}: columns x and y of numbers are wanted ({error})") from None
-    if values.shape[1:] != (2,) or values.shape[0] < 2:
-        raise BadInput(
-            f"{path}: two columns, x and y, and at least two points are wanted; it has "
-            f"{values.shape[0]} lines of {values.shape[1]}"
-        )
-    return np.ascontiguousarray(values.T)
 
 
 def evaluate(formula: float | str, values: dict[str, np.ndarray], where: str) -> np.ndarray:

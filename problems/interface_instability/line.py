@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import cmath
 import functools
-import io
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ import numpy as np
 
 from problems.deck import MOST_CELLS, DeckTable, key
 from regrid.errors import BadInput
-from regrid.text_files import read_text
+from regrid.text_files import read_columns
 
 ROUGH = 5  # harmonics from this one on are none of a gentle wave's own
 NOTHING = 1e-12  # of the largest mode: what round-off leaves of modes that cancel
@@ -59,17 +58,13 @@ def find_harmonics(modes: Iterable[Mode], wavenumber: float) -> list[Harmonic]:
         part = cmath.rect(mode.ka0, mode.phase) / wavenumber
         sums[mode.number] = sums.get(mode.number, 0.0) + part
     most = max((abs(whole) for whole in sums.values()), default=0.0)
-    return [_make_harmonic(n, whole) for n, whole in sorted(sums.items()) if _is_there(whole, most)]
-
-
-def _is_there(whole: complex, most: float) -> bool:
-    return abs(whole) > NOTHING * most
-
-
-def _make_harmonic(number: int, whole: complex) -> Harmonic:
-    if abs(whole.imag) <= NOTHING * abs(whole):
-        return Harmonic(number, whole.real, 0.0)
-    return Harmonic(number, abs(whole), cmath.phase(whole))
+    return [
+        Harmonic(number, whole.real, 0.0)
+        if abs(whole.imag) <= NOTHING * abs(whole)
+        else Harmonic(number, abs(whole), cmath.phase(whole))
+        for number, whole in sorted(sums.items())
+        if abs(whole) > NOTHING * most
+    ]
 
 
 def _weigh_nodes(y: np.ndarray) -> np.ndarray:
@@ -124,9 +119,6 @@ Perturbation = Callable[[np.ndarray], np.ndarray]  # heights y (n,) [m] -> place
 STRONGEST = 12  # harmonics of a free line that are followed
 FAINT = 0.01  # of the strongest: weaker ones are not
 LEAST_CELLS = 8  # in a wave: shorter waves are damped by the scheme too much to compare
-FEW_CELLS = 16  # in a wave: shorter ones grow by more than a twentieth less than theory
-# cells of a wave, part of theory's growth found (start after the passage, Mach 1.5, 1 : 3)
-FOUND = ((3.0, 0.06), (4.0, 0.19), (6.0, 0.59), (8.0, 0.68), (12.0, 0.86), (16.0, 0.94))
 CLOSED = 1e-6  # of a line's extent: so far its ends may differ between periodic sides
 
 
@@ -181,32 +173,15 @@ def _draw_normal(seed: int, count: int) -> np.ndarray:
 def read_line(path: str, width: float) -> Perturbation:
     """The line in a text file: columns x, y [m], or x alone evenly from y = 0 to `width` [m].
 
-    Numbers are parted by blanks or commas; what follows # is a comment.  Between its points the
-    line is a cubic spline.  Raises BadInput for a file that cannot be such a line.
+    Between its points the line is a cubic spline.  Raises BadInput for a file that is no such line.
     """
     from scipy.interpolate import CubicSpline  # slow to load
 
     where = f"deck: line_file {path!r}"
-    try:
-        text = read_text(path)
-    except (OSError, UnicodeDecodeError) as error:
-        words = getattr(error, "strerror", None) or "it is not a text file"
-        raise BadInput(f"{where} cannot be read: {words}") from error
-    try:
-        if not text.strip():
-            raise ValueError("it is empty")
-        table = np.loadtxt(io.StringIO(text.replace(",", " ")), ndmin=2)
-    except ValueError as error:
-        raise BadInput(f"{where} is not a table of numbers: {error}") from error
-    if table.shape[1] not in (1, 2) or table.shape[0] < 4:
-        raise BadInput(
-            f"{where} has {table.shape[0]} rows of {table.shape[1]} numbers; wanted are at least "
-            "4 rows of x and y, or of x alone"
-        )
-    if not np.isfinite(table).all():
-        raise BadInput(f"{where} holds numbers that are not finite")
-    x = table[:, 0]
-    y = table[:, 1] if table.shape[1] == 2 else np.linspace(0.0, width, x.size)
+    table = read_columns(path, (1, 2), where)
+    x, y = table if len(table) == 2 else (table[0], np.linspace(0.0, width, table.shape[1]))
+    if x.size < 4:
+        raise BadInput(f"{where} has {x.size} points; at least 4 are wanted")
     if not (np.diff(y) > 0.0).all():
         row = int(np.flatnonzero(np.diff(y) <= 0.0)[0]) + 2
         raise BadInput(f"{where}: y must rise from row to row; it does not at row {row}")
@@ -254,28 +229,11 @@ class FreeLine:
         per_wave = (self.y.size - 1) * 2.0 * math.pi / (wavenumber * (self.y[-1] - self.y[0]))
         found = []
         for number in range(1, max(1, int(per_wave / LEAST_CELLS)) + 1):
-            a = measure_mode(line, wavenumber, number, 0.0)
-            b = 0.0 if self.even else measure_mode(line, wavenumber, number, -0.5 * math.pi)
-            if self.even:
-                found.append(Mode(number=number, ka0=wavenumber * a))
-            else:
-                size, phase = wavenumber * math.hypot(a, b), math.atan2(-b, a)
-                found.append(Mode(number=number, ka0=size, phase=phase))
+            size, phase = wavenumber * measure_mode(line, wavenumber, number, 0.0), 0.0
+            if not self.even:
+                other = wavenumber * measure_mode(line, wavenumber, number, -0.5 * math.pi)
+                size, phase = math.hypot(size, other), math.atan2(-other, size)
+            found.append(Mode(number=number, ka0=size, phase=phase))
         found.sort(key=lambda mode: -abs(mode.ka0))
         strongest = [m for m in found[:STRONGEST] if abs(m.ka0) > FAINT * abs(found[0].ka0)]
         return sorted(strongest, key=lambda mode: mode.number)
-
-
-def caution_short_waves(numbers: list[int], cells: int) -> list[str]:
-    """A sentence where modes have fewer than FEW_CELLS cells a wave."""
-    short = [number for number in numbers if cells < FEW_CELLS * number]
-    if not short:
-        return []
-    which = f"mode {short[0]} has" if len(short) == 1 else f"modes {short[0]} to {short[-1]} have"
-    least = cells / short[-1]
-    low = 1.0 - float(np.interp(least, *zip(*FOUND, strict=True)))
-    return [
-        f"{which} fewer than {FEW_CELLS} cells a wave, down to {least:.3g}: the scheme damps such "
-        f"waves, growth with {least:.3g} was found about {100.0 * low:.0f} % low; take cells = "
-        f"{FEW_CELLS * short[-1]} or longer waves"
-    ]

@@ -40,6 +40,13 @@ from problems.interface_instability.line import (
     measure_roughness,
     read_line,
 )
+from problems.interface_instability.report import (
+    MOST_CURVES,
+    draw_growth,
+    draw_spectrum,
+    make_report,
+)
+from problems.interface_instability.theories import find_cautions, sort_deck
 from problems.problem import BlockPlan, Problem, Report
 from problems.references.hugoniot import (
     Shock,
@@ -550,23 +557,15 @@ class InterfaceInstability(Problem):
         }
 
     def report(self, history, final=None) -> Report:
-        from problems.interface_instability.report import make_report
-
         return make_report(self, history)
 
     def cautions(self, history=None) -> list[str]:
-        from problems.interface_instability.theories import find_cautions
-
         return find_cautions(self, history)
 
     def list_wave_cautions(self) -> list[str]:
-        from problems.interface_instability.theories import list_wave_cautions
-
-        return list_wave_cautions(self)
+        return sort_deck(self)[0] if self.harmonics else []
 
     def figures(self):
-        from problems.interface_instability.report import MOST_CURVES, draw_growth, draw_spectrum
-
         found = {"growth": functools.partial(draw_growth, self)}
         if len(self.harmonics) > MOST_CURVES:
             found["spectrum"] = functools.partial(draw_spectrum, self)

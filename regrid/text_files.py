@@ -12,11 +12,12 @@ import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from regrid.errors import BadInput
+
+if TYPE_CHECKING:
+    import numpy as np
 
 MOST_BYTES = 64_000_000  # of a text that is read whole
 DEEPEST = 100  # tables and lists in one another
@@ -49,6 +50,8 @@ def read_columns(path: str | Path, counts: Sequence[int] = (2,), where: str = ""
     Numbers are parted by blanks or commas; # begins a comment.  Raises BadInput naming the file,
     as `where` does if it is given.
     """
+    import numpy as np  # slow to load, and texts are read before
+
     where = where or str(path)
     try:
         text = read_text(path).replace(",", " ")

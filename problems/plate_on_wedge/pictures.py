@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from problems.plate_on_wedge.report import MM, PHASES, STEADY, choose_rows
 from problems.pictures import draw_field
+from problems.plate_on_wedge.report import MM, PHASES, STEADY, choose_rows
 from regrid.sides import trace_outline
 
 PANELS = 6  # of the pictures that show phases

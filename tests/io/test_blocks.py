@@ -95,7 +95,7 @@ REFUSED = [  # what the deck has, what stands there instead, what is said
     ('"right.i_min"]', '"right.i_mim"]', "there is no side 'i_mim'; did you mean 'i_min'?"),
     ('"right.i_min"]', '"right.i_min[4:12]"]', "the side has the faces 0 to 8"),
     ('"right.i_min"]', '"right"]', 'write "block.i_max"'),
-    ('"cut.txt"\ncurves.i_max = {', '"gone.txt"\ncurves.i_max = {', "gone.txt cannot be read: No such file"),
+    ('"cut.txt"\ncurves.i_max = {', '"gone.txt"\ncurves.i_max = {', "gone.txt cannot be read"),
     ('kind = "outflow" },\n    { side = "j_min"', 'kind = "outfow" },\n    { side = "j_min"',
      "did you mean 'outflow'?"),
     ('{ side = "i_max", kind = "outflow" }', '{ side = "i_max", kind = "piston" }',

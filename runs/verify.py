@@ -431,7 +431,7 @@ def write_results(path: Path, records: list[dict[str, Any]], command: str) -> li
 
 
 def verify(
-    names: tuple[str, ...],
+    problems: tuple[str, ...],
     short: bool,
     output: str | None,
     say: Callable[[str], None],
@@ -442,7 +442,7 @@ def verify(
     `output` is the Markdown page, with a JSON file of the same name beside it, or "NAME.json";
     `jobs`: runs at once.
     """
-    cases = choose_cases(names)
+    cases = choose_cases(problems)
     if output is not None and not Path(output).parent.is_dir():
         raise BadInput(f"verify: there is no folder {str(Path(output).parent)!r} to write into")
     if output is not None and Path(output).is_dir():
@@ -457,7 +457,7 @@ def verify(
             line = "  ".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=False))
             say(f"{line}  {cells[-1]}".rstrip())
     if output is not None:
-        words = ["shockgrid verify", *names, *(["--short"] if short else []), "-o", output]
+        words = ["shockgrid verify", *problems, *(["--short"] if short else []), "-o", output]
         written = write_results(Path(output), records, " ".join(words))
         say(f"written: {', '.join(map(str, written))}")
     return 1 if any(record["met"] is False for record in records) else 0

@@ -103,7 +103,7 @@ def list_names(picture, force) -> None:
 @outputs
 @force
 @picture
-def make(source, family, cells, weight, options, at, steps, passes, block, outputs, force, picture):
+def make(source, family, weight, options, cells, at, steps, passes, block, outputs, force, picture):
     """Make a grid: of a named domain, between curves in a file, of a 3D block.
 
     \b

@@ -28,39 +28,6 @@ from runs.cli.terminal import (
 )
 from runs.ranks.started import is_for_ranks
 
-
-@click.command()
-@click.argument("deck", metavar="PROBLEM_DECK_OR_STUDY")
-@click.option(
-    "--vary",
-    multiple=True,
-    metavar="KEY=VALUES",
-    help="A:B:N, A:B:N:log or V1,V2,...; several are varied in all combinations.",
-)
-@click.option(
-    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="A key of the deck for all runs."
-)
-@click.option("-o", "--output", metavar="DIR", help="Folder of the study.")
-@click.option("--jobs", type=click.IntRange(1), help="Parallel runs [one per processor].")
-@click.option("--engine", default="processes", help="processes, mpi or dask://ADDRESS [processes].")
-@click.option("--of", "shown", multiple=True, metavar="NAME", help="Quantity to draw and print.")
-@click.option("--refine", metavar="KEY", help="The key of cells, for orders [cells].")
-@click.option("--retry", is_flag=True, help="Also continue failed runs.")
-@click.option("--dry-run", is_flag=True, help="List the runs and the state of each, and stop.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress, only the summary.")
-def study(deck, vary, settings, output, jobs, engine, shown, refine, retry, dry_run, quiet) -> int:
-    """Run a deck at many points: table, orders and picture.
-
-    DECK may be a study file, or the folder of a study to continue.  Each point is a run directory
-    in DIR/runs and is computed once, also if the study was killed; after a change of the deck only
-    what has changed is computed.  Failed runs are listed; the study continues.
-    """
-    from runs.study.command import study as compute
-
-    words = deck, vary, settings, output, jobs, engine, shown, refine, retry, dry_run, quiet
-    return compute(*words, echo, lambda text: echo(text, err=True))
-
-
 BAD_INPUT, FAILED, INTERNAL = 2, 3, 70
 
 
@@ -167,9 +134,7 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
 @max_wall
 @with_plot
 @quiet
-def restart(
-    directory, at, cells, output, force, settings, threads, max_wall, picture, quiet
-) -> int:
+def restart(directory, at, cells, output, force, settings, threads, max_wall, picture, quiet):
     """Continue a run from its last restart point.
 
     Keys that do not affect the state may be changed (run.t_end, output.*, ...;
@@ -197,7 +162,35 @@ def restart(
     return _finish(runner.resume(at, _say), opened, picture)
 
 
-cli.add_command(study)
+@cli.command()
+@click.argument("deck", metavar="PROBLEM_DECK_OR_STUDY")
+@click.option(
+    "--vary",
+    multiple=True,
+    metavar="KEY=VALUES",
+    help="A:B:N, A:B:N:log or V1,V2,...; several are varied in all combinations.",
+)
+@click.option(
+    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="A key of the deck for all runs."
+)
+@click.option("-o", "--output", metavar="DIR", help="Folder of the study.")
+@click.option("--jobs", type=click.IntRange(1), help="Parallel runs [one per processor].")
+@click.option("--engine", default="processes", help="processes, mpi or dask://ADDRESS [processes].")
+@click.option("--of", "shown", multiple=True, metavar="NAME", help="Quantity to draw and print.")
+@click.option("--refine", metavar="KEY", help="The key of cells, for orders [cells].")
+@click.option("--retry", is_flag=True, help="Also continue failed runs.")
+@click.option("--dry-run", is_flag=True, help="List the runs and the state of each, and stop.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress, only the summary.")
+def study(deck, **words) -> int:
+    """Run a deck at many points: table, orders and picture.
+
+    DECK may be a study file, or the folder of a study to continue.  Each point is a run directory
+    in DIR/runs and is computed once, also if the study was killed; after a change of the deck only
+    what has changed is computed.  Failed runs are listed; the study continues.
+    """
+    from runs.study.command import study as compute
+
+    return compute(deck, **words, say=echo, note=_say)
 
 
 @cli.command()
@@ -292,22 +285,7 @@ def inspect(file, other) -> None:
 @click.option("--csv", "table", metavar="FILE", help="Write the values along --line, too.")
 @click.option("-o", "--output", metavar="FILE", help="Picture to write [DIR/<what>.png].")
 @click.option("--dpi", type=click.IntRange(20, 1200), default=140, help="Dots per inch [140].")
-def plot(
-    directory,
-    fields,
-    what,
-    at,
-    mesh,
-    zoom,
-    mirror,
-    beside,
-    line,
-    limits,
-    colours,
-    table,
-    output,
-    dpi,
-) -> None:
+def plot(directory, output, dpi, table, **words) -> None:
     """Draw fields, grids, interfaces or the history of a run.
 
     Without options: the density (or the first field) at four times. Beside
@@ -316,8 +294,7 @@ def plot(
     """
     from runs.pictures.command import Wanted, draw
 
-    wanted = Wanted(fields, what, at, mesh, zoom, mirror, beside, line, limits, colours)
-    for path in draw(directory, wanted, output, dpi, _say, table):
+    for path in draw(directory, Wanted(**words), output, dpi, _say, table):
         echo(path)
 
 
@@ -345,11 +322,10 @@ def export(directory, output) -> None:
 @click.option("--fps", type=click.IntRange(1, 60), help="Frames per second [a film of 8 s].")
 @click.option("--dpi", type=click.IntRange(20, 600), default=110, help="Dots per inch [110].")
 @click.option("-o", "--output", metavar="FILE", help="Film [DIR/film-FIELD.mp4 or .gif].")
-def film(directory, field, follow, zoom, mesh, mirror, fps, dpi, output) -> None:
+def film(directory, field, output, **words) -> None:
     """Make a film of a field over the dumps: mp4 with ffmpeg, else GIF."""
     from runs.pictures.film import make_film
 
-    words = {"follow": follow, "zoom": zoom, "mesh": mesh, "mirror": mirror, "fps": fps, "dpi": dpi}
     echo(make_film(directory, field, output, **words))
 
 
@@ -400,14 +376,14 @@ cli.add_command(grid)
 @click.option("--short", is_flag=True, help="One small size of each, a minute in all.")
 @click.option("-o", "--output", metavar="FILE", help="Write a table (FILE.md) and FILE.json.")
 @click.option("--jobs", type=click.IntRange(1), default=1, help="Parallel runs [1].")
-def verify(problems, short, output, jobs) -> int:
+def verify(**words) -> int:
     """Run the standard problems (or PROBLEMS) at stated sizes: errors, orders, bars.
 
     The exit code is 1 if a bar is missed.
     """
     from runs.verify import verify as run_all
 
-    return run_all(problems, short, output, echo, jobs)
+    return run_all(**words, say=echo)
 
 
 @cli.command()
@@ -421,14 +397,14 @@ def verify(problems, short, output, jobs) -> int:
 )
 @click.option("--json", "path", metavar="FILE", help="Also write the tables to this file.")
 @click.option("--peer", metavar="DIR", help="A built CloverLeaf_ref to measure beside.")
-def bench(cells, rounds, runs, path, peer) -> None:
+def bench(**words) -> None:
     """Measure how fast this computer is, and where the time goes.
 
     Run nothing else meanwhile: other work distorts the timings.
     """
     from runs.bench import bench as measure
 
-    measure(cells, rounds, runs, path, peer, echo)
+    measure(**words, say=echo)
 
 
 def _say(text: str) -> None:

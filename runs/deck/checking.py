@@ -1,11 +1,9 @@
 """Telling what is wrong with a deck in words: unknown keys, wrong types, bounds.
 
-The JSON schema that editors are given says what a deck may hold, and jsonschema finds what breaks
-it; here each refusal becomes a sentence with the full key, where it was given, the value and what
-would be right, an unknown key gets the nearest known one, and all mistakes are reported at once.
-
-Note: jsonschema takes 0.3 s to be imported.  A deck that msgspec takes, from whose types the
-schema is made, needs no words, and is not shown to it.
+msgspec checks a deck against the types and constraints of its class; where it refuses, the deck is
+gone through key by key, so that all mistakes are reported at once, each in a sentence with the full
+key, where it was given, the value and what would be right; an unknown key gets the nearest known
+one.  The JSON schema that msgspec makes of the same types is for editors, and for the words.
 """
 
 from __future__ import annotations
@@ -17,7 +15,7 @@ import textwrap
 import typing
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 
@@ -25,11 +23,8 @@ from problems.deck import Deck, DeckTable
 from problems.registry import load_problem, read_docstring
 from regrid.errors import BadInput, find_nearest
 
-if TYPE_CHECKING:
-    from jsonschema import ValidationError
-
-
 DIGESTS = "digests"
+UNIONS = (typing.Union, type(int | str))
 
 
 @dataclass(frozen=True)
@@ -138,18 +133,15 @@ def make_schema(problem: str) -> dict[str, Any]:
     return {**schema, **head, "$defs": parts}
 
 
-def make_parts(kind: type) -> dict[str, Any]:
-    """The schema of a deck's own fields, without the key problem, by which decks are checked."""
-    (outline,), parts = msgspec.json.schema_components([kind], ref_template="#/$defs/{name}")
-    name = outline["$ref"].rsplit("/", 1)[-1]
-    root = parts.pop(name)
+def make_parts(kind: Any) -> dict[str, Any]:
+    """The schema of a type: of a deck's own fields, without the key problem."""
+    (root,), parts = msgspec.json.schema_components([kind], ref_template="#/$defs/{name}")
     root, parts = _without_null(root), _without_null(parts)
-    needed = any(field.required for field in msgspec.structs.fields(kind))
-    default = {} if needed else _without_null(msgspec.to_builtins(kind()))
-    for key, value in default.items():
-        entry = root["properties"][key]
-        if "default" not in entry:
-            entry["default"] = value
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        root = parts.pop(kind.__name__)
+        needed = any(field.required for field in msgspec.structs.fields(kind))
+        for key, value in ({} if needed else _without_null(msgspec.to_builtins(kind()))).items():
+            root["properties"][key].setdefault("default", value)
     return {"$schema": "http://json-schema.org/draft-07/schema#", **root, "$defs": parts}
 
 
@@ -194,190 +186,131 @@ REPLACED = {  # the last name of a key of older decks: what took its place, and 
 
 def check_deck(table: dict[str, Any], kind: type, where: Where) -> None:
     """Raise BadInput with a line about each thing in `table` that a deck `kind` cannot take."""
-    try:
-        msgspec.convert(table, kind)
-        if _is_finite(table):
-            return
-    except msgspec.ValidationError:
-        pass
-    schema = make_parts(kind)
-    told = list(_Words(schema, where).tell_all(_find_errors(schema, table)))
-    order = list(table)
-    told.sort(key=lambda one: order.index(one[0]) if one[0] in order else len(order))
+    told = [f"{where(key)}: {words}" for key, words in find_mistakes(table, kind, "", kind)]
     if told:
-        raise BadInput("\n".join(dict.fromkeys(sentence for _, sentence in told)))
+        raise BadInput("\n".join(dict.fromkeys(told)))
+
+
+def takes(value: Any, kind: Any) -> bool:
+    """Is `value` one of the type `kind`, and every number in it finite?"""
+    try:
+        msgspec.convert(value, kind)
+    except msgspec.ValidationError:
+        return False
+    return _is_finite(value)
 
 
 def _is_finite(value: Any) -> bool:
-    if isinstance(value, dict):
-        return all(map(_is_finite, value.values()))
-    if isinstance(value, list):
-        return all(map(_is_finite, value))
-    return not isinstance(value, float) or math.isfinite(value)
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return all(map(_is_finite, inner)) and not (
+        isinstance(value, float) and not math.isfinite(value)
+    )
 
 
-def _find_errors(schema: Part, table: dict[str, Any]) -> list[ValidationError]:
-    """What breaks the schema.
-
-    Numbers have to be finite, and 2.0 is no whole number, as in TOML.
-    """
-    from jsonschema.validators import extend, validator_for
-
-    def is_integer(checker, value) -> bool:
-        return isinstance(value, int) and not isinstance(value, bool)
-
-    def is_number(checker, value) -> bool:
-        return is_integer(checker, value) or (isinstance(value, float) and math.isfinite(value))
-
-    base = validator_for(schema)
-    types = base.TYPE_CHECKER.redefine_many({"integer": is_integer, "number": is_number})
-    return list(extend(base, type_checker=types)(schema).iter_errors(table))
+def list_choices(kind: Any) -> list[Any]:
+    """The types that a value of `kind` may have, without their constraints."""
+    if hasattr(kind, "__metadata__"):  # Annotated
+        return list_choices(kind.__origin__)
+    inner = typing.get_args(kind) if typing.get_origin(kind) in UNIONS else ()
+    return [choice for one in inner for choice in list_choices(one)] or [kind]
 
 
-class _Words:
-    """Sentences about errors of jsonschema, each after the first name of the key it is about."""
-
-    def __init__(self, schema: Part, where: Where):
-        self.schema, self.where = schema, where
-        self.known = list(known_keys(schema))
-
-    def tell_all(self, errors: list[ValidationError]) -> Iterator[tuple[str, str]]:
-        for error in errors:
-            yield from self.tell(error)
-
-    def tell(self, error: ValidationError) -> Iterator[tuple[str, str]]:
-        key = ".".join(map(str, error.absolute_path))
-        prefix = f"{key}." if key else ""
-        match error.validator:
-            case "additionalProperties" if error.validator_value is False:
-                for name in error.instance:
-                    if name not in error.schema.get("properties", {}):
-                        full = prefix + name
-                        nearest = _nearest_key(full, self.known)
-                        words = f"{self.where(full)}: there is no key {full!r}{nearest}"
-                        yield full.split(".")[0], words
-            case "required":
-                for name in error.validator_value:
-                    if name not in error.instance:
-                        full = prefix + name
-                        yield full.split(".")[0], f"{self.where(full)}: the key {full!r} is missing"
-            case "anyOf":
-                yield from self.tell_choice(error, key)
-            case _:
-                yield key.split(".")[0], self.tell_value(error, key)
-
-    def tell_choice(self, error: ValidationError, key: str) -> Iterator[tuple[str, str]]:
-        """Of a value that may be of several kinds: what is wrong with it as the one it looks like.
-
-        That is the table with its tag, or the only kind that is a table or a list as it is.
-        """
-        choices = [resolve(self.schema, part) for part in error.validator_value]
-        tag = error.schema.get("discriminator", {}).get("propertyName")
-        value = error.instance
-        if isinstance(value, dict) and tag:
-            tags = [choice["properties"][tag]["enum"][0] for choice in choices]
-            if value.get(tag) not in tags:
-                words = ", ".join(repr(one) for one in tags)
-                told = f"{key} lacks the key {tag!r}: one of {words}"
-                if tag in value:
-                    told = f"{key}.{tag} = {show(value[tag])}; it has to be one of {words}"
-                yield key.split(".")[0], f"{self.where(key)}: {told}"
-                return
-            chosen = [tags.index(value[tag])]
-        else:
-            looks = {dict: "object", list: "array"}.get(type(value))
-            chosen = [k for k, one in enumerate(choices) if looks and one.get("type") == looks]
-        if len(chosen) == 1:
-            inner = [one for one in error.context or () if one.schema_path[0] == chosen[0]]
-            yield from self.tell_all(inner)
+def find_mistakes(value: Any, kind: Any, key: str, deck: type) -> Iterator[tuple[str, str]]:
+    """What of a value, at the dotted `key` of a `deck`, is not of its type: keys and sentences."""
+    if takes(value, kind):
+        return
+    choices = list_choices(kind)
+    tables = [one for one in choices if isinstance(one, type) and issubclass(one, msgspec.Struct)]
+    found: list[tuple[str, str]] = []
+    if isinstance(value, dict) and tables:
+        tag = tables[0].__struct_config__.tag_field
+        by_tag = {one.__struct_config__.tag: one for one in tables}
+        table = by_tag.get(value.get(tag)) if tag else tables[0]
+        if table is None:
+            words = ", ".join(repr(one) for one in by_tag)
+            told = f"{key}.{tag} = {show(value[tag])}; it has to be" if tag in value else ""
+            yield key, f"{told or f'{key} lacks the key {tag!r}:'} one of {words}"
             return
-        yield key.split(".")[0], self.tell_value(error, key)
+        found += _find_in_table(value, table, f"{key}." if key else "", deck)
+    for one in choices:
+        inner = typing.get_args(one)
+        if isinstance(value, dict) and typing.get_origin(one) is dict:
+            pairs = [(f"{key}.{name}", part, inner[1]) for name, part in value.items()]
+        elif isinstance(value, list) and typing.get_origin(one) in (list, tuple):
+            alike = inner[:1] * len(value) if inner[1:] in ((), (...,)) else inner
+            pairs = [
+                (f"{key}.{k}", *pair) for k, pair in enumerate(zip(value, alike, strict=False))
+            ]
+        else:
+            continue
+        for name, part, part_kind in pairs:
+            found += find_mistakes(part, part_kind, name, deck)
+    yield from found
+    if found:
+        return
+    if isinstance(value, dict):
+        inner = ", ".join(f"{key}.{name}" for name in value) or "{}"
+        yield inner.split(", ")[0], f"{inner}: {key} is a value, not a table: {describe_type(kind)}"
+        return
+    wanted = describe_type(kind) + ", finite" * (not _is_finite(value))
+    if isinstance(value, str) and any("material" in one.__struct_fields__ for one in tables):
+        wanted += f", such as {key} = {{ material = {show(value)} }}"
+    yield key, f"{key} = {show(value)}; it has to be {wanted}"
 
-    def tell_value(self, error: ValidationError, key: str) -> str:
-        value, part = error.instance, error.schema
-        wanted = describe(self.schema, part)
-        if isinstance(value, dict) and "object" not in _list_types(self.schema, part):
-            inner = ", ".join(f"{key}.{name}" for name in value) or "{}"
-            start = self.where(inner.split(", ")[0])
-            return f"{start}: {inner}: {key} is a value, not a table: {wanted}"
-        if isinstance(value, float) and not math.isfinite(value):
-            wanted += ", finite"
-        keys = resolve(self.schema, part).get("properties", {})
-        if isinstance(value, str) and "material" in keys:
-            wanted += f", such as {key} = {{ material = {show(value)} }}"
-        return f"{self.where(key)}: {key} = {show(value)}; it has to be {wanted}"
+
+def _find_in_table(
+    value: dict[str, Any], table: type, prefix: str, deck: type
+) -> Iterator[tuple[str, str]]:
+    """Unknown keys, mistakes in those that are known, missing ones."""
+    fields = {field.encode_name: field for field in msgspec.structs.fields(table)}
+    for name, part in value.items():
+        full = prefix + name
+        if name in fields:
+            yield from find_mistakes(part, fields[name].type, full, deck)
+        elif name != table.__struct_config__.tag_field:
+            yield full, f"there is no key {full!r}{_nearest_key(full, list_keys(deck))}"
+    for name, field in fields.items():
+        if field.required and name not in value:
+            yield prefix + name, f"the key {prefix + name!r} is missing"
+
+
+def list_keys(deck: type) -> list[str]:
+    """All dotted keys of a deck, tables before what is in them; in lists without the place."""
+    return [
+        f"{prefix}.{name}" if prefix else name
+        for prefix, table in find_tables(deck)
+        for name in table.__struct_fields__
+    ]
+
+
+def find_type(kind: Any, names: list[str]) -> Any:
+    """The type of what lies at the dotted key `names` in a value of `kind`; None where nothing."""
+    if not names:
+        return kind
+    for one in list_choices(kind):
+        inner = typing.get_args(one)
+        if isinstance(one, type) and issubclass(one, msgspec.Struct):
+            inner = {field.name: field.type for field in msgspec.structs.fields(one)}.get(names[0])
+        elif typing.get_origin(one) is dict:
+            inner = inner[1]
+        elif names[0].isdigit() and inner:
+            inner = inner[min(int(names[0]), len(inner) - 1)] if inner[-1] is not ... else inner[0]
+        if inner and (found := find_type(inner, names[1:])) is not None:
+            return found
+    return None
+
+
+def wants_text(kind: type, key: str, value: Any) -> bool:
+    """Does the field at the dotted `key` of a deck take text, but nothing like `value`?"""
+    found = list_choices(find_type(kind, key.split(".")))
+    like = {bool: (bool,), int: (int, float), float: (float,)}[type(value)]
+    return str in found and not set(like) & set(found)
 
 
 def resolve(schema: Part, part: Part) -> Part:
     """A part of the schema, or the definition that it refers to."""
     reference = part.get("$ref")
     return schema["$defs"][reference.rsplit("/", 1)[-1]] if reference else part
-
-
-def known_keys(schema: Part, part: Part | None = None, prefix: str = "") -> Iterator[str]:
-    """All dotted keys of a deck, tables before what is in them; in lists without the place."""
-    part = resolve(schema, schema if part is None else part)
-    for name, inner in part.get("properties", {}).items():
-        if prefix + name == "problem" or _is_tag(inner):
-            continue
-        yield prefix + name
-        yield from known_keys(schema, inner, f"{prefix}{name}.")
-    for inner in part.get("anyOf", ()):
-        yield from known_keys(schema, inner, prefix)
-    if isinstance(part.get("items"), dict):
-        yield from known_keys(schema, part["items"], prefix)
-
-
-def _is_tag(part: Part) -> bool:
-    """Is this the key that tells one kind of table from another?"""
-    return len(part.get("enum", ())) == 1 and "default" not in part and "description" not in part
-
-
-def find_part(schema: Part, names: list[str]) -> Part | None:
-    """The part of the schema for the dotted key `names`; None where there is none."""
-    return next(_find_parts(schema, schema, names), None)
-
-
-def _find_parts(schema: Part, part: Part, names: list[str]) -> Iterator[Part]:
-    part = resolve(schema, part)
-    if not names:
-        yield part
-        return
-    name, *rest = names
-    inner: list[tuple[Part, list[str]]] = [(one, names) for one in part.get("anyOf", ())]
-    items, others = part.get("items"), part.get("additionalProperties")
-    if name in part.get("properties", {}):
-        inner.append((part["properties"][name], rest))
-    elif isinstance(others, dict):
-        inner.append((others, rest))
-    if name.isdigit() and isinstance(items, dict):
-        inner.append((items, rest))
-    elif name.isdigit() and isinstance(items, list) and int(name) < len(items):
-        inner.append((items[int(name)], rest))
-    for one, following in inner:
-        yield from _find_parts(schema, one, following)
-
-
-def wants_text(kind: type, key: str, value: Any) -> bool:
-    """Does the field at the dotted `key` of a deck take text, but nothing like `value`?"""
-    schema = make_parts(kind)
-    part = find_part(schema, key.split("."))
-    types = _list_types(schema, part) if part is not None else set()
-    given = {bool: {"boolean"}, int: {"integer", "number"}, float: {"number"}}.get(type(value))
-    return "string" in types and not types & (given or set())
-
-
-def _list_types(schema: Part, part: Part) -> set[str]:
-    part = resolve(schema, part)
-    found = {_name_type(one) for one in part.get("enum", ())}
-    for inner in part.get("anyOf", ()):
-        found |= _list_types(schema, inner)
-    return found | ({part["type"]} if "type" in part else set())
-
-
-def _name_type(value: Any) -> str:
-    names = {bool: "boolean", int: "integer", float: "number", str: "string"}
-    return names.get(type(value), "object")
 
 
 def _nearest_key(key: str, known: list[str]) -> str:
@@ -399,6 +332,12 @@ def _nearest_key(key: str, known: list[str]) -> str:
     if by_last is not None:
         return f"; did you mean {lasts[by_last]!r}?"
     return f"; known there are: {', '.join(beside)}" if beside else ""
+
+
+def describe_type(kind: Any) -> str:
+    """What a value of a type looks like, in words."""
+    part = make_parts(kind)
+    return describe(part, part)
 
 
 def describe(schema: Part, part: Part) -> str:

@@ -11,10 +11,11 @@ grid); one that ends early looks better than it is, so the steps come first.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -46,8 +47,7 @@ HEAD = (
 REASON = 110  # characters of a reason that are shown
 
 
-@dataclass(frozen=True)
-class Family:
+class Family(NamedTuple):
     """A name of the registry with options, as given on the command line."""
 
     label: str
@@ -93,18 +93,43 @@ def compare_families(
         raise BadInput(f"--set changes the deck of a flow; a {kinds[names[0]]} has none")
     pictures = _plan_pictures(picture, names, force)
     for name in names:
-        drawn: list[tuple[str, March, np.ndarray]] = []
         if kinds[name] == "flow":
-            yield from _compare_in_flow(name, families, weight, settings, drawn)
+            title, compute = _prepare_flow(name, settings)
         elif kinds[name] == "file":
-            yield from _compare_on_file(name, block, cells, steps, families, weight, drawn)
+            title, compute = _prepare_file(name, block, cells, steps)
         else:
-            yield from _compare_on_domain(name, cells, steps, families, weight, drawn)
+            title, compute = _prepare_domain(name, cells, steps)
+        yield title
+        yield HEAD
+        drawn, reasons = [], []
+        for family in families:
+            found = compute(family, weight if takes_weight(family.name) else None)
+            yield describe_march(family.label, found.march, found.steps)
+            if found.march.failure:
+                words_why = found.march.failure.removeprefix("regrid: ")
+                why = textwrap.shorten(words_why, REASON, placeholder="...")
+                reasons.append(f"  {family.label}{found.when}: {why}")
+            drawn.append((f"{family.label}: {found.title}", found.march, found.sides))
+        yield from reasons
         if name in pictures:
             from runs.grids.pictures import draw_comparison
 
             yield f"picture: {draw_comparison(drawn, name, pictures[name])}"
         yield ""
+
+
+class Compared(NamedTuple):
+    """What came of a family: its march, the steps and the title in words, the sides that are drawn,
+    and when it failed."""
+
+    march: March
+    steps: str
+    title: str
+    sides: np.ndarray
+    when: str = ""
+
+
+Compute = Callable[[Family, str | None], Compared]  # from a family and its weight
 
 
 def _find_kind(name: str) -> str:
@@ -136,54 +161,44 @@ def default_cells(name: str) -> tuple[int, int]:
     return parameters["ni"].default, parameters["nj"].default
 
 
-def _compare_on_domain(name, cells, steps, families, weight, drawn) -> Iterator[str]:
+def _prepare_domain(name: str, cells, steps: int) -> tuple[str, Compute]:
     ni, nj = cells or default_cells(name)
     domain = make_domain(name, ni, nj)
-    way = domain.travel_in_cells / steps
-    yield f"{name}: {ni} x {nj} cells, {steps} steps of {way:.2g} cells at the fastest node"
-    yield HEAD
-    reasons = []
-    for family in families:
-        given = weight if takes_weight(family.name) else None
-        found = march(domain, make_family(family.name, family.options, given), steps)
-        yield describe_march(family.label, found, f"{found.done}/{steps}")
-        if found.failure:
-            reasons.append(f"  {family.label}, step {found.done + 1}: {_shorten(found.failure)}")
+
+    def compute(family: Family, weight: str | None) -> Compared:
+        found = march(domain, make_family(family.name, family.options, weight), steps)
         last = found.done + 1 if found.failure else steps
-        title = f"{family.label}: {found.done} of {steps} steps"
-        drawn.append((title, found, domain.boundary(last / steps)))
-    yield from reasons
+        title, when = f"{found.done} of {steps} steps", f", step {found.done + 1}"
+        return Compared(found, f"{found.done}/{steps}", title, domain.boundary(last / steps), when)
+
+    way = domain.travel_in_cells / steps
+    words = f"{ni} x {nj} cells, {steps} steps of {way:.2g} cells at the fastest node"
+    return f"{name}: {words}", compute
 
 
-def _compare_on_file(name, block, cells, passes, families, weight, drawn) -> Iterator[str]:
-    found = read_source(name, block)
-    given = not isinstance(found, dict) and cells is None  # a grid, whose own inside is the start
-    sides = found if given else read_sides(name, block, cells)
+def _prepare_file(name: str, block: str | None, cells, passes: int) -> tuple[str, Compute]:
+    source = read_source(name, block)
+    given = not isinstance(source, dict) and cells is None  # a grid, whose own inside is the start
+    sides = source if given else read_sides(name, block, cells)
     if sides.shape[0] == 3:
         raise BadInput(f"{name} is a grid in space; families are compared on plane grids")
-    size = f"{sides.shape[1] - 1} x {sides.shape[2] - 1} cells"
-    yield f"{name}: {size}, the last of at most {passes} passes on its sides"
-    yield HEAD
-    reasons = []
-    for family in families:
-        regridder = make_family(
-            family.name, family.options, weight if takes_weight(family.name) else None
-        )
+
+    def compute(family: Family, weight: str | None) -> Compared:
+        regridder = make_family(family.name, family.options, weight)
         warm_up(make_domain("swan", 8, 8), regridder)
         if given:
             made = regrid_plane(sides, regridder, passes)
         else:
             made = make_on_curves(sides, regridder, passes, name)
-        march = made.march or March(made.nodes, passes, failure=made.failure)
-        march.nodes = made.nodes
-        if march.done:
-            march.gap = max(measure_first_line_gap(march.nodes, side) for side in SIDE_NAMES)
-        yield describe_march(family.label, march, f"{march.done}/{passes}")
-        if made.failure:
-            reasons.append(f"  {family.label}: {_shorten(made.failure)}")
-        title = f"{family.label}: " + ("no grid" if made.failure else f"sine {march.sine:.2f}")
-        drawn.append((title, march, sides))
-    yield from reasons
+        found = made.march or March(made.nodes, passes)
+        found.nodes, found.failure = made.nodes, made.failure
+        if found.done:
+            found.gap = max(measure_first_line_gap(found.nodes, side) for side in SIDE_NAMES)
+        title = "no grid" if made.failure else f"sine {found.sine:.2f}"
+        return Compared(found, f"{found.done}/{passes}", title, sides)
+
+    size = f"{sides.shape[1] - 1} x {sides.shape[2] - 1} cells"
+    return f"{name}: {size}, the last of at most {passes} passes on its sides", compute
 
 
 def describe_march(label: str, found: March, steps: str) -> str:
@@ -196,46 +211,37 @@ def describe_march(label: str, found: March, steps: str) -> str:
     )
 
 
-def _shorten(words: str) -> str:
-    words = words.removeprefix("regrid: ")
-    return words if len(words) <= REASON else words[: REASON - 3] + "..."
-
-
-def _compare_in_flow(name, families, weight, settings, drawn) -> Iterator[str]:
+def _prepare_flow(name: str, settings: tuple[str, ...]) -> tuple[str, Compute]:
     read = read_deck(name, settings)
     if not hasattr(read.deck, "regrid") or read.problem == "grid-march":
         raise BadInput(f"{name}: the problem {read.problem} has no regridder to compare")
     started = read.make_problem().build()
-    sizes = ", ".join(f"{b.nodes.shape[1] - 1} x {b.nodes.shape[2] - 1}" for b in started.blocks)
-    yield f"{name}: flow to t = {started.t_end:.6g} s, blocks of {sizes} cells"
-    yield HEAD
-    reasons = []
-    for family in families:
-        options = dict(family.options)
-        if weight is not None and takes_weight(family.name):
-            options["weight"] = weight
+
+    def compute(family: Family, weight: str | None) -> Compared:
+        options = family.options | ({} if weight is None else {"weight": weight})
         found, part = _run_flow(read, family.name, options)
-        yield describe_march(family.label, found, f"{found.done} {100.0 * part:3.0f}%")
-        if found.failure:
-            reasons.append(f"  {family.label}: {_shorten(found.failure)}")
-        title = f"{family.label}: {100.0 * part:.0f} % of the time"
-        drawn.append((title, found, found.nodes))
-    yield from reasons
+        share = 100.0 * part
+        title = f"{share:.0f} % of the time"
+        return Compared(found, f"{found.done} {share:3.0f}%", title, found.nodes)
+
+    sizes = ", ".join(f"{b.nodes.shape[1] - 1} x {b.nodes.shape[2] - 1}" for b in started.blocks)
+    return f"{name}: flow to t = {started.t_end:.6g} s, blocks of {sizes} cells", compute
 
 
 def _run_flow(read, name: str, options: dict[str, Any]) -> tuple[March, float]:
     """Run one flow as far as it goes; `nodes` of the result are those of the interface's block."""
-    own = {key: options.pop(key) for key in ("epsilon", "method", "edge_lengths") if key in options}
-    if name != "barrier" and own:
-        options |= own
-        own = {}
-    chosen = msgspec.structs.replace(read.deck.regrid, name=name, options=options, **own)
+    own = {"epsilon", "method", "edge_lengths"} & options.keys() if name == "barrier" else set()
+    chosen = msgspec.structs.replace(
+        read.deck.regrid,
+        name=name,
+        options={key: value for key, value in options.items() if key not in own},
+        **{key: options[key] for key in own},
+    )
     deck = msgspec.structs.replace(read.deck, regrid=chosen)
     evolution = replace(read, deck=deck).make_problem().build()
     block, sides = _find_interface(evolution.blocks)
     found = March(block.nodes.copy(), 0)
-    inner = sum((b.nodes.shape[1] - 2) * (b.nodes.shape[2] - 2) for b in evolution.blocks)
-    own_inner = (block.nodes.shape[1] - 2) * (block.nodes.shape[2] - 2)
+    inner = [(b.nodes.shape[1] - 2) * (b.nodes.shape[2] - 2) for b in (block, *evolution.blocks)]
     while evolution.finished is None:
         if deck.run.max_steps is not None and found.done >= deck.run.max_steps:
             found.failure = f"stopped after run.max_steps = {deck.run.max_steps} steps"
@@ -247,7 +253,7 @@ def _run_flow(read, name: str, options: dict[str, Any]) -> tuple[March, float]:
             break
         found.done = evolution.step
         # Of one node, whichever block it is in: `cost` divides by the shown block's own count.
-        found.seconds.append(row.get("seconds_regrid", np.nan) * own_inner / inner)
+        found.seconds.append(row.get("seconds_regrid", np.nan) * inner[0] / sum(inner[1:]))
         found.sine = min(found.sine, row["least_scaled_jacobian"])
         found.aspect = max(found.aspect, row["worst_aspect"])
         found.sub_moves += int(row.get("regrid_sub_moves", 0))

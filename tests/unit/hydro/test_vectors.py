@@ -13,6 +13,7 @@ from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
 from hydro.formulas.riemann import FLUXES
 from hydro.interior import axisymmetric, faces, reconstruction, slopes, update
 from hydro.interior import scratch as at
+from regrid.barrier import residual_estimate as look
 
 CURVED = GEOMETRIES["axisymmetric"]
 LIMIT, SOUND, ENERGY = (
@@ -61,22 +62,41 @@ PHASES = {  # how a phase is made, its arguments after the scratch and the numbe
     "radial lines": (lambda: axisymmetric.fill_lines, ()),
     "radial shifts": (lambda: axisymmetric.fill_shift_after, ()),
 }
-HOISTED = {"switch": 2}  # scalar instructions on numbers that are the same for all cells
+NUMBERS = (1.0,) * 8
+LOOKS = {  # loops over a row of cells of the regridder's check: their arguments before the scratch
+    "moved row": (look.move_row, ((0.5, 0.1, *(((0.1, 0.1),) * 4), 0.1, 0.1), 16)),
+    "laws of edges": (look.take_laws, (NUMBERS[:5], NUMBERS[:3], 16)),
+    "old areas": (look.fill_old_areas, (16,)),
+    "cells": (look.take_row_of_cells, (NUMBERS, 16)),
+    "nodes": (look.add_row, (16,)),
+}
+HOISTED = {"switch": 2, "cells": 6}  # scalar instructions on numbers that are the same for all cells
 PACKED_SINCE = {"switch": (0, 66)}  # numba
 INSTRUCTION = re.compile(r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*)(p|s)d\s", re.M)
 
 
+def count_kinds(function, *arguments):
+    """Packed and scalar instructions of a compiled function's loops."""
+    # not through the disk cache: code loaded from there has no text to read
+    compiled = numba.njit(error_model="numpy")(function)
+    compiled(*arguments)
+    (code,) = compiled.inspect_asm().values()
+    kinds = INSTRUCTION.findall(code)
+    return kinds.count("p"), kinds.count("s")
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86-64 code")
-@pytest.mark.parametrize("name", PHASES)
+@pytest.mark.parametrize("name", [*PHASES, *LOOKS])
 def test_rows_of_cells_are_vectors(name):
     if numba.version_info.short < PACKED_SINCE.get(name, (0, 0)):
         pytest.skip("the compiler of this numba leaves the loop scalar: slower, the same numbers")
-    make, arguments = PHASES[name]
-    # not through the disk cache: code loaded from there has no text to read
-    compiled = numba.njit(error_model="numpy")(make())
-    compiled(np.ones(at.SIZE), 1 if name == "HLL flux" else 16, *arguments)
-    (code,) = compiled.inspect_asm().values()
-    kinds = INSTRUCTION.findall(code)
-    packed, scalar = kinds.count("p"), kinds.count("s") - HOISTED.get(name, 0)
+    if name in LOOKS:
+        kernel, arguments = LOOKS[name]
+        packed, scalar = count_kinds(kernel.py_func, *arguments, np.ones(look.LOOK_ROWS))
+    else:
+        make, arguments = PHASES[name]
+        count = 1 if name == "HLL flux" else 16
+        packed, scalar = count_kinds(make(), np.ones(at.SIZE), count, *arguments)
+    scalar -= HOISTED.get(name, 0)
     assert packed >= 0.9 * scalar and packed > 0, (packed, scalar)

@@ -71,9 +71,10 @@ class NewtonMove:
         """Check the residual of the moved grid: True when it is `work.trial` and needs no more."""
         work, tuning = self.work, self.tuning
         if work.ni == 1 or work.nj == 1:
+            work.load_old()
             work.fill_moved()
             return False
-        self.moved_ratio, self.estimate, strayed = work.look(work.base, work.old, moves=True)
+        self.moved_ratio, self.estimate, strayed = work.look()
         corrected = False
         if self.moved_ratio > tuning.start_ratio and self._correct_smooth_error():
             strayed, corrected = np.inf, True
@@ -97,6 +98,7 @@ class NewtonMove:
         size = work.coarse.find(work.base, work.law, tuning.smooth_floor)
         if not tuning.smooth_floor < size < np.inf:
             return False
+        work.load_old()
         moved = float(np.abs(work.base - work.old).max()) / math.sqrt(work.sigma)
         work.coarse.add(work.base, work.trial, min(1.0, tuning.smooth_part * moved / size))
         ratio = work.compare_corners(work.trial, work.old)
@@ -112,6 +114,7 @@ class NewtonMove:
         True when `work.trial` is valid.
         """
         work = self.work
+        work.load_old()
         if work.sides is not work.own_sides:  # the moved grid may lie in the same array
             work.own_sides[:] = work.sides
             work.sides = work.own_sides

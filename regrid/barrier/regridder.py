@@ -165,7 +165,7 @@ class BarrierRegridder:
         if not (simple and move.is_settled()):
             if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
                 raise explain_failure(boundary)
-            if not np.isfinite(work.old).all():
+            if not np.isfinite(previous).all():
                 raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
             if not simple:
                 raise explain_failure(boundary, previous=previous)
@@ -174,7 +174,7 @@ class BarrierRegridder:
         report = move.report()
         if report.quality and mirrored != transposed:  # of a grid that turns clockwise
             report = replace(report, quality=None)
-        return RegridResult(work.give(transposed, mirrored, into), report)
+        return RegridResult(work.give(), report)
 
     def compute_limiting_rate(self, boundary: np.ndarray, sound_speed: np.ndarray) -> float:
         """R [1/s] of theory R4.11: the rate that these sides ask for, whatever is inside.

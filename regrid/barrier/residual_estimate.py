@@ -46,6 +46,7 @@ from regrid.measure.corners import mark_triangles
 LOOK_ROWS = 70 * SPAN
 OLD_ROWS = OLD_X, OLD_Y, OLD_NEXT_X, OLD_NEXT_Y
 ROWS = HERE_X, HERE_Y, NEXT_X, NEXT_Y
+UPRIGHT = False, False  # a frame: is it transposed, is it mirrored?
 OWN = -NOTHING
 # What a look finds in a chunk of columns, and in the block: the most that a corner has shrunk, the
 # least scaled corner area, how far nodes are from interpolated places, the largest squared inverse
@@ -71,26 +72,46 @@ def begin(law, motion, low, cells, Z):
             Z[LAW + k * SPAN + col] = motion.along_j[k, low + col]
 
 
-@inlined
-def take_old_row(old, i, low, count, Z):
-    """Row i of the old grid; what were the next rows of both grids are no more."""
-    x, y = old[0, i, low : low + count], old[1, i, low : low + count]
-    for col in range(count):
+@kernel(allocates=False)
+def shift_rows(count, Z):
+    """The next rows of both grids become those of this row of cells."""
+    for col in range(round_up(count)):
         Z[OLD_X + col] = Z[OLD_NEXT_X + col]
         Z[OLD_Y + col] = Z[OLD_NEXT_Y + col]
         Z[HERE_X + col] = Z[NEXT_X + col]
         Z[HERE_Y + col] = Z[NEXT_Y + col]
-        Z[OLD_NEXT_X + col] = x[col]
-        Z[OLD_NEXT_Y + col] = y[col]
 
 
 @inlined
-def take_new_row(nodes, i, low, count, Z):
-    """Row i of a grid, `count` columns from `low` on."""
-    x, y = nodes[0, i, low : low + count], nodes[1, i, low : low + count]
-    for col in range(count):
-        Z[NEXT_X + col] = x[col]
-        Z[NEXT_Y + col] = y[col]
+def take_row(nodes, i, frame, low, count, to_x, to_y, Z):
+    """Row i of a grid in a `frame` into two rows of Z, `count` columns from `low` on."""
+    transposed, mirrored = frame
+    x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
+    if transposed:
+        for col in range(count):
+            Z[to_x + col] = x[low + col, i]
+            Z[to_y + col] = y[low + col, i]
+    else:
+        row_x, row_y = x[i, low : low + count], y[i, low : low + count]
+        for col in range(count):
+            Z[to_x + col] = row_x[col]
+            Z[to_y + col] = row_y[col]
+
+
+@inlined
+def give_row(nodes, i, frame, low, first, last, Z):
+    """The next row's columns `first` to `last` - 1 into row i of a grid in a `frame`."""
+    transposed, mirrored = frame
+    x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
+    if transposed:
+        for j in range(first, last):
+            x[j, i] = Z[NEXT_X + j - low]
+            y[j, i] = Z[NEXT_Y + j - low]
+    else:
+        row_x, row_y, start = x[i, first:last], y[i, first:last], first - low
+        for col in range(last - first):
+            row_x[col] = Z[NEXT_X + start + col]
+            row_y[col] = Z[NEXT_Y + start + col]
 
 
 @kernel(allocates=False)
@@ -109,23 +130,21 @@ def move_row(here, count, Z):
 def make_new_row(i, law, motion, low, count, nodes, Z):
     """Row i of the moved grid: inner columns into `nodes`, too, whose sides may be the motion's."""
     ni, nj, sides = nodes.shape[1] - 1, nodes.shape[2] - 1, motion.sides
-    first, last = (low, low + count) if i == 0 or i == ni else (max(low, 1), min(low + count, nj))
     if i == 0 or i == ni:
-        take_new_row(sides, i, low, count, Z)
-    else:
-        move_row(take_blend(i, motion.along_i, motion.corners), count, Z)
-        if law.bent:
-            for j in range(first, last):
-                Z[NEXT_X + j - low] += law.bend[i, j] * motion.turn[0, j]
-                Z[NEXT_Y + j - low] += law.bend[i, j] * motion.turn[1, j]
-        for j in (0, nj):
-            if low <= j < low + count:
-                Z[NEXT_X + j - low] = nodes[0, i, j] = sides[0, i, j]
-                Z[NEXT_Y + j - low] = nodes[1, i, j] = sides[1, i, j]
-    x, y = nodes[0, i, first:last], nodes[1, i, first:last]
-    for col in range(last - first):
-        x[col] = Z[NEXT_X + first - low + col]
-        y[col] = Z[NEXT_Y + first - low + col]
+        take_row(sides, i, UPRIGHT, low, count, NEXT_X, NEXT_Y, Z)
+        give_row(nodes, i, UPRIGHT, low, low, low + count, Z)
+        return
+    first, last = max(low, 1), min(low + count, nj)
+    move_row(take_blend(i, motion.along_i, motion.corners), count, Z)
+    if law.bent:
+        for j in range(first, last):
+            Z[NEXT_X + j - low] += law.bend[i, j] * motion.turn[0, j]
+            Z[NEXT_Y + j - low] += law.bend[i, j] * motion.turn[1, j]
+    give_row(nodes, i, UPRIGHT, low, first, last, Z)
+    for j in (0, nj):
+        if low <= j < low + count:
+            Z[NEXT_X + j - low] = nodes[0, i, j] = sides[0, i, j]
+            Z[NEXT_Y + j - low] = nodes[1, i, j] = sides[1, i, j]
 
 
 @kernel(allocates=False)
@@ -385,31 +404,30 @@ def add_to_stretch(w, cells, Z):
 
 
 @kernel(allocates=False)
-def estimate_residual(nodes, old, law, motion, moves, stretches, totals, chunk):
-    """Estimate of the residual r·z of `nodes` in a chunk's node columns into `totals` (nj+1).
+def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
+    """Move a grid with its sides into `nodes`; estimate of its residual r·z into `totals` (nj+1).
 
-    `chunk`: its first column and the one after its last, found and scratch.  Into found (5,), for
-    all cells that have a corner at these columns, what the names above say; corners are compared
-    with those of `old`.  Way strayed: the most that `motion.reach` (nj+1), a distance a column [m],
-    is over the old cells' heights there, taken as the column's least area over its longest edge.
-
-    Both grids (2, ni+1, nj+1); where `moves`, `nodes` is written first, row by row, from `old` and
-    its sides' motion (`make_new_row`).  Columns are inner ones; where lines are not `law.bent`
-    nothing strays.  `stretches`: starts, the first node row of each stretch of lines, and the last
-    one, and sums (2, stretches + 1, nj+1), which gets the sums over them at these columns
-    (`regrid.barrier.coarse_nodes`).
+    In a chunk's node columns, which are inner ones.  `given`: the old grid, a grid that gets the
+    new one, and the frame of these two; both may lie as `nodes` does, and then the second is not
+    read.  `chunk`: its first column and the one after its last, found and scratch.  Into found
+    (5,), for all cells that have a corner at these columns, what the names above say; corners are
+    compared with the old ones.  Way strayed: the most that `motion.reach` (nj+1), a distance a
+    column [m], is over the old cells' heights there, taken as the column's least area over its
+    longest edge; 0 where lines are not `law.bent`.  `stretches`: starts, the first node row of
+    each stretch of lines, and the last one, and sums (2, stretches + 1, nj+1), which gets the sums
+    over them at these columns (`regrid.barrier.coarse_nodes`).
     """
-    (starts, sums), (first, last, found, Z) = stretches, chunk
+    (starts, sums), (first, last, found, Z), (old, into, frame) = stretches, chunk, given
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     low, cells = first - 1, last - first + 1
     count, stretch = starts.shape[0] - 1, 0
     begin(law, motion, low, cells, Z)
     for i in range(-1, ni):
-        take_old_row(old, i + 1, low, cells + 1, Z)
-        if moves:
-            make_new_row(i + 1, law, motion, low, cells + 1, nodes, Z)
-        else:
-            take_new_row(nodes, i + 1, low, cells + 1, Z)
+        shift_rows(cells + 1, Z)
+        take_row(old, i + 1, frame, low, cells + 1, OLD_NEXT_X, OLD_NEXT_Y, Z)
+        make_new_row(i + 1, law, motion, low, cells + 1, nodes, Z)
+        if frame[0] or frame[1]:
+            give_row(into, i + 1, frame, low, low, low + cells + 1, Z)
         row = law.along_i[:, max(i, 0)]
         line = row[LENGTH], row[LENGTH_CHANGE], row[STEP], row[STEP_CHANGE], law.ki
         take_laws(line, (law.blend_i[i + 1], (i + 1) / ni, law.kj), cells + 1, Z)
@@ -470,7 +488,7 @@ def make_look(parallel):
     """The residual check of a whole block, over its column chunks in turn or on threads."""
 
     @kernel(parallel=parallel)
-    def look(nodes, old, law, motion, moves, stretches, totals, chunks):
+    def look(nodes, given, law, motion, stretches, totals, chunks):
         """Estimate of the residual r·z, and marks of triangles at the block's corners.
 
         `chunks`: their first node columns (chunks + 1), found (chunks, 5) and scratch (chunks,
@@ -480,7 +498,7 @@ def make_look(parallel):
         count = columns.shape[0] - 1
         for c in prange(count):
             estimate_residual(
-                nodes, old, law, motion, moves, stretches, totals,
+                nodes, given, law, motion, stretches, totals,
                 (columns[c], columns[c + 1], found[c], scratch[c]),
             )  # fmt: skip
         for c in range(1, count):

@@ -30,6 +30,7 @@ from regrid.barrier.residual_estimate import (
     LOOK_ROWS,
     MOST_SHRUNK,
     STRAYED,
+    UPRIGHT,
     look_serial,
     look_threaded,
 )
@@ -183,43 +184,53 @@ class Workspace:
         """Let all grids be arrays of the workspace, whose contents may be anything."""
         self.old, self.sides, self.sound = self.own_old, self.own_sides, self.own_sound
         self.base, self.trial = self.own_base, self.own_trial
+        self.frame, self.given = UPRIGHT, None
 
     def take(self, previous, boundary, transposed, mirrored, sound=None, into=None) -> None:
         """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides.
 
         `sound` (ni, nj) [m/s], where speeds of sound are given; without a grid before sides alone.
         In the workspace's own frame they are read where they are, and `base` is the array `into`,
-        a new one without it.
+        a new one without it; else a look reads the grid before where it is (`load_old`).
         """
         if self.shared:
             self._lay(share_memory(self.size))
             self.clean = False
         self.use_own()
+        self.into = np.empty(boundary.shape) if into is None else into
         if not (transposed or mirrored):
-            self.base, self.sides = np.empty(self.shape) if into is None else into, boundary
+            self.base, self.sides = self.into, boundary
             self.old = boundary if previous is None else previous
         else:
-            load_grid(boundary, self.sides, transposed, mirrored, inside=False)
+            self.frame = transposed, mirrored
+            load_grid(boundary, self.sides, *self.frame, inside=False)
             if previous is not None:
-                load_grid(previous, self.old, transposed, mirrored, inside=True)
+                load_grid(previous, self.old, *self.frame, inside=False)
+                self.given = previous
         if sound is not None:
             self.sound = np.ascontiguousarray(sound.T) if transposed else sound
+
+    def load_old(self) -> None:
+        """The inside of the grid before into `old`, where only a look has read it so far."""
+        if self.given is not None:
+            load_grid(self.given, self.old, *self.frame, inside=True)
+            self.given = None
 
     def keep_own(self, old: np.ndarray, sides: np.ndarray) -> None:
         """Copies of `old` and `sides` that may be written to, in their places."""
         self.old, self.sides = self.own_old, self.own_sides
         self.old[:], self.sides[:] = old, sides
 
-    def give(self, transposed: bool, mirrored: bool, into=None) -> np.ndarray:
-        """The grid `trial` in the block's own frame, to keep: the array `into` or a new one."""
-        if not (transposed or mirrored or self.trial is self.own_trial):
-            return self.trial
-        source = self.trial[::-1] if mirrored else self.trial
-        source = source.transpose(0, 2, 1) if transposed else source
-        if into is None:
-            return np.array(source, order="C")
-        into[:] = source
-        return into
+    def give(self) -> np.ndarray:
+        """The grid `trial` in the block's own frame, to keep: the array given for it or a new one.
+
+        A look has written it there already where nothing else was needed.
+        """
+        if self.given is None and self.trial is not self.into:
+            transposed, mirrored = self.frame
+            source = self.trial[::-1] if mirrored else self.trial
+            self.into[:] = source.transpose(0, 2, 1) if transposed else source
+        return self.into
 
     def begin(
         self,
@@ -287,25 +298,30 @@ class Workspace:
             self.base[inside] += (self.bend * motion.turn[:, None])[inside]
         copy_sides(self.sides, self.base)
 
-    def look(self, nodes, old, moves: bool = False) -> tuple[float, float, float]:
-        """Least ratio of corner areas to those of `old`, an estimate of the residual in cells, and
-        how far inner nodes are from interpolated places at most, in old cell heights.
+    def look(self) -> tuple[float, float, float]:
+        """Move `old` along with its sides (R6.5) into `base`.  Least ratio of its corner areas to
+        the old ones, an estimate of its residual in cells, and how far inner nodes are from
+        interpolated places at most, in old cell heights.
 
-        With `moves` the `nodes` are written first: `old` moved along with its sides (R6.5).  The
-        ratio is 0 unless all areas are positive numbers; the estimate is infinite then.
+        The ratio is 0 unless all areas are positive numbers; the estimate is infinite then.
         """
         look = look_serial
         if self.threads > 1:
             self._set_threads()
             look = look_threaded
+        given = (self.old, self.base, UPRIGHT)
+        if self.given is not None:
+            given = (self.given, self.into, self.frame)
         total, self.marks = look(
-            nodes, old, self.law, self.motion, moves, (self.coarse.starts_i, self.coarse.sums),
+            self.base, given, self.law, self.motion, (self.coarse.starts_i, self.coarse.sums),
             self.totals, (self.columns, self.found, self.scratch),
         )  # fmt: skip
         found = self.found[0]
         good, shrunk = found[LEAST_SCALED] > 0.0, found[MOST_SHRUNK]
         if not (good and shrunk > 0.0 and total >= 0.0):
-            return self.compare_corners(nodes, old) if good else 0.0, math.inf, math.inf
+            self.load_old()
+            ratio = self.compare_corners(self.base, self.old) if good else 0.0
+            return ratio, math.inf, math.inf
         inner = (self.ni - 1) * (self.nj - 1)
         residual = math.sqrt(total / (self.sigma * inner))
         return float(1.0 / shrunk), residual, float(found[STRAYED])

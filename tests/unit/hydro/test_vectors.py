@@ -70,7 +70,10 @@ LOOKS = {  # loops over a row of cells of the regridder's check: their arguments
     "cells": (look.take_row_of_cells, (NUMBERS, 16)),
     "nodes": (look.add_row, (16,)),
 }
-HOISTED = {"switch": 2, "cells": 6}  # scalar instructions on numbers that are the same for all cells
+HOISTED = {
+    "switch": 2,
+    "cells": 6,
+}  # scalar, on numbers that are the same for all cells
 PACKED_SINCE = {"switch": (0, 66)}  # numba
 INSTRUCTION = re.compile(r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*)(p|s)d\s", re.M)
 

@@ -19,7 +19,7 @@ def make_work(ni=64, nj=48, limiting=False, seed=0):
     work.old[:] = work.sides[:] = nodes
     work.sound[:] = 1.0 + 10.0 * np.exp(-20.0 * (i - 0.5) ** 2)[:-1, :-1] if limiting else 1.0
     work.begin(True, 0.9, 0.1, Tuning(epsilon=1e-1), cost=limiting)
-    work.look(nodes, nodes)
+    work.look()
     work.assemble(nodes)
     return work, nodes
 

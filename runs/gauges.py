@@ -120,8 +120,8 @@ def place_points(points: Sequence[GaugePoint], blocks: Sequence[BlockView]) -> P
     and does not begin in a block, and where blocks lack a field that is asked for.
     """
     _check_fields(points, blocks)
-    position = np.array([point.at for point in points], dtype=float).T.copy()
-    moves = np.array([point.moves for point in points])
+    position = np.array([point.at for point in points], dtype=float).reshape(-1, 2).T.copy()
+    moves = np.array([point.moves for point in points], dtype=bool)
     everywhere = np.ones((len(blocks), len(points)), dtype=bool)
     places = Places(position, everywhere, np.where(moves, 0.0, GAP))
     places.locate(blocks)
@@ -148,7 +148,7 @@ def _describe_extent(blocks: Sequence[BlockView]) -> str:
 def _check_fields(points: Sequence[GaugePoint], blocks: Sequence[BlockView]) -> None:
     """Raise BadInput where a gauge asks for what a block does not have."""
     for block in blocks:
-        if isinstance(block, Block):
+        if isinstance(block, Block) or not points:
             continue
         if block.nodes.shape[0] != 2:
             raise BadInput("deck: gauge: gauges are for plane and axisymmetric flows")
@@ -184,10 +184,15 @@ NO_BLOCK = "-"  # in the table, for the block of a gauge outside of all
 
 
 class Gauges:
-    """The gauges of one evolution, where they are now."""
+    """The gauges of one evolution, where they are now, and the file that they are written to.
+
+    Of a deck without gauges it does nothing.
+    """
 
     def __init__(self, points: Sequence[GaugePoint], evolution: Evolution):
         self.points = list(points)
+        self.columns: list[str] | None = None  # of the file, where a run goes on
+        self._writer: HistoryWriter | None = None
         self.evolution = evolution
         self.t = evolution.t
         self.places = place_points(points, evolution.blocks)
@@ -233,7 +238,9 @@ class Gauges:
         return row
 
     def get_state(self) -> dict[str, np.ndarray]:
-        """What a restart needs of the gauges, under names of their own."""
+        """What a restart needs of the gauges, under names of their own; {} without gauges."""
+        if not self.points:
+            return {}
         places = self.places
         arrays = {
             "position": places.position,
@@ -249,6 +256,8 @@ class Gauges:
 
         other_cells: the blocks have other cells than those of the state.
         """
+        if not self.points:
+            return
         for name, array in self.get_state().items():
             if np.shape(state.get(name)) != array.shape:
                 raise BadInput(
@@ -266,41 +275,23 @@ class Gauges:
             self.velocity = np.array(state[PREFIX + "velocity"])
         self.t = self.evolution.t
 
-
-class GaugeTable:
-    """Gauges and the file they are written to; does nothing where a deck has no gauges."""
-
-    def __init__(self, path: Path, gauges: Gauges | None):
-        self.path, self.gauges = path, gauges
-        self.columns: list[str] | None = None  # of the file, where a run goes on
-        self._writer: HistoryWriter | None = None
-
-    def set_state(self, state: Mapping[str, Any]) -> None:
-        """Take up the state of a restart point.  Raises BadInput."""
-        if self.gauges is not None:
-            self.gauges.set_state(state)
-
-    def open(self) -> None:
+    def open(self, path: Path) -> None:
         """Open the file; a new one gets the row of the present state."""
-        if self.gauges is not None:
-            self._writer = HistoryWriter(self.path, self.columns)
+        if self.points:
+            self._writer = HistoryWriter(path, self.columns)
             if self.columns is None:
-                self._writer.append(self.gauges.make_row())
+                self._writer.append(self.make_row())
 
     def record(self) -> None:
         """Write a row of the state after a step."""
-        if self.gauges is not None and self._writer is not None:
-            self.gauges.follow()
-            self._writer.append(self.gauges.make_row())
+        if self._writer is not None:
+            self.follow()
+            self._writer.append(self.make_row())
 
     def sync(self) -> None:
         """Force the rows to the disk, before a dump."""
         if self._writer is not None:
             self._writer.sync()
-
-    def get_state(self) -> dict[str, np.ndarray]:
-        """The gauges' part of a restart point; {} without gauges."""
-        return {} if self.gauges is None else self.gauges.get_state()
 
     def close(self) -> None:
         """Close the file."""
@@ -308,10 +299,9 @@ class GaugeTable:
             self._writer.close()
 
 
-def make_gauges(deck: Any, evolution: Evolution) -> Gauges | None:
-    """The gauges of a deck, found in a fresh evolution; None without any.
+def make_gauges(deck: Any, evolution: Evolution) -> Gauges:
+    """The gauges of a deck, found in a fresh evolution.
 
     Raises BadInput for fields that the flow does not have and for points of the material outside.
     """
-    points = place_gauges(deck.gauge)
-    return Gauges(points, evolution) if points else None
+    return Gauges(place_gauges(deck.gauge), evolution)

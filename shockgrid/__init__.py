@@ -33,21 +33,15 @@ if TYPE_CHECKING:
     from regrid.errors import BadInput, RegridFailure, RunFailure
     from regrid.jit import inlined
     from regrid.registry import make_regridder
+    from runs.inspection.compare import compare
+    from runs.inspection.info import inspect
     from runs.interface import grid
-    from runs.interface.calls import (
-        compare,
-        film,
-        inspect,
-        plot,
-        report,
-        restart,
-        run,
-        verify,
-    )
+    from runs.interface.calls import film, plot, restart, run, verify
     from runs.interface.case import Case, load
     from runs.interface.opened import OpenRun
     from runs.interface.opened import open_run as open
     from runs.interface.settings import Hook, register
+    from runs.report.page import report
     from runs.study.study import Study, study
     from shockgrid import testing
 
@@ -79,13 +73,13 @@ MODULES = {
     "Study": "runs.study.study",
     "StiffenedGas": "hydro.eos.gases",
     "Tabular": "hydro.eos.tabular",
-    "compare": "runs.interface.calls",
+    "compare": "runs.inspection.compare",
     "film": "runs.interface.calls",
     "find_material": "hydro.eos.materials",
     "gravity": "hydro.sources",
     "grid": "runs.interface",
     "inlined": "regrid.jit",
-    "inspect": "runs.interface.calls",
+    "inspect": "runs.inspection.info",
     "join": "hydro.links",
     "load": "runs.interface.case",
     "make_regridder": "regrid.registry",
@@ -93,7 +87,7 @@ MODULES = {
     "plot": "runs.interface.calls",
     "put": "hydro.boundary",
     "register": "runs.interface.settings",
-    "report": "runs.interface.calls",
+    "report": "runs.report.page",
     "restart": "runs.interface.calls",
     "run": "runs.interface.calls",
     "shock": "problems.initial_states",

@@ -261,9 +261,9 @@ def inspect(file, other) -> None:
 
     With OTHER, print how that file differs from FILE, array by array.
     """
-    from runs.inspection.info import inspect_differences, inspect_file
+    from runs.inspection.info import inspect as describe
 
-    echo(inspect_differences(file, other) if other else inspect_file(file))
+    echo(describe(file, other))
 
 
 @cli.command()
@@ -357,14 +357,10 @@ def compare(a, b, rtol, atol) -> int:
     count.  A tolerance is relative to the largest size in an array.  If numbers
     of cells or steps differ, dumps are paired by time, and tolerances apply to L1 norms.
     """
-    from runs.inspection import compare as comparing
+    from runs.inspection.compare import compare_in_words
 
-    if comparing.is_needed(a, b):
-        table, differ = comparing.compare_by_norms(a, b, rtol, atol)
-    else:
-        differences = comparing.compare(a, b, rtol, atol)
-        table, differ = comparing.report(differences, a, b), bool(differences)
-    echo("\n".join([table, *comparing.describe_makers(a, b)]))
+    words, differ = compare_in_words(a, b, rtol, atol)
+    echo(words)
     return 1 if differ else 0
 
 

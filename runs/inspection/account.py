@@ -244,11 +244,6 @@ def describe_own(
         return f"there is no comparison with theory: {error}"
 
 
-History = Mapping[str, np.ndarray]
-WAVES = "cells a wave"
-OWN_REASONS = ("start", "t_end", "end", "dump", "retry")  # of a step's length: no trend
-
-
 class Rule(NamedTuple):
     """What is measured (nan where the run has no such thing), the value above which it is reported.
 
@@ -263,39 +258,22 @@ class Rule(NamedTuple):
     below: bool = False
 
 
-def _find_known(history: History, name: str) -> np.ndarray:
-    """The values of a column but for its start."""
+def find_known(history: History, name: str) -> np.ndarray:
+    """The values of a column but for its start, those that are not finite left out."""
     values = np.asarray(history.get(name, ()), dtype=float)[1:]
     return values[np.isfinite(values)]
 
 
-def _share_of_steps(name: str) -> Callable[[History, int, Problem | None], float]:
-    """Steps in which a column is above zero, over all steps whose rows have it."""
-    return lambda history, cells, problem: (
-        float((values > 0).mean()) if (values := _find_known(history, name)).size else np.nan
-    )
+def _find_mean(values: np.ndarray) -> float:
+    return float(values.mean()) if values.size else np.nan
 
 
-def _share_of_cells(name: str, a_cell: float) -> Callable[[History, int, Problem | None], float]:
-    """Mean of a column over all steps, over the number of cells times `a_cell`."""
-    return lambda history, cells, problem: (
-        float(values.mean()) / (a_cell * cells)
-        if (values := _find_known(history, name)).size and cells
-        else np.nan
-    )
+def _find_most(history: History, name: str) -> float:
+    values = history.get(name, NONE)
+    return float(np.nanmax(values)) if np.isfinite(values).any() else np.nan
 
 
-def _most(name: str) -> Callable[[History, int, Problem | None], float]:
-    return lambda history, cells, problem: (
-        float(np.nanmax(values)) if np.isfinite(values := history.get(name, NONE)).any() else np.nan
-    )
-
-
-def _measure_drift(history: History, cells: int, problem: Problem | None) -> float:
-    return max(measure_drifts(history).values(), default=np.nan)
-
-
-def measure_shrinkage(history: History, cells: int = 0, problem: Problem | None = None) -> float:
+def measure_shrinkage(history: History) -> float:
     """How many times dt fell below its largest value before, steps cut on purpose left out."""
     dts, limits = history.get("dt"), history.get("dt_limit")
     if dts is None or limits is None or dts.dtype.kind != "f":
@@ -304,34 +282,45 @@ def measure_shrinkage(history: History, cells: int = 0, problem: Problem | None 
     return float((np.maximum.accumulate(counts) / counts).max()) if counts.size else np.nan
 
 
-def _count_cells_a_wave(history: History, cells: int, problem: Problem | None) -> float:
-    waves = problem.count_cells_a_wave() if problem is not None else {}
-    return min(waves.values(), default=np.nan)
+def _count_cells_a_wave(problem: Problem | None) -> float:
+    return min((problem.count_cells_a_wave() if problem else {}).values(), default=np.nan)
 
 
 RULES = (
-    Rule("cells not convex", _most("cells_not_convex"), 0.0, "{value:.0f} cells not convex",
-         "most cells in a step that were not convex"),
-    Rule("rescues", _share_of_steps("regrid_rescues"), 0.01,
-         "rescues (folded grids untangled) in {share} of the steps",
+    Rule("cells not convex",
+         lambda history, cells, problem: _find_most(history, "cells_not_convex"),
+         0.0, "{value:.0f} cells not convex", "most cells in a step that were not convex"),
+    Rule("rescues",
+         lambda history, cells, problem: _find_mean(find_known(history, "regrid_rescues") > 0),
+         0.01, "rescues (folded grids untangled) in {share} of the steps",
          "steps in which a grid had to be untangled"),
-    Rule("retries", _share_of_steps("retries"), 0.02, "{share} of the steps retried",
-         "steps that were repeated with a shorter dt"),
-    Rule("first-order faces", _share_of_cells("first_order_faces", 2.0), 0.01,
-         "{share} of the faces of first order",
+    Rule("retries",
+         lambda history, cells, problem: _find_mean(find_known(history, "retries") > 0),
+         0.02, "{share} of the steps retried", "steps that were repeated with a shorter dt"),
+    Rule("first-order faces",
+         lambda history, cells, problem: _find_mean(
+             find_known(history, "first_order_faces")) / (2 * cells or np.nan),
+         0.01, "{share} of the faces of first order",
          "mean part of the faces that are computed at first order, where second gave no positive "
          "state"),
-    Rule("voids", _most("voided_cells"), 0.0, "voids in {value:.0f} cells",
-         "most failed cells with a void in a step"),
-    Rule("shared cells", _share_of_cells("shared_cells", 1.0), 0.03,
-         "{share} of the cells redistribute their states",
+    Rule("voids",
+         lambda history, cells, problem: _find_most(history, "voided_cells"),
+         0.0, "voids in {value:.0f} cells", "most failed cells with a void in a step"),
+    Rule("shared cells",
+         lambda history, cells, problem: _find_mean(
+             find_known(history, "shared_cells")) / (cells or np.nan),
+         0.03, "{share} of the cells redistribute their states",
          "mean fraction of cells too small for the step, with state redistribution"),
-    Rule("dt", measure_shrinkage, 100.0, "dt fell {value:.3g} times",
+    Rule("dt", lambda history, cells, problem: measure_shrinkage(history),
+         100.0, "dt fell {value:.3g} times",
          "how many times dt fell below its largest value"),
-    Rule("drift", _measure_drift, 1e-10, "conservation error {value:.1e}",
+    Rule("drift",
+         lambda history, cells, problem: max(measure_drifts(history).values(), default=np.nan),
+         1e-10, "conservation error {value:.1e}",
          "largest relative conservation error of mass, energy or momentum; round-off is below the "
          "limit"),
-    Rule(WAVES, _count_cells_a_wave, 16.0, "{value:.3g} cells per wave of the shortest mode",
+    Rule(WAVES, lambda history, cells, problem: _count_cells_a_wave(problem),
+         16.0, "{value:.3g} cells per wave of the shortest mode",
          "cells per wave of the deck's shortest mode: reported below the limit", True),
 )  # fmt: skip
 

@@ -2,21 +2,29 @@
 
 Columns `seconds_*` of the history are wall times and are left out.  Numbers agree when
 `|a - b| <= atol + rtol * scale`, with `scale` the largest size in that array (a field that passes
-through zero is not judged against its zeros); nan agrees with nan.
+through zero is not judged against its zeros); nan agrees with nan.  Runs of other cells or other
+steps are compared by norms instead: dumps of about the same time, one laid on the other's grid.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from hydro.remap.conserved import check_convex, remap_means
 from hydro.remap.overlay import compute_cell_moments
 from regrid.errors import BadInput
-from runs.store.reader import BlockData, Dump, RunData
+from runs.inspection.account import count
+from runs.store.reader import BlockData, Dump, RunData, Table
+
+SHOWN = 8  # differences, and earlier dumps
+SHOWN_COLUMNS = 5  # of histories
+SAME_TIME = 1e-2  # relative: steps of one number nearer than this are the same
 
 
 @dataclass(frozen=True)
@@ -32,31 +40,60 @@ class Difference:
         return f"{self.where}: {self.words}"
 
 
-def compare(a: str, b: str, rtol: float, atol: float) -> list[Difference]:
-    """All differences between two run directories or two dumps, first in time first.
+class Side:
+    """A run or a single dump: `dumps`, and the `history` of a run."""
 
-    Raises BadInput where the two cannot be compared: of different kind, problem, blocks or shapes.
-    """
+    def __init__(self, path: Path):
+        self.path = path
+        run = RunData(path) if path.is_dir() else None
+        self.dumps: list[Dump] = run.outputs if run else [Dump(path)]
+        self.history: Table | None = run.history if run else None
+        self.problem = run.problem_name if run else self.dumps[0].problem
+
+
+def open_both(
+    a: str | os.PathLike, b: str | os.PathLike, rtol: float, atol: float
+) -> tuple[Side, Side]:
+    """Two runs or two dumps; BadInput where they are not of one kind, and for bad tolerances."""
     if not (0.0 <= rtol < np.inf and 0.0 <= atol < np.inf):
         raise BadInput("--rtol and --atol have to be finite numbers, at least 0")
-    missing = [path for path in (a, b) if not Path(path).exists()]
-    if missing:
+    one, other = Path(a), Path(b)
+    if missing := [path for path in (one, other) if not path.exists()]:
         raise BadInput("; ".join(f"{path} does not exist" for path in dict.fromkeys(missing)))
-    if Path(a).is_dir() != Path(b).is_dir():
+    if one.is_dir() != other.is_dir():
         raise BadInput(f"{a} and {b} cannot be compared: one is a folder, the other is not")
-    if not Path(a).is_dir():
-        return list(compare_dumps(Dump(a), Dump(b), rtol, atol))
-    return compare_runs(RunData(a), RunData(b), rtol, atol)
+    return Side(one), Side(other)
 
 
-def compare_runs(a: RunData, b: RunData, rtol: float, atol: float) -> list[Difference]:
-    """Differences of history and dumps of two runs of one problem."""
-    if a.problem_name != b.problem_name:
-        raise BadInput(
-            f"{a.path} is {a.problem_name}, {b.path} is {b.problem_name}: not comparable"
-        )
+def compare(
+    a: str | os.PathLike, b: str | os.PathLike, *, rtol: float = 0.0, atol: float = 0.0
+) -> list[Difference]:
+    """Differences of two runs or two dumps, first in time first; none where they agree.
+
+    rtol: relative to the largest size in an array; atol: in its unit.  Raises BadInput where the
+    two cannot be compared: of different kind, problem, blocks or shapes.
+    """
+    return _find_differences(*open_both(a, b, rtol, atol), rtol, atol)
+
+
+def compare_in_words(a: str, b: str, rtol: float, atol: float) -> tuple[str, bool]:
+    """What `shockgrid compare` prints, and whether the two differ by more than the tolerances."""
+    one, other = open_both(a, b, rtol, atol)
+    if _needs_norms(one, other):
+        lines, differ = compare_by_norms(one, other, rtol, atol)
+    else:
+        differences = _find_differences(one, other, rtol, atol)
+        lines, differ = report(differences, one, other), bool(differences)
+    return "\n".join([*lines, *_describe_makers(one, other)]), differ
+
+
+def _find_differences(a: Side, b: Side, rtol: float, atol: float) -> list[Difference]:
+    if a.history is None or b.history is None:
+        return list(compare_dumps(a.dumps[0], b.dumps[0], rtol, atol))
+    if a.problem != b.problem:
+        raise BadInput(f"{a.path} is {a.problem}, {b.path} is {b.problem}: not comparable")
     found = list(compare_histories(a, b, rtol, atol))
-    one, other = ({dump.step: dump for dump in run.outputs} for run in (a, b))
+    one, other = ({dump.step: dump for dump in run.dumps} for run in (a, b))
     for run, lonely in ((a, set(one) - set(other)), (b, set(other) - set(one))):
         if lonely:
             steps = ", ".join(str(step) for step in sorted(lonely)[:5])
@@ -67,73 +104,73 @@ def compare_runs(a: RunData, b: RunData, rtol: float, atol: float) -> list[Diffe
     return sorted(found, key=lambda difference: difference.order)
 
 
-def compare_histories(a: RunData, b: RunData, rtol: float, atol: float) -> Iterator[Difference]:
+def compare_histories(a: Side, b: Side, rtol: float, atol: float) -> Iterator[Difference]:
     """Differences column by column, over the steps that both have."""
-    one, other = a.history, b.history
-    names = [name for name in one if name in other and not name.startswith("seconds_")]
-    lost = [n for n in {**one, **other} if n not in names and not n.startswith("seconds_")]
-    if lost:
+    one, other = ({n: c for n, c in (side.history or {}).items() if not n.startswith("seconds_")}
+                  for side in (a, b))  # fmt: skip
+    if lost := [name for name in {**one, **other} if name not in one or name not in other]:
         yield Difference("history columns", -1.0, np.inf, f"only in one: {', '.join(lost)}")
     lengths = len(one.get("step", ())), len(other.get("step", ()))
     if lengths[0] != lengths[1]:
         words = f"{lengths[0]} rows in {a.path}, {lengths[1]} in {b.path}"
         yield Difference("history", np.inf, 0.0, words)
     common = min(lengths)
-    for name in names:
+    for name in (name for name in one if name in other):
         x, y = one[name][:common], other[name][:common]
-        if x.dtype.kind == "U" or y.dtype.kind == "U":
-            differing = np.flatnonzero(x != y)
-            relative, much = 0.0, ""
-        else:
+        bad, relative, much = x != y, 0.0, ""
+        if "U" not in (x.dtype.kind, y.dtype.kind):
             bad, relative = find_differences(x, y, rtol, atol)
             much = f", up to {relative:.2g} of its size"
-            differing = np.flatnonzero(bad)
-        if differing.size:
-            k = int(differing[0])
-            yield Difference(
-                f"history {name}",
-                float(one["t"][k]),
-                relative,
-                f"first at step {one['step'][k]}: {x[k]} and {y[k]}, "
-                f"{differing.size} of {common} rows{much}",
-            )
+        if bad.any():
+            k = int(np.argmax(bad))
+            first = f"first at step {one['step'][k]}: {x[k]} and {y[k]}"
+            words = f"{first}, {np.count_nonzero(bad)} of {common} rows{much}"
+            yield Difference(f"history {name}", float(one["t"][k]), relative, words)
 
 
 def compare_dumps(a: Dump, b: Dump, rtol: float, atol: float) -> Iterator[Difference]:
     """Differences of time, nodes and fields of two dumps."""
-    names = [block.name for block in a.blocks], [block.name for block in b.blocks]
-    if names[0] != names[1]:
+    if [block.name for block in a.blocks] != [block.name for block in b.blocks]:
         raise BadInput(f"{a.path} and {b.path} have different blocks: not comparable")
     if a.step != b.step:
         yield Difference("step", a.t, np.inf, f"{a.step} and {b.step}")
-    if abs(a.t - b.t) > atol + rtol * max(abs(a.t), abs(b.t)):
-        relative = abs(a.t - b.t) / max(abs(a.t), abs(b.t))
-        yield Difference(f"step {a.step}, t", a.t, relative, f"{a.t!r} and {b.t!r}")
+    latest = max(abs(a.t), abs(b.t))
+    if (apart := abs(a.t - b.t)) > atol + rtol * latest:
+        yield Difference(f"step {a.step}, t", a.t, apart / latest, f"{a.t!r} and {b.t!r}")
     for one, other in zip(a.blocks, b.blocks, strict=True):
-        if one.nodes.shape != other.nodes.shape:
+        if one.cells != other.cells:
             raise BadInput(
                 f"block {one.name!r} has other numbers of cells in {a.path} and {b.path}: "
                 "not comparable"
             )
-        arrays = {"x": (one.nodes[0], other.nodes[0]), "y": (one.nodes[1], other.nodes[1])}
-        for kind in ("cell_fields", "node_fields"):
-            left, right = getattr(one, kind), getattr(other, kind)
-            lost = sorted(set(left) ^ set(right))
-            if lost:
-                words = f"fields only in one: {', '.join(lost)}"
-                yield Difference(f"step {a.step}, block {one.name}", a.t, np.inf, words)
-            arrays |= {name: (left[name], right[name]) for name in left if name in right}
-        for name, (x, y) in arrays.items():
-            bad, relative = find_differences(x, y, rtol, atol)
-            if not bad.any():
-                continue
-            where = np.unravel_index(np.nanargmax(np.where(bad, np.abs(x - y), -1)), x.shape)
-            words = (
-                f"{np.count_nonzero(bad)} of {x.size} values, most at [{where[0]}, {where[1]}]: "
-                f"{x[where]!s} and {y[where]!s} ({relative:.2g} of its size)"
-            )
-            where = f"step {a.step}, block {one.name}, {name}"
-            yield Difference(where, a.t, relative, words)
+        where = f"step {a.step}, block {one.name}"
+        left, right = (
+            {"x": k.nodes[0], "y": k.nodes[1], **k.cell_fields, **k.node_fields}
+            for k in (one, other)
+        )
+        if lost := sorted(set(left) ^ set(right)):
+            yield Difference(where, a.t, np.inf, f"fields only in one: {', '.join(lost)}")
+        for name in (name for name in left if name in right):
+            words, relative = describe_difference(left[name], right[name], rtol, atol)
+            if words:
+                yield Difference(f"{where}, {name}", a.t, relative, words)
+
+
+def describe_difference(
+    x: np.ndarray, y: np.ndarray, rtol: float = 0.0, atol: float = 0.0
+) -> tuple[str, float]:
+    """Words for how two arrays differ, "" where they do not; how much relative to their size."""
+    bad, relative = find_differences(x, y, rtol, atol)
+    if not bad.any():
+        return "", relative
+    with np.errstate(invalid="ignore"):
+        apart = np.nan_to_num(np.abs(np.subtract(x, y, dtype=float)), nan=np.inf)
+    where = np.unravel_index(np.argmax(np.where(bad, apart, -1.0)), bad.shape)
+    return (
+        f"{np.count_nonzero(bad)} of {bad.size} values differ, most at "
+        f"[{', '.join(map(str, map(int, where)))}]: {x[where]!s} and {y[where]!s} "
+        f"({relative:.2g} of its size)"
+    ), relative
 
 
 def find_differences(
@@ -151,49 +188,27 @@ def find_differences(
     return bad, relative if finite[bad].all() else float("inf")
 
 
-def report(differences: list[Difference], a: str, b: str, shown: int = 8) -> str:
+def report(differences: list[Difference], a: Side, b: Side) -> list[str]:
     """What differs first, what differs most, and how much more there is."""
     if not differences:
-        return f"no difference between {a} and {b}"
+        return [f"no difference between {a.path} and {b.path}"]
     first = differences[0]
     most = max(differences, key=lambda difference: difference.relative)
-    lines = [f"first: {first}"]
-    if most is not first:
-        lines.append(f"most:  {most}")
+    lines = [f"first: {first}"] + [f"most:  {most}"] * (most is not first)
     rest = [one for one in differences if one is not first and one is not most]
-    lines += [f"       {one}" for one in rest[:shown]]
-    if len(rest) > shown:
-        lines.append(f"       and {len(rest) - shown} more")
-    return "\n".join(lines)
+    lines += [f"       {one}" for one in rest[:SHOWN]]
+    return lines + [f"       and {len(rest) - SHOWN} more"] * (len(rest) > SHOWN)
 
 
-def describe_makers(a: str, b: str) -> list[str]:
-    """A line on what differs in what made two runs or two dumps: versions, commit, packages.
-
-    [] where nothing does, or where one of them does not say.
-    """
-    one, other = (_find_maker(path) for path in (a, b))
+def _describe_makers(a: Side, b: Side) -> list[str]:
+    """A line on what differs in what made the two: versions, commit, packages; [] for nothing."""
+    one, other = (side.dumps[-1].provenance if side.dumps else {} for side in (a, b))
     names = [n for n in one if n in other and n != "deck_sha256" and one[n] != other[n]]
-    if not names:
-        return []
     words = ", ".join(f"{n} {one[n] or 'unknown'} and {other[n] or 'unknown'}" for n in names)
-    return [f"made by different versions: {words}"]
+    return [f"made by different versions: {words}"] if names else []
 
 
-def _find_maker(path: str) -> dict[str, str]:
-    if not Path(path).is_dir():
-        return Dump(path).provenance
-    dumps = RunData(path).dumps
-    return dumps[-1].provenance if dumps else {}
-
-
-SHOWN = 8  # earlier dumps
-SHOWN_COLUMNS = 5  # of histories
-SAME_TIME = 1e-2  # relative: steps of one number nearer than this are the same
-
-
-@dataclass(frozen=True)
-class FieldDifference:
+class Norms(NamedTuple):
     """Norms of one field's difference in one block: L1, L2, Linf, and the field's largest size."""
 
     block: str
@@ -203,89 +218,85 @@ class FieldDifference:
     largest: float
     scale: float
 
-    def exceeds(self, rtol: float, atol: float) -> bool:
-        """Is the L1 norm above `atol + rtol * scale` (or no number)?"""
-        return not self.l1 <= atol + rtol * self.scale
+    @property
+    def relative(self) -> float:
+        """L1 over the field's size."""
+        return self.l1 / self.scale if self.scale else 0.0
 
 
-def is_needed(a: str, b: str) -> bool:
-    """Are `a` and `b` of the same blocks with other cells, or runs with other steps?"""
-    if not (Path(a).exists() and Path(b).exists()) or Path(a).is_dir() != Path(b).is_dir():
+def _needs_norms(a: Side, b: Side) -> bool:
+    """Are they of the same blocks with other cells, or runs with other steps?"""
+    if not (a.dumps and b.dumps) or a.dumps[0].problem != b.dumps[0].problem:
         return False
-    ours, theirs = _list_dumps(a), _list_dumps(b)
-    if not (ours and theirs) or ours[0].problem != theirs[0].problem:
-        return False
-    one, other = ({k.name: k.nodes.shape for k in dump.blocks} for dump in (ours[0], theirs[0]))
-    if list(one) != list(other):
-        return False
-    return one != other or (Path(a).is_dir() and find_other_steps(a, b) is not None)
+    one, other = ({k.name: k.cells for k in side.dumps[0].blocks} for side in (a, b))
+    return list(one) == list(other) and (one != other or bool(find_other_steps(a, b)))
 
 
-def find_other_steps(a: str, b: str) -> str | None:
-    """Words on how two runs march at other times from their first common step on, else None.
+def find_other_steps(a: Side, b: Side) -> str:
+    """Words on how two runs march at other times from their first common step on, else "".
 
-    Runs whose times part later, and those of no step yet, are None: their rows belong together.
+    Runs whose times part later, and those of no step yet, are none: their rows belong together.
     """
-    one, other = RunData(a).history, RunData(b).history
+    one, other = a.history or {}, b.history or {}
     if min(len(history.get("t", ())) for history in (one, other)) < 2:
-        return None
+        return ""
     common, i, j = np.intersect1d(one["step"], other["step"], return_indices=True)
     marched = np.flatnonzero((one["t"][i] > 0.0) | (other["t"][j] > 0.0))
     if not marched.size:
         return (
-            f"they have no step in common ({a} begins at {one['step'][0]:.0f}, {b} at "
+            f"they have no step in common ({a.path} begins at {one['step'][0]:.0f}, {b.path} at "
             f"{other['step'][0]:.0f})"
         )
     k = marched[0]
     t, t_other = float(one["t"][i[k]]), float(other["t"][j[k]])
-    if abs(t - t_other) <= SAME_TIME * max(abs(t), abs(t_other)):
-        return None
-    return f"step {common[k]:.0f} is at t = {t:.6g} and {t_other:.6g}"
+    near = abs(t - t_other) <= SAME_TIME * max(abs(t), abs(t_other))
+    return "" if near else f"step {common[k]:.0f} is at t = {t:.6g} and {t_other:.6g}"
 
 
-def compare_by_norms(a: str, b: str, rtol: float, atol: float) -> tuple[str, bool]:
+def compare_by_norms(a: Side, b: Side, rtol: float, atol: float) -> tuple[list[str], bool]:
     """The table of differences, and whether an L1 norm is above the tolerances.
 
-    a, b: run directories or dumps for which `is_needed`.  Raises BadInput for tolerances below
-    zero, runs without dumps of about the same time, and grids with cells that are not convex.
+    Raises BadInput for runs without dumps of about the same time, and for grids with cells that are
+    not convex.
     """
-    if not (0.0 <= rtol < np.inf and 0.0 <= atol < np.inf):
-        raise BadInput("--rtol and --atol have to be finite numbers, at least 0")
-    pairs = _pair(_list_dumps(a), _list_dumps(b))
+    pairs = _pair(a.dumps, b.dumps)
     if not pairs:
-        raise BadInput(f"{a} and {b} have no dumps of about the same time: not comparable")
-    found = [measure_norms(one, other) for one, other in pairs]
-    beyond = [any(field.exceeds(rtol, atol) for field in fields) for fields in found]
-    parted = None if _other_cells(*pairs[0]) else find_other_steps(a, b)
-    head = f"other cells: {b} laid on the grid of {a}"
-    if parted:
-        head = f"other steps: {parted}; dumps are compared by the nearest time, histories by time"
-    lines = [
-        f"{head}; {len(pairs)} dump{'s' * (len(pairs) > 1)} of about the same time, "
-        f"{beyond.count(False)} within the tolerances"
+        raise BadInput(f"{a.path} and {b.path} have no dumps of about the same time: "
+                       "not comparable")  # fmt: skip
+    found = [
+        [row for block in one.blocks for row in _compare_blocks(block, other.block(block.name))]
+        for one, other in pairs
     ]
-    if parted:
-        lines += compare_histories_by_time(RunData(a), RunData(b))
-    earlier = list(zip(pairs, found, strict=True))[:-1]
-    lines += [_describe_pair(*pair, rows) for pair, rows in earlier[-SHOWN:]]
-    one, other = pairs[-1]
-    lines.append(_describe_times(one, other) + ":")
+    beyond = [any(not r.l1 <= atol + rtol * r.scale for r in rows) for rows in found]
+    lines = [f"other cells: {b.path} laid on the grid of {a.path}"]
+    same_cells = all(one.cells == b.dumps[0].block(one.name).cells for one in a.dumps[0].blocks)
+    if same_cells and (parted := find_other_steps(a, b)):
+        nearest = "dumps are compared by the nearest time, histories by time"
+        lines = [f"other steps: {parted}; {nearest}", *compare_histories_by_time(a, b)]
+    lines[0] += (
+        f"; {count(len(pairs), 'dump')} of about the same time, {beyond.count(False)} within the "
+        "tolerances"
+    )
+    for (one, other), rows in list(zip(pairs, found, strict=True))[:-1][-SHOWN:]:
+        most = max(rows, key=lambda row: row.relative, default=None)
+        words = "no fields of cells that both have"
+        if most:
+            words = f"L1 up to {most.relative:.2g} of {most.block}, {most.field}"
+        lines.append(f"{_describe_times(one, other)}: {words}")
+    lines.append(f"{_describe_times(*pairs[-1])}:")
     lines.append(f"  {'block':14s} {'field':8s} {'L1':>10s} {'L2':>10s} {'Linf':>10s} {'of':>10s}")
-    lines += [
-        f"  {row.block:14s} {row.field:8s} {row.l1:10.3g} {row.l2:10.3g} {row.largest:10.3g} "
-        f"{row.scale:10.3g}"
-        for row in found[-1]
-    ]
-    return "\n".join(lines), any(beyond)
+    for block, field, *norms in found[-1]:
+        lines.append(f"  {block:14s} {field:8s} " + " ".join(f"{norm:10.3g}" for norm in norms))
+    return lines, any(beyond)
 
 
-def compare_histories_by_time(a: RunData, b: RunData) -> list[str]:
+def compare_histories_by_time(a: Side, b: Side) -> list[str]:
     """Lines on the columns of numbers that differ most over the times that both histories have.
 
     That of `b` is interpolated at the times of `a`; a difference counts relative to the column's
     largest size.
     """
-    one, other = a.history, b.history
+    one, other = a.history or {}, b.history or {}
     begin, end = max(one["t"][0], other["t"][0]), min(one["t"][-1], other["t"][-1])
     here = (one["t"] >= begin) & (one["t"] <= end)
     if not here.any():
@@ -300,10 +311,10 @@ def compare_histories_by_time(a: RunData, b: RunData) -> list[str]:
         ours, theirs = one[name][here], np.interp(t, other["t"], other[name])
         there = np.isfinite(ours) & np.isfinite(theirs)
         scale = max(np.abs(ours[there]).max(initial=0.0), np.abs(theirs[there]).max(initial=0.0))
-        if scale > 0.0:
-            apart = np.where(there, np.abs(ours - theirs), -1.0)
+        apart = np.where(there, np.abs(ours - theirs), 0.0)
+        if apart.any():
             found.append((float(apart.max() / scale), name, int(apart.argmax()), float(scale)))
-    found = [entry for entry in sorted(found, reverse=True) if entry[0] > 0.0]
+    found.sort(reverse=True)
     lines = [
         f"history {name}: up to {part:.2g} of its size {scale:.3g}, at t = {t[k]:.6g}"
         for part, name, k, scale in found[:SHOWN_COLUMNS]
@@ -312,12 +323,8 @@ def compare_histories_by_time(a: RunData, b: RunData) -> list[str]:
     return [*lines, f"history: {more} more columns differ by less"] if more > 0 else lines
 
 
-def measure_norms(one: Dump, other: Dump) -> list[FieldDifference]:
-    """Norms of all fields of cells that both dumps have, block by block, on the grid of `one`."""
-    return [row for block in one.blocks for row in _compare_blocks(block, other.block(block.name))]
-
-
-def _compare_blocks(one: BlockData, other: BlockData) -> list[FieldDifference]:
+def _compare_blocks(one: BlockData, other: BlockData) -> list[Norms]:
+    """Norms of all fields of cells that both blocks have, on the grid of `one`."""
     for block in (one, other):
         check_convex(block.name, block.nodes)
     curved = one.axes[1] == "r"
@@ -335,21 +342,19 @@ def _compare_blocks(one: BlockData, other: BlockData) -> list[FieldDifference]:
         away = np.abs(ours - theirs)
         l1, l2 = float((away * weight).sum()), float(np.sqrt((away**2 * weight).sum()))
         scale = float(max(np.abs(ours).max(), np.abs(theirs).max()))
-        rows.append(FieldDifference(one.name, name, l1, l2, float(away.max()), scale))
+        rows.append(Norms(one.name, name, l1, l2, float(away.max()), scale))
     return rows
-
-
-def _other_cells(one: Dump, other: Dump) -> bool:
-    return any(k.nodes.shape != other.block(k.name).nodes.shape for k in one.blocks)
-
-
-def _list_dumps(path: str) -> list[Dump]:
-    return RunData(path).outputs if Path(path).is_dir() else [Dump(path)]
 
 
 def _pair(ours: list[Dump], theirs: list[Dump]) -> list[tuple[Dump, Dump]]:
     """Dumps that are nearest to each other in time, less than half a dump's distance apart."""
-    reach = 0.5 * max(_find_interval(ours), _find_interval(theirs))
+
+    def find_interval(dumps: list[Dump]) -> float:
+        if len(dumps) == 1:  # any other may be near
+            return 2.0 * abs(dumps[0].t)
+        return (dumps[-1].t - dumps[0].t) / (len(dumps) - 1)
+
+    reach = 0.5 * max(find_interval(ours), find_interval(theirs))
     pairs = []
     for one in ours:
         other = min(theirs, key=lambda dump: abs(dump.t - one.t))
@@ -359,23 +364,7 @@ def _pair(ours: list[Dump], theirs: list[Dump]) -> list[tuple[Dump, Dump]]:
     return pairs
 
 
-def _find_interval(dumps: list[Dump]) -> float:
-    """Mean time between dumps [s]; of a single one its time, so that any other may be near."""
-    if len(dumps) == 1:
-        return 2.0 * abs(dumps[0].t)
-    return (dumps[-1].t - dumps[0].t) / (len(dumps) - 1)
-
-
 def _describe_times(one: Dump, other: Dump) -> str:
     same = one.t == other.t
     apart = "the same time" if same else f"{abs(one.t - other.t):.2g} {one.t_unit} apart"
     return f"t = {one.t:.6g} {one.t_unit} (steps {one.step} and {other.step}, {apart})"
-
-
-def _describe_pair(one: Dump, other: Dump, rows: list[FieldDifference]) -> str:
-    """One line for an earlier dump: the field that differs most, relative to its size."""
-    if not rows:
-        return f"{_describe_times(one, other)}: no fields of cells that both have"
-    most = max(rows, key=lambda row: row.l1 / row.scale if row.scale else 0.0)
-    part = most.l1 / most.scale if most.scale else 0.0
-    return f"{_describe_times(one, other)}: L1 up to {part:.2g} of {most.block}, {most.field}"

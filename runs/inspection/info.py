@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import math
+import os
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from runs.inspection.account import (
     describe_verdict,
     judge,
 )
-from runs.inspection.compare import find_differences
+from runs.inspection.compare import describe_difference
 from runs.store.checksum import NAME as CHECKSUM
 from runs.store.checksum import PARTS, find_fault, find_sum, read_parts
 from runs.store.directory import RunDirectory
@@ -65,8 +65,8 @@ def describe_blocks(dump: Dump) -> list[str]:
     """Blocks with their cells and extent, then the range of every field in every block."""
     lines = []
     for block in dump.blocks:
-        ni, nj = block.nodes.shape[1] - 1, block.nodes.shape[2] - 1
-        low, high = block.nodes.min(axis=(1, 2)), block.nodes.max(axis=(1, 2))
+        (ni, nj), nodes = block.cells, block.nodes
+        low, high = nodes.min(axis=(1, 2)), nodes.max(axis=(1, 2))
         lines.append(
             f"block {block.name}{other_name(block)}: {ni} x {nj} cells, "
             f"{block.axes[0]} {low[0]:.4g} to {high[0]:.4g} m, "
@@ -74,11 +74,7 @@ def describe_blocks(dump: Dump) -> list[str]:
         )
         width = max((len(name) for name in block.cell_fields), default=0)
         for name, values in block.cell_fields.items():
-            unit = (
-                block.units[name].replace("1", "")
-                if block.units[name] == "1"
-                else block.units[name]
-            )
+            unit = "" if block.units[name] == "1" else block.units[name]
             bad = np.count_nonzero(~np.isfinite(values))
             note = f", {bad} not finite" if bad else ""
             lines.append(
@@ -112,59 +108,57 @@ def describe_problem(run: RunData) -> str:
     return ""
 
 
+def describe_state(last: Dump, history: Mapping[str, np.ndarray]) -> str:
+    """How far a run came, by its history where it has one, else by its last dump."""
+    told = len(history.get("t", ()))
+    t, step = (history["t"][-1], int(history["step"][-1])) if told else (last.t, last.step)
+    ending, t_end = last.finished or "not finished", last.t_end
+    words = f"{describe_time(t, last.t_unit)} of {t_end:.6g} ({t / t_end:.0%})"
+    return f"{ending}: step {step}, {words}"
+
+
 def describe_directory(path: str) -> str:
     """What was run, how far it came, its conservation errors, and what there is to see."""
     run = RunData(path, lenient=True)
     lines = [f"{run.path}: {run.problem_name}{describe_problem(run)}"]
     quoted = run.directory.quoted
     try:
-        history = run.history
+        history: Mapping[str, np.ndarray] = run.history
     except BadInput as error:
         run.skipped.append(str(error))
         history = {}
-    if run.dumps:
-        last = run.dumps[-1]
-        state = last.finished or "not finished"
-        t = float(history["t"][-1]) if len(history.get("t", ())) else last.t
-        step = int(history["step"][-1]) if len(history.get("step", ())) else last.step
-        lines.append(
-            f"{state}: step {step}, {describe_time(t, last.t_unit)} of {last.t_end:.6g} "
-            f"({t / last.t_end:.0%})"
-        )
-        if not last.finished:
-            point = run.restart_step
-            there = f"last restart point: step {point} ({say_restart(run)})"
-            lines.append("no restart point yet" if point is None else there)
-    else:
-        lines.append("no dump that can be read")
-    lines += _describe_verdict(run)
+    last = run.dumps[-1] if run.dumps else None
+    lines.append(describe_state(last, history) if last else "no dump that can be read")
+    if last and not last.finished:
+        point = run.restart_step
+        there = f"last restart point: step {point} ({say_restart(run)})"
+        lines.append("no restart point yet" if point is None else there)
+    try:
+        verdict = find_verdict(run)
+        lines += [describe_verdict(verdict)] if verdict else []
+    except BadInput as error:
+        lines.append(f"no verdict: {error}")
     lines += ["", *describe_settings(run)]
     if history:
-        cells, names = 0, []
-        if run.dumps:
-            names = [block.name for block in run.dumps[-1].blocks]
-            cells = sum(
-                (b.nodes.shape[1] - 1) * (b.nodes.shape[2] - 1) for b in run.dumps[-1].blocks
-            )
+        names = [block.name for block in last.blocks] if last else []
+        cells = last.cells if last else 0
         lines += ["", *describe_history(history), *describe_run(history, cells, names)]
         lines += _find_threads(run)
-    if run.dumps:
-        first, last, number = run.dumps[0], run.dumps[-1], len(run.outputs)
+    if last:
+        first, number = run.dumps[0], len(run.outputs)
         newer = " and a newer restart point" if len(run.dumps) > number else ""
         words = f"t = {first.t:.6g} to {describe_time(last.t, last.t_unit).removeprefix('t = ')}"
         lines += ["", f"{count(number, 'dump')}{newer}, {words}; in the last:"]
-        lines += describe_blocks(run.dumps[-1])
-        if run.dumps[-1].provenance:
-            lines += ["", *describe_provenance(run.dumps[-1].provenance)]
+        lines += describe_blocks(last)
+        lines += ["", *describe_provenance(last.provenance)] if last.provenance else []
     try:
         cautions = describe_cautions(run.problem, history)
         lines += ["", *cautions] if cautions else []
-        figures = ", ".join(run.problem.figures())
+        if figures := ", ".join(run.problem.figures()):
+            words = f"{figures} (shockgrid plot {quoted} --what NAME)"
+            lines += ["", f"pictures of this problem: {words}"]
     except BadInput as error:
-        figures = ""
         lines.append(f"the deck does not suit this version of the problem: {error}")
-    if figures:
-        lines += ["", f"pictures of this problem: {figures} (shockgrid plot {quoted} --what NAME)"]
     return "\n".join([*lines, *run.said, *_list_damage(run)])
 
 
@@ -180,21 +174,20 @@ def _list_damage(run: RunData) -> list[str]:
     return [DAMAGED + sentence for sentence in dict.fromkeys(run.skipped)]
 
 
-def _describe_verdict(run: RunData) -> list[str]:
-    """The verdict; of a run that has not ended, what its history tells so far."""
+def find_verdict(run: RunData) -> dict[str, Any] | None:
+    """The verdict; of a run that has not ended, what its history tells so far; None without one.
+
+    Raises BadInput where a file is damaged; that of the verdict itself is among `run.skipped` then.
+    """
     try:
         verdict = run.verdict
     except BadInput as error:
         run.skipped.append(str(error))
-        return ["no verdict: its file is damaged"]
-    try:
-        if verdict is None and len(run.history.get("step", ())) > 1:
-            cells = sum(math.prod(n - 1 for n in b.nodes.shape[1:]) for b in run.dumps[-1].blocks)
-            reason = "it is still running, or was killed"
-            verdict = judge("unfinished", reason, run.history, cells, run.problem)
-        return [describe_verdict(verdict)] if verdict else []
-    except (BadInput, IndexError) as error:
-        return [f"no verdict: {error}"]
+        raise BadInput("its file is damaged") from error
+    if verdict is None and len(run.history.get("step", ())) > 1 and run.dumps:
+        reason, cells = "it is still running, or was killed", run.dumps[-1].cells
+        return judge("unfinished", reason, run.history, cells, run.problem)
+    return verdict
 
 
 def _find_threads(run: RunData) -> list[str]:
@@ -208,25 +201,22 @@ def _find_threads(run: RunData) -> list[str]:
 
 def describe_settings(run: RunData) -> list[str]:
     """Those keys of the deck that differ from the problem's defaults."""
+
+    def find_changed(deck: Any, default: Any, prefix: str) -> Iterator[str]:
+        for name in deck.__struct_fields__:
+            value, usual = getattr(deck, name), getattr(default, name)
+            if value == usual:
+                continue
+            if hasattr(value, "__struct_fields__") and type(value) is type(usual):
+                yield from find_changed(value, usual, f"{prefix}{name}.")
+            else:
+                yield f"  {prefix}{name} = {_say_gauges(value) if name == 'gauge' else value}"
+
     try:
-        default = type(run.deck)()
+        changed = list(find_changed(run.deck, type(run.deck)(), ""))
     except BadInput:
         return []
-    changed = dict(_differences(run.deck, default, ""))
-    if not changed:
-        return ["deck: all defaults"]
-    return ["deck, where not default:"] + [f"  {key} = {value}" for key, value in changed.items()]
-
-
-def _differences(deck, default, prefix: str):
-    for name in deck.__struct_fields__:
-        value, usual = getattr(deck, name), getattr(default, name)
-        if value == usual:
-            continue
-        if hasattr(value, "__struct_fields__") and type(value) is type(usual):
-            yield from _differences(value, usual, f"{prefix}{name}.")
-        else:
-            yield prefix + name, _say_gauges(value) if name == "gauge" else value
+    return ["deck, where not default:", *changed] if changed else ["deck: all defaults"]
 
 
 def _say_gauges(gauges: Sequence[Gauge]) -> str:
@@ -241,7 +231,7 @@ def _say_gauges(gauges: Sequence[Gauge]) -> str:
     return "; ".join(words)
 
 
-def describe_history(history: dict[str, np.ndarray]) -> list[str]:
+def describe_history(history: Mapping[str, np.ndarray]) -> list[str]:
     """Steps, range of dt, wall time."""
     if not len(history["step"]):
         return ["no row of the history is known"]
@@ -259,6 +249,16 @@ SAID = ("units", "long_name")  # attributes that a dataset's own line tells
 SCALES = ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid")  # HDF5's own
 VERSION = " @format_version"  # one of dumps in one file, one of those in parts
 MADE = "/provenance"  # differs between machines and versions without any other difference
+
+
+def inspect(file: str | os.PathLike, other: str | os.PathLike | None = None) -> str:
+    """The tree of an HDF5 file in words, or how `other` differs from it: `shockgrid inspect`.
+
+    Each is a file or a dump of an opened run.  Raises BadInput where one is no HDF5 file.
+    """
+    if other is None:
+        return inspect_file(os.fspath(file))
+    return inspect_differences(os.fspath(file), os.fspath(other))
 
 
 def inspect_file(path: str) -> str:
@@ -468,12 +468,4 @@ def _compare_arrays(one: h5py.Dataset, other: h5py.Dataset) -> str:
         return "" if x == y or (x != x and y != y) else f"{_say_value(x)} and {_say_value(y)}"
     if x.dtype.kind not in "fiub":
         return "" if (x == y).all() else f"{int((x != y).sum())} of {x.size} values differ"
-    bad, relative = find_differences(x, y, 0.0, 0.0)
-    if not bad.any():
-        return ""
-    where = np.unravel_index(np.nanargmax(np.where(bad, np.abs(x - y), -1.0)), x.shape)
-    place = ", ".join(str(int(index)) for index in where)
-    return (
-        f"{int(bad.sum())} of {x.size} values differ, most at [{place}]: "
-        f"{x[where]!s} and {y[where]!s} ({relative:.2g} of its size)"
-    )
+    return describe_difference(x, y)[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,10 +13,9 @@ from problems.own_simulation import Measure, OwnSimulation, OwnSimulationDeck
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, read_toml, resolve_deck
 from runs.interface.case import Case, load
-from runs.interface.opened import OpenRun, finish
+from runs.interface.opened import OpenRun, finish, open_run
 from runs.interface.settings import (
     HooksGiven,
-    check_options,
     join_hooks,
     make_settings,
     said_in_python,
@@ -27,10 +27,6 @@ from runs.store.directory import RunDirectory, open_directory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from runs.inspection.compare import Difference
-    from runs.store.reader import Dump
-    from runs.study.study import Study
 
 
 NAME = "simulation"  # of the problem, in decks and folders
@@ -139,7 +135,7 @@ def _find_script() -> str:
     return Path(getattr(sys.modules.get("__main__"), "__file__", None) or "").name
 
 
-Run = OpenRun | str | Path
+Run = str | os.PathLike  # a directory, or an opened run
 
 
 def run(
@@ -198,10 +194,20 @@ def restart(
     the run, the problem's file or the settings do not let it go on; else as `Case.run`.
     """
     check_single("shockgrid.restart", "restart DIR")
-    opened = open_directory(_find_path(directory))
+    opened = open_directory(directory)
     words = make_settings(settings)
     if cells is not None:
-        return _go_on_with(opened, cells, words, at, output, force, hooks, quiet)
+        from runs.march.launching import remap_runner
+
+        if hooks:
+            raise BadInput(
+                "hooks: a restart on other cells has none; restart the result with hooks"
+            )
+        number = ",".join(str(n) for n in ([cells] if isinstance(cells, int) else cells))
+        place = None if output is None else str(output)
+        with said_in_python():
+            runner = remap_runner(opened, number, words, at, place, force, quiet, _say)
+        return finish(runner, runner.go_on(), quiet)
     if output is not None or force:
         raise BadInput("output and force need cells; otherwise a run continues in its directory")
     with said_in_python():
@@ -217,71 +223,20 @@ def restart(
     return case.march(runner, lambda: runner.resume(at), quiet)
 
 
-def _go_on_with(opened, cells, words, at, output, force, hooks, quiet) -> OpenRun:
-    """`restart` on other cells."""
-    from runs.march.launching import remap_runner
-
-    if hooks:
-        raise BadInput("hooks: a restart on other cells has none; restart the result with hooks")
-    number = ",".join(str(n) for n in ([cells] if isinstance(cells, int) else cells))
-    place = None if output is None else str(output)
-    with said_in_python():
-        runner = remap_runner(opened, number, words, at, place, force, quiet, _say)
-    return finish(runner, runner.go_on(), quiet)
-
-
 def _say(text: str) -> None:
     print(text, file=sys.stderr)
 
 
 def plot(directory: Run, *fields: str, **options: Any) -> Figure:
     """The figure that `shockgrid plot` draws of a run; fields and options: `OpenRun.plot`."""
-    opened = directory if isinstance(directory, OpenRun) else OpenRun(_find_path(directory))
-    return opened.plot(*fields, **options)
+    return open_run(directory).plot(*fields, **options)
 
 
 def film(
     directory: Run, field: str | None = None, output: str | Path | None = None, **options: Any
 ) -> Path:
     """Make a film of a run, as `shockgrid film` does; its path.  Options: `OpenRun.film`."""
-    opened = directory if isinstance(directory, OpenRun) else OpenRun(_find_path(directory))
-    return opened.film(field, output, **options)
-
-
-def report(directory: Run | Study, output: str | Path | None = None, **options: Any) -> Path:
-    """Write one HTML file about a run or a study, as `shockgrid report` does; its path.
-
-    output: FILE [DIR/report.html]; options: film (bool), dpi.  Raises BadInput where the directory
-    is neither, or the extra `report` is not installed.
-    """
-    from runs.report.page import report as write
-
-    check_options("report", write, options)
-    return write(_find_path(directory), output, **options)
-
-
-def inspect(file: str | Path | Dump, other: str | Path | Dump | None = None) -> str:
-    """The tree of an HDF5 file in words, or how `other` differs from it: `shockgrid inspect`.
-
-    Each is a file or a dump of an opened run.  Raises BadInput where one is no HDF5 file.
-    """
-    from runs.inspection.info import inspect_differences, inspect_file
-
-    path = str(getattr(file, "path", file))
-    if other is None:
-        return inspect_file(path)
-    return inspect_differences(path, str(getattr(other, "path", other)))
-
-
-def compare(a: Run, b: Run, *, rtol: float = 0.0, atol: float = 0.0) -> list[Difference]:
-    """Differences of two runs or two dumps, first in time first; none where they agree.
-
-    rtol: relative to the largest size in an array; atol: in its unit.  Raises BadInput where the
-    two cannot be compared.
-    """
-    from runs.inspection.compare import compare as find
-
-    return find(str(_find_path(a)), str(_find_path(b)), rtol, atol)
+    return open_run(directory).film(field, output, **options)
 
 
 def verify(*problems: str, short: bool = False) -> list[dict[str, Any]]:
@@ -293,12 +248,3 @@ def verify(*problems: str, short: bool = False) -> list[dict[str, Any]]:
     from runs.verify import choose_cases, compute_rows
 
     return [row.make_record() for row in compute_rows(choose_cases(problems), short)]
-
-
-def _find_path(run: Run | Study) -> Path:
-    if isinstance(run, str | Path):
-        return Path(run)
-    path = getattr(run, "path", None)
-    if not isinstance(path, Path):
-        raise BadInput(f"{run!r} is not a run: give its directory, or what shockgrid.run returns")
-    return path

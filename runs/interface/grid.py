@@ -52,7 +52,11 @@ class Grid:
 
         Raises BadInput for another ending, and for a file that exists unless `force`.
         """
-        return write(self, *paths, force=force)
+        wanted = plan_outputs([str(path) for path in paths], force)
+        for path in wanted:
+            check_free(path, force)
+        parts = self.nodes, self.quality, self.made_by
+        return [written for path in wanted for written in write_grid(path, *parts)]
 
 
 def make(
@@ -155,13 +159,10 @@ def compare(
 
 def write(grid: Grid | np.ndarray, *paths: str | Path, force: bool = False) -> list[Path]:
     """Write a grid to files of the kinds their names end in; see `Grid.write`."""
-    wanted = plan_outputs([str(path) for path in paths], force)
-    for path in wanted:
-        check_free(path, force)
-    made_by = grid.made_by if isinstance(grid, Grid) else {}
-    nodes = _find_nodes(grid)
-    judgement = grid.quality if isinstance(grid, Grid) else judge(nodes)
-    return [written for path in wanted for written in write_grid(path, nodes, judgement, made_by)]
+    if not isinstance(grid, Grid):
+        nodes = _find_nodes(grid)
+        grid = Grid(nodes, [], judge(nodes))
+    return grid.write(*paths, force=force)
 
 
 def _find_family(family: Family, options: dict[str, Any], weight: str | None) -> Any:

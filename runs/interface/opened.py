@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from problems.evolution import Evolution
 from problems.problem import Problem
 from runs.inspection.account import describe_time
-from runs.interface.settings import check_options, make_table, with_known_options
+from runs.interface.settings import make_table
 from runs.march.runner import Ending, Runner
 from runs.store.reader import RunData
 
@@ -32,7 +33,6 @@ class Drawn:
         """Words for `what` of `plot`."""
         raise NotImplementedError
 
-    @with_known_options
     def plot(
         self,
         *fields: str,
@@ -109,7 +109,6 @@ class OpenRun(Drawn, RunData):
         from runs.interface.pictures import say_numbers
         from runs.pictures.film import make_film
 
-        check_options("film", make_film, options)
         return make_film(self.path, field, output, zoom=say_numbers(zoom), **options)
 
     def report(self, output: str | Path | None = None, **options: Any) -> Path:
@@ -119,7 +118,6 @@ class OpenRun(Drawn, RunData):
         """
         from runs.report.page import report
 
-        check_options("report", report, options)
         return report(self.path, output, **options)
 
     @property
@@ -139,9 +137,9 @@ class OpenRun(Drawn, RunData):
         return make_table(rows, self.theory)
 
 
-def open_run(directory: str | Path) -> OpenRun:
-    """The run in a directory; BadInput where there is none."""
-    return OpenRun(directory)
+def open_run(directory: str | os.PathLike) -> OpenRun:
+    """The run in a directory, or one that is opened already; BadInput where there is none."""
+    return directory if isinstance(directory, OpenRun) else OpenRun(directory)
 
 
 def finish(runner: Runner, ending: Ending, quiet: bool) -> OpenRun:

@@ -5,12 +5,10 @@ They become the words of `--set`, so that the command line and Python have the s
 
 from __future__ import annotations
 
-import functools
 import html
-import inspect
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -19,7 +17,7 @@ from hydro.eos import EQUATIONS_OF_STATE
 from hydro.eos.base import EquationOfState
 from problems.problem import Problem
 from problems.registry import PROBLEMS
-from regrid.errors import BadInput, suggest
+from regrid.errors import BadInput
 from regrid.registry import REGRIDDERS
 from runs.study.definition import flatten, write_settings
 
@@ -65,29 +63,6 @@ def said_in_python() -> Iterator[None]:
         for option, keyword in SAID:
             words = words.replace(option, keyword)
         raise BadInput(words) from error
-
-
-def check_options(name: str, call: Callable, options: Iterable[str]) -> None:
-    """Raise BadInput for options that `call`, known to the user by `name`, does not have."""
-    known = [
-        one.name
-        for one in inspect.signature(call).parameters.values()
-        if one.name != "self" and one.kind is not one.VAR_POSITIONAL
-    ]
-    for option in options:
-        if option not in known:
-            raise BadInput(f"{name}: there is no option {option!r}{suggest(option, known)}")
-
-
-def with_known_options(call: Callable) -> Callable:
-    """`call`, with BadInput instead of a TypeError for an option that it does not have."""
-
-    @functools.wraps(call)
-    def checked(*values: Any, **options: Any) -> Any:
-        check_options(call.__name__, call, options)
-        return call(*values, **options)
-
-    return checked
 
 
 HookFunction = Callable[[Any], Any]  # of the case; None, or words on why to stop

@@ -233,8 +233,7 @@ def remap_runner(
     before_rows = _read_history(old, step)
     with patience(quiet):
         blocks = take_over(source, target)
-    if gauges is not None:
-        gauges.set_state(state, other_cells=True)
+    gauges.set_state(state, other_cells=True)
     directory = create_directory(output, deck.label, force)
     write_atomically(directory.deck, deck.to_toml())  # by which the directory is known
     columns = truncate_history(directory.history, step, before_rows)

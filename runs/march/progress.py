@@ -55,27 +55,30 @@ WORTH_A_WORD = 30.0  # wall seconds of a run that is foretold in a line of its o
 BAR = "{desc} {percentage:3.0f}%|{bar:12}| {elapsed}{postfix}"
 
 
+_told: list[float] = []  # when this command has said that kernels are compiled [s]
+
+
 @contextlib.contextmanager
 def patience(quiet: bool, stream=None):
-    """Say that kernels are being compiled, now and then, while they are in the block.
+    """Say that kernels are being compiled in the block: once a command, later that they still are.
 
     Kernels that come from the disk, which takes a second or so, are not spoken of.
     """
     if quiet:
         yield
         return
-    stream, done, began = stream or sys.stderr, threading.Event(), time.monotonic()
+    stream, done = stream or sys.stderr, threading.Event()
     with watch_compiler() as compiled:
 
         def say():
             words = "compiling kernels, once on this machine: a minute, several on a busy one ..."
-            wait = PATIENCE
-            while not done.wait(wait):
-                if not compiled:
-                    continue
-                print(words, file=stream, flush=True)
-                wait = REMINDER
-                words = f"still compiling kernels ({time.monotonic() - began + REMINDER:.0f} s) ..."
+            while not done.wait(PATIENCE):
+                now = time.monotonic()
+                if compiled and (not _told or now > _told[-1] + REMINDER):
+                    if _told:
+                        words = f"still compiling kernels ({now - _told[0] + PATIENCE:.0f} s) ..."
+                    _told.append(now)
+                    print(words, file=stream, flush=True)
 
         threading.Thread(target=say, daemon=True).start()
         try:

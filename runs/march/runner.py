@@ -31,7 +31,7 @@ from regrid.jit import read_clock
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import ENDS
 from runs.early_end.explain import explain
-from runs.gauges import Gauges, GaugeTable, make_gauges
+from runs.gauges import Gauges, make_gauges
 from runs.inspection.account import count, describe_time
 from runs.march.progress import Outlook, Progress, closing_screen, patience
 from runs.march.restart import find_restart_point, is_light, restore
@@ -247,8 +247,7 @@ class Runner:
         check_cut(deck.deck.run.cut, [block.name for block in evolution.blocks])
         self.last_point: int | None = None
         self.sidecar = Sidecar(directory.sidecar)
-        gauges = gauges or make_gauges(deck.deck, evolution)
-        self.gauges = GaugeTable(directory.gauges, gauges)
+        self.gauges = gauges or make_gauges(deck.deck, evolution)
         self.limit: WallLimit | None = None  # of wall time; whoever starts the run may set one
         self.writing = Background()
         self.world: World | None = None  # ranks of MPI that share the run; set like the limit
@@ -267,9 +266,8 @@ class Runner:
         """Go on from the last good restart point, or from the one of step `at`."""
         with self.directory.claimed():
             check_columns(self.directory.history, self.evolution, self._measure())
-            tables = [self.directory.history] + [self.gauges.path] * (
-                self.gauges.gauges is not None
-            )
+            tables = [self.directory.history]
+            tables += [self.directory.gauges] * bool(self.gauges.points)
             state, step, rows = find_restart_point(self.directory, at, say, tables)
             if step or all(one.rows for one in rows):  # else it is as it was built
                 restore(self.evolution, state, self.directory, step)
@@ -320,7 +318,7 @@ class Runner:
     def _run(self) -> Ending:
         began, cpu_began, status = time.monotonic(), time.process_time(), "stopped"
         self.history = HistoryWriter(self.directory.history, self.columns)
-        self.gauges.open()
+        self.gauges.open(self.directory.gauges)
         self.progress = Progress(self.evolution, self.quiet, t_unit=self.problem.t_unit)
         self.outlook = Outlook(
             self.deck, self.problem, self.evolution, self.directory, self.progress.say

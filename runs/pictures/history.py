@@ -112,54 +112,51 @@ def _say(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _draw_panel(axes, t, history, names: list[str], units) -> None:
-    if names == ["dt"]:
-        _draw_dt(axes, t, history)
-    elif names == ["drift"]:
-        for name, drift in compute_drifts(history).items():
-            axes.plot(t, drift, linewidth=0.9, label=_say(name))
-        axes.set_title("change of conserved totals, relative", fontsize=9)
-    else:
-        largest = max(float(np.nanmax(np.abs(history[name]))) for name in names)
-        factor, unit = pick_prefix(largest, units.get(names[0], "1"))
-        title = _find_title(names)
-        for name in names:
-            label = _say(name).removeprefix(title).strip() or _say(name)
-            axes.plot(t, history[name] * factor, linewidth=0.9, label=label)
-        size = np.concatenate([np.abs(history[name]) for name in names])
-        falls = any(word in LOGARITHMIC for name in names for word in name.split("_"))
-        if falls and np.nanmax(size) > DECADES * np.nanmin(size[size > 0.0]):
-            axes.set_yscale("log", nonpositive="mask")
-        axes.set_title(f"{title} [{unit}]" if unit else title, fontsize=9)
+def make_panel(
+    history: Mapping[str, np.ndarray], names: Panel, units: Mapping[str, str]
+) -> tuple[str, list[tuple[str, np.ndarray, bool]]]:
+    """Title of a panel; of its curves label, values (n,), and whether they are points."""
+    if names == ["drift"]:
+        drifts = compute_drifts(history).items()
+        title = "change of conserved totals, relative"
+        return title, [(_say(name), drift, False) for name, drift in drifts]
+    largest = max(float(np.nanmax(np.abs(history[name]))) for name in names)
+    factor, unit = pick_prefix(largest, units.get(names[0], "1"))
+    words = history.get("dt_limit")
+    if names == ["dt"] and words is not None and words.dtype.kind == "U":
+        kinds = [word for word in dict.fromkeys(words.tolist()) if word]
+        dt = history["dt"] * factor
+        return f"dt [{unit}]", [(k, np.where(words == k, dt, np.nan), True) for k in kinds]
+    parts = zip(*(name.split("_") for name in names), strict=False)
+    title = " ".join(one[0] for one in parts if len(set(one)) == 1)
+    curves = [
+        (_say(name).removeprefix(title).strip() or _say(name), history[name] * factor, False)
+        for name in names
+    ]
+    return f"{title} [{unit}]" if unit else title, curves
+
+
+def _draw_panel(axes, t, history, names: Panel, units) -> None:
+    title, curves = make_panel(history, names, units)
+    for label, values, points in curves:
+        look = {"ls": "", "marker": ".", "ms": 2.5} if points else {"lw": 0.9}
+        axes.plot(t, values, label=label, **look)
+    axes.set_title(title, fontsize=9)
     if names == ["drift"]:
         low, high = axes.get_ylim()
         axes.set_ylim(low, high + HEADROOM * (high - low))
         close = {"columnspacing": 0.8, "handlelength": 1.2, "borderaxespad": 0.2}
         axes.legend(fontsize=6, framealpha=0.6, loc="upper center", ncols=2, **close)
-    elif len(axes.get_lines()) > 1:
+    elif len(curves) > 1:
         axes.legend(fontsize=7, framealpha=0.6)
+    size = np.concatenate([np.abs(values) for _, values, _ in curves])
+    falls = any(word in LOGARITHMIC for name in names for word in name.split("_"))
+    if falls and np.nanmax(size) > DECADES * np.nanmin(size[size > 0.0]):
+        axes.set_yscale("log", nonpositive="mask")
+    if curves and curves[0][2]:
+        axes.set_ylim(bottom=0.0)
     axes.tick_params(labelsize=8)
     axes.grid(alpha=0.3)
-
-
-def _find_title(names: list[str]) -> str:
-    """The words that all names begin with."""
-    words = [name.split("_") for name in names]
-    common = [one[0] for one in zip(*words, strict=False) if len(set(one)) == 1]
-    return " ".join(common)
-
-
-def _draw_dt(axes, t: np.ndarray, history) -> None:
-    dt, words = history["dt"], history.get("dt_limit")
-    factor, unit = pick_prefix(float(np.nanmax(dt)), "s")
-    axes.set_title(f"dt [{unit}]", fontsize=9)
-    if words is None or words.dtype.kind != "U":
-        axes.plot(t, dt * factor, linewidth=0.9)
-        return
-    for name in [word for word in dict.fromkeys(words.tolist()) if word]:
-        there = words == name
-        axes.plot(t[there], dt[there] * factor, ".", markersize=2.5, label=name)
-    axes.set_ylim(bottom=0.0)
 
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg", "c": "m/s"}

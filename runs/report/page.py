@@ -11,29 +11,33 @@ import csv
 import html
 import os
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from problems.evolution import get_material
-from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput, RunFailure
 from regrid.text_files import escape_controls
 from runs.grids.quality import judge
 from runs.inspection.account import (
     HEAD,
-    compute_drifts,
     describe_cautions,
     describe_convexity,
     describe_own,
     describe_run,
-    describe_time,
+    describe_verdict,
     measure_drifts,
     pick_prefix,
 )
-from runs.inspection.info import describe_settings, other_name
+from runs.inspection.info import (
+    describe_problem,
+    describe_settings,
+    describe_state,
+    find_verdict,
+    other_name,
+)
 from runs.pictures.command import (
     Wanted,
     default_fields,
@@ -44,8 +48,7 @@ from runs.pictures.command import (
 )
 from runs.pictures.fields import list_fields, scale_times
 from runs.pictures.film import make_film
-from runs.pictures.history import choose_panels
-from runs.store.directory import RunDirectory
+from runs.pictures.history import choose_panels, make_panel
 from runs.store.files import disk_errors, write_atomically
 from runs.store.reader import Dump, RunData
 
@@ -86,7 +89,8 @@ def make_history_plot(run: RunData) -> str:
     for number, (_, curves) in enumerate(drawn):
         place = {"row": number // COLUMNS + 1, "col": number % COLUMNS + 1}
         legend = f"legend{number + 1}" if number else "legend"
-        for k, (name, values, mode) in enumerate(curves):
+        for k, (name, values, points) in enumerate(curves):
+            mode = "markers" if points else "lines"
             x, y = thin(t, values)
             look = {"color": COLOURS[k % len(COLOURS)]}
             figure.add_scatter(
@@ -116,25 +120,6 @@ def make_history_plot(run: RunData) -> str:
         div_id="history",
         config={"displaylogo": False, "responsive": True},
     )
-
-
-def make_panel(
-    history: Mapping[str, np.ndarray], names: list[str], units: Mapping[str, str]
-) -> tuple[str, list[tuple[str, np.ndarray, str]]]:
-    """Title of a panel, and name, values and mode of its curves."""
-    if names == ["drift"]:
-        drifts = compute_drifts(history)
-        curves = [(name.replace("_", " "), drift, "lines") for name, drift in drifts.items()]
-        return "change of conserved totals, relative", curves
-    largest = max(float(np.nanmax(np.abs(history[name]))) for name in names)
-    factor, unit = pick_prefix(largest, units.get(names[0], "s" if names == ["dt"] else "1"))
-    title = ", ".join(name.replace("_", " ") for name in names) + (f" [{unit}]" if unit else "")
-    words = history.get("dt_limit")
-    if names == ["dt"] and words is not None and words.dtype.kind == "U":
-        kinds = [word for word in dict.fromkeys(words.tolist()) if word]
-        values = history["dt"] * factor
-        return title, [(kind, np.where(words == kind, values, np.nan), "markers") for kind in kinds]
-    return title, [(name.replace("_", " "), history[name] * factor, "lines") for name in names]
 
 
 def thin(t: np.ndarray, values: np.ndarray, most: int = MOST) -> tuple[np.ndarray, np.ndarray]:
@@ -168,19 +153,14 @@ PICTURES = (  # heading, words of `shockgrid plot`
 
 
 def make_report(
-    directory: str | Path,
+    directory: str | os.PathLike,
     output: str | Path | None = None,
     *,
     film: bool = True,
     dpi: int = 90,
-    say: Callable[[str], None] | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> Path:
-    """Write the report of a run and return its path [DIR/report.html].
-
-    film: make one, of a run of two dumps or more.  `say` takes remarks on what is left out.
-    Raises BadInput where there is no run, the file cannot be written, or plotly or jinja2 is
-    missing.
-    """
+    """Write the report of a run; arguments: `report`.  A film needs two dumps or more."""
     run = RunData(directory)
     path = Path(output) if output else run.path / "report.html"
     check_path(path)
@@ -195,7 +175,7 @@ def make_report(
         history=make_history_plot(run),
         left_out=left_out,
     )
-    for sentence in left_out if say else ():
+    for sentence in left_out:
         say(f"left out: {sentence}")
     write_atomically(path, page, durable=False)
     return path
@@ -229,59 +209,57 @@ def load_template(name: str) -> Any:
 def describe_run_in_words(run: RunData, left_out: list[str]) -> dict[str, Any]:
     """What the page says besides pictures: state, verdict, cautions, tables, provenance, deck."""
     history, last = run.history, run.dumps[-1] if run.dumps else None
-    screen = read_text(run.directory.summary)
+    marched = len(history.get("t", ())) > 1
     try:
         cautions = describe_cautions(run.problem, history)
-        errors = run.problem.errors(history) if len(history.get("t", ())) > 1 else {}
-        verdict = find_verdict(run, screen)
+        errors = run.problem.errors(history) if marched else {}
+        theory, script = find_own_words(run), run.problem.say_repeat()
+        verdict = find_verdict(run)
     except (BadInput, RunFailure, KeyError, ValueError, IndexError) as error:  # of another version
         left_out.append(f"what the problem says ({error})")
-        cautions, errors, verdict = [], {}, ""
-    left_out += [f"{sentence}" for sentence in run.skipped]
-    cells = sum((b.nodes[0].size - sum(b.nodes.shape[1:]) + 1) for b in last.blocks) if last else 0
+        cautions, errors, theory, script, verdict = [], {}, "", "", None
+    left_out += run.skipped
+    drifts = measure_drifts(history) if marched else {}
+    states = [(describe_state(last, history), bool(last.finished))] if last else []
+    if convexity := describe_convexity(history):
+        states.append((convexity, not convexity.startswith("NOT")))
+    if drifts:
+        worst = max(drifts, key=drifts.__getitem__)
+        words = f"largest conservation error: {drifts[worst]:.1e} ({worst.replace('_', ' ')})"
+        states.append((words, bool(np.isfinite(drifts[worst]))))
     names = [block.name for block in last.blocks] if last else []
-    known = run.problem_name in PROBLEMS
+    deck = read_text(run.directory.deck)
     return {
-        "about": summary_line(run.problem_name) if known else "",
-        "states": list_states(run, last),
-        "verdict": verdict,
+        "about": describe_problem(run).strip(" ()"),
+        "verdict": describe_verdict(verdict) if verdict else "",
+        "trusted": bool(verdict and verdict["status"] == "finished" and not verdict["trust"]),
+        "states": states or [("there is no dump that can be read", False)],
+        "theory": theory,
         "errors": {name: f"{value:.4g}" for name, value in errors.items()},
         "cautions": [line.removeprefix(HEAD) for line in cautions],
-        "account": describe_run(history, cells, names) if history else [],
+        "account": describe_run(history, last.cells if last else 0, names) if history else [],
         "settings": describe_settings(run),
         "blocks": judge_blocks(last) if last else [],
-        "drifts": measure_drifts(history) if len(history.get("t", ())) > 1 else {},
+        "drifts": drifts,
         "provenance": last.provenance if last else {},
-        "deck": (deck := read_text(run.directory.deck)),
+        "deck": deck,
         "deck_link": embed(deck.encode("utf-8"), ".toml"),
         "log": read_text(run.directory.log),
-        "repeat": describe_repeat(run.directory),
-        "script": find_script(run),
+        "repeat": [  # commands that compute the run again and compare the two
+            "shockgrid run deck.toml -o again",
+            f"shockgrid compare {run.directory.quoted} again",
+        ],
+        "script": script,
     }
 
 
-def list_states(run: RunData, last: Dump | None) -> list[tuple[str, bool]]:
-    """How it ended and its conservation errors: sentences, and whether each is good."""
-    if last is None:
-        return [("there is no dump that can be read", False)]
-    t = f"{describe_time(last.t, last.t_unit)} of {last.t_end:.6g}"
-    states = [(f"{last.finished or 'not finished'}: step {last.step}, {t}", bool(last.finished))]
-    if convexity := describe_convexity(run.history):
-        states.append((convexity, not convexity.startswith("NOT")))
-    if drifts := measure_drifts(run.history):
-        worst = max(drifts, key=drifts.__getitem__)
-        words = f"largest conservation error: {drifts[worst]:.1e}"
-        states.append((f"{words} ({worst.replace('_', ' ')})", bool(np.isfinite(drifts[worst]))))
-    return states
-
-
-def find_verdict(run: RunData, screen: str) -> str:
+def find_own_words(run: RunData) -> str:
     """What the problem itself says beside theory: of its summary, or said again."""
+    screen = read_text(run.directory.summary)
+    if not screen and len(run.history.get("t", ())) > 1:
+        return describe_own(run.problem, run.history)
     own = screen.split("\n\n")[1:-1]
-    own = [part for part in own if not part.startswith(HEAD)]
-    if screen or len(run.history.get("t", ())) < 2:
-        return "\n\n".join(own)
-    return describe_own(run.problem, run.history)
+    return "\n\n".join(part for part in own if not part.startswith(HEAD))
 
 
 def judge_blocks(dump: Dump) -> list[dict[str, str]]:
@@ -290,7 +268,7 @@ def judge_blocks(dump: Dump) -> list[dict[str, str]]:
     for block in dump.blocks:
         judgement = judge(block.nodes)
         fields = judgement.fields
-        ni, nj = (n - 1 for n in block.nodes.shape[1:])
+        ni, nj = block.cells
         rows.append(
             {
                 "block": block.name + other_name(block),
@@ -376,59 +354,39 @@ def read_text(path: Path) -> str:
         return ""
 
 
-def find_script(run: RunData) -> str:
-    """The words on a run that its deck alone does not repeat; "" where it does."""
-    try:
-        return run.problem.say_repeat()
-    except BadInput:
-        return ""
-
-
-def describe_repeat(directory: RunDirectory) -> list[str]:
-    """Commands that compute the run again and compare the two."""
-    return ["shockgrid run deck.toml -o again", f"shockgrid compare {directory.quoted} again"]
-
-
 TABLE, RUNS, PAGE = "study.csv", "runs", "report.html"
 
 
 def report(
-    directory: str | Path,
+    directory: str | os.PathLike,
     output: str | Path | None = None,
     *,
     film: bool | None = None,
     dpi: int = 90,
-    say: Callable[[str], None] | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> Path:
-    """Write the report of a run or of a study and return its path [DIR/report.html].
+    """Write one HTML file about a run or a study, as `shockgrid report` does; its path.
 
-    film: with films; if not said, of a run yes, of the runs of a study no.  `say` takes remarks.
-    Raises BadInput where the directory is neither, or the file cannot be written.
+    output: FILE [DIR/report.html]; film: with films; if not said, of a run yes, of the runs of a
+    study no; dpi: of the pictures; say: takes remarks.  Raises BadInput where the directory is
+    neither, the file cannot be written, or the extra `report` is not installed.
     """
-    if is_study(Path(directory)):
-        return make_study_report(directory, output, film=bool(film), dpi=dpi, say=say)
+    if (Path(directory) / TABLE).is_file():
+        return make_study_report(Path(directory), output, bool(film), dpi, say)
     return make_report(directory, output, film=film is not False, dpi=dpi, say=say)
 
 
-def is_study(directory: Path) -> bool:
-    """Does the folder hold the table of a study?"""
-    return (directory / TABLE).is_file()
-
-
 def make_study_report(
-    directory: str | Path,
-    output: str | Path | None = None,
-    *,
-    film: bool = False,
-    dpi: int = 90,
-    say: Callable[[str], None] | None = None,
+    home: Path,
+    output: str | Path | None,
+    film: bool,
+    dpi: int,
+    say: Callable[[str], None],
 ) -> Path:
     """Write the reports of a study's runs where they are missing or old, and the page over them.
 
-    Raises BadInput where the table cannot be read; a run that cannot be reported is named on the
-    page.
+    A run that cannot be reported is named on the page.
     """
-    home = Path(directory)
     path = Path(output) if output else home / PAGE
     check_path(path)
     heads, rows = read_table(home / TABLE)
@@ -456,7 +414,7 @@ def make_study_report(
         failed=failed,
         log=read_text(home / "study.toml"),
     )
-    for sentence in failed if say else ():
+    for sentence in failed:
         say(f"no report of {sentence}")
     write_atomically(path, page_text, durable=False)
     return path
@@ -482,6 +440,5 @@ def show_number(cell: str) -> str:
 def is_old(page: Path, folder: Path) -> bool:
     """Is there no page of a run, or has its log been written to since?"""
     log = folder / "run.log"
-    if not page.exists():
-        return True
-    return log.exists() and log.stat().st_mtime > page.stat().st_mtime
+    newer = page.exists() and log.exists() and log.stat().st_mtime > page.stat().st_mtime
+    return not page.exists() or newer

@@ -35,7 +35,7 @@ _NAME = re.compile(r"(dump|restart)_(\d+)\.h5")
 class RunDirectory:
     """The paths of one run; reading and listing never writes."""
 
-    def __init__(self, path: Path | str):
+    def __init__(self, path: str | os.PathLike):
         self.path = Path(path)
         self.dumps_folder = self.path / DUMPS
         self.deck = self.path / "deck.toml"
@@ -244,7 +244,7 @@ def _holds_beginning(directory: RunDirectory) -> bool:
     return dumps.is_dir() and there <= own and not any(dumps.iterdir())
 
 
-def open_directory(path: str | Path) -> RunDirectory:
+def open_directory(path: str | os.PathLike) -> RunDirectory:
     """An existing run directory for reading; BadInput where there is none."""
     directory = RunDirectory(path)
     if not directory.path.exists():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import importlib
 import math
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -220,6 +221,9 @@ class Snapshot:
 
     blocks: list[BlockData]
 
+    def __fspath__(self) -> str:
+        return str(self.path)
+
     @property
     def axes(self) -> tuple[str, str]:
         """Names of the plane's coordinates: x and y, or x and r in axisymmetric flow."""
@@ -253,7 +257,7 @@ class Snapshot:
 class Dump(Snapshot):
     """One dump, besides a `Snapshot`: `problem`, `finished`, `deck_text`, `provenance`."""
 
-    def __init__(self, path: Path | str):
+    def __init__(self, path: str | os.PathLike):
         path = Path(path)
         with open_dump(path) as file, damage_told(path, "its attributes"):
             at = file.attrs
@@ -288,7 +292,7 @@ class RunData:
     a damaged deck or summary is taken as it is; the sentences stand in `skipped`.
     """
 
-    def __init__(self, path: Path | str, lenient: bool = False):
+    def __init__(self, path: str | os.PathLike, lenient: bool = False):
         self.lenient = lenient
         self.skipped: list[str] = []  # sentences about what is damaged
         self.directory: RunDirectory = open_directory(path)
@@ -303,6 +307,9 @@ class RunData:
                 if not lenient:
                     raise
                 self.skipped.append(str(error))
+
+    def __fspath__(self) -> str:
+        return str(self.path)
 
     @cached_property
     def read_deck(self) -> ReadDeck:

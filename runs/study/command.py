@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 from regrid.errors import BadInput
@@ -20,13 +18,10 @@ from runs.study.definition import (
     NUMBER,
     Definition,
     check_same_deck,
-    is_study,
-    make_definition,
-    read_definition,
     read_vary,
 )
 from runs.study.orders import describe_series
-from runs.study.study import Study, terminate_softly
+from runs.study.study import Study, make_study, terminate_softly
 
 FAILED, INTERRUPTED = 3, 128 + 2
 MOST_CAUTIONS = 10  # on the screen
@@ -53,14 +48,16 @@ def study(
     The exit code is 0 where all runs came to their end, 3 where some failed, 130 or 143 after a
     signal.
     """
-    definition, output = read_words(source, vary, settings, output, shown)
-    made, began = Study(definition, output, refine), time.monotonic()
+    varied, fixed = read_words(vary, settings)
+    names = [name for entry in shown for name in entry.split(",") if name]
+    made = make_study(source, varied, output or "", (), fixed, names, refine)
+    began = time.monotonic()
     if dry_run:
         made.check()
-        check_same_deck(made.path, definition)
+        check_same_deck(made.path, made.definition)
         say(describe_plan(made))
         return 0
-    progress = Progress(definition, quiet, note)
+    progress = Progress(made.definition, quiet, note)
     with terminate_softly() as caught:
         try:
             with open_engine(engine, jobs) as opened:
@@ -85,38 +82,21 @@ def study(
 
 
 def read_words(
-    source: str,
-    vary: Sequence[str],
-    settings: Sequence[str],
-    output: str | None,
-    shown: Sequence[str],
-) -> tuple[Definition, str]:
-    """The study and its folder from the words of the command line; BadInput for wrong ones."""
-    names = [name for entry in shown for name in entry.split(",") if name]
-    file = is_study(source)
-    if file is not None:
-        if vary or settings:
-            given = "--vary" if vary else "--set"
-            raise BadInput(f"{given}: {source} is a study already; change {file} instead")
-        definition = read_definition(file)
-        if names:
-            definition = dataclasses.replace(definition, shown=tuple(names))
-        output = output or (source if Path(source).is_dir() else None)
-    else:
-        pairs = [read_vary(text) for text in vary]
-        twice = next((k for k, _ in pairs if [key for key, _ in pairs].count(k) > 1), None)
-        if twice is not None:
-            raise BadInput(f"--vary {twice} is given twice; give all its values in one list")
-        fixed = {}
-        for setting in settings:
-            key, equals, text = setting.partition("=")
-            if not equals or not key.strip():
-                raise BadInput(f"--set {setting!r}: the form is key=value, such as cells=32")
-            fixed[key.strip()] = parse_value(text)
-        definition = make_definition(source, dict(pairs), (), fixed, names)
-    if not output:
-        raise BadInput("study: name the folder of the study with -o DIR")
-    return definition, output
+    vary: Sequence[str], settings: Sequence[str]
+) -> tuple[dict[str, list[Any]], dict[str, Any]]:
+    """Values by key of the words of --vary and --set; BadInput for wrong ones."""
+    varied: dict[str, list[Any]] = {}
+    for key, values in map(read_vary, vary):
+        if key in varied:
+            raise BadInput(f"--vary {key} is given twice; give all its values in one list")
+        varied[key] = values
+    fixed = {}
+    for setting in settings:
+        key, equals, text = setting.partition("=")
+        if not equals or not key.strip():
+            raise BadInput(f"--set {setting!r}: the form is key=value, such as cells=32")
+        fixed[key.strip()] = parse_value(text)
+    return varied, fixed
 
 
 def describe_plan(study: Study) -> str:

@@ -214,8 +214,6 @@ def _compute(work: Work) -> Result:
         runner = continue_runner(directory, share, True)
         if (result := _finish(runner, runner.resume, digest)) is not None:
             return result
-    if not directory.deck.exists():
-        _drop_empty(directory)
     deck = read_deck(work.source, (*work.settings, *share))
     runner = start_runner(deck, str(work.folder), True, True, lambda text: None)
     result = _finish(runner, runner.start, digest)
@@ -290,16 +288,6 @@ def _set_aside(directory: RunDirectory) -> None:
         parent.mkdir(exist_ok=True)
         names = (parent / f"{directory.path.name}-{number}" for number in itertools.count(1))
         os.replace(directory.path, next(place for place in names if not place.exists()))
-
-
-def _drop_empty(directory: RunDirectory) -> None:
-    """Remove what a run leaves that was killed before its deck was there: half of it, no dumps."""
-    notes = directory.problem_copy, directory.problem_note
-    torn = [path.with_name(f".{path.name}.part") for path in (directory.deck, *notes)]
-    with contextlib.suppress(OSError):
-        for path in (directory.lock, *notes, *torn):
-            path.unlink(missing_ok=True)
-        directory.dumps_folder.rmdir()
 
 
 def warm_up(work: Work) -> None:

@@ -24,6 +24,7 @@ import signal
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from types import UnionType
@@ -92,6 +93,9 @@ class Study:
         self.definition, self.path = definition, Path(path)
         self.results: list[Result | None] = [None] * len(definition.points)
         self.refined_key = find_refined_key(definition, refine)
+
+    def __fspath__(self) -> str:
+        return str(self.path)
 
     def __repr__(self) -> str:
         done = sum(result is not None for result in self.results)
@@ -433,6 +437,34 @@ def _find_start_names(problem_name: str, problem: Problem) -> list[str]:
     return [*found.values, *measured]
 
 
+def make_study(
+    deck: str | Path | Callable[..., Mapping[str, float]],
+    vary: Mapping[str, Any],
+    output: str | Path,
+    points: Sequence[Mapping[str, Any]],
+    fixed: Mapping[str, Any],
+    shown: Sequence[str],
+    refine: str | None,
+) -> Study:
+    """The study of a deck, a study file, a study's folder or a function; arguments: `study`.
+
+    fixed: keys for all points.  Raises BadInput for what cannot be a study.
+    """
+    file = None if callable(deck) else is_study(str(deck))
+    if file is None:
+        source = deck if callable(deck) else str(deck)
+        definition = make_definition(source, vary, points, fixed, shown)
+    elif vary or points or fixed:
+        raise BadInput(f"{deck} is a study already: change {file}, or give it no keys and values")
+    else:
+        definition = read_definition(file)
+        definition = replace(definition, shown=tuple(shown) or definition.shown)
+        output = output or (file.parent if Path(str(deck)).is_dir() else "")
+    if not str(output):
+        raise BadInput("study: the output folder is missing; name it with -o DIR (output)")
+    return Study(definition, output, refine)
+
+
 def study(
     deck: str | Path | Callable[..., Mapping[str, float]],
     vary: Mapping[str, Any] | None = None,
@@ -459,19 +491,8 @@ def study(
     that fail are in `Study.failures`.  KeyboardInterrupt where it was stopped; it can be gone on
     with.
     """
-    file = None if callable(deck) else is_study(str(deck))
-    if file is not None:
-        if vary or points or settings or keywords:
-            raise BadInput(f"{deck} is a study already; leave vary, points and settings out")
-        definition = read_definition(file)
-        output = output or (file.parent if file.parent == Path(str(deck)) else "")
-    else:
-        source = deck if callable(deck) else str(deck)
-        fixed = flatten({**(settings or {}), **keywords})
-        definition = make_definition(source, vary, points, fixed, shown)
-    if not str(output):
-        raise BadInput("study: the output folder is missing; name it with `output` (-o)")
-    made = Study(definition, output, refine)
+    fixed = flatten({**(settings or {}), **keywords})
+    made = make_study(deck, vary or {}, output, points, fixed, shown, refine)
     with open_engine(engine, jobs) as opened:
         if opened is None:
             return None

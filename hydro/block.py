@@ -20,10 +20,8 @@ from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
 from hydro.interior.advance import allocate_scratch, count_tiles, make_flow_kernels
 from hydro.interior.cell_fields import (
-    ENERGY,
     SLAB,
     CellFields,
-    Energies,
     check_first_state,
     make_fill_sound_speed,
 )
@@ -435,17 +433,18 @@ class Block:
     def cell_fields(self) -> Mapping[str, np.ndarray]:
         """Density, velocity, pressure and specific internal energy, each (ni, nj).
 
-        Views of the state; the energy is computed whenever it is asked for.
+        Views of the state; the energy is computed whenever it is asked for, in the rows that this
+        process has: it is 0 in the others.
         """
         rho, u, v, p = self.state[:, 1:-1, 1:-1]
-        return CellFields({"rho": rho, "u": u, "v": v, "p": p}, self.computed_fields[ENERGY])
+        rows = slice(0, self.ni) if self.is_here else slice(self.first_row, self.last_row)
 
-    @property
-    def computed_fields(self) -> Mapping[str, Energies]:
-        """The energy, of which rows are computed; it holds as long as the present state does."""
-        rho, _, _, p = self.state[:, 1:-1, 1:-1]
-        known = (0, self.ni) if self.is_here else (self.first_row, self.last_row)
-        return {ENERGY: Energies(rho, p, self.void_energy, self.fill_energy, known)}
+        def compute_energy() -> np.ndarray:
+            e = np.zeros(rho.shape)
+            self.fill_energy(rho[rows], p[rows], self.void_energy[rows], e[rows])
+            return e
+
+        return CellFields({"rho": rho, "u": u, "v": v, "p": p}, compute_energy)
 
     def compute_fields(self, state: np.ndarray) -> dict[str, np.ndarray]:
         """`cell_fields` of a state (4, ni + 2, nj + 2) of this block: views, and a new `e`."""

@@ -32,7 +32,6 @@ of a block
 - `material`: its name
 - `node_fields`: fields at its nodes by name, (ni+1, nj+1) each
 - `long_names`: words for the axes of its fields, by the field's name
-- `computed_fields`: see `HasComputedFields`
 
 Note: `get_state` must hold *everything* that the next step depends on, or a restarted run
 ends in other bits than an unbroken one.
@@ -121,26 +120,6 @@ def get_state_of(evolution: Evolution, names: Container[str]) -> State:
     if isinstance(evolution, HasStateOfBlocks):
         return evolution.get_state_of(names)
     return evolution.get_state()
-
-
-@runtime_checkable
-class Computed(Protocol):
-    """A field (ni, nj) of numbers that are computed, some rows at a time, when they are read."""
-
-    shape: tuple[int, ...]
-    dtype: np.dtype
-    nbytes: int
-
-    def compute_rows(self, first: int, last: int) -> np.ndarray:
-        """The rows first..last - 1, (last - first, nj)."""
-        ...
-
-
-@runtime_checkable
-class HasComputedFields(Protocol):
-    """A block with fields among `cell_fields` that need not be computed whole."""
-
-    computed_fields: Mapping[str, Computed]  # as long as the arrays hold of which they are made
 
 
 def get_material(block: BlockView) -> str:

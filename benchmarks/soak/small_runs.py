@@ -7,6 +7,7 @@ from pathlib import Path
 
 from benchmarks.soak.child import Done, call, count_changes
 from runs.store.directory import RunDirectory
+from runs.store.files import LOCK
 
 OFTEN = ("output.dumps=4", "output.restart_every=0.02", "run.threads=1")
 POINT = '[{name="g", x=0.0, y=0.0}]'
@@ -77,8 +78,8 @@ def find_other_files(one: Path, other: Path) -> list[str]:
 
 
 def find_left_overs(directory: Path) -> list[str]:
-    """Files of a directory that no run leaves: parts of files and locks."""
-    return sorted(p.name for p in directory.rglob(".*") if p.is_file())
+    """Files of a directory that no run leaves: parts of files."""
+    return sorted(p.name for p in directory.rglob(".*") if p.is_file() and p.name != LOCK)
 
 
 class TrialsOfRuns:

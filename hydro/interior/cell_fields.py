@@ -18,7 +18,6 @@ from regrid.jit import kernel
 
 SLAB = 64  # rows for which something is computed at a time
 ENERGY = "e"
-Compute = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], None]
 
 
 def check_first_state(name: str, eos: EquationOfState, state: np.ndarray) -> None:
@@ -39,50 +38,17 @@ def check_first_state(name: str, eos: EquationOfState, state: np.ndarray) -> Non
         )
 
 
-class Energies:
-    """Specific internal energies (ni, nj) [J/kg], of which rows are computed that are read.
-
-    fill: fills an array of them for density, pressure and voids' energy, which are those given
-    here: arrays (ni, nj) that hold as long as the energies are read.  known: the rows, first and
-    the one after the last, whose states are here; those of others are 0.
-    """
-
-    def __init__(
-        self,
-        rho: np.ndarray,
-        p: np.ndarray,
-        voids: np.ndarray,
-        fill: Compute,
-        known: tuple[int, int],
-    ):
-        self._arrays, self._fill, self._known = (rho, p, voids), fill, known
-        self.shape, self.dtype, self.nbytes = voids.shape, voids.dtype, voids.nbytes
-
-    def compute_rows(self, first: int, last: int) -> np.ndarray:
-        """Of the rows first..last - 1 of cells: (last - first, nj)."""
-        e = np.zeros((last - first, self.shape[1]))
-        begin = max(first, self._known[0])
-        rows = slice(begin, max(begin, min(last, self._known[1])))
-        taken = [array[rows] for array in self._arrays]
-        self._fill(*taken, e[rows.start - first : rows.stop - first])
-        return e
-
-
 class CellFields(Mapping[str, np.ndarray]):
-    """Density, velocity, pressure, each (ni, nj), and the specific internal energy.
+    """Density, velocity, pressure, each (ni, nj), and the specific internal energy [J/kg].
 
-    stored: the first four.
+    stored: the first four; compute_energy: gives the last.
     """
 
-    def __init__(self, stored: Mapping[str, np.ndarray], energies: Energies):
-        self._stored, self._energies = stored, energies
+    def __init__(self, stored: Mapping[str, np.ndarray], compute_energy: Callable[[], np.ndarray]):
+        self._stored, self._compute_energy = stored, compute_energy
 
     def __getitem__(self, name: str) -> np.ndarray:
-        return (
-            self._stored[name]
-            if name != ENERGY
-            else self._energies.compute_rows(0, self._energies.shape[0])
-        )
+        return self._compute_energy() if name == ENERGY else self._stored[name]
 
     def __iter__(self) -> Iterator[str]:
         yield from self._stored

@@ -25,6 +25,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
+from hydro.ranks.cutting import Shares
 from hydro.ranks.ranks import COLLECT, COUNT, END, STEP, Ranks, hear, tell
 from hydro.simulation import Simulation
 from hydro.workers import count_processors
@@ -84,13 +85,9 @@ class World:
         state = evolution.get_state() if restored else {}
         self.build(deck)
         self._watched = problem.watch(evolution)
-        watched = self._watched or {}
         self._beginning = True
         tell(self.comm, BEGIN)
-        self.comm.bcast((shares, watched), root=0)
-        share_state(self.comm, state)
-        self.ranks = Ranks(self.comm, evolution.blocks, *shares, watched)
-        evolution.spread(self.ranks, count_own_processors(self.comm))
+        _, self.ranks = share_flow(self.comm, evolution, (shares, self._watched or {}), state)
         self._beginning = False
         return describe_shares([block.name for block in evolution.blocks], shares, self.size)
 
@@ -107,10 +104,27 @@ class World:
         tell(self.comm, END, code)
 
 
-def share_state(comm: Any, state: State = EMPTY) -> dict[str, Any]:
-    """The state of the first rank on all ranks, sent array by array."""
+def share_flow(
+    comm: Any, built: Any, shared: tuple[Shares, Watched] | None = None, state: State = EMPTY
+) -> tuple[Simulation, Ranks]:
+    """An evolution that each rank has built, with the first one's state, and the ranks that share
+    it.
+
+    shared, state: what the first rank says; state: its own, empty where all have the same.  Raises
+    what has failed in building it here alone.
+    """
+    shares, watched = comm.bcast(shared, root=0)
+    if isinstance(built, Exception):
+        raise built
+    if not isinstance(built, Simulation):
+        raise TypeError("what was built is not a flow on blocks")
     keys = comm.bcast(list(state), root=0)
-    return {key: comm.bcast(state.get(key), root=0) for key in keys}
+    taken = {key: comm.bcast(state.get(key), root=0) for key in keys}  # array by array
+    if taken and shared is None:
+        built.set_state(taken)
+    ranks = Ranks(comm, built.blocks, *shares, watched)
+    built.spread(ranks, count_own_processors(comm))
+    return built, ranks
 
 
 def open_world() -> Any:
@@ -299,7 +313,7 @@ def follow(comm: Any, screen: TextIO) -> int:
             word, code = hear(comm)
         if word == END:
             return code
-        evolution, ranks = begin(comm, built)
+        evolution, ranks = share_flow(comm, built)
         while True:
             word, code = hear(comm)
             if word == END:
@@ -333,21 +347,3 @@ def build(comm: Any) -> Evolution | Exception:
         return deck.make_problem().build()
     except Exception as error:
         return error
-
-
-def begin(comm: Any, built: Evolution | Exception | None) -> tuple[Simulation, Ranks]:
-    """The evolution that was built with the state of the first rank's, and the ranks that share it.
-
-    Raises what has failed here alone.
-    """
-    shares, watched = comm.bcast(None, root=0)
-    if isinstance(built, Exception):
-        raise built
-    if not isinstance(built, Simulation):
-        raise TypeError("what was built is not a flow on blocks")
-    evolution, state = built, share_state(comm)
-    if state:
-        evolution.set_state(state)
-    ranks = Ranks(comm, evolution.blocks, *shares, watched)
-    evolution.spread(ranks, count_own_processors(comm))
-    return evolution, ranks

@@ -6,7 +6,6 @@ docs/files.md lists the files of a run.
 from __future__ import annotations
 
 import contextlib
-import os
 import re
 import shlex
 import time
@@ -17,7 +16,6 @@ from regrid.text_files import check_regular, escape_controls
 from runs.store.checksum import PART_NAME, find_parts_by_name
 from runs.store.files import (
     DUMPS,
-    KEEPS_OPEN_FILES,
     KEPT_NAMES,
     LOCK,
     disk_errors,
@@ -123,38 +121,17 @@ class RunDirectory:
     def claimed(self):
         """Hold the directory for one process; BadInput when another has it already.
 
-        The lock is the system's: it goes with its process, however that ends.
+        The lock is the system's, on a file that stays: it goes with its process, however that ends.
         """
-        in_use = BadInput(f"{self.path} is in use: another shockgrid runs there")
         with disk_errors(self.lock):
             file = open(self.lock, "a", encoding="utf-8")
-        with contextlib.ExitStack() as closing:
-            if KEEPS_OPEN_FILES:
-                closing.callback(self._remove_lock)
-            closing.enter_context(file)
+        with file:
             if not try_lock(file):
-                raise in_use
-            if not _is_at(file.fileno(), self.lock):  # who had it ended meanwhile and removed it
-                raise in_use
+                raise BadInput(f"{self.path} is in use: another shockgrid runs there")
             for path in _find_leftovers(self):  # those of other commands are theirs
                 with contextlib.suppress(OSError):
                     path.unlink()
-            try:
-                yield self
-            finally:
-                self._remove_lock()
-
-    def _remove_lock(self) -> None:
-        with contextlib.suppress(OSError):
-            self.lock.unlink(missing_ok=True)
-
-
-def _is_at(descriptor: int, path: Path) -> bool:
-    """Is an open file still the one that lies at a path?"""
-    try:
-        return os.path.samestat(os.fstat(descriptor), os.stat(path))
-    except FileNotFoundError:
-        return False
+            yield self
 
 
 def create_directory(wanted: str | None, problem: str, force: bool = False) -> RunDirectory:

@@ -27,7 +27,7 @@ with contextlib.suppress(ImportError):
 TRIES, PAUSE = 20, 0.05  # s
 SYSTEM = ("dev", "proc", "sys")  # folders at the root that hold no files of people
 DUMPS = "dumps"  # folder of a run
-LOCK = ".running"
+LOCK = ".lock"
 KEPT_NAMES = (  # files of a run but those in `dumps`; deck.toml, by which it is known, last
     "history.csv", "gauges.csv", "run.xmf", "summary.txt", "run.log", "problem.py", "verdict.json",
     "early-end.png", "early-end.txt", "problem.json", "deck.toml",
@@ -143,9 +143,6 @@ def describe_disk_error(error: OSError, path: Path) -> str:
         case errno.EISDIR:
             return f"{path} is a folder, a file is needed"
     return f"{path}: {error.strerror or error}"
-
-
-KEEPS_OPEN_FILES = os.name == "nt"  # a file that is open cannot be removed there
 
 
 def try_lock(file: IO) -> bool:

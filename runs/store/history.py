@@ -11,7 +11,6 @@ follows the first such row is not trusted: a restart cuts the file there and com
 
 from __future__ import annotations
 
-import csv
 import os
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
@@ -188,19 +187,9 @@ def read_columns(found: Rows) -> dict[str, np.ndarray]:
     """The columns of those rows of a history that are whole, without their checksums."""
     if found.columns is None:
         return {}
-    names, rows = [*found.columns, SUM], list(csv.reader(line for _, line in found.rows))
-    for (step, _), row in zip(found.rows, rows, strict=True):
-        if len(row) != len(names):
-            raise BadInput(f"{found.path}, step {step}: {len(row)} values for {len(names)} columns")
-    columns = zip(*rows, strict=True) if rows else [()] * len(names)
-    named = zip(found.columns, columns, strict=False)
-    history = {name: _to_array(column) for name, column in named}
-    for name in ("step", "t"):
-        if name not in history or history[name].dtype.kind not in "fi":
-            raise BadInput(
-                f"{found.path} is damaged: its column {name!r} is missing or holds no numbers"
-            )
-    return history
+    columns = zip(*(line.split(",") for _, line in found.rows), strict=True)
+    named = zip(found.columns, columns if found.rows else [()] * len(found.columns), strict=False)
+    return {name: _to_array(column) for name, column in named}
 
 
 def _to_array(texts: tuple[str, ...]) -> np.ndarray:
@@ -235,13 +224,11 @@ def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> 
         )
 
 
-def truncate_history(path: Path, step: int, source: Rows | None = None) -> list[str] | None:
-    """Drop all rows after `step`, and an incomplete line; the columns, None if none are known.
+def truncate_history(path: Path, step: int, found: Rows) -> list[str] | None:
+    """Let the file have those of the rows up to `step`; the columns, None if none are known.
 
-    source: rows of another file, which are put in place of those.  Raises BadInput where rows up to
-    `step` are lost.
+    Raises BadInput where rows up to `step` are lost.
     """
-    found = source or read_rows(path)
     if found.columns is None or (step == 0 and not found.rows):
         path.unlink(missing_ok=True)
         return None

@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-OWN = {FILE, "runs", "study.csv", "study.h5", "orders.csv", "study.png", "superseded", ".running"}
+OWN = {FILE, "runs", "study.csv", "study.h5", "orders.csv", "study.png", "superseded", ".lock"}
 FORMAT, FORMAT_VERSION = "shockgrid study", 1
 LONG_NAMES = {
     "run": "folder in runs", "state": "how the run ended",

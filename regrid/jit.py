@@ -20,6 +20,7 @@ import sys
 import threading
 import time
 import uuid
+from collections.abc import Callable
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 
@@ -144,7 +145,7 @@ class KernelCache:
                 parts = _Reader(file).load()
             context.codegen().unserialize_library = functools.partial(_Loaded, context.codegen())
             return CompileResult._rebuild(context, *parts)
-        _name_by_contents()  # it is compiled now
+        prepare_compiler()
 
     def save_overload(self, types, result) -> None:
         with contextlib.suppress(OSError):  # where nothing can be written the run goes on without
@@ -206,21 +207,21 @@ def _rebuild_environment(module: str, constants: list, name: str) -> Environment
     return _rebuild_env(module, constants, name)
 
 
-_unnamed: list[tuple[FunctionType, list]] = []  # that are not yet compiled, with their options
+_before_compiling: list[Callable[[], None]] = []
 
 
-def _has_variants(function, options=()) -> None:
-    """Remember a function of which there may be variants: made by a factory, of a user's own, with
-    options."""
+def prepare_compiler() -> None:
+    """Do what numba needs of kernels and inlined functions before it compiles something: names,
+    entries in its tables.  Kernels from the disk need none of it."""
+    while _before_compiling:
+        _before_compiling.pop()()
+
+
+def _name_by_contents(function, options) -> None:
+    """Give a function of which there may be variants (made by a factory, of a user's own, with
+    options) a name of its own variant: machine code is linked by name and types, and variants
+    cached by two processes and loaded by a third would pass for one another."""
     if function.__closure__ or options or function.__module__.split(".")[0] not in PACKAGES:
-        _unnamed.append((function, sorted(options)))
-
-
-def _name_by_contents() -> None:
-    """Give these functions names of their own: machine code is linked by name and types, and
-    variants cached by two processes and loaded by a third would pass for one another."""
-    while _unnamed:
-        function, options = _unnamed.pop()
         words = f"{compute_contents_digest(function)} {options}"
         function.__qualname__ += f"_{hashlib.sha256(words.encode()).hexdigest()[:10]}"
 
@@ -273,7 +274,8 @@ def kernel(function=None, *, allocates=True, **options):
     if function is None:
         return functools.partial(kernel, allocates=allocates, **options)
     options |= {} if allocates else {"_nrt": False}
-    _has_variants(function, options.items())
+    named = sorted(options.items())
+    _before_compiling.append(lambda: _name_by_contents(function, named))
     compiled = numba.njit(nogil=True, error_model="numpy", **options)(function)
     if isinstance(compiled, Dispatcher):  # not so with NUMBA_DISABLE_JIT
         compiled._cache = KernelCache(compiled.py_func)
@@ -294,6 +296,11 @@ def compiled_once(function=None, *, allocates=True, **options):
         return functools.partial(compiled_once, allocates=allocates, **options)
     options |= {} if allocates else {"_nrt": False}
     function.compiled_as = sorted(options)
-    _has_variants(function)
-    wrappers = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return register_jitable(error_model="numpy", **wrappers, **options)(function)
+
+    def register() -> None:
+        _name_by_contents(function, ())
+        wrappers = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        register_jitable(error_model="numpy", **wrappers, **options)(function)
+
+    _before_compiling.append(register)
+    return function

@@ -5,11 +5,13 @@ It stands apart from `runs`, as another package of that name can hide the comman
 
 from __future__ import annotations
 
+import gc
 import sys
 
 from shockgrid.shadowing import find_shadow
 
 BAD_INPUT = 2  # exit code, as in runs.cli.main
+UNCOLLECTED = 200_000  # new objects before Python looks for cycles: loading makes no garbage
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -17,6 +19,7 @@ def main(arguments: list[str] | None = None) -> int:
     if shadow := find_shadow():
         print(f"shockgrid: {shadow}", file=sys.stderr)
         return BAD_INPUT
+    gc.set_threshold(UNCOLLECTED)
     from runs.cli.main import main as run_command
 
     return run_command(arguments)

@@ -8,7 +8,6 @@ folder or a file of such a name in the current directory can hide ours too.
 from __future__ import annotations
 
 import importlib.util
-from importlib import metadata
 from pathlib import Path
 
 PACKAGES = ("regrid", "hydro", "problems", "runs")
@@ -42,6 +41,8 @@ def _describe_shadow(package: str) -> str:
 
 def _find_owner(found: Path) -> str:
     """Words for the distribution that brought a file; "" where none lists it."""
+    from importlib import metadata  # slow to load
+
     tail = "/".join(found.parts[-2:])
     for distribution in metadata.distributions():
         for file in distribution.files or ():

@@ -30,7 +30,6 @@ from regrid.errors import BadInput, RunFailure, find_nearest
 from regrid.jit import read_clock
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import ENDS
-from runs.early_end.explain import explain
 from runs.gauges import Gauges, make_gauges
 from runs.inspection.account import count, describe_time
 from runs.march.progress import Outlook, Progress, closing_screen, patience
@@ -538,6 +537,8 @@ class Runner:
 
     def _explain(self, failure: RunFailure) -> RunFailure:
         """The failure with what it means and what has helped; the last state is in a dump then."""
+        from runs.early_end.explain import explain
+
         with contextlib.suppress(BadInput):
             if not self.directory.dump_path(self.evolution.step).exists():
                 self._dump_light()

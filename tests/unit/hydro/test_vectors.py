@@ -14,6 +14,7 @@ from hydro.formulas.riemann import FLUXES
 from hydro.interior import axisymmetric, faces, reconstruction, slopes, update
 from hydro.interior import scratch as at
 from regrid.barrier import residual_estimate as look
+from regrid.jit import prepare_compiler
 
 CURVED = GEOMETRIES["axisymmetric"]
 LIMIT, SOUND, ENERGY = (
@@ -82,6 +83,7 @@ def count_kinds(function, *arguments):
     """Packed and scalar instructions of a compiled function's loops."""
     # not through the disk cache: code loaded from there has no text to read
     compiled = numba.njit(error_model="numpy")(function)
+    prepare_compiler()
     compiled(*arguments)
     (code,) = compiled.inspect_asm().values()
     kinds = INSTRUCTION.findall(code)

@@ -33,6 +33,7 @@ from numba.core.codegen import CodeLibrary, JITCodeLibrary
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
 from numba.core.environment import Environment, _rebuild_env, lookup_environment
+from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python
 from numba.extending import register_jitable
 
@@ -133,11 +134,7 @@ class KernelCache:
         return compute_contents_digest(self._function)
 
     def _find(self, types, context) -> Path:
-        words = repr((self._contents, str(types), context.codegen().magic_tuple(), VERSIONS))
-        home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-        folder = os.environ.get("SHOCKGRID_CACHE_DIR") or os.path.join(home, "shockgrid")
-        name = f"{self._function.__name__}-{hashlib.sha256(words.encode()).hexdigest()[:24]}"
-        return Path(folder, "kernels", name)
+        return find_kept(self._function.__name__, self._contents, str(types))
 
     def load_overload(self, types, context):
         with contextlib.suppress(OSError, EOFError, pickle.UnpicklingError):
@@ -148,15 +145,35 @@ class KernelCache:
         prepare_compiler()
 
     def save_overload(self, types, result) -> None:
-        with contextlib.suppress(OSError):  # where nothing can be written the run goes on without
-            path = self._find(types, result.target_context)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            part = path.with_name(uuid.uuid4().hex)
-            part.write_bytes(serialize.dumps(result._reduce()))
-            part.replace(path)
-            found = sorted(path.parent.iterdir(), key=os.path.getmtime)
-            for old in found[: -KEPT_FILES // 2] if len(found) > KEPT_FILES else ():
-                old.unlink()
+        keep(self._find(types, result.target_context), serialize.dumps(result._reduce()))
+
+
+def find_kept(name: str, *words: str) -> Path:
+    """The file of the cache for what these words, the compiler and the processor determine."""
+    machine = cpu_target.target_context.codegen().magic_tuple()
+    key = hashlib.sha256(repr((words, machine, VERSIONS)).encode()).hexdigest()
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    folder = os.environ.get("SHOCKGRID_CACHE_DIR") or os.path.join(home, "shockgrid")
+    return Path(folder, "kernels", f"{name}-{key[:24]}")
+
+
+def keep(path: Path, contents: bytes) -> None:
+    """Write a file of the cache; where nothing can be written the run goes on without."""
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_name(uuid.uuid4().hex)
+        part.write_bytes(contents)
+        part.replace(path)
+        found = sorted(path.parent.iterdir(), key=os.path.getmtime)
+        for old in found[: -KEPT_FILES // 2] if len(found) > KEPT_FILES else ():
+            old.unlink()
+
+
+@functools.cache
+def digest_sources() -> str:
+    """Digest of all files of the packages: what is computed with them may differ with it."""
+    files = sorted(file for name in PACKAGES for file in ROOT.joinpath(name).rglob("*.py"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
 class _Loaded(JITCodeLibrary):

@@ -11,7 +11,8 @@ import shockgrid as sg
 from builders import march
 from hydro.eos import IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
-from problems.initial_states import KEPT, SettledShock, settle_shock
+from problems import initial_states
+from problems.initial_states import KEPT, Front, SettledShock, settle_front, settle_shock
 from problems.references.hugoniot import Shock, shock_to_pressure, shock_with_mach
 
 CFL, LIMITER = 0.8, "monotonised-central"
@@ -121,3 +122,15 @@ def test_a_shock_that_starts_settled_leaves_no_spot_behind():
     plain = push(shock, jump, nodes)
     off, spot = (float(np.abs(rho / shock.rho - 1.0).max()) for rho in (settled, plain))
     assert off < 5e-3 and spot > 4.0 * off
+
+
+def test_a_settled_front_from_the_cache_is_the_one_that_was_computed(tmp_path, monkeypatch):
+    monkeypatch.setattr(initial_states, "find_kept", lambda *words: tmp_path / "settled")
+    speed = 2.0 * 1.4**0.5  # Mach 2
+    ahead, behind = (1.0, 0.0, 1.0), (8.0 / 3.0, 0.625 * speed, 4.5)
+    front = Front(IdealGas(1.4), behind, ahead, speed, 0.02 * np.arange(101.0), 80, behind[1])
+    found = [settle_front(front, cfl=CFL, limiter=LIMITER) for _ in range(2)]
+    assert (tmp_path / "settled").exists() and found[0].first == found[1].first
+    for name in ("rho", "u", "p"):
+        np.testing.assert_array_equal(*(getattr(one, name) for one in found))
+    assert found[0].rho[:4] == pytest.approx(behind[0], rel=1e-3)

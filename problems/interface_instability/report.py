@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from problems.interface_instability.theories import (
     is_still,
     predict_amplitude,
 )
+from problems.pictures import draw_field, find_dump, spread_dumps
 from problems.problem import Report, Row
 from problems.references.linear_growth import compute_atwood_number
 from regrid.measure.corners import compute_centres
@@ -48,11 +49,13 @@ def make_report(problem, history) -> Report:
         return Report(rows=_predict(problem))
     column = _columns(problem, history)
     kct = float(get_kct(problem, column["t"][-1]))
+    jump = abs(theory.base.p - problem.shock.p)
+    reflected = theory.reflected if jump > NO_WAVE * problem.shock.p else "none"
     head = [
         f"shock to p = {problem.shock.p:g} through rho = {problem.rho_first:g} onto rho = "
         f"{problem.rho_second:g}; {_describe_modes(problem)}, "
         f"{deck.cells} cells a wavelength, to k c t = {kct:.3g}",
-        f"  reflected wave: {_describe_reflected(problem)}, Atwood number after the shock "
+        f"  reflected wave: {reflected}, Atwood number after the shock "
         f"{compute_atwood_number(theory.base.rho_left, theory.base.rho_right):.3f}",
         f"  thickness of the interface: {problem.thickness:.3g} m "
         f"({problem.thickness * deck.cells / deck.wavelength:.2g} of a first cell)",
@@ -70,17 +73,17 @@ def make_report(problem, history) -> Report:
 
 def _predict(problem) -> list[Row]:
     """Theory alone; growth_rate is the mean over the part of WINDOW that the run reaches."""
-    theory, found = problem.theory, {}
+    theory, base = problem.theory, problem.theory.base
     if problem.deck.second_shock is not None:
         return []
-    found["interface_speed"] = theory.base.u
-    found["atwood_number"] = compute_atwood_number(theory.base.rho_left, theory.base.rho_right)
+    atwood = compute_atwood_number(base.rho_left, base.rho_right)
+    rows = [Row("interface_speed", theory=base.u), Row("atwood_number", theory=atwood)]
     if problem.harmonics:
         last = min(WINDOW[1], float(get_kct(problem, problem.t_end)))
         if last > WINDOW[0] + LEAST_WINDOW:
-            found["growth_rate"] = theory.get_mean_rate(WINDOW[0], last)
-        found["impulsive_rate"] = theory.impulsive
-    return [Row(name, theory=float(value)) for name, value in found.items()]
+            rows.append(Row("growth_rate", theory=theory.get_mean_rate(WINDOW[0], last)))
+        rows.append(Row("impulsive_rate", theory=theory.impulsive))
+    return rows
 
 
 def _measure_speed(problem, column) -> float:
@@ -112,12 +115,6 @@ def _describe_modes(problem) -> str:
     return f"k a0 = {sizes}" + (f" of modes {numbers}" if numbers != "1" else "")
 
 
-def _describe_reflected(problem) -> str:
-    theory = problem.theory
-    jump = theory.base.p - problem.shock.p
-    return theory.reflected if abs(jump) > NO_WAVE * problem.shock.p else "none"
-
-
 def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
     """Rows of the modes, the speed and the models, and what else is to be said of the growth."""
     theory, growth, notes = problem.theory, Growth(problem), []
@@ -145,22 +142,17 @@ def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
         rows.append(Row("impulsive", math.nan, theory.impulsive, words, digits=5, source=source))
     if growth.linear_reach < kct:
         if several:
-            notes.append(_say_coupling(growth))
+            start, reach = growth.first_slope, growth.linear_reach
+            since = f"from k c t = {reach:.3g} on" if reach else "from the start"
+            notes.append(
+                f"the modes interact {since}: the sum of their k a, {start:.3g} at first, is above "
+                f"{COUPLED:g}; linear theory has each mode alone"
+            )
         if growth.model_fails:
             notes.append(f"beyond linear theory no model is at hand: {growth.model_fails}")
         else:
             rows.append(_compare_model(growth, column, kct))
     return rows, notes
-
-
-def _say_coupling(growth) -> str:
-    """Since when the modes of a line interact."""
-    start, reach = growth.first_slope, growth.linear_reach
-    since = f"from k c t = {reach:.3g} on" if reach else "from the start"
-    return (
-        f"the modes interact {since}: the sum of their k a, {start:.3g} at first, is above "
-        f"{COUPLED:g}; linear theory has each mode alone"
-    )
 
 
 def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, shown) -> list[Row]:
@@ -210,8 +202,7 @@ def _compare_model(growth, column, kct: float) -> Row:
     return Row("model_amplitude", computed, model, words, digits=5, source=source)
 
 
-@dataclass(frozen=True)
-class _Curve:
+class _Curve(NamedTuple):
     """What is drawn of one mode, or of the whole line: values over `first`, in k of `number`."""
 
     label: str
@@ -232,46 +223,29 @@ def _choose_curves(problem, growth, column) -> list[_Curve]:
     ]
 
 
-def draw_curves(problem, amplitude, rate, column) -> None:
-    """Amplitudes and growth rates of the modes over their first, with theory where there is one."""
-    theory = problem.theory
-    kct = get_kct(problem, column["t"])
+def _draw_theory(amplitude, rate, growth, curves: list[_Curve], column, kct: np.ndarray) -> None:
+    """Theories of the curves, and the time up to which they hold, where it ends."""
+    problem, theory = growth.problem, growth.theory
     known = (kct > 0.0) & (kct <= theory.kt[-1] * theory.sound_speed)
-    t = column["t"][known] - problem.arrival
-    growth = Growth(problem) if problem.deck.second_shock is None and problem.harmonics else None
-    curves = _choose_curves(problem, growth, column)
+    t, reach, several = column["t"][known] - problem.arrival, growth.linear_reach, len(curves) > 1
     for n, curve in enumerate(curves):
-        wavenumber = curve.number * problem.k
-        amplitude.plot(kct, curve.values / curve.first, color=f"C{n}", label=curve.label)
-        if growth is None:
-            continue
-        size = predict_amplitude(theory, curve.number * kct[known])
-        dashes = {"color": f"C{n}" if len(curves) > 1 else "k", "ls": "--"}
-        amplitude.plot(kct[known], size, **dashes)
-        rate.plot(kct[known], theory.get_rate(wavenumber, t), **dashes)
-    if growth is not None:
-        _name_theory((amplitude, rate), growth, float(kct[-1]))
-        rate.axhline(theory.impulsive, color="0.6", lw=0.8, label=f"impulsive ({theory.impulse})")
-        if growth.linear_reach == 0.0 and not growth.model_fails:
-            model = growth.compute_model(column["t"]) / curves[0].first
-            model[kct > growth.model_reach] = np.nan
-            amplitude.plot(kct, model, "C1:", label="Padé model")
-            top = np.nanmax([np.nanmax(model), (column["amplitude"] / curves[0].first).max()])
-            amplitude.set_ylim(0.0, 1.6 * top)
-    if len(kct) > 3:
-        _draw_rates(problem, rate, kct, column["t"], curves, growth is not None)
-
-
-def _name_theory(panels, growth, last: float) -> None:
-    """The legend's entry for dashed lines; the time up to which theory holds, where it ends."""
-    words, several = "linear compressible", len(growth.problem.harmonics) > 1
-    if several and growth.linear_reach == 0.0:
-        words += ", waves couple"
-    for axes in panels[several:]:  # the first is too narrow for this beside the names of modes
+        dashes = {"color": f"C{n}" if several else "k", "ls": "--"}
+        amplitude.plot(kct[known], predict_amplitude(theory, curve.number * kct[known]), **dashes)
+        rate.plot(kct[known], theory.get_rate(curve.number * problem.k, t), **dashes)
+    words, modes = "linear compressible", len(problem.harmonics) > 1
+    words += ", waves couple" if modes and reach == 0.0 else ""
+    for axes in (amplitude, rate)[modes:]:  # the first is too narrow for this and names of modes
         axes.plot([], [], "k--", label=words)
-    for axes in panels:
-        if several and 0.0 < growth.linear_reach < last:
-            axes.axvline(growth.linear_reach, color="0.4", lw=0.8, ls=":", label="waves couple")
+    if modes and 0.0 < reach < kct[-1]:
+        for axes in (amplitude, rate):
+            axes.axvline(reach, color="0.4", lw=0.8, ls=":", label="waves couple")
+    rate.axhline(theory.impulsive, color="0.6", lw=0.8, label=f"impulsive ({theory.impulse})")
+    if reach == 0.0 and not growth.model_fails:
+        model = growth.compute_model(column["t"]) / curves[0].first
+        model[kct > growth.model_reach] = np.nan
+        amplitude.plot(kct, model, "C1:", label="Padé model")
+        top = np.nanmax([np.nanmax(model), (column["amplitude"] / curves[0].first).max()])
+        amplitude.set_ylim(0.0, 1.6 * top)
 
 
 def _draw_rates(problem, axes, kct, t, curves: list[_Curve], theory: bool) -> None:
@@ -302,74 +276,41 @@ def _draw_rates(problem, axes, kct, t, curves: list[_Curve], theory: bool) -> No
 def draw_growth(problem, figure, run) -> None:
     """Amplitude and growth rate against theory, and the interface with its grid at the end."""
     grid = figure.add_gridspec(2, SHOWN, height_ratios=(1.0, 1.1))
-    amplitude = figure.add_subplot(grid[0, 0])
-    rate = figure.add_subplot(grid[0, 1:])
-    draw_curves(problem, amplitude, rate, _columns(problem, run.history))
-    several = len(problem.harmonics) > 1
+    amplitude, rate = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1:])
+    column = _columns(problem, run.history)
+    kct, several = get_kct(problem, column["t"]), len(problem.harmonics) > 1
+    growth = Growth(problem) if problem.deck.second_shock is None and problem.harmonics else None
+    curves = _choose_curves(problem, growth, column)
+    for n, curve in enumerate(curves):
+        amplitude.plot(kct, curve.values / curve.first, color=f"C{n}", label=curve.label)
+    if growth is not None:
+        _draw_theory(amplitude, rate, growth, curves, column, kct)
+    if len(kct) > 3:
+        _draw_rates(problem, rate, kct, column["t"], curves, growth is not None)
     for axes, words in ((amplitude, "a / a0"), (rate, "(da/dt) / (k a0)")):
         axes.set(xlabel="k c t after the shock's arrival" + ", k of mode 1" * several, ylabel=words)
         axes.legend(fontsize=8, frameon=False)
         axes.grid(alpha=0.3)
-    dumps = run.dumps
-    chosen = sorted({round((n + 1) * (len(dumps) - 1) / SHOWN) for n in range(SHOWN)})
-    shown = [dumps[number] for number in chosen]
-    windows = find_windows(problem, shown)
-    fields = [find_shown(dump, window) for dump, window in zip(shown, windows, strict=True)]
-    scale = min(f.min() for f in fields), max(f.max() for f in fields)
-    panels = [figure.add_subplot(grid[1, column]) for column in range(len(chosen))]
-    for axes, dump, window in zip(panels, shown, windows, strict=True):
-        mesh = _draw_grid(axes, problem, dump, window, scale)
+    windows, shown = [], []
+    dumps = spread_dumps(run, SHOWN)
+    for dump in dumps:
+        x, y = dump.blocks[0].nodes[:, -1, :]
+        middle, half = 0.5 * (x.min() + x.max()), 0.5 * np.ptp(y)
+        reach = max(0.6 * np.ptp(x) + 0.05 * problem.deck.wavelength, half)
+        windows.append((middle - reach, middle + reach))
+        for block in dump.blocks:
+            inside = np.abs(compute_centres(block.nodes)[0] - middle) <= reach
+            shown.append(block.cell_fields["rho"][inside])
+    rho = np.concatenate(shown) if shown else np.empty(0)
+    panels = [figure.add_subplot(grid[1, column]) for column in range(len(dumps))]
+    for axes, dump, window in zip(panels, dumps, windows, strict=True):
+        line = dump.blocks[0].nodes[:, -1, :]
+        title = f"density and grid, k c t = {float(get_kct(problem, dump.t)):.1f}"
+        style = {"low": rho.min(), "high": rho.max(), "every": 1, "lines": [line]}
+        picture = draw_field(axes, dump, "rho", title=title, **style)
+        axes.set_xlim(*window)
     if panels:
-        panels[0].set_ylabel("y [m]")
-        figure.colorbar(mesh, ax=panels, label="density [kg/m3]")
-
-
-def find_windows(problem, dumps) -> list[tuple[float, float]]:
-    """Least and greatest x [m] around the interface for each dump, all as wide as the widest."""
-    lines = [dump.blocks[0].nodes[:, -1, :] for dump in dumps]
-    reach = max(
-        (max(0.6 * np.ptp(x) + 0.05 * problem.deck.wavelength, 0.5 * np.ptp(y)) for x, y in lines),
-        default=0.0,
-    )
-    middles = [0.5 * float(x.min() + x.max()) for x, _ in lines]
-    return [(middle - reach, middle + reach) for middle in middles]
-
-
-def find_shown(dump, window) -> np.ndarray:
-    """Densities of the cells that lie in the window of the dump's picture."""
-    low, high = window
-    shown = []
-    for block in dump.blocks:
-        x = compute_centres(block.nodes)[0]
-        shown.append(block.cell_fields["rho"][(x >= low) & (x <= high)])
-    return np.concatenate(shown)
-
-
-def _draw_grid(axes, problem, dump, window, scale):
-    """Both grids around the interface at one time, coloured by density on one scale.
-
-    Returns what a colour bar needs.
-    """
-    line = dump.blocks[0].nodes[:, -1, :]
-    fields = [block.cell_fields["rho"] for block in dump.blocks]
-    low, high = scale
-    for block, field in zip(dump.blocks, fields, strict=True):
-        x, y = block.nodes
-        mesh = axes.pcolormesh(
-            x,
-            y,
-            field,
-            vmin=low,
-            vmax=high,
-            cmap="viridis",
-            edgecolor=(1, 1, 1, 0.25),
-            linewidth=0.15,
-        )
-    axes.plot(line[0], line[1], color="C3", lw=1.2)
-    axes.set_xlim(*window)
-    axes.set(aspect="equal", xlabel="x [m]")
-    axes.set_title(f"density and grid, k c t = {float(get_kct(problem, dump.t)):.1f}", fontsize=9)
-    return mesh
+        figure.colorbar(picture, ax=panels, label="density [kg/m3]")
 
 
 def draw_spectrum(problem, figure, run) -> None:
@@ -377,18 +318,16 @@ def draw_spectrum(problem, figure, run) -> None:
 
     Theory is drawn where there is one: for a single shock, and for small slopes alone right.
     """
-    history, modes = run.history, problem.harmonics
-    known = np.flatnonzero(np.isfinite(history["amplitude"]))
-    numbers = np.array([mode.number for mode in modes])
-    first = np.array([mode.amplitude for mode in modes])
-    kct = np.asarray(get_kct(problem, history["t"]), dtype=float)
-    last = kct[known[-1]]
     from matplotlib.ticker import MaxNLocator
 
+    history, modes = run.history, problem.harmonics
+    known = np.flatnonzero(np.isfinite(history["amplitude"]))
+    numbers, first = np.array([(mode.number, mode.amplitude) for mode in modes]).T
+    kct = np.asarray(get_kct(problem, history["t"]), dtype=float)
     axes, lines = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
     axes.semilogy(numbers, np.abs(first) * problem.k, "o-", color="0.6", ms=3, label="start")
     for n in range(SHOWN):
-        row = known[np.argmin(np.abs(kct[known] - last * (n + 1) / SHOWN))]
+        row = known[np.argmin(np.abs(kct[known] - kct[known[-1]] * (n + 1) / SHOWN))]
         size = np.array([history[mode.column][row] for mode in modes])
         colour, words = f"C{n}", f"k c t = {kct[row]:.3g}"
         axes.semilogy(numbers, np.abs(size) * problem.k, "o", color=colour, ms=4, label=words)
@@ -396,14 +335,14 @@ def draw_spectrum(problem, figure, run) -> None:
             theory = first * predict_amplitude(problem.theory, numbers * kct[row])
             axes.semilogy(numbers, np.abs(theory) * problem.k, "--", color=colour, lw=1)
         if run.dumps:
-            nodes = run.dump_at(float(history["t"][row])).blocks[0].nodes[:, -1, :]
-            lines.plot(nodes[0] - nodes[0].mean(), nodes[1], color=colour, lw=1)
+            x, y = find_dump(run, float(history["t"][row])).blocks[0].nodes[:, -1, :]
+            lines.plot(x - x.mean(), y, color=colour, lw=1)
     axes.plot([], [], "k--", lw=1, label="linear compressible")
     axes.set(xlabel="number of the mode", ylabel="size of the mode: k |a|, k of the wavelength")
-    axes.grid(alpha=0.3)
     axes.legend(fontsize=8, frameon=False)
     lines.set(xlabel="x less its mean [m]", ylabel="y [m]")
     lines.set_title("the line at these times", fontsize=9)
-    lines.grid(alpha=0.3)
     lines.xaxis.set_major_locator(MaxNLocator(4))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    for panel in (axes, lines):
+        panel.grid(alpha=0.3)

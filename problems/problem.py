@@ -50,6 +50,19 @@ class BlockPlan:
     high: tuple[float, float]
 
 
+def plan_blocks(grids: Mapping[str, np.ndarray]) -> list[BlockPlan]:
+    """Sizes of blocks whose first nodes (2, ni + 1, nj + 1) are made, by name."""
+    return [
+        BlockPlan(
+            name,
+            (nodes.shape[1] - 1, nodes.shape[2] - 1),
+            tuple(map(float, nodes.min(axis=(1, 2)))),
+            tuple(map(float, nodes.max(axis=(1, 2)))),
+        )
+        for name, nodes in grids.items()
+    ]
+
+
 @dataclass(frozen=True)
 class Row:
     """One number of a report: as computed and by theory, NaN where unknown, in SI units.

@@ -29,7 +29,6 @@ import numpy as np
 
 from hydro.boundary import put
 from hydro.links import join, slide
-from problems.problem import BlockPlan
 from problems.references.hugoniot import shock_with_particle_speed
 from problems.references.riemann import solve_riemann
 from problems.references.shock_polars import Body, CrossedLine, cross_line
@@ -251,30 +250,14 @@ class Layout:
             count(deck.length - deck.cone),
         )
 
-    def plan(self) -> list[BlockPlan]:
-        """Sizes of the blocks."""
-        deck, parts = self.deck, self.count_parts()
-        after, end = deck.front + deck.cone, deck.front + deck.length
-        outer, wide = deck.radius + deck.side, parts.inside + parts.shell
-        beside = parts.covered + parts.ring
-        rim = (parts.within + parts.covered, deck.cover) if self.open else (wide, outer)
-        start, rows = (0.0, parts.front) if self.open else (deck.front, 0)
-        plans = {
-            "impactor": ((parts.impactor, wide), (-deck.thickness, 0.0), (0.0, outer)),
-            "front": ((parts.front, rim[0]), (0.0, 0.0), (deck.front, rim[1])),
-            "ring": ((parts.front, parts.ring), (0.0, deck.cover), (deck.front, deck.radius)),
-            "cone": ((parts.along, parts.within), (deck.front, 0.0), (after, deck.base)),
-            "beside": ((parts.along, beside), (deck.front, deck.tip), (after, deck.radius)),
-            "behind": ((parts.behind, parts.within + beside), (after, 0.0), (end, deck.radius)),
-            "side": (
-                (rows + parts.along + parts.behind, parts.shell),
-                (start, deck.radius),
-                (end, outer),
-            ),
-        }
-        if not self.open:
-            del plans["ring"]
-        return [BlockPlan(name, *plan) for name, plan in plans.items()]
+    def estimate_cells(self) -> int:
+        """Cells of all blocks, by arithmetic alone."""
+        parts = self.count_parts()
+        wide = parts.inside + parts.shell
+        deep = parts.along + parts.behind + (parts.front if self.open else 0)
+        front = parts.front * (parts.inside if self.open else wide)
+        inside = (parts.along + parts.behind) * parts.inside
+        return parts.impactor * wide + front + inside + deep * parts.shell
 
     def make_nodes(self) -> dict[str, np.ndarray]:
         """Nodes of the blocks at the impact."""

@@ -45,7 +45,7 @@ from problems.conical_target.report import (
     measure_departure,
 )
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, check_solid, key
-from problems.problem import BlockPlan, Problem, Report, Row, check_memory, find_crossing
+from problems.problem import Problem, Report, Row, check_memory, find_crossing, plan_blocks
 from problems.references.hugoniot import find_rise, shock_to_pressure
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
@@ -80,8 +80,8 @@ class Contact(DeckTable, kw_only=True):
 class ConicalTargetDeck(Deck, kw_only=True):
     """Deck of `conical-target`."""
 
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=5e-6, cfl=0.8))
-    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    run: RunControl = RunControl(t_end=5e-6, cfl=0.8)
+    regrid: Regrid = Regrid()
     cells: key(int, "cells from the axis to the shell", ge=16, le=MOST_CELLS) = 48
     speed: key(float, "of the impactor [m/s]", gt=0) = 2000.0
     impactor: key(str, "material of the impactor") = "Al1100"
@@ -104,8 +104,8 @@ class ConicalTargetDeck(Deck, kw_only=True):
     )
     ripple_wavelength: key(float, "along the cone's side [m]", gt=0) = 4e-3
     ripple_phase: key(float, "of the sine that begins at the cone's base [rad]") = 0.0
-    contact: Contact = msgspec.field(default_factory=Contact)
-    eos: EosNumbers = msgspec.field(default_factory=EosNumbers)
+    contact: Contact = Contact()
+    eos: EosNumbers = EosNumbers()
 
 
 THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
@@ -177,49 +177,48 @@ class ConicalTarget(Problem):
             self.ripple.check(self.layout.count_cells(deck.cone), self.make_nodes())
 
     def _match_impact(self) -> tuple[float, float, float]:
-        """Pressure and velocity of the impact face until waves come back, and for how long."""
-        deck, (one, two) = self.deck, (self.materials[n] for n in ("impactor", "shell"))
-        limits = [float(solid.eos.sound_speed(solid.rho0, 0.0)) for solid in (one, two)]
-        if deck.speed > sum(limits):
-            self._refuse_speed(limits)
+        """Pressure and velocity of the impact face until waves come back, and for how long.
 
-        def shock(name, p):
-            material = self.materials[name]
-            return shock_to_pressure(material.eos, material.rho0, 0.0, p)
-
-        def excess(p):
-            first, second = shock("impactor", p), shock("shell", p)
-            return first.particle_speed + second.particle_speed - deck.speed
-
-        stiffness = [solid.rho0 * c for solid, c in zip((one, two), limits, strict=True)]
-        try:
-            p = find_rise(excess, deck.speed / sum(1.0 / value for value in stiffness))
-        except BadInput as error:
-            if "tabular" not in (one.eos.kind, two.eos.kind):
-                raise
-            raise BadInput(
-                f"deck: the shocks that {deck.impactor!r} at {deck.speed:g} m/s and {deck.shell!r} "
-                f"give each other are not in the table: {error}"
-            ) from None
-        in_shell = shock("shell", p)
-        u = in_shell.particle_speed
-        if deck.speed - u > limits[0] or u > limits[1]:
-            self._refuse_speed(limits)
-        return p, u, deck.front / in_shell.shock_speed
-
-    def _refuse_speed(self, limits: list[float]) -> None:
-        """Raise BadInput: past the speeds at which the materials' Hugoniots were measured."""
-        deck = self.deck
-        raise BadInput(
+        Raises BadInput past the speeds at which the materials' Hugoniots were measured.
+        """
+        deck, solids = self.deck, [self.materials[name] for name in ("impactor", "shell")]
+        limits = [float(solid.eos.sound_speed(solid.rho0, 0.0)) for solid in solids]
+        refusal = BadInput(
             f"deck: speed is {deck.speed:g} m/s; behind its shocks {deck.impactor} or {deck.shell} "
             "would move faster than sound does in it at rest "
             f"({limits[0]:.0f} and {limits[1]:.0f} m/s), for which their equations of state are "
             "not made; take a slower impactor"
         )
+        if deck.speed > sum(limits):
+            raise refusal
 
-    def plan(self) -> tuple[float, list[BlockPlan]]:
-        """End time and sizes of the blocks."""
-        return self.deck.run.t_end, self.layout.plan()
+        def excess(p):
+            shocks = [shock_to_pressure(solid.eos, solid.rho0, 0.0, p) for solid in solids]
+            return shocks[0].particle_speed + shocks[1].particle_speed - deck.speed
+
+        stiffness = [solid.rho0 * c for solid, c in zip(solids, limits, strict=True)]
+        try:
+            p = find_rise(excess, deck.speed / sum(1.0 / value for value in stiffness))
+        except BadInput as error:
+            if all(solid.eos.kind != "tabular" for solid in solids):
+                raise
+            raise BadInput(
+                f"deck: the shocks that {deck.impactor!r} at {deck.speed:g} m/s and {deck.shell!r} "
+                f"give each other are not in the table: {error}"
+            ) from None
+        shock = shock_to_pressure(solids[1].eos, solids[1].rho0, 0.0, p)
+        u = shock.particle_speed
+        if deck.speed - u > limits[0] or u > limits[1]:
+            raise refusal
+        return p, u, deck.front / shock.shock_speed
+
+    def estimate_cells(self) -> int:
+        return self.layout.estimate_cells()
+
+    def plan(self):
+        """End time and sizes of the blocks, whose grids are made."""
+        check_memory(self)
+        return self.deck.run.t_end, plan_blocks(self.make_nodes())
 
     def make_nodes(self) -> dict[str, np.ndarray]:
         """Nodes of the blocks at the impact."""

@@ -65,14 +65,6 @@ def find_waves(y: np.ndarray, x: np.ndarray, even: bool) -> list[Wave]:
     ]
 
 
-@dataclass(frozen=True)
-class Cells:
-    """First nodes (2, ni + 1, nj + 1) of a block and rho, u, v, p (4, ni, nj) of its cells."""
-
-    nodes: np.ndarray
-    state: np.ndarray
-
-
 def find_nearer_speed(base) -> float:
     """Speed [m/s], from the interface, of the nearer of the waves that leave it."""
     return min(base.u - base.left_wave.tail, base.right_wave.tail - base.u)
@@ -111,15 +103,15 @@ class CrossedStart:
             self.y, [flow.amplitude for flow in self.fields]
         )
 
-    def make_cells(self) -> tuple[Cells, Cells]:
-        """Both blocks at the start."""
+    def make_states(self) -> list[np.ndarray]:
+        """rho, u, v, p (4, ni, nj) of the cells of both blocks at the start."""
         sides = [_Side(self, sign) for sign in (-1.0, 1.0)]
-        signal = max(side.signal for side in sides)
-        return sides[0].make_cells(signal), sides[1].make_cells(signal)
+        signal = max(side.front.measure_signal() for side in sides)
+        return [side.make_state(signal) for side in sides]
 
-    def make_grids(self) -> tuple[np.ndarray, np.ndarray]:
-        first, second = (_Side(self, sign).nodes for sign in (-1.0, 1.0))
-        return first, second
+    def make_grids(self) -> list[np.ndarray]:
+        """First nodes (2, ni + 1, nj + 1) of both blocks."""
+        return [_Side(self, sign).make_nodes() for sign in (-1.0, 1.0)]
 
 
 class _Side:
@@ -130,20 +122,14 @@ class _Side:
         problem, base = start.problem, start.base
         shock, deck = problem.shock, problem.deck
         if sign < 0.0:
-            self.eos, self.wave = problem.eos_first, base.left_wave
-            self.behind = base.rho_left, sign * base.u, base.p
+            self.eos, self.wave, rho = problem.eos_first, base.left_wave, base.rho_left
             self.ahead = shock.rho, sign * shock.particle_speed, shock.p
-            self.end_speed = sign * shock.particle_speed
-            end = problem.find_ends()[0]
         else:
-            self.eos, self.wave = problem.eos_second, base.right_wave
-            self.behind = base.rho_right, base.u, base.p
+            self.eos, self.wave, rho = problem.eos_second, base.right_wave, base.rho_right
             self.ahead = problem.rho_second, 0.0, deck.pressure
-            self.end_speed = 0.0
-            end = problem.find_ends()[1]
-        if problem.has_open_ends:
-            self.end_speed = self.behind[1]
-        self.length = abs(end - base.u * start.since)
+        self.behind = rho, sign * base.u, base.p
+        self.end_speed = (self.behind if problem.has_open_ends else self.ahead)[1]
+        self.length = abs(problem.find_ends()[int(sign > 0.0)] - base.u * start.since)
         self.speeds = [abs(self.wave.tail - base.u)]  # of fronts, from the interface
         size = deck.wavelength / deck.cells
         if abs(self.wave.head - self.wave.tail) * start.since > THIN * size:
@@ -189,27 +175,14 @@ class _Side:
     @functools.cached_property
     def front(self) -> Front:
         """The shock on the mean nodes."""
-        return Front(
-            self.eos,
-            self.behind,
-            self.ahead,
-            self.sign * self.wave.head,
-            self.away,
-            self.places[0],
-            self.end_speed,
-        )
+        speed, place = self.sign * self.wave.head, self.places[0]
+        return Front(self.eos, self.behind, self.ahead, speed, self.away, place, self.end_speed)
 
-    @property
-    def signal(self) -> float:
-        return self.front.measure_signal()
+    def get_layer(self, flow: PerturbedFlow) -> PerturbedLayer:
+        """The side's own of both."""
+        return flow.first if self.sign < 0.0 else flow.second
 
-    @property
-    def layers(self) -> list[PerturbedLayer]:
-        flows = self.start.fields
-        return [flow.first if self.sign < 0.0 else flow.second for flow in flows]
-
-    @functools.cached_property
-    def nodes(self) -> np.ndarray:
+    def make_nodes(self) -> np.ndarray:
         """First grid (2, ni + 1, nj + 1), with lines through the interface and the fronts."""
         start = self.start
         x = start.base.u * start.since + self.sign * self.away[:, None] + np.zeros(start.y.size)
@@ -244,7 +217,7 @@ class _Side:
         passage = np.maximum(passage, 0.0)
         t, rest = start.since + passage, 1.0 - self.away / self.length
         shape = theory.get_front(0 if self.sign < 0.0 else 1, wave.wavenumber, t)
-        if math.isnan(flow.first.front if self.sign < 0.0 else flow.second.front):
+        if math.isnan(self.get_layer(flow).front):
             shape = np.full(t.size, amplitudes[1])
         bend = shape - theory.get_amplitude(wave.wavenumber, t) * rest
         bend = (bend / (1.0 + rate * passage) + flow.amplitude * rest) * fade
@@ -265,7 +238,7 @@ class _Side:
         if self.is_shock:
             if abs(self.behind[2] - self.ahead[2]) > LEAST_JUMP * abs(self.ahead[2]):
                 deck = self.start.problem.deck
-                cfl = deck.run.cfl * self.signal / signal
+                cfl = deck.run.cfl * self.front.measure_signal() / signal
                 settled = settle_front(self.front, cfl=cfl, limiter=deck.limiter)
                 here = slice(settled.first, min(count, settled.first + settled.rho.size))
                 taken = slice(0, here.stop - here.start)
@@ -283,7 +256,8 @@ class _Side:
         inside[: self.places[-1]] = 1.0
         return row, inside
 
-    def make_cells(self, signal: float) -> Cells:
+    def make_state(self, signal: float) -> np.ndarray:
+        """rho, u, v, p (4, ni, nj) of the cells; `signal` [1/s]: the fastest of both sides."""
         start = self.start
         row, part = self._make_row(signal)
         rows = start.y.size - 1
@@ -291,7 +265,8 @@ class _Side:
         middle = 0.5 * (self.away[1:] + self.away[:-1]) / start.since
         y = 0.5 * (start.y[1:] + start.y[:-1])
         inside = slice(0, int(np.flatnonzero(part > 1e-9)[-1]) + 1 if part.any() else 0)
-        fields = [layer.interpolate(middle[inside]) * part[inside] for layer in self.layers]
+        layers = [self.get_layer(flow) for flow in start.fields]
+        fields = [layer.interpolate(middle[inside]) * part[inside] for layer in layers]
         # for a harmonic of amplitude a theory's are for k a0 = 1; means over the rows' heights
         high = start.y[1] - start.y[0]
         scales = [w.wavenumber * np.sinc(0.5 * w.wavenumber * high / math.pi) for w in start.waves]
@@ -303,4 +278,4 @@ class _Side:
             v[inside] = start.sum_waves(y, [field[2] for field in parts], sine=True)
         rho, u, p = state
         state = np.array([rho, self.sign * u, v, p])
-        return Cells(self.nodes, state[:, ::-1] if self.sign < 0.0 else state)
+        return state[:, ::-1] if self.sign < 0.0 else state

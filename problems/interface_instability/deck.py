@@ -45,14 +45,11 @@ class LineMotion(DeckTable, kw_only=True):
 
     shape: key(Literal["spline", "chord"], "curve between nodes when re-spaced") = "spline"
     relax: key(float, "fraction of the way to the target spacing in a step", ge=0, le=1) = 0.02
-    thickness: (
-        key(
-            float,
-            "waves of the interface much shorter decay [m]; left out: 0.75 of a first cell",
-            ge=0,
-            le=1e12,
-        )
-        | None
+    thickness: key(
+        float | None,
+        "waves of the interface much shorter decay [m]; left out: 0.75 of a first cell",
+        ge=0,
+        le=1e12,
     ) = None
     tension: key(float, "surface tension of the interface [N/m]", ge=0, le=1e20) = 0.0
 
@@ -64,18 +61,18 @@ class InterfaceDeck(Deck, kw_only=True):
     absent: ClassVar[dict[str, str]] = {"start": "incident"}
     overruled: ClassVar[dict[str, str]] = {"kct_end": "run.t_end"}
 
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
-    first: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=1.0))
-    second: Fluid = msgspec.field(default_factory=lambda: Fluid(rho=3.0))
+    run: RunControl = RunControl(cfl=0.8)
+    first: Fluid = Fluid(rho=1.0)
+    second: Fluid = Fluid(rho=3.0)
     pressure: key(float, "pressure ahead of the shock [Pa]", le=1e20) = 1.0
-    mach: (
-        key(
-            float, "Mach number of the shock; left out: `shock_pressure`, or 1.5", ge=1.001, le=1000
-        )
-        | None
+    mach: key(
+        float | None,
+        "Mach number of the shock; left out: shock_pressure, or 1.5",
+        ge=1.001,
+        le=1000,
     ) = None
-    shock_pressure: (
-        key(float, "pressure behind the shock [Pa]; left out: by `mach`", gt=0, le=1e20) | None
+    shock_pressure: key(
+        float | None, "pressure behind the shock [Pa]; left out: by mach", gt=0, le=1e20
     ) = None
     second_shock: SecondShock | None = None
     wavelength: key(float, "2 pi / k [m]", ge=1e-12, le=1e12) = 1.0
@@ -83,9 +80,10 @@ class InterfaceDeck(Deck, kw_only=True):
         default_factory=lambda: [Mode()]
     )
     spectrum: Spectrum | None = None
-    line_file: (
-        key(str, "text file of a line that is added to the modes: x and y, or x [m]", min_length=1)
-        | None
+    line_file: key(
+        str | None,
+        "text file of a line that is added to the modes: x and y, or x [m]",
+        min_length=1,
     ) = None
     width: key(float, "width of the domain in wavelengths", gt=0) = 0.5
     sides: key(Literal["wall", "periodic"], "what bounds the domain along the interface") = "wall"
@@ -98,24 +96,21 @@ class InterfaceDeck(Deck, kw_only=True):
     reach: key(float, "distance from the interface, in waves, where lines begin to bend", gt=0) = (
         0.25
     )
-    lengths: (
-        key(tuple[float, float], "lengths of the two materials [m]; left out: no echo returns")
-        | None
+    lengths: key(
+        tuple[float, float] | None,
+        "lengths of the two materials [m]; left out: no echo returns",
     ) = None
     start: key(
         Literal["auto", "crossed", "incident"],
         "incident: the shock is on its way to the interface; crossed: it has just "
         "crossed it; auto: crossed where linear theory gives that state",
     ) = "auto"
-    layer: (
-        key(
-            float,
-            "start crossed: first distance of the nearer wave from the interface, "
-            "in cells; left out: an eighth of the shortest wave, 3 to 8 cells",
-            ge=3,
-            le=1000,
-        )
-        | None
+    layer: key(
+        float | None,
+        "start crossed: first distance of the nearer wave from the interface, "
+        "in cells; left out: an eighth of the shortest wave, 3 to 8 cells",
+        ge=3,
+        le=1000,
     ) = None
     gap: key(float, "first distance of the shock from the interface, in waves", ge=0.01, le=20) = (
         0.3
@@ -124,8 +119,8 @@ class InterfaceDeck(Deck, kw_only=True):
         float, "end: k c t after arrival, c of the shocked second material", gt=0, le=10000
     ) = 30.0
     limiter: Limiter = "smooth-shear"
-    line: LineMotion = msgspec.field(default_factory=LineMotion)
-    regrid: Regrid = msgspec.field(default_factory=Regrid)
+    line: LineMotion = LineMotion()
+    regrid: Regrid = Regrid()
     digests: key(
         dict[str, str], "sha256 of line_file, as a run stores it; not needed in your own deck"
     ) = msgspec.field(default_factory=dict)
@@ -153,13 +148,15 @@ def check_sense(deck: InterfaceDeck, rho: tuple[float, float], drawn: Iterable[M
     """
     named = [(f"modes.{place}", mode) for place, mode in enumerate(deck.modes)]
     waves = [(name, mode) for name, mode in named if mode.ka0]
-    told = [*_tell_cells(deck, waves), *_tell_fit(deck, waves, list(drawn))]
-    told += [*_tell_aspect(deck), *_tell_sizes(deck, rho)]
+    told = [*_list_wave_faults(deck, waves, drawn), *_list_size_faults(deck, rho)]
     if told:
         raise BadInput("\n".join(f"deck: {sentence}" for sentence in dict.fromkeys(told)))
 
 
-def _tell_cells(deck: InterfaceDeck, waves: list[tuple[str, Mode]]) -> Iterator[str]:
+def _list_wave_faults(
+    deck: InterfaceDeck, waves: list[tuple[str, Mode]], drawn: Iterable[Mode]
+) -> Iterator[str]:
+    """Waves of too few cells, and whether waves fit into the width and stand square on walls."""
     for name, mode in waves:
         if LEAST_CELLS * mode.number > deck.cells:
             share = deck.cells / mode.number
@@ -169,21 +166,12 @@ def _tell_cells(deck: InterfaceDeck, waves: list[tuple[str, Mode]]) -> Iterator[
                 f"take a number up to {deck.cells // LEAST_CELLS}, or cells = "
                 f"{LEAST_CELLS * mode.number}"
             )
-
-
-def _tell_fit(
-    deck: InterfaceDeck, waves: list[tuple[str, Mode]], drawn: list[Mode]
-) -> Iterator[str]:
-    """Whether waves fit into the width, and stand square on walls."""
-    walls = deck.sides == "wall"
-    piece = 0.5 if walls else 1.0  # of a wave
-    what = "halves of waves" if walls else "waves"
-    for name, mode in waves:
-        if walls and abs(math.sin(mode.phase)) > SQUARE:
+        if deck.sides == "wall" and abs(math.sin(mode.phase)) > SQUARE:
             yield (
                 f"{name}.phase is {mode.phase:g}; between walls the line has to meet them at a "
                 "right angle, with phase 0 or 3.141592653589793; or take sides = 'periodic'"
             )
+    piece, what = (0.5, "halves of waves") if deck.sides == "wall" else (1.0, "waves")
     for name, mode in [*waves, *(("spectrum", mode) for mode in drawn)]:
         count = mode.number * deck.width / piece
         if abs(math.sin(math.pi * count)) > SQUARE or round(count) < 1:
@@ -196,7 +184,8 @@ def _tell_fit(
             return
 
 
-def _tell_aspect(deck: InterfaceDeck) -> Iterator[str]:
+def _list_size_faults(deck: InterfaceDeck, rho: tuple[float, float]) -> Iterator[str]:
+    """Cells far from square, lengths and densities out of all proportion."""
     rows = max(2, round(deck.cells * deck.width))
     aspect = deck.width / rows * deck.cells
     if not 1.0 / FLATTEST <= aspect <= FLATTEST:
@@ -205,9 +194,6 @@ def _tell_aspect(deck: InterfaceDeck) -> Iterator[str]:
             f"as cells are long (cells = {deck.cells} a wavelength); take a width from "
             f"{2.0 / FLATTEST / deck.cells:.3g}, or more cells"
         )
-
-
-def _tell_sizes(deck: InterfaceDeck, rho: tuple[float, float]) -> Iterator[str]:
     for place, length in enumerate(deck.lengths or ()):
         if length > LONGEST * deck.wavelength:
             yield (

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -200,15 +200,9 @@ class InterfaceInstability(Problem):
     @functools.cached_property
     def theory(self) -> LinearGrowth:
         """Linear compressible growth for the deck's materials and shock."""
-        return compute_linear_growth(
-            self.eos_first,
-            self.rho_first,
-            self.eos_second,
-            self.rho_second,
-            self.deck.pressure,
-            self.shock.p,
-            kct_end=max(30.0, self.deck.kct_end),
-        )
+        fluids = self.eos_first, self.rho_first, self.eos_second, self.rho_second
+        end = max(30.0, self.deck.kct_end)
+        return compute_linear_growth(*fluids, self.deck.pressure, self.shock.p, kct_end=end)
 
     @property
     def t_end(self) -> float:
@@ -402,23 +396,18 @@ class InterfaceInstability(Problem):
         if self.start == "crossed":
             front = front - self.theory.base.u * self.arrival
         spans = (("first", first, low, front.max()), ("second", second, front.min(), high))
-        return self.t_end, [
-            BlockPlan(
-                name,
-                (len(self.make_spacing(length)) - 1, len(y) - 1),
-                (float(low), 0.0),
-                (float(high), float(y[-1])),
-            )
-            for name, length, low, high in spans
-        ]
+        plans = []
+        for name, length, low, high in spans:
+            cells = len(self.make_spacing(length)) - 1, len(y) - 1
+            plans.append(BlockPlan(name, cells, (float(low), 0.0), (float(high), float(y[-1]))))
+        return self.t_end, plans
 
-    def make_grids(self) -> tuple[np.ndarray, np.ndarray]:
+    def make_grids(self) -> Sequence[np.ndarray]:
         """First grids of both blocks: lines parallel to the far sides, bent near the interface.
 
-        Those of a start after the shock's passage: see `crossed_start`.
-
         A shock that runs over bent lines meets cells of other sizes in every row, and prints that.
-        The bend fades out without a change of the cells' size at either end.
+        The bend fades out without a change of the cells' size at either end.  Those of a start
+        after the shock's passage: see `crossed_start`.
         """
         front, y = self.make_interface()
         if self.start == "crossed":
@@ -432,14 +421,14 @@ class InterfaceInstability(Problem):
             part = left * left * (3.0 - 2.0 * left)
             x = front[None, :] * part[:, None] + sign * away[:, None]
             grids.append(np.array([x, np.broadcast_to(y, x.shape)]))
-        return grids[0], grids[1]
+        return grids
 
     def build(self) -> Simulation:
         """Blocks at the start: the shock, run in, `gap` waves before the interface or beyond it."""
         deck = self.deck
-        grids, states = self._make_states()
-        blocks, links, make_regridder = self.assemble(grids, states)
-        del grids, states  # the blocks have them
+        grids = self.make_grids()
+        blocks, links, make_regridder = self.assemble(grids, self._make_states(grids[0]))
+        del grids  # the blocks have them
         refining = None
         if deck.refine:
             from hydro.remap.flow import Refinement  # with scipy: slow to load
@@ -454,25 +443,17 @@ class InterfaceInstability(Problem):
             refining=refining,
         )
 
-    def _make_states(self):
-        """First grids of both blocks, and rho, u, v, p of their cells."""
+    def _make_states(self, grid: np.ndarray) -> Sequence:
+        """rho, u, v, p of the cells of both blocks, the first of which has this grid."""
         deck = self.deck
         if self.start == "crossed":
-            cells = self.crossed.make_cells()
-            return [c.nodes for c in cells], [c.state for c in cells]
-        grid, grid_second = self.make_grids()
+            return self.crossed.make_states()
+        spacing = -self.make_spacing(self.choose_lengths()[0])[::-1]
         position = -(deck.gap * deck.wavelength + self.amplitude)
-        shock = settle_shock(
-            self.eos_first,
-            -self.make_spacing(self.choose_lengths()[0])[::-1],
-            position,
-            self.shock,
-            cfl=deck.run.cfl,
-            limiter=deck.limiter,
-        )
+        choice = {"cfl": deck.run.cfl, "limiter": deck.limiter}
+        shock = settle_shock(self.eos_first, spacing, position, self.shock, **choice)
         rho, u, p = shock.lay_on(grid)
-        ahead = self.rho_second, 0.0, 0.0, deck.pressure
-        return [grid, grid_second], [(rho, u, 0.0, p), ahead]
+        return (rho, u, 0.0, p), (self.rho_second, 0.0, 0.0, deck.pressure)
 
     def assemble(self, grids, states) -> tuple[list[Block], list[Link], Callable[[], object]]:
         """Both blocks on their first grids with states rho, u, v, p, between the piston and the
@@ -550,11 +531,7 @@ class InterfaceInstability(Problem):
         }
 
     def count_cells_a_wave(self) -> dict[str, float]:
-        return {
-            f"mode {mode.number}": self.deck.cells / mode.number
-            for mode in self.harmonics
-            if mode.number
-        }
+        return {f"mode {mode.number}": self.deck.cells / mode.number for mode in self.harmonics}
 
     def report(self, history, final=None) -> Report:
         return make_report(self, history)

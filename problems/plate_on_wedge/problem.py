@@ -21,7 +21,6 @@ import itertools
 import math
 from typing import Annotated, ClassVar, Literal
 
-import msgspec
 import numpy as np
 from msgspec import Meta
 
@@ -32,7 +31,7 @@ from hydro.links import join, slide
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, check_solid, key
 from problems.plate_on_wedge.report import COLUMNS, WIDE_ZONE, find_cautions, make_report
 from problems.plate_on_wedge.run import PlateRun
-from problems.problem import BlockPlan, Problem, Report, check_memory
+from problems.problem import Problem, Report, check_memory, plan_blocks
 from problems.references.hugoniot import shock_to_pressure, shock_with_particle_speed
 from problems.references.riemann import solve_riemann
 from problems.references.shock_polars import (
@@ -67,9 +66,9 @@ class Drive(DeckTable, kw_only=True):
 class PlateOnWedgeDeck(Deck, kw_only=True):
     """Deck of `plate-on-wedge`; the default is the paper's scenario, its sizes are ours."""
 
-    run: RunControl = msgspec.field(default_factory=lambda: RunControl(cfl=0.8))
+    run: RunControl = RunControl(cfl=0.8)
     # a stronger barrier than elsewhere: the plate's grid bends by 300 degrees around B
-    regrid: Regrid = msgspec.field(default_factory=lambda: Regrid(epsilon=3e-2))
+    regrid: Regrid = Regrid(epsilon=3e-2)
     plate: key(str, "material of the plate") = "Al1100"
     thickness: key(float, "of the plate [m]", gt=0) = 10e-3
     wedge: key(str, "material of the wedge body") = "SS304"
@@ -89,7 +88,7 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     right: key(
         Literal["symmetry", "free"], "the plate's far end: a plane of symmetry, or a free end face"
     ) = "symmetry"
-    drive: Drive = msgspec.field(default_factory=Drive)
+    drive: Drive = Drive()
     cells: key(
         tuple[Annotated[int, Meta(ge=1, le=MOST_CELLS)], Annotated[int, Meta(ge=1, le=MOST_CELLS)]],
         "cells of the plate along and across it",
@@ -97,15 +96,12 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     contact_cells: key(float, "part of the plate's cells that lie on the wedge", gt=0.1, lt=0.9) = (
         0.6
     )
-    refinement: (
-        key(
-            float,
-            "how many times finer the cells are at the contact point A; left out: "
-            "for a moving plate by the distance from the critical angle, 1 (far) to 3 (near)",
-            ge=1,
-            le=8,
-        )
-        | None
+    refinement: key(
+        float | None,
+        "how many times finer the cells are at the contact point A; left out: "
+        "for a moving plate by the distance from the critical angle, 1 (far) to 3 (near)",
+        ge=1,
+        le=8,
     ) = None
     wedge_spacing: key(float, "spacing of the wedge's nodes over the plate's", gt=0.2, lt=5) = 1.0
     until: key(
@@ -344,12 +340,7 @@ class PlateOnWedge(Problem):
         """End time and sizes of the blocks, whose grids are made."""
         check_memory(self)
         plate, wedge, _ = self.make_grids()
-        plans = []
-        for name, nodes in (("plate", plate), ("wedge", wedge)):
-            cells = (nodes.shape[1] - 1, nodes.shape[2] - 1)
-            low, high = nodes.min(axis=(1, 2)), nodes.max(axis=(1, 2))
-            plans.append(BlockPlan(name, cells, tuple(map(float, low)), tuple(map(float, high))))
-        return self.t_end, plans
+        return self.t_end, plan_blocks({"plate": plate, "wedge": wedge})
 
     @functools.cached_property
     def frame(self) -> np.ndarray:

@@ -19,6 +19,7 @@ from problems.conical_target.report import (
 )
 from problems.deck import RunControl
 from problems.references.hugoniot import shock_with_particle_speed
+from regrid.errors import BadInput
 from runs.deck.reading import read_deck
 
 
@@ -122,17 +123,14 @@ def test_graphite_that_is_pinched_off_at_the_junction():
     assert max(row["cells_not_convex"] for row in rows) == 0
 
 
-def test_plan_is_what_is_built():
-    """Also of a size that nobody could allocate."""
-    problem = ConicalTarget(ConicalTargetDeck(cells=24))
-    t_end, plans = problem.plan()
-    nodes = problem.make_nodes()
-    assert t_end == 5e-6 and [plan.name for plan in plans] == list(nodes)
-    for plan, grid in zip(plans, nodes.values(), strict=True):
-        assert plan.cells == (grid.shape[1] - 1, grid.shape[2] - 1)
-        assert plan.low == pytest.approx(tuple(grid.min(axis=(1, 2))), abs=1e-12)
-        assert plan.high == pytest.approx(tuple(grid.max(axis=(1, 2))), abs=1e-12)
-    assert ConicalTarget(ConicalTargetDeck(cells=10**6)).plan()[1][0].cells[1] == 1250000
+def test_cells_are_counted_before_grids_are_made():
+    for cover in (12.5e-3, 16e-3):
+        problem = ConicalTarget(ConicalTargetDeck(cells=24, cover=cover))
+        plans = problem.plan()[1]
+        cells = sum(plan.cells[0] * plan.cells[1] for plan in plans)
+        assert problem.estimate_cells() == cells
+    with pytest.raises(BadInput, match="cells need about"):
+        ConicalTarget(ConicalTargetDeck(cells=10**6)).plan()
 
 
 def make_problem(**changes):

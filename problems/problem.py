@@ -52,15 +52,11 @@ class BlockPlan:
 
 def plan_blocks(grids: Mapping[str, np.ndarray]) -> list[BlockPlan]:
     """Sizes of blocks whose first nodes (2, ni + 1, nj + 1) are made, by name."""
-    return [
-        BlockPlan(
-            name,
-            (nodes.shape[1] - 1, nodes.shape[2] - 1),
-            tuple(map(float, nodes.min(axis=(1, 2)))),
-            tuple(map(float, nodes.max(axis=(1, 2)))),
-        )
-        for name, nodes in grids.items()
-    ]
+    plans = []
+    for name, (x, y) in grids.items():
+        low, high = (float(x.min()), float(y.min())), (float(x.max()), float(y.max()))
+        plans.append(BlockPlan(name, (x.shape[0] - 1, x.shape[1] - 1), low, high))
+    return plans
 
 
 @dataclass(frozen=True)

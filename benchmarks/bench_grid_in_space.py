@@ -42,7 +42,7 @@ def march_blocks(tables: Tables, sizes: list[int], steps: int) -> None:
                 cells=f"{size}³",
                 steps=found.done,
                 **{
-                    "cells with a corner not positive, all steps": found.folded,
+                    "cells with a corner not positive, all steps": found.corners,
                     "with a Jacobian not positive at 5³ places, at the end": found.creased,
                     "least corner sine": found.sine,
                     "sub-moves": found.sub_moves,

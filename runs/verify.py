@@ -231,53 +231,6 @@ RunName = tuple[str, tuple[str, ...]]  # deck and settings
 HEADS = ("problem", "what", "size", "error", "order", "threshold", "met", "CPU s", "others")
 
 
-@dataclass(frozen=True)
-class Row:
-    """One run of a case; `error` is NaN where it failed, then `failure` says why."""
-
-    case: Case
-    size: int
-    error: float
-    order: float
-    seconds: float
-    failure: str = ""
-    short: bool = False
-
-    @property
-    def met(self) -> bool | None:
-        """Is the bar, if there is one for this row, met?"""
-        case = self.case
-        if self.failure:
-            return False
-        if self.short:
-            return None if case.short_bar is None else self.error <= case.short_bar
-        if case.bar is not None and self.size == case.sizes[case.judged]:
-            return self.error <= case.bar
-        if case.order is not None and self.size == case.sizes[-1] and not math.isnan(self.order):
-            return self.order >= case.order
-        return None
-
-    def make_record(self) -> dict[str, Any]:
-        """The row as JSON holds it: no NaN (None instead), and the bar only where it is judged."""
-        case, met = self.case, self.met
-        bar: str | float | None = case.short_bar if self.short else case.bar
-        if case.order is not None and not self.short:
-            bar = f"order {case.order:g}"
-        return {
-            "problem": case.deck,
-            "what": case.what,
-            "size": self.size,
-            "settings": [*case.settings, *case.refine(self.size)],
-            "error": None if math.isnan(self.error) else self.error,
-            "order": None if math.isnan(self.order) else self.order,
-            "bar": None if met is None else bar,
-            "met": met,
-            "cpu_seconds": round(self.seconds, 1),
-            "others": case.others,
-            "failure": self.failure,
-        }
-
-
 def format_record(record: Mapping[str, Any]) -> tuple[str, ...]:
     """A record in words, in the order of HEADS."""
     error, order, bar = record["error"], record["order"], record["bar"]
@@ -320,32 +273,71 @@ def march(deck: str, settings: tuple[str, ...]) -> tuple[dict[str, np.ndarray], 
     return history, problem.errors(history), time.process_time() - start
 
 
-def compute_rows(cases: list[Case], short: bool, engine: Engine | None = None) -> Iterator[Row]:
-    """All rows in their order, each as soon as its run is there; `engine` makes the runs."""
-    wanted = [(case, size) for case in cases for size in _choose_sizes(case, short)]
-    keys = list(dict.fromkeys(_name_run(case, size) for case, size in wanted))
+def compute_records(
+    cases: list[Case], short: bool, engine: Engine | None = None
+) -> Iterator[dict[str, Any]]:
+    """A record of each size of each case, in order, as soon as its run is there; `engine` makes
+    the runs.
+
+    As JSON holds it: None for what there is not, the threshold (`bar`) where one is judged, and
+    the `failure` of a run that has no error.
+    """
+    sizes = {case: (case.short,) if short else case.sizes for case in cases}
+    wanted = [(case, size) for case in cases for size in sizes[case] if size is not None]
+    names = [(case.deck, (*case.settings, *case.refine(size))) for case, size in wanted]
+    keys = list(dict.fromkeys(names))
     computed = (engine or InTurn()).compute(march_named, keys)
     runs: dict[RunName, Any] = {}
-    before: Row | None = None
-    for case, size in wanted:
-        while (key := _name_run(case, size)) not in runs:
+    before: tuple[Case, int, float] | None = None
+    for (case, size), name in zip(wanted, names, strict=True):
+        while name not in runs:
             place, run = next(computed)
             if isinstance(run, Exception) and not isinstance(run, RunFailure):
                 raise run
             runs[keys[place]] = run
-        known = before if before is not None and before.case is case else None
-        before = _make_row(case, size, runs[key], known, short)
-        yield before
+        error, seconds, failure = _find_error(case, runs[name])
+        order = math.nan
+        if case.converges and before and before[0] is case and before[2] > 0.0 and error > 0.0:
+            order = math.log(before[2] / error) / math.log(size / before[1])
+        met, bar = _judge(case, size, error, order, short)
+        before = case, size, error
+        yield {
+            "problem": case.deck,
+            "what": case.what,
+            "size": size,
+            "settings": list(name[1]),
+            "error": None if math.isnan(error) else error,
+            "order": None if math.isnan(order) else order,
+            "bar": bar,
+            "met": False if failure else met,
+            "cpu_seconds": round(seconds, 1),
+            "others": case.others,
+            "failure": failure,
+        }
 
 
-def _choose_sizes(case: Case, short: bool) -> tuple[int, ...]:
-    if short:
-        return () if case.short is None else (case.short,)
-    return case.sizes
+def _find_error(case: Case, run: Any) -> tuple[float, float, str]:
+    """Error and CPU seconds of a run; NaN and why where it has none."""
+    if isinstance(run, RunFailure):
+        return math.nan, 0.0, f"failed: {run}"
+    history, errors, seconds = run
+    known = np.atleast_1d(errors.get(case.quantity, history.get(case.quantity)))
+    known = known[np.isfinite(known)]
+    if not known.size:
+        return math.nan, seconds, "failed: it was not measured"
+    return float(known[-1]), seconds, ""
 
 
-def _name_run(case: Case, size: int) -> RunName:
-    return case.deck, (*case.settings, *case.refine(size))
+def _judge(
+    case: Case, size: int, error: float, order: float, short: bool
+) -> tuple[bool | None, float | str | None]:
+    """Is the threshold, if there is one at this size, met, and what is it?"""
+    limit = case.short_bar if short else case.bar
+    if limit is not None and (short or size == case.sizes[case.judged]):
+        return error <= limit, limit
+    if case.order is not None and not short and size == case.sizes[-1] and not math.isnan(order):
+        return order >= case.order, f"order {case.order:g}"
+    return None, None
 
 
 def march_named(name: RunName) -> tuple[dict[str, np.ndarray], dict, float]:
@@ -353,68 +345,18 @@ def march_named(name: RunName) -> tuple[dict[str, np.ndarray], dict, float]:
     return march(*name)
 
 
-def _make_row(case: Case, size: int, run, before: Row | None, short: bool) -> Row:
-    if isinstance(run, RunFailure):
-        return Row(case, size, math.nan, math.nan, 0.0, f"failed: {run}", short)
-    history, errors, seconds = run
-    error = errors.get(case.quantity)
-    if case.quantity == "kept":
-        error = measure_loss(history)
-    elif error is None:
-        column = history[case.quantity]
-        known = column[np.isfinite(column)]
-        error = float(known[-1]) if known.size else math.nan
-    if math.isnan(error):
-        return Row(case, size, error, math.nan, seconds, "failed: it was not measured", short)
-    order = math.nan
-    if case.converges and before is not None and before.error > 0.0 and error > 0.0:
-        order = math.log(before.error / error) / math.log(size / before.size)
-    return Row(case, size, float(error), order, seconds, short=short)
-
-
-def measure_loss(history: dict[str, np.ndarray]) -> float:
-    """Largest change of a material's mass or of the energy that did not come through the boundary.
-
-    Relative to the largest of what is inside and what came; with sources at work they are in the
-    ledger too.
-    """
-    worst = 0.0
-    for name, inside in history.items():
-        kept = name.removeprefix("total_")
-        if kept != name and kept.startswith(("mass", "energy")):
-            came = np.nan_to_num(history.get("boundary_" + kept, np.zeros_like(inside)))
-            size = max(float(np.abs(inside).max()), float(np.abs(came).max()))
-            worst = max(worst, float(np.abs(inside - came - inside[0]).max()) / size)
-    return worst
-
-
 def make_page(document: Mapping[str, Any]) -> str:
     """The Markdown page of a document: how it was made, how many bars are met, the table."""
-    lines = [
-        "# Standard problems",
-        "",
-        f"Written by `{document['command']}`;",
-        f"{describe_bars(document['rows'])}.",
-        "",
-        *format_table(document["rows"]),
-        "",
-    ]
-    return "\n".join(lines)
+    rows = [HEADS, ("---",) * len(HEADS), *map(format_record, document["rows"])]
+    head = f"Written by `{document['command']}`;\n{describe_bars(document['rows'])}.\n"
+    table = [f"| {' | '.join(row)} |" for row in rows]
+    return "\n".join(["# Standard problems", "", head, *table, ""])
 
 
 def describe_bars(records: list[Mapping[str, Any]]) -> str:
     """`44 of 44 thresholds met`."""
     met = [record["met"] for record in records if record["met"] is not None]
     return f"{sum(met)} of {len(met)} thresholds met"
-
-
-def format_table(records: list[Mapping[str, Any]]) -> list[str]:
-    """The lines of a Markdown table of records."""
-    return [
-        "| " + " | ".join(HEADS) + " |",
-        "|" + "---|" * len(HEADS),
-        *("| " + " | ".join(format_record(record)) + " |" for record in records),
-    ]
 
 
 def write_results(path: Path, records: list[dict[str, Any]], command: str) -> list[Path]:
@@ -451,9 +393,9 @@ def verify(
     say("  ".join(f"{head:{width}}" for head, width in zip(HEADS, widths, strict=False)).rstrip())
     records = []
     with open_engine("processes", jobs) as engine:
-        for row in compute_rows(cases, short, engine):
-            records.append(row.make_record())
-            cells = format_record(records[-1])
+        for record in compute_records(cases, short, engine):
+            records.append(record)
+            cells = format_record(record)
             line = "  ".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=False))
             say(f"{line}  {cells[-1]}".rstrip())
     if output is not None:

@@ -55,14 +55,9 @@ class ReadDeck:
 
     def make_problem(self):
         """The problem for this deck; raises BadInput for what the deck's fields say together."""
-        with self.numbers_in_reach():
-            try:
-                place_gauges(self.deck.gauge)
-                kind = self.file.problem if self.file else load_problem(self.problem)
-                return kind(self.deck)
-            except BadInput as error:
-                words = [line.removeprefix("deck: ") for line in str(error).splitlines()]
-                raise BadInput("\n".join(f"{self.given_in}: {line}" for line in words)) from error
+        with self.numbers_in_reach(always=True):
+            place_gauges(self.deck.gauge)
+            return (self.file.problem if self.file else load_problem(self.problem))(self.deck)
 
     @property
     def described(self) -> str:
@@ -76,17 +71,17 @@ class ReadDeck:
         return self.origin + " and --set" * bool(self.settings)
 
     @contextlib.contextmanager
-    def numbers_in_reach(self):
+    def numbers_in_reach(self, always: bool = False):
         """Turn an overflow or a division by zero met in the block into BadInput about the deck.
 
-        BadInput about `deck:` that comes from the block says where the deck is from; a division by
-        zero in a problem's own file, its line.
+        BadInput about `deck:` (or `always`) that comes from the block says where the deck is from;
+        a division by zero in a problem's own file, its line.
         """
         try:
             yield
         except BadInput as error:
             lines = str(error).splitlines()
-            if not any(line.startswith("deck: ") for line in lines):
+            if not (always or any(line.startswith("deck: ") for line in lines)):
                 raise
             lines = [f"{self.given_in}: {line.removeprefix('deck: ')}" for line in lines]
             raise BadInput("\n".join(lines)) from error
@@ -165,26 +160,24 @@ def resolve_deck(
     file: that of the problem, where it is known already; else a Python file that the deck names is
     looked for from here, then beside the deck.
     """
-    _add_default_lists(table, origin, settings, file)
-    given = {}
-    for setting in settings:
-        given[apply_setting(table, setting)] = setting.partition("=")[2].strip()
-    problem = table.pop("problem", None)
+    named = [s.partition("=")[2] for s in settings if s.partition("=")[0].strip() == "problem"]
+    problem = parse_value(named[-1]) if named else table.get("problem")
     if problem is None:
         raise BadInput(f'{origin}: a deck starts with problem = "name"{suggest("", PROBLEMS)}')
     if not isinstance(problem, str):
         raise BadInput(f"{origin}: problem = {problem!r} is not a name; write it in quotes")
     if not is_problem(problem):
         raise BadInput(f"{origin}: there is no problem {problem!r}{suggest(problem, PROBLEMS)}")
-    file = file or _read_file(problem, origin)
+    if file is None and is_problem_file(problem):
+        file = read_problem_file(find_problem_file(problem, Path(origin).parent))
     kind = (file.problem if file else load_problem(problem)).Deck
+    given = [apply_setting(table, setting, kind) for setting in settings]
+    table.pop("problem", None)
 
     def where(key: str) -> str:
         ours = any(f"{key}.".startswith(f"{k}.") or k.startswith(f"{key}.") for k in given)
         return "--set" if ours else origin
 
-    for key, text in given.items():
-        _keep_text(table, kind, key, text)
     check_deck(table, kind, where)
     try:
         deck = msgspec.convert(merge_defaults(table, kind()), kind).find_files(_find_folder(origin))
@@ -212,78 +205,40 @@ def merge_defaults(table: dict[str, Any], default: DeckTable) -> dict[str, Any]:
     return merged
 
 
-def apply_setting(table: dict[str, Any], setting: str) -> str:
-    """Lay `a.b=value` over a raw table; return the dotted key."""
-    key, equals, text = setting.partition("=")
-    key = key.strip()
-    if not equals or not key or not all(key.split(".")):
-        raise BadInput(f"--set {setting!r}: the form is key=value, such as run.t_end=1e-3")
-    *outer, last = key.split(".")
-    if len(outer) > DEEPEST:
-        raise BadInput(f"--set {cut(key)}: a key of {len(outer) + 1} names is in no deck")
-    branch: Any = table
-    for depth, name in enumerate(outer):
-        if isinstance(branch, list):
-            branch = _list_entry(branch, name, key)
-        else:
-            branch = branch.setdefault(name, {})
-        if not isinstance(branch, dict | list):
-            above = ".".join(outer[: depth + 1])
-            raise BadInput(f"--set {key}: {above} is a value, not a table")
-    if isinstance(branch, list):
-        _list_entry(branch, last, key)
-        branch[int(last)] = parse_value(text)
-    else:
-        branch[last] = parse_value(text)
-    return key
+def apply_setting(table: dict[str, Any], setting: str, kind: type[Deck] | None = None) -> str:
+    """Lay `a.b=value` over a raw table; return the dotted key.
 
-
-def _read_file(problem: str, origin: str) -> ProblemFile | None:
-    """The Python file that `problem` names, looked for from here, then beside the deck `origin`."""
-    if not is_problem_file(problem):
-        return None
-    return read_problem_file(find_problem_file(problem, Path(origin).parent))
-
-
-def _add_default_lists(
-    table: dict[str, Any], origin: str, settings: tuple[str, ...], file: ProblemFile | None
-) -> None:
-    """Copy a default list into `table` where a setting such as modes.0.ka0=1 needs one.
-
-    A deck that has the list itself keeps its own.
+    kind: that of the deck.  Where the table lacks a list of which an entry is set, as in
+    modes.0.ka0=1, it gets the default one; where a field wants text it gets it as written:
+    case=123 names a case.
     """
-    keys = [setting.partition("=")[0].strip().split(".") for setting in settings]
-    keys = [names for names in keys if any(name.isdigit() for name in names[1:])]
-    named = [s.partition("=")[2].strip() for s in settings if s.partition("=")[0] == "problem"]
-    problem = named[-1] if named else table.get("problem")
-    if not keys or not isinstance(problem, str) or not is_problem(problem):
-        return
-    file = file or _read_file(problem, origin)
-    kind = file.problem if file else load_problem(problem)
-    defaults = _drop_none(msgspec.to_builtins(kind.Deck()))
-    for names in keys:
-        branch, default = table, defaults
-        for name, following in pairwise(names):
-            default = default.get(name)
-            if following.isdigit() and isinstance(default, list):
-                branch.setdefault(name, deepcopy(default))
-                break
-            if not isinstance(default, dict) or not isinstance(branch.get(name, {}), dict):
-                break
-            branch = branch.setdefault(name, {})
-
-
-def _keep_text(table: dict[str, Any], kind: type, key: str, text: str) -> None:
-    """Where a field wants text, take `text` as written: --set case=123 names a case."""
-    *outer, last = key.split(".")
+    key, equals, text = setting.partition("=")
+    key, names = key.strip(), key.strip().split(".")
+    if not equals or not all(names):
+        raise BadInput(f"--set {setting!r}: the form is key=value, such as run.t_end=1e-3")
+    if len(names) - 1 > DEEPEST:
+        raise BadInput(f"--set {cut(key)}: a key of {len(names)} names is in no deck")
     branch: Any = table
-    for name in outer:
-        branch = branch[int(name)] if isinstance(branch, list) else branch.get(name)
+    listed = kind is not None and any(name.isdigit() for name in names[1:])
+    default: Any = _drop_none(msgspec.to_builtins(kind())) if kind and listed else {}
+    for depth, (name, following) in enumerate(pairwise(names), start=1):
+        if isinstance(branch, list):
+            branch, default = _list_entry(branch, name, key), None
+        else:
+            default = default.get(name) if isinstance(default, dict) else None
+            is_list = following.isdigit() and isinstance(default, list)
+            branch = branch.setdefault(name, deepcopy(default) if is_list else {})
         if not isinstance(branch, dict | list):
-            return
-    where = int(last) if isinstance(branch, list) else last
-    if isinstance(branch[where], bool | int | float) and wants_text(kind, key, branch[where]):
-        branch[where] = text
+            raise BadInput(f"--set {key}: {'.'.join(names[:depth])} is a value, not a table")
+    value = parse_value(text)
+    if kind and isinstance(value, bool | int | float) and wants_text(kind, key, value):
+        value = text.strip()
+    if isinstance(branch, list):
+        _list_entry(branch, names[-1], key)
+        branch[int(names[-1])] = value
+    else:
+        branch[names[-1]] = value
+    return key
 
 
 def _list_entry(entries: list, name: str, key: str) -> Any:

@@ -14,24 +14,22 @@ import numpy as np
 
 from regrid.domains import DOMAINS, make_domain
 from regrid.domains_in_space import BLOCKS, SHAPES
-from regrid.errors import BadInput, RunFailure, suggest
-from regrid.given import is_file_name, read_grid, read_sides
+from regrid.errors import BadInput, RunFailure
+from regrid.given import read_grid
 from regrid.registry import find_usable, load_regridder
-from runs.grids.compare import default_cells
 from runs.grids.making import (
     Made,
+    default_cells,
     make_family,
     make_in_block,
     make_moving,
-    make_on_curves,
-    make_on_domain,
+    make_plane,
     make_spatial_law,
     march,
     parse_options,
     regrid_plane,
     regrid_space,
     takes_weight,
-    weigh_cells,
 )
 from runs.grids.quality import (
     Judgement,
@@ -51,13 +49,18 @@ Request = tuple[str | None, tuple[str, ...], str | None]  # family, --option wor
 
 def list_everything() -> str:
     """Domains, blocks and families, each with its first line of words."""
-    lines = ["domains (marched from a simple shape to the one described)"]
-    lines += [f"  {name.replace('_', '-'):22s} {_first(make)}" for name, make in DOMAINS.items()]
-    lines += ["", "blocks in space"]
-    lines += [f"  {name.replace('_', '-'):22s} {_first(make)}" for name, make in BLOCKS.items()]
-    lines += ["", "moving blocks in space (families barrier, equidistribution)"]
-    lines += [f"  {name.replace('_', '-'):22s} {_first(make)}" for name, make in SHAPES.items()]
-    lines += ["", "families (* takes a --weight)"]
+    lines = []
+    for head, makers in (
+        ("domains (marched from a simple shape to the one described)", DOMAINS),
+        ("blocks in space", BLOCKS),
+        ("moving blocks in space (families barrier, equidistribution)", SHAPES),
+    ):
+        lines += [
+            head,
+            *(f"  {n.replace('_', '-'):22s} {_first(m)}" for n, m in makers.items()),
+            "",
+        ]
+    lines.append("families (* takes a --weight)")
     for name in find_usable():
         star = "*" if takes_weight(name) else " "
         module = inspect.getmodule(load_regridder(name))
@@ -109,41 +112,28 @@ def make_grid(
     block: str | None,
     files: Files,
 ) -> list[str]:
-    """`grid make`; `motion`: steps, part of it, passes on sides given at once."""
-    steps, at, passes = motion
-    if not 0.0 <= at <= 1.0:
-        raise BadInput(f"--at {at}: a number from 0 to 1 is wanted")
+    """`grid make`; `motion`: as in `make_plane`."""
+    steps, at, _ = motion
     family, words, weight = request
-    given = parse_options(words)
-    name = source.replace("-", "_")
+    given, name = parse_options(words), source.replace("-", "_")
+    in_space = name in BLOCKS or name in SHAPES
+    size = parse_cells(cells, 3 if in_space else 2)
     if name in BLOCKS:
         _refuse_family(family, source)
-        size, law = parse_cells(cells, 3) or CELLS_IN_SPACE, make_spatial_law(given, weight)
+        family, law = "ed3", make_spatial_law(given, weight)
         plan, label = _plan(files, f"{source}.h5"), source
-        made = make_in_block(name, law, size, given)
-        family = "ed3"
-    elif name in SHAPES:
-        if weight is not None:
-            raise BadInput(f"--weight: {source} moves; its families take none")
-        size, family = parse_cells(cells, 3) or CELLS_IN_SPACE, family or "barrier"
-        plan, label = _plan(files, f"{source}-{family}.h5"), f"{source}, {family}"
-        made = make_moving(name, family, given, size, steps, at)
+        made = make_in_block(name, law, size or CELLS_IN_SPACE, given)
     else:
         family = family or "barrier"
-        if name not in DOMAINS and not is_file_name(source):
-            _explain_unknown(source)
-        size, regridder = parse_cells(cells), make_family(family, given, weight)
+        plan = _plan(files, f"{Path(source).stem}-{family}.h5")
         label = f"{source}, {family}"
-        if name in DOMAINS:
-            plan = _plan(files, f"{source}-{family}.h5")
-            size = size or default_cells(name)
-            made = make_on_domain(name, family, regridder, size, steps, at)
+        if in_space and weight is not None:
+            raise BadInput(f"--weight: {source} moves; its families take none")
+        if in_space:
+            made = make_moving(name, family, given, size or CELLS_IN_SPACE, steps, at)
         else:
-            boundary = read_sides(source, block, size)
-            plan = _plan(files, f"{Path(source).stem}-{family}.h5")
-            made = make_on_curves(boundary, regridder, passes, source)
-        if not made.failure:
-            made.weight = weigh_cells(weight, made.nodes)
+            regridder = make_family(family, given, weight)
+            made = make_plane(source, family, regridder, size, motion, block, weight)
     made.made_by = {"source": source, "family": family, "options": " ".join(words)}
     made.made_by |= {"weight": weight or "", "at": at, "steps": steps}
     return _finish(made, label, plan)
@@ -152,12 +142,6 @@ def make_grid(
 def _refuse_family(family: str | None, source: str) -> None:
     if family is not None:
         raise BadInput(f"--family {family}: {source} is in space, where cells are equidistributed")
-
-
-def _explain_unknown(source: str) -> None:
-    """Raise BadInput that names the nearest domain or block."""
-    known = [name.replace("_", "-") for name in (*DOMAINS, *BLOCKS, *SHAPES)]
-    raise BadInput(f"no domain and no file is called '{source}'{suggest(source, known)}")
 
 
 def regrid_file(
@@ -177,9 +161,7 @@ def regrid_file(
         family = family or "barrier"
         regridder = make_family(family, given, weight)
         plan = _plan(files, f"{stem}-{family}.h5")
-        made = regrid_plane(nodes, regridder, passes)
-        if not made.failure:
-            made.weight = weigh_cells(weight, made.nodes)
+        made = regrid_plane(nodes, regridder, passes, weight)
     before = judge(nodes)
     made.made_by = {"source": file, "family": family, "options": " ".join(words)}
     made.made_by |= {"weight": weight or ""}

@@ -10,7 +10,6 @@ grid); one that ends early looks better than it is, so the steps come first.
 
 from __future__ import annotations
 
-import inspect
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -30,6 +29,7 @@ from regrid.sides import SIDE_NAMES, get_side, get_sides
 from runs.deck.reading import packaged_decks, read_deck
 from runs.grids.making import (
     March,
+    default_cells,
     make_family,
     make_on_curves,
     march,
@@ -153,12 +153,6 @@ def _plan_pictures(picture: str | None, names: list[str], force: bool) -> dict[s
     for target in found.values():
         check_free(target, force)
     return found
-
-
-def default_cells(name: str) -> tuple[int, int]:
-    """Cells that a named domain has where nothing else is asked for."""
-    parameters = inspect.signature(DOMAINS[name.replace("-", "_")]).parameters
-    return parameters["ni"].default, parameters["nj"].default
 
 
 def _prepare_domain(name: str, cells, steps: int) -> tuple[str, Compute]:

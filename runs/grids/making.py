@@ -13,6 +13,7 @@ moved a node is told.
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import time
 from dataclasses import dataclass, field
@@ -22,8 +23,8 @@ import numpy as np
 
 from regrid.algebraic import transfinite_grid
 from regrid.barrier.repair import repair_grid
-from regrid.domains import MovingDomain, make_domain
-from regrid.domains_in_space import MovingBlock, find_block, make_moving_block
+from regrid.domains import DOMAINS, MovingDomain, make_domain
+from regrid.domains_in_space import BLOCKS, SHAPES, MovingBlock, find_block, make_moving_block
 from regrid.equidistribution.volumes import (
     Equidistributed,
     EquidistributionRegridder3D,
@@ -32,7 +33,7 @@ from regrid.equidistribution.volumes import (
 )
 from regrid.equidistribution.weights import Weight, make_position_weight
 from regrid.errors import BadInput, RegridFailure, suggest
-from regrid.given import describe_repair, find_start
+from regrid.given import check_nodes, describe_repair, find_start, is_file_name, read_sides
 from regrid.hexahedra.regridder import BarrierRegridder3D
 from regrid.marching import March, march_domain
 from regrid.measure.corners import compute_hexahedron_centres
@@ -48,7 +49,7 @@ from regrid.protocol import call_regridder
 from regrid.registry import find_usable, load_regridder, make_regridder
 from regrid.sides import compute_area
 
-__all__ = ["March", "make_family", "march", "parse_options", "takes_weight", "warm_up"]
+Cells = tuple[int, ...]
 
 
 def parse_options(words: tuple[str, ...]) -> dict[str, Any]:
@@ -64,10 +65,8 @@ def parse_options(words: tuple[str, ...]) -> dict[str, Any]:
 
 def _read_value(text: str) -> Any:
     for kind in (int, float):
-        try:
+        with contextlib.suppress(ValueError):
             return kind(text)
-        except ValueError:
-            pass
     return {"true": True, "false": False}.get(text.lower(), text)
 
 
@@ -129,9 +128,42 @@ class Made:
     made_by: dict[str, Any] = field(default_factory=dict)
 
 
-def make_on_domain(
-    name: str, family: str, regridder, cells: tuple[int, int], steps: int, at: float
-) -> Made:
+def default_cells(name: str) -> tuple[int, int]:
+    """Cells that a named domain has where nothing else is asked for."""
+    parameters = inspect.signature(DOMAINS[name.replace("-", "_")]).parameters
+    return parameters["ni"].default, parameters["nj"].default
+
+
+def make_plane(
+    source: str | np.ndarray, family: str, regridder, cells: Cells | None = None,
+    motion: tuple[int, float, int] = (40, 1.0, PASSES), block: str | None = None,
+    weight: str | None = None,
+) -> Made:  # fmt: skip
+    """A plane grid of a named domain, on the curves or sides in a file, or on those of an array.
+
+    motion: steps of a domain's motion, the part of it that is made, passes at most on sides given
+    at once; block: of a file; weight: its values at the finished cells go into what is returned.
+    Raises BadInput for what there is not.
+    """
+    steps, at, passes = motion
+    if not 0.0 <= at <= 1.0:
+        raise BadInput(f"at = {at}: a number from 0 to 1 is wanted")
+    if isinstance(source, np.ndarray):
+        made = make_on_curves(check_nodes(source, "the array"), regridder, passes, "the array")
+    elif source.replace("-", "_") in DOMAINS:
+        size = cells or default_cells(source)
+        made = make_on_domain(source, family, regridder, size, steps, at)
+    elif is_file_name(source):
+        made = make_on_curves(read_sides(source, block, cells), regridder, passes, source)
+    else:
+        known = [name.replace("_", "-") for name in (*DOMAINS, *BLOCKS, *SHAPES)]
+        raise BadInput(f"no domain and no file is called {source!r}{suggest(source, known)}")
+    if weight is not None and not made.failure:
+        made.weight = Weight(weight).on(made.nodes, made.nodes)(made.nodes)
+    return made
+
+
+def make_on_domain(name: str, family: str, regridder, cells: Cells, steps: int, at: float) -> Made:
     """Grid of a named domain at part `at` of its motion; a failure says the step."""
     domain = make_domain(name, *cells)
     if steps == 0:
@@ -171,8 +203,13 @@ def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> 
     return made
 
 
-def regrid_plane(nodes: np.ndarray, regridder, passes: int) -> Made:
-    """A user's plane grid regenerated on its sides; one that is not valid is untangled first."""
+def regrid_plane(
+    nodes: np.ndarray, regridder, passes: int = PASSES, weight: str | None = None
+) -> Made:
+    """A user's plane grid regenerated on its sides; one that is not valid is untangled first.
+
+    weight: as in `make_plane`.
+    """
     turned = _positive(nodes)
     try:
         repaired = repair_grid(turned)
@@ -182,6 +219,8 @@ def regrid_plane(nodes: np.ndarray, regridder, passes: int) -> Made:
     made = settle(start, turned, regridder, passes, words)
     if turned is not nodes:
         made.nodes = np.ascontiguousarray(made.nodes[:, :, ::-1])
+    if weight is not None and not made.failure:
+        made.weight = Weight(weight).on(made.nodes, made.nodes)(made.nodes)
     return made
 
 
@@ -230,11 +269,6 @@ def _least_sine(nodes: np.ndarray) -> float:
     return float(compute_scaled_jacobians(nodes).min())
 
 
-def weigh_cells(weight: str | None, nodes: np.ndarray) -> np.ndarray | None:
-    """The weight's values at the cells of the finished plane grid."""
-    return None if weight is None else Weight(weight).on(nodes, nodes)(nodes)
-
-
 def make_in_block(name: str, law, cells: tuple[int, int, int], options: dict[str, Any]) -> Made:
     """Grid of a named block of space by edges, faces, volume; the options are those of ED3."""
     return _describe_ed3(equidistribute_block(find_block(name), cells, law, **options), law)
@@ -280,24 +314,15 @@ FAMILIES_IN_SPACE = {"barrier": BarrierRegridder3D, "equidistribution": Equidist
 
 
 @dataclass
-class MarchInSpace:
-    """The last grid (3, ...), and sums and worst of all steps; cells counted in every step.
+class MarchInSpace(March):
+    """As `March`, of nodes (3, ...).
 
-    `folded` are cells of which a corner volume is not positive, `creased` those of the last grid
-    whose trilinear Jacobian is not at one of 5³ places.
+    `corners` are cells of which a corner volume is not positive, counted in every step, `creased`
+    those of the last grid whose trilinear Jacobian is not positive at one of 5³ places.
     """
 
-    nodes: np.ndarray
-    steps: int
-    done: int = 0
-    failure: str | None = None
-    folded: int = 0
+    corners: int = 0
     creased: int = 0
-    sine: float = 1.0
-    sub_moves: int = 0
-    rescues: int = 0
-    iterations: int = 0
-    seconds: list[float] = field(default_factory=list)
 
     def get_cost(self, mean: bool = False) -> float:
         """Median, or mean, of a step in microseconds of a processor an inner node."""
@@ -331,22 +356,17 @@ def march_in_space(block: MovingBlock, regridder, steps: int, end: float = 1.0) 
             break
         found.seconds.append(time.process_time() - begun)
         found.nodes, found.done = result.nodes, step
+        found.reports.append(result.report)
         found.sub_moves += result.report.sub_moves
         found.rescues += result.report.rescues
-        found.iterations += result.report.iterations
-        found.folded += int((~(compute_least_corner_volumes(found.nodes) > 0.0)).sum())
+        found.corners += int((~(compute_least_corner_volumes(found.nodes) > 0.0)).sum())
         found.sine = min(found.sine, float(compute_hexahedron_sines(found.nodes).min()))
     found.creased = int((~(compute_least_jacobian(found.nodes) > 0.0)).sum())
     return found
 
 
 def make_moving(
-    name: str,
-    family: str,
-    options: dict[str, Any],
-    cells: tuple[int, int, int],
-    steps: int,
-    at: float,
+    name: str, family: str, options: dict[str, Any], cells: Cells, steps: int, at: float
 ) -> Made:
     """Grid of a named moving block at part `at` of its motion; a failure says the step."""
     if steps < 1:
@@ -363,7 +383,7 @@ def make_moving(
     )
     worst = (
         f"least corner sine of all steps {found.sine:.4f}; cells with a corner not positive in any "
-        f"step: {found.folded}; with a Jacobian not positive at 5x5x5 places, at the end: "
+        f"step: {found.corners}; with a Jacobian not positive at 5x5x5 places, at the end: "
         f"{found.creased}"
     )
     return Made(found.nodes, [note, worst])

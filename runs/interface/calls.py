@@ -245,6 +245,6 @@ def verify(*problems: str, short: bool = False) -> list[dict[str, Any]]:
     A record has "problem", "what", "size", "error", "order", "bar" and "met", None where there is
     none.  short: one small size of each.  Raises BadInput for a name that is none.
     """
-    from runs.verify import choose_cases, compute_rows
+    from runs.verify import choose_cases, compute_records
 
-    return [row.make_record() for row in compute_rows(choose_cases(problems), short)]
+    return list(compute_records(choose_cases(problems), short))

@@ -6,6 +6,7 @@ docs/files.md lists the files of a run.
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 import shlex
 import time

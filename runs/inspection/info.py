@@ -247,7 +247,7 @@ def describe_history(history: Mapping[str, np.ndarray]) -> list[str]:
 LONGEST = 60  # characters of a text that are shown
 SAID = ("units", "long_name")  # attributes that a dataset's own line tells
 SCALES = ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid")  # HDF5's own
-VERSION = " @format_version"  # one of dumps in one file, one of those in parts
+VERSION = "format_version"  # one of dumps in one file, one of those in parts
 MADE = "/provenance"  # differs between machines and versions without any other difference
 
 
@@ -262,38 +262,43 @@ def inspect(file: str | os.PathLike, other: str | os.PathLike | None = None) -> 
 
 
 def inspect_file(path: str) -> str:
-    """The tree of the file: for each array shape, type, range, unit, bad values, checksum.
-
-    Raises BadInput where `path` is no HDF5 file.
-    """
+    """The tree of the file: for each array shape, type, range, unit, bad values, checksum."""
     with open_hdf5(Path(path)) as file:
         lines = [f"{path}: {Path(path).stat().st_size} bytes"]
         if (found := find_sum(Path(path))) is not None:
             lines[0] += f", checksum {'as stored' if found else 'NOT AS STORED'}"
-        lines += [f"  {words}" for words in _describe_parts(Path(path), file)]
-        lines += [f"  @{name} = {words}" for name, words in describe_attributes(file)]
-        lines += _describe_items(file)
+        for part, crc in read_parts(file).items():
+            fault = find_fault(Path(path), part, crc)
+            lines.append(f"  {part}: {fault or 'checksum as stored'}")
+        items = list_items(file)
+        for folder in (name for name, item in items.items() if isinstance(item, h5py.Group)):
+            lines += [f"{folder}/"] * (folder != "/")
+            lines += describe_attributes(items[folder], "  ")
+            arrays = {n: i for n, i in items[folder].items() if isinstance(i, h5py.Dataset)}
+            width = max(map(len, arrays), default=0)
+            for name, data in arrays.items():
+                lines.append(f"  {name:{width}}  {describe_array(data)}")
+                lines += describe_attributes(data, "    ", SAID)
     return "\n".join(lines)
 
 
 def inspect_differences(a: str, b: str) -> str:
-    """How the file `b` differs from `a`, array by array; what made them does not count.
-
-    Raises BadInput where one of them is no HDF5 file.
-    """
+    """How the file `b` differs from `a`, array by array; what made them does not count."""
     with open_hdf5(Path(a)) as one, open_hdf5(Path(b)) as other:
-        left, right = _list_contents(one), _list_contents(other)
+        parts = {path: len(read_parts(file)) for path, file in ((a, one), (b, other))}
+        stored = [
+            f"  {path} in {count(n, 'part') if n else 'one file'}" for path, n in parts.items()
+        ]
+        stored *= len(set(parts.values())) > 1
+        left, right = list_items(one), list_items(other)
         lines: list[str] = []
         made: list[str] = []
-        stored = [f"  {path} in {words}" for path, words in _count_parts((a, one), (b, other))]
         for path, here in ((a, set(left) - set(right)), (b, set(right) - set(left))):
             for name in sorted(here):
                 (made if name == MADE else lines).append(f"{name}: only in {path}")
         common = [name for name in left if name in right]
         for name in common:
-            words = _compare_attributes(left[name], right[name])
-            if stored:
-                words = [line for line in words if not line.startswith(VERSION)]
+            words = _compare_attributes(left[name], right[name], VERSION if stored else "")
             (made if name == MADE else lines).extend(f"{name}{line}" for line in words)
             if isinstance(left[name], h5py.Dataset) and isinstance(right[name], h5py.Dataset):
                 if told := _compare_arrays(left[name], right[name]):
@@ -330,37 +335,18 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
 
 
 def list_items(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
-    """Everything in the file by its path, the root "/" first."""
+    """Everything in the file by its path, the root "/" first, but where an index has its arrays."""
     found: dict[str, h5py.Group | h5py.Dataset] = {"/": file}
     file.visititems(lambda name, item: found.__setitem__(f"/{name}", item))
-    return found
+    return {n: i for n, i in found.items() if not f"{n}/".startswith(f"/{PARTS}/")}
 
 
-def _list_contents(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
-    """`list_items` without those that tell where the arrays of an index lie."""
-    return {n: i for n, i in list_items(file).items() if not f"{n}/".startswith(f"/{PARTS}/")}
-
-
-def _count_parts(*files: tuple[str, h5py.File]) -> list[tuple[str, str]]:
-    """Name and words for two files that are in parts or not, where their numbers differ."""
-    numbers = [len(read_parts(file)) for _, file in files]
-    if len(set(numbers)) == 1:
-        return []
-    told = [count(number, "part") if number else "one file" for number in numbers]
-    return [(path, words) for (path, _), words in zip(files, told, strict=True)]
-
-
-def _describe_parts(path: Path, file: h5py.File) -> Iterator[str]:
-    """A line a part of an index, which says what is wrong with it."""
-    for part, crc in read_parts(file).items():
-        yield f"{part}: {find_fault(path, part, crc) or 'checksum as stored'}"
-
-
-def describe_attributes(item: h5py.Group | h5py.Dataset) -> Iterator[tuple[str, str]]:
-    """Name and value of the attributes that no other words tell; a long text by its size."""
-    for name in item.attrs:
-        if name not in SCALES:
-            yield name, _say_value(item.attrs[name])
+def describe_attributes(
+    item: h5py.Group | h5py.Dataset, margin: str, said: Sequence[str] = ()
+) -> list[str]:
+    """A line for each attribute that no other words tell."""
+    names = [name for name in item.attrs if name not in (*SCALES, *said)]
+    return [f"{margin}@{name} = {_say_value(item.attrs[name])}" for name in names]
 
 
 def describe_array(data: h5py.Dataset) -> str:
@@ -373,34 +359,24 @@ def describe_array(data: h5py.Dataset) -> str:
     unit = "" if unit == "1" else unit
     if not isinstance(values, np.ndarray):
         return " ".join(word for word in (_say_value(values), unit, name) if word)
-    words = [f"{values.shape} {values.dtype}", _say_range(values), unit]
-    told = [
-        " ".join(word for word in words if word),
-        name,
-        _say_bad(values),
-        _say_sum(values),
-    ]
-    return ", ".join(word for word in told if word)
-
-
-def _describe_items(file: h5py.File) -> Iterator[str]:
-    items = list_items(file)
-    folders = [name for name, item in items.items() if isinstance(item, h5py.Group)]
-    for folder in folders:
-        if folder != "/":
-            yield f"{folder}/"
-            yield from (
-                f"  @{name} = {words}" for name, words in describe_attributes(items[folder])
+    extent, told = "" if values.size else "empty", []
+    if values.dtype.kind in "fiub":
+        finite, nans = values[np.isfinite(values)], int(np.isnan(values).sum())
+        extent = extent or "nothing finite"
+        if values.size:
+            extent = (
+                f"{finite.min():.7g} to {finite.max():.7g}" if finite.size else "nothing finite"
             )
-        arrays = {n: i for n, i in items[folder].items() if isinstance(i, h5py.Dataset)}
-        width = max(map(len, arrays), default=0)
-        for name, data in arrays.items():
-            yield f"  {name:{width}}  {describe_array(data)}"
-            left = [(key, words) for key, words in describe_attributes(data) if key not in SAID]
-            yield from (f"    @{key} = {words}" for key, words in left)
+        infinite = values.size - finite.size - nans
+        told = [f"{nans} NaN"] * bool(nans) + [f"{infinite} infinite"] * bool(infinite)
+        told.append(f"crc32 {zlib.crc32(np.ascontiguousarray(values).data):08x}")
+    head = " ".join(word for word in (f"{values.shape} {values.dtype}", extent, unit) if word)
+    return ", ".join(word for word in (head, name, *told) if word)
 
 
 def _say_value(value: Any) -> str:
+    if value is None:
+        return "missing"
     if isinstance(value, bytes):
         value = value.decode("utf-8", "replace")
     if isinstance(value, str):
@@ -438,22 +414,17 @@ def _say_sum(values: np.ndarray) -> str:
     return f"crc32 {zlib.crc32(np.ascontiguousarray(values).data):08x}"
 
 
-def _compare_attributes(one: h5py.Group | h5py.Dataset, other) -> list[str]:
+def _compare_attributes(one, other, ignored: str) -> list[str]:
+    """A line for each attribute that differs, of two groups or arrays."""
     left, right = (
-        {name: words for name, words in describe_attributes(item) if name != CHECKSUM}
-        for item in (one, other)  # the array's own line tells of its sum
+        {n: item.attrs[n] for n in item.attrs if n not in (*SCALES, CHECKSUM, ignored)}
+        for item in (one, other)
     )
     return [
-        f" @{name}: {left.get(name, 'missing')} and {right.get(name, 'missing')}"
+        f" @{name}: {_say_value(left.get(name))} and {_say_value(right.get(name))}"
         for name in {**left, **right}
-        if left.get(name) != right.get(name) or _are_other_texts(one, other, name)
+        if not np.array_equal(left.get(name), right.get(name))
     ]
-
-
-def _are_other_texts(one, other, name: str) -> bool:
-    """Do two texts differ that are too long to be shown?"""
-    values = one.attrs[name], other.attrs[name]
-    return all(isinstance(value, str) for value in values) and values[0] != values[1]
 
 
 def _compare_arrays(one: h5py.Dataset, other: h5py.Dataset) -> str:

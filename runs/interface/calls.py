@@ -34,59 +34,23 @@ OWN_KEYS = ("run.max_steps", "output", "gauge")  # of the deck, or tables of it
 
 
 def make_case(
-    simulation: Evolution, settings: tuple[str, ...] = (), measure: Measure | None = None
+    simulation: Evolution,
+    settings: tuple[str, ...] = (),
+    measure: Measure | None = None,
+    begun: RunDirectory | None = None,
 ) -> Case:
-    """A case of a simulation that a script has made.
+    """A case of a simulation that a script has made; `begun`: goes on with the run there.
 
     settings: `key=value` of run.max_steps, output.* and gauge; all else is the simulation's own.
     Raises BadInput for other keys and for what is no simulation.
     """
-    table = {"run": _describe_march(simulation)}
-    return _make(
-        simulation, table, f"a simulation of {_find_script() or 'Python'}", settings, measure
-    )
-
-
-def continue_case(
-    directory: RunDirectory,
-    simulation: Evolution,
-    settings: tuple[str, ...] = (),
-    measure: Measure | None = None,
-) -> Case:
-    """A case that continues the run in `directory` with blocks rebuilt by its script.
-
-    Raises BadInput for a run of something else, for a simulation that has marched already, and
-    where its blocks have other materials.
-    """
-    table = read_toml(directory.deck)
-    if table.get("problem") != NAME:
-        raise BadInput(
-            f"{directory} is a run of {table.get('problem')}, which makes its blocks itself: "
-            "restart it without simulation="
-        )
-    if simulation.step:
-        raise BadInput(
-            f"the simulation has made {simulation.step} steps already; a restart needs one as it "
-            "was before its first step"
-        )
-    check_changeable(settings, OwnSimulationDeck)
-    kept: dict[str, Any] = {key: table[key] for key in ("output", "gauge") if key in table}
-    march = _describe_march(simulation)
-    if "max_steps" in table.get("run", {}):
-        march["max_steps"] = table["run"]["max_steps"]
-    case = _make(simulation, {"run": march, **kept}, str(directory.deck), settings, measure)
-    before, now = table.get("materials", {}), _describe_materials(simulation)
-    if before != now:
-        which = [name for name in {**before, **now} if before.get(name) != now.get(name)]
-        name = which[0]
-        raise BadInput(
-            f"block {name!r} is of {now.get(name, 'no block')} in this simulation, of "
-            f"{before.get(name, 'no block')} in the run in {directory}: that is another flow"
-        )
-    return case
-
-
-def _make(simulation, table: dict[str, Any], origin: str, settings, measure) -> Case:
+    table: dict[str, Any] = {"problem": NAME, "run": _describe_march(simulation)}
+    table |= {"script": _find_script(), "materials": _describe_materials(simulation)}
+    origin = f"a simulation of {_find_script() or 'Python'}"
+    if begun is not None:
+        origin = str(begun.deck)
+        check_changeable(settings, OwnSimulationDeck)
+        _take_over(table, begun, simulation)
     for setting in settings:
         key = setting.partition("=")[0].strip()
         if not any(f"{key}.".startswith(f"{own}.") for own in OWN_KEYS):
@@ -94,14 +58,37 @@ def _make(simulation, table: dict[str, Any], origin: str, settings, measure) -> 
                 f"{key}: your own simulation has all but {', '.join(OWN_KEYS)} from its "
                 "script; give it to shockgrid.Simulation or to its blocks"
             )
-    table = {
-        "problem": NAME,
-        "script": _find_script(),
-        "materials": _describe_materials(simulation),
-        **table,
-    }
     read: ReadDeck = resolve_deck(table, origin, settings)
     return Case(read, OwnSimulation(read.deck, simulation, measure))  # type: ignore[arg-type]
+
+
+def _take_over(table: dict[str, Any], begun: RunDirectory, simulation: Evolution) -> None:
+    """Take what a run's deck has beyond its script.
+
+    Raises BadInput for a run of something else, for a simulation that has marched already, and
+    where its blocks have other materials.
+    """
+    before = read_toml(begun.deck)
+    if before.get("problem") != NAME:
+        raise BadInput(
+            f"{begun} is a run of {before.get('problem')}, which makes its blocks itself: "
+            "restart it without simulation="
+        )
+    if simulation.step:
+        raise BadInput(
+            f"the simulation has made {simulation.step} steps already; a restart needs one as it "
+            "was before its first step"
+        )
+    was, now = before.get("materials", {}), table["materials"]
+    for name in {**was, **now}:
+        if was.get(name) != now.get(name):
+            raise BadInput(
+                f"block {name!r} is of {now.get(name, 'no block')} in this simulation, of "
+                f"{was.get(name, 'no block')} in the run in {begun}: that is another flow"
+            )
+    table |= {key: before[key] for key in ("output", "gauge") if key in before}
+    most = before.get("run", {}).get("max_steps")
+    table["run"] |= {} if most is None else {"max_steps": most}
 
 
 def _describe_march(simulation: Evolution) -> dict[str, Any]:
@@ -212,7 +199,7 @@ def restart(
         raise BadInput("output and force need cells; otherwise a run continues in its directory")
     with said_in_python():
         if simulation is not None:
-            case = continue_case(opened, simulation, words, measure)
+            case = make_case(simulation, words, measure, opened)
         else:
             read = read_restart_deck(opened, words, at)
             case = Case(read, read.make_problem())

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from regrid.errors import BadInput
 from runs.pictures.command import Wanted, fill_figure, new_figure
-from runs.pictures.fields import split_outline
+from runs.pictures.curves import find_curves
 
 Times = float | str | Sequence[float] | None
 
@@ -61,12 +61,9 @@ def say_numbers(numbers: Sequence[float] | np.ndarray | None) -> str | None:
 
 def find_interface(blocks: Sequence[Any], t: float, where: str) -> Curve:
     """The lines between blocks of different materials; BadInput where there are none."""
-    lines, _ = split_outline(blocks)
+    lines = [curve.nodes for curve in find_curves(blocks)]
     if not lines:
         raise BadInput(f"{where}: no two materials touch, so there is no interface")
-    parts = [lines[0]]
-    for line in lines[1:]:
-        touches = np.array_equal(parts[-1][:, -1], line[:, 0])
-        parts += [line[:, 1:]] if touches else [np.full((2, 1), np.nan), line]
-    x, y = np.concatenate(parts, axis=1)
+    gap = np.full((2, 1), np.nan)
+    x, y = np.concatenate([part for line in lines for part in (gap, line)][1:], axis=1)
     return Curve(x, y, t)

@@ -6,7 +6,7 @@ import functools
 import importlib
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,8 @@ from runs.store.dumps import damage_told, has_state, open_dump, read_state
 from runs.store.guards import check_deck, check_summary, read_run_deck, read_verdict
 from runs.store.history import read_columns, read_history, read_rows
 
+MOST_ROWS = 30  # of a table on the screen
+
 
 class NotThere(BadInput, KeyError):
     """A field or a column that is asked for and is not there."""
@@ -31,7 +33,7 @@ class NotThere(BadInput, KeyError):
 
 
 class Table(dict[str, np.ndarray]):
-    """Columns by name, one value a row; `table.t` is `table["t"]`.
+    """Columns by name, one value a row; `table.t` is `table["t"]`.  It prints as a table.
 
     `units` maps columns to their SI unit, as far as it is known.  An unknown name raises
     AttributeError or, in brackets, BadInput, which here is a KeyError too.
@@ -66,6 +68,26 @@ class Table(dict[str, np.ndarray]):
     def __repr__(self) -> str:
         rows = len(next(iter(self.values()), ()))
         return f"<{self.name}: {rows} rows, {len(self)} columns: {', '.join(self)}>"
+
+    def __str__(self) -> str:
+        return "\n".join(self.make_rows(list(self)))
+
+    def make_rows(self, names: Sequence[str]) -> list[str]:
+        """The table in words: the heads, then MOST_ROWS of the rows at most."""
+
+        def say(value: Any) -> str:
+            if isinstance(value, np.floating):
+                return "-" if np.isnan(value) else f"{value:.6g}"
+            return str(value)
+
+        cells = [[name, *map(say, self[name][:MOST_ROWS])] for name in names]
+        widths = [max(map(len, column)) for column in cells]
+        rows = [
+            "  " + "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
+            for row in zip(*cells, strict=True)
+        ]
+        more = len(self[names[0]]) - MOST_ROWS if names else 0
+        return [*rows, f"  ... and {more} more"] if more > 0 else rows
 
     def to_xarray(self) -> Any:
         """An xarray.Dataset over the rows, units as attributes.

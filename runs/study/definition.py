@@ -38,6 +38,7 @@ from runs.store.directory import STUDY_FILE, RunDirectory
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 RANGE = re.compile(rf"({NUMBER}):({NUMBER}):(\d+)(?::(log))?")
+LIKE_RANGE = re.compile(rf"{NUMBER}:{NUMBER}|[^,'\"\[{{]*:[^,'\"\[{{]*:[^,'\"\[{{]*")
 MOST_VALUES = 100_000  # of one range
 DIGITS = 6
 LONGEST_NAME = 120  # of a folder
@@ -117,36 +118,30 @@ def read_vary(text: str) -> tuple[str, list[Any]]:
 
 def read_values(words: str, where: str) -> list[Any]:
     """The values that `words` mean: a range, or a list; `where` begins the sentence of BadInput."""
-    if match := RANGE.fullmatch(words):
-        first, last, count, log = match.groups()
-        return _spread(first, last, count, log, where)
-    without_count = re.fullmatch(rf"{NUMBER}:{NUMBER}", words)
-    if without_count or re.fullmatch(r"[^,'\"\[{]*:[^,'\"\[{]*:[^,'\"\[{]*", words):
-        raise BadInput(
-            f"{where} = {words}: a range is A:B:N or A:B:N:log, N a whole number, such as 1.2:3:7"
-        )
+    if LIKE_RANGE.fullmatch(words):
+        match = RANGE.fullmatch(words)
+        values = _spread(*match.groups()) if match else []
+        if not values:
+            raise BadInput(
+                f"{where} = {words}: a range is A:B:N or A:B:N:log, such as 1.2:3:7, with two "
+                f"different finite ends, above 0 for log, and N from 2 to {MOST_VALUES}"
+            )
+        return values
     try:
         return list(load_toml(f"values = [{words}]")["values"])
-    except TooMuch as error:
-        raise BadInput(f"{where} = {cut(words)}: no list of values: {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        if any(sign in words for sign in "[{\"'"):
-            raise BadInput(f"{where} = {words}: no list of TOML values: {error}") from error
+    except (TooMuch, tomllib.TOMLDecodeError) as error:
+        if isinstance(error, TooMuch) or any(sign in words for sign in "[{\"'"):
+            raise BadInput(f"{where} = {cut(words)}: not a list of values: {error}") from error
     return [parse_value(word) for word in words.split(",") if word.strip()]
 
 
-def _spread(first: str, last: str, count: str, log: str | None, where: str) -> list[Any]:
+def _spread(first: str, last: str, count: str, log: str | None) -> list[Any]:
+    """The values of a range; [] where it is none."""
     start, end = float(first), float(last)
     number = int(count) if len(count) < 10 else MOST_VALUES + 1
-    if not 2 <= number <= MOST_VALUES or start == end:
-        raise BadInput(
-            f"{where} = {first}:{last}:{count}: a range has two different ends and 2 to "
-            f"{MOST_VALUES} values"
-        )
-    if not (math.isfinite(start) and math.isfinite(end)):
-        raise BadInput(f"{where} = {first}:{last}:{count}: the ends have to be finite")
-    if log and (start <= 0.0 or end <= 0.0):
-        raise BadInput(f"{where} = {first}:{last}:{count}:log: both ends have to be above 0")
+    good = 2 <= number <= MOST_VALUES and start != end and math.isfinite(start - end)
+    if not good or (log and min(start, end) <= 0.0):
+        return []
     values = np.geomspace(start, end, number) if log else np.linspace(start, end, number)
     rounded = [float(f"{value:.{DIGITS}g}") for value in values]
     if len(set(rounded)) < number:  # closer than the digits tell
@@ -181,13 +176,10 @@ def make_product(vary: Mapping[str, Sequence[Any]]) -> list[Point]:
 
 def list_points(points: Iterable[Mapping[str, Any]]) -> list[Point]:
     """Points given one by one; BadInput where one lacks a key of the others, or two are equal."""
-    flat = []
-    for number, point in enumerate(points, start=1):
-        if not isinstance(point, Mapping):
-            raise BadInput(
-                f"points: number {number} is {point!r}; it has to be a table of keys with values"
-            )
-        flat.append(flatten(point))
+    given = list(points)
+    if wrong := [point for point in given if not isinstance(point, Mapping)]:
+        raise BadInput(f"points: {wrong[0]!r} has to be a table of keys with values")
+    flat = [flatten(point) for point in given]
     keys = list(dict.fromkeys(key for point in flat for key in point))
     for number, point in enumerate(flat, start=1):
         if missing := [key for key in keys if key not in point]:

@@ -79,7 +79,6 @@ LONG_NAMES = {
     "cautions": "where not to trust the run", "step": "steps made", "t": "time at the end",
     "seconds": "wall time of the steps",
 }  # fmt: skip
-MOST_ROWS = 30  # of the table on the screen
 
 
 class Study:
@@ -103,22 +102,12 @@ class Study:
         return "\n".join([f"study in {self.path}: {runs}", *self.make_rows()])
 
     def make_rows(self) -> list[str]:
-        """The table in words: what is varied and what is shown, MOST_ROWS of the rows."""
-        table, columns = self.table, list(self.definition.keys)
+        """The first rows of the table: what is varied and what is shown."""
+        columns = list(self.definition.keys)
         for name in self.shown:
             stem = name.removesuffix("_error")
-            columns += [c for c in (stem, f"{stem}_theory", f"{stem}_error", name) if c in table]
-        columns = list(dict.fromkeys(columns))
-        cells = [columns]
-        cells += [[_say(table[name][n]) for name in columns] for n in range(len(self.results))]
-        widths = [max(len(row[n]) for row in cells) for n in range(len(columns))]
-        rows = [
-            "  " + "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
-            for row in cells
-        ]
-        if (more := len(rows) - 1 - MOST_ROWS) > 0:
-            rows = [*rows[: MOST_ROWS + 1], f"  ... and {more} more in {self.path}/study.csv"]
-        return rows
+            columns += [stem, f"{stem}_theory", f"{stem}_error", name]
+        return self.table.make_rows([c for c in dict.fromkeys(columns) if c in self.table])
 
     @cached_property
     def table(self) -> Table:
@@ -213,8 +202,11 @@ class Study:
         Raises BadInput where the disk does not take them.
         """
         paths = [self.path / "study.csv", self.path / "study.h5"]
-        rows = zip(*self.table.values(), strict=True)
-        write_csv(paths[0], list(self.table), ([_say(v, repr, "") for v in row] for row in rows))
+        columns = [
+            ["" if v != v else repr(v) if isinstance(v, float) else str(v) for v in column.tolist()]
+            for column in self.table.values()
+        ]
+        write_csv(paths[0], list(self.table), zip(*columns, strict=True))
         write_atomically(paths[1], self._make_hdf5())
         if self.orders:
             paths.append(self.path / "orders.csv")
@@ -399,12 +391,6 @@ def write_csv(path: Path, heads: Sequence[str], rows: Iterable[Sequence[str]]) -
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([heads, *rows])
     write_atomically(path, text.getvalue())
-
-
-def _say(value: Any, write: Callable[[float], str] = "{:.6g}".format, none: str = "-") -> str:
-    if isinstance(value, np.floating):
-        return none if np.isnan(value) else write(float(value))
-    return str(value)
 
 
 def _say_state(result: Result | None) -> str:

@@ -8,6 +8,7 @@ first for the scale and the window, then for the frames.
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
@@ -62,6 +63,8 @@ def make_film(
 ) -> Path:
     """Write a film of a run and return its path; [DIR/film-FIELD.mp4, .gif without ffmpeg].
 
+    What is chosen besides stands in the name, too: film-p-mesh.mp4.
+
     field: of the dumps or derived, the density if not said; follow: the window goes with the
     interface, else it is `zoom` (x0,x1,y0,y1 [m]) or the domain, in a long one again what is about
     the interface.  fps: frames a second, one each dump.  Raises BadInput.
@@ -70,7 +73,10 @@ def make_film(
     view = View(parse_zoom(zoom), mirror, mesh)
     if follow and view.zoom:
         raise BadInput("--follow and --zoom: the window follows the interface or is fixed; use one")
-    path = choose_path(run, output, name := field or default_fields(run)[0])
+    name = field or default_fields(run)[0]
+    marks = ["follow"] * follow + ["mesh"] * mesh + [f"mirror-{mirror}"] * bool(mirror)
+    marks += [re.sub(r"[^\w.+-]+", "_", f"zoom-{zoom}")] * bool(zoom)
+    path = choose_path(run, output, "-".join(["film", name, *marks]))
     paths = [dump.path for dump in run.dumps]
     if len(paths) < 2:
         raise BadInput(f"{run.path} has {len(paths)} dump: a film needs two or more")
@@ -140,11 +146,11 @@ class Frames:
         axes.set(xlabel=self.labels[0], ylabel=self.labels[1])
 
 
-def choose_path(run: RunData, output: str | Path | None, field: str) -> Path:
+def choose_path(run: RunData, output: str | Path | None, stem: str) -> Path:
     """Where the film goes; BadInput where that cannot be, before anything is drawn."""
     has_ffmpeg = animation.writers.is_available("ffmpeg")
     ending = KINDS[0] if has_ffmpeg else KINDS[1]
-    path = Path(output) if output else run.path / f"film-{field}{ending}"
+    path = Path(output) if output else run.path / f"{stem}{ending}"
     if path.suffix.lower() not in KINDS:
         raise BadInput(f"{path}: a film's name has to end in .mp4 or .gif")
     if path.suffix.lower() == ".mp4" and not has_ffmpeg:

@@ -25,9 +25,10 @@ from regrid.barrier.coarse_nodes import end_stretch
 from regrid.barrier.functional import cell_rate, corner_slope, cost_slope, fade, weigh
 from regrid.barrier.line_cg import add_columns
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
-from regrid.barrier.step_control import NOTHING, SPAN, find_areas, round_up, take_edges
+from regrid.barrier.step_control import NOTHING, SPAN, UPRIGHT, round_up, take_edges, take_row
 from regrid.jit import inlined, kernel
 from regrid.measure.corners import mark_triangles
+from regrid.measure.quality import find_areas
 
 # Scratch: one row each.  The first ones hold node rows i and i + 1 of the old grid and of this one;
 # then what a chunk takes of the tables along j, inverse conditional lengths of edges (G) and their
@@ -46,7 +47,7 @@ from regrid.measure.corners import mark_triangles
 LOOK_ROWS = 70 * SPAN
 OLD_ROWS = OLD_X, OLD_Y, OLD_NEXT_X, OLD_NEXT_Y
 ROWS = HERE_X, HERE_Y, NEXT_X, NEXT_Y
-UPRIGHT = False, False  # a frame: is it transposed, is it mirrored?
+OLD_NEXT, NEXT = OLD_ROWS[2:], ROWS[2:]
 OWN = -NOTHING
 # What a look finds in a chunk of columns, and in the block: the most that a corner has shrunk, the
 # least scaled corner area, how far nodes are from interpolated places, the largest squared inverse
@@ -58,8 +59,9 @@ MOST_SHRUNK, LEAST_SCALED, STRAYED, COSECANT, ASPECT = range(5)
 def begin(law, motion, low, cells, Z):
     """Sums and extremes of nothing, and the tables along j, before the first row of cells."""
     nj = law.along_j.shape[1]
-    for k in range(LOOK_ROWS):
-        Z[k] = 0.0
+    for k in range(0, LOOK_ROWS, SPAN):
+        for col in range(round_up(cells + 2)):
+            Z[k + col] = 0.0
     for col in range(cells):
         Z[LEAST_AREA + col] = Z[OLD_AREA + col] = NOTHING
         Z[SHORT + col] = 1.0
@@ -80,22 +82,6 @@ def shift_rows(count, Z):
         Z[OLD_Y + col] = Z[OLD_NEXT_Y + col]
         Z[HERE_X + col] = Z[NEXT_X + col]
         Z[HERE_Y + col] = Z[NEXT_Y + col]
-
-
-@inlined
-def take_row(nodes, i, frame, low, count, to_x, to_y, Z):
-    """Row i of a grid in a `frame` into two rows of Z, `count` columns from `low` on."""
-    transposed, mirrored = frame
-    x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
-    if transposed:
-        for col in range(count):
-            Z[to_x + col] = x[low + col, i]
-            Z[to_y + col] = y[low + col, i]
-    else:
-        row_x, row_y = x[i, low : low + count], y[i, low : low + count]
-        for col in range(count):
-            Z[to_x + col] = row_x[col]
-            Z[to_y + col] = row_y[col]
 
 
 @inlined
@@ -131,7 +117,7 @@ def make_new_row(i, law, motion, low, count, nodes, Z):
     """Row i of the moved grid: inner columns into `nodes`, too, whose sides may be the motion's."""
     ni, nj, sides = nodes.shape[1] - 1, nodes.shape[2] - 1, motion.sides
     if i == 0 or i == ni:
-        take_row(sides, i, UPRIGHT, low, count, NEXT_X, NEXT_Y, Z)
+        take_row(sides, i, UPRIGHT, low, count, NEXT, Z)
         give_row(nodes, i, UPRIGHT, low, low, low + count, Z)
         return
     first, last = max(low, 1), min(low + count, nj)
@@ -189,7 +175,7 @@ def take_cell(col, numbers, Z):
     compared nor the weight, and has its area from `given`.
     """
     full, growth, least_sine, most, lam_c, flat, rate, given = numbers
-    ax, ay, ux, uy, bx, by, rx, ry = take_edges(ROWS, col, Z)
+    (ax, ay), (ux, uy), (bx, by), (rx, ry) = take_edges(ROWS, col, Z)
     ga, gu, gb, gr = Z[LINE_G + col], Z[LINE_G + col + 1], Z[NEAR_G + col], Z[FAR_G + col]
     a1, a2 = ax * by - ay * bx, ux * by - uy * bx
     a3, a4 = ux * ry - uy * rx, ax * ry - ay * rx
@@ -270,7 +256,7 @@ def fill_old_areas(cells, Z):
     """Doubled corner areas of a row of old cells."""
     for col in range(round_up(cells)):
         Z[OLD_1 + col], Z[OLD_2 + col], Z[OLD_3 + col], Z[OLD_4 + col] = find_areas(
-            OLD_ROWS, col, Z
+            *take_edges(OLD_ROWS, col, Z)
         )
 
 
@@ -317,7 +303,7 @@ def measure_old(cells, Z):
         a1, a3 = a1 if a1 < a2 else a2, a3 if a3 < a4 else a4
         a1, a2 = a1 if a1 < a3 else a3, Z[OLD_AREA + col]
         Z[OLD_AREA + col] = a1 if a1 < a2 else a2
-        ax, ay, _, _, bx, by, rx, ry = take_edges(OLD_ROWS, col, Z)
+        (ax, ay), _, (bx, by), (rx, ry) = take_edges(OLD_ROWS, col, Z)
         line, longest = ax * ax + ay * ay, Z[LONG_LINE + col]
         Z[LONG_LINE + col] = line if line > longest else longest
         side, far, longest = bx * bx + by * by, rx * rx + ry * ry, Z[LONG_SIDE + col]
@@ -333,7 +319,7 @@ def add_limiting_shares(scale, weight, cells, Z):
     """
     for col in range(cells):
         if Z[LIMITING + col] > 0.0:
-            ax, ay, ux, uy, bx, by, rx, ry = take_edges(ROWS, col, Z)
+            (ax, ay), (ux, uy), (bx, by), (rx, ry) = take_edges(ROWS, col, Z)
             ax, ay, bx, by = 0.5 * (ax + ux), 0.5 * (ay + uy), 0.5 * (bx + rx), 0.5 * (by + ry)
             rho = cell_rate(ax, ay, bx, by, Z[SOUND + col], scale)
             first, curve, dax, day, dbx, dby, twice, share, inverse = cost_slope(
@@ -424,7 +410,7 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
     begin(law, motion, low, cells, Z)
     for i in range(-1, ni):
         shift_rows(cells + 1, Z)
-        take_row(old, i + 1, frame, low, cells + 1, OLD_NEXT_X, OLD_NEXT_Y, Z)
+        take_row(old, i + 1, frame, low, cells + 1, OLD_NEXT, Z)
         make_new_row(i + 1, law, motion, low, cells + 1, nodes, Z)
         if frame[0] or frame[1]:
             give_row(into, i + 1, frame, low, low, low + cells + 1, Z)

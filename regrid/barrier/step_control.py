@@ -13,6 +13,7 @@ import numpy as np
 
 from regrid.jit import inlined, kernel
 from regrid.measure.corners import compute_doubled_area, find_triangle
+from regrid.measure.quality import find_areas
 
 SPAN = 136  # length of a row of scratch: a multiple of 8, not a power of two
 WIDEST = 128  # nodes of one chunk of columns; the halo is one node on either side
@@ -28,31 +29,37 @@ FRACTION, FAILS = range(2)  # rows of a shortening: part of the step kept, last 
 HALVINGS = 8  # after this many, a node that still offends stays where it was
 
 
+UPRIGHT = False, False  # a frame: is it transposed, is it mirrored?
+
+
+@inlined
+def take_row(nodes, i, frame, low, count, rows, Z):
+    """x and y of row i of a grid in a `frame` into two rows of Z, `count` columns from `low` on."""
+    (transposed, mirrored), (to_x, to_y) = frame, rows
+    x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
+    if transposed:
+        for col in range(count):
+            Z[to_x + col] = x[low + col, i]
+            Z[to_y + col] = y[low + col, i]
+    else:
+        row_x, row_y = x[i, low : low + count], y[i, low : low + count]
+        for col in range(count):
+            Z[to_x + col] = row_x[col]
+            Z[to_y + col] = row_y[col]
+
+
 @inlined
 def take_edges(rows, col, Z):
-    """Edges of a cell between two rows of nodes: x, y along i (near, far), then along j.
+    """Edges of a cell between two rows of nodes: along i (low, high), then along j (near, far).
 
     `rows`: where x and y of the first row lie in Z, and of the next one.
     """
     x0, y0, x1, y1 = rows
     return (
-        Z[x1 + col] - Z[x0 + col], Z[y1 + col] - Z[y0 + col],
-        Z[x1 + col + 1] - Z[x0 + col + 1], Z[y1 + col + 1] - Z[y0 + col + 1],
-        Z[x0 + col + 1] - Z[x0 + col], Z[y0 + col + 1] - Z[y0 + col],
-        Z[x1 + col + 1] - Z[x1 + col], Z[y1 + col + 1] - Z[y1 + col],
-    )  # fmt: skip
-
-
-@inlined
-def find_areas(rows, col, Z):
-    """Doubled corner areas of a cell between two rows of nodes, as in `take_edges`.
-
-    Corners are numbered as in theory R2: 1 (i,j), 2 (i,j+1), 3 (i+1,j+1), 4 (i+1,j).
-    """
-    low_x, low_y, up_x, up_y, left_x, left_y, right_x, right_y = take_edges(rows, col, Z)
-    return (
-        low_x * left_y - low_y * left_x, up_x * left_y - up_y * left_x,
-        up_x * right_y - up_y * right_x, low_x * right_y - low_y * right_x,
+        (Z[x1 + col] - Z[x0 + col], Z[y1 + col] - Z[y0 + col]),
+        (Z[x1 + col + 1] - Z[x0 + col + 1], Z[y1 + col + 1] - Z[y0 + col + 1]),
+        (Z[x0 + col + 1] - Z[x0 + col], Z[y0 + col + 1] - Z[y0 + col]),
+        (Z[x1 + col + 1] - Z[x1 + col], Z[y1 + col + 1] - Z[y1 + col]),
     )  # fmt: skip
 
 
@@ -75,18 +82,15 @@ def measure_corners(trial, old, first, last, Z):
         Z[LEAST_AREA + col] = NOTHING
         Z[NOT_A_NUMBER + col] = 0.0
     for i in range(ni):
-        for k in range(4):
-            row = slice(first, last + 1)
-            new, before = trial[k % 2, i + k // 2, row], old[k % 2, i + k // 2, row]
-            for col in range(cells + 1):
-                Z[NEW_ROWS[k] + col] = new[col]
-                Z[OLD_ROWS[k] + col] = before[col]
+        for grid, rows in ((trial, NEW_ROWS), (old, OLD_ROWS)):
+            take_row(grid, i, UPRIGHT, first, cells + 1, rows[:2], Z)
+            take_row(grid, i + 1, UPRIGHT, first, cells + 1, rows[2:], Z)
         for col in range(round_up(cells)):
             Z[AREA_1 + col], Z[AREA_2 + col], Z[AREA_3 + col], Z[AREA_4 + col] = find_areas(
-                NEW_ROWS, col, Z
+                *take_edges(NEW_ROWS, col, Z)
             )
             Z[OLD_1 + col], Z[OLD_2 + col], Z[OLD_3 + col], Z[OLD_4 + col] = find_areas(
-                OLD_ROWS, col, Z
+                *take_edges(OLD_ROWS, col, Z)
             )
         corner_low, corner_up = (AREA_1, AREA_2) if i == 0 else (AREA_4, AREA_3)
         if i == 0 or i == ni - 1:

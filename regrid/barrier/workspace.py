@@ -30,12 +30,11 @@ from regrid.barrier.residual_estimate import (
     LOOK_ROWS,
     MOST_SHRUNK,
     STRAYED,
-    UPRIGHT,
     look_serial,
     look_threaded,
 )
 from regrid.barrier.side_laws import BarrierLaw, prepare, weigh_curves
-from regrid.barrier.step_control import SPAN, WIDEST, measure_corners
+from regrid.barrier.step_control import SPAN, UPRIGHT, WIDEST, measure_corners
 from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
 from regrid.measure.corners import BLOCK_CORNERS

@@ -28,7 +28,7 @@ from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_C
 from regrid.barrier.step_control import NOTHING, SPAN, UPRIGHT, round_up, take_edges, take_row
 from regrid.jit import inlined, kernel
 from regrid.measure.corners import mark_triangles
-from regrid.measure.quality import find_areas
+from regrid.measure.quality import find_areas, square
 
 # Scratch: one row each.  The first ones hold node rows i and i + 1 of the old grid and of this one;
 # then what a chunk takes of the tables along j, inverse conditional lengths of edges (G) and their
@@ -37,14 +37,15 @@ from regrid.measure.quality import find_areas
     OLD_X, OLD_Y, OLD_NEXT_X, OLD_NEXT_Y, HERE_X, HERE_Y, NEXT_X, NEXT_Y,
     LAW, LAW_CHANGE, VALUE_X, VALUE_Y, CHANGE_X, CHANGE_Y, V, BLEND,
     SIDE_LENGTH, SIDE_LENGTH_CHANGE, SIDE_STEP, SIDE_STEP_CHANGE,
-    OLD_1, OLD_2, OLD_3, OLD_4, SOUND, BEND, TURN_X, TURN_Y,
+    OLD_1, OLD_2, OLD_3, OLD_4, SOUND,
+    BEND, TURN_X, TURN_Y, WAY_X, WAY_Y, CHANGED_X, CHANGED_Y,
     LINE_G, LINE_Q, NEAR_G, NEAR_Q, FAR_G, FAR_Q,
     LOW_X, LOW_Y, LOW_Q, UP_X, UP_Y, UP_Q, SIDE_X, SIDE_Y, SIDE_Q, RIGHT_X, RIGHT_Y, RIGHT_Q,
     FLUX_X, FLUX_Y, PIVOT, PART_X, PART_Y, PASSED, SUM,
     SHRUNK, LEAST_AREA, SHARPEST, LONG, SHORT, OLD_AREA, LONG_LINE, LONG_SIDE, LIMITING,
     WHOLE_X, WHOLE_Y, NEAR_SUM_I, NEAR_SUM_J, FAR_SUM_I, FAR_SUM_J, PAST_X, PAST_Y,
-) = range(0, 70 * SPAN, SPAN)  # fmt: skip
-LOOK_ROWS = 70 * SPAN
+) = range(0, 74 * SPAN, SPAN)  # fmt: skip
+LOOK_ROWS = 74 * SPAN
 OLD_ROWS = OLD_X, OLD_Y, OLD_NEXT_X, OLD_NEXT_Y
 ROWS = HERE_X, HERE_Y, NEXT_X, NEXT_Y
 OLD_NEXT, NEXT = OLD_ROWS[2:], ROWS[2:]
@@ -72,6 +73,10 @@ def begin(law, motion, low, cells, Z):
         Z[BLEND + col] = law.blend_j[low + col]
         for k in range(6):
             Z[LAW + k * SPAN + col] = motion.along_j[k, low + col]
+        if law.bent:
+            Z[WAY_X + col], Z[WAY_Y + col] = law.way[0, low + col], law.way[1, low + col]
+            Z[CHANGED_X + col] = motion.turn[0, low + col]
+            Z[CHANGED_Y + col] = motion.turn[1, low + col]
 
 
 @kernel(allocates=False)
@@ -85,19 +90,19 @@ def shift_rows(count, Z):
 
 
 @inlined
-def give_row(nodes, i, frame, low, first, last, Z):
-    """The next row's columns `first` to `last` - 1 into row i of a grid in a `frame`."""
+def give_row(nodes, i, frame, low, count, Z):
+    """The next row into row i of a grid in a `frame`, `count` columns from `low` on."""
     transposed, mirrored = frame
     x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
     if transposed:
-        for j in range(first, last):
-            x[j, i] = Z[NEXT_X + j - low]
-            y[j, i] = Z[NEXT_Y + j - low]
+        for col in range(count):
+            x[low + col, i] = Z[NEXT_X + col]
+            y[low + col, i] = Z[NEXT_Y + col]
     else:
-        row_x, row_y, start = x[i, first:last], y[i, first:last], first - low
-        for col in range(last - first):
-            row_x[col] = Z[NEXT_X + start + col]
-            row_y[col] = Z[NEXT_Y + start + col]
+        row_x, row_y = x[i, low : low + count], y[i, low : low + count]
+        for col in range(count):
+            row_x[col] = Z[NEXT_X + col]
+            row_y[col] = Z[NEXT_Y + col]
 
 
 @kernel(allocates=False)
@@ -112,25 +117,35 @@ def move_row(here, count, Z):
         Z[NEXT_Y + col] = Z[OLD_NEXT_Y + col] + y
 
 
+@kernel(allocates=False)
+def bend_row(bend, Z):
+    """The parts `bend` (count) by which lines' own laws depart there, into the moved row.
+
+    And what the edges that lead there depart by.
+    """
+    for col in range(bend.shape[0]):
+        turn, part = bend[col] - Z[BEND + col], bend[col]
+        Z[NEXT_X + col] += part * Z[CHANGED_X + col]
+        Z[NEXT_Y + col] += part * Z[CHANGED_Y + col]
+        Z[TURN_X + col] = turn * Z[WAY_X + col]
+        Z[TURN_Y + col] = turn * Z[WAY_Y + col]
+        Z[BEND + col] = part
+
+
 @inlined
 def make_new_row(i, law, motion, low, count, nodes, Z):
-    """Row i of the moved grid: inner columns into `nodes`, too, whose sides may be the motion's."""
+    """Row i of the moved grid, into `nodes`, too, whose sides may be those of the motion."""
     ni, nj, sides = nodes.shape[1] - 1, nodes.shape[2] - 1, motion.sides
     if i == 0 or i == ni:
         take_row(sides, i, UPRIGHT, low, count, NEXT, Z)
-        give_row(nodes, i, UPRIGHT, low, low, low + count, Z)
-        return
-    first, last = max(low, 1), min(low + count, nj)
-    move_row(take_blend(i, motion.along_i, motion.corners), count, Z)
+    else:
+        move_row(take_blend(i, motion.along_i, motion.corners), count, Z)
     if law.bent:
-        for j in range(first, last):
-            Z[NEXT_X + j - low] += law.bend[i, j] * motion.turn[0, j]
-            Z[NEXT_Y + j - low] += law.bend[i, j] * motion.turn[1, j]
-    give_row(nodes, i, UPRIGHT, low, first, last, Z)
+        bend_row(law.bend[i, low : low + count], Z)
     for j in (0, nj):
         if low <= j < low + count:
-            Z[NEXT_X + j - low] = nodes[0, i, j] = sides[0, i, j]
-            Z[NEXT_Y + j - low] = nodes[1, i, j] = sides[1, i, j]
+            Z[NEXT_X + j - low], Z[NEXT_Y + j - low] = sides[0, i, j], sides[1, i, j]
+    give_row(nodes, i, UPRIGHT, low, count, Z)
 
 
 @kernel(allocates=False)
@@ -153,18 +168,6 @@ def take_laws(line, side, count, Z):
         inverse = 1.0 / (s * t)
         Z[FAR_G + col] = t * inverse
         Z[FAR_Q + col] = kj * (s * inverse)
-
-
-@inlined
-def take_turn(law, i, low, count, Z):
-    """What lines that keep laws of their own depart by along the edges that lead to row i."""
-    row, way_x, way_y = law.bend[i, low:], law.way[0, low:], law.way[1, low:]
-    for col in range(count):
-        turn = row[col] - Z[BEND + col]
-        Z[TURN_X + col] = turn * way_x[col]
-        Z[TURN_Y + col] = turn * way_y[col]
-    for col in range(count):
-        Z[BEND + col] = row[col]
 
 
 @inlined
@@ -267,9 +270,10 @@ def take_cells(i, law, shape, low, cells, Z):
     Whole vectors of columns, as in `add_row`: what lies behind the last cell stays by itself.
     """
     ni, nj = shape
-    fill_old_areas(cells, Z)
     if law.bent:
         measure_old(cells, Z)
+    else:
+        fill_old_areas(cells, Z)
     if i == 0 or i == ni - 1:
         if low == 0:
             Z[OLD_1 if i == 0 else OLD_4] = OWN
@@ -296,18 +300,19 @@ def take_cells(i, law, shape, low, cells, Z):
 
 @kernel(allocates=False)
 def measure_old(cells, Z):
-    """Least old corner area and longest old edges by columns, squared, for the way nodes stray."""
-    for col in range(cells):
-        a1, a2 = Z[OLD_1 + col], Z[OLD_2 + col]
-        a3, a4 = Z[OLD_3 + col], Z[OLD_4 + col]
+    """`fill_old_areas`, and for the way nodes stray the least area and the longest edges, squared,
+    by columns."""
+    for col in range(round_up(cells)):
+        low, high, near, far = take_edges(OLD_ROWS, col, Z)
+        a1, a2, a3, a4 = find_areas(low, high, near, far)
+        Z[OLD_1 + col], Z[OLD_2 + col], Z[OLD_3 + col], Z[OLD_4 + col] = a1, a2, a3, a4
         a1, a3 = a1 if a1 < a2 else a2, a3 if a3 < a4 else a4
         a1, a2 = a1 if a1 < a3 else a3, Z[OLD_AREA + col]
         Z[OLD_AREA + col] = a1 if a1 < a2 else a2
-        (ax, ay), _, (bx, by), (rx, ry) = take_edges(OLD_ROWS, col, Z)
-        line, longest = ax * ax + ay * ay, Z[LONG_LINE + col]
+        line, longest = square(low), Z[LONG_LINE + col]
         Z[LONG_LINE + col] = line if line > longest else longest
-        side, far, longest = bx * bx + by * by, rx * rx + ry * ry, Z[LONG_SIDE + col]
-        side = side if side > far else far
+        side, other, longest = square(near), square(far), Z[LONG_SIDE + col]
+        side = side if side > other else other
         Z[LONG_SIDE + col] = side if side > longest else longest
 
 
@@ -413,14 +418,12 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
         take_row(old, i + 1, frame, low, cells + 1, OLD_NEXT, Z)
         make_new_row(i + 1, law, motion, low, cells + 1, nodes, Z)
         if frame[0] or frame[1]:
-            give_row(into, i + 1, frame, low, low, low + cells + 1, Z)
+            give_row(into, i + 1, frame, low, cells + 1, Z)
         row = law.along_i[:, max(i, 0)]
         line = row[LENGTH], row[LENGTH_CHANGE], row[STEP], row[STEP_CHANGE], law.ki
         take_laws(line, (law.blend_i[i + 1], (i + 1) / ni, law.kj), cells + 1, Z)
         if i < 0:
             continue
-        if law.bent:
-            take_turn(law, i + 1, low, cells + 1, Z)
         if law.curved:
             take_curve(law.curve, i + 1, low, cells + 1, TURN_X, TURN_Y, Z)
         take_cells(i, law, (ni, nj), low, cells, Z)

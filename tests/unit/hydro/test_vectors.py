@@ -66,6 +66,7 @@ PHASES = {  # how a phase is made, its arguments after the scratch and the numbe
 NUMBERS = (1.0,) * 8
 LOOKS = {  # loops over a row of cells of the regridder's check: their arguments before the scratch
     "moved row": (look.move_row, ((0.5, 0.1, *(((0.1, 0.1),) * 4), 0.1, 0.1), 16)),
+    "old measures": (look.measure_old, (16,)),
     "laws of edges": (look.take_laws, (NUMBERS[:5], NUMBERS[:3], 16)),
     "old areas": (look.fill_old_areas, (16,)),
     "cells": (look.take_row_of_cells, (NUMBERS, 16)),

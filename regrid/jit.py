@@ -145,6 +145,7 @@ class KernelCache:
         prepare_compiler()
 
     def save_overload(self, types, result) -> None:
+        _compiling.compiled += 1
         keep(self._find(types, result.target_context), serialize.dumps(result._reduce()))
 
 
@@ -260,7 +261,7 @@ def interpreted():
 
 
 # wall seconds of compiling and loading until now; when the present one began, 0 where there is none
-_compiling = SimpleNamespace(lock=threading.Lock(), seconds=0.0, begun=0.0)
+_compiling = SimpleNamespace(lock=threading.Lock(), seconds=0.0, begun=0.0, ready=0, compiled=0)
 
 
 def _compile_or_interpret(compiled: Dispatcher, *arguments):
@@ -272,8 +273,16 @@ def _compile_or_interpret(compiled: Dispatcher, *arguments):
         try:
             return type(compiled)._compile_for_args(compiled, *arguments)
         finally:
+            _compiling.ready += 1
             _compiling.seconds += time.perf_counter() - _compiling.begun
             _compiling.begun = 0.0
+
+
+def count_compiling() -> tuple[int, int, float]:
+    """Kernels that Python has called until now; how many kernels had to be compiled for them; wall
+    seconds [s] of compiling and loading them."""
+    now = time.perf_counter() - _compiling.begun if _compiling.begun else 0.0
+    return _compiling.ready, _compiling.compiled, _compiling.seconds + now
 
 
 def read_clock() -> float:

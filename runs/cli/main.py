@@ -9,7 +9,6 @@ itself (`--debug` shows where).
 
 from __future__ import annotations
 
-import contextlib
 import os
 import sys
 
@@ -112,11 +111,11 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
         raise BadInput(
             f"--ranks needs --dry-run; start a run with mpiexec -n {ranks} shockgrid ..."
         )
-    from runs.march.compiling import second_compiler
+    from runs.march.compiling import compiling
     from runs.march.launching import start_runner
 
     world = _find_world()
-    with second_compiler() if world is None else contextlib.nullcontext():
+    with compiling(quiet, helped=world is None):
         runner = start_runner(checked, output, force, quiet, _say, world)
         runner.limit, runner.world = limit, world
         end = runner.start()

@@ -38,8 +38,8 @@ from runs.interface.settings import (
     make_table,
     said_in_python,
 )
+from runs.march.compiling import compiling
 from runs.march.launching import check_requests
-from runs.march.progress import patience
 from runs.march.runner import Runner
 from runs.ranks.started import check_single
 from runs.store.directory import create_directory
@@ -229,7 +229,7 @@ class Case(Drawn):
                 f"{self.name} has made {self.step} steps already, and max_steps = {most}: nothing "
                 "is left to do; give a larger one, or make a new simulation"
             )
-        with patience(quiet):
+        with compiling(quiet):
             check_memory(self.problem)
             check_requests(read, self.simulation)
             self.measure()

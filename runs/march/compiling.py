@@ -1,4 +1,4 @@
-"""Compiling a run's kernels in two processes, those of the regridder in the second one.
+"""Compiling a run's kernels: a second process helps, a person sees how far it is.
 
 numba compiles one kernel at a time and keeps it on the disk.  A run first needs the kernels of its
 start and its flow.  Meanwhile a second process marches a small grid, and when the run comes to its
@@ -14,41 +14,78 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from typing import Any
 
-from problems.grid_march import GridMarch, GridMarchDeck
-from runs.march.progress import watch_compiler
+from regrid.jit import count_compiling
 
-LOOK_EVERY = 0.1  # wall seconds until the run is looked at again: how much does it compile?
-MANY = 10  # beginnings and ends of compilations from which on a second process is worth its start
+LOOK_EVERY = 0.2  # wall seconds until the run is looked at again: how much does it compile?
+MANY = 5  # compiled kernels from which on a second process is worth its start
+PATIENCE = 3.0  # wall seconds of compiling before a person is told what takes so long
+USUAL = 30  # kernels that most runs call
 STEPS = 3  # of the small grid: those that need no solve, and those that do
+WORDS = "compiling kernels, once on this machine"
+BAR = "{desc}: {n_fmt} of about {total_fmt}|{bar:12}| {elapsed}"
+
+_watched = threading.Lock()  # held by the block that watches
+_told = False  # has this command said it?
 
 
 @contextlib.contextmanager
-def second_compiler() -> Iterator[None]:
-    """In the block a second process compiles, too, once this one has compiled some kernels."""
+def compiling(quiet: bool, stream: Any = None, helped: bool = True) -> Iterator[None]:
+    """In the block, or in the one around it, compiling is told to a person and `helped`.
+
+    In a terminal it is a bar, elsewhere a line, once a command.  Kernels that come from the disk,
+    which takes a second or so, are not spoken of.
+    """
+    if not _watched.acquire(blocking=False):
+        yield
+        return
+    helped = helped and (os.cpu_count() or 1) > 1 and os.environ.get("SHOCKGRID_COMPILERS") != "1"
     done = threading.Event()
-    with watch_compiler() as compiled:
+    words = done, stream or sys.stderr, quiet, helped
+    watcher = threading.Thread(target=_watch, args=words, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        done.set()
+        watcher.join()
+        _watched.release()
 
-        def compile_beside() -> None:
-            while len(compiled) < MANY:
-                if done.wait(LOOK_EVERY):
-                    return
-            program = [sys.executable, "-m", "runs.march.compiling"]
-            quiet = subprocess.DEVNULL
-            with subprocess.Popen(program, stdin=quiet, stdout=quiet, stderr=quiet) as process:
-                done.wait()
-                process.terminate()
 
-        if (os.cpu_count() or 1) > 1 and os.environ.get("SHOCKGRID_COMPILERS") != "1":
-            threading.Thread(target=compile_beside, daemon=True).start()
-        try:
-            yield
-        finally:
-            done.set()
+def _watch(done: threading.Event, stream: Any, quiet: bool, helped: bool) -> None:
+    global _told
+    (_, before, since), bar = count_compiling(), None
+    with contextlib.ExitStack() as started:
+        while not done.wait(LOOK_EVERY):
+            ready, compiled, seconds = count_compiling()
+            if helped and compiled - before >= MANY:
+                helped = False
+                program = [sys.executable, "-m", "runs.march.compiling"]
+                none = subprocess.DEVNULL
+                process = subprocess.Popen(program, stdin=none, stdout=none, stderr=none)
+                started.enter_context(process)
+                started.callback(process.terminate)
+            if quiet or compiled == before or seconds - since < PATIENCE:
+                continue
+            if bar is not None:
+                bar.total = max(bar.total, ready)
+                bar.n = ready
+                bar.refresh()
+            elif stream.isatty():
+                from tqdm import tqdm
+
+                bar = tqdm(total=USUAL, desc=WORDS, bar_format=BAR, file=stream, leave=False)
+                started.callback(bar.close)
+            elif not _told:
+                _told = True
+                print(f"{WORDS}: a minute, several on a busy one ...", file=stream, flush=True)
 
 
 def compile_grid_kernels() -> None:
     """Call the kernels of the default regridder: some steps of a small grid."""
+    from problems.grid_march import GridMarch, GridMarchDeck
+
     evolution = GridMarch(GridMarchDeck(domain="three_fingers", ni=24, nj=16)).build()
     for _ in range(STEPS):
         evolution.advance()

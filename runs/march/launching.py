@@ -19,7 +19,7 @@ from runs.deck.reading import ReadDeck, parse_value
 from runs.forecast.cost import check_disk, describe_cost, estimate_cost
 from runs.gauges import make_gauges
 from runs.inspection.account import describe_cautions
-from runs.march.progress import patience
+from runs.march.compiling import compiling
 from runs.march.restart import settle_deck
 from runs.march.runner import Runner, check_output, check_times, find_restart_point, restore
 from runs.ranks.map import check_cut
@@ -44,7 +44,7 @@ def check_deck_fully(read: ReadDeck, problem: Problem) -> None:
     cells is not built: its gauges, fields and columns are left to the run.
     """
     output = read.deck.output
-    with read.numbers_in_reach(), patience(quiet=False):
+    with read.numbers_in_reach(), compiling(quiet=False):
         check_regridder(problem)
         find_columns(output.columns)
         with interpreted():
@@ -91,7 +91,7 @@ def start_runner(
     world: the ranks of MPI that are to share it.
     """
     problem = deck.make_problem()
-    with patience(quiet), deck.numbers_in_reach():
+    with compiling(quiet), deck.numbers_in_reach():
         check_memory(problem)
         cautions = describe_cautions(problem)
         check_regridder(problem)
@@ -134,7 +134,7 @@ def continue_runner(
     """
     deck = read_restart_deck(directory, settings, at, say)
     problem = deck.make_problem()
-    with patience(quiet), deck.numbers_in_reach():
+    with compiling(quiet), deck.numbers_in_reach():
         if world is not None:
             world.build(deck)
         evolution = problem.build()
@@ -231,7 +231,7 @@ def remap_runner(
     state, step, _ = find_restart_point(old, at, say)
     restore(source, state, old, step)
     before_rows = _read_history(old, step)
-    with patience(quiet):
+    with compiling(quiet):
         blocks = take_over(source, target)
     gauges.set_state(state, other_cells=True)
     directory = create_directory(output, deck.label, force)
@@ -303,7 +303,7 @@ def _is_flow(evolution: object) -> bool:
 def _build(deck: ReadDeck, quiet: bool) -> Evolution:
     """The first state of a deck's problem."""
     problem = deck.make_problem()
-    with patience(quiet), deck.numbers_in_reach():
+    with compiling(quiet), deck.numbers_in_reach():
         check_memory(problem)
         return problem.build()
 

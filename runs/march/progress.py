@@ -5,8 +5,6 @@ from __future__ import annotations
 import contextlib
 import math
 import sys
-import threading
-import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -47,56 +45,10 @@ from runs.store.directory import RunDirectory
 from runs.store.guards import write_verdict
 from runs.store.history import read_history
 
-PATIENCE = 3.0  # wall seconds before a person is told what takes so long
-REMINDER = 60.0  # wall seconds until the person is told again
 LINE_EVERY = 15.0  # wall seconds between lines when there is no terminal
 FIRST_WORD = 3.0  # wall seconds after the first step until the whole run is foretold
 WORTH_A_WORD = 30.0  # wall seconds of a run that is foretold in a line of its own
 BAR = "{desc} {percentage:3.0f}%|{bar:12}| {elapsed}{postfix}"
-
-
-_told: list[float] = []  # when this command has said that kernels are compiled [s]
-
-
-@contextlib.contextmanager
-def patience(quiet: bool, stream=None):
-    """Say that kernels are being compiled in the block: once a command, later that they still are.
-
-    Kernels that come from the disk, which takes a second or so, are not spoken of.
-    """
-    if quiet:
-        yield
-        return
-    stream, done = stream or sys.stderr, threading.Event()
-    with watch_compiler() as compiled:
-
-        def say():
-            words = "compiling kernels, once on this machine: a minute, several on a busy one ..."
-            while not done.wait(PATIENCE):
-                now = time.monotonic()
-                if compiled and (not _told or now > _told[-1] + REMINDER):
-                    if _told:
-                        words = f"still compiling kernels ({now - _told[0] + PATIENCE:.0f} s) ..."
-                    _told.append(now)
-                    print(words, file=stream, flush=True)
-
-        threading.Thread(target=say, daemon=True).start()
-        try:
-            yield
-        finally:
-            done.set()
-
-
-@contextlib.contextmanager
-def watch_compiler():
-    """A list that is not empty once numba has begun to compile something in the block."""
-    if "numba" not in sys.modules:
-        yield []
-        return
-    from numba.core.event import install_recorder
-
-    with install_recorder("numba:compile") as recorder:
-        yield recorder.buffer
 
 
 class Progress:

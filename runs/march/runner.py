@@ -32,7 +32,8 @@ from runs.deck.reading import ReadDeck
 from runs.early_end.causes import ENDS
 from runs.gauges import Gauges, make_gauges
 from runs.inspection.account import count, describe_time
-from runs.march.progress import Outlook, Progress, closing_screen, patience
+from runs.march.compiling import compiling
+from runs.march.progress import Outlook, Progress, closing_screen
 from runs.march.restart import find_restart_point, is_light, restore
 from runs.ranks.map import check_cut
 from runs.ranks.world import World, describe_ranks, loss_told, write_on_ranks
@@ -325,7 +326,7 @@ class Runner:
         self.progress.left.course = self.outlook.find_course()
         try:
             lost = loss_told(self.world is not None, lambda: self._signal, self._way_on)
-            with self._signals_caught(), lost, self.writing:
+            with self._signals_caught(), lost, self.writing, compiling(self.quiet):
                 reason = self._march()
             missed = get_missed(self.evolution)
             reason, code = (f"{reason}, {missed}", 3) if missed else (reason, 0)
@@ -413,8 +414,7 @@ class Runner:
                 self._write_restart_point()
                 raise OutOfTime(str(self.limit))
             t_before, clock = evolution.t, read_clock()
-            with patience(self.quiet) if self.progress.steps == 0 else contextlib.nullcontext():
-                row = evolution.advance()
+            row = evolution.advance()
             seconds = read_clock() - clock
             self._record(row, seconds)
             self.writing.look()

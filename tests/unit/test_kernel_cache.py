@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import subprocess
 import sys
@@ -167,28 +168,55 @@ def test_the_clock_of_steps_stands_while_a_kernel_is_compiled():
     assert read_clock() - began >= 0.009
 
 
-@pytest.mark.parametrize(("compilers", "started"), [("", 1), ("1", 0)])
-def test_a_second_process_compiles_unless_only_one_may(monkeypatch, compilers, started):
-    threads, programs = [], []
+COUNTS = [(0, 0, 0.0), (4, 9, 1.0), (9, 20, 4.0), (30, 60, 40.0)]  # ready, compiled, seconds
 
-    def make_thread(target, **options):
-        return SimpleNamespace(start=lambda: threads.append(target))
+
+def watch(monkeypatch, counts, terminal=False, helped=True) -> tuple[str, list]:
+    """What is said where the kernels are counted so, and the programs that are started."""
+    programs, stream, numbers = [], io.StringIO(), iter(counts)
+    looks = iter([*[False] * (len(counts) - 1), True])
 
     def start_process(program, **options):
         programs.append(program)
-        return contextlib.nullcontext(SimpleNamespace(terminate=lambda: None))
+        process = contextlib.ExitStack()
+        process.terminate = lambda: None
+        return process
 
+    monkeypatch.setattr(compiling, "_told", False)
+    monkeypatch.setattr(compiling, "count_compiling", lambda: next(numbers))
+    monkeypatch.setattr(compiling.subprocess, "Popen", start_process)
+    monkeypatch.setattr(stream, "isatty", lambda: terminal, raising=False)
+    done = SimpleNamespace(wait=lambda seconds: next(looks))
+    compiling._watch(done, stream, False, helped)
+    return stream.getvalue(), programs
+
+
+def test_a_second_process_compiles_where_much_is_compiled(monkeypatch):
+    program = [sys.executable, "-m", "runs.march.compiling"]
+    assert watch(monkeypatch, COUNTS)[1] == [program]
+    assert watch(monkeypatch, COUNTS, helped=False)[1] == []
+    loaded = [(0, 0, 0.0), (30, 0, 4.0), (40, 2, 6.0)]
+    assert watch(monkeypatch, loaded)[1] == []
+
+
+def test_compiling_is_said_once_and_counted_in_a_terminal(monkeypatch):
+    assert watch(monkeypatch, COUNTS)[0].count("compiling kernels, once on this machine") == 1
+    bar = watch(monkeypatch, COUNTS, terminal=True)[0]
+    assert "compiling kernels, once on this machine: 30 of about 30|" in bar
+    assert watch(monkeypatch, [(0, 0, 0.0), (9, 0, 9.0)])[0] == ""  # from the disk
+
+
+@pytest.mark.parametrize(("compilers", "helped"), [("", True), ("1", False)])
+def test_one_process_compiles_where_only_one_may(monkeypatch, compilers, helped):
+    told = []
     monkeypatch.setenv("SHOCKGRID_COMPILERS", compilers)
-    monkeypatch.setattr(compiling, "MANY", 0)
     monkeypatch.setattr(compiling.os, "cpu_count", lambda: 2)
-    with monkeypatch.context() as patched:
-        patched.setattr(compiling.threading, "Thread", make_thread)
-        patched.setattr(compiling.subprocess, "Popen", start_process)
-        with compiling.second_compiler():
-            pass
-        for target in threads:
-            target()
-    assert programs == started * [[sys.executable, "-m", "runs.march.compiling"]]
+    monkeypatch.setattr(
+        compiling, "_watch", lambda done, stream, quiet, helped: told.append(helped)
+    )
+    with compiling.compiling(quiet=True), compiling.compiling(quiet=True):
+        pass
+    assert told == [helped]
 
 
 def test_code_that_uses_numpy_is_loaded_without_numba_np_and_scipy(tmp_path):

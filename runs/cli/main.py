@@ -195,26 +195,19 @@ def study(deck, **words) -> int:
 @cli.command()
 @click.argument("deck", metavar="PROBLEM_OR_DECK")
 @setting
-@click.option("--schema", is_flag=True, help="Print the JSON schema instead, for editors.")
-def check(deck, settings, schema) -> None:
+def check(deck, settings) -> None:
     """Check a deck and print it with every key resolved.
 
     Keys without a value follow as comments, with their meaning.  Cautions about
     the results go to standard error.
     """
-    from runs.deck import reading as deck_reading
-
-    checked = deck_reading.read_deck(deck, settings)
-    if schema:
-        from runs.deck.checking import schema_text
-
-        echo(schema_text(checked.problem), nl=False)
-        return
     from regrid.jit import interpreted
+    from runs.deck import reading as deck_reading
     from runs.deck.checking import describe_unset
     from runs.inspection.account import describe_cautions
     from runs.march.launching import check_deck_fully
 
+    checked = deck_reading.read_deck(deck, settings)
     with interpreted():
         problem = checked.make_problem()
     check_deck_fully(checked, problem)

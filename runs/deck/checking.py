@@ -390,38 +390,28 @@ HEAD = "# keys without a value, and what that means or what they could be:"
 
 def describe_unset(deck: Deck) -> str:
     """Comment lines on the keys of a deck without a value; "" where all have one."""
-    schema = make_parts(type(deck))
-    entries = list(_find_unset(schema, schema, msgspec.to_builtins(deck), ""))
-    lines = [HEAD] if entries else []
-    for key, words in entries:
+    lines = []
+    for key, words in _find_unset(deck, ""):
         lines += textwrap.wrap(
             f"{key}: {words}", WIDTH, initial_indent="# ", subsequent_indent="#     "
         )
-    return "".join(f"{line}\n" for line in (["", *lines] if lines else []))
+    return "".join(f"{line}\n" for line in (["", HEAD, *lines] if lines else []))
 
 
-def _find_unset(
-    schema: Mapping[str, Any], part: Mapping[str, Any], value: Any, prefix: str
-) -> Iterator[tuple[str, str]]:
+def _find_unset(table: Any, prefix: str) -> Iterator[tuple[str, str]]:
     """Dotted keys of a table with their words; the keys of a table that is left out after it."""
-    part = resolve(schema, part)
-    if isinstance(value, list | tuple) and isinstance(part.get("items"), dict):
-        for k, entry in enumerate(value):
-            yield from _find_unset(schema, part["items"], entry, f"{prefix}{k}.")
-        return
-    if not isinstance(value, dict):
-        return
-    kinds = [resolve(schema, one) for one in part.get("anyOf", ())]  # of several kinds of tables
-    part = next((one for one in kinds if value.keys() <= one.get("properties", {}).keys()), part)
-    for name, field in part.get("properties", {}).items():
-        key, inner = prefix + name, resolve(schema, field)
-        if value.get(name) is not None:
-            yield from _find_unset(schema, field, value[name], f"{key}.")
+    for field in msgspec.structs.fields(table) if isinstance(table, DeckTable) else ():
+        key, value = prefix + field.name, getattr(table, field.name)
+        if value is not None:
+            entries = value if isinstance(value, list | tuple) else ()
+            yield from _find_unset(value, f"{key}.")
+            for k, entry in enumerate(entries):
+                yield from _find_unset(entry, f"{key}.{k}.")
             continue
-        words = field.get("description", inner.get("description", "")).strip().partition("\n")[0]
-        table = "properties" in inner
-        yield key, f"{words.rstrip('.')} ({'a table' if table else describe(schema, field)})"
-        if table:
-            for name_inside, field_inside in inner["properties"].items():
-                told = field_inside.get("description", "")
-                yield f"{key}.{name_inside}", f"{told} ({describe(schema, field_inside)})"
+        part = make_parts(field.type)
+        inner = resolve(part, part)
+        words = part.get("description", inner.get("description", "")).strip().partition("\n")[0]
+        is_table = "properties" in inner
+        yield key, f"{words.rstrip('.')} ({'a table' if is_table else describe(part, part)})"
+        for name, inside in inner["properties"].items() if is_table else ():
+            yield f"{key}.{name}", f"{inside.get('description', '')} ({describe(part, inside)})"

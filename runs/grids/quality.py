@@ -124,21 +124,20 @@ def describe(judgement: Judgement) -> list[str]:
             lines.append(f"{judgement.forced} of these because of the sides' own nodes")
     if judgement.left_handed:
         lines.append("the indices turn the other way than x, y: judged as mirrored")
-    sine = f"least corner sine     {judgement.least_sine:10.4f}   "
-    sine += _say_where(fields["scaled_jacobian"], np.nanargmin)
-    if plane:
-        best, side, node = find_best_sine(judgement.nodes)
-        sine += f"; the sides allow {best:.4f} at most ({side}, node {node})"
-    lines.append(sine)
-    lines.append(
-        f"worst aspect ratio    {judgement.worst_aspect:10.3f}   "
-        + _say_where(fields["aspect_ratio"], np.nanargmax)
-    )
-    if plane:
-        lines.append(
-            f"worst skew            {np.nanmax(fields['skew']):10.4f}   "
-            + _say_where(fields["skew"], np.nanargmax)
-        )
+    for name, label, digits, find in (
+        ("scaled_jacobian", "least corner sine", 4, np.nanargmin),
+        ("aspect_ratio", "worst aspect ratio", 3, np.nanargmax),
+        ("skew", "worst skew", 4, np.nanargmax),
+    ):
+        if name not in fields:
+            continue
+        cell = np.unravel_index(int(find(fields[name])), fields[name].shape)
+        where = ", ".join(str(int(k)) for k in cell)
+        line = f"{label:22s}{fields[name][cell]:10.{digits}f}   in cell ({where})"
+        if plane and name == "scaled_jacobian":
+            best, side, node = find_best_sine(judgement.nodes)
+            line += f"; the sides allow {best:.4f} at most ({side}, node {node})"
+        lines.append(line)
     size = fields["size"]
     lines.append(
         f"{'area' if plane else 'volume'} of the cells     {size.min():.4g} to {size.max():.4g}, "
@@ -171,11 +170,6 @@ def _draw_bars(values: np.ndarray, edges) -> list[str]:
     ]
     filled = np.flatnonzero(counts)
     return rows[filled[0] : filled[-1] + 1] if filled.size else ["  none"]
-
-
-def _say_where(values: np.ndarray, find) -> str:
-    cell = np.unravel_index(int(find(values)), values.shape)
-    return "in cell (" + ", ".join(str(int(k)) for k in cell) + ")"
 
 
 FORMAT, FORMAT_VERSION = "shockgrid grid", 1

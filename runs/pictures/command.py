@@ -28,7 +28,7 @@ from runs.pictures.curves import (
     take_lineouts,
     write_csv,
 )
-from runs.pictures.fields import View, check_nodes, draw_fields, time_titles
+from runs.pictures.fields import View, draw_fields, time_titles
 from runs.pictures.history import draw_gauges, draw_history
 from runs.store.files import check_not_of_a_run, check_replaceable, disk_errors
 from runs.store.provenance import describe_software, hash_deck
@@ -83,7 +83,7 @@ def make_metadata(ending: str, deck_text: str | None) -> dict[str, Any]:
     return words
 
 
-OWN = ("fields", "mesh", "interface", "history", "gauges", "line")
+OPTIONS = ("at", "mesh", "zoom", "mirror", "line", "limits", "colours")  # that name a picture
 HEEDED = {  # of the options that choose what is shown, by picture; a problem's own heeds none
     "fields": ("FIELDS", "--at", "--mesh", "--zoom", "--mirror", "--limits", "--colours"),
     "mesh": ("--at", "--zoom", "--mirror"),
@@ -154,44 +154,38 @@ def fill_figure(
 
     Returns the stem of a name for it, and what writes the table of a line's values, if it is one.
     """
-    fields, what, at, mesh, zoom, mirror, beside, line, limits, colours = wanted
-    view = View(
-        parse_zoom(zoom),
-        mirror,
-        mesh,
-        limits and parse_numbers("--limits", limits, "low,high with low < high", rising=1),
-        check_colours(colours),
+    at, beside, line = wanted.at, wanted.beside, wanted.line
+    limits = wanted.limits and parse_numbers(
+        "--limits", wanted.limits, "low,high with low < high", 1
     )
-    names = [name for entry in fields for name in entry.split(",") if name]
-    what = what or ("line" if line else "fields")
-    stem, write_table = what, None
+    colours = check_colours(wanted.colours)
+    view = View(parse_zoom(wanted.zoom), wanted.mirror, wanted.mesh, limits or None, colours)
+    names = [name for entry in wanted.fields for name in entry.split(",") if name]
+    given = {"FIELDS": names, **{f"--{name}": getattr(wanted, name) for name in OPTIONS}}
+    what = wanted.what or ("line" if line else "fields")
+    shown, write_table = [what], None
     if beside and what not in BESIDE:
         raise BadInput(f"--beside {beside}: for {' and '.join(BESIDE)}, not for {what!r}")
     runs = [run, RunData(beside)] if beside else [run]
-    if what == "fields":
+    if what in BESIDE:
         names = names or default_fields(run)
+        shown += names
+    if what == "fields":
         dumps = choose_pairs(runs, at, say) if beside else choose_dumps(run, at, say=say)
         draw_fields(figure, dumps, names, view, name_runs(runs, dumps) if beside else ())
-        stem = "-".join(["fields", *names])
     elif what == "line":
         if not line:
             raise BadInput("--what line: --line X0,Y0,X1,Y1 says which line [m]")
-        names = names or default_fields(run)
-        dumps = choose_pairs(runs, at, say)
-        way, titles = parse_line(line), name_paths(runs)
+        dumps, way, titles = choose_pairs(runs, at, say), parse_line(line), name_paths(runs)
         lineouts = [
             take_lineouts(dumps[k :: len(runs)], names, way, view, say) for k in range(len(runs))
         ]
         draw_lineouts(figure, lineouts, names, titles)
-        stem = "-".join(["line", *names])
         write_table = partial(write_csv, lineouts=lineouts, names=names, runs=titles)
     elif what == "mesh":
         draw_fields(figure, choose_dumps(run, at, say=say), (), view)
     elif what == "interface":
-        dumps = choose_dumps(run, at, 12, say)
-        for dump in dumps:
-            check_nodes(dump)
-        draw_interfaces(figure, dumps, view)
+        draw_interfaces(figure, choose_dumps(run, at, 12, say), view)
     elif what == "history":
         check_history(run)
         draw_history(figure, run, names)
@@ -200,23 +194,23 @@ def fill_figure(
     else:
         own = run.problem.figures()
         if what not in own:
-            hint = suggest(what, [*OWN, *own])
+            hint = suggest(what, [*HEEDED, *own])
             raise BadInput(f"there is no picture {what!r} of {run.problem_name}{hint}")
         try:
             own[what](figure, run)
         except KeyError:  # perhaps of a column, where there is no history
             check_history(run)
             raise
-    given = {"FIELDS": names, "--at": at, "--mesh": mesh, "--zoom": zoom, "--mirror": mirror}
-    given |= {"--line": line, "--limits": limits, "--colours": colours}
-    idle = [option for option in given if given[option] and option not in HEEDED.get(what, ())]
+    idle = [name for name in given if given[name] and name not in HEEDED.get(what, ())]
     if idle and say:
         say(f"{', '.join(idle)}: not heeded by the picture {what!r}")
-    marks = [f"{option[2:]}-{given[option]}" for option in given if given[option]][bool(names) :]
-    if mesh:
-        marks = [mark.replace("mesh-True", "mesh") for mark in marks]
-    marks += [f"beside-{Path(beside).name}"] if beside else []
-    return "-".join([stem, *(re.sub(r"[^\w.+-]+", "_", mark) for mark in marks)]), write_table
+    if what not in BESIDE:
+        shown += names
+    for name in OPTIONS:
+        if value := given[f"--{name}"]:
+            shown.append(name if value is True else f"{name}-{value}")
+    shown += [f"beside-{Path(beside).name}"] if beside else []
+    return "-".join(re.sub(r"[^\w.+-]+", "_", word) for word in shown), write_table
 
 
 def check_history(run: RunData) -> None:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import partial
-from operator import attrgetter
+import operator
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -17,7 +16,6 @@ from matplotlib.colors import Normalize
 from regrid.errors import BadInput
 from runs.inspection.account import pick_prefix
 from runs.pictures.fields import (
-    Sheet,
     View,
     check_fields,
     check_zoom,
@@ -36,64 +34,38 @@ CLOSE = 1e-9  # of the interfaces' extent: ends so near are one point
 FORMAT = "shockgrid interfaces"
 
 
-@dataclass(frozen=True)
-class Curve:
-    """One interface at one time: its name and its nodes (2, n) [m]."""
-
-    name: str
-    nodes: np.ndarray
-
-    @property
-    def length(self) -> np.ndarray:
-        """Length s (n,) [m] along the curve, from its first node."""
-        steps = np.hypot(*np.diff(self.nodes, axis=1))
-        return np.concatenate([[0.0], np.cumsum(steps)])
-
-
-def find_curves(blocks: Sequence) -> list[Curve]:
-    """All interfaces of some blocks, by their materials' names in the blocks' order."""
+def find_curves(blocks: Sequence) -> dict[str, np.ndarray]:
+    """All interfaces of some blocks by name, after their materials in the blocks' order: x, y and
+    the length along the curve from its first node, (3, n) [m]."""
     found: dict[tuple[str, str], list[np.ndarray]] = {}
     for pair, line in trace_outline(blocks)[0]:
         pair = pair if pair[::-1] not in found else pair[::-1]
         found.setdefault(pair, []).append(line)
-    curves = []
+    curves = {}
     for pair, lines in found.items():
+        near, joined = CLOSE * max(float(np.ptp(line, axis=1).max()) for line in lines), []
+        while lines:
+            joined.append(_extend(lines.pop(0), lines, near))
         name = "interface_" + "_".join(word.replace("/", "-") for word in pair)
-        joined = _join(lines)
         for number, nodes in enumerate(joined, start=1):
-            curves.append(Curve(f"{name}_{number}" if len(joined) > 1 else name, nodes))
+            length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(nodes, axis=1)))])
+            curves[f"{name}_{number}" if len(joined) > 1 else name] = np.vstack([nodes, length])
     return curves
 
 
-def _join(lines: list[np.ndarray]) -> list[np.ndarray]:
-    """Lines that meet end to end as one, until none is left that meets another."""
-    near = CLOSE * max(float(np.ptp(line, axis=1).max()) for line in lines)
-    waiting, joined = list(lines), []
-    while waiting:
-        line = waiting.pop(0)
-        while (number := _find_next(line, waiting, near)) is not None:
-            line = _append(line, waiting.pop(number), near)
-        joined.append(line)
-    return joined
-
-
-def _find_next(line: np.ndarray, others: list[np.ndarray], near: float) -> int | None:
-    ends = line[:, [0, -1]]
+def _extend(line: np.ndarray, others: list[np.ndarray], near: float) -> np.ndarray:
+    """The line with all of `others` that meet its ends, which are taken from the list."""
     for number, other in enumerate(others):
-        gaps = np.hypot(*(ends[:, :, None] - other[:, None, [0, -1]]))
-        if gaps.min() <= near:
-            return number
-    return None
-
-
-def _append(line: np.ndarray, other: np.ndarray, near: float) -> np.ndarray:
-    """Both lines as one; it keeps the direction of the first."""
-    for forward in (other, other[:, ::-1]):
-        if np.hypot(*(line[:, -1] - forward[:, 0])) <= near:
-            return np.hstack([line, forward[:, 1:]])
-        if np.hypot(*(line[:, 0] - forward[:, -1])) <= near:
-            return np.hstack([forward[:, :-1], line])
-    raise AssertionError("lines that meet")
+        for piece in (other, other[:, ::-1]):
+            if np.hypot(*(line[:, -1] - piece[:, 0])) <= near:
+                longer = np.hstack([line, piece[:, 1:]])
+            elif np.hypot(*(line[:, 0] - piece[:, -1])) <= near:
+                longer = np.hstack([piece[:, :-1], line])
+            else:
+                continue
+            del others[number]
+            return _extend(longer, others, near)
+    return line
 
 
 def export_interfaces(directory: str, output: str | None = None) -> list[Path]:
@@ -118,42 +90,40 @@ def export_interfaces(directory: str, output: str | None = None) -> list[Path]:
     return paths
 
 
-Moments = Sequence[tuple[Dump, Sequence[Curve]]]
+Moments = Sequence[tuple[Dump, dict[str, np.ndarray]]]
 
 
-def _list_rows(moments: Moments) -> Iterator[list]:
-    yield ["step", "t", "interface", "x", "y", "s"]
-    for dump, curves in moments:
-        for curve in curves:
-            for x, y, s in zip(*curve.nodes.tolist(), curve.length.tolist(), strict=True):
-                yield [dump.step, repr(dump.t), curve.name, repr(x), repr(y), repr(s)]
-
-
-def _make_csv(moments: Moments) -> bytes:
+def make_csv(rows: Iterable[Iterable[Any]]) -> str:
+    """Rows as the text of a CSV file; numbers with all their digits."""
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(_list_rows(moments))
-    return text.getvalue().encode("utf-8")
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+def _make_table(moments: Moments) -> bytes:
+    rows: list[Iterable[Any]] = [["step", "t", "interface", "x", "y", "s"]]
+    for dump, curves in moments:
+        for name, curve in curves.items():
+            rows += [[dump.step, dump.t, name, *point] for point in curve.T.tolist()]
+    return make_csv(rows).encode()
 
 
 def _make_hdf5(moments: Moments) -> bytes:
     with h5py.File("interfaces", "w", driver="core", backing_store=False) as file:
-        file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = 1
+        file.attrs.update({"format": FORMAT, "format_version": 1})
         for dump, curves in moments:
             moment = file.create_group(f"step_{dump.step:06d}")
-            moment.attrs["step"], moment.attrs["t"] = dump.step, dump.t
-            for curve in curves:
-                group = moment.create_group(curve.name)
+            moment.attrs.update({"step": dump.step, "t": dump.t})
+            for name, curve in curves.items():
                 words = (*dump.axes, "length along the curve")
-                columns = zip("xys", (*curve.nodes, curve.length), words, strict=True)
-                for name, values, long_name in columns:
-                    data = group.create_dataset(name, data=values)
-                    data.attrs["units"], data.attrs["long_name"] = "m", long_name
+                for column, values, long_name in zip("xys", curve, words, strict=True):
+                    data = moment.create_dataset(f"{name}/{column}", data=values)
+                    data.attrs.update({"units": "m", "long_name": long_name})
         file.flush()
         return file.id.get_file_image()
 
 
-WRITERS = {".csv": _make_csv, ".h5": _make_hdf5}
+WRITERS = {".csv": _make_table, ".h5": _make_hdf5}
 
 
 def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
@@ -205,16 +175,12 @@ WIDTH, HEIGHT = 8.0, 2.6  # inches: of the picture, of a panel
 Line = tuple[float, float, float, float]  # x0, y0, x1, y1 [m]
 
 
-@dataclass(frozen=True)
-class Lineout:
-    """The cells of one dump along a line: blocks' names, indices, middles, ways [m], values."""
+class Lineout(NamedTuple):
+    """The cells of one dump along a line, in order: block, i, j, x and y of the middle of the piece
+    [m], way to it from the line's start [m], fields (nan in a block without the field)."""
 
     dump: Dump
-    blocks: list[str]  # (n,) names, in the order along the line
-    cells: np.ndarray  # (n, 2) i and j
-    points: np.ndarray  # (2, n) middles of the pieces [m]
-    way: np.ndarray  # (n,) from the line's start to them [m]
-    values: dict[str, np.ndarray]  # (n,) each; nan in a block without the field
+    columns: dict[str, np.ndarray]  # (n,) each
 
 
 def find_pieces(nodes: np.ndarray, line: Line) -> tuple[np.ndarray, np.ndarray]:
@@ -254,45 +220,30 @@ def take_lineouts(
     Raises BadInput where it meets no cell of any of them, or a field is missing.
     """
     lineouts = [take_lineout(dump, names, line, view) for dump in dumps]
-    missed = [one.dump for one in lineouts if not one.blocks]
+    missed = [one.dump for one in lineouts if not len(one.columns["way"])]
     given = ",".join(f"{number:g}" for number in line)
     if len(missed) == len(lineouts):
         raise BadInput(f"--line {given}: it meets no cell of {missed[0].path}")
     for dump in missed if say else ():
         say(f"--line {given}: it meets no cell of {dump.path}")
-    return [one for one in lineouts if one.blocks]
+    return [one for one in lineouts if len(one.columns["way"])]
 
 
 def take_lineout(dump: Dump, names: Sequence[str], line: Line, view: View) -> Lineout:
     """The cells of a dump along the line; BadInput where a field is missing."""
     check_fields([dump], names)
-    sheets = make_sheets(dump, names, view)
-    found = [find_pieces(sheet.nodes, line) for sheet in sheets]
-    parts = np.concatenate([ends.mean(axis=1) for _, ends in found])
-    order = np.argsort(parts, kind="stable")
-    owners = [sheet for sheet, (cells, _) in zip(sheets, found, strict=True) for _ in cells]
-    start, end = np.array(line[:2])[:, None], np.array(line[2:])[:, None]
-    parts = parts[order]
-    values = {
-        name: np.concatenate(
-            [_take(sheet, name, cells) for sheet, (cells, _) in zip(sheets, found, strict=True)]
-        )[order]
-        for name in names
-    }
-    return Lineout(
-        dump,
-        [owners[k].name for k in order],
-        np.concatenate([cells for cells, _ in found])[order],
-        start + parts * (end - start),
-        parts * float(np.hypot(*(end - start))[0]),
-        values,
-    )
-
-
-def _take(sheet: Sheet, name: str, cells: np.ndarray) -> np.ndarray:
-    if name not in sheet.fields:
-        return np.full(len(cells), np.nan)
-    return np.asarray(sheet.fields[name][cells[:, 0], cells[:, 1]], dtype=float)
+    (x0, y0, x1, y1), rows = line, []
+    for sheet in make_sheets(dump, names, view):
+        for (i, j), ends in zip(*find_pieces(sheet.nodes, line), strict=True):
+            part = float(ends.mean())
+            values = [float(sheet.fields[n][i, j]) if n in sheet.fields else np.nan for n in names]
+            point = x0 + part * (x1 - x0), y0 + part * (y1 - y0)
+            way = part * float(np.hypot(x1 - x0, y1 - y0))
+            rows.append((sheet.name, int(i), int(j), *point, way, *values))
+    heads = ("block", "i", "j", "x", "y", "way", *names)
+    rows.sort(key=operator.itemgetter(heads.index("way")))
+    columns = zip(*rows, strict=True) if rows else [()] * len(heads)
+    return Lineout(dump, {n: np.array(c) for n, c in zip(heads, columns, strict=True)})
 
 
 def draw_lineouts(
@@ -301,18 +252,21 @@ def draw_lineouts(
     """A panel for each field: a curve for each dump, colour by time, style by run."""
     first = lineouts[0][0]
     way, label = choose_abscissa(first)
-    largest = max(float(np.abs(way(one)).max()) for run in lineouts for one in run)
+    largest = max(float(np.abs(one.columns[way]).max()) for run in lineouts for one in run)
     scale, length = pick_prefix(largest, "m")
     figure.set_size_inches(WIDTH, HEIGHT * len(names) + 0.8)
     panels = figure.subplots(len(names), 1, squeeze=False, sharex=True)[:, 0]
     for axes, name in zip(panels, names, strict=True):
         style = get_style(first.dump, name)
-        sizes = [np.nanmax(np.abs(one.values[name])) for run in lineouts for one in run]
+        sizes = [np.nanmax(np.abs(one.columns[name])) for run in lineouts for one in run]
         factor, unit = pick_prefix(float(max(sizes)), style.unit)
         for run, style, title in zip(lineouts, STYLES, runs, strict=False):
             titles = time_titles([one.dump for one in run])
             for k, (one, when) in enumerate(zip(run, titles, strict=True)):
-                x, values = part_blocks(one, way(one) * scale, one.values[name] * factor)
+                x, values = one.columns[way] * scale, one.columns[name] * factor
+                blocks = one.columns["block"]
+                gaps = np.flatnonzero(blocks[1:] != blocks[:-1]) + 1  # another block begins
+                x, values = np.insert(x, gaps, np.nan), np.insert(values, gaps, np.nan)
                 named = f"{title}, {when}" if len(lineouts) > 1 else when
                 axes.plot(x, values, style, color=f"C{k % 10}", linewidth=1.1, label=named)
                 if style == "-":
@@ -324,42 +278,25 @@ def draw_lineouts(
     panels[0].legend(fontsize=7, ncols=2 if len(lineouts) > 1 else 1)
 
 
-def choose_abscissa(lineout: Lineout) -> tuple[Callable[[Lineout], np.ndarray], str]:
-    """(What the values are drawn over, its name): x or y of a line along it, else the way."""
-    axes = lineout.dump.axes
-    for axis in (0, 1):
-        if np.ptp(lineout.points[1 - axis]) == 0.0:
-            return partial(_take_points, axis), axes[axis]
-    return attrgetter("way"), "distance along the line"
-
-
-def _take_points(axis: int, lineout: Lineout) -> np.ndarray:
-    return lineout.points[axis]
-
-
-def part_blocks(lineout: Lineout, x: np.ndarray, values: np.ndarray):
-    """x and values with a gap wherever another block begins."""
-    blocks = np.array(lineout.blocks)
-    gaps = np.flatnonzero(blocks[1:] != blocks[:-1]) + 1
-    return np.insert(x, gaps, np.nan), np.insert(values, gaps, np.nan)
+def choose_abscissa(lineout: Lineout) -> tuple[str, str]:
+    """The column over which values are drawn, and its name: x or y of a line along it, else way."""
+    for k, (axis, other) in enumerate((("x", "y"), ("y", "x"))):
+        if np.ptp(lineout.columns[other]) == 0.0:
+            return axis, lineout.dump.axes[k]
+    return "way", "distance along the line"
 
 
 def write_csv(
     path: Path, lineouts: Sequence[Sequence[Lineout]], names: Sequence[str], runs: Sequence[str]
 ) -> Path:
     """One row a cell: run, step, t, block, i, j, x, y, way, fields; the head has SI units."""
-    first = lineouts[0][0]
-    words = [f"{name} [{get_style(first.dump, name).unit}]" for name in names]
-    axes, t_unit = first.dump.axes, first.dump.t_unit
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    heads = ["run", "step", f"t [{t_unit}]", "block", "i", "j", f"{axes[0]} [m]", f"{axes[1]} [m]"]
-    table.writerow([*heads, "way [m]", *words])
+    first = lineouts[0][0].dump
+    fields = [f"{name} [{get_style(first, name).unit}]" for name in names]
+    heads = ["run", "step", f"t [{first.t_unit}]", "block", "i", "j"]
+    rows = [[*heads, f"{first.axes[0]} [m]", f"{first.axes[1]} [m]", "way [m]", *fields]]
     for run, title in zip(lineouts, runs, strict=True):
-        for one in run:
-            for k, block in enumerate(one.blocks):
-                numbers = [*one.points[:, k], one.way[k], *(one.values[name][k] for name in names)]
-                row = [title, one.dump.step, repr(one.dump.t), block, *map(int, one.cells[k])]
-                table.writerow([*row, *(repr(float(number)) for number in numbers)])
-    write_atomically(path, text.getvalue(), durable=False)
+        for dump, columns in run:
+            cells = zip(*(column.tolist() for column in columns.values()), strict=True)
+            rows += [[title, dump.step, dump.t, *cell] for cell in cells]
+    write_atomically(path, make_csv(rows), durable=False)
     return path

@@ -61,7 +61,7 @@ def say_numbers(numbers: Sequence[float] | np.ndarray | None) -> str | None:
 
 def find_interface(blocks: Sequence[Any], t: float, where: str) -> Curve:
     """The lines between blocks of different materials; BadInput where there are none."""
-    lines = [curve.nodes for curve in find_curves(blocks)]
+    lines = [curve[:2] for curve in find_curves(blocks).values()]
     if not lines:
         raise BadInput(f"{where}: no two materials touch, so there is no interface")
     gap = np.full((2, 1), np.nan)

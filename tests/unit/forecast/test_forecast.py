@@ -10,7 +10,7 @@ import pytest
 
 from regrid.errors import BadInput, RegridFailure, RunFailure
 from runs.early_end.causes import name_failure
-from runs.forecast.cost import TimeLeft
+from runs.forecast.cost import TimeLeft, make_past_run
 from runs.forecast.step_trend import StepTrend, classify
 from runs.inspection.account import RULES, describe_verdict, judge
 
@@ -103,6 +103,17 @@ def test_a_falling_dt_is_followed(fall):
     assert 0.67 < forecast.seconds / real < 1.5
     assert abs(np.log(forecast.seconds / real)) < abs(np.log(naive / real))
     assert forecast.low <= real <= forecast.high
+
+
+def test_a_run_that_ends_before_its_end_time_is_expected_to_do_so_again():
+    rows = march(lambda t: 1e-3, t_end=0.6)
+    steps, times, walls = np.array([(0, 0.0, 0.0), *rows]).T
+    history = {"step": steps, "t": times, "seconds_step": np.diff(walls, prepend=0.0)}
+    past = make_past_run("flow", 1000, 1.0, 0.1, 1e-3, history)
+    assert past.steps == 600 and past.course.steps[12:] == (1.0,) * 9
+    forecast, real = foretell(rows, 0.25, past.course)
+    assert forecast.seconds == pytest.approx(real, rel=0.02)
+    assert forecast.steps == pytest.approx(450, rel=0.02)
 
 
 STEPS, CELLS = 200, 1000

@@ -22,4 +22,7 @@ def main(arguments: list[str] | None = None) -> int:
     gc.set_threshold(UNCOLLECTED)
     from runs.cli.main import main as run_command
 
-    return run_command(arguments)
+    try:
+        return run_command(arguments)
+    finally:
+        gc.freeze()  # Python's last search for garbage takes longer than most commands

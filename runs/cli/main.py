@@ -150,7 +150,7 @@ def restart(directory, at, cells, output, force, settings, threads, max_wall, pi
     if wants_other_cells(cells, settings):
         runner = remap_runner(opened, cells, settings, at, output, force, quiet, _say)
         runner.limit, runner.world = limit, _find_world()
-        return _finish(runner.go_on(), runner.directory, picture)
+        return _finish(runner.start(), runner.directory, picture)
     if output is not None or force:
         raise BadInput(
             "restart: -o and --force need --cells; otherwise a run continues in its directory"

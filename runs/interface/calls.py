@@ -194,7 +194,7 @@ def restart(
         place = None if output is None else str(output)
         with said_in_python():
             runner = remap_runner(opened, number, words, at, place, force, quiet, _say)
-        return finish(runner, runner.go_on(), quiet)
+        return finish(runner, runner.start(), quiet)
     if output is not None or force:
         raise BadInput("output and force need cells; otherwise a run continues in its directory")
     with said_in_python():

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
 
 from hydro.history import compute_chosen_columns, find_columns
 from hydro.simulation import Simulation
@@ -20,18 +19,14 @@ from runs.forecast.cost import check_disk, describe_cost, estimate_cost
 from runs.gauges import make_gauges
 from runs.inspection.account import describe_cautions
 from runs.march.compiling import compiling
-from runs.march.restart import settle_deck
+from runs.march.restart import CELLS, settle_deck
 from runs.march.runner import Runner, check_output, check_times, find_restart_point, restore
 from runs.ranks.map import check_cut
 from runs.ranks.world import World
 from runs.store.directory import RunDirectory, create_directory
 from runs.store.files import write_atomically
 from runs.store.guards import read_run_deck
-from runs.store.history import (
-    Rows,
-    read_rows,
-    truncate_history,
-)
+from runs.store.history import read_rows, truncate_history
 
 MOST_CELLS = 1_000_000  # that are built to look
 
@@ -106,15 +101,8 @@ def start_runner(
         cautions += check_disk(cost, folder)
     directory = create_directory(output, deck.label, force)
     if not quiet:
-        say(
-            "\n".join(
-                [
-                    f"{deck.problem} ({deck.described}) in {directory}",
-                    *describe_cost(cost),
-                    *cautions,
-                ]
-            )
-        )
+        head = f"{deck.problem} ({deck.described}) in {directory}"
+        say("\n".join([head, *describe_cost(cost), *cautions]))
     return Runner(deck, directory, problem, evolution, quiet)
 
 
@@ -159,10 +147,13 @@ def read_restart_deck(
     return settle_deck(directory, deck, at)
 
 
+def _list_keys(settings: tuple[str, ...]) -> list[str]:
+    return [setting.partition("=")[0].strip() for setting in settings]
+
+
 def check_effect(settings: tuple[str, ...], deck: Deck) -> None:
     """Raise BadInput for a setting of a key that another key of the deck overrules."""
-    for setting in settings:
-        key = setting.partition("=")[0].strip()
+    for key in _list_keys(settings):
         other = deck.overruled.get(key)
         if other is not None and attrgetter(other)(deck) is not None:
             raise BadInput(
@@ -178,8 +169,7 @@ def check_changeable(
 
     besides: keys that this restart can change, too.
     """
-    for setting in settings:
-        key = setting.partition("=")[0].strip()
+    for key in _list_keys(settings):
         if not is_runtime_key(key, kind) and key not in besides:
             keys = ", ".join((*besides, describe_runtime_keys(kind)))
             raise BadInput(
@@ -188,12 +178,9 @@ def check_changeable(
             )
 
 
-KEY = "cells"
-
-
 def wants_other_cells(cells: str | None, settings: tuple[str, ...]) -> bool:
     """Do `--cells` or a `--set cells=...` ask for another grid?"""
-    return cells is not None or any(_get_key(setting) == KEY for setting in settings)
+    return cells is not None or CELLS in _list_keys(settings)
 
 
 def remap_runner(
@@ -209,8 +196,8 @@ def remap_runner(
     """A runner in a new directory, whose evolution has the state of `old` on other cells.
 
     cells: the deck's key `cells`, "64" or "64,32"; settings: others, of run, output and regrid; at:
-    the step of the restart point, None the last; output, force: as for a new run.  Its `go_on`
-    starts it.  Raises BadInput, before anything is written, for what cannot be gone on with.
+    the step of the restart point, None the last; output, force: as for a new run.  Its `start`
+    continues it.  Raises BadInput, before anything is written, for what cannot be gone on with.
     """
     from hydro.remap.flow import take_over  # with scipy: slow to load
 
@@ -219,10 +206,15 @@ def remap_runner(
     deck = read_run_deck(old, _add_cells(before, cells, settings), strict=True)
     check_effect(settings, deck.deck)
     deck = settle_deck(old, deck, at, cells=True)
-    _check_apart(old, output)
-    source: Any = _build(before, quiet)
-    target: Any = _build(deck, quiet)
-    if not (_is_flow(source) and _is_flow(target)):
+    if output:
+        new, kept = RunDirectory(output).path.resolve(), old.path.resolve()
+        if new == kept or kept in new.parents:
+            raise BadInput(
+                f"-o {output} is the run that is gone on with, which stays as it is; name another "
+                "directory"
+            )
+    source, target = _build(before, quiet), _build(deck, quiet)
+    if type(source) is not Simulation or type(target) is not Simulation:  # it holds more
         raise BadInput(
             f"--cells: {deck.problem} is not only a flow on blocks, and what else it holds cannot "
             "be laid on other cells; begin a new run with the cells wanted"
@@ -230,17 +222,15 @@ def remap_runner(
     gauges = make_gauges(deck.deck, target)  # points of the material are those of the first state
     state, step, _ = find_restart_point(old, at, say)
     restore(source, state, old, step)
-    before_rows = _read_history(old, step)
+    before_rows = read_rows(old.history)
+    before_rows.check(f"shockgrid restart {old.quoted} cuts it back and computes it again")
     with compiling(quiet):
         blocks = take_over(source, target)
     gauges.set_state(state, other_cells=True)
     directory = create_directory(output, deck.label, force)
     write_atomically(directory.deck, deck.to_toml())  # by which the directory is known
     columns = truncate_history(directory.history, step, before_rows)
-    words = "; ".join(
-        f"{block.name} {_format_cells(block.before)} -> {_format_cells(block.now)}"
-        for block in blocks
-    )
+    words = "; ".join("{} {} x {} -> {} x {}".format(b.name, *b.before, *b.now) for b in blocks)
     slivers = sum(block.slivers.count for block in blocks)
     note = f"continues from step {step} of {old} on other cells: {words}"
     if slivers:
@@ -254,50 +244,29 @@ def remap_runner(
             f"continue with --set run.t_end=T, T > {target.t:.6g}"
         )
     runner = Runner(deck, directory, deck.make_problem(), target, quiet, gauges=gauges)
-    runner.columns = columns
+    runner.columns, runner.restored = columns, True
     return runner
 
 
 def _add_cells(before: ReadDeck, cells: str | None, settings: tuple[str, ...]) -> tuple[str, ...]:
     """The settings with the cells among them; BadInput where the deck or a restart has no such."""
-    check_changeable(settings, type(before.deck), besides=(KEY,))
-    present = getattr(before.deck, KEY, None)
+    check_changeable(settings, type(before.deck), besides=(CELLS,))
+    present = getattr(before.deck, CELLS, None)
     if present is None:
         raise BadInput(
-            f"--cells: the deck of {before.problem} has no key `{KEY}`, so its grid cannot be "
+            f"--cells: the deck of {before.problem} has no key `cells`, so its grid cannot be "
             "changed in a restart; begin a new run"
         )
     if cells is None:
         return settings
-    if any(_get_key(setting) == KEY for setting in settings):
+    if CELLS in _list_keys(settings):
         raise BadInput("--cells and --set cells say the same; give one of them")
     many = [parse_value(word) for word in cells.split(",")]
-    if not all(type(number) is int and number > 0 for number in many):
-        raise BadInput(f"--cells {cells}: the form is N or N,M, whole numbers such as 64")
     wanted = len(present) if isinstance(present, list | tuple) else 1
-    if len(many) != wanted:
-        numbers = "one number" if wanted == 1 else f"{wanted} numbers"
-        raise BadInput(f"--cells {cells}: the key `{KEY}` of {before.problem} is {numbers}")
-    return (*settings, f"{KEY}={cells if wanted == 1 else list(many)}")
-
-
-def _get_key(setting: str) -> str:
-    return setting.partition("=")[0].strip()
-
-
-def _check_apart(old: RunDirectory, output: str | None) -> None:
-    """The new directory is not the old one, nor inside it; BadInput otherwise."""
-    if output:
-        new, kept = RunDirectory(output).path.resolve(), old.path.resolve()
-        if new == kept or kept in new.parents:
-            raise BadInput(
-                f"-o {output} is the run that is gone on with, which stays as it is; name another "
-                "directory"
-            )
-
-
-def _is_flow(evolution: object) -> bool:
-    return type(evolution) is Simulation  # one of a class of its own holds more
+    if len(many) != wanted or not all(type(number) is int and number > 0 for number in many):
+        words = "a whole number such as 64" if wanted == 1 else f"{wanted} whole numbers: 64,32"
+        raise BadInput(f"--cells {cells}: the key `cells` of {before.problem} is {words}, above 0")
+    return (*settings, f"{CELLS}={cells if wanted == 1 else list(many)}")
 
 
 def _build(deck: ReadDeck, quiet: bool) -> Evolution:
@@ -306,14 +275,3 @@ def _build(deck: ReadDeck, quiet: bool) -> Evolution:
     with compiling(quiet), deck.numbers_in_reach():
         check_memory(problem)
         return problem.build()
-
-
-def _read_history(old: RunDirectory, step: int) -> Rows:
-    """The old run's history; BadInput where it is damaged or ends before the restart point."""
-    found = read_rows(old.history)
-    found.check(f"shockgrid restart {old.quoted} cuts it back and computes it again")
-    return found
-
-
-def _format_cells(cells: tuple[int, int]) -> str:
-    return f"{cells[0]} x {cells[1]}"

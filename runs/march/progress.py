@@ -184,10 +184,6 @@ class Outlook:
         same = past is not None and past.flow == self.flow and math.isclose(past.t_end, t_end)
         return past.course if same else None
 
-    def follow(self, row: Mapping[str, Any]) -> None:
-        """Take note of a step's history row."""
-        self.trend.follow(row)
-
     def fail(self, error: Exception) -> None:
         """The verdict on a run that has failed; nothing may hide its own sentence."""
         with contextlib.suppress(Exception):

@@ -133,12 +133,20 @@ def settle_deck(
             f"{directory.deck}: problem = {show(deck.problem)}, and {kept.path.name} holds a run "
             f"of {before.problem}; another problem is another run (shockgrid run)"
         )
+    run, made_for = deck.deck.run, before.deck.run.t_set_up or kept.t_end
     found = find_differences(before.deck, deck.deck)
     refused = [one for one in found if not is_runtime_key(one.key, type(deck.deck))]
-    refused = [one for one in refused if one.key != SET_UP and not (cells and one.key == CELLS)]
+    may_differ = {CELLS} if cells else set()
+    if run.t_set_up in (None, made_for):
+        may_differ.add(SET_UP)
+    refused = [one for one in refused if one.key not in may_differ]
     if refused:
         raise BadInput("\n".join(_refuse(one, directory, deck, kept) for one in refused))
-    return _keep_set_up(found, before, deck, directory, kept)
+    moves = [one for one in found if one.key == "run.t_end" or "." not in one.key]
+    if run.t_set_up is not None or not (moves or before.deck.run.t_set_up):
+        return deck
+    run = msgspec.structs.replace(run, t_set_up=made_for)
+    return dataclasses.replace(deck, deck=msgspec.structs.replace(deck.deck, run=run))
 
 
 def _resolve_kept(kept: StoredDeck, deck: ReadDeck) -> ReadDeck | None:
@@ -164,28 +172,3 @@ def _refuse(found: Difference, directory: RunDirectory, deck: ReadDeck, kept: St
 
 def _say(value: Any) -> str:
     return "left out" if value is None else show(value)
-
-
-def _keep_set_up(
-    found: list[Difference],
-    before: ReadDeck,
-    deck: ReadDeck,
-    directory: RunDirectory,
-    kept: StoredDeck,
-) -> ReadDeck:
-    """The deck with the time that the run was set up for, where its end is another one now."""
-    made_for = before.deck.run.t_set_up or kept.t_end
-    run = deck.deck.run
-    if run.t_set_up is not None:
-        if run.t_set_up != made_for:
-            raise BadInput(
-                f"{SET_UP} is {run.t_set_up!r}, and the run in {directory} was set up for "
-                f"{made_for!r} s: it affects the state, so a restart cannot change it; leave it "
-                "out, or start a new run with it (shockgrid run)"
-            )
-        return deck
-    moves = [one for one in found if one.key == "run.t_end" or "." not in one.key]
-    if not moves and before.deck.run.t_set_up is None:
-        return deck
-    run = msgspec.structs.replace(run, t_set_up=made_for)
-    return dataclasses.replace(deck, deck=msgspec.structs.replace(deck.deck, run=run))

@@ -16,6 +16,7 @@ import platform
 import re
 import signal
 import time
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -26,7 +27,7 @@ from hydro.history import compute_chosen_columns, find_columns
 from problems.deck import Output
 from problems.evolution import Evolution, get_missed, get_node_fields, get_start_row
 from problems.problem import Problem
-from regrid.errors import BadInput, RunFailure, find_nearest
+from regrid.errors import BadInput, RunFailure, suggest
 from regrid.jit import read_clock
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import ENDS
@@ -122,16 +123,14 @@ def parse_duration(text: str) -> float:
 class WallLimit:
     """Wall time that a run may take, counted from when this is made.
 
-    The first step, for which kernels may be compiled, counts for the time that has gone and not for
-    how long steps are.  At least one step is made, so that runs in a queue come to their end.
+    At least one step is made, so that runs in a queue come to their end.
     """
 
     def __init__(self, text: str):
         self.text = text
         self.end = time.monotonic() + parse_duration(text)
-        self._steps: list[float] = []
+        self._steps: deque[float] = deque(maxlen=REMEMBERED)
         self._write = 0.0
-        self._made = 0
 
     def __str__(self) -> str:
         return f"--max-wall {self.text}"
@@ -139,16 +138,14 @@ class WallLimit:
     @property
     def reached(self) -> bool:
         """Would one more step, and the restart point after it, come too late?"""
-        if not self._made:
+        if not self._steps:
             return False
-        needed = MARGIN * (max(self._steps, default=0.0) + self._write)
+        needed = MARGIN * (max(self._steps) + self._write)
         return time.monotonic() + needed >= self.end
 
     def note_step(self, seconds: float) -> None:
-        """Remember how long a step has taken [s]."""
-        self._made += 1
-        if self._made > 1:
-            self._steps = [*self._steps[1 - REMEMBERED :], seconds]
+        """Remember how long a step has taken [s], without the compiling of kernels."""
+        self._steps.append(seconds)
 
     def note_write(self, seconds: float) -> None:
         """Remember how long a restart point has taken [s]."""
@@ -169,7 +166,11 @@ def is_dump_due(output: Output, t_end: float, t_before: float, t: float) -> bool
 def check_output(output: Output, evolution: Evolution) -> None:
     """Raise BadInput for a time of a dump past the end and for a field that no block has."""
     check_times(output, evolution.t_end)
-    check_fields(output, evolution)
+    there = {name for b in evolution.blocks for name in (*b.cell_fields, *get_node_fields(b))}
+    for name in output.fields:
+        if name not in there:
+            hint = suggest(name, sorted(there), cutoff=0.6)
+            raise BadInput(f"deck: output.fields has {name!r}; no block has such a field{hint}")
 
 
 def check_times(output: Output, t_end: float) -> None:
@@ -179,25 +180,6 @@ def check_times(output: Output, t_end: float) -> None:
         raise BadInput(
             f"deck: output.times has {late[0]:g}, which is after the end of the run, t = {t_end:g}"
         )
-
-
-def check_fields(output: Output, evolution: Evolution) -> None:
-    """Raise BadInput for a field of light dumps that no block has."""
-    there = list(
-        dict.fromkeys(
-            name
-            for block in evolution.blocks
-            for name in (*block.cell_fields, *get_node_fields(block))
-        )
-    )
-    for name in output.fields:
-        if name not in there:
-            nearest = find_nearest(name, there, cutoff=0.6)
-            hint = f"; did you mean {nearest!r}?" if nearest else ""
-            raise BadInput(
-                f"deck: output.fields has {name!r}; no block has such a field, there are: "
-                f"{', '.join(there)}{hint}"
-            )
 
 
 MISSED = "not-steady"  # the cause of an end that is not what the run is for
@@ -213,11 +195,7 @@ class Ending:
 
 
 class Stopped(Exception):
-    """A signal asked the run to stop; carries its number."""
-
-
-class OutOfTime(Exception):
-    """The limit of wall time is reached; carries its words."""
+    """A signal or the limit of wall time stops the run: its words and the exit code."""
 
 
 class Runner:
@@ -251,15 +229,17 @@ class Runner:
         self.limit: WallLimit | None = None  # of wall time; whoever starts the run may set one
         self.writing = Background()
         self.world: World | None = None  # ranks of MPI that share the run; set like the limit
-        self._restored = False
+        self.restored = False
         self._signal = 0
         self._point_wanted = False
 
     def start(self) -> Ending:
-        """Run from the beginning."""
+        """Run in a new directory, from the beginning or the state that another run has given."""
         with self.directory.claimed():
-            self._keep_deck()
-            self._note_start("start")
+            write_atomically(self.directory.deck, self.deck_text)
+            if self.deck.file:
+                keep_problem_file(self.directory, self.deck.file)
+            self._note_start(f"start from step {self.evolution.step}" if self.restored else "start")
             return self._run()
 
     def resume(self, at: int | None = None, say=lambda text: None) -> Ending:
@@ -271,7 +251,7 @@ class Runner:
             state, step, rows = find_restart_point(self.directory, at, say, tables)
             if step or all(one.rows for one in rows):  # else it is as it was built
                 restore(self.evolution, state, self.directory, step)
-                self._restored = True
+                self.restored = True
                 self.gauges.set_state(state)
             for one in rows:
                 if one.fault:
@@ -293,20 +273,6 @@ class Runner:
             self.last_point = step
             self.directory.forget_early_end()
             return self._run()
-
-    def go_on(self) -> Ending:
-        """Run from the state that the evolution has, which another run's directory gave it."""
-        self._restored = True
-        with self.directory.claimed():
-            self._keep_deck()
-            self._note_start(f"start from step {self.evolution.step}")
-            return self._run()
-
-    def _keep_deck(self) -> None:
-        """Write the deck of a new directory, and the file that its problem is in."""
-        write_atomically(self.directory.deck, self.deck_text)
-        if self.deck.file:
-            keep_problem_file(self.directory, self.deck.file)
 
     def _note_start(self, what: str) -> None:
         made, deck = describe_provenance(find_provenance(self.deck_text))
@@ -332,11 +298,7 @@ class Runner:
             reason, code = (f"{reason}, {missed}", 3) if missed else (reason, 0)
             status = "ended early" if missed else "finished" if self.evolution.finished else status
         except Stopped as stop:
-            code = 128 + int(stop.args[0])
-            name = signal.Signals(stop.args[0]).name
-            reason = f"stopped by {name}"
-        except OutOfTime as limit:
-            reason, code = f"{limit} reached", 0
+            reason, code = stop.args
         except (RunFailure, BadInput) as error:  # BadInput here: the disk, mostly
             with contextlib.suppress(BadInput):
                 self.directory.note(f"failed: {error}")
@@ -394,7 +356,7 @@ class Runner:
             self._dump_light() if self.deck.deck.output.light else self._dump()
         written = time.monotonic()
         if self.world is not None:
-            words = self.world.begin(self.deck, self.problem, self.evolution, self._restored)
+            words = self.world.begin(self.deck, self.problem, self.evolution, self.restored)
             self.directory.note(words)
         while True:
             reason = evolution.finished
@@ -409,10 +371,11 @@ class Runner:
                 return reason
             if self._signal:
                 self._write_restart_point()
-                raise Stopped(self._signal)
+                words = f"stopped by {signal.Signals(self._signal).name}"
+                raise Stopped(words, 128 + self._signal)
             if self.limit is not None and self.limit.reached:
                 self._write_restart_point()
-                raise OutOfTime(str(self.limit))
+                raise Stopped(f"{self.limit} reached", 0)
             t_before, clock = evolution.t, read_clock()
             row = evolution.advance()
             seconds = read_clock() - clock
@@ -460,7 +423,7 @@ class Runner:
         self.history.append(full)
         self.gauges.record()
         self.progress.update(evolution, full)
-        self.outlook.follow(full)
+        self.outlook.trend.follow(full)
         for name in ("t", "dt"):
             if name in full and not math.isfinite(full[name]):
                 words = f"{name} = {full[name]} at step {evolution.step}"

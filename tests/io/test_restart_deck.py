@@ -136,9 +136,9 @@ def test_fewer_cells(shockgrid, half):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("--cells=many",), "--cells many: the form is N or N,M, whole numbers such as 64"),
-        (("--cells=0",), "--cells 0: the form is N or N,M"),
-        (("--cells=16,8",), "--cells 16,8: the key `cells` of interface-instability is one number"),
+        (("--cells=many",), "--cells many: the key `cells` of interface-instability is a whole"),
+        (("--cells=0",), "number such as 64, above 0"),
+        (("--cells=16,8",), "--cells 16,8: the key `cells` of interface-instability is a whole"),
         (("--cells=2",), "cells = 2"),
         (("--cells=16", "--set=cells=16"), "say the same; give one of them"),
         (("--cells=16", "--set=mach=3"), "another mach is another run"),

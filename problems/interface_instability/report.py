@@ -292,19 +292,19 @@ def draw_growth(problem, figure, run) -> None:
         axes.legend(fontsize=8, frameon=False)
         axes.grid(alpha=0.3)
     windows, shown = [], []
-    dumps = spread_dumps(run, SHOWN)
-    for dump in dumps:
-        x, y = dump.blocks[0].nodes[:, -1, :]
-        middle, half = 0.5 * (x.min() + x.max()), 0.5 * np.ptp(y)
-        reach = max(0.6 * np.ptp(x) + 0.05 * problem.deck.wavelength, half)
+    dumps, margin = spread_dumps(run, SHOWN), 0.05 * problem.deck.wavelength
+    lines = [dump.blocks[0].nodes[:, -1, :] for dump in dumps]
+    # all panels are as wide as the widest needs
+    reach = max((max(0.6 * np.ptp(x) + margin, 0.5 * np.ptp(y)) for x, y in lines), default=0.0)
+    for dump, (x, _) in zip(dumps, lines, strict=True):
+        middle = 0.5 * (x.min() + x.max())
         windows.append((middle - reach, middle + reach))
         for block in dump.blocks:
             inside = np.abs(compute_centres(block.nodes)[0] - middle) <= reach
             shown.append(block.cell_fields["rho"][inside])
     rho = np.concatenate(shown) if shown else np.empty(0)
     panels = [figure.add_subplot(grid[1, column]) for column in range(len(dumps))]
-    for axes, dump, window in zip(panels, dumps, windows, strict=True):
-        line = dump.blocks[0].nodes[:, -1, :]
+    for axes, dump, line, window in zip(panels, dumps, lines, windows, strict=True):
         title = f"density and grid, k c t = {float(get_kct(problem, dump.t)):.1f}"
         style = {"low": rho.min(), "high": rho.max(), "every": 1, "lines": [line]}
         picture = draw_field(axes, dump, "rho", title=title, **style)

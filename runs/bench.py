@@ -358,7 +358,7 @@ class Calls:
 
 
 def make_step(settings: tuple[str, ...]) -> Callable[[], None]:
-    """A run of DECK on one thread, its first steps taken; each call is a step and its columns."""
+    """A run of STEPS_DECK on one thread after its first steps; each call is a step."""
     problem = read_deck(STEPS_DECK, ("run.threads=1", *settings)).make_problem()
     evolution = problem.build()
 
@@ -384,7 +384,7 @@ def count_calls(step: Callable[[], None]) -> Calls:
 
 
 def measure_steps(tables: Tables, rounds: int) -> None:
-    """Table `steps`: medians of a step of DECK with two blocks."""
+    """Table `steps`: medians of a step of STEPS_DECK, with two blocks."""
     step = make_step(())
     counted, whole = [], []
     for _ in range(rounds):
@@ -396,7 +396,7 @@ def measure_steps(tables: Tables, rounds: int) -> None:
     kernels = statistics.median(calls.seconds for calls in counted)
     tables.add(
         "steps",
-        case=f"{DECK}, two blocks",
+        case=f"{STEPS_DECK}, two blocks",
         **{
             "calls of kernels": statistics.median_high(calls.kernels for calls in counted),
             "other calls": statistics.median_high(calls.others for calls in counted),

@@ -50,6 +50,9 @@ setting = click.option(
     help="Change a key of the deck, such as run.t_end=1e-3; can be repeated.",
 )
 quiet = click.option("-q", "--quiet", is_flag=True, help="No progress, only the summary.")
+zoom = click.option("--zoom", metavar="X0,X1,Y0,Y1", help="Part of the plane [m] to show.")
+mesh = click.option("--mesh", is_flag=True, help="Draw the grid over the field.")
+mirror = click.option("--mirror", type=click.Choice(["x", "y"]), help="Complete a half domain.")
 with_plot = click.option("--plot", "picture", is_flag=True, help="Draw pictures at the end.")
 threads = click.option("--threads", type=click.IntRange(1), help="Same as --set run.threads=N.")
 max_wall = click.option(
@@ -267,9 +270,9 @@ def inspect(file, other) -> None:
     help="fields, mesh, interface, history, gauges, line or a problem's own.",
 )
 @click.option("--at", metavar="T1,T2,...", help="Times [s]: the nearest dumps are drawn.")
-@click.option("--mesh", is_flag=True, help="Draw the grid over the fields.")
-@click.option("--zoom", metavar="X0,X1,Y0,Y1", help="Part of the plane [m] to show.")
-@click.option("--mirror", type=click.Choice(["x", "y"]), help="Complete a half domain.")
+@mesh
+@zoom
+@mirror
 @click.option("--beside", metavar="DIR2", help="Another run, drawn to the same scale.")
 @click.option("--line", metavar="X0,Y0,X1,Y1", help="Values of the cells that this line [m] meets.")
 @click.option("--limits", metavar="LOW,HIGH", help="Limits of the colours, in SI units.")
@@ -308,9 +311,9 @@ def export(directory, output) -> None:
 @click.argument("directory", metavar="DIR")
 @click.argument("field", required=False)
 @click.option("--follow", is_flag=True, help="Move the window with the interface.")
-@click.option("--zoom", metavar="X0,X1,Y0,Y1", help="Part of the plane [m] to show.")
-@click.option("--mesh", is_flag=True, help="Draw the grid over the field.")
-@click.option("--mirror", type=click.Choice(["x", "y"]), help="Complete a half domain.")
+@zoom
+@mesh
+@mirror
 @click.option("--fps", type=click.IntRange(1, 60), help="Frames per second [a film of 8 s].")
 @click.option("--dpi", type=click.IntRange(20, 600), default=110, help="Dots per inch [110].")
 @click.option("-o", "--output", metavar="FILE", help="Film [DIR/film-FIELD.mp4 or .gif].")

@@ -31,7 +31,6 @@ from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state
 from runs.store.files import write_atomically
 from runs.store.history import read_history
-from runs.store.reader import RunData
 
 MET = 0.1  # distances of neighbouring nodes: lines as near as this have met
 DETOUR = 6.0  # times their distance: two places of an outline less far apart along it are one
@@ -63,6 +62,8 @@ def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restar
     restart: the command that continues the run.  The failure gets what was made as its
     `early_end`, and the words as its notes.  Raises nothing that is an Exception.
     """
+    from runs.store.reader import RunData  # not at the start of every run
+
     cause, made, lines = ENDS.get(failure.cause), {}, []
 
     def measure() -> str:

@@ -30,7 +30,7 @@ import msgspec
 import numpy as np
 
 from problems.deck import Output
-from problems.problem import BlockPlan, Problem, estimate_memory
+from problems.problem import Problem, estimate_memory, plan_blocks
 from regrid.errors import BadInput
 from runs.deck.checking import find_changes
 from runs.deck.reading import ReadDeck
@@ -327,13 +327,8 @@ def measure_size(problem: Problem, evolution: Any = None, blocks: Sequence[Any] 
     else:
         evolution = evolution or (None if blocks else problem.build())
         t_end = evolution.t_end if evolution is not None else math.nan
-        planned = [
-            BlockPlan(
-                block.name, tuple(n - 1 for n in size), tuple(x.min(axis=1)), tuple(x.max(axis=1))
-            )
-            for block in blocks or evolution.blocks
-            for size, x in [(block.nodes.shape[1:], block.nodes.reshape(len(block.nodes), -1))]
-        ]
+        built = blocks or evolution.blocks
+        planned = plan_blocks({block.name: block.nodes for block in built})
     sizes = [math.prod(block.cells) for block in planned]
     widths = [
         (high - low) / number

@@ -99,7 +99,7 @@ def describe_deck(path: Path) -> str:
 
 def describe_plan(deck: ReadDeck) -> str:
     """Blocks, cells, memory, end time and cautions of the run that a deck would make."""
-    from problems.problem import BlockPlan
+    from problems.problem import plan_blocks
     from runs.inspection.account import count, describe_cautions
     from runs.inspection.info import other_name
 
@@ -111,15 +111,7 @@ def describe_plan(deck: ReadDeck) -> str:
         evolution = problem.build() if plan is None else None
     if evolution is not None:
         t_end = evolution.t_end
-        blocks = [
-            BlockPlan(
-                block.name + other_name(block),
-                (block.nodes.shape[1] - 1, block.nodes.shape[2] - 1),
-                tuple(block.nodes.min(axis=(1, 2))),
-                tuple(block.nodes.max(axis=(1, 2))),
-            )
-            for block in evolution.blocks
-        ]
+        blocks = plan_blocks({b.name + other_name(b): b.nodes for b in evolution.blocks})
     else:
         t_end, blocks = plan
     march = f"t = 0 to {t_end:g} s"

@@ -78,7 +78,7 @@ def test_a_gif_has_a_frame_for_each_dump(run_of_film, shockgrid, monkeypatch):
     code, said, error = shockgrid("film", "run", "--fps", "4", "--dpi", "30", "--mesh")
     assert code == 0, error
     path = Path(said.strip())
-    assert path == Path("run/film-rho.gif")
+    assert path == Path("run/film-rho-mesh.gif")
     with Image.open(path) as film:
         assert film.n_frames == len(run_of_film.dumps) == 6
         assert film.info["duration"] == 250

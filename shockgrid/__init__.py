@@ -36,11 +36,10 @@ if TYPE_CHECKING:
     from runs.inspection.compare import compare
     from runs.inspection.info import inspect
     from runs.interface import grid
-    from runs.interface.calls import film, plot, restart, run, verify
-    from runs.interface.case import Case, load
+    from runs.interface.calls import film, plot, register, restart, run, verify
+    from runs.interface.case import Case, Hook, load
     from runs.interface.opened import OpenRun
     from runs.interface.opened import open_run as open
-    from runs.interface.settings import Hook, register
     from runs.report.page import report
     from runs.study.study import Study, study
     from shockgrid import testing
@@ -56,7 +55,7 @@ MODULES = {
     "Deck": "problems.deck",
     "DeckTable": "problems.deck",
     "EquationOfState": "hydro.eos.base",
-    "Hook": "runs.interface.settings",
+    "Hook": "runs.interface.case",
     "IdealGas": "hydro.eos.gases",
     "JWL": "hydro.eos.jwl",
     "MieGruneisen": "hydro.eos.mie_gruneisen",
@@ -86,7 +85,7 @@ MODULES = {
     "open": "runs.interface.opened",
     "plot": "runs.interface.calls",
     "put": "hydro.boundary",
-    "register": "runs.interface.settings",
+    "register": "runs.interface.calls",
     "report": "runs.report.page",
     "restart": "runs.interface.calls",
     "run": "runs.interface.calls",

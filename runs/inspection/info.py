@@ -389,31 +389,6 @@ def _say_value(value: Any) -> str:
     return repr(value)
 
 
-def _say_range(values: np.ndarray) -> str:
-    if values.size == 0:
-        return "empty"
-    if values.dtype.kind not in "fiub":
-        return ""
-    finite = values[np.isfinite(values)]
-    if finite.size == 0:
-        return "nothing finite"
-    return f"{finite.min():.7g} to {finite.max():.7g}"
-
-
-def _say_bad(values: np.ndarray) -> str:
-    if values.dtype.kind != "f":
-        return ""
-    nans, infinite = int(np.isnan(values).sum()), int(np.isinf(values).sum())
-    words = [f"{nans} NaN"] * bool(nans) + [f"{infinite} infinite"] * bool(infinite)
-    return ", ".join(words)
-
-
-def _say_sum(values: np.ndarray) -> str:
-    if values.dtype.kind not in "fiub":
-        return ""
-    return f"crc32 {zlib.crc32(np.ascontiguousarray(values).data):08x}"
-
-
 def _compare_attributes(one, other, ignored: str) -> list[str]:
     """A line for each attribute that differs, of two groups or arrays."""
     left, right = (

@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
-from collections.abc import Sequence
+from collections.abc import MutableMapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hydro.boundary import SEGMENTS, Segment
+from hydro.eos import EQUATIONS_OF_STATE
+from hydro.eos.base import EquationOfState
 from problems.evolution import Evolution, get_material
 from problems.own_simulation import Measure, OwnSimulation, OwnSimulationDeck
+from problems.problem import Problem
+from problems.registry import PROBLEMS
 from regrid.errors import BadInput
+from regrid.registry import REGRIDDERS
 from runs.deck.reading import ReadDeck, read_toml, resolve_deck
-from runs.interface.case import Case, load
-from runs.interface.opened import OpenRun, finish, open_run
-from runs.interface.settings import (
+from runs.interface.case import (
+    Case,
     HooksGiven,
     join_hooks,
+    load,
     make_settings,
     said_in_python,
 )
+from runs.interface.opened import OpenRun, finish, open_run
 from runs.march.launching import check_changeable, read_restart_deck
 from runs.march.runner import Runner, check_output
 from runs.ranks.started import check_single
@@ -235,3 +243,42 @@ def verify(*problems: str, short: bool = False) -> list[dict[str, Any]]:
     from runs.verify import choose_cases, compute_records
 
     return list(compute_records(choose_cases(problems), short))
+
+
+PLAIN = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
+_OWN: dict[tuple[str, str], str] = {}  # what was registered here: kind and name, and its class
+
+
+def register(name: str, thing: type) -> None:
+    """Make a class known by name: a problem, an equation of state, a boundary kind, a regridder.
+
+    A regridder is a class with a method `regrid(previous, boundary)`.  The same name may be given
+    again by the same class, rewritten.  Raises BadInput for another class, for a name that is
+    taken, and for one that is not of small letters, digits and hyphens.
+    """
+    if not isinstance(thing, type):
+        raise BadInput(f"{name!r}: a class is registered, not a {type(thing).__name__}")
+    if not PLAIN.fullmatch(name):
+        raise BadInput(f"{name!r} is not a valid name: use lower-case letters, digits and hyphens")
+    place = f"{thing.__module__}:{thing.__qualname__}"
+    registry: MutableMapping[str, Any]
+    value: Any
+    if issubclass(thing, Problem):
+        kind, registry, value = "problem", PROBLEMS, place
+    elif issubclass(thing, EquationOfState):
+        kind, registry, value = "equation of state", EQUATIONS_OF_STATE, thing
+    elif issubclass(thing, Segment):
+        kind, registry, value = "boundary kind", SEGMENTS, thing
+    elif callable(getattr(thing, "regrid", None)):
+        kind, registry, value = "regridder", REGRIDDERS, place
+    else:
+        raise BadInput(
+            f"{thing.__name__} is not a problem, equation of state, boundary kind or regridder: it "
+            "is derived from none of them and has no method regrid"
+        )
+    if "<locals>" in place:
+        raise BadInput(f"{thing.__qualname__}: a class inside a function cannot be registered")
+    if name in registry and _OWN.get((kind, name)) != place:
+        raise BadInput(f"there is a {kind} {name!r} already; choose another name")
+    registry[name] = value
+    _OWN[kind, name] = place

@@ -1,14 +1,19 @@
 """A problem with its deck, to inspect, step, run and draw: what `shockgrid.load` returns.
 
+Keywords are settings of the deck, `cells=32, run={"t_end": 1e-3}` or `"run.t_end": 1e-3`: they
+become the words of `--set`, so that the command line and Python have the same checks.
+
 Note: blocks are built when they are first asked for, which may compile kernels for a minute;
-their arrays are live (`runs.interface.case`).
+their arrays are live.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,26 +34,114 @@ from problems.problem import Problem, check_memory
 from regrid.errors import BadInput, suggest
 from runs.deck.reading import ReadDeck, read_deck, resolve_deck
 from runs.inspection.account import describe_cautions
-from runs.interface.opened import Drawn, OpenRun, finish
-from runs.interface.settings import (
-    HooksGiven,
-    is_count,
-    join_hooks,
-    make_settings,
-    make_table,
-    said_in_python,
-)
+from runs.interface.opened import Curve, Drawn, OpenRun, find_interface, finish, make_table
 from runs.march.compiling import compiling
 from runs.march.launching import check_requests
 from runs.march.runner import Runner
 from runs.ranks.started import check_single
 from runs.store.directory import create_directory
 from runs.store.reader import BlockData, Fields, Snapshot, Table
+from runs.study.definition import flatten, write_settings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from runs.interface.pictures import Curve
+
+def make_settings(keywords: Mapping[str, Any]) -> tuple[str, ...]:
+    """`key=value` for each value, keys of tables joined by dots.
+
+    Raises BadInput for None and for values that no deck can hold.
+    """
+    return write_settings(flatten(keywords))
+
+
+SAID = (  # on the command line, in Python
+    ("--set: ", ""),
+    (" and --set", " and the keywords"),
+    ("--set ", ""),
+    ("choose another with -o, or --force to", "choose another, or force=True to"),
+    ("choose another with -o", "choose another"),
+    ("choose another folder with -o", "choose another folder"),
+    ("another directory with -o", "another directory"),
+    ("choose an earlier one with --at", "choose an earlier one with at="),
+)
+
+
+@contextmanager
+def said_in_python() -> Iterator[None]:
+    """Sentences of BadInput that name options of the command line name keywords instead."""
+    try:
+        yield
+    except BadInput as error:
+        words = str(error)
+        for option, keyword in SAID:
+            words = words.replace(option, keyword)
+        raise BadInput(words) from error
+
+
+HookFunction = Callable[[Any], Any]  # of the case; None, or words on why to stop
+
+
+def is_count(value: object) -> bool:
+    """Is it a whole number of at least 1?"""
+    return type(value) is int and value >= 1
+
+
+class Hook:
+    """A function to be called every `steps` steps or every `time` [s], after each step
+    where neither is given.
+
+    Times are multiples of `time`; a call is made after the first step past one.  Raises BadInput
+    where both are given, or one that is not positive.
+    """
+
+    def __init__(
+        self, function: HookFunction, *, steps: int | None = None, time: float | None = None
+    ):
+        if not callable(function):
+            raise BadInput(f"a hook is a function of the case, not a {type(function).__name__}")
+        if steps is not None and time is not None:
+            raise BadInput(
+                "a hook is called every so many steps or every so many seconds, not both"
+            )
+        if steps is not None and not is_count(steps):
+            raise BadInput(f"steps = {steps!r} of a hook: a whole number of at least 1 is wanted")
+        if time is not None and not (math.isfinite(time) and time > 0.0):
+            raise BadInput(f"time = {time!r} s of a hook: a positive number is wanted")
+        self.function, self.steps, self.time = function, steps, time
+
+    def is_due(self, case: Any, t_before: float) -> bool:
+        """Is it to be called after the step from `t_before` to the time of the case?"""
+        if self.time is not None:
+            return math.floor(case.t / self.time) > math.floor(t_before / self.time)
+        return case.step % (self.steps or 1) == 0
+
+
+HooksGiven = Sequence[Hook | HookFunction] | Hook | HookFunction
+
+
+def join_hooks(case: Any, given: HooksGiven) -> Callable[[float], str | None]:
+    """What a runner calls after each step, from a time [s] on: all hooks that are due.
+
+    It returns the first reason to stop, and raises BadInput where a hook returns neither None nor
+    text.
+    """
+    several = given if isinstance(given, Sequence) else [given]
+    hooks = [hook if isinstance(hook, Hook) else Hook(hook) for hook in several]
+
+    def call(t_before: float) -> str | None:
+        for hook in [one for one in hooks if one.is_due(case, t_before)]:
+            reason = hook.function(case)
+            if reason is not None and not isinstance(reason, str):
+                name = getattr(hook.function, "__name__", "hook")
+                raise BadInput(
+                    f"{name} returned {reason!r}: a hook returns None, or words on why to stop"
+                )
+            if reason:
+                return reason
+        return None
+
+    return call
 
 
 def _view(block: BlockView, axes: tuple[str, str]) -> BlockData:
@@ -253,8 +346,6 @@ class Case(Drawn):
 
     def interface(self) -> Curve:
         """The curve between blocks of different materials now: arrays x, y [m], and t [s]."""
-        from runs.interface.pictures import find_interface
-
         return find_interface(list(self.blocks.values()), self.t, self.name)
 
     def plot(self, *fields: str, **options: Any) -> Figure:

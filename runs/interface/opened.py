@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
+import html
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from problems.evolution import Evolution
 from problems.problem import Problem
+from regrid.errors import BadInput
 from runs.inspection.account import describe_time
-from runs.interface.settings import make_table
 from runs.march.runner import Ending, Runner
-from runs.store.reader import RunData
+from runs.store.reader import BlockData, RunData
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from runs.interface.pictures import Curve, Times
-
 FIRST_SIGNAL = 128  # exit codes from here on: stopped by a signal
 INTERRUPTED = 130
+
+
+def make_table(rows: Sequence[tuple[str, str]], theory: Mapping[str, float]) -> str:
+    """HTML of two columns, what and its value, `theory` the last rows."""
+    rows = [*rows, *((f"theory: {name}", f"{value:.6g}") for name, value in theory.items())]
+    lines = "".join(
+        f"<tr><th style='text-align:left'>{html.escape(what)}</th>"
+        f"<td style='text-align:left'>{html.escape(value)}</td></tr>"
+        for what, value in rows
+    )
+    return f"<table>{lines}</table>"
 
 
 class Drawn:
@@ -37,7 +49,7 @@ class Drawn:
         self,
         *fields: str,
         what: str | None = None,
-        at: Times = None,
+        at: float | str | Sequence[float] | None = None,
         mesh: bool = False,
         zoom: Sequence[float] | None = None,
         mirror: str | None = None,
@@ -56,14 +68,56 @@ class Drawn:
         fields along it are drawn; limits: low, high of the colours in SI units; colours: a colour
         map.  Raises BadInput for what there is not.
         """
-        from runs.interface.pictures import draw_picture
+        from runs.pictures.command import Wanted, fill_figure, new_figure
 
         if what is None and len(fields) == 1 and fields[0] in self.pictures:
             what, fields = fields[0], ()
-        return draw_picture(
-            self, fields, what=what, at=at, mesh=mesh, zoom=zoom, mirror=mirror, beside=beside,
-            line=line, limits=limits, colours=colours,
-        )  # fmt: skip
+        if mirror not in (None, "x", "y"):
+            raise BadInput(f"mirror = {mirror!r}: 'x' or 'y' is wanted")
+        if at is not None and not isinstance(at, str):
+            at = say_numbers(np.atleast_1d(np.asarray(at, float)))
+        wanted = Wanted(
+            fields,
+            what,
+            at,
+            mesh,
+            say_numbers(zoom),
+            mirror,
+            None if beside is None else str(beside),
+            say_numbers(line),
+            say_numbers(limits),
+            colours,
+        )
+        fill_figure(figure := new_figure(), self, wanted)  # type: ignore[arg-type]
+        return figure
+
+
+def say_numbers(numbers: Sequence[float] | np.ndarray | None) -> str | None:
+    """Numbers as an option of the command line gives them."""
+    return None if numbers is None else ",".join(repr(float(value)) for value in numbers)
+
+
+class Curve(NamedTuple):
+    """Where two materials meet at time t [s]: x and y [m], one array each, along the line.
+
+    Where there are several lines a nan stands between them.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    t: float
+
+
+def find_interface(blocks: Sequence[BlockData], t: float, where: str) -> Curve:
+    """The lines between blocks of different materials; BadInput where there are none."""
+    from runs.pictures.curves import find_curves
+
+    lines = [curve[:2] for curve in find_curves(blocks).values()]
+    if not lines:
+        raise BadInput(f"{where}: no two materials touch, so there is no interface")
+    gap = np.full((2, 1), np.nan)
+    x, y = np.concatenate([part for line in lines for part in (gap, line)][1:], axis=1)
+    return Curve(x, y, t)
 
 
 class OpenRun(Drawn, RunData):
@@ -83,8 +137,6 @@ class OpenRun(Drawn, RunData):
         Arrays x and y [m], and the time t of that dump; without `t` the last.  Raises BadInput
         where there is no dump, or no two materials touch.
         """
-        from runs.interface.pictures import find_interface
-
         dump = self.dump_at(t)
         return find_interface(dump.blocks, dump.t, str(dump.path))
 
@@ -106,7 +158,6 @@ class OpenRun(Drawn, RunData):
         field: the density where none is named; output: FILE [DIR/film-FIELD.mp4 or .gif]; zoom: x0,
         x1, y0, y1 [m]; options: follow, mesh (bool), mirror "x" or "y", fps, dpi.  Raises BadInput.
         """
-        from runs.interface.pictures import say_numbers
         from runs.pictures.film import make_film
 
         return make_film(self.path, field, output, zoom=say_numbers(zoom), **options)

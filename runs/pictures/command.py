@@ -5,6 +5,7 @@ matplotlib is used through its objects, without pyplot: faster to load and no di
 
 from __future__ import annotations
 
+import io
 import math
 import re
 from collections.abc import Callable
@@ -232,9 +233,18 @@ def draw_all(directory: str, dpi: int = 140) -> list[Path]:
     return paths
 
 
-def new_figure(kind: type[Figure] = Figure) -> Figure:
+class Picture(Figure):
+    """A figure that notebooks show as it stands, and that needs no display."""
+
+    def _repr_png_(self) -> bytes:
+        image = io.BytesIO()
+        self.savefig(image, format="png", dpi=100)
+        return image.getvalue()
+
+
+def new_figure() -> Figure:
     """An empty figure that can be saved; no window."""
-    figure = kind(figsize=(10.0, 6.0), layout="constrained")
+    figure = Picture(figsize=(10.0, 6.0), layout="constrained")
     FigureCanvasAgg(figure)
     figure.get_layout_engine().set(w_pad=PAD, h_pad=PAD)
     return figure

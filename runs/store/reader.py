@@ -7,6 +7,7 @@ import importlib
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -142,6 +143,7 @@ class Fields(Mapping[str, np.ndarray]):
         return len(self._names)
 
 
+@dataclass(repr=False, eq=False)
 class BlockData:
     """A block of a dump or of a flow in memory: `nodes` (2, ni+1, nj+1) [m], and its fields.
 
@@ -149,29 +151,20 @@ class BlockData:
     too: `block.rho`.  An unknown name raises AttributeError with those that there are.
     """
 
-    def __init__(
-        self,
-        name: str,
-        material: str,
-        axes: tuple[str, str],
-        get_nodes: Callable[[], np.ndarray],
-        cell_fields: Fields,
-        node_fields: Fields,
-        state_fields: Fields,
-        units: Mapping[str, str],
-        long_names: Mapping[str, str],
-    ):
-        self.name, self.material = name, material
-        self.axes = axes  # their names on pictures: x and y, or x and r
-        self._get_nodes = get_nodes
-        self.cell_fields, self.node_fields = cell_fields, node_fields
-        self.state_fields = state_fields  # of the cells, beside what is drawn: `rates` [1/s]
-        self.units, self.long_names = units, long_names
+    name: str
+    material: str
+    axes: tuple[str, str]  # their names on pictures: x and y, or x and r
+    get_nodes: Callable[[], np.ndarray]
+    cell_fields: Fields
+    node_fields: Fields
+    state_fields: Fields  # of the cells, beside what is drawn: `rates` [1/s]
+    units: Mapping[str, str]
+    long_names: Mapping[str, str]
 
     @property
     def nodes(self) -> np.ndarray:
         """Nodes (2, ni+1, nj+1) [m]."""
-        return self._get_nodes()
+        return self.get_nodes()
 
     @property
     def centres(self) -> np.ndarray:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import msgspec
 import numpy as np
 
 from problems.deck import Gauge
@@ -17,6 +18,7 @@ from problems.evolution import get_material
 from problems.problem_file import read_head
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
+from runs.deck.checking import find_changes
 from runs.inspection.account import (
     count,
     describe_cautions,
@@ -201,22 +203,15 @@ def _find_threads(run: RunData) -> list[str]:
 
 def describe_settings(run: RunData) -> list[str]:
     """Those keys of the deck that differ from the problem's defaults."""
-
-    def find_changed(deck: Any, default: Any, prefix: str) -> Iterator[str]:
-        for name in deck.__struct_fields__:
-            value, usual = getattr(deck, name), getattr(default, name)
-            if value == usual:
-                continue
-            if hasattr(value, "__struct_fields__") and type(value) is type(usual):
-                yield from find_changed(value, usual, f"{prefix}{name}.")
-            else:
-                yield f"  {prefix}{name} = {_say_gauges(value) if name == 'gauge' else value}"
-
     try:
-        changed = list(find_changed(run.deck, type(run.deck)(), ""))
+        usual, now = (msgspec.to_builtins(deck) for deck in (type(run.deck)(), run.deck))
     except BadInput:
         return []
-    return ["deck, where not default:", *changed] if changed else ["deck: all defaults"]
+    changed = {one.key: one.now for one in find_changes(usual, now)}
+    if "gauge" in changed:
+        changed["gauge"] = _say_gauges(run.deck.gauge)
+    lines = [f"  {key} = {value}" for key, value in changed.items()]
+    return ["deck, where not default:", *lines] if lines else ["deck: all defaults"]
 
 
 def _say_gauges(gauges: Sequence[Gauge]) -> str:

@@ -12,7 +12,7 @@ import json
 import re
 import shlex
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ import msgspec
 from problems.problem_file import ProblemFile, compute_digest, is_problem_file, read_problem_file
 from problems.registry import is_problem, load_problem
 from regrid.errors import BadInput
-from runs.deck.checking import show
+from runs.deck.checking import find_changes, show
 from runs.deck.reading import ReadDeck, read_toml, resolve_deck
 from runs.store.directory import RunDirectory
 from runs.store.dumps import open_dump
@@ -82,22 +82,15 @@ def check_deck(directory: RunDirectory) -> str:
 def _find_changes(text: str, stored: str) -> list[str] | None:
     """Keys of two decks that differ, in words; None where one is no TOML."""
     try:
-        now, was = (dict(_flatten(tomllib.loads(words))) for words in (text, stored))
+        was, now = tomllib.loads(stored), tomllib.loads(text)
     except tomllib.TOMLDecodeError:
         return None
-    changed = [name for name in {**was, **now} if now.get(name) != was.get(name)]
-    told = [
-        [show(deck[name]) if name in deck else "missing" for deck in (now, was)] for name in changed
-    ]
-    return [f"{name} is {new}, was {old}" for name, (new, old) in zip(changed, told, strict=True)]
+    told = [(one.key, _show(one.now), _show(one.before)) for one in find_changes(was, now)]
+    return [f"{key} is {new}, was {old}" for key, new, old in told]
 
 
-def _flatten(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    for name, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flatten(value, f"{prefix}{name}.")
-        else:
-            yield prefix + name, value
+def _show(value: Any) -> str:
+    return "missing" if value is None else show(value)
 
 
 def check_summary(directory: RunDirectory) -> str:

@@ -20,7 +20,6 @@ from problems.interface_instability.theories import (
 )
 from problems.pictures import draw_field, find_dump, spread_dumps
 from problems.problem import Report, Row
-from problems.references.linear_growth import compute_atwood_number
 from regrid.measure.corners import compute_centres
 
 SHOWN = 3  # times drawn beside the growth
@@ -55,8 +54,7 @@ def make_report(problem, history) -> Report:
         f"shock to p = {problem.shock.p:g} through rho = {problem.rho_first:g} onto rho = "
         f"{problem.rho_second:g}; {_describe_modes(problem)}, "
         f"{deck.cells} cells a wavelength, to k c t = {kct:.3g}",
-        f"  reflected wave: {reflected}, Atwood number after the shock "
-        f"{compute_atwood_number(theory.base.rho_left, theory.base.rho_right):.3f}",
+        f"  reflected wave: {reflected}, Atwood number after the shock {theory.atwood:.3f}",
         f"  thickness of the interface: {problem.thickness:.3g} m "
         f"({problem.thickness * deck.cells / deck.wavelength:.2g} of a first cell)",
     ]
@@ -73,11 +71,11 @@ def make_report(problem, history) -> Report:
 
 def _predict(problem) -> list[Row]:
     """Theory alone; growth_rate is the mean over the part of WINDOW that the run reaches."""
-    theory, base = problem.theory, problem.theory.base
+    theory = problem.theory
     if problem.deck.second_shock is not None:
         return []
-    atwood = compute_atwood_number(base.rho_left, base.rho_right)
-    rows = [Row("interface_speed", theory=base.u), Row("atwood_number", theory=atwood)]
+    known = {"interface_speed": theory.base.u, "atwood_number": theory.atwood}
+    rows = [Row(name, theory=value) for name, value in known.items()]
     if problem.harmonics:
         last = min(WINDOW[1], float(get_kct(problem, problem.t_end)))
         if last > WINDOW[0] + LEAST_WINDOW:

@@ -8,7 +8,7 @@ than 1 %.  For several modes the sum of
 their k a is to be <= 0.1: waves that two of them make are k a times as large as they [Haan1991].
 The Padé model [ZhangSohn1997] is one for a single mode and a reflected shock, with k a+ < 1, growth
 slower than 0.3 of the sound speed (its flow is incompressible) and as long as its growth falls no
-faster than 1/t (`find_pade_range`).  The impulsive models are nowhere exact: they are shown without
+faster than 1/t (`PadeModel.reach`).  The impulsive models are nowhere exact: they are shown without
 a difference.
 
 k is the mode's own wavenumber, n times the deck's, and so are its times k c t; c is the sound speed
@@ -48,12 +48,7 @@ import numpy as np
 
 from hydro.eos import IdealGas
 from problems.interface_instability.line import Harmonic
-from problems.references.linear_growth import (
-    LinearGrowth,
-    compute_atwood_number,
-    compute_pade_amplitude,
-    find_pade_range,
-)
+from problems.references.linear_growth import LinearGrowth, PadeModel
 
 WINDOW = (6.0, 30.0)  # k c t over which a growth rate is averaged
 LEAST_WINDOW = 1.0
@@ -115,9 +110,7 @@ class Growth:
         """Largest sum of the modes' k a to which linear theory applies."""
         if len(self.problem.harmonics) > 1:
             return COUPLED
-        base = self.theory.base
-        atwood = compute_atwood_number(base.rho_left, base.rho_right)
-        return min(LINEAR, math.sqrt(8.0 * LOSS / (4.0 * atwood**2 + 1.0)))
+        return min(LINEAR, math.sqrt(8.0 * LOSS / (4.0 * self.theory.atwood**2 + 1.0)))
 
     @functools.cached_property
     def linear_reach(self) -> float:
@@ -177,38 +170,32 @@ class Growth:
             return "theory has next to no growth"
         if theory.reflected != "shock" or theory.compression <= 0.0:
             return "the Padé model is one for reflected shocks"
-        wavenumber, start, rate, _ = self._model_terms()
-        if wavenumber * start >= 1.0:
-            return f"the Padé model ends at k a+ = 1, here {wavenumber * start:.2g}"
-        speed = rate / theory.sound_speed
+        slope = self.model.wavenumber * self.model.amplitude
+        if slope >= 1.0:
+            return f"the Padé model ends at k a+ = 1, here {slope:.2g}"
+        speed = self.model.rate / theory.sound_speed
         if speed > INCOMPRESSIBLE:
             return f"the Padé model is incompressible, growth is at {speed:.2g} of the sound speed"
         return ""
 
-    def _model_terms(self) -> tuple[float, float, float, float]:
-        """Wavenumber, amplitude and rate just after the shock, Atwood number of the one mode."""
-        theory = self.theory
-        mode = self.problem.harmonics[0]
-        wavenumber = mode.number * self.problem.k
-        start = abs(mode.amplitude)
+    @functools.cached_property
+    def model(self) -> PadeModel:
+        """The Padé model of the one mode, from the linear asymptotic rate."""
+        (mode,), theory = self.problem.harmonics, self.theory
+        wavenumber, start = mode.number * self.problem.k, abs(mode.amplitude)
         rate = abs(theory.get_asymptotic_rate()) * wavenumber * start
-        atwood = compute_atwood_number(theory.base.rho_left, theory.base.rho_right)
-        return wavenumber, start * theory.compression, rate, atwood
+        return PadeModel(wavenumber, start * theory.compression, rate, theory.atwood)
 
     @property
     def model_reach(self) -> float:
         """k c t (k of the wavelength) up to which the Padé model can be right; 0 where nowhere."""
         if self.model_fails:
             return 0.0
-        problem = self.problem
-        return find_pade_range(*self._model_terms()) * problem.k * self.theory.sound_speed
+        return self.model.reach * self.problem.k * self.theory.sound_speed
 
     def compute_model(self, t: np.ndarray) -> np.ndarray:
-        """Non-linear amplitude (Padé from the linear asymptotic rate) at ascending times t."""
-        wavenumber, start, rate, atwood = self._model_terms()
-        after = np.maximum(np.asarray(t) - self.problem.arrival, 0.0)
-        times = np.concatenate([[0.0], after])
-        return compute_pade_amplitude(wavenumber, start, rate, atwood, times)[1:]
+        """Amplitude by the Padé model at the times t (n,)."""
+        return self.model.compute_amplitude(np.maximum(np.asarray(t) - self.problem.arrival, 0.0))
 
 
 FEW_CELLS = 16  # in a wave: shorter ones grow by more than a twentieth less than theory

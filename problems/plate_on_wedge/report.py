@@ -18,7 +18,6 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -51,8 +50,7 @@ FARTHEST = 0.15  # of A's path: where the profile has to begin at the latest
 BENDS = 40  # places of the bend that are tried
 
 
-@dataclass(frozen=True)
-class Plateau:
+class Plateau(NamedTuple):
     """What was found behind A.
 
     - `p`: pressure behind A, Pa: mean of the plateau, or the fall continued to A; NaN where
@@ -63,15 +61,12 @@ class Plateau:
     - `fall`: by how much the pressure is less at `end` than at A, over p; 0 of a plateau.
     """
 
-    p: float
-    scatter: float
-    start: float
-    end: float
-    flat: bool
-    fall: float
-
-
-NOTHING = Plateau(math.nan, math.nan, math.nan, math.nan, False, math.nan)
+    p: float = math.nan
+    scatter: float = math.nan
+    start: float = math.nan
+    end: float = math.nan
+    flat: bool = False
+    fall: float = math.nan
 
 
 def measure_profile(
@@ -110,7 +105,7 @@ def find_plateau(profiles: np.ndarray, mach: float = 1.0) -> Plateau:
     known = np.flatnonzero(seen.sum(axis=0) > SEEN * max(len(profiles), 1))
     edges = 1e-3 * np.array(EDGES)
     if known.size < LEAST_PARTS or (np.diff(known) > 1).any() or edges[known[0]] > FARTHEST:
-        return NOTHING
+        return Plateau()
     low, high = edges[:-1][known], edges[1:][known]
     profiles = profiles[:, known]
     p = np.nanmean(profiles, axis=0)
@@ -217,7 +212,7 @@ def measure_plateau(problem, history) -> Plateau:
     """The pressure plateau behind A on the face's last part, or what stands for it."""
     rows = choose_rows(problem, history, STEADY)
     if not rows.any():
-        return NOTHING
+        return Plateau()
     columns = [np.asarray(history[name], dtype=float)[rows] for name in COLUMNS]
     theory = problem.collision
     machs = [wave.mach_behind for wave in (theory.plate, theory.wedge) if wave is not None]

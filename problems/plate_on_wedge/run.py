@@ -88,13 +88,18 @@ class PlateRun(Simulation):
             return self.get_lower_line()[:, self.contact.slave.count]
         return self.find_touching()[1]
 
-    def get_contact_line(self) -> np.ndarray:
-        """Nodes (2, n) of the contact, from A backwards."""
-        return self.get_lower_line()[:, self.count_contact() :: -1]
-
     def get_free_line(self) -> np.ndarray:
         """Nodes (2, n) of the plate's free lower side, from A on."""
         return self.get_lower_line()[:, self.count_contact() :]
+
+    def has_run(self) -> bool:
+        """Has A left the wedge's edge?"""
+        moved = self.find_contact_point() - self.start
+        return np.hypot(*moved) > 1e-2 * self.problem.deck.face
+
+    def has_jet(self) -> bool:
+        """Are enough cells fast?"""
+        return self.measured[0][1] >= LEAST_JET
 
     def is_at_end(self) -> bool:
         """Has A come to the end B of the face?"""
@@ -138,23 +143,22 @@ class PlateRun(Simulation):
 
     def measure(self) -> dict[str, float]:
         """Columns of the history: A, the states behind it, the jet, the phase."""
-        point = self.find_contact_point()
-        first, last = BEHIND
-        line = self.get_contact_line()
-        count = self.count_contact()
-        direction = line[:, first] - line[:, last] if count >= last else np.full(2, math.nan)
-        pressure = self.plate.state[3, 1:-1, 1]
-        surface = np.hypot(*self.plate.state[1:3, 1:-1, 1])
+        point, count, (first, last) = self.find_contact_point(), self.count_contact(), BEHIND
+        line = self.get_lower_line()[:, count::-1]  # of the contact, from A backwards
+        _, u, v, pressure = self.plate.state[:, 1:-1, 1]
+        surface = np.hypot(u, v)
         if not self.end:
             pressure, surface = pressure[::-1], surface[::-1]
+        behind, direction = math.nan, np.full(2, math.nan)
+        if count >= last:
+            behind = float(pressure[count - last : count - first].mean())
+            direction = line[:, first] - line[:, last]
         (fastest, cells, mass, angle), (*_, angle_in_wedge) = self.measured[:2]
         return {
             "contact_x": float(point[0]),
             "contact_y": float(point[1]),
             "contact_path": self.measure_path(),
-            "contact_pressure": float(pressure[count - last : count - first].mean())
-            if count >= last
-            else math.nan,
+            "contact_pressure": behind,
             **self.measure_pressures(line, pressure[:count][::-1]),
             "interface_angle": -math.degrees(math.atan2(direction[1], direction[0])),
             "shock_angle_plate": angle,
@@ -237,17 +241,13 @@ class PlateRun(Simulation):
     def advance(self) -> dict:
         """One step; then looks which phase it is and whether the run is at its end."""
         row = super().advance()
-        if not math.isfinite(self.times["attached"]):
-            moved = self.find_contact_point() - self.start
-            if np.hypot(*moved) > 1e-2 * self.problem.deck.face:
-                self._enter("attached")
-        if not math.isfinite(self.times["arrived"]) and self.is_at_end():
-            self._enter("arrived")
-        if not math.isfinite(self.times["jet"]) and self.measured[0][1] >= LEAST_JET:
-            self._enter("jet")
+        begun = {"attached": self.has_run, "arrived": self.is_at_end, "jet": self.has_jet}
+        for phase, is_there in begun.items():
+            if not math.isfinite(self.times[phase]) and is_there():
+                self.times[phase] = self.t
         reason = self.find_closure()
         if reason and not self.finished:
-            self._enter("closed")
+            self.times["closed"] = self.t
             self.finished = reason
         self.finished = self.finished or self.find_arrival()
         return row
@@ -262,9 +262,6 @@ class PlateRun(Simulation):
         """Number (1..) in PHASES of the phase entered last, 0 before the first."""
         entered = [(t, k) for k, t in enumerate(self.times.values(), 1) if math.isfinite(t)]
         return max(entered)[1] if entered else 0
-
-    def _enter(self, phase: str) -> None:
-        self.times[phase] = self.t
 
     def find_closure(self) -> str | None:
         """What the plate's free surface has met, in words, or None."""
@@ -302,8 +299,7 @@ class PlateRun(Simulation):
         Both lines begin at A, where no contact is between them.
         """
         wedge = self.problem.to_set_up(self.wedge.nodes)
-        for k in range(1, APART):
-            x, y = free[:, k]
+        for k, (x, y) in enumerate(free[:, 1:APART].T, 1):
             if is_inside((x, y), wedge):
                 away = min(project(face, a, x, y)[1] for a in range(face.shape[1] - 1))
                 if away > near[k] ** 2:

@@ -181,43 +181,45 @@ def compute_atwood_number(rho_first: float, rho_second: float) -> float:
     return (rho_second - rho_first) / (rho_second + rho_first)
 
 
-def compute_pade_rate(wavenumber: float, amplitude: float, rate: float, atwood: float, t):
-    """da/dt at the times `t` (any shape) in the non-linear stage [ZhangSohn1997].
+@dataclass(frozen=True)
+class PadeModel:
+    """Non-linear growth of the half height of bubble and spike [ZhangSohn1997], from memory of the
+    literature: with `amplitude` a0 [m] and the linear `rate` v0 > 0 [m/s] just after the shock,
 
-    `v = v0/(1 + v0 a0 k² t + max(0, a0² k² - A² + 1/2) v0² k² t²)` for the half height of bubble
-    and spike; `amplitude` a0 and the linear `rate` v0 > 0 just after the shock.  Quoted from memory
-    of the literature.  Its range: `find_pade_range`.
+        v = v0/(1 + v0 a0 k² t + max(0, c) v0² k² t²),   c = a0² k² - A² + 1/2.
     """
-    reduced = rate * np.asarray(t, dtype=float)
-    square = max(0.0, (amplitude * wavenumber) ** 2 - atwood**2 + 0.5)
-    denominator = 1.0 + reduced * amplitude * wavenumber**2 + square * (wavenumber * reduced) ** 2
-    return rate / denominator
 
+    wavenumber: float
+    amplitude: float
+    rate: float
+    atwood: float
 
-def find_pade_range(wavenumber: float, amplitude: float, rate: float, atwood: float) -> float:
-    """Time after the shock up to which `compute_pade_rate` can be right; inf without such an end.
+    @property
+    def square(self) -> float:
+        """The c of the formula."""
+        return (self.amplitude * self.wavenumber) ** 2 - self.atwood**2 + 0.5
 
-    The growth of one mode slows down like 1/t and no faster [Sadot1998].  The model's goes over to
-    1/t² where c (k v0 t)² = 1, c = a0² k² - A² + 1/2: from there on it is no approximation.
-    """
-    square = (amplitude * wavenumber) ** 2 - atwood**2 + 0.5
-    return math.inf if square <= 0.0 else 1.0 / (math.sqrt(square) * wavenumber * rate)
+    @property
+    def reach(self) -> float:
+        """Time after the shock up to which the model can be right; inf without such an end.
 
+        The growth of one mode slows down like 1/t and no faster [Sadot1998].  The model's goes over
+        to 1/t² where c (k v0 t)² = 1: from there on it is no approximation.
+        """
+        growth = math.sqrt(max(self.square, 0.0)) * self.wavenumber * self.rate
+        return 1.0 / growth if growth else math.inf
 
-def compute_pade_amplitude(wavenumber: float, amplitude: float, rate: float, atwood: float, t):
-    """Amplitude at the ascending times `t` (n,) from t = 0 by the rate of `compute_pade_rate`.
+    def compute_rate(self, t):
+        """da/dt at the times `t` (any shape)."""
+        reduced = self.rate * np.asarray(t, dtype=float)
+        slow = 1.0 + reduced * self.amplitude * self.wavenumber**2
+        return self.rate / (slow + max(0.0, self.square) * (self.wavenumber * reduced) ** 2)
 
-    Integrated by Simpson's rule between the times, 16 pieces each.
-    """
-    t = np.asarray(t, dtype=float)
-    start = np.concatenate([[0.0], t[:-1]])
-    position = np.linspace(0.0, 1.0, 33)
-    weight = np.full(33, 2.0)
-    weight[1::2] = 4.0
-    weight[[0, -1]] = 1.0
-    times = start[:, None] + (t - start)[:, None] * position
-    speed = compute_pade_rate(wavenumber, amplitude, rate, atwood, times)
-    return amplitude + np.cumsum((speed @ weight) / 96.0 * (t - start))
+    def compute_amplitude(self, t):
+        """Amplitude at the times `t` >= 0 (n,), by Gauss's rule."""
+        points, weights = np.polynomial.legendre.leggauss(40)
+        half = 0.5 * np.asarray(t, dtype=float)
+        return self.amplitude + half * (self.compute_rate(half[:, None] * (1.0 + points)) @ weights)
 
 
 LAYER_POINTS = 40
@@ -299,6 +301,11 @@ class LinearGrowth:
     reflected: str
     incident: Shock
     base: RiemannSolution
+
+    @property
+    def atwood(self) -> float:
+        """Atwood number after the shock."""
+        return compute_atwood_number(self.base.rho_left, self.base.rho_right)
 
     @functools.cached_property
     def _curve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

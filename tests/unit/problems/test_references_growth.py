@@ -9,31 +9,25 @@ import pytest
 from hydro.eos import IdealGas, MieGruneisen
 from hydro.eos.materials import find_material
 from problems.references.hugoniot import shock_with_mach
-from problems.references.linear_growth import (
-    compute_linear_growth,
-    compute_pade_amplitude,
-    compute_pade_rate,
-    find_pade_range,
-)
+from problems.references.linear_growth import PadeModel, compute_linear_growth
 from problems.references.shock_polars import Body, cross_line
 
 
 def test_pade_amplitude_is_the_integral():
     t = np.linspace(0.0, 3.0, 31)
-    amplitude = compute_pade_amplitude(2.0, 0.05, 0.3, 0.9, t)
+    amplitude = PadeModel(2.0, 0.05, 0.3, 0.9).compute_amplitude(t)
     assert amplitude[0] == 0.05
     exact = 0.05 + math.log1p(0.3 * 0.05 * 4 * 3.0) / (0.05 * 4)
     assert amplitude[-1] == pytest.approx(exact, rel=1e-10)
 
 
 def test_pade_ends_where_its_growth_falls_faster_than_one_over_t():
-    terms = (2.0, 0.05, 0.3, 0.5)
-    end = find_pade_range(*terms)
+    model = PadeModel(2.0, 0.05, 0.3, 0.5)
     for part, sign in ((0.9, 1.0), (1.1, -1.0)):
-        t = part * end * np.array([1.0 - 1e-4, 1.0 + 1e-4])
-        steepness = np.diff(np.log(compute_pade_rate(*terms, t))) / np.diff(np.log(t))
+        t = part * model.reach * np.array([1.0 - 1e-4, 1.0 + 1e-4])
+        steepness = np.diff(np.log(model.compute_rate(t))) / np.diff(np.log(t))
         assert sign * (steepness[0] + 1.0) > 0.01
-    assert find_pade_range(2.0, 0.05, 0.3, 0.9) == math.inf
+    assert PadeModel(2.0, 0.05, 0.3, 0.9).reach == math.inf
 
 
 AL = MieGruneisen(2.707, 5.386, 1.339, 1.97)

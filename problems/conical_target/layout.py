@@ -78,16 +78,13 @@ class Ripple:
     def __bool__(self) -> bool:
         return self.amplitude > 0.0
 
-    def compute_heights(self, position: np.ndarray) -> np.ndarray:
-        """Heights (n,) [m] over the side at the places (n,) along it [m]."""
+    def compute_shift(self, line: np.ndarray) -> np.ndarray:
+        """How far (2, n) [m] the nodes of the straight side (2, n) are moved by the ripple."""
+        position = self.frame.measure(line)[0]
         inside = np.minimum(position, self.frame.length - position) / self.wavelength
         rise = np.sin(0.5 * math.pi * np.clip(inside, 0.0, 1.0)) ** 2
-        return self.amplitude * rise * np.sin(self.wavenumber * position + self.deck.ripple_phase)
-
-    def compute_shift(self, line: np.ndarray) -> np.ndarray:
-        """How far (2, n) the nodes of the straight side (2, n) are moved by the ripple."""
-        heights = self.compute_heights(self.frame.measure(line)[0])
-        return self.frame.across[:, None] * heights
+        wave = np.sin(self.wavenumber * position + self.deck.ripple_phase)
+        return self.frame.across[:, None] * (self.amplitude * rise * wave)
 
     def check(self, cells: int, grids: dict[str, np.ndarray]) -> None:
         """Raise BadInput for waves of too few of the side's `cells`, or grids that they fold."""

@@ -124,17 +124,10 @@ class ConicalTarget(Problem):
     Deck = ConicalTargetDeck
     measures_sides = True  # peaks are found by who has the block
     units: ClassVar[dict[str, str]] = {
-        "pressure_impact": "Pa",
-        "greatest_pressure": "Pa",
-        "greatest_x": "m",
-        "greatest_y": "m",
-        "line_bend": "m",
-        "line_amplitude": "m",
-        "line_length": "m",
-        "shock_x_axis": "m",
-        "shock_x_side": "m",
-        "shock_pressure_axis": "Pa",
-        "shock_pressure_side": "Pa",
+        **dict.fromkeys(("greatest_x", "greatest_y", "shock_x_axis", "shock_x_side"), "m"),
+        **dict.fromkeys(("line_bend", "line_amplitude", "line_length"), "m"),
+        **dict.fromkeys(("pressure_impact", "greatest_pressure"), "Pa"),
+        **dict.fromkeys(("shock_pressure_axis", "shock_pressure_side"), "Pa"),
         **{f"pressure_gauge_{number}": "Pa" for number in range(len(GAUGES))},
         **PEAK_UNITS,
     }
@@ -247,12 +240,8 @@ class ConicalTarget(Problem):
         front, cone = blocks["front"], blocks["cone"]
         measured = dict(zip(blocks, evolution.measured, strict=True))
         greatest, x, y, transformed = measured["cone"]
-        row = {
-            "pressure_impact": float(front.state[3, 2, 1]),
-            "greatest_pressure": greatest,
-            "greatest_x": x,
-            "greatest_y": y,
-        }
+        row = {"pressure_impact": float(front.state[3, 2, 1]), "greatest_pressure": greatest}
+        row |= {"greatest_x": x, "greatest_y": y}
         p = cone.state[3, 1:-1, 1:-1]
         axis = compute_centres(cone.nodes)[0, :, 0]
         ends = cone.nodes[0, [0, -1], 0]

@@ -72,11 +72,8 @@ class InterfaceInstability(Problem):
     Deck = InterfaceDeck
     measures_sides = True  # far speeds are found by who has the block
     units: ClassVar[dict[str, str]] = {
-        "interface_mean": "m",
-        "interface_max": "m",
-        "interface_min": "m",
-        "amplitude": "m",
-        "roughness": "m",
+        **dict.fromkeys(("interface_mean", "interface_max", "interface_min"), "m"),
+        **dict.fromkeys(("amplitude", "roughness"), "m"),
         "largest_turn": "deg",
         "far_transverse_speed": "m/s",
     }

@@ -126,17 +126,10 @@ class PlateOnWedge(Problem):
     measures_sides = True  # jet and shocks are found by who has the block
     Deck = PlateOnWedgeDeck
     units: ClassVar = {
-        "contact_x": "m",
-        "contact_y": "m",
-        "contact_path": "m",
-        "contact_pressure": "Pa",
-        "interface_angle": "degrees",
-        "shock_angle_plate": "degrees",
-        "shock_angle_wedge": "degrees",
-        "surface_speed": "m/s",
-        "lead": "m",
-        **dict.fromkeys(COLUMNS, "Pa"),
-        "jet_speed": "m/s",
+        **dict.fromkeys(("contact_x", "contact_y", "contact_path", "lead"), "m"),
+        **dict.fromkeys(("contact_pressure", *COLUMNS), "Pa"),
+        **dict.fromkeys(("interface_angle", "shock_angle_plate", "shock_angle_wedge"), "degrees"),
+        **dict.fromkeys(("surface_speed", "jet_speed"), "m/s"),
         "jet_mass": "kg/m",
     }
 

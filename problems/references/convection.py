@@ -45,16 +45,6 @@ BOX_ONSETS = {"adiabatic": 2585.019, "conducting": 5011.71}  # square, by its si
 POINTS = 40  # of collocation; 32 give the same ten digits
 
 
-def differentiate(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """(points of [0, 1], matrix of the derivative) on n + 1 Chebyshev points [Trefethen2000]."""
-    x = np.cos(np.pi * np.arange(n + 1) / n)
-    weight = np.where((np.arange(n + 1) % n) == 0, 2.0, 1.0) * (-1.0) ** np.arange(n + 1)
-    distance = x[:, None] - x[None, :] + np.eye(n + 1)
-    matrix = np.outer(weight, 1.0 / weight) / distance
-    matrix -= np.diag(matrix.sum(axis=1))
-    return 0.5 * (x + 1.0), 2.0 * matrix
-
-
 def compute_layer_growth(
     rayleigh: float, prandtl: float, wavenumber: float, free: bool = False
 ) -> float:
@@ -70,8 +60,10 @@ def compute_layer_growth(
     """
     from scipy.linalg import eig  # slow to load
 
+    from problems.references.linear_growth import make_chebyshev  # slow to load
+
     n = POINTS
-    _, d = differentiate(n)
+    _, d, _ = make_chebyshev(n + 1)
     unit, k2 = np.eye(n + 1), wavenumber**2
     laplacian = d @ d - k2 * unit
     none = np.zeros_like(unit)

@@ -38,15 +38,11 @@ class SedovBlast:
                 "near it the closed form is of no use"
             )
         self.positions, self.profile = _make_profile(n, gamma)
-        self.alpha = self._integrate_energy()
-
-    def _integrate_energy(self) -> float:
-        """E t²/(rho0 R^(n+2)), from the profile in units of rho0, R and t."""
-        n, r = self.dimensions, self.positions
-        rho, u, p = self.profile
-        density = (0.5 * rho * u * u + p / (self.gamma - 1.0)) * r ** (n - 1)
+        # E t²/(rho0 R^(n+2)), from the profile in units of rho0, R and t
+        r, (rho, u, p) = self.positions, self.profile
+        density = (0.5 * rho * u * u + p / (gamma - 1.0)) * r ** (n - 1)
         inside = 0.5 * ((density[1:] + density[:-1]) * np.diff(r)).sum()
-        return float({1: 2.0, 2: 2.0 * np.pi, 3: 4.0 * np.pi}[n] * inside)
+        self.alpha = float({1: 2.0, 2: 2.0 * np.pi, 3: 4.0 * np.pi}[n] * inside)
 
     def radius(self, t: float) -> float:
         """Radius of the shock at time t [m]."""

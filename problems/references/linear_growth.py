@@ -396,7 +396,7 @@ class LinearGrowth:
 
 
 @functools.cache
-def _chebyshev(points: int) -> tuple[np.ndarray, np.ndarray, float]:
+def make_chebyshev(points: int) -> tuple[np.ndarray, np.ndarray, float]:
     """Nodes on [0, 1] ascending, the differentiation matrix there ([Trefethen2000] ch. 6), and the
     spectral radius of that with the value at one end given."""
     j = np.arange(points)
@@ -425,7 +425,7 @@ class _Side:
 def _make_layer(points: int, rho: float, c: float, width: float, edge, v: float) -> Zone:
     """Uniform material between the interface and its outer edge at speed `width`; at first its
     perturbation is a transverse velocity `v`."""
-    xi, matrix, radius = _chebyshev(points)
+    xi, matrix, radius = make_chebyshev(points)
     coefficients = np.zeros((COEFFICIENTS, points))
     coefficients[CARRY] = xi
     coefficients[STRETCH] = rho * c * c
@@ -461,7 +461,7 @@ def _make_fan_side(eos, base: RiemannSolution, ahead, incident_speed: float, poi
     tail = float(isentrope.sound_speed(base.p))
     width = base.u - u + isentrope.c - tail
     fan_points = math.ceil(3.5 + 18.0 * (width / tail) ** 0.7)
-    nodes, matrix, radius = _chebyshev(fan_points)
+    nodes, matrix, radius = make_chebyshev(fan_points)
     position = tail + width * nodes
     pressure = isentrope.pressure_in_fan(position - (base.u - u), base.p)
     pressure[0], pressure[-1] = base.p, p

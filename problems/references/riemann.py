@@ -37,12 +37,11 @@ class _Side:
     def __init__(self, eos, state, sign: int):
         self.eos, self.sign = eos, sign
         self.rho, self.u, self.p = (float(value) for value in state)
+        where = "left" if sign < 0 else "right"
         if not self.rho > 0.0:
-            where = "left" if sign < 0 else "right"
             raise BadInput(f"riemann problem: the {where} density is {self.rho:g}; give one > 0")
         self.isentrope = make_isentrope(eos, self.rho, self.p)
         if not math.isfinite(self.isentrope.c) or self.isentrope.c <= 0.0:
-            where = "left" if sign < 0 else "right"
             raise BadInput(
                 f"riemann problem: the {where} state rho = {self.rho:g}, p = {self.p:g} has no "
                 "sound speed in its equation of state"
@@ -56,18 +55,15 @@ class _Side:
             gain = -float(self.isentrope.velocity_gain(p))
         return self.u + self.sign * gain
 
-    def density(self, p: float) -> float:
+    def reach(self, p: float) -> tuple[float, Wave]:
+        """Density behind the wave that leads to pressure p, and the wave."""
         if p > self.p:
-            return shock_to_pressure(self.eos, self.rho, self.p, p).rho
-        return float(self.isentrope.density(p))
-
-    def wave(self, p: float) -> Wave:
-        if p > self.p:
-            speed = shock_to_pressure(self.eos, self.rho, self.p, p).shock_speed
-            front = self.u + self.sign * speed
-            return Wave("shock", front, front)
+            shock = shock_to_pressure(self.eos, self.rho, self.p, p)
+            front = self.u + self.sign * shock.shock_speed
+            return shock.rho, Wave("shock", front, front)
         tail = self.velocity(p) + self.sign * float(self.isentrope.sound_speed(p))
-        return Wave("rarefaction", self.u + self.sign * self.isentrope.c, tail)
+        head = self.u + self.sign * self.isentrope.c
+        return float(self.isentrope.density(p)), Wave("rarefaction", head, tail)
 
 
 @dataclass(frozen=True)
@@ -165,8 +161,7 @@ def _join(sides, p: float, gap: bool) -> RiemannSolution:
     speeds = [side.velocity(p) for side in sides]
     if not gap:
         speeds = [0.5 * (speeds[0] + speeds[1])] * 2
-    densities = [side.density(p) for side in sides]
-    waves = [side.wave(p) for side in sides]
+    densities, waves = zip(*(side.reach(p) for side in sides), strict=True)
     return RiemannSolution(p, *speeds, *densities, *waves, gap, sides)
 
 

@@ -314,40 +314,32 @@ FREE = 0.25  # phase of a capillary wave up to which its growth is within 1 % of
 def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str]:
     """Sentences for the deck of an `InterfaceInstability`; with a history, for the run as well."""
     told = [words for some in sort_deck(problem) for words in some] if problem.harmonics else []
-    told += _caution_echoes(problem) + _caution_tension(problem)
-    if history is not None and problem.harmonics and problem.deck.second_shock is None:
+    single, tension, base = (
+        problem.deck.second_shock is None,
+        problem.deck.line.tension,
+        problem.theory.base,
+    )
+    if single:  # waves that are back from the far ends before the run's end
+        told += [
+            f"waves are back at the interface from the far end of the {name} material at t = "
+            f"{t:.4g} s, k c t = {float(get_kct(problem, t)):.3g}, and the run ends at t = "
+            f"{problem.t_end:.4g} s: what comes after is not the growth of an open interface; for "
+            "that begin a new run with longer `lengths`, or without them and run.t_set_up"
+            for name, t in problem.find_echoes().items()
+            if t < problem.t_end
+        ]
+    if tension and problem.harmonics:  # which is not in any theory here
+        number = problem.harmonics[-1].number
+        omega = math.sqrt(tension * (number * problem.k) ** 3 / (base.rho_left + base.rho_right))
+        if omega * (problem.t_end - problem.arrival) >= FREE:
+            told.append(
+                f"surface tension swings waves of mode {number} with a period of "
+                f"{2.0 * math.pi / omega:.3g} s; the theories of growth leave it out, and hold "
+                f"until t = {problem.arrival + FREE / omega:.3g} s"
+            )
+    if history is not None and problem.harmonics and single:
         told += _caution_line(problem, history)
     return told
-
-
-def _caution_echoes(problem) -> list[str]:
-    """Waves that are back from the far ends before the run's end: the domain is too short."""
-    if problem.deck.second_shock is not None:
-        return []
-    return [
-        f"waves are back at the interface from the far end of the {name} material at t = "
-        f"{t:.4g} s, k c t = {float(get_kct(problem, t)):.3g}, and the run ends at t = "
-        f"{problem.t_end:.4g} s: what comes after is not the growth of an open interface; for that "
-        "begin a new run with longer `lengths`, or without them and run.t_set_up"
-        for name, t in problem.find_echoes().items()
-        if t < problem.t_end
-    ]
-
-
-def _caution_tension(problem) -> list[str]:
-    """Surface tension that changes growth before the run's end, and is not in any theory here."""
-    tension, base = problem.deck.line.tension, problem.theory.base
-    if not (tension and problem.harmonics):
-        return []
-    k = problem.harmonics[-1].number * problem.k
-    omega = math.sqrt(tension * k**3 / (base.rho_left + base.rho_right))
-    if omega * (problem.t_end - problem.arrival) < FREE:
-        return []
-    return [
-        f"surface tension swings waves of mode {problem.harmonics[-1].number} with a period of "
-        f"{2.0 * math.pi / omega:.3g} s; the theories of growth leave it out, and hold until "
-        f"t = {problem.arrival + FREE / omega:.3g} s"
-    ]
 
 
 def sort_deck(problem) -> tuple[list[str], list[str]]:

@@ -182,8 +182,6 @@ class PlateOnWedge(Problem):
         self.coarse_spacing = deck.wedge_spacing * self.length / ni
         self.wedge_spacing = self.coarse_spacing / math.sqrt(self.refinement)
 
-    # --- references ----------------------------------------------------------------------------
-
     def find_particle_speed(self) -> float:
         """Velocity behind the drive's first shock in the plate [m/s]; BadInput without one."""
         drive, solid = self.deck.drive, self.materials["plate"]
@@ -278,8 +276,6 @@ class PlateOnWedge(Problem):
         fall = self.deck.gap + self.deck.depth / 1.2
         return self.deck.run.t_end or self.find_arrival() + 2.5 * path + fall / self.plate_speed
 
-    # --- set-up --------------------------------------------------------------------------------
-
     def make_lines(self) -> tuple[np.ndarray, np.ndarray, int]:
         """Nodes of the plate's lower side and of the wedge's top; faces of the wedge's edge."""
         deck = self.deck
@@ -367,8 +363,6 @@ class PlateOnWedge(Problem):
     def to_set_up(self, points: np.ndarray) -> np.ndarray:
         """Points (2, ...) of the deck's frame in the set-up as described here."""
         return np.einsum("ba,b...->a...", self.frame, points)
-
-    # --- run -----------------------------------------------------------------------------------
 
     def build(self) -> PlateRun:
         deck, drive = self.deck, self.deck.drive

@@ -51,8 +51,6 @@ class PlateRun(Simulation):
             self.contact.refinement = problem.refinement
             self.start = self.find_contact_point()
 
-    # --- where things are ----------------------------------------------------------------------
-
     def get_lower_line(self) -> np.ndarray:
         """Nodes (2, n) of the plate's lower side, from the wedge's edge outwards."""
         line = self.problem.to_set_up(self.plate.side_line("j_min", self.plate.nodes))
@@ -124,8 +122,6 @@ class PlateRun(Simulation):
         if not self.contact and math.isfinite(self.times["arrived"]):
             return math.nan
         return float(self.measure_along(self.find_contact_point() - self.start))
-
-    # --- measurements --------------------------------------------------------------------------
 
     def measure_block(self, block: Block) -> tuple[float, float, float, float]:
         """Of plate or wedge: greatest speed [m/s], cells of the jet and their mass, angle of the
@@ -236,8 +232,6 @@ class PlateRun(Simulation):
             return math.degrees(direction - (math.pi - self.problem.angle))
         return math.degrees(math.pi - direction)
 
-    # --- phases --------------------------------------------------------------------------------
-
     def advance(self) -> dict:
         """One step; then looks which phase it is and whether the run is at its end."""
         row = super().advance()
@@ -305,8 +299,6 @@ class PlateRun(Simulation):
                 if away > near[k] ** 2:
                     return True
         return False
-
-    # --- state ---------------------------------------------------------------------------------
 
     def get_state_of(self, names: Container[str]) -> dict:
         """The state of the flow in these blocks, and the times of the phases."""

@@ -396,9 +396,10 @@ def make_segment(
     kind: str, block: Block, side: str, start: int, stop: int, options: dict
 ) -> Segment:
     """A segment of a registered kind; raises BadInput for an unknown kind or option."""
+    place = f"block {block.name!r}, side {side}"
     if not isinstance(kind, str) or kind not in SEGMENTS:
-        raise BadInput(f"there is no segment kind {kind!r}{suggest(kind, SEGMENTS)}")
-    place = f"block {block.name!r}, side {side}: {kind} segment"
+        raise BadInput(f"{place}: there is no segment kind {kind!r}{suggest(kind, SEGMENTS)}")
+    place += f": {kind} segment"
     _check_options(place, SEGMENTS[kind], options)
     try:
         return SEGMENTS[kind](block, side, start, stop, **options)

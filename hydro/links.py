@@ -35,15 +35,17 @@ class Link:
         if one.shape != two.shape:
             raise BadInput(
                 f"{leader.kind}: {leader} has {one.shape[1] - 1} faces and {follower} has "
-                f"{two.shape[1] - 1}; they must be as many"
+                f"{two.shape[1] - 1}; they must be as many, or be a sliding contact (slide)"
             )
         misses = [_misfit(one, two[:, ::order], leader.kind == "periodic") for order in (1, -1)]
-        self.reverse = misses[1][0] < misses[0][0]
-        miss, self.shift = misses[self.reverse]
-        if miss > 1e-9:
+        self.reverse = bool(misses[1][0].max() < misses[0][0].max())
+        gaps, self.shift = misses[self.reverse]
+        worst = int(gaps.argmax())
+        if gaps[worst] > 1e-9 * np.ptp(one, axis=1).max():
+            x, y = one[:, worst]
             raise BadInput(
-                f"{leader.kind}: nodes of {leader} and of {follower} do not match "
-                f"(they are up to {miss:.1e} of the segment's length apart)"
+                f"{leader.kind}: nodes of {leader} and of {follower} do not match: the largest gap "
+                f"is {gaps[worst]:.3g} m at node {leader.start + worst}, ({x:.6g}, {y:.6g})"
             )
         follower.has_own_line = False
         order = (follower.last - 1, -1) if self.reverse else (follower.first, 1)
@@ -77,12 +79,11 @@ class Link:
         self.follower.line(self.follower.block.nodes_new)[...] = self.to_follower(line)
 
 
-def _misfit(one: np.ndarray, two: np.ndarray, periodic: bool) -> tuple[float, np.ndarray]:
-    """Largest distance of matching nodes over the line's size, and the shift between them."""
+def _misfit(one: np.ndarray, two: np.ndarray, periodic: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Distances (n + 1,) [m] of matching nodes, and the shift between the lines."""
     difference = two - one
     shift = difference.mean(axis=1) if periodic else np.zeros(2)
-    size = np.ptp(one, axis=1).max()
-    return float(np.abs(difference - shift[:, None]).max() / size), shift
+    return np.hypot(*(difference - shift[:, None])), shift
 
 
 class Exchange:

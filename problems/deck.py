@@ -84,46 +84,37 @@ class RunControl(DeckTable, kw_only=True):
     merges = True
     runtime = ("t_end", "max_steps", "cfl", "small_cells", "threads", "cut")
 
-    t_end: key(float, "end time [s]; left out: the problem's choice", gt=0) | None = None
-    t_set_up: (
-        key(
-            float,
-            "end time [s] that lengths and given motions are made for; left out: "
-            "that of the run; a restart with another end writes it down",
-            gt=0,
-        )
-        | None
+    t_end: key(float | None, "end time [s]; left out: the problem's choice", gt=0) = None
+    t_set_up: key(
+        float | None,
+        "end time [s] that lengths and given motions are made for; left out: "
+        "that of the run; a restart with another end writes it down",
+        gt=0,
     ) = None
-    max_steps: (
-        key(int, "stop after so many steps; left out: no limit", ge=0, le=2**63 - 1) | None
+    max_steps: key(
+        int | None, "stop after so many steps; left out: no limit", ge=0, le=2**63 - 1
     ) = None
     cfl: key(float, "fraction of the stable time step", ge=1e-3, le=1) = 0.5
-    small_cells: (
-        key(
-            float,
-            "fraction of a block's cells that may be too small for a step and then use state "
-            "redistribution; 0: the fastest cell sets the step; left out: 0.05 where the grid is "
-            "rebuilt in every step, else 0",
-            ge=0,
-            le=0.1,
-        )
-        | None
+    small_cells: key(
+        float | None,
+        "fraction of a block's cells that may be too small for a step and then use state "
+        "redistribution; 0: the fastest cell sets the step; left out: 0.05 where the grid is "
+        "rebuilt in every step, else 0",
+        ge=0,
+        le=0.1,
     ) = None
-    threads: (
-        key(
-            int,
-            "threads; results are bitwise the same for any number; left out: one a large block, "
-            "as far as there are processors",
-            ge=1,
-            le=1024,
-        )
-        | None
+    threads: key(
+        int | None,
+        "threads; results are bitwise the same for any number; left out: one a large block, "
+        "as far as there are processors",
+        ge=1,
+        le=1024,
     ) = None
     cut: key(
         dict[str, Annotated[int, Meta(ge=1, le=1024)]],
         "by a block's name, among how many ranks of MPI its update is cut at most; "
         "1: it stays whole; not named: cut where it is more than 1.2 of a rank's share",
-    ) = msgspec.field(default_factory=dict)
+    ) = {}
 
 
 class Output(DeckTable, kw_only=True):
@@ -137,16 +128,14 @@ class Output(DeckTable, kw_only=True):
     dumps: key(
         int, "dumps evenly over the run besides the first; 0: first and last", ge=0, le=1_000_000
     ) = 20
-    every: key(float, "time [s] from dump to dump; given: `dumps` does not count", gt=0) | None = (
+    every: key(float | None, "time [s] from dump to dump; given: `dumps` does not count", gt=0) = (
         None
     )
     times: key(
         list[Annotated[float, Meta(gt=0)]],
         "times [s] of further dumps; with dumps = 0 of these and the last alone",
-    ) = msgspec.field(default_factory=list)
-    fields: key(list[str], "fields in light dumps, such as rho and p; none: all there are") = (
-        msgspec.field(default_factory=list)
-    )
+    ) = []
+    fields: key(list[str], "fields in light dumps, such as rho and p; none: all there are") = []
     precision: key(
         Literal["double", "single"], "of the fields in light dumps; their nodes are always double"
     ) = "double"
@@ -177,7 +166,7 @@ class Gauge(DeckTable, kw_only=True):
         max_length=40,
     )
     at: key(tuple[float, float], "place [x, y] [m], a line's first one")
-    to: key(tuple[float, float], "a line's last place [x, y] [m]") | None = None
+    to: key(tuple[float, float] | None, "a line's last place [x, y] [m]") = None
     count: key(int, "points of a line, evenly from `at` to `to`", ge=1, le=10000) = 1
     moves: key(bool, "true: moves with the material; false: fixed in space") = False
     fields: key(list[Field], "what is recorded; c is the sound speed", min_length=1) = (
@@ -211,9 +200,8 @@ class Regrid(DeckTable, kw_only=True):
     ) = "conditional"
     weight: key(str, "where cells are to be small: a formula such as 1 + 5*|grad(rho)|/max") = ""
     options: key(
-        dict[str, bool | int | float | str],
-        "further options of the regridder, passed on unchanged",
-    ) = msgspec.field(default_factory=dict)
+        dict[str, bool | int | float | str], "more options of the regridder, passed on unchanged"
+    ) = {}
 
     def check_weight(self, fields: tuple[str, ...] = FIELDS) -> None:
         """Raise BadInput for a weight that is no formula or has names other than `fields`'."""
@@ -248,9 +236,7 @@ class Deck(DeckTable, kw_only=True):
 
     run: RunControl = RunControl()
     output: Output = Output()
-    gauge: key(list[Gauge], "points at which the flow is recorded after every step") = (
-        msgspec.field(default_factory=list)
-    )
+    gauge: key(list[Gauge], "points at which the flow is recorded after every step") = []
 
     def find_files(self, folder: Path) -> Deck:
         """The same deck with the files that it names taken from `folder`, that of the deck."""

@@ -26,7 +26,7 @@ of an Evolution
 - `missed`: what a run that ends now has not reached, in a few words; such a run has exit code 3
 - `geometry.curved`: is y the distance from the axis x?
 - `take_cells(state)`: have as many cells as a state of `get_state`, before `set_state` takes it up
-- `get_state_of(names)`: see `HasStateOfBlocks`
+- `get_state_of(names)`: `get_state`, with the arrays of these blocks alone, the others not touched
 
 of a block
 - `material`: its name
@@ -84,8 +84,7 @@ class Evolution(Protocol):
 
 def get_start_row(evolution: Evolution) -> dict[str, Scalar]:
     """Columns known before the first step: row 0 of the history, whose other fields stay empty."""
-    start_row = getattr(evolution, "start_row", None)
-    return start_row() if start_row else {}
+    return getattr(evolution, "start_row", dict)()
 
 
 def get_missed(evolution: Evolution) -> str:
@@ -95,31 +94,18 @@ def get_missed(evolution: Evolution) -> str:
 
 def is_axisymmetric(evolution: Evolution) -> bool:
     """Is y the distance from the axis x?"""
-    geometry = getattr(evolution, "geometry", None)
-    return geometry is not None and bool(geometry.curved)
+    return bool(getattr(getattr(evolution, "geometry", None), "curved", False))
 
 
 def take_cells(evolution: Evolution, state: State) -> None:
     """Let the evolution have as many cells as the state, where it can have others."""
-    take = getattr(evolution, "take_cells", None)
-    if take:
-        take(state)
-
-
-@runtime_checkable
-class HasStateOfBlocks(Protocol):
-    """An Evolution that gives the state of some blocks without touching the others."""
-
-    def get_state_of(self, names: Container[str]) -> State:
-        """`get_state`, with the arrays `<block>/...` of the blocks of these names alone."""
-        ...
+    getattr(evolution, "take_cells", lambda state: None)(state)
 
 
 def get_state_of(evolution: Evolution, names: Container[str]) -> State:
-    """The state, at least with the arrays of the blocks of these names."""
-    if isinstance(evolution, HasStateOfBlocks):
-        return evolution.get_state_of(names)
-    return evolution.get_state()
+    """The state, at least with the arrays `<block>/...` of the blocks of these names."""
+    get = getattr(evolution, "get_state_of", lambda names: evolution.get_state())
+    return get(names)
 
 
 def get_material(block: BlockView) -> str:

@@ -13,6 +13,7 @@ look at the number of steps before comparing the rest.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from typing import Literal
@@ -20,7 +21,8 @@ from typing import Literal
 import numpy as np
 
 from problems.deck import Deck, Regrid, RunControl, key
-from problems.problem import Problem, Report
+from problems.pictures import draw_grid
+from problems.problem import Problem, Report, Row
 from regrid.domains import DOMAINS, MovingDomain, make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import (
@@ -34,6 +36,18 @@ from regrid.protocol import RegridReport, call_regridder
 from regrid.sides import get_side
 
 DomainName = Literal[tuple(DOMAINS)]
+NUMBERS = {  # of all steps: label, what of the column, what is wanted
+    "bad_cells": ("bad cells in any step", np.max, 0.0),
+    "regrid_sub_moves": ("sub-moves", np.sum, math.nan),
+    "regrid_rescues": ("rescues", np.sum, math.nan),
+    "first_line_gap": ("largest first line gap", np.max, 1.0),
+    "worst_aspect": ("worst aspect ratio", np.max, math.nan),
+    "least_scaled_jacobian": ("least scaled Jacobian", np.min, math.nan),
+    "node_speed_ratio": ("node speed ratio, at most 1 wanted", np.max, math.nan),
+    "regrid_iterations": ("iterations a step", np.mean, math.nan),
+    "far_line_bend": ("far lines from straight [cells]", np.max, math.nan),
+    "shift_error": ("error of the shift [cells]", np.max, math.nan),
+}
 FAR_HEIGHT = 5.0  # of the strip's widths: lines beyond are to stay straight
 
 
@@ -119,40 +133,26 @@ class GridMarch(Problem):
         return {}
 
     def report(self, history, final=None) -> Report:
-        return Report(lambda: self._make_screen(history))
-
-    def _make_screen(self, history) -> str:
-        deck = self.deck
-        rows = slice(1, None) if len(history["t"]) and np.isnan(history["dt"][0]) else slice(None)
-        column = {name: np.asarray(values)[rows] for name, values in history.items()}
-        steps = len(column["t"])
-        if steps == 0:
-            return "no step was made"
+        deck, rows = self.deck, []
+        made = {
+            name: np.asarray(values)[np.isfinite(history["dt"])] for name, values in history.items()
+        }
+        if not len(made.get("t", ())):
+            return Report("no step was made" if history else "")
+        for name, (label, reduce, wanted) in NUMBERS.items():
+            if name in made:
+                value = float(reduce(made[name]))
+                rows.append(Row(name, value, wanted, label, digits=4, off=" "))
         inner = (deck.ni - 1) * (deck.nj - 1)
-        cost = 1e6 * float(np.median(column["seconds_regrid"])) / inner
-        label = deck.regrid.name + (
-            f" ({deck.regrid.method})" if deck.regrid.name.startswith("barrier") else ""
+        cost = 1e6 * float(np.median(made["seconds_regrid"])) / inner
+        rows.append(Row("cost", cost, label="cost a node and step, median [us]", digits=4))
+        method = f" ({deck.regrid.method})" if deck.regrid.name.startswith("barrier") else ""
+        head = (
+            f"{deck.domain} {deck.ni} x {deck.nj}, regridder {deck.regrid.name}{method}: "
+            f"{len(made['t'])} steps of {deck.cells_a_step:g} cells, to "
+            f"{100.0 * made['t'][-1]:.0f} % of the motion; theory is the quasi-1D grid's"
         )
-        lines = [
-            f"{deck.domain} {deck.ni} x {deck.nj}, regridder {label}: {steps} steps of "
-            f"{deck.cells_a_step:g} cells, to {100.0 * column['t'][-1]:.0f} % of the motion",
-            f"  bad cells in any step   {int(column['bad_cells'].max()):10d}   wanted 0",
-            f"  sub-moves, rescues      {int(column['regrid_sub_moves'].sum()):10d}"
-            f" {int(column['regrid_rescues'].sum())}",
-            f"  largest first line gap  {column['first_line_gap'].max():10.3f}   quasi-1D grid 1",
-            f"  worst aspect ratio      {column['worst_aspect'].max():10.2f}",
-            f"  least scaled Jacobian   {column['least_scaled_jacobian'].min():10.4f}",
-            f"  node speed ratio        {column['node_speed_ratio'].max():10.2f}   wanted <= 1",
-            f"  iterations a step       {column['regrid_iterations'].mean():10.1f}",
-            f"  cost a node and step    {cost:10.3f} us (median step)",
-        ]
-        for name, words in (
-            ("far_line_bend", "far lines from straight"),
-            ("shift_error", "error of the shift"),
-        ):
-            if name in column:
-                lines.append(f"  {words:23s} {column[name].max():10.1e} cells")
-        return "\n".join(lines)
+        return Report(head, rows)
 
     def figures(self):
         return {"grids": draw_grids, "quality": draw_quality}
@@ -191,15 +191,11 @@ class GridMarchEvolution:
         try:
             result = call_regridder(self.regridder, self.nodes, boundary)
         except RegridFailure as failure:
-            raise RegridFailure(
-                f"{failure.what}, t = {self.t:.4g} (step {self.step + 1} of {self.steps})",
-                block="grid",
-                side=failure.side,
-                nodes=failure.nodes,
-                grid=failure.grid,
-                cell=failure.cell,
-                cause=failure.cause,
-            ) from failure
+            where = f"t = {self.t:.4g} (step {self.step + 1} of {self.steps})"
+            known = {
+                name: getattr(failure, name) for name in ("side", "nodes", "grid", "cell", "cause")
+            }
+            raise RegridFailure(f"{failure.what}, {where}", block="grid", **known) from failure
         nodes, too_fast = result.nodes, 0
         if self.deck.speed_factor > 0.0:
             nodes = limit_node_speeds(self.nodes, nodes, self.deck.speed_factor)
@@ -272,11 +268,10 @@ def draw_grids(figure, run_data) -> None:
     dumps = list(run_data.dumps)
     chosen = [dumps[k] for k in np.unique(np.linspace(0, len(dumps) - 1, 4).astype(int))]
     figure.set_size_inches(4.0 * len(chosen), 5.0)
-    for k, dump in enumerate(chosen):
-        axes = figure.add_subplot(1, len(chosen), k + 1)
-        x, y = dump.blocks[0].nodes
-        axes.plot(x, y, color="0.25", linewidth=0.4)
-        axes.plot(x.T, y.T, color="0.25", linewidth=0.4)
+    panels = figure.subplots(1, len(chosen), squeeze=False)[0]
+    for axes, dump in zip(panels, chosen, strict=True):
+        x, y = nodes = dump.blocks[0].nodes
+        draw_grid(axes, nodes, color="0.25", lw=0.4)
         if np.ptp(y) > 20.0 * np.ptp(x):
             axes.set_ylim(y.min(), y.min() + 4.0 * np.ptp(x))
         axes.set(aspect="equal", title=f"t = {dump.t:.3g}")
@@ -284,17 +279,12 @@ def draw_grids(figure, run_data) -> None:
 
 def draw_quality(figure, run_data) -> None:
     """First line gap, aspect ratio, least corner sine and the regridder's work against time."""
-    history = run_data.history
-    columns = (
-        ("first_line_gap", "first line gap"),
-        ("worst_aspect", "worst aspect ratio"),
-        ("least_scaled_jacobian", "least corner sine"),
-        ("regrid_iterations", "iterations"),
-    )
     figure.set_size_inches(8.0, 8.0)
-    for k, (name, words) in enumerate(columns):
-        axes = figure.add_subplot(len(columns), 1, k + 1)
-        axes.plot(history["t"], history[name], linewidth=1.2)
-        axes.set_ylabel(words)
+    columns = "first_line_gap", "worst_aspect", "least_scaled_jacobian", "regrid_iterations"
+    words = "first line gap", "worst aspect ratio", "least corner sine", "iterations"
+    panels = figure.subplots(len(columns), 1)
+    for axes, name, label in zip(panels, columns, words, strict=True):
+        axes.plot(run_data.history["t"], run_data.history[name], linewidth=1.2)
+        axes.set_ylabel(label)
         axes.grid(alpha=0.3)
     axes.set_xlabel("part of the motion done")

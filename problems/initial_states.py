@@ -30,6 +30,7 @@ from hydro.step import take_step
 from problems.deck import DeckTable, key
 from problems.pictures import draw_field
 from problems.problem import find_crossing
+from problems.references.exact_flows import average_points
 from problems.references.hugoniot import Shock, shock_with_mach
 from regrid.errors import BadInput
 from regrid.jit import PACKAGES, digest_sources, find_kept, keep
@@ -113,21 +114,6 @@ def follow_gas(block: Block, dt: float) -> np.ndarray:
     around[2][:, [0, -1]] *= -1.0
     total = (around[:, 1:, 1:] + around[:, :-1, :-1]) + (around[:, 1:, :-1] + around[:, :-1, 1:])
     return block.nodes + dt * (total[1:] / total[0])
-
-
-def average_points(nodes: np.ndarray, places, function: Callable) -> np.ndarray:
-    """Means over the cells of `function(points) -> (values, weights)`, at `places` in 0..1 each
-    way with their weights; points (2, ni, nj) lie on the bilinear cells of `nodes`."""
-    a, b, c, d = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
-    total, volume = 0.0, 0.0
-    for s, weight_s in places:
-        for q, weight_q in places:
-            point = (1 - s) * (1 - q) * a + s * (1 - q) * b + s * q * c + (1 - s) * q * d
-            along, across = (1 - q) * (b - a) + q * (c - d), (1 - s) * (d - a) + s * (c - b)
-            values, weight = function(point, along[0] * across[1] - along[1] * across[0])
-            weight = weight_s * weight_q * weight
-            total, volume = total + weight * values, volume + weight
-    return total / volume
 
 
 @dataclass(frozen=True)

@@ -63,15 +63,10 @@ class OwnSimulation(Problem):
 
     def say_repeat(self) -> str:
         """The script makes the blocks, and its deck alone no run."""
-        if not self.deck.script:
-            return (
-                "Its blocks were made in Python, in a notebook or by hand: run that again, "
-                "shockgrid.run(simulation, directory). The deck alone makes no run."
-            )
-        return (
-            f"Its blocks were made by the script {self.deck.script}: run that again, "
-            f"python {shlex.quote(self.deck.script)}. The deck alone makes no run."
-        )
+        script = self.deck.script
+        where = f"by the script {script}" if script else "in Python, in a notebook or by hand"
+        call = f"python {shlex.quote(script)}" if script else "shockgrid.run(simulation, directory)"
+        return f"Its blocks were made {where}: run that again, {call}. The deck alone makes no run."
 
     def measure(self, evolution: Evolution) -> dict[str, float]:
         """The columns of the function that was given; none without.

@@ -29,14 +29,8 @@ if TYPE_CHECKING:
 
 # `run_data` is runs.store.reader.RunData; the import would point the wrong way, hence Any.
 AnyDeck: TypeAlias = Deck  # inside Problem the name Deck is that of the problem's own
-
-
 Watched: TypeAlias = Mapping[str, Sequence[tuple[int | slice, slice, slice]]]
-
-
 History: TypeAlias = Mapping[str, np.ndarray]
-
-
 DrawFigure = Callable[["Figure", Any], None]
 
 
@@ -48,6 +42,18 @@ class BlockPlan:
     cells: tuple[int, int]
     low: tuple[float, float]
     high: tuple[float, float]
+
+    @classmethod
+    def of_nodes(cls, name: str, nodes: np.ndarray) -> BlockPlan:
+        """That of a grid (2, ni + 1, nj + 1)."""
+        low, high = ((float(x), float(y)) for x, y in (nodes.min((1, 2)), nodes.max((1, 2))))
+        return cls(name, (nodes.shape[1] - 1, nodes.shape[2] - 1), low, high)
+
+    def make_nodes(self) -> np.ndarray:
+        """Nodes (2, ni + 1, nj + 1) of even cells in a rectangle of this extent [m]."""
+        ends = zip(self.low, self.high, self.cells, strict=True)
+        lines = [np.linspace(low, high, count + 1) for low, high, count in ends]
+        return np.array(np.meshgrid(*lines, indexing="ij"))
 
 
 def plan_blocks(grids: Mapping[str, np.ndarray]) -> list[BlockPlan]:
@@ -320,14 +326,8 @@ class Problem:
 
 
 LARGE = 100_000  # cells
-
-
 PROGRAM = 190e6  # bytes of the program with its libraries and kernels, measured
-
-
 RUN_BYTES = 640  # a cell at the peak of a run, measured,
-
-
 LARGE_BYTES = 350  # of blocks of LARGE cells and more, two even ones, with solves; without 200
 
 
@@ -348,9 +348,9 @@ def find_memory() -> float | None:
         return None
 
 
-def check_cells(cells: int) -> None:
-    """Raise BadInput for more cells than the machine's memory holds."""
-    memory = find_memory()
+def check_memory(problem: Problem) -> None:
+    """Raise BadInput for a problem whose cells the machine's memory does not hold."""
+    cells, memory = problem.estimate_cells(), find_memory()
     if memory is None or (wanted := estimate_memory(cells)) <= memory:
         return
     fit = max(0, int((memory - PROGRAM) / LARGE_BYTES))
@@ -360,8 +360,3 @@ def check_cells(cells: int) -> None:
         f"deck: {cells:.4g} cells need about {wanted / 1e9:.3g} GB of memory, this machine has "
         f"{memory / 1e9:.3g} GB; take fewer cells, at most about {fit:.2g} fit"
     )
-
-
-def check_memory(problem: Problem) -> None:
-    """Raise BadInput for a problem whose cells the machine's memory does not hold."""
-    check_cells(problem.estimate_cells())

@@ -63,13 +63,7 @@ def read_problem_file(
     run, or holds no problem or two.
     """
     path = Path(path)
-    check_regular(path)
-    try:
-        text = path.read_bytes()
-    except FileNotFoundError:
-        raise BadInput(f"{path} does not exist") from None
-    except OSError as error:
-        raise BadInput(f"{path} cannot be read: {error.strerror}") from error
+    text = _read(path)
     digest = compute_digest(text)
     key = str(path.resolve()), digest
     if key not in _LOADED:
@@ -91,13 +85,20 @@ def read_head(path: Path | str) -> str:
     Raises BadInput where the file cannot be read or is no Python.
     """
     path = Path(path)
+    try:
+        return ast.get_docstring(ast.parse(_read(path), str(path))) or ""
+    except (SyntaxError, ValueError) as error:
+        raise BadInput(_describe_failure(path, error)) from error
+
+
+def _read(path: Path) -> bytes:
     check_regular(path)
     try:
-        return ast.get_docstring(ast.parse(path.read_bytes(), str(path))) or ""
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise BadInput(f"{path} does not exist") from None
     except OSError as error:
         raise BadInput(f"{path} cannot be read: {error.strerror}") from error
-    except (SyntaxError, ValueError) as error:
-        raise BadInput(_describe_syntax(path, error)) from error
 
 
 def describe_mistake(error: BaseException) -> str:
@@ -132,30 +133,19 @@ def _run(path: Path, text: bytes, stem: str, folder: Path) -> ModuleType:
 
 
 def _describe_failure(path: Path, error: BaseException) -> str:
-    if isinstance(error, SyntaxError) and error.filename == str(path):
-        return _describe_syntax(path, error)
     lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
-    place = f", line {lines[-1]}" if lines else ""
-    return f"{path}{place}: the file cannot be run ({type(error).__name__}: {error})"
-
-
-def _describe_syntax(path: Path, error: Exception) -> str:
-    line = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
-    words = error.msg if isinstance(error, SyntaxError) else str(error)
-    return f"{path}{line}: this is not valid Python ({words})"
+    what = f"the file cannot be run ({type(error).__name__}: {error})"
+    if isinstance(error, SyntaxError) and error.filename == str(path):
+        lines, what = [error.lineno], f"this is not valid Python ({error.msg})"
+    place = f", line {lines[-1]}" if lines and lines[-1] else ""
+    return f"{path}{place}: {what}"
 
 
 def _find_class(module: ModuleType, path: Path) -> type[Problem]:
     from problems.problem import Problem
 
-    own = [
-        value
-        for value in vars(module).values()
-        if isinstance(value, type)
-        and issubclass(value, Problem)
-        and value.__module__ == module.__name__
-    ]
-    own = list(dict.fromkeys(own))
+    classes = dict.fromkeys(value for value in vars(module).values() if isinstance(value, type))
+    own = [one for one in classes if issubclass(one, Problem) and one.__module__ == module.__name__]
     last = [one for one in own if not any(one in other.__mro__[1:] for other in own)]
     if len(last) == 1:
         return last[0]

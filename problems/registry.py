@@ -59,12 +59,9 @@ def load_problem(name: str) -> type[Problem]:
     """The class of problem `name`, a name or a Python file; BadInput with the nearest name."""
     if is_problem_file(name):
         return read_problem_file(name).problem
-    if name in INNER:
-        module, _, attribute = INNER[name].partition(":")
-        return getattr(importlib.import_module(module), attribute)
-    if name not in PROBLEMS:
+    if name not in INNER and name not in PROBLEMS:
         raise BadInput(f"there is no problem {name!r}{suggest(name, PROBLEMS)}")
-    found = PROBLEMS[name]
+    found = INNER.get(name) or PROBLEMS[name]
     if not isinstance(found, str):
         return found
     module, _, attribute = found.partition(":")

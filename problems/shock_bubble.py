@@ -33,7 +33,7 @@ from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Output, Regrid, RunControl, key
 from problems.initial_states import make_plane_grid, mix_states, put_walls
 from problems.pictures import draw_grid, find_dump
-from problems.problem import Problem, Report, Row, align, get_last
+from problems.problem import Problem, Report, Row, align, find_time, get_last
 from problems.references.hugoniot import shock_with_mach
 from problems.references.riemann import solve_riemann
 from regrid.algebraic import fill_from_sides
@@ -136,11 +136,6 @@ class ShockBubbleDeck(Deck, kw_only=True):
     limiter: Limiter = "van-leer"
 
 
-def blend(first: np.ndarray, second: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """Nodes (2, part.size, n) of straight lines from the nodes `first` (2, n) to `second`."""
-    return first[:, None, :] * (1.0 - part[:, None]) + second[:, None, :] * part[:, None]
-
-
 def find_front(rows: list[tuple[np.ndarray, np.ndarray]], level: float) -> float:
     """Where the pressure first falls below `level` along rows of cells one after the other [m].
 
@@ -202,17 +197,16 @@ class ShockBubble(Problem):
         side = np.array([np.full(up.size, high), high * up])
         lid = np.array([high * across, np.full(across.size, high)])
         box = {"west": mirror * side, "north": lid, "east": side}
-        inner = np.linspace(0.0, 1.0, round((RADIUS - core) / size) + 1)
-        outer = np.linspace(0.0, 1.0, round(1.2 * (high - RADIUS) / size) + 1)
+        inner, outer = round((RADIUS - core) / size) + 1, round(1.2 * (high - RADIUS) / size) + 1
         middle = np.zeros((2, across.size, up.size))
         middle[0, :, 0] = core * across
         middle[:, 0], middle[:, -1] = barrel["west"], barrel["east"]
         middle[:, :, -1] = barrel["north"]
         fill_from_sides(middle.copy(), middle)
         grids = {"core": middle}
-        for position in ("west", "north", "east"):
-            grids[position] = blend(barrel[position], circle[position], inner)
-            grids["air-" + position] = blend(circle[position], box[position], outer)
+        for place in ("west", "north", "east"):
+            grids[place] = np.linspace(barrel[place], circle[place], inner, axis=1)
+            grids["air-" + place] = np.linspace(circle[place], box[place], outer, axis=1)
         step = 2.0 * size
         ends = {"upwind": (-high - UPWIND, -high), "downwind": (high, high + DOWNWIND)}
         for name, (first, last) in ends.items():
@@ -311,11 +305,10 @@ class ShockBubble(Problem):
         A window is complete when the run has passed its end; of the rearmost point's, a third
         suffices.
         """
-        out = np.flatnonzero(history["axis_front"] > history["downwind"])
-        left = float(history["t"][out[0]]) if out.size else math.nan  # the refracted shock's exit
+        leaves = find_time(history, history["axis_front"] > history["downwind"])
         start, end = (
-            left + float(mark.partition("+")[2] or 0.0) * MICRO
-            if isinstance(mark, str)
+            leaves + float(mark.partition("+")[2] or 0.0) * MICRO
+            if isinstance(mark, str)  # from the refracted shock's exit on
             else self.arrival + mark * MICRO
             for mark in feature.window
         )

@@ -120,21 +120,20 @@ class LinkTable(DeckTable, kw_only=True):
     tension: key(float, "surface tension of an interface [N/m]", ge=0, le=1e20) = 0.0
 
 
-def make_default_blocks() -> tuple[BlockTable, ...]:
-    """Air that a piston drives into a channel with a bump."""
-    curves = Curves(
+CHANNEL = BlockTable(  # air that a piston drives into a channel with a bump
+    name="air",
+    cells=(56, 16),
+    curves=Curves(
         i_min=((-0.3, 0.0), (-0.3, 0.2)),
         i_max=((0.4, 0.0), (0.4, 0.2)),
         j_min=((-0.3, 0.0), (0.4, 0.0)),
         j_max=CurveTable(x="0.7*s - 0.3", y="0.2 - 0.08*exp(-40*(s - 0.6)**2)*(4*s*(1 - s))"),
-    )
-    sides = (
+    ),
+    side=(
         BlockSide(side="i_min", kind="piston", velocity=(100.0, 0.0)),
-        BlockSide(side="i_max", kind="wall"),
-        BlockSide(side="j_min", kind="wall"),
-        BlockSide(side="j_max", kind="wall"),
-    )
-    return (BlockTable(name="air", cells=(56, 16), curves=curves, side=sides),)
+        *(BlockSide(side=side, kind="wall") for side in ("i_max", "j_min", "j_max")),
+    ),
+)
 
 
 class BlocksDeck(Deck, kw_only=True):
@@ -153,9 +152,7 @@ class BlocksDeck(Deck, kw_only=True):
     )
     limiter: Limiter = "van-leer"
     void_fill: VoidFill = VoidFill()
-    block: key(tuple[BlockTable, ...], "the blocks, [[block]] each", min_length=1) = msgspec.field(
-        default_factory=make_default_blocks
-    )
+    block: key(tuple[BlockTable, ...], "the blocks, [[block]] each", min_length=1) = (CHANNEL,)
     link: key(tuple[LinkTable, ...], "the links, [[link]] each") = ()
 
     digests: key(

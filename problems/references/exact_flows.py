@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -156,7 +157,25 @@ def compute_taylor_wave(eos: JWL) -> TaylorWave:
     return TaylorWave(speed, *(curve[::-1] for curve in curves), eos.rho0)
 
 
-GAUSS_POINTS = 4
+# places in 0..1 and weights of four Gauss points
+GAUSS = [
+    (0.5 * (1.0 + s), 0.5 * w) for s, w in zip(*np.polynomial.legendre.leggauss(4), strict=True)
+]
+
+
+def average_points(nodes: np.ndarray, places, function: Callable) -> np.ndarray:
+    """Means over the cells of `function(points) -> (values, weights)`, at `places` in 0..1 each
+    way with their weights; points (2, ni, nj) lie on the bilinear cells of `nodes`."""
+    a, b, c, d = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
+    total, volume = 0.0, 0.0
+    for s, weight_s in places:
+        for q, weight_q in places:
+            point = (1 - s) * (1 - q) * a + s * (1 - q) * b + s * q * c + (1 - s) * q * d
+            along, across = (1 - q) * (b - a) + q * (c - d), (1 - s) * (d - a) + s * (c - b)
+            values, weight = function(point, along[0] * across[1] - along[1] * across[0])
+            weight = weight_s * weight_q * weight
+            total, volume = total + weight * values, volume + weight
+    return total / volume
 
 
 @dataclass(frozen=True)
@@ -199,27 +218,13 @@ class Vortex:
         nodes: (2, ni+1, nj+1).  Density, momentum and total energy are averaged over each
         quadrilateral (bilinear map, 4 x 4 Gauss points); u, v, p are those of the averages.
         """
-        points, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-        points, weights = 0.5 * (points + 1.0), 0.5 * weights
-        south_west, south_east = nodes[:, :-1, :-1], nodes[:, 1:, :-1]
-        north_west, north_east = nodes[:, :-1, 1:], nodes[:, 1:, 1:]
-        volume = 0.0
-        totals = [0.0, 0.0, 0.0, 0.0]
-        for a, weight_a in zip(points, weights, strict=True):
-            for b, weight_b in zip(points, weights, strict=True):
-                south = (1.0 - a) * south_west + a * south_east
-                north = (1.0 - a) * north_west + a * north_east
-                x, y = (1.0 - b) * south + b * north
-                along = (1.0 - b) * (south_east - south_west) + b * (north_east - north_west)
-                across = north - south
-                share = along[0] * across[1] - along[1] * across[0]
-                share = weight_a * weight_b * share
-                rho, u, v, p = self.sample(x, y, t)
-                total = p / (self.gamma - 1.0) + 0.5 * rho * (u * u + v * v)
-                volume = volume + share
-                for k, value in enumerate((rho, rho * u, rho * v, total)):
-                    totals[k] = totals[k] + share * value
-        rho, momentum_x, momentum_y, total = (value / volume for value in totals)
+
+        def sample(point, area):
+            rho, u, v, p = self.sample(*point, t)
+            total = p / (self.gamma - 1.0) + 0.5 * rho * (u * u + v * v)
+            return np.array([rho, rho * u, rho * v, total]), area
+
+        rho, momentum_x, momentum_y, total = average_points(nodes, GAUSS, sample)
         u, v = momentum_x / rho, momentum_y / rho
         p = (self.gamma - 1.0) * (total - 0.5 * rho * (u * u + v * v))
         return rho, u, v, p

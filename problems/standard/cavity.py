@@ -102,9 +102,7 @@ class Cavity(Problem):
         return round(deck.cells**2 / math.pi * 0.5 * (deck.before + deck.width)) + 6 * deck.cells
 
     def plan(self):
-        nodes, _ = self.make_grid()
-        low, high = (tuple(map(float, find(nodes, axis=(1, 2)))) for find in (np.min, np.max))
-        return self.t_end, [BlockPlan("metal", (nodes.shape[1] - 1, nodes.shape[2] - 1), low, high)]
+        return self.t_end, [BlockPlan.of_nodes("metal", self.make_grid()[0])]
 
     def build(self):
         deck, (nodes, corners) = self.deck, self.make_grid()

@@ -28,9 +28,9 @@ from hydro.eos import JWL
 from hydro.eos.materials import find_material
 from hydro.sources import ProgrammedBurn
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.initial_states import make_plane_grid, put_walls
+from problems.initial_states import put_walls
 from problems.pictures import draw_field, spread_dumps
-from problems.problem import Problem, Report, Row, compare, find_crossing, get_last
+from problems.problem import BlockPlan, Problem, Report, Row, compare, find_crossing, get_last
 from problems.references.exact_flows import compute_taylor_wave
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
@@ -99,13 +99,15 @@ class Detonation(Problem):
 
         return velocity
 
-    def estimate_cells(self) -> int:
-        return self.deck.cells * self.rows
+    def plan(self):
+        """End time and the bar or square."""
+        deck, height = self.deck, self.deck.length / self.deck.cells * self.rows
+        bar = BlockPlan("explosive", (deck.cells, self.rows), (0.0, 0.0), (deck.length, height))
+        return self.t_end, [bar]
 
     def build(self):
         deck, eos, size = self.deck, self.material.eos, self.deck.length / self.deck.cells
-        x = np.linspace(0.0, deck.length, deck.cells + 1)
-        nodes = make_plane_grid(x, size * np.arange(self.rows + 1.0))
+        nodes = self.plan()[1][0].make_nodes()
         named = {"material": deck.explosive, "limiter": deck.limiter}
         block = Block("explosive", eos, nodes, eos.rho0, 0.0, 0.0, AMBIENT, **named)
         if deck.behind == "piston":
@@ -132,11 +134,11 @@ class Detonation(Problem):
             inside = (x > back + 0.3 * (front - back)) & (x < back + 0.8 * (front - back))
             pressure = float(p[inside].mean()) if inside.any() else math.nan
         row = {"front": front, "pressure": pressure}
-        if self.deck.behind == "wall":
-            exact = self.taylor_wave.compute_state(x / max(evolution.t, 1e-300))[0]
-            total = float(exact.sum())
-            row["taylor_error"] = float(np.abs(p - exact).sum()) / total if total else math.nan
-        return row
+        if self.deck.behind != "wall":
+            return row
+        exact = self.taylor_wave.compute_state(x / max(evolution.t, 1e-300))[0]
+        error = np.abs(p - exact).sum() / exact.sum() if exact.any() else math.nan
+        return {**row, "taylor_error": float(error)}
 
     def find_late_speed(self, history) -> float:
         """Speed [m/s] of the front over the last half of the run, by a straight line."""

@@ -24,7 +24,7 @@ from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.rows import P, U
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, VoidFill, key
-from problems.initial_states import make_plane_grid, put_walls
+from problems.initial_states import put_walls
 from problems.pictures import draw_columns
 from problems.problem import BlockPlan, Problem, Report, Row, find_time
 from problems.references.plate_impact import compute_plate_impact
@@ -93,9 +93,8 @@ class FlyerTarget(Problem):
     def build(self):
         blocks = []
         for plan, material in zip(self.plan()[1], self.materials, strict=True):
-            spans = zip(plan.low, plan.high, plan.cells, strict=True)
-            nodes = make_plane_grid(*(np.linspace(low, high, n + 1) for low, high, n in spans))
-            state = material.rho0, 0.0 if blocks else self.deck.speed, 0.0, 0.0
+            nodes, speed = plan.make_nodes(), 0.0 if blocks else self.deck.speed
+            state = material.rho0, speed, 0.0, 0.0
             blocks.append(Block(plan.name, material.eos, nodes, *state, material=plan.name))
             for side in ("i_min", "i_max"):
                 put(blocks[-1], side, "free-surface", bond=self.deck.bond)

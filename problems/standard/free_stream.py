@@ -20,7 +20,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.boundary import put
-from hydro.eos import EquationOfState, IdealGas
+from hydro.eos import IdealGas
 from hydro.eos.materials import find_material
 from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, RunControl, key
@@ -54,7 +54,10 @@ class FreeStream(Problem):
 
     def __init__(self, deck: FreeStreamDeck):
         super().__init__(deck)
-        self.fluids = dict(zip(("left", "right"), map(_make_fluid, deck.materials), strict=True))
+        self.fluids = {}  # equation of state and density by block
+        for block, name in zip(("left", "right"), deck.materials, strict=True):
+            found = None if name == "gas" else find_material(name)
+            self.fluids[block] = (found.eos, found.rho0) if found else (IdealGas(1.4), 1.0)
         if deck.contact == "seam" and deck.materials[0] != deck.materials[1]:
             raise BadInput("deck: a seam joins blocks of one material; give both the same")
         eos, rho = self.fluids["left"]
@@ -122,11 +125,3 @@ class FreeStream(Problem):
             f"{deck.sides} sides, nodes shaken by {deck.shake:g} cells at every step:"
         )
         return Report(head, [row], ["round-off makes 1e-13 in 100 steps"])
-
-
-def _make_fluid(name: str) -> tuple[EquationOfState, float]:
-    """Equation of state and density of a block."""
-    if name == "gas":
-        return IdealGas(1.4), 1.0
-    found = find_material(name)
-    return found.eos, found.rho0

@@ -19,14 +19,14 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.initial_states import average_points, swing_square
+from problems.initial_states import swing_square
 from problems.pictures import draw_field
 from problems.problem import Problem, Report, Row, compare
+from problems.references.exact_flows import GAUSS, average_points
 from regrid.measure.corners import compute_centres
 
 TURN = 0.4 * math.pi  # of the core [s]
 KINETIC_ENERGY = 8.0 * math.pi / 300.0
-POINTS = 4  # Gauss points each way for the cell averages of the start
 
 
 def compute_flow(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -38,13 +38,6 @@ def compute_flow(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     p_ring = 9.0 - 4.0 * math.log(0.2) + 12.5 * r_ring**2 - 20.0 * r_ring + 4.0 * np.log(r_ring)
     p = np.where(inner, 5.0 + 12.5 * r * r, np.where(ring, p_ring, 3.0 + 4.0 * math.log(2.0)))
     return np.array([-turn * y, turn * x, p])
-
-
-def average(nodes: np.ndarray) -> np.ndarray:
-    """Means (3, ni, nj) of `compute_flow` over the cells of `nodes`, by Gauss points."""
-    abscissae, weights = np.polynomial.legendre.leggauss(POINTS)
-    places = list(zip(0.5 * (1.0 + abscissae), weights, strict=True))
-    return average_points(nodes, places, lambda point, area: (compute_flow(*point), area))
 
 
 class GreshoDeck(Deck, kw_only=True):
@@ -71,7 +64,8 @@ class Gresho(Problem):
 
     def build(self):
         deck, nodes = self.deck, self.make_block_nodes("square", 0.0)
-        block = Block("square", IdealGas(1.4), nodes, 1.0, *average(nodes), limiter=deck.limiter)
+        flow = average_points(nodes, GAUSS, lambda point, area: (compute_flow(*point), area))
+        block = Block("square", IdealGas(1.4), nodes, 1.0, *flow, limiter=deck.limiter)
         links = [join("periodic", (block, f"{d}_min"), (block, f"{d}_max")) for d in "ij"]
         mesh = "fixed" if deck.mesh == "fixed" else self.make_block_nodes
         return self.simulate([block], links, mesh=mesh)

@@ -88,36 +88,37 @@ class Kidder(Problem):
         rho = shell.compute_density(self.compute_layers(nodes), 0.0)
         p = shell.entropy * rho**shell.gamma
         block = Block("shell", IdealGas(shell.gamma), nodes, rho, 0.0, 0.0, p)
-        for n, side in enumerate(("i_min", "i_max")):
-            load = lambda t, n=n: shell.compute_pressures(t)[n]  # noqa: E731
-            put(block, side, "free-surface", pressure=load)
-        put(block, "j_min", "axis" if self.deck.n == 3 else "wall")
+        put(block, "i_min", "free-surface", pressure=lambda t: shell.compute_pressures(t)[0])
+        put(block, "i_max", "free-surface", pressure=lambda t: shell.compute_pressures(t)[1])
+        line, geometry = ("axis", "axisymmetric") if self.deck.n == 3 else ("wall", "plane")
+        put(block, "j_min", line)
         put(block, "j_max", "wall")
-        return self.simulate([block], geometry="axisymmetric" if self.deck.n == 3 else "plane")
+        return self.simulate([block], geometry=geometry)
 
     def measure(self, evolution) -> dict[str, float]:
         """Relative errors of both radii, how round they are, and of the density."""
         (block,) = evolution.blocks
         h, row = self.shell.compute_shrinking(evolution.t), {}
         for side, edge, first in (("inner", 0, RADII[0]), ("outer", -1, RADII[1])):
-            radius = self.compute_radii(block.nodes[:, edge, :])
-            row[f"{side}_error"] = abs(float(radius.mean()) / (h * first) - 1.0)
-            row[f"{side}_worst"] = float(np.abs(radius / (h * first) - 1.0).max())
-            row[f"{side}_roundness"] = float(np.ptp(radius)) / (h * first)
+            part = self.compute_radii(block.nodes[:, edge, :]) / (h * first)
+            row[f"{side}_error"] = abs(float(part.mean()) - 1.0)
+            row[f"{side}_worst"] = float(np.abs(part - 1.0).max())
+            row[f"{side}_roundness"] = float(np.ptp(part))
         exact = self.shell.compute_density(self.compute_layers(block.nodes), evolution.t)
         error = np.abs(block.state[0, 1:-1, 1:-1] / exact - 1.0)
         row["error_rho"] = float(np.average(error, weights=block.volume))
         return row
 
     def report(self, history, final=None) -> Report:
-        deck, rows = self.deck, []
+        deck = self.deck
         h = self.shell.compute_shrinking(get_last(history, "t")) if history else 0.5
         kinds = {"error": "relative error", "worst": "at the worst ray", "roundness": "round to"}
-        for side in ("inner", "outer"):
-            for kind, words in kinds.items():
-                label = f"{side} radius, {words}"
-                rows.append(compare(history, f"{side}_{kind}", label=label, digits=3))
-        rows.append(compare(history, "error_rho", label="mean error of the density", digits=3))
+        labels = {
+            f"{side}_{kind}": f"{side} radius, {words}"
+            for side in ("inner", "outer")
+            for kind, words in kinds.items()
+        } | {"error_rho": "mean error of the density"}
+        rows = [compare(history, name, label=words, digits=3) for name, words in labels.items()]
         head = f"kidder, {SHAPES[deck.n]} of {deck.cells} x {deck.rays} cells: shrunk to {h:.4g}"
         return Report(f"{head} of the first radii", rows)
 
@@ -135,10 +136,12 @@ class Kidder(Problem):
             )
         left.set(xlim=(0.0, 1.08), ylim=(0.0, 1.08))
         times = np.array([dump.t for dump in dumps])
-        h = np.sqrt(1.0 - (times / self.shell.tau) ** 2)
+        h = [shrink(t) for t in times]
         for edge, first, words in ((-1, RADII[1], "outer"), (0, RADII[0], "inner")):
             radius = [self.compute_radii(d.blocks[0].nodes[:, edge, :]).mean() for d in dumps]
             right.plot(1e3 * times, radius, "o", ms=4, label=f"{words} surface")
-            right.plot(1e3 * times, first * h, "k", lw=0.8, label="exact" if edge == 0 else None)
+            right.plot(
+                1e3 * times, first * np.array(h), "k", lw=0.8, label="exact" if edge == 0 else None
+            )
         right.set(xlabel="t [ms]", ylabel="radius [m]")
         right.legend(frameon=False)

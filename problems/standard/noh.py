@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Literal
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.initial_states import RadialFlow
+from problems.initial_states import RadialFlow, Symmetry
 from problems.problem import Problem, Report, Row, compare, get_last, say_unreached
 from problems.references.exact_flows import DIMENSIONS
 from regrid.errors import BadInput
@@ -36,10 +35,8 @@ PEERS = {
 
 
 class NohDeck(Deck, kw_only=True):
-    """Deck of `noh`."""
-
     run: RunControl = RunControl(t_end=0.6, cfl=0.8)
-    geometry: key(Literal["plane", "cylindrical", "spherical"], "shape of the flow") = "cylindrical"
+    geometry: key(Symmetry, "shape of the flow") = "cylindrical"
     cells: key(int, "cells along each side, 1 long", ge=8, le=MOST_CELLS) = 100
     gamma: key(float, "ratio of specific heats", ge=1.01) = 5.0 / 3.0
     pressure: key(float, "of the cold gas; exact theory has 0", ge=1e-8, le=0.01) = 1e-6
@@ -106,11 +103,11 @@ class Noh(Problem):
         t, shock = evolution.t, self.shock_speed * evolution.t
         r = self.flow.compute_radii(compute_centres(block.nodes))
         weight = block.volume * ((r > 0.3 * shock) & (r < 0.8 * shock))
-        row = {"density_behind": math.nan, "pressure_behind": math.nan, "error_rho": math.nan}
+        row = dict.fromkeys(("density_behind", "pressure_behind", "error_rho"), math.nan)
         if weight.any():
-            rho, _, _, p = block.state[:, 1:-1, 1:-1]
-            row["density_behind"] = float((rho * weight).sum() / weight.sum())
-            row["pressure_behind"] = float((p * weight).sum() / weight.sum())
+            state = {"density_behind": block.state[0], "pressure_behind": block.state[3]}
+            for name, cells in state.items():
+                row[name] = float(np.average(cells[1:-1, 1:-1], weights=weight))
         if evolution.finished is not None:
             exact = functools.partial(self.compute_density, t=t)
             row["error_rho"] = self.flow.measure_error(block, exact, 2.0 * shock)
@@ -119,15 +116,14 @@ class Noh(Problem):
     def report(self, history, final=None) -> Report:
         deck, t = self.deck, get_last(history, "t") if history else self.t_end
         behind = float(self.compute_density(np.zeros(1), max(t, 1e-9))[0])
-        reach, labels = self.shock_speed * t, ("density behind the shock", "pressure behind it")
+        reach, p = self.shock_speed * t, self.shock_speed * behind
+        words = f"relative error of the density, r < {2 * reach:.3g}"
         grid = f"grid shrinking at {deck.shrink:g} a second" if deck.shrink else "fixed grid"
         rows = [
-            compare(history, "density_behind", behind, labels[0]),
-            compare(history, "pressure_behind", self.shock_speed * behind, labels[1]),
+            compare(history, "density_behind", behind, "density behind the shock"),
+            compare(history, "pressure_behind", p, "pressure behind it"),
             Row("shock_radius", theory=reach),
-            compare(
-                history, "error_rho", label=f"relative error of the density, r < {2 * reach:.3g}"
-            ),
+            compare(history, "error_rho", label=words),
         ]
         notes = say_unreached(history, "error_rho")
         if deck.cells == 100 and deck.geometry in PEERS:
@@ -136,8 +132,7 @@ class Noh(Problem):
 
     def draw(self, figure, run_data) -> None:
         """Density in the last dump out to twice the shock's radius, and against the radius."""
-        dump = run_data.dumps[-1]
-        high = float(self.compute_density(np.zeros(1), max(dump.t, 1e-9))[0])
+        dump, exact = run_data.dumps[-1], self.compute_density
+        high = float(exact(np.zeros(1), max(dump.t, 1e-9))[0])
         reach = max(2.0 * self.shock_speed * dump.t, 0.05)
-        exact = functools.partial(self.compute_density, t=dump.t)
-        self.flow.draw(figure, dump, exact, reach, high=1.1 * high)
+        self.flow.draw(figure, dump, functools.partial(exact, t=dump.t), reach, high=1.1 * high)

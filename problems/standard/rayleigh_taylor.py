@@ -70,16 +70,16 @@ class RayleighTaylor(Problem):
         self.pressure = deck.sound_speed**2 / GAMMA  # of both gases at y = 0
         sign, density = (1.0, 2.0) if self.heavy else (-1.0, 1.0)
         if self.compute_layer(sign, density)[0] <= 0.0:
+            least = math.sqrt(density * (GAMMA - 1.0) * GRAVITY)
             raise BadInput(
-                f"deck: sound_speed is {deck.sound_speed:g}; below it the gas above cannot "
-                "reach up to the wall, it must be greater than "
-                f"{math.sqrt(density * (GAMMA - 1.0) * GRAVITY):.3g}"
+                f"deck: sound_speed is {deck.sound_speed:g}; the gas above cannot reach up to the "
+                f"wall, it must be greater than {least:.3g}"
             )
         square = compute_square(deck.above, deck.tension)
         if square == 0.0:
             raise BadInput(
-                f"deck: at tension = {deck.tension!r} the wave rests, it neither grows nor swings; "
-                "take more or less"
+                f"deck: at tension = {deck.tension!r} the wave neither grows nor swings; take more "
+                "or less"
             )
         self.grows, self.exact = square > 0.0, math.sqrt(abs(square))
         self.amplitude = deck.amplitude or (1e-4 if self.heavy else 1e-3)
@@ -93,12 +93,9 @@ class RayleighTaylor(Problem):
     @property
     def t_end(self) -> float:
         """End time: the deck's, or several e-folds or swings."""
-        if self.deck.run.t_end:
-            return self.deck.run.t_end
-        if self.heavy and not self.grows:
-            return SWING / self.exact
-        above = self.deck.above
-        return T_END[above] * (math.sqrt(abs(compute_square(above, 0.0))) / self.exact)
+        rate = math.sqrt(abs(compute_square(self.deck.above, 0.0)))
+        swing, usual = SWING / self.exact, T_END[self.deck.above] * (rate / self.exact)
+        return self.deck.run.t_end or (swing if self.heavy and not self.grows else usual)
 
     def estimate_cells(self) -> int:
         return max(4, self.deck.cells // 2) * self.deck.cells * (1 + self.heavy)
@@ -118,11 +115,11 @@ class RayleighTaylor(Problem):
             rho, p = self.compute_layer(compute_centres(grid)[1], density)
             blocks.append(Block(name, IdealGas(GAMMA), grid, rho, 0.0, 0.0, p))
             put_walls(blocks[-1], "i_min", "i_max", "j_min" if name == "light" else "j_max")
-        links = []
+        top, links = (blocks[0], "j_max"), []
         if self.heavy:
-            links = [join("interface", (blocks[0], "j_max"), (blocks[1], "j_min"), tension=tension)]
+            links = [join("interface", top, (blocks[1], "j_min"), tension=tension)]
         else:
-            put(blocks[0], "j_max", "free-surface", pressure=self.pressure, tension=tension)
+            put(*top, "free-surface", pressure=self.pressure, tension=tension)
         return self.simulate(blocks, links, source=make_gravity(0.0, -GRAVITY))
 
     def measure(self, evolution) -> dict[str, float]:
@@ -152,10 +149,8 @@ class RayleighTaylor(Problem):
         what = "growth rate [1/s]" if self.grows else "angular frequency [1/s]"
         mean = history.get("interface_mean", np.zeros(1))
         head = f"rayleigh-taylor, {self.deck.above} above, {self.deck.cells} cells a wavelength"
-        rows = [
-            Row("rate", rate, self.exact, what, digits=7, error="rate"),
-            compare(history, "amplitude", label="last amplitude [m]", digits=4),
-        ]
+        row = Row("rate", rate, self.exact, what, digits=7, error="rate")
+        rows = [row, compare(history, "amplitude", label="last amplitude [m]", digits=4)]
         moved = f"the mean has moved by at most {np.abs(mean - mean[0]).max():.1e} m"
         return Report(head, rows, ["theory is without compression", moved])
 
@@ -179,7 +174,5 @@ class RayleighTaylor(Problem):
         dump = run_data.dumps[-1]
         most = max(float(np.abs(block.cell_fields["v"][:, 4:-4]).max()) for block in dump.blocks)
         lines = [dump.blocks[0].nodes[:, :, -1]] if len(dump.blocks) > 1 else []
-        draw_field(
-            right, dump, "v", colours="RdBu_r", low=-most, high=most, every=4, lines=lines,
-            bar="velocity y [m/s]", title="t",
-        )  # fmt: skip
+        words = {"bar": "velocity y [m/s]", "title": "t", "colours": "RdBu_r"}
+        draw_field(right, dump, "v", low=-most, high=most, every=4, lines=lines, **words)

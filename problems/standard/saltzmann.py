@@ -25,7 +25,7 @@ from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.initial_states import make_plane_grid, put_walls
+from problems.initial_states import put_walls
 from problems.pictures import draw_field, find_dump
 from problems.problem import BlockPlan, Problem, Report, Row
 from regrid.errors import BadInput
@@ -68,22 +68,17 @@ class Saltzmann(Problem):
                 "third shock meets the wall"
             )
 
-    def make_grid(self) -> np.ndarray:
-        """The skewed grid."""
-        ends = ((1.0, self.deck.cells), (0.1, self.deck.rows))
-        x, y = make_plane_grid(*(np.linspace(0.0, end, count + 1) for end, count in ends))
-        bend = np.sin(math.pi * x)
-        bend[-1] = 0.0
-        return np.array([x + self.deck.skew * (1.0 - 10.0 * y) * bend, y])
-
     def plan(self):
         tube = BlockPlan("gas", (self.deck.cells, self.deck.rows), (0.0, 0.0), (1.0, 0.1))
         return self.t_end, [tube]
 
     def build(self):
-        deck, gas = self.deck, IdealGas(5.0 / 3.0)
+        deck, (x, y) = self.deck, self.plan()[1][0].make_nodes()
+        bend = np.sin(math.pi * x)
+        bend[-1] = 0.0
+        nodes = np.array([x + deck.skew * (1.0 - 10.0 * y) * bend, y])
         state, scheme = (1.0, 0.0, 0.0, deck.pressure), {"limiter": deck.limiter, "flux": deck.flux}
-        block = Block("gas", gas, self.make_grid(), *state, **scheme)
+        block = Block("gas", IdealGas(5.0 / 3.0), nodes, *state, **scheme)
         put(block, "i_min", "piston", velocity=(1.0, 0.0))
         put_walls(block, "i_max", "j_min", "j_max")
         simulation = self.simulate([block])

@@ -62,9 +62,7 @@ class Sedov(Problem):
         end, cell = self.blast.radius(deck.run.t_end), deck.size / deck.cells
         where = f"deck: at run.t_end = {deck.run.t_end:g} the shock is at r = {end:.3g}"
         if end < cell:
-            raise BadInput(
-                f"{where}, inside the first cell, {cell:.3g} long; end later, or take smaller cells"
-            )
+            raise BadInput(f"{where}, inside the first cell, {cell:.3g} long; end later")
         if end > 0.95 * deck.size:
             raise BadInput(
                 f"{where}; the sides are {deck.size:g} long, and its mirror image would come back"

@@ -24,32 +24,11 @@ from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import make_square, put_walls
 from problems.pictures import draw_field, find_dump
 from problems.problem import Problem, Report, compare
+from problems.references import taylor_green
 from regrid.measure.corners import compute_centres
 
-GAMMA = 5.0 / 3.0
 PERIOD = 0.6  # of the swinging grid [s]: at t = 0.75 it is as far as it goes
 PATH_STEPS = 12  # of Runge and Kutta along the paths that nodes follow
-
-
-def compute_flow(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """u, v [m/s] and p [Pa] of the steady flow."""
-    a, b = math.pi * x, math.pi * y
-    p = 1.0 + 0.25 * (np.cos(2.0 * a) + np.cos(2.0 * b))
-    return np.sin(a) * np.cos(b), -np.cos(a) * np.sin(b), p
-
-
-def compute_velocity(nodes: np.ndarray) -> np.ndarray:
-    """Velocity [m/s] of the flow at nodes (2, ni + 1, nj + 1) of a grid between the walls."""
-    velocity = np.array(compute_flow(*nodes)[:2])
-    velocity[0, [0, -1]], velocity[1, :, [0, -1]] = 0.0, 0.0  # sin(pi) is not zero
-    return velocity
-
-
-def heat(block, x, y, t, dt):
-    """The source (`hydro.sources`): heat per mass that keeps the flow steady."""
-    pi = math.pi
-    wave = np.cos(3 * pi * x) * np.cos(pi * y) - np.cos(pi * x) * np.cos(3 * pi * y)
-    return 0.0, 0.0, dt * pi / (4.0 * (GAMMA - 1.0)) * wave
 
 
 class TaylorGreenDeck(Deck, kw_only=True):
@@ -73,31 +52,26 @@ class TaylorGreen(Problem):
         nodes = make_square(self.deck.cells, 0.0, 1.0)
         if self.deck.mesh != "follow":
             swing = self.deck.amplitude * math.sin(2.0 * math.pi * t / PERIOD)
-            return nodes + swing * compute_velocity(nodes)
-        step = t / PATH_STEPS
-        for _ in range(PATH_STEPS):
-            first = compute_velocity(nodes)
-            second = compute_velocity(nodes + 0.5 * step * first)
-            third = compute_velocity(nodes + 0.5 * step * second)
-            fourth = compute_velocity(nodes + step * third)
-            nodes = nodes + step / 6.0 * ((first + fourth) + 2.0 * (second + third))
-        return nodes
+            return nodes + swing * taylor_green.compute_velocity(nodes)
+        return taylor_green.follow_flow(nodes, t, PATH_STEPS)
 
     def estimate_cells(self) -> int:
         return self.deck.cells**2
 
     def build(self):
         deck, nodes = self.deck, self.make_block_nodes("square", 0.0)
-        flow = compute_flow(*compute_centres(nodes))
-        block = Block("square", IdealGas(GAMMA), nodes, 1.0, *flow, limiter=deck.limiter)
+        flow = taylor_green.compute_flow(*compute_centres(nodes))
+        block = Block(
+            "square", IdealGas(taylor_green.GAMMA), nodes, 1.0, *flow, limiter=deck.limiter
+        )
         put_walls(block)
         mesh = "fixed" if deck.mesh == "fixed" else self.make_block_nodes
-        return self.simulate([block], mesh=mesh, source=heat)
+        return self.simulate([block], mesh=mesh, source=taylor_green.heat)
 
     def measure(self, evolution) -> dict[str, float]:
         """Mean errors of velocity and pressure against the values at the cells' centres."""
         (block,) = evolution.blocks
-        u, v, p = compute_flow(*compute_centres(block.nodes))
+        u, v, p = taylor_green.compute_flow(*compute_centres(block.nodes))
         _, u_cell, v_cell, p_cell = block.state[:, 1:-1, 1:-1]
         errors = {"error_velocity": np.hypot(u_cell - u, v_cell - v), "error_p": np.abs(p_cell - p)}
         return {name: float((e * block.volume).sum()) for name, e in errors.items()}
@@ -122,7 +96,7 @@ class TaylorGreen(Problem):
             draw_field(axis, dump, "p", low=0.5, high=1.5, bar="pressure [Pa]", **options)
 
         def compute_error(block):
-            u, v, _ = compute_flow(*compute_centres(block.nodes))
+            u, v, _ = taylor_green.compute_flow(*compute_centres(block.nodes))
             return np.hypot(block.cell_fields["u"] - u, block.cell_fields["v"] - v)
 
         options |= {"bar": "error of the velocity [m/s]", "colours": "magma_r"}

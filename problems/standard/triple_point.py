@@ -25,7 +25,7 @@ from hydro.eos import IdealGas
 from hydro.links import join
 from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.initial_states import make_plane_grid, put_walls
+from problems.initial_states import put_walls
 from problems.pictures import draw_field, draw_grid
 from problems.problem import BlockPlan, Problem, Report, Row, average_plateau, get_last
 from problems.references.riemann import solve_riemann
@@ -65,29 +65,27 @@ class TriplePoint(Problem):
                 f"deck: cells is {deck.cells}; it must be even, the point is half a length up"
             )
 
-    def count_cells(self, span: tuple[float, float]) -> int:
-        """Cells along a side."""
-        return round(self.deck.cells * (span[1] - span[0]))
-
     def plan(self):
-        plans = [
-            BlockPlan(name, (self.count_cells(x), self.count_cells(y)), (x[0], y[0]), (x[1], y[1]))
-            for name, (_, _, _, x, y) in GASES.items()
-        ]
+        plans = []
+        for name, (*_, x, y) in GASES.items():
+            low, high = zip(x, y, strict=True)
+            cells = tuple(round(self.deck.cells * (end - start)) for start, end in (x, y))
+            plans.append(BlockPlan(name, cells, low, high))
         return self.t_end, plans
 
     def build(self):
         deck, blocks = self.deck, []
-        for name, (rho, p, gamma, *spans) in GASES.items():
-            lines = [np.linspace(*span, self.count_cells(span) + 1) for span in spans]
-            state, nodes = (rho, 0.0, 0.0, p), make_plane_grid(*lines)
-            blocks.append(Block(name, IdealGas(gamma), nodes, *state, limiter=deck.limiter))
+        for plan in self.plan()[1]:
+            rho, p, gamma, *_ = GASES[plan.name]
+            what, state = (plan.name, IdealGas(gamma), plan.make_nodes()), (rho, 0.0, 0.0, p)
+            blocks.append(Block(*what, *state, limiter=deck.limiter))
         left, bottom, top = blocks
-        links = [
-            join("interface", (left, "i_max", 0, bottom.nj), (bottom, "i_min")),
-            join("interface", (left, "i_max", bottom.nj, left.nj), (top, "i_min")),
-            join("interface", (bottom, "j_max"), (top, "j_min")),
-        ]
+        pairs = (
+            ((left, "i_max", 0, bottom.nj), (bottom, "i_min")),
+            ((left, "i_max", bottom.nj, left.nj), (top, "i_min")),
+            ((bottom, "j_max"), (top, "j_min")),
+        )
+        links = [join("interface", *pair) for pair in pairs]
         put_walls(left, "i_min", "j_min", "j_max")
         put_walls(bottom, "i_max", "j_min")
         put_walls(top, "i_max", "j_max")

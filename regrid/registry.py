@@ -63,20 +63,26 @@ def find_usable() -> list[str]:
 def make_regridder(name: str, **options: Any) -> Regridder:
     """A regridder for one block; BadInput for a name, an option or a value that is none."""
     regridder = load_regridder(name)
-    parameters = inspect.signature(regridder).parameters
-    known = list(parameters)
+    if "weight" in options and not takes_weight(name):
+        weighted = ", ".join(sorted(filter(takes_weight, find_usable())))
+        raise BadInput(f"regridder '{name}' takes no weight; those that do are: {weighted}")
+    return call_with_options(regridder, name, options)
+
+
+def call_with_options(maker: Any, name: str, options: dict[str, Any]) -> Any:
+    """The regridder that a class makes; BadInput for an option or a value that is none."""
+    parameters = inspect.signature(maker).parameters
     for option, value in options.items():
-        if option == "weight" and option not in known:
-            weighted = ", ".join(sorted(n for n in find_usable() if _takes_weight(n)))
-            raise BadInput(f"regridder '{name}' takes no weight; those that do are: {weighted}")
-        if option not in known:
-            raise BadInput(f"regridder '{name}' has no option '{option}'{suggest(option, known)}")
+        if option not in parameters:
+            hint = suggest(option, list(parameters))
+            raise BadInput(f"regridder '{name}' has no option '{option}'{hint}")
         wanted = KINDS.get(str(parameters[option].annotation).removesuffix(" | None"))
         if wanted and value is not None and (type(value) is bool or not isinstance(value, wanted)):
             words = {Real: "a number", Integral: "a whole number", str: "a word"}[wanted]
             raise BadInput(f"regridder '{name}': {option} = {value!r}; it has to be {words}")
-    return regridder(**options)
+    return maker(**options)
 
 
-def _takes_weight(name: str) -> bool:
+def takes_weight(name: str) -> bool:
+    """Has this regridder an option called weight?"""
     return "weight" in inspect.signature(load_regridder(name)).parameters

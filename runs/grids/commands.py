@@ -16,7 +16,7 @@ from regrid.domains import DOMAINS, make_domain
 from regrid.domains_in_space import BLOCKS, SHAPES
 from regrid.errors import BadInput, RunFailure
 from regrid.given import read_grid
-from regrid.registry import find_usable, load_regridder
+from regrid.registry import find_usable, load_regridder, takes_weight
 from runs.grids.making import (
     Made,
     default_cells,
@@ -29,7 +29,6 @@ from runs.grids.making import (
     parse_options,
     regrid_plane,
     regrid_space,
-    takes_weight,
 )
 from runs.grids.quality import (
     Judgement,

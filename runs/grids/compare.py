@@ -24,7 +24,7 @@ from regrid.domains import DOMAINS, make_domain
 from regrid.errors import BadInput, RunFailure
 from regrid.given import is_file_name, read_sides, read_source
 from regrid.measure.quality import measure_first_line_gap
-from regrid.registry import find_usable
+from regrid.registry import find_usable, takes_weight
 from regrid.sides import SIDE_NAMES, get_side, get_sides
 from runs.deck.reading import packaged_decks, read_deck
 from runs.grids.making import (
@@ -35,7 +35,6 @@ from runs.grids.making import (
     march,
     parse_options,
     regrid_plane,
-    takes_weight,
     warm_up,
 )
 from runs.grids.quality import check_free

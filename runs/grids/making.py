@@ -46,7 +46,7 @@ from regrid.measure.hexahedra import (
 )
 from regrid.measure.quality import compute_scaled_jacobians, measure_quality
 from regrid.protocol import call_regridder
-from regrid.registry import find_usable, load_regridder, make_regridder
+from regrid.registry import call_with_options, make_regridder
 from regrid.sides import compute_area
 
 Cells = tuple[int, ...]
@@ -71,18 +71,9 @@ def _read_value(text: str) -> Any:
 
 
 def make_family(name: str, options: dict[str, Any], weight: str | None = None):
-    """A regridder of the registry; BadInput for a weight given to a family that takes none."""
-    if weight is None:
-        return make_regridder(name, **options)
-    if not takes_weight(name):
-        able = ", ".join(family for family in find_usable() if takes_weight(family))
-        raise BadInput(f"--weight: the family '{name}' takes none; these do: {able}")
-    return make_regridder(name, **{"weight": _read_value(weight), **options})
-
-
-def takes_weight(name: str) -> bool:
-    """Has this family an option called weight?"""
-    return "weight" in inspect.signature(load_regridder(name).__init__).parameters
+    """A regridder of the registry, with a weight if one is given; BadInput as `make_regridder`."""
+    weighted = {} if weight is None else {"weight": _read_value(weight)}
+    return make_regridder(name, **{**weighted, **options})
 
 
 def march(domain: MovingDomain, regridder, steps: int, end: float = 1.0) -> March:
@@ -335,11 +326,7 @@ def make_family_in_space(name: str, options: dict[str, Any]):
     """A regridder for blocks of space; BadInput for a name or an option that is none."""
     if name not in FAMILIES_IN_SPACE:
         raise BadInput(f"--family {name}: not one of space{suggest(name, FAMILIES_IN_SPACE)}")
-    known = list(inspect.signature(FAMILIES_IN_SPACE[name]).parameters)
-    for option in options:
-        if option not in known:
-            raise BadInput(f"--option {option}: family '{name}' has none{suggest(option, known)}")
-    return FAMILIES_IN_SPACE[name](**options)
+    return call_with_options(FAMILIES_IN_SPACE[name], name, options)
 
 
 def march_in_space(block: MovingBlock, regridder, steps: int, end: float = 1.0) -> MarchInSpace:

@@ -129,7 +129,7 @@ def test_compare_in_a_flow(shockgrid):
         ("grid make swan --at nan", 2, "from 0 to 1"),
         ("grid check point.npz", 2, "the grid's extent in x is 0; it has to be between"),
         ("grid check huge.npz", 2, "extent in x is 1e+300"),
-        ("grid make swan --weight 1+x", 2, "takes none; these do: equidistribution"),
+        ("grid make swan --weight 1+x", 2, "takes no weight; those that do are: "),
         ("grid make swan --family equidistribution --weight 1+q", 2, "there is no 'q' here"),
         ("grid make swan -o grid.txt", 2, "ending in .h5, .vts, .npz"),
         ("grid make swan -o nowhere/grid.h5", 2, "is not a folder"),

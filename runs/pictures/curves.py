@@ -260,7 +260,7 @@ def draw_lineouts(
         style = get_style(first.dump, name)
         sizes = [np.nanmax(np.abs(one.columns[name])) for run in lineouts for one in run]
         factor, unit = pick_prefix(float(max(sizes)), style.unit)
-        for run, style, title in zip(lineouts, STYLES, runs, strict=False):
+        for run, dash, title in zip(lineouts, STYLES, runs, strict=False):
             titles = time_titles([one.dump for one in run])
             for k, (one, when) in enumerate(zip(run, titles, strict=True)):
                 x, values = one.columns[way] * scale, one.columns[name] * factor
@@ -268,8 +268,8 @@ def draw_lineouts(
                 gaps = np.flatnonzero(blocks[1:] != blocks[:-1]) + 1  # another block begins
                 x, values = np.insert(x, gaps, np.nan), np.insert(values, gaps, np.nan)
                 named = f"{title}, {when}" if len(lineouts) > 1 else when
-                axes.plot(x, values, style, color=f"C{k % 10}", linewidth=1.1, label=named)
-                if style == "-":
+                axes.plot(x, values, dash, color=f"C{k % 10}", linewidth=1.1, label=named)
+                if dash == "-":
                     axes.plot(x, values, ".", color=f"C{k % 10}", markersize=2.5)
         axes.set_ylabel(f"{style.words} [{unit}]" if unit else style.words, fontsize=9)
         axes.grid(alpha=0.3)

@@ -304,10 +304,10 @@ def make_report(problem, history, final) -> Report:
             )
     else:
         notes.append(f"no material faster than {JET:g} V")
-    if final is not None:
-        known = {phase: time for phase, time in final.times.items() if math.isfinite(time)}
-        words = (f"{PHASES[phase]} {1e6 * time:.3f} us" for phase, time in known.items())
-        notes.append("phases: " + "; ".join(words))
+    times = final.times.items() if final is not None else ()
+    known = [f"{PHASES[name]} {1e6 * time:.3f} us" for name, time in times if math.isfinite(time)]
+    if known:
+        notes.append("phases: " + "; ".join(known))
     return Report(functools.partial(describe_deck, problem), rows, notes)
 
 

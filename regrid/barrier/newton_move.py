@@ -72,7 +72,7 @@ class NewtonMove:
         work, tuning = self.work, self.tuning
         if work.ni == 1 or work.nj == 1:
             work.load_old()
-            work.fill_moved()
+            copy_sides(work.sides, work.base)
             return False
         self.moved_ratio, self.estimate, strayed = work.look()
         corrected = False
@@ -149,7 +149,7 @@ class NewtonMove:
             return False
         broken, self.quality, self.triangles = self.broken, None, -1
         self._begin()
-        work.fill_moved()
+        work.look()
         straight = transfinite_grid(work.sides)
         for start in (work.base.copy(), straight, None):
             found = straight.copy() if start is None else start

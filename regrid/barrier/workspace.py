@@ -14,7 +14,7 @@ import math
 import numba
 import numpy as np
 
-from regrid.algebraic import SideMotion, fill_blend, fill_curves
+from regrid.algebraic import SideMotion, fill_curves
 from regrid.barrier.assembly import (
     NODE_ROWS,
     assemble_barrier,
@@ -145,7 +145,8 @@ class Workspace:
             "curve": (shape, 0),
         }
         self.size = sum(count_numbers(*form) for form, _ in self.arrays.values())
-        self.scratch = np.zeros((chunks, max(ENERGY_ROWS, LOOK_ROWS)))
+        form = chunks, max(ENERGY_ROWS, LOOK_ROWS)
+        self.scratch = Carver(np.zeros(count_numbers(*form))).cut(*form)
         self.shared, self.clean = shared, not shared
         self._whole = np.zeros(0)
         if not shared:
@@ -287,15 +288,6 @@ class Workspace:
         self.bent = is_bent(bend)
         if self.bent:
             self.bend = bend
-
-    def fill_moved(self) -> None:
-        """`base` = the old grid moved along with its sides (R6.5)."""
-        motion, inside = self.motion, np.s_[:, 1:-1, 1:-1]
-        fill_blend(motion.along_i, motion.along_j, motion.corners, self.base)
-        self.base[inside] += self.old[inside]
-        if self.bent:
-            self.base[inside] += (self.bend * motion.turn[:, None])[inside]
-        copy_sides(self.sides, self.base)
 
     def look(self) -> tuple[float, float, float]:
         """Move `old` along with its sides (R6.5) into `base`.  Least ratio of its corner areas to

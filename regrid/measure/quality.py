@@ -392,6 +392,6 @@ def find_best_sine(boundary: np.ndarray) -> tuple[float, str, int]:
 
 def measure_turns(line: np.ndarray) -> np.ndarray:
     """Turns (n - 2,) [rad] from segment to segment of a polyline (2, n), positive to the left."""
-    before, after = np.diff(line[:, :-1], axis=1), np.diff(line[:, 1:], axis=1)
-    cross = before[0] * after[1] - before[1] * after[0]
-    return np.arctan2(cross, (before * after).sum(axis=0))
+    steps = line[:, 1:] - line[:, :-1]
+    (ax, ay), (bx, by) = steps[:, :-1], steps[:, 1:]
+    return np.arctan2(ax * by - ay * bx, ax * bx + ay * by)

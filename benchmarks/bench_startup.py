@@ -50,7 +50,7 @@ def cpu_seconds(words: list[str]) -> float:
     after = read_child_time()
     if done.returncode:
         raise SystemExit(f"{' '.join(words)}: {done.stderr.decode()}")
-    return after.user + after.system - before.user - before.system
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 if __name__ == "__main__":

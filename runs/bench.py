@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 import numpy as np
@@ -41,22 +41,14 @@ except ImportError:  # Windows
     resource = None  # type: ignore[assignment]
 
 
-class ChildTime(NamedTuple):
-    """Seconds of CPU time of all ended child processes so far."""
-
-    user: float
-    system: float
-
-
-def read_child_time() -> ChildTime:
-    """User and system time of ended child processes; BadInput where the system keeps no count."""
+def read_child_time() -> Any:
+    """Use of ended child processes (`ru_utime`, `ru_stime` [s]); BadInput if it is not counted."""
     if resource is None:
         raise BadInput(
             "bench: this system does not tell the CPU time of a command that has ended; "
             "take --runs none and leave out --peer"
         )
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return ChildTime(used.ru_utime, used.ru_stime)
+    return resource.getrusage(resource.RUSAGE_CHILDREN)
 
 
 CELLS, STEPS = 400, 87
@@ -104,7 +96,7 @@ class Peer:
             after = read_child_time()
         if done.returncode:
             raise BadInput(f"{self.program} ended with {done.returncode}: {done.stderr[-200:]}")
-        return CELLS * CELLS * STEPS / (after.user - before.user) / 1e6
+        return CELLS * CELLS * STEPS / (after.ru_utime - before.ru_utime) / 1e6
 
 
 def time_rounds(
@@ -217,7 +209,7 @@ def measure_command(tables: Tables, words: tuple[str, ...], rounds: int, peer: P
             cells = sum(np.prod(np.array(b.nodes.shape[1:]) - 1) for b in run.dumps[-1].blocks)
             if number == 0:
                 continue
-            used = after.user - before.user + after.system - before.system
+            used = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
             seconds.append(used)
             walls.append(end - begin)
             speeds.append(float(cells) * steps / used / 1e6)

@@ -53,31 +53,20 @@ def _find_table_types(kind: Any) -> Iterator[type[DeckTable]]:
 
 
 def list_runtime_keys(kind: type[Deck]) -> list[str]:
-    """The dotted keys of a deck `kind` that a restart may change, the deck's own first."""
-    return [
-        f"{key}.{name}" if key else name
-        for key, table in find_tables(kind)
-        for name in table.runtime
-    ]
-
-
-def describe_runtime_keys(kind: type[Deck]) -> str:
-    """The same in words for a sentence: `kct_end, run.t_end, ..., output.*`."""
-    words = []
+    """The dotted keys of a deck `kind` that a restart may change, the deck's own first; `output.*`
+    stands for a whole table."""
+    keys = []
     for key, table in find_tables(kind):
-        whole = len(table.runtime) == len(table.__struct_fields__)
-        names = ["*"] if key and whole else table.runtime
-        words += [f"{key}.{name}" if key else name for name in names]
-    return ", ".join(words)
+        whole = key and len(table.runtime) == len(table.__struct_fields__)
+        names = ["*"] if whole else table.runtime
+        keys += [f"{key}.{name}" if key else name for name in names]
+    return keys
 
 
 def is_runtime_key(key: str, kind: type[Deck]) -> bool:
     """May a restart change the dotted `key`, or all that is in it?"""
-    allowed = list_runtime_keys(kind)
-    if any(key == one or key.startswith(f"{one}.") for one in allowed):
-        return True
-    tables = {name: table for name, table in find_tables(kind) if name}
-    return key in tables and set(tables[key].runtime) == set(tables[key].__struct_fields__)
+    allowed = [one.removesuffix(".*") for one in list_runtime_keys(kind)]
+    return any(key == one or key.startswith(f"{one}.") for one in allowed)
 
 
 def find_differences(before: Deck, now: Deck) -> list[Difference]:

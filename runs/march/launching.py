@@ -13,7 +13,7 @@ from problems.evolution import Evolution
 from problems.problem import Problem, check_memory
 from regrid.errors import BadInput
 from regrid.jit import interpreted
-from runs.deck.checking import describe_runtime_keys, is_runtime_key, show
+from runs.deck.checking import is_runtime_key, list_runtime_keys, show
 from runs.deck.reading import ReadDeck, parse_value
 from runs.forecast.cost import check_disk, describe_cost, estimate_cost
 from runs.gauges import make_gauges
@@ -171,7 +171,7 @@ def check_changeable(
     """
     for key in _list_keys(settings):
         if not is_runtime_key(key, kind) and key not in besides:
-            keys = ", ".join((*besides, describe_runtime_keys(kind)))
+            keys = ", ".join((*besides, *list_runtime_keys(kind)))
             raise BadInput(
                 f"--set {key}: it shapes the state, and a restart can change only {keys}; another "
                 f"{key} is another run (shockgrid run)"

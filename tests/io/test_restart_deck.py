@@ -54,7 +54,7 @@ def test_the_end_moves_and_the_domain_stays(shockgrid, again, setting):
     [
         ("wavelength = 1.0", "wavelength = 2.0", "wavelength is 2.0, was 1.0"),
         ("gamma = 1.4", "gamma = 1.5", "first.gamma is 1.5, was 1.4"),
-        ("ka0 = 0.02", "ka0 = 0.05", "modes is [{'number': 1, 'ka0': 0.05"),
+        ("ka0 = 0.02", "ka0 = 0.05", "modes.0.ka0 is 0.05, was 0.02"),
         ("cells = 16", "cells = 24", "cells is 24, was 16"),
         ("pressure = 1.0", "pressure = 1.0\nmach = 2.0", "mach is 2.0, was missing"),
         ("[output]", "[[gauge]]\nname = 'a'\nat = [0.0, 0.0]\n\n[output]", "gauge is "),

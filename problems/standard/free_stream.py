@@ -33,8 +33,6 @@ PRESSURE = 1e5
 
 
 class FreeStreamDeck(Deck, kw_only=True):
-    """The defaults are two gases at Mach 0.6 between open sides."""
-
     run: RunControl = RunControl(max_steps=100, t_end=1e9)
     materials: key(tuple[str, str], '"gas" or a name of the material library') = ("gas", "gas")
     contact: key(Literal["interface", "seam"], "what joins the two blocks") = "interface"
@@ -64,8 +62,8 @@ class FreeStream(Problem):
         turn, speed = math.radians(deck.angle), deck.mach * float(eos.sound_speed(rho, PRESSURE))
         self.velocity = speed * math.cos(turn), speed * math.sin(turn)
 
-    def make_nodes(self, t: float) -> np.ndarray:
-        """All nodes (2, 2 cells + 1, cells + 1) at time t; a function of t, deck and seed alone."""
+    def make_block_nodes(self, name: str, t: float) -> np.ndarray:
+        """Nodes of a block at time t, cut from those of both; a function of t, deck and seed."""
         deck, n = self.deck, self.deck.cells
         x, y = make_plane_grid(np.linspace(-1.0, 1.0, 2 * n + 1), np.linspace(0.0, 1.0, n + 1))
         nodes = np.array([x + BEND * (1.0 - x * x) * np.sin(2.0 * math.pi * y), y])
@@ -77,11 +75,6 @@ class FreeStream(Problem):
         if deck.sides == "periodic":
             shift[:, :, -1] = shift[:, :, 0]
         nodes += shift + t * np.reshape(self.velocity, (2, 1, 1))
-        return nodes
-
-    def make_block_nodes(self, name: str, t: float) -> np.ndarray:
-        """Nodes of a block at time t."""
-        n, nodes = self.deck.cells, self.make_nodes(t)
         return nodes[:, : n + 1] if name == "left" else nodes[:, n:]
 
     def estimate_cells(self) -> int:

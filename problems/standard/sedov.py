@@ -59,10 +59,10 @@ class Sedov(Problem):
         alpha = SedovBlast(deck.geometry, deck.gamma).alpha
         self.blast = SedovBlast(deck.geometry, deck.gamma, energy=alpha)
         self.mesh = deck.mesh or ("fixed" if deck.geometry == "plane" else "follow")
-        end, cell = self.blast.radius(deck.run.t_end), deck.size / deck.cells
+        end = self.blast.radius(deck.run.t_end)
         where = f"deck: at run.t_end = {deck.run.t_end:g} the shock is at r = {end:.3g}"
-        if end < cell:
-            raise BadInput(f"{where}, inside the first cell, {cell:.3g} long; end later")
+        if end < deck.size / deck.cells:
+            raise BadInput(f"{where}, inside the first cell; end later, or take smaller cells")
         if end > 0.95 * deck.size:
             raise BadInput(
                 f"{where}; the sides are {deck.size:g} long, and its mirror image would come back"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -33,12 +33,7 @@ from runs.gauges import NO_BLOCK
 from runs.inspection.account import (
     count,
     count_cells,
-    describe_cautions,
-    describe_own,
-    describe_run,
-    describe_seconds,
     describe_time,
-    describe_verdict,
     judge,
 )
 from runs.store.directory import RunDirectory
@@ -209,48 +204,6 @@ class Outlook:
             if run is not None:
                 keep_run(run)
         return verdict
-
-
-def closing_screen(
-    problem: Problem,
-    evolution: Evolution,
-    history: Mapping[str, np.ndarray],
-    directory: RunDirectory,
-    reason: str,
-    seconds: float,
-    verdict: Mapping[str, Any],
-    ranks: Sequence[str] = (),
-) -> str:
-    """All of the screen as text; ranks: lines about those of MPI."""
-    cells = count_cells(evolution)
-    blocks = count(len(evolution.blocks), "block")
-    marched = [describe_time(evolution.t, problem.t_unit)]
-    if problem.t_unit == "s":
-        marched.append(count(evolution.step, "step"))
-    words = ", ".join([*marched, f"{cells} cells in {blocks}", describe_seconds(seconds)])
-    lines = [f"{reason}: {words}", describe_verdict(verdict)]
-    lines += describe_run(history, cells, [block.name for block in evolution.blocks])
-    lines += describe_gauges(problem.deck, directory)
-    motion = getattr(evolution, "motion", None)
-    if motion is not None and motion.blocks.size > 1:
-        lines.append(f"ranks of MPI: {motion.blocks.size}; on the first of them")
-    lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")
-    lines += ranks
-    if len(history.get("step", ())) > 1:
-        own = describe_own(problem, history, evolution)
-        if own:
-            lines += ["", own]
-    cautions = describe_cautions(problem, history)
-    lines += ["", *cautions] if cautions else []
-    dumps = count(len(directory.list_files("dump")), "dump")
-    lines += [
-        "",
-        f"in {directory}: {dumps}, history.csv, run.xmf (ParaView)",
-        f"see it:      shockgrid plot {directory.quoted}    shockgrid info {directory.quoted}",
-    ]
-    if evolution.finished is None:
-        lines.append(f"continue:    {problem.say_restart(directory.quoted)}")
-    return "\n".join(lines)
 
 
 def describe_gauges(deck: Deck, directory: RunDirectory) -> list[str]:

@@ -17,11 +17,13 @@ import re
 import signal
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from hydro.history import compute_chosen_columns, find_columns
 from problems.deck import Output
@@ -32,9 +34,18 @@ from regrid.jit import read_clock
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import ENDS
 from runs.gauges import Gauges, make_gauges
-from runs.inspection.account import count, describe_time
+from runs.inspection.account import (
+    count,
+    count_cells,
+    describe_cautions,
+    describe_own,
+    describe_run,
+    describe_seconds,
+    describe_time,
+    describe_verdict,
+)
 from runs.march.compiling import compiling
-from runs.march.progress import Outlook, Progress, closing_screen
+from runs.march.progress import Outlook, Progress, describe_gauges, describe_threads
 from runs.march.restart import find_restart_point, is_light, restore
 from runs.ranks.map import check_cut
 from runs.ranks.world import World, describe_ranks, loss_told, write_on_ranks
@@ -326,16 +337,8 @@ class Runner:
         name = ENDS[MISSED].name if code == 3 else ""
         verdict = self.outlook.close(status, reason, history, name)
         try:
-            screen = closing_screen(
-                self.problem,
-                self.evolution,
-                history,
-                self.directory,
-                reason,
-                seconds,
-                verdict,
-                describe_ranks(self.world, self.directory.note),
-            )
+            head = f"{reason}: {self._describe_march()}, {describe_seconds(seconds)}"
+            screen = "\n".join([head, describe_verdict(verdict), *self._describe_run(history)])
         except RunFailure as error:  # of what is computed for the screen alone
             self.outlook.fail(error)
             raise self._explain(error) from error
@@ -344,6 +347,39 @@ class Runner:
             screen = "\n".join([screen, *told])
         write_noted(self.directory, self.directory.summary, screen + "\n")
         return Ending(reason, code, screen)
+
+    def _describe_march(self) -> str:
+        """Where the run has come to, and the size of it."""
+        evolution, t_unit = self.evolution, self.problem.t_unit
+        blocks = count(len(evolution.blocks), "block")
+        steps = f", {count(evolution.step, 'step')}" if t_unit == "s" else ""
+        cells = f"{count_cells(evolution)} cells in {blocks}"
+        return f"{describe_time(evolution.t, t_unit)}{steps}, {cells}"
+
+    def _describe_run(self, history: Mapping[str, np.ndarray]) -> list[str]:
+        """The lines of the screen at the end, but for the first two."""
+        evolution, problem, directory = self.evolution, self.problem, self.directory
+        names = [block.name for block in evolution.blocks]
+        lines = describe_run(history, count_cells(evolution), names)
+        lines += describe_gauges(problem.deck, directory)
+        motion = getattr(evolution, "motion", None)
+        if motion is not None and motion.blocks.size > 1:
+            lines.append(f"ranks of MPI: {motion.blocks.size}; on the first of them")
+        lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")
+        lines += describe_ranks(self.world, directory.note)
+        if len(history.get("step", ())) > 1 and (own := describe_own(problem, history, evolution)):
+            lines += ["", own]
+        cautions = describe_cautions(problem, history)
+        lines += ["", *cautions] if cautions else []
+        dumps = count(len(directory.list_files("dump")), "dump")
+        lines += [
+            "",
+            f"in {directory}: {dumps}, history.csv, run.xmf (ParaView)",
+            f"see it:      shockgrid plot {directory.quoted}    shockgrid info {directory.quoted}",
+        ]
+        if evolution.finished is None:
+            lines.append(f"continue:    {problem.say_restart(directory.quoted)}")
+        return lines
 
     def _march(self) -> str:
         """Step until there is a reason to stop; the state then is in a dump."""

@@ -511,7 +511,8 @@ class BlockSharing:
 
     def _find_small(self, limit: float, rows: Rows) -> np.ndarray:
         """The cells (n, 2) of these rows whose rate is above `limit`."""
-        small = np.argwhere(self.block.rates[slice(*rows)] > limit)
+        # rows one after the other, however many: kernels are compiled for one order only
+        small = np.ascontiguousarray(np.argwhere(self.block.rates[slice(*rows)] > limit))
         small[:, 0] += rows[0]
         if len(small) and self.reaches is None:
             block = self.block

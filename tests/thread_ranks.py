@@ -13,6 +13,7 @@ from collections import defaultdict
 
 import numpy as np
 
+from builders import get_bits, march
 from hydro.ranks.cutting import share_blocks
 from hydro.ranks.ranks import END, STEP, Ranks, hear, tell
 from hydro.simulation import Simulation
@@ -207,3 +208,16 @@ def march_on_ranks(
         return rows, state
 
     return run_on_threads(size, rank)[0]
+
+
+def compare_with_ranks(build, steps: int, sizes, **options) -> list[dict]:
+    """March alone and on ranks: the same rows but for wall times, the same state, to the bit."""
+    alone = build()
+    rows = march(alone, steps)
+    for size in sizes:
+        found, there = march_on_ranks(size, build, steps, **options)
+        for one, other in zip(rows, found, strict=True):
+            timed = dict.fromkeys(name for name in one if name.startswith("seconds"))
+            assert {**one, **timed} == {**other, **timed}
+        assert get_bits(there) == get_bits(alone)
+    return rows

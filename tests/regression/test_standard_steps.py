@@ -60,13 +60,7 @@ def measure_steps(name: str) -> list[float]:
     return [float(evolution.t), *(float(np.sqrt(np.mean(row * row))) for row in rows)]
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.slow) if name.startswith("conical-target") else name
-        for name in CASES
-    ],
-)
+@pytest.mark.parametrize("name", CASES)
 def test_first_steps_follow_the_baseline(name, update_baselines):
     found = measure_steps(name)
     stored = json.loads(PATH.read_text(encoding="utf-8")) if PATH.exists() else {}

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from problems.deck import RunControl
 from problems.interface_instability.deck import Fluid, InterfaceDeck, SecondShock
 from problems.interface_instability.line import Mode, Spectrum, measure_mode
 from problems.interface_instability.problem import BENDS, InterfaceInstability
@@ -114,8 +115,9 @@ def test_what_is_wrong_with_a_first_shape_is_said(deck, words):
 def test_each_mode_of_a_small_spectrum_grows_as_theory_says():
     spectrum = Spectrum(first=1, last=3, ka_rms=1e-3, seed=3)
     problem = make_problem(
-        spectrum=spectrum, width=1.0, sides="periodic", kct_end=10.0, lengths=(2.5, 2.5)
-    )
+        spectrum=spectrum, width=1.0, sides="periodic", kct_end=10.0, lengths=(2.5, 2.5),
+        run=RunControl(cfl=0.8, threads=1),
+    )  # fmt: skip
     evolution = problem.build()
     while not evolution.finished:
         evolution.advance()

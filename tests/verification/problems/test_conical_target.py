@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from builders import check_budget, collect_columns, march, march_measured
+from builders import check_budget, collect_columns, march_measured
 from problems.conical_target.layout import densify, fit_wave
 from problems.conical_target.problem import ConicalTarget, ConicalTargetDeck, Contact
 from problems.conical_target.report import (
@@ -94,20 +94,6 @@ def test_five_microseconds():
     assert 40e9 < top < 60e9 and 13e-3 < x < 20e-3 and 8e-3 < y < 12e-3, "the focus in the lead"
     assert "greatest pressure in the target, Pb" in text
     assert "shock on the axis" in text and "growth of the side's amplitude" in text
-
-
-@pytest.mark.slow
-def test_restart():
-    problem = ConicalTarget(ConicalTargetDeck(cells=16))
-    one = problem.build()
-    march(one, 30)
-    again = ConicalTarget(ConicalTargetDeck(cells=16)).build()
-    again.set_state(one.get_state())
-    march(one, 10)
-    march(again, 10)
-    state = again.get_state()
-    for name, value in one.get_state().items():
-        assert np.array_equal(value, state[name]), name
 
 
 @pytest.mark.slow

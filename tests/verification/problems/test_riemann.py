@@ -36,10 +36,7 @@ def test_sod_converges():
     assert errors[1] <= 0.55 * errors[0]
 
 
-@pytest.mark.parametrize(
-    "name",  # toro3's limiter is nobody else's
-    [pytest.param(name, marks=pytest.mark.slow) if name == "toro3" else name for name in CASES],
-)
+@pytest.mark.parametrize("name", CASES)
 def test_star_states(name):
     problem, row = measure_end(case=name, cells=200)
     assert 100.0 * find_worst_star(problem, row) <= BARS.get(name, WANTED)

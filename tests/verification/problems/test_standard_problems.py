@@ -46,13 +46,7 @@ def assert_same(one, other, where):
     assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), where
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.slow) if name == "conical-target" else name
-        for name in PROBLEMS
-    ],
-)
+@pytest.mark.parametrize("name", PROBLEMS)
 def test_five_steps_and_a_restart_in_the_middle_are_the_same_bits(name):
     """Every problem of the registry; those with many cells by default get few in SMALL."""
     deck = read_deck(name, SMALL.get(name, ()))

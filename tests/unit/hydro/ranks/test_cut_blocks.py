@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from builders import march, wall_off
+from builders import wall_off
 from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.interior.advance import TILE_ROWS
@@ -22,7 +22,7 @@ from problems.initial_states import make_plane_grid
 from regrid.errors import BadInput, RunFailure
 from regrid.protocol import RegridReport, RegridResult
 from runs.deck.reading import read_deck
-from thread_ranks import march_on_ranks, run_on_threads
+from thread_ranks import compare_with_ranks, march_on_ranks, run_on_threads
 
 GAS = IdealGas(1.4)
 
@@ -47,17 +47,7 @@ def build_tube(rows=100, squeezed=(), u=0.3, p=1.0, **options):
 
 def check_cut(build, steps, places):
     """March alone and cut; the same rows but for wall times, and the same state, to the bit."""
-    alone = build()
-    rows = march(alone, steps)
-    state = alone.get_state()
-    found, there = march_on_ranks(1 + max(max(p) for p in places), build, steps, places=places)
-    assert len(found) == len(rows)
-    for one, other in zip(rows, found, strict=True):
-        timed = [name for name in one if name.startswith("seconds")]
-        assert {**one, **dict.fromkeys(timed)} == {**other, **dict.fromkeys(timed)}
-    for name, value in state.items():
-        assert np.asarray(value).tobytes() == np.asarray(there[name]).tobytes(), name
-    return rows
+    return compare_with_ranks(build, steps, [1 + max(max(p) for p in places)], places=places)
 
 
 sizes = st.lists(st.tuples(st.integers(2, 2000), st.integers(2, 500)), min_size=1, max_size=12)

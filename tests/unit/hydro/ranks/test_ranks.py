@@ -10,14 +10,14 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from builders import march, two_blocks, wall_off
+from builders import two_blocks, wall_off
 from hydro.eos import IdealGas
 from hydro.ranks.cutting import share_blocks, sum_cells
 from hydro.simulation import Simulation
 from hydro.sources import make_gravity
 from regrid.errors import RegridFailure
 from runs.deck.reading import read_deck
-from thread_ranks import march_on_ranks
+from thread_ranks import compare_with_ranks
 
 GAS = IdealGas(1.4)
 
@@ -47,19 +47,7 @@ def check_same(build, steps, sizes=(2, 3), settings=lambda simulation: None):
         settings(simulation)
         return simulation
 
-    alone = make()
-    rows = march(alone, steps)
-    state = alone.get_state()
-    for size in sizes:
-        found, there = march_on_ranks(size, make, steps)
-        assert len(found) == len(rows)
-        for one, other in zip(rows, found, strict=True):
-            timed = [name for name in one if name.startswith("seconds")]
-            assert {**one, **dict.fromkeys(timed)} == {**other, **dict.fromkeys(timed)}
-        assert there.keys() == state.keys()
-        for name, value in state.items():
-            assert np.asarray(value).tobytes() == np.asarray(there[name]).tobytes(), name
-    return rows
+    return compare_with_ranks(make, steps, sizes)
 
 
 @given(

@@ -6,6 +6,7 @@ import fnmatch
 import os
 from pathlib import PurePath
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -29,6 +30,29 @@ def pytest_addoption(parser):
 def update_baselines(request) -> bool:
     """Whether to write a baseline instead of comparing with it."""
     return request.config.getoption("--update-baselines")
+
+
+@pytest.fixture
+def check_steps(update_baselines):
+    """Compare rows of steps with a stored table, or write it; `counts` columns are exact."""
+
+    def check(found, path, columns, tolerance, counts=0):
+        if update_baselines:
+            form = ["%d"] * counts + ["%.13e"] * (len(columns) - counts)
+            np.savetxt(path, found, fmt=form, header=" ".join(columns))
+            return
+        stored = np.loadtxt(path, ndmin=2)
+        assert found.shape == stored.shape
+        for k, column in enumerate(columns):
+            allowed = tolerance if k >= counts else 0.0
+            near = np.isclose(found[:, k], stored[:, k], rtol=allowed, atol=0.0)
+            first = near.argmin()
+            assert near.all(), (
+                f"{path.stem}: {column} differs first in step {first + 1}: "
+                f"{found[first, k]:.15g}, stored {stored[first, k]:.15g}"
+            )
+
+    return check
 
 
 # Compiling the kernels of one equation of state, limiter, geometry and flux takes some 25 seconds.

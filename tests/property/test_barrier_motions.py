@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.random_motions import OUTCOMES, count_outcomes, judge
+from builders import unit_steps
 from regrid.algebraic import transfinite_grid
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import DEFAULT
@@ -184,10 +185,6 @@ def test_motions_that_were_wrong_once(number):
     assert judge(nodes, boundary, answer) == OUTCOMES[1 if crosses else 0]
 
 
-def make_box(ni, nj):
-    return np.array(np.meshgrid(np.arange(ni + 1.0), np.arange(nj + 1.0), indexing="ij"))
-
-
 def unfold_from(start, sides):
     """Is `start` unfolded, in place, on the sides of `sides`?  Without it a harmonic map."""
     work = Workspace(sides.shape[1] - 1, sides.shape[2] - 1, 1)
@@ -200,7 +197,7 @@ def unfold_from(start, sides):
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_scrambled_inside_is_unfolded(turned):
     """From random places of all inner nodes, on a box with a deep notch."""
-    nodes = make_box(14, 8)
+    nodes = unit_steps(14, 8)
     nodes[1, 5:10, 0] += (1.0, 3.0, 4.5, 3.0, 1.0)
     if turned:
         nodes = np.ascontiguousarray(nodes.transpose(0, 2, 1)[::-1])

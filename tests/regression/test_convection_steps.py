@@ -59,16 +59,5 @@ def measure_steps(name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
-def test_every_step_follows_the_baseline(name, update_baselines):
-    found, path = measure_steps(name), FOLDER / f"{name}.txt"
-    if update_baselines:
-        np.savetxt(path, found, fmt="%.11e", header=" ".join(COLUMNS))
-        return
-    stored = np.loadtxt(path, ndmin=2)
-    assert found.shape == stored.shape
-    for k, column in enumerate(COLUMNS):
-        wrong = np.flatnonzero(~np.isclose(found[:, k], stored[:, k], rtol=TOLERANCE, atol=0.0))
-        assert wrong.size == 0, (
-            f"{column} differs first in step {wrong[0] + 1}: {found[wrong[0], k]:.12g}, "
-            f"stored {stored[wrong[0], k]:.12g}"
-        )
+def test_every_step_follows_the_baseline(name, check_steps):
+    check_steps(measure_steps(name), FOLDER / f"{name}.txt", COLUMNS, TOLERANCE)

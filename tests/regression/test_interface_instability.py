@@ -41,18 +41,5 @@ def measure_steps() -> np.ndarray:
     return np.array(rows, dtype=float)
 
 
-def test_every_step_follows_the_baseline(update_baselines):
-    found = measure_steps()
-    if update_baselines:
-        PATH.parent.mkdir(exist_ok=True)
-        np.savetxt(PATH, found, fmt="%d %d %d %.13e %.13e %.13e", header=" ".join(COLUMNS))
-        return
-    stored = np.loadtxt(PATH, ndmin=2)
-    assert found.shape == stored.shape
-    for k, column in enumerate(COLUMNS):
-        tolerance = 0.0 if column in COUNTS else TOLERANCE
-        wrong = np.flatnonzero(~np.isclose(found[:, k], stored[:, k], rtol=tolerance, atol=0.0))
-        assert wrong.size == 0, (
-            f"{column} differs first in step {wrong[0] + 1}: {found[wrong[0], k]:.15g}, "
-            f"stored {stored[wrong[0], k]:.15g}"
-        )
+def test_every_step_follows_the_baseline(check_steps):
+    check_steps(measure_steps(), PATH, COLUMNS, TOLERANCE, counts=len(COUNTS))

@@ -10,7 +10,10 @@ import re
 import unicodedata
 from pathlib import Path
 
+import pytest
+
 from builders import ROOT
+from hydro.step import SIDE_PASSES
 
 DOCS = ROOT / "docs"
 PACKAGES = ("regrid", "hydro", "problems", "runs", "shockgrid")
@@ -31,6 +34,8 @@ LINK = re.compile(r"!?\[[^\]]*\]\(([^()\s]+)(?:\s+\"[^\"]*\")?\)")
 FENCE = re.compile(r"^(```|~~~).*?^\1", re.MULTILINE | re.DOTALL)
 SPAN = re.compile(r"`([^`\n]+)`")
 FILE_NAMED = re.compile(r"(?:" + "|".join((*FOLDERS, "docs")) + r")/[\w./*-]+")
+CODE_NAMED = re.compile(r"`([A-Za-z_][\w.]*)(?:\(.*?\))?`")
+ENDINGS = "toml", "csv", "py", "md", "history"  # of files
 MODULE_NAMED = re.compile(r"(?:" + "|".join(PACKAGES) + r")(?:\.\w+)+")
 LEAST_CITATIONS = 60  # of formulas and sections, in the code: fewer, and the pattern is broken
 
@@ -185,3 +190,22 @@ def test_names_on_the_theory_pages_are_those_of_the_code():
     for page in (DOCS / "theory").glob("*.md"):
         named = {span for span in SPAN.findall(read(page)) if re.fullmatch(r"[A-Za-z]\w*", span)}
         assert named <= words, f"{name(page)}: {sorted(named - words)}"
+
+
+@pytest.mark.parametrize("page", ["architecture.md", "extending.md"])
+def test_names_on_pages_about_code_are_those_of_the_code(page):
+    text = read(DOCS / page)
+    code = " ".join(read(path) for path in SOURCES if path.relative_to(ROOT).parts[0] in PACKAGES)
+    own = " ".join(found[0] for found in FENCE.finditer(text))  # of the page's examples
+    names = {name for name in CODE_NAMED.findall(FENCE.sub("", text)) if {*name} & {*"_."}}
+    names |= {name for name in CODE_NAMED.findall(text) if re.match(r"[A-Z]\w+[a-z]$", name)}
+    assert len(names) >= 5
+    known = {*re.findall(r"\w+", code + own), *ENDINGS, ""}
+    assert not {name for name in names if not {*name.split(".")} <= known}
+
+
+def test_passes_stand_in_the_page_in_their_order():
+    names, text = [move.__name__ for move, _, _ in SIDE_PASSES], read(DOCS / "architecture.md")
+    told = CODE_NAMED.findall(text[text.index("| pass |") :])
+    assert [name for name in told if name in names] == names
+    assert all(reason for _, _, reason in SIDE_PASSES)

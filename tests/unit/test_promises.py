@@ -69,44 +69,38 @@ def test_broken_equations_of_state(eos, words):
         sg.testing.check_eos(eos)
 
 
-class Broken(TransfiniteRegridder):
-    """Transfinite interpolation, its result or its arguments then changed."""
+class Changed(TransfiniteRegridder):
+    """Transfinite interpolation; `change` then changes its result or its arguments."""
 
-    def change(self, previous, boundary, nodes):
-        raise NotImplementedError
+    def __init__(self, change):
+        super().__init__()
+        self.change, self.calls = change, 0
 
     def regrid(self, previous, boundary):
         result = super().regrid(previous, boundary)
-        self.change(previous, boundary, result.nodes)
+        self.calls += 1
+        self.change(self, previous, boundary, result.nodes)
         return result
 
 
-class MovesSides(Broken):
-    def change(self, previous, boundary, nodes):
-        nodes[0, 0, 3] += 1e-12
+def move_side(regridder, previous, boundary, nodes):
+    nodes[0, 0, 3] += 1e-12
 
 
-class WritesInput(Broken):
-    def change(self, previous, boundary, nodes):
-        previous[0, 2, 2] += 1e-12
+def write_input(regridder, previous, boundary, nodes):
+    previous[0, 2, 2] += 1e-12
 
 
-class Folds(Broken):
-    def change(self, previous, boundary, nodes):
-        nodes[:, 5, 5] = nodes[:, 8, 5]
+def fold(regridder, previous, boundary, nodes):
+    nodes[:, 5, 5] = nodes[:, 8, 5]
 
 
-class Remembers(Broken):
-    calls = 0.0
-
-    def change(self, previous, boundary, nodes):
-        self.calls += 1e-9
-        nodes[:, 5, 5] += self.calls
+def remember(regridder, previous, boundary, nodes):
+    nodes[:, 5, 5] += 1e-9 * regridder.calls
 
 
-class KnowsUpwards(Broken):
-    def change(self, previous, boundary, nodes):
-        nodes[1, 5, 5] += 1e-6 * np.ptp(boundary[1, 0])
+def know_upwards(regridder, previous, boundary, nodes):
+    nodes[1, 5, 5] += 1e-6 * np.ptp(boundary[1, 0])
 
 
 class SwallowsFolds(TransfiniteRegridder):
@@ -136,11 +130,11 @@ def test_a_regridder_as_object_class_and_factory():
 @pytest.mark.parametrize(
     ("regridder", "words"),
     [
-        (MovesSides, "nodes of side i_min are not those of the boundary"),
-        (WritesInput, "the grid of the last step was written"),
-        (Folds, "cells are not convex"),
-        (Remembers, "calls repeat: the same call gives other nodes"),
-        (KnowsUpwards, "the domain turned gives another grid"),
+        (lambda: Changed(move_side), "nodes of side i_min are not those of the boundary"),
+        (lambda: Changed(write_input), "the grid of the last step was written"),
+        (lambda: Changed(fold), "cells are not convex"),
+        (lambda: Changed(remember), "calls repeat: the same call gives other nodes"),
+        (lambda: Changed(know_upwards), "the domain turned gives another grid"),
         (SwallowsFolds, "does not raise RegridFailure|side changed"),
         (FindsNothing, "it raised RegridFailure: no grid was found"),
         (WrongShape, "nodes of side i_max are not those|it raised"),

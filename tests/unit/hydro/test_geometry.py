@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from builders import wall_off
-from hydro.boundary import put
 from hydro.formulas.geometry import (
     GEOMETRIES,
     compute_volumes,
@@ -70,9 +68,3 @@ def test_faces_of_a_moving_cell_close(seed):
             x, y = old + t * (new - old)
             areas.append(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
         assert area_y == pytest.approx(np.mean(areas), rel=1e-13)
-
-
-def close(block, j_min):
-    put(block, "j_min", j_min)
-    wall_off(block)
-    return block

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import shockgrid as sg
-from builders import march
+from builders import march, wall_off
 from hydro.eos import IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
 from problems import initial_states
@@ -102,8 +102,7 @@ def push(shock, state, nodes):
     """The density of a row of cells after a shock in a tube has gone 0.2 on, pushed by a piston."""
     gas = sg.Block("gas", shock.eos, nodes, *state)
     sg.put(gas, "i_min", "piston", velocity=(shock.particle_speed, 0.0))
-    for side in ("i_max", "j_min", "j_max"):
-        sg.put(gas, side, "wall")
+    wall_off(gas)
     tube = sg.Simulation([gas], [], t_end=0.2 / shock.shock_speed)
     march(tube)
     x = 0.5 * (gas.nodes[0, 1:, 0] + gas.nodes[0, :-1, 0])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.random_motions import is_simple
+from builders import unit_steps
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.measure.crossings import (
     GROUP,
@@ -52,15 +53,11 @@ def test_long_spiral_does_not_cross_until_its_end_turns_in():
     assert crossing is not None and crossing[1] == 898
 
 
-def make_box(ni, nj):
-    return np.array(np.meshgrid(np.arange(ni + 1.0), np.arange(nj + 1.0), indexing="ij"))
-
-
 @pytest.mark.parametrize("seed", range(10))
 def test_rough_boundaries_agree_with_every_pair(seed):
     rng = np.random.default_rng(seed)
     ni, nj = (int(count) for count in rng.integers(1, 30, 2))
-    nodes = make_box(ni, nj)
+    nodes = unit_steps(ni, nj)
     nodes += rng.normal(scale=rng.uniform(0.05, 0.6), size=nodes.shape)
     simple = is_simple(nodes)
     assert BoundaryCheck(ni, nj).is_simple(nodes) == simple
@@ -68,7 +65,7 @@ def test_rough_boundaries_agree_with_every_pair(seed):
 
 
 def test_touching_by_a_rounding_is_told_exactly():
-    nodes = make_box(8, 3) * 0.1
+    nodes = unit_steps(8, 3) * 0.1
     for move, simple in ((0.0, False), (np.spacing(0.3), True), (-np.spacing(0.3), False)):
         nodes[1, 4, 0] = nodes[1, 4, -1] - move
         assert BoundaryCheck(8, 3).is_simple(nodes) == simple == is_simple(nodes)

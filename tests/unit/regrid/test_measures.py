@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.regrid_suite import measures
-from builders import tensor, unit_steps
+from builders import box, tensor, unit_steps
 from regrid.measure import quality
+from regrid.measure.cells import compute_area_fractions
 from regrid.measure.corners import compute_corner_signs, compute_turns, turn_exactly
 from regrid.measure.hexahedra import (
     compute_hexahedron_aspects,
@@ -143,16 +144,10 @@ def test_least_sine_has_the_sign_of_the_least_corner_volume():
     assert np.array_equal(np.sign(compute_hexahedron_sines(nodes)), np.sign(least))
 
 
-def make_box(ni=6, nj=4, width=3.0, height=1.0):
-    """A rectangle of even cells."""
-    x, y = np.linspace(0.0, width, ni + 1), np.linspace(0.0, height, nj + 1)
-    return np.array(np.meshgrid(x, y, indexing="ij"))
-
-
 @given(st.floats(0.1, 10.0), st.floats(0.1, 10.0), st.floats(-1.0, 1.0))
 @settings(max_examples=25, derandomize=True, deadline=None)
 def test_a_sheared_rectangle(width, height, slope):
-    nodes = make_box(6, 4, width, height)
+    nodes = box((0.0, 0.0), (width, height), (6, 4))
     nodes[0] += slope * nodes[1]
     a, b = np.array([width / 6, 0.0]), np.array([slope * height / 4, height / 4])
     area = width * height / 24
@@ -170,20 +165,20 @@ def test_a_sheared_rectangle(width, height, slope):
 
 
 def test_convexity_is_exact():
-    nodes = make_box(2, 2, 2.0, 2.0)
+    nodes = unit_steps(2, 2)
     for x, bad in ((np.nextafter(0.5, 1.0), 0), (0.5, 1), (np.nextafter(0.5, 0.0), 1)):
         nodes[:, 1, 1] = x, 0.5
         assert measures.count_bad_cells(nodes) == bad
 
 
 def test_crossing_is_exact():
-    nodes = make_box(4, 4, 1.0, 1.0)
+    nodes = box((0.0, 0.0), (1.0, 1.0), (4, 4))
     assert measures.find_boundary_crossing(nodes) is None
     for y, crosses in ((np.nextafter(1.0, 0.0), False), (1.0, True), (np.nextafter(1, 2), True)):
         nodes[1, 2, 0] = y  # a spike from below to the upper side, where it has a straight piece
         nodes[0, 2, 0] = 0.6
         assert (measures.find_boundary_crossing(nodes) is not None) is crosses
-    nodes = make_box(4, 4, 1.0, 1.0)
+    nodes = box((0.0, 0.0), (1.0, 1.0), (4, 4))
     nodes[0, 2, 0] = nodes[0, 1, 0] - 0.01
     nodes[1, 2, 0] = 0.0
     assert measures.find_boundary_crossing(nodes) is not None  # folds back onto itself
@@ -193,7 +188,7 @@ def test_crossing_is_exact():
 @settings(max_examples=15, derandomize=True, deadline=None)
 def test_all_measures_stay_when_the_grid_is_turned_moved_and_scaled(seed):
     generator = np.random.default_rng(seed)
-    nodes = make_box(6, 5, 6.0, 5.0) + generator.uniform(-0.3, 0.3, (2, 7, 6))
+    nodes = unit_steps(6, 5) + generator.uniform(-0.3, 0.3, (2, 7, 6))
     angle, scale = generator.uniform(0.0, 6.0), generator.uniform(0.1, 9.0)
     turn = scale * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     turned = np.einsum("ab,bij->aij", turn, nodes) + generator.uniform(-5, 5, (2, 1, 1))
@@ -207,3 +202,13 @@ def test_all_measures_stay_when_the_grid_is_turned_moved_and_scaled(seed):
     assert rates[0] == pytest.approx(scale * rates[1], rel=1e-7)
     mirrored = np.ascontiguousarray(nodes[:, ::-1])
     assert measures.count_bad_cells(mirrored) == 30  # left-handed: no cell counts
+
+
+@pytest.mark.parametrize("front", [0.4, 1.0, 1.333])
+def test_plane_front_cuts_the_exact_area(front):
+    x, y = box((0.0, 0.0), (2.0, 1.0), (17, 13))
+    wave = 0.03 * np.sin(np.pi * x) * np.sin(2.0 * np.pi * y)
+    nodes = np.array([x + wave, y - 0.5 * wave])
+    fraction = compute_area_fractions(nodes, front)
+    assert np.sum(fraction * measures.compute_sizes(nodes)) == pytest.approx(front, abs=1e-14)
+    assert set(np.unique(fraction[[0, -1]])) <= {0.0, 1.0}

@@ -8,6 +8,7 @@ from hydro.block import Block
 from hydro.eos import IdealGas, MieGruneisen
 from hydro.links import join
 from hydro.simulation import Simulation
+from regrid.measure.corners import compute_centres
 
 NI, NJ = 40, 36
 CUTS = {
@@ -35,9 +36,7 @@ def place_all(t, geometry="plane"):
 def make_flow(cut_i, cut_j, fluid, geometry):
     """A blast in a box, cut at the given lines."""
     eos, rho0, p0, c = FLUIDS[fluid]
-    centre = 0.25 * (lambda n: n[:, 1:, 1:] + n[:, :-1, 1:] + n[:, 1:, :-1] + n[:, :-1, :-1])(
-        place_all(0.0)
-    )
+    centre = compute_centres(place_all(0.0))
     hot = np.hypot(centre[0] - 0.4, centre[1] - 0.45) < 0.15
     rho, p = np.where(hot, 1.2, 1.0) * rho0, np.where(hot, 6.0, 0.5) * p0
     u, v = 0.1 * c * np.sin(3.0 * centre[1]), 0.05 * c * np.cos(4.0 * centre[0])

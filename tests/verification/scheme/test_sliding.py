@@ -13,6 +13,7 @@ from hydro.eos import IdealGas
 from hydro.links import join, slide
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
+from regrid.measure.corners import compute_centres
 
 GAS = IdealGas(1.4)
 MACH, SLIP = 2.0, 0.7
@@ -125,10 +126,6 @@ def make_ring(low, high, cells, around):
     angle[-1] = 0.0
     radius = np.linspace(low, high, cells + 1)[:, None]
     return np.array([radius * np.cos(angle), radius * np.sin(angle)])
-
-
-def compute_centres(nodes):
-    return 0.25 * (nodes[:, 1:, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, 1:] + nodes[:, :-1, :-1])
 
 
 def compute_annulus_pressure(centres):

@@ -62,8 +62,10 @@ def run_ours(name: str, numbers: dict[str, Any], cells: int) -> tuple[dict, floa
         if name == "contact":
             (home / "slab.toml").write_text(write_slab(numbers, cells))
             deck, settings = "slab.toml", {}
-        elif name == "growth":
+        elif name.startswith("growth"):
             deck = "interface-instability"
+            if name == "growth":
+                settings["start"] = '"incident"'
         elif name == "mushroom":
             deck = "interface-instability-mushroom"
             settings |= {"second.gamma": numbers["gamma"], "kct_end": 15.5, "line.thickness": 0.01}
@@ -82,7 +84,7 @@ def run_ours(name: str, numbers: dict[str, Any], cells: int) -> tuple[dict, floa
 def find_amplitude(name: str, run: Any) -> dict[str, Any]:
     """The interface's amplitude over the time since the shock met the mean interface."""
     t = run.history.t - run.problem.arrival
-    if name == "growth":
+    if name.startswith("growth"):
         return {"t": t, "amplitude": run.history.amplitude}
     lines = [run.interface(dump.t) for dump in run.dumps]
     width = [0.5 * np.ptp(line.x) for line in lines]

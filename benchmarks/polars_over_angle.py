@@ -32,11 +32,11 @@ def describe_point(point: dict) -> dict[str, str | int]:
         "finer at A": f"{point['refinement']:.2g}",
         "steps": point["steps"],
     }
-    row |= {"p off, %": "", "scatter, %": "", "behind A": "jet by theory"}
+    row |= {"error in p, %": "", "scatter, %": "", "behind A": "jet by theory"}
     if point["attached"] and point["p"] is None:
         row["behind A"] = "too few cells"
     elif point["attached"]:
-        row["p off, %"] = f"{point['p off, %']:+.2f}"
+        row["error in p, %"] = f"{point['error in p, %']:+.2f}"
         row["scatter, %"] = f"{point['scatter, %']:.2f}"
         row["behind A"] = "plateau" if point["plateau"] else "fall"
     if point["failure"]:

@@ -68,7 +68,7 @@ def measure_polar_point(deck: PlateOnWedgeDeck) -> dict:
         found |= {
             "p": behind["p"],
             "p, theory": theory.p,
-            "p off, %": 100.0 * (behind["p"] / theory.p - 1.0),
+            "error in p, %": 100.0 * (behind["p"] / theory.p - 1.0),
             "plateau": plateau.flat,
             "scatter, %": 100.0 * plateau.scatter,
             "zone, theory": problem.zone,

@@ -3,10 +3,10 @@
     accuracy rates gas 64       growth rates of gases at 64 cells, Mach numbers by density ratios
     accuracy rates condensed 64 the same of condensed materials
     accuracy polars             pressure behind A over the angle
-    accuracy lines              a flat line, the shock begun a part of a cell farther away
-    accuracy null               a wavy line in one gas
+    accuracy lines              a flat interface, the shock begun a part of a cell farther away
+    accuracy null               a rippled interface in one gas
     accuracy pairs              random Riemann problems
-    accuracy doubts             where not to trust the code, sentence by sentence
+    accuracy doubts             the range of validity, sentence by sentence
 
 Sources: problems/interface_instability/accuracy.json (rates; screens look up their cautions there),
 results/bench.json (polars), results/accuracy.json (the others).  Each function takes rows and
@@ -62,7 +62,7 @@ def name_ratio(materials: str, ratio: float) -> str:
 
 
 def table_rates(rows: Iterable[Measured], materials: str, cells: float) -> list[str]:
-    """Errors of growth rates with their colours; `-` where there is no figure."""
+    """Errors of growth rates with their colours; `-` where there is no value."""
     known = {(r.mach, r.ratio): r for r in rows if (r.materials, r.cells) == (materials, cells)}
     machs, ratios = (sorted({key[n] for key in known}) for n in (0, 1))
     body = [
@@ -76,7 +76,7 @@ def _say_rate(row: Measured | None) -> str:
 
 
 def table_polars(rows: Rows) -> list[str]:
-    """Pressure off theory by angles below critical, a column for each plate, wedge and speed."""
+    """Error of the pressure by angles below critical, a column for each plate, wedge and speed."""
     cases, angles, found = [], [], {}
     for row in rows:
         case = (row["plate on wedge"], row["V, km/s"], row["cells"])
@@ -92,9 +92,9 @@ def table_polars(rows: Rows) -> list[str]:
 
 
 def _say_polar(row: dict[str, Any]) -> str:
-    if row["p off, %"] == "":
+    if row["error in p, %"] == "":
         return row["behind A"]
-    return f"{mark(float(row['p off, %']) / 100.0)} {row['p off, %']}"
+    return f"{mark(float(row['error in p, %']) / 100.0)} {row['error in p, %']}"
 
 
 def table_lines(rows: Rows) -> list[str]:
@@ -104,9 +104,9 @@ def table_lines(rows: Rows) -> list[str]:
     for row in rows:
         cases.setdefault((row["materials"], row["mach"]), {})[row["cfl"]] = row
     columns = (
-        ("off linear, 1e-3 cell", lambda row: f"{1e3 * row['unevenness']:.2f}"),
-        ("dx/ds off, %", lambda row: f"{100.0 * row['slope_error']:.2f}"),
-        ("speed off, 1e-5 D", lambda row: f"{1e5 * row['speed_error']:+.1f}"),
+        ("deviation from linear, 1e-3 cell", lambda row: f"{1e3 * row['unevenness']:.2f}"),
+        ("error in dx/ds, %", lambda row: f"{100.0 * row['slope_error']:.2f}"),
+        ("speed error, 1e-5 D", lambda row: f"{1e5 * row['speed_error']:+.1f}"),
         ("its scatter", lambda row: f"{1e5 * row['speed_scatter']:.1f}"),
     )
     heads = [f"{head}; cfl {cfl:g}" for head, _ in columns for cfl in steps]
@@ -137,16 +137,16 @@ def table_null(rows: Rows) -> list[str]:
 
 
 def table_pairs(rows: Rows) -> list[str]:
-    """How many pairs are how far off, then the worst of them."""
+    """Counts of pairs by their errors, then the worst of them."""
     errors = [row["error"] for row in rows if row["error"] is not None]
     bounds = [0.0, *PAIR_STEPS, float("inf")]
     counts = [
         sum(low < error <= high for error in errors) for low, high in itertools.pairwise(bounds)
     ]
     heads = [f"to {100.0 * step:g} %" for step in PAIR_STEPS]
-    heads += ["more", "no figure"]
+    heads += ["more", "no value"]
     numbers = [str(count) for count in [*counts, len(rows) - len(errors)]]
-    lines = make_table(["star state off", *heads], [["pairs", *numbers]])
+    lines = make_table(["star-state error", *heads], [["pairs", *numbers]])
     worst = sorted((row for row in rows if row["error"] is not None), key=lambda r: -r["error"])
     body = []
     for row in worst[:PAIRS_SHOWN]:
@@ -155,7 +155,7 @@ def table_pairs(rows: Rows) -> list[str]:
             ", ".join(f"{value:.3g}" for value in (side.rho, side.p, side.gamma)) for side in sides
         ]
         body.append([str(row["seed"]), *states, f"{sides[1].u:.3g}", f"{100.0 * row['error']:.3g}"])
-    heads = ["seed", "left: rho, p, gamma", "right: rho, p, gamma", "u right", "off, %"]
+    heads = ["seed", "left: rho, p, gamma", "right: rho, p, gamma", "u right", "error, %"]
     return [*lines, "", "The worst:", "", *make_table(heads, body)]
 
 
@@ -184,14 +184,14 @@ def _list_rates(group: list[Measured], materials: str) -> str:
     bar = MARKS[1][0]
     worst = sorted((r for r in group if abs(r.rate_error) > bar), key=lambda r: -abs(r.rate_error))
     named = [_name_rate(row, materials, f"{100.0 * row.rate_error:+.1f} %") for row in worst]
-    return f". More than {100.0 * bar:g} % off: {_cut(named)}." if named else "."
+    return f". Errors above {100.0 * bar:g} %: {_cut(named)}." if named else "."
 
 
 def _list_rough(group: list[Measured], materials: str) -> str:
     rough = [row for row in group if row.roughness > ROUGH and row.ratio != SAME]
     rough.sort(key=lambda row: -row.roughness)
     named = [_name_rate(row, materials, f"{row.roughness:g}") for row in rough]
-    return f" The line is rough (more than {ROUGH:g}): {_cut(named)}." if named else ""
+    return f" The interface is rough (more than {ROUGH:g}): {_cut(named)}." if named else ""
 
 
 def _name_rate(row: Measured, materials: str, said: str) -> str:
@@ -205,7 +205,7 @@ def _cut(named: list[str]) -> str:
 
 
 def doubt_polars(rows: Rows) -> list[str]:
-    """Near the critical angle and away from it: the worst, and what has no figure."""
+    """Near the critical angle and away from it: the worst, and what has no value."""
     told = []
     for near, words in ((False, "farther than"), (True, "up to")):
         group = [
@@ -213,27 +213,27 @@ def doubt_polars(rows: Rows) -> list[str]:
             for row in rows
             if float(row["below critical"]) > 0.0 and (float(row["below critical"]) <= NEAR) == near
         ]
-        known = [row for row in group if row["p off, %"] != ""]
+        known = [row for row in group if row["error in p, %"] != ""]
         if not known:
             continue
-        worst = max(known, key=lambda row: abs(float(row["p off, %"])))
-        over = [row for row in known if abs(float(row["p off, %"])) > POLAR_BAR]
+        worst = max(known, key=lambda row: abs(float(row["error in p, %"])))
+        over = [row for row in known if abs(float(row["error in p, %"])) > POLAR_BAR]
         without = len(group) - len(known)
         told.append(
             f"- Pressure behind A {words} {NEAR:g} degrees below the critical angle: "
             f"{len(known) - len(over)} of {len(group)} within {POLAR_BAR:g} %; the worst is "
-            f"{_name_polar(worst)}, {worst['p off, %']} %."
-            + (f" Without a figure: {without}." if without else "")
+            f"{_name_polar(worst)}, {worst['error in p, %']} %."
+            + (f" Without a value: {without}." if without else "")
         )
     past = [row for row in rows if float(row["below critical"]) < 0.0]
     if past:
         told.append(
-            f"- Past the critical angle there is no figure ({len(past)} runs): no attached shock "
+            f"- Past the critical angle no error is quoted ({len(past)} runs): no attached shock "
             "exists, and only the presence or absence of a jet is compared with theory."
         )
     died = [row for row in rows if row["behind A"] == "died"]
     if died:
-        told.append(f"- Runs that died: {'; '.join(map(_name_polar, died))}.")
+        told.append(f"- Failed runs: {'; '.join(map(_name_polar, died))}.")
     return told
 
 
@@ -245,21 +245,22 @@ def _name_polar(row: dict[str, Any]) -> str:
 
 
 def doubt_lines(rows: Rows) -> list[str]:
-    """Where the place of a flat line depends on where in a cell the shock began."""
+    """How the position of a flat interface depends on the sub-cell phase of the shock."""
     told = []
     for key, bar, words, unit in (
         ("unevenness", LINE_BAR, "whose end position is linear in the start distance s", "cell"),
         ("speed_scatter", SPEED_BAR, "whose late speed does not vary with s", "of the shock's"),
     ):
         over = sorted((row for row in rows if row[key] > bar), key=lambda row: -row[key])
-        text = f"- Flat lines {words}, to {bar:g} {unit}: {len(rows) - len(over)} of {len(rows)}"
+        met = f"{len(rows) - len(over)} of {len(rows)}"
+        text = f"- Flat interfaces {words}, to {bar:g} {unit}: {met}"
         if over:
             text += f"; the worst is {_name_line(over[0])}, {over[0][key]:.2g} {unit}"
         told.append(text + ".")
     worst = max(rows, key=lambda row: abs(row["speed_error"]))
     told.append(
-        f"- The mean late speed of a flat line is off by up to {abs(worst['speed_error']):.1e} of "
-        f"the shock's speed ({_name_line(worst)})."
+        f"- The error of the mean late speed of a flat interface is at most "
+        f"{abs(worst['speed_error']):.1e} of the shock's speed ({_name_line(worst)})."
     )
     return told
 
@@ -278,11 +279,13 @@ def doubt_null(rows: Rows) -> list[str]:
         for row in rows
         if abs(row["mode_1"] - row["exact"]) > NULL_BAR or row["others"] > OTHERS_BAR
     }
+    count = "All" if len(bad) == len(runs) else f"{len(bad)} of"
     return [
-        f"- A line in one gas keeps its first mode to {NULL_BAR:g} and the others below "
-        f"{OTHERS_BAR:g} in {len(runs) - len(bad)} of {len(runs)} runs. Farthest off is "
-        f"mode 1 at {_name_null(first)}: {first['mode_1']:.4f} for {first['exact']:.4f}; the "
-        f"largest of the others, {other['others']:.4f}, comes at {_name_null(other)}."
+        f"- {count} {len(runs)} runs with one gas on both sides fail the tolerance (first mode "
+        f"within {NULL_BAR:g} of its exact value, all others below {OTHERS_BAR:g}). The largest "
+        f"error is that of mode 1 at {_name_null(first)}: {first['mode_1']:.4f} instead of "
+        f"{first['exact']:.4f}; the largest of the others, {other['others']:.4f}, occurs at "
+        f"{_name_null(other)}."
     ]
 
 
@@ -294,16 +297,16 @@ def _name_null(row: dict[str, Any]) -> str:
 
 
 def doubt_pairs(rows: Rows) -> list[str]:
-    """Median, worst, and what was refused or has no figure."""
+    """Median, worst, and what was refused or has no value."""
     errors = sorted(row["error"] for row in rows if row["error"] is not None)
     over = sum(error > PAIR_STEPS[-1] for error in errors)
     told = (
-        f"- Riemann problems of random gases: {over} of {len(rows)} have a star state more than "
-        f"{100.0 * PAIR_STEPS[-1]:g} % off; the median is {100.0 * errors[len(errors) // 2]:.2g} %,"
-        f" the worst {100.0 * errors[-1]:.2g} %."
+        f"- Riemann problems of random gases: {over} of {len(rows)} have a star-state error "
+        f"above {100.0 * PAIR_STEPS[-1]:g} %; the median is "
+        f"{100.0 * errors[len(errors) // 2]:.2g} %, the worst {100.0 * errors[-1]:.2g} %."
     )
     said = [row for row in rows if row["error"] is None]
-    return [told + (f" No figure, seed {said[0]['seed']}: {said[0]['said']}." if said else "")]
+    return [told + (f" No value, seed {said[0]['seed']}: {said[0]['said']}." if said else "")]
 
 
 def read_document(name: str, part: str) -> Rows:

@@ -67,7 +67,10 @@ REGION = re.compile(
 )
 SHOCKGRID = [sys.executable, "-m", "shockgrid"]
 FIGURES = tomllib.loads((DOCS / "figures.toml").read_text(encoding="utf-8"))
-USUAL = ("steps", "sub-moves", "rescues", "least sine", "worst aspect", "largest drift")
+USUAL = (
+    "steps", "sub-moves", "untangling events", "minimum scaled Jacobian", "worst aspect",
+    "largest drift",
+)  # fmt: skip
 
 
 def read_result(name: str) -> dict[str, Any]:
@@ -146,9 +149,9 @@ def read_run(directory: Path, said: str) -> dict[str, Any]:
         "t": data.dumps[-1].t,
         "cells": {b.name: [n - 1 for n in b.nodes.shape[1:]] for b in data.dumps[-1].blocks},
         "sub-moves": reduce("regrid_sub_moves", sum),
-        "rescues": reduce("regrid_rescues", sum),
+        "untangling events": reduce("regrid_rescues", sum),
         "retries": reduce("retries", sum),
-        "least sine": reduce("least_scaled_jacobian", min),
+        "minimum scaled Jacobian": reduce("least_scaled_jacobian", min),
         "worst aspect": reduce("worst_aspect", max),
         "convexity": describe_convexity(history),
         "drifts": {name: float(f"{drift:.2g}") for name, drift in measure_drifts(history).items()},
@@ -252,7 +255,7 @@ def fill_causes(arguments: str) -> list[str]:
     for cause in ENDS.values():
         helped = "; ".join(f"{one.described}: {one.words}" for one in cause.settings)
         rows.append([cause.says, cause.means, helped or "-", cause.advice or "-"])
-    return make_table(["what it says or shows", "cause", "settings that have helped", "else"], rows)
+    return make_table(["message or symptom", "cause", "settings that have helped", "else"], rows)
 
 
 KINDS = {

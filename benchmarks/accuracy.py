@@ -258,7 +258,7 @@ def draw_rates(rows: Iterable[Measured], path: Path) -> None:
         axis.set_xticks(range(len(ratios)), [f"{ratio:.3g}" for ratio in ratios])
         axis.set_yticks(range(len(machs)), [f"{mach:g}" for mach in machs])
         axis.set(xlabel="density ratio", ylabel="Mach number")
-        axis.set_title(f"rate off theory [%], {cells:g} cells a wavelength", fontsize=10)
+        axis.set_title(f"error of the rate [%], {cells:g} cells per wavelength", fontsize=10)
     figure.savefig(path, dpi=110)
     plt.close(figure)
 

@@ -1,6 +1,6 @@
 """What a block that is cut among ranks costs: its regridding, its update, what travels.
 
-    mpiexec -n 2 python benchmarks/bench_cut.py [cells a wavelength] [steps]
+    mpiexec -n 2 python benchmarks/bench_cut.py [cells per wavelength] [steps]
 
 The mushroom, marched by every rank alone; then its largest block is cut in two, and the messages
 of a cut are timed.  Three ways to regrid such a block on more ranks are computed from this: by its
@@ -68,8 +68,8 @@ def main() -> None:
     if comm.rank:
         return
     per_cell = 1e9 / size
-    print(f"block of {block.ni} x {block.nj} cells, cut in two; ns a cell of the block")
-    print(f"regridding    {1e9 * regrid / count:8.2f}, {iterations:g} iterations a block")
+    print(f"block of {block.ni} x {block.nj} cells, cut in two; ns per cell of the block")
+    print(f"regridding    {1e9 * regrid / count:8.2f}, {iterations:g} iterations per block")
     print(f"update        {1e9 * update / count:8.2f}")
     print(f"nodes to half {per_cell * nodes:8.2f}")
     print(f"sound of half {per_cell * sound:8.2f}")
@@ -77,7 +77,7 @@ def main() -> None:
     print(f"crowding      {per_cell * scan:8.2f}, with the scan of the rates")
     print(f"a sum of all ranks {1e6 * latency:.1f} us, rows beside lines {1e6 * halo:.1f} us")
     solve, own = 1e9 * regrid / count, 1e9 * update / count
-    print("ranks  home regrids  all regrid  lines shared   (regridding and update, ns a cell)")
+    print("ranks  home regrids  all regrid  lines shared   (regridding and update, ns per cell)")
     for n in (2, 4, 8, 16):
         far = 2.0 * (n - 1) / n  # of what travels to half of the block
         home = solve + far * per_cell * (nodes + sound) + own / n

@@ -71,8 +71,8 @@ def main() -> None:
                             "fell in every iteration": "yes" if falls else "no",
                             "bad cells": len(find_bad_hexahedra(found.nodes)),
                             "least sine": float(sine),
-                            "ns a node, weight an array": costs[0],
-                            "weight a formula": costs[1],
+                            "ns per node, weight as an array": costs[0],
+                            "weight as a formula": costs[1],
                         },
                     )
     tables.write()

@@ -48,7 +48,7 @@ def march_blocks(tables: Tables, sizes: list[int], steps: int) -> None:
                     "sub-moves": found.sub_moves,
                     "rescues": found.rescues,
                     "solver iterations": found.iterations,
-                    "us a node and step": found.get_cost(),
+                    "us per node and step": found.get_cost(),
                     "mean": found.get_cost(mean=True),
                 },
             )

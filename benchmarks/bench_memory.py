@@ -1,6 +1,6 @@
 """Memory a cell and time to the first step of interface runs, each in a process of its own.
 
-The bytes a cell are those of the whole process at its peak, less those of a run of next to no
+The bytes per cell are those of the whole process at its peak, less those of a run of next to no
 cells: two blocks, a shock in the first one, some steps with the barrier, a dump before the first
 step and one at the end.  With `--solve` the floor of the linear solve is so low that every step has
 one, as after motions that no coarse correction can follow.
@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 from result_tables import Tables
 
-SMALLEST = 8  # cells a wavelength of the run that tells what the program itself takes
+SMALLEST = 8  # cells per wavelength of the run that tells what the program itself takes
 SOLVED = "regrid.options={floor=1e-6}"
 PAUSE = 0.02  # s between two looks for the first dump
 
@@ -85,7 +85,7 @@ def measure(tables: Tables) -> None:
                 **{
                     "steps with a solve": f"{found.solves} of {options.steps}",
                     "peak, MB": found.peak / 1e6,
-                    "bytes a cell": (found.peak - program) / found.cells,
+                    "bytes per cell": (found.peak - program) / found.cells,
                     "start, wall s": found.start,
                     "whole run, CPU s": found.cpu,
                 },

@@ -64,7 +64,7 @@ def run_all(cases: list[Case], rounds: int, mpiexec: list[str]) -> dict[Case, Ti
                 continue
             measure(timing, mpiexec)
             print(f"round {number + 1}: {case.kind} {case.cells}², {case.how}: "
-                  f"{1e3 * timing.seconds['loop']:.3g} ms a step", flush=True)  # fmt: skip
+                  f"{1e3 * timing.seconds['loop']:.3g} ms per step", flush=True)  # fmt: skip
     return found
 
 
@@ -77,9 +77,9 @@ def make_strong(timings: dict[Case, Timing], strong: list[Case]) -> list[dict[st
         gain = base.seconds["loop"] / timing.seconds["loop"]
         rows.append(
             {
-                "cells a block": f"{case.cells}²",
+                "cells per block": f"{case.cells}²",
                 "how": case.how,
-                "ms a step": 1e3 * timing.seconds["loop"],
+                "ms per step": 1e3 * timing.seconds["loop"],
                 "speed-up": gain,
                 "efficiency": gain / parts,
                 "command, s": timing.command,
@@ -91,17 +91,17 @@ def make_strong(timings: dict[Case, Timing], strong: list[Case]) -> list[dict[st
 
 
 def make_weak(timings: dict[Case, Timing], weak: list[Case], sizes: list[int]) -> list[dict]:
-    """Rows of weak scaling: two ranks with as many cells a rank as one process has."""
+    """Rows of weak scaling: two ranks with as many cells per rank as one process has."""
     rows = []
     for half, n in zip(weak, sizes, strict=True):
         one, two = timings[half], timings[Case("square", n, 2, 1, count_steps(n))]
         for timing, cells in ((one, half.cells), (two, n)):
             rows.append(
                 {
-                    "cells a block": f"{cells}²",
+                    "cells per block": f"{cells}²",
                     "how": timing.case.how,
-                    "cells a rank": 2 * cells * cells // max(1, timing.case.ranks),
-                    "ms a step": 1e3 * timing.seconds["loop"],
+                    "cells per rank": 2 * cells * cells // max(1, timing.case.ranks),
+                    "ms per step": 1e3 * timing.seconds["loop"],
                     "efficiency": one.seconds["loop"] / timing.seconds["loop"],
                 }
             )

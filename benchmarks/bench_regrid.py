@@ -67,7 +67,7 @@ def time_parts(tables: Tables, ni: int, nj: int) -> None:
     cost = {name: least_seconds(call) / inner for name, call in parts.items()}
     ten = least_seconds(lambda: work.solve(0.0, 0.0, 10)) / inner
     cost["one CG iteration"] = (ten - cost["start of the solve"]) / 10.0
-    parts = {f"{name}, ns a node": 1e9 * seconds for name, seconds in cost.items()}
+    parts = {f"{name}, ns per node": 1e9 * seconds for name, seconds in cost.items()}
     tables.add("regrid-parts", cells=f"{ni} × {nj}", **parts)
 
 
@@ -87,7 +87,7 @@ def time_moves(tables: Tables, ni: int, nj: int, threads: int) -> None:
             "regrid-moves",
             cells=f"{ni} × {nj}",
             threads=threads,
-            **{"boundary moves by": f"{move:g} cell", "us a node": cost},
+            **{"boundary moves by": f"{move:g} cell", "us per node": cost},
             iterations=report.iterations,
         )
 
@@ -121,7 +121,7 @@ def time_left_behind(tables: Tables, ni: int, nj: int) -> None:
             "regrid-left-behind",
             cells=f"{ni} × {nj}",
             method=name,
-            **{"error, cells": float(error), "us a node": cost},
+            **{"error, cells": float(error), "us per node": cost},
             iterations=result.report.iterations,
         )
     newton_move.LOST = kept
@@ -141,8 +141,8 @@ def time_march(tables: Tables, name: str, ni: int, nj: int) -> None:
         cells=f"{ni} × {nj}",
         steps=found.done,
         **{
-            "us a node and step": cost,
-            "iterations a step": found.iterations / found.done,
+            "us per node and step": cost,
+            "iterations per step": found.iterations / found.done,
             "bad cells": 0 if found.folded is None else len(find_bad_cells(found.folded)),
             "sub-moves": found.sub_moves,
             "rescues": found.rescues,

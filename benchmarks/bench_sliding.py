@@ -105,7 +105,7 @@ def main() -> None:
                 cells=f"{size}²",
                 contact=case,
                 **{
-                    "best, ns a cell and step": best,
+                    "best, ns per cell and step": best,
                     "median": statistics.median(seconds),
                     "more than node to node, %": 100.0 * (best / base - 1.0),
                 },

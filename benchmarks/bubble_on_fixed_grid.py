@@ -9,11 +9,11 @@ Source: [Toro1994] for the fluxes, [JohnsenColonius2006] for G.
 `shock-bubble` on a uniform grid at rest, by another method: the same places at the same times.
 
 The history has the columns of the problem's own, so that the same straight lines go through both.
-Figures of 200 cells a diameter stand in problems/shock_bubble.py; they were made by
+Figures of 200 cells per diameter stand in problems/shock_bubble.py; they were made by
 
     python -m benchmarks.bubble_on_fixed_grid R22 200 400
 
-(gas, cells a diameter, microseconds after the shock's arrival; minutes).  Note: the gases mix
+(gas, cells per diameter, microseconds after the shock's arrival; minutes).  Note: the gases mix
 over some cells, an end is where half of the mixture on the lowest row of cells is the bubble's gas.
 """
 
@@ -216,7 +216,7 @@ def march(problem: ShockBubble, cells: int, until: float) -> dict[str, np.ndarra
 
 
 def main(gas: str, cells: str, last: str) -> None:
-    """Print the velocities of `gas` (a gas of the deck) from a run with so many cells a diameter.
+    """Print the velocities of `gas` of a run with `cells` per diameter.
 
     `last`: end [µs after the shock's arrival].
     """

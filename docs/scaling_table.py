@@ -69,10 +69,10 @@ def _list_assumed(assumed: Mapping[str, float]) -> list[str]:
     rows = [
         ["latency $a$ of the network", f"{1e6 * assumed['latency']:.3g} µs", "assumed"],
         ["its bandwidth $b$", f"{assumed['bandwidth'] / 1e9:.3g} GB/s a rank", "assumed"],
-        ["messages a step", f"{assumed['messages a step']:.3g}", "of the run on two ranks"],
+        ["messages per step", f"{assumed['messages per step']:.3g}", "of the run on two ranks"],
         [
             "iterations of the regridder a node and step",
-            f"{assumed['iterations a node and step']:.3g}",
+            f"{assumed['iterations per node and step']:.3g}",
             "of `interface-instability-mushroom`",
         ],
     ]

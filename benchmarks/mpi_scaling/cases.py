@@ -1,6 +1,6 @@
 """The runs that are measured: decks, ranks, threads; each clocked from outside and step by step.
 
-The flow is `interface-instability` in a square of so many cells a block, with the shock at the
+The flow is `interface-instability` in a square of so many cells per block, with the shock at the
 interface from the first steps on; `blocks` is eight gases in a row, for what a block and its sides
 cost apart from its cells; `mushroom` is a rolled-up interface, for the iterations of the regridder.
 """

@@ -6,7 +6,7 @@ A step takes, on the rank that has most to do,
 
     own work    u C + u_b B_own + i N           cells C, iterations x nodes N of its B_own blocks
     alike       p P + p_b B + s                 faces P along the sides of all blocks B
-    messages    m (c + a log2 R) + (w + 1/b) D  with m messages and D bytes a step to every rank
+    messages    m (c + a log2 R) + (w + 1/b) D  with m messages and D bytes per step to every rank
 
 and r for the history's row and what the first rank has to say.  u, i, p, s, c, w, r are fitted to
 runs of one machine, where a = 1/b = 0; the latency a and the bandwidth b of a network are assumed.
@@ -28,7 +28,7 @@ from benchmarks.mpi_scaling.cases import Timing
 from hydro.ranks.messages import CELLS_DEEP, NODES_DEEP
 
 RING_BYTES = 8 * (2 * NODES_DEEP + 5 * CELLS_DEEP)  # that a face of a side stands for in a step
-GHOST_ROWS, GHOST_NUMBERS = 2, 6  # of a block that is cut: rows at each cut, numbers a cell
+GHOST_ROWS, GHOST_NUMBERS = 2, 6  # of a block that is cut: rows at each cut, numbers per cell
 LEAST_GAIN = 0.5  # efficiency at which another rank is said to gain nothing
 
 

@@ -32,7 +32,8 @@ def _draw_fit(axes: Axes, rows: list[Mapping[str, Any]]) -> None:
     ends = [row["model, ms"] for row in rows]
     line = min(ends) / 1.5, 1.5 * max(ends)
     axes.plot(line, line, color="grey", lw=0.8, label="equal")
-    axes.set(xscale="log", yscale="log", xlabel="model, ms a step", ylabel="measured, ms a step")
+    axes.set(xscale="log", yscale="log")
+    axes.set(xlabel="model, ms per step", ylabel="measured, ms per step")
     axes.set_title("Measured runs and the model fitted to them", fontsize=10)
     axes.legend(fontsize=8)
 

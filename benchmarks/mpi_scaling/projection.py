@@ -79,11 +79,11 @@ def project(costs: Costs, mushroom: Timing, two: Timing) -> dict[str, Any]:
     assumed = {
         "latency": network.latency,
         "bandwidth": network.bandwidth,
-        "messages a step": calls,
-        "iterations a node and step": iterations,
+        "messages per step": calls,
+        "iterations per node and step": iterations,
         "strong cells": STRONG_CELLS,
         "strong blocks": STRONG_BLOCKS,
-        "weak cells a rank": WEAK_CELLS,
+        "weak cells per rank": WEAK_CELLS,
         "least efficiency": LEAST_GAIN,
     }
     return {"cases": found, "assumed": assumed}

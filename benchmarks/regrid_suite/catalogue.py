@@ -22,7 +22,7 @@ DATA = Path(__file__).with_name("data")
 ROLL_PARTS = 4  # steps from one dump of the roll to the next
 LOW, BOTH, ALL = ("j_min",), ("j_min", "j_max"), PLANE_SIDES
 
-# name: the formula, cells, cells a step, the sides that deform
+# name: the formula, cells, cells per step, the sides that deform
 FORMULAS = {
     "comb": (shapes.comb, (40, 24), 0.5, BOTH),
     "opposed-tongues": (shapes.opposed_tongues, (32, 24), 0.5, BOTH),

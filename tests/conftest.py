@@ -107,7 +107,7 @@ KERNEL_GROUPS = {
     "regridders": (
         "io/test_grid_*.py", "property/test_barrier_motions.py", "property/test_regridders.py",
         "regression/test_grid_march.py", "unit/regrid/*.py", "unit/regrid/*/*.py",
-        "unit/problems/test_set_ups.py", "verification/problems/test_domain_marches.py",
+        "verification/problems/test_domain_marches.py",
     ),
     "metals, interfaces": (
         "io/output/*.py", "io/test_restart_*.py", "property/test_flow*.py",

@@ -12,8 +12,10 @@ from benchmarks.soak.kills import finish, has_deck
 from benchmarks.soak.small_runs import SMALL, TrialsOfRuns, compare, find_other_files, list_words
 from benchmarks.soak.trial import Outcome, find_fault, make_random, tell_last
 
-REFUSALS = ("in use", "is not empty", "no restart point", "holds no run", "does not exist",
-            "no run directory", "has no dump", "no history", "no space", "nothing to")  # fmt: skip
+REFUSALS = (
+    "in use", "is not empty", "no restart point", "holds no run", "does not exist",
+    "no run directory", "has no dump", "no deck yet", "no history", "no space", "nothing to",
+)  # fmt: skip
 PAIRS = (
     ("run", "run"), ("restart", "restart"), ("force", "force"), ("force", "restart"),
     ("restart", "info"), ("run", "info"), ("restart", "compare"), ("run", "plot"),

@@ -236,8 +236,8 @@ def open_directory(path: str | os.PathLike) -> RunDirectory:
         )
     if not directory.deck.exists() and _holds_beginning(directory):
         raise BadInput(
-            f"{path} holds a run that ended before its first step: nothing was computed, and it "
-            f"has no deck yet; start it again: shockgrid run PROBLEM_OR_DECK -o {directory.quoted} "
+            f"{path} has no deck yet: a run is just starting there, or ended before its first step; "
+            f"if it ended, start it again: shockgrid run PROBLEM_OR_DECK -o {directory.quoted} "
             "--force"
         )
     if not directory.deck.exists():

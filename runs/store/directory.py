@@ -236,7 +236,7 @@ def open_directory(path: str | os.PathLike) -> RunDirectory:
         )
     if not directory.deck.exists() and _holds_beginning(directory):
         raise BadInput(
-            f"{path} has no deck yet: a run is just starting there, or ended before its first step; "
+            f"{path} has no deck yet: a run is just starting there, or ended before a step; "
             f"if it ended, start it again: shockgrid run PROBLEM_OR_DECK -o {directory.quoted} "
             "--force"
         )

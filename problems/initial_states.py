@@ -15,7 +15,7 @@ import contextlib
 import io
 import pickle
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
 import numpy as np
@@ -272,7 +272,8 @@ def settle_front(front: Front, *, cfl: float, limiter: str) -> SettledFront:
     """
     if type(front.eos).__module__.split(".")[0] not in PACKAGES:
         return _settle(front, cfl, limiter)
-    words = pickle.dumps((front, cfl, limiter)).hex()
+    eos, rest = front.eos, [getattr(front, one.name) for one in fields(front)[1:]]
+    words = pickle.dumps((type(eos).__qualname__, eos.parameters, rest, cfl, limiter)).hex()
     path = find_kept("settled", digest_sources(), words)
     with contextlib.suppress(OSError, ValueError, EOFError):
         first, *rows = np.load(path)
@@ -444,9 +445,12 @@ class MovingShock(Shock):
         """rho, u, v, p (ni, nj) of a block with the shock, settled, at x = `position` [m].
 
         nodes: (2, ni + 1, nj + 1) of a block that a piston at i_min pushes, `velocity=(shock.
-        particle_speed, 0.0)`; its lines i = const are upright, or nearly so.
+        particle_speed, 0.0)`; its lines i = const are upright, or nearly so.  Raises BadInput for a
+        shock that is not in the block.
         """
         x = nodes[0].mean(axis=1)
+        if not x[0] < position < x[-1]:
+            raise BadInput(f"no shock at x = {position:g} m: the block is at {x[0]:g} to {x[-1]:g}")
         line = settle_shock(self.eos, x, position, self, cfl=cfl, limiter=limiter)
         rho, u, p = line.lay_on(nodes)
         return rho, u, np.zeros_like(u), p

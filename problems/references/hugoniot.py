@@ -299,14 +299,18 @@ def shock_with_speed(eos, rho: float, p: float, shock_speed: float) -> Shock:
 
 def shock_with_mach(eos, rho: float, p: float, mach: float) -> Shock:
     """Shock into (rho, p) with the Mach number `mach` >= 1 relative to the sound speed ahead."""
-    if mach < 1.0:
+    if not 1.0 <= mach < math.inf:
         raise BadInput(f"shock Mach number is {mach:g}: give one of at least 1")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        c = float(eos.sound_speed(rho, p))
+    if not 0.0 < c < math.inf:
+        raise BadInput(f"density {rho:g} kg/m3 and pressure {p:g} Pa: no sound runs there")
     stiffened = get_stiffened_parameters(eos)
     if stiffened is not None:
         gamma, p_inf = stiffened
         rise = 2.0 * gamma / (gamma + 1.0) * (mach**2 - 1.0) * (p + p_inf)
         return shock_to_pressure(eos, rho, p, p + rise)
-    return shock_with_speed(eos, rho, p, mach * float(eos.sound_speed(rho, p)))
+    return shock_with_speed(eos, rho, p, mach * c)
 
 
 def _shock_with(eos, rho: float, p: float, name: str, value: float, scale: float) -> Shock:

@@ -47,6 +47,8 @@ class Side:
         self.path = path
         run = RunData(path) if path.is_dir() else None
         self.dumps: list[Dump] = run.outputs if run else [Dump(path)]
+        if not self.dumps:
+            raise BadInput(f"{path} has no dump yet that could be compared")
         self.history: Table | None = run.history if run else None
         self.problem = run.problem_name if run else self.dumps[0].problem
 

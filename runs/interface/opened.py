@@ -190,7 +190,14 @@ class OpenRun(Drawn, RunData):
 
 def open_run(directory: str | os.PathLike) -> OpenRun:
     """The run in a directory, or one that is opened already; BadInput where there is none."""
-    return directory if isinstance(directory, OpenRun) else OpenRun(directory)
+    if isinstance(directory, OpenRun):
+        return directory
+    try:
+        path = os.fspath(directory)
+    except TypeError:
+        words = f"a {type(directory).__name__} is not the directory of a run"
+        raise BadInput(f"{words}; a case gets one by its run()") from None
+    return OpenRun(path)
 
 
 def finish(runner: Runner, ending: Ending, quiet: bool) -> OpenRun:

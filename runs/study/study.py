@@ -20,6 +20,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import io
+import re
 import signal
 import threading
 import warnings
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
 
 OWN = {FILE, "runs", "study.csv", "study.h5", "orders.csv", "study.png", "superseded", ".lock"}
 FORMAT, FORMAT_VERSION = "shockgrid study", 1
+FUNCTION = re.compile(r"[\w.]+:[\w.<>]+")  # module and name
 LONG_NAMES = {
     "run": "folder in runs", "state": "how the run ended",
     "cautions": "where not to trust the run", "step": "steps made", "t": "time at the end",
@@ -444,6 +446,11 @@ def make_study(
         raise BadInput(f"{deck} is a study already: change {file}, or give it no keys and values")
     else:
         definition = read_definition(file)
+        if FUNCTION.fullmatch(definition.source):
+            raise BadInput(
+                f"{deck} is a study of the function {definition.source}, known to Python alone: "
+                "give shockgrid.study the function, what is varied and this folder"
+            )
         definition = replace(definition, shown=tuple(shown) or definition.shown)
         output = output or (file.parent if Path(str(deck)).is_dir() else "")
     if not str(output):

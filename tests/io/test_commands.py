@@ -142,6 +142,10 @@ def test_compare_codes(shockgrid, run):
     assert code == 1 and "finer laid on the grid of run" in text
     assert shockgrid("compare", "run", a)[0] == 2
     assert shockgrid("compare", "run", "nowhere")[0] == 2
+    for path in RunData("same").path.joinpath("dumps").iterdir():
+        path.unlink()
+    code, _, error = shockgrid("compare", "same", "same")
+    assert code == 2 and "same has no dump yet" in error
 
 
 def test_schema(shockgrid):

@@ -210,3 +210,5 @@ def test_a_study_of_a_function_is_a_table_and_computes_once(tmp_path):
     assert "sum" in repr(made) and repr(made).count("\n") == 7
     again = study(add, {"a": [1, 2], "b": [1, 2]}, tmp_path / "s")
     assert again.table["product"].tolist() == [1.0, 2.0, 2.0, 4.0]
+    with pytest.raises(BadInput, match=r"a study of the function .*:add, known to Python alone"):
+        study(tmp_path / "s")

@@ -170,3 +170,8 @@ def test_a_bad_hook_or_measure_leaves_no_directory(tmp_path):
         with pytest.raises(sg.BadInput, match=words):
             sg.run(make_tube(), place, measure=wrong)
     assert not place.exists()
+
+
+def test_a_run_is_opened_by_its_directory():
+    with pytest.raises(sg.BadInput, match=r"a Case is not the directory of a run"):
+        sg.open(sg.load("riemann"))

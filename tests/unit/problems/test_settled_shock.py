@@ -12,7 +12,14 @@ from builders import march, wall_off
 from hydro.eos import IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
 from problems import initial_states
-from problems.initial_states import KEPT, Front, SettledShock, settle_front, settle_shock
+from problems.initial_states import (
+    KEPT,
+    Front,
+    SettledFront,
+    SettledShock,
+    settle_front,
+    settle_shock,
+)
 from problems.references.hugoniot import Shock, shock_to_pressure, shock_with_mach
 
 CFL, LIMITER = 0.8, "monotonised-central"
@@ -133,3 +140,33 @@ def test_a_settled_front_from_the_cache_is_the_one_that_was_computed(tmp_path, m
     for name in ("rho", "u", "p"):
         np.testing.assert_array_equal(*(getattr(one, name) for one in found))
     assert found[0].rho[:4] == pytest.approx(behind[0], rel=1e-3)
+
+
+def test_a_settled_front_is_found_again_whatever_its_material_was_used_for(tmp_path, monkeypatch):
+    monkeypatch.setenv("SHOCKGRID_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(initial_states, "_settle", lambda *_: SettledFront(0, *np.ones((3, 4))))
+
+    def make_front(gas):
+        return Front(gas, (2.0, 1.0, 4.0), (1.0, 0.0, 1.0), 2.0, np.arange(9.0), 6, 1.0)
+
+    settle_front(make_front(IdealGas(1.4)), cfl=CFL, limiter=LIMITER)
+    used = IdealGas(1.4)
+    used.sound_speed(1.0, 1.0)
+    for gas, files in ((used, 1), (IdealGas(1.5), 2), (StiffenedGas(1.4, 0.0), 3)):
+        settle_front(make_front(gas), cfl=CFL, limiter=LIMITER)
+        assert len(list(tmp_path.rglob("settled-*"))) == files
+
+
+@pytest.mark.parametrize(
+    "ahead, mach", [((-1.2, 1e5), 2.0), ((1.2, -1e5), 2.0), ((1.2, 1e5), np.nan)]
+)
+def test_no_shock_of_numbers_that_are_no_state(ahead, mach):
+    with pytest.raises(sg.BadInput, match=r"no sound runs there|give one of at least 1"):
+        sg.shock(IdealGas(1.4), ahead, mach)
+
+
+@pytest.mark.parametrize("position", [-0.1, 1.0, np.nan])
+def test_no_shock_outside_its_block(position):
+    nodes = np.array(np.meshgrid(np.linspace(0.0, 1.0, 11), [0.0, 0.1, 0.2], indexing="ij"))
+    with pytest.raises(sg.BadInput, match="the block is at 0 to 1"):
+        sg.shock(IdealGas(1.4), (1.2, 1e5), 2.0).start(nodes, position)

@@ -205,9 +205,15 @@ def spend(command: list[str], home: Path, given: str | None = None) -> float:
     """CPU seconds (user and system) of a command; CalledProcessError if it fails."""
     before = sum(os.times()[2:4])
     allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    environment = os.environ | allowed | {"OMP_NUM_THREADS": "1"}
+    one = {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}  # one core
     done = subprocess.run(
-        command, cwd=home, env=environment, input=given, capture_output=True, text=True, check=True
+        command,
+        cwd=home,
+        env=os.environ | allowed | one,
+        input=given,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     (home / "stdout").write_text(done.stdout)
     return sum(os.times()[2:4]) - before

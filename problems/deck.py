@@ -92,7 +92,7 @@ class RunControl(DeckTable, kw_only=True):
         gt=0,
     ) = None
     max_steps: key(
-        int | None, "stop after so many steps; left out: no limit", ge=0, le=2**63 - 1
+        int | None, "stop after this number of steps; left out: no limit", ge=0, le=2**63 - 1
     ) = None
     cfl: key(float, "fraction of the stable time step", ge=1e-3, le=1) = 0.5
     small_cells: key(
@@ -105,7 +105,7 @@ class RunControl(DeckTable, kw_only=True):
     ) = None
     threads: key(
         int | None,
-        "threads; results are bitwise the same for any number; left out: one a large block, "
+        "threads; results are bitwise the same for any number; left out: one per large block, "
         "as far as there are processors",
         ge=1,
         le=1024,

@@ -39,12 +39,12 @@ DomainName = Literal[tuple(DOMAINS)]
 NUMBERS = {  # of all steps: label, what of the column, what is wanted
     "bad_cells": ("bad cells in any step", np.max, 0.0),
     "regrid_sub_moves": ("sub-moves", np.sum, math.nan),
-    "regrid_rescues": ("rescues", np.sum, math.nan),
+    "regrid_rescues": ("untangling events", np.sum, math.nan),
     "first_line_gap": ("largest first line gap", np.max, 1.0),
     "worst_aspect": ("worst aspect ratio", np.max, math.nan),
     "least_scaled_jacobian": ("least scaled Jacobian", np.min, math.nan),
     "node_speed_ratio": ("node speed ratio, at most 1 wanted", np.max, math.nan),
-    "regrid_iterations": ("iterations a step", np.mean, math.nan),
+    "regrid_iterations": ("iterations per step", np.mean, math.nan),
     "far_line_bend": ("far lines from straight [cells]", np.max, math.nan),
     "shift_error": ("error of the shift [cells]", np.max, math.nan),
 }
@@ -65,7 +65,7 @@ class GridMarchDeck(Deck, kw_only=True):
     noise: key(float, "normal noise of deforming sides, in node spacings (std)", ge=0, le=0.5) = 0.0
     seed: key(int, "seed of the noise", ge=0, le=2**63 - 1) = 0
     speed_factor: key(
-        float, "inner nodes at most so many times as fast as the boundary; 0: any", ge=0
+        float, "largest ratio of inner nodes' speed to the boundary's; 0: any", ge=0
     ) = 0.0
     regrid: Regrid = Regrid()
 

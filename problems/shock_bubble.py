@@ -69,7 +69,7 @@ class Feature(NamedTuple):
     Window in microseconds after the shock's arrival; a name stands for the moment the refracted
     shock leaves the bubble, `exit`, some microseconds added.  measured: Haas and Sturtevant's (the
     light gas's confirmed in other publications, the heavy gas's from memory but for the incident
-    shock's); computed: Quirk and Karni's; fixed_grid: on 200 cells a diameter, of
+    shock's); computed: Quirk and Karni's; fixed_grid: on 200 cells per diameter, of
     benchmarks/bubble_on_fixed_grid.py.
     """
 
@@ -131,7 +131,7 @@ class ShockBubbleDeck(Deck, kw_only=True):
     mach: key(float, "Mach number of the shock in air", ge=1.001, le=5) = 1.22
     cells: key(int, "cells along 45 degrees of the bubble's surface", ge=4, le=MOST_CELLS) = 12
     thickness: key(
-        float | None, "shorter waves of the surface decay [m]; left out: .75 of a cell", ge=0, le=1
+        float | None, "smoothing length of the surface [m]; left out: .75 of a cell", ge=0, le=1
     ) = None
     limiter: Limiter = "van-leer"
 
@@ -374,7 +374,7 @@ class ShockBubble(Problem):
         notes = [
             f"plane waves: shock {self.shock.shock_speed:.1f}, refracted shock "
             f"{self.contact.right_wave.head:.1f}, contact {self.contact.u:.1f} m/s; the upwind "
-            f"end at first {self.find_upwind_speed(t, history['upwind']):.1f}",
+            f"end initially {self.find_upwind_speed(t, history['upwind']):.1f}",
             f"bubble from x = {ends[0]:.2f} to {ends[1]:.2f} mm on the axis, {ends[2]:.2f} mm "
             f"high, {volume[-1] / volume[0]:.4f} of its first volume",
         ]

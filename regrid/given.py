@@ -178,7 +178,7 @@ def check_nodes(nodes: np.ndarray, where: str) -> np.ndarray:
     extent = np.ptp(nodes.reshape(nodes.shape[0], -1), axis=1)
     for name, size in zip("xyz", extent, strict=False):
         if not LEAST < size < MOST:
-            words = f"{size:g}; it has to be between {LEAST:g} and {MOST:g}"
+            words = f"{size:g}; it must be between {LEAST:g} and {MOST:g}"
             raise BadInput(f"{where}: the grid's extent in {name} is {words}")
     return nodes
 

@@ -21,6 +21,7 @@ from regrid.measure.quality import (
     find_bad_cells,
     measure_first_line_gap,
     measure_quality,
+    say_not_convex,
 )
 from regrid.protocol import Regridder, RegridReport, call_regridder
 from regrid.sides import SIDE_NAMES, compute_area, get_sides
@@ -120,7 +121,7 @@ def march(
         quality = measure_quality(upright)
         if quality.bad_cells:
             named = name_cells(find_bad_cells(upright), 8)
-            found.failure = f"{quality.bad_cells} cells are not convex: {named}"
+            found.failure = f"{say_not_convex(quality.bad_cells)}: {named}"
             found.folded = result.nodes
             break
         found.nodes, found.done = result.nodes, step

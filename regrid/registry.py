@@ -79,7 +79,7 @@ def call_with_options(maker: Any, name: str, options: dict[str, Any]) -> Any:
         wanted = KINDS.get(str(parameters[option].annotation).removesuffix(" | None"))
         if wanted and value is not None and (type(value) is bool or not isinstance(value, wanted)):
             words = {Real: "a number", Integral: "a whole number", str: "a word"}[wanted]
-            raise BadInput(f"regridder '{name}': {option} = {value!r}; it has to be {words}")
+            raise BadInput(f"regridder '{name}': {option} = {value!r}; it must be {words}")
     return maker(**options)
 
 

@@ -301,7 +301,7 @@ def measure_flow(tables: Tables, cells: int, rounds: int, peer: Peer | None) -> 
         shares = {f"{part}, %": 100.0 * v / sum(parts.values()) for part, v in parts.items()}
         arrays = [v for b in fixed.blocks for v in vars(b).values() if isinstance(v, np.ndarray)]
         held = round(sum(a.nbytes for a in arrays) / cells**2)
-        tables.add("flow-parts", case=f"{name}, {cells}²", **shares, **{"bytes a cell": held})
+        tables.add("flow-parts", case=f"{name}, {cells}²", **shares, **{"bytes per cell": held})
 
 
 def measure_threads(tables: Tables, sizes: tuple[int, ...], rounds: int) -> None:

@@ -19,7 +19,7 @@ from hydro.motion.sides import Sides, Span
 from hydro.ranks.blocks import Blocks
 from hydro.sliding.polygons import LEAST_LEFT, make_find_crushed
 from regrid.errors import BadInput, Place, RegridFailure, RunFailure
-from regrid.measure.quality import find_bad_cells, measure_worst
+from regrid.measure.quality import find_bad_cells, measure_worst, say_not_convex
 from regrid.node_speeds import MotionLimiter
 from regrid.protocol import (
     RegridReport,
@@ -108,8 +108,8 @@ class GridMotion(Sides):
         if len(bad):
             i, j = (int(index) for index in bad[0])
             raise RegridFailure(
-                f"mesh motion: block {block.name!r}: {len(bad)} cells are not convex, the first "
-                f"is i={i}, j={j}",
+                f"mesh motion: block {block.name!r}: {say_not_convex(len(bad))}, the first is "
+                f"i={i}, j={j}",
                 cause="mesh-law",
                 place=Place(block.name, (i, j)),
             )

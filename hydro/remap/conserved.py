@@ -34,7 +34,7 @@ from hydro.remap.overlay import (
 )
 from hydro.rows import RHO, P, U, V
 from regrid.errors import BadInput, Place, RunFailure
-from regrid.measure.quality import find_bad_cells
+from regrid.measure.quality import find_bad_cells, say_not_convex
 
 LEAST_SLIVER = 1e-13  # part of a cell from which on a gap is no round-off
 SIDES = {"i_min": (0, 0), "i_max": (0, -1), "j_min": (1, 0), "j_max": (1, -1)}  # axis, which end
@@ -241,7 +241,7 @@ def check_convex(name: str, nodes: np.ndarray) -> None:
     if len(bad):
         i, j = (int(index) for index in bad[0])
         raise BadInput(
-            f"block {name!r}: {len(bad)} cells are not convex (the first is i={i}, j={j}), and "
+            f"block {name!r}: {say_not_convex(len(bad))} (the first is i={i}, j={j}), and "
             "what they hold cannot be laid on another grid; take an earlier restart point or dump"
         )
 

@@ -2,7 +2,7 @@
 
 Each `[[block]]` has a grid from a file or is made on four curves; `[[block.side]]` says what is at
 its sides, `[[link]]` which sides of two blocks lie on one another.  Files are looked for beside the
-deck.  Measured are the mean velocity, the centre of mass and the greatest pressure of every block.
+deck.  The problem measures mean velocity, centre of mass and greatest pressure of each block.
 
 Note: nothing here knows what the flow should be.  A side that is moved by the flow keeps to the
 walls at its ends, and a wall that ends in a corner does not go on beyond it.

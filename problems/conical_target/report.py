@@ -134,7 +134,7 @@ def measure_growth(history) -> tuple[float, float, float]:
 
 
 AGES = (0.5e-6, 1.2e-6)  # after the passage: between them the rate of growth is told [s]
-COMPARABLE = 16.0  # cells a wave: amplitudes are within 10 % of theory from there on
+COMPARABLE = 16.0  # cells per wave: amplitudes are within 10 % of theory from there on
 
 
 @dataclass(frozen=True)
@@ -248,15 +248,13 @@ def make_report(problem, history) -> Report:
     widest = int(np.nanargmax(history["line_amplitude"]))
     top, when = (history[name][widest] for name in ("line_amplitude", "t"))
     words = f"half of peak to peak at the end; at most {top * MM:.2g} mm at {when * US:.2f} us"
-    label = "side off its own straight line [mm]"
+    label = "side: deviation from its own line [mm]"
     tell("line_amplitude", history["line_amplitude"][-1], label, 1e-3, words)
-    words = (
-        f"{history['line_length'][-1] / history['line_length'][0]:.3f} times as long as at first"
-    )
-    tell("line_bend", history["line_bend"][-1], "side off its chord at the end [mm]", 1e-3, words)
+    words = f"{history['line_length'][-1] / history['line_length'][0]:.3f} times its initial length"
+    tell("line_bend", history["line_bend"][-1], "side: deviation from its chord [mm]", 1e-3, words)
     if math.isfinite(first):
         words = f"from {begin * US:.2f} us on; {late:.3g} m/s in the latest half"
-        tell("line_growth", first, "growth of the side's amplitude at first [m/s]", 1.0, words)
+        tell("line_growth", first, "initial growth of the side's amplitude [m/s]", 1.0, words)
     return Report(head, rows)
 
 
@@ -271,7 +269,7 @@ def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
     if ripple.cells_a_wave < COMPARABLE:
         wanted = math.ceil(problem.deck.cells * COMPARABLE / ripple.cells_a_wave)
         notes.append(
-            f"{ripple.cells_a_wave:.3g} cells a wave are too few to compare growth with theory: "
+            f"{ripple.cells_a_wave:.3g} cells per wave are too few to compare growth with theory: "
             f"the thickness of the interface holds it back; cells={wanted} or more would do"
         )
     if crossed is not None:

@@ -7,7 +7,7 @@ velocities are in kappa/L and the heat through a wall is the Nusselt number.
 
 `method = "steady"` uses Newton's method, one iteration per step; `"time"` integrates from rest.
 The grid is clustered at the walls unless `grid.kind` says otherwise: uniform, polevikov (follows
-the speed), monitor (follows gradients) or combined.  N cells a side have (N + 1)² nodes.
+the speed), monitor (follows gradients) or combined.  N cells per side mean (N + 1)² nodes.
 
 Note: Polevikov's grid puts nodes where the speed is large; the step at a wall decreases only as
 N^-1/2, so the Nusselt number is better on most other grids.

@@ -109,6 +109,11 @@ class CrossedStart:
         signal = max(side.front.measure_signal() for side in sides)
         return [side.make_state(signal) for side in sides]
 
+    def count_columns(self) -> tuple[int, int]:
+        """Cells along x of both blocks."""
+        first, second = (_Side(self, sign).away.size - 1 for sign in (-1.0, 1.0))
+        return first, second
+
     def make_grids(self) -> list[np.ndarray]:
         """First nodes (2, ni + 1, nj + 1) of both blocks."""
         return [_Side(self, sign).make_nodes() for sign in (-1.0, 1.0)]

@@ -37,7 +37,7 @@ class SecondShock(DeckTable, kw_only=True):
     """A stronger shock that follows the first."""
 
     pressure: key(float, "pressure behind it [Pa]", gt=0, le=1e20)
-    kct: key(float, "when the piston sends it: k c t after the first arrived", gt=0) = 6.0
+    kct: key(float, "when the piston sends it: k c t after the arrival of the first", gt=0) = 6.0
 
 
 class LineMotion(DeckTable, kw_only=True):
@@ -47,7 +47,7 @@ class LineMotion(DeckTable, kw_only=True):
     relax: key(float, "fraction of the way to the target spacing in a step", ge=0, le=1) = 0.02
     thickness: key(
         float | None,
-        "waves of the interface much shorter decay [m]; left out: 0.75 of a first cell",
+        "smoothing length [m]: shorter waves of the interface decay; left out: 0.75 of a cell",
         ge=0,
         le=1e12,
     ) = None
@@ -82,23 +82,21 @@ class InterfaceDeck(Deck, kw_only=True):
     spectrum: Spectrum | None = None
     line_file: key(
         str | None,
-        "text file of a line that is added to the modes: x and y, or x [m]",
+        "text file of an interface that is added to the modes: x and y, or x [m]",
         min_length=1,
     ) = None
     width: key(float, "width of the domain in wavelengths", gt=0) = 0.5
     sides: key(Literal["wall", "periodic"], "what bounds the domain along the interface") = "wall"
-    cells: key(int, "cells a wavelength", ge=4, le=MOST_CELLS) = 64
+    cells: key(int, "cells per wavelength", ge=4, le=MOST_CELLS) = 64
     refine: key(bool, "add grid lines during the run where the interface grows long or bends") = (
         False
     )
     uniform: key(float, "evenly spaced zone on each side, in wavelengths", ge=0) = 1.0
     stretch: key(float, "growth of cells from one to the next beyond it", ge=1, le=1.5) = 1.01
-    reach: key(float, "distance from the interface, in waves, where lines begin to bend", gt=0) = (
-        0.25
-    )
+    reach: key(float, "distance from the interface, in waves, where grid lines bend", gt=0) = 0.25
     lengths: key(
         tuple[float, float] | None,
-        "lengths of the two materials [m]; left out: no echo returns",
+        "lengths of the two materials [m]; left out: too long for a reflection to return",
     ) = None
     start: key(
         Literal["auto", "crossed", "incident"],
@@ -162,13 +160,13 @@ def _list_wave_faults(
             share = deck.cells / mode.number
             yield (
                 f"{name}.number is {mode.number}, of which a wave has {share:.3g} cells (cells = "
-                f"{deck.cells} a wavelength); waves of fewer than {LEAST_CELLS} hardly grow: "
+                f"{deck.cells} per wavelength); waves of fewer than {LEAST_CELLS} hardly grow: "
                 f"take a number up to {deck.cells // LEAST_CELLS}, or cells = "
                 f"{LEAST_CELLS * mode.number}"
             )
         if deck.sides == "wall" and abs(math.sin(mode.phase)) > SQUARE:
             yield (
-                f"{name}.phase is {mode.phase:g}; between walls the line has to meet them at a "
+                f"{name}.phase is {mode.phase:g}; between walls the interface must meet them at a "
                 "right angle, with phase 0 or 3.141592653589793; or take sides = 'periodic'"
             )
     piece, what = (0.5, "halves of waves") if deck.sides == "wall" else (1.0, "waves")
@@ -178,7 +176,7 @@ def _list_wave_faults(
             right = max(1, round(count)) * piece / mode.number
             yield (
                 f"width is {deck.width:g} wavelengths, which holds {count:.4g} {what} of mode "
-                f"{mode.number} ({name}); it has to hold a whole number, such as width = "
+                f"{mode.number} ({name}); it must hold a whole number, such as width = "
                 f"{right:.12g}"
             )
             return
@@ -191,7 +189,7 @@ def _list_size_faults(deck: InterfaceDeck, rho: tuple[float, float]) -> Iterator
     if not 1.0 / FLATTEST <= aspect <= FLATTEST:
         yield (
             f"width is {deck.width:g} wavelengths: its {rows} rows are {aspect:.3g} times as high "
-            f"as cells are long (cells = {deck.cells} a wavelength); take a width from "
+            f"as cells are long (cells = {deck.cells} per wavelength); take a width from "
             f"{2.0 / FLATTEST / deck.cells:.3g}, or more cells"
         )
     for place, length in enumerate(deck.lengths or ()):

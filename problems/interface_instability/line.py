@@ -29,7 +29,7 @@ NOTHING = 1e-12  # of the largest mode: what round-off leaves of modes that canc
 class Mode(DeckTable, kw_only=True):
     """One harmonic of the interface's first shape: x = (ka0 / k) cos(number k y + phase)."""
 
-    number: key(int, "waves in one wavelength", ge=1, le=MOST_CELLS) = 1
+    number: key(int, "waves per wavelength", ge=1, le=MOST_CELLS) = 1
     ka0: key(float, "amplitude times k = 2 pi / wavelength", ge=-10, le=10) = 0.02
     phase: key(float, "phase [rad]; 0 or pi between walls") = 0.0
 
@@ -125,11 +125,11 @@ CLOSED = 1e-6  # of a line's extent: so far its ends may differ between periodic
 class Spectrum(DeckTable, kw_only=True):
     """Random modes, added to `modes`: amplitudes of normal distribution times number^slope."""
 
-    first: key(int, "least number, of waves in one wavelength", ge=1, le=10000)
-    last: key(int, "greatest number", ge=1, le=10000)
-    slope: key(float, "power of the number that amplitudes go with", ge=-10, le=10) = 0.0
-    ka_rms: key(float, "root of the line's mean square times k = 2 pi / wavelength", gt=0) = 0.01
-    seed: key(int, "another one draws another line", ge=0, le=2**63 - 1) = 0
+    first: key(int, "lowest mode: waves per wavelength", ge=1, le=10000)
+    last: key(int, "highest mode", ge=1, le=10000)
+    slope: key(float, "amplitudes are proportional to number^slope", ge=-10, le=10) = 0.0
+    ka_rms: key(float, "rms displacement of the interface times k = 2 pi / wavelength", gt=0) = 0.01
+    seed: key(int, "of the random numbers", ge=0, le=2**63 - 1) = 0
 
 
 def draw_modes(spectrum: Spectrum, even: bool, cells: int) -> list[Mode]:
@@ -145,8 +145,8 @@ def draw_modes(spectrum: Spectrum, even: bool, cells: int) -> list[Mode]:
         )
     if 2 * spectrum.last > cells:
         raise BadInput(
-            f"deck: spectrum.last is {spectrum.last}; the line's nodes show waves up to number "
-            f"{cells // 2} with {cells} cells a wavelength"
+            f"deck: spectrum.last is {spectrum.last}; the nodes resolve waves up to number "
+            f"{cells // 2} with {cells} cells per wavelength"
         )
     numbers = np.arange(spectrum.first, spectrum.last + 1)
     waves = _draw_normal(spectrum.seed, numbers.size)
@@ -211,8 +211,8 @@ class FreeLine:
             gap = abs(x[-1] - x[0])
             if gap > CLOSED * float(np.ptp(x)):
                 raise BadInput(
-                    f"deck: {what}: the line's ends are {gap:g} m apart in x; between periodic "
-                    "sides they must meet"
+                    f"deck: {what}: the ends of the interface are {gap:g} m apart in x; between "
+                    "periodic sides they must meet"
                 )
             x = np.append(x[:-1], x[0])
         weights = np.diff(y)
@@ -224,7 +224,7 @@ class FreeLine:
         return self.x if np.array_equal(y, self.y) else np.interp(y, self.y, self.x)
 
     def find_modes(self, wavenumber: float) -> list[Mode]:
-        """The strongest harmonics, those of LEAST_CELLS and more cells a wave, for theory."""
+        """The strongest harmonics, those of LEAST_CELLS and more cells per wave, for theory."""
         line = np.array([self.x, self.y])
         per_wave = (self.y.size - 1) * 2.0 * math.pi / (wavenumber * (self.y[-1] - self.y[0]))
         found = []

@@ -1,8 +1,8 @@
-"""A shock hits a perturbed interface between two materials and makes it unstable.
+"""Richtmyer–Meshkov instability: a shock hits a perturbed interface between two materials.
 
 The shock runs through the first material towards larger x, driven by a piston that moves with the
 material behind it; the second material is at rest beyond the interface.  Each material is a block,
-the interface the grid line between them.  A second, stronger shock may follow.  The problem
+and the interface is the grid line between them.  A second, stronger shock may follow.  The problem
 measures the amplitude of the interface, its growth rate and how one-dimensional the far field
 stays, and compares with linear compressible theory for the deck's materials and with non-linear
 models.
@@ -98,8 +98,8 @@ class InterfaceInstability(Problem):
             )
         if deck.second_shock and deck.lengths is None:
             raise BadInput(
-                "deck: with a second_shock give `lengths` too; the program finds lengths without "
-                "echoes for one shock only"
+                "deck: with a second_shock give `lengths` too; shockgrid finds lengths without "
+                "reflections for one shock only"
             )
         even = deck.sides == "wall"
         drawn = draw_modes(deck.spectrum, even, deck.cells) if deck.spectrum else []
@@ -388,15 +388,16 @@ class InterfaceInstability(Problem):
     def plan(self) -> tuple[float, list[BlockPlan]]:
         """End time and sizes of both blocks."""
         front, y = self.make_interface()
-        first, second = self.choose_lengths()
         low, high = self.find_ends()
-        if self.start == "crossed":
+        columns = [len(self.make_spacing(length)) - 1 for length in self.choose_lengths()]
+        if self.start == "crossed":  # whose cells fit to the fronts
+            columns = self.crossed.count_columns()
             front = front - self.theory.base.u * self.arrival
-        spans = (("first", first, low, front.max()), ("second", second, front.min(), high))
-        plans = []
-        for name, length, low, high in spans:
-            cells = len(self.make_spacing(length)) - 1, len(y) - 1
-            plans.append(BlockPlan(name, cells, (float(low), 0.0), (float(high), float(y[-1]))))
+        spans = (("first", low, front.max()), ("second", front.min(), high))
+        plans = [
+            BlockPlan(name, (count, len(y) - 1), (float(low), 0.0), (float(high), float(y[-1])))
+            for count, (name, low, high) in zip(columns, spans, strict=True)
+        ]
         return self.t_end, plans
 
     def make_grids(self) -> Sequence[np.ndarray]:

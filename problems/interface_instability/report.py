@@ -1,4 +1,4 @@
-"""Summary and pictures of `interface-instability`: measured growth beside theory."""
+"""Summary and pictures of `interface-instability`: measured growth compared with theory."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def make_report(problem, history) -> Report:
     """Growth rates (da/dt)/(k a0) of the modes [m/s], each over the window where theory applies,
     and the speed of the interface [m/s], which studies draw; sizes by the models.
 
-    No numbers for two shocks, of which no theory is at hand.
+    No numbers for two shocks, for which there is no theory.
     """
     theory, deck = problem.theory, problem.deck
     if not history:
@@ -53,12 +53,12 @@ def make_report(problem, history) -> Report:
     head = [
         f"shock to p = {problem.shock.p:g} through rho = {problem.rho_first:g} onto rho = "
         f"{problem.rho_second:g}; {_describe_modes(problem)}, "
-        f"{deck.cells} cells a wavelength, to k c t = {kct:.3g}",
+        f"{deck.cells} cells per wavelength, to k c t = {kct:.3g}",
         f"  reflected wave: {reflected}, Atwood number after the shock {theory.atwood:.3f}",
-        f"  thickness of the interface: {problem.thickness:.3g} m "
+        f"  smoothing length of the interface: {problem.thickness:.3g} m "
         f"({problem.thickness * deck.cells / deck.wavelength:.2g} of a first cell)",
     ]
-    rows, notes = [], ["growth: no theory at hand for two shocks"]
+    rows, notes = [], ["growth: there is no theory for two shocks"]
     if deck.second_shock is None:
         rows, notes = _compare(problem, column, kct)
     far = column["far_transverse_speed"].max() / theory.sound_speed
@@ -130,7 +130,7 @@ def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
         rows += _compare_mode(growth, mode, column, kct, several, words)
     if len(strongest) < len(modes):
         notes.append(
-            f"shown are the {len(strongest)} steepest of {len(modes)} modes; all: "
+            f"these are the {len(strongest)} steepest of {len(modes)} modes; all of them: "
             "shockgrid plot DIR --what spectrum"
         )
     known = [row for row in rows if row.label and row.source.startswith("linear")]
@@ -143,11 +143,11 @@ def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
             start, reach = growth.first_slope, growth.linear_reach
             since = f"from k c t = {reach:.3g} on" if reach else "from the start"
             notes.append(
-                f"the modes interact {since}: the sum of their k a, {start:.3g} at first, is above "
-                f"{COUPLED:g}; linear theory has each mode alone"
+                f"the modes couple {since}: the sum of their k a, initially {start:.3g}, exceeds "
+                f"{COUPLED:g}; linear theory treats each mode alone"
             )
         if growth.model_fails:
-            notes.append(f"beyond linear theory no model is at hand: {growth.model_fails}")
+            notes.append(f"beyond linear theory there is no model: {growth.model_fails}")
         else:
             rows.append(_compare_model(growth, column, kct))
     return rows, notes
@@ -173,7 +173,7 @@ def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, sho
         ]
     if not is_still(theory, expected):
         if not several and window.last < min(WINDOW[1], kct):
-            source += f", to k a = {growth.limit:.2g} where it ends"
+            source += f", up to k a = {growth.limit:.2g}, its limit"
         return [Row(name, rate, expected, words, digits=5, studied=True, source=source)]
     share = f"{100.0 * (rate - expected) / theory.base.u:+.2f} % of u"
     source += "; u: interface speed"
@@ -336,10 +336,10 @@ def draw_spectrum(problem, figure, run) -> None:
             x, y = find_dump(run, float(history["t"][row])).blocks[0].nodes[:, -1, :]
             lines.plot(x - x.mean(), y, color=colour, lw=1)
     axes.plot([], [], "k--", lw=1, label="linear compressible")
-    axes.set(xlabel="number of the mode", ylabel="size of the mode: k |a|, k of the wavelength")
+    axes.set(xlabel="number of the mode", ylabel="k |a| of the mode, k of the wavelength")
     axes.legend(fontsize=8, frameon=False)
-    lines.set(xlabel="x less its mean [m]", ylabel="y [m]")
-    lines.set_title("the line at these times", fontsize=9)
+    lines.set(xlabel="x minus its mean [m]", ylabel="y [m]")
+    lines.set_title("the interface at these times", fontsize=9)
     lines.xaxis.set_major_locator(MaxNLocator(4))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     for panel in (axes, lines):

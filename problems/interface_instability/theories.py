@@ -285,24 +285,24 @@ def sort_cautions(
     of_cells, told = [], []
     if worst.cells > cells * (1.0 + EDGE):
         of_cells.append(
-            f"growth was never compared with theory at {cells:.3g} cells in a wavelength: "
+            f"growth was never compared with theory at {cells:.3g} cells per wavelength: "
             f"take {worst.cells:g} or more"
         )
     if error > TRUSTED:
-        words = f"{100.0 * error:.2g} % off theory"
+        words = f"{100.0 * error:.2g} %"
         if error != abs(worst.rate_error):
             words = (
-                f"{100.0 * abs(worst.rate_error):.2g} % of the interface's speed off theory, which "
-                f"is {100.0 * error:.2g} % of the growth here,"
+                f"{100.0 * abs(worst.rate_error):.2g} % of the interface's speed, which is "
+                f"{100.0 * error:.2g} % of the growth here,"
             )
         told.append(
-            f"growth rates at {where} were found up to {words} with {worst.cells:g} cells in a "
+            f"growth rates at {where} have errors of up to {words} with {worst.cells:g} cells per "
             "wavelength"
         )
     rough = max(row.roughness for row in found)
     if rough > ROUGH_LINE:
         told.append(
-            f"at {where} the line was found rough with {worst.cells:g} cells in a wavelength: "
+            f"at {where} the interface became rough with {worst.cells:g} cells per wavelength: "
             f"harmonics above the fourth are {rough:.2g} of the largest mode"
         )
     return of_cells, told
@@ -321,10 +321,10 @@ def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str
     )
     if single:  # waves that are back from the far ends before the run's end
         told += [
-            f"waves are back at the interface from the far end of the {name} material at t = "
+            f"waves return to the interface from the far end of the {name} material at t = "
             f"{t:.4g} s, k c t = {float(get_kct(problem, t)):.3g}, and the run ends at t = "
-            f"{problem.t_end:.4g} s: what comes after is not the growth of an open interface; for "
-            "that begin a new run with longer `lengths`, or without them and run.t_set_up"
+            f"{problem.t_end:.4g} s: later growth is not that of an open interface; for that begin "
+            "a new run with longer `lengths`, or without them and run.t_set_up"
             for name, t in problem.find_echoes().items()
             if t < problem.t_end
         ]
@@ -333,8 +333,8 @@ def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str
         omega = math.sqrt(tension * (number * problem.k) ** 3 / (base.rho_left + base.rho_right))
         if omega * (problem.t_end - problem.arrival) >= FREE:
             told.append(
-                f"surface tension swings waves of mode {number} with a period of "
-                f"{2.0 * math.pi / omega:.3g} s; the theories of growth leave it out, and hold "
+                f"surface tension makes waves of mode {number} oscillate with a period of "
+                f"{2.0 * math.pi / omega:.3g} s; the theories of growth ignore it and hold "
                 f"until t = {problem.arrival + FREE / omega:.3g} s"
             )
     if history is not None and problem.harmonics and single:
@@ -343,7 +343,7 @@ def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str
 
 
 def sort_deck(problem) -> tuple[list[str], list[str]]:
-    """Sentences on modes with few cells a wave, and others.
+    """Sentences on modes with few cells per wave, and others.
 
     By the shock's Mach number, the ratio of densities and the cells of the shortest mode.
     """
@@ -364,8 +364,8 @@ def sort_deck(problem) -> tuple[list[str], list[str]]:
         )
         low = 100.0 * (1.0 - float(np.interp(least, *zip(*FOUND, strict=True))))
         of_cells = [
-            f"{which} fewer than {FEW_CELLS} cells a wave, down to {least:.3g}: the scheme damps "
-            f"such waves, growth with {least:.3g} was found about {low:.0f} % low; take cells = "
+            f"{which} fewer than {FEW_CELLS} cells per wave, down to {least:.3g}: the scheme damps "
+            f"such waves, measured growth with {least:.3g} is about {low:.0f} % low; take cells = "
             f"{FEW_CELLS * short[-1]} or longer waves",
             *of_cells,
         ]
@@ -387,6 +387,6 @@ def _caution_line(problem, history) -> list[str]:
     if last <= ROUGH_LINE:
         return []
     return [
-        f"the line is rough: harmonics above the fourth are {last:.2g} of the largest mode at "
-        f"k c t = {kct[gentle][-1]:.3g}, and theory has next to none; try other or finer cells"
+        f"the interface is rough: harmonics above the fourth are {last:.2g} of the largest mode at "
+        f"k c t = {kct[gentle][-1]:.3g}, and theory predicts almost none; try other or finer cells"
     ]

@@ -1,4 +1,4 @@
-"""Pictures of `plate-on-wedge`: the bodies at the phases, the contact point A against theory."""
+"""Pictures of `plate-on-wedge`: the bodies at the phases, the collision point A against theory."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from regrid.sides import trace_outline
 PANELS = 6  # of the pictures that show phases
 SHADES = ("#c9d4e2", "#8c99a8", "#e2cfa9")
 TITLES = (
-    "before the contact point runs",
-    "the contact point A runs",
+    "before the collision point runs",
+    "the collision point A runs",
     "A has arrived at B",
     "jet",
     "closed",
@@ -89,7 +89,7 @@ def draw_phases(problem, figure, run) -> None:
 
 
 def draw_contact(problem, figure, run) -> None:
-    """Zooms at the contact point and at the end of the face; A's path and speed against theory."""
+    """Zooms at the collision point and the end of the face; A's path and speed against theory."""
     history, theory = run.history, problem.collision.contact_speed
     figure.set_size_inches(12.0, 8.5)
     zooms, (paths, speeds) = figure.subplots(2, 2)
@@ -99,7 +99,7 @@ def draw_contact(problem, figure, run) -> None:
     near = int(np.abs(times - (t[rows].mean() if rows.any() else t[len(t) // 2])).argmin())
     size = 0.2 * problem.deck.face * MM
     for axes, number, words in (
-        (zooms[0], near, "contact point A"),
+        (zooms[0], near, "collision point A"),
         (zooms[1], -1, "end of the contact, B"),
     ):
         dump = run.dumps[number]

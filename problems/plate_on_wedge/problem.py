@@ -1,13 +1,13 @@
-"""A driven plate is thrown onto a wedge: a contact point runs along its face, a jet follows.
+"""A driven plate strikes a wedge; the collision point runs along the face and may emit a jet.
 
 The plate lies on the flat edge of the wedge body; beside it the wedge's face slopes away at
 `angle`.  A shock from the drive reaches the plate's free lower side, which flies into the gap
-with about twice the particle speed and closes it from the edge outwards: the contact point A
-runs along the face.  With a `gap` the plate starts above the edge: two bodies, whose contact closes
-and opens by itself.  Below a critical angle the oblique shocks stay attached to A and there is no
-jet; above it a jet runs ahead of A.  When A reaches the end B of the face the shocks detach and a
-thin jet leaves over B and bends round the end face.  Plate and wedge slide on each other; both
-grids follow the contact line, with non-matching nodes.
+with about twice the particle speed and closes it from the edge outwards: the collision point A
+runs along the face.  With a `gap` the plate starts above the edge, and the contact of the two
+bodies closes and opens by itself.  Below a critical angle the oblique shocks stay attached to A and
+there is no jet; above it a jet runs ahead of A.  When A reaches the end B of the face the shocks
+detach and a thin jet leaves over B and bends round the end face.  Plate and wedge slide on each
+other; both grids follow the contact line, with non-matching nodes.
 
 The history has the phases and their times.  The run ends when the jet meets something (the end
 face, the base on which the wedge stands, the symmetry plane) or when the free surface meets itself.
@@ -98,7 +98,7 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     )
     refinement: key(
         float | None,
-        "how many times finer the cells are at the contact point A; left out: "
+        "how many times finer the cells are at the collision point A; left out: "
         "for a moving plate by the distance from the critical angle, 1 (far) to 3 (near)",
         ge=1,
         le=8,

@@ -1,4 +1,4 @@
-"""Summary of `plate-on-wedge`: the contact point A against shock polars.
+"""Summary of `plate-on-wedge`: the collision point A against shock polars.
 
 The pressure behind A is a plateau found in the data, or none.  Nothing but A's path sets a length
 in the flow around A, so pressures at equal parts of the path behind A are compared: in every step
@@ -31,7 +31,7 @@ COLUMNS = tuple(f"behind_{edge}" for edge in EDGES[:-1])
 JET = 1.3  # material faster than this many times the plate's speed V belongs to a jet
 WIDE_ZONE = 0.15  # of A's path: the length of that zone from which no finer cells are needed
 PHASES = {
-    "attached": "contact point runs",
+    "attached": "collision point runs",
     "arrived": "arrives at the face's end B",
     "jet": "jet",
     "closed": "closed",
@@ -174,7 +174,7 @@ def _fit_parabola(x, p, width) -> _Fit:
     return min(steep, level, key=lambda fit: fit.misfit)
 
 
-FITTED = (0.25, 0.95)  # part of the face over which the contact point's speed is fitted
+FITTED = (0.25, 0.95)  # part of the face over which the collision point's speed is fitted
 PARTS = 5  # parts of that path whose own speeds say how constant it is
 STEADY = (0.6, 0.95)  # part of the face over which states behind A are averaged
 COARSE_CELLS = 80  # along the plate: what was compared with theory at the least
@@ -255,7 +255,7 @@ def measure_jet_speed(history) -> float:
 
 
 def measure_lead(problem, history) -> float:
-    """Greatest length [m] of plate ahead of the contact point of theory on the face; NaN if none.
+    """Greatest length [m] of plate ahead of the collision point of theory on the face; NaN if none.
 
     See `PlateRun.measure_lead`; the first tenth of the face, where the flow is not yet the steady
     one, does not count.
@@ -300,7 +300,7 @@ def make_report(problem, history, final) -> Report:
         )
         if not theory.attached:
             notes.append(
-                "the jet ahead of A is thinner than a cell at first: its speed and mass are rough"
+                "the jet ahead of A is thinner than a cell: its speed and mass are estimates"
             )
     else:
         notes.append(f"no material faster than {JET:g} V")

@@ -1,4 +1,4 @@
-"""The run of a plate on a wedge: where the contact point is, which phase it is, when it ends.
+"""The run of a plate on a wedge: where the collision point is, which phase it is, when it ends.
 
 All places and angles are those of the set-up before the deck turns or mirrors it.
 """
@@ -27,7 +27,7 @@ from regrid.curves import compute_arc_lengths
 
 LEAST_JET = 3  # cells that make a jet
 NEAR = 0.5  # of the local spacing: lines as near as this have met
-BEHIND = (3, 9)  # faces behind the contact point between which pressure and angle are averaged
+BEHIND = (3, 9)  # faces behind the collision point between which pressure and angle are averaged
 SHOCK_ROWS = (2, 10)  # grid lines from the contact on which a shock's place is looked for
 HANGING = 0.1  # spacings below its undisturbed height at which a free surface is a jet's
 APART = 6  # nodes along a line that do not count as another part of it

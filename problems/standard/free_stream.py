@@ -3,10 +3,10 @@
 Two blocks lie side by side with a curved line between them, an interface of two materials or a
 seam; left and right the stream flows through, below and above the domain is periodic or open too.
 The grid drifts with the stream and every node but those of the interface is thrown about by a
-fraction of a cell at every step.  Measured is the largest deviation from the stream, of density
-and pressure relative to their own size, of velocity to the sound speed.
+fraction of a cell at every step.  The problem measures the largest deviation from the stream: of
+density and pressure relative to their values, of velocity relative to the sound speed.
 
-Note: the given motion of an interface has to be that of the material, or the test itself would
+Note: the given motion of an interface must be that of the material, or the test itself would
 push material through a line that lets none pass.
 """
 

@@ -1,9 +1,9 @@
 """Gresho's vortex: a steady round flow with a kinked profile; how much of it is dissipated.
 
 The speed around the centre rises as 5 r to r = 0.2, falls as 2 - 5 r to r = 0.4 and is zero beyond;
-the pressure balances it.  After one turn (t = 0.4 pi) everything should be as it was.  Measured is
-the kinetic energy left, 0.0837758041 at the start, and the mean error of the speed.  The grid is at
-rest or swings smoothly while the flow turns.
+the pressure balances it.  After one turn (t = 0.4 pi) everything should be as it was.  The
+problem measures the remaining kinetic energy, initially 0.0837758041, and the mean error of the
+speed.  The grid is at rest or swings smoothly while the flow turns.
 
 Note: the corners of the profile make it a test of dissipation, not of order.
 """

@@ -128,7 +128,7 @@ class Noh(Problem):
         notes = say_unreached(history, "error_rho")
         if deck.cells == 100 and deck.geometry in PEERS:
             notes.append(f"other codes: {PEERS[deck.geometry]}")
-        return Report(f"noh, {deck.geometry}, {deck.cells} cells a side, {grid}", rows, notes)
+        return Report(f"noh, {deck.geometry}, {deck.cells} cells per side, {grid}", rows, notes)
 
     def draw(self, figure, run_data) -> None:
         """Density in the last dump out to twice the shock's radius, and against the radius."""

@@ -3,7 +3,7 @@
 Gas comes in from the left at Mach `mach` along a wall that rises by `angle` from x = 0 on; the grid
 follows the wall.  The flow becomes steady with a straight shock from the corner, whose angle beta
 is the weak solution of tan(angle) = 2 cot(beta) (M² sin² beta - 1)/(M² (g + cos 2 beta) + 2).
-Measured are the pressure on the wall and the angle of the line where the pressure is half way up.
+The problem measures the pressure on the wall, and the angle of the line of half the pressure jump.
 
 Note: above the largest angle of attached shocks there is no such solution; the deck is refused.
 Source of the relation: any text on gas dynamics, e.g. NACA report 1135 (1953), equation 148.

@@ -148,7 +148,7 @@ class RayleighTaylor(Problem):
         rate = self.find_rate(history["t"], history["amplitude"]) if history else math.nan
         what = "growth rate [1/s]" if self.grows else "angular frequency [1/s]"
         mean = history.get("interface_mean", np.zeros(1))
-        head = f"rayleigh-taylor, {self.deck.above} above, {self.deck.cells} cells a wavelength"
+        head = f"rayleigh-taylor, {self.deck.above} above, {self.deck.cells} cells per wavelength"
         row = Row("rate", rate, self.exact, what, digits=7, error="rate")
         rows = [row, compare(history, "amplitude", label="last amplitude [m]", digits=4)]
         moved = f"the mean has moved by at most {np.abs(mean - mean[0]).max():.1e} m"

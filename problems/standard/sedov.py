@@ -112,7 +112,7 @@ class Sedov(Problem):
         if deck.cells == 100 and deck.geometry in PEERS:
             notes.append(f"other codes: {PEERS[deck.geometry]}")
         grid = "nodes follow the gas" if self.mesh == "follow" else "fixed grid"
-        return Report(f"sedov, {deck.geometry}, {deck.cells} cells a side, {grid}", rows, notes)
+        return Report(f"sedov, {deck.geometry}, {deck.cells} cells per side, {grid}", rows, notes)
 
     def draw(self, figure, run_data) -> None:
         """Density in the last dump with the grid, and against the radius."""

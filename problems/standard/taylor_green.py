@@ -5,7 +5,7 @@ p = 1 + (cos 2 pi x + cos 2 pi y)/4 stay as they are when heat is added and take
 rho de/dt = pi/(4 (g - 1)) (cos 3 pi x cos pi y - cos pi x cos 3 pi y).  Grids that move with
 computed velocities tangle at about t = 0.75.  Here the grid swings, with its largest distortion
 at that time, rests, or follows the exact paths, on which its corners close to 15 degrees by then.
-Measured are the mean errors of velocity and pressure.
+The problem measures the mean errors of velocity and pressure.
 
 Note: without the source the flow is no solution and the error does not fall with the cells;
 a grid that is back at its start when the error is taken tests little.

@@ -1,8 +1,8 @@
 """Isentropic vortex in a periodic square: the order of accuracy of smooth flow.
 
 The vortex of `problems.references.exact_flows` moves once through the square of 10 x 10, on a
-grid at rest or on one that swings smoothly while the flow passes.  Measured at the end is the mean
-error of the cells' densities against the exact averages.
+grid at rest or on one that swings smoothly while the flow passes.  At the end the problem measures
+the mean error of the cells' densities against the exact averages.
 
 Note: at t = 10 the exact solution is the start; a code that does nothing has no error, so see
 the picture too.

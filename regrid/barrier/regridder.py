@@ -85,7 +85,7 @@ class BarrierRegridder:
         _check_tuning(self.tuning)
         self.conditional = edge_lengths == "conditional"
         if not isinstance(curves, bool):
-            raise BadInput(f"barrier regridder: curves = {curves!r}; it has to be true or false")
+            raise BadInput(f"barrier regridder: curves = {curves!r}; it must be true or false")
         self.family = _family_weights(family)
         self.curved = curves and self.family is None
         if first_grid is not None and (self.family != (1.0, 0.0) or method != "newton"):

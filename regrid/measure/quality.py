@@ -199,6 +199,11 @@ def compute_skew(nodes: np.ndarray) -> np.ndarray:
     return np.abs((along * across).sum(axis=0)) / (np.hypot(*along) * np.hypot(*across))
 
 
+def say_not_convex(count: int) -> str:
+    """`1 cell is not convex`, `2 cells are not convex`."""
+    return f"{count} {'cell is' if count == 1 else 'cells are'} not convex"
+
+
 def find_bad_cells(nodes: np.ndarray) -> np.ndarray:
     """Cells (n, 2) as (i, j) that are not convex or not finite, worst first.
 

@@ -217,7 +217,7 @@ def find_mistakes(value: Any, kind: Any, key: str, deck: type) -> Iterator[tuple
         table = by_tag.get(value.get(tag)) if tag else tables[0]
         if table is None:
             words = ", ".join(repr(one) for one in by_tag)
-            told = f"{key}.{tag} = {show(value[tag])}; it has to be" if tag in value else ""
+            told = f"{key}.{tag} = {show(value[tag])}; it must be" if tag in value else ""
             yield key, f"{told or f'{key} lacks the key {tag!r}:'} one of {words}"
             return
         found += _find_in_table(value, table, f"{key}." if key else "", deck)
@@ -244,7 +244,7 @@ def find_mistakes(value: Any, kind: Any, key: str, deck: type) -> Iterator[tuple
     wanted = describe_type(kind) + ", finite" * (not _is_finite(value))
     if isinstance(value, str) and any("material" in one.__struct_fields__ for one in tables):
         wanted += f", such as {key} = {{ material = {show(value)} }}"
-    yield key, f"{key} = {show(value)}; it has to be {wanted}"
+    yield key, f"{key} = {show(value)}; it must be {wanted}"
 
 
 def _find_in_table(
@@ -340,8 +340,9 @@ def describe(schema: Part, part: Part) -> str:
     if kind == "array":
         return _describe_list(schema, part)
     bounds = " and ".join(f"{words} {part[k]:g}" for k, words in BOUNDS.items() if k in part)
+    bounds = f" of {bounds}" if bounds.startswith("at ") else bounds and f" {bounds}"
     form = f" of the form {part['pattern']}" if "pattern" in part else ""
-    return TYPES.get(kind, "something else") + (f" {bounds}" if bounds else "") + form
+    return TYPES.get(kind, "something else") + bounds + form
 
 
 def _describe_list(schema: Part, part: Part) -> str:

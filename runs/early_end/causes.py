@@ -70,7 +70,7 @@ MORE_BARRIER = Setting(
 MORE_SHARING = Setting("run.small_cells", "redistributes the states of more cells", value="0.1")
 GRID_AT_REST = Setting("mesh", "the grid is fixed, the gas flows through it", value="fixed")
 LESS_SHARING = Setting("run.small_cells", "redistributes the states of fewer cells", factor=0.5)
-THICKER = Setting("thickness", "damps the shortest waves of lines", factor=2.0)
+THICKER = Setting("thickness", "damps the shortest waves of interfaces", factor=2.0)
 BARRIER = Setting("regrid.name", "the regridder that finds a grid most often", value="barrier")
 FEWER_CELLS = Setting("cells", "larger cells do not follow the finest folds", factor=0.5)
 END = "end the run there (`run.t_end`)"
@@ -95,33 +95,33 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         "no grid"),
     "flat-cell": Cause(
         "no grid was found: a cell is too flat for its equations to be solved",
-        "a corner of a block, or a thin layer between two lines, is so thin that the area of its "
-        "cell is lost to round-off", (FEWER_CELLS,),
-        f"{END}; what lies between the lines is thinner than can be computed", "no grid"),
+        "a corner of a block, or a thin layer between two interfaces, is so thin that the area of "
+        "its cell is lost to round-off", (FEWER_CELLS,),
+        f"{END}; what lies between them is thinner than can be computed", "no grid"),
     "lines-cross": Cause(
-        "the line of a side crosses itself or another side",
-        "a line curls back on itself, or closes on another: a material is cut in two",
-        (THICKER, FEWER_CELLS, SMALLER_CFL), f"lines that reconnect cannot be followed: {END}",
+        "a side crosses itself or another side",
+        "an interface curls back on itself, or closes on another: a material is cut in two",
+        (THICKER, FEWER_CELLS, SMALLER_CFL), f"interfaces that reconnect cannot be followed: {END}",
         "lines cross"),
     "collapse": Cause(
         "the time step has collapsed",
         "cells become ever thinner: in a neck, a thin layer or the tip of a hook",
         (THICKER, FEWER_CELLS), END, "time step collapsed"),
     "line-torn": Cause(
-        "neighbouring nodes of a line would separate too far in one step",
-        "the flow parts two nodes of an interface or free surface faster than any step follows", (),
-        f"see where the line was cut (`shockgrid plot DIR --what interface`); {END}", "line cut"),
+        "neighbouring nodes of an interface or surface would separate too far in one step",
+        "two nodes separate faster than the time step can resolve", (),
+        f"see where it was cut (`shockgrid plot DIR --what interface`); {END}", "line cut"),
     "contact-lost": Cause(
         "a sliding contact has shrunk to nothing, or takes all of a cell, or bodies that meet "
         "penetrate far in one step",
-        "the contact point has come to the end of its line, or the other block presses through "
+        "the contact point has reached the end of its side, or the other block presses through "
         "the cells beside it", (),
         "`contact.impactor=joined` where the problem has it; other cells", "contact lost"),
     "blocks-overlap": Cause(
         "two blocks overlap",
         "a body has run into another with sides that cannot meet: contacts close between free "
         "surfaces, and free surfaces and walls, of bodies without links between them", (),
-        f"{END}, or make the sides that meet free surfaces; finer cells where one line has bent "
+        f"{END}, or make the sides that meet free surfaces; finer cells where one has bent "
         "through the other", "blocks overlap"),
     "mesh-law": Cause(
         "mesh motion: cells are not convex, or blocks are apart",
@@ -129,7 +129,7 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         (GRID_AT_REST,), "", "no grid"),
     "pistons-part": Cause(
         "`node`: two adjacent sides have incompatible velocities",
-        "two sides with given velocities meet in a node and are parallel there", (),
+        "two sides with given velocities meet at a node and are parallel there", (),
         "give both the same velocity, or put a wall between them", "pistons part"),
     "no-surface": Cause(
         "a free surface under a pressure where the material has no sound speed",
@@ -166,15 +166,17 @@ SHORT_STEPS: dict[str, tuple[str, tuple[Setting, ...]]] = {  # by what limits dt
     "hot": ("fast waves: the material is hot or moves fast, the cell is no thinner than others",
             (FEWER_CELLS,)),
     "crushed": ("crushed: all cells of the block have become thin", (FEWER_CELLS,)),
-    "stretching": ("stretching: nodes of a line part fast", (SMALLER_CFL, FEWER_CELLS)),
+    "stretching": ("stretching: neighbouring nodes of an interface or surface separate fast",
+                   (SMALLER_CFL, FEWER_CELLS)),
     "touch": ("touch: bodies come to touch, node by node", (FEWER_CELLS,)),
-    "tension": ("tension: the shortest capillary waves of a line are fast", (FEWER_CELLS,)),
-    "corner": ("corner: at a key node, where lines meet", _BESIDE),
+    "tension": ("tension: the shortest capillary waves of an interface or surface are fast",
+                (FEWER_CELLS,)),
+    "corner": ("corner: at a key node, where interfaces meet", _BESIDE),
     "sliding": ("sliding contact: in the first cells beside it", _BESIDE),
     "line": ("line: the first cells beside an interface or a surface are squeezed", _INSIDE),
     "axis": ("axis: in the first cells beside the axis", _BESIDE),
     "wall": ("wall: in the first cells beside a wall", _BESIDE),
-    "inside": ("inside: cells away from all lines are squeezed", _INSIDE),
+    "inside": ("inside: cells away from all sides are squeezed", _INSIDE),
 }  # fmt: skip
 
 

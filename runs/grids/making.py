@@ -169,9 +169,9 @@ def make_on_domain(name: str, family: str, regridder, cells: Cells, steps: int, 
         if found.folded is not None:
             return Made(found.folded, [], failure)
         return Made(found.nodes, [], failure, domain.boundary(s))
-    note = f"marched in {steps} steps, {found.cost:.2f} us a node and step"
+    note = f"marched in {steps} steps, {found.cost:.2f} us per node and step"
     if found.sub_moves or found.rescues:
-        note += f", {found.sub_moves} sub-moves, {found.rescues} rescues"
+        note += f", {found.sub_moves} sub-moves, {found.rescues} untangling events"
     return Made(found.nodes, [note])
 
 
@@ -364,9 +364,9 @@ def make_moving(
         words = f"{block.name}, family {family}: no grid at step {found.done + 1} of {steps}"
         return Made(found.nodes, [], f"{words}; {found.failure}")
     note = (
-        f"marched in {steps} steps, {found.get_cost():.2f} us a node and step (mean "
+        f"marched in {steps} steps, {found.get_cost():.2f} us per node and step (mean "
         f"{found.get_cost(mean=True):.2f}), {found.iterations} iterations, {found.sub_moves} "
-        f"sub-moves, {found.rescues} rescues"
+        f"sub-moves, {found.rescues} untangling events"
     )
     worst = (
         f"least corner sine of all steps {found.sine:.4f}; cells with a corner not positive in any "

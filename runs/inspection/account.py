@@ -22,7 +22,7 @@ History = Mapping[str, np.ndarray]
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 PREFIXED = ("m", "s", "m/s", "Pa", "J", "J/kg", "N")
 HEAD = "caution: "
-WAVES = "cells a wave"
+WAVES = "cells per wave"
 OWN_REASONS = ("start", "t_end", "end", "dump", "retry")  # of a step's length: no trend
 NONE = np.zeros(0)
 
@@ -119,8 +119,8 @@ def describe_regridding(history: History) -> str:
     for name, words, find in (
         ("regrid_iterations", "iterations", np.nansum),
         ("regrid_sub_moves", "sub-moves", np.nansum),
-        ("regrid_rescues", "rescues", np.nansum),
-        ("least_scaled_jacobian", "least scaled Jacobian", np.nanmin),
+        ("regrid_rescues", "untangling events", np.nansum),
+        ("least_scaled_jacobian", "minimum scaled Jacobian", np.nanmin),
         ("worst_aspect", "worst aspect ratio", np.nanmax),
     ):
         values = history.get(name, NONE)
@@ -204,12 +204,12 @@ def compute_drifts(history: History) -> dict[str, np.ndarray]:
 
 
 def describe_speed(history: History, cells: int) -> str:
-    """Cell updates a second of wall time and the share of each phase."""
+    """Cell updates per second of wall time and the share of each phase."""
     step = history.get("seconds_step", NONE)[2:]  # row 0 is the start; row 1 fills caches
     total = float(np.nansum(step))
     if not cells or total <= 0:
         return ""
-    text = f"{np.isfinite(step).sum() * cells / total / 1e6:.3g} million cell updates a second"
+    text = f"{np.isfinite(step).sum() * cells / total / 1e6:.3g} million cell updates per second"
     shares = [
         f"{name.removeprefix('seconds_').replace('_', ' ')} "
         f"{describe_share(float(np.nansum(values[2:])) / total)}"
@@ -290,9 +290,9 @@ RULES = (
     Rule("cells not convex",
          lambda history, cells, problem: _find_most(history, "cells_not_convex"),
          0.0, "{value:.0f} cells not convex", "most cells in a step that were not convex"),
-    Rule("rescues",
+    Rule("untangling events",
          lambda history, cells, problem: _find_mean(find_known(history, "regrid_rescues") > 0),
-         0.01, "rescues (folded grids untangled) in {share} of the steps",
+         0.01, "folded grids untangled in {share} of the steps",
          "steps in which a grid had to be untangled"),
     Rule("retries",
          lambda history, cells, problem: _find_mean(find_known(history, "retries") > 0),

@@ -127,7 +127,7 @@ def describe_plan(deck: ReadDeck) -> str:
     run, output = deck.deck.run, deck.deck.output
     limit = f", at most {run.max_steps} steps" if run.max_steps is not None else ""
     dumps = count(output.dumps + 1, "dump")
-    threads = count(run.threads, "thread") if run.threads else "one thread a large block"
+    threads = count(run.threads, "thread") if run.threads else "one thread per large block"
     lines.append(f"{dumps}, {threads}{limit}; nothing was run")
     with interpreted():
         return "\n".join(lines + describe_cautions(problem))

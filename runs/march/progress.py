@@ -47,7 +47,7 @@ BAR = "{desc} {percentage:3.0f}%|{bar:12}| {elapsed}{postfix}"
 
 
 class Progress:
-    """Shows time, steps, dt and its limiter, cell updates a second and the worst corner."""
+    """Shows time, steps, dt and its limiter, cell updates per second and the worst corner."""
 
     def __init__(self, evolution: Evolution, quiet: bool = False, stream=None, t_unit: str = "s"):
         self.t_unit = t_unit
@@ -134,7 +134,7 @@ class Progress:
             return
         ends = describe_seconds_range(found.low, found.seconds, found.high)
         a_step = (now - self._began) / self.steps
-        self.say(f"measured: {a_step * 1e3:.3g} ms a step; {ends} to the end")
+        self.say(f"measured: {a_step * 1e3:.3g} ms per step; {ends} to the end")
 
     def say(self, text: str) -> None:
         """A line for the person, above the bar if there is one; nothing when quiet."""

@@ -67,7 +67,7 @@ def make_film(
 
     field: of the dumps or derived, the density if not said; follow: the window goes with the
     interface, else it is `zoom` (x0,x1,y0,y1 [m]) or the domain, in a long one again what is about
-    the interface.  fps: frames a second, one each dump.  Raises BadInput.
+    the interface.  fps: frames per second, one each dump.  Raises BadInput.
     """
     run = RunData(directory)
     view = View(parse_zoom(zoom), mirror, mesh)

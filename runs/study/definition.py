@@ -178,7 +178,7 @@ def list_points(points: Iterable[Mapping[str, Any]]) -> list[Point]:
     """Points given one by one; BadInput where one lacks a key of the others, or two are equal."""
     given = list(points)
     if wrong := [point for point in given if not isinstance(point, Mapping)]:
-        raise BadInput(f"points: {wrong[0]!r} has to be a table of keys with values")
+        raise BadInput(f"points: {wrong[0]!r} must be a table of keys with values")
     flat = [flatten(point) for point in given]
     keys = list(dict.fromkeys(key for point in flat for key in point))
     for number, point in enumerate(flat, start=1):
@@ -340,7 +340,7 @@ def read_definition(path: Path) -> Definition:
         values = read_values(given, f"{path}: vary.{key}") if isinstance(given, str) else given
         if not isinstance(values, list):
             raise BadInput(
-                f'{path}: vary.{key} = {given!r}; it has to be a list or a range such as "1:3:5"'
+                f'{path}: vary.{key} = {given!r}; it must be a list or a range such as "1:3:5"'
             )
         vary[key] = values
     beside = path.parent / file.deck

@@ -157,7 +157,7 @@ def _is_map(study: Any, name: str) -> bool:
 
 
 def _draw_map(figure, axes, study: Any, name: str) -> None:
-    """How far a quantity is off theory, in per cent, over the two varied keys."""
+    """Error of a quantity against theory, in per cent, over the two varied keys."""
     first, second = study.definition.vary
     x, y = (make_column(list(study.definition.vary[key])).astype(float) for key in (first, second))
     errors = 100.0 * study.table[f"{name}_error"].reshape(x.size, y.size)
@@ -179,7 +179,7 @@ def _draw_map(figure, axes, study: Any, name: str) -> None:
             _mark(axis, values)
     axes.set_xlabel(first)
     axes.set_ylabel(second)
-    axes.set_title(f"{name.replace('_', ' ')}, per cent off theory", fontsize="medium")
+    axes.set_title(f"error of {name.replace('_', ' ')} [%]", fontsize="medium")
     figure.colorbar(mesh, ax=axes, label="%", ticks=BOUNDS)
 
 
@@ -242,7 +242,7 @@ def _draw_errors(axes, study: Any, name: str, series: list[Series]) -> None:
 def _draw_values(axes, study: Any, name: str, series: list[Series]) -> None:
     """Values with the uncertainty of the finest, theory dashed, a star for cells of no size.
 
-    Series that lie farther apart than they are long are drawn as what they are off theory, or off
+    Series that lie farther apart than they are long are drawn as differences from theory, or from
     their finest value where there is none.
     """
     spans = [float(np.ptp(one.values)) for one in series]
@@ -265,8 +265,10 @@ def _draw_values(axes, study: Any, name: str, series: list[Series]) -> None:
             axes.axhline(one.theory, color=colour, lw=1.0, ls="--")
         if np.isfinite(one.refined.extrapolated):
             axes.plot(0.0, show(one.refined.extrapolated), "*", color=colour, ms=9)
-    away = "theory" if known else "the finest"
-    label = f"{name.replace('_', ' ')}, per cent off {away}" if apart else _label(study, name)
+    away = "theory" if known else "the finest grid"
+    label = (
+        f"{name.replace('_', ' ')}: difference from {away} [%]" if apart else _label(study, name)
+    )
     axes.set_ylabel(label)
     axes.set_xlim(left=-0.03 * float(max((1.0 / one.cells).max() for one in series)))
     if apart and known:

@@ -78,7 +78,7 @@ FORMAT, FORMAT_VERSION = "shockgrid study", 1
 FUNCTION = re.compile(r"[\w.]+:[\w.<>]+")  # module and name
 LONG_NAMES = {
     "run": "folder in runs", "state": "how the run ended",
-    "cautions": "where not to trust the run", "step": "steps made", "t": "time at the end",
+    "cautions": "why the results may be wrong", "step": "steps made", "t": "time at the end",
     "seconds": "wall time of the steps",
 }  # fmt: skip
 
@@ -144,7 +144,7 @@ class Study:
 
     @property
     def cautions(self) -> dict[str, list[str]]:
-        """Sentences on where not to trust a run, by the name of its folder; only runs with some."""
+        """Why results of a run may be wrong, by its folder's name; only runs with sentences."""
         return {name: r.cautions for name, r in self._pairs if r is not None and r.cautions}
 
     @property

@@ -115,7 +115,7 @@ REFUSED = [  # what the deck has, what stands there instead, what is said
     ("[[0.0, 0.0], [0.2, 0.0]]", "{ points = [[0.0, 0.0], [0.2, 0.0]], cells = [5] }",
      "curve j_min has 5 cells in all; the block has 6"),
     ('curves.i_min = "cut.txt"', 'grid = "cut.txt"\ncurves.i_min = "cut.txt"', "and not both"),
-    ("mesh = \"fixed\"", "mesh = \"frozen\"", 'it has to be "fixed" or "regrid"'),
+    ("mesh = \"fixed\"", "mesh = \"frozen\"", 'it must be "fixed" or "regrid"'),
 ]  # fmt: skip
 
 

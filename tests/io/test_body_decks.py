@@ -63,7 +63,7 @@ CASES = {
     ),
     "gas without pressure": (
         [FILL.replace("1e5", "-1") + ONE],
-        "void_fill.pressure = -1; it has to be a number at least 0",
+        "void_fill.pressure = -1; it must be a number of at least 0",
     ),
     "misspelt": ([make_bonded("bnd = 1e8")], "no option 'bnd'; did you mean 'bond'"),
     "one in the other": (
@@ -107,9 +107,9 @@ def test_a_body_that_cannot_be_is_told_in_one_sentence(case, shockgrid, tmp_path
     ("settings", "words"),
     [
         (("plates.0.gap=1e-4",), "nothing is before the first plate"),
-        (("plates.1.gap=-1e-4",), "plates.1.gap = -0.0001; it has to be a number at least 0"),
-        (("void_fill.pressure=-1",), "void_fill.pressure = -1; it has to be a number at least 0"),
-        (("bond=-1",), "bond = -1; it has to be a number at least 0"),
+        (("plates.1.gap=-1e-4",), "plates.1.gap = -0.0001; it must be a number of at least 0"),
+        (("void_fill.pressure=-1",), "void_fill.pressure = -1; it must be a number of at least 0"),
+        (("bond=-1",), "bond = -1; it must be a number of at least 0"),
         (("plates=[{}]",), "plates"),
     ],
 )
@@ -123,16 +123,16 @@ def test_plates_that_cannot_be(settings, words, shockgrid):
 @pytest.mark.parametrize(
     ("deck", "setting", "words"),
     [
-        ("plate-on-wedge", "gap=-1e-3", "gap = -0.001; it has to be a number at least 0"),
+        ("plate-on-wedge", "gap=-1e-3", "gap = -0.001; it must be a number of at least 0"),
         ("plate-on-wedge-apart", "refinement=2", "finer at A only where the plate lies"),
         (
             "cavity",
             "void_fill.gamma=1",
-            "void_fill.gamma = 1; it has to be a number greater than 1",
+            "void_fill.gamma = 1; it must be a number greater than 1",
         ),
-        ("cavity", "before=0.5", "before = 0.5; it has to be a number greater than 1"),
+        ("cavity", "before=0.5", "before = 0.5; it must be a number greater than 1"),
         ("cavity", "material=air", "has no such shock"),
-        ("cavity", "speed=1e6", "speed = 1000000.0; it has to be a number"),
+        ("cavity", "speed=1e6", "speed = 1000000.0; it must be a number"),
     ],
 )
 def test_plates_and_voids_that_cannot_be(deck, setting, words, shockgrid):

@@ -37,7 +37,7 @@ class ToyDeck(Deck, kw_only=True):
     runtime = ("fail_at", "pause")
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=0.5, cfl=0.75))
-    cells: Annotated[int, Meta(ge=2, le=400, description="cells a side")] = 8
+    cells: Annotated[int, Meta(ge=2, le=400, description="cells per side")] = 8
     density: Annotated[float, Meta(gt=0)] = 1.0
     shape: Literal["flat", "wavy"] = "wavy"
     start: Hot | Cold = msgspec.field(default_factory=Hot)

@@ -1,6 +1,6 @@
 """Every step of a small `interface-instability` against a stored baseline.
 
-A steep interface (k a0 = 0.5, 16 cells a wavelength) from before the shock to well behind it: per
+A steep interface (k a0 = 0.5, 16 cells per wavelength) from before the shock to well behind it: per
 step the regridder's work, the worst corner, the grid and the time step.  `pytest tests/regression
 --update-baselines` writes the file anew; review the difference before committing it.
 """

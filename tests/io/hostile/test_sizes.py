@@ -59,7 +59,7 @@ def test_every_whole_number_of_a_deck_is_bounded(small_machine, name):
             for value in HUGE:
                 table = {"problem": name, **lay(key, value)}
                 if value > part["maximum"]:
-                    with pytest.raises(BadInput, match=r"it has to be|lacks the key"):
+                    with pytest.raises(BadInput, match=r"it must be|lacks the key"):
                         resolve_deck(table, "deck.toml")
         assert tracemalloc.get_traced_memory()[1] < 50e6
     finally:

@@ -43,11 +43,11 @@ def test_dumps_at_chosen_times_and_intervals(shockgrid):
             "output.times=[0.2,9.0]",
             "output.times has 9, which is after the end of the run, t = 0.5",
         ),
-        ("output.times=[0.0]", "output.times.0 = 0.0; it has to be a number greater than 0"),
-        ("output.every=0", "output.every = 0; it has to be a number greater than 0"),
+        ("output.times=[0.0]", "output.times.0 = 0.0; it must be a number greater than 0"),
+        ("output.every=0", "output.every = 0; it must be a number greater than 0"),
         ("output.fields=['rhoo']", "output.fields has 'rhoo'; no block has such a field"),
         ("output.precision=half", "output.precision"),
-        ("output.compression=12", "output.compression = 12; it has to be a whole number"),
+        ("output.compression=12", "output.compression = 12; it must be a whole number"),
     ],
 )
 def test_what_is_wrong_with_the_output_is_said(shockgrid, setting, words):

@@ -153,7 +153,7 @@ def test_a_good_run_has_nothing_that_limits_trust():
 @pytest.mark.parametrize(
     ("rule", "column", "bad", "good"),
     [
-        ("rescues", "regrid_rescues", fill(1, 20), fill(1, 190)),
+        ("untangling events", "regrid_rescues", fill(1, 20), fill(1, 190)),
         ("retries", "retries", fill(2, 20), fill(1, 100)),
         ("first-order faces", "first_order_faces", fill(30), fill(3)),
         ("voids", "voided_cells", fill(1, 100), fill(0)),

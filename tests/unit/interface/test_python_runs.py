@@ -40,7 +40,7 @@ def test_keywords_are_settings_of_the_deck():
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"cells": -3}, r"^cells = -3; it has to be a whole number at least"),
+        ({"cells": -3}, r"^cells = -3; it must be a whole number of at least"),
         ({"run": {"t_nd": 1.0}}, r"^there is no key 'run.t_nd'; did you mean 'run.t_end'\?"),
         ({"cells": None}, "cells = None: a deck cannot hold this"),
         ({"cells": object()}, "cells = <object.*: a deck cannot hold this"),

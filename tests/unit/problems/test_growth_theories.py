@@ -74,7 +74,7 @@ def test_the_window_ends_where_the_wave_is_steep():
     slope = 0.06 * predict_amplitude(steep.theory, window.last)
     assert slope == pytest.approx(steep.limit, rel=0.01) and 0.2 < steep.limit < 0.3
     screen = steep.problem.summary(make_history(steep.problem), None)
-    assert "theory, to k a = 0.25 where it ends" in find_row(screen, "(da/dt)")
+    assert "theory, up to k a = 0.25, its limit" in find_row(screen, "(da/dt)")
     assert abs(find_percent(find_row(screen, "(da/dt)"))) < 0.05
     assert "Padé model, rough" in screen
 

@@ -109,7 +109,7 @@ NONSENSE = [
 @pytest.mark.parametrize(("problem", "setting"), NONSENSE, ids=" ".join)
 def test_values_without_a_meaning_are_refused(problem, setting):
     key = setting.partition("=")[0]
-    with pytest.raises(BadInput, match=f"--set: {key} = .*; it has to be "):
+    with pytest.raises(BadInput, match=f"--set: {key} = .*; it must be "):
         read_deck(problem, (setting,))
 
 

@@ -80,7 +80,7 @@ def test_a_value_is_written_so_that_it_reads_the_same(value):
         ("deck = 'riemann'\nvery = 1", "no key 'very'; did you mean 'vary'"),
         ("deck = 'riemann'\n[vary]\nmach = 3", "a list or a range"),
         ("deck = 'riemann'\n[vary]\nmach = '1:2:z'", "vary.mach"),
-        ("deck = 'riemann'\npoints = 3", "points = 3; it has to be a list"),
+        ("deck = 'riemann'\npoints = 3", "points = 3; it must be a list"),
     ],
 )
 def test_wrong_study_files_are_told(tmp_path, text, told):

@@ -1,6 +1,6 @@
 """Growth of a shocked interface against linear compressible theory, and what must not change it.
 
-The fast part: one gas pair at 32 cells a wavelength, the half domain between walls against the
+The fast part: one gas pair at 32 cells per wavelength, the half domain between walls against the
 whole one, and the domain's length.  The slow part (`make verify`): four pairs at 64 and 128 cells
 against theory, and a steep interface into its mushroom stage.  Figures: `docs/verification.md`.
 """
@@ -68,7 +68,7 @@ def run_case(name: str, cells: int) -> Finished:
 
 @functools.cache
 def run_small(**deck) -> Finished:
-    """Air over SF6 at 16 cells a wavelength."""
+    """Air over SF6 at 16 cells per wavelength."""
     modes = list(deck.pop("modes", ())) or [Mode(ka0=deck.pop("ka0", 0.02))]
     regrid = Regrid(name=deck.pop("regridder", "barrier"))
     deck = {"mach": 1.2, "first": AIR, "second": SF6, **deck}

@@ -1,4 +1,4 @@
-"""A driven plate strikes a wedge; the collision point runs along the face and may emit a jet.
+"""A driven plate strikes a wedge; a collision point runs along the face and may emit a jet.
 
 The plate lies on the flat edge of the wedge body; beside it the wedge's face slopes away at
 `angle`.  A shock from the drive reaches the plate's free lower side, which flies into the gap

@@ -103,7 +103,7 @@ def test_a_spectrum_has_the_size_that_is_asked_for(even):
     ("deck", "words"),
     [
         ({"spectrum": Spectrum(first=9, last=3)}, "spectrum.last is 3; it must be at least"),
-        ({"spectrum": Spectrum(first=1, last=33)}, "show waves up to number 32 with 64 cells"),
+        ({"spectrum": Spectrum(first=1, last=33)}, "resolve waves up to number 32 with 64 cells"),
         ({"line_file": "nowhere.txt"}, "line_file 'nowhere.txt' cannot be read: No such file"),
     ],
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import importlib
 import math
 import os
@@ -58,10 +57,15 @@ class Table(dict[str, np.ndarray]):
         raise NotThere(f"the {self.name} has no column {name!r}{suggest(str(name), self)}")
 
     def __getattr__(self, name: str) -> np.ndarray:
+        if name.startswith("_"):  # asked for by copies, before there is anything
+            raise AttributeError(name)
         try:
             return self[name]
         except KeyError as error:
             raise AttributeError(str(error)) from None
+
+    def __reduce__(self) -> tuple:
+        return Table, (dict(self), self.name, self._index, self._find_units)
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *self})
@@ -194,6 +198,19 @@ class BlockData:
         return f"<block {self.name}: {self.material}, {ni} x {nj} cells>"
 
 
+class _Stored(dict[str, np.ndarray]):
+    """Arrays of a group of a dump, each read at its first use; unlike a function it can be copied
+    to another process."""
+
+    def __init__(self, path: Path, group: str):
+        self.path, self.group = path, group
+
+    def __missing__(self, name: str) -> np.ndarray:
+        with open_dump(self.path) as file, damage_told(self.path, f"{self.group}/{name}"):
+            self[name] = file[self.group][name][()]
+        return self[name]
+
+
 def _read_block(path: Path, group: Any) -> BlockData:
     """The block of a dump's group; an array is read at its first use."""
     name: str = group.name.rsplit("/", 1)[-1]
@@ -206,18 +223,14 @@ def _read_block(path: Path, group: Any) -> BlockData:
     stored = [n for n, d in state.items() if getattr(d, "shape", ()) == cells]
 
     def make_fields(names: Iterable[str], folder: str = "blocks") -> Fields:
-        @functools.cache
-        def read(field: str) -> np.ndarray:
-            with open_dump(path) as file, damage_told(path, f"{name}/{field}"):
-                return file[folder][name][field][()]
-
+        read = _Stored(path, f"{folder}/{name}").__getitem__
         return Fields(f"{path}: block {name!r}", names, read)
 
     return BlockData(
         name,
         str(group.attrs["material"]),
         ("x", "r" if radial else "y"),
-        lambda: nodes,
+        nodes.view,
         make_fields([n for n in fields if n not in at_nodes]),
         make_fields(at_nodes),
         make_fields(stored, "state"),

@@ -26,7 +26,7 @@ import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Any
@@ -127,7 +127,7 @@ class Study:
         for name in dict.fromkeys(name for result in results if result for name in result.values):
             found = [result.values.get(name) if result else None for result in results]
             table.setdefault(name, np.array(found, dtype=float))
-        return Table(table, find_units=lambda: self.units)
+        return Table(table, find_units=partial(getattr, self, "units"))
 
     @property
     def units(self) -> dict[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -208,6 +209,7 @@ def test_a_study_of_a_function_is_a_table_and_computes_once(tmp_path):
     assert made.table["sum"].tolist()[:4] == [2.0, 3.0, 3.0, 4.0]
     assert set(made.failures) == {"a=3,b=1", "a=3,b=2"} and "too large" in str(made.failures)
     assert "sum" in repr(made) and repr(made).count("\n") == 7
+    assert pickle.loads(pickle.dumps(made.table))["sum"].tolist()[:4] == [2.0, 3.0, 3.0, 4.0]
     again = study(add, {"a": [1, 2], "b": [1, 2]}, tmp_path / "s")
     assert again.table["product"].tolist() == [1.0, 2.0, 2.0, 4.0]
     with pytest.raises(BadInput, match=r"a study of the function .*:add, known to Python alone"):

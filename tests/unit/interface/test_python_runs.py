@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import os
+import pickle
 import subprocess
 import sys
 
@@ -157,6 +159,17 @@ def test_data_of_a_run(run):
     line = run.dumps[0]["left"].nodes[:, -1]
     assert np.array_equal([curve.x, curve.y], line) and curve.t == 0.0
     assert run.interface().t == 0.1
+
+
+def test_data_of_a_run_go_to_other_processes(run):
+    one = sg.open(run.path)
+    block = one.dumps[-1]["right"]
+    history, rho = one.history, block.rho
+    for other in (pickle.loads(pickle.dumps(one)), copy.deepcopy(one)):
+        assert other.history.t.tolist() == history.t.tolist()
+        assert other.history.units == history.units
+        assert np.array_equal(other.dumps[-1]["right"].rho, rho)
+        assert np.array_equal(other.dumps[-1]["right"].nodes, block.nodes)
 
 
 def test_restart_with_blocks_made_anew_ends_in_the_same_bits(run, tmp_path):

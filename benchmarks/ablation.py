@@ -197,7 +197,7 @@ def main() -> None:
             "variant": name,
             "ended": found["ended"],
             "sub-moves": found["sub_moves"],
-            "rescues": found["rescues"],
+            "untangling events": found["rescues"],
             "iterations": found["iterations"],
             "cost, s": round(found["seconds"], 2),
             **compare(found, base, names),

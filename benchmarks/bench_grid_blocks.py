@@ -70,7 +70,7 @@ def main() -> None:
                             "after": float(found.spreads[found.best]),
                             "fell in every iteration": "yes" if falls else "no",
                             "bad cells": len(find_bad_hexahedra(found.nodes)),
-                            "least sine": float(sine),
+                            "minimum scaled Jacobian": float(sine),
                             "ns per node, weight as an array": costs[0],
                             "weight as a formula": costs[1],
                         },

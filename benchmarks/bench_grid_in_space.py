@@ -44,9 +44,9 @@ def march_blocks(tables: Tables, sizes: list[int], steps: int) -> None:
                 **{
                     "cells with a corner not positive, all steps": found.corners,
                     "with a Jacobian not positive at 5³ places, at the end": found.creased,
-                    "least corner sine": found.sine,
+                    "minimum scaled Jacobian": found.sine,
                     "sub-moves": found.sub_moves,
-                    "rescues": found.rescues,
+                    "untangling events": found.rescues,
                     "solver iterations": found.iterations,
                     "us per node and step": found.get_cost(),
                     "mean": found.get_cost(mean=True),
@@ -73,7 +73,7 @@ def settle_blocks(tables: Tables, sizes: list[int]) -> None:
                 passes=passes,
                 **{
                     "bad cells": len(find_bad_hexahedra(nodes)),
-                    "least corner sine of the boolean sum": float(
+                    "minimum scaled Jacobian of the boolean sum": float(
                         compute_hexahedron_sines(first).min()
                     ),
                     "of the barrier": float(compute_hexahedron_sines(nodes).min()),

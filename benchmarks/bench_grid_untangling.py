@@ -65,7 +65,7 @@ def main() -> None:
             **{
                 "cells not convex": bad,
                 "untangled in, ms": 1e3 * least,
-                "least corner sine then": float(sine),
+                "minimum scaled Jacobian then": float(sine),
                 "nodes projected": moved,
             },
         )

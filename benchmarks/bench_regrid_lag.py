@@ -97,7 +97,7 @@ def march(tables: Tables, name: str, ni: int, nj: int) -> None:
                 "us per node and step": cost,
                 "iterations per step": sum(r.iterations for r in way.reports) / count,
                 "sub-moves": sum(r.sub_moves for r in way.reports),
-                "rescues": sum(r.rescues for r in way.reports),
+                "untangling events": sum(r.rescues for r in way.reports),
             },
         )
 

@@ -2,8 +2,8 @@
 
 regrid_suite regridders   what was run, of which version, how far it came
 regrid_suite common       the marches to whose end several came: medians and worst values
-regrid_suite plane        every plane march: gap and least sine, or the step that had no grid
-regrid_suite space        the same in space: least sine
+regrid_suite plane        every plane march: gap and smallest sine, or the step that had no grid
+regrid_suite space        the same in space: smallest sine
 regrid_suite cost         what the mushroom's roll costs a flow, with the term of the time step
 regrid_suite formulas     every march: cells, steps, words
 """
@@ -120,7 +120,14 @@ def _list_space(document: dict, rows: dict) -> list[str]:
 
 
 def _tell_cost(document: dict, rows: dict) -> list[str]:
-    heads = ["march", "regridder", "largest rate", "mean of the largest", "gap", "least sine"]
+    heads = [
+        "march",
+        "regridder",
+        "largest rate",
+        "mean of the largest",
+        "gap",
+        "minimum scaled Jacobian",
+    ]
     table = []
     for name in ("mushroom-roll", "mushroom-roll-heavy"):
         for who in ("barrier-no-cost", "barrier"):

@@ -6,9 +6,9 @@ boundary node goes in one step, `noise` shakes the deforming sides by fresh rand
 displacements every step.  Time runs from 0 to 1 over the whole motion.
 
 The closing table gives the worst of every step: first line gap (distance of the first grid line
-from a deforming side over that of the quasi-1D grid), aspect ratio, least corner sine, node speeds,
-and what the regridder did.  Note: a march ends with the first step that has no valid grid, so
-look at the number of steps before comparing the rest.
+from a deforming side over that of the quasi-1D grid), aspect ratio, scaled Jacobian (the smallest
+sine of a corner), node speeds, and what the regridder did.  Note: a march ends with the first step
+that has no valid grid, so look at the number of steps before comparing the rest.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ NUMBERS = {  # of all steps: label, what of the column, what is wanted
     "regrid_rescues": ("untangling events", np.sum, math.nan),
     "first_line_gap": ("largest first line gap", np.max, 1.0),
     "worst_aspect": ("worst aspect ratio", np.max, math.nan),
-    "least_scaled_jacobian": ("least scaled Jacobian", np.min, math.nan),
+    "least_scaled_jacobian": ("min. scaled Jacobian", np.min, math.nan),
     "node_speed_ratio": ("node speed ratio, at most 1 wanted", np.max, math.nan),
     "regrid_iterations": ("iterations per step", np.mean, math.nan),
     "far_line_bend": ("far lines from straight [cells]", np.max, math.nan),
@@ -76,7 +76,7 @@ class GridBlock:
     name = "grid"
     units: Mapping[str, str] = {"scaled_jacobian": "1", "aspect_ratio": "1"}
     long_names: Mapping[str, str] = {
-        "scaled_jacobian": "least corner sine",
+        "scaled_jacobian": "scaled Jacobian",
         "aspect_ratio": "aspect ratio",
     }
 
@@ -145,7 +145,7 @@ class GridMarch(Problem):
                 rows.append(Row(name, value, wanted, label, digits=4, off=" "))
         inner = (deck.ni - 1) * (deck.nj - 1)
         cost = 1e6 * float(np.median(made["seconds_regrid"])) / inner
-        rows.append(Row("cost", cost, label="cost a node and step, median [us]", digits=4))
+        rows.append(Row("cost", cost, label="cost per node and step, median [us]", digits=4))
         method = f" ({deck.regrid.method})" if deck.regrid.name.startswith("barrier") else ""
         head = (
             f"{deck.domain} {deck.ni} x {deck.nj}, regridder {deck.regrid.name}{method}: "
@@ -278,10 +278,10 @@ def draw_grids(figure, run_data) -> None:
 
 
 def draw_quality(figure, run_data) -> None:
-    """First line gap, aspect ratio, least corner sine and the regridder's work against time."""
+    """First line gap, aspect ratio, scaled Jacobian and the regridder's work against time."""
     figure.set_size_inches(8.0, 8.0)
     columns = "first_line_gap", "worst_aspect", "least_scaled_jacobian", "regrid_iterations"
-    words = "first line gap", "worst aspect ratio", "least corner sine", "iterations"
+    words = "first line gap", "worst aspect ratio", "minimum scaled Jacobian", "iterations"
     panels = figure.subplots(len(columns), 1)
     for axes, name, label in zip(panels, columns, words, strict=True):
         axes.plot(run_data.history["t"], run_data.history[name], linewidth=1.2)

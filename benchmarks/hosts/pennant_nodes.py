@@ -66,7 +66,7 @@ def draw(grids: dict[str, np.ndarray], path: str) -> None:
         i, j = quality.least_scaled_jacobian_at
         x, y = nodes[:, i : i + 2, j : j + 2].mean(axis=(1, 2))
         axes.plot(x, y, "o", color="red", markersize=12, fillstyle="none")
-        axes.set_title(f"{label}\nleast corner sine {quality.least_scaled_jacobian:.3f}")
+        axes.set_title(f"{label}\nminimum scaled Jacobian {quality.least_scaled_jacobian:.3f}")
         axes.set(xlabel="x", aspect="equal")
     panels[0].set_ylabel("y")
     figure.savefig(path, dpi=80, bbox_inches="tight")
@@ -98,7 +98,7 @@ def main() -> None:
                 nodes=words,
                 **{
                     "bad cells": quality.bad_cells,
-                    "least corner sine": quality.least_scaled_jacobian,
+                    "minimum scaled Jacobian": quality.least_scaled_jacobian,
                     "worst aspect": quality.worst_aspect_ratio,
                     "worst skew": quality.worst_skew,
                 },

@@ -251,7 +251,7 @@ def main() -> None:
                     "stopped at, s": "-" if through else f"{passage.stopped:.2f}",
                     "error of q": passage.error if through else "-",
                     "largest q": float(passage.pulses[-1].max()) if through else "-",
-                    "least corner sine": passage.worst_sine,
+                    "minimum scaled Jacobian": passage.worst_sine,
                     "Courant number": passage.largest_courant,
                 },
             )

@@ -166,7 +166,7 @@ def regrid_file(
     made.made_by |= {"weight": weight or ""}
     made.notes.insert(
         0,
-        f"before: {len(before.bad_cells)} cells not convex, least corner sine "
+        f"before: {len(before.bad_cells)} cells not convex, minimum scaled Jacobian "
         f"{before.least_sine:.4f}, worst aspect ratio {before.worst_aspect:.3f}",
     )
     return _finish(made, f"{file}, {family}", plan)

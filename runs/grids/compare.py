@@ -40,8 +40,8 @@ from runs.grids.making import (
 from runs.grids.quality import check_free
 
 HEAD = (
-    f"{'family':34s} {'steps':>12s} {'gap':>7s} {'least sine':>10s} {'aspect':>8s}"
-    f" {'us/node':>8s} {'sub-moves':>9s} {'rescues':>7s}"
+    f"{'family':34s} {'steps':>12s} {'gap':>7s} {'min. sine':>10s} {'aspect':>8s}"
+    f" {'us/node':>8s} {'sub-moves':>9s} {'folded':>7s}"
 )
 REASON = 110  # characters of a reason that are shown
 

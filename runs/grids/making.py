@@ -96,7 +96,7 @@ def warm_up(domain: MovingDomain, regridder) -> None:
 
 PASSES = 40
 SPATIAL_OPTIONS = ("iterations", "sides", "threads")
-MOST_LOSS = 0.5  # a pass may leave the least corner sine no smaller than this part of it
+MOST_LOSS = 0.5  # a pass may leave the minimum scaled Jacobian no smaller than this part of it
 LEAST_PART = 0.02  # of a pass
 SETTLED = 1e-3  # cells: a pass that moves no node further is the last
 
@@ -223,7 +223,7 @@ def _positive(nodes: np.ndarray) -> np.ndarray:
 def settle(nodes, boundary, regridder, passes: int, words: str) -> Made:
     """Call the family on the same sides until its grid stays, or it fails.
 
-    A pass that would more than halve the least corner sine is gone only part of the way.
+    A pass that would more than halve the minimum scaled Jacobian is gone only part of the way.
     """
     cell = np.sqrt(abs(compute_area(nodes)) / ((nodes.shape[1] - 1) * (nodes.shape[2] - 1)))
     shortened, moved, sine = 0, np.inf, _least_sine(nodes)
@@ -369,8 +369,8 @@ def make_moving(
         f"sub-moves, {found.rescues} untangling events"
     )
     worst = (
-        f"least corner sine of all steps {found.sine:.4f}; cells with a corner not positive in any "
-        f"step: {found.corners}; with a Jacobian not positive at 5x5x5 places, at the end: "
+        f"minimum scaled Jacobian of all steps {found.sine:.4f}; cells with a corner not positive "
+        f"in any step: {found.corners}; with a Jacobian not positive at 5x5x5 places, at the end: "
         f"{found.creased}"
     )
     return Made(found.nodes, [note, worst])

@@ -50,7 +50,7 @@ def draw_grid(
     image = coloured.pcolormesh(
         *nodes, sines, cmap=COLOURS, norm=Normalize(worst, 1.0), rasterized=True
     )
-    figure.colorbar(image, ax=coloured, label="least corner sine", shrink=0.9)
+    figure.colorbar(image, ax=coloured, label="scaled Jacobian", shrink=0.9)
     everything = None
     if sides is not None:
         plot_sides(plain, sides, BAD)
@@ -60,7 +60,7 @@ def draw_grid(
         axes.set_xlabel("x")
         axes.set_ylabel("y")
     bars.hist(sines[np.isfinite(sines)], bins=np.linspace(worst, 1.0, 31), color="0.4")
-    bars.set_xlabel("least corner sine")
+    bars.set_xlabel("scaled Jacobian")
     bars.set_ylabel("cells")
     bars.set_yscale("log")
     plain.set_title(title, fontsize=10)
@@ -162,7 +162,7 @@ def draw_block(
             )  # fmt: skip
         middle = sines.shape[axis] // 2
         _plot_cut(cuts, nodes, sines, axis, middle, norm)
-    for axes, words in ((surface, title), (cuts, "cut planes: least corner sine")):
+    for axes, words in ((surface, title), (cuts, "cut planes: scaled Jacobian")):
         axes.set_box_aspect(np.ptp(nodes.reshape(3, -1), axis=1))
         axes.set_title(words, fontsize=10)
         axes.tick_params(labelsize=7)
@@ -177,7 +177,7 @@ def draw_block(
         side.grid(alpha=0.3)
     else:
         side.hist(sines.ravel(), bins=30, color="0.4")
-        side.set_xlabel("least corner sine")
+        side.set_xlabel("scaled Jacobian")
         side.set_ylabel("cells")
     return save(figure, path, dpi)
 

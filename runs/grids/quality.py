@@ -39,7 +39,7 @@ BAR = 40  # characters of the longest bar of a histogram
 SINE_EDGES = (-1.0, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 ASPECT_EDGES = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)
 LONG_NAMES = {
-    "scaled_jacobian": "least corner sine",
+    "scaled_jacobian": "scaled Jacobian: smallest sine of a corner",
     "aspect_ratio": "aspect ratio",
     "skew": "cosine between the mid-lines",
     "size": "area or volume of the cell",
@@ -125,7 +125,7 @@ def describe(judgement: Judgement) -> list[str]:
     if judgement.left_handed:
         lines.append("the indices turn the other way than x, y: judged as mirrored")
     for name, label, digits, find in (
-        ("scaled_jacobian", "least corner sine", 4, np.nanargmin),
+        ("scaled_jacobian", "min. scaled Jacobian", 4, np.nanargmin),
         ("aspect_ratio", "worst aspect ratio", 3, np.nanargmax),
         ("skew", "worst skew", 4, np.nanargmax),
     ):
@@ -152,7 +152,7 @@ def describe(judgement: Judgement) -> list[str]:
 def describe_histograms(judgement: Judgement) -> list[str]:
     """Lines: how many cells have which corner sine and which aspect ratio."""
     return [
-        "cells by least corner sine",
+        "cells by scaled Jacobian",
         *_draw_bars(judgement.fields["scaled_jacobian"], SINE_EDGES),
         "cells by aspect ratio",
         *_draw_bars(judgement.fields["aspect_ratio"], ASPECT_EDGES),

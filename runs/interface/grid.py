@@ -117,7 +117,7 @@ def read(path: str | Path, block: str | None = None) -> np.ndarray:
 def quality(grid: Grid | np.ndarray | str | Path) -> Judgement:
     """What `shockgrid grid check` measures: `valid`, `bad_cells`, `least_sine`, `worst_aspect`, ...
 
-    `fields` of the cells, (ni, nj) each: the least sine of a corner, aspect ratio, skew, size.
+    `fields` of the cells, (ni, nj) each: the smallest sine of a corner, aspect ratio, skew, size.
     """
     return judge(_find_nodes(grid))
 

@@ -274,7 +274,7 @@ def judge_blocks(dump: Dump) -> list[dict[str, str]]:
                 "block": block.name + other_name(block),
                 "cells": f"{ni} x {nj}",
                 "not convex": str(len(judgement.bad_cells)),
-                "least corner sine": f"{judgement.least_sine:.3f}",
+                "minimum scaled Jacobian": f"{judgement.least_sine:.3f}",
                 "worst aspect ratio": f"{np.nanmax(fields['aspect_ratio']):.3g}",
                 "least cell [m2]": f"{np.nanmin(fields['size']):.3g}",
                 "largest cell [m2]": f"{np.nanmax(fields['size']):.3g}",

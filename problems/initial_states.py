@@ -275,8 +275,8 @@ def settle_front(front: Front, *, cfl: float, limiter: str) -> SettledFront:
     eos, rest = front.eos, [getattr(front, one.name) for one in fields(front)[1:]]
     words = pickle.dumps((type(eos).__qualname__, eos.parameters, rest, cfl, limiter)).hex()
     path = find_kept("settled", digest_sources(), words)
-    with contextlib.suppress(OSError, ValueError, EOFError):
-        first, *rows = np.load(path)
+    with contextlib.suppress(OSError, ValueError), path.open("rb") as kept:
+        first, *rows = np.lib.format.read_array(kept)
         return SettledFront(int(first[0]), *rows)
     found = _settle(front, cfl, limiter)
     file = io.BytesIO()

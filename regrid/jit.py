@@ -137,7 +137,7 @@ class KernelCache:
         return find_kept(self._function.__name__, self._contents, str(types))
 
     def load_overload(self, types, context):
-        with contextlib.suppress(OSError, EOFError, pickle.UnpicklingError):
+        with contextlib.suppress(Exception):  # no file, or a damaged one, which may raise anything
             with self._find(types, context).open("rb") as file:
                 parts = _Reader(file).load()
             context.codegen().unserialize_library = functools.partial(_Loaded, context.codegen())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import pickle
 import subprocess
 import sys
 import time
@@ -224,3 +225,15 @@ def test_code_that_uses_numpy_is_loaded_without_numba_np_and_scipy(tmp_path):
     script.write_text(LEAST)
     assert run(tmp_path, script=str(script))[0] == 2.0
     assert run(tmp_path, script=str(script)) == (2.0, 0)
+
+
+@pytest.mark.parametrize("damaged", [b"", b"\x80\x04X\x02\0\0\0\xff\xff.", pickle.dumps((1, 2))])
+def test_a_damaged_file_is_compiled_anew(tmp_path, damaged):
+    script = tmp_path / "least.py"
+    script.write_text(LEAST)
+    run(tmp_path, script=str(script))
+    (file,) = tmp_path.joinpath("cache", "kernels").iterdir()
+    whole = file.read_bytes()
+    file.write_bytes(damaged)
+    assert run(tmp_path, script=str(script))[0] == 2.0
+    assert len(file.read_bytes()) > 0.9 * len(whole)

@@ -270,7 +270,7 @@ def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
         wanted = math.ceil(problem.deck.cells * COMPARABLE / ripple.cells_a_wave)
         notes.append(
             f"{ripple.cells_a_wave:.3g} cells per wave are too few to compare growth with theory: "
-            f"the thickness of the interface holds it back; cells={wanted} or more would do"
+            f"the smoothing length of the interface slows it; take cells = {wanted} or more"
         )
     if crossed is not None:
         impulse, slip = crossed.compute_rates(k)

@@ -220,9 +220,9 @@ def doubt_polars(rows: Rows) -> list[str]:
         over = [row for row in known if abs(float(row["error in p, %"])) > POLAR_BAR]
         without = len(group) - len(known)
         told.append(
-            f"- Pressure behind A {words} {NEAR:g} degrees below the critical angle: "
-            f"{len(known) - len(over)} of {len(group)} within {POLAR_BAR:g} %; the worst is "
-            f"{_name_polar(worst)}, {worst['error in p, %']} %."
+            f"- Pressure behind A, {words} {NEAR:g} degrees below the critical angle: "
+            f"{len(known) - len(over)} of {len(group)} errors are within {POLAR_BAR:g} %; the worst "
+            f"is {_name_polar(worst)}, {worst['error in p, %']} %."
             + (f" Without a value: {without}." if without else "")
         )
     past = [row for row in rows if float(row["below critical"]) < 0.0]
@@ -248,12 +248,12 @@ def doubt_lines(rows: Rows) -> list[str]:
     """How the position of a flat interface depends on the sub-cell phase of the shock."""
     told = []
     for key, bar, words, unit in (
-        ("unevenness", LINE_BAR, "whose end position is linear in the start distance s", "cell"),
-        ("speed_scatter", SPEED_BAR, "whose late speed does not vary with s", "of the shock's"),
+        ("unevenness", LINE_BAR, "end position is linear in the start distance s", "cell"),
+        ("speed_scatter", SPEED_BAR, "late speed does not vary with s", "of the shock's"),
     ):
         over = sorted((row for row in rows if row[key] > bar), key=lambda row: -row[key])
         met = f"{len(rows) - len(over)} of {len(rows)}"
-        text = f"- Flat interfaces {words}, to {bar:g} {unit}: {met}"
+        text = f"- The {words}, to {bar:g} {unit}, for {met} flat interfaces"
         if over:
             text += f"; the worst is {_name_line(over[0])}, {over[0][key]:.2g} {unit}"
         told.append(text + ".")

@@ -221,8 +221,8 @@ def doubt_polars(rows: Rows) -> list[str]:
         without = len(group) - len(known)
         told.append(
             f"- Pressure behind A, {words} {NEAR:g} degrees below the critical angle: "
-            f"{len(known) - len(over)} of {len(group)} errors are within {POLAR_BAR:g} %; the worst "
-            f"is {_name_polar(worst)}, {worst['error in p, %']} %."
+            f"{len(known) - len(over)} of {len(group)} errors are within {POLAR_BAR:g} %; the "
+            f"worst is {_name_polar(worst)}, {worst['error in p, %']} %."
             + (f" Without a value: {without}." if without else "")
         )
     past = [row for row in rows if float(row["below critical"]) < 0.0]

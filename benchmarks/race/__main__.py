@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import subprocess
+import textwrap
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -92,10 +93,12 @@ def race(case: Case, options: argparse.Namespace) -> list[dict[str, Any]]:
     return rows
 
 
-def draw(rows: list[dict[str, Any]]) -> None:
-    """Error over CPU seconds, a panel a case."""
+def draw(document: dict[str, Any]) -> None:
+    """Error over CPU seconds, a panel per case; errors below 1e-3 % are drawn there."""
     import matplotlib.pyplot as plt
 
+    rows = document["rows"]
+    titles = {name: case["title"] for name, case in document["cases"].items()}
     names = [name for name in CASES if any(r["case"] == name for r in rows)]
     columns = 3 if len(names) > 2 else len(names)
     lines = -(-len(names) // columns)
@@ -113,7 +116,8 @@ def draw(rows: list[dict[str, Any]]) -> None:
                 width = 2.2 if code == "shockgrid" else 1.2
                 axis.loglog(seconds, errors, "o-", color=f"C{i}", label=label, lw=width, ms=4)
         axis.axhline(100.0 * BAR, color="0.6", lw=0.8, ls="--")
-        axis.set(title=name, xlabel="CPU seconds", ylabel="error [%]")
+        axis.set(xlabel="CPU seconds", ylabel="error [%]")
+        axis.set_title(textwrap.fill(titles[name], 44), fontsize=9)
         axis.legend(fontsize=8)
     figure.savefig(PICTURE, dpi=110)
 
@@ -145,7 +149,7 @@ def main() -> None:
     print("\n".join(write_tables(document)))
     if options.write:
         RESULTS.write_text(json.dumps(document, indent=1) + "\n")
-        draw(document["rows"])
+        draw(document)
 
 
 if __name__ == "__main__":

@@ -64,7 +64,7 @@ def add_sizes(tables: Tables, name: str, sizes: list[int]) -> None:
                 limit = values[-1] + (values[-1] - values[-2]) / (ratio - 1.0)
                 row["order"] = ", ".join(f"{order:.2f}" for order in orders)
                 row["extrapolated"] = f"{limit:.5f}"
-                row["off, %"] = 100.0 * float(limit / exact - 1.0)
+                row["error, %"] = 100.0 * float(limit / exact - 1.0)
             if quantity in PLACES:
                 place = PLACES[quantity]
                 row["at (reference)"] = f"{runs[-1][place]:.5f} ({getattr(reference, place):.5f})"

@@ -1,4 +1,4 @@
-"""Riemann problems of random ideal gases: how far the star states are off, pair by pair.
+"""Riemann problems of random ideal gases: errors of the star states, pair by pair.
 
 Pressures are drawn from 1e-3 to 1e3, densities from .01 to 100, both evenly in their logarithms,
 gammas from 1.1 to 3.  The right gas moves: with an odd seed up to three sound speeds of the slower

@@ -117,6 +117,7 @@ def draw(document: dict[str, Any]) -> None:
                 axis.loglog(seconds, errors, "o-", color=f"C{i}", label=label, lw=width, ms=4)
         axis.axhline(100.0 * BAR, color="0.6", lw=0.8, ls="--")
         axis.set(xlabel="CPU seconds", ylabel="error [%]")
+        axis.xaxis.set_minor_formatter("")
         axis.set_title(textwrap.fill(titles[name], 44), fontsize=9)
         axis.legend(fontsize=8)
     figure.savefig(PICTURE, dpi=110)

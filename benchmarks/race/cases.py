@@ -107,7 +107,7 @@ def make_growth(name: str = "growth") -> Case:
             "pyro": (32, 64, 128),
         }
     else:
-        title = "the same, from theory's flow behind the shocks on"
+        title = "the same, initialised from linear theory after the shock's passage"
     error_name = "rate of growth, 6 < k c t < 25, against linear compressible theory"
     return Case(name, title, error_name, numbers, cells)
 

@@ -94,6 +94,6 @@ def write_tables(document: dict[str, Any]) -> list[str]:
         lines += ["", f"## {title[0].upper()}{title[1:]}", "", f"Error: {case['error']}.", ""]
         lines += ["| code | cells | error | CPU seconds |", "|---|---|---|---|"]
         for row in (r for r in document["rows"] if r["case"] == name):
-            error = f"{100.0 * row['error']:.2g} %" if abs(row["error"]) > 1e-9 else "round-off"
+            error = f"{100.0 * row['error']:.3g} %" if abs(row["error"]) > 1e-9 else "round-off"
             lines.append(f"| {NAMES[row['code']]} | {row['cells']} | {error} | {row['cpu']:.3g} |")
     return lines[1:]

@@ -3,8 +3,8 @@
 The shock runs through the first material towards larger x, driven by a piston that moves with the
 material behind it; the second material is at rest beyond the interface.  Each material is a block,
 and the interface is the grid line between them.  A second, stronger shock may follow.  The problem
-measures the amplitude of the interface, its growth rate and how one-dimensional the far field
-stays, and compares with linear compressible theory for the deck's materials and with non-linear
+measures the amplitude of the interface, its growth rate and the transverse velocity in the far
+field, and compares with linear compressible theory for the deck's materials and with non-linear
 models.
 
 Use any consistent units: SI for the materials of the library, or rho = p = 1.

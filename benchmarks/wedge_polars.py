@@ -66,9 +66,9 @@ def measure_polar_point(deck: PlateOnWedgeDeck) -> dict:
     }
     if theory.attached:
         found |= {
-            "p": behind["p"],
+            "p": plateau.p,
             "p, theory": theory.p,
-            "error in p, %": 100.0 * (behind["p"] / theory.p - 1.0),
+            "error in p, %": 100.0 * (plateau.p / theory.p - 1.0),
             "plateau": plateau.flat,
             "scatter, %": 100.0 * plateau.scatter,
             "zone, theory": problem.zone,

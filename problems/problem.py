@@ -58,11 +58,7 @@ class BlockPlan:
 
 def plan_blocks(grids: Mapping[str, np.ndarray]) -> list[BlockPlan]:
     """Sizes of blocks whose first nodes (2, ni + 1, nj + 1) are made, by name."""
-    plans = []
-    for name, (x, y) in grids.items():
-        low, high = (float(x.min()), float(y.min())), (float(x.max()), float(y.max()))
-        plans.append(BlockPlan(name, (x.shape[0] - 1, x.shape[1] - 1), low, high))
-    return plans
+    return [BlockPlan.of_nodes(name, nodes) for name, nodes in grids.items()]
 
 
 @dataclass(frozen=True)

@@ -165,9 +165,10 @@ def keep(path: Path, contents: bytes) -> None:
         part = path.with_name(uuid.uuid4().hex)
         part.write_bytes(contents)
         part.replace(path)
-        found = sorted(path.parent.iterdir(), key=os.path.getmtime)
-        for old in found[: -KEPT_FILES // 2] if len(found) > KEPT_FILES else ():
-            old.unlink()
+        found = list(path.parent.iterdir())
+        if len(found) > KEPT_FILES:
+            for old in sorted(found, key=os.path.getmtime)[: -KEPT_FILES // 2]:
+                old.unlink()
 
 
 @functools.cache

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from runs.interface.case import Case, Hook, load
     from runs.interface.opened import OpenRun
     from runs.interface.opened import open_run as open
-    from runs.report.page import report
+    from runs.report import report
     from runs.study.study import Study, study
     from shockgrid import testing
 
@@ -86,7 +86,7 @@ MODULES = {
     "plot": "runs.interface.calls",
     "put": "hydro.boundary",
     "register": "runs.interface.calls",
-    "report": "runs.report.page",
+    "report": "runs.report",
     "restart": "runs.interface.calls",
     "run": "runs.interface.calls",
     "shock": "problems.initial_states",

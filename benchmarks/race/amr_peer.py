@@ -41,7 +41,7 @@ def write_input(name: str, numbers: dict, cells: int, ratios: list[int]) -> tupl
     claw.lower, claw.upper = [x0, y0], [x0 + nx * whole / cells, y1]
     claw.num_cells = [nx, ny // whole]
     claw.num_eqn, claw.num_aux, claw.num_waves, claw.num_ghost = 4, 0, 4, 2
-    claw.output_style, claw.output_times = 2, find_times(name, numbers).tolist()
+    claw.output_style, claw.output_times = 2, find_times(numbers).tolist()
     claw.output_format, claw.output_q_components = "ascii", "all"
     claw.output_aux_components, claw.verbosity = "none", 0
     claw.dt_variable, claw.dt_initial, claw.steps_max = True, 0.01 * whole / cells, 10**7

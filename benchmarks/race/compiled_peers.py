@@ -14,6 +14,7 @@ AMRClaw (PyClaw's method with adaptive refinement, compiled Fortran).  Its start
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import shutil
@@ -86,6 +87,7 @@ include $(CLAW)/clawutil/src/Makefile.common
 """
 
 
+@functools.cache
 def build_amrclaw(checkouts: Path, python: str) -> Path:
     """The program, built in a copy of a folder with amrclaw, classic, clawutil and riemann."""
     work = Path(tempfile.mkdtemp()) / "claw"

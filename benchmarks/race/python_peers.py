@@ -97,7 +97,7 @@ def find_crossing(row: np.ndarray, x: np.ndarray, sides: tuple, which: int) -> f
     return x[i] - place[i] / (place[i + 1] - place[i]) * (x[1] - x[0])
 
 
-def find_times(name: str, numbers: dict) -> np.ndarray:
+def find_times(numbers: dict) -> np.ndarray:
     """Times of output; an interface's count from the shock's meeting the mean interface."""
     if "times" not in numbers:
         return np.array([numbers["t_end"]])
@@ -141,12 +141,12 @@ def run_pyclaw(name: str, numbers: dict, cells: int) -> dict:
     solver.setup(solution)
     x, y = (0.5 * (f[1:] + f[:-1]) for f in (x_face, y_face))
     amplitude = []
-    times = find_times(name, numbers)
+    times = find_times(numbers)
     for t in times:
         solver.evolve_to_time(solution, t)
         if "times" in numbers:
             amplitude.append(find_line(name, numbers, solution.q[0], x, y))
-    return finish(numbers, times, amplitude, solution.q[0], x, y)
+    return finish(numbers, amplitude, solution.q[0], x, y)
 
 
 def run_pyro(name: str, numbers: dict, cells: int) -> dict:
@@ -175,7 +175,7 @@ def run_pyro(name: str, numbers: dict, cells: int) -> dict:
     code = Pyro("compressible")
     code.add_problem("race", fill)
     keys = ("mesh.xlboundary", "mesh.xrboundary", "mesh.ylboundary", "mesh.yrboundary")
-    times = find_times(name, numbers)
+    times = find_times(numbers)
     code.initialize_problem(
         "race",
         inputs_dict={
@@ -202,10 +202,10 @@ def run_pyro(name: str, numbers: dict, cells: int) -> dict:
                 amplitude[-1] = before[1] + share * (amplitude[-1] - before[1])
                 seen[-1] = times[len(seen) - 1]
     rho = np.array(code.sim.cc_data.get_var("density"))[inside]
-    return finish(numbers, np.array(seen or times), amplitude, rho, x, y)
+    return finish(numbers, amplitude, rho, x, y)
 
 
-def finish(numbers: dict, times, amplitude: list, rho, x, y) -> dict:
+def finish(numbers: dict, amplitude: list, rho, x, y) -> dict:
     """What is printed: the interface's amplitude over time, or the cells at the end."""
     if "times" in numbers:
         return {"t": numbers["times"], "amplitude": amplitude}

@@ -22,8 +22,6 @@ from benchmarks.soak.trial import Outcome, find_fault, make_random, tell_last
 ROOM = 16 << 20  # bytes of the small file system
 PAGE = 4096
 
-FULL = ("no space left", "too large", "free, and a run needs")  # what is said of a full disk
-
 
 class Disks(TrialsOfRuns):
     """A run on a disk with room for a part of it, then with room enough."""

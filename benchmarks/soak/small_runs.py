@@ -10,7 +10,6 @@ from runs.store.directory import RunDirectory
 from runs.store.files import LOCK
 
 OFTEN = ("output.dumps=4", "output.restart_every=0.02", "run.threads=1")
-POINT = '[{name="g", x=0.0, y=0.0}]'
 SMALL = {
     "interface-instability": ("cells=8", "kct_end=4"),
     "plate-on-wedge": ("cells=[24,4]", "run.max_steps=60"),

@@ -31,7 +31,7 @@ from hydro.sliding.contact import SlidingContact
 from regrid.errors import BadInput, Place, RunFailure
 from regrid.jit import kernel
 from regrid.measure.crossings import GROUP, fill_boxes, find_touching
-from regrid.sides import get_sides
+from regrid.sides import trace_outline
 
 TIMES = 101  # at which pistons are looked at beforehand
 INSIDE = 0.25  # of the cells along a side: so far in the other block is no longer beside it
@@ -294,12 +294,6 @@ def describe_depth(one: Block, other: Block) -> str:
                 words = f"; block {block.name!r} is up to {depth:.3g} m inside block "
                 found = max(found, (depth, f"{words}{around.name!r}"))
     return found[1]
-
-
-def trace_outline(nodes: np.ndarray) -> np.ndarray:
-    """Nodes (2, n) around the four sides of `nodes` (2, ni+1, nj+1)."""
-    i_min, i_max, j_min, j_max = get_sides(nodes)
-    return np.concatenate([i_min, j_max, i_max[:, ::-1], j_min[:, ::-1]], axis=1)
 
 
 def is_inside(point: tuple[float, float], nodes: np.ndarray) -> bool:

@@ -27,7 +27,7 @@ from hydro.sources import make_gravity
 from problems.blocks.deck import LINKED, BlocksDeck, BlockSide, BlockTable, CurveTable
 from problems.deck import check_digests
 from problems.pictures import draw_field
-from problems.problem import BlockPlan, Problem, Report, check_memory
+from problems.problem import Problem, Report, check_memory, plan_blocks
 from regrid.domains import distribute_by_arc_length
 from regrid.equidistribution.weights import Expression
 from regrid.errors import BadInput, RegridFailure, suggest
@@ -249,8 +249,7 @@ class Blocks(Problem):
     def plan(self):
         """End time and blocks, all files having been read and all grids made."""
         check_memory(self)
-        plans = [BlockPlan.of_nodes(name, nodes) for name, nodes in self.grids.items()]
-        return self.deck.run.t_end, plans
+        return self.deck.run.t_end, plan_blocks(self.grids)
 
     def cautions(self, history=None) -> list[str]:
         """None; without a history the grids are made, so that a check tells what is wrong."""

@@ -29,6 +29,7 @@ import numpy as np
 
 from hydro.boundary import put
 from hydro.links import join, slide
+from problems.initial_states import make_plane_grid
 from problems.references.hugoniot import shock_with_particle_speed
 from problems.references.riemann import solve_riemann
 from problems.references.shock_polars import Body, CrossedLine, cross_line
@@ -269,9 +270,6 @@ class Layout:
         def radii(split):
             return np.concatenate((split * part, (split + (deck.radius - split) * part_beside)[1:]))
 
-        def box(x, r):
-            return np.array(np.meshgrid(x, r, indexing="ij"))
-
         before = np.linspace(0.0, deck.front, parts.front + 1)
         along = np.linspace(deck.front, deck.front + deck.cone, parts.along + 1)
         behind = np.linspace(deck.front + deck.cone, deck.front + deck.length, parts.behind + 1)
@@ -282,16 +280,16 @@ class Layout:
         shift = self.ripple.compute_shift(line)[:, :, None] if self.ripple else np.zeros((2, 1, 1))
         wide = part_beside.size
         nodes = {
-            "impactor": box(np.linspace(-deck.thickness, 0, parts.impactor + 1), whole),
-            "front": box(before, whole[: cut + 1]),
-            "ring": box(before, whole[cut : parts.inside + 1]),
+            "impactor": make_plane_grid(np.linspace(-deck.thickness, 0, parts.impactor + 1), whole),
+            "front": make_plane_grid(before, whole[: cut + 1]),
+            "ring": make_plane_grid(before, whole[cut : parts.inside + 1]),
             "cone": np.array([np.repeat(along[:, None], part.size, 1), edge * part]) + shift * part,
             "beside": np.array(
                 [np.repeat(along[:, None], wide, 1), edge + (deck.radius - edge) * part_beside]
             )
             + shift * (1.0 - part_beside),
-            "behind": box(behind, radii(deck.tip)),
-            "side": box(
+            "behind": make_plane_grid(behind, radii(deck.tip)),
+            "side": make_plane_grid(
                 np.concatenate((before[:-1] if self.open else before[:0], along, behind[1:])),
                 outside,
             ),

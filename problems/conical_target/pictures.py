@@ -32,10 +32,6 @@ PAINTED = ("impactor", "front", "side", "cone", "ring", "beside", "behind")
 SHOWN = 6  # dumps in a picture that shows several times
 
 
-def _get_cone(dump):
-    return next(block for block in dump.blocks if block.name == "cone")
-
-
 def _find_outlines(dump, following: set[tuple[str, str]]) -> list[np.ndarray]:
     """Polylines (2, n) [m] of the blocks' sides, cut where they are seams in one material.
 
@@ -109,7 +105,7 @@ def draw_configuration(problem, figure, run) -> None:
     for axis in (near, corner):
         axis.set_facecolor(FACES["shell"])  # what shows between chords and the line is the shell's
         _draw_materials(axis, last, {}, following, grid=True)
-    cone = MM * _get_cone(last).nodes
+    cone = MM * last.block("cone").nodes
     (left, _), (right, high) = cone.min(axis=(1, 2)), cone.max(axis=(1, 2))
     near.set(xlim=(left - 1.5, right + 1.5), ylim=(0.0, high + 1.5))
     near.set_title(f"the graphite at {last.t * US:.3g} us", fontsize="medium")
@@ -127,12 +123,12 @@ def draw_graphite(problem, figure, run) -> None:
     part.plot(US * t, 100.0 * share, color="k")
     part.set(xlim=(0.0, US * t[-1]), ylim=(0.0, None))
     part.set(xlabel="t [us]", ylabel="in the second phase [% of the cone's mass]")
-    tops = [float(_get_cone(dump).cell_fields["p"].max()) for dump in run.dumps]
+    tops = [float(dump.block("cone").cell_fields["p"].max()) for dump in run.dumps]
     shares = [float(np.interp(dump.t, t, share)) for dump in run.dumps]
     most = run.dumps[int(np.argmax(shares if max(shares) > 0.0 else tops))]
     lowest = 0.0
     for dump in sorted({*spread_dumps(run, SHOWN)[1:], most}, key=lambda dump: dump.t):
-        fields = _get_cone(dump).cell_fields
+        fields = dump.block("cone").cell_fields
         rho, p = fields["rho"].ravel(), GPA * fields["p"].ravel()
         states.plot(rho, p, ".", ms=1.5, zorder=2, label=f"{US * dump.t:.3g} us")
         lowest = min(lowest, p.min())
@@ -147,7 +143,7 @@ def draw_graphite(problem, figure, run) -> None:
     states.locator_params(axis="x", nbins=5)
     states.set(xlabel="density [kg/m3]", ylabel="pressure [GPa]")
     states.legend(fontsize="x-small", markerscale=4.0, loc="upper left")
-    cone = _get_cone(most)
+    cone = most.block("cone")
     values = 100.0 * eos.compute_second_part(cone.cell_fields["rho"])
     picture = map_axes.pcolormesh(
         *(MM * cone.nodes), values, cmap="magma_r", vmin=0.0, rasterized=True
@@ -222,7 +218,7 @@ def draw_side(problem, figure, run) -> None:
     figure.set_size_inches(13.5, 4.0)
     shape, away, growth = figure.subplots(1, 3)
     for dump in spread_dumps(run, SHOWN):
-        line, label = _get_cone(dump).nodes[:, :, -1], f"{US * dump.t:.2g} us"
+        line, label = dump.block("cone").nodes[:, :, -1], f"{US * dump.t:.2g} us"
         departure, part = measure_departure(line)
         shape.plot(*(MM * line), lw=1.0, label=label)
         away.plot(part, MM * departure, lw=1.0, label=label)
@@ -249,8 +245,8 @@ def draw_ripple(problem, figure, run) -> None:
     amplitude, growth = (figure.add_subplot(grid[1, column]) for column in (0, 1))
     dumps, k = spread_dumps(run, SHOWN), problem.ripple.wavenumber
     for shade, dump in zip(np.linspace(0.0, 0.9, len(dumps)), dumps, strict=True):
-        line, style = MM * _get_cone(dump).nodes[:, :, -1], {"color": colormaps["viridis"](shade)}
-        shape.plot(*line, lw=1.4, label=f"{US * dump.t:.2g} us", **style)
+        line, colour = MM * dump.block("cone").nodes[:, :, -1], colormaps["viridis"](shade)
+        shape.plot(*line, lw=1.4, label=f"{US * dump.t:.2g} us", color=colour)
     shape.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
     shape.set_title("line between graphite and lead", fontsize="medium")
     shape.legend(fontsize="small", frameon=False, loc="upper right")

@@ -299,8 +299,7 @@ class BoxProblem(Problem):
 
     def draw_nusselt(self, figure, run_data) -> None:
         """Local Nusselt number along two walls in the last dump, and the reference's maximum."""
-        _, *state = self.read_dump(run_data.dumps[-1])
-        equations, heat = state
+        _, equations, heat = self.read_dump(run_data.dumps[-1])
         state = equations, self.fluid, heat
         figure.set_size_inches(7.0, 4.6)
         axis, (hot, cold) = figure.subplots(), self.hot_and_cold

@@ -22,7 +22,7 @@ from typing import Literal
 from hydro.convection import measure
 from hydro.convection.box import Wall, make_fluid
 from hydro.convection.steady import SteadySolver, make_rest
-from problems.convection.boxes import AxisGrid, BoxProblem, SteadyEvolution
+from problems.convection.boxes import SIDES, AxisGrid, BoxProblem, SteadyEvolution
 from problems.deck import Deck, DeckTable, Output, RunControl, key
 from problems.problem import Report, compare, get_last
 from problems.references.convection import PRANDTL, STATES, CavityState
@@ -111,8 +111,7 @@ class HeatedCavity(BoxProblem):
         direction = None if deck.gravity is None else tuple(deck.gravity)
         self.fluid = make_fluid(deck.rayleigh, deck.prandtl, deck.tilt, direction)
         self.extent = 1.0, deck.aspect
-        names = {"i_min": "left", "i_max": "right", "j_min": "bottom", "j_max": "top"}
-        self.walls = {side: getattr(deck, name).make(name) for side, name in names.items()}
+        self.walls = {side: getattr(deck, name).make(name) for side, name in SIDES.items()}
         known = deck.left.heat == "isothermal" and deck.right.heat == "isothermal"
         # the scale of the Nusselt number: the difference of the sides, or 1 K without one
         self.scale = (abs(deck.left.value - deck.right.value) if known else 1.0) or 1.0

@@ -29,6 +29,7 @@ from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.links import join, slide
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, check_solid, key
+from problems.initial_states import make_plane_grid
 from problems.plate_on_wedge.report import COLUMNS, WIDE_ZONE, find_cautions, make_report
 from problems.plate_on_wedge.run import PlateRun
 from problems.problem import Problem, Report, check_memory, plan_blocks
@@ -304,7 +305,7 @@ class PlateOnWedge(Problem):
         deck = self.deck
         x, top, on_edge = self.make_lines()
         y = deck.gap + self.lay_rows(deck.cells[1], deck.thickness)
-        plate = np.array(np.meshgrid(x, y, indexing="ij"))
+        plate = make_plane_grid(x, y)
         rows = max(6, round(deck.depth / self.coarse_spacing))
         bottom = np.array([arc_law(top) * self.foot, np.full(top.shape[1], self.base)])
         part = self.lay_rows(rows, 1.0, from_end=True)
@@ -417,7 +418,7 @@ class PlateOnWedge(Problem):
             x, _, _ = self.make_lines()
             rows = max(4, round(drive.thickness / self.deck.thickness * self.deck.cells[1]))
             y = self.deck.gap + self.deck.thickness + np.linspace(0.0, drive.thickness, rows + 1)
-            nodes = np.array(np.meshgrid(x, y, indexing="ij"))
+            nodes = make_plane_grid(x, y)
             flyer = self.make_block(
                 "flyer", nodes, (0.0, -drive.speed), find_material(drive.material)
             )

@@ -225,14 +225,13 @@ def reduce_known(reduce: Callable[[np.ndarray], np.floating], values: np.ndarray
 
 
 def measure_behind(problem, history) -> dict[str, float]:
-    """Pressure behind A, both deflections and shock angles [rad] on the face's last part."""
+    """Both deflections and shock angles behind A [rad] on the face's last part."""
     rows = choose_rows(problem, history, STEADY)
     turn, plate, wedge = (
         math.radians(reduce_known(np.nanmean, history[name][rows]))
         for name in ("interface_angle", "shock_angle_plate", "shock_angle_wedge")
     )
     return {
-        "p": measure_plateau(problem, history).p,
         "theta_plate": turn,
         "theta_wedge": problem.angle - turn,
         "shock_plate": plate,
@@ -282,9 +281,9 @@ def make_report(problem, history, final) -> Report:
     rows.append(Row("contact_speed", speed, theory.contact_speed, words, 1e3, 5, source=source))
     if theory.attached:
         found, degree = measure_behind(problem, history), math.pi / 180.0
-        source = describe_plateau(measure_plateau(problem, history))
-        words = "pressure behind A [GPa]"
-        rows.append(Row("pressure", found["p"], theory.p, words, 1e9, 5, source=source))
+        plateau = measure_plateau(problem, history)
+        source, words = describe_plateau(plateau), "pressure behind A [GPa]"
+        rows.append(Row("pressure", plateau.p, theory.p, words, 1e9, 5, source=source))
         for name, wave in (("plate", theory.plate), ("wedge", theory.wedge)):
             turn, words = found[f"theta_{name}"], f"deflection of the {name} [deg]"
             rows.append(Row(f"theta_{name}", turn, wave.deflection, words, degree, 5))

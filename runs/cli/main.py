@@ -335,7 +335,7 @@ def report(directory, output, film, dpi) -> None:
     The file is complete and needs no network.  A study's report links those of its
     runs.  Needs the extra: pip install 'shockgrid[report]'.
     """
-    from runs.report.page import report as write_report
+    from runs.report import report as write_report
 
     echo(write_report(directory, output, film=film, dpi=dpi, say=_say))
 

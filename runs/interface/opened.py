@@ -167,7 +167,7 @@ class OpenRun(Drawn, RunData):
 
         options: film (bool), dpi.  Raises BadInput where the extra `report` is not installed.
         """
-        from runs.report.page import report
+        from runs.report import report
 
         return report(self.path, output, **options)
 

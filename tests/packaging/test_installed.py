@@ -93,7 +93,7 @@ def test_packaged_data_are_there(call):
         if name.endswith(".toml"):
             assert name.removesuffix(".toml") in shown
     assert files("hydro").joinpath("eos", "materials.toml").is_file()
-    assert files("runs").joinpath("report", "run.html.j2").is_file()
+    assert files("runs").joinpath("templates", "run.html.j2").is_file()
     assert files("problems").joinpath("interface_instability", "accuracy.json").is_file()
 
 

@@ -16,7 +16,7 @@ from PIL import Image
 pytest.importorskip("plotly")
 pytest.importorskip("jinja2")
 
-from runs.report.page import PICTURES, make_report
+from runs.report import PICTURES, make_report
 
 
 class Page(HTMLParser):
@@ -60,7 +60,7 @@ def run(shockgrid):
 @pytest.fixture
 def few_pictures(monkeypatch):
     """Pages with the problem's own picture alone, where others do not matter."""
-    monkeypatch.setattr("runs.report.page.PICTURES", PICTURES[:1])
+    monkeypatch.setattr("runs.report.PICTURES", PICTURES[:1])
 
 
 def test_a_page_has_all_in_it_and_nothing_from_a_network(run, shockgrid):

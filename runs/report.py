@@ -141,7 +141,7 @@ def thin(t: np.ndarray, values: np.ndarray, most: int = MOST) -> tuple[np.ndarra
     return t[kept], values[kept]
 
 
-TEMPLATES = Path(__file__).resolve().parent
+TEMPLATES = Path(__file__).resolve().with_name("templates")
 KINDS = {".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4", ".toml": "text/plain"}
 PICTURES = (  # heading, words of `shockgrid plot`
     ("{field} at four times", {}),
@@ -190,7 +190,7 @@ def check_path(path: Path) -> None:
 
 
 def load_template(name: str) -> Any:
-    """A template of this folder, in which all words are escaped; BadInput without jinja2."""
+    """A template of TEMPLATES, in which all words are escaped; BadInput without jinja2."""
     try:
         import jinja2
     except ImportError as error:

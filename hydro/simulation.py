@@ -103,7 +103,7 @@ class Simulation:
         self._mesh = mesh
         self._line_rule = line_rule or LineRule()
         self._source = source
-        self._void_fill, self._find_end = void_fill, find_end or (lambda simulation: None)
+        self._void_fill, self._find_end = void_fill, find_end
         self.refining, self._counts_cells = refining, refining is not None
         self._connect(blocks, links, make_regridder)
         self._overlaps.check_pistons(float(t_end))
@@ -273,9 +273,13 @@ class Simulation:
             ranks.bring_states()
             own = [self._measure_block(self._blocks[number]) for number in ranks.own]
             self._measured = list(ranks.share_rows(own, self._measured_numbers))
+        self._note_end()  # within the step: every rank has what it reads
         ranks.end_step()
-        self.finished = self.finished or self._find_end(self)
         return row
+
+    def _note_end(self) -> None:
+        if self.finished is None and self._find_end is not None:
+            self.finished = self._find_end(self)
 
     def _refine(self, refining: Refining) -> None:
         """Add or take away grid lines where it is time and a grid is found for them."""
@@ -413,7 +417,7 @@ class Simulation:
             block.void_energy[...] = state[f"{block.name}/void_energy"]
             block.rates[...] = state[f"{block.name}/rates"]
         self.small_cells.find_fastest()
-        self.finished = self.finished or self._find_end(self)
+        self._note_end()
 
 
 def _find_smallest(block: Block) -> tuple[int, int]:

@@ -150,6 +150,14 @@ def test_a_run_with_a_cut_block_and_its_restart_on_another_cut(tmp_path):
             np.testing.assert_array_equal(one[column], other[column], err_msg=column)
 
 
+@pytest.mark.slow
+def test_an_end_that_is_looked_for_in_each_step(tmp_path):
+    words = ("run", "cavity", "--set", "run.max_steps=5", "--set", "run.threads=1", "-q", "-o")
+    run_on_ranks(2, *words, tmp_path / "ranks")
+    assert main([*words, str(tmp_path / "alone")]) == 0
+    assert main(["compare", str(tmp_path / "alone"), str(tmp_path / "ranks")]) == 0
+
+
 RUN = ("triple-point", "--set", "cells=8", "--set", "output.dumps=2000", "-q")
 STEPS = 6
 

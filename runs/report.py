@@ -214,10 +214,14 @@ def describe_run_in_words(run: RunData, left_out: list[str]) -> dict[str, Any]:
         cautions = describe_cautions(run.problem, history)
         errors = run.problem.errors(history) if marched else {}
         theory, script = find_own_words(run), run.problem.say_repeat()
-        verdict = find_verdict(run)
     except (BadInput, RunFailure, KeyError, ValueError, IndexError) as error:  # of another version
         left_out.append(f"what the problem says ({error})")
-        cautions, errors, theory, script, verdict = [], {}, "", "", None
+        cautions, errors, theory, script = [], {}, "", ""
+    try:
+        verdict = find_verdict(run)
+    except BadInput as error:
+        left_out.append(f"the verdict ({error})")
+        verdict = None
     left_out += run.skipped
     drifts = measure_drifts(history) if marched else {}
     states = [(describe_state(last, history), bool(last.finished))] if last else []

@@ -204,7 +204,7 @@ def report(differences: list[Difference], a: Side, b: Side) -> list[str]:
 
 def _describe_makers(a: Side, b: Side) -> list[str]:
     """A line on what differs in what made the two: versions, commit, packages; [] for nothing."""
-    one, other = (side.dumps[-1].provenance if side.dumps else {} for side in (a, b))
+    one, other = (side.dumps[-1].provenance for side in (a, b))
     names = [n for n in one if n in other and n != "deck_sha256" and one[n] != other[n]]
     words = ", ".join(f"{n} {one[n] or 'unknown'} and {other[n] or 'unknown'}" for n in names)
     return [f"made by different versions: {words}"] if names else []
@@ -228,7 +228,7 @@ class Norms(NamedTuple):
 
 def _needs_norms(a: Side, b: Side) -> bool:
     """Are they of the same blocks with other cells, or runs with other steps?"""
-    if not (a.dumps and b.dumps) or a.dumps[0].problem != b.dumps[0].problem:
+    if a.dumps[0].problem != b.dumps[0].problem:
         return False
     one, other = ({k.name: k.cells for k in side.dumps[0].blocks} for side in (a, b))
     return list(one) == list(other) and (one != other or bool(find_other_steps(a, b)))

@@ -357,7 +357,6 @@ def describe_array(data: h5py.Dataset) -> str:
     extent, told = "" if values.size else "empty", []
     if values.dtype.kind in "fiub":
         finite, nans = values[np.isfinite(values)], int(np.isnan(values).sum())
-        extent = extent or "nothing finite"
         if values.size:
             extent = (
                 f"{finite.min():.7g} to {finite.max():.7g}" if finite.size else "nothing finite"

@@ -31,7 +31,7 @@ _told = False  # has this command said it?
 
 
 @contextlib.contextmanager
-def compiling(quiet: bool, stream: Any = None, helped: bool = True) -> Iterator[None]:
+def compiling(quiet: bool, helped: bool = True) -> Iterator[None]:
     """In the block, or in the one around it, compiling is told to a person and `helped`.
 
     In a terminal it is a bar, elsewhere a line, once a command.  Kernels that come from the disk,
@@ -42,7 +42,7 @@ def compiling(quiet: bool, stream: Any = None, helped: bool = True) -> Iterator[
         return
     helped = helped and (os.cpu_count() or 1) > 1 and os.environ.get("SHOCKGRID_COMPILERS") != "1"
     done = threading.Event()
-    words = done, stream or sys.stderr, quiet, helped
+    words = done, sys.stderr, quiet, helped
     watcher = threading.Thread(target=_watch, args=words, daemon=True)
     watcher.start()
     try:

@@ -73,8 +73,9 @@ PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 check: lint
 	@$(PYTEST) tests/unit tests/property -m 'not slow and not kernels'
 
-test: lint
-	@$(PYTEST)
+# Lint runs beside the tests; its words come first.
+test: $(DEVELOP)
+	@$(MAKE) --no-print-directory lint & $(PYTEST) && wait $$!
 
 verify: lint
 	@$(PYTEST) -m 'slow or not slow'

@@ -8,10 +8,12 @@ from pathlib import PurePath
 
 import numpy as np
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
-settings.register_profile("ci", derandomize=True, deadline=None, print_blob=True)
-settings.register_profile("dev", deadline=None)
+# nothing fails for the time that it takes
+UNTIMED = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+settings.register_profile("ci", derandomize=True, print_blob=True, **UNTIMED)
+settings.register_profile("dev", **UNTIMED)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "dev"))
 
 # runs that tests start compile in one process: pytest's workers have the other processors
@@ -114,6 +116,9 @@ KERNEL_GROUPS = {
         "unit/hydro/ranks/*.py", "unit/hydro/remap/*.py", "unit/hydro/test_pieces.py",
         "unit/problems/*.py", "verification/contacts/*.py", "verification/problems/*.py",
     ),
+    # processes of their own take long: these come before the shorter files
+    "cache": ("unit/test_kernel_cache.py",), "ranks": ("io/mpi/*.py",),
+    "studies": ("io/studies/*.py",),
 }  # fmt: skip
 
 

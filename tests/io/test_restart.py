@@ -5,8 +5,10 @@ from __future__ import annotations
 import random
 import signal
 import time
+from pathlib import Path
 
 import pytest
+from toy_problem import wait_for
 
 from runs.store.reader import RunData
 
@@ -28,9 +30,7 @@ def test_run_of_2n_steps_is_n_and_n(shockgrid):
 def test_killed_at_a_random_moment(shockgrid, spawn, toy, seed):
     assert shockgrid("run", "toy", "-o", "whole", "-q", "--set", "pause=0.004")[0] == 0
     process = spawn("run", "toy", "-o", "killed", "-q", "--set", "pause=0.004")
-    while not (toy / "killed" / "dumps" / "dump_000000.h5").exists():
-        assert process.poll() is None
-        time.sleep(0.005)
+    wait_for(toy / "killed/dumps/dump_000000.h5", process)
     time.sleep(random.Random(seed).uniform(0.0, 0.3))
     process.kill()
     process.wait()
@@ -45,22 +45,18 @@ def test_killed_at_a_random_moment(shockgrid, spawn, toy, seed):
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_signal_leaves_a_restart_point(shockgrid, spawn, toy, number, code):
-    process = spawn("run", "toy", "-o", "stopped", "--set", "pause=0.02", "--set", "output.dumps=1")
-    while (
-        len(RunData("stopped").history.get("t", ())) < 4
-        if (toy / "stopped/deck.toml").exists()
-        else 1
-    ):
-        assert process.poll() is None
-        time.sleep(0.01)
+    words = ("--set", "output.dumps=1")
+    process = spawn("run", "toy", "-o", "stopped", *words, "--set", "holds=[4]")
+    wait_for(toy / "held-4", process)
     process.send_signal(number)
+    Path("go-4").touch()
     output, error = process.communicate()
     assert process.returncode == code, error
     assert "stopped by" in output and "shockgrid restart stopped" in output
-    step = RunData("stopped").history["step"][-1]
-    assert RunData("stopped").directory.list_points()[-1][0] == step
-    assert shockgrid("restart", "stopped", "-q", "--set", "output.dumps=1")[0] == 0
-    shockgrid("run", "toy", "-o", "whole", "-q", "--set", "output.dumps=1", "--set", "pause=0.02")
+    assert RunData("stopped").history["step"][-1] == 5
+    assert RunData("stopped").directory.list_points()[-1][0] == 5
+    assert shockgrid("restart", "stopped", "-q", *words)[0] == 0
+    shockgrid("run", "toy", "-o", "whole", "-q", *words)
     code, text, _ = shockgrid("compare", "whole", "stopped")
     assert code == 0, text
     assert not RunData("stopped").directory.list_files("restart")

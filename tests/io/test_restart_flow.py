@@ -23,6 +23,7 @@ GAS = (
 )
 METAL = (
     "interface-instability-al-ss304",
+    "--set=limiter=monotonised-central",  # whose kernels other tests have compiled
     "--set=lengths=[1e-3,1e-3]",
     "--set=modes=[{ka0=0.5}]",
     "--set=cells=12",

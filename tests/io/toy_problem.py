@@ -34,7 +34,7 @@ class Mode(DeckTable, kw_only=True):
 
 
 class ToyDeck(Deck, kw_only=True):
-    runtime = ("fail_at", "pause")
+    runtime = ("fail_at", "pause", "holds")
 
     run: RunControl = msgspec.field(default_factory=lambda: RunControl(t_end=0.5, cfl=0.75))
     cells: Annotated[int, Meta(ge=2, le=400, description="cells per side")] = 8
@@ -44,6 +44,14 @@ class ToyDeck(Deck, kw_only=True):
     modes: list[Mode] = msgspec.field(default_factory=list)
     fail_at: int = -1
     pause: Annotated[float, Meta(ge=0)] = 0.0
+    holds: list[int] = msgspec.field(default_factory=list)
+
+
+def hold(step: int) -> None:
+    """Touch a file `held-STEP`, and wait for `go-STEP`."""
+    Path(f"held-{step}").touch()
+    while not Path(f"go-{step}").exists():
+        time.sleep(0.002)
 
 
 class ToyBlock:
@@ -87,6 +95,8 @@ class ToyEvolution:
         if self.step == self.deck.fail_at:
             raise RunFailure(f"block 'left', cell (1, 2), t = {self.t:.3g} s: density -1")
         time.sleep(self.deck.pause)
+        if self.step in self.deck.holds:
+            hold(self.step)
         left, right = (block.heat for block in self.blocks)
         dt = 0.01 * (1 + 0.1 * self.random.random()) / float(left.max()) ** 0.5
         limit = "diffusion"
@@ -174,6 +184,13 @@ def register():
     from problems.registry import PROBLEMS
 
     PROBLEMS["toy"] = "toy_problem:Toy"
+
+
+def wait_for(path: Path, process) -> None:
+    """Wait until the process has made a file; fails where it ends without."""
+    while not path.exists():
+        assert process.poll() is None or path.exists(), process.communicate()
+        time.sleep(0.002)
 
 
 if __name__ == "__main__":

@@ -52,6 +52,12 @@ def test_a_run_with_followers_writes_what_a_run_alone_writes(tmp_path):
     assert "shared by 3 ranks of MPI; blocks of rank 0: " in log
 
 
+def test_a_problem_that_is_no_flow_is_refused_before_anything_is_written(tmp_path):
+    with pytest.raises(BadInput, match="run it without mpiexec"):
+        run_with_followers(2, tmp_path / "none", (), "grid-march-strip")
+    assert not (tmp_path / "none").exists()
+
+
 def test_a_follower_that_cannot_build_the_flow_says_so_and_breaks_off(tmp_path, monkeypatch):
     screens = io.StringIO()
 

@@ -223,9 +223,9 @@ def main(gas: str, cells: str, last: str) -> None:
     problem = ShockBubble(ShockBubbleDeck(gas=gas))
     history = march(problem, int(cells), problem.arrival + float(last) * MICRO)
     for feature in FEATURES[gas]:
-        print(f"{feature.words:28s}{problem.fit_velocity(history, feature):8.1f} m/s")
+        print(f"{feature.words:28s}{problem.fit_velocity(history, feature)[1]:8.1f} m/s")
     if gas in FOCUS:
-        print(f"{'focus':28s}{problem.find_focus(history) / MICRO:8.1f} us")
+        print(f"{'focus':28s}{problem.find_focus(history):8.1f} us")
 
 
 if __name__ == "__main__":

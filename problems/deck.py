@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union, get_args
 
@@ -246,37 +245,28 @@ class Deck(DeckTable, kw_only=True):
 MOST_POINTS = 10_000  # of all gauges together
 
 
-@dataclass(frozen=True)
-class GaugePoint:
-    """One gauge: its name, first place [m], whether it goes with the material, and its fields."""
-
-    name: str
-    at: tuple[float, float]
-    moves: bool
-    fields: tuple[str, ...]
-
-
-def place_gauges(tables: Iterable[Gauge]) -> list[GaugePoint]:
-    """All points of the `[[gauge]]` tables, in their order.
+def place_gauges(tables: Iterable[Gauge]) -> list[Gauge]:
+    """The points of the `[[gauge]]` tables in their order, a gauge without `to` each.
 
     Raises BadInput for a name that comes twice and for a line without `to` or of one point.
     """
     tables = list(tables)
     if (count := sum(gauge.count for gauge in tables)) > MOST_POINTS:
         raise BadInput(f"deck: gauge: {count} points in all; at most {MOST_POINTS} are followed")
-    points: list[GaugePoint] = []
+    points: list[Gauge] = []
     for number, gauge in enumerate(tables):
         key = f"deck: gauge.{number} ({gauge.name!r})"
         if (gauge.to is None) != (gauge.count == 1):
             missing = "a line needs its end `to`" if gauge.to is None else "give `count` above 1"
             raise BadInput(f"{key}: count = {gauge.count}; {missing}")
-        fields = tuple(dict.fromkeys(gauge.fields))
+        fields = list(dict.fromkeys(gauge.fields))
         for k in range(gauge.count):
             part = k / (gauge.count - 1) if gauge.to else 0.0
             (x, y), (x_end, y_end) = gauge.at, gauge.to or gauge.at
             at = (1.0 - part) * x + part * x_end, (1.0 - part) * y + part * y_end
             name = f"{gauge.name}_{k + 1}" if gauge.to else gauge.name
-            points.append(GaugePoint(name, at, gauge.moves, fields))
+            point = {"name": name, "at": at, "to": None, "count": 1, "fields": fields}
+            points.append(msgspec.structs.replace(gauge, **point))
     columns: dict[str, str] = {"step": "the step", "t": "the time", "outside": "a count"}
     for point in points:
         for column in list_columns(point):
@@ -289,7 +279,7 @@ def place_gauges(tables: Iterable[Gauge]) -> list[GaugePoint]:
     return points
 
 
-def list_columns(point: GaugePoint) -> list[str]:
+def list_columns(point: Gauge) -> list[str]:
     """Names of the columns that a gauge has in gauges.csv: place (if it moves), block, fields."""
     own = ["x", "y"] if point.moves else []
     return [f"{point.name}_{word}" for word in (*own, "block", *point.fields)]
@@ -302,13 +292,11 @@ def place_file(name: str, folder: Path) -> str:
 
 def compute_digests(names: Iterable[str], known: Mapping[str, str]) -> dict[str, str]:
     """The digests (sha256) of those of the files that can be read; known ones are kept."""
-    digests = {}
-    for name in dict.fromkeys(names):
-        if name in known:
-            digests[name] = known[name]
-        elif Path(name).is_file():
-            digests[name] = hashlib.sha256(Path(name).read_bytes()).hexdigest()
-    return digests
+    return {
+        name: known.get(name) or hashlib.sha256(Path(name).read_bytes()).hexdigest()
+        for name in dict.fromkeys(names)
+        if name in known or Path(name).is_file()
+    }
 
 
 def check_digests(digests: Mapping[str, str]) -> None:

@@ -104,6 +104,7 @@ class GridMarch(Problem):
     """The problem; also makes the steps' boundaries, which tests and benchmarks use."""
 
     Deck = GridMarchDeck
+    counted = ("ni", "nj")
 
     def __init__(self, deck: GridMarchDeck):
         super().__init__(deck)
@@ -116,9 +117,6 @@ class GridMarch(Problem):
     def make_domain(self) -> MovingDomain:
         domain = make_domain(self.deck.domain, self.deck.ni, self.deck.nj)
         return domain.transposed() if self.deck.transposed else domain
-
-    def estimate_cells(self) -> int:
-        return self.deck.ni * self.deck.nj
 
     def build(self) -> GridMarchEvolution:
         return GridMarchEvolution(self.deck, self.make_domain())
@@ -154,8 +152,30 @@ class GridMarch(Problem):
         )
         return Report(head, rows)
 
-    def figures(self):
-        return {"grids": draw_grids, "quality": draw_quality}
+    def draw_grids(self, figure, run_data) -> None:
+        """The grid at up to four times of the march."""
+        dumps = list(run_data.dumps)
+        chosen = [dumps[k] for k in np.unique(np.linspace(0, len(dumps) - 1, 4).astype(int))]
+        figure.set_size_inches(4.0 * len(chosen), 5.0)
+        panels = figure.subplots(1, len(chosen), squeeze=False)[0]
+        for axes, dump in zip(panels, chosen, strict=True):
+            x, y = nodes = dump.blocks[0].nodes
+            draw_grid(axes, nodes, color="0.25", lw=0.4)
+            if np.ptp(y) > 20.0 * np.ptp(x):
+                axes.set_ylim(y.min(), y.min() + 4.0 * np.ptp(x))
+            axes.set(aspect="equal", title=f"t = {dump.t:.3g}")
+
+    def draw_quality(self, figure, run_data) -> None:
+        """First line gap, aspect ratio, scaled Jacobian and the regridder's work against time."""
+        figure.set_size_inches(8.0, 8.0)
+        columns = "first_line_gap", "worst_aspect", "least_scaled_jacobian", "regrid_iterations"
+        words = "first line gap", "worst aspect ratio", "minimum scaled Jacobian", "iterations"
+        panels = figure.subplots(len(columns), 1)
+        for axes, name, label in zip(panels, columns, words, strict=True):
+            axes.plot(run_data.history["t"], run_data.history[name], linewidth=1.2)
+            axes.set_ylabel(label)
+            axes.grid(alpha=0.3)
+        axes.set_xlabel("part of the motion done")
 
 
 class GridMarchEvolution:
@@ -261,30 +281,3 @@ def measure_far_bend(nodes: np.ndarray, domain: MovingDomain) -> float:
     part = (y[first:] - y[first]) / (y[-1] - y[first])
     straight = x[first] + part * (x[-1] - x[first])
     return float(np.abs(x[first:] - straight).max() * domain.start.shape[2])
-
-
-def draw_grids(figure, run_data) -> None:
-    """The grid at up to four times of the march."""
-    dumps = list(run_data.dumps)
-    chosen = [dumps[k] for k in np.unique(np.linspace(0, len(dumps) - 1, 4).astype(int))]
-    figure.set_size_inches(4.0 * len(chosen), 5.0)
-    panels = figure.subplots(1, len(chosen), squeeze=False)[0]
-    for axes, dump in zip(panels, chosen, strict=True):
-        x, y = nodes = dump.blocks[0].nodes
-        draw_grid(axes, nodes, color="0.25", lw=0.4)
-        if np.ptp(y) > 20.0 * np.ptp(x):
-            axes.set_ylim(y.min(), y.min() + 4.0 * np.ptp(x))
-        axes.set(aspect="equal", title=f"t = {dump.t:.3g}")
-
-
-def draw_quality(figure, run_data) -> None:
-    """First line gap, aspect ratio, scaled Jacobian and the regridder's work against time."""
-    figure.set_size_inches(8.0, 8.0)
-    columns = "first_line_gap", "worst_aspect", "least_scaled_jacobian", "regrid_iterations"
-    words = "first line gap", "worst aspect ratio", "minimum scaled Jacobian", "iterations"
-    panels = figure.subplots(len(columns), 1)
-    for axes, name, label in zip(panels, columns, words, strict=True):
-        axes.plot(run_data.history["t"], run_data.history[name], linewidth=1.2)
-        axes.set_ylabel(label)
-        axes.grid(alpha=0.3)
-    axes.set_xlabel("part of the motion done")

@@ -13,8 +13,9 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import pickle
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
@@ -73,10 +74,9 @@ def make_plane_grid(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.array(np.meshgrid(x, y, indexing="ij"))
 
 
-def make_square(cells: int, low: float, length: float) -> np.ndarray:
-    """Nodes (2, cells + 1, cells + 1) of a square with its corner at (low, low) [m]."""
-    line = np.linspace(low, low + length, cells + 1)
-    return make_plane_grid(line, line)
+def make_box(cells: tuple[int, int], low: Sequence[float], high: Sequence[float]) -> np.ndarray:
+    """Nodes (2, ni + 1, nj + 1) of even cells in a rectangle between two corners [m]."""
+    return make_plane_grid(*map(np.linspace, low, high, np.add(cells, 1)))
 
 
 def swing_square(cells: int, low: float, period: float, swing: float) -> np.ndarray:
@@ -86,7 +86,7 @@ def swing_square(cells: int, low: float, period: float, swing: float) -> np.ndar
     sin(k (x - low)) sin(k (y - low)), k = 2 pi/period, and y down by as much.  Bitwise periodic:
     the far sides take the displacement of the near ones.
     """
-    x, y = make_square(cells, low, period)
+    x, y = make_box((cells, cells), (low, low), (low + period, low + period))
     k = 2.0 * np.pi / period
     wave = np.sin(k * (x - low)) * np.sin(k * (y - low))
     wave[-1] = wave[0]
@@ -94,10 +94,16 @@ def swing_square(cells: int, low: float, period: float, swing: float) -> np.ndar
     return np.array([x + swing * wave, y - swing * wave])
 
 
-def put_walls(block: Block, *sides: str) -> None:
-    """Walls on these sides of a block, on all four where none is named."""
-    for side in sides or SIDE_NAMES:
-        put(block, side, "wall")
+def put_walls(*blocks: Block) -> None:
+    """Walls on all faces of these blocks that have nothing else on them."""
+    for block, side in itertools.product(blocks, SIDE_NAMES):
+        free = np.ones(block.side_faces(side)[1], dtype=int)
+        for segment in block.segments:
+            if segment.side == side:
+                free[segment.start : segment.stop] = 0
+        ends = np.flatnonzero(np.diff(np.pad(free, 1))).reshape(-1, 2)
+        for start, stop in ends.tolist():
+            put(block, side, "wall", start, stop)
 
 
 def follow_gas(block: Block, dt: float) -> np.ndarray:
@@ -136,14 +142,11 @@ class RadialFlow:
         line = np.linspace(0.0, size, cells + 1)
         return make_plane_grid(line, line[: STRIP + 1] if self.symmetry == "plane" else line)
 
-    def close_inside(self, block: Block) -> list[str]:
-        """Put the sides that symmetry closes; returns those that remain."""
-        put(block, "i_min", "wall")
-        put(block, "j_min", "axis" if self.symmetry == "spherical" else "wall")
-        if self.symmetry != "plane":
-            return ["i_max", "j_max"]
-        put(block, "j_max", "wall")
-        return ["i_max"]
+    def close(self, block: Block) -> None:
+        """Put the axis, and walls on the sides that nothing has been put on."""
+        if self.symmetry == "spherical":
+            put(block, "j_min", "axis")
+        put_walls(block)
 
     def compute_radii(self, points: np.ndarray) -> np.ndarray:
         """Radii (...) of points (2, ...)."""

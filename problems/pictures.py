@@ -23,17 +23,18 @@ def spread_dumps(run_data, count: int) -> list:
 
 
 def draw_field(
-    axis, dump, values, *, colours="viridis", low=None, high=None, every=0, lines=(), bar="",
-    title="", mm=False,
+    axis, dump, values, *, unit=1.0, colours="viridis", low=None, high=None, every=0, lines=(),
+    bar="", title="", mm=False,
 ):  # fmt: skip
     """Draw a field of all blocks of a dump on an axis; returns the picture for a colour bar.
 
-    values: a name of `cell_fields` or a function `block -> (ni, nj)`; every: draw each so many
-    grid lines, 0 none; lines: polylines (2, n) drawn over it; bar: words at a colour bar, none
-    without; title: above the panel, "t" for the time; mm: lengths in millimetres.
+    values: a name of `cell_fields` or a function `block -> (ni, nj)`, shown over `unit`, as low
+    and high are; every: draw each so many grid lines, 0 none; lines: polylines (2, n) drawn over
+    it; bar: words at a colour bar, none without; title: above the panel, "t" for the time; mm:
+    lengths in millimetres.
     """
     make = values if callable(values) else (lambda block: block.cell_fields[values])
-    fields = [make(block) for block in dump.blocks]
+    fields = [make(block) / unit for block in dump.blocks]
     low = min(float(np.nanmin(field)) for field in fields) if low is None else low
     high = max(float(np.nanmax(field)) for field in fields) if high is None else high
     picture, scale, unit = None, 1e3 if mm else 1.0, "mm" if mm else "m"

@@ -3,8 +3,8 @@
 A problem is one module.  The first line of its docstring is what `shockgrid list` prints, the
 whole docstring is the head of its page in docs/problems.  It has a deck, the blocks that it starts
 from (`build`), columns of the history (`measure`), the numbers that a run found beside theory
-(`report`) and its own picture (`draw`).  Screens, errors for `shockgrid verify`, the results that
-studies draw and what the references say beforehand all follow from the report.
+(`report`) and its own pictures (`draw_...`).  Screens, errors for `shockgrid verify`, the results
+that studies draw and what the references say beforehand all follow from the report.
 """
 
 from __future__ import annotations
@@ -48,12 +48,6 @@ class BlockPlan:
         """That of a grid (2, ni + 1, nj + 1)."""
         low, high = ((float(x), float(y)) for x, y in (nodes.min((1, 2)), nodes.max((1, 2))))
         return cls(name, (nodes.shape[1] - 1, nodes.shape[2] - 1), low, high)
-
-    def make_nodes(self) -> np.ndarray:
-        """Nodes (2, ni + 1, nj + 1) of even cells in a rectangle of this extent [m]."""
-        ends = zip(self.low, self.high, self.cells, strict=True)
-        lines = [np.linspace(low, high, count + 1) for low, high, count in ends]
-        return np.array(np.meshgrid(*lines, indexing="ij"))
 
 
 def plan_blocks(grids: Mapping[str, np.ndarray]) -> list[BlockPlan]:
@@ -143,6 +137,12 @@ def get_last(history: History, name: str) -> float:
     return float(column[-1]) if column is not None and len(column) else math.nan
 
 
+def find_most(history: History, name: str) -> float:
+    """The greatest value of a column; NaN where there is none."""
+    column = history.get(name, np.empty(0))
+    return float(np.nanmax(column)) if np.isfinite(column).any() else math.nan
+
+
 def find_crossing(x: np.ndarray, values: np.ndarray, level: float) -> float:
     """The last place where `values` (n,) at `x` (n,) fall below a level, linear between two; NaN
     where none is above it, or the last one still is."""
@@ -189,7 +189,7 @@ class Problem:
     Deck: ClassVar[type[Deck]] = Deck
     units: ClassVar[Mapping[str, str]] = {}  # of the columns of `measure` that have one
     t_unit: str = "s"  # of t, in words of the screen: "iterations" where it counts those
-    picture: ClassVar[str] = ""  # the name of what `draw` draws
+    counted: ClassVar[tuple[str, ...]] = ()  # keys of the deck whose product is the cells of all
     measures_sides: ClassVar[bool] = False  # `measure` reads cells along sides alone: see `watch`
 
     def __init__(self, deck: AnyDeck):
@@ -211,7 +211,8 @@ class Problem:
     ) -> Simulation:
         """The flow of these blocks to the end time, with the deck's run, regrid and void_fill.
 
-        kind: a class derived from Simulation.
+        mesh: as there; any other word: the nodes are those of `make_grids` at the time.  kind: a
+        class derived from Simulation.
         """
         from hydro.simulation import Simulation  # slow to load; a deck is not
 
@@ -221,22 +222,32 @@ class Problem:
         chosen["small_cells"] = run.small_cells
         if fill is not None:
             chosen["void_fill"] = (fill.pressure, fill.gamma)
+        mesh = options.get("mesh", "regrid")
+        if isinstance(mesh, str) and mesh not in ("regrid", "fixed"):
+            options["mesh"] = lambda name, t: self.make_grids(t)[name]
         if regrid is not None:
             chosen["make_regridder"] = lambda: regrid.make(threads=run.threads)
         return (kind or Simulation)(list(blocks), list(links), **(chosen | options))
 
-    def plan(self) -> tuple[float, list[BlockPlan]] | None:
-        """End time and blocks of the run without allocating it, after all checks of the deck.
+    def make_grids(self, t: float = 0.0) -> dict[str, np.ndarray]:
+        """Nodes (2, ni + 1, nj + 1) [m] of the blocks by name at the start, and at time t where
+        their motion is given; {} where `build` is the only way to know (for small problems)."""
+        return {}
 
-        None where `build` is the only way to know (right for problems that are always small).
-        """
-        return None
+    def plan(self) -> tuple[float, list[BlockPlan]] | None:
+        """End time and blocks of the run without allocating it, after all checks of the deck; None
+        where they are unknown before `build`."""
+        check_memory(self)
+        grids = self.make_grids()
+        return (self.t_end, plan_blocks(grids)) if grids else None
 
     def estimate_cells(self) -> int:
         """Cells of all blocks by arithmetic alone, or somewhat more: asked before `plan` and
         `build`, so that too many are refused before an array of them is made."""
-        plan = self.plan()
-        return sum(block.cells[0] * block.cells[1] for block in plan[1]) if plan else 0
+        if self.counted:
+            return math.prod(getattr(self.deck, name) for name in self.counted)
+        plan = self.plan() if type(self).plan is not Problem.plan else None
+        return sum(math.prod(block.cells) for block in plan[1]) if plan else 0
 
     def measure(self, evolution: Evolution) -> dict[str, float]:
         """Extra history columns, evaluated before the first and after every step: cheap, same
@@ -289,15 +300,14 @@ class Problem:
         """How its runs are made again where the deck alone does not do it; "" where it does."""
         return ""
 
-    def draw(self, figure: Figure, run_data: Any) -> None:
-        """The problem's own picture, named `picture`.
+    def figures(self) -> dict[str, DrawFigure]:
+        """Pictures of this problem by name: its methods `draw_<name>(figure, run_data)`.
 
         `run_data` (runs.store.reader.RunData) has `.deck`, `.history` (dict of arrays), `.dumps`.
         """
-
-    def figures(self) -> dict[str, DrawFigure]:
-        """Pictures of this problem by name: functions `(figure, run_data) -> None`."""
-        return {self.picture: self.draw} if self.picture else {}
+        own = [name for kind in reversed(type(self).__mro__) for name in vars(kind)]
+        drawn = [name for name in dict.fromkeys(own) if name.startswith("draw_")]
+        return {name[5:].replace("_", "-"): getattr(self, name) for name in drawn}
 
     def summary(self, history: History, final: Evolution | None) -> str:
         """The report as text."""

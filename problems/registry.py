@@ -41,7 +41,7 @@ OWN: dict[str, str] = {
     "grid-march": "problems.grid_march:GridMarch",
     "flyer-target": "problems.standard.flyer_target:FlyerTarget",
     "cavity": "problems.standard.cavity:Cavity",
-    "blocks": "problems.blocks.problem:Blocks",
+    "blocks": "problems.blocks:Blocks",
 }
 INSTALLED = PlugIns("shockgrid.problems")  # of other packages
 # where each is, "module:class"; of an installed package, the class itself

@@ -14,9 +14,6 @@ are refused.  Note: a plateau a few cells wide, as in the 123 problem, retains t
 the contact; `grading` puts small cells there.
 """
 
-from __future__ import annotations
-
-import functools
 import math
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
@@ -238,31 +235,10 @@ class Riemann(Problem):
     """One or two blocks along x, a few cells across."""
 
     Deck = RiemannDeck
-    picture, measures_sides = "profiles", True
+    counted, measures_sides = ("cells", "rows"), True
 
     def __init__(self, deck: RiemannDeck):
         super().__init__(deck)
-        self.case = case = self._make_case()
-        self.limiter = deck.limiter or case.limiter
-        self.name = "own states" if deck.left is not None else deck.case
-        if deck.contact == "captured" and case.left_eos != case.right_eos:
-            raise BadInput(
-                "deck: the two sides are of different materials; set contact = 'on-line' "
-                "(a captured contact needs one material)"
-            )
-        if deck.contact == "captured" and deck.grading is not None:
-            raise BadInput("deck: grading is for contact = 'on-line'; leave it out")
-        exact = self.exact
-        if exact.gap:
-            parting = case.right[1] - case.left[1]
-            raise BadInput(
-                f"deck: the two gases part and leave a vacuum between x/t = {exact.u_left:.6g} and "
-                f"{exact.u_right:.6g} m/s, so there is no contact; they part with {parting:.6g} "
-                f"m/s, make that less than {parting - (exact.u_right - exact.u_left):.6g} m/s"
-            )
-
-    def _make_case(self) -> Case:
-        deck = self.deck
         if (deck.left is None) != (deck.right is None):
             raise BadInput("deck: give both `left` and `right`, or neither and a `case`")
         if deck.left is not None:
@@ -271,101 +247,98 @@ class Riemann(Problem):
             case = CASES[deck.case]
         else:
             raise BadInput(f"deck: there is no case {deck.case!r}{suggest(deck.case, CASES)}")
-        return case if deck.lengths is None else replace(case, lengths=deck.lengths, t_end=None)
+        if deck.lengths is not None:
+            case = replace(case, lengths=deck.lengths, t_end=None)
+        self.case, self.limiter = case, deck.limiter or case.limiter
+        self.name = "own states" if deck.left is not None else deck.case
+        self.on_line = deck.contact == "on-line"
+        if not self.on_line and case.left_eos != case.right_eos:
+            raise BadInput(
+                "deck: the two sides are of different materials; set contact = 'on-line' "
+                "(a captured contact needs one material)"
+            )
+        if not self.on_line and deck.grading is not None:
+            raise BadInput("deck: grading is for contact = 'on-line'; leave it out")
+        self.exact = exact = solve_riemann(case.left_eos, case.left, case.right_eos, case.right)
+        if exact.gap:
+            parting = case.right[1] - case.left[1]
+            raise BadInput(
+                f"deck: the two gases part and leave a vacuum between x/t = {exact.u_left:.6g} and "
+                f"{exact.u_right:.6g} m/s, so there is no contact; they part with {parting:.6g} "
+                f"m/s, make that less than {parting - (exact.u_right - exact.u_left):.6g} m/s"
+            )
+        self.domain = self.choose_domain()
+        self.t_end = self.domain.t_end
 
-    @functools.cached_property
-    def exact(self) -> RiemannSolution:
-        """The exact solution; the contact starts at x = 0."""
-        case = self.case
-        return solve_riemann(case.left_eos, case.left, case.right_eos, case.right)
-
-    @functools.cached_property
-    def domain(self) -> Domain:
+    def choose_domain(self) -> Domain:
         """Lengths, growths and end time: the deck's, the case's, or by the waves, of which one is
         WAY of the way to its end where nothing else gives the end time."""
         deck, case, exact = self.deck, self.case, self.exact
-        grading, on_line = deck.grading, deck.contact == "on-line"
         if case.lengths is not None:
-            ends = (case.left[1], case.right[1]) if on_line else (0.0, 0.0)
+            ends = (case.left[1], case.right[1]) if self.on_line else (0.0, 0.0)
             speeds = ends[0] - exact.left_wave.head, exact.right_wave.head - ends[1]
             ways = zip(case.lengths, speeds, strict=True)
             t = WAY * min(length / speed for length, speed in ways if speed > 0.0)
-            t_end = deck.run.t_end or case.t_end or t
-            growths = (grading or case.grading,) * 2
+            t_end, growths = deck.run.t_end or case.t_end or t, (deck.grading or case.grading,) * 2
             return Domain(case.lengths, growths, ends, t_end, sum(case.lengths))
         made_for = deck.run.t_set_up or deck.run.t_end
-        if on_line:
+        if self.on_line:
             cells = deck.cells // 2, deck.cells - deck.cells // 2
             domain = choose_domain(exact, cells, made_for)
         else:
             speed = exact.u if deck.mesh == "follow" else 0.0
             domain = choose_captured_domain(exact, speed, made_for)
-        growths = domain.growths if grading is None else (grading,) * 2
+        growths = domain.growths if deck.grading is None else (deck.grading,) * 2
         return replace(domain, t_end=deck.run.t_end or domain.t_end, growths=growths)
 
-    @property
-    def t_end(self) -> float:
-        """End time [s]."""
-        return self.domain.t_end
-
-    def make_grid(self, x: np.ndarray) -> np.ndarray:
-        """Grid with straight lines at `x`, cells about as wide as long."""
-        rows = self.deck.rows
-        width = self.domain.span / self.deck.cells * rows
-        return make_plane_grid(x, np.linspace(0.0, width, rows + 1))
-
-    def estimate_cells(self) -> int:
-        return self.deck.cells * self.deck.rows
+    def make_grids(self, t=0.0):
+        """Straight lines, cells about as wide as long.  A captured contact is on a grid at rest,
+        one that drifts with it, or one that swings as a standing wave of one period, which
+        stretches cells by a fifth at most and is back at its start at the end."""
+        deck, domain, half = self.deck, self.domain, self.deck.cells // 2
+        across = np.linspace(0.0, domain.span / deck.cells * deck.rows, deck.rows + 1)
+        left, right = domain.lengths
+        if self.on_line:
+            lines = {
+                "left": left * -grade(half, domain.growths[0])[::-1],
+                "right": right * grade(deck.cells - half, domain.growths[1]),
+            }
+        else:
+            x = np.linspace(-left, right, deck.cells + 1)
+            if deck.mesh == "follow":
+                x = x + self.exact.u * t
+            elif deck.mesh == "wave":
+                turn, length, period = 2.0 * math.pi, x[-1] - x[0], deck.run.t_set_up or self.t_end
+                wave = 0.2 * length / turn * np.sin(turn * (x - x[0]) / length)
+                x = x + wave * math.sin(turn * t / period)
+            lines = {"all": x}
+        return {name: make_plane_grid(x, across) for name, x in lines.items()}
 
     def build(self):
-        """Blocks at the start."""
-        return self._build_on_line() if self.deck.contact == "on-line" else self._build_captured()
-
-    def _build_on_line(self):
-        case, domain, half = self.case, self.domain, self.deck.cells // 2
-        left = -grade(half, domain.growths[0])[::-1]
-        right, blocks = grade(self.deck.cells - half, domain.growths[1]), []
-        for name, side, eos, (rho, u, p), x, length, speed in zip(
-            ("left", "right"), ("i_min", "i_max"), (case.left_eos, case.right_eos),
-            (case.left, case.right), (left, right), domain.lengths, domain.ends, strict=True,
+        case, grids, blocks = self.case, self.make_grids(), []
+        if not self.on_line:
+            x = grids["all"][0]
+            first = np.clip(-x[:-1, 1:] / np.diff(x[:, 1:], axis=0), 0.0, 1.0)  # of a cell in x < 0
+            pairs = zip(case.left, case.right, strict=True)
+            rho, u, p = (first * a + (1.0 - first) * b for a, b in pairs)
+            block = Block("all", case.left_eos, grids["all"], rho, u, 0.0, p, limiter=self.limiter)
+            for side in ("i_min", "i_max"):
+                put(block, side, "outflow")
+            put_walls(block)
+            return self.simulate([block], mesh=self.deck.mesh)
+        for side, eos, (rho, u, p), speed, (name, nodes) in zip(
+            ("i_min", "i_max"), (case.left_eos, case.right_eos), (case.left, case.right),
+            self.domain.ends, grids.items(), strict=True,
         ):  # fmt: skip
             state = rho, u, 0.0, p
-            block = Block(name, eos, self.make_grid(length * x), *state, limiter=self.limiter)
+            block = Block(name, eos, nodes, *state, limiter=self.limiter)
             # ends that the waves give do not go with the materials
             end = {"kind": "piston"} if case.lengths else {"kind": "inflow", "state": state}
             put(block, side, velocity=(speed, 0.0), **end)
-            put_walls(block, "j_min", "j_max")
             blocks.append(block)
         link = join("interface", (blocks[0], "i_max"), (blocks[1], "i_min"))
-        return self.simulate(blocks, [link], mesh="regrid")
-
-    def _build_captured(self):
-        case, (length, length_2) = self.case, self.domain.lengths
-        x = np.linspace(-length, length_2, self.deck.cells + 1)
-        first = np.clip(-x[:-1] / np.diff(x), 0.0, 1.0)[:, None]  # part of a cell left of x = 0
-        pairs = zip(case.left, case.right, strict=True)
-        rho, u, p = (first * a + (1.0 - first) * b for a, b in pairs)
-        grid = self.make_grid(x)
-        block = Block("all", case.left_eos, grid, rho, u, 0.0, p, limiter=self.limiter)
-        put(block, "i_min", "outflow")
-        put(block, "i_max", "outflow")
-        put_walls(block, "j_min", "j_max")
-        moving = lambda name, t: self.make_grid(self.move(x, t))  # noqa: E731
-        return self.simulate([block], mesh="fixed" if self.deck.mesh == "fixed" else moving)
-
-    def move(self, x: np.ndarray, t: float) -> np.ndarray:
-        """Places at time t of the nodes that start at `x`, for a captured contact.
-
-        "wave": a standing wave of one period that stretches cells by a fifth at most, back at its
-        start at the end; "follow": all drift with the contact.
-        """
-        if self.deck.mesh == "follow":
-            return x + self.exact.u * t
-        length = x[-1] - x[0]
-        size = 0.2 * length / (2.0 * math.pi)
-        wave = np.sin(2.0 * math.pi * (x - x[0]) / length)
-        period = self.deck.run.t_set_up or self.t_end
-        return x + size * wave * math.sin(2.0 * math.pi * t / period)
+        put_walls(*blocks)
+        return self.simulate(blocks, [link])
 
     def measure(self, evolution) -> dict[str, float]:
         """Error of the density and the star states (NaN while a plateau is too narrow)."""
@@ -402,7 +375,7 @@ class Riemann(Problem):
 
     def report(self, history, final=None) -> Report:
         deck, exact, t = self.deck, self.exact, get_last(history, "t")
-        where = "on a grid line" if deck.contact == "on-line" else f"captured, grid {deck.mesh}"
+        where = "on a grid line" if self.on_line else f"captured, grid {deck.mesh}"
         rows = [
             compare(
                 history, f"star_{name}", float(value), name.replace("_", " "), size=float(size),
@@ -422,7 +395,7 @@ class Riemann(Problem):
         )
         return Report(head, rows, notes)
 
-    def draw(self, figure, run_data) -> None:
+    def draw_profiles(self, figure, run_data) -> None:
         """Density, velocity and pressure along x in the last dump over the exact solution."""
         dump, axes = run_data.dumps[-1], figure.subplots(1, 3)
         ends = [block.nodes[0, [0, -1], 0] for block in dump.blocks]
@@ -435,10 +408,9 @@ class Riemann(Problem):
                 axis.plot(x, values, color="0.6", lw=1.2, label="exact")
         for axis, (name, label) in zip(axes, LABELS.items(), strict=True):
             for block, colour in zip(dump.blocks, ("C0", "C3"), strict=False):
-                edges, words = block.nodes[0, :, 0], "computed"
-                words = block.name if len(dump.blocks) > 1 else words
-                middle, values = 0.5 * (edges[1:] + edges[:-1]), block.cell_fields[name][:, 0]
-                axis.plot(middle, values, ".", ms=3, color=colour, label=words)
+                x, values = block.centres[0][:, 0], block.cell_fields[name][:, 0]
+                words = block.name if self.on_line else "computed"
+                axis.plot(x, values, ".", ms=3, color=colour, label=words)
             axis.set_xlabel("x [m]")
             axis.set_title(label, fontsize="medium")
             values = np.concatenate([block.cell_fields[name][:, 0] for block in dump.blocks])

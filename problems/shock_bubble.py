@@ -17,8 +17,6 @@ Source: [HaasSturtevant1987], table 2; the gases as flow solvers take them since
 table 3.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import ClassVar, Literal, NamedTuple
@@ -117,9 +115,6 @@ LINKS = (
     ("seam", "air-north", "j_min", "air-east", "j_max"),
 )
 AXIS = ("upwind", "air-west", "west", "core", "east", "air-east", "downwind")
-WALLS = {name: ("j_min",) for name in AXIS} | {
-    "upwind": ("j_min", "j_max"), "downwind": ("j_min", "j_max", "i_max"), "air-north": ("i_max",),
-}  # fmt: skip
 OUTLINE = {"west": 0, "north": -1, "east": -1}  # the row of nodes on the bubble's surface
 
 
@@ -136,24 +131,7 @@ class ShockBubbleDeck(Deck, kw_only=True):
     limiter: Limiter = "van-leer"
 
 
-def find_front(rows: list[tuple[np.ndarray, np.ndarray]], level: float) -> float:
-    """Where the pressure first falls below `level` along rows of cells one after the other [m].
-
-    rows: places of the nodes (n + 1) and pressures of the cells between them (n); linear between
-    the cells' middles; the last node's place where the pressure does not fall.
-    """
-    x = np.concatenate([0.5 * (nodes[1:] + nodes[:-1]) for nodes, _ in rows])
-    p = np.concatenate([pressure for _, pressure in rows])
-    below = np.flatnonzero(p < level)
-    if below.size == 0 or below[0] == 0:
-        return float(rows[-1][0][-1] if below.size == 0 else rows[0][0][0])
-    k = int(below[0])
-    return float(x[k - 1] + (x[k] - x[k - 1]) * (p[k - 1] - level) / (p[k - 1] - p[k]))
-
-
 class ShockBubble(Problem):
-    """Nine blocks: a bubble of four, air of five."""
-
     Deck = ShockBubbleDeck
     units: ClassVar = {
         **dict.fromkeys(("upwind", "downwind", "rear", "height", "axis_front", "wall_front"), "m"),
@@ -169,16 +147,13 @@ class ShockBubble(Problem):
         self.rho, self.eos = GASES[deck.gas]
         self.far_end = HALF_HEIGHT + DOWNWIND
         self.arrival = GAP * RADIUS / shock.shock_speed
+        self.t_end = deck.run.t_end or self.arrival + PICTURE[deck.gas]
+        # velocities of the experiment, at whose Mach number alone they are known
+        self.features = FEATURES[deck.gas] if deck.mach == self.Deck().mach else ()
         air = shock.rho, shock.particle_speed, shock.p
         self.contact = solve_riemann(AIR, air, self.eos, (self.rho, 0.0, PRESSURE))
 
-    @property
-    def t_end(self) -> float:
-        """End time: the deck's, or that of the experiment's picture with the jet formed."""
-        return self.deck.run.t_end or self.arrival + PICTURE[self.deck.gas]
-
-    def make_grids(self) -> dict[str, np.ndarray]:
-        """First nodes of the nine blocks."""
+    def make_grids(self, t=0.0):
         n, high, joint = self.deck.cells, HALF_HEIGHT, math.radians(JOINT[self.deck.gas])
         core = CORE * RADIUS
         size = core / n
@@ -219,7 +194,6 @@ class ShockBubble(Problem):
         return {name: np.ascontiguousarray(nodes) for name, nodes in grids.items()}
 
     def estimate_cells(self) -> int:
-        """Those of the largest deck with `make_grids`, and somewhat more."""
         return 34 * (self.deck.cells + 2) ** 2
 
     def build(self):
@@ -231,13 +205,12 @@ class ShockBubble(Problem):
                 part = compute_area_fractions(nodes, -RADIUS - GAP * RADIUS)
                 eos, state, material = AIR, mix_states(AIR, part, self.behind, ahead), "air"
             blocks[name] = Block(name, eos, nodes, *state, material=material, limiter=deck.limiter)
-            if name in WALLS:
-                put_walls(blocks[name], *WALLS[name])
         put(blocks["upwind"], "i_min", "inflow", state=self.behind)
         links = [
             join(kind, (blocks[one], side), (blocks[other], other_side))
             for kind, one, side, other, other_side in LINKS
         ]
+        put_walls(*blocks.values())
         simulation = self.simulate(
             blocks.values(),
             links,
@@ -279,31 +252,20 @@ class ShockBubble(Problem):
             "wall_front": find_front(wall, 0.5 * (PRESSURE + self.shock.p)),
         }
 
-    def find_upwind_speed(self, t: np.ndarray, upwind: np.ndarray) -> float:
-        """Mean speed [m/s] of the upwind end while the shock goes a quarter of a radius on."""
-        start = self.arrival + 0.05 * RADIUS / self.shock.shock_speed
-        end = self.arrival + 0.3 * RADIUS / self.shock.shock_speed
-        if t[-1] < end:
-            return math.nan
-        first, last = np.interp([start, end], t, upwind)
-        return (last - first) / (end - start)
-
     def find_focus(self, history) -> float:
-        """When the refracted shock comes to its focus at the downwind end and turns it [s].
+        """When the refracted shock comes to its focus at the downwind end and turns it [us after
+        the shock's arrival]; NaN before."""
+        since = (history["t"] - self.arrival) / MICRO
+        inside = np.flatnonzero((since > 100.0) & (since < 250.0))
+        known = since[-1] >= 250.0
+        return float(since[inside[np.argmin(history["downwind"][inside])]]) if known else math.nan
 
-        Counted from the shock's arrival; NaN before.
-        """
-        since = history["t"] - self.arrival
-        if since[-1] < 250.0 * MICRO:
-            return math.nan
-        inside = np.flatnonzero((since > 100.0 * MICRO) & (since < 250.0 * MICRO))
-        return float(since[inside[np.argmin(history["downwind"][inside])]])
-
-    def compute_window(self, history, feature: Feature) -> tuple[float, float] | None:
-        """Start and end [s] of a feature's window in a run, None where the run is not there yet.
+    def fit_velocity(self, history, feature: Feature) -> tuple[tuple[float, float] | None, float]:
+        """A feature's window [s] in a run and the slope [m/s] of the straight line through its
+        places there; None and NaN where the run is not there yet.
 
         A window is complete when the run has passed its end; of the rearmost point's, a third
-        suffices.
+        suffices.  The line is fitted to equally many places in equal times.
         """
         leaves = find_time(history, history["axis_front"] > history["downwind"])
         start, end = (
@@ -315,89 +277,61 @@ class ShockBubble(Problem):
         last = float(history["t"][-1])
         if feature.column == "rear" and last > start + 100.0 * MICRO:
             end = min(end, last)
-        return (start, end) if start < end <= last * (1.0 + 1e-12) else None
-
-    def fit_velocity(self, history, feature: Feature) -> float:
-        """Slope [m/s] of the straight line through a feature's places in its window, NaN before.
-
-        The line is fitted to equally many places in equal times, whatever the steps were.
-        """
-        window = self.compute_window(history, feature)
-        if window is None:
-            return math.nan
-        t = np.linspace(*window, 101)
+        if not start < end <= last * (1.0 + 1e-12):
+            return None, math.nan
+        t = np.linspace(start, end, 101)
         places = np.interp(t, history["t"], history[feature.column])
-        return float(np.polyfit(t - t[0], places, 1)[0])
-
-    @property
-    def features(self) -> tuple[Feature, ...]:
-        """Those of the gas, where the Mach number is that of the experiment."""
-        return FEATURES[self.deck.gas] if self.deck.mach == self.Deck().mach else ()
-
-    def list_errors(self, history) -> list[Row]:
-        """Relative differences of velocities from the experiment's, by the features' names.
-
-        Those that the experiment has not are compared with the fixed grid's.  `upwind_speed`: of
-        the upwind end's first speed from the plane contact's; `focus`: of the time at which the
-        heavy bubble's downwind end turns from the fixed grid's.
-        """
-        speed = self.find_upwind_speed(history["t"], history["upwind"])
-        rows = [Row("first_upwind_speed", speed, self.contact.u, error="upwind_speed")]
-        for feature in FEATURES[self.deck.gas]:
-            alone = math.isnan(feature.measured)
-            reference = feature.fixed_grid if alone else feature.measured
-            found = self.fit_velocity(history, feature)
-            rows.append(Row(feature.words, found, reference, error=feature.words))
-        if self.deck.gas in FOCUS:
-            focus = self.find_focus(history) / MICRO
-            rows.append(Row("focus", focus, FOCUS[self.deck.gas], error="focus"))
-        return rows
+        return (start, end), float(np.polyfit(t - t[0], places, 1)[0])
 
     def report(self, history, final=None) -> Report:
+        """Errors are those of velocities against the experiment's, or the fixed grid's where it has
+        none; of the upwind end's first speed against the plane contact's; of the focus' time."""
         if not history:
             return Report()
-        deck, t, volume = self.deck, history["t"], history["volume"]
+        deck, t, volume, first = self.deck, history["t"], history["volume"], math.nan
+        # the upwind end while the shock goes a quarter of a radius on
+        start, end = (self.arrival + part * RADIUS / self.shock.shock_speed for part in (0.05, 0.3))
+        if t[-1] >= end:
+            first = float(np.diff(np.interp([start, end], t, history["upwind"]))[0]) / (end - start)
+        rows = [Row("first_upwind_speed", first, self.contact.u, error="upwind_speed")]
+        table = [["velocities [m/s]", "here", "fixed grid", "measured", "computed", "window [us]"]]
+        for feature in FEATURES[deck.gas]:
+            (name, *_, measured, computed, fixed), alone = feature, math.isnan(feature.measured)
+            window, speed = self.fit_velocity(history, feature)
+            rows.append(Row(name, speed, fixed if alone else measured, error=name))
+            if window and self.features:
+                begin, end = ((time - self.arrival) / MICRO for time in window)
+                others = ["" if math.isnan(x) else f"{x:g}" for x in (fixed, measured, computed)]
+                table.append([name, f"{speed:.1f}", *others, f"{begin:.0f}-{end:.0f}"])
+        if deck.gas in FOCUS:
+            rows.append(Row("focus", self.find_focus(history), FOCUS[deck.gas], error="focus"))
         lines = [
             f"shock-bubble, {deck.gas} in air, Mach {deck.mach:g}, "
             f"t = {(t[-1] - self.arrival) / MICRO:.4g} us after the shock's arrival:"
         ]
-        table = [["velocities [m/s]", "here", "fixed grid", "measured", "computed", "window [us]"]]
-        for feature in self.features:
-            if window := self.compute_window(history, feature):
-                start, end = ((time - self.arrival) / MICRO for time in window)
-                others = feature.fixed_grid, feature.measured, feature.computed
-                words = ["" if math.isnan(speed) else f"{speed:g}" for speed in others]
-                here = f"{self.fit_velocity(history, feature):.1f}"
-                table.append([feature.words, here, *words, f"{start:.0f}-{end:.0f}"])
         lines += align(table) if len(table) > 1 else []
         ends = [1e3 * get_last(history, name) for name in ("upwind", "downwind", "height")]
         notes = [
             f"plane waves: shock {self.shock.shock_speed:.1f}, refracted shock "
             f"{self.contact.right_wave.head:.1f}, contact {self.contact.u:.1f} m/s; the upwind "
-            f"end initially {self.find_upwind_speed(t, history['upwind']):.1f}",
+            f"end initially {first:.1f}",
             f"bubble from x = {ends[0]:.2f} to {ends[1]:.2f} mm on the axis, {ends[2]:.2f} mm "
             f"high, {volume[-1] / volume[0]:.4f} of its first volume",
         ]
         if deck.gas != "helium" and len(table) > 1:
             notes.append("published velocities from memory")
-        return Report("\n".join(lines), self.list_errors(history), notes)
+        return Report("\n".join(lines), rows, notes)
 
-    def figures(self):
-        return {"shock-bubble": self.draw_shadowgraphs, "space-time": self.draw_space_time}
-
-    def choose_dumps(self, run_data) -> list:
-        """Dumps nearest to the times of the experiment's photographs, each once, and the last."""
+    def draw_shock_bubble(self, figure, run_data) -> None:
+        """Density gradients as a shadowgraph shows them, the grid mirrored below, at the times of
+        the experiment's photographs and at the end."""
         last, chosen = run_data.dumps[-1], {}
         for time in PHOTOGRAPHS[self.deck.gas]:
             wanted = self.arrival + time * MICRO
             dump = find_dump(run_data, wanted)
             if dump.t > self.arrival and wanted <= last.t * (1.0 + 1e-12):
                 chosen[dump.t] = dump
-        return list({**chosen, last.t: last}.values())
-
-    def draw_shadowgraphs(self, figure, run_data) -> None:
-        """Density gradients as a shadowgraph shows them, the grid mirrored below, at six times."""
-        dumps = self.choose_dumps(run_data)
+        dumps = list({**chosen, last.t: last}.values())
         columns = min(3, len(dumps))
         rows = -(-len(dumps) // columns)
         figure.set_size_inches(4.2 * columns, 3.9 * rows)
@@ -428,7 +362,7 @@ class ShockBubble(Problem):
             places = np.where(inside, history[name], np.nan) if "front" in name else history[name]
             axis.plot(1e3 * places, t, color=colour, label=words)
         for feature in self.features:
-            window = self.compute_window(history, feature)
+            window, _ = self.fit_velocity(history, feature)
             if window is None or math.isnan(feature.measured):
                 continue
             ends = np.array(window)
@@ -441,6 +375,20 @@ class ShockBubble(Problem):
         axis.set(xlabel="x [mm]", ylabel="time after the shock's arrival [µs]")
         axis.legend(loc="lower right", frameon=False)
         axis.set_title(f"{self.deck.gas}, {self.deck.cells} cells", fontsize="medium")
+
+
+def find_front(rows: list[tuple[np.ndarray, np.ndarray]], level: float) -> float:
+    """Where the pressure first falls below `level` [m], linear between the middles of cells.
+
+    rows: places of the nodes (n + 1) and pressures of the cells (n), one row after the other.
+    """
+    x = np.concatenate([0.5 * (nodes[1:] + nodes[:-1]) for nodes, _ in rows])
+    p = np.concatenate([pressure for _, pressure in rows])
+    below = np.flatnonzero(p < level)
+    if below.size == 0 or below[0] == 0:
+        return float(rows[-1][0][-1] if below.size == 0 else rows[0][0][0])
+    k = int(below[0])
+    return float(x[k - 1] + (x[k] - x[k - 1]) * (p[k - 1] - level) / (p[k - 1] - p[k]))
 
 
 def pad_over_seams(blocks: Mapping, fields: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -468,8 +416,7 @@ def compute_shadows(blocks: Mapping) -> dict[str, np.ndarray]:
     """
     fields, sizes = {}, {}
     for name, block in blocks.items():
-        rho = np.log(block.cell_fields["rho"])
-        fields[name] = np.array([*compute_centres(block.nodes), rho])
+        fields[name] = np.array([*block.centres, np.log(block.rho)])
     for name, wide in pad_over_seams(blocks, fields).items():
         x_i, y_i, rho_i = wide[:, 2:, 1:-1] - wide[:, :-2, 1:-1]
         x_j, y_j, rho_j = wide[:, 1:-1, 2:] - wide[:, 1:-1, :-2]

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from hydro.block import Block
-from problems.deck import GaugePoint, place_gauges
+from problems.deck import Gauge, place_gauges
 from problems.evolution import BlockView, Evolution, get_material
 from regrid.errors import BadInput
 from regrid.measure.cells import OUTSIDE, find_places
@@ -113,7 +113,7 @@ class Places:
         return values
 
 
-def place_points(points: Sequence[GaugePoint], blocks: Sequence[BlockView]) -> Places:
+def place_points(points: Sequence[Gauge], blocks: Sequence[BlockView]) -> Places:
     """The gauges of a flow, found in its first grids.
 
     One that moves may be in blocks of its own material alone.  Raises BadInput for one that moves
@@ -145,7 +145,7 @@ def _describe_extent(blocks: Sequence[BlockView]) -> str:
     return f"the blocks lie within x = {low[0]:g} to {high[0]:g} m, y = {low[1]:g} to {high[1]:g} m"
 
 
-def _check_fields(points: Sequence[GaugePoint], blocks: Sequence[BlockView]) -> None:
+def _check_fields(points: Sequence[Gauge], blocks: Sequence[BlockView]) -> None:
     """Raise BadInput where a gauge asks for what a block does not have."""
     for block in blocks:
         if isinstance(block, Block) or not points:
@@ -189,7 +189,7 @@ class Gauges:
     Of a deck without gauges it does nothing.
     """
 
-    def __init__(self, points: Sequence[GaugePoint], evolution: Evolution):
+    def __init__(self, points: Sequence[Gauge], evolution: Evolution):
         self.points = list(points)
         self.columns: list[str] | None = None  # of the file, where a run goes on
         self._writer: HistoryWriter | None = None

@@ -21,7 +21,6 @@ meaningless.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -29,7 +28,7 @@ import numpy as np
 
 from hydro.boundary import put
 from hydro.links import join, slide
-from problems.initial_states import make_plane_grid
+from problems.initial_states import make_plane_grid, put_walls
 from problems.references.hugoniot import shock_with_particle_speed
 from problems.references.riemann import solve_riemann
 from problems.references.shock_polars import Body, CrossedLine, cross_line
@@ -68,8 +67,8 @@ class Ripple:
         self.deck, self.materials = deck, materials
         self.frame = SideFrame(deck)
         self.amplitude, self.wavelength = deck.ripple_amplitude, deck.ripple_wavelength
-        self.wavenumber = 2.0 * math.pi / self.wavelength
-        length = self.frame.length
+        self.wavenumber, length = 2.0 * math.pi / self.wavelength, self.frame.length
+        self.cells_a_wave = deck.cells * deck.cone / deck.radius * self.wavelength / length
         if self.amplitude > 0.0 and 3.0 * self.wavelength > length:
             raise BadInput(
                 f"deck: ripple_wavelength is {self.wavelength:g} m; the cone's side is "
@@ -103,12 +102,6 @@ class Ripple:
                 f"deck: ripple_amplitude is {self.amplitude:g} m on waves of {self.wavelength:g} "
                 "m; cells beside the cone's side would not be convex, give a smaller one"
             )
-
-    @property
-    def cells_a_wave(self) -> float:
-        """Cells of the cone's side on a wave, as the deck asks for them."""
-        deck = self.deck
-        return deck.cells * deck.cone / deck.radius * self.wavelength / self.frame.length
 
     @cached_property
     def first_shock(self) -> tuple[float, float]:
@@ -202,146 +195,105 @@ MATERIALS = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Counts:
-    """Cells of the parts: along the radius up to `shell`, along the axis the others."""
-
-    within: int  # from the axis to the cone's edge
-    covered: int  # from there to the rim of the shell's front
-    ring: int  # from there to the shell's side; 0 where the front closes the shell
-    shell: int
-    impactor: int
-    front: int
-    along: int  # the cone
-    behind: int
-
-    @property
-    def inside(self) -> int:
-        """From the axis to the shell's side."""
-        return self.within + self.covered + self.ring
-
-
 class Layout:
     """Sizes, nodes and contacts of the blocks."""
 
     def __init__(self, deck, ripple: Ripple | None = None):
         self.deck, self.ripple = deck, ripple
         self.open = deck.cover < deck.radius
+        count = self.count_cells  # from the axis to the cone, to the front's rim, to the side
+        self.within, self.shell = count(deck.base), count(deck.side)
+        self.ring = count(deck.radius - deck.cover) if self.open else 0
+        self.covered = max(THINNEST, deck.cells - self.within - self.ring)
+        self.inside = self.within + self.covered + self.ring
+        self.impactor, self.front = count(deck.thickness), count(deck.front)
+        self.along, self.behind = count(deck.cone), count(deck.length - deck.cone)
 
     def count_cells(self, length: float) -> int:
         """Cells along a part of that length [m], square ones where it is not very short."""
         return max(THINNEST, round(length * self.deck.cells / self.deck.radius))
 
-    def count_parts(self) -> Counts:
-        """Cells along the parts of the set-up that the deck's resolution asks for."""
-        deck, count = self.deck, self.count_cells
-        within = count(deck.base)
-        ring = count(deck.radius - deck.cover) if self.open else 0
-        return Counts(
-            within,
-            max(THINNEST, deck.cells - within - ring),
-            ring,
-            count(deck.side),
-            count(deck.thickness),
-            count(deck.front),
-            count(deck.cone),
-            count(deck.length - deck.cone),
-        )
-
     def estimate_cells(self) -> int:
         """Cells of all blocks, by arithmetic alone."""
-        parts = self.count_parts()
-        wide = parts.inside + parts.shell
-        deep = parts.along + parts.behind + (parts.front if self.open else 0)
-        front = parts.front * (parts.inside if self.open else wide)
-        inside = (parts.along + parts.behind) * parts.inside
-        return parts.impactor * wide + front + inside + deep * parts.shell
+        wide, deep = self.inside + self.shell, self.along + self.behind
+        # the front as far as the shell's outside, or beside it the ring and the shell's side
+        return (self.impactor + self.front + deep) * wide
 
-    def make_nodes(self) -> dict[str, np.ndarray]:
+    def make_grids(self) -> dict[str, np.ndarray]:
         """Nodes of the blocks at the impact."""
-        deck, parts = self.deck, self.count_parts()
-        part = np.linspace(0, 1, parts.within + 1)
+        deck = self.deck
+        part = np.linspace(0, 1, self.within + 1)
         rim = (min(deck.cover, deck.radius) - deck.base) / (deck.radius - deck.base)
-        part_beside = np.linspace(0, rim, parts.covered + 1)
+        part_beside = np.linspace(0, rim, self.covered + 1)
         if self.open:
-            part_beside = np.append(part_beside, np.linspace(rim, 1, parts.ring + 1)[1:])
-        outside = np.linspace(deck.radius, deck.radius + deck.side, parts.shell + 1)
+            part_beside = np.append(part_beside, np.linspace(rim, 1, self.ring + 1)[1:])
+        outside = np.linspace(deck.radius, deck.radius + deck.side, self.shell + 1)
 
         def radii(split):
             return np.concatenate((split * part, (split + (deck.radius - split) * part_beside)[1:]))
 
-        before = np.linspace(0.0, deck.front, parts.front + 1)
-        along = np.linspace(deck.front, deck.front + deck.cone, parts.along + 1)
-        behind = np.linspace(deck.front + deck.cone, deck.front + deck.length, parts.behind + 1)
-        edge = deck.base + (deck.tip - deck.base) * ((along - deck.front) / deck.cone)[:, None]
+        impactor = np.linspace(-deck.thickness, 0, self.impactor + 1)
+        before = np.linspace(0.0, deck.front, self.front + 1)
+        along = np.linspace(deck.front, deck.front + deck.cone, self.along + 1)[:, None]
+        behind = np.linspace(deck.front + deck.cone, deck.front + deck.length, self.behind + 1)
+        deep = np.concatenate((before[: -1 if self.open else 0], along[:, 0], behind[1:]))
+        edge = deck.base + (deck.tip - deck.base) * ((along - deck.front) / deck.cone)
+        cone = np.array(np.broadcast_arrays(along, edge * part))
+        beside = np.broadcast_arrays(along, edge + (deck.radius - edge) * part_beside)
+        shift = self.ripple.compute_shift(cone[:, :, -1])[:, :, None] if self.ripple else 0.0
         whole = np.concatenate((radii(deck.base), outside[1:]))
-        cut = parts.within + parts.covered if self.open else whole.size - 1
-        line = np.array([along, edge[:, 0]])
-        shift = self.ripple.compute_shift(line)[:, :, None] if self.ripple else np.zeros((2, 1, 1))
-        wide = part_beside.size
-        nodes = {
-            "impactor": make_plane_grid(np.linspace(-deck.thickness, 0, parts.impactor + 1), whole),
+        cut = self.within + self.covered if self.open else whole.size - 1
+        grids = {
+            "impactor": make_plane_grid(impactor, whole),
             "front": make_plane_grid(before, whole[: cut + 1]),
-            "ring": make_plane_grid(before, whole[cut : parts.inside + 1]),
-            "cone": np.array([np.repeat(along[:, None], part.size, 1), edge * part]) + shift * part,
-            "beside": np.array(
-                [np.repeat(along[:, None], wide, 1), edge + (deck.radius - edge) * part_beside]
-            )
-            + shift * (1.0 - part_beside),
+            "ring": make_plane_grid(before, whole[cut : self.inside + 1]),
+            "cone": cone + shift * part,
+            "beside": np.array(beside) + shift * (1.0 - part_beside),
             "behind": make_plane_grid(behind, radii(deck.tip)),
-            "side": make_plane_grid(
-                np.concatenate((before[:-1] if self.open else before[:0], along, behind[1:])),
-                outside,
-            ),
+            "side": make_plane_grid(deep, outside),
         }
-        if not self.open:
-            del nodes["ring"]
-        return nodes
+        return {name: nodes for name, nodes in grids.items() if self.open or name != "ring"}
 
     def find_following(self) -> set[tuple[str, str]]:
         """Blocks and sides whose nodes are laid on the line of others."""
-        sides = {
-            "impactor": [("impactor", "i_max")],
-            "front": [("front", "i_max"), *([("front", "j_max")] if self.open else [])],
-            "side": [("side", "j_min")],
-            "cone": [("cone", "j_max")],
-        }
         contact = self.deck.contact
-        chosen = (sides[name] for name in sides if getattr(contact, name) == "sliding")
-        return {side for group in chosen for side in group}
+        sides = {
+            ("impactor", "i_max"): contact.impactor,
+            ("front", "i_max"): contact.front,
+            ("front", "j_max"): contact.front if self.open else "",
+            ("side", "j_min"): contact.side,
+            ("cone", "j_max"): contact.cone,
+        }
+        return {side for side, how in sides.items() if how == "sliding"}
 
     def connect(self, blocks: dict[str, Block]) -> list:
         """Links and contacts of all blocks, the walls, the axis and the free surface."""
         impactor, front, side = blocks["impactor"], blocks["front"], blocks["side"]
         cone, beside, behind = blocks["cone"], blocks["beside"], blocks["behind"]
-        contact, parts = self.deck.contact, self.count_parts()
-        inner, inside = parts.within, parts.inside
-        cut = inner + parts.covered
-        links = [join("seam", (beside, "i_max"), (behind, "i_min", inner, inside))]
+        contact, inner, covered = self.deck.contact, self.within, self.covered
+        links = [join("seam", (beside, "i_max"), (behind, "i_min", inner, self.inside))]
         links += touch(contact.cone, [(beside, "j_min")], (cone, "j_max"))
         links += touch("joined", [(cone, "i_max")], (behind, "i_min", 0, inner))
-        under = [(cone, "i_min"), (beside, "i_min", 0, parts.covered)]
+        under = [(cone, "i_min"), (beside, "i_min", 0, covered)]
         around = [(beside, "j_max"), (behind, "j_max")]
         face = [(front, "i_min")]
         if self.open:
             ring = blocks["ring"]
-            links.append(join("seam", (ring, "i_max"), (beside, "i_min", parts.covered, None)))
+            links.append(join("seam", (ring, "i_max"), (beside, "i_min", covered, None)))
             links += touch(contact.front, under, (front, "i_max"))
             links += touch(contact.front, [(ring, "j_min")], (front, "j_max"))
             around = [(ring, "j_max"), *around]
             face = [*face, (ring, "i_min"), (side, "i_min")]
         else:
+            cut = inner + covered
             links.append(join("seam", (front, "i_max", cut, front.nj), (side, "i_min")))
             links += touch(contact.front, under, (front, "i_max", 0, cut))
         links += touch(contact.side, around, (side, "j_min"))
         links += touch(contact.impactor, face, (impactor, "i_max"))
         for block in (impactor, front, cone, behind):
             put(block, "j_min", "axis")
-        for block in (impactor, side) if self.open else (impactor, front, side):
-            put(block, "j_max", "wall")
         put(impactor, "i_min", "free-surface")
-        put(behind, "i_max", "wall")
-        put(side, "i_max", "wall")
+        put_walls(*blocks.values())
         return links
 
 

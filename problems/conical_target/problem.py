@@ -22,7 +22,6 @@ again; there, and on the cone's side, materials share the nodes of their line.
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from pathlib import Path
 from typing import ClassVar, Literal
@@ -39,13 +38,13 @@ from problems.conical_target.report import (
     MEASURED_NUMBERS,
     MIDDLE,
     PEAK_UNITS,
+    Results,
     find_peaks,
-    make_report,
     measure_block,
     measure_departure,
 )
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, check_solid, key
-from problems.problem import Problem, Report, Row, check_memory, find_crossing, plan_blocks
+from problems.problem import Problem, check_memory, find_crossing
 from problems.references.hugoniot import find_rise, shock_to_pressure
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
@@ -53,19 +52,18 @@ from regrid.measure.corners import compute_centres
 Touch = Literal["joined", "sliding"]
 
 
+NUMBERS = msgspec.field(default_factory=dict)  # none
+
+
 class EosNumbers(DeckTable, kw_only=True):
     """Numbers of the equations of state in place of the library's, such as `onset = 3e10`."""
 
     merges = True
 
-    impactor: key(dict[str, float], "of the impactor's material") = msgspec.field(
-        default_factory=dict
-    )
-    shell: key(dict[str, float], "of the shell's material") = msgspec.field(default_factory=dict)
-    target: key(dict[str, float], "of the material around the cone") = msgspec.field(
-        default_factory=dict
-    )
-    filling: key(dict[str, float], "of the cone's material") = msgspec.field(default_factory=dict)
+    impactor: key(dict[str, float], "of the impactor's material") = NUMBERS
+    shell: key(dict[str, float], "of the shell's material") = NUMBERS
+    target: key(dict[str, float], "of the material around the cone") = NUMBERS
+    filling: key(dict[str, float], "of the cone's material") = NUMBERS
 
 
 class Contact(DeckTable, kw_only=True):
@@ -78,8 +76,6 @@ class Contact(DeckTable, kw_only=True):
 
 
 class ConicalTargetDeck(Deck, kw_only=True):
-    """Deck of `conical-target`."""
-
     run: RunControl = RunControl(t_end=5e-6, cfl=0.8)
     regrid: Regrid = Regrid()
     cells: key(int, "cells from the axis to the shell", ge=16, le=MOST_CELLS) = 48
@@ -114,11 +110,10 @@ EXTENTS = (  # of parts over the radius inside the shell: no slivers of cells, n
     ("thickness", 0.005, 100.0), ("front", 0.005, 100.0), ("side", 0.005, 100.0),
     ("length", 0.05, 100.0), ("cone", 0.02, 100.0), ("base", 0.02, 1.0), ("tip", 0.01, 1.0),
 )  # fmt: skip
-PLATEAU = (0.5, 0.95)  # of the time until a wave is back: the impact face's pressure is its mean
 BEHIND = 5  # cells behind the front: a shock is three or four wide
 
 
-class ConicalTarget(Problem):
+class ConicalTarget(Results, Problem):
     """Seven blocks: impactor, the shell's front and side, graphite, lead in three parts."""
 
     Deck = ConicalTargetDeck
@@ -167,7 +162,7 @@ class ConicalTarget(Problem):
         self.layout = Layout(deck, self.ripple)
         if self.ripple:
             check_memory(self)  # grids are made here
-            self.ripple.check(self.layout.count_cells(deck.cone), self.make_nodes())
+            self.ripple.check(self.layout.along, self.make_grids())
 
     def _match_impact(self) -> tuple[float, float, float]:
         """Pressure and velocity of the impact face until waves come back, and for how long.
@@ -208,19 +203,13 @@ class ConicalTarget(Problem):
     def estimate_cells(self) -> int:
         return self.layout.estimate_cells()
 
-    def plan(self):
-        """End time and sizes of the blocks, whose grids are made."""
-        check_memory(self)
-        return self.deck.run.t_end, plan_blocks(self.make_nodes())
-
-    def make_nodes(self) -> dict[str, np.ndarray]:
-        """Nodes of the blocks at the impact."""
-        return self.layout.make_nodes()
+    def make_grids(self, t=0.0):
+        return self.layout.make_grids()
 
     def build(self) -> Simulation:
         deck = self.deck
         blocks = {}
-        for name, nodes in self.make_nodes().items():
+        for name, nodes in self.make_grids().items():
             material = self.materials[MATERIALS[name]]
             speed = deck.speed if name == "impactor" else 0.0
             blocks[name] = Block(
@@ -263,23 +252,6 @@ class ConicalTarget(Problem):
             row[f"shock_x_{name}"], row[f"shock_pressure_{name}"] = front
         row |= find_peaks([(blocks[name].material, *found[:3]) for name, found in measured.items()])
         return row | (self.ripple.measure(line, evolution.t) if self.ripple else {})
-
-    @property
-    def plateau(self) -> tuple[float, float]:
-        """From when to when the pressure at the impact face is taken for its plateau [s]."""
-        first, last = PLATEAU
-        return first * self.impact[2], last * self.impact[2]
-
-    def report(self, history, final=None) -> Report:
-        if not history:
-            return Report(rows=[Row("impact", theory=self.impact[0])])
-        return make_report(self, history)
-
-    def figures(self):
-        from problems.conical_target.pictures import FIGURES, draw_ripple
-
-        draws = ({"ripple": draw_ripple} if self.ripple else {}) | FIGURES
-        return {name: functools.partial(draw, self) for name, draw in draws.items()}
 
 
 def _find_material(deck: ConicalTargetDeck, name: str) -> Material:

@@ -1,4 +1,4 @@
-"""Report of `conical-target`: pressures, the shock, the cone's side, ripples.
+"""Report and pictures of `conical-target`: pressures, the shock, the cone's side, ripples.
 
 Each wave of a ripple has its own clock, which starts when the shock along the side is at its
 middle.  Theory is that of ripples of small slope behind shocks that cross a line; the speed of the
@@ -15,9 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydro.block import Block
+from problems.pictures import draw_field, draw_grid, spread_dumps
 from problems.problem import Report, Row
+from problems.references.hugoniot import shock_to_pressure
 from problems.references.shock_polars import CrossedLine
+from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
+from regrid.sides import SIDE_NAMES, get_sides, trace_outline
 
 PARTS = ("impactor", "shell", "target", "filling")
 MM, GPA, US = 1e3, 1e-9, 1e6
@@ -63,6 +67,7 @@ def find_peak(history, part: str) -> tuple[float, float, float, float]:
     return tuple(float(history[name][k]) for name in names)
 
 
+PLATEAU = (0.5, 0.95)  # of the time until a wave is back: the impact face's pressure is its mean
 GAUGES = (0.1, 0.5, 0.9)  # of the length of the graphite's axis, as it is at the time
 STATIONS = (0.25, 0.5, 0.75)  # of the cone's length at first: where the shock's speed is told
 WIDTH = 0.1  # of that length, to either side: the stretch over which a speed is fitted
@@ -72,10 +77,9 @@ GROWTH = 0.5  # of the time from the first bend to the end: the latest stage
 
 def get_shock_path(history, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times [s], places x [m] and pressures [Pa] of the shock on the cone's "axis" or "side"."""
-    x = np.asarray(history[f"shock_x_{name}"], dtype=float)
+    x, p = history[f"shock_x_{name}"], history[f"shock_pressure_{name}"]
     known = np.isfinite(x)
-    p = np.asarray(history[f"shock_pressure_{name}"], dtype=float)
-    return np.asarray(history["t"], dtype=float)[known], x[known], p[known]
+    return history["t"][known], x[known], p[known]
 
 
 def measure_passage(problem, history, name: str) -> list[tuple[float, float, float]]:
@@ -118,8 +122,7 @@ def measure_growth(history) -> tuple[float, float, float]:
 
     It begins when the amplitude is a twentieth of its last; at first: to a quarter of it.
     """
-    t = np.asarray(history["t"], dtype=float)
-    amplitude = np.asarray(history["line_amplitude"], dtype=float)
+    t, amplitude = history["t"], history["line_amplitude"]
     top = float(np.nanmax(amplitude))
     if not top > 0.0 or t.size < 10:
         return (math.nan,) * 3
@@ -164,11 +167,8 @@ def measure_side_shock(problem, history) -> tuple[float, float] | None:
 
     The straight line of least squares through the places that the history has, None if too few.
     """
-    t = np.asarray(history["t"], dtype=float)
-    x = np.asarray(history["shock_x_side"], dtype=float)
-    frame = problem.ripple.frame
-    position = (x - problem.deck.front) / frame.along[0]
-    waves = problem.ripple.waves
+    t, frame, waves = history["t"], problem.ripple.frame, problem.ripple.waves
+    position = (history["shock_x_side"] - problem.deck.front) / frame.along[0]
     known = np.isfinite(position) & (position > waves[0]) & (position < waves[-1] + 1e-3)
     if known.sum() < 4:
         return None
@@ -181,81 +181,12 @@ def measure_waves(problem, history) -> tuple[CrossedLine | None, list[WaveGrowth
     seen = measure_side_shock(problem, history)
     if seen is None:
         return None, []
-    speed, begin = seen
-    t = np.asarray(history["t"], dtype=float)
-    waves = []
+    (speed, begin), waves = seen, []
     for number, position in enumerate(problem.ripple.waves):
         passed = begin + position / speed
-        amplitude = np.asarray(history[f"ripple_{number}"], dtype=float)
-        waves.append(WaveGrowth(float(position), float(passed), t - passed, amplitude))
+        since, amplitude = history["t"] - passed, history[f"ripple_{number}"]
+        waves.append(WaveGrowth(float(position), float(passed), since, amplitude))
     return problem.ripple.cross(speed), waves
-
-
-def find_rate(ripple, crossed: CrossedLine) -> float:
-    """Theory of `WaveGrowth.measure_rate` [1/s]."""
-    first, last = crossed.compute_growth(ripple.wavenumber, np.array(AGES))
-    return float(np.log(last / first)) / (AGES[1] - AGES[0])
-
-
-def measure_plateau(problem, history) -> float:
-    """Mean pressure of the face's second cell of steel during the plateau [Pa]; NaN before."""
-    t, (first, last) = np.asarray(history["t"]), problem.plateau
-    chosen = (t > first) & (t < last)
-    return (
-        float(np.asarray(history["pressure_impact"])[chosen].mean()) if chosen.any() else math.nan
-    )
-
-
-def make_report(problem, history) -> Report:
-    """What was computed, beside theory where there is one."""
-    deck, gauges = problem.deck, enumerate(GAUGES)
-    words = "mean from {:.2f} to {:.2f} us; impedances match".format(
-        *(US * t for t in problem.plateau)
-    )
-    impact, label = measure_plateau(problem, history), "pressure on the impact face [GPa]"
-    rows = [Row("impact", impact, problem.impact[0], label, 1e9, 5, "impact", source=words)]
-
-    def tell(name: str, computed: float, label: str, unit: float = 1.0, source: str = "") -> None:
-        rows.append(Row(name, float(computed), label=label, unit=unit, digits=3, source=source))
-
-    for part in PARTS:
-        p, t, x, y = find_peak(history, part)
-        words = f"at {t * US:.3g} us, x = {x * MM:.3g}, r = {y * MM:.2g} mm"
-        label = f"greatest pressure in the {part}, {getattr(deck, part)} [GPa]"
-        tell(f"peak_{part}", p, label, 1e9, words)
-    for number, part in gauges:
-        p = np.nanmax(history[f"pressure_gauge_{number}"])
-        tell(f"gauge_{number}", p, f"the same on the axis at {part:g} of the cone [GPa]", 1e9)
-    words = f"{100.0 * history['transformed'][-1]:.2g} % at the end"
-    most = np.nanmax(history["transformed"])
-    tell("transformed", most, "most of the cone in the second phase [%]", 0.01, words)
-    for name, where in (("axis", "on the axis"), ("side", "along the side")):
-        for station, passage in zip(STATIONS, measure_passage(problem, history, name), strict=True):
-            t, speed, p = passage
-            if math.isfinite(t):
-                x = MM * (deck.front + station * deck.cone)
-                label = f"shock {where} at x = {x:.4g} mm [km/s]"
-                words = f"at {t * US:.3f} us, {p * GPA:.3g} GPa behind it"
-                tell(f"shock_{name}_{station:g}", speed, label, 1e3, words)
-    head = (
-        f"conical-target: {deck.impactor} at {deck.speed:g} m/s on {deck.shell}, "
-        f"{deck.filling} in {deck.target}, {deck.cells} cells to the shell"
-    )
-    if problem.ripple:
-        waves, notes = compare_waves(problem, history)
-        return Report(head, rows + waves, notes)
-    begin, first, late = measure_growth(history)
-    widest = int(np.nanargmax(history["line_amplitude"]))
-    top, when = (history[name][widest] for name in ("line_amplitude", "t"))
-    words = f"half of peak to peak at the end; at most {top * MM:.2g} mm at {when * US:.2f} us"
-    label = "side: deviation from its own line [mm]"
-    tell("line_amplitude", history["line_amplitude"][-1], label, 1e-3, words)
-    words = f"{history['line_length'][-1] / history['line_length'][0]:.3f} times its initial length"
-    tell("line_bend", history["line_bend"][-1], "side: deviation from its chord [mm]", 1e-3, words)
-    if math.isfinite(first):
-        words = f"from {begin * US:.2f} us on; {late:.3g} m/s in the latest half"
-        tell("line_growth", first, "initial growth of the side's amplitude [m/s]", 1.0, words)
-    return Report(head, rows)
 
 
 def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
@@ -272,7 +203,10 @@ def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
             f"{ripple.cells_a_wave:.3g} cells per wave are too few to compare growth with theory: "
             f"the smoothing length of the interface slows it; take cells = {wanted} or more"
         )
+    theory = math.nan  # of `WaveGrowth.measure_rate`
     if crossed is not None:
+        first, last = crossed.compute_growth(k, np.array(AGES))
+        theory = float(np.log(last / first)) / (AGES[1] - AGES[0])
         impulse, slip = crossed.compute_rates(k)
         notes += [
             f"shocks cross the side at {crossed.speed / 1e3:.3g} km/s; polars: "
@@ -282,7 +216,6 @@ def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
             f"slip {crossed.slip:.3g} m/s, Atwood number {crossed.atwood:.3g}; rates of the "
             f"impulse {impulse / US:.3g} and of the slip {slip / US:.3g} a us",
         ]
-    theory = find_rate(ripple, crossed) if crossed is not None else math.nan
     for number, wave in enumerate(waves):
         if not np.isfinite(wave.amplitude).any():
             continue
@@ -297,3 +230,340 @@ def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
         label = f"wave {number + 1}, passed at {wave.passed * US:.2f} us: growth [1/us]"
         rows.append(Row(f"growth_{number}", rate, theory, label, US, 3, source="; ".join(words)))
     return rows, notes
+
+
+COLOURS = {"impactor": "tab:blue", "shell": "0.45", "target": "tab:purple", "filling": "k"}
+FACES = {"impactor": "#cfe2f3", "shell": "0.88", "target": "#e6dcf0", "filling": "#f6e3b4"}
+LABELS = {"impactor": "impactor", "side": "shell", "behind": "target", "cone": "filling"}
+PAINTED = ("impactor", "front", "side", "cone", "ring", "beside", "behind")
+SHOWN = 6  # dumps in a picture that shows several times
+
+
+def _find_outlines(dump, following: set[tuple[str, str]]) -> list[np.ndarray]:
+    """Polylines (2, n) [m] of the blocks' sides, cut where they are seams in one material.
+
+    Sides that are laid on another's line are left out: that line is where they touch.
+    """
+    lines = []
+    for block in dump.blocks:
+        own = [b for b in dump.blocks if b.name != block.name and b.material == block.material]
+        inside = {tuple(point) for b in own for line in get_sides(b.nodes) for point in line.T}
+        for side, line in zip(SIDE_NAMES, get_sides(block.nodes), strict=True):
+            if (block.name, side) not in following:
+                shared = np.array([tuple(point) in inside for point in line.T])
+                lines.append(
+                    np.insert(line, np.flatnonzero(shared[1:] & shared[:-1]) + 1, np.nan, axis=1)
+                )
+    return lines
+
+
+def _draw_materials(axis, dump, names: dict[str, str], following, grid: bool) -> None:
+    """Blocks filled with their materials' colours, the lines between, and the grid if asked for.
+
+    Blocks that follow come first: where their chords leave the line, others cover them.
+    """
+    for block in sorted(dump.blocks, key=lambda block: PAINTED.index(block.name)):
+        x, y = nodes = MM * block.nodes
+        face = FACES[block.material]
+        axis.fill(*trace_outline(nodes), facecolor=face, edgecolor=face, lw=0.5)
+        if grid:
+            draw_grid(axis, nodes, color=COLOURS[block.material], lw=0.25)
+        if block.name in names:
+            position = 0.5 * (x.min() + x.max()), 0.5 * (y.min() + y.max())
+            if block.name == "cone":
+                position = x.mean(), 0.3 * y.max()
+            axis.text(*position, names[block.name], ha="center", va="center", fontsize="small")
+    for line in _find_outlines(dump, following):
+        axis.plot(*(MM * line), color="k", lw=0.8)
+    axis.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
+
+
+def sample_hugoniot(material, top: float) -> tuple[np.ndarray, np.ndarray]:
+    """Densities and pressures of single shocks from rest up to the pressure `top`, if there are."""
+    points = [(material.rho0, 0.0)]
+    for p in np.linspace(0.0, 1.05 * top, 60)[1:]:
+        try:
+            points.append((shock_to_pressure(material.eos, material.rho0, 0.0, p).rho, p))
+        except BadInput:  # beyond its table
+            break
+    return tuple(np.array(points).T)
+
+
+def _fit_slope(t: np.ndarray, x: np.ndarray, near: np.ndarray) -> float:
+    return float(np.polyfit(t[near], x[near], 1)[0]) if near.sum() > 3 else math.nan
+
+
+class Results:
+    """What the problem says of a run, a part of its class: its report and its pictures, in which
+    each material has one colour."""
+
+    def report(self, history, final=None) -> Report:
+        """What was computed, beside theory where there is one."""
+        if not history:
+            return Report(rows=[Row("impact", theory=self.impact[0])])
+        deck, t, (first, last) = (
+            self.deck,
+            history["t"],
+            (part * self.impact[2] for part in PLATEAU),
+        )
+        inside = (t > first) & (t < last)
+        impact = float(history["pressure_impact"][inside].mean()) if inside.any() else math.nan
+        words = f"mean from {US * first:.2f} to {US * last:.2f} us; impedances match"
+        label = "pressure on the impact face [GPa]"
+        rows = [Row("impact", impact, self.impact[0], label, 1e9, 5, "impact", source=words)]
+
+        def tell(name, computed, label, unit=1.0, source=""):
+            rows.append(Row(name, float(computed), label=label, unit=unit, digits=3, source=source))
+
+        for part in PARTS:
+            p, t, x, y = find_peak(history, part)
+            words = f"at {t * US:.3g} us, x = {x * MM:.3g}, r = {y * MM:.2g} mm"
+            label = f"greatest pressure in the {part}, {getattr(deck, part)} [GPa]"
+            tell(f"peak_{part}", p, label, 1e9, words)
+        for number, part in enumerate(GAUGES):
+            p = np.nanmax(history[f"pressure_gauge_{number}"])
+            tell(f"gauge_{number}", p, f"the same on the axis at {part:g} of the cone [GPa]", 1e9)
+        words = f"{100.0 * history['transformed'][-1]:.2g} % at the end"
+        most = np.nanmax(history["transformed"])
+        tell("transformed", most, "most of the cone in the second phase [%]", 0.01, words)
+        for name, where in (("axis", "on the axis"), ("side", "along the side")):
+            for station, passage in zip(
+                STATIONS, measure_passage(self, history, name), strict=True
+            ):
+                t, speed, p = passage
+                if math.isfinite(t):
+                    x = MM * (deck.front + station * deck.cone)
+                    label = f"shock {where} at x = {x:.4g} mm [km/s]"
+                    words = f"at {t * US:.3f} us, {p * GPA:.3g} GPa behind it"
+                    tell(f"shock_{name}_{station:g}", speed, label, 1e3, words)
+        head = (
+            f"conical-target: {deck.impactor} at {deck.speed:g} m/s on {deck.shell}, "
+            f"{deck.filling} in {deck.target}, {deck.cells} cells to the shell"
+        )
+        if self.ripple:
+            waves, notes = compare_waves(self, history)
+            return Report(head, rows + waves, notes)
+        begin, first, late = measure_growth(history)
+        widest = int(np.nanargmax(history["line_amplitude"]))
+        top, when = (history[name][widest] for name in ("line_amplitude", "t"))
+        words = f"half of peak to peak at the end; at most {top * MM:.2g} mm at {when * US:.2f} us"
+        label = "side: deviation from its own line [mm]"
+        tell("line_amplitude", history["line_amplitude"][-1], label, 1e-3, words)
+        words = (
+            f"{history['line_length'][-1] / history['line_length'][0]:.3f} times its initial length"
+        )
+        tell(
+            "line_bend",
+            history["line_bend"][-1],
+            "side: deviation from its chord [mm]",
+            1e-3,
+            words,
+        )
+        if math.isfinite(first):
+            words = f"from {begin * US:.2f} us on; {late:.3g} m/s in the latest half"
+            tell("line_growth", first, "initial growth of the side's amplitude [m/s]", 1.0, words)
+        return Report(head, rows)
+
+    def figures(self):
+        return {n: draw for n, draw in super().figures().items() if n != "ripple" or self.ripple}
+
+    def draw_ripple(self, figure, run) -> None:
+        """The rippled side at several times; amplitude over time, growth over age, with theory."""
+        from matplotlib import colormaps
+
+        figure.set_size_inches(11.0, 7.2)
+        grid = figure.add_gridspec(2, 2, height_ratios=(1.25, 1.0))
+        shape = figure.add_subplot(grid[0, :])
+        amplitude, growth = (figure.add_subplot(grid[1, column]) for column in (0, 1))
+        dumps, k = spread_dumps(run, SHOWN), self.ripple.wavenumber
+        for shade, dump in zip(np.linspace(0.0, 0.9, len(dumps)), dumps, strict=True):
+            line, colour = MM * dump.block("cone").nodes[:, :, -1], colormaps["viridis"](shade)
+            shape.plot(*line, lw=1.4, label=f"{US * dump.t:.2g} us", color=colour)
+        shape.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
+        shape.set_title("line between graphite and lead", fontsize="medium")
+        shape.legend(fontsize="small", frameon=False, loc="upper right")
+        crossed, waves = measure_waves(self, run.history)
+        t = run.history["t"]
+        top = max((np.nanmax(wave.amplitude) for wave in waves), default=math.nan)
+        for number, wave in enumerate(waves):
+            style, grown = {"color": f"C{number}"}, wave.age > 0.0
+            label, first = f"wave {number + 1}", wave.amplitude[0]
+            amplitude.plot(US * t, MM * wave.amplitude, label=label, **style)
+            growth.plot(US * wave.age[grown], wave.amplitude[grown] / first, label=label, **style)
+            if crossed is not None:
+                theory = first * crossed.compute_growth(k, wave.age)
+                gentle = theory < 1.5 * top
+                amplitude.plot(US * t[gentle], MM * theory[gentle], "--", lw=0.9, **style)
+        amplitude.axhline(MM / k, color="0.6", lw=0.7)
+        amplitude.text(0.05, MM / k, "k a = 1", color="0.4", fontsize="small", va="bottom")
+        if crossed is not None:
+            age = np.linspace(0.0, max(wave.age[-1] for wave in waves), 200)
+            (impulse, shear), plus = crossed.compute_rates(k), crossed.compression
+            for values, style, words in (
+                (crossed.compute_growth(k, age), {"color": "k", "ls": "--", "lw": 1.0}, "theory"),
+                (
+                    plus * (1.0 + impulse * age),
+                    {"color": "0.5", "ls": "-.", "lw": 0.8},
+                    "impulse alone",
+                ),
+                (plus * np.cosh(shear * age), {"color": "0.5", "ls": ":", "lw": 1.0}, "slip alone"),
+            ):
+                growth.plot(US * age, values, label=words, **style)
+            growth.set_yscale("log")
+            ticks = (0.8, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0)
+            growth.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+            growth.set_yticks([], minor=True)
+            growth.set_ylim(0.75, 2.0 * top / np.nanmean([wave.amplitude[0] for wave in waves]))
+        amplitude.set(xlabel="t [us]", ylabel="amplitude [mm]")
+        amplitude.legend(fontsize="small", frameon=False)
+        amplitude.set_title("dashed: theory of small slopes", fontsize="medium")
+        growth.set(xlabel="time since the shock was at the wave [us]", ylabel="a / a0")
+        growth.legend(fontsize="small", frameon=False, ncols=2)
+
+    def draw_conical_target(self, figure, run) -> None:
+        """Materials at the start and the end, pressure at the end; graphite and its corner near."""
+        figure.set_size_inches(12.0, 7.4)
+        grid = figure.add_gridspec(2, 6, height_ratios=(1.0, 1.25))
+        top = [figure.add_subplot(grid[0, 2 * n : 2 * n + 2]) for n in range(3)]
+        near, corner = figure.add_subplot(grid[1, :3]), figure.add_subplot(grid[1, 3:])
+        first, last = run.dumps[0], run.dumps[-1]
+        following, times = (
+            self.layout.find_following(),
+            [f"t = {d.t * US:.3g} us" for d in (first, last)],
+        )
+        names = {block: getattr(self.deck, part) for block, part in LABELS.items()}
+        names["cone"] = names["cone"].split("-")[0]
+        for axis, dump, time in zip(top, (first, last), times, strict=False):
+            _draw_materials(axis, dump, names, following, grid=False)
+            axis.set_title(time, fontsize="medium")
+        picture = draw_field(
+            top[2], last, lambda block: GPA * block.cell_fields["p"],
+            lines=_find_outlines(last, following), title=f"{times[1]}, pressure", mm=True,
+        )  # fmt: skip
+        nodes = MM * np.concatenate(
+            [block.nodes.reshape(2, -1) for dump in (first, last) for block in dump.blocks], axis=1
+        )
+        for axis in top:
+            ends = nodes[0].min() - 1.0, nodes[0].max() + 1.0
+            axis.set(xlim=ends, ylim=(0.0, 1.32 * nodes[1].max()))
+        bar = figure.colorbar(
+            picture, cax=top[2].inset_axes([0.08, 0.9, 0.84, 0.045]), orientation="horizontal"
+        )
+        bar.ax.tick_params(labelsize="small", pad=1.0)
+        bar.ax.set_title("GPa", fontsize="small", loc="right", x=1.08, y=-1.6)
+        for axis in (near, corner):
+            axis.set_facecolor(
+                FACES["shell"]
+            )  # what shows between chords and the line is the shell's
+            _draw_materials(axis, last, {}, following, grid=True)
+        cone = MM * last.block("cone").nodes
+        (left, _), (right, high) = cone.min(axis=(1, 2)), cone.max(axis=(1, 2))
+        near.set(xlim=(left - 1.5, right + 1.5), ylim=(0.0, high + 1.5))
+        near.set_title(f"the graphite at {last.t * US:.3g} us", fontsize="medium")
+        x, y = cone[:, 0, -1]
+        corner.set(xlim=(x - 1.6, x + 3.2), ylim=(y - 1.9, y + 1.3))
+        corner.set_title("where graphite, steel and lead meet", fontsize="medium")
+
+    def draw_gauges(self, figure, run) -> None:
+        """Pressures over time: gauges on the axis, the greatest and its place, the impact face."""
+        figure.set_size_inches(11.0, 4.2)
+        axis, places = figure.subplots(1, 2)
+        history, impact = run.history, self.impact[0]
+        t, top = US * history["t"], history["greatest_pressure"]
+        for number, part in enumerate(GAUGES):
+            p = history[f"pressure_gauge_{number}"]
+            axis.plot(t, p * GPA, label=f"axis, {part:g} of the cone")
+        axis.plot(t, top * GPA, "k:", label="greatest in the cone")
+        axis.plot(t, history["pressure_impact"] * GPA, color="0.6", label="impact face")
+        axis.axhline(impact * GPA, color="0.6", lw=0.6)
+        axis.set_ylabel("pressure [GPa]")
+        for column, words, colour in (("x", "x", "k"), ("y", "r", "tab:red")):
+            values = np.where(top > 0.01 * impact, MM * history[f"greatest_{column}"], np.nan)
+            places.plot(t, values, ".", ms=2.0, color=colour, label=words)
+        peak = t[int(np.nanargmax(top))]
+        places.axvline(peak, color="0.7", lw=0.8)
+        places.text(peak, 0.5, " peak", color="0.4", fontsize="small", va="bottom")
+        places.set_ylabel("place of the greatest pressure in the cone [mm]")
+        above = {"ncols": 3, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+        for panel in (axis, places):
+            panel.set(xlabel="t [us]", xlim=(0.0, t[-1]), ylim=(0.0, None))
+            panel.legend(fontsize="small", frameon=False, **above)
+
+    def draw_graphite(self, figure, run) -> None:
+        """Part in the second phase over time; states beside the Hugoniot; where the phase is."""
+        figure.set_size_inches(12.0, 4.2)
+        part, states, map_axes = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.3))
+        material = self.materials["filling"]
+        eos, t, share = material.eos, run.history["t"], run.history["transformed"]
+        part.plot(US * t, 100.0 * share, color="k")
+        part.set(xlim=(0.0, US * t[-1]), ylim=(0.0, None))
+        part.set(xlabel="t [us]", ylabel="in the second phase [% of the cone's mass]")
+        tops = [float(dump.block("cone").cell_fields["p"].max()) for dump in run.dumps]
+        shares = [float(np.interp(dump.t, t, share)) for dump in run.dumps]
+        most = run.dumps[int(np.argmax(shares if max(shares) > 0.0 else tops))]
+        lowest = 0.0
+        for dump in sorted({*spread_dumps(run, SHOWN)[1:], most}, key=lambda dump: dump.t):
+            fields = dump.block("cone").cell_fields
+            rho, p = fields["rho"].ravel(), GPA * fields["p"].ravel()
+            states.plot(rho, p, ".", ms=1.5, zorder=2, label=f"{US * dump.t:.3g} us")
+            lowest = min(lowest, p.min())
+        rho, p = sample_hugoniot(material, max(tops))
+        states.plot(rho, GPA * p, color="k", lw=0.9, zorder=3, label="Hugoniot")
+        if eos.mixed_region is not None:
+            edges = [eos.rho0 / (1.0 - eta) for eta in eos.mixed_region]
+            states.axvspan(*edges, color="0.9", zorder=0)
+            states.text(edges[0], 0.0, " mixed", color="0.4", fontsize="small", va="bottom")
+            states.set_xlim(
+                0.9 * rho[0], min(1.02 * edges[1], max(1.05 * rho[-1], 1.15 * edges[0]))
+            )
+        states.set_ylim(1.1 * lowest, 1.1 * GPA * max(tops))
+        states.locator_params(axis="x", nbins=5)
+        states.set(xlabel="density [kg/m3]", ylabel="pressure [GPa]")
+        states.legend(fontsize="x-small", markerscale=4.0, loc="upper left")
+        cone = most.block("cone")
+        values = 100.0 * eos.compute_second_part(cone.cell_fields["rho"])
+        picture = map_axes.pcolormesh(
+            *(MM * cone.nodes), values, cmap="magma_r", vmin=0.0, rasterized=True
+        )
+        map_axes.plot(*(MM * trace_outline(cone.nodes)), "k", lw=0.8)
+        map_axes.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
+        map_axes.set_title(f"t = {US * most.t:.3g} us", fontsize="medium")
+        figure.colorbar(picture, ax=map_axes, shrink=0.7, label="second phase [%]")
+
+    def draw_converging_shock(self, figure, run) -> None:
+        """Place of the shock in the cone over time, pressure behind it and speed over the place."""
+        figure.set_size_inches(11.0, 3.8)
+        path, pressure, speed = figure.subplots(1, 3)
+        reach = WIDTH * self.deck.cone
+        for name, words in (("axis", "on the axis"), ("side", "along the side")):
+            t, x, p = get_shock_path(run.history, name)
+            path.plot(US * t, MM * x, label=words)
+            pressure.plot(MM * x, GPA * p, label=words)
+            positions = np.linspace(*x[[0, -1]], 40)[1:-1] if x.size > 8 else np.empty(0)
+            slopes = [_fit_slope(t, x, np.abs(x - position) < reach) for position in positions]
+            speed.plot(MM * positions, 1e-3 * np.array(slopes), label=words)
+        pressure.set(xlabel="x of the shock [mm]", ylabel="greatest pressure just behind [GPa]")
+        speed.set(xlabel="x of the shock [mm]", ylabel="speed [km/s]")
+        path.set(xlabel="t [us]", ylabel="x of the shock [mm]")
+        path.legend(fontsize="small")
+
+    def draw_cone_side(self, figure, run) -> None:
+        """The line between graphite and lead, its departure from its own straight line, growth."""
+        figure.set_size_inches(13.5, 4.0)
+        shape, away, growth = figure.subplots(1, 3)
+        for dump in spread_dumps(run, SHOWN):
+            line, label = dump.block("cone").nodes[:, :, -1], f"{US * dump.t:.2g} us"
+            departure, part = measure_departure(line)
+            shape.plot(*(MM * line), lw=1.0, label=label)
+            away.plot(part, MM * departure, lw=1.0, label=label)
+        shape.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
+        words = "off its own straight line [mm]"
+        away.set(xlabel="part of the side's length, from the base", ylabel=words)
+        for end in MIDDLE:
+            away.axvline(end, color="0.7", lw=0.6)
+        away.legend(fontsize="x-small")
+        t, history = US * run.history["t"], run.history
+        growth.plot(t, MM * history["line_amplitude"], label="amplitude: half of peak to peak")
+        growth.plot(t, MM * history["line_bend"], ls="--", label="greatest distance from the chord")
+        growth.set(xlabel="t [us]", ylabel="[mm]")
+        growth.legend(fontsize="small")

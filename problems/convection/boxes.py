@@ -27,6 +27,7 @@ from hydro.convection.steady import (
 )
 from hydro.convection.tensor_grids import make_axis
 from problems.deck import DeckTable, key
+from problems.initial_states import make_plane_grid
 from problems.pictures import draw_grid
 from problems.problem import BlockPlan, Problem, get_last
 
@@ -44,8 +45,7 @@ class ConvectionBlock:
     def __init__(self, name: str, equations: Equations, psi: np.ndarray, temperature: np.ndarray):
         self.name, self.equations = name, equations
         self.psi, self.temperature = psi, temperature
-        x, y = (axis.nodes for axis in equations.axes)
-        self.nodes = np.array(np.meshgrid(x, y, indexing="ij"))
+        self.nodes = make_plane_grid(*(axis.nodes for axis in equations.axes))
 
     @property
     def cell_fields(self) -> dict[str, np.ndarray]:
@@ -214,6 +214,10 @@ class AxisGrid(DeckTable, kw_only=True):
         names = ("floor", "ratio", "strength", "share", "relaxation")
         return {name: getattr(self, name) for name in names}
 
+    def control(self) -> GridControl:
+        """How the grid is to follow the flow."""
+        return GridControl(self.kind, self.every, options=self.options())
+
 
 class BoxProblem(Problem):
     """A box, `extent` [m] wide and high, of `fluid` between `walls`, by the solver's names.
@@ -243,25 +247,17 @@ class BoxProblem(Problem):
         ends = zip(self.size, self.extent, strict=True)
         return Equations(*(self.deck.grid.make(n, 0.0, end) for n, end in ends), self.walls)
 
-    def make_grid_control(self) -> GridControl:
-        """How the deck wants the grid to follow the flow."""
-        grid = self.deck.grid
-        return GridControl(grid.kind, grid.every, options=grid.options())
-
     def make_march(self, equations: Equations, psi, temperature, coldest: float) -> TimeEvolution:
         """The march in time from a state."""
         run = self.deck.run
         longest = self.deck.longest_step or self.longest_part * (run.t_set_up or self.t_end)
         march = March(equations, self.fluid, psi, temperature, cfl=run.cfl, longest=longest)
-        return TimeEvolution("box", march, self.make_grid_control(), self.t_end, coldest)
+        return TimeEvolution("box", march, self.deck.grid.control(), self.t_end, coldest)
 
     def say_lost_volume(self, history) -> str:
         """A sentence on the conservation of volume in the last step."""
         lost = get_last(history, "mass_residual")
         return f"volume lost in a cell, over the largest flux: {lost:.1e}"
-
-    def figures(self):
-        return {"flow": self.draw_flow, "nusselt": self.draw_nusselt, "grid": self.draw_steps}
 
     def read_dump(self, dump) -> tuple[Any, Equations, np.ndarray]:
         """The block of a dump, the equations on its grid, its temperatures [K] in one row."""
@@ -318,7 +314,7 @@ class BoxProblem(Problem):
         axis.grid(alpha=0.3)
         axis.legend(fontsize="small")
 
-    def draw_steps(self, figure, run_data) -> None:
+    def draw_grid(self, figure, run_data) -> None:
         """The grid of the last dump over the speed, and its steps along both axes."""
         (block,) = run_data.dumps[-1].blocks
         x, y = block.nodes

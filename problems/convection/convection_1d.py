@@ -14,8 +14,6 @@ solution.  Note: Polevikov's grid has its longest steps at the plates, where the
 the square root of the number of cells: v is first order on it, not second.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Mapping
@@ -48,8 +46,6 @@ ERRORS = ("error_T", "error_v", "swings_T", "swings_v")
 
 
 class Convection1DDeck(Deck, kw_only=True):
-    """Deck of `convection-1d`."""
-
     output: Output = Output(dumps=4)
     run: RunControl = RunControl()
     cells: key(int, "cells across the slot", ge=3, le=20000) = 40
@@ -65,8 +61,6 @@ class Convection1DDeck(Deck, kw_only=True):
 
 
 class Convection1D(Problem):
-    """One column of cells."""
-
     Deck = Convection1DDeck
     units: Mapping[str, str] = {"least_step": "m", "flow": "m2/s", "reference_temperature": "K"}
 
@@ -83,14 +77,9 @@ class Convection1D(Problem):
     def make_column(self, scheme: str | None = None) -> Column:
         """The fluid and its walls, with the deck's scheme or another."""
         deck = self.deck
-        return Column(
-            viscosity=deck.prandtl,
-            diffusivity=1.0,
-            buoyancy=deck.rayleigh * deck.prandtl,
-            through_flow=deck.peclet,
-            mean_speed=deck.mean_speed,
-            scheme=scheme or deck.scheme,
-        )
+        forces = {"buoyancy": deck.rayleigh * deck.prandtl, "through_flow": deck.peclet}
+        forces |= {"mean_speed": deck.mean_speed, "scheme": scheme or deck.scheme}
+        return Column(viscosity=deck.prandtl, diffusivity=1.0, **forces)
 
     def build(self) -> ColumnMarch:
         deck, grid = self.deck, self.deck.grid
@@ -134,16 +123,7 @@ class Convection1D(Problem):
                 f"  NOT STEADY: the state still changes by {change:.1e} in a diffusive time, and "
                 "the exact profiles are the steady ones; a longer time (run.t_end)"
             )
-        lines += ["", *align(self.tabulate_grids())]
-        if deck.peclet != 0.0:
-            local = abs(deck.peclet) / deck.cells
-            lines += ["", f"  uniform grid, grid Péclet number {local:.3g}"]
-            lines += align(self.tabulate_schemes())
-        return "\n".join(lines)
-
-    def tabulate_grids(self) -> list[list[str]]:
-        """All kinds of grid at SIZES times the deck's cells: error of v, its order and more."""
-        counts = [size * self.deck.cells for size in SIZES]
+        counts = [size * deck.cells for size in SIZES]
         head = ["grid (settled)  error of v on", *map(str, counts), "order", "of T there"]
         table = [[*head, "shortest step", "most grid Re"]]
         for name in GRIDS:
@@ -151,22 +131,19 @@ class Convection1D(Problem):
             errors, last = [row["error_v"] for row in found], found[-1]
             order, least = math.log2(errors[-2] / errors[-1]), np.diff(axes[-1]).min()
             row = [f"{order:.2f}", f"{last['error_T']:.1e}", f"{least:.2e}"]
-            table.append(
-                [name, *(f"{error:.2e}" for error in errors), *row, f"{last['reynolds']:.3g}"]
-            )
-        return table
-
-    def tabulate_schemes(self) -> list[list[str]]:
-        """All schemes of the flux on a uniform grid of the deck's cells."""
-        x, table = make_axis("uniform", self.deck.cells), []
+            row.append(f"{last['reynolds']:.3g}")
+            table.append([name, *(f"{error:.2e}" for error in errors), *row])
+        lines += ["", *align(table)]
+        if deck.peclet == 0.0:
+            return "\n".join(lines)
+        local, x = abs(deck.peclet) / deck.cells, make_axis("uniform", deck.cells)
+        table = [["  scheme", "error of T", "of v", "turns too many of T", "of v"]]
         for scheme in SCHEMES:
             found = measure_errors(self.exact, x, *solve_column(self.make_column(scheme), x)[:2])
             sizes = (f"{found[name]:{'.1e' if 'error' in name else '.0f'}}" for name in ERRORS)
             table.append([f"  {scheme}", *sizes])
-        return [["  scheme", "error of T", "of v", "turns too many of T", "of v"], *table]
-
-    def figures(self):
-        return {"profiles": self.draw_profiles, "grids": self.draw_grids}
+        title = f"  uniform grid, grid Péclet number {local:.3g}"
+        return "\n".join([*lines, "", title, *align(table)])
 
     def draw_profiles(self, figure, run_data) -> None:
         """Temperature and velocity in the last dump over the exact profiles, nodes below.
@@ -183,30 +160,27 @@ class Convection1D(Problem):
             width = max(width, 3.0 * np.diff(x)[last])
             windows.append((1.0 - width, 1.0) if last else (0.0, width))
         figure.set_size_inches(9.0, 3.8 * len(windows))
-        panels = figure.subplots(len(windows), 2, squeeze=False)
-        for row, window in zip(panels, windows, strict=True):
-            self._draw_window(row, block, x, window)
         figure.suptitle(
             f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}, {deck.cells} cells, "
             f"grid {deck.grid.kind}, t = {dump.t:.3g} s",
             fontsize="medium",
         )
-
-    def _draw_window(self, panels, block, x: np.ndarray, window: tuple[float, float]) -> None:
-        centres, fine = 0.5 * (x[1:] + x[:-1]), np.linspace(*window, 501)
+        centres = 0.5 * (x[1:] + x[:-1])
         labels = {"T": "temperature [K]", "v": "velocity along the plates [m/s]"}
-        shown = (centres >= window[0]) & (centres <= window[1])
-        nodes = x[(x >= window[0]) & (x <= window[1])]
-        for axes, exact, name in zip(panels, self.exact.sample(fine), labels, strict=True):
-            found = block.cell_fields[name][shown, 0]
-            axes.plot(fine, exact, color="0.6", lw=1.2, label="exact")
-            axes.plot(centres[shown], found, ".", ms=4, label="computed")
-            values = np.concatenate([exact, found])
-            position = values.min() - 0.07 * (np.ptp(values) or 1.0)
-            axes.plot(nodes, np.full_like(nodes, position), "|", color="k", ms=7, mew=0.6)
-            axes.set_xlabel("x [m], nodes below")
-            axes.set_title(labels[name], fontsize="medium")
-            axes.legend(fontsize="small")
+        panels = figure.subplots(len(windows), 2, squeeze=False)
+        for row, (low, high) in zip(panels, windows, strict=True):
+            shown, fine = (centres >= low) & (centres <= high), np.linspace(low, high, 501)
+            nodes = x[(x >= low) & (x <= high)]
+            for axes, exact, name in zip(row, self.exact.sample(fine), labels, strict=True):
+                found = block.cell_fields[name][shown, 0]
+                axes.plot(fine, exact, color="0.6", lw=1.2, label="exact")
+                axes.plot(centres[shown], found, ".", ms=4, label="computed")
+                values = np.concatenate([exact, found])
+                position = values.min() - 0.07 * (np.ptp(values) or 1.0)
+                axes.plot(nodes, np.full_like(nodes, position), "|", color="k", ms=7, mew=0.6)
+                axes.set_xlabel("x [m], nodes below")
+                axes.set_title(labels[name], fontsize="medium")
+                axes.legend(fontsize="small")
 
     def draw_grids(self, figure, run_data) -> None:
         """Steps of all kinds of grid, settled, and how their error of v falls with the cells."""

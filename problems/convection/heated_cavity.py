@@ -13,8 +13,6 @@ Note: Polevikov's grid puts nodes where the speed is large; the step at a wall d
 N^-1/2, so the Nusselt number is better on most other grids.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Literal
@@ -69,8 +67,6 @@ class Side(DeckTable, kw_only=True):
 
 
 class HeatedCavityDeck(Deck, kw_only=True):
-    """Deck of `heated-cavity`."""
-
     output: Output = Output(dumps=4)
     run: RunControl = RunControl()
     method: key(Literal["steady", "time"], "Newton's iteration, or a march from rest") = "steady"
@@ -93,8 +89,6 @@ class HeatedCavityDeck(Deck, kw_only=True):
 
 
 class HeatedCavity(BoxProblem):
-    """One box."""
-
     Deck = HeatedCavityDeck
     name = "heated-cavity"
     longest_part = 1 / 400
@@ -115,20 +109,15 @@ class HeatedCavity(BoxProblem):
         known = deck.left.heat == "isothermal" and deck.right.heat == "isothermal"
         # the scale of the Nusselt number: the difference of the sides, or 1 K without one
         self.scale = (abs(deck.left.value - deck.right.value) if known else 1.0) or 1.0
-
-    @property
-    def t_end(self) -> float:
-        default = float(STEADY_ITERATIONS) if self.deck.method == "steady" else TIME
-        return self.deck.run.t_end or default
-
-    @property
-    def t_unit(self) -> str:
-        return "iterations" if self.deck.method == "steady" else "s"
+        usual, self.t_unit = (
+            (TIME, "s") if deck.method == "time" else (STEADY_ITERATIONS, "iterations")
+        )
+        self.t_end = deck.run.t_end or float(usual)
 
     def build(self):
         deck, equations = self.deck, self.make_first_equations()
         if deck.method == "steady":
-            solver = SteadySolver(equations, self.fluid, self.make_grid_control(), deck.tolerance)
+            solver = SteadySolver(equations, self.fluid, deck.grid.control(), deck.tolerance)
             return SteadyEvolution("box", solver, self.t_end)
         sides = (deck.left, deck.right, deck.bottom, deck.top)
         coldest = min((s.value for s in sides if s.heat == "isothermal"), default=0.0)

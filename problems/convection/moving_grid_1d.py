@@ -15,8 +15,6 @@ accelerates); orders of grids with bounded neighbours look low because the bound
 ones most (`grid.ratio = 1000` shows the second order).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from itertools import pairwise
@@ -41,13 +39,6 @@ COLOURS = dict(zip(FAMILIES, ("0.3", "C3", "C1", "C0"), strict=True))
 PARTS = (4, 2)  # of the deck's cells, run again for the summary
 
 
-def find_loss(family: str, start, end) -> float:
-    """Change of the sum of u dx beyond what came in, over its largest size."""
-    total, through = f"total_u_{family}", f"boundary_u_{family}"
-    change = end[total] - start[total] - (end[through] - start[through])
-    return abs(change) / max(abs(end[total]), abs(start[total]))
-
-
 class PlacingPart(DeckTable, kw_only=True):
     """How the nodes of the moving columns are placed."""
 
@@ -65,8 +56,6 @@ class PlacingPart(DeckTable, kw_only=True):
 
 
 class MovingGrid1DDeck(Deck, kw_only=True):
-    """Deck of `moving-grid-1d`."""
-
     run: RunControl = RunControl(t_end=1.0, cfl=0.5)
     cells: key(int, "cells of each column", ge=16, le=10000) = 160
     viscosity: key(float, "viscosity [m2/s]; the column is 1 m", gt=0, le=10) = 5e-3
@@ -83,8 +72,6 @@ class MovingGrid1DDeck(Deck, kw_only=True):
 
 
 class MovingGrid1D(Problem):
-    """Four columns, one front or more."""
-
     Deck = MovingGrid1DDeck
     units: Mapping[str, str] = {f"error_{family}": "m2/s" for family in FAMILIES}
 
@@ -142,28 +129,27 @@ class MovingGrid1D(Problem):
         deck = self.deck
         if history["t"][-1] < 0.999999 * self.t_end:
             return "moving-grid-1d: the families are compared at the end time, which is not reached"
-        start, end = ({name: history[name][k] for name in history} for k in (0, -1))
         counts = sorted({max(16, deck.cells // part) for part in PARTS} - {deck.cells})
         coarse = [self.repeat(count) for count in counts]
         counts.append(deck.cells)
-        steps = int(end["step"])
+        steps = int(history["step"][-1])
         fronts = f"{len(deck.fronts)} front" + "s" * (len(deck.fronts) > 1)
         head = f"{fronts}, viscosity {deck.viscosity:g} m2/s, {steps} steps; mean |u - exact| on"
         words = ["order", "worst in time", "sum lost", "CPU ms/step"]
         table = [["", *map(str, counts), *words]]
         for family in FAMILIES:
-            errors = [run[family][0] for run in coarse] + [end[f"error_{family}"]]
+            errors = [run[family][0] for run in coarse] + [history[f"error_{family}"][-1]]
             order = math.nan
             if len(errors) > 1:
                 order = math.log2(errors[-2] / errors[-1]) / math.log2(counts[-1] / counts[-2])
             seconds = float(np.nansum(history[f"seconds_{family}"])) / max(1, steps)
-            worst, lost = np.nanmax(history[f"error_{family}"]), find_loss(family, start, end)
+            worst, total = np.nanmax(history[f"error_{family}"]), history[f"total_u_{family}"]
+            through = history[f"boundary_u_{family}"]
+            lost = abs(total[-1] - total[0] - (through[-1] - through[0]))
+            lost /= max(abs(total[-1]), abs(total[0]))  # of u dx beyond what came in
             row = [f"{order:.2f}", f"{worst:.2e}", f"{lost:.1e}", f"{1e3 * seconds:.2f}"]
             table.append([WORDS[family], *(f"{error:.2e}" for error in errors), *row])
         return "\n".join([head, *align(table)])
-
-    def figures(self):
-        return {"fronts": self.draw_fronts, "errors": self.draw_errors}
 
     def draw_fronts(self, figure, run_data) -> None:
         """The steepest front at the end with its error, and the ways of the nodes."""
@@ -208,9 +194,8 @@ class MovingGrid1D(Problem):
         runs = [self.repeat(count) for count in counts]
         for family, colour in COLOURS.items():
             style = {"color": colour, "lw": 1.0}
-            over_time.semilogy(
-                history["t"], history[f"error_{family}"], label=WORDS[family], **style
-            )
+            error = history[f"error_{family}"]
+            over_time.semilogy(history["t"], error, label=WORDS[family], **style)
             errors, seconds = zip(*(run[family] for run in runs), strict=True)
             over_cost.loglog(seconds, errors, "o-", ms=3.5, **style)
         over_time.set_xlabel("t [s]")

@@ -16,8 +16,6 @@ Note: near the onset everything is slow.  At one per cent above it a disturbance
 diffusive times to grow by a factor e.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Literal
@@ -73,8 +71,6 @@ def conduct(y: np.ndarray) -> np.ndarray:
 
 
 class RayleighBenard(BoxProblem):
-    """One box, or one period of a layer."""
-
     Deck = RayleighBenardDeck
     longest_part = 1 / 600
     hot_and_cold = ("j_min", "j_max")
@@ -82,6 +78,7 @@ class RayleighBenard(BoxProblem):
 
     def __init__(self, deck: RayleighBenardDeck):
         super().__init__(deck)
+        self.t_end = deck.run.t_end or TIME
         if deck.shape == "layer" and deck.sides != "adiabatic":
             raise BadInput(
                 f"sides = {deck.sides!r} contradicts shape = 'layer', whose sides are periodic; "
@@ -98,14 +95,9 @@ class RayleighBenard(BoxProblem):
         floor, ceiling = (isothermal(heat, deck.walls) for heat in (0.5, -0.5))
         self.walls = {"i_min": side, "i_max": side, "j_min": floor, "j_max": ceiling}
 
-    @property
-    def t_end(self) -> float:
-        return self.deck.run.t_end or TIME
-
     def build(self):
         equations, size = self.make_first_equations(), self.deck.amplitude
-        psi, temperature = measure.solve_rest(equations, self.fluid)
-        _, flow, heat = measure.compute_growth(equations, self.fluid, psi, temperature)
+        (psi, temperature), _, flow, heat = self.compute_growth(equations)
         return self.make_march(equations, psi + size * flow, temperature + size * heat, -0.5)
 
     def measure(self, evolution) -> dict[str, float]:
@@ -143,11 +135,10 @@ class RayleighBenard(BoxProblem):
                 low, high = 0.1 * low, 10.0 * high
         return None
 
-    def compute_rate(self) -> float:
-        """The largest growth rate [1/s] of the discrete equations on the first grid."""
-        equations = self.make_first_equations()
+    def compute_growth(self, equations) -> tuple:
+        """Rest, and the largest growth rate [1/s] of the discrete equations with its flow."""
         rest = measure.solve_rest(equations, self.fluid)
-        return measure.compute_growth(equations, self.fluid, *rest)[0]
+        return rest, *measure.compute_growth(equations, self.fluid, *rest)
 
     def report(self, history, final=None) -> Report:
         onset = self.find_onset_reference()
@@ -165,7 +156,7 @@ class RayleighBenard(BoxProblem):
                 theory = self.find_onset_reference() or math.nan
                 rows.append(Row("onset", found, theory, "onset, Ra"))
         if deck.tilt == 0.0:
-            rate, theory = self.compute_rate(), math.nan
+            rate, theory = self.compute_growth(self.make_first_equations())[1], math.nan
             if deck.shape == "layer":
                 numbers = deck.rayleigh, deck.prandtl, 2.0 * math.pi / self.width
                 theory = compute_layer_growth(*numbers, deck.walls == "free")
@@ -184,9 +175,6 @@ class RayleighBenard(BoxProblem):
         )
         return Report(head, rows, [*notes, self.say_lost_volume(history)])
 
-    def figures(self):
-        return {**super().figures(), "growth": self.draw_growth}
-
     def draw_growth(self, figure, run_data) -> None:
         """Kinetic energy and Nusselt number against time, with the growth of the eigenvalue."""
         t, energy = run_data.history["t"], run_data.history["kinetic_energy"]
@@ -194,7 +182,7 @@ class RayleighBenard(BoxProblem):
         left, right = figure.subplots(1, 2)
         left.semilogy(t, energy, lw=1.4, label="kinetic energy")
         if self.deck.tilt == 0.0:
-            rate = self.compute_rate()
+            rate = self.compute_growth(self.make_first_equations())[1]
             line = energy[0] * np.exp(2.0 * rate * (t - t[0]))
             shown = line <= 3.0 * energy.max()
             left.semilogy(t[shown], line[shown], "k--", lw=0.9, label=f"exp(2 · {rate:.4g} t)")

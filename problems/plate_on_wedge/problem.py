@@ -30,9 +30,9 @@ from hydro.eos.materials import find_material
 from hydro.links import join, slide
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, check_solid, key
 from problems.initial_states import make_plane_grid
-from problems.plate_on_wedge.report import COLUMNS, WIDE_ZONE, find_cautions, make_report
+from problems.plate_on_wedge.report import COLUMNS, WIDE_ZONE, Results
 from problems.plate_on_wedge.run import PlateRun
-from problems.problem import Problem, Report, check_memory, plan_blocks
+from problems.problem import Problem
 from problems.references.hugoniot import shock_to_pressure, shock_with_particle_speed
 from problems.references.riemann import solve_riemann
 from problems.references.shock_polars import (
@@ -121,7 +121,7 @@ CLOSEST = 0.85  # of the compression at which a Mie-Grueneisen Hugoniot's pressu
 COST_WEIGHT = 0.3
 
 
-class PlateOnWedge(Problem):
+class PlateOnWedge(Results, Problem):
     """Plate, wedge, drive: checked, built, run and measured, with their shock polars."""
 
     measures_sides = True  # jet and shocks are found by who has the block
@@ -136,10 +136,8 @@ class PlateOnWedge(Problem):
 
     def __init__(self, deck: PlateOnWedgeDeck):
         super().__init__(deck)
-        self.materials = {
-            name: find_material(label)
-            for name, label in (("plate", deck.plate), ("wedge", deck.wedge))
-        }
+        solid, wedge = find_material(deck.plate), find_material(deck.wedge)
+        self.materials = {"plate": solid, "wedge": wedge}
         for name, material in self.materials.items():
             check_solid(name, getattr(deck, name), material)
         ni, nj = deck.cells
@@ -175,13 +173,29 @@ class PlateOnWedge(Problem):
         times = [time for time, _ in deck.drive.history]
         if any(b <= a for a, b in itertools.pairwise(times)):
             raise BadInput("deck: drive.history: its times must increase")
-        self.plate_speed, self.flying = self.find_plate_speed()
-        solid = self.materials["wedge"]
-        self.target = Body(solid.eos, solid.rho0)
+        # the plate as it flies, its speed V [m/s], and when the drive's shock is at its lower side
+        self.flying, self.plate_speed, arrival = Body(solid.eos, solid.rho0), deck.drive.speed, 0.0
+        if deck.drive.kind != "moving":
+            particle_speed = self.find_particle_speed()
+            shock = shock_with_particle_speed(solid.eos, solid.rho0, 0.0, particle_speed)
+            arrival = deck.thickness / shock.shock_speed
+            self.flying, self.plate_speed = release_driven_plate(self.flying, particle_speed)
+        # time enough for a jet to reach the base
+        path = deck.face * math.sin(self.angle) / self.plate_speed
+        fall = deck.gap + deck.depth / 1.2
+        self.t_end = deck.run.t_end or arrival + 2.5 * path + fall / self.plate_speed
+        self.target = Body(wedge.eos, wedge.rho0)
         self.collision = solve_collision(self.flying, self.target, self.plate_speed, self.angle)
         self.refinement = deck.refinement or self.find_refinement()
+        until_arrival = deck.until == "auto" and self.refinement > 1.0
+        self.ends_at_arrival = deck.until == "arrival" or until_arrival
         self.coarse_spacing = deck.wedge_spacing * self.length / ni
         self.wedge_spacing = self.coarse_spacing / math.sqrt(self.refinement)
+        parts = deck.edge / self.wedge_spacing, deck.face / self.wedge_spacing
+        self.on_edge, self.on_face = (max(3, round(part)) for part in parts)  # faces of the wedge
+        turn = math.radians(deck.turn)  # `frame`: from the set-up as described here to the deck's
+        matrix = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+        self.frame = matrix @ np.diag([-1.0, 1.0]) if deck.mirror else matrix
 
     def find_particle_speed(self) -> float:
         """Velocity behind the drive's first shock in the plate [m/s]; BadInput without one."""
@@ -213,23 +227,6 @@ class PlateOnWedge(Problem):
                     "compression; take a slower or weaker drive"
                 )
         return found
-
-    def find_plate_speed(self) -> tuple[float, Body]:
-        """Speed V of the flying lower side [m/s], and the plate's material as it flies."""
-        solid = self.materials["plate"]
-        body = Body(solid.eos, solid.rho0)
-        if self.deck.drive.kind == "moving":
-            return self.deck.drive.speed, body
-        flying, speed = release_driven_plate(body, self.find_particle_speed())
-        return speed, flying
-
-    def find_arrival(self) -> float:
-        """Time at which the drive's shock reaches the plate's lower side [s]."""
-        if self.deck.drive.kind == "moving":
-            return 0.0
-        solid = self.materials["plate"]
-        shock = shock_with_particle_speed(solid.eos, solid.rho0, 0.0, self.find_particle_speed())
-        return self.deck.thickness / shock.shock_speed
 
     @functools.cached_property
     def critical(self) -> float:
@@ -264,53 +261,28 @@ class PlateOnWedge(Problem):
         zone = max(self.zone, 1e-3 * WIDE_ZONE)
         return min(max((WIDE_ZONE / zone) ** 1.5, 1.0), MOST_REFINED)
 
-    @property
-    def ends_at_arrival(self) -> bool:
-        """Does the run end when A arrives at B?"""
-        until = self.deck.until
-        return until == "arrival" or (until == "auto" and self.refinement > 1.0)
-
-    @property
-    def t_end(self) -> float:
-        """The deck's end time, or time enough for a jet to reach the base."""
-        path = self.deck.face * math.sin(self.angle) / self.plate_speed
-        fall = self.deck.gap + self.deck.depth / 1.2
-        return self.deck.run.t_end or self.find_arrival() + 2.5 * path + fall / self.plate_speed
-
-    def make_lines(self) -> tuple[np.ndarray, np.ndarray, int]:
-        """Nodes of the plate's lower side and of the wedge's top; faces of the wedge's edge."""
-        deck = self.deck
-        ni = deck.cells[0]
+    def make_grids(self, t=0.0):
+        """Those of plate and wedge, and of a flyer, as they stand in the set-up."""
+        deck, (ni, nj), drive = self.deck, self.deck.cells, self.deck.drive
         lengths = (deck.edge, self.length - deck.edge)
         counts = (self.contact + 1, ni - self.contact + 1)
         law, free_law = meeting_laws(counts, lengths, self.refinement)
         x = np.concatenate((lengths[0] * law, deck.edge + lengths[1] * free_law[1:]))
         if deck.gap:  # nodes stay with the plate
             x = np.linspace(0.0, self.length, ni + 1)
-        spacing = self.wedge_spacing
-        on_edge, on_face = (max(3, round(part / spacing)) for part in (deck.edge, deck.face))
-        along = np.concatenate(
-            (np.linspace(0.0, 1.0, on_edge + 1), 1.0 + np.linspace(0.0, 1.0, on_face + 1)[1:])
-        )
-        top = np.array(
-            [
-                np.interp(along, (0.0, 1.0, 2.0), (0.0, deck.edge, self.end[0])),
-                np.interp(along, (0.0, 1.0, 2.0), (0.0, 0.0, self.end[1])),
-            ]
-        )
-        return x, top, on_edge
-
-    def make_grids(self) -> tuple[np.ndarray, np.ndarray, int]:
-        """First grids of plate and wedge, as they stand; faces of the wedge's edge."""
-        deck = self.deck
-        x, top, on_edge = self.make_lines()
-        y = deck.gap + self.lay_rows(deck.cells[1], deck.thickness)
-        plate = make_plane_grid(x, y)
-        rows = max(6, round(deck.depth / self.coarse_spacing))
+        grids = {"plate": make_plane_grid(x, deck.gap + self.lay_rows(nj, deck.thickness))}
+        edge, face = (np.linspace(0.0, 1.0, n + 1) for n in (self.on_edge, self.on_face))
+        along = np.concatenate((edge, 1.0 + face[1:]))
+        ends = (0.0, deck.edge, self.end[0]), (0.0, 0.0, self.end[1])
+        top = np.array([np.interp(along, (0.0, 1.0, 2.0), places) for places in ends])
         bottom = np.array([arc_law(top) * self.foot, np.full(top.shape[1], self.base)])
-        part = self.lay_rows(rows, 1.0, from_end=True)
-        wedge = bottom[:, :, None] * (1.0 - part) + top[:, :, None] * part
-        return plate, wedge, on_edge
+        part = self.lay_rows(max(6, round(deck.depth / self.coarse_spacing)), 1.0, from_end=True)
+        grids["wedge"] = bottom[:, :, None] * (1.0 - part) + top[:, :, None] * part
+        if drive.kind == "flyer":
+            rows = max(4, round(drive.thickness / deck.thickness * nj))
+            y = deck.gap + deck.thickness + np.linspace(0.0, drive.thickness, rows + 1)
+            grids["flyer"] = make_plane_grid(x, y)
+        return grids
 
     def lay_rows(self, rows: int, length: float, from_end: bool = False) -> np.ndarray:
         """Places (rows + 1,) of grid lines across a body from 0 to `length`, finer at one end."""
@@ -325,28 +297,6 @@ class PlateOnWedge(Problem):
         (ni, nj), deck = self.deck.cells, self.deck
         along = 6.0 + (deck.edge + deck.face) / self.wedge_spacing
         return ni * nj + math.ceil(along * max(6.0, 1.0 + deck.depth / self.coarse_spacing))
-
-    def plan(self):
-        """End time and sizes of the blocks, whose grids are made."""
-        check_memory(self)
-        plate, wedge, _ = self.make_grids()
-        return self.t_end, plan_blocks({"plate": plate, "wedge": wedge})
-
-    @functools.cached_property
-    def frame(self) -> np.ndarray:
-        """Matrix (2, 2) from the set-up as described here to the deck's (turned, mirrored)."""
-        turn = math.radians(self.deck.turn)
-        matrix = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-        return matrix @ np.diag([-1.0, 1.0]) if self.deck.mirror else matrix
-
-    def make_block(self, name: str, nodes: np.ndarray, velocity=(0.0, 0.0), material=None) -> Block:
-        """Block of a part of the set-up in the deck's frame; material at rest at p = 0."""
-        solid = material or self.materials[name]
-        nodes = np.einsum("ab,bij->aij", self.frame, nodes)
-        if self.deck.mirror:
-            nodes = nodes[:, ::-1]
-        u, v = self.frame @ velocity
-        return Block(name, solid.eos, nodes, solid.rho0, u, v, 0.0)
 
     def turn_faces(self, block: Block, side: str, start: int = 0, stop: int | None = None):
         """(block, side, start, stop) of faces counted in the set-up as described here."""
@@ -366,29 +316,43 @@ class PlateOnWedge(Problem):
         return np.einsum("ba,b...->a...", self.frame, points)
 
     def build(self) -> PlateRun:
-        deck, drive = self.deck, self.deck.drive
-        plate_nodes, wedge_nodes, on_edge = self.make_grids()
-        speed = -drive.speed if drive.kind == "moving" else 0.0
-        plate = self.make_block("plate", plate_nodes, (0.0, speed))
-        wedge = self.make_block("wedge", wedge_nodes)
-        blocks = [plate, wedge]
-        edge, face = (
-            self.turn_faces(wedge, "j_max", 0, on_edge),
-            self.turn_faces(wedge, "j_max", on_edge),
-        )
-        links = []
+        deck, drive, grids, blocks = self.deck, self.deck.drive, self.make_grids(), []
+        strength = lambda t: 1.0  # noqa: E731
+        if drive.history:
+            times, parts = (np.array(column) for column in zip(*drive.history, strict=True))
+            strength = lambda t: float(np.interp(t, times, parts))  # noqa: E731
+        speeds = {"plate": -drive.speed if drive.kind == "moving" else 0.0, "flyer": -drive.speed}
+        solids = {**self.materials, "flyer": find_material(drive.material)}
+        for name, nodes in grids.items():
+            nodes = np.einsum("ab,bij->aij", self.frame, nodes)
+            nodes = nodes[:, ::-1] if deck.mirror else nodes
+            state = solids[name].rho0, *(self.frame @ (0.0, speeds.get(name, 0.0))), 0.0
+            blocks.append(Block(name, solids[name].eos, nodes, *state))
+        plate, wedge, *flyer = blocks
+        edge = self.turn_faces(wedge, "j_max", 0, self.on_edge)
+        face, links = self.turn_faces(wedge, "j_max", self.on_edge), []
         if deck.gap:
             for body, side, start, stop in (edge, face):
                 put(body, side, "free-surface", start, stop)
             self.put("free-surface", plate, "j_min")
         else:
             master = [face, edge] if deck.mirror else [edge, face]
-            links = [slide(master, self.turn_faces(plate, "j_min", 0, self.contact))]
+            links.append(slide(master, self.turn_faces(plate, "j_min", 0, self.contact)))
             self.put("free-surface", plate, "j_min", self.contact)
-        links += self._drive(plate, blocks)
+        if drive.kind == "piston":
+            velocity = self.frame @ (0.0, -drive.speed)
+            self.put("piston", plate, "j_max", velocity=lambda t: tuple(strength(t) * velocity))
+        elif drive.kind == "pressure":
+            pressure = lambda t: strength(t) * drive.pressure  # noqa: E731
+            self.put("free-surface", plate, "j_max", pressure=pressure)
+        elif flyer:
+            pair = self.turn_faces(plate, "j_max"), self.turn_faces(flyer[0], "j_min")
+            links.append(join("interface", *pair))
+        if drive.kind in ("moving", "flyer"):
+            self.put("free-surface", *flyer or [plate], "j_max")
         for block in blocks:
             self.put("wall", block, "i_min")
-            if block.name != "wedge":
+            if block is not wedge:
                 end = "wall" if deck.right == "symmetry" else "free-surface"
                 self.put(end, block, "i_max")
         self.put("free-surface", wedge, "i_max")
@@ -401,52 +365,5 @@ class PlateOnWedge(Problem):
             make_regridder=lambda: deck.regrid.make(threads=deck.run.threads, **weights),
         )
 
-    def _drive(self, plate: Block, blocks: list[Block]) -> list:
-        """Put the drive on the plate's back; returns links, adds a flyer to the blocks."""
-        drive = self.deck.drive
-        strength = _interpolate(drive.history)
-        if drive.kind == "piston":
-            velocity = self.frame @ (0.0, -drive.speed)
-            self.put("piston", plate, "j_max", velocity=lambda t: tuple(strength(t) * velocity))
-        elif drive.kind == "pressure":
-            self.put(
-                "free-surface", plate, "j_max", pressure=lambda t: strength(t) * drive.pressure
-            )
-        elif drive.kind == "moving":
-            self.put("free-surface", plate, "j_max")
-        else:
-            x, _, _ = self.make_lines()
-            rows = max(4, round(drive.thickness / self.deck.thickness * self.deck.cells[1]))
-            y = self.deck.gap + self.deck.thickness + np.linspace(0.0, drive.thickness, rows + 1)
-            nodes = make_plane_grid(x, y)
-            flyer = self.make_block(
-                "flyer", nodes, (0.0, -drive.speed), find_material(drive.material)
-            )
-            blocks.append(flyer)
-            self.put("free-surface", flyer, "j_max")
-            return [
-                join("interface", self.turn_faces(plate, "j_max"), self.turn_faces(flyer, "j_min"))
-            ]
-        return []
-
     def measure(self, evolution: PlateRun) -> dict[str, float]:
         return evolution.measure()
-
-    def cautions(self, history=None) -> list[str]:
-        return find_cautions(self)
-
-    def report(self, history, final=None) -> Report:
-        return make_report(self, history, final) if history else Report()
-
-    def figures(self):
-        from problems.plate_on_wedge.pictures import FIGURES
-
-        return {name: functools.partial(draw, self) for name, draw in FIGURES.items()}
-
-
-def _interpolate(history):
-    """Part of the full drive at a time: straight lines between the pairs, 1 without any."""
-    if not history:
-        return lambda t: 1.0
-    times, parts = (np.array(column) for column in zip(*history, strict=True))
-    return lambda t: float(np.interp(t, times, parts))

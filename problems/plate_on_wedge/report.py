@@ -1,4 +1,4 @@
-"""Summary of `plate-on-wedge`: the collision point A against shock polars.
+"""Summary and pictures of `plate-on-wedge`: the collision point A against shock polars.
 
 The pressure behind A is a plateau found in the data, or none.  Nothing but A's path sets a length
 in the flow around A, so pressures at equal parts of the path behind A are compared: in every step
@@ -15,15 +15,16 @@ each, and a mean over so few faces may pass for a plateau of the wrong pressure.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
+from problems.pictures import draw_field
 from problems.problem import Report, Row
 from problems.references.shock_polars import compute_jet_speed
+from regrid.sides import trace_outline
 
 # thousandths of A's path behind A between which pressures are averaged
 EDGES = (*range(10, 100, 10), 100, 125, 150, 175, 200, 250, 300, 350, 400, 450, 500)
@@ -187,8 +188,7 @@ MM = 1e3
 
 def choose_rows(problem, history, parts) -> np.ndarray:
     """Rows of the history in which A is on the given part of the face and has not arrived."""
-    path = np.nan_to_num(np.asarray(history["contact_path"], dtype=float), nan=-1.0)
-    face = problem.deck.face
+    path, face = np.nan_to_num(history["contact_path"], nan=-1.0), problem.deck.face
     return (path > parts[0] * face) & (path < parts[1] * face)
 
 
@@ -213,7 +213,7 @@ def measure_plateau(problem, history) -> Plateau:
     rows = choose_rows(problem, history, STEADY)
     if not rows.any():
         return Plateau()
-    columns = [np.asarray(history[name], dtype=float)[rows] for name in COLUMNS]
+    columns = [history[name][rows] for name in COLUMNS]
     theory = problem.collision
     machs = [wave.mach_behind for wave in (theory.plate, theory.wedge) if wave is not None]
     return find_plateau(np.stack(columns, axis=1), min(machs, default=1.0))
@@ -239,20 +239,6 @@ def measure_behind(problem, history) -> dict[str, float]:
     }
 
 
-def measure_jet_speed(history) -> float:
-    """Median in time of the fastest material's speed [m/s] while there is a jet; 0 without one.
-
-    Single cells that are nearly empty are faster for a few steps: a maximum would be theirs.
-    """
-    speed, t = (np.asarray(history[name], dtype=float) for name in ("jet_speed", "t"))
-    there = speed > 0.0
-    if not there.any():
-        return 0.0
-    order = np.argsort(speed[there])
-    weight = np.cumsum(np.gradient(t)[there][order]) if t.size > 1 else np.ones(1)
-    return float(speed[there][order][np.searchsorted(weight, 0.5 * weight[-1])])
-
-
 def measure_lead(problem, history) -> float:
     """Greatest length [m] of plate ahead of the collision point of theory on the face; NaN if none.
 
@@ -261,125 +247,6 @@ def measure_lead(problem, history) -> float:
     """
     rows = choose_rows(problem, history, (0.1, STEADY[1]))
     return reduce_known(np.nanmax, history["lead"][rows])
-
-
-def make_report(problem, history, final) -> Report:
-    """What was computed and how far it is from theory."""
-    deck, theory = problem.deck, problem.collision
-    rows, notes = [], [describe_verdict(problem, measure_lead(problem, history))]
-    chosen = choose_rows(problem, history, (0.2, 0.8))
-    if deck.drive.kind != "moving" and chosen.any():
-        speed = float(np.median(history["surface_speed"][chosen]))
-        words = "speed of the free surface [km/s]"
-        rows.append(Row("plate_speed", speed, problem.plate_speed, words, 1e3, 5))
-    speed, spread = measure_contact_speed(problem, history)
-    words, source = "speed of A on the face [km/s]", ""
-    if math.isfinite(spread):
-        source = f"constant within {100.0 * spread:.2f} % over fifths of its path"
-    if not theory.attached:
-        words, source = "speed of A, the jet's tip [km/s]", "where the plate would meet the face"
-    rows.append(Row("contact_speed", speed, theory.contact_speed, words, 1e3, 5, source=source))
-    if theory.attached:
-        found, degree = measure_behind(problem, history), math.pi / 180.0
-        plateau = measure_plateau(problem, history)
-        source, words = describe_plateau(plateau), "pressure behind A [GPa]"
-        rows.append(Row("pressure", plateau.p, theory.p, words, 1e9, 5, source=source))
-        for name, wave in (("plate", theory.plate), ("wedge", theory.wedge)):
-            turn, words = found[f"theta_{name}"], f"deflection of the {name} [deg]"
-            rows.append(Row(f"theta_{name}", turn, wave.deflection, words, degree, 5))
-            angle, words = found[f"shock_{name}"], f"shock angle in the {name} [deg]"
-            rows.append(Row(f"shock_{name}", angle, wave.wave_angle, words, degree, 5))
-    jet, whose = measure_jet_speed(history), "behind B" if theory.attached else "jet"
-    ideal = compute_jet_speed(problem.plate_speed, problem.angle)
-    if jet > 0.0:
-        notes.append(
-            f"{whose}: fastest material {jet / 1e3:.3g} km/s (median in time), "
-            f"{history['jet_mass'][-1]:.3g} kg/m at the end (incompressible theory on a rigid "
-            f"wedge: {ideal / 1e3:.3g} km/s)"
-        )
-        if not theory.attached:
-            notes.append(
-                "the jet ahead of A is thinner than a cell: its speed and mass are estimates"
-            )
-    else:
-        notes.append(f"no material faster than {JET:g} V")
-    times = final.times.items() if final is not None else ()
-    known = [f"{PHASES[name]} {1e6 * time:.3f} us" for name, time in times if math.isfinite(time)]
-    if known:
-        notes.append("phases: " + "; ".join(known))
-    return Report(functools.partial(describe_deck, problem), rows, notes)
-
-
-def describe_deck(problem) -> str:
-    """The head of the report: what collides, and what theory says of it."""
-    deck = problem.deck
-    lines = [
-        f"{deck.plate} plate on {deck.wedge} wedge at {deck.angle:g} degrees; drive: "
-        f"{deck.drive.kind}; {deck.cells[0]} x {deck.cells[1]} cells in the plate",
-        f"  theory for V = {problem.plate_speed / 1e3:.4g} km/s: {describe_margin(problem)}",
-    ]
-    return "\n".join(lines + describe_nearness(problem))
-
-
-def describe_margin(problem) -> str:
-    """The critical angle, how far this one is from it, and what theory says of it."""
-    critical = math.degrees(problem.critical)
-    away = critical - problem.deck.angle
-    attached = problem.collision.attached
-    return f"critical angle {critical:.2f} degrees, this one is {abs(away):.2f} " + (
-        "below it: the shocks are attached" if attached else "above it: a jet"
-    )
-
-
-def find_cautions(problem) -> list[str]:
-    """Sentences where the pressure behind A is low: too few cells close to the critical angle."""
-    deck, zone = problem.deck, problem.zone
-    cells = deck.cells[0]
-    if not problem.collision.attached or zone >= WIDE_ZONE or cells >= FINE_CELLS:
-        return []
-    away = math.degrees(problem.critical) - deck.angle
-    near = f"{away:.2g} degrees below the critical angle the pressure behind A"
-    finer = f"cells=[{FINE_CELLS}, {math.ceil(FINE_CELLS * deck.cells[1] / cells)}]"
-    if cells < COARSE_CELLS:
-        return [
-            f"{near} was never compared with theory at fewer than {COARSE_CELLS} cells along the "
-            f"plate; take {finer}"
-        ]
-    if problem.refinement <= 1.0 and zone < SHORT_ZONE:
-        refined = "refinement=3" if deck.drive.kind == "moving" else "refinement=2, until=arrival"
-        return [
-            f"{near} was found 5 to 8 % low with {COARSE_CELLS} unrefined cells; take {refined}"
-        ]
-    if away < NEAR_CRITICAL:
-        return [f"{near} was found up to 5 % low with {COARSE_CELLS} cells; take {finer}"]
-    return []
-
-
-def describe_nearness(problem) -> list[str]:
-    """How near the critical angle is felt, and what it costs; nothing far from it."""
-    theory, zone = problem.collision, problem.zone
-    if not theory.attached or zone >= WIDE_ZONE:
-        return []
-    if zone > 0.0:
-        words = f"the zone of constant states behind A is {100.0 * zone:.1f} % of A's path long"
-    else:
-        words = "no zone of constant states behind A"
-    lines = [
-        f"  near critical: the flow leaves A at Mach {theory.plate.mach_behind:.2f} in the plate, "
-        f"{theory.wedge.mach_behind:.2f} in the wedge; {words}"
-    ]
-    finer = problem.refinement
-    ending = "; such a run ends at B" if problem.deck.until == "auto" else ""
-    if finer > 1.0:
-        lines.append(
-            f"    so the cells at A are {finer:.3g} times finer, at as many times the steps "
-            f"(refinement=1: none of it){ending}"
-        )
-    else:
-        lines.append(
-            "    refinement=2 or 3 makes the cells at A finer, at as many times the steps" + ending
-        )
-    return lines
 
 
 def describe_plateau(plateau: Plateau) -> str:
@@ -396,8 +263,9 @@ def describe_plateau(plateau: Plateau) -> str:
     )
 
 
-def describe_verdict(problem, lead: float) -> str:
+def describe_jet(problem, history) -> str:
     """One sentence: is there a jet ahead of A, and does theory have one?"""
+    lead = measure_lead(problem, history)
     attached, spacing = problem.collision.attached, problem.length / problem.deck.cells[0]
     if not math.isfinite(lead):
         return "jet: A has not run far enough to tell whether one runs ahead of it"
@@ -409,3 +277,252 @@ def describe_verdict(problem, lead: float) -> str:
         words = "predicted ahead of A, but too thin to be resolved by these cells"
     ahead = f"at most {MM * lead:.2f} mm ({lead / spacing:.1f} cells)" if lead > 0.0 else "none"
     return f"jet: {words}; {ahead} of the plate is ahead before {STEADY[1]:.0%} of the face"
+
+
+PANELS = 6  # of the pictures that show phases
+SHADES = ("#c9d4e2", "#8c99a8", "#e2cfa9")
+TITLES = (
+    "before the collision point runs",
+    "the collision point A runs",
+    "A has arrived at B",
+    "jet",
+    "closed",
+)
+
+
+def _choose_dumps(run) -> list[tuple[str, object]]:
+    """Titles and dumps of up to PANELS panels: the first, the phases, the widest gaps, the last.
+
+    Of a phase the dump nearest to the middle of its time.
+    """
+    history, dumps = run.history, run.dumps
+    times = np.array([dump.t for dump in dumps])
+    t, phase = history["t"], history["phase"]
+    chosen = {0, len(dumps) - 1}
+    for number in range(1, len(PHASES)):
+        rows = np.flatnonzero(phase == number)
+        if rows.size:
+            chosen.add(int(np.abs(times - t[rows[rows.size // 2]]).argmin()))
+    while len(chosen) < min(PANELS, len(dumps)):
+        shown = times[sorted(chosen)]
+        chosen.add(int(np.argmax([np.abs(shown - time).min() for time in times])))
+    named = []
+    for number in sorted(chosen):
+        before = phase[t <= times[number] * (1.0 + 1e-9)]
+        latest = int(before[-1]) if before.size else 0
+        name = "at the start" if number == 0 else TITLES[latest]
+        named.append((f"{name}, t = {1e6 * times[number]:.2f} us", dumps[number]))
+    return named
+
+
+def _make_panels(figure, chosen, room: float):
+    """Axes of equal frames that hold all bodies, in rows of three; `room` [inch]: to the right.
+
+    The figure is made as high as the frames need.
+    """
+    nodes = [block.nodes.reshape(2, -1) for _, dump in chosen for block in dump.blocks]
+    places = MM * np.concatenate(nodes, axis=1)
+    low, high = places.min(axis=1), places.max(axis=1)
+    margin, width = 0.03 * (high - low).max(), 4.6
+    low, high = low - margin, high + margin
+    columns = min(3, len(chosen))
+    rows = -(-len(chosen) // columns)
+    height = width * (high[1] - low[1]) / (high[0] - low[0]) + 0.25
+    figure.set_size_inches(width * columns + room, height * rows + 0.35)
+    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for panel, (title, _) in zip(axes, chosen, strict=False):
+        panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+        panel.set_title(title, fontsize=10)
+    for panel in axes[len(chosen) :]:
+        panel.set_visible(False)
+    return axes[: len(chosen)]
+
+
+def _draw_pressure(axes, problem, run, dump, **more):
+    """Pressure [GPa] of all blocks with the grid, on one scale for the whole run."""
+    if problem.collision.attached:
+        top = 1.1 * problem.collision.p / 1e9
+    else:
+        last = run.dumps[-1].blocks
+        top = max(float(np.percentile(block.cell_fields["p"], 99.5)) for block in last) / 1e9
+    style = {"colours": "turbo", "low": 0.0, "high": top, "every": 1, "mm": True}
+    return draw_field(axes, dump, lambda block: block.cell_fields["p"] / 1e9, **style, **more)
+
+
+class Results:
+    """What the problem says of a run, a part of its class: report, cautions, pictures."""
+
+    def report(self, history, final=None) -> Report:
+        """What was computed and how far it is from theory."""
+        if not history:
+            return Report()
+        deck, theory = self.deck, self.collision
+        rows, notes = [], [describe_jet(self, history)]
+        chosen = choose_rows(self, history, (0.2, 0.8))
+        if deck.drive.kind != "moving" and chosen.any():
+            speed = float(np.median(history["surface_speed"][chosen]))
+            words = "speed of the free surface [km/s]"
+            rows.append(Row("plate_speed", speed, self.plate_speed, words, 1e3, 5))
+        speed, spread = measure_contact_speed(self, history)
+        words, source = "speed of A on the face [km/s]", ""
+        if math.isfinite(spread):
+            source = f"constant within {100.0 * spread:.2f} % over fifths of its path"
+        if not theory.attached:
+            words, source = (
+                "speed of A, the jet's tip [km/s]",
+                "where the plate would meet the face",
+            )
+        rows.append(Row("contact_speed", speed, theory.contact_speed, words, 1e3, 5, source=source))
+        if theory.attached:
+            found, degree = measure_behind(self, history), math.pi / 180.0
+            plateau, words = measure_plateau(self, history), "pressure behind A [GPa]"
+            source = describe_plateau(plateau)
+            rows.append(Row("pressure", plateau.p, theory.p, words, 1e9, 5, source=source))
+            for name, wave in (("plate", theory.plate), ("wedge", theory.wedge)):
+                for kind, words, exact in (
+                    ("theta", f"deflection of the {name} [deg]", wave.deflection),
+                    ("shock", f"shock angle in the {name} [deg]", wave.wave_angle),
+                ):
+                    what = f"{kind}_{name}"
+                    rows.append(Row(what, found[what], exact, words, degree, 5))
+        # fastest material; single cells that are nearly empty are faster for a few steps
+        speed, t = history["jet_speed"], history["t"]
+        if (there := speed > 0.0).any():
+            order = np.argsort(speed[there])
+            weight = np.cumsum(np.gradient(t)[there][order]) if t.size > 1 else np.ones(1)
+            jet = float(speed[there][order][np.searchsorted(weight, 0.5 * weight[-1])])
+            ideal = compute_jet_speed(self.plate_speed, self.angle)
+            notes.append(
+                f"{'behind B' if theory.attached else 'jet'}: fastest material {jet / 1e3:.3g} "
+                f"km/s (median in time), {history['jet_mass'][-1]:.3g} kg/m at the end "
+                f"(incompressible theory on a rigid wedge: {ideal / 1e3:.3g} km/s)"
+            )
+            if not theory.attached:
+                notes.append(
+                    "the jet ahead of A is thinner than a cell: its speed and mass are estimates"
+                )
+        else:
+            notes.append(f"no material faster than {JET:g} V")
+        times = final.times if final is not None else {}
+        known = [f"{PHASES[n]} {1e6 * t:.3f} us" for n, t in times.items() if math.isfinite(t)]
+        notes += ["phases: " + "; ".join(known)] if known else []
+        return Report(self.describe, rows, notes)
+
+    def describe(self) -> str:
+        """What collides, how far it is from the critical angle, and what it costs to be near."""
+        deck, theory, zone, finer = self.deck, self.collision, self.zone, self.refinement
+        critical = math.degrees(self.critical)
+        state = "below it: the shocks are attached" if theory.attached else "above it: a jet"
+        lines = [
+            f"{deck.plate} plate on {deck.wedge} wedge at {deck.angle:g} degrees; drive: "
+            f"{deck.drive.kind}; {deck.cells[0]} x {deck.cells[1]} cells in the plate",
+            f"  theory for V = {self.plate_speed / 1e3:.4g} km/s: critical angle {critical:.2f} "
+            f"degrees, this one is {abs(critical - deck.angle):.2f} {state}",
+        ]
+        if theory.attached and zone < WIDE_ZONE:
+            words = "no zone of constant states behind A"
+            if zone > 0.0:
+                words = (
+                    f"the zone of constant states behind A is {100.0 * zone:.1f} % of A's path long"
+                )
+            lines.append(
+                f"  near critical: the flow leaves A at Mach {theory.plate.mach_behind:.2f} in the "
+                f"plate, {theory.wedge.mach_behind:.2f} in the wedge; {words}"
+            )
+            words = "refinement=2 or 3 makes the cells at A finer, at as many times the steps"
+            if finer > 1.0:
+                words = (
+                    f"so the cells at A are {finer:.3g} times finer, at as many times the steps "
+                    "(refinement=1: none of it)"
+                )
+            ending = "; such a run ends at B" if deck.until == "auto" else ""
+            lines.append(f"    {words}{ending}")
+        return "\n".join(lines)
+
+    def cautions(self, history=None) -> list[str]:
+        """Where the pressure behind A is low: too few cells close to the critical angle."""
+        deck, cells = self.deck, self.deck.cells[0]
+        if not self.collision.attached or self.zone >= WIDE_ZONE or cells >= FINE_CELLS:
+            return []
+        away = math.degrees(self.critical) - deck.angle
+        near = f"{away:.2g} degrees below the critical angle the pressure behind A"
+        finer = f"cells=[{FINE_CELLS}, {math.ceil(FINE_CELLS * deck.cells[1] / cells)}]"
+        if cells < COARSE_CELLS:
+            return [
+                f"{near} was never compared with theory at fewer than {COARSE_CELLS} cells along "
+                f"the plate; take {finer}"
+            ]
+        if self.refinement <= 1.0 and self.zone < SHORT_ZONE:
+            finer = "refinement=3" if deck.drive.kind == "moving" else "refinement=2, until=arrival"
+            return [
+                f"{near} was found 5 to 8 % low with {COARSE_CELLS} unrefined cells; take {finer}"
+            ]
+        if away < NEAR_CRITICAL:
+            return [f"{near} was found up to 5 % low with {COARSE_CELLS} cells; take {finer}"]
+        return []
+
+    def draw_phases(self, figure, run) -> None:
+        """Pressure with the grid at the phases, side by side, all in one frame."""
+        chosen = _choose_dumps(run)
+        panels = _make_panels(figure, chosen, 0.9)
+        for axes, (_, dump) in zip(panels, chosen, strict=True):
+            image = _draw_pressure(axes, self, run, dump)
+            axes.label_outer()
+        figure.colorbar(image, ax=panels, label="pressure [GPa]", extend="max", pad=0.01)
+
+    def draw_contact(self, figure, run) -> None:
+        """Zooms at the collision point and the face's end; A's path and speed against theory."""
+        history, theory = run.history, self.collision.contact_speed
+        figure.set_size_inches(12.0, 8.5)
+        zooms, (paths, speeds) = figure.subplots(2, 2)
+        t, path = history["t"], history["contact_path"]
+        rows = choose_rows(self, history, STEADY)
+        times = np.array([dump.t for dump in run.dumps])
+        near = int(np.abs(times - (t[rows].mean() if rows.any() else t[len(t) // 2])).argmin())
+        size = 0.2 * self.deck.face * MM
+        for axes, number, words in (
+            (zooms[0], near, "collision point A"),
+            (zooms[1], -1, "end of the contact, B"),
+        ):
+            dump = run.dumps[number]
+            title = f"{words}, t = {1e6 * dump.t:.2f} us"
+            _draw_pressure(axes, self, run, dump, bar="pressure [GPa]", title=title)
+            place = [np.interp(dump.t, t, history[name]) for name in ("contact_x", "contact_y")]
+            x, y = MM * self.frame @ place
+            axes.set(xlim=(x - size, x + size), ylim=(y - 0.8 * size, y + 0.8 * size))
+        paths.plot(1e6 * t, MM * path, label="computed")
+        rows = choose_rows(self, history, (0.02, 1.0))
+        if rows.any():
+            line = (t - t[rows][0]) * theory + path[rows][0]
+            inside = (line > 0.0) & (line < self.deck.face)
+            paths.plot(1e6 * t[inside], MM * line[inside], "k--", label="V / sin(angle)")
+            speed = np.gradient(path[rows], t[rows]) / 1e3
+            speeds.plot(MM * path[rows], speed, lw=0.7, alpha=0.5, label="computed, step by step")
+            ends = np.linspace(path[rows][0], path[rows][-1], 16)
+            mean = np.diff(ends) / np.diff(np.interp(ends, path[rows], t[rows])) / 1e3
+            middles = 0.5 * MM * (ends[1:] + ends[:-1])
+            speeds.plot(middles, mean, "o-", ms=3, label="mean over a fifteenth of the path")
+            speeds.axhline(theory / 1e3, color="k", ls="--", label="theory")
+            speeds.set_ylim(0.8 * speed.min(), 1.1 * np.percentile(speed, 98.0))
+            speeds.legend(frameon=False, fontsize=8)
+        paths.set(xlabel="t [us]", ylabel="path of A along the face [mm]")
+        speeds.set(xlabel="path of A along the face [mm]", ylabel="speed of A [km/s]")
+        paths.legend(frameon=False, fontsize=8)
+        for axes in (paths, speeds):
+            axes.grid(alpha=0.3)
+
+    def draw_configuration(self, figure, run) -> None:
+        """Outlines of all bodies at several times, as the paper draws them (its Fig 6)."""
+        chosen, deck = _choose_dumps(run), self.deck
+        materials = {"plate": deck.plate, "wedge": deck.wedge, "flyer": deck.drive.material}
+        panels = _make_panels(figure, chosen, 0.0)
+        for axes, (_, dump) in zip(panels, chosen, strict=True):
+            for block, shade in zip(dump.blocks, SHADES, strict=False):
+                label = f"{block.name} ({materials[block.name]})"
+                outline = MM * trace_outline(block.nodes)
+                axes.fill(*outline, facecolor=shade, edgecolor="k", lw=0.9, label=label)
+            axes.set(xlabel="x [mm]", ylabel="y [mm]")
+            axes.label_outer()
+        figure.set_figheight(figure.get_figheight() + 0.35)
+        handles = panels[0].get_legend_handles_labels()[0]
+        figure.legend(handles=handles, frameon=False, ncols=3, loc="outside lower center")

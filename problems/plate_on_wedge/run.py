@@ -51,10 +51,14 @@ class PlateRun(Simulation):
             self.contact.refinement = problem.refinement
             self.start = self.find_contact_point()
 
+    def see(self, block: Block) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes (2, ni + 1, nj + 1) and states (4, ni, nj) of a block as they are in the set-up."""
+        nodes, state = self.problem.to_set_up(block.nodes), block.state[:, 1:-1, 1:-1]
+        return (nodes, state) if self.end else (nodes[:, ::-1], state[:, ::-1])
+
     def get_lower_line(self) -> np.ndarray:
         """Nodes (2, n) of the plate's lower side, from the wedge's edge outwards."""
-        line = self.problem.to_set_up(self.plate.side_line("j_min", self.plate.nodes))
-        return line if self.end else line[:, ::-1]
+        return self.see(self.plate)[0][:, :, 0]
 
     def find_touching(self) -> tuple[int, np.ndarray]:
         """Faces of the plate's lower side before A, and A's place (2,), with a gap at the start.
@@ -90,32 +94,22 @@ class PlateRun(Simulation):
         """Nodes (2, n) of the plate's free lower side, from A on."""
         return self.get_lower_line()[:, self.count_contact() :]
 
-    def has_run(self) -> bool:
-        """Has A left the wedge's edge?"""
-        moved = self.find_contact_point() - self.start
-        return np.hypot(*moved) > 1e-2 * self.problem.deck.face
-
-    def has_jet(self) -> bool:
-        """Are enough cells fast?"""
-        return self.measured[0][1] >= LEAST_JET
+    def get_end_face(self) -> np.ndarray:
+        """Nodes (2, n) of the wedge's end face, from the top down."""
+        return self.see(self.wedge)[0][:, -1, ::-1]
 
     def is_at_end(self) -> bool:
         """Has A come to the end B of the face?"""
         if self.contact:
             return self.contact.fixed[self.end] >= 0
-        point, free = self.find_contact_point(), self.get_free_line()
-        away = self.get_end_face()[:, 0] - point
+        free = self.get_free_line()
+        away = self.get_end_face()[:, 0] - self.find_contact_point()
         step = free[:, 1] - free[:, 0] if free.shape[1] > 1 else np.full(2, np.inf)
         return bool(np.hypot(*away) < NEAR * np.hypot(*step))
 
     def measure_along(self, point: np.ndarray) -> float:
         """How far a point is along the direction of the face [m]."""
         return math.cos(self.problem.angle) * point[0] - math.sin(self.problem.angle) * point[1]
-
-    def get_end_face(self) -> np.ndarray:
-        """Nodes (2, n) of the wedge's end face, from the top down."""
-        side = "i_max" if self.end else "i_min"
-        return self.problem.to_set_up(self.wedge.side_line(side, self.wedge.nodes))[:, ::-1]
 
     def measure_path(self) -> float:
         """Path of A along the face [m]; NaN behind B where bodies move freely."""
@@ -141,55 +135,44 @@ class PlateRun(Simulation):
         """Columns of the history: A, the states behind it, the jet, the phase."""
         point, count, (first, last) = self.find_contact_point(), self.count_contact(), BEHIND
         line = self.get_lower_line()[:, count::-1]  # of the contact, from A backwards
-        _, u, v, pressure = self.plate.state[:, 1:-1, 1]
-        surface = np.hypot(u, v)
-        if not self.end:
-            pressure, surface = pressure[::-1], surface[::-1]
+        _, u, v, pressure = self.see(self.plate)[1][:, :, 0]
+        surface, arrived = np.hypot(u, v), math.isfinite(self.times["arrived"])
         behind, direction = math.nan, np.full(2, math.nan)
         if count >= last:
             behind = float(pressure[count - last : count - first].mean())
             direction = line[:, first] - line[:, last]
         (fastest, cells, mass, angle), (*_, angle_in_wedge) = self.measured[:2]
+        means = np.full(len(COLUMNS), math.nan)  # at fixed parts of A's path, while it runs
+        if not arrived:
+            arc, behind_a = compute_arc_lengths(line), pressure[:count][::-1]
+            ringing = REFINED_RINGING if self.problem.refinement > 1.0 else RINGING
+            means = measure_profile(arc, behind_a[: arc.size - 1], self.measure_path(), ringing)
+        free = surface[count:]
+        # number of the phase entered last in PHASES, 0 before the first
+        entered = [(t, k) for k, t in enumerate(self.times.values(), 1) if math.isfinite(t)]
         return {
             "contact_x": float(point[0]),
             "contact_y": float(point[1]),
             "contact_path": self.measure_path(),
             "contact_pressure": behind,
-            **self.measure_pressures(line, pressure[:count][::-1]),
+            **dict(zip(COLUMNS, map(float, means), strict=True)),
             "interface_angle": -math.degrees(math.atan2(direction[1], direction[0])),
             "shock_angle_plate": angle,
             "shock_angle_wedge": angle_in_wedge,
-            "surface_speed": float(np.median(surface[count:]))
-            if count < surface.size
-            else math.nan,
-            "lead": self.measure_lead(point),
+            "surface_speed": float(np.median(free)) if free.size else math.nan,
+            "lead": math.nan if arrived else self.measure_lead(),
             "jet_speed": fastest if cells >= LEAST_JET else 0.0,
             "jet_mass": mass,
-            "phase": float(self.find_phase()),
+            "phase": float(max(entered)[1] if entered else 0),
         }
 
-    def measure_pressures(self, line: np.ndarray, pressure: np.ndarray) -> dict[str, float]:
-        """Pressures at fixed parts of A's path behind A, while A runs along the face; else NaN.
-
-        `line` (2, n + 1) are the contact's nodes, `pressure` (n, at least) the plate's faces there,
-        both from A backwards.
-        """
-        means = np.full(len(COLUMNS), math.nan)
-        if not math.isfinite(self.times["arrived"]):
-            arc = compute_arc_lengths(line)
-            ringing = REFINED_RINGING if self.problem.refinement > 1.0 else RINGING
-            means = measure_profile(arc, pressure[: arc.size - 1], self.measure_path(), ringing)
-        return dict(zip(COLUMNS, map(float, means), strict=True))
-
-    def measure_lead(self, point: np.ndarray) -> float:
+    def measure_lead(self) -> float:
         """How far [m, along the face] the plate is ahead of where its lower side should meet it.
 
         That place is where the height of the outer half of the free surface, not yet disturbed,
         meets the face.  Counted are A and the free surface where it hangs below that height.  A
-        jet has a growing lead, attached shocks have none.  NaN after the arrival at B.
+        jet has a growing lead, attached shocks have none.
         """
-        if math.isfinite(self.times["arrived"]):
-            return math.nan
         free = self.get_free_line()
         height = float(np.median(free[1, free.shape[1] // 2 :]))
         spacing = float(np.hypot(*np.diff(free)).mean())
@@ -205,15 +188,13 @@ class PlateRun(Simulation):
         pressure falls through half of theory's (or of its own largest value); the angle is that of
         the straight line from A through these places.
         """
-        nodes, p = self.problem.to_set_up(block.nodes), block.state[3, 1:-1, 1:-1]
+        nodes, (*_, p) = self.see(block)
         rows = np.arange(*SHOCK_ROWS)
         rows = -1 - rows[rows < block.nj] if in_wedge else rows[rows < block.nj]
         low, high = np.sort((rows[0], rows[-1])) + (block.nj if in_wedge else 0)
         part = nodes[:, :, low : high + 2]
         centres = 0.25 * (part[:, 1:, 1:] + part[:, :-1, 1:] + part[:, 1:, :-1] + part[:, :-1, :-1])
         p = p[:, low : high + 1]
-        if not self.end:
-            centres, p = centres[:, ::-1], p[::-1]
         collision = self.problem.collision
         level = 0.5 * (collision.p if collision.attached else float(p.max()))
         above = p > level
@@ -235,7 +216,12 @@ class PlateRun(Simulation):
     def advance(self) -> dict:
         """One step; then looks which phase it is and whether the run is at its end."""
         row = super().advance()
-        begun = {"attached": self.has_run, "arrived": self.is_at_end, "jet": self.has_jet}
+        far = 1e-2 * self.problem.deck.face
+        begun = {
+            "attached": lambda: np.hypot(*self.find_contact_point() - self.start) > far,
+            "arrived": self.is_at_end,
+            "jet": lambda: self.measured[0][1] >= LEAST_JET,
+        }
         for phase, is_there in begun.items():
             if not math.isfinite(self.times[phase]) and is_there():
                 self.times[phase] = self.t
@@ -251,11 +237,6 @@ class PlateRun(Simulation):
         if self.problem.ends_at_arrival and math.isfinite(self.times["arrived"]):
             return "A has arrived at the end B of the face"
         return None
-
-    def find_phase(self) -> int:
-        """Number (1..) in PHASES of the phase entered last, 0 before the first."""
-        entered = [(t, k) for k, t in enumerate(self.times.values(), 1) if math.isfinite(t)]
-        return max(entered)[1] if entered else 0
 
     def find_closure(self) -> str | None:
         """What the plate's free surface has met, in words, or None."""

@@ -13,8 +13,6 @@ Note: the jet's speed and the pressure of its impact increase with finer cells; 
 the void is closed does not change.
 """
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar, Literal
 
@@ -24,8 +22,9 @@ from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos.materials import find_material
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, VoidFill, key
+from problems.initial_states import put_walls
 from problems.pictures import draw_columns, draw_field, find_dump
-from problems.problem import BlockPlan, Problem, Report, Row, find_time
+from problems.problem import Problem, Report, Row, find_most, find_time
 from problems.references.hugoniot import release, shock_with_particle_speed
 from regrid.errors import BadInput
 
@@ -53,7 +52,6 @@ class Cavity(Problem):
     """One block around the void: rays from the void to the channel's walls."""
 
     Deck = CavityDeck
-    picture = "cavity"
     units: ClassVar = {
         "void_size": "m2", "void_width": "m", "jet_speed": "m/s", "far_speed": "m/s",
         "most_pressure": "Pa",
@@ -71,56 +69,49 @@ class Cavity(Problem):
                 f"deck: speed is {deck.speed:g} m/s: {deck.material} has no such shock ({error})"
             ) from None
         self.arrival = (deck.before - 1.0) * deck.radius / shock.shock_speed
+        closing = 2.0 / self.near_speed + 1.5 / shock.shock_speed  # and the jet's shock runs on
+        self.t_end = deck.run.t_end or self.arrival + closing * deck.radius
+        # corners of the channel, and as many cells on each wall as its part of the half turn has
+        before, behind, width = deck.before, deck.behind, deck.width
+        corners = [[-before, 0.0], [-before, width], [behind, width], [behind, 0.0]]
+        self.corners = deck.radius * np.array(corners).T
+        turn = -np.diff(np.unwrap(np.arctan2(*self.corners[::-1])))
+        counts = np.maximum(3, np.rint(deck.cells * turn / math.pi).astype(int))
+        self.corner_nodes = [0, *(int(number) for number in np.cumsum(counts))]
+        self.rows = max(6, round(deck.cells / math.pi * 0.5 * (before + width - 2.0)))
 
-    @property
-    def t_end(self) -> float:
-        """The deck's, or time enough for the void to close and the jet's shock to run on."""
-        closing = 2.0 / self.near_speed + 1.5 / self.shock.shock_speed
-        return self.deck.run.t_end or self.arrival + closing * self.deck.radius
-
-    def make_grid(self) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes (2, ni + 1, nj + 1): i along the void from its near to its far side, j outwards;
-        and the numbers of the nodes at the channel's corners."""
-        deck, radius = self.deck, self.deck.radius
-        before, behind, width = (radius * part for part in (deck.before, deck.behind, deck.width))
-        corners = np.array([[-before, 0.0], [-before, width], [behind, width], [behind, 0.0]]).T
-        # as many cells on each of the channel's walls as its part of the half turn asks for
-        turn = np.unwrap(np.arctan2(corners[1], corners[0]))
-        counts = np.maximum(3, np.rint(deck.cells * -np.diff(turn) / math.pi).astype(int))
-        at = np.concatenate([[0], np.cumsum(counts)])
-        outer = np.array([np.interp(np.arange(at[-1] + 1), at, row) for row in corners])
-        angle = np.pi * (1.0 - np.linspace(0.0, 1.0, at[-1] + 1))
-        inner = radius * np.array([np.cos(angle), np.sin(angle)])
+    def make_grids(self, t=0.0):
+        """i runs along the void from its near to its far side, j outwards."""
+        along = np.arange(self.corner_nodes[-1] + 1)
+        outer = np.array([np.interp(along, self.corner_nodes, row) for row in self.corners])
+        angle = np.pi * (1.0 - np.linspace(0.0, 1.0, along.size))
+        inner = self.deck.radius * np.array([np.cos(angle), np.sin(angle)])
         inner[1, [0, -1]] = 0.0
-        rows = max(6, round(deck.cells / math.pi * 0.5 * (deck.before + deck.width - 2.0)))
-        part = np.linspace(0.0, 1.0, rows + 1)
+        part = np.linspace(0.0, 1.0, self.rows + 1)
         part = FINEST * part + (1.0 - FINEST) * part**2
-        return inner[:, :, None] * (1.0 - part) + outer[:, :, None] * part, at
+        return {"metal": inner[:, :, None] * (1.0 - part) + outer[:, :, None] * part}
 
     def estimate_cells(self) -> int:
         deck = self.deck
         return round(deck.cells**2 / math.pi * 0.5 * (deck.before + deck.width)) + 6 * deck.cells
 
-    def plan(self):
-        return self.t_end, [BlockPlan.of_nodes("metal", self.make_grid()[0])]
-
     def build(self):
-        deck, (nodes, corners) = self.deck, self.make_grid()
+        deck, nodes = self.deck, self.make_grids()["metal"]
         state, material = (self.material.rho0, 0.0, 0.0, 0.0), deck.material.rpartition(":")[2]
         block = Block("metal", self.material.eos, nodes, *state, material=material)
-        for side in ("i_min", "i_max"):
-            put(block, side, "axis" if self.curved else "wall")
+        for side in ("i_min", "i_max") if self.curved else ():
+            put(block, side, "axis")
         put(block, "j_min", "free-surface")
-        first, second, third, last = (int(k) for k in corners)
-        put(block, "j_max", "piston", first, second, velocity=(deck.speed, 0.0))
-        put(block, "j_max", "wall", second, third)
-        put(block, "j_max", "free-surface", third, last)
+        _, first, second, last = self.corner_nodes
+        put(block, "j_max", "piston", 0, first, velocity=(deck.speed, 0.0))
+        put(block, "j_max", "free-surface", second, last)
+        put_walls(block)
         least = deck.closed * measure_void(nodes, self.curved)
+        words = f"the void is closed but for {100.0 * deck.closed:g} % of its size"
 
         def find_end(simulation):
-            if measure_void(simulation.blocks[0].nodes, self.curved) >= least:
-                return None
-            return f"the void is closed but for {100.0 * deck.closed:g} % of its size"
+            left = measure_void(simulation.blocks[0].nodes, self.curved)
+            return words if left < least else None
 
         return self.simulate([block], geometry=deck.geometry, find_end=find_end)
 
@@ -141,59 +132,56 @@ class Cavity(Problem):
         return find_time(history, history["void_width"] <= 1e-6 * self.deck.radius)
 
     def report(self, history, final=None) -> Report:
-        deck, near, t, notes = self.deck, self.near_speed, math.nan, []
+        deck, near, pressure, found, left = (
+            self.deck,
+            self.near_speed,
+            self.shock.p,
+            [math.nan] * 2,
+            0,
+        )
         if history:
-            jet, size = history["jet_speed"], history["void_size"]
-            t = find_time(history, jet > 0.5 * near)
-            notes = [
-                f"jet: up to {float(np.nanmax(jet)):.5g} m/s; behind this shock a plane free "
-                f"surface goes at {near:.5g} m/s"
-            ]
-            if math.isfinite(closing := self.find_closing(history)):
-                most = float(np.nanmax(history["most_pressure"]))
-                notes.append(
-                    f"it hits the far side at t = {closing:.4g} s; greatest pressure then "
-                    f"{1e-9 * most:.4g} GPa, behind the shock {1e-9 * self.shock.p:.4g} GPa"
-                )
-            left = 100.0 * max(float(size[-1]), 0.0) / float(size[0])
-            notes.append(f"the void has {left:.2g} % of its size in the end")
+            arrival = find_time(history, history["jet_speed"] > 0.5 * near)
+            found, size = [arrival, self.find_closing(history)], history["void_size"]
+            left = max(float(size[-1] / size[0]), 0.0)
+        most = find_most(history, "most_pressure") if math.isfinite(found[1]) else math.nan
+        words = "greatest speed of the jet; plane free surface [m/s]"
         rows = [
-            Row("shock_pressure", theory=self.shock.p),
-            Row("arrival", t, self.arrival, "shock at the void [s]", digits=5),
-            Row("near_speed", theory=near),
+            Row("arrival", found[0], self.arrival, "shock at the void [s]", digits=5),
+            Row("near_speed", find_most(history, "jet_speed"), near, words, digits=5, off=" "),
+            Row("closing", found[1], label="it hits the far side [s]", digits=4),
+            Row("shock_pressure", most, pressure, "greatest pressure then [GPa]", 1e9, 4, off=" "),
+            Row("left", left, label="void left at the end [%]", unit=0.01, digits=3),
         ]
         head = (
             f"cavity: void of {1e3 * deck.radius:g} mm radius in {deck.material}, piston at "
             f"{deck.speed:g} m/s, {deck.cells} cells along the void"
         )
-        return Report(head, rows, notes)
+        return Report(head, rows)
 
-    def draw(self, figure, run_data) -> None:
+    def draw_cavity(self, figure, run_data) -> None:
         """Pressure and grid at four times, size of the void and speed of the jet over time."""
         figure.set_size_inches(12.0, 5.6)
-        history, deck, last = run_data.history, self.deck, run_data.history["t"][-1]
-        closing = self.find_closing(history)
+        history, radius, axes = run_data.history, self.deck.radius, figure.subplots(2, 3)
+        closing, last = self.find_closing(history), history["t"][-1]
         end = closing if math.isfinite(closing) else last
         times = (self.arrival, 0.5 * (self.arrival + end), end, last)
-        dumps, axes = [find_dump(run_data, t) for t in times], figure.subplots(2, 3)
-        high = max(float(np.quantile(d.blocks[0].cell_fields["p"], 0.995)) for d in dumps)
-        for axis, dump in zip((*axes[0, :2], *axes[1, :2]), dumps, strict=True):
-            pressure = lambda block: 1e-9 * block.cell_fields["p"]  # noqa: E731
-            picture = draw_field(axis, dump, pressure, low=0.0, high=1e-9 * high, every=1)
-            axis.set(xlim=(-1.6 * deck.radius, 2.4 * deck.radius), ylim=(0.0, 2.0 * deck.radius))
-            axis.set_title(f"t = {1e6 * dump.t:.3f} µs", fontsize="medium")
+        dumps = [find_dump(run_data, t) for t in times]
+        high = max(1e-9 * float(np.quantile(dump.blocks[0].p, 0.995)) for dump in dumps)
+        for axis, dump in zip(axes[:, :2].ravel(), dumps, strict=True):
+            words = {"title": f"t = {1e6 * dump.t:.3f} µs", "unit": 1e9}
+            picture = draw_field(axis, dump, "p", low=0.0, high=high, every=1, **words)
+            axis.set(xlim=(-1.6 * radius, 2.4 * radius), ylim=(0.0, 2.0 * radius))
         figure.colorbar(picture, ax=axes[:, :2], shrink=0.7, label="pressure [GPa]")
         part = {**history, "part": history["void_size"] / history["void_size"][0]}
         draw_columns(axes[0, 2], part, {"part": ""}, "size of the void, of its first one", "µs")
+        axes[1, 2].axhline(self.near_speed, color="k", lw=0.8, ls="--", label="plane free surface")
         speeds = {"jet_speed": "near side, jet", "far_speed": "far side"}
         draw_columns(axes[1, 2], history, speeds, "speed [m/s]", "µs")
-        axes[1, 2].axhline(self.near_speed, color="k", lw=0.8, ls="--", label="plane free surface")
-        axes[1, 2].legend()
 
 
 def measure_void(nodes: np.ndarray, curved: bool) -> float:
     """Area of the half void [m2], or its volume per radian."""
     x, y = nodes[:, :, 0]
-    if curved:
-        return float((np.diff(x) * (y[1:] ** 2 + y[1:] * y[:-1] + y[:-1] ** 2)).sum()) / 6.0
-    return float((np.diff(x) * (y[1:] + y[:-1])).sum()) / 2.0
+    near, far = y[:-1], y[1:]
+    height = far * far + far * near + near * near if curved else far + near
+    return float((np.diff(x) * height).sum()) / (6.0 if curved else 2.0)

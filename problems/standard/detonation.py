@@ -14,9 +14,6 @@ as sharp as the front is thin, and converges to pCJ from below; behind a spreadi
 pressure falls as a square root, with order 1/2 only.
 """
 
-from __future__ import annotations
-
-import functools
 import math
 from typing import ClassVar, Literal
 
@@ -28,12 +25,11 @@ from hydro.eos import JWL
 from hydro.eos.materials import find_material
 from hydro.sources import ProgrammedBurn
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.initial_states import put_walls
+from problems.initial_states import make_box, put_walls
 from problems.pictures import draw_field, spread_dumps
-from problems.problem import BlockPlan, Problem, Report, Row, compare, find_crossing, get_last
+from problems.problem import Problem, Report, Row, compare, find_crossing, get_last
 from problems.references.exact_flows import compute_taylor_wave
 from regrid.errors import BadInput
-from regrid.measure.corners import compute_centres
 
 WAY = 0.9  # of the length that the front goes, where no end time is given
 AMBIENT = 1e5  # pressure of the explosive at rest [Pa]
@@ -56,63 +52,48 @@ class DetonationDeck(Deck, kw_only=True):
 
 
 class Detonation(Problem):
-    """One block of explosive."""
-
     Deck = DetonationDeck
     units: ClassVar = {"front": "m", "pressure": "Pa"}
-    picture, measures_sides = "detonation", True
+    measures_sides = True
 
     def __init__(self, deck: DetonationDeck):
         super().__init__(deck)
-        self.material = find_material(deck.explosive)
-        self.rows = deck.cells if deck.behind == "point" else 4
-        if not isinstance(self.material.eos, JWL):
+        self.eos = eos = find_material(deck.explosive).eos
+        if not isinstance(eos, JWL):
             raise BadInput(
-                f"deck: explosive is {deck.explosive!r}, a {self.material.eos.kind}; it must be a "
-                "JWL material such as TNT or Comp-B"
+                f"deck: explosive is {deck.explosive!r}, a {eos.kind}; it must be a JWL material "
+                "such as TNT or Comp-B"
             )
-        self.speed, self.pressure, self.rho = self.material.eos.find_detonation()
-        self.particle_speed = self.speed * (1.0 - self.material.eos.rho0 / self.rho)
+        self.speed, self.pressure, rho = eos.find_detonation()
+        self.particle_speed = self.speed * (1.0 - eos.rho0 / rho)
+        self.t_end = deck.run.t_end or WAY * deck.length / self.speed
+        self.taylor_wave = compute_taylor_wave(eos) if deck.behind == "wall" else None
 
-    @functools.cached_property
-    def taylor_wave(self):
-        """The exact wave behind a plane front with a wall at its start."""
-        return compute_taylor_wave(self.material.eos)
+    def estimate_cells(self) -> int:
+        return self.deck.cells * (self.deck.cells if self.deck.behind == "point" else 4)
 
-    @property
-    def t_end(self) -> float:
-        """End time: the deck's, or when the front has gone most of the way."""
-        return self.deck.run.t_end or WAY * self.deck.length / self.speed
-
-    def make_piston(self, width: float):
-        """Velocity of the piston as a function of time: that of the material as it burns there.
-
-        Through the front the speed rises in a straight line, over less and less of the front as
-        the piston goes along with it.  A piston that started at once would send a shock ahead of
-        the burning.
-        """
-        pace = self.particle_speed / width  # of the front that the piston keeps up with in the end
-
-        def velocity(t):
-            part = self.speed / self.particle_speed * -math.expm1(-pace * t)
-            return self.particle_speed * min(part, 1.0), 0.0
-
-        return velocity
-
-    def plan(self):
-        """End time and the bar or square."""
-        deck, height = self.deck, self.deck.length / self.deck.cells * self.rows
-        bar = BlockPlan("explosive", (deck.cells, self.rows), (0.0, 0.0), (deck.length, height))
-        return self.t_end, [bar]
+    def make_grids(self, t=0.0):
+        length, cells = self.deck.length, self.deck.cells
+        rows = self.estimate_cells() // cells
+        return {"explosive": make_box((cells, rows), (0.0, 0.0), (length, length / cells * rows))}
 
     def build(self):
-        deck, eos, size = self.deck, self.material.eos, self.deck.length / self.deck.cells
-        nodes = self.plan()[1][0].make_nodes()
+        deck, eos, size = self.deck, self.eos, self.deck.length / self.deck.cells
+        nodes = self.make_grids()["explosive"]
         named = {"material": deck.explosive, "limiter": deck.limiter}
         block = Block("explosive", eos, nodes, eos.rho0, 0.0, 0.0, AMBIENT, **named)
+
+        def follow(t):
+            """The material's speed as it burns at the piston, which keeps up with the front: it
+            rises in a straight line through less and less of it.  A start at once would send a
+            shock ahead of the burning."""
+            rise = self.speed / self.particle_speed
+            part = rise * -math.expm1(-self.particle_speed / (deck.front * size) * t)
+            return self.particle_speed * min(part, 1.0), 0.0
+
         if deck.behind == "piston":
-            put(block, "i_min", "piston", velocity=self.make_piston(deck.front * size))
-        put_walls(block, *("i_min",) * (deck.behind != "piston"), "i_max", "j_min", "j_max")
+            put(block, "i_min", "piston", velocity=follow)
+        put_walls(block)
         along = None if deck.behind == "point" else (1.0, 0.0)
         made_for = deck.run.t_set_up or self.t_end
         stop = math.inf if deck.clock == 1.0 else deck.clock * made_for
@@ -127,7 +108,7 @@ class Detonation(Problem):
         The last, of `wall`, is the mean of |p - exact| over the mean of p exact in the whole bar.
         """
         (block,) = evolution.blocks
-        x, p = compute_centres(block.nodes)[0][:, 0], block.state[3, 1:-1, 1]
+        x, p = block.centres[0][:, 0], block.state[3, 1:-1, 1]
         front, pressure = find_crossing(x, p, 0.5 * self.pressure), float(p.max())
         if self.deck.behind == "piston" and math.isfinite(front):
             back = float(block.nodes[0, 0, 0])
@@ -140,14 +121,15 @@ class Detonation(Problem):
         error = np.abs(p - exact).sum() / exact.sum() if exact.any() else math.nan
         return {**row, "taylor_error": float(error)}
 
-    def find_late_speed(self, history) -> float:
-        """Speed [m/s] of the front over the last half of the run, by a straight line."""
-        t, front = history["t"], history["front"]
-        late = (t > 0.5 * t[-1]) & np.isfinite(front)
-        return float(np.polyfit(t[late], front[late], 1)[0]) if late.sum() > 2 else math.nan
-
     def report(self, history, final=None) -> Report:
-        deck, found = self.deck, self.find_late_speed(history) if history else math.nan
+        deck, (t, front), found = (
+            self.deck,
+            (history.get(x, np.zeros(1)) for x in ("t", "front")),
+            math.nan,
+        )
+        late = (t > 0.5 * t[-1]) & np.isfinite(front)
+        if late.sum() > 2:  # a straight line through the last half of the run
+            found = float(np.polyfit(t[late], front[late], 1)[0])
         words = "pressure behind it [GPa]" if deck.behind == "piston" else "peak pressure [GPa]"
         pressure = get_last(history, "pressure")
         rows = [
@@ -160,13 +142,13 @@ class Detonation(Problem):
         head = f"detonation, {deck.explosive}, {deck.cells} cells, {deck.behind}"
         return Report(f"{head}; theory: Chapman-Jouguet", rows)
 
-    def draw(self, figure, run_data) -> None:
+    def draw_detonation(self, figure, run_data) -> None:
         """Pressure at several times (or the last), and the place of the front over time."""
         figure.set_size_inches(11.5, 4.6)
         left, right = figure.subplots(1, 2)
         if self.deck.behind == "point":
-            field = lambda block: block.cell_fields["p"] / 1e9  # noqa: E731
-            draw_field(left, run_data.dumps[-1], field, every=10, bar="pressure [GPa]", title="t")
+            words = {"bar": "pressure [GPa]", "title": "t"}
+            draw_field(left, run_data.dumps[-1], "p", unit=1e9, every=10, **words)
         else:
             self._draw_profiles(left, spread_dumps(run_data, 5))
         t, front = run_data.history["t"], run_data.history["front"]
@@ -179,10 +161,10 @@ class Detonation(Problem):
 
     def _draw_profiles(self, axis, dumps) -> None:
         for dump in dumps:
-            (block,) = dump.blocks
-            x = 1e3 * compute_centres(block.nodes)[0][:, 0]
-            axis.plot(x, block.cell_fields["p"][:, 0] / 1e9, lw=1.4, label=f"{1e6 * dump.t:.3g} µs")
-            if self.deck.behind == "wall" and dump.t > 0.0:
+            bar = dump["explosive"]
+            x, p = 1e3 * bar.centres[0][:, 0], bar.p[:, 0] / 1e9
+            axis.plot(x, p, lw=1.4, label=f"{1e6 * dump.t:.3g} µs")
+            if self.taylor_wave and dump.t > 0.0:
                 wave, t = self.taylor_wave, 1e3 * dump.t
                 exact = np.concatenate([wave.p[:1], wave.p, [0.0]])
                 places = np.concatenate([[0.0], wave.pace * t, [self.speed * t]])

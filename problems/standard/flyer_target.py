@@ -12,8 +12,6 @@ Note: a release is sharp at low speeds, and the scheme spreads it over some cell
 separate a little early.  Use cells of an eightieth of the thinnest plate or less.
 """
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar
 
@@ -24,9 +22,9 @@ from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.rows import P, U
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, VoidFill, key
-from problems.initial_states import put_walls
+from problems.initial_states import make_box, put_walls
 from problems.pictures import draw_columns
-from problems.problem import BlockPlan, Problem, Report, Row, find_time
+from problems.problem import Problem, Report, Row, find_time
 from problems.references.plate_impact import compute_plate_impact
 from regrid.errors import BadInput
 
@@ -41,8 +39,6 @@ NUMBERS = {
 
 
 class PlateTable(DeckTable, kw_only=True):
-    """One plate of the row."""
-
     material: key(str, "name of a material, or FILE.toml:NAME") = "Cu"
     thickness: key(float, "[m]", gt=0, le=1e3) = 2e-3
     cells: key(int, "cells across it", ge=2, le=MOST_CELLS) = 160
@@ -66,7 +62,6 @@ class FlyerTarget(Problem):
     """Plates in a row, between two walls along it."""
 
     Deck = FlyerTargetDeck
-    picture = "flyer-target"
     units: ClassVar = {"free_surface_speed": "m/s", "contact_pressure": "Pa"}
 
     def __init__(self, deck: FlyerTargetDeck):
@@ -82,23 +77,25 @@ class FlyerTarget(Problem):
         self.known = ("impact", "pressure") if more else tuple(NUMBERS)
         self.names = [f"plate-{number}" for number in range(1, len(deck.plates) + 1)]
 
-    def plan(self):
-        height = TALL * self.deck.rows * min(one.thickness / one.cells for one in self.deck.plates)
-        plans, x = [], 0.0
+    def estimate_cells(self) -> int:
+        return self.deck.rows * sum(plate.cells for plate in self.deck.plates)
+
+    def make_grids(self, t=0.0):
+        rows, grids, x = self.deck.rows, {}, 0.0
+        height = TALL * rows * min(one.thickness / one.cells for one in self.deck.plates)
         for name, plate in zip(self.names, self.deck.plates, strict=True):
             low, x = x + plate.gap, x + plate.gap + plate.thickness
-            plans.append(BlockPlan(name, (plate.cells, self.deck.rows), (low, 0.0), (x, height)))
-        return self.t_end, plans
+            grids[name] = make_box((plate.cells, rows), (low, 0.0), (x, height))
+        return grids
 
     def build(self):
         blocks = []
-        for plan, material in zip(self.plan()[1], self.materials, strict=True):
-            nodes, speed = plan.make_nodes(), 0.0 if blocks else self.deck.speed
-            state = material.rho0, speed, 0.0, 0.0
-            blocks.append(Block(plan.name, material.eos, nodes, *state, material=plan.name))
+        for (name, nodes), material in zip(self.make_grids().items(), self.materials, strict=True):
+            state = material.rho0, 0.0 if blocks else self.deck.speed, 0.0, 0.0
+            blocks.append(Block(name, material.eos, nodes, *state, material=name))
             for side in ("i_min", "i_max"):
                 put(blocks[-1], side, "free-surface", bond=self.deck.bond)
-            put_walls(blocks[-1], "j_min", "j_max")
+            put_walls(blocks[-1])
         return self.simulate(blocks)
 
     def measure(self, evolution) -> dict[str, float]:
@@ -147,7 +144,7 @@ class FlyerTarget(Problem):
             notes.append(f"plates parted first at t = {t:.4g} s")
         return Report(head, rows, notes)
 
-    def draw(self, figure, run_data) -> None:
+    def draw_flyer_target(self, figure, run_data) -> None:
         """The free surface's speed beside theory, and the mean speeds of all plates."""
         (left, right), theory = figure.subplots(1, 2), self.theory
         words = {"free_surface_speed": "computed"}

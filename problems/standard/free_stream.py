@@ -10,8 +10,6 @@ Note: the given motion of an interface must be that of the material, or the test
 push material through a line that lets none pass.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from typing import Literal
@@ -45,8 +43,6 @@ class FreeStreamDeck(Deck, kw_only=True):
 
 
 class FreeStream(Problem):
-    """Two shaken blocks in one stream."""
-
     Deck = FreeStreamDeck
     measures_sides = True  # a block's deviation is found by who has the block
 
@@ -62,8 +58,8 @@ class FreeStream(Problem):
         turn, speed = math.radians(deck.angle), deck.mach * float(eos.sound_speed(rho, PRESSURE))
         self.velocity = speed * math.cos(turn), speed * math.sin(turn)
 
-    def make_block_nodes(self, name: str, t: float) -> np.ndarray:
-        """Nodes of a block at time t, cut from those of both; a function of t, deck and seed."""
+    def make_grids(self, t=0.0):
+        """Cut from the nodes of both; a function of t, deck and seed."""
         deck, n = self.deck, self.deck.cells
         x, y = make_plane_grid(np.linspace(-1.0, 1.0, 2 * n + 1), np.linspace(0.0, 1.0, n + 1))
         nodes = np.array([x + BEND * (1.0 - x * x) * np.sin(2.0 * math.pi * y), y])
@@ -75,17 +71,17 @@ class FreeStream(Problem):
         if deck.sides == "periodic":
             shift[:, :, -1] = shift[:, :, 0]
         nodes += shift + t * np.reshape(self.velocity, (2, 1, 1))
-        return nodes[:, : n + 1] if name == "left" else nodes[:, n:]
+        return {"left": nodes[:, : n + 1], "right": nodes[:, n:]}
 
     def estimate_cells(self) -> int:
         return 2 * self.deck.cells**2
 
     def build(self):
-        deck, blocks, links = self.deck, [], []
+        deck, grids, blocks, links = self.deck, self.make_grids(), [], []
         for name, (eos, rho) in self.fluids.items():
             stream = rho, *self.velocity, PRESSURE
             material = "all" if deck.contact == "seam" else name
-            block = Block(name, eos, self.make_block_nodes(name, 0.0), *stream, material=material)
+            block = Block(name, eos, grids[name], *stream, material=material)
             if deck.sides == "periodic":
                 links.append(join("periodic", (block, "j_min"), (block, "j_max")))
             across = ("j_min", "j_max") if deck.sides == "inflow" else ()
@@ -93,8 +89,7 @@ class FreeStream(Problem):
                 put(block, side, "inflow", state=stream)
             blocks.append(block)
         links.insert(0, join(deck.contact, (blocks[0], "i_max"), (blocks[1], "i_min")))
-        found = {"mesh": self.make_block_nodes, "measure_block": self.measure_deviation}
-        return self.simulate(blocks, links, **found)
+        return self.simulate(blocks, links, mesh="given", measure_block=self.measure_deviation)
 
     def measure(self, evolution) -> dict[str, float]:
         """Largest deviation from the stream, over sizes of density, sound speed and pressure."""

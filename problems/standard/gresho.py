@@ -8,8 +8,6 @@ speed.  The grid is at rest or swings smoothly while the flow turns.
 Note: the corners of the profile make it a test of dissipation, not of order.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 
@@ -23,7 +21,6 @@ from problems.initial_states import swing_square
 from problems.pictures import draw_field
 from problems.problem import Problem, Report, Row, compare
 from problems.references.exact_flows import GAUSS, average_points
-from regrid.measure.corners import compute_centres
 
 TURN = 0.4 * math.pi  # of the core [s]
 KINETIC_ENERGY = 8.0 * math.pi / 300.0
@@ -49,32 +46,26 @@ class GreshoDeck(Deck, kw_only=True):
 
 
 class Gresho(Problem):
-    """One periodic block."""
-
     Deck = GreshoDeck
-    picture = "gresho"
+    counted = ("cells", "cells")
 
-    def make_block_nodes(self, name: str, t: float) -> np.ndarray:
-        """Nodes at time t: every node swings about its position, twice in a turn."""
+    def make_grids(self, t=0.0):
+        """Every node swings about its position, twice in a turn."""
         swing = self.deck.amplitude * math.sin(2.0 * (2.0 * math.pi) * t / TURN)
-        return swing_square(self.deck.cells, -0.5, 1.0, swing)
-
-    def estimate_cells(self) -> int:
-        return self.deck.cells**2
+        return {"square": swing_square(self.deck.cells, -0.5, 1.0, swing)}
 
     def build(self):
-        deck, nodes = self.deck, self.make_block_nodes("square", 0.0)
+        deck, nodes = self.deck, self.make_grids()["square"]
         flow = average_points(nodes, GAUSS, lambda point, area: (compute_flow(*point), area))
         block = Block("square", IdealGas(1.4), nodes, 1.0, *flow, limiter=deck.limiter)
         links = [join("periodic", (block, f"{d}_min"), (block, f"{d}_max")) for d in "ij"]
-        mesh = "fixed" if deck.mesh == "fixed" else self.make_block_nodes
-        return self.simulate([block], links, mesh=mesh)
+        return self.simulate([block], links, mesh=deck.mesh)
 
     def measure(self, evolution) -> dict[str, float]:
         """Kinetic energy over that of the start (cell means), and mean error of the velocity."""
         (block,) = evolution.blocks
         rho, u, v, _ = block.state[:, 1:-1, 1:-1]
-        exact_u, exact_v, _ = compute_flow(*compute_centres(block.nodes))
+        exact_u, exact_v, _ = compute_flow(*block.centres)
         error = np.average(np.hypot(u - exact_u, v - exact_v), weights=block.volume)
         energy = (0.5 * rho * (u * u + v * v) * block.volume).sum()
         return {"kinetic_energy": float(energy), "error_velocity": float(error)}
@@ -91,18 +82,14 @@ class Gresho(Problem):
         head = f"gresho, {deck.cells} x {deck.cells}, grid {deck.mesh}{turns}"
         return Report(head, rows, ["bar: 2 % lost after one turn at 40 x 40"])
 
-    def draw(self, figure, run_data) -> None:
+    def draw_gresho(self, figure, run_data) -> None:
         """Speed at the start and at the end, and against the radius."""
-
-        def speed(block):
-            return np.hypot(block.cell_fields["u"], block.cell_fields["v"])
-
+        speed = lambda block: np.hypot(block.u, block.v)  # noqa: E731
         *panels, right = figure.subplots(1, 3)
         for axis, dump in zip(panels, (run_data.dumps[0], run_data.dumps[-1]), strict=True):
             title = f"speed, t = {dump.t:.3g}"
             draw_field(axis, dump, speed, low=0.0, high=1.0, every=2, title=title)
-        (block,) = run_data.dumps[-1].blocks
-        r = np.hypot(*compute_centres(block.nodes))
-        right.plot(r.ravel(), speed(block).ravel(), ".", ms=2)
+        square = run_data.dumps[-1]["square"]
+        right.plot(np.hypot(*square.centres).ravel(), speed(square).ravel(), ".", ms=2)
         right.plot([0.0, 0.2, 0.4, 0.7], [0.0, 1.0, 0.0, 0.0], "k", lw=0.8)
         right.set_xlabel("r")

@@ -12,8 +12,6 @@ Note: the surfaces are loaded by gas at their own pressure; a wrong pressure the
 first-order error of the outer radius.  Source: [Kidder1976], the shells n = 1, 2, 3.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 
@@ -23,6 +21,7 @@ from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
+from problems.initial_states import put_walls
 from problems.pictures import draw_field
 from problems.problem import Problem, Report, compare, get_last
 from problems.references.exact_flows import RADII, Shell
@@ -42,10 +41,8 @@ class KidderDeck(Deck, kw_only=True):
 
 
 class Kidder(Problem):
-    """One block with two free surfaces."""
-
     Deck = KidderDeck
-    picture = "kidder"
+    counted = ("cells", "rays")
 
     def __init__(self, deck: KidderDeck):
         super().__init__(deck)
@@ -69,31 +66,27 @@ class Kidder(Problem):
         """
         return compute_centres(self.compute_radii(nodes))
 
-    def make_nodes(self) -> np.ndarray:
-        """First nodes (2, cells + 1, rays + 1)."""
+    def make_grids(self, t=0.0):
         radius = np.linspace(*RADII, self.deck.cells + 1)[:, None]
         part = np.linspace(0.0, 1.0, self.deck.rays + 1)
         if self.deck.n == 1:
-            return np.array(np.broadcast_arrays(radius, part))
-        angle = np.linspace(0.0, 0.5 * math.pi, self.deck.rays + 1)[None, :]
+            return {"shell": np.array(np.broadcast_arrays(radius, part))}
+        angle = np.linspace(0.0, 0.5 * math.pi, self.deck.rays + 1)
         nodes = np.array([radius * np.cos(angle), radius * np.sin(angle)])
         nodes[0, :, -1], nodes[1, :, 0] = 0.0, 0.0
-        return nodes
-
-    def estimate_cells(self) -> int:
-        return self.deck.cells * self.deck.rays
+        return {"shell": nodes}
 
     def build(self):
-        shell, nodes = self.shell, self.make_nodes()
+        shell, nodes = self.shell, self.make_grids()["shell"]
         rho = shell.compute_density(self.compute_layers(nodes), 0.0)
         p = shell.entropy * rho**shell.gamma
         block = Block("shell", IdealGas(shell.gamma), nodes, rho, 0.0, 0.0, p)
         put(block, "i_min", "free-surface", pressure=lambda t: shell.compute_pressures(t)[0])
         put(block, "i_max", "free-surface", pressure=lambda t: shell.compute_pressures(t)[1])
-        line, geometry = ("axis", "axisymmetric") if self.deck.n == 3 else ("wall", "plane")
-        put(block, "j_min", line)
-        put(block, "j_max", "wall")
-        return self.simulate([block], geometry=geometry)
+        if self.deck.n == 3:
+            put(block, "j_min", "axis")
+        put_walls(block)
+        return self.simulate([block], geometry="axisymmetric" if self.deck.n == 3 else "plane")
 
     def measure(self, evolution) -> dict[str, float]:
         """Relative errors of both radii, how round they are, and of the density."""
@@ -122,26 +115,23 @@ class Kidder(Problem):
         head = f"kidder, {SHAPES[deck.n]} of {deck.cells} x {deck.rays} cells: shrunk to {h:.4g}"
         return Report(f"{head} of the first radii", rows)
 
-    def draw(self, figure, run_data) -> None:
+    def draw_kidder(self, figure, run_data) -> None:
         """Shell at the start, on the way and at the end; radii over time; how far they are off."""
         figure.set_size_inches(11.5, 5.0)
         left, right = figure.subplots(1, 2)
         dumps, shrink = run_data.dumps, self.shell.compute_shrinking
-        high = max(float(block.cell_fields["rho"].max()) for block in dumps[-1].blocks)
+        high = float(dumps[-1]["shell"].rho.max())
         middle = min(dumps, key=lambda dump: abs(shrink(dump.t) - 0.75))
         for dump, bar in ((dumps[0], ""), (middle, ""), (dumps[-1], "density [kg/m3]")):
             draw_field(left, dump, "rho", low=0.0, high=high, every=4, bar=bar)
-            left.text(
-                0.02, 1.01 * RADII[1] * shrink(dump.t), f"{1e3 * dump.t:.3g} ms", size="small"
-            )
+            height = 1.01 * RADII[1] * shrink(dump.t)
+            left.text(0.02, height, f"{1e3 * dump.t:.3g} ms", size="small")
         left.set(xlim=(0.0, 1.08), ylim=(0.0, 1.08))
-        times = np.array([dump.t for dump in dumps])
-        h = [shrink(t) for t in times]
-        for edge, first, words in ((-1, RADII[1], "outer"), (0, RADII[0], "inner")):
-            radius = [self.compute_radii(d.blocks[0].nodes[:, edge, :]).mean() for d in dumps]
-            right.plot(1e3 * times, radius, "o", ms=4, label=f"{words} surface")
-            right.plot(
-                1e3 * times, first * np.array(h), "k", lw=0.8, label="exact" if edge == 0 else None
-            )
+        times = 1e3 * np.array([dump.t for dump in dumps])
+        h = np.array([shrink(dump.t) for dump in dumps])
+        for edge, words, exact in ((-1, "outer", None), (0, "inner", "exact")):
+            radius = [self.compute_radii(d["shell"].nodes[:, edge, :]).mean() for d in dumps]
+            right.plot(times, radius, "o", ms=4, label=f"{words} surface")
+            right.plot(times, RADII[edge] * h, "k", lw=0.8, label=exact)
         right.set(xlabel="t [ms]", ylabel="radius [m]")
         right.legend(frameon=False)

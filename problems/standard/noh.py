@@ -10,8 +10,6 @@ Note: every shock-capturing scheme overheats the first gas at the centre ("wall 
 density remains too low.  Source: [Noh1987].
 """
 
-from __future__ import annotations
-
 import functools
 import math
 
@@ -45,10 +43,8 @@ class NohDeck(Deck, kw_only=True):
 
 
 class Noh(Problem):
-    """One block."""
-
     Deck = NohDeck
-    picture = "noh"
+    counted = ("cells", "cells")
 
     def __init__(self, deck: NohDeck):
         super().__init__(deck)
@@ -75,33 +71,31 @@ class Noh(Problem):
         u, v = -points / r if self.dimensions > 1 else (-np.ones_like(r), np.zeros_like(r))
         return rise, u, v, self.deck.pressure * rise**self.deck.gamma
 
-    def make_block_nodes(self, name: str, t: float) -> np.ndarray:
-        """Nodes at time t."""
+    def make_grids(self, t=0.0):
         nodes, factor = self.flow.make_nodes(self.deck.cells, 1.0), 1.0 - self.deck.shrink * t
-        return nodes * (np.reshape((factor, 1.0), (2, 1, 1)) if self.dimensions == 1 else factor)
-
-    def estimate_cells(self) -> int:
-        return self.deck.cells**2
+        factors = np.reshape((factor, 1.0 if self.dimensions == 1 else factor), (2, 1, 1))
+        return {"gas": nodes * factors}
 
     def build(self):
-        deck, nodes = self.deck, self.make_block_nodes("gas", 0.0)
+        deck, nodes = self.deck, self.make_grids()["gas"]
         start = self.compute_stream(compute_centres(nodes), 0.0)
         block = Block("gas", IdealGas(deck.gamma), nodes, *start, limiter=deck.limiter)
-        for side in self.flow.close_inside(block):
+        for side in ("i_max", "j_max")[: self.dimensions]:
 
             def beyond(t, side=side):
-                line = block.side_line(side, self.make_block_nodes("gas", t))
+                line = block.side_line(side, self.make_grids(t)["gas"])
                 return self.compute_stream(0.5 * (line[:, 1:] + line[:, :-1]), t)
 
             put(block, side, "inflow", state=beyond)
-        mesh = self.make_block_nodes if deck.shrink > 0.0 else "fixed"
+        self.flow.close(block)
+        mesh = "given" if deck.shrink > 0.0 else "fixed"
         return self.simulate([block], mesh=mesh, geometry=self.flow.geometry)
 
     def measure(self, evolution) -> dict[str, float]:
         """Mean density and pressure behind the shock; at the end the error of the density."""
         (block,) = evolution.blocks
         t, shock = evolution.t, self.shock_speed * evolution.t
-        r = self.flow.compute_radii(compute_centres(block.nodes))
+        r = self.flow.compute_radii(block.centres)
         weight = block.volume * ((r > 0.3 * shock) & (r < 0.8 * shock))
         row = dict.fromkeys(("density_behind", "pressure_behind", "error_rho"), math.nan)
         if weight.any():
@@ -130,7 +124,7 @@ class Noh(Problem):
             notes.append(f"other codes: {PEERS[deck.geometry]}")
         return Report(f"noh, {deck.geometry}, {deck.cells} cells per side, {grid}", rows, notes)
 
-    def draw(self, figure, run_data) -> None:
+    def draw_noh(self, figure, run_data) -> None:
         """Density in the last dump out to twice the shock's radius, and against the radius."""
         dump, exact = run_data.dumps[-1], self.compute_density
         high = float(exact(np.zeros(1), max(dump.t, 1e-9))[0])

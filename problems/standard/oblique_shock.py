@@ -9,8 +9,6 @@ Note: above the largest angle of attached shocks there is no such solution; the 
 Source of the relation: any text on gas dynamics, e.g. NACA report 1135 (1953), equation 148.
 """
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar
 
@@ -24,7 +22,6 @@ from problems.pictures import draw_field
 from problems.problem import Problem, Report, compare, find_crossing
 from problems.references.shock_polars import Body, ShockPolar, search_pressure, solve_collision
 from regrid.errors import BadInput
-from regrid.measure.corners import compute_centres
 
 LENGTH, BEFORE, HEIGHT = 1.0, 0.25, 1.0
 
@@ -43,7 +40,6 @@ class ObliqueShock(Problem):
 
     Deck = ObliqueShockDeck
     units: ClassVar = {"shock_angle": "degrees"}
-    picture = "oblique-shock"
 
     def __init__(self, deck: ObliqueShockDeck):
         super().__init__(deck)
@@ -64,7 +60,7 @@ class ObliqueShock(Problem):
                 f"{math.degrees(math.atan(HEIGHT / LENGTH)):g} it leaves through the top"
             )
 
-    def make_grid(self) -> np.ndarray:
+    def make_grids(self, t=0.0):
         """Straight upright lines between the wall and the top."""
         cells = self.deck.cells
         before = round(cells * BEFORE / (LENGTH + BEFORE))
@@ -72,14 +68,18 @@ class ObliqueShock(Problem):
         x = np.concatenate([upstream, np.linspace(0.0, LENGTH, cells - before + 1)])[:, None]
         wall = math.tan(self.angle) * np.maximum(x, 0.0)
         y = wall + (HEIGHT - wall) * np.linspace(0.0, 1.0, round(0.8 * cells) + 1)
-        return np.array([np.broadcast_to(x, y.shape), y])
+        return {"gas": np.array([np.broadcast_to(x, y.shape), y])}
 
     def estimate_cells(self) -> int:
         return self.deck.cells * round(0.8 * self.deck.cells)
 
     def build(self):
-        deck, state = self.deck, (1.0, self.deck.mach, 0.0, self.ahead)
-        block = Block("gas", IdealGas(deck.gamma), self.make_grid(), *state, limiter=deck.limiter)
+        deck, gas, state = (
+            self.deck,
+            IdealGas(self.deck.gamma),
+            (1.0, self.deck.mach, 0.0, self.ahead),
+        )
+        block = Block("gas", gas, self.make_grids()["gas"], *state, limiter=deck.limiter)
         for side in ("i_min", "j_max"):
             put(block, side, "inflow", state=state)
         put(block, "i_max", "outflow")
@@ -89,7 +89,7 @@ class ObliqueShock(Problem):
     def measure(self, evolution) -> dict[str, float]:
         """Pressure on the last half of the wedge over the exact one, and the shock's angle."""
         (block,) = evolution.blocks
-        x, y = compute_centres(block.nodes)
+        x, y = block.centres
         p, x = block.state[3, 1:-1, 1:-1], x[:, 0]
         level = 0.5 * (self.ahead + self.pressure)
         heights = np.array([find_crossing(*column, level) for column in zip(y, p, strict=True)])
@@ -113,7 +113,7 @@ class ObliqueShock(Problem):
         exact = f"exact pressure: {self.pressure / self.ahead:.5g} of the stream's"
         return Report(head, rows, [exact])
 
-    def draw(self, figure, run_data) -> None:
+    def draw_oblique_shock(self, figure, run_data) -> None:
         """Pressure with the grid and the exact shock, and pressure along the wall."""
         figure.set_size_inches(11.5, 4.6)
         left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
@@ -121,7 +121,7 @@ class ObliqueShock(Problem):
         draw_field(left, dump, "p", every=5, bar="pressure [Pa]")
         left.plot((0.0, LENGTH), (0.0, end), "r--", lw=1.5, zorder=5, label="exact shock")
         left.legend(loc="upper left")
-        x, p = compute_centres(dump.blocks[0].nodes)[0][:, 0], dump.blocks[0].cell_fields["p"][:, 0]
+        x, p = dump["gas"].centres[0][:, 0], dump["gas"].p[:, 0]
         right.plot(x, p, ".-", ms=4, lw=0.8, label="computed")
         exact = (float(p[0]),) * 2 + (self.pressure,) * 2
         right.plot((x[0], 0.0, 0.0, LENGTH), exact, "k--", lw=0.9, label="exact")

@@ -14,8 +14,6 @@ a1 + a3 = 2 a2 cosh(rate T); omega from the times of zero amplitude.  Note: gas 
 in equilibrium oscillates vertically, and the interface with it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar, Literal
 
@@ -58,11 +56,9 @@ class RayleighTaylorDeck(Deck, kw_only=True):
 
 
 class RayleighTaylor(Problem):
-    """One or two blocks in a box under gravity."""
-
     Deck = RayleighTaylorDeck
     units: ClassVar = {"amplitude": "m"}
-    picture, measures_sides = "growth", True
+    measures_sides = True
 
     def __init__(self, deck: RayleighTaylorDeck):
         super().__init__(deck)
@@ -83,6 +79,9 @@ class RayleighTaylor(Problem):
             )
         self.grows, self.exact = square > 0.0, math.sqrt(abs(square))
         self.amplitude = deck.amplitude or (1e-4 if self.heavy else 1e-3)
+        rate = math.sqrt(abs(compute_square(deck.above, 0.0)))
+        swings, usual = self.heavy and not self.grows, T_END[deck.above] * (rate / self.exact)
+        self.t_end = deck.run.t_end or (SWING / self.exact if swings else usual)
 
     def compute_layer(self, y, density: float):
         """Density and pressure at height y [m] of the isentropic layer of `density` at y = 0."""
@@ -90,36 +89,32 @@ class RayleighTaylor(Problem):
         base, power = np.where(base > 0.0, base, 0.0), GAMMA - 1.0
         return density * base ** (1.0 / power), self.pressure * base ** (GAMMA / power)
 
-    @property
-    def t_end(self) -> float:
-        """End time: the deck's, or several e-folds or swings."""
-        rate = math.sqrt(abs(compute_square(self.deck.above, 0.0)))
-        swing, usual = SWING / self.exact, T_END[self.deck.above] * (rate / self.exact)
-        return self.deck.run.t_end or (swing if self.heavy and not self.grows else usual)
-
     def estimate_cells(self) -> int:
         return max(4, self.deck.cells // 2) * self.deck.cells * (1 + self.heavy)
 
+    def make_grids(self, t=0.0):
+        x = np.linspace(0.0, 0.5, max(4, self.deck.cells // 2) + 1)[:, None]
+        part, front = (
+            np.linspace(0.0, 1.0, self.deck.cells + 1),
+            self.amplitude * np.cos(WAVE_NUMBER * x),
+        )
+        heights = {"light": -1.0 + (front + 1.0) * part, "heavy": front + (1.0 - front) * part}
+        shown = heights if self.heavy else ("light",)
+        return {name: np.array(np.broadcast_arrays(x, heights[name])) for name in shown}
+
     def build(self):
-        tension, cells = self.deck.tension, self.deck.cells
-        x = np.linspace(0.0, 0.5, max(4, cells // 2) + 1)[:, None]
-        part = np.linspace(0.0, 1.0, cells + 1)
-        front = self.amplitude * np.cos(WAVE_NUMBER * x)
-        heights = {"light": (1.0, -1.0 + (front + 1.0) * part)}
-        if self.heavy:
-            heights["heavy"] = 2.0, front + (1.0 - front) * part
-        blocks = []
-        for name, (density, y) in heights.items():
-            grid = np.array([np.broadcast_to(x, y.shape), y])
+        tension, blocks = self.deck.tension, []
+        for name, grid in self.make_grids().items():
+            density = 2.0 if name == "heavy" else 1.0
             # layers of the same height everywhere: the gas beside the wave is out of balance
             rho, p = self.compute_layer(compute_centres(grid)[1], density)
             blocks.append(Block(name, IdealGas(GAMMA), grid, rho, 0.0, 0.0, p))
-            put_walls(blocks[-1], "i_min", "i_max", "j_min" if name == "light" else "j_max")
         top, links = (blocks[0], "j_max"), []
         if self.heavy:
             links = [join("interface", top, (blocks[1], "j_min"), tension=tension)]
         else:
             put(*top, "free-surface", pressure=self.pressure, tension=tension)
+        put_walls(*blocks)
         return self.simulate(blocks, links, source=make_gravity(0.0, -GRAVITY))
 
     def measure(self, evolution) -> dict[str, float]:
@@ -154,7 +149,7 @@ class RayleighTaylor(Problem):
         moved = f"the mean has moved by at most {np.abs(mean - mean[0]).max():.1e} m"
         return Report(head, rows, ["theory is without compression", moved])
 
-    def draw(self, figure, run_data) -> None:
+    def draw_growth(self, figure, run_data) -> None:
         """Amplitude against theory, the interface, and the velocity upwards with the grid."""
         figure.set_size_inches(12.0, 4.6)
         left, middle, right = figure.subplots(1, 3, width_ratios=(1.5, 1.2, 0.9))
@@ -172,7 +167,7 @@ class RayleighTaylor(Problem):
         middle.ticklabel_format(axis="y", scilimits=(-2, 3))
         middle.legend(loc="best", fontsize="small")
         dump = run_data.dumps[-1]
-        most = max(float(np.abs(block.cell_fields["v"][:, 4:-4]).max()) for block in dump.blocks)
+        most = max(float(np.abs(block.v[:, 4:-4]).max()) for block in dump.blocks)
         lines = [dump.blocks[0].nodes[:, :, -1]] if len(dump.blocks) > 1 else []
         words = {"bar": "velocity y [m/s]", "title": "t", "colours": "RdBu_r"}
         draw_field(right, dump, "v", low=-most, high=most, every=4, lines=lines, **words)

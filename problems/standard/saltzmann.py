@@ -13,8 +13,6 @@ There is no contact to preserve, so HLL on all faces reduces the error in rows o
 oblique to the shock leave.
 """
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar, Literal
 
@@ -25,11 +23,10 @@ from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.initial_states import put_walls
+from problems.initial_states import make_box, put_walls
 from problems.pictures import draw_field, find_dump
-from problems.problem import BlockPlan, Problem, Report, Row
+from problems.problem import Problem, Report, Row, find_most
 from regrid.errors import BadInput
-from regrid.measure.corners import compute_centres
 
 # times at which a shock starts and ends, its first place, its speed, density behind it
 PHASES = (
@@ -54,11 +51,9 @@ class SaltzmannDeck(Deck, kw_only=True):
 
 
 class Saltzmann(Problem):
-    """One block between a piston and a wall."""
-
     Deck = SaltzmannDeck
     units: ClassVar = {"transverse_speed": "m/s"}
-    picture = "saltzmann"
+    counted = ("cells", "rows")
 
     def __init__(self, deck: SaltzmannDeck):
         super().__init__(deck)
@@ -68,19 +63,18 @@ class Saltzmann(Problem):
                 "third shock meets the wall"
             )
 
-    def plan(self):
-        tube = BlockPlan("gas", (self.deck.cells, self.deck.rows), (0.0, 0.0), (1.0, 0.1))
-        return self.t_end, [tube]
-
-    def build(self):
-        deck, (x, y) = self.deck, self.plan()[1][0].make_nodes()
+    def make_grids(self, t=0.0):
+        x, y = make_box((self.deck.cells, self.deck.rows), (0.0, 0.0), (1.0, 0.1))
         bend = np.sin(math.pi * x)
         bend[-1] = 0.0
-        nodes = np.array([x + deck.skew * (1.0 - 10.0 * y) * bend, y])
-        state, scheme = (1.0, 0.0, 0.0, deck.pressure), {"limiter": deck.limiter, "flux": deck.flux}
-        block = Block("gas", IdealGas(5.0 / 3.0), nodes, *state, **scheme)
+        return {"gas": np.array([x + self.deck.skew * (1.0 - 10.0 * y) * bend, y])}
+
+    def build(self):
+        deck, gas, state = self.deck, IdealGas(5.0 / 3.0), (1.0, 0.0, 0.0, self.deck.pressure)
+        scheme = {"limiter": deck.limiter, "flux": deck.flux}
+        block = Block("gas", gas, self.make_grids()["gas"], *state, **scheme)
         put(block, "i_min", "piston", velocity=(1.0, 0.0))
-        put_walls(block, "i_max", "j_min", "j_max")
+        put_walls(block)
         simulation = self.simulate([block])
         simulation.clock.retry_dt = FIRST_STEP / (deck.cells * PHASES[0][3])
         return simulation
@@ -90,7 +84,7 @@ class Saltzmann(Problem):
         (block,) = evolution.blocks
         row = {f"{kind}_error_{n}": math.nan for n in (1, 2, 3) for kind in KINDS}
         row["transverse_speed"] = float(np.abs(block.state[2, 1:-1, 1:-1]).max())
-        t, x = evolution.t, compute_centres(block.nodes)[0]
+        t, x = evolution.t, block.centres[0]
         phase = sum(t > start for start, *_ in PHASES[1:])  # reflections before
         start, end, place, speed, exact = PHASES[phase]
         front, back = place + speed * (t - start), t if phase != 1 else 1.0
@@ -112,13 +106,12 @@ class Saltzmann(Problem):
                     name, label = f"{kind}_error_{n}", f"{when}: {words} [%]"
                     value = float(history[name][last])
                     rows.append(Row(name, value, label=label, unit=0.01, digits=3))
-        most = float(np.nanmax(history.get("transverse_speed", [math.nan])))
-        words = "largest speed across [m/s]"
+        most, words = find_most(history, "transverse_speed"), "largest speed across [m/s]"
         rows.append(Row("largest_transverse_speed", most, label=words, digits=2))
         head = f"saltzmann, {deck.cells} x {deck.rows} cells, {deck.regrid.name}"
         return Report(f"{head}; errors of the density behind each shock:", rows)
 
-    def draw(self, figure, run_data) -> None:
+    def draw_saltzmann(self, figure, run_data) -> None:
         """Grid and density at three times, and density against x of all cells."""
         last = run_data.dumps[-1].t
         times = dict.fromkeys([*(t for t in (0.6, 0.85, 0.93) if t < last), last])
@@ -127,10 +120,8 @@ class Saltzmann(Problem):
         for (left, right), dump in zip(panels, dumps, strict=True):
             draw_field(left, dump, "rho", every=1, bar="density", title="t")
             left.set_aspect("auto")
-            (block,) = dump.blocks
-            x = compute_centres(block.nodes)[0]
-            right.plot(x.ravel(), block.cell_fields["rho"].ravel(), ".", ms=1.5)
-            for start, *_, exact in PHASES:
-                if dump.t > start:
-                    right.axhline(exact, color="k", lw=0.5)
+            gas = dump["gas"]
+            right.plot(gas.centres[0].ravel(), gas.rho.ravel(), ".", ms=1.5)
+            for exact in (exact for start, *_, exact in PHASES if dump.t > start):
+                right.axhline(exact, color="k", lw=0.5)
             right.set_xlabel("x")

@@ -12,8 +12,6 @@ that gains a tenth has a radius error of a fortieth.  In the plane the whole cen
 gas when nodes follow; use a grid at rest.  Source: [Sedov1959], [Kamm2000].
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 
@@ -23,7 +21,7 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.formulas.geometry import compute_volumes, find_geometry
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.initial_states import RadialFlow, Symmetry, follow_gas, put_walls
+from problems.initial_states import RadialFlow, Symmetry, follow_gas
 from problems.problem import Problem, Report, Row, compare, get_last, say_unreached
 from problems.references.exact_flows import SedovBlast
 from regrid.errors import BadInput
@@ -48,10 +46,8 @@ class SedovDeck(Deck, kw_only=True):
 
 
 class Sedov(Problem):
-    """One block."""
-
     Deck = SedovDeck
-    picture = "sedov"
+    counted = ("cells", "cells")
 
     def __init__(self, deck: SedovDeck):
         super().__init__(deck)
@@ -68,12 +64,11 @@ class Sedov(Problem):
                 f"{where}; the sides are {deck.size:g} long, and its mirror image would come back"
             )
 
-    def estimate_cells(self) -> int:
-        return self.deck.cells**2
+    def make_grids(self, t=0.0):
+        return {"gas": self.flow.make_nodes(self.deck.cells, self.deck.size)}
 
     def build(self):
-        deck, flow = self.deck, self.flow
-        nodes = flow.make_nodes(deck.cells, deck.size)
+        deck, flow, nodes = self.deck, self.flow, self.make_grids()["gas"]
         volume = compute_volumes(find_geometry(flow.geometry), nodes)
         pressure = np.full(volume.shape, deck.pressure)
         first, energy = np.index_exp[:1, :1], SHARES[deck.geometry] * self.blast.energy
@@ -81,7 +76,7 @@ class Sedov(Problem):
             first, energy = np.index_exp[:1, :], energy * nodes[1, 0, -1]
         pressure[first] += (deck.gamma - 1.0) * energy / volume[first].sum()
         block = Block("gas", IdealGas(deck.gamma), nodes, 1, 0, 0, pressure, limiter=deck.limiter)
-        put_walls(block, *flow.close_inside(block))
+        flow.close(block)
         follow = lambda name, t: follow_gas(block, t - simulation.t)  # noqa: E731
         mesh = follow if self.mesh == "follow" else "fixed"
         simulation = self.simulate([block], mesh=mesh, geometry=flow.geometry)
@@ -92,10 +87,10 @@ class Sedov(Problem):
         (block,) = evolution.blocks
         most = float(block.state[0, 1:-1, 1:-1].max())
         found = {"shock_radius": self.flow.find_shock(block), "most_density": most}
-        if evolution.finished is not None:
-            exact = lambda r: self.blast.sample(r, evolution.t)[0]  # noqa: E731
-            return {**found, "error_rho": self.flow.measure_error(block, exact)}
-        return {**found, "error_rho": math.nan}
+        if evolution.finished is None:
+            return {**found, "error_rho": math.nan}
+        exact = lambda r: self.blast.sample(r, evolution.t)[0]  # noqa: E731
+        return {**found, "error_rho": self.flow.measure_error(block, exact)}
 
     def report(self, history, final=None) -> Report:
         deck, energy = self.deck, np.asarray(history.get("total_energy", [math.nan]))
@@ -114,7 +109,7 @@ class Sedov(Problem):
         grid = "nodes follow the gas" if self.mesh == "follow" else "fixed grid"
         return Report(f"sedov, {deck.geometry}, {deck.cells} cells per side, {grid}", rows, notes)
 
-    def draw(self, figure, run_data) -> None:
+    def draw_sedov(self, figure, run_data) -> None:
         """Density in the last dump with the grid, and against the radius."""
         dump = run_data.dumps[-1]
         exact = lambda r: self.blast.sample(r, max(dump.t, 1e-9))[0]  # noqa: E731

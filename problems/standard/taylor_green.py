@@ -11,8 +11,6 @@ Note: without the source the flow is no solution and the error does not fall wit
 a grid that is back at its start when the error is taken tests little.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 
@@ -21,7 +19,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.initial_states import make_square, put_walls
+from problems.initial_states import make_box, put_walls
 from problems.pictures import draw_field, find_dump
 from problems.problem import Problem, Report, compare
 from problems.references import taylor_green
@@ -42,36 +40,28 @@ class TaylorGreenDeck(Deck, kw_only=True):
 
 
 class TaylorGreen(Problem):
-    """One block between walls."""
-
     Deck = TaylorGreenDeck
-    picture = "taylor-green"
+    counted = ("cells", "cells")
 
-    def make_block_nodes(self, name: str, t: float) -> np.ndarray:
-        """Nodes at time t, swinging as the vortex turns, back and forth, or on the paths of gas."""
-        nodes = make_square(self.deck.cells, 0.0, 1.0)
-        if self.deck.mesh != "follow":
-            swing = self.deck.amplitude * math.sin(2.0 * math.pi * t / PERIOD)
-            return nodes + swing * taylor_green.compute_velocity(nodes)
-        return taylor_green.follow_flow(nodes, t, PATH_STEPS)
-
-    def estimate_cells(self) -> int:
-        return self.deck.cells**2
+    def make_grids(self, t=0.0):
+        """Nodes swing as the vortex turns, back and forth, or are on the paths of gas."""
+        nodes = make_box((self.deck.cells, self.deck.cells), (0.0, 0.0), (1.0, 1.0))
+        if self.deck.mesh == "follow":
+            return {"square": taylor_green.follow_flow(nodes, t, PATH_STEPS)}
+        swing = self.deck.amplitude * math.sin(2.0 * math.pi * t / PERIOD)
+        return {"square": nodes + swing * taylor_green.compute_velocity(nodes)}
 
     def build(self):
-        deck, nodes = self.deck, self.make_block_nodes("square", 0.0)
+        gas, nodes = IdealGas(taylor_green.GAMMA), self.make_grids()["square"]
         flow = taylor_green.compute_flow(*compute_centres(nodes))
-        block = Block(
-            "square", IdealGas(taylor_green.GAMMA), nodes, 1.0, *flow, limiter=deck.limiter
-        )
+        block = Block("square", gas, nodes, 1.0, *flow, limiter=self.deck.limiter)
         put_walls(block)
-        mesh = "fixed" if deck.mesh == "fixed" else self.make_block_nodes
-        return self.simulate([block], mesh=mesh, source=taylor_green.heat)
+        return self.simulate([block], mesh=self.deck.mesh, source=taylor_green.heat)
 
     def measure(self, evolution) -> dict[str, float]:
         """Mean errors of velocity and pressure against the values at the cells' centres."""
         (block,) = evolution.blocks
-        u, v, p = taylor_green.compute_flow(*compute_centres(block.nodes))
+        u, v, p = taylor_green.compute_flow(*block.centres)
         _, u_cell, v_cell, p_cell = block.state[:, 1:-1, 1:-1]
         errors = {"error_velocity": np.hypot(u_cell - u, v_cell - v), "error_p": np.abs(p_cell - p)}
         return {name: float((e * block.volume).sum()) for name, e in errors.items()}
@@ -85,7 +75,7 @@ class TaylorGreen(Problem):
         ]
         return Report(f"taylor-green, {n} x {n}, grid {self.deck.mesh}{t}", rows)
 
-    def draw(self, figure, run_data) -> None:
+    def draw_taylor_green(self, figure, run_data) -> None:
         """Pressure with the grid at two times and the velocity's error in the last dump."""
         figure.set_size_inches(13.0, 4.2)
         *panels, right = figure.subplots(1, 3)
@@ -96,8 +86,8 @@ class TaylorGreen(Problem):
             draw_field(axis, dump, "p", low=0.5, high=1.5, bar="pressure [Pa]", **options)
 
         def compute_error(block):
-            u, v, _ = taylor_green.compute_flow(*compute_centres(block.nodes))
-            return np.hypot(block.cell_fields["u"] - u, block.cell_fields["v"] - v)
+            u, v, _ = taylor_green.compute_flow(*block.centres)
+            return np.hypot(block.u - u, block.v - v)
 
         options |= {"bar": "error of the velocity [m/s]", "colours": "magma_r"}
         draw_field(right, last, compute_error, low=0.0, **options)

@@ -12,8 +12,6 @@ angle, which `hydro.motion.constraints` prevents; finer grids wind further, and 
 point does not converge.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from typing import ClassVar
@@ -25,17 +23,17 @@ from hydro.eos import IdealGas
 from hydro.links import join
 from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.initial_states import put_walls
+from problems.initial_states import make_box, put_walls
 from problems.pictures import draw_field, draw_grid
-from problems.problem import BlockPlan, Problem, Report, Row, average_plateau, get_last
+from problems.problem import Problem, Report, Row, average_plateau, get_last
 from problems.references.riemann import solve_riemann
 from regrid.errors import BadInput
 
-# density, pressure, gamma; x from and to; y from and to
+# equation of state; density, velocity, pressure; lower left and upper right corner
 GASES = {
-    "left": (1.0, 1.0, 1.5, (0.0, 1.0), (0.0, 3.0)),
-    "bottom": (1.0, 0.1, 1.4, (1.0, 7.0), (0.0, 1.5)),
-    "top": (0.125, 0.1, 1.5, (1.0, 7.0), (1.5, 3.0)),
+    "left": (IdealGas(1.5), (1.0, 0.0, 1.0), (0.0, 0.0), (1.0, 3.0)),
+    "bottom": (IdealGas(1.4), (1.0, 0.0, 0.1), (1.0, 0.0), (7.0, 1.5)),
+    "top": (IdealGas(1.5), (0.125, 0.0, 0.1), (1.0, 1.5), (7.0, 3.0)),
 }
 EARLY = 0.25  # until then the states beside the walls have not felt the point
 
@@ -56,7 +54,7 @@ class TriplePoint(Problem):
 
     Deck = TriplePointDeck
     units: ClassVar = {"point_x": "m", "point_y": "m"}
-    picture, measures_sides = "triple-point", True
+    measures_sides = True
 
     def __init__(self, deck: TriplePointDeck):
         super().__init__(deck)
@@ -65,20 +63,20 @@ class TriplePoint(Problem):
                 f"deck: cells is {deck.cells}; it must be even, the point is half a length up"
             )
 
-    def plan(self):
-        plans = []
-        for name, (*_, x, y) in GASES.items():
-            low, high = zip(x, y, strict=True)
-            cells = tuple(round(self.deck.cells * (end - start)) for start, end in (x, y))
-            plans.append(BlockPlan(name, cells, low, high))
-        return self.t_end, plans
+    def estimate_cells(self) -> int:
+        return 21 * self.deck.cells**2
+
+    def make_grids(self, t=0.0):
+        return {
+            name: make_box(np.rint(self.deck.cells * np.subtract(high, low)).astype(int), low, high)
+            for name, (_, _, low, high) in GASES.items()
+        }
 
     def build(self):
         deck, blocks = self.deck, []
-        for plan in self.plan()[1]:
-            rho, p, gamma, *_ = GASES[plan.name]
-            what, state = (plan.name, IdealGas(gamma), plan.make_nodes()), (rho, 0.0, 0.0, p)
-            blocks.append(Block(*what, *state, limiter=deck.limiter))
+        for name, nodes in self.make_grids().items():
+            eos, (rho, u, p), *_ = GASES[name]
+            blocks.append(Block(name, eos, nodes, rho, u, 0.0, p, limiter=deck.limiter))
         left, bottom, top = blocks
         pairs = (
             ((left, "i_max", 0, bottom.nj), (bottom, "i_min")),
@@ -86,26 +84,15 @@ class TriplePoint(Problem):
             ((bottom, "j_max"), (top, "j_min")),
         )
         links = [join("interface", *pair) for pair in pairs]
-        put_walls(left, "i_min", "j_min", "j_max")
-        put_walls(bottom, "i_max", "j_min")
-        put_walls(top, "i_max", "j_max")
+        put_walls(*blocks)
         rule = LineRule(relax=deck.relax, thickness=deck.thickness)
         return self.simulate(blocks, links, line_rule=rule)
 
     @functools.cached_property
     def exact(self):
         """Plane Riemann solutions of the left gas with the other two."""
-        sides = {n: (IdealGas(gamma), (rho, 0.0, p)) for n, (rho, p, gamma, *_) in GASES.items()}
-        return {name: solve_riemann(*sides["left"], *sides[name]) for name in ("bottom", "top")}
-
-    def list_stars(self):
-        """Exact states beside the left contact at the walls, by the columns of measured ones."""
-        found = {}
-        for name, exact in self.exact.items():
-            for side, rho in (("l", exact.rho_left), ("r", exact.rho_right)):
-                values = {"rho": rho, "u": exact.u, "p": exact.p}
-                found |= {f"{q}_{name}_{side}": float(value) for q, value in values.items()}
-        return found
+        left = GASES["left"][:2]
+        return {name: solve_riemann(*left, *GASES[name][:2]) for name in ("bottom", "top")}
 
     def measure(self, evolution) -> dict[str, float]:
         """Where the point is; early on, star states beside the contacts at the walls."""
@@ -123,7 +110,11 @@ class TriplePoint(Problem):
         return row
 
     def report(self, history, final=None) -> Report:
-        stars, rows = self.list_stars(), []
+        stars, rows = {}, []  # exact states beside the left contact at the walls, by columns
+        for name, exact in self.exact.items():
+            for side, rho in (("l", exact.rho_left), ("r", exact.rho_right)):
+                values = {"rho": rho, "u": exact.u, "p": exact.p}
+                stars |= {f"{q}_{name}_{side}": float(value) for q, value in values.items()}
         known = np.isfinite([history[name] for name in stars]).all(axis=0) if history else []
         last = int(np.flatnonzero(known)[-1]) if np.any(known) else None
         for name, theory in stars.items():
@@ -142,14 +133,13 @@ class TriplePoint(Problem):
         where = f"t = {get_last(history, 't'):.3g}: the point is at x = {x:.4f}, y = {y:.4f}"
         return Report(head, rows, [where])
 
-    def draw(self, figure, run_data) -> None:
+    def draw_triple_point(self, figure, run_data) -> None:
         """Density with the contacts, and the grid around the vortex, at the end."""
         dump = run_data.dumps[-1]
-        blocks = {block.name: block for block in dump.blocks}
-        lines = blocks["top"].nodes[:, :, 0], blocks["left"].nodes[:, -1, :]
+        lines = dump["top"].nodes[:, :, 0], dump["left"].nodes[:, -1, :]
         figure.set_size_inches(9.0, 6.6)
         top, below = figure.subplots(2, 1, sharex=True, sharey=True)
-        density = lambda block: np.log10(block.cell_fields["rho"])  # noqa: E731
+        density = lambda block: np.log10(block.rho)  # noqa: E731
         picture = draw_field(top, dump, density, lines=lines, title="t")
         figure.colorbar(picture, ax=(top, below), shrink=0.6, label="log10 of density in kg/m3")
         for n, block in enumerate(dump.blocks):

@@ -8,8 +8,6 @@ Note: at t = 10 the exact solution is the start; a code that does nothing has no
 the picture too.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 
@@ -21,7 +19,7 @@ from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import swing_square
 from problems.pictures import draw_field
-from problems.problem import BlockPlan, Problem, Report, compare, get_last, say_unreached
+from problems.problem import Problem, Report, compare, get_last, say_unreached
 from problems.references.exact_flows import Vortex as ExactVortex
 
 # mean |rho - exact| at t = 10, beta 5, on a fixed grid; computed independently
@@ -40,33 +38,25 @@ class VortexDeck(Deck, kw_only=True):
 
 
 class Vortex(Problem):
-    """One periodic block."""
-
     Deck = VortexDeck
-    picture = "vortex"
+    counted = ("cells", "cells")
 
     def __init__(self, deck: VortexDeck):
         super().__init__(deck)
         self.exact = ExactVortex(beta=deck.beta)
 
-    def make_block_nodes(self, name: str, t: float) -> np.ndarray:
-        """Nodes at time t: every node swings about its position, twice during the run."""
+    def make_grids(self, t=0.0):
+        """Every node swings about its position, twice during the run."""
         deck, period = self.deck, self.exact.period
         swing = deck.amplitude * math.sin(2.0 * (2.0 * math.pi / period) * t)
-        return swing_square(deck.cells, 0.0, period, swing)
-
-    def plan(self):
-        n, period = self.deck.cells, float(self.exact.period)
-        return self.t_end, [BlockPlan("square", (n, n), (0.0, 0.0), (period, period))]
+        return {"square": swing_square(deck.cells, 0.0, period, swing)}
 
     def build(self):
-        deck, gas = self.deck, IdealGas(self.exact.gamma)
-        nodes = self.make_block_nodes("square", 0.0)
+        deck, gas, nodes = self.deck, IdealGas(self.exact.gamma), self.make_grids()["square"]
         state = self.exact.compute_cell_averages(nodes)
         block = Block("square", gas, nodes, *state, limiter=deck.limiter)
         links = [join("periodic", (block, f"{d}_min"), (block, f"{d}_max")) for d in "ij"]
-        mesh = "fixed" if deck.mesh == "fixed" else self.make_block_nodes
-        return self.simulate([block], links, mesh=mesh)
+        return self.simulate([block], links, mesh=deck.mesh)
 
     def measure(self, evolution) -> dict[str, float]:
         """Mean error of the density, at the end only (the exact averages cost many steps)."""
@@ -85,11 +75,11 @@ class Vortex(Problem):
             notes = [f"{error / known:.2f} of the reference on a fixed grid, {known:.3g}"]
         return Report(f"vortex, {deck.cells} x {deck.cells}, grid {deck.mesh}", rows, notes)
 
-    def draw(self, figure, run_data) -> None:
+    def draw_vortex(self, figure, run_data) -> None:
         """Density in the last dump with the grid, and its error."""
         dump, n = run_data.dumps[-1], self.deck.cells
-        (block,) = dump.blocks
-        error = block.cell_fields["rho"] - self.exact.compute_cell_averages(block.nodes, dump.t)[0]
+        square = dump["square"]
+        error = square.rho - self.exact.compute_cell_averages(square.nodes, dump.t)[0]
         left, right = figure.subplots(1, 2)
         most, every = np.abs(error).max(), max(1, n // 32)
         draw_field(left, dump, "rho", every=every, bar="density [kg/m3]")

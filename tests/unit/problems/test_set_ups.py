@@ -8,8 +8,7 @@ import pytest
 
 from benchmarks.random_pairs import make_random_pair
 from builders import march
-from problems.blocks.deck import BlocksDeck
-from problems.blocks.problem import Blocks
+from problems.blocks import Blocks, BlocksDeck
 from problems.grid_march import GridMarch, GridMarchDeck
 from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.problem import InterfaceInstability

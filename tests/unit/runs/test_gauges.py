@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from problems.deck import GaugePoint
+from problems.deck import Gauge
 from regrid.measure.corners import compute_centres
 from runs.gauges import Gauges, place_points
 
@@ -40,7 +40,8 @@ def test_linear_fields_are_exact_on_a_grid_that_moves(ni, nj):
     points = []
     for a, b in inside.T:  # of the first grid, up to its very sides
         x = a + 0.06 * np.sin(5.0 * b) + 0.03 * np.sin(7.0 * a)
-        points.append(GaugePoint("g", (x, b + 0.05 * np.sin(4.0 * a) + 0.3 * a), False, FIELDS))
+        at = x, b + 0.05 * np.sin(4.0 * a) + 0.3 * a
+        points.append(Gauge(name="g", at=at, fields=FIELDS))
     places = place_points(points, [make_block(distort(ni, nj), fields)])
     counted = 0
     for phase in (0.0, 0.4, 0.8, 1.2):
@@ -84,7 +85,7 @@ def test_a_tracer_in_solid_rotation_is_of_second_order():
     errors = []
     for steps in (40, 80, 160):
         flow = Carried()
-        gauges = Gauges([GaugePoint("g", (1.1, 0.3), True, ("rho",))], flow)
+        gauges = Gauges([Gauge(name="g", at=(1.1, 0.3), moves=True, fields=["rho"])], flow)
         for _ in range(steps):
             flow.go(4.0 / steps)
             gauges.follow()

@@ -130,7 +130,7 @@ def make_problem(**changes):
 def test_amplitudes_at_the_start():
     for phase in (0.0, 1.0, math.pi):
         problem = make_problem(cells=64, ripple_wavelength=4e-3, ripple_phase=phase)
-        line = problem.make_nodes()["cone"][:, :, -1]
+        line = problem.make_grids()["cone"][:, :, -1]
         found = problem.ripple.measure(line, 0.0)
         assert len(found) == 2
         assert list(found.values()) == pytest.approx([1e-4] * 2, rel=0.05)

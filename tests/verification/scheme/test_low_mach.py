@@ -28,7 +28,7 @@ def run_gresho(velocity=(0.0, 0.0), steps=None, **settings):
         simulation.exchange.links,
         t_end=simulation.t_end,
         cfl=simulation.clock.cfl,
-        mesh=lambda name, t: problem.make_block_nodes(name, 0.0) + drift * t,
+        mesh=lambda name, t: problem.make_grids()[name] + drift * t,
     )
     moved.clock.rate = simulation.clock.rate  # the first step knows no motion of the cells yet
     while not moved.finished and moved.step != steps:

@@ -14,9 +14,12 @@ import functools
 import math
 import re
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from hydro.block import Block
 from hydro.boundary import put
@@ -24,10 +27,20 @@ from hydro.eos.materials import Material, find_material, make_material
 from hydro.links import join, slide
 from hydro.simulation import Simulation
 from hydro.sources import make_gravity
-from problems.blocks.deck import LINKED, BlocksDeck, BlockSide, BlockTable, CurveTable
-from problems.deck import check_digests
+from problems.deck import (
+    Deck,
+    DeckTable,
+    Limiter,
+    Regrid,
+    RunControl,
+    VoidFill,
+    check_digests,
+    compute_digests,
+    key,
+    place_file,
+)
 from problems.pictures import draw_field
-from problems.problem import Problem, Report, check_memory, plan_blocks
+from problems.problem import Problem, Report
 from regrid.domains import distribute_by_arc_length
 from regrid.equidistribution.weights import Expression
 from regrid.errors import BadInput, RegridFailure, suggest
@@ -40,6 +53,157 @@ from regrid.text_files import read_columns
 
 SAMPLES = 1025  # points on a curve given by formulas
 PASSES, SETTLED = 20, 1e-3  # of the regridder; the last moves no node by more cells than that
+# Text such as "1e5*(1 + 0.1*sin(pi*x))": of x and y [m] in a state, of the time t [s] at a side, of
+# the part s of the way from 0 to 1 along a curve; parsed (`Expression`), never run.
+Formula = float | str
+Pair = tuple[Formula, Formula]
+SideName = Literal["i_min", "i_max", "j_min", "j_max"]
+LINKED = {"interface": "interface", "seam": "seam", "periodic": "periodic", "slide": "sliding"}
+Points = Annotated[tuple[tuple[float, float], ...], Meta(min_length=2)]
+
+
+class CurveTable(DeckTable, kw_only=True):
+    """A curve by two formulas of s, from 0 to 1, or by points with the cells between them."""
+
+    x: key(Formula | None, "x [m], a number or a formula of s") = None
+    y: key(Formula | None, "y [m], a number or a formula of s") = None
+    points: key(Points | None, "[[x, y], ...] [m], joined by straight lines") = None
+    cells: key(
+        tuple[Annotated[int, Meta(ge=1, le=4000)], ...] | None,
+        "cells on each of the straight lines; every point is then a node",
+    ) = None
+
+
+Curve = Annotated[
+    str | Points | CurveTable,
+    Meta(
+        description="a file with columns x and y [m], points [[x, y], ...] joined by straight "
+        "lines, {x = ..., y = ...}, formulas of s from 0 to 1, or {points = ..., cells = ...}"
+    ),
+]
+
+
+class Curves(DeckTable, kw_only=True):
+    """The four sides of a block; each may run either way, neighbours share their ends."""
+
+    i_min: Curve
+    i_max: Curve
+    j_min: Curve
+    j_max: Curve
+
+
+class BlockSide(DeckTable, kw_only=True):
+    """What is at a side of a block, or at some of its faces."""
+
+    side: key(SideName, "which side")
+    kind: key(str, "wall, axis, piston, free-surface, inflow, outflow or an installed one")
+    faces: key(
+        tuple[Annotated[int, Meta(ge=0, le=10**9)], Annotated[int, Meta(ge=1, le=10**9)]] | None,
+        "from this face up to that, counted from 0; left out: the whole side",
+    ) = None
+    velocity: key(Pair | None, "of a piston or an open side: u, v [m/s] of t") = None
+    pressure: key(Formula | None, "on a free surface [Pa], a number or a formula of t") = None
+    state: key(
+        tuple[Formula, Formula, Formula, Formula] | None,
+        "beyond an inflow: rho [kg/m3], u, v [m/s], p [Pa], formulas of t",
+    ) = None
+    options: key(
+        dict[str, bool | int | float | str], "further options of the kind, passed on unchanged"
+    ) = msgspec.field(default_factory=dict)
+
+
+class BlockTable(DeckTable, kw_only=True):
+    """One block: its grid, its material, its state and its sides."""
+
+    name: key(str, "name, for links and files", pattern="^[A-Za-z][A-Za-z0-9_-]*$")
+    grid: key(str, "file of its grid, or of its four curves: .npz, .h5, .vts, .vtk") = ""
+    grid_block: key(str, "which of several blocks in that file") = ""
+    curves: key(Curves | None, "its four sides, where there is no file of a grid") = None
+    cells: key(
+        tuple[Annotated[int, Meta(ge=2, le=4000)], Annotated[int, Meta(ge=2, le=4000)]] | None,
+        "cells along i and j; left out: the nodes of the file, or the points",
+    ) = None
+    material: key(
+        str | dict[str, int | float | str],
+        "name of a material, FILE.toml:NAME, or a table with eos and its parameters",
+    ) = "air"
+    rho: key(
+        Formula | None, "density [kg/m3], of x and y; left out: that of the material at rest"
+    ) = None
+    u: key(Formula, "velocity along x [m/s], of x and y") = 0.0
+    v: key(Formula, "velocity along y [m/s], of x and y") = 0.0
+    p: key(Formula, "pressure [Pa], of x and y") = 1e5
+    side: key(tuple[BlockSide, ...], "what is at its sides that are not linked") = ()
+
+
+class LinkTable(DeckTable, kw_only=True):
+    """Two runs of faces that lie on one another."""
+
+    kind: key(
+        Literal["interface", "seam", "periodic", "slide"],
+        "interface: contact of two materials, nodes match; seam: cut inside one "
+        "material; periodic: a period apart; slide: nodes need not match, the first side leads",
+    )
+    sides: key(
+        tuple[str, str], 'two sides, such as "left.i_max" or "left.i_max[0:8]", faces 0 to 7'
+    )
+    tension: key(float, "surface tension of an interface [N/m]", ge=0, le=1e20) = 0.0
+
+
+CHANNEL = BlockTable(  # air that a piston drives into a channel with a bump
+    name="air",
+    cells=(56, 16),
+    curves=Curves(
+        i_min=((-0.3, 0.0), (-0.3, 0.2)),
+        i_max=((0.4, 0.0), (0.4, 0.2)),
+        j_min=((-0.3, 0.0), (0.4, 0.0)),
+        j_max=CurveTable(x="0.7*s - 0.3", y="0.2 - 0.08*exp(-40*(s - 0.6)**2)*(4*s*(1 - s))"),
+    ),
+    side=(
+        BlockSide(side="i_min", kind="piston", velocity=(100.0, 0.0)),
+        *(BlockSide(side=side, kind="wall") for side in ("i_max", "j_min", "j_max")),
+    ),
+)
+
+
+class BlocksDeck(Deck, kw_only=True):
+    run: RunControl = RunControl(t_end=1e-3)
+    regrid: Regrid = Regrid()
+    title: key(str, "a line for the summary") = ""
+    geometry: key(Literal["plane", "axisymmetric"], "axisymmetric: y is the radius") = "plane"
+    mesh: key(
+        Literal["regrid", "fixed"], "regrid: grids follow moving sides; fixed: no node moves"
+    ) = "regrid"
+    gravity: key(tuple[float, float], "acceleration of all blocks along x and y [m/s2]") = (
+        0.0,
+        0.0,
+    )
+    limiter: Limiter = "van-leer"
+    void_fill: VoidFill = VoidFill()
+    block: key(tuple[BlockTable, ...], "the blocks, [[block]] each", min_length=1) = (CHANNEL,)
+    link: key(tuple[LinkTable, ...], "the links, [[link]] each") = ()
+    digests: key(
+        dict[str, str], "sha256 of the files, as a run stores them; not needed in your own deck"
+    ) = msgspec.field(default_factory=dict)
+
+    def find_files(self, folder: Path) -> BlocksDeck:
+        """The same deck, the files that it names taken from `folder` where they are relative."""
+        blocks, names = [], []
+        for block in self.block:
+            changed: dict[str, Any] = {"grid": block.grid and place_file(block.grid, folder)}
+            names.append(changed["grid"])
+            if isinstance(block.material, str) and ".toml:" in block.material:
+                file, _, name = block.material.rpartition(":")
+                names.append(place_file(file, folder))
+                changed["material"] = f"{names[-1]}:{name}"
+            if block.curves is not None:
+                sides = {side: getattr(block.curves, side) for side in SIDE_NAMES}
+                files = {s: place_file(c, folder) for s, c in sides.items() if isinstance(c, str)}
+                changed["curves"] = msgspec.structs.replace(block.curves, **files)
+                names += files.values()
+            blocks.append(msgspec.structs.replace(block, **changed))
+        digests = compute_digests(filter(None, names), self.digests)
+        return msgspec.structs.replace(self, block=tuple(blocks), digests=digests)
 
 
 def make_grid(deck: BlocksDeck, block: BlockTable) -> np.ndarray:
@@ -90,14 +254,12 @@ def read_curve(block: BlockTable, side: str) -> np.ndarray:
     if not isinstance(curve, CurveTable):
         return make_polyline(np.array(curve).T, side, where)
     where = f"{where}, curve {side}"
-    pieces = len(curve.points or (0,)) - 1
     if (curve.x is None) != (curve.y is None) or (curve.x is None) == (curve.points is None):
         raise BadInput(f"{where}: give x and y, formulas of s, or points, and not both")
+    pieces = len(curve.points or (0,)) - 1
     if curve.cells is not None and len(curve.cells) != pieces:
-        raise BadInput(
-            f"{where}: cells has {len(curve.cells)} numbers for {pieces} straight lines between "
-            "points"
-        )
+        words = f"{len(curve.cells)} numbers for {pieces} straight lines between points"
+        raise BadInput(f"{where}: cells has {words}")
     if curve.points is None:
         s = {"s": np.linspace(0.0, 1.0, SAMPLES if block.cells else 2)}
         values = [evaluate(getattr(curve, axis), s, f"{where}, {axis}") for axis in "xy"]
@@ -107,28 +269,6 @@ def read_curve(block: BlockTable, side: str) -> np.ndarray:
         return points
     at = np.concatenate([[0], np.cumsum(curve.cells)])
     return np.array([np.interp(np.arange(at[-1] + 1), at, row) for row in points])
-
-
-def place_nodes(
-    sides: dict[str, np.ndarray], block: BlockTable, where: str
-) -> dict[str, np.ndarray]:
-    """The curves with the nodes on them: given ones, else equal lengths of arc."""
-    if block.cells is None:
-        return sides
-    placed = {}
-    for side, line in sides.items():
-        count = block.cells[1 if side[0] == "i" else 0]
-        curve = getattr(block.curves, side, None)
-        if isinstance(curve, CurveTable) and curve.cells is not None:
-            if sum(curve.cells) != count:
-                raise BadInput(
-                    f"{where}: curve {side} has {sum(curve.cells)} cells in all; the block has "
-                    f"{count} along it"
-                )
-            placed[side] = line
-        else:
-            placed[side] = distribute_by_arc_length(line, count + 1)
-    return placed
 
 
 def evaluate(formula: float | str, values: dict[str, np.ndarray], where: str) -> np.ndarray:
@@ -151,7 +291,17 @@ def make_on_sides(
     sides: dict[str, np.ndarray], deck: BlocksDeck, block: BlockTable, where: str
 ) -> np.ndarray:
     """The grid on four polylines; BadInput says why there is none."""
-    boundary = make_boundary(place_nodes(sides, block, where), None, where)
+    for side, line in sides.items() if block.cells else ():
+        count, curve = block.cells[1 if side[0] == "i" else 0], getattr(block.curves, side, None)
+        given = getattr(curve, "cells", None)
+        if given is None:
+            sides[side] = distribute_by_arc_length(line, count + 1)
+        elif sum(given) != count:
+            raise BadInput(
+                f"{where}: curve {side} has {sum(given)} cells in all; the block has {count} "
+                "along it"
+            )
+    boundary = make_boundary(sides, None, where)
     if compute_area(np.nan_to_num(boundary)) <= 0.0:
         raise BadInput(
             f"{where}: i and j turn clockwise; exchange i_min and i_max, or j_min and j_max"
@@ -194,14 +344,13 @@ def count_cells(block: BlockTable) -> int:
 RUN_OF_FACES = re.compile(r"(?P<block>[^.\[\]]+)\.(?P<side>\w+)(\[(?P<start>\d+):(?P<stop>\d+)\])?")
 # of every block, see `measure_means`
 MEASURED = {"u_mean": "m/s", "v_mean": "m/s", "x_mass": "m", "p_max": "Pa"}
-Run = tuple  # block, side and, of a part of it, the first face and the one after the last
 
 
 class Blocks(Problem):
     """The blocks of the deck; `grids` are made when first asked for."""
 
     Deck = BlocksDeck
-    picture, measures_sides = "blocks", True  # a block's means are found by who has the block
+    measures_sides = True  # a block's means are found by who has the block
     deck: BlocksDeck
 
     def __init__(self, deck: BlocksDeck):
@@ -228,28 +377,12 @@ class Blocks(Problem):
         check_digests(self.deck.digests)
         return {block.name: make_grid(self.deck, block) for block in self.deck.block}
 
-    def find_run(self, text: str) -> Run:
-        """The faces that "block.side" or "block.side[from:to]" means; BadInput where none."""
-        found = RUN_OF_FACES.fullmatch(text.strip())
-        if not found:
-            raise BadInput(
-                f'deck: link: {text!r} is not a side; write "block.i_max" or "block.i_max[0:8]"'
-            )
-        name, side = found["block"], found["side"]
-        if name not in self.grids:
-            raise BadInput(
-                f"deck: link: {text!r}: there is no block {name!r}{suggest(name, self.grids)}"
-            )
-        return name, side, *((int(found["start"]), int(found["stop"])) if found["start"] else ())
-
     def estimate_cells(self) -> int:
         """Cells of the blocks on curves; grids in files are there already."""
         return sum(map(count_cells, self.deck.block))
 
-    def plan(self):
-        """End time and blocks, all files having been read and all grids made."""
-        check_memory(self)
-        return self.deck.run.t_end, plan_blocks(self.grids)
+    def make_grids(self, t=0.0):
+        return self.grids
 
     def cautions(self, history=None) -> list[str]:
         """None; without a history the grids are made, so that a check tells what is wrong."""
@@ -261,8 +394,17 @@ class Blocks(Problem):
         deck, links = self.deck, []
         blocks = {table.name: self.make_block(table) for table in deck.block}
         for link in deck.link:
-            ends = [self.find_run(text) for text in link.sides]
-            pair = [(blocks[name], *faces) for name, *faces in ends]
+            pair = []
+            for text in link.sides:
+                where, found = f"deck: link: {text!r}", RUN_OF_FACES.fullmatch(text.strip())
+                if not found:
+                    raise BadInput(
+                        f'{where} is not a side; write "block.i_max" or "block.i_max[0:8]"'
+                    )
+                if (name := found["block"]) not in blocks:
+                    raise BadInput(f"{where}: there is no block {name!r}{suggest(name, blocks)}")
+                faces = (int(found["start"]), int(found["stop"])) if found["start"] else ()
+                pair.append((blocks[name], found["side"], *faces))
             options = {"tension": link.tension} if link.tension else {}
             slides = link.kind == "slide"
             links.append(slide(*pair) if slides else join(link.kind, *pair, **options))
@@ -314,7 +456,7 @@ class Blocks(Problem):
             )
         return Report(self.deck.title or "blocks of a deck:", notes=notes)
 
-    def draw(self, figure, run_data) -> None:
+    def draw_blocks(self, figure, run_data) -> None:
         """Pressure at the end, the outlines of the blocks and every fourth grid line."""
         dump = run_data.dumps[-1]
         sides = [line for block in dump.blocks for line in get_sides(block.nodes)]
@@ -342,8 +484,6 @@ def find_block_material(block: BlockTable) -> Material:
         table = {"source": "the deck", "rho0": 1.0, **block.material}
         if "rho0" not in block.material and block.rho is None:
             raise BadInput(f"{where}: rho is missing, and its material says no rho0")
-        from pathlib import Path
-
         return make_material(f"{where}, material", table, Path())
     try:
         return find_material(block.material)

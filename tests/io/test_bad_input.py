@@ -46,6 +46,36 @@ def test_settings(shockgrid, setting, words):
     assert words in error and error.count("\n") == 1, error
 
 
+GIVEN = ("heated-cavity", "gravity=[0.0,-1.0]", "tilt=10")
+NO_STEADY = ("left.heat=adiabatic", "left.value=0", "right.heat=flux", "right.value=1")
+NO_HEAT = [f"{side}.{key}" for side in ("left", "right") for key in ("heat=adiabatic", "value=0")]
+
+
+@pytest.mark.parametrize(
+    ("deck", "words"),
+    [
+        (("flyer-target", "plates.0.gap=1e-4"), "nothing is before the first plate"),
+        (("flyer-target", "plates=[{}]"), "plates"),
+        (("plate-on-wedge-apart", "refinement=2"), "finer at A only where the plate lies"),
+        (("cavity", "material=air"), "has no such shock"),
+        (("heated-cavity", "rayleigh=-5"), "Ra = -5 is negative"),
+        (("heated-cavity", "rayleigh=nan"), "rayleigh"),
+        (("heated-cavity", "tilt=inf"), "tilt"),
+        (("heated-cavity", "prandtl=0"), "Pr = 0 must be positive"),
+        (("heated-cavity", "gravity=[0.0,0.0]"), "gravity is zero but Ra = 100000"),
+        (GIVEN, "are both given"),
+        (("heated-cavity", "top.value=1"), "top.value = 1 contradicts top.heat = 'adiabatic'"),
+        (("heated-cavity", *NO_STEADY), "which no steady state can"),
+        (("heated-cavity", *NO_HEAT), "no wall is isothermal"),
+        (("convection-1d", "rayleigh=0"), "nothing would rise"),
+    ],
+)
+def test_keys_that_contradict_each_other(shockgrid, deck, words):
+    name, *settings = deck
+    code, _, error = shockgrid("run", name, *(f"--set={setting}" for setting in settings), "-q")
+    assert code == 2 and words in error and error.count("\n") == 1, error
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [

@@ -1,44 +1,16 @@
-"""Grids opened by readers that people use, and files of a real writer read here.
-
-Each reader runs in a process of its own: some crash on a file they do not like.
-"""
+"""Grids opened by readers that people use, and files of a real writer read here."""
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from foreign_readers import missing
+from foreign_readers import READ_VTS, missing, read_elsewhere
 
 from regrid.given import read_structured
 from runs.store.paraview import write_vts
 
-SHOW = """
-import json, sys
-from vtkmodules.util.numpy_support import vtk_to_numpy
-def show(grid):
-    points = vtk_to_numpy(grid.GetPoints().GetData())
-    fields = {}
-    data = grid.GetCellData()
-    for k in range(data.GetNumberOfArrays()):
-        fields[data.GetArrayName(k)] = vtk_to_numpy(data.GetArray(k)).tolist()
-    print(json.dumps({"extent": list(grid.GetExtent()), "points": points.tolist(),
-                      "cells": grid.GetNumberOfCells(), "fields": fields}))
-"""
-READ_VTS = (
-    SHOW
-    + """
-from vtkmodules.vtkIOXML import vtkXMLStructuredGridReader
-reader = vtkXMLStructuredGridReader()
-reader.SetFileName(sys.argv[1])
-reader.Update()
-show(reader.GetOutput())
-"""
-)
 WRITE = """
 import sys
 from vtkmodules.vtkIOLegacy import vtkStructuredGridWriter
@@ -64,13 +36,6 @@ for mode in ("ASCII", "Binary"):
     writer.Write()
 print(0)
 """
-
-
-def read_elsewhere(script: str, path):
-    command = [sys.executable, "-c", script, str(path)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, f"exit {done.returncode}: {done.stderr[-2000:]}"
-    return json.loads(done.stdout.splitlines()[-1])
 
 
 MAKE = {

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from toy_problem import wait_for
+from processes import wait_for
 
 from runs.store.reader import RunData
 

@@ -186,13 +186,6 @@ def register():
     PROBLEMS["toy"] = "toy_problem:Toy"
 
 
-def wait_for(path: Path, process) -> None:
-    """Wait until the process has made a file; fails where it ends without."""
-    while not path.exists():
-        assert process.poll() is None or path.exists(), process.communicate()
-        time.sleep(0.002)
-
-
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
     from runs.cli.main import main

@@ -11,41 +11,12 @@ from pathlib import Path
 
 import pytest
 import toy_problem
+from processes import forks, run_and_die
 
-from runs.cli.main import main
-
-OPEN = open
-
-
-def run_and_die(number: int, words: tuple[str, ...]) -> int:
-    """Run the command in a fork that kills itself at its N-th making, renaming or writing of a
-    file in `killed`; the signal that ended the fork, SIGTERM where the run was through."""
-    child = os.fork()
-    if child:
-        return -os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    left = [number]
-
-    def count(call):
-        def counted(*given, **named):
-            writes = call is not OPEN or (len(given) > 1 and given[1][0] in "wa")
-            if writes and "killed" in str(given[0]):
-                left[0] -= 1
-                if left[0] == 0:
-                    os.kill(os.getpid(), signal.SIGKILL)
-            return call(*given, **named)
-
-        return counted
-
-    code = 70
-    try:
-        os.replace, os.mkdir = count(os.replace), count(os.mkdir)
-        builtins.open = io.open = count(OPEN)
-        code = main(list(words))
-    finally:
-        os.kill(os.getpid(), signal.SIGTERM if code == 0 else signal.SIGHUP)
+CALLS = (os, "replace"), (os, "mkdir"), (builtins, "open"), (io, "open")
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs a system that forks")
+@forks
 @pytest.mark.parametrize("problem", ["toy", "own"])
 def test_killed_between_any_two_files(shockgrid, toy, problem):
     if problem == "own":  # a problem in a file of its own, which the run copies
@@ -56,7 +27,7 @@ def test_killed_between_any_two_files(shockgrid, toy, problem):
     left = set()
     for number in range(1, 40):
         shutil.rmtree("killed", ignore_errors=True)
-        code = run_and_die(number, words)
+        code = run_and_die(number, words, *CALLS)
         if code == signal.SIGTERM:
             break
         assert code == signal.SIGKILL

@@ -92,21 +92,3 @@ def test_killed_it_goes_on_to_the_same_table(shockgrid, spawn, deck, toy):
     assert process.wait() in (0, -signal.SIGKILL)  # 0: it was through before it was killed
     assert shockgrid("restart", "killed", "-q")[0] == 0
     assert read_table("killed") == read_table("whole")
-
-
-@pytest.mark.parametrize(
-    ("lines", "words"),
-    [
-        ('name = "a b"', "gauge.0.name"),
-        ('name = "a"\nfields = ["rho", "T"]', "gauge.0.fields.1"),
-        ('name = "a"\ncount = 3', "a line needs its end `to`"),
-        ('name = "a"\nmoves = true', "moves with the material, but at [50, 0] there is none"),
-        ('name = "a"\nspeed = 1', "there is no key 'gauge.0.speed'"),
-    ],
-)
-def test_what_is_wrong_with_a_gauge_is_said(shockgrid, toy, lines, words):
-    head = DECK.partition("[[gauge]]")[0]
-    Path("bad.toml").write_text(f"{head}[[gauge]]\nat = [50.0, 0.0]\n{lines}\n")
-    code, _, error = shockgrid("run", "bad.toml", "-o", "bad", "-q")
-    assert code == 2 and words in error, error
-    assert not Path("bad").exists()

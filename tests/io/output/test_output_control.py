@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from runs.store.dumps import read_state
 from runs.store.reader import RunData
@@ -34,26 +33,6 @@ def test_dumps_at_chosen_times_and_intervals(shockgrid):
     run = RunData("every")
     wanted = [find_first_past(run.history, 0.11 * k) for k in range(5)]
     assert [dump.step for dump in run.outputs] == [*wanted, run.history["step"][-1]]
-
-
-@pytest.mark.parametrize(
-    ("setting", "words"),
-    [
-        (
-            "output.times=[0.2,9.0]",
-            "output.times has 9, which is after the end of the run, t = 0.5",
-        ),
-        ("output.times=[0.0]", "output.times.0 = 0.0; it must be a number greater than 0"),
-        ("output.every=0", "output.every = 0; it must be a number greater than 0"),
-        ("output.fields=['rhoo']", "output.fields has 'rhoo'; no block has such a field"),
-        ("output.precision=half", "output.precision"),
-        ("output.compression=12", "output.compression = 12; it must be a whole number"),
-    ],
-)
-def test_what_is_wrong_with_the_output_is_said(shockgrid, setting, words):
-    code, _, error = shockgrid("run", "toy", "-o", "bad", "-q", "--set", setting)
-    assert code == 2 and words in error, error
-    assert not Path("bad").exists()
 
 
 def test_light_dumps_hold_what_was_asked_for_and_the_last_one_all(shockgrid):

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from toy_problem import wait_for
+from processes import wait_for
 
 from runs.march import runner as limits
 from runs.march.runner import WallLimit, parse_duration

@@ -2,19 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import signal
-
-import pytest
-
 import runs.march.runner as runner
-from runs.cli.main import main
 from runs.store.parts import Share, write_dump_in_parts
-
-names_of_open_files = pytest.mark.skipif(
-    not os.path.isdir("/proc/self/fd"), reason="needs a system that tells names of open files"
-)
-forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs a system that forks")
 
 
 def cut_in_bands(evolution, parts: int) -> list[dict]:
@@ -66,27 +55,3 @@ def write_in_parts(monkeypatch, parts: int, cut) -> None:
 
     monkeypatch.setattr(runner, "write_on_ranks", write)
     monkeypatch.setattr(runner.Runner, "_ranked", True)
-
-
-def kill_at(number: int, words: tuple[str, ...]) -> int:
-    """Run in a fork that kills itself before its N-th fsync or renaming, else by SIGTERM."""
-    child = os.fork()
-    if child:
-        return -os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    left = [number]
-
-    def count(call):
-        def counted(*given):
-            left[0] -= 1
-            if left[0] == 0:
-                os.kill(os.getpid(), signal.SIGKILL)
-            return call(*given)
-
-        return counted
-
-    code = 70
-    try:
-        os.fsync, os.replace = count(os.fsync), count(os.replace)
-        code = main(list(words))
-    finally:
-        os.kill(os.getpid(), signal.SIGTERM if code == 0 else signal.SIGHUP)

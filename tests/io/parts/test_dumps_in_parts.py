@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
-import foreign_readers
 import h5py
 import numpy as np
 import pytest
-from in_parts import (
-    cut_in_bands,
-    deal_blocks,
-    forks,
-    kill_at,
-    write_in_parts,
-)  # fmt: skip
+from foreign_readers import READ_XDMF, missing, read_elsewhere
+from in_parts import cut_in_bands, deal_blocks, write_in_parts
+from processes import forks, run_and_die
 
 from regrid.errors import BadInput
 from runs.store.checksum import find_parts_by_name, read_parts
@@ -122,7 +116,7 @@ def flip(path: Path, place: int) -> None:
     path.write_bytes(image)
 
 
-@foreign_readers.missing("xarray", "h5netcdf")
+@missing("xarray", "h5netcdf")
 def test_xarray_reads_the_index(in_parts):
     import xarray
 
@@ -137,41 +131,13 @@ def test_xarray_reads_the_index(in_parts):
     assert band.i.values.tolist() == [2, 3] and (band.rho == one.rho.sel(i=band.i)).all()
 
 
-READ_BY_VTK = """
-import sys
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
-from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
-
-def show(data):
-    if hasattr(data, "GetNumberOfBlocks"):
-        for number in range(data.GetNumberOfBlocks()):
-            show(data.GetBlock(number))
-    elif data is not None:
-        print(vtk_to_numpy(data.GetPoints().GetData()).tolist())
-        for arrays in (data.GetCellData(), data.GetPointData()):
-            for number in range(arrays.GetNumberOfArrays()):
-                print(arrays.GetArrayName(number), vtk_to_numpy(arrays.GetArray(number)).tolist())
-
-reader = vtkXdmfReader()
-reader.SetFileName(sys.argv[1])
-reader.UpdateInformation()
-for t in reader.GetOutputInformation(0).Get(Pipeline.TIME_STEPS()):
-    reader.UpdateTimeStep(t)
-    print(t)
-    show(reader.GetOutputDataObject(0))
-"""
-
-
-@foreign_readers.missing("vtkmodules")
+@missing("vtkmodules")
 def test_vtk_reads_the_index_by_the_sidecar(in_parts):
-    one, run = (
-        subprocess.run(
-            [sys.executable, "-c", READ_BY_VTK, f"{name}/run.xmf"], capture_output=True, text=True
-        ).stdout
-        for name in ("one", "run")
+    one, run = (read_elsewhere(READ_XDMF, f"{name}/run.xmf") for name in ("one", "run"))
+    assert one == run and len(run) == 2
+    assert all(
+        {"rho", "v_node"} <= grid["fields"].keys() for grids in run.values() for grid in grids
     )
-    assert one == run and run.count("rho [") == run.count("v_node [") == 4
 
 
 @pytest.mark.slow
@@ -183,7 +149,8 @@ def test_killed_between_any_two_file_operations(shockgrid, toy, monkeypatch):
     seen = set()
     for number in range(1, 200):
         shutil.rmtree("killed", ignore_errors=True)
-        if kill_at(number, (*words, "-o", "killed")) == signal.SIGTERM:
+        calls = (os, "fsync"), (os, "replace")
+        if run_and_die(number, (*words, "-o", "killed"), *calls) == signal.SIGTERM:
             break
         folder = Path("killed/dumps")
         there = tuple(sorted(p.name for p in folder.iterdir())) if folder.exists() else ()

@@ -20,7 +20,6 @@ from hydro.convection.tensor_grids import make_axis
 from problems.convection.convection_1d import measure_errors
 from problems.convection.moving_grid_1d import MovingGrid1D, MovingGrid1DDeck, PlacingPart
 from problems.references.convection import BurgersFronts, VerticalPlates
-from runs.cli.main import main
 
 
 def make(peclet=0.0, scheme="exponential", prandtl=0.71, mean=0.0, rayleigh=1e4):
@@ -87,28 +86,6 @@ def test_moving_nodes_keep_uniform_temperature_and_the_heat():
     gained = moved @ np.diff(new) - heat @ np.diff(old)
     assert gained == pytest.approx(0.01 * (fluxes[0] - fluxes[1]), abs=1e-14)
     assert abs(velocity @ np.diff(new)) < 1e-13 * np.abs(velocity).max()
-
-
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        (["rayleigh=-1"], "rayleigh"),
-        (["cells=2"], "cells"),
-        (["prandtl=0"], "prandtl"),
-        (["prandtl=1e-300"], "prandtl"),
-        (["rayleigh=0"], "nothing would rise"),
-        (["mean_speed=nan"], "mean_speed"),
-        (["grid.kind=polevikof"], "polevikov"),
-        (["grid.ratio=0.5"], "ratio"),
-        (["scheme=centred"], "central"),
-    ],
-)
-def test_bad_input_is_one_sentence(settings, words, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    given = [word for setting in settings for word in ("--set", setting)]
-    assert main(["run", "convection-1d", *given]) == 2
-    error = capsys.readouterr().err.strip()
-    assert words in error and len(error.splitlines()) == 1, error
 
 
 def make_of_1d(cells=64, t_end=1.0, **given):

@@ -21,6 +21,17 @@ def tensor(*lines) -> np.ndarray:
     return np.array(np.meshgrid(*lines, indexing="ij"))
 
 
+def make_tensor_grid(n1, n2=None) -> np.ndarray:
+    """The exact grid that equidistributes w = (1 + 10x)(1 + 5y) on the unit square."""
+    counts = n1, n1 if n2 is None else n2
+    return tensor(
+        *(
+            (np.sqrt(1.0 + c * (c + 2.0) * np.linspace(0.0, 1.0, n + 1)) - 1.0) / c
+            for c, n in zip((10.0, 5.0), counts, strict=True)
+        )
+    )
+
+
 def box(low, high, cells, angle=0.0) -> np.ndarray:
     """Nodes of evenly spaced `cells` between two corners; in the plane turned about the origin."""
     nodes = tensor(*(np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells, strict=True)))

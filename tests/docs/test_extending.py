@@ -31,7 +31,6 @@ from runs.store.history import read_history
 from shockgrid.testing import check_boundary, check_eos, check_problem, check_regridder
 
 PAGE = ROOT / "docs" / "extending.md"
-LONGEST = 40  # lines of an example
 REGISTRIES = {
     "PROBLEMS": problem_registry.PROBLEMS,
     "EQUATIONS_OF_STATE": eos_registry.EQUATIONS_OF_STATE,
@@ -92,13 +91,6 @@ def run(name, folder, *settings):
     """History of a run of the command line."""
     assert main(["run", name, "-o", str(folder), "--quiet", *settings]) == 0
     return read_history(folder / "history.csv")
-
-
-@pytest.mark.parametrize("file", EXAMPLES)
-def test_examples_are_short(file):
-    text, line = EXAMPLES[file]
-    assert len([one for one in text.splitlines()[1:] if one.strip()]) <= LONGEST
-    assert len(line.splitlines()) == 1
 
 
 def test_problem_standing_sound_has_its_period(add, tmp_path, capsys):

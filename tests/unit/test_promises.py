@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import shockgrid as sg
+from builders import box, wall_off
 from hydro import rim as on
 from hydro.boundary import FreeSurface, Outflow
 from hydro.eos import IdealGas, MieGruneisen
@@ -143,6 +144,57 @@ def test_a_regridder_as_object_class_and_factory():
 def test_broken_regridders(regridder, words):
     with pytest.raises(AssertionError, match=f"^regridder, .*({words})"):
         sg.testing.check_regridder(regridder())
+
+
+def stretch(regridder, previous, boundary, nodes):
+    nodes[0] *= 1.05
+
+
+def move_one(regridder, previous, boundary, nodes):
+    nodes[1, 3, -1] += 2.0**-40
+
+
+def write_boundary(regridder, previous, boundary, nodes):
+    for line in (nodes, boundary):
+        line[1, :, -1] += 0.25
+
+
+class Returns(TransfiniteRegridder):
+    """Transfinite interpolation that gives something else of its result."""
+
+    def __init__(self, change):
+        super().__init__()
+        self.change = change
+
+    def regrid(self, previous, boundary):
+        return self.change(super().regrid(previous, boundary))
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Changed(stretch), "side i_max: it returned .*, up to 0.05 m away"),
+        (
+            lambda: Changed(move_one),
+            "side j_max: it returned .*, up to 9.09e-13 m away",
+        ),
+        (lambda: Changed(write_boundary), "side i_min: it returned .*, up to 0.25 m away"),
+        (
+            lambda: Returns(lambda found: found.nodes),
+            "it returned ndarray; a RegridResult",
+        ),
+        (lambda: Returns(lambda found: None), "it returned NoneType; a RegridResult"),
+        (WrongShape, r"it returned nodes \(2, 6, 5\)"),
+    ],
+)
+def test_a_flow_does_not_believe_other_sides(make, words):
+    block = sg.Block("gas", IdealGas(1.4), box((0, 0), (1, 1), (6, 4)), 1.0, 0.0, 0.0, 1.0)
+    sg.put(block, "i_min", "piston", velocity=(0.1, 0.0))
+    wall_off(block)
+    flow = sg.Simulation([block], [], t_end=1.0, make_regridder=make)
+    name = type(make()).__name__
+    with pytest.raises(BadInput, match=f"regridder {name}: block 'gas'[,:] {words}"):
+        flow.advance()
 
 
 class Spills(Outflow):

@@ -1,4 +1,4 @@
-"""Gradient, Hessian, line solve and conjugate gradients against plain sums and dense algebra."""
+"""Gradient, Hessian, line solve, conjugate gradients, cost against plain sums, dense algebra."""
 
 import functools
 
@@ -13,6 +13,8 @@ from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.workspace import Workspace
 
 NI, NJ = 7, 9
+INNER = np.s_[:, 1:-1, 1:-1]
+FASTER = 3.5  # than R was made for: about half of all cells limit the step
 KI, KJ, EPSILON, LAM = 0.7, 0.3, DEFAULT.epsilon, DEFAULT.area_weight
 
 
@@ -86,9 +88,7 @@ def assembled(nodes, spread=0.0):
     return work
 
 
-@functools.cache
-def dense_matrix(spread):
-    work = assembled(shaken_grid(), spread)
+def make_dense(work):
     size = 2 * (NI - 1) * (NJ - 1)
     matrix = np.zeros((size, size))
     zero, out = np.zeros((2, NI + 1, NJ + 1)), np.zeros((2, NI + 1, NJ + 1))
@@ -101,7 +101,24 @@ def dense_matrix(spread):
             (direction, zero, zero), -1.0, 1, NJ, work.H[0], out, work.totals, work.scratch[0]
         )
         matrix[:, column] = out[:, 1:-1, 1:-1].ravel()
-    return work, matrix
+    return matrix
+
+
+@functools.cache
+def dense_matrix(spread):
+    work = assembled(shaken_grid(), spread)
+    return work, make_dense(work)
+
+
+def find_slopes(nodes, compute):
+    """Central differences of a function of the nodes, at the inner ones."""
+    step, slopes = 1e-6, np.zeros_like(nodes)
+    for k, i, j in np.ndindex(2, NI - 1, NJ - 1):
+        for sign in (1.0, -1.0):
+            moved = nodes.copy()
+            moved[k, i + 1, j + 1] += sign * step
+            slopes[k, i + 1, j + 1] += sign * compute(moved)
+    return slopes[INNER] / (2.0 * step)
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.7])
@@ -109,16 +126,8 @@ def test_gradient_is_the_slope_of_the_functional(spread):
     nodes = shaken_grid()
     work = assembled(nodes, spread)
     weights = barrier_weights(work, nodes, spread)
-    step, slopes = 1e-6, np.zeros_like(nodes)
-    for place in np.ndindex(2, NI - 1, NJ - 1):
-        place = (place[0], place[1] + 1, place[2] + 1)
-        ahead, behind = nodes.copy(), nodes.copy()
-        ahead[place] += step
-        behind[place] -= step
-        slopes[place] = energy(work, ahead, weights, spread) - energy(work, behind, weights, spread)
-    inner = np.s_[:, 1:-1, 1:-1]
-    expected = slopes[inner] / (2.0 * step)
-    assert np.abs(work.gradient[inner] - expected).max() < 1e-8 * np.abs(expected).max()
+    expected = find_slopes(nodes, lambda moved: energy(work, moved, weights, spread))
+    assert np.abs(work.gradient[INNER] - expected).max() < 1e-8 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.7])
@@ -215,3 +224,39 @@ def test_limiting_cells_enter_the_estimate():
     # the minimum without what cells cost lies apart
     work.begin(True, 1.0, 0.0)
     assert work.look()[1] > 1e-2 * begun
+
+
+def priced(nodes, weight):
+    """A workspace of cells with sound speeds that cost `weight`, assembled."""
+    work = Workspace(NI, NJ, 1)
+    work.sides[:] = nodes
+    work.sound[:] = np.random.default_rng(4).uniform(1.0, 3.0, (NI, NJ))
+    work.begin(True, KI, KJ, Tuning(cost_weight=weight), cost=True)
+    work.sound *= FASTER
+    work.assemble(nodes)
+    return work
+
+
+def test_gradient_is_the_slope_of_the_cost():
+    nodes = shaken_grid(0.3)
+    work, without = priced(nodes, 1.0), priced(nodes, 0.0)
+    barrier = np.zeros((NI, NJ))  # leaves straight lines and the cost
+
+    def measure_cost(moved):
+        both = (one.compute_energy(moved, 0.0, barrier)[0] for one in (work, without))
+        return next(both) - next(both)
+
+    expected = find_slopes(nodes, measure_cost)
+    found = (work.gradient - without.gradient)[INNER]
+    assert np.abs(expected).max() > np.abs(without.gradient[INNER]).max()
+    assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("seed", [3, 8, 11])
+def test_hessian_of_the_cost_is_symmetric_and_positive_semidefinite(seed):
+    nodes = shaken_grid(0.3, seed)
+    matrix = make_dense(priced(nodes, 1e3)) - make_dense(priced(nodes, 0.0))
+    size = np.abs(matrix).max()
+    assert np.abs(matrix - matrix.T).max() <= 1e-13 * size
+    assert np.linalg.eigvalsh(matrix)[0] > -1e-12 * size
+    assert np.linalg.eigvalsh(matrix)[-1] > 0.1 * size

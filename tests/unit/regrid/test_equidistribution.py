@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import tensor
+from builders import make_tensor_grid, tensor
 from regrid import curves as spacing
 from regrid.equidistribution.areas import Ed2Operator, iterate_ed2
 from regrid.equidistribution.volumes import solve_edc, solve_eds, weigh_surface
@@ -76,14 +76,8 @@ def tensor_weight(x, y):
     return (1.0 + 10.0 * x) * (1.0 + 5.0 * y)
 
 
-def tensor_grid(n1, n2):
-    q1, q2 = np.linspace(0.0, 1.0, n1 + 1), np.linspace(0.0, 1.0, n2 + 1)
-    x, y = (np.sqrt(1.0 + 120.0 * q1) - 1.0) / 10.0, (np.sqrt(1.0 + 35.0 * q2) - 1.0) / 5.0
-    return tensor(x, y)
-
-
 def test_exact_grids_have_residuals_of_round_off():
-    assert np.abs(compute_residual(tensor_grid(20, 14), tensor_weight)).max() < 1e-15
+    assert np.abs(compute_residual(make_tensor_grid(20, 14), tensor_weight)).max() < 1e-15
     assert np.abs(compute_residual(annulus(20))).max() < 1e-16
 
 

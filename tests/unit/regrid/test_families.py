@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import tensor
+from builders import make_tensor_grid, tensor
 from regrid.algebraic import fill_displacement, quasi_1d_grid, transfinite_grid
 from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
@@ -167,14 +167,7 @@ def test_conformal_grid_is_second_order_for_smoothness_alone():
     assert errors[0] / errors[1] > 3.4 and errors[1] / errors[2] > 3.4, errors
 
 
-def tensor_grid(steps):
-    """ED2's exact grid for w = (1 + 10x)(1 + 5y)."""
-    q = np.linspace(0.0, 1.0, steps + 1)
-    x, y = ((np.sqrt(1.0 + c * (c + 2.0) * q) - 1.0) / c for c in (10.0, 5.0))
-    return tensor(x, y)
-
-
 def test_sides_that_follow_the_weight_make_the_tensor_grid_exact():
     regridder = VariationalRegridder(weight="(1 + 10*x)*(1 + 5*y)", boundary="equidistributed")
     found = regridder.regrid(graded_box(12, 12), graded_box(12, 12)).nodes
-    assert np.abs(found - tensor_grid(12)).max() < 1e-12
+    assert np.abs(found - make_tensor_grid(12)).max() < 1e-12

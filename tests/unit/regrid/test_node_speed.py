@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from builders import box, tensor, unit_steps
+from builders import box, make_tensor_grid, unit_steps
 from regrid.measure.quality import find_bad_cells
 from regrid.node_speeds import MotionLimiter, limit_node_speeds, measure_node_speeds
 from regrid.variational import NodeSpeedRegridder
@@ -64,20 +64,14 @@ def test_a_flat_corner_opens_without_a_jump():
 WEIGHT = "(1 + 10*x)*(1 + 5*y)"
 
 
-def tensor_grid(steps):
-    q = np.linspace(0.0, 1.0, steps + 1)
-    x, y = ((np.sqrt(1.0 + c * (c + 2.0) * q) - 1.0) / c for c in (10.0, 5.0))
-    return tensor(x, y)
-
-
 def test_the_law_is_at_rest_on_the_exact_grid():
-    exact = tensor_grid(12)
+    exact = make_tensor_grid(12)
     result = NodeSpeedRegridder(weight=WEIGHT).regrid(exact, exact)
     assert np.abs(result.nodes - exact).max() < 1e-12 and result.report.residual < 1e-12
 
 
 def test_a_bent_grid_relaxes_to_the_tensor_grid_in_tau_steps():
-    exact, errors = tensor_grid(12), []
+    exact, errors = make_tensor_grid(12), []
     nodes, q = exact.copy(), np.sin(np.pi * np.linspace(0.0, 1.0, 13))
     nodes[:, 1:-1, 1:-1] += 0.01 * np.outer(q, q)[1:-1, 1:-1]
     regridder = NodeSpeedRegridder(weight=WEIGHT, tau=2.0)
@@ -94,7 +88,7 @@ def test_a_bent_grid_relaxes_to_the_tensor_grid_in_tau_steps():
 def test_sides_that_follow_the_weight_take_the_grid_along():
     regridder = NodeSpeedRegridder(weight=WEIGHT, boundary="equidistributed")
     found = regridder.regrid(box((0, 0), (1, 1), (12, 12)), box((0, 0), (1, 1), (12, 12))).nodes
-    assert np.abs(found - tensor_grid(12)).max() < 1e-12
+    assert np.abs(found - make_tensor_grid(12)).max() < 1e-12
     held = NodeSpeedRegridder(weight=WEIGHT, boundary="equidistributed")
     held.take_step({}, 1.0)  # in a flow: a tenth of a spacing a step
     found = held.regrid(box((0, 0), (1, 1), (12, 12)), box((0, 0), (1, 1), (12, 12))).nodes

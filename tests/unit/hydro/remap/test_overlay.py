@@ -95,14 +95,6 @@ def test_smooth_fields_are_of_second_order(curved):
 GAS = IdealGas(1.4)
 
 
-def shake_of_states(cells, seed, part=0.25):
-    """A grid of the rectangle from (0, 0.3) to (1, 1.5) with inner nodes off their places."""
-    nodes = box((0.0, 0.3), (1.0, 1.5), cells)
-    away = np.random.default_rng(seed).uniform(-part, part, nodes.shape)
-    away[:, [0, -1]], away[:, :, [0, -1]] = 0.0, 0.0
-    return nodes + away * np.reshape([1.0 / cells[0], 1.2 / cells[1]], (2, 1, 1))
-
-
 def sum_up(eos, nodes, state, void_energy, curved):
     volumes, _ = compute_cell_moments(nodes, curved)
     return (compute_conserved(eos, state, void_energy) * volumes).sum(axis=(1, 2))
@@ -128,7 +120,7 @@ def wild_state(cells, seed):
 @pytest.mark.parametrize("curved", [False, True])
 @pytest.mark.parametrize("seed", range(3))
 def test_any_state_stays_one_and_keeps_its_totals(seed, curved):
-    old, new = shake_of_states((14, 18), seed), shake_of_states((29, 23), seed + 10)
+    old, new = shake((14, 18), seed), shake((29, 23), seed + 10)
     state, nothing = wild_state((14, 18), seed), np.zeros((14, 18))
     found, void, slivers = remap_state("gas", GAS, curved, old, state, nothing, new)
     assert is_state(GAS, found).all() and not void.any() and slivers.count == 0
@@ -138,7 +130,7 @@ def test_any_state_stays_one_and_keeps_its_totals(seed, curved):
 
 
 def test_uniform_velocity_and_pressure_stay_so():
-    old, new = shake_of_states((20, 20), 1), shake_of_states((33, 27), 2)
+    old, new = shake((20, 20), 1), shake((33, 27), 2)
     _, (x, _) = compute_cell_moments(old, False)
     rho = np.where(x > 0.4, 1000.0, 1.0)
     state = np.array([rho, *np.broadcast_to(np.reshape([3.0, -2.0, 5.0], (3, 1, 1)), (3, 20, 20))])
@@ -149,7 +141,7 @@ def test_uniform_velocity_and_pressure_stay_so():
 
 
 def test_bad_grids_are_told():
-    old = shake_of_states((8, 8), 1)
+    old = shake((8, 8), 1)
     state, nothing = wild_state((8, 8), 2), np.zeros((8, 8))
     with pytest.raises(BadInput, match=r"block 'gas': the outlines .* differ by .* of its volume"):
         remap_state("gas", GAS, False, old, state, nothing, 1.1 * old)

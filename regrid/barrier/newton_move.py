@@ -78,7 +78,7 @@ class NewtonMove:
         corrected = False
         if self.moved_ratio > tuning.start_ratio and self._correct_smooth_error():
             strayed, corrected = np.inf, True
-        good = self.estimate <= min(max(tuning.floor, ROUND_OFF), self._get_lost())
+        good = self.estimate <= min(max(tuning.idle * tuning.floor, ROUND_OFF), self._get_lost())
         if not (self.moved_ratio > tuning.start_ratio and good):
             return False
         self.residual = max(self.residual, self.estimate)
@@ -116,7 +116,7 @@ class NewtonMove:
         work = self.work
         work.load_old()
         if work.sides is not work.own_sides:  # the moved grid may lie in the same array
-            work.own_sides[:] = work.sides
+            copy_sides(work.sides, work.own_sides)
             work.sides = work.own_sides
         if self._advance():
             return True

@@ -29,7 +29,8 @@ class Tuning:
     fast_sides: float = 1e-2  # R4.18: cells a step from which sides count as moving
     # the linear solve
     tolerance: float = 0.05  # R4.8: of the first residual
-    floor: float = 1e-3  # R4.8: residual in cells that is left
+    floor: float = 7e-4  # R4.8: residual in cells that is left
+    idle: float = 2.5  # R4.8, step 1: floors of a moved grid's estimate that are left, too
     max_iterations: int = 16  # R4.8
     exact_tolerance: float = 0.02  # R4.8, step 2, R4.14, R5.4: of solves that stand for exact ones
     predict_iterations: int = 30  # R4.8, step 2

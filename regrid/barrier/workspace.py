@@ -40,7 +40,7 @@ from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
 from regrid.measure.corners import BLOCK_CORNERS
 from regrid.measure.crossings import BoundaryCheck
 from regrid.measure.quality import compute_scaled_jacobians
-from regrid.sides import copy_sides
+from regrid.sides import copy_sides, get_sides
 from regrid.work_arrays import Carver, count_numbers, share_memory
 
 VECTORS = ("solution", "r", "z", "p", "p_old", "product")  # of the solve
@@ -167,12 +167,14 @@ class Workspace:
 
     def _clear(self) -> None:
         """Zeros where the solve looks for them: another regrid may have used the memory."""
-        self.gradient[:] = 0.0
-        for name in VECTORS:
-            getattr(self, name)[:] = 0.0
+        for vector in (self.r, self.z, self.p_old):
+            vector[:] = 0.0
+        for side in get_sides(self.gradient):
+            side[:] = 0.0
         rows = self.H.reshape(self.columns.size - 1, self.ni + 1, -1, SPAN)
         rows[:, 0] = 0.0
-        rows[-1, :, :, self.columns[-1] - self.columns[-2] + 1 :] = 0.0
+        last, whole = self.columns[-1], self.whole_columns[-1]
+        rows[-1, :, :, last - self.columns[-2] + 1 : whole - self.columns[-2] + 1] = 0.0
         self.clean = True
 
     @functools.cached_property
@@ -355,8 +357,8 @@ class Workspace:
         its boundary values are kept and its inside is where the iteration begins.
         """
         right = self.r[:, :, : self.nj + 1]
+        self.solution[:] = 0.0
         if guess is None:
-            self.solution[:] = 0.0
             np.negative(self.gradient, out=right)
         else:
             self.change[:] = guess

@@ -98,7 +98,7 @@ class GridMotion(Sides):
             if callable(self.mesh):
                 block.nodes_new[...] = self.mesh(block.name, span.t + span.dt)
                 self._check_law(block)
-            else:
+            elif self.quality is None:  # else both arrays hold the fixed grid already
                 block.nodes_new[...] = block.nodes
 
     @staticmethod
@@ -139,11 +139,14 @@ class GridMotion(Sides):
         number = -1 if failure is None or not callable(self.mesh) else self._find_number(failure)
         if failure is None:
             number, failure = self._regrid_own(fraction)
-        rows = []
+        rows, before = [], self.quality
         for own in self.blocks.own if failure is None else ():
             report = self.reports[own] if self.mesh == "regrid" else None
             known = report.quality if report is not None and not self._limited[own] else None
-            rows += [(known or measure_worst(self.blocks[own].nodes_new)) + self._count(own)]
+            if self.mesh == "fixed" and before is not None:
+                known = before[own]
+            known = known or measure_worst(self.blocks[own].nodes_new)
+            rows += [(*known, *self._count(own))]
         self.quality, self.counts = [], []
         for row in self.blocks.share_nodes(rows, number, failure):
             self.quality += [row[:4]]

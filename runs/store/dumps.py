@@ -214,12 +214,12 @@ def _refill(
     """The bytes of a dump of the same form as `file`."""
     for name, number in _list_numbers(evolution).items():
         file.attrs.modify(name, number)
-    for block, fields in arrays.items():
-        for name, values in fields:
-            file["blocks"][block][name][...] = values
-    for key, value in state.items():
-        if not isinstance(value, str | Virtual):
-            file["state"][key][...] = value
+    numbers = {f"blocks/{block}/{name}": v for block in arrays for name, v in arrays[block]}
+    numbers |= {f"state/{key}": value for key, value in state.items() if not isinstance(value, str)}
+    for path, value in numbers.items():
+        if not isinstance(value, Virtual):  # by HDF5's own calls: a fifth of the time
+            stored = h5py.h5d.open(file.id, path.encode())
+            stored.write(h5py.h5s.ALL, h5py.h5s.ALL, np.ascontiguousarray(value))
     file.flush()
     return file.id.get_file_image()
 
@@ -261,6 +261,8 @@ def _link_shown(arrays: Arrays, state: Mapping[str, Any]) -> Mapping[str, Any]:
         if not isinstance(value, np.ndarray) or value.ndim < 2 or not value.size:
             continue
         whole, shape = find(key, value), value.shape
+        if whole is None and find(key, value[0]) is None:
+            continue
         paths = [whole] if whole else [find(key, row) for row in value]
         if all(paths):
             stored, here = (shape, shape) if whole else (shape[1:], (1, *shape[1:]))

@@ -6,6 +6,7 @@ It stands apart from `runs`, as another package of that name can hide the comman
 from __future__ import annotations
 
 import gc
+import os
 import sys
 
 from shockgrid.shadowing import find_shadow
@@ -20,6 +21,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"shockgrid: {shadow}", file=sys.stderr)
         return BAD_INPUT
     gc.set_threshold(UNCOLLECTED)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for small matrices; idle threads spin
     from runs.cli.main import main as run_command
 
     try:

@@ -163,8 +163,8 @@ def compute_whole_ratio(ratio, p, strength):
     no tension, it is the ratio itself (a strength of 0 too).
     """
     excess = 0.5 * ((ratio - 1.0) + abs(ratio - 1.0))
-    inverse = (1.0 + excess) / (strength + 1e-300)
-    left = 2.0 + (p - abs(p)) * inverse  # 2 at p = 0, 1 at half the tension, 0 at it
+    tension = (p - abs(p)) * (1.0 / (strength + 1e-300))  # of the strength at rho0, twice over
+    left = 2.0 + tension * (1.0 + excess)  # 2 at p = 0, 1 at half the tension, 0 at it
     left = 0.5 * (left + abs(left))
     whole = 0.5 * (1.0 + left - abs(1.0 - left))
     return ratio - excess * (1.0 - whole)

@@ -13,19 +13,6 @@ from processes import wait_for
 from runs.store.reader import RunData
 
 
-def test_run_of_2n_steps_is_n_and_n(shockgrid):
-    assert shockgrid("run", "toy", "-o", "whole", "-q")[0] == 0
-    assert shockgrid("run", "toy", "-o", "halves", "-q", "--set", "run.max_steps=40")[0] == 0
-    code, _, _ = shockgrid("restart", "halves", "-q", "--set", "run.max_steps=1000")
-    assert code == 0
-    # the first half ended with a dump of its own at step 40
-    extra = RunData("halves").directory.dump_path(40)
-    if not RunData("whole").directory.dump_path(40).exists():
-        extra.unlink()
-    code, text, _ = shockgrid("compare", "whole", "halves")
-    assert (code, text.startswith("no difference")) == (0, True), text
-
-
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_killed_at_a_random_moment(shockgrid, spawn, toy, seed):
     assert shockgrid("run", "toy", "-o", "whole", "-q", "--set", "pause=0.004")[0] == 0

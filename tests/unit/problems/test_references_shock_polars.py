@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from scipy.optimize import brentq
 
@@ -104,12 +105,7 @@ TABLE = {
     (3, 10): (48.80798, 6.7825, 3.2175, 29.184, 20.616),
     (3, 12): (51.37507, 8.08037, 3.91963, 36.5658, 25.2116),
 }
-LAST_DIGITS = {
-    (2, 8): (5e-6, 5e-6, 5e-6, 5e-5, 5e-5),
-    (2, 10): (5e-6, 5e-6, 5e-6, 5e-5, 5e-5),
-    (3, 10): (5e-6, 5e-5, 5e-5, 5e-4, 5e-4),
-    (3, 12): (5e-6, 5e-6, 5e-6, 5e-5, 5e-5),
-}
+DIGITS = 5e-6, 5e-6, 5e-6, 5e-5, 5e-5  # half of the last one
 
 
 @pytest.mark.parametrize("speed, angle", TABLE)
@@ -123,10 +119,8 @@ def test_attached_shocks_of_aluminium_on_steel(speed, angle):
         found.wedge.wave_angle,
     )
     values = (found.p / 1e9, *(math.degrees(value) for value in angles))
-    for value, wanted, digit in zip(
-        values, TABLE[speed, angle], LAST_DIGITS[speed, angle], strict=True
-    ):
-        assert value == pytest.approx(wanted, abs=1.01 * digit)
+    digits = np.multiply(DIGITS, (1, 10, 10, 10, 10) if (speed, angle) == (3, 10) else 1)
+    assert (np.abs(np.subtract(values, TABLE[speed, angle])) <= 1.01 * digits).all()
     assert found.plate.p == found.wedge.p == found.p
     assert sum(angles[:2]) == pytest.approx(math.radians(angle), rel=1e-12)
     assert found.contact_speed * math.sin(math.radians(angle)) == pytest.approx(1000.0 * speed)

@@ -12,7 +12,7 @@ import pytest
 
 from regrid.errors import BadInput
 from runs.deck.checking import describe_unset
-from runs.deck.reading import apply_setting, packaged_decks, parse_value, read_deck
+from runs.deck.reading import apply_setting, parse_value, read_deck
 from runs.inspection.account import measure_drifts
 from runs.store.history import HistoryWriter, read_history
 
@@ -136,11 +136,6 @@ def test_values_without_a_meaning_are_refused(problem, setting):
     key = setting.partition("=")[0]
     with pytest.raises(BadInput, match=f"--set: {key} = .*; it must be "):
         read_deck(problem, (setting,))
-
-
-@pytest.mark.parametrize("name", packaged_decks())
-def test_packaged_decks_are_taken(name):
-    read_deck(name).make_problem()
 
 
 def list_keys(value, prefix=""):

@@ -117,49 +117,6 @@ def test_offset_of_a_flat_line_between_gases(mach, pair, cfl):
     check(measured, *BARS[mach])
 
 
-def measure_modes(line: np.ndarray) -> np.ndarray:
-    """Cosines 0 to 15 of a line (2, n) of half a wavelength."""
-    x, y = line
-    even = np.linspace(0.0, 1.0, x.size)
-    height = np.interp(even, y / y[-1], x)
-    weights = np.ones(x.size)
-    weights[0] = weights[-1] = 0.5
-    height -= np.average(height, weights=weights)
-    waves = np.cos(np.pi * np.outer(np.arange(16), even))
-    return 2.0 / (x.size - 1) * (waves * weights * height).sum(axis=1)
-
-
-def compress_line(ka0: float, farther: float = 0.0) -> np.ndarray:
-    """Modes of a line in one gas, over its first mode 1, when a Mach 5 shock is well past it."""
-    gap = 0.3 + farther / CELLS
-    problem = InterfaceInstability(
-        InterfaceDeck(
-            mach=5.0,
-            second=LIGHT,
-            kct_end=8.0,
-            cells=CELLS,
-            gap=gap,
-            modes=[Mode(ka0=ka0)],
-            start="incident",
-        )
-    )
-    assert problem.shock.rho_ahead / problem.shock.rho == pytest.approx(0.2)
-    flow = problem.build()
-    first = measure_modes(flow.blocks[0].nodes[:, -1])[1]
-    while flow.t < 0.2 * flow.t_end:
-        flow.advance()
-    return measure_modes(flow.blocks[0].nodes[:, -1]) / first
-
-
-def test_a_line_almost_flat_in_one_gas():
-    """Its height is a small part of one step's travel: what is left of it, less a fifth, is how
-    far the line's place depends on where in a step the shock arrives, and averages out."""
-    modes = np.array([compress_line(1e-6, part) for part in np.arange(5) / 5.0])
-    assert modes[:, 1].mean() == pytest.approx(0.2, abs=0.007)
-    assert np.abs(modes[:, 1] - 0.2).max() < 0.017
-    assert np.abs(modes[:, 2:]).max() < 0.0015
-
-
 BESIDE = 40  # cells from the line
 CLEAR = 24  # cells behind the waves, on which a captured shock leaves ripples that fade
 

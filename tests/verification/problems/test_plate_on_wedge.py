@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from builders import collect_columns, march, tensor
+from builders import collect_columns, tensor
 from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos.materials import find_material
@@ -127,25 +127,6 @@ def test_the_default_ends_by_itself_and_keeps_its_sums():
     assert spread < BAR_SPEED
     times = run.times
     assert times["attached"] < times["arrived"] < times["jet"] < times["closed"] == run.t
-
-
-def compare(steps, **image):
-    """Largest differences of nodes and states from the plain set-up, and the numbers of cells."""
-    plain, other = make_problem(cells=(40, 12)), make_problem(cells=(40, 12), **image)
-    one, two = plain.build(), other.build()
-    march(one, steps)
-    march(two, steps)
-    worst = {"t": abs(two.t / one.t - 1.0)}
-    for block, copy in zip(one.blocks, two.blocks, strict=True):
-        nodes, state = other.to_set_up(copy.nodes), copy.state[:, 1:-1, 1:-1].copy()
-        state[1:3] = other.to_set_up(state[1:3])
-        if other.deck.mirror:
-            nodes, state = nodes[:, ::-1], state[:, ::-1]
-        worst["nodes"] = max(worst.get("nodes", 0.0), np.abs(nodes - block.nodes).max() / 1e-2)
-        for row, size in zip(range(4), (1e4, 1e4, 1e4, 1e11), strict=True):
-            miss = np.abs(state[row] - block.state[row, 1:-1, 1:-1]).max() / size
-            worst[f"row {row}"] = max(worst.get(f"row {row}", 0.0), miss)
-    return worst, one
 
 
 IMPACTS = {  # plate, target: pressure [Pa] and velocity [m/s] behind an impact at 2 km/s

@@ -1,7 +1,5 @@
 """Slow turning flow keeps its energy; waves and plane flow are left as they are; in every frame."""
 
-import math
-
 import numpy as np
 import pytest
 
@@ -9,11 +7,6 @@ from builders import march
 from hydro.simulation import Simulation
 from problems.standard.gresho import Gresho, GreshoDeck
 from problems.standard.sedov import Sedov, SedovDeck
-
-
-def turn(vectors, angle):
-    c, s = math.cos(angle), math.sin(angle)
-    return np.asarray(vectors) @ np.array([[c, s], [-s, c]])
 
 
 def run_gresho(velocity=(0.0, 0.0), steps=None, **settings):

@@ -39,7 +39,7 @@ from problems.deck import (
     key,
     place_file,
 )
-from problems.pictures import draw_field
+from problems.pictures import draw_field, make_panels
 from problems.problem import Problem, Report
 from regrid.domains import distribute_by_arc_length
 from regrid.equidistribution.weights import Expression
@@ -74,13 +74,11 @@ class CurveTable(DeckTable, kw_only=True):
     ) = None
 
 
-Curve = Annotated[
+Curve = key(
     str | Points | CurveTable,
-    Meta(
-        description="a file with columns x and y [m], points [[x, y], ...] joined by straight "
-        "lines, {x = ..., y = ...}, formulas of s from 0 to 1, or {points = ..., cells = ...}"
-    ),
-]
+    "a file with columns x and y [m], points [[x, y], ...] joined by straight lines, {x = ..., y = "
+    "...}, formulas of s from 0 to 1, or {points = ..., cells = ...}",
+)
 
 
 class Curves(DeckTable, kw_only=True):
@@ -461,8 +459,7 @@ class Blocks(Problem):
         dump = run_data.dumps[-1]
         sides = [line for block in dump.blocks for line in get_sides(block.nodes)]
         width, height = np.ptp(np.concatenate(sides, axis=1), axis=1)
-        figure.set_size_inches(10.0, float(np.clip(8.5 * height / width + 2.0, 3.0, 10.0)))
-        axis = figure.subplots()
+        axis = make_panels(figure, 10.0, float(np.clip(8.5 * height / width + 2.0, 3.0, 10.0)))
         picture = draw_field(axis, dump, "p", every=4, lines=sides)
         look = {"orientation": "horizontal", "fraction": 0.08, "aspect": 50}
         figure.colorbar(picture, ax=axis, label="pressure [Pa]", **look)

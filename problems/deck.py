@@ -30,14 +30,6 @@ if TYPE_CHECKING:
     from regrid.protocol import Regridder
 
 MOST_CELLS = 100_000  # along a side: arrays of one line stay small, whatever a deck says
-Limiter = Annotated[  # the names of hydro.formulas.reconstruction.LIMITERS
-    Literal["low-mach", "smooth-shear", "monotonised-central", "van-leer", "minmod"],
-    Meta(
-        description="limiter of slopes, from sharp to smooth; smooth-shear: van-leer but for the "
-        "velocity where the flow turns or shears without jumps; low-mach: monotonised-central "
-        "but there, with jumps of velocity between cells lessened where the flow is slow"
-    ),
-]
 
 
 def key(kind: Any, description: str, **bounds: Any) -> Any:
@@ -49,6 +41,14 @@ def key(kind: Any, description: str, **bounds: Any) -> Any:
     if len(parts) == len(get_args(kind)):
         return Annotated[kind, Meta(description=description, **bounds)]
     return key(Union[tuple(parts)], description, **bounds) | None  # noqa: UP007
+
+
+Limiter = key(  # the names of hydro.formulas.reconstruction.LIMITERS
+    Literal["low-mach", "smooth-shear", "monotonised-central", "van-leer", "minmod"],
+    "limiter of slopes, from sharp to smooth; smooth-shear: van-leer but for the velocity where "
+    "the flow turns or shears without jumps; low-mach: monotonised-central but there, with jumps "
+    "of velocity between cells lessened where the flow is slow",
+)
 
 
 class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -221,12 +221,8 @@ class Regrid(DeckTable, kw_only=True):
         if self.weight:
             chosen["weight"] = self.weight
         if self.name.startswith("barrier"):
-            chosen = {
-                "epsilon": self.epsilon,
-                "method": self.method,
-                "edge_lengths": self.edge_lengths,
-                **chosen,
-            }
+            own = ("epsilon", "method", "edge_lengths")
+            chosen = {name: getattr(self, name) for name in own} | chosen
         return make_regridder(self.name, **chosen)
 
 
@@ -262,14 +258,15 @@ def place_gauges(tables: Iterable[Gauge]) -> list[Gauge]:
         fields = list(dict.fromkeys(gauge.fields))
         for k in range(gauge.count):
             part = k / (gauge.count - 1) if gauge.to else 0.0
-            (x, y), (x_end, y_end) = gauge.at, gauge.to or gauge.at
-            at = (1.0 - part) * x + part * x_end, (1.0 - part) * y + part * y_end
+            ends = zip(gauge.at, gauge.to or gauge.at, strict=True)
+            at = tuple((1.0 - part) * first + part * last for first, last in ends)
             name = f"{gauge.name}_{k + 1}" if gauge.to else gauge.name
-            point = {"name": name, "at": at, "to": None, "count": 1, "fields": fields}
-            points.append(msgspec.structs.replace(gauge, **point))
+            alone = {"name": name, "at": at, "to": None, "count": 1, "fields": fields}
+            points.append(msgspec.structs.replace(gauge, **alone))
     columns: dict[str, str] = {"step": "the step", "t": "the time", "outside": "a count"}
     for point in points:
-        for column in list_columns(point):
+        own = [*(("x", "y") if point.moves else ()), "block", *point.fields]  # in gauges.csv
+        for column in (f"{point.name}_{word}" for word in own):
             if column in columns:
                 raise BadInput(
                     f"deck: gauge {point.name!r} would write the column {column!r}, which is that "
@@ -277,12 +274,6 @@ def place_gauges(tables: Iterable[Gauge]) -> list[Gauge]:
                 )
             columns[column] = point.name
     return points
-
-
-def list_columns(point: Gauge) -> list[str]:
-    """Names of the columns that a gauge has in gauges.csv: place (if it moves), block, fields."""
-    own = ["x", "y"] if point.moves else []
-    return [f"{point.name}_{word}" for word in (*own, "block", *point.fields)]
 
 
 def place_file(name: str, folder: Path) -> str:

@@ -21,7 +21,7 @@ from typing import Literal
 import numpy as np
 
 from problems.deck import Deck, Regrid, RunControl, key
-from problems.pictures import draw_grid
+from problems.pictures import draw_grid, make_panels
 from problems.problem import Problem, Report, Row
 from regrid.domains import DOMAINS, MovingDomain, make_domain
 from regrid.errors import BadInput, RegridFailure
@@ -32,7 +32,7 @@ from regrid.measure.quality import (
     measure_quality,
 )
 from regrid.node_speeds import limit_node_speeds, measure_node_speeds
-from regrid.protocol import RegridReport, call_regridder
+from regrid.protocol import call_regridder
 from regrid.sides import get_side
 
 DomainName = Literal[tuple(DOMAINS)]
@@ -48,6 +48,7 @@ NUMBERS = {  # of all steps: label, what of the column, what is wanted
     "far_line_bend": ("far lines from straight [cells]", np.max, math.nan),
     "shift_error": ("error of the shift [cells]", np.max, math.nan),
 }
+REPORTED = "iterations node_iterations sub_moves rescues least_corner_ratio residual".split()
 FAR_HEIGHT = 5.0  # of the strip's widths: lines beyond are to stay straight
 
 
@@ -74,21 +75,19 @@ class GridBlock:
     """The marched grid as pictures see it."""
 
     name = "grid"
-    units: Mapping[str, str] = {"scaled_jacobian": "1", "aspect_ratio": "1"}
     long_names: Mapping[str, str] = {
         "scaled_jacobian": "scaled Jacobian",
         "aspect_ratio": "aspect ratio",
     }
+    units: Mapping[str, str] = dict.fromkeys(long_names, "1")
 
     def __init__(self, nodes: np.ndarray):
         self.nodes = nodes
 
     @property
     def cell_fields(self) -> dict[str, np.ndarray]:
-        return {
-            "scaled_jacobian": compute_scaled_jacobians(self.nodes).min(axis=0),
-            "aspect_ratio": compute_aspect_ratio(self.nodes),
-        }
+        least = compute_scaled_jacobians(self.nodes).min(axis=0)
+        return {"scaled_jacobian": least, "aspect_ratio": compute_aspect_ratio(self.nodes)}
 
 
 def shake_side(line: np.ndarray, noise: float, random: np.random.Generator) -> None:
@@ -131,11 +130,9 @@ class GridMarch(Problem):
         return {}
 
     def report(self, history, final=None) -> Report:
-        deck, rows = self.deck, []
-        made = {
-            name: np.asarray(values)[np.isfinite(history["dt"])] for name, values in history.items()
-        }
-        if not len(made.get("t", ())):
+        deck, rows, steps = self.deck, [], np.isfinite(history["dt"])
+        made = {name: values[steps] for name, values in history.items()}
+        if not steps.any():
             return Report("no step was made" if history else "")
         for name, (label, reduce, wanted) in NUMBERS.items():
             if name in made:
@@ -156,8 +153,7 @@ class GridMarch(Problem):
         """The grid at up to four times of the march."""
         dumps = list(run_data.dumps)
         chosen = [dumps[k] for k in np.unique(np.linspace(0, len(dumps) - 1, 4).astype(int))]
-        figure.set_size_inches(4.0 * len(chosen), 5.0)
-        panels = figure.subplots(1, len(chosen), squeeze=False)[0]
+        panels = make_panels(figure, 4.0 * len(chosen), 5.0, 1, len(chosen), squeeze=False)[0]
         for axes, dump in zip(panels, chosen, strict=True):
             x, y = nodes = dump.blocks[0].nodes
             draw_grid(axes, nodes, color="0.25", lw=0.4)
@@ -167,10 +163,9 @@ class GridMarch(Problem):
 
     def draw_quality(self, figure, run_data) -> None:
         """First line gap, aspect ratio, scaled Jacobian and the regridder's work against time."""
-        figure.set_size_inches(8.0, 8.0)
         columns = "first_line_gap", "worst_aspect", "least_scaled_jacobian", "regrid_iterations"
         words = "first line gap", "worst aspect ratio", "minimum scaled Jacobian", "iterations"
-        panels = figure.subplots(len(columns), 1)
+        panels = make_panels(figure, 8.0, 8.0, len(columns))
         for axes, name, label in zip(panels, columns, words, strict=True):
             axes.plot(run_data.history["t"], run_data.history[name], linewidth=1.2)
             axes.set_ylabel(label)
@@ -212,9 +207,8 @@ class GridMarchEvolution:
             result = call_regridder(self.regridder, self.nodes, boundary)
         except RegridFailure as failure:
             where = f"t = {self.t:.4g} (step {self.step + 1} of {self.steps})"
-            known = {
-                name: getattr(failure, name) for name in ("side", "nodes", "grid", "cell", "cause")
-            }
+            names = "side", "nodes", "grid", "cell", "cause"
+            known = {name: getattr(failure, name) for name in names}
             raise RegridFailure(f"{failure.what}, {where}", block="grid", **known) from failure
         nodes, too_fast = result.nodes, 0
         if self.deck.speed_factor > 0.0:
@@ -232,7 +226,8 @@ class GridMarchEvolution:
             "dt_limit": "march",
             **self._measure(),
             "node_speed_ratio": min(ratio, 1e300),
-            **report_columns(result.report, too_fast),
+            **{f"regrid_{name}": getattr(result.report, name) for name in REPORTED},
+            "regrid_limited_nodes": result.report.limited_nodes + too_fast,
             "seconds_regrid": seconds,
         }
 
@@ -254,19 +249,6 @@ class GridMarchEvolution:
     def set_state(self, state) -> None:
         self.t, self.step = float(state["t"]), int(state["step"])
         self.nodes = self.blocks[0].nodes = np.array(state["nodes"], dtype=np.float64)
-
-
-def report_columns(report: RegridReport, too_fast: int = 0) -> dict[str, float | int]:
-    """History columns of one regrid; `too_fast`: nodes held back because of their speed."""
-    return {
-        "regrid_iterations": report.iterations,
-        "regrid_node_iterations": report.node_iterations,
-        "regrid_sub_moves": report.sub_moves,
-        "regrid_rescues": report.rescues,
-        "regrid_least_corner_ratio": report.least_corner_ratio,
-        "regrid_residual": report.residual,
-        "regrid_limited_nodes": report.limited_nodes + too_fast,
-    }
 
 
 def measure_far_bend(nodes: np.ndarray, domain: MovingDomain) -> float:

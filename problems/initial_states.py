@@ -9,8 +9,6 @@ it the exact state stands again.  `settle_shock`: a shock driven by a piston; `s
 that runs outwards from a contact.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import itertools
@@ -29,14 +27,13 @@ from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.simulation import Simulation
 from hydro.step import take_step
 from problems.deck import DeckTable, key
-from problems.pictures import draw_field
+from problems.pictures import draw_field, make_panels
 from problems.problem import find_crossing
 from problems.references.exact_flows import average_points
 from problems.references.hugoniot import Shock, shock_with_mach
 from regrid.errors import BadInput
 from regrid.jit import PACKAGES, digest_sources, find_kept, keep
 from regrid.measure.cells import compute_area_fractions
-from regrid.measure.corners import compute_centres
 from regrid.sides import SIDE_NAMES
 
 Symmetry = Literal["plane", "cylindrical", "spherical"]
@@ -164,7 +161,7 @@ class RadialFlow:
 
         places = [((n + 0.5) / POINTS, 1.0) for n in range(POINTS)]
         exact = average_points(block.nodes, places, sample)
-        weight = block.volume * (self.compute_radii(compute_centres(block.nodes)) < within)
+        weight = block.volume * (self.compute_radii(block.centres) < within)
         error = np.abs(block.state[0, 1:-1, 1:-1] - exact)
         return float((error * weight).sum() / (exact * weight).sum())
 
@@ -175,7 +172,7 @@ class RadialFlow:
         half way from 1 to the greatest of all; in a straight line between centres.  0 where nothing
         is denser than the cold gas.
         """
-        r, rho = self.compute_radii(compute_centres(block.nodes)), block.state[0, 1:-1, 1:-1]
+        r, rho = self.compute_radii(block.centres), block.state[0, 1:-1, 1:-1]
         level = 0.5 * (1.0 + float(rho.max()))
         lines = [*zip(r.T, rho.T, strict=True), *zip(r, rho, strict=True)]
         found = np.array([find_crossing(*line, level) for line in lines])
@@ -184,14 +181,13 @@ class RadialFlow:
 
     def draw(self, figure, dump, exact, reach: float, **options) -> None:
         """Density out to `reach` [m], and of every cell against its radius beside `exact(r)`."""
-        figure.set_size_inches(11.5, 4.8)
-        left, right = figure.subplots(1, 2)
+        left, right = make_panels(figure, 11.5, 4.8, 1, 2)
         draw_field(left, dump, "rho", low=0.0, bar="density [kg/m3]", **options)
         if self.symmetry != "plane":
             left.set(xlim=(0.0, reach), ylim=(0.0, reach))
-        (block,) = dump.blocks
-        r = self.compute_radii(compute_centres(block.nodes))
-        right.plot(r.ravel(), block.cell_fields["rho"].ravel(), ".", ms=1.5, color="tab:blue")
+        gas = dump["gas"]
+        r = self.compute_radii(gas.centres)
+        right.plot(r.ravel(), gas.rho.ravel(), ".", ms=1.5, color="tab:blue")
         r = np.linspace(1e-3, reach, 2000)
         right.plot(r, exact(r), color="k", lw=0.8)
         right.set(xlim=(0.0, reach), xlabel="r [m]", ylabel="density [kg/m3], exact in black")
@@ -216,10 +212,10 @@ def mix_states(eos, fraction: np.ndarray, first, second):
     )
     u, v = momentum_x / rho, momentum_y / rho
     p = eos.pressure(rho, total / rho - 0.5 * (u * u + v * v))
-    mixed = []
-    for value, a, b in zip((rho, u, v, p), first, second, strict=True):
-        mixed.append(np.where(fraction == 1.0, a, np.where(fraction == 0.0, b, value)))
-    return tuple(mixed)
+    return tuple(
+        np.where(fraction == 1.0, a, np.where(fraction == 0.0, b, value))
+        for value, a, b in zip((rho, u, v, p), first, second, strict=True)
+    )
 
 
 RUN_IN = 64  # cells that the shock runs before
@@ -250,11 +246,9 @@ class Front:
 
     def measure_signal(self) -> float:
         """Greatest speed [m/s] of waves through the cells, summed over both directions."""
-        speeds = []
-        for rho, u, p in (self.behind, self.ahead):
-            c = float(self.eos.sound_speed(rho, p))
-            speeds.append(abs(u - self.behind[1]) + 2.0 * c)
-        return max(speeds)
+        contact, sound = self.behind[1], self.eos.sound_speed
+        states = self.behind, self.ahead
+        return max(abs(u - contact) + 2.0 * float(sound(rho, p)) for rho, u, p in states)
 
 
 @dataclass(frozen=True)

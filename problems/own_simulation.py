@@ -4,8 +4,6 @@ The deck of such a run contains what does not need the script: how long it runs 
 Blocks, materials and links are only in the script, so a restart needs them again.
 """
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -35,12 +33,7 @@ class OwnSimulation(Problem):
     Deck = OwnSimulationDeck
     deck: OwnSimulationDeck
 
-    def __init__(
-        self,
-        deck: OwnSimulationDeck,
-        evolution: Evolution | None = None,
-        measure: Measure | None = None,
-    ):
+    def __init__(self, deck: OwnSimulationDeck, evolution=None, measure: Measure | None = None):
         super().__init__(deck)
         if measure is not None and not callable(measure):
             raise BadInput(f"measure = {measure!r}: a function of the simulation is wanted")
@@ -49,7 +42,6 @@ class OwnSimulation(Problem):
     def build(self) -> Evolution:
         """The simulation that was given; BadInput where none was."""
         self.plan()
-        assert self.evolution is not None
         return self.evolution
 
     def plan(self) -> None:
@@ -80,17 +72,15 @@ class OwnSimulation(Problem):
             raise BadInput(f"measure returned {row!r}: it returns numbers by name, as a dict")
         for name, value in row.items():
             if not isinstance(name, str) or not name.isprintable() or set(name) & set(NOT_IN_NAMES):
-                raise BadInput(
-                    f"measure returned {name!r}: a column's name is text without , or \""
-                )
+                wanted = "a column's name is text without , or \""
+                raise BadInput(f"measure returned {name!r}: {wanted}")
             if name in TAKEN:
                 raise BadInput(f"measure returned {name!r}, which every history has; rename it")
             try:
                 float(value)
             except (TypeError, ValueError):
-                raise BadInput(
-                    f"measure returned {value!r} for {name!r}: a number is wanted"
-                ) from None
+                words = f"measure returned {value!r} for {name!r}: a number is wanted"
+                raise BadInput(words) from None
         return dict(row)
 
     def say_restart(self, directory: str) -> str:

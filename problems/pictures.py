@@ -3,13 +3,17 @@
 `run_data` is runs.store.reader.RunData: `.deck`, `.history` (dict of arrays), `.dumps`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
 
 UNITS = {"s": 1.0, "ms": 1e3, "µs": 1e6}  # of a time axis, in a second
+
+
+def make_panels(figure, width: float, height: float, rows: int = 1, columns: int = 1, **more):
+    """The panels of a picture of that size [inch], as `figure.subplots` gives them."""
+    figure.set_size_inches(width, height)
+    return figure.subplots(rows, columns, **more)
 
 
 def find_dump(run_data, t: float):

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 # `run_data` is runs.store.reader.RunData; the import would point the wrong way, hence Any.
 AnyDeck: TypeAlias = Deck  # inside Problem the name Deck is that of the problem's own
-Watched: TypeAlias = Mapping[str, Sequence[tuple[int | slice, slice, slice]]]
 History: TypeAlias = Mapping[str, np.ndarray]
 DrawFigure = Callable[["Figure", Any], None]
 
@@ -43,16 +42,14 @@ class BlockPlan:
     low: tuple[float, float]
     high: tuple[float, float]
 
-    @classmethod
-    def of_nodes(cls, name: str, nodes: np.ndarray) -> BlockPlan:
-        """That of a grid (2, ni + 1, nj + 1)."""
-        low, high = ((float(x), float(y)) for x, y in (nodes.min((1, 2)), nodes.max((1, 2))))
-        return cls(name, (nodes.shape[1] - 1, nodes.shape[2] - 1), low, high)
-
 
 def plan_blocks(grids: Mapping[str, np.ndarray]) -> list[BlockPlan]:
     """Sizes of blocks whose first nodes (2, ni + 1, nj + 1) are made, by name."""
-    return [BlockPlan.of_nodes(name, nodes) for name, nodes in grids.items()]
+    plans = []
+    for name, nodes in grids.items():
+        low, high = ((float(x), float(y)) for x, y in (nodes.min((1, 2)), nodes.max((1, 2))))
+        plans.append(BlockPlan(name, (nodes.shape[1] - 1, nodes.shape[2] - 1), low, high))
+    return plans
 
 
 @dataclass(frozen=True)
@@ -119,6 +116,13 @@ class Report:
             lines.append(f"  {'':{width}} {'computed':>14} {'theory':>14} {'difference':>12}")
             lines += [row.format(width) for row in shown]
         return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
+
+
+class NoHistory(dict):
+    """The history of a run that has not begun: each of its columns is one NaN."""
+
+    def __missing__(self, name: str) -> np.ndarray:
+        return np.full(1, math.nan)
 
 
 def align(rows: Sequence[Sequence[str]]) -> list[str]:
@@ -190,7 +194,7 @@ class Problem:
     units: ClassVar[Mapping[str, str]] = {}  # of the columns of `measure` that have one
     t_unit: str = "s"  # of t, in words of the screen: "iterations" where it counts those
     counted: ClassVar[tuple[str, ...]] = ()  # keys of the deck whose product is the cells of all
-    measures_sides: ClassVar[bool] = False  # `measure` reads cells along sides alone: see `watch`
+    measures_sides: ClassVar[bool] = False  # `measure` reads cells along sides alone: `reads_cells`
 
     def __init__(self, deck: AnyDeck):
         """Keep the deck; a subclass checks here what no single field can (raises BadInput)."""
@@ -254,24 +258,21 @@ class Problem:
         keys always, a function of the evolution's state alone (a restart must give the same)."""
         return {}
 
-    def watch(self, evolution: Evolution) -> Watched | None:
-        """What `measure` reads of the cells' states besides three rows along every side: by a
-        block's name indices of an array (rows, ni, nj) of its states, rows as in `hydro.rows`; {}
-        for nothing more; None: any cell, or nodes inside.  What `measure_block` of a
-        `hydro.simulation.Simulation` finds need not be watched.
+    @property
+    def reads_cells(self) -> bool:
+        """Does `measure` read cells' states besides three rows along every side, or nodes inside?
 
-        On several ranks of MPI the first one, which measures, receives so much after every step;
-        where it is None, all of all blocks.
+        On several ranks of MPI the first one, which measures, then receives all of all blocks after
+        every step.  What `measure_block` of a `hydro.simulation.Simulation` finds does not count.
         """
-        alone = self.measures_sides or type(self).measure is Problem.measure
-        return {} if alone else None
+        return not (self.measures_sides or type(self).measure is Problem.measure)
 
     def report(self, history: History, final: Evolution | None = None) -> Report:
         """What was computed, beside what theory says: the one method for all numbers of a run.
 
-        `history` maps columns to arrays, and is empty before a run, when rows have their theory
-        alone; `final` is the state at the end, None when only the run directory is at hand.  The
-        runner prints time, steps and conservation itself.
+        `history` maps columns to arrays; before a run it is a `NoHistory`, which is false, and rows
+        have their theory alone; `final` is the state at the end, None when only the run directory
+        is at hand.  The runner prints time, steps and conservation itself.
         """
         return Report()
 
@@ -311,11 +312,11 @@ class Problem:
 
     def summary(self, history: History, final: Evolution | None) -> str:
         """The report as text."""
-        return str(self.report(history, final))
+        return str(self.report(history or NoHistory(), final))
 
     def predict(self) -> dict[str, float]:
         """What the references say for this deck, by name; none where unknown."""
-        rows = self.report({}).rows
+        rows = self.report(NoHistory()).rows
         return {row.name: float(row.theory) for row in rows if not math.isnan(row.theory)}
 
     def errors(self, history: History) -> dict[str, float]:

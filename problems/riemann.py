@@ -149,17 +149,6 @@ def choose_domain(exact: RiemannSolution, cells: tuple[int, int], t_end: float |
     return Domain(lengths, tuple(growths), tuple(ends), t, 2.0 * max(last) * t)
 
 
-def choose_captured_domain(exact: RiemannSolution, speed: float, t_end: float | None) -> Domain:
-    """The one grid, going at `speed`, on which a contact is captured."""
-    left = max(speed - exact.left_wave.head, 0.0)
-    right = max(exact.right_wave.head - speed, 0.0)
-    beyond = BEYOND * (left + right)
-    span = left + right + 2.0 * beyond
-    t = 1.0 / span if t_end is None else t_end
-    lengths = (left + beyond) * t, (right + beyond) * t
-    return Domain(lengths, (1.0, 1.0), (speed, speed), t, span * t)
-
-
 def find_growth(part: float, count: int) -> float:
     """Growth of `count` cells from one to the next, such that SHARE of them are in the first `part`
     of their length; 1 where that is so with even cells, MOST_GROWTH at most."""
@@ -287,7 +276,13 @@ class Riemann(Problem):
             domain = choose_domain(exact, cells, made_for)
         else:
             speed = exact.u if deck.mesh == "follow" else 0.0
-            domain = choose_captured_domain(exact, speed, made_for)
+            left = max(speed - exact.left_wave.head, 0.0)
+            right = max(exact.right_wave.head - speed, 0.0)
+            beyond = BEYOND * (left + right)
+            span = left + right + 2.0 * beyond
+            t = 1.0 / span if made_for is None else made_for
+            lengths = (left + beyond) * t, (right + beyond) * t
+            domain = Domain(lengths, (1.0, 1.0), (speed, speed), t, span * t)
         growths = domain.growths if deck.grading is None else (deck.grading,) * 2
         return replace(domain, t_end=deck.run.t_end or domain.t_end, growths=growths)
 

@@ -30,7 +30,7 @@ from hydro.links import join
 from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Output, Regrid, RunControl, key
 from problems.initial_states import make_plane_grid, mix_states, put_walls
-from problems.pictures import draw_grid, find_dump
+from problems.pictures import draw_grid, find_dump, make_panels
 from problems.problem import Problem, Report, Row, align, find_time, get_last
 from problems.references.hugoniot import shock_with_mach
 from problems.references.riemann import solve_riemann
@@ -334,8 +334,7 @@ class ShockBubble(Problem):
         dumps = list({**chosen, last.t: last}.values())
         columns = min(3, len(dumps))
         rows = -(-len(dumps) // columns)
-        figure.set_size_inches(4.2 * columns, 3.9 * rows)
-        panels = figure.subplots(rows, columns, squeeze=False)
+        panels = make_panels(figure, 4.2 * columns, 3.9 * rows, rows, columns, squeeze=False)
         for axis in panels.ravel()[len(dumps) :]:
             axis.remove()
         for number, (axis, dump) in enumerate(zip(panels.ravel(), dumps, strict=False)):
@@ -400,9 +399,8 @@ def pad_over_seams(blocks: Mapping, fields: Mapping[str, np.ndarray]) -> dict[st
     for kind, one, side, other, there in LINKS:
         if kind == "seam":
             line, opposite = get_side(blocks[one].nodes, side), get_side(blocks[other].nodes, there)
-            back = (
-                -1 if np.abs(line - opposite).max() > np.abs(line[:, ::-1] - opposite).max() else 1
-            )
+            turned = np.abs(line - opposite).max() > np.abs(line[:, ::-1] - opposite).max()
+            back = -1 if turned else 1
             get_side(frames[one], side)[:, 1:-1] = get_side(fields[other], there)[:, ::back]
             get_side(frames[other], there)[:, 1:-1] = get_side(fields[one], side)[:, ::back]
     return frames
@@ -434,9 +432,8 @@ def draw_shadowgraph(axis, gas: str, dump) -> None:
     for name, block in blocks.items():
         x, y = 1e3 * block.nodes
         dark = np.log10(np.maximum(shadows[name] / most, 1e-9))
-        axis.pcolormesh(
-            x, y, dark, cmap="Greys", shading="gouraud", vmin=-DECADES, vmax=0.2, rasterized=True
-        )
+        style = {"cmap": "Greys", "shading": "gouraud", "vmin": -DECADES, "vmax": 0.2}
+        axis.pcolormesh(x, y, dark, rasterized=True, **style)
         draw_grid(axis, np.array([x, -y]), color="C0" if block.material == gas else "0.6")
     lines = [1e3 * blocks[name].nodes[:, row] for name, row in OUTLINE.items()]
     for x, y in lines:

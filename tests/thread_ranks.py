@@ -169,13 +169,11 @@ def spoil(block) -> None:
         getattr(block, name)[others, 3:-3] = np.nan
 
 
-def march_on_ranks(
-    size: int, build, steps: int, look=lambda simulation: None, watched=None, places=None
-):
+def march_on_ranks(size: int, build, steps: int, look=lambda simulation: None, places=None):
     """The history rows and the state after `steps` of `build()` on so many ranks.
 
-    look: called on the first rank with the simulation after each step; watched: as in
-    `problems.problem.Problem.watch`; places: the ranks of each block, left out: whole blocks.
+    look: called on the first rank with the simulation after each step; places: the ranks of
+    each block, left out: whole blocks.
     What a rank may not read is spoiled.  A failure on which all ranks agree ends the march; it is
     the last of the rows.
     """
@@ -186,7 +184,7 @@ def march_on_ranks(
         blocks = simulation.blocks
         whole = dict.fromkeys(range(len(blocks)), 1)
         there = places or share_blocks([(b.ni, b.nj) for b in blocks], size, whole).places
-        simulation.spread(Ranks(comm, blocks, there, watched=watched or {}))
+        simulation.spread(Ranks(comm, blocks, there))
         for block in blocks:
             spoil(block)
         if comm.rank:

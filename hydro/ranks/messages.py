@@ -33,7 +33,6 @@ KINDS = (
 )  # what the messages are about
 COUNTED = ("Allgatherv", "Ibcast", "Send", "Recv", "Isend", "Irecv", "bcast")
 
-Index = tuple[int | slice, slice, slice]
 Part = tuple[Callable[[Block], np.ndarray], np.ndarray]  # an array of a block, flat places in it
 
 
@@ -46,20 +45,16 @@ def find_ring(ni: int, nj: int, deep: int) -> np.ndarray:
 
 def find_ring_of_cells(
     block: Block,
-    watched: Sequence[Index] = (),
     rows: Rows | None = None,
     deep: int = CELLS_DEEP,
 ) -> np.ndarray:
     """Flat places of the cells of a ring in the array of a block's `state`, all its quantities.
 
-    watched: indices of an array (rows, ni, nj) of the states, which go with them; rows: of cells,
-    where not all are meant.
+    rows: of cells, where not all are meant.
     """
     ni, nj = block.ni, block.nj
     chosen = np.zeros((len(block.state), ni, nj), dtype=bool)
     chosen.reshape(len(chosen), -1)[:, find_ring(ni, nj, deep)] = True
-    for index in watched:
-        chosen[index] = True
     if rows is not None:
         chosen[:, : rows[0]] = chosen[:, rows[1] :] = False
     row, i, j = np.nonzero(chosen)

@@ -20,10 +20,9 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from operator import attrgetter
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -54,8 +53,7 @@ class Ranks(Blocks):
     `Isend` and `Irecv`.
 
     places: the ranks of each block, its owner first (`hydro.ranks.cutting`); bounds: of their
-    bands, as rows of cells; left out: nearly as many rows for each; watched: by a block's
-    name indices of its states (rows, ni, nj), sent to all ranks besides those along the sides.
+    bands, as rows of cells; left out: nearly as many rows for each.
     """
 
     def __init__(
@@ -64,7 +62,6 @@ class Ranks(Blocks):
         blocks: Sequence[Block],
         places: Sequence[tuple[int, ...]],
         bounds: Sequence[Sequence[int]] | None = None,
-        watched: Mapping[str, Sequence[messages.Index]] = MappingProxyType({}),
     ):
         super().__init__(blocks)
         self.book = messages.Book(comm)
@@ -78,7 +75,7 @@ class Ranks(Blocks):
         self.bounds = _find_all_bounds(blocks, places, bounds)
         self.cuts: dict[int, CutBlock] = {}
         self._find_pieces(comm)
-        self._make_messages(watched)
+        self._make_messages()
         self._starts: messages.Message | None = None  # where a body source acts
         self._pushes: list[np.ndarray] = []
         self.busy = False  # with what all ranks do together
@@ -109,7 +106,7 @@ class Ranks(Blocks):
         for number, first, last in self.pieces:
             self[number].take_rows(first, last)
 
-    def _make_messages(self, watched: Mapping[str, Sequence[messages.Index]]) -> None:
+    def _make_messages(self) -> None:
         blocks, new, now = self, [], []
         rings = [
             [(attrgetter("nodes_new"), messages.find_ring_of_nodes(block))] for block in blocks
@@ -118,7 +115,7 @@ class Ranks(Blocks):
         for number, block in enumerate(blocks):
             there, bounds = self.places[number], self.bounds[number]
             for rank, rows in zip(there, pairwise(bounds), strict=True):
-                at = messages.find_ring_of_cells(block, watched.get(block.name, ()), rows)
+                at = messages.find_ring_of_cells(block, rows)
                 ring = messages.find_part_of_ring(block, messages.CELLS_DEEP, rows)
                 new.append(
                     messages.Item(
@@ -337,7 +334,7 @@ class Ranks(Blocks):
 
     @contextlib.contextmanager
     def glance(self) -> Iterator[None]:
-        """In the block nobody looks beyond the sides and what is watched: nothing is collected."""
+        """In the block nobody looks beyond the sides: nothing is collected."""
         self._glancing = True
         try:
             yield
@@ -367,7 +364,7 @@ def _find_polygon_parts(block: Block, rows: Rows) -> list[messages.Part]:
     """What polygon cells read and change of an update."""
     ring = messages.find_part_of_ring(block, 1, rows)
     return [
-        (attrgetter("state_new"), messages.find_ring_of_cells(block, (), rows, 1)),
+        (attrgetter("state_new"), messages.find_ring_of_cells(block, rows, 1)),
         *((attrgetter(name), ring) for name in ("void_energy_new", "rates_new", "crowding")),
     ]
 

@@ -161,9 +161,8 @@ class Ripple:
 def densify(line: np.ndarray) -> np.ndarray:
     """POINTS times as many points (2, m) on the cubic spline through the line's nodes (2, n)."""
     arc = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line, axis=1)))))
-    fine = np.interp(
-        np.arange(POINTS * (arc.size - 1) + 1) / POINTS, np.arange(arc.size, dtype=float), arc
-    )
+    fine = np.arange(POINTS * (arc.size - 1) + 1) / POINTS
+    fine = np.interp(fine, np.arange(arc.size, dtype=float), arc)
     from scipy.interpolate import CubicSpline  # slow to load
 
     return CubicSpline(arc, line, axis=1)(fine)

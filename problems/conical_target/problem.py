@@ -19,8 +19,6 @@ Note: failed aluminium that slides on the impact face is compressed without boun
 again; there, and on the cone's side, materials share the nodes of their line.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from pathlib import Path
@@ -32,22 +30,12 @@ import numpy as np
 from hydro.block import Block
 from hydro.eos.materials import Material, find_material, make_material
 from hydro.simulation import Simulation
+from problems.conical_target import report as seen
 from problems.conical_target.layout import MATERIALS, Layout, Ripple
-from problems.conical_target.report import (
-    GAUGES,
-    MEASURED_NUMBERS,
-    MIDDLE,
-    PEAK_UNITS,
-    Results,
-    find_peaks,
-    measure_block,
-    measure_departure,
-)
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, check_solid, key
 from problems.problem import Problem, check_memory, find_crossing
 from problems.references.hugoniot import find_rise, shock_to_pressure
 from regrid.errors import BadInput
-from regrid.measure.corners import compute_centres
 
 Touch = Literal["joined", "sliding"]
 
@@ -106,6 +94,7 @@ class ConicalTargetDeck(Deck, kw_only=True):
 
 THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
 AT_REST = 0.01  # of the impactor's speed
+PEAK = ("pressure", "x", "y")  # greatest pressure of a material, and the centre of that cell
 EXTENTS = (  # of parts over the radius inside the shell: no slivers of cells, no endless blocks
     ("thickness", 0.005, 100.0), ("front", 0.005, 100.0), ("side", 0.005, 100.0),
     ("length", 0.05, 100.0), ("cone", 0.02, 100.0), ("base", 0.02, 1.0), ("tip", 0.01, 1.0),
@@ -113,7 +102,7 @@ EXTENTS = (  # of parts over the radius inside the shell: no slivers of cells, n
 BEHIND = 5  # cells behind the front: a shock is three or four wide
 
 
-class ConicalTarget(Results, Problem):
+class ConicalTarget(seen.Results, Problem):
     """Seven blocks: impactor, the shell's front and side, graphite, lead in three parts."""
 
     Deck = ConicalTargetDeck
@@ -123,8 +112,12 @@ class ConicalTarget(Results, Problem):
         **dict.fromkeys(("line_bend", "line_amplitude", "line_length"), "m"),
         **dict.fromkeys(("pressure_impact", "greatest_pressure"), "Pa"),
         **dict.fromkeys(("shock_pressure_axis", "shock_pressure_side"), "Pa"),
-        **{f"pressure_gauge_{number}": "Pa" for number in range(len(GAUGES))},
-        **PEAK_UNITS,
+        **{f"pressure_gauge_{number}": "Pa" for number in range(len(seen.GAUGES))},
+        **{
+            f"peak_{n}_{part}": u
+            for part in seen.PARTS
+            for n, u in zip(PEAK, ("Pa", "m", "m"), strict=True)
+        },
     }
 
     def __init__(self, deck: ConicalTargetDeck):
@@ -212,15 +205,14 @@ class ConicalTarget(Results, Problem):
         for name, nodes in self.make_grids().items():
             material = self.materials[MATERIALS[name]]
             speed = deck.speed if name == "impactor" else 0.0
-            blocks[name] = Block(
-                name, material.eos, nodes, material.rho0, speed, 0.0, 0.0, material=MATERIALS[name]
-            )
+            state = material.rho0, speed, 0.0, 0.0
+            blocks[name] = Block(name, material.eos, nodes, *state, material=MATERIALS[name])
         return self.simulate(
             blocks.values(),
             self.layout.connect(blocks),
             geometry="axisymmetric",
-            measure_block=measure_block,
-            measured_numbers=MEASURED_NUMBERS,
+            measure_block=seen.measure_block,
+            measured_numbers=seen.MEASURED_NUMBERS,
         )
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
@@ -232,9 +224,9 @@ class ConicalTarget(Results, Problem):
         row = {"pressure_impact": float(front.state[3, 2, 1]), "greatest_pressure": greatest}
         row |= {"greatest_x": x, "greatest_y": y}
         p = cone.state[3, 1:-1, 1:-1]
-        axis = compute_centres(cone.nodes)[0, :, 0]
+        axis = cone.centres[0, :, 0]
         ends = cone.nodes[0, [0, -1], 0]
-        for number, part in enumerate(GAUGES):
+        for number, part in enumerate(seen.GAUGES):
             position = ends[0] + part * (ends[1] - ends[0])
             row[f"pressure_gauge_{number}"] = float(np.interp(position, axis, p[:, 0]))
         row["transformed"] = transformed
@@ -242,15 +234,18 @@ class ConicalTarget(Results, Problem):
         chord = line[:, -1] - line[:, 0]
         away = chord[0] * (line[1] - line[1, 0]) - chord[1] * (line[0] - line[0, 0])
         row["line_bend"] = float(np.abs(away).max() / math.hypot(*chord))
-        departure, part = measure_departure(line)
-        middle = departure[(part >= MIDDLE[0]) & (part <= MIDDLE[1])]
+        departure, part = seen.measure_departure(line)
+        middle = departure[(part >= seen.MIDDLE[0]) & (part <= seen.MIDDLE[1])]
         row["line_amplitude"] = 0.5 * float(np.ptp(middle))
         row["line_length"] = float(np.hypot(*np.diff(line, axis=1)).sum())
         threshold, speed = THRESHOLD * self.impact[0], AT_REST * self.deck.speed
         for name, number in (("axis", 0), ("side", -1)):
             front = measure_front(cone, number, threshold, speed)
             row[f"shock_x_{name}"], row[f"shock_pressure_{name}"] = front
-        row |= find_peaks([(blocks[name].material, *found[:3]) for name, found in measured.items()])
+        for part in seen.PARTS:
+            own = [found[:3] for name, found in measured.items() if MATERIALS[name] == part]
+            peak = max(own, key=lambda found: found[0])
+            row |= {f"peak_{n}_{part}": value for n, value in zip(PEAK, peak, strict=True)}
         return row | (self.ripple.measure(line, evolution.t) if self.ripple else {})
 
 
@@ -272,7 +267,7 @@ def measure_front(block: Block, row: int, threshold: float, speed: float) -> tup
     """
     p = block.state[3, 1:-1, 1:-1][:, row]
     u, v = block.state[1:3, -2, 1:-1][:, row]
-    x = find_crossing(compute_centres(block.nodes)[0, :, row], p, threshold)
+    x = find_crossing(block.centres[0, :, row], p, threshold)
     if math.isnan(x) or math.hypot(u, v) > speed:
         return math.nan, math.nan
     last = int(np.flatnonzero(p > threshold)[-1])

@@ -6,30 +6,22 @@ shocks along the line is the one that was seen.  Note: lead beside a rigid wall 
 the shock and by what comes back.
 """
 
-from __future__ import annotations
-
+import contextlib
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hydro.block import Block
-from problems.pictures import draw_field, draw_grid, spread_dumps
+from problems.pictures import draw_field, draw_grid, make_panels, spread_dumps
 from problems.problem import Report, Row
 from problems.references.hugoniot import shock_to_pressure
 from problems.references.shock_polars import CrossedLine
 from regrid.errors import BadInput
-from regrid.measure.corners import compute_centres
 from regrid.sides import SIDE_NAMES, get_sides, trace_outline
 
 PARTS = ("impactor", "shell", "target", "filling")
 MM, GPA, US = 1e3, 1e-9, 1e6
-PEAK_UNITS = {
-    f"peak_{what}_{part}": unit
-    for part in PARTS
-    for what, unit in (("pressure", "Pa"), ("x", "m"), ("y", "m"))
-}
 MEASURED_NUMBERS = 4  # that `measure_block` gives
 
 
@@ -38,26 +30,12 @@ def measure_block(block: Block) -> tuple[float, float, float, float]:
     its second phase (NaN but for the cone)."""
     rho, _, _, p = block.state[:, 1:-1, 1:-1]
     cell = np.unravel_index(p.argmax(), p.shape)
-    x, y = compute_centres(block.nodes)[(slice(None), *cell)]
+    x, y = block.centres[(slice(None), *cell)]
     part = math.nan
     if block.name == "cone":
         mass = rho * block.volume
         part = float((mass * block.eos.compute_second_part(rho)).sum() / mass.sum())
     return float(p.max()), float(x), float(y), part
-
-
-def find_peaks(measured: Sequence[tuple[str, float, float, float]]) -> dict[str, float]:
-    """Greatest pressure [Pa] of each material's cells, and the centre x, y [m] of that cell.
-
-    measured: of each block its material, and the first three numbers of `measure_block`.
-    """
-    row = {}
-    for part in PARTS:
-        own = [numbers for material, *numbers in measured if material == part]
-        peak = own[int(np.argmax([pressure for pressure, *_ in own]))]
-        for what, number in zip(("pressure", "x", "y"), peak, strict=True):
-            row[f"peak_{what}_{part}"] = number
-    return row
 
 
 def find_peak(history, part: str) -> tuple[float, float, float, float]:
@@ -162,30 +140,22 @@ class WaveGrowth:
         return math.log(last / first) / (AGES[1] - AGES[0])
 
 
-def measure_side_shock(problem, history) -> tuple[float, float] | None:
-    """Speed [m/s] of the shock along the side, from its base on, and when it was at the base [s].
-
-    The straight line of least squares through the places that the history has, None if too few.
-    """
-    t, frame, waves = history["t"], problem.ripple.frame, problem.ripple.waves
-    position = (history["shock_x_side"] - problem.deck.front) / frame.along[0]
-    known = np.isfinite(position) & (position > waves[0]) & (position < waves[-1] + 1e-3)
-    if known.sum() < 4:
-        return None
-    speed, start = np.polyfit(t[known], position[known], 1)
-    return float(speed), float(-start / speed)
-
-
 def measure_waves(problem, history) -> tuple[CrossedLine | None, list[WaveGrowth]]:
-    """Theory for the shock that was seen, and the growth of every wave; (None, []) too early."""
-    seen = measure_side_shock(problem, history)
-    if seen is None:
+    """Theory for the shock that was seen, and the growth of every wave; (None, []) too early.
+
+    That shock's path along the side is the straight line of least squares through its places.
+    """
+    t, frame, middles = history["t"], problem.ripple.frame, problem.ripple.waves
+    position = (history["shock_x_side"] - problem.deck.front) / frame.along[0]
+    known = np.isfinite(position) & (position > middles[0]) & (position < middles[-1] + 1e-3)
+    if known.sum() < 4:
         return None, []
-    (speed, begin), waves = seen, []
-    for number, position in enumerate(problem.ripple.waves):
-        passed = begin + position / speed
-        since, amplitude = history["t"] - passed, history[f"ripple_{number}"]
-        waves.append(WaveGrowth(float(position), float(passed), since, amplitude))
+    speed, start = (float(x) for x in np.polyfit(t[known], position[known], 1))
+    waves = []
+    for number, middle in enumerate(middles):
+        passed = -start / speed + middle / speed
+        amplitude = history[f"ripple_{number}"]
+        waves.append(WaveGrowth(float(middle), float(passed), t - passed, amplitude))
     return problem.ripple.cross(speed), waves
 
 
@@ -224,9 +194,8 @@ def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
         if math.isfinite(rate):
             words = ["theory of small slopes", f"a/a0 = {grown:.3g} at {AGES[1] * US:.2g} us"]
         most = wave.amplitude[top]
-        words.append(
-            f"at most {most * MM:.3g} mm, k a = {k * most:.2g}, at {history['t'][top] * US:.2f} us"
-        )
+        when = f"at {history['t'][top] * US:.2f} us"
+        words.append(f"at most {most * MM:.3g} mm, k a = {k * most:.2g}, {when}")
         label = f"wave {number + 1}, passed at {wave.passed * US:.2f} us: growth [1/us]"
         rows.append(Row(f"growth_{number}", rate, theory, label, US, 3, source="; ".join(words)))
     return rows, notes
@@ -251,9 +220,8 @@ def _find_outlines(dump, following: set[tuple[str, str]]) -> list[np.ndarray]:
         for side, line in zip(SIDE_NAMES, get_sides(block.nodes), strict=True):
             if (block.name, side) not in following:
                 shared = np.array([tuple(point) in inside for point in line.T])
-                lines.append(
-                    np.insert(line, np.flatnonzero(shared[1:] & shared[:-1]) + 1, np.nan, axis=1)
-                )
+                cuts = np.flatnonzero(shared[1:] & shared[:-1]) + 1
+                lines.append(np.insert(line, cuts, np.nan, axis=1))
     return lines
 
 
@@ -278,21 +246,6 @@ def _draw_materials(axis, dump, names: dict[str, str], following, grid: bool) ->
     axis.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
 
 
-def sample_hugoniot(material, top: float) -> tuple[np.ndarray, np.ndarray]:
-    """Densities and pressures of single shocks from rest up to the pressure `top`, if there are."""
-    points = [(material.rho0, 0.0)]
-    for p in np.linspace(0.0, 1.05 * top, 60)[1:]:
-        try:
-            points.append((shock_to_pressure(material.eos, material.rho0, 0.0, p).rho, p))
-        except BadInput:  # beyond its table
-            break
-    return tuple(np.array(points).T)
-
-
-def _fit_slope(t: np.ndarray, x: np.ndarray, near: np.ndarray) -> float:
-    return float(np.polyfit(t[near], x[near], 1)[0]) if near.sum() > 3 else math.nan
-
-
 class Results:
     """What the problem says of a run, a part of its class: its report and its pictures, in which
     each material has one colour."""
@@ -301,11 +254,8 @@ class Results:
         """What was computed, beside theory where there is one."""
         if not history:
             return Report(rows=[Row("impact", theory=self.impact[0])])
-        deck, t, (first, last) = (
-            self.deck,
-            history["t"],
-            (part * self.impact[2] for part in PLATEAU),
-        )
+        deck, t = self.deck, history["t"]
+        first, last = (part * self.impact[2] for part in PLATEAU)
         inside = (t > first) & (t < last)
         impact = float(history["pressure_impact"][inside].mean()) if inside.any() else math.nan
         words = f"mean from {US * first:.2f} to {US * last:.2f} us; impedances match"
@@ -327,10 +277,8 @@ class Results:
         most = np.nanmax(history["transformed"])
         tell("transformed", most, "most of the cone in the second phase [%]", 0.01, words)
         for name, where in (("axis", "on the axis"), ("side", "along the side")):
-            for station, passage in zip(
-                STATIONS, measure_passage(self, history, name), strict=True
-            ):
-                t, speed, p = passage
+            passages = measure_passage(self, history, name)
+            for station, (t, speed, p) in zip(STATIONS, passages, strict=True):
                 if math.isfinite(t):
                     x = MM * (deck.front + station * deck.cone)
                     label = f"shock {where} at x = {x:.4g} mm [km/s]"
@@ -349,16 +297,10 @@ class Results:
         words = f"half of peak to peak at the end; at most {top * MM:.2g} mm at {when * US:.2f} us"
         label = "side: deviation from its own line [mm]"
         tell("line_amplitude", history["line_amplitude"][-1], label, 1e-3, words)
-        words = (
-            f"{history['line_length'][-1] / history['line_length'][0]:.3f} times its initial length"
-        )
-        tell(
-            "line_bend",
-            history["line_bend"][-1],
-            "side: deviation from its chord [mm]",
-            1e-3,
-            words,
-        )
+        bend, length = history["line_bend"][-1], history["line_length"]
+        words = f"{length[-1] / length[0]:.3f} times its initial length"
+        label = "side: deviation from its chord [mm]"
+        tell("line_bend", bend, label, 1e-3, words)
         if math.isfinite(first):
             words = f"from {begin * US:.2f} us on; {late:.3g} m/s in the latest half"
             tell("line_growth", first, "initial growth of the side's amplitude [m/s]", 1.0, words)
@@ -399,16 +341,12 @@ class Results:
         if crossed is not None:
             age = np.linspace(0.0, max(wave.age[-1] for wave in waves), 200)
             (impulse, shear), plus = crossed.compute_rates(k), crossed.compression
-            for values, style, words in (
-                (crossed.compute_growth(k, age), {"color": "k", "ls": "--", "lw": 1.0}, "theory"),
-                (
-                    plus * (1.0 + impulse * age),
-                    {"color": "0.5", "ls": "-.", "lw": 0.8},
-                    "impulse alone",
-                ),
-                (plus * np.cosh(shear * age), {"color": "0.5", "ls": ":", "lw": 1.0}, "slip alone"),
+            for values, colour, style, lw, words in (
+                (crossed.compute_growth(k, age), "k", "--", 1.0, "theory"),
+                (plus * (1.0 + impulse * age), "0.5", "-.", 0.8, "impulse alone"),
+                (plus * np.cosh(shear * age), "0.5", ":", 1.0, "slip alone"),
             ):
-                growth.plot(US * age, values, label=words, **style)
+                growth.plot(US * age, values, style, label=words, color=colour, lw=lw)
             growth.set_yscale("log")
             ticks = (0.8, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0)
             growth.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
@@ -427,34 +365,26 @@ class Results:
         top = [figure.add_subplot(grid[0, 2 * n : 2 * n + 2]) for n in range(3)]
         near, corner = figure.add_subplot(grid[1, :3]), figure.add_subplot(grid[1, 3:])
         first, last = run.dumps[0], run.dumps[-1]
-        following, times = (
-            self.layout.find_following(),
-            [f"t = {d.t * US:.3g} us" for d in (first, last)],
-        )
+        following = self.layout.find_following()
+        times = [f"t = {dump.t * US:.3g} us" for dump in (first, last)]
         names = {block: getattr(self.deck, part) for block, part in LABELS.items()}
         names["cone"] = names["cone"].split("-")[0]
         for axis, dump, time in zip(top, (first, last), times, strict=False):
             _draw_materials(axis, dump, names, following, grid=False)
             axis.set_title(time, fontsize="medium")
-        picture = draw_field(
-            top[2], last, lambda block: GPA * block.cell_fields["p"],
-            lines=_find_outlines(last, following), title=f"{times[1]}, pressure", mm=True,
-        )  # fmt: skip
-        nodes = MM * np.concatenate(
-            [block.nodes.reshape(2, -1) for dump in (first, last) for block in dump.blocks], axis=1
-        )
+        words = {"title": f"{times[1]}, pressure", "lines": _find_outlines(last, following)}
+        picture = draw_field(top[2], last, "p", unit=1e9, mm=True, **words)
+        blocks = [block.nodes.reshape(2, -1) for block in (*first.blocks, *last.blocks)]
+        nodes = MM * np.concatenate(blocks, axis=1)
         for axis in top:
             ends = nodes[0].min() - 1.0, nodes[0].max() + 1.0
             axis.set(xlim=ends, ylim=(0.0, 1.32 * nodes[1].max()))
-        bar = figure.colorbar(
-            picture, cax=top[2].inset_axes([0.08, 0.9, 0.84, 0.045]), orientation="horizontal"
-        )
+        inset = top[2].inset_axes([0.08, 0.9, 0.84, 0.045])
+        bar = figure.colorbar(picture, cax=inset, orientation="horizontal")
         bar.ax.tick_params(labelsize="small", pad=1.0)
         bar.ax.set_title("GPa", fontsize="small", loc="right", x=1.08, y=-1.6)
         for axis in (near, corner):
-            axis.set_facecolor(
-                FACES["shell"]
-            )  # what shows between chords and the line is the shell's
+            axis.set_facecolor(FACES["shell"])  # what shows between chords and the line
             _draw_materials(axis, last, {}, following, grid=True)
         cone = MM * last.block("cone").nodes
         (left, _), (right, high) = cone.min(axis=(1, 2)), cone.max(axis=(1, 2))
@@ -466,8 +396,7 @@ class Results:
 
     def draw_gauges(self, figure, run) -> None:
         """Pressures over time: gauges on the axis, the greatest and its place, the impact face."""
-        figure.set_size_inches(11.0, 4.2)
-        axis, places = figure.subplots(1, 2)
+        axis, places = make_panels(figure, 11.0, 4.2, 1, 2)
         history, impact = run.history, self.impact[0]
         t, top = US * history["t"], history["greatest_pressure"]
         for number, part in enumerate(GAUGES):
@@ -491,40 +420,39 @@ class Results:
 
     def draw_graphite(self, figure, run) -> None:
         """Part in the second phase over time; states beside the Hugoniot; where the phase is."""
-        figure.set_size_inches(12.0, 4.2)
-        part, states, map_axes = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.3))
+        part, states, map_axes = make_panels(figure, 12.0, 4.2, 1, 3, width_ratios=(1.0, 1.0, 1.3))
         material = self.materials["filling"]
         eos, t, share = material.eos, run.history["t"], run.history["transformed"]
         part.plot(US * t, 100.0 * share, color="k")
         part.set(xlim=(0.0, US * t[-1]), ylim=(0.0, None))
         part.set(xlabel="t [us]", ylabel="in the second phase [% of the cone's mass]")
-        tops = [float(dump.block("cone").cell_fields["p"].max()) for dump in run.dumps]
+        tops = [float(dump["cone"].p.max()) for dump in run.dumps]
         shares = [float(np.interp(dump.t, t, share)) for dump in run.dumps]
         most = run.dumps[int(np.argmax(shares if max(shares) > 0.0 else tops))]
         lowest = 0.0
         for dump in sorted({*spread_dumps(run, SHOWN)[1:], most}, key=lambda dump: dump.t):
-            fields = dump.block("cone").cell_fields
-            rho, p = fields["rho"].ravel(), GPA * fields["p"].ravel()
+            rho, p = dump["cone"].rho.ravel(), GPA * dump["cone"].p.ravel()
             states.plot(rho, p, ".", ms=1.5, zorder=2, label=f"{US * dump.t:.3g} us")
             lowest = min(lowest, p.min())
-        rho, p = sample_hugoniot(material, max(tops))
+        shocks = [(material.rho0, 0.0)]
+        with contextlib.suppress(BadInput):  # beyond its table
+            for p in np.linspace(0.0, 1.05 * max(tops), 60)[1:]:
+                shocks.append((shock_to_pressure(eos, material.rho0, 0.0, p).rho, p))
+        rho, p = np.array(shocks).T
         states.plot(rho, GPA * p, color="k", lw=0.9, zorder=3, label="Hugoniot")
         if eos.mixed_region is not None:
             edges = [eos.rho0 / (1.0 - eta) for eta in eos.mixed_region]
             states.axvspan(*edges, color="0.9", zorder=0)
             states.text(edges[0], 0.0, " mixed", color="0.4", fontsize="small", va="bottom")
-            states.set_xlim(
-                0.9 * rho[0], min(1.02 * edges[1], max(1.05 * rho[-1], 1.15 * edges[0]))
-            )
+            right = min(1.02 * edges[1], max(1.05 * rho[-1], 1.15 * edges[0]))
+            states.set_xlim(0.9 * rho[0], right)
         states.set_ylim(1.1 * lowest, 1.1 * GPA * max(tops))
         states.locator_params(axis="x", nbins=5)
         states.set(xlabel="density [kg/m3]", ylabel="pressure [GPa]")
         states.legend(fontsize="x-small", markerscale=4.0, loc="upper left")
-        cone = most.block("cone")
-        values = 100.0 * eos.compute_second_part(cone.cell_fields["rho"])
-        picture = map_axes.pcolormesh(
-            *(MM * cone.nodes), values, cmap="magma_r", vmin=0.0, rasterized=True
-        )
+        cone, style = most["cone"], {"cmap": "magma_r", "vmin": 0.0, "rasterized": True}
+        values = 100.0 * eos.compute_second_part(cone.rho)
+        picture = map_axes.pcolormesh(*(MM * cone.nodes), values, **style)
         map_axes.plot(*(MM * trace_outline(cone.nodes)), "k", lw=0.8)
         map_axes.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
         map_axes.set_title(f"t = {US * most.t:.3g} us", fontsize="medium")
@@ -532,16 +460,16 @@ class Results:
 
     def draw_converging_shock(self, figure, run) -> None:
         """Place of the shock in the cone over time, pressure behind it and speed over the place."""
-        figure.set_size_inches(11.0, 3.8)
-        path, pressure, speed = figure.subplots(1, 3)
+        path, pressure, speed = make_panels(figure, 11.0, 3.8, 1, 3)
         reach = WIDTH * self.deck.cone
         for name, words in (("axis", "on the axis"), ("side", "along the side")):
             t, x, p = get_shock_path(run.history, name)
             path.plot(US * t, MM * x, label=words)
             pressure.plot(MM * x, GPA * p, label=words)
             positions = np.linspace(*x[[0, -1]], 40)[1:-1] if x.size > 8 else np.empty(0)
-            slopes = [_fit_slope(t, x, np.abs(x - position) < reach) for position in positions]
-            speed.plot(MM * positions, 1e-3 * np.array(slopes), label=words)
+            chosen = [np.abs(x - position) < reach for position in positions]
+            speeds = [np.polyfit(t[a], x[a], 1)[0] if a.sum() > 3 else math.nan for a in chosen]
+            speed.plot(MM * positions, 1e-3 * np.array(speeds), label=words)
         pressure.set(xlabel="x of the shock [mm]", ylabel="greatest pressure just behind [GPa]")
         speed.set(xlabel="x of the shock [mm]", ylabel="speed [km/s]")
         path.set(xlabel="t [us]", ylabel="x of the shock [mm]")
@@ -549,8 +477,7 @@ class Results:
 
     def draw_cone_side(self, figure, run) -> None:
         """The line between graphite and lead, its departure from its own straight line, growth."""
-        figure.set_size_inches(13.5, 4.0)
-        shape, away, growth = figure.subplots(1, 3)
+        shape, away, growth = make_panels(figure, 13.5, 4.0, 1, 3)
         for dump in spread_dumps(run, SHOWN):
             line, label = dump.block("cone").nodes[:, :, -1], f"{US * dump.t:.2g} us"
             departure, part = measure_departure(line)

@@ -5,8 +5,6 @@ history shows before the end are iterates, most of them at a smaller Rayleigh nu
 deck's; the column `buoyancy` says what part of the wanted one has been reached.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from operator import attrgetter
@@ -28,7 +26,7 @@ from hydro.convection.steady import (
 from hydro.convection.tensor_grids import make_axis
 from problems.deck import DeckTable, key
 from problems.initial_states import make_plane_grid
-from problems.pictures import draw_grid
+from problems.pictures import draw_grid, make_panels
 from problems.problem import BlockPlan, Problem, get_last
 
 LARGEST_SHIFT = 0.1  # of a node in one step of the time march, in its shorter neighbouring step
@@ -318,8 +316,7 @@ class BoxProblem(Problem):
         """The grid of the last dump over the speed, and its steps along both axes."""
         (block,) = run_data.dumps[-1].blocks
         x, y = block.nodes
-        figure.set_size_inches(11.0, 5.0)
-        left, right = figure.subplots(1, 2)
+        left, right = make_panels(figure, 11.0, 5.0, 1, 2)
         speed = np.hypot(block.cell_fields["u"], block.cell_fields["v"])
         picture = left.pcolormesh(x, y, speed, cmap="Blues", rasterized=True)
         figure.colorbar(picture, ax=left, shrink=0.85, label="speed [m/s]")

@@ -21,15 +21,7 @@ from typing import Literal
 
 import numpy as np
 
-from hydro.convection.columns import (
-    SCHEMES,
-    SETTLED,
-    Column,
-    ColumnMarch,
-    settle_column,
-    solve_column,
-    to_nodes,
-)
+from hydro.convection import columns
 from hydro.convection.tensor_grids import KINDS, compute_grid_reynolds, make_axis
 from problems.convection.boxes import AxisGrid
 from problems.deck import Deck, Output, RunControl, key
@@ -74,20 +66,21 @@ class Convection1D(Problem):
             raise BadInput("rayleigh and mean_speed must be finite numbers")
         self.exact = VerticalPlates(deck.rayleigh, deck.prandtl, deck.peclet, deck.mean_speed)
 
-    def make_column(self, scheme: str | None = None) -> Column:
+    def make_column(self, scheme: str | None = None) -> columns.Column:
         """The fluid and its walls, with the deck's scheme or another."""
         deck = self.deck
         forces = {"buoyancy": deck.rayleigh * deck.prandtl, "through_flow": deck.peclet}
         forces |= {"mean_speed": deck.mean_speed, "scheme": scheme or deck.scheme}
-        return Column(viscosity=deck.prandtl, diffusivity=1.0, **forces)
+        return columns.Column(viscosity=deck.prandtl, diffusivity=1.0, **forces)
 
-    def build(self) -> ColumnMarch:
+    def build(self) -> columns.ColumnMarch:
         deck, grid = self.deck, self.deck.grid
         t_end = deck.run.t_end or LASTING * max(1.0, 1.0 / deck.prandtl)
         kind = t_end, grid.kind, grid.every
-        return ColumnMarch(self.make_column(), grid.make(deck.cells), *kind, **grid.options())
+        column, first = self.make_column(), grid.make(deck.cells)
+        return columns.ColumnMarch(column, first, *kind, **grid.options())
 
-    def measure(self, evolution: ColumnMarch) -> dict[str, float]:
+    def measure(self, evolution: columns.ColumnMarch) -> dict[str, float]:
         """Errors and swings against the exact steady profiles, at the end only."""
         if evolution.finished is None:
             return dict.fromkeys(ERRORS, math.nan)
@@ -98,8 +91,8 @@ class Convection1D(Problem):
         the largest grid Reynolds number of its steps, through-flow included."""
         grid, (kind, change), column = self.deck.grid, GRIDS[name], self.make_column()
         first = make_axis(kind, cells, walls=grid.walls, clustering=grid.clustering)
-        x, *found = settle_column(column, kind, first, **{**grid.options(), **change})[:3]
-        speed = np.hypot(to_nodes(x, found[1], (0.0, 0.0)), column.through_flow)
+        x, *found = columns.settle_column(column, kind, first, **{**grid.options(), **change})[:3]
+        speed = np.hypot(columns.to_nodes(x, found[1], (0.0, 0.0)), column.through_flow)
         reynolds = float(compute_grid_reynolds(x, speed, column.viscosity).max())
         return x, measure_errors(self.exact, x, *found) | {"reynolds": reynolds}
 
@@ -118,7 +111,7 @@ class Convection1D(Problem):
             f"  largest error of T {error_t:.2e} K, of v {error_v:.2e} of its largest; "
             f"heat {history['nusselt'][-1]:.9g}, exact {self.exact.compute_nusselt():.9g}",
         ]
-        if not change < SETTLED:
+        if not change < columns.SETTLED:
             lines.append(
                 f"  NOT STEADY: the state still changes by {change:.1e} in a diffusive time, and "
                 "the exact profiles are the steady ones; a longer time (run.t_end)"
@@ -138,8 +131,9 @@ class Convection1D(Problem):
             return "\n".join(lines)
         local, x = abs(deck.peclet) / deck.cells, make_axis("uniform", deck.cells)
         table = [["  scheme", "error of T", "of v", "turns too many of T", "of v"]]
-        for scheme in SCHEMES:
-            found = measure_errors(self.exact, x, *solve_column(self.make_column(scheme), x)[:2])
+        for scheme in columns.SCHEMES:
+            solution = columns.solve_column(self.make_column(scheme), x)[:2]
+            found = measure_errors(self.exact, x, *solution)
             sizes = (f"{found[name]:{'.1e' if 'error' in name else '.0f'}}" for name in ERRORS)
             table.append([f"  {scheme}", *sizes])
         title = f"  uniform grid, grid Péclet number {local:.3g}"

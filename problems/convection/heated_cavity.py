@@ -54,16 +54,13 @@ class Side(DeckTable, kw_only=True):
 
     def make(self, name: str):
         """The wall for the solver; BadInput where heat and value contradict."""
-        if self.heat == "adiabatic":
-            if self.value != 0.0:
-                raise BadInput(
-                    f"{name}.value = {self.value:g} contradicts {name}.heat = 'adiabatic'; "
-                    "take heat = 'flux' or 'isothermal'"
-                )
-            return Wall(self.flow)
-        if self.heat == "flux":
-            return Wall(self.flow, flux=self.value)
-        return Wall(self.flow, temperature=self.value)
+        if self.heat == "adiabatic" and self.value != 0.0:
+            raise BadInput(
+                f"{name}.value = {self.value:g} contradicts {name}.heat = 'adiabatic'; "
+                "take heat = 'flux' or 'isothermal'"
+            )
+        what = {"flux": "flux", "isothermal": "temperature"}.get(self.heat)
+        return Wall(self.flow, **({what: self.value} if what else {}))
 
 
 class HeatedCavityDeck(Deck, kw_only=True):
@@ -109,10 +106,9 @@ class HeatedCavity(BoxProblem):
         known = deck.left.heat == "isothermal" and deck.right.heat == "isothermal"
         # the scale of the Nusselt number: the difference of the sides, or 1 K without one
         self.scale = (abs(deck.left.value - deck.right.value) if known else 1.0) or 1.0
-        usual, self.t_unit = (
-            (TIME, "s") if deck.method == "time" else (STEADY_ITERATIONS, "iterations")
-        )
-        self.t_end = deck.run.t_end or float(usual)
+        steady = deck.method == "steady"
+        self.t_unit = "iterations" if steady else "s"
+        self.t_end = deck.run.t_end or float(STEADY_ITERATIONS if steady else TIME)
 
     def build(self):
         deck, equations = self.deck, self.make_first_equations()

@@ -27,15 +27,7 @@ from hydro.convection.box import PERIODIC, adiabatic, isothermal, make_fluid
 from problems.convection.boxes import AxisGrid, BoxProblem
 from problems.deck import Deck, Output, RunControl, key
 from problems.problem import Report, Row, compare
-from problems.references.convection import (
-    BOX_ONSETS,
-    FREE_LAYER_ONSET,
-    FREE_LAYER_WAVENUMBER,
-    LAYER_ONSET,
-    LAYER_WAVENUMBER,
-    PRANDTL,
-    compute_layer_growth,
-)
+from problems.references import convection as linear
 from regrid.errors import BadInput
 
 TIME = 1.5
@@ -57,17 +49,12 @@ class RayleighBenardDeck(Deck, kw_only=True):
         None
     )
     rayleigh: key(float, "Rayleigh number of the height", le=1e12) = 5000.0
-    prandtl: key(float, "viscosity over diffusivity", le=1e6) = PRANDTL
+    prandtl: key(float, "viscosity over diffusivity", le=1e6) = linear.PRANDTL
     tilt: key(float, "of gravity, anticlockwise from down [degrees]", gt=-90, lt=90) = 0.0
     amplitude: key(float, "of the first disturbance of the temperature [K]", gt=0, le=1) = 1e-3
     onset: key(bool, "search for the onset at the end") = True
     grid: AxisGrid = AxisGrid()
     longest_step: key(float | None, "of the march [s]; left out: 1/600 of its time", gt=0) = None
-
-
-def conduct(y: np.ndarray) -> np.ndarray:
-    """Temperature at rest, on conducting side walls."""
-    return 0.5 - y
 
 
 class RayleighBenard(BoxProblem):
@@ -86,12 +73,19 @@ class RayleighBenard(BoxProblem):
             )
         self.fluid = make_fluid(deck.rayleigh, deck.prandtl, deck.tilt)
         free = deck.walls == "free"
-        self.critical = FREE_LAYER_WAVENUMBER if free else LAYER_WAVENUMBER
+        self.critical = linear.FREE_LAYER_WAVENUMBER if free else linear.LAYER_WAVENUMBER
         usual = 1.0 if deck.shape == "box" else 2.0 * math.pi / self.critical
         self.width = deck.width or usual
         self.extent, side = (self.width, 1.0), PERIODIC
+        self.onset = math.nan  # by linear theory, where it has one for this deck
+        if deck.tilt == 0.0 and deck.shape == "layer":
+            if math.isclose(self.width * self.critical, 2.0 * math.pi, rel_tol=1e-3):
+                self.onset = linear.FREE_LAYER_ONSET if free else linear.LAYER_ONSET
+        elif deck.tilt == 0.0 and self.width == 1.0 and not free:
+            self.onset = linear.BOX_ONSETS[deck.sides]
         if deck.shape == "box":
-            side = adiabatic() if deck.sides == "adiabatic" else isothermal(conduct)
+            rest = lambda y: 0.5 - y  # noqa: E731
+            side = adiabatic() if deck.sides == "adiabatic" else isothermal(rest)
         floor, ceiling = (isothermal(heat, deck.walls) for heat in (0.5, -0.5))
         self.walls = {"i_min": side, "i_max": side, "j_min": floor, "j_max": ceiling}
 
@@ -111,21 +105,10 @@ class RayleighBenard(BoxProblem):
             "u_max": float(np.abs(equations.compute_velocities(evolution.psi)[0]).max()),
         }
 
-    def find_onset_reference(self) -> float | None:
-        """Ra of the onset by linear theory; None where there is none for this deck."""
-        deck = self.deck
-        if deck.tilt != 0.0:
-            return None
-        if deck.shape == "layer":
-            critical = math.isclose(self.width * self.critical, 2.0 * math.pi, rel_tol=1e-3)
-            onset = FREE_LAYER_ONSET if deck.walls == "free" else LAYER_ONSET
-            return onset if critical else None
-        return None if self.width != 1.0 or deck.walls == "free" else BOX_ONSETS[deck.sides]
-
     def find_onset(self) -> float | None:
         """Ra at which growth of the discrete equations begins; None where none is found."""
         deck, equations = self.deck, self.make_first_equations()
-        about = self.find_onset_reference() or max(deck.rayleigh, 1.0)
+        about = self.onset if math.isfinite(self.onset) else max(deck.rayleigh, 1.0)
         fluid = make_fluid(1.0, deck.prandtl, deck.tilt)
         low, high = (part * about for part in ONSET_BRACKET)
         for _ in range(WIDENINGS):
@@ -141,8 +124,7 @@ class RayleighBenard(BoxProblem):
         return rest, *measure.compute_growth(equations, self.fluid, *rest)
 
     def report(self, history, final=None) -> Report:
-        onset = self.find_onset_reference()
-        rows = [] if onset is None else [Row("onset", theory=onset)]
+        rows = [Row("onset", theory=self.onset)]
         return Report((lambda: str(self.compute_report(history))) if history else "", rows)
 
     def compute_report(self, history) -> Report:
@@ -153,13 +135,12 @@ class RayleighBenard(BoxProblem):
             if found is None:
                 notes.append("onset: none was found")
             else:
-                theory = self.find_onset_reference() or math.nan
-                rows.append(Row("onset", found, theory, "onset, Ra"))
+                rows.append(Row("onset", found, self.onset, "onset, Ra"))
         if deck.tilt == 0.0:
             rate, theory = self.compute_growth(self.make_first_equations())[1], math.nan
             if deck.shape == "layer":
                 numbers = deck.rayleigh, deck.prandtl, 2.0 * math.pi / self.width
-                theory = compute_layer_growth(*numbers, deck.walls == "free")
+                theory = linear.compute_layer_growth(*numbers, deck.walls == "free")
             rows.append(Row("eigenvalue", rate, theory, "growth rate, eigenvalue [1/s]"))
             seen = measure_growth(history["t"], history["kinetic_energy"])
             if history["kinetic_energy"][0] < STILL * deck.amplitude**2:

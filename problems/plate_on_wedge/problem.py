@@ -14,8 +14,6 @@ face, the base on which the wedge stands, the symmetry plane) or when the free s
 References: shock polars of both materials, the critical angle, Birkhoff's jet.
 """
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math
@@ -148,9 +146,8 @@ class PlateOnWedge(Results, Problem):
                 f"{ni - self.contact} beyond it and {nj} across; the plate needs at least 4 of each"
             )
         self.angle = math.radians(deck.angle)
-        self.end = np.array(
-            [deck.edge + deck.face * math.cos(self.angle), -deck.face * math.sin(self.angle)]
-        )
+        along, down = deck.face * math.cos(self.angle), deck.face * math.sin(self.angle)
+        self.end = np.array([deck.edge + along, -down])
         self.length = float(self.end[0]) + deck.overhang
         self.base = float(self.end[1]) - deck.depth
         lean = deck.depth / math.tan(math.radians(deck.end_angle))
@@ -288,9 +285,8 @@ class PlateOnWedge(Results, Problem):
         """Places (rows + 1,) of grid lines across a body from 0 to `length`, finer at one end."""
         if self.refinement <= 1.0:
             return np.linspace(0.0, length, rows + 1)
-        return length * clustered_law(
-            rows + 1, 1.0 / (rows * self.refinement**FINER_ROWS), from_end
-        )
+        least = 1.0 / (rows * self.refinement**FINER_ROWS)
+        return length * clustered_law(rows + 1, least, from_end)
 
     def estimate_cells(self) -> int:
         """Cells of the plate and of the wedge, counted from the sizes that the deck asks for."""

@@ -13,15 +13,13 @@ continued to A.  Note: behind the rise the scheme's own crest and dip are a few 
 each, and a mean over so few faces may pass for a plateau of the wrong pressure.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from problems.pictures import draw_field
+from problems.pictures import draw_field, make_panels
 from problems.problem import Report, Row
 from problems.references.shock_polars import compute_jet_speed
 from regrid.sides import trace_outline
@@ -368,10 +366,8 @@ class Results:
         if math.isfinite(spread):
             source = f"constant within {100.0 * spread:.2f} % over fifths of its path"
         if not theory.attached:
-            words, source = (
-                "speed of A, the jet's tip [km/s]",
-                "where the plate would meet the face",
-            )
+            words = "speed of A, the jet's tip [km/s]"
+            source = "where the plate would meet the face"
         rows.append(Row("contact_speed", speed, theory.contact_speed, words, 1e3, 5, source=source))
         if theory.attached:
             found, degree = measure_behind(self, history), math.pi / 180.0
@@ -473,8 +469,7 @@ class Results:
     def draw_contact(self, figure, run) -> None:
         """Zooms at the collision point and the face's end; A's path and speed against theory."""
         history, theory = run.history, self.collision.contact_speed
-        figure.set_size_inches(12.0, 8.5)
-        zooms, (paths, speeds) = figure.subplots(2, 2)
+        zooms, (paths, speeds) = make_panels(figure, 12.0, 8.5, 2, 2)
         t, path = history["t"], history["contact_path"]
         rows = choose_rows(self, history, STEADY)
         times = np.array([dump.t for dump in run.dumps])

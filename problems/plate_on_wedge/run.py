@@ -3,8 +3,6 @@
 All places and angles are those of the set-up before the deck turns or mirrors it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Container
 
@@ -15,14 +13,7 @@ from hydro.motion.overlaps import is_inside
 from hydro.simulation import Simulation
 from hydro.sliding.contact import SlidingContact
 from hydro.sliding.pieces import project
-from problems.plate_on_wedge.report import (
-    COLUMNS,
-    JET,
-    PHASES,
-    REFINED_RINGING,
-    RINGING,
-    measure_profile,
-)
+from problems.plate_on_wedge import report
 from regrid.curves import compute_arc_lengths
 
 LEAST_JET = 3  # cells that make a jet
@@ -37,13 +28,12 @@ class PlateRun(Simulation):
     """The flow, its phases and its end; the phases' times belong to the state."""
 
     def __init__(self, problem, blocks, links, **options):
-        super().__init__(
-            blocks, links, measure_block=self.measure_block, measured_numbers=4, **options
-        )
+        options |= {"measure_block": self.measure_block, "measured_numbers": 4}
+        super().__init__(blocks, links, **options)
         self.problem = problem
         self.plate, self.wedge = blocks[0], blocks[1]
         self.end = 0 if problem.deck.mirror else 1  # of the contact that runs
-        self.times = dict.fromkeys(PHASES, math.nan)
+        self.times = dict.fromkeys(report.PHASES, math.nan)
         self.start = np.array([problem.deck.edge, 0.0])
         self.contact: SlidingContact | None = None  # where plate and wedge are bodies of their own
         if not problem.deck.gap:
@@ -127,7 +117,7 @@ class PlateRun(Simulation):
         if in_wedge:
             return 0.0, 0.0, 0.0, angle
         speed = np.hypot(*block.state[1:3, 1:-1, 1:-1])
-        fast = speed > JET * self.problem.plate_speed
+        fast = speed > report.JET * self.problem.plate_speed
         mass = float((block.volume * block.state[0, 1:-1, 1:-1])[fast].sum())
         return float(speed.max()), float(fast.sum()), mass, angle
 
@@ -142,11 +132,12 @@ class PlateRun(Simulation):
             behind = float(pressure[count - last : count - first].mean())
             direction = line[:, first] - line[:, last]
         (fastest, cells, mass, angle), (*_, angle_in_wedge) = self.measured[:2]
-        means = np.full(len(COLUMNS), math.nan)  # at fixed parts of A's path, while it runs
+        means = np.full(len(report.COLUMNS), math.nan)  # at fixed parts of A's path, while it runs
         if not arrived:
             arc, behind_a = compute_arc_lengths(line), pressure[:count][::-1]
-            ringing = REFINED_RINGING if self.problem.refinement > 1.0 else RINGING
-            means = measure_profile(arc, behind_a[: arc.size - 1], self.measure_path(), ringing)
+            ringing = report.REFINED_RINGING if self.problem.refinement > 1.0 else report.RINGING
+            pressures = behind_a[: arc.size - 1]
+            means = report.measure_profile(arc, pressures, self.measure_path(), ringing)
         free = surface[count:]
         # number of the phase entered last in PHASES, 0 before the first
         entered = [(t, k) for k, t in enumerate(self.times.values(), 1) if math.isfinite(t)]
@@ -155,7 +146,7 @@ class PlateRun(Simulation):
             "contact_y": float(point[1]),
             "contact_path": self.measure_path(),
             "contact_pressure": behind,
-            **dict(zip(COLUMNS, map(float, means), strict=True)),
+            **dict(zip(report.COLUMNS, map(float, means), strict=True)),
             "interface_angle": -math.degrees(math.atan2(direction[1], direction[0])),
             "shock_angle_plate": angle,
             "shock_angle_wedge": angle_in_wedge,
@@ -283,17 +274,15 @@ class PlateRun(Simulation):
 
     def get_state_of(self, names: Container[str]) -> dict:
         """The state of the flow in these blocks, and the times of the phases."""
-        times = np.array([self.times[phase] for phase in PHASES])
-        return super().get_state_of(names) | {
-            "phase_times": times,
-            "plate_start": self.start.copy(),
-        }
+        times = np.array([self.times[phase] for phase in report.PHASES])
+        own = {"phase_times": times, "plate_start": self.start.copy()}
+        return super().get_state_of(names) | own
 
     def set_state(self, state) -> None:
         """Take up a state of `get_state`."""
         super().set_state(state)
         self.start = np.array(state["plate_start"], dtype=float)
-        self.times = dict(zip(PHASES, map(float, state["phase_times"]), strict=True))
+        self.times = dict(zip(report.PHASES, map(float, state["phase_times"]), strict=True))
         if math.isfinite(self.times["closed"]):
             self.finished = self.find_closure()
         self.finished = self.finished or self.find_arrival()

@@ -23,7 +23,7 @@ from hydro.boundary import put
 from hydro.eos.materials import find_material
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, VoidFill, key
 from problems.initial_states import put_walls
-from problems.pictures import draw_columns, draw_field, find_dump
+from problems.pictures import draw_columns, draw_field, find_dump, make_panels
 from problems.problem import Problem, Report, Row, find_most, find_time
 from problems.references.hugoniot import release, shock_with_particle_speed
 from regrid.errors import BadInput
@@ -119,37 +119,25 @@ class Cavity(Problem):
         """Size and width of the void, speeds of the cells at its ends, greatest pressure."""
         (block,) = evolution.blocks
         x, (_, u, _, p) = block.nodes[0, :, 0], block.state[:, 1:-1, 1:-1]
-        return {
-            "void_size": measure_void(block.nodes, self.curved),
-            "void_width": float(x[-1] - x[0]),
-            "jet_speed": float(u[0, 0]),
-            "far_speed": float(u[-1, 0]),
-            "most_pressure": float(p.max()),
-        }
+        size, width = measure_void(block.nodes, self.curved), float(x[-1] - x[0])
+        row = {"void_size": size, "void_width": width, "jet_speed": float(u[0, 0])}
+        return {**row, "far_speed": float(u[-1, 0]), "most_pressure": float(p.max())}
 
     def find_closing(self, history) -> float:
         """When the jet has come to the far side [s], NaN where it has not."""
         return find_time(history, history["void_width"] <= 1e-6 * self.deck.radius)
 
     def report(self, history, final=None) -> Report:
-        deck, near, pressure, found, left = (
-            self.deck,
-            self.near_speed,
-            self.shock.p,
-            [math.nan] * 2,
-            0,
-        )
-        if history:
-            arrival = find_time(history, history["jet_speed"] > 0.5 * near)
-            found, size = [arrival, self.find_closing(history)], history["void_size"]
-            left = max(float(size[-1] / size[0]), 0.0)
-        most = find_most(history, "most_pressure") if math.isfinite(found[1]) else math.nan
+        deck, near, p, size = self.deck, self.near_speed, self.shock.p, history["void_size"]
+        arrival = find_time(history, history["jet_speed"] > 0.5 * near)
+        closing, left = self.find_closing(history), max(float(size[-1] / size[0]), 0.0)
+        most = find_most(history, "most_pressure") if math.isfinite(closing) else math.nan
         words = "greatest speed of the jet; plane free surface [m/s]"
         rows = [
-            Row("arrival", found[0], self.arrival, "shock at the void [s]", digits=5),
+            Row("arrival", arrival, self.arrival, "shock at the void [s]", digits=5),
             Row("near_speed", find_most(history, "jet_speed"), near, words, digits=5, off=" "),
-            Row("closing", found[1], label="it hits the far side [s]", digits=4),
-            Row("shock_pressure", most, pressure, "greatest pressure then [GPa]", 1e9, 4, off=" "),
+            Row("closing", closing, label="it hits the far side [s]", digits=4),
+            Row("shock_pressure", most, p, "greatest pressure then [GPa]", 1e9, 4, off=" "),
             Row("left", left, label="void left at the end [%]", unit=0.01, digits=3),
         ]
         head = (
@@ -160,8 +148,8 @@ class Cavity(Problem):
 
     def draw_cavity(self, figure, run_data) -> None:
         """Pressure and grid at four times, size of the void and speed of the jet over time."""
-        figure.set_size_inches(12.0, 5.6)
-        history, radius, axes = run_data.history, self.deck.radius, figure.subplots(2, 3)
+        history, radius = run_data.history, self.deck.radius
+        axes = make_panels(figure, 12.0, 5.6, 2, 3)
         closing, last = self.find_closing(history), history["t"][-1]
         end = closing if math.isfinite(closing) else last
         times = (self.arrival, 0.5 * (self.arrival + end), end, last)

@@ -26,7 +26,7 @@ from hydro.eos.materials import find_material
 from hydro.sources import ProgrammedBurn
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import make_box, put_walls
-from problems.pictures import draw_field, spread_dumps
+from problems.pictures import draw_field, make_panels, spread_dumps
 from problems.problem import Problem, Report, Row, compare, find_crossing, get_last
 from problems.references.exact_flows import compute_taylor_wave
 from regrid.errors import BadInput
@@ -122,11 +122,8 @@ class Detonation(Problem):
         return {**row, "taylor_error": float(error)}
 
     def report(self, history, final=None) -> Report:
-        deck, (t, front), found = (
-            self.deck,
-            (history.get(x, np.zeros(1)) for x in ("t", "front")),
-            math.nan,
-        )
+        deck, found = self.deck, math.nan
+        t, front = history["t"], history["front"]
         late = (t > 0.5 * t[-1]) & np.isfinite(front)
         if late.sum() > 2:  # a straight line through the last half of the run
             found = float(np.polyfit(t[late], front[late], 1)[0])
@@ -144,8 +141,7 @@ class Detonation(Problem):
 
     def draw_detonation(self, figure, run_data) -> None:
         """Pressure at several times (or the last), and the place of the front over time."""
-        figure.set_size_inches(11.5, 4.6)
-        left, right = figure.subplots(1, 2)
+        left, right = make_panels(figure, 11.5, 4.6, 1, 2)
         if self.deck.behind == "point":
             words = {"bar": "pressure [GPa]", "title": "t"}
             draw_field(left, run_data.dumps[-1], "p", unit=1e9, every=10, **words)

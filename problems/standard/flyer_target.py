@@ -29,13 +29,6 @@ from problems.references.plate_impact import compute_plate_impact
 from regrid.errors import BadInput
 
 TALL = 8.0  # heights of cells over their least width: square ones would halve the time step
-NUMBERS = {
-    "impact": ("time of impact [s]", 1.0),
-    "pressure": ("pressure [GPa]", 1e9),
-    "out": ("shock at the free surface [s]", 1.0),
-    "free": ("free surface [m/s]", 1.0),
-    "end": ("until the release [s]", 1.0),
-}
 
 
 class PlateTable(DeckTable, kw_only=True):
@@ -74,7 +67,7 @@ class FlyerTarget(Problem):
         self.materials = [find_material(plate.material) for plate in deck.plates]
         impact = deck.speed, second.gap, first.thickness, second.thickness
         self.theory = compute_plate_impact(*self.materials[:2], *impact)
-        self.known = ("impact", "pressure") if more else tuple(NUMBERS)
+        self.is_pair = not more
         self.names = [f"plate-{number}" for number in range(1, len(deck.plates) + 1)]
 
     def estimate_cells(self) -> int:
@@ -109,39 +102,32 @@ class FlyerTarget(Problem):
         meeting = 0.5 * (states[0][P, -1].mean() + states[1][P, 0].mean())
         return {**row, "contact_pressure": float(meeting)}
 
-    def find_numbers(self, history) -> dict[str, float]:
-        """What NUMBERS names, as computed; NaN for what the run has not come to."""
-        t, trace, theory = history["t"], history["free_surface_speed"], self.theory
+    def report(self, history, final=None) -> Report:
+        deck, theory, trace = self.deck, self.theory, history["free_surface_speed"]
+        first, t, parted = deck.plates[0], history["t"], history["contacts_opened"] > 0
         # a contact that a step has made was there at its start
         impact = find_time(history, np.append(history["contacts_made"][1:] > 0, False))
-        early = (t > impact) & (t < impact + 0.7 * theory.back)
+        pressure = history["contact_pressure"][(t > impact) & (t < impact + 0.7 * theory.back)]
         late = (t > max(theory.out, 0.5 * (theory.out + theory.end))) & (t < theory.end)
         risen = np.maximum.accumulate(trace) > 0.98 * theory.free
         fallen = risen & (t > theory.out) & (trace < 0.98 * theory.free)
-        return {
-            "impact": impact,
-            "pressure": median(history["contact_pressure"][early]),
-            "out": find_time(history, trace > 0.5 * theory.free),
-            "free": median(trace[late]),
-            "end": find_time(history, fallen),
-        }
-
-    def report(self, history, final=None) -> Report:
-        deck, first = self.deck, self.deck.plates[0]
-        found = self.find_numbers(history) if history else dict.fromkeys(NUMBERS, math.nan)
+        out, end = find_time(history, trace > 0.5 * theory.free), find_time(history, fallen)
         rows = [
-            Row(name, found[name], getattr(self.theory, name), *NUMBERS[name], digits=5)
-            for name in self.known
-            if not math.isnan(getattr(self.theory, name))
+            Row("impact", impact, theory.impact, "time of impact [s]", digits=5),
+            Row("pressure", median(pressure), theory.pressure, "pressure [GPa]", 1e9, 5),
+            Row("out", out, theory.out, "shock at the free surface [s]", digits=5),
+            Row("free", median(trace[late]), theory.free, "free surface [m/s]", digits=5),
+            Row("end", end, theory.end, "until the release [s]", digits=5),
         ]
+        rows = [row for row in rows[: 5 if self.is_pair else 2] if not math.isnan(row.theory)]
         plate = f"{first.material} of {1e3 * first.thickness:g} mm at {deck.speed:g} m/s"
         head, notes = f"flyer-target: {plate}, {len(deck.plates)} plates", []
-        if "free" in self.known:
-            notes.append(f"behind the impact both go at {self.theory.u:.5g} m/s")
+        if self.is_pair:
+            notes.append(f"behind the impact both go at {theory.u:.5g} m/s")
         for name in self.names if history else ():
             notes.append(f"{name} goes at {history[f'speed_{name}'][-1]:.5g} m/s in the end")
-        if history and not math.isnan(t := find_time(history, history["contacts_opened"] > 0)):
-            notes.append(f"plates parted first at t = {t:.4g} s")
+        if parted.any():
+            notes.append(f"plates parted first at t = {find_time(history, parted):.4g} s")
         return Report(head, rows, notes)
 
     def draw_flyer_target(self, figure, run_data) -> None:
@@ -149,7 +135,7 @@ class FlyerTarget(Problem):
         (left, right), theory = figure.subplots(1, 2), self.theory
         words = {"free_surface_speed": "computed"}
         draw_columns(left, run_data.history, words, "free surface of the last plate [m/s]", "µs")
-        if "free" in self.known:
+        if self.is_pair:
             end = theory.end if math.isfinite(theory.end) else theory.out
             t = 1e6 * np.array([0.0, theory.out, theory.out, end])
             trace = 0.0, 0.0, theory.free, theory.free

@@ -71,7 +71,7 @@ class Gresho(Problem):
         return {"kinetic_energy": float(energy), "error_velocity": float(error)}
 
     def report(self, history, final=None) -> Report:
-        deck, energy = self.deck, history.get("kinetic_energy", [math.nan])
+        deck, energy = self.deck, history["kinetic_energy"]
         lost = 1.0 - float(energy[-1] / energy[0])
         turns = f", {history['t'][-1] / TURN:.3g} turns" if history else ""
         rows = [

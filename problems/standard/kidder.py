@@ -22,7 +22,7 @@ from hydro.boundary import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
 from problems.initial_states import put_walls
-from problems.pictures import draw_field
+from problems.pictures import draw_field, make_panels
 from problems.problem import Problem, Report, compare, get_last
 from problems.references.exact_flows import RADII, Shell
 from regrid.errors import BadInput
@@ -117,8 +117,7 @@ class Kidder(Problem):
 
     def draw_kidder(self, figure, run_data) -> None:
         """Shell at the start, on the way and at the end; radii over time; how far they are off."""
-        figure.set_size_inches(11.5, 5.0)
-        left, right = figure.subplots(1, 2)
+        left, right = make_panels(figure, 11.5, 5.0, 1, 2)
         dumps, shrink = run_data.dumps, self.shell.compute_shrinking
         high = float(dumps[-1]["shell"].rho.max())
         middle = min(dumps, key=lambda dump: abs(shrink(dump.t) - 0.75))

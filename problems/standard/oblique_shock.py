@@ -18,7 +18,7 @@ from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.pictures import draw_field
+from problems.pictures import draw_field, make_panels
 from problems.problem import Problem, Report, compare, find_crossing
 from problems.references.shock_polars import Body, ShockPolar, search_pressure, solve_collision
 from regrid.errors import BadInput
@@ -74,12 +74,9 @@ class ObliqueShock(Problem):
         return self.deck.cells * round(0.8 * self.deck.cells)
 
     def build(self):
-        deck, gas, state = (
-            self.deck,
-            IdealGas(self.deck.gamma),
-            (1.0, self.deck.mach, 0.0, self.ahead),
-        )
-        block = Block("gas", gas, self.make_grids()["gas"], *state, limiter=deck.limiter)
+        deck, state = self.deck, (1.0, self.deck.mach, 0.0, self.ahead)
+        gas, nodes = IdealGas(deck.gamma), self.make_grids()["gas"]
+        block = Block("gas", gas, nodes, *state, limiter=deck.limiter)
         for side in ("i_min", "j_max"):
             put(block, side, "inflow", state=state)
         put(block, "i_max", "outflow")
@@ -115,8 +112,7 @@ class ObliqueShock(Problem):
 
     def draw_oblique_shock(self, figure, run_data) -> None:
         """Pressure with the grid and the exact shock, and pressure along the wall."""
-        figure.set_size_inches(11.5, 4.6)
-        left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
+        left, right = make_panels(figure, 11.5, 4.6, 1, 2, width_ratios=(1.3, 1.0))
         dump, end = run_data.dumps[-1], LENGTH * math.tan(self.beta)
         draw_field(left, dump, "p", every=5, bar="pressure [Pa]")
         left.plot((0.0, LENGTH), (0.0, end), "r--", lw=1.5, zorder=5, label="exact shock")

@@ -26,7 +26,7 @@ from hydro.links import join
 from hydro.sources import make_gravity
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
 from problems.initial_states import put_walls
-from problems.pictures import draw_columns, draw_field, spread_dumps
+from problems.pictures import draw_columns, draw_field, make_panels, spread_dumps
 from problems.problem import Problem, Report, Row, compare
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
@@ -94,10 +94,8 @@ class RayleighTaylor(Problem):
 
     def make_grids(self, t=0.0):
         x = np.linspace(0.0, 0.5, max(4, self.deck.cells // 2) + 1)[:, None]
-        part, front = (
-            np.linspace(0.0, 1.0, self.deck.cells + 1),
-            self.amplitude * np.cos(WAVE_NUMBER * x),
-        )
+        part = np.linspace(0.0, 1.0, self.deck.cells + 1)
+        front = self.amplitude * np.cos(WAVE_NUMBER * x)
         heights = {"light": -1.0 + (front + 1.0) * part, "heavy": front + (1.0 - front) * part}
         shown = heights if self.heavy else ("light",)
         return {name: np.array(np.broadcast_arrays(x, heights[name])) for name in shown}
@@ -140,9 +138,9 @@ class RayleighTaylor(Problem):
         return math.pi * (change.size - 1) / float(zeros[-1] - zeros[0])
 
     def report(self, history, final=None) -> Report:
-        rate = self.find_rate(history["t"], history["amplitude"]) if history else math.nan
+        rate = self.find_rate(history["t"], history["amplitude"])
         what = "growth rate [1/s]" if self.grows else "angular frequency [1/s]"
-        mean = history.get("interface_mean", np.zeros(1))
+        mean = history["interface_mean"]
         head = f"rayleigh-taylor, {self.deck.above} above, {self.deck.cells} cells per wavelength"
         row = Row("rate", rate, self.exact, what, digits=7, error="rate")
         rows = [row, compare(history, "amplitude", label="last amplitude [m]", digits=4)]
@@ -151,8 +149,7 @@ class RayleighTaylor(Problem):
 
     def draw_growth(self, figure, run_data) -> None:
         """Amplitude against theory, the interface, and the velocity upwards with the grid."""
-        figure.set_size_inches(12.0, 4.6)
-        left, middle, right = figure.subplots(1, 3, width_ratios=(1.5, 1.2, 0.9))
+        left, middle, right = make_panels(figure, 12.0, 4.6, 1, 3, width_ratios=(1.5, 1.2, 0.9))
         t = run_data.history["t"]
         draw_columns(left, run_data.history, {"amplitude": "computed"}, "amplitude [m]")
         theory, name = (np.cosh, "cosh(rate t)") if self.grows else (np.cos, "cos(omega t)")

@@ -100,7 +100,7 @@ class Saltzmann(Problem):
     def report(self, history, final=None) -> Report:
         deck, rows = self.deck, []
         for n, (*_, exact) in enumerate(PHASES, 1):
-            for last in np.flatnonzero(np.isfinite(history.get(f"mean_error_{n}", [])))[-1:]:
+            for last in np.flatnonzero(np.isfinite(history[f"mean_error_{n}"]))[-1:]:
                 when = f"density {exact:g}, t = {history['t'][last]:.3f}"
                 for kind, words in KINDS.items():
                     name, label = f"{kind}_error_{n}", f"{when}: {words} [%]"

@@ -93,7 +93,7 @@ class Sedov(Problem):
         return {**found, "error_rho": self.flow.measure_error(block, exact)}
 
     def report(self, history, final=None) -> Report:
-        deck, energy = self.deck, np.asarray(history.get("total_energy", [math.nan]))
+        deck, energy = self.deck, history["total_energy"]
         t = get_last(history, "t") if history else self.t_end
         jump = (deck.gamma + 1.0) / (deck.gamma - 1.0)
         change = float(np.abs(energy / energy[0] - 1.0).max())

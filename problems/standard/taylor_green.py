@@ -20,7 +20,7 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import make_box, put_walls
-from problems.pictures import draw_field, find_dump
+from problems.pictures import draw_field, find_dump, make_panels
 from problems.problem import Problem, Report, compare
 from problems.references import taylor_green
 from regrid.measure.corners import compute_centres
@@ -77,8 +77,7 @@ class TaylorGreen(Problem):
 
     def draw_taylor_green(self, figure, run_data) -> None:
         """Pressure with the grid at two times and the velocity's error in the last dump."""
-        figure.set_size_inches(13.0, 4.2)
-        *panels, right = figure.subplots(1, 3)
+        *panels, right = make_panels(figure, 13.0, 4.2, 1, 3)
         last, every = run_data.dumps[-1], max(1, self.deck.cells // 16)
         options = {"every": every, "title": "t"}
         for axis, part in zip(panels, (0.25, 1.0), strict=True):

@@ -24,7 +24,7 @@ from hydro.links import join
 from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import make_box, put_walls
-from problems.pictures import draw_field, draw_grid
+from problems.pictures import draw_field, draw_grid, make_panels
 from problems.problem import Problem, Report, Row, average_plateau, get_last
 from problems.references.riemann import solve_riemann
 from regrid.errors import BadInput
@@ -115,7 +115,7 @@ class TriplePoint(Problem):
             for side, rho in (("l", exact.rho_left), ("r", exact.rho_right)):
                 values = {"rho": rho, "u": exact.u, "p": exact.p}
                 stars |= {f"{q}_{name}_{side}": float(value) for q, value in values.items()}
-        known = np.isfinite([history[name] for name in stars]).all(axis=0) if history else []
+        known = np.isfinite([history[name] for name in stars]).all(axis=0)
         last = int(np.flatnonzero(known)[-1]) if np.any(known) else None
         for name, theory in stars.items():
             q, gas, side = name.split("_")
@@ -123,7 +123,7 @@ class TriplePoint(Problem):
             found = math.nan if last is None else float(history[name][last])
             rows.append(Row(name, found, theory, label, digits=5))
         off = [abs(row.difference) for row in rows if row.name[0] in "pu"]
-        masses = [np.asarray(history.get(f"total_mass_{name}", [math.nan])) for name in GASES]
+        masses = [history[f"total_mass_{name}"] for name in GASES]
         lost = max(float(np.ptp(mass) / mass[0]) for mass in masses)
         rows += [Row("star", max(off), error="star"), Row("mass", lost, error="mass")]
         head = f"triple-point, {self.deck.cells} cells in a length of 1"
@@ -137,8 +137,7 @@ class TriplePoint(Problem):
         """Density with the contacts, and the grid around the vortex, at the end."""
         dump = run_data.dumps[-1]
         lines = dump["top"].nodes[:, :, 0], dump["left"].nodes[:, -1, :]
-        figure.set_size_inches(9.0, 6.6)
-        top, below = figure.subplots(2, 1, sharex=True, sharey=True)
+        top, below = make_panels(figure, 9.0, 6.6, 2, 1, sharex=True, sharey=True)
         density = lambda block: np.log10(block.rho)  # noqa: E731
         picture = draw_field(top, dump, density, lines=lines, title="t")
         figure.colorbar(picture, ax=(top, below), shrink=0.6, label="log10 of density in kg/m3")

@@ -31,7 +31,7 @@ from hydro.simulation import Simulation
 from hydro.workers import count_processors
 from problems.deck import Output
 from problems.evolution import Evolution, State
-from problems.problem import Problem, Watched
+from problems.problem import Problem
 from problems.problem_file import read_problem_file
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck, resolve_deck
@@ -50,7 +50,7 @@ class World:
     def __init__(self, comm: Any):
         self.comm, self.size = comm, int(comm.size)
         self.ranks: Ranks | None = None
-        self._watched: Watched | None = None
+        self._reads_cells = True  # does the problem measure inside blocks?
         self._beginning = False
         self._sent: str | None = None  # the deck that all ranks build
 
@@ -84,16 +84,16 @@ class World:
         shares = share_evolution(evolution, self.size, deck.deck.run.cut)
         state = evolution.get_state() if restored else {}
         self.build(deck)
-        self._watched = problem.watch(evolution)
+        self._reads_cells = problem.reads_cells
         self._beginning = True
         tell(self.comm, BEGIN)
-        _, self.ranks = share_flow(self.comm, evolution, (shares, self._watched or {}), state)
+        _, self.ranks = share_flow(self.comm, evolution, shares, state)
         self._beginning = False
         return describe_shares([block.name for block in evolution.blocks], shares, self.size)
 
     def measuring(self) -> contextlib.AbstractContextManager[None]:
-        """For the block in which a problem measures: no more is collected than it watches."""
-        if self.ranks is None or self._watched is None:
+        """For the block in which a problem measures: no more is collected than it reads."""
+        if self.ranks is None or self._reads_cells:
             return contextlib.nullcontext()
         return self.ranks.glance()
 
@@ -105,7 +105,7 @@ class World:
 
 
 def share_flow(
-    comm: Any, built: Any, shared: tuple[Shares, Watched] | None = None, state: State = EMPTY
+    comm: Any, built: Any, shared: Shares | None = None, state: State = EMPTY
 ) -> tuple[Simulation, Ranks]:
     """An evolution that each rank has built, with the first one's state, and the ranks that share
     it.
@@ -113,7 +113,7 @@ def share_flow(
     shared, state: what the first rank says; state: its own, empty where all have the same.  Raises
     what has failed in building it here alone.
     """
-    shares, watched = comm.bcast(shared, root=0)
+    shares = comm.bcast(shared, root=0)
     if isinstance(built, Exception):
         raise built
     if not isinstance(built, Simulation):
@@ -122,7 +122,7 @@ def share_flow(
     taken = {key: comm.bcast(state.get(key), root=0) for key in keys}  # array by array
     if taken and shared is None:
         built.set_state(taken)
-    ranks = Ranks(comm, built.blocks, *shares, watched)
+    ranks = Ranks(comm, built.blocks, *shares)
     built.spread(ranks, count_own_processors(comm))
     return built, ranks
 

@@ -1,6 +1,6 @@
 """Past runs that foretell others, and how well the cost of ten decks is foretold.
 
-    python benchmarks/forecast_table.py past     runs/forecast/past_runs.json anew: small runs
+    python benchmarks/forecast_table.py past     runs/past_runs.json anew: small runs
     python benchmarks/forecast_table.py judge    docs/results/forecast.json anew: ten other runs
 
 The runs that are judged have other cells than those of the table.  What is foretold at a tenth, a
@@ -27,7 +27,7 @@ sys.path.insert(0, str(ROOT))
 
 from hydro.clock import START_FACTORS  # noqa: E402
 from runs.deck.reading import read_deck  # noqa: E402
-from runs.forecast.cost import (  # noqa: E402
+from runs.forecast import (  # noqa: E402
     DELIVERED,
     TimeLeft,
     drop_events,
@@ -99,9 +99,8 @@ def make_past(deck: str, setting: str, folder: Path) -> Any:
     size = measure_size(data.problem, None, data.dumps[0].blocks)
     row = data.history
     first_dt = float(row["dt"][1]) / START_FACTORS[0]
-    flow = name_flow(read.problem, read.deck)
-    last = data.dumps[0].t_end
-    past = make_past_run(flow, size.cells, last, size.finest, first_dt, row)
+    size = dataclasses.replace(size, t_end=data.dumps[0].t_end)
+    past = make_past_run(name_flow(read.problem, read.deck), size, first_dt, row)
     return msgspec.structs.replace(past, seconds=0.0)
 
 
@@ -119,16 +118,16 @@ def judge(deck: str, setting: str, folder: Path) -> dict[str, Any]:
     past = find_past(name_flow(read.problem, read.deck), size.cells, own=False)
     t, seconds = history["t"][1:], history["seconds_step"][1:].copy()
     seconds[0] = np.median(seconds)  # loading kernels
-    wall = np.cumsum(drop_events(np.ones(len(seconds)), seconds))
-    left, found = TimeLeft(size.t_end, past.course if past else None), {}
+    wall = np.cumsum(drop_events(seconds))
+    left, found = TimeLeft(size.t_end, past.course if past else ()), {}
     waiting = [share * wall[-1] for share in SHARES]
     for number, (now, when) in enumerate(zip(t, wall, strict=True), start=1):
         left.note(number, float(now), float(when))
         if waiting and when >= waiting[0]:
             share = SHARES[len(SHARES) - len(waiting)]
-            forecast = left.foretell(number, float(now), float(when))
+            low, likely, high = left.foretell(number, float(now), float(when))
             waiting.pop(0)
-            ends = forecast.seconds, forecast.low, forecast.high
+            ends = likely, low, high
             found[f"{share:.0%}"] = [round(float((when + end) / wall[-1]), 3) for end in ends]
     return {
         "deck": f"{deck}, {setting}",

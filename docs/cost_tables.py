@@ -3,7 +3,7 @@
 cost judged     steps and wall time of runs, foretold over real, from results/forecast.json
 cost sizes      memory and dumps, foretold and real, of the same runs
 cost rules      the rules of the verdict
-cost meanings   what a cell that sets the step may mean, and the settings that have helped
+cost meanings   where the cell that sets the step lies, and the settings that have helped
 """
 
 from __future__ import annotations
@@ -64,10 +64,7 @@ def _list_sizes() -> list[str]:
 
 
 def _list_rules() -> list[str]:
-    rows = [
-        [rule.name, rule.meaning, f"{'below' if rule.below else 'above'} {rule.limit:g}"]
-        for rule in RULES
-    ]
+    rows = [[rule.name, rule.meaning, f"above {rule.limit:g}"] for rule in RULES]
     rows.append(["cautions", "sentences of the problem on this deck and run", "above 0"])
     return make_table(["rule", "what is measured", "reported"], rows)
 

@@ -253,9 +253,9 @@ def fill_causes(arguments: str) -> list[str]:
     """Causes of early ends: what is seen, why, what has helped."""
     rows = []
     for cause in ENDS.values():
-        helped = "; ".join(f"{one.described}: {one.words}" for one in cause.settings)
-        rows.append([cause.says, cause.means, helped or "-", cause.advice or "-"])
-    return make_table(["message or symptom", "cause", "settings that have helped", "else"], rows)
+        helped = "; ".join(one.described for one in cause.settings)
+        rows.append([cause.name, cause.means, helped or "-", cause.advice or "-"])
+    return make_table(["ended early", "cause", "settings that have helped", "else"], rows)
 
 
 KINDS = {

@@ -285,14 +285,6 @@ class Problem:
         """
         return []
 
-    def count_cells_a_wave(self) -> dict[str, float]:
-        """Cells in a wave of each mode that the deck begins with, by its name; {} without modes."""
-        return {}
-
-    def list_wave_cautions(self) -> list[str]:
-        """Those of the `cautions` that say that `count_cells_a_wave` is too small."""
-        return []
-
     def say_restart(self, directory: str) -> str:
         """The command that continues a stopped run in `directory`, quoted for a shell."""
         return f"shockgrid restart {directory}"

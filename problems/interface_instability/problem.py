@@ -46,7 +46,7 @@ from problems.interface_instability.report import (
     draw_spectrum,
     make_report,
 )
-from problems.interface_instability.theories import find_cautions, sort_deck
+from problems.interface_instability.theories import find_cautions
 from problems.problem import BlockPlan, Problem, Report
 from problems.references.hugoniot import (
     Shock,
@@ -528,17 +528,11 @@ class InterfaceInstability(Problem):
             "far_transverse_speed": max(evolution.measured)[0],
         }
 
-    def count_cells_a_wave(self) -> dict[str, float]:
-        return {f"mode {mode.number}": self.deck.cells / mode.number for mode in self.harmonics}
-
     def report(self, history, final=None) -> Report:
         return make_report(self, history)
 
     def cautions(self, history=None) -> list[str]:
         return find_cautions(self, history)
-
-    def list_wave_cautions(self) -> list[str]:
-        return sort_deck(self)[0] if self.harmonics else []
 
     def figures(self):
         found = {"growth": functools.partial(draw_growth, self)}

@@ -95,7 +95,7 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
     checked = deck_reading.read_deck(deck, _with_threads(settings, threads))
     if dry_run:
         from regrid.jit import interpreted
-        from runs.forecast.cost import foretell, measure_size
+        from runs.forecast import foretell, measure_size
         from runs.inspection.listing import describe_plan
         from runs.march.launching import check_deck_fully
         from runs.ranks.map import describe_map
@@ -105,7 +105,8 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
         check_deck_fully(checked, problem)
         echo(describe_plan(checked))
         with interpreted():
-            echo("\n".join(foretell(checked, output)))
+            lines, cautions = foretell(checked, problem, None, output)
+            echo("\n".join([*lines, *cautions]))
             if count := ranks or getattr(_find_world(), "size", None):
                 size = measure_size(problem)
                 echo("\n".join(describe_map(size.blocks, count, checked.deck.run.cut)))

@@ -4,56 +4,71 @@ Nothing that goes wrong in here may hide the sentence: each part is made by itse
 cannot be made is reported in its place.
 
 What happened there is measured on the outlines of the last dump: two places of one outline that are
-near each other, but far along it, have thin material between them, or a gap.  Below MET of the
-distance of neighbouring nodes no grid resolves what lies between.
+near each other, but far along it, have thin material between them, or a gap.
 """
 
 from __future__ import annotations
 
 import contextlib
+import re
 import shlex
+import textwrap
 import tomllib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.patches import Polygon, Rectangle
 
 from regrid.errors import BadInput, Place, RunFailure
 from regrid.measure.quality import compute_corner_areas
-from regrid.sides import get_side
+from regrid.sides import get_side, trace_outline
 from runs.deck.checking import is_runtime_key
 from runs.deck.reading import ReadDeck, resolve_deck
 from runs.early_end.causes import ENDS, Cause
+from runs.inspection.account import pick_prefix
+from runs.pictures.command import new_figure, save
+from runs.pictures.fields import (
+    View,
+    choose_colours,
+    draw_panel,
+    find_extent,
+    find_range,
+    make_sheets,
+)
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state
 from runs.store.files import write_atomically
 from runs.store.history import read_history
+from runs.store.reader import RunData
 
-MET = 0.1  # distances of neighbouring nodes: lines as near as this have met
+MET = 0.1  # distances of neighbouring nodes: what is thinner no grid resolves
 DETOUR = 6.0  # times their distance: two places of an outline less far apart along it are one
 NEAR = 10  # distances of neighbouring nodes from the place that failed
 CALM = 0.3  # of the usual dt: with less a run is in trouble already
 SHOWN = 3  # settings
+AROUND = 5  # cells on each side of the marked one in the picture
+MOST_SHOWN = 0.3  # of the longer side of the domain: half a window at most
+MARK = "tab:red"
 
 
-@dataclass(frozen=True)
+@dataclass
 class EarlyEnd:
-    """What was left of a run that ended early; None and () for what could not be made.
+    """What was left of a run that ended early; None and [] for what could not be made.
 
     picture: path of early-end.png; point: step of the restart point to go back to; settings: words
     for `--set`, the best first; commands: one for each of them; lines: all of it as words.
     """
 
-    directory: Path
-    cause: str
     picture: Path | None = None
     point: int | None = None
-    settings: tuple[str, ...] = ()
-    commands: tuple[str, ...] = ()
-    lines: tuple[str, ...] = ()
+    settings: list[str] = field(default_factory=list)
+    commands: list[str] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
 
 
 def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restart: str) -> EarlyEnd:
@@ -62,60 +77,50 @@ def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restar
     restart: the command that continues the run.  The failure gets what was made as its
     `early_end`, and the words as its notes.  Raises nothing that is an Exception.
     """
-    from runs.store.reader import RunData  # not at the start of every run
+    cause, place = ENDS.get(failure.cause, Cause("", "")), failure.place
+    end = failure.early_end = EarlyEnd()
 
-    cause, made, lines = ENDS.get(failure.cause), {}, []
+    def say(head: str, words: str) -> None:
+        end.lines += [f"{head}: {words.replace('`', '')}"] if words else []
 
-    def measure() -> str:
+    def measure() -> None:
         outputs = RunData(directory.path).outputs
-        return describe_event(outputs[-1].blocks, failure.place) if outputs else ""
+        say("what happened there", describe_event(outputs[-1].blocks, place) if outputs else "")
 
-    def draw() -> Path:
-        from runs.early_end.picture import draw_early_end
+    def choose_point() -> None:
+        end.point = find_calm_point(directory)
 
-        title = str(failure).partition("; last restart point is")[0]
-        title = title.partition("; there is no restart point yet")[0]
-        run = RunData(directory.path)
-        marked = find_marked(run.outputs[-1].blocks, failure.place)
-        return draw_early_end(run, title, failure.place, marked, made["point"])
+    def list_commands() -> None:
+        told = list_settings(cause, deck)[:SHOWN]
+        end.settings = [setting for setting, _ in told]
+        end.commands = [make_command(s, directory, deck, restart, end.point) for s in end.settings]
+        end.lines += ["what has helped in such runs:"] * bool(told)
+        for command, (_, words) in zip(end.commands, told, strict=True):
+            end.lines.append(f"  {command}   ({words})")
 
-    def attempt(part: Callable[[], Any], otherwise: str) -> Any:
+    def draw() -> None:
+        title = re.split("; last restart point is|; there is no restart point yet", str(failure))[0]
+        end.picture = draw_early_end(RunData(directory.path), title, place, end.point)
+        end.lines.append(f"picture of the place: {end.picture}")
+
+    say("what it means", cause.means)
+    parts: dict[str, Callable[[], None]] = {
+        "the outlines could not be measured": measure,
+        "no restart point could be chosen": choose_point,
+        "settings that have helped could not be looked up": list_commands,
+        "no picture of the place could be made": draw,
+    }
+    for otherwise, part in parts.items():
         try:
-            return part()
+            part()
         except Exception as error:  # whatever it is: the sentence comes first
-            lines.append(f"{otherwise}: {str(error).partition(chr(10))[0] or type(error).__name__}")
-            return None
-
-    if cause is not None:
-        lines.append(f"what it means: {cause.means.replace('`', '')}")
-    if event := attempt(measure, "the outlines could not be measured"):
-        lines.append(f"what happened there: {event}")
-    made["point"] = attempt(lambda: find_calm_point(directory), "no restart point could be chosen")
-    settings = attempt(
-        lambda: list_settings(cause, deck)[:SHOWN],
-        "settings that have helped could not be looked up",
-    )
-    if settings:
-        made["settings"] = tuple(one for one, _ in settings)
-        made["commands"] = tuple(
-            make_command(one, directory, deck, restart, made["point"]) for one in made["settings"]
-        )
-        lines.append("what has helped in such runs:")
-        lines += [
-            f"  {command}   ({words})"
-            for command, (_, words) in zip(made["commands"], settings, strict=True)
-        ]
-    if picture := attempt(draw, "no picture of the place could be made"):
-        made["picture"] = picture
-        lines.append(f"picture of the place: {picture}")
-    if cause is not None and cause.advice:
-        lines.append(f"what else can be done: {cause.advice.replace('`', '')}")
-    failure.early_end = EarlyEnd(directory.path, failure.cause, **made, lines=tuple(lines))
-    for line in lines:
+            say(otherwise, str(error).partition("\n")[0] or type(error).__name__)
+    say("what else can be done", cause.advice)
+    for line in end.lines:
         failure.add_note(line)
     with contextlib.suppress(BadInput, OSError):
-        write_atomically(directory.early_words, "\n".join([str(failure), *lines]) + "\n")
-    return failure.early_end
+        write_atomically(directory.early_words, "\n".join([str(failure), *end.lines]) + "\n")
+    return end
 
 
 def find_calm_point(directory: RunDirectory) -> int | None:
@@ -126,36 +131,31 @@ def find_calm_point(directory: RunDirectory) -> int | None:
     """
     points = []
     for step, path in directory.list_points():
-        try:
+        with contextlib.suppress(BadInput):  # torn
             points += [step] if has_state(path) else []
-        except BadInput:  # torn
-            continue
-    if not points:
-        return None
     history = read_history(directory.history)
-    steps, dt = history.get("step"), history.get("dt")
-    if steps is None or dt is None or len(steps) < 2:
-        return points[-1]
-    retries = history.get("retries", np.zeros(len(steps)))
-    calm = steps[(dt >= CALM * float(np.nanmedian(dt))) & ~(retries > 0)]
-    last = int(calm[-1]) if len(calm) else points[0]
-    return max((s for s in points if s <= last and s < int(steps[-1])), default=points[0])
+    steps, dt = history.get("step", ()), history.get("dt")
+    if not points or dt is None or len(steps) < 2:
+        return points[-1] if points else None
+    retried = history.get("retries", np.zeros(len(steps))) > 0
+    calm = steps[(dt >= CALM * float(np.nanmedian(dt))) & ~retried]
+    last = min(calm[-1] if len(calm) else points[0], steps[-1] - 1)
+    return max((step for step in points if step <= last), default=points[0])
 
 
-def list_settings(cause: Cause | None, deck: ReadDeck) -> list[tuple[str, str]]:
+def list_settings(cause: Cause, deck: ReadDeck) -> list[tuple[str, str]]:
     """(`key=value`, what it does) of the settings of a cause that this deck can take."""
     found = []
-    for setting in cause.settings if cause else ():
+    for setting in cause.settings:
         present: Any = msgspec.to_builtins(deck.deck)
         for name in setting.key.split("."):
             present = present.get(name) if isinstance(present, dict) else None
-        if (value := setting.choose(present)) is None:
-            continue
-        words = f"{setting.key}={value}"
+        words = f"{setting.key}={setting.choose(present)}"
         with contextlib.suppress(BadInput):  # not for this problem, or with this deck
             table = tomllib.loads(deck.to_toml())
-            resolve_deck(table, deck.origin, (words,), deck.file).make_problem()
-            found.append((words, setting.words))
+            if setting.choose(present) is not None:
+                resolve_deck(table, deck.origin, (words,), deck.file).make_problem()
+                found.append((words, setting.words))
     return found
 
 
@@ -174,8 +174,6 @@ def make_command(
 def describe_event(blocks: Sequence, place: Place | None) -> str:
     """A sentence on the thinnest layer, neck or gap where it failed; "" where none is thin.
 
-    Where one of a layer's sides is a seam inside one material, that is said: no material is cut.
-
     blocks: with `name` and `nodes` (2, ni + 1, nj + 1) [m]; without a place all are looked at.
     """
     named = [block for block in blocks if place is not None and block.name == place.block]
@@ -183,110 +181,65 @@ def describe_event(blocks: Sequence, place: Place | None) -> str:
     for block in named or blocks:
         cell = find_cell(block.nodes, place) if named else None
         centre = None if cell is None else block.nodes[:, cell[0], cell[1]]
-        event = find_thinnest(block.nodes, centre)
-        found += [(event, block.name)] if event is not None else []
-    (share, width, sides, x, y, inside), name = min(
-        found, key=lambda one: one[0][0], default=((np.inf, 0.0, ("", ""), 0.0, 0.0, False), "")
-    )
+        found.append((*find_narrowest(block.nodes, centre), block.name))
+    share, width, (one, other), (x, y), name = min(found, key=lambda one: one[0])
     if share > MET:
         return ""
-    size = f"{width:.3g} m, {share:.2g} of the distance of its nodes, at ({x:.6g}, {y:.6g})"
-    one, other = sides
-    if inside and one == other:
-        return f"block '{name}' is pinched off: between two parts of its side {one} it is {size}"
-    if inside and (seam := _find_seam(blocks, name, sides, x, y)) is not None:
-        side, neighbour = seam
-        return (
-            f"side {other if side == one else one} of block '{name}' has come to its seam with "
-            f"'{neighbour}', of the same material: what is left between them is {size}"
-        )
-    if inside:
-        return f"block '{name}' is a thin layer: between its sides {one} and {other} it is {size}"
-    whose = f"side {one} of '{name}' has" if one == other else f"sides {one} and {other} have"
-    return f"{whose} met {'itself' if one == other else f'outside of {name!r}'}: the gap is {size}"
+    sides = f"two parts of side {one}" if one == other else f"sides {one} and {other}"
+    return (
+        f"between {sides} of block '{name}' {width:.3g} m are left, {share:.2g} of the distance "
+        f"of its nodes, at ({x:.6g}, {y:.6g})"
+    )
 
 
-def _find_seam(blocks, name: str, sides, x: float, y: float) -> tuple[str, str] | None:
-    """The one of two sides whose node nearest to (x, y) lies on another block of the same material,
-    and that block's name."""
-    block = next(block for block in blocks if block.name == name)
-    material = getattr(block, "material", "")
-    for side in sides if material else ():
-        line = get_side(block.nodes, side)
-        node = line[:, [int(np.argmin((line[0] - x) ** 2 + (line[1] - y) ** 2))]]
-        close = 1e-9 * float(np.ptp(line, axis=1).max())
-        for other in blocks:
-            if other.name != name and getattr(other, "material", "") == material:
-                if np.hypot(*(_trace_ring(other.nodes)[0] - node)).min() <= close:
-                    return side, other.name
-    return None
+def find_narrowest(
+    nodes: np.ndarray, centre: np.ndarray | None = None
+) -> tuple[float, float, tuple[str, str], np.ndarray]:
+    """The nearest two places of a block's outline that are far apart along it: their distance over
+    that of neighbouring nodes (infinite where there are none), the same in metres, their sides, and
+    the middle (2,) between them.
 
-
-def find_thinnest(nodes: np.ndarray, centre: np.ndarray | None = None):
-    """The nearest two places of a block's outline that are far apart along it, or None.
-
-    Returns their distance over that of neighbouring nodes, their distance [m], their sides, x, y of
-    the middle between them, and whether that lies inside of the block.  centre (2,): only nodes
-    near it count.
+    centre (2,): only nodes near it count.
     """
-    ring, side = _trace_ring(nodes)
-    way = np.roll(ring, -1, axis=1) - ring
-    steps = np.hypot(*way)
+    ni, nj = (n - 1 for n in nodes.shape[1:])
+    outline = trace_outline(nodes)  # corners are in it twice
+    names = np.repeat(["j_min", "i_max", "j_max", "i_min"], [ni + 1, nj + 1, ni + 1, nj + 1])[:-1]
+    steps = np.hypot(*np.diff(outline, axis=1))
+    long = steps > 0.0
+    ring, way = outline[:, :-1][:, long], np.diff(outline, axis=1)[:, long]
+    names, steps = names[long], steps[long]
     arc = np.concatenate(([0.0], np.cumsum(steps)))
-    spacing, best = np.maximum(steps, np.roll(steps, 1)), None
-    squares = np.maximum((way**2).sum(axis=0), 1e-300)
-    for k in range(ring.shape[1]):
-        here = ring[:, k : k + 1]
-        if centre is not None and np.hypot(*(ring[:, k] - centre)) > NEAR * spacing[k]:
+    spacing = np.maximum(steps, np.roll(steps, 1))
+    best = np.inf, np.inf, ("", ""), np.zeros(2)
+    for k, here in enumerate(ring.T):
+        if centre is not None and np.hypot(*(here - centre)) > NEAR * spacing[k]:
             continue
-        part = np.clip(((here - ring) * way).sum(axis=0) / squares, 0.0, 1.0)
+        part = np.clip(((here[:, None] - ring) * way).sum(axis=0) / steps**2, 0.0, 1.0)
         foot = ring + part * way
-        away = np.hypot(*(foot - here))
+        away = np.hypot(*(foot - here[:, None]))
         along = np.abs(arc[:-1] + part * steps - arc[k])
         along = np.minimum(along, arc[-1] - along)
-        far = (along > DETOUR * away) & (along > spacing[k])
-        if not far.any():
-            continue
-        m = int(np.argmin(np.where(far, away, np.inf)))
-        share = float(away[m] / spacing[k])
-        if best is None or share < best[0]:
-            x, y = 0.5 * (foot[:, m] + ring[:, k])
-            best = share, float(away[m]), (side[k], side[m]), float(x), float(y)
-    if best is None:
-        return None
-    (x0, y0), (x1, y1), (x, y) = ring, np.roll(ring, -1, axis=1), best[3:5]
-    with np.errstate(all="ignore"):
-        crossed = ((y0 > y) != (y1 > y)) & (x < x0 + (y - y0) / (y1 - y0) * (x1 - x0))
-    return (*best, bool(np.count_nonzero(crossed) % 2))
-
-
-def _trace_ring(nodes: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """Nodes (2, n) round a block, each once, and the side of the segment that begins at each."""
-    parts = (
-        ("j_min", nodes[:, :-1, 0]),
-        ("i_max", nodes[:, -1, :-1]),
-        ("j_max", nodes[:, :0:-1, -1]),
-        ("i_min", nodes[:, 0, :0:-1]),
-    )
-    ring = np.concatenate([line for _, line in parts], axis=1)
-    return ring, [name for name, line in parts for _ in range(line.shape[1])]
+        away[(along <= DETOUR * away) | (along <= spacing[k])] = np.inf
+        m = int(away.argmin())
+        if away[m] / spacing[k] < best[0]:
+            sides = str(names[k]), str(names[m])
+            best = away[m] / spacing[k], away[m], sides, 0.5 * (foot[:, m] + here)
+    return best
 
 
 def find_cell(nodes: np.ndarray, place: Place | None) -> tuple[int, int] | None:
     """The cell (i, j) of a block that a place means: for nodes of a side the one beside the first
     of them; None where it names no more than the block."""
-    if place is None:
+    last = np.array(nodes.shape[1:]) - 2
+    if place is None or not (place.cell or (place.side and place.nodes)):
         return None
-    most_i, most_j = (n - 2 for n in nodes.shape[1:])
     if place.cell is not None:
-        i, j = place.cell
-    elif place.side and place.nodes:
-        along = place.nodes[0]
-        i = {"i_min": 0, "i_max": most_i}.get(place.side, along)
-        j = {"j_min": 0, "j_max": most_j}.get(place.side, along)
+        cell = np.array(place.cell)
     else:
-        return None
-    return min(max(i, 0), most_i), min(max(j, 0), most_j)
+        cell = np.full(2, place.nodes[0])
+        cell["ij".index(place.side[0])] = last.max() if place.side.endswith("max") else 0
+    i, j = np.clip(cell, 0, last).tolist()
+    return i, j
 
 
 def find_marked(blocks: Sequence, place: Place | None) -> tuple[Any, tuple[int, int]]:
@@ -301,3 +254,64 @@ def find_marked(blocks: Sequence, place: Place | None) -> tuple[Any, tuple[int, 
     i, j = np.unravel_index(areas[number].argmin(), areas[number].shape)
     cell = find_cell(candidates[number].nodes, place) if named else None
     return candidates[number], cell or (int(i), int(j))
+
+
+def draw_early_end(run: RunData, title: str, place: Place | None, point: int | None) -> Path:
+    """Write DIR/early-end.png from the last dump of `run`; returns its path.
+
+    The place with its grid, the whole domain, dt over the steps with those retried and the restart
+    point of step `point`.  A failure without a cell is marked at the smallest.  Raises BadInput
+    where the disk is full.
+    """
+    figure, dump = new_figure(), run.outputs[-1]
+    figure.set_size_inches(13.0, 6.8)
+    figure.suptitle(textwrap.fill(title, 190), fontsize=9, x=0.01, ha="left")
+    left, right = figure.subfigures(1, 2, width_ratios=(1.35, 1.0))
+    near = left.subplots()
+    whole, below = right.subplots(2, 1, height_ratios=(1.25, 1.0))
+    block, (i, j) = find_marked(dump.blocks, place)
+    named = place is not None and place.block == block.name and find_cell(block.nodes, place)
+    known = dump.field_names()
+    name = "rho" if "rho" in known else next(iter(known), "")
+    sheets = make_sheets(dump, [name] if name else [], View())
+    extent = find_extent([sheets])
+    scale, unit = pick_prefix(float(np.abs(extent).max()), "m")
+    part = block.nodes[:, max(i - AROUND, 0) : i + AROUND + 2, max(j - AROUND, 0) : j + AROUND + 2]
+    corners = block.nodes[:, [i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
+    x, y = corners.mean(axis=1)
+    reach = 1.05 * max(np.abs(part[0] - x).max(), np.abs(part[1] - y).max())
+    reach = min(reach, MOST_SHOWN * max(extent[1] - extent[0], extent[3] - extent[2]))
+    window = x - reach, x + reach, y - reach, y + reach
+    words = f"block {block.name!r}, cell i={i}, j={j}{'' if named else ': the smallest'}"
+    for axes, box, title in ((near, window, words), (whole, extent, "the whole domain")):
+        look = choose_colours(dump, name, [find_range(sheets, name, box)]) if name else None
+        draw_panel(axes, sheets, name, look, scale, box)
+        if look:
+            figure.colorbar(ScalarMappable(*look[:2]), ax=axes, label=look[3], shrink=0.9)
+        axes.set_title(title, fontsize=10, color=MARK if axes is near else "k")
+        axes.set(xlabel=f"{dump.axes[0]} [{unit}]", ylabel=f"{dump.axes[1]} [{unit}]")
+        ring = {"markersize": 16, "markeredgewidth": 1.8, "fillstyle": "none", "zorder": 6}
+        axes.plot(x * scale, y * scale, "o", color=MARK, **ring)  # seen however flat the cell is
+    near.add_patch(Polygon(corners.T * scale, fill=False, edgecolor=MARK, linewidth=2.0, zorder=5))
+    if place is not None and place.side and place.nodes:
+        line = get_side(block.nodes, place.side)
+        there = [node for node in place.nodes if node < line.shape[1]]
+        near.plot(*(line[:, there] * scale), "o", markersize=5, color=MARK, zorder=7)
+    box = (window[0] * scale, window[2] * scale), 2 * reach * scale, 2 * reach * scale
+    whole.add_patch(Rectangle(*box, fill=False, edgecolor=MARK, zorder=5))
+    draw_steps(below, run, dump.step, point)
+    return save(figure, run.directory.early_picture, 120)
+
+
+def draw_steps(axes: Any, run: RunData, step: int, point: int | None) -> None:
+    """dt over the steps, those that were retried, the end, the restart point."""
+    steps, dt = run.history.get("step", np.zeros(0)), run.history.get("dt", np.zeros(0))
+    again = run.history.get("retries", np.zeros(len(steps))) > 0
+    axes.semilogy(steps, np.where(dt > 0.0, dt, np.nan), "k-", linewidth=0.9)
+    axes.semilogy(steps[again], dt[again], ".", color=MARK, markersize=4, label="retried")
+    axes.axvline(step, color=MARK, linewidth=1.2, label=f"end, step {step}")
+    if point is not None:
+        axes.axvline(point, color="tab:blue", ls="--", label=f"restart point, step {point}")
+    axes.set(xlabel="step", ylabel="dt [s]")
+    axes.legend(fontsize=8, loc="lower left")
+    axes.grid(alpha=0.3)

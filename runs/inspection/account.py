@@ -1,9 +1,8 @@
 """What a run's history says in words, and the verdict on it: how it ended, what limits trust in it.
 
-Each rule of RULES measures one thing in the history and says from what value on it is reported.  A
-verdict is plain data: `status` ("finished", "stopped", "ended early", "unfinished"), `name` (the
-reason in a word or two), `reason` (its sentence), `trust` (list of what the rules found, each with
-`rule`, `value`, `limit`, `words`), and `dt_trend` (marks of `runs.forecast.step_trend`).
+A verdict is plain data: `status` ("finished", "stopped", "ended early", "unfinished"), `name` (the
+reason in a word or two), `reason` (its sentence), `trust` (list of what RULES found, each with
+`rule`, `value`, `limit`, `words`), and `dt_trend` (marks of `runs.forecast`).
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ History = Mapping[str, np.ndarray]
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 PREFIXED = ("m", "s", "m/s", "Pa", "J", "J/kg", "N")
 HEAD = "caution: "
-WAVES = "cells per wave"
 OWN_REASONS = ("start", "t_end", "end", "dump", "retry")  # of a step's length: no trend
 NONE = np.zeros(0)
 
@@ -41,12 +39,20 @@ def describe_time(t: float, unit: str = "s", digits: int = 6) -> str:
     return f"t = {t:.{digits}g} s" if unit == "s" else f"{t:.{digits}g} {unit}"
 
 
-def describe_seconds(seconds: float) -> str:
-    """A wall time in the unit a person would choose."""
-    if seconds < 100:
-        return f"{seconds:.1f} s" if seconds >= 1 else f"{seconds:.2g} s"
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes} min {rest} s" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"
+def describe_seconds(low: float, high: float | None = None) -> str:
+    """A wall time, or a range, in the unit a person would choose: `34 s`, `6 to 9 min`."""
+    high = low if high is None else high
+    units = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"), (1.0, "s"))
+    size, unit = next((pair for pair in units if high >= 1.5 * pair[0]), units[-1])
+    first, last = (f"{one:.2g}" if one < 100 else f"{one:.0f}" for one in (low / size, high / size))
+    return f"{first} {unit}" if first == last else f"{first} to {last} {unit}"
+
+
+def describe_bytes(number: float) -> str:
+    """A number of bytes in the unit a person would choose."""
+    units = ((1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
+    size, unit = next((pair for pair in units if number >= pair[0]), units[-1])
+    return f"{number / size:.3g} {unit}"
 
 
 def describe_share(share: float) -> str:
@@ -69,16 +75,14 @@ def describe_run(history: History, cells: int, blocks: Sequence[str] = ()) -> li
 
     blocks: their names.
     """
-    drifts = ", ".join(
-        f"{name.replace('_', ' ')} {drift:.1e}" for name, drift in measure_drifts(history).items()
-    )
+    drifts = [f"{n.replace('_', ' ')} {v:.1e}" for n, v in measure_drifts(history).items()]
     lines = (
         ("dt limited by: ", describe_limits(history)),
         ("fastest cell: ", describe_fastest(history, blocks)),
         ("regridding: ", describe_regridding(history)),
         ("", describe_convexity(history)),
-        ("", describe_contacts(history)),
-        ("largest conservation errors: ", drifts),
+        ("contacts: ", describe_contacts(history)),
+        ("largest conservation errors: ", ", ".join(drifts)),
         ("speed: ", describe_speed(history, cells)),
     )
     return [head + words for head, words in lines if words]
@@ -86,27 +90,26 @@ def describe_run(history: History, cells: int, blocks: Sequence[str] = ()) -> li
 
 def describe_limits(history: History) -> str:
     """How often each limiter decided dt."""
-    words = history.get("dt_limit")
-    if words is None or words.dtype.kind != "U":
+    words = history.get("dt_limit", NONE)
+    if words.dtype.kind != "U":
         return ""
     names, counts = np.unique(words[words != ""], return_counts=True)
-    order = np.argsort(-counts)
-    return ", ".join(f"{names[k]} {describe_share(counts[k] / counts.sum())}" for k in order)
+    shares = [describe_share(often) for often in counts / counts.sum()]
+    return ", ".join(f"{names[k]} {shares[k]}" for k in np.argsort(-counts))
 
 
 def describe_fastest(history: History, blocks: Sequence[str]) -> str:
     """Where the cell of largest rate was mostly, and what not waiting for it has saved."""
     over = history.get("fastest_over_limit", NONE)
-    if "fastest_block" not in history or not np.isfinite(over).any():
-        return ""
     known = np.isfinite(over)
-    cells = np.array([history[name][known] for name in ("fastest_block", "fastest_i", "fastest_j")])
+    if not known.any():
+        return ""
+    cells = np.array([history[f"fastest_{name}"][known] for name in ("block", "i", "j")])
     places, counts = np.unique(cells.astype(int), axis=1, return_counts=True)
-    (number, i, j), often = places[:, counts.argmax()], counts.max() / known.sum()
+    number, i, j = places[:, counts.argmax()]
     block = blocks[number] if number < len(blocks) else f"block {number}"
-    told = f"{block}, i={i}, j={j} in {describe_share(often)} of the steps"
-    # a step of the fastest cell's own would have been so many times shorter
-    alone = round(float(np.sum(over[known])))
+    told = f"{block}, i={i}, j={j} in {describe_share(counts.max() / known.sum())} of the steps"
+    alone = round(float(over[known].sum()))  # steps, if none were longer than this cell's own
     if alone > 1.02 * known.sum():
         most = count(int(np.nanmax(history.get("shared_cells", np.zeros(1)))), "cell")
         told += f"; state redistribution in up to {most} ({alone} steps would be needed without it)"
@@ -117,16 +120,14 @@ def describe_regridding(history: History) -> str:
     """Totals of the regridder's work and the worst cells of the run."""
     parts = []
     for name, words, find in (
-        ("regrid_iterations", "iterations", np.nansum),
-        ("regrid_sub_moves", "sub-moves", np.nansum),
-        ("regrid_rescues", "untangling events", np.nansum),
-        ("least_scaled_jacobian", "minimum scaled Jacobian", np.nanmin),
-        ("worst_aspect", "worst aspect ratio", np.nanmax),
+        ("regrid_iterations", "{:.0f} iterations", np.nansum),
+        ("regrid_sub_moves", "{:.0f} sub-moves", np.nansum),
+        ("regrid_rescues", "{:.0f} untangling events", np.nansum),
+        ("least_scaled_jacobian", "minimum scaled Jacobian {:.3g}", np.nanmin),
+        ("worst_aspect", "worst aspect ratio {:.3g}", np.nanmax),
     ):
-        values = history.get(name, NONE)
-        if np.isfinite(values).any():
-            value = find(values)
-            parts.append(f"{int(value)} {words}" if find is np.nansum else f"{words} {value:.3g}")
+        if np.isfinite(history.get(name, NONE)).any():
+            parts.append(words.format(find(history[name])))
     return ", ".join(parts)
 
 
@@ -136,35 +137,32 @@ def describe_contacts(history: History) -> str:
     for name in ("made", "opened"):
         counts = np.nan_to_num(history.get(f"contacts_{name}", NONE))
         if counts.any():
-            first = float(history["t"][np.flatnonzero(counts > 0)[0]])
+            first = float(history["t"][np.argmax(counts > 0)])
             told.append(f"{int(counts.max())} {name}, the first by t = {first:.4g} s")
-    return f"contacts: {'; '.join(told)}" if told else ""
+    return "; ".join(told)
 
 
 def describe_convexity(history: History) -> str:
-    """Whether every cell was convex in every step; if not, how many, in how many steps, since when.
+    """Whether every cell was convex in every step; if not, in how many steps, since when.
 
     Cells at blocks' corners that the sides make triangles are counted apart.  Histories without
     `cells_not_convex` are judged by `least_scaled_jacobian`; "" without both.
     """
-    count_bad, sine = history.get("cells_not_convex"), history.get("least_scaled_jacobian")
-    if count_bad is not None:
-        bad = np.nan_to_num(count_bad) > 0
-    elif sine is not None:
-        bad = sine <= 0.0
-    else:
+    sine = history.get("least_scaled_jacobian")
+    bad = history.get("cells_not_convex", None if sine is None else sine <= 0.0)
+    if bad is None:
         return ""
-    if bad.any():
-        most = "" if count_bad is None else f", at most {count(int(np.nanmax(count_bad)), 'cell')}"
-        since, steps = history["t"][int(np.argmax(bad))], count(int(bad.sum()), "step")
-        return f"NOT CONVEX: in {steps} of {bad.size}, first at t = {since:.6g} s{most}"
-    told = "every cell convex in every step"
-    flat = np.nan_to_num(history.get("cells_triangular", np.zeros(1)))
-    if not flat.any():
-        return told
-    since, most = history["t"][int(np.argmax(flat > 0))], count(int(flat.max()), "triangle")
-    steps = count(int((flat > 0).sum()), "step")
-    return f"{told}; at corners of blocks {most} at most, in {steps}, first at t = {since:.6g} s"
+    flat = np.nan_to_num(history.get("cells_triangular", NONE))
+    words = "every cell convex in every step"
+    for counts in (np.nan_to_num(bad), flat):
+        if counts.any():
+            since = f"first at t = {history['t'][np.argmax(counts > 0)]:.6g} s"
+            steps = count(int((counts > 0).sum()), "step")
+            if counts is not flat:
+                return f"NOT CONVEX: in {steps} of {counts.size}, {since}"
+            most = count(int(flat.max()), "triangle")
+            words += f"; at corners of blocks {most} at most, in {steps}, {since}"
+    return words
 
 
 def measure_drifts(history: History) -> dict[str, float]:
@@ -180,48 +178,40 @@ def compute_drifts(history: History) -> dict[str, np.ndarray]:
     Relative to the largest size of the total; momentum, which may be zero, to the momentum of all
     mass at the speed that all energy would give it.
     """
-
-    def find_largest(values: np.ndarray) -> float:
-        return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
-
+    totals = {
+        name.removeprefix("total_"): values
+        for name, values in history.items()
+        if name.startswith("total_")
+        and values.dtype.kind in "fi" and np.isfinite(values).sum() > 1
+    }  # fmt: skip
+    sizes = {name: float(np.nanmax(np.abs(values))) for name, values in totals.items()}
+    mass = sum(size for name, size in sizes.items() if name.startswith("mass"))
     drifts = {}
-    masses = [find_largest(v) for n, v in history.items() if n.startswith("total_mass")]
-    energy = find_largest(history.get("total_energy", NONE))
-    usual_momentum = float(np.sqrt(2.0 * sum(masses) * energy))
-    for name, values in history.items():
-        if not name.startswith("total_") or values.dtype.kind not in "fi":
-            continue
-        if np.isfinite(values).sum() < 2:
-            continue
-        through = history.get("boundary_" + name.removeprefix("total_"))
-        inside = values - np.nan_to_num(through) if through is not None else values
-        size = find_largest(values)
-        if name.startswith("total_momentum"):
-            size = max(size, usual_momentum)
-        start = inside[np.flatnonzero(np.isfinite(inside))[0]]
-        drifts[name.removeprefix("total_")] = (inside - start) / (size or 1.0)
+    for name, values in totals.items():
+        inside = values - np.nan_to_num(history.get(f"boundary_{name}", np.zeros(len(values))))
+        usual = math.sqrt(2.0 * mass * sizes.get("energy", 0.0)) * name.startswith("momentum")
+        start = inside[np.isfinite(inside)][0]
+        drifts[name] = (inside - start) / (max(sizes[name], usual) or 1.0)
     return drifts
 
 
 def describe_speed(history: History, cells: int) -> str:
     """Cell updates per second of wall time and the share of each phase."""
-    step = history.get("seconds_step", NONE)[2:]  # row 0 is the start; row 1 fills caches
-    total = float(np.nansum(step))
-    if not cells or total <= 0:
-        return ""
-    text = f"{np.isfinite(step).sum() * cells / total / 1e6:.3g} million cell updates per second"
-    shares = [
-        f"{name.removeprefix('seconds_').replace('_', ' ')} "
-        f"{describe_share(float(np.nansum(values[2:])) / total)}"
+    sums = {  # row 0 is the start; row 1 fills caches
+        name.removeprefix("seconds_").replace("_", " "): float(np.nansum(values[2:]))
         for name, values in history.items()
-        if name.startswith("seconds_") and name != "seconds_step"
-    ]
-    return text + (f" ({', '.join(shares)})" if shares else "")
+        if name.startswith("seconds_")
+    }
+    total = sums.pop("step", 0.0)
+    if not cells or total <= 0.0:
+        return ""
+    steps = np.isfinite(history["seconds_step"][2:]).sum()
+    shares = ", ".join(f"{name} {describe_share(part / total)}" for name, part in sums.items())
+    text = f"{steps * cells / total / 1e6:.3g} million cell updates per second"
+    return f"{text} ({shares})" if shares else text
 
 
-def describe_cautions(
-    problem: Problem, history: Mapping[str, np.ndarray] | None = None
-) -> list[str]:
+def describe_cautions(problem: Problem, history: History | None = None) -> list[str]:
     """A line for each of the problem's cautions; a history of one row tells no more than none.
 
     Where a reference that they need cannot be computed, a line says so.
@@ -234,9 +224,7 @@ def describe_cautions(
     return [HEAD + sentence for sentence in dict.fromkeys(sentences)]
 
 
-def describe_own(
-    problem: Problem, history: Mapping[str, np.ndarray], final: Evolution | None = None
-) -> str:
+def describe_own(problem: Problem, history: History, final: Evolution | None = None) -> str:
     """The problem's summary of columns of a history and, where there is one, the final state."""
     try:
         return problem.summary(history, final).strip("\n")
@@ -245,32 +233,30 @@ def describe_own(
 
 
 class Rule(NamedTuple):
-    """What is measured (nan where the run has no such thing), the value above which it is reported.
+    """What is measured (nan where the run has no such thing) of a history and the number of cells,
+    and the value above which it is reported.
 
-    words: with `{value}`, `{share}`; meaning: for the table in the pages; below: reported below it.
+    words: with `{value}`, `{share}`; meaning: for the table in the pages.
     """
 
     name: str
-    measure: Callable[[History, int, Problem | None], float]
+    measure: Callable[[History, int], float]
     limit: float
     words: str
     meaning: str
-    below: bool = False
 
 
-def find_known(history: History, name: str) -> np.ndarray:
-    """The values of a column but for its start, those that are not finite left out."""
-    values = np.asarray(history.get(name, ()), dtype=float)[1:]
-    return values[np.isfinite(values)]
-
-
-def _find_mean(values: np.ndarray) -> float:
-    return float(values.mean()) if values.size else np.nan
-
-
-def _find_most(history: History, name: str) -> float:
+def find_most(history: History, name: str) -> float:
+    """The largest value of a column; nan where none is known."""
     values = history.get(name, NONE)
     return float(np.nanmax(values)) if np.isfinite(values).any() else np.nan
+
+
+def find_mean(history: History, name: str, part: Callable[[np.ndarray], Any]) -> float:
+    """The mean over all steps of what `part` makes of a column; nan where none is known."""
+    values = np.asarray(history.get(name, NONE), dtype=float)[1:]
+    values = values[np.isfinite(values)]
+    return float(np.mean(part(values))) if values.size else np.nan
 
 
 def measure_shrinkage(history: History) -> float:
@@ -282,46 +268,34 @@ def measure_shrinkage(history: History) -> float:
     return float((np.maximum.accumulate(counts) / counts).max()) if counts.size else np.nan
 
 
-def _count_cells_a_wave(problem: Problem | None) -> float:
-    return min((problem.count_cells_a_wave() if problem else {}).values(), default=np.nan)
-
-
 RULES = (
-    Rule("cells not convex",
-         lambda history, cells, problem: _find_most(history, "cells_not_convex"),
+    Rule("cells not convex", lambda history, cells: find_most(history, "cells_not_convex"),
          0.0, "{value:.0f} cells not convex", "most cells in a step that were not convex"),
     Rule("untangling events",
-         lambda history, cells, problem: _find_mean(find_known(history, "regrid_rescues") > 0),
+         lambda history, cells: find_mean(history, "regrid_rescues", lambda n: n > 0),
          0.01, "folded grids untangled in {share} of the steps",
          "steps in which a grid had to be untangled"),
-    Rule("retries",
-         lambda history, cells, problem: _find_mean(find_known(history, "retries") > 0),
+    Rule("retries", lambda history, cells: find_mean(history, "retries", lambda n: n > 0),
          0.02, "{share} of the steps retried", "steps that were repeated with a shorter dt"),
     Rule("first-order faces",
-         lambda history, cells, problem: _find_mean(
-             find_known(history, "first_order_faces")) / (2 * cells or np.nan),
+         lambda history, cells: find_mean(history, "first_order_faces", lambda n: n / (2 * cells)),
          0.01, "{share} of the faces of first order",
          "mean part of the faces that are computed at first order, where second gave no positive "
          "state"),
-    Rule("voids",
-         lambda history, cells, problem: _find_most(history, "voided_cells"),
+    Rule("voids", lambda history, cells: find_most(history, "voided_cells"),
          0.0, "voids in {value:.0f} cells", "most failed cells with a void in a step"),
     Rule("shared cells",
-         lambda history, cells, problem: _find_mean(
-             find_known(history, "shared_cells")) / (cells or np.nan),
+         lambda history, cells: find_mean(history, "shared_cells", lambda n: n / cells),
          0.03, "{share} of the cells redistribute their states",
          "mean fraction of cells too small for the step, with state redistribution"),
-    Rule("dt", lambda history, cells, problem: measure_shrinkage(history),
+    Rule("dt", lambda history, cells: measure_shrinkage(history),
          100.0, "dt fell {value:.3g} times",
          "how many times dt fell below its largest value"),
     Rule("drift",
-         lambda history, cells, problem: max(measure_drifts(history).values(), default=np.nan),
+         lambda history, cells: max(measure_drifts(history).values(), default=np.nan),
          1e-10, "conservation error {value:.1e}",
          "largest relative conservation error of mass, energy or momentum; round-off is below the "
          "limit"),
-    Rule(WAVES, lambda history, cells, problem: _count_cells_a_wave(problem),
-         16.0, "{value:.3g} cells per wave of the shortest mode",
-         "cells per wave of the deck's shortest mode: reported below the limit", True),
 )  # fmt: skip
 
 
@@ -340,36 +314,26 @@ def judge(
     """
     found = []
     for rule in RULES if history else ():
-        value = rule.measure(history, cells, problem)
-        if value < rule.limit if rule.below else value > rule.limit:
+        if (value := rule.measure(history, cells)) > rule.limit:
             words = rule.words.format(value=value, share=describe_share(value))
             found.append({"rule": rule.name, "value": value, "limit": rule.limit, "words": words})
-    if problem is not None:
-        told = history if len(history.get("step", ())) > 1 else None
-        sentences = dict.fromkeys(describe_cautions(problem, told))
-        if any(one["rule"] == WAVES for one in found):  # told already
-            for sentence in problem.list_wave_cautions():
-                sentences.pop(HEAD + sentence, None)
-        if number := len(sentences):
-            words = f"{count(number, 'caution')} of the problem"
-            found.append({"rule": "cautions", "value": number, "limit": 0, "words": words})
+    if problem is not None and (number := len(describe_cautions(problem, history))):
+        words = f"{count(number, 'caution')} of the problem"
+        found.append({"rule": "cautions", "value": number, "limit": 0, "words": words})
     if status != "ended early":
         name = reason.partition(" = ")[0].partition(",")[0]
-    trend = [dict(mark) for mark in dt_trend]
-    verdict = {"status": status, "name": name or "failed", "reason": reason}
-    return {**verdict, "trust": found, "dt_trend": trend}
+    return {
+        "status": status, "name": name or "failed", "reason": reason, "trust": found,
+        "dt_trend": [dict(mark) for mark in dt_trend],
+    }  # fmt: skip
 
 
 def describe_verdict(verdict: Mapping[str, Any]) -> str:
     """The verdict in one line."""
-    status, reason = str(verdict["status"]), str(verdict["reason"]).splitlines()
-    head = status
-    if status == "ended early":
-        head = f"{status}, {verdict['name']}"
-    elif status != "finished" and reason:
-        said = reason[0].startswith(status)  # such as "stopped by SIGTERM"
-        head = reason[0] if said else f"{status}, {reason[0]}"
-    words = [str(one["words"]) for one in verdict["trust"]]
-    if not words:
-        return f"verdict: {head}; no warnings"
-    return f"verdict: {head}; warnings: {', '.join(words)}"
+    head, reason = str(verdict["status"]), str(verdict["reason"]).partition("\n")[0]
+    if head == "ended early":
+        head = f"{head}, {verdict['name']}"
+    elif head != "finished" and reason:  # which may begin so: "stopped by SIGTERM"
+        head = reason if reason.startswith(head) else f"{head}, {reason}"
+    words = ", ".join(str(one["words"]) for one in verdict["trust"])
+    return f"verdict: {head}; {f'warnings: {words}' if words else 'no warnings'}"

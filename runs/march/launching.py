@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from operator import attrgetter
-from pathlib import Path
 
 from hydro.history import compute_chosen_columns, find_columns
 from hydro.simulation import Simulation
@@ -15,7 +14,7 @@ from regrid.errors import BadInput
 from regrid.jit import interpreted
 from runs.deck.checking import is_runtime_key, list_runtime_keys, show
 from runs.deck.reading import ReadDeck, parse_value
-from runs.forecast.cost import check_disk, describe_cost, estimate_cost
+from runs.forecast import foretell
 from runs.gauges import make_gauges
 from runs.inspection.account import describe_cautions
 from runs.march.compiling import compiling
@@ -96,13 +95,11 @@ def start_runner(
         check_requests(deck, evolution)  # refused before there is a directory
         if world is not None:
             world.check(evolution)
-        folder = Path(output) if output else None
-        cost = estimate_cost(deck, problem, evolution, folder)
-        cautions += check_disk(cost, folder)
+        lines, of_disk = foretell(deck, problem, evolution, output)
     directory = create_directory(output, deck.label, force)
     if not quiet:
         head = f"{deck.problem} ({deck.described}) in {directory}"
-        say("\n".join([head, *describe_cost(cost), *cautions]))
+        say("\n".join([head, *lines, *cautions, *of_disk]))
     return Runner(deck, directory, problem, evolution, quiet)
 
 

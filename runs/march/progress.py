@@ -17,25 +17,9 @@ from regrid.jit import read_clock
 from regrid.text_files import escape_controls
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import name_failure
-from runs.forecast.cost import (
-    Course,
-    TimeLeft,
-    describe_seconds_range,
-    find_past,
-    keep_run,
-    make_past_run,
-    measure_size,
-    name_flow,
-    name_kernels,
-)
-from runs.forecast.step_trend import StepTrend
+from runs.forecast import StepTrend, TimeLeft, find_past, keep_run, measure_size, name_flow
 from runs.gauges import NO_BLOCK
-from runs.inspection.account import (
-    count,
-    count_cells,
-    describe_time,
-    judge,
-)
+from runs.inspection.account import count, count_cells, describe_seconds, describe_time, judge
 from runs.store.directory import RunDirectory
 from runs.store.guards import write_verdict
 from runs.store.history import read_history
@@ -120,7 +104,7 @@ class Progress:
         since, words = self._left_said
         if now - since >= 1.0:
             found = self.left.foretell(self.steps, evolution.t, now)
-            words = describe_seconds_range(found.low, found.seconds, found.high) if found else "?"
+            words = describe_seconds(found[0], found[2]) if found else "?"
             self._left_said = now, words
         return words
 
@@ -130,11 +114,13 @@ class Progress:
         if found is None:
             return
         self._foretold = True
-        if found.seconds < WORTH_A_WORD:
+        low, likely, high = found
+        if likely < WORTH_A_WORD:
             return
-        ends = describe_seconds_range(found.low, found.seconds, found.high)
         a_step = (now - self._began) / self.steps
-        self.say(f"measured: {a_step * 1e3:.3g} ms per step; {ends} to the end")
+        self.say(
+            f"measured: {a_step * 1e3:.3g} ms per step; {describe_seconds(low, high)} to the end"
+        )
 
     def say(self, text: str) -> None:
         """A line for the person, above the bar if there is one; nothing when quiet."""
@@ -166,18 +152,17 @@ class Outlook:
         self.deck, self.problem, self.evolution = deck, problem, evolution
         self.directory = directory
         self.began = evolution.step
-        self.flow, self.cells = name_flow(deck.problem, deck.deck), count_cells(evolution)
-        self.finest = measure_size(problem, evolution).finest
+        self.flow, self.size = name_flow(deck.problem, deck.deck), measure_size(problem, evolution)
         self.trend = StepTrend(evolution, directory.note, say)
         directory.verdict.unlink(missing_ok=True)
         if self.began:
             self.trend.resume(read_history(directory.history))
 
-    def find_course(self) -> Course | None:
-        """How dt went in a past run of the same flow."""
-        past, t_end = find_past(self.flow, self.cells), self.evolution.t_end
+    def find_course(self) -> tuple[float, ...]:
+        """How the wall time of a past run of the same flow went; () where there was none."""
+        past, t_end = find_past(self.flow, self.size.cells), self.evolution.t_end
         same = past is not None and past.flow == self.flow and math.isclose(past.t_end, t_end)
-        return past.course if same else None
+        return past.course if past is not None and same else ()
 
     def fail(self, error: Exception) -> None:
         """The verdict on a run that has failed; nothing may hide its own sentence."""
@@ -192,17 +177,12 @@ class Outlook:
 
         name: of the cause of an early end.
         """
-        marks = self.trend.describe()
-        verdict = judge(status, reason, history, self.cells, self.problem, marks, name)
+        marks = [mark._asdict() for mark in self.trend.marks]
+        verdict = judge(status, reason, history, self.size.cells, self.problem, marks, name)
         write_verdict(self.directory, verdict)
         clock = getattr(self.evolution, "clock", None)
         if status == "finished" and clock is not None and not self.began:
-            run = make_past_run(
-                self.flow, self.cells, self.evolution.t_end, self.finest,
-                clock.first_stable_dt, history, name_kernels(self.evolution),
-            )  # fmt: skip
-            if run is not None:
-                keep_run(run)
+            keep_run(self.flow, self.size, clock.first_stable_dt, history)
         return verdict
 
 

@@ -50,7 +50,7 @@ def test_the_last_state_can_be_drawn_and_the_restart_points_are_as_before(shockg
 
 
 def test_the_settings_of_the_cause_are_told_with_commands_that_work(shockgrid, monkeypatch):
-    helped = (Setting("run.cfl", "shorter steps", factor=0.5), Setting("no.such", "x", value="1"))
+    helped = (Setting("run.cfl", 0.5, "shorter steps"), Setting("no.such", "1", "x"))
     cause = ENDS["no-state"].__class__("density -1", "the toy was told to", helped, "`fail_at=-1`")
     monkeypatch.setitem(ENDS, "toy", cause)
     failure = functools.partial(RunFailure, cause="toy", place=Place("left", (1, 2)))

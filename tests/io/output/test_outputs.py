@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from runs.forecast import cost as past_runs
+from runs import forecast
 from runs.store.reader import RunData
 
 DECK = ("interface-instability", "--set", "cells=16", "--set", "lengths=[2, 2]", "--set", "mach=2")
@@ -80,7 +80,7 @@ def test_what_a_run_takes_passes(shockgrid):
 def own_cache(monkeypatch, tmp_path):
     """Past runs of these tests are kept among themselves; no kernels are needed."""
     home = tmp_path / "cache"
-    monkeypatch.setattr(past_runs, "find_home", lambda: home)
+    monkeypatch.setattr(forecast, "find_home", lambda: home)
     return home
 
 

@@ -1,0 +1,447 @@
+"""What a run costs: before it starts, how long it still takes, and why its steps become short.
+
+Before the run: the steps of the most similar past run, scaled with the first stable dt, or where
+nothing is built yet with the width of the finest cells.  A past run of the same flow has the same
+problem and the same keys of the deck, but for cells, `run`, `output` and gauges.  past_runs.json
+beside this file is delivered and knows steps alone; runs that finish here are kept in the cache
+directory, with the wall time of a step.  A cache that cannot be read or written is none.
+
+During the run: the steps that are left by the trend of dt, times the wall time of a step; and the
+share of its wall time that a past run of the same flow had taken by the same part of the end time.
+
+Each time that dt has shrunk by another factor of the root of ten below its largest value so far, a
+line of run.log and an entry of the verdict say which cell sets it and where that lies.  Once, when
+it has shrunk a hundredfold, the user reads what can be changed.  Steps that are short on purpose do
+not count: the first five, the last two, those repeated with a smaller dt.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import math
+import os
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from problems.problem import Problem, estimate_memory, plan_blocks
+from regrid.errors import BadInput
+from runs.deck.checking import find_changes
+from runs.deck.reading import ReadDeck
+from runs.early_end.causes import SHORT_STEPS, describe_settings
+from runs.inspection.account import (
+    OWN_REASONS,
+    count,
+    describe_bytes,
+    describe_seconds,
+    measure_shrinkage,
+)
+from runs.store.directory import KEPT_RESTARTS
+from runs.store.files import write_atomically
+
+DUMP_BYTES = 64  # a cell in a dump: nodes, five fields and a rate
+BLOCK_BYTES = 30_000  # of a block in a dump, for the form of the file; measured
+ROW_BYTES = 600  # of a step in history.csv; measured
+# steps over those foretold, at the least and most: from a run of this flow to this time, or else
+SAME, LIKE = (0.75, 1.5), (0.5, 5.0)
+TIGHT = 0.9  # part of the free disk that a run may be foretold to fill without a word
+MOST_NAMED = 6  # blocks in a line
+
+DELIVERED = Path(__file__).with_name("past_runs.json")
+KEPT = 300  # runs of this machine
+SURE = 1.4  # a step's wall time may be so many times what it was in runs before, or less
+UNSURE = 0.25  # power of the ratio of cells by which that grows
+WORK = 0.8  # power of the number of cells with which a step's wall time grows
+LEAST_STEPS = 40  # of a run that says something about others
+OTHER = ("run", "output", "gauge", "cells")  # keys of a deck that leave the flow as it is
+
+FIRST_STEPS = 12  # until there is a word: the first five are shortened on purpose
+GROWTH = 1.03  # of the steps from mark to mark: a few hundred marks for any run
+STEEPEST = 4.0  # change of a logarithm, at most, that is foretold from a fit alone
+UNUSUAL = 4.0  # times the usual wall time of a step: no speed, but an event
+PARTS = np.linspace(0.0, 1.0, 21)  # of the end time of a past run
+# what was left over what was foretold, at its least and most, at the very start of runs
+FITTED, REMEMBERED = (0.8, 3.0), (0.65, 1.8)
+
+MOST = 4  # times the root of ten: a hundredfold
+NEAR = 2  # cells: so near to a key node or a side is at it
+EQUAL = 1e-6  # relative: so near to the step's rate is the rate of the cell that set it
+OF_LINES = ("stretching", "tension", "touch")  # what limits dt and is no cell
+
+
+class PastRun(msgspec.Struct, frozen=True):
+    """One run: its flow and how it went.
+
+    finest: the least width [m] of a block over its cells; first_dt: the first stable step [s];
+    course: the share of its wall time that was over at PARTS of t_end; seconds: wall time [s] of a
+    step here, 0 where it is of another machine.
+    """
+
+    flow: str
+    cells: int
+    t_end: float
+    finest: float
+    first_dt: float
+    steps: int
+    course: tuple[float, ...]
+    seconds: float = 0.0
+
+    def is_off(self, cells: int) -> float:
+        """How far the number of cells is from another, as the size of a logarithm."""
+        return abs(math.log(self.cells / max(cells, 1)))
+
+
+@dataclass(frozen=True)
+class Size:
+    """Cells of all blocks, which are named with their cells both ways, and their least width [m].
+
+    t_end: the end [s]; memory, dump: bytes.
+    """
+
+    cells: int
+    blocks: tuple[tuple[str, tuple[int, ...]], ...]
+    finest: float
+    t_end: float
+    memory: float
+    dump: float
+
+
+def name_flow(problem: str, deck: Any) -> str:
+    """The problem and those keys of its deck that make it another flow than by default."""
+    try:
+        usual = msgspec.to_builtins(type(deck)())
+    except (BadInput, TypeError):
+        usual = {}
+    changes = [one for one in find_changes(usual, msgspec.to_builtins(deck))
+               if one.key.partition(".")[0] not in OTHER]  # fmt: skip
+    return "; ".join([problem, *sorted(f"{one.key}={one.now}" for one in changes)])
+
+
+def find_home() -> Path:
+    """Where this machine's past runs are kept: beside the compiled kernels."""
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(os.environ.get("SHOCKGRID_CACHE_DIR") or os.path.join(home, "shockgrid"))
+
+
+@functools.cache
+def read_delivered() -> list[PastRun]:
+    """The runs that come with shockgrid."""
+    return msgspec.json.decode(DELIVERED.read_bytes(), type=list[PastRun])
+
+
+def read_own() -> list[PastRun]:
+    """The runs that finished on this machine, the newest last; [] where none can be read."""
+    try:
+        text = (find_home() / DELIVERED.name).read_bytes()
+        return msgspec.json.decode(text, type=list[PastRun])
+    except (OSError, msgspec.MsgspecError):
+        return []
+
+
+def keep_run(flow: str, size: Size, first_dt: float, history: Mapping[str, np.ndarray]) -> None:
+    """Keep a run of this machine in place of one of the same flow with the same cells."""
+    run = make_past_run(flow, size, first_dt, history)
+    if run is not None:
+        others = [one for one in read_own() if (one.flow, one.cells) != (flow, size.cells)]
+        with contextlib.suppress(OSError, BadInput):
+            find_home().mkdir(parents=True, exist_ok=True)
+            text = msgspec.json.encode([*others, run][-KEPT:])
+            write_atomically(find_home() / DELIVERED.name, text, durable=False)
+
+
+def make_past_run(
+    flow: str, size: Size, first_dt: float, history: Mapping[str, np.ndarray]
+) -> PastRun | None:
+    """A past run from the history of a whole run; None where it is too short to say anything."""
+    steps = history["step"]
+    if len(steps) < LEAST_STEPS or "seconds_step" not in history or not first_dt > 0.0:
+        return None
+    seconds = drop_events(np.nan_to_num(history["seconds_step"]))
+    done = np.interp(PARTS * size.t_end, history["t"], seconds.cumsum() / seconds.sum())
+    return PastRun(
+        flow, size.cells, size.t_end, size.finest, first_dt, int(steps[-1]),
+        tuple(done.round(4).tolist()), float(np.median(seconds[2:])),
+    )  # fmt: skip
+
+
+def drop_events(seconds: np.ndarray) -> np.ndarray:
+    """Wall times [s] of steps (n,), those of far slower ones made usual: kernels that compile when
+    they are first needed, another program on the machine."""
+    usual = float(np.median(seconds))
+    return np.where(seconds <= UNUSUAL * usual, seconds, usual)
+
+
+def find_past(flow: str, cells: int, own: bool = True) -> PastRun | None:
+    """The past run most like a flow: of the same one, or else of the problem with its defaults, or
+    else of the problem; of this machine (`own`) rather than delivered; cells nearest in number."""
+    problem, mine = flow.partition("; ")[0], read_own() if own else []
+    return min(
+        (run for run in (*mine, *read_delivered()) if run.flow.partition("; ")[0] == problem),
+        key=lambda run: (
+            run.flow != flow, run.flow != problem, run.flow == flow and not run.seconds,
+            run.is_off(cells),
+        ),
+        default=None,
+    )  # fmt: skip
+
+
+def measure_size(problem: Problem, evolution: Any = None, blocks: Sequence[Any] = ()) -> Size:
+    """The size of a run from its problem's plan, or from its built blocks where it has none.
+
+    evolution: as built; blocks: of a dump.  With neither, a problem without a plan is built.
+    """
+    plan = problem.plan() if evolution is None and not blocks else None
+    if plan is not None:
+        t_end, planned = plan
+    else:
+        evolution = evolution or (None if blocks else problem.build())
+        t_end = evolution.t_end if evolution is not None else math.nan
+        planned = plan_blocks({b.name: b.nodes for b in blocks or evolution.blocks})
+    sizes = [math.prod(block.cells) for block in planned]
+    widths = np.ravel([(np.subtract(b.high, b.low)) / b.cells for b in planned])
+    finest = float(np.min(widths[widths > 0.0], initial=math.inf))
+    named = tuple((block.name, tuple(block.cells)) for block in planned)
+    dump = float(DUMP_BYTES * sum(sizes) + BLOCK_BYTES * len(planned))
+    return Size(sum(sizes), named, finest, float(t_end), estimate_memory(sum(sizes), sizes), dump)
+
+
+def foretell_steps(
+    read: ReadDeck, size: Size, first_dt: float | None, own: bool = True
+) -> tuple[float, float, float] | None:
+    """Steps of a run: the least, the likely, the most; None where nothing is known.
+
+    first_dt: the first stable step [s], None where nothing is built; own: from runs of this machine
+    too.
+    """
+    flow = name_flow(read.problem, read.deck)
+    past = find_past(flow, size.cells, own)
+    same = past is not None and past.flow == flow
+    if not 0.0 < size.t_end < math.inf or (first_dt is None and not same):
+        return None  # the speeds of another flow are others: without a first step they tell nothing
+    steps, limits = size.t_end / (first_dt or size.finest), LIKE
+    if past is not None:
+        steps *= past.steps * (past.first_dt if first_dt else past.finest) / past.t_end
+        limits = SAME if same and 0.95 < size.t_end / past.t_end < 1.05 else LIKE
+    most = read.deck.run.max_steps or math.inf
+    low, likely, high = (min(factor * steps, most) for factor in (limits[0], 1.0, limits[1]))
+    return low, likely, high
+
+
+def foretell(
+    read: ReadDeck, problem: Problem, evolution: Any = None, output: str | None = None
+) -> tuple[list[str], list[str]]:
+    """Lines on the cost of a run of a checked deck into the folder `output`, and cautions on the
+    disk.
+
+    evolution: as built, where it is.  Raises BadInput where the disk does not hold two dumps, which
+    a run cannot do without.
+    """
+    with read.numbers_in_reach():
+        size = measure_size(problem, evolution)
+    clock, wanted = getattr(evolution, "clock", None), read.deck.output
+    steps = foretell_steps(read, size, None if clock is None else clock.first_stable_dt)
+    words = "steps and time are unknown before the start: no run of this flow yet"
+    if steps is not None:
+        low, likely, high = (max(round(float(f"{number:.2g}")), 1) for number in steps)
+        words = f"about {likely}{f' ({low} to {high})' * (low < high)} steps; "
+        alike = [run for run in read_own() if run.flow.partition("; ")[0] == read.problem]
+        past = min(alike, key=lambda run: run.is_off(size.cells), default=None)
+        if past is None:
+            words += "the time of a step on this computer is not known yet"
+        else:
+            a_step = past.seconds * (max(size.cells, 1) / past.cells) ** WORK
+            sure = SURE * math.exp(UNSURE * past.is_off(size.cells))
+            seconds = describe_seconds(steps[0] * a_step / sure, steps[2] * a_step * sure)
+            words += f"time stepping will take {seconds} on this machine"
+    named = [f"{name} {' x '.join(map(str, cells))}" for name, cells in size.blocks[:MOST_NAMED]]
+    more = len(size.blocks) - len(named)
+    cells = f"{size.cells} cells ({', '.join(named)}{f' and {more} more blocks' * (more > 0)})"
+    if getattr(read.deck, "refine", False):
+        cells += " initially, more where the interface needs them later (refine)"
+    between = max(wanted.dumps - 1, 0)  # besides the first and the last
+    if wanted.every is not None:
+        between = size.t_end // wanted.every if math.isfinite(size.t_end) else 0
+    dumps = 2 + between + len(wanted.times)
+    restarts = KEPT_RESTARTS + 1 if wanted.restart_every else 0
+    disk = (dumps + restarts) * size.dump + ROW_BYTES * (steps[1] if steps else 0.0)
+    folder = Path(output or "out")
+    free = find_free(folder)
+    a_dump, needed, there = map(describe_bytes, (size.dump, disk, free))
+    if free < 2.0 * size.dump:
+        raise BadInput(
+            f"the disk of {folder} has {there} free, and a run needs two dumps of {a_dump} at the "
+            "least; free some, choose another folder with -o or take fewer cells"
+        )
+    cautions = [
+        f"caution: the run will need about {needed} of disk, where {there} are free (the disk of "
+        f"{folder}): free some, or take fewer dumps (output.dumps) or lighter ones "
+        "(output.fields, output.precision, output.compression)"
+    ] * (disk > TIGHT * free)
+    return [
+        f"cost: {cells}; {words}",
+        f"cost: memory about {describe_bytes(size.memory)}; disk about {needed} "
+        f"({count(round(dumps), 'dump')} of {a_dump}{f', {there} free' * math.isfinite(free)})",
+    ], cautions
+
+
+def find_free(folder: Path) -> float:
+    """Free bytes of the disk that a folder, which may not be there yet, would lie on; or nan."""
+    folder = folder.absolute()
+    try:
+        usage = shutil.disk_usage(next(p for p in (folder, *folder.parents) if p.exists()))
+    except OSError:
+        return math.nan
+    return float(usage.free) if usage.total else math.nan  # nothing in all: such as /proc
+
+
+class TimeLeft:
+    """Marks of a run, and what they foretell; course: of a past run of this deck, if any."""
+
+    def __init__(self, t_end: float, course: Sequence[float] = ()):
+        self.t_end, self.course = t_end, course
+        self.marks: list[tuple[float, float, float]] = []  # step, t, wall time
+        self._next = 0.0
+
+    def note(self, step: int, t: float, wall: float) -> None:
+        """Take note of a step that ended at time `t` [s] and wall time `wall` [s]."""
+        if step >= self._next:
+            self._next = step * GROWTH + 1.0
+            self.marks.append((step, t, wall))
+
+    def foretell(self, step: int, t: float, wall: float) -> tuple[float, float, float] | None:
+        """Wall time left [s] after the step that has just ended: the least, the likely, the most;
+        None where nothing is known yet."""
+        if not self.marks or step - self.marks[0][0] < FIRST_STEPS:
+            return None
+        fresh = [(step, t, wall)] * (step > self.marks[-1][0])
+        steps, times, walls = np.array([*self.marks, *fresh], dtype=float).T
+        if not (math.isfinite(self.t_end) and t > times[0]):
+            return None
+        counts, flow = np.diff(steps), np.diff(times)
+        each = drop_events(np.diff(walls) / counts)
+        half = slice(max(int(np.searchsorted(steps, steps.mean())) - 1, 0), None)
+        a_step = np.average(each[half], weights=counts[half])
+        end, limits = self.t_end, FITTED
+        if self.course:  # a run may end before its end time
+            end *= PARTS[np.searchsorted(self.course, 1.0)]
+        # the trend of steps a second of the flow, believed in for about as long as it was seen
+        middles, memory = 0.5 * (times[1:] + times[:-1])[half] - t, t - times[half][0]
+        rates, weights = np.log(counts / flow)[half], np.sqrt(counts[half])
+        slope, level = np.polyfit(middles, rates, 1, w=weights)
+        ahead = np.linspace(0.0, max(end - t, 0.0), 200)
+        trend = np.clip(slope * memory * (1.0 - np.exp(-ahead / memory)), -STEEPEST, STEEPEST)
+        left = float(np.trapezoid(np.exp(level + trend), ahead)) * a_step
+        if self.course:
+            first, now = np.interp([times[0] / self.t_end, t / self.t_end], PARTS, self.course)
+            spent = each @ counts
+            known = spent * (1.0 - now) / max(now - first, 1e-9)
+            share, limits = spent / (spent + known), REMEMBERED
+            left = left**share * known ** (1.0 - share)
+        unknown = math.sqrt(max(1.0 - t / self.t_end, 0.0))
+        return tuple(float(left * x**unknown) for x in (limits[0], 1.0, limits[1]))
+
+
+class Mark(NamedTuple):
+    """dt [s] at a step and its part of the largest so far; the cell, its centre [m], its meaning.
+
+    block is "" where dt is limited by no cell.
+    """
+
+    step: int
+    t: float
+    dt: float
+    shrunk: float
+    block: str = ""
+    i: int = 0
+    j: int = 0
+    x: float = math.nan
+    y: float = math.nan
+    meaning: str = "step"
+
+    def describe(self) -> str:
+        """One line for run.log and the screen."""
+        words, _ = SHORT_STEPS.get(self.meaning, (self.meaning, ()))
+        cell = f", {self.block} i={self.i}, j={self.j} at ({self.x:.4g}, {self.y:.4g}) m"
+        return (
+            f"dt is {self.shrunk:.3g} times below its largest: {self.dt:.3g} s at step "
+            f"{self.step}, t = {self.t:.6g} s{cell if self.block else ''}; {words}"
+        )
+
+
+class StepTrend:
+    """Follows dt; note: takes a line for run.log, say: one for the screen, both seldom."""
+
+    def __init__(self, evolution: Any, note: Callable[[str], None], say: Callable[[str], None]):
+        self.evolution, self.note, self.say = evolution, note, say
+        self.largest, self.level = 0.0, 0  # level: times the root of ten below the largest
+        self.marks: list[Mark] = []
+
+    def resume(self, history: Mapping[str, np.ndarray]) -> None:
+        """Continue where a restarted run was, from its history."""
+        if math.isfinite(shrunk := measure_shrinkage(history)):
+            counts = ~np.isin(history["dt_limit"], OWN_REASONS)
+            self.largest = float(np.nanmax(history["dt"][counts]))
+            self.level = count_factors(shrunk)
+
+    def follow(self, row: Mapping[str, Any]) -> None:
+        """Take note of a step's history row."""
+        dt, limit = row.get("dt"), row.get("dt_limit")
+        if dt is None or limit in OWN_REASONS or not dt > 0.0:
+            return
+        self.largest = max(self.largest, dt)
+        before, level = self.level, count_factors(self.largest / dt)
+        if level <= before:
+            return
+        flow, self.level = getattr(self.evolution, "flow", None), level
+        mark = Mark(self.evolution.step, self.evolution.t, float(dt), self.largest / dt)
+        if flow is None or limit in OF_LINES:
+            mark = mark._replace(meaning=str(limit or mark.meaning))
+        else:
+            block, i, j = find_limiting_cell(flow)
+            x, y = block.nodes[:, i : i + 2, j : j + 2].mean(axis=(1, 2)).tolist()
+            where = {"block": block.name, "i": i, "j": j, "x": x, "y": y}
+            mark = mark._replace(**where, meaning=classify(block, i, j))
+        self.marks.append(mark)
+        self.note(mark.describe())
+        if level >= MOST > before:
+            self.say(f"{mark.describe()}; what can be changed: {describe_settings(mark.meaning)}")
+
+
+def count_factors(ratio: float) -> int:
+    """How many times a ratio holds the root of ten."""
+    return math.floor(2.0 * math.log10(ratio) + 1e-9)
+
+
+def find_limiting_cell(flow: Any) -> tuple[Any, int, int]:
+    """Block, i and j of the cell that sets the next step.
+
+    Cells that share their states are faster than that: it is the one whose rate is the clock's, or
+    the nearest below.
+    """
+    most = flow.clock.rate * (1.0 + EQUAL)
+    rates = [np.where(block.rates <= most, block.rates, -1.0) for block in flow.blocks]
+    number = int(np.argmax([one.max() for one in rates]))
+    i, j = np.unravel_index(rates[number].argmax(), rates[number].shape)
+    return flow.blocks[number], int(i), int(j)
+
+
+def classify(block: Any, i: int, j: int) -> str:
+    """Which of SHORT_STEPS holds for a cell, by the segments that it lies beside."""
+    ni, nj = block.nodes.shape[1] - 1, block.nodes.shape[2] - 1
+    away = {"i_min": i, "i_max": ni - 1 - i, "j_min": j, "j_max": nj - 1 - j}
+    kinds = set()
+    for one in block.segments:
+        k = j if one.side[0] == "i" else i
+        if away[one.side] >= NEAR or not one.start <= k < one.stop:
+            continue
+        at_end = min(k - one.start, one.stop - 1 - k) < NEAR
+        if one.follows_flow and at_end and one.stop - one.start > 2 * NEAR:
+            return "corner"
+        kinds.add("line" if one.follows_flow and one.kind != "sliding" else one.kind)
+    return next((kind for kind in ("sliding", "line", "axis", "wall") if kind in kinds), "inside")

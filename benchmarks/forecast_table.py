@@ -10,7 +10,6 @@ that the progress line asks.  Other work on the machine counts: leave it alone m
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 import subprocess
@@ -96,10 +95,9 @@ def make_past(deck: str, setting: str, folder: Path) -> Any:
     """The entry of past_runs.json."""
     data, _ = run(deck, setting, folder)
     read = read_deck(deck, (setting,))
-    size = measure_size(data.problem, None, data.dumps[0].blocks)
+    size = measure_size(data.problem)
     row = data.history
     first_dt = float(row["dt"][1]) / START_FACTORS[0]
-    size = dataclasses.replace(size, t_end=data.dumps[0].t_end)
     past = make_past_run(name_flow(read.problem, read.deck), size, first_dt, row)
     return msgspec.structs.replace(past, seconds=0.0)
 
@@ -109,8 +107,7 @@ def judge(deck: str, setting: str, folder: Path) -> dict[str, Any]:
     data, memory = run(deck, setting, folder)
     read = read_deck(deck, (setting,))
     problem = read.make_problem()
-    size = measure_size(problem, None, data.dumps[0].blocks)
-    size = dataclasses.replace(size, t_end=data.dumps[0].t_end)
+    size = measure_size(problem)
     history = data.history
     first_dt = float(history["dt"][1]) / START_FACTORS[0]
     steps = int(history["step"][-1])

@@ -3,7 +3,6 @@
 cost judged     steps and wall time of runs, foretold over real, from results/forecast.json
 cost sizes      memory and dumps, foretold and real, of the same runs
 cost rules      the rules of the verdict
-cost meanings   where the cell that sets the step lies, and the settings that have helped
 """
 
 from __future__ import annotations
@@ -13,7 +12,6 @@ from pathlib import Path
 
 from accuracy_tables import make_table
 
-from runs.early_end.causes import SHORT_STEPS, describe_settings
 from runs.inspection.account import RULES
 
 RESULTS = Path(__file__).resolve().parent / "results"
@@ -26,7 +24,6 @@ def fill_cost(part: str) -> list[str]:
         "judged": _judge,
         "sizes": _list_sizes,
         "rules": _list_rules,
-        "meanings": _list_meanings,
     }[part.strip()]()
 
 
@@ -67,10 +64,3 @@ def _list_rules() -> list[str]:
     rows = [[rule.name, rule.meaning, f"above {rule.limit:g}"] for rule in RULES]
     rows.append(["cautions", "sentences of the problem on this deck and run", "above 0"])
     return make_table(["rule", "what is measured", "reported"], rows)
-
-
-def _list_meanings() -> list[str]:
-    rows = [
-        [f"`{name}`", words, describe_settings(name)] for name, (words, _) in SHORT_STEPS.items()
-    ]
-    return make_table(["name", "what it says", "what can be changed"], rows)

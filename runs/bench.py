@@ -1,7 +1,6 @@
 """`shockgrid bench`: how fast this machine computes, and where the time of a step goes.
 
-CloverLeaf_ref, compiled Fortran on a grid at rest, can be measured beside it (`--peer`).  A
-profiler sees every call of a kernel as one of the function that was compiled.
+CloverLeaf_ref, compiled Fortran on a grid at rest, can be measured beside it (`--peer`).
 """
 
 from __future__ import annotations
@@ -30,9 +29,7 @@ from hydro.history import PHASES
 from hydro.links import join
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
-from regrid.jit import KERNEL_CODES
 from regrid.registry import make_regridder
-from runs.deck.reading import read_deck
 from runs.store.reader import RunData
 
 try:
@@ -325,84 +322,10 @@ def measure_threads(tables: Tables, sizes: tuple[int, ...], rounds: int) -> None
         )
 
 
-STEPS_DECK = "interface-instability"  # two blocks, a contact, walls and a piston
-FIRST_STEPS = 20  # not counted: kernels are loaded, the first steps are short
-STEPS_STEPS = 50  # of each round, with the profiler and without
-
-
-class Calls:
-    """Counts, while `sys.setprofile` holds it: calls of `kernels` and their seconds, `others`."""
-
-    def __init__(self):
-        self.codes = KERNEL_CODES
-        self.kernels = self.others = 0
-        self.seconds = self._begun = 0.0
-
-    def __call__(self, frame, event: str, argument) -> None:
-        is_kernel = id(frame.f_code) in self.codes
-        if event == "call" and is_kernel:
-            self.kernels += 1
-            self._begun = time.process_time()
-        elif event == "return" and is_kernel:
-            self.seconds += time.process_time() - self._begun
-        elif event in ("call", "c_call"):
-            self.others += 1
-
-
-def make_step(settings: tuple[str, ...]) -> Callable[[], None]:
-    """A run of STEPS_DECK on one thread after its first steps; each call is a step."""
-    problem = read_deck(STEPS_DECK, ("run.threads=1", *settings)).make_problem()
-    evolution = problem.build()
-
-    def step() -> None:
-        evolution.advance()
-        problem.measure(evolution)
-
-    for _ in range(FIRST_STEPS):
-        step()
-    return step
-
-
-def count_calls(step: Callable[[], None]) -> Calls:
-    """The calls of one step."""
-    calls = Calls()
-    sys.setprofile(calls)
-    try:
-        step()
-    finally:
-        sys.setprofile(None)
-    calls.others -= 1  # of `sys.setprofile` itself
-    return calls
-
-
-def measure_steps(tables: Tables, rounds: int) -> None:
-    """Table `steps`: medians of a step of STEPS_DECK, with two blocks."""
-    step = make_step(())
-    counted, whole = [], []
-    for _ in range(rounds):
-        counted += [count_calls(step) for _ in range(STEPS_STEPS)]
-        for _ in range(STEPS_STEPS):
-            start = time.process_time()
-            step()
-            whole.append(time.process_time() - start)
-    kernels = statistics.median(calls.seconds for calls in counted)
-    tables.add(
-        "steps",
-        case=f"{STEPS_DECK}, two blocks",
-        **{
-            "calls of kernels": statistics.median_high(calls.kernels for calls in counted),
-            "other calls": statistics.median_high(calls.others for calls in counted),
-            "kernels, us": 1e6 * kernels,
-            "outside kernels, us": 1e6 * (statistics.median(whole) - kernels),
-        },
-    )
-
-
 EXPLANATION = """\
 flow: million cell updates a CPU second on one thread. A whole step holds the sides, the history row
 with the quality of every cell, and the ledger; where the grid is rebuilt, the regridder too.
-flow-parts: how the time of such a step divides. steps: calls of kernels and of all else in a step
-of a small run, CPU time inside and outside of kernels. commands: whole commands, start and output
+flow-parts: how the time of such a step divides. commands: whole commands, start and output
 included, kernels compiled before; what their shares leave of the wall time is start and output."""
 
 
@@ -427,7 +350,6 @@ def bench(
     say(EXPLANATION)
     measure_flow(tables, cells, rounds, beside)
     measure_threads(tables, (cells // 2, cells), rounds)
-    measure_steps(tables, rounds)
     for words_of_run in RUNS[runs]:
         measure_command(tables, words_of_run, rounds, beside)
     tables.write()

@@ -25,7 +25,7 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -70,9 +70,8 @@ PARTS = np.linspace(0.0, 1.0, 21)  # of the end time of a past run
 FITTED, REMEMBERED = (0.8, 3.0), (0.65, 1.8)
 
 MOST = 4  # times the root of ten: a hundredfold
-NEAR = 2  # cells: so near to a key node or a side is at it
+NEAR = 2  # cells: so near to a side is beside it
 EQUAL = 1e-6  # relative: so near to the step's rate is the rate of the cell that set it
-OF_LINES = ("stretching", "tension", "touch")  # what limits dt and is no cell
 
 
 class PastRun(msgspec.Struct, frozen=True):
@@ -191,20 +190,17 @@ def find_past(flow: str, cells: int, own: bool = True) -> PastRun | None:
     )  # fmt: skip
 
 
-def measure_size(problem: Problem, evolution: Any = None, blocks: Sequence[Any] = ()) -> Size:
-    """The size of a run from its problem's plan, or from its built blocks where it has none.
-
-    evolution: as built; blocks: of a dump.  With neither, a problem without a plan is built.
-    """
-    plan = problem.plan() if evolution is None and not blocks else None
-    if plan is not None:
-        t_end, planned = plan
-    else:
-        evolution = evolution or (None if blocks else problem.build())
-        t_end = evolution.t_end if evolution is not None else math.nan
-        planned = plan_blocks({b.name: b.nodes for b in blocks or evolution.blocks})
+def measure_size(problem: Problem, evolution: Any = None) -> Size:
+    """The size of a run from its evolution as built, else from its problem's plan; where it has
+    none, it is built."""
+    plan = problem.plan() if evolution is None else None
+    if plan is None:
+        evolution = evolution or problem.build()
+        blocks = {block.name: block.nodes for block in evolution.blocks}
+        plan = evolution.t_end, plan_blocks(blocks)
+    t_end, planned = plan
     sizes = [math.prod(block.cells) for block in planned]
-    widths = np.ravel([(np.subtract(b.high, b.low)) / b.cells for b in planned])
+    widths = np.ravel([np.subtract(b.high, b.low) / b.cells for b in planned])
     finest = float(np.min(widths[widths > 0.0], initial=math.inf))
     named = tuple((block.name, tuple(block.cells)) for block in planned)
     dump = float(DUMP_BYTES * sum(sizes) + BLOCK_BYTES * len(planned))
@@ -347,40 +343,17 @@ class TimeLeft:
         return tuple(float(left * x**unknown) for x in (limits[0], 1.0, limits[1]))
 
 
-class Mark(NamedTuple):
-    """dt [s] at a step and its part of the largest so far; the cell, its centre [m], its meaning.
-
-    block is "" where dt is limited by no cell.
-    """
-
-    step: int
-    t: float
-    dt: float
-    shrunk: float
-    block: str = ""
-    i: int = 0
-    j: int = 0
-    x: float = math.nan
-    y: float = math.nan
-    meaning: str = "step"
-
-    def describe(self) -> str:
-        """One line for run.log and the screen."""
-        words, _ = SHORT_STEPS.get(self.meaning, (self.meaning, ()))
-        cell = f", {self.block} i={self.i}, j={self.j} at ({self.x:.4g}, {self.y:.4g}) m"
-        return (
-            f"dt is {self.shrunk:.3g} times below its largest: {self.dt:.3g} s at step "
-            f"{self.step}, t = {self.t:.6g} s{cell if self.block else ''}; {words}"
-        )
-
-
 class StepTrend:
-    """Follows dt; note: takes a line for run.log, say: one for the screen, both seldom."""
+    """Follows dt; note: takes a line for run.log, say: one for the screen, both seldom.
+
+    marks: by `step`, `t`, `dt` how many times dt was `shrunk`; of the limiting cell `block`, `i`,
+    `j`, its centre `x`, `y` [m], None where it is no cell; `meaning`: what it lies beside.
+    """
 
     def __init__(self, evolution: Any, note: Callable[[str], None], say: Callable[[str], None]):
         self.evolution, self.note, self.say = evolution, note, say
         self.largest, self.level = 0.0, 0  # level: times the root of ten below the largest
-        self.marks: list[Mark] = []
+        self.marks: list[dict[str, Any]] = []
 
     def resume(self, history: Mapping[str, np.ndarray]) -> None:
         """Continue where a restarted run was, from its history."""
@@ -395,22 +368,27 @@ class StepTrend:
         if dt is None or limit in OWN_REASONS or not dt > 0.0:
             return
         self.largest = max(self.largest, dt)
-        before, level = self.level, count_factors(self.largest / dt)
+        before, level, shrunk = self.level, count_factors(self.largest / dt), self.largest / dt
         if level <= before:
             return
-        flow, self.level = getattr(self.evolution, "flow", None), level
-        mark = Mark(self.evolution.step, self.evolution.t, float(dt), self.largest / dt)
-        if flow is None or limit in OF_LINES:
-            mark = mark._replace(meaning=str(limit or mark.meaning))
-        else:
+        self.level, step, t = level, self.evolution.step, self.evolution.t
+        flow, meaning, words = getattr(self.evolution, "flow", None), str(limit or "step"), ""
+        cell: dict[str, Any] = dict.fromkeys(("block", "i", "j", "x", "y"))
+        if flow is not None and limit not in SHORT_STEPS:
             block, i, j = find_limiting_cell(flow)
             x, y = block.nodes[:, i : i + 2, j : j + 2].mean(axis=(1, 2)).tolist()
-            where = {"block": block.name, "i": i, "j": j, "x": x, "y": y}
-            mark = mark._replace(**where, meaning=classify(block, i, j))
+            cell = {"block": block.name, "i": i, "j": j, "x": x, "y": y}
+            meaning = describe_place(block, i, j)
+            words = f", {block.name} i={i}, j={j} at ({x:.4g}, {y:.4g}) m"
+        mark = {"step": step, "t": t, "dt": float(dt), "shrunk": shrunk, **cell, "meaning": meaning}
         self.marks.append(mark)
-        self.note(mark.describe())
+        line = (
+            f"dt is {shrunk:.3g} times below its largest: {dt:.3g} s at step {step}, t = {t:.6g} s"
+            f"{words}; {meaning}"
+        )
+        self.note(line)
         if level >= MOST > before:
-            self.say(f"{mark.describe()}; what can be changed: {describe_settings(mark.meaning)}")
+            self.say(f"{line}; what can be changed: {describe_settings(meaning)}")
 
 
 def count_factors(ratio: float) -> int:
@@ -431,17 +409,13 @@ def find_limiting_cell(flow: Any) -> tuple[Any, int, int]:
     return flow.blocks[number], int(i), int(j)
 
 
-def classify(block: Any, i: int, j: int) -> str:
-    """Which of SHORT_STEPS holds for a cell, by the segments that it lies beside."""
-    ni, nj = block.nodes.shape[1] - 1, block.nodes.shape[2] - 1
+def describe_place(block: Any, i: int, j: int) -> str:
+    """What a cell lies beside: the kinds of the segments within NEAR cells of it."""
+    ni, nj = (n - 1 for n in block.nodes.shape[1:])
     away = {"i_min": i, "i_max": ni - 1 - i, "j_min": j, "j_max": nj - 1 - j}
-    kinds = set()
-    for one in block.segments:
-        k = j if one.side[0] == "i" else i
-        if away[one.side] >= NEAR or not one.start <= k < one.stop:
-            continue
-        at_end = min(k - one.start, one.stop - 1 - k) < NEAR
-        if one.follows_flow and at_end and one.stop - one.start > 2 * NEAR:
-            return "corner"
-        kinds.add("line" if one.follows_flow and one.kind != "sliding" else one.kind)
-    return next((kind for kind in ("sliding", "line", "axis", "wall") if kind in kinds), "inside")
+    kinds = dict.fromkeys(
+        one.kind
+        for one in block.segments
+        if away[one.side] < NEAR and one.start <= (j if one.side[0] == "i" else i) < one.stop
+    )
+    return f"beside: {', '.join(kinds)}" if kinds else "inside, away from all sides"

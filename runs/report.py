@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 import csv
-import html
 import os
 import tempfile
 from collections.abc import Callable
@@ -29,7 +28,6 @@ from runs.inspection.account import (
     describe_run,
     describe_verdict,
     measure_drifts,
-    pick_prefix,
 )
 from runs.inspection.info import (
     describe_problem,
@@ -46,100 +44,10 @@ from runs.pictures.command import (
     new_figure,
     write_figure,
 )
-from runs.pictures.fields import list_fields, scale_times
+from runs.pictures.fields import list_fields
 from runs.pictures.film import make_film
-from runs.pictures.history import choose_panels, make_panel
 from runs.store.files import disk_errors, write_atomically
 from runs.store.reader import Dump, RunData
-
-MOST = 4000  # points of a curve; a longer one is thinned
-COLUMNS, HEIGHT = 2, 230  # panels beside each other, pixels of each
-COLOURS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#17becf")
-EXTRA = "a report needs {name}, which is not installed: pip install 'shockgrid[report]'"
-
-
-def make_history_plot(run: RunData) -> str:
-    """The history as HTML with the plotting library inside; "" where no step was made.
-
-    All panels share the axis of time.  Raises BadInput where plotly is missing.
-    """
-    try:
-        from plotly.subplots import make_subplots
-    except ImportError as error:
-        raise BadInput(EXTRA.format(name="plotly")) from error
-    history = dict(run.history)
-    if len(history.get("t", ())) < 2:
-        return ""
-    factor, unit = scale_times(run.dumps) if run.dumps else pick_prefix(history["t"][-1], "s")
-    if run.dumps and run.dumps[-1].t_unit != "s":
-        history = {name: values[1:] for name, values in history.items()}
-    units = run.find_units()
-    panels, constant = choose_panels(history, units)
-    drawn = [make_panel(history, names, units) for names in panels]
-    rows = -(-len(drawn) // COLUMNS)
-    figure = make_subplots(
-        rows,
-        COLUMNS,
-        shared_xaxes="all",
-        subplot_titles=[title for title, _ in drawn],
-        vertical_spacing=min(0.3 / rows, 0.08),
-        horizontal_spacing=0.2,  # the names of curves stand there
-    )
-    t = history["t"] * factor
-    for number, (_, curves) in enumerate(drawn):
-        place = {"row": number // COLUMNS + 1, "col": number % COLUMNS + 1}
-        legend = f"legend{number + 1}" if number else "legend"
-        for k, (name, values, points) in enumerate(curves):
-            mode = "markers" if points else "lines"
-            x, y = thin(t, values)
-            look = {"color": COLOURS[k % len(COLOURS)]}
-            figure.add_scatter(
-                x=x, y=y, name=name, legend=legend, mode=mode, showlegend=len(curves) > 1,
-                line={"width": 1.2, **look}, marker={"size": 3, **look}, **place,
-            )  # fmt: skip
-        figure.update_xaxes(showticklabels=True, **place)
-        axes = figure.get_subplot(place["row"], place["col"])
-        side = {"x": axes.xaxis.domain[1] + 0.005, "y": axes.yaxis.domain[1]}
-        side |= {"xanchor": "left", "yanchor": "top", "font": {"size": 10}}
-        figure.update_layout({legend: side})
-    last = {"row": rows, "col": 1}
-    figure.update_xaxes(title_text=f"t [{unit}]" if unit.endswith("s") else unit, **last)
-    figure.update_annotations(font_size=13)
-    figure.update_layout(
-        template="plotly_white",
-        height=HEIGHT * rows + 80,
-        margin={"l": 50, "r": 20, "t": 40, "b": 50},
-        hovermode="closest",
-    )
-    told = [f"{name.replace('_', ' ')} {np.nanmax(history[name]):.4g}" for name in constant]
-    words = f'<p class="small">Constant: {html.escape(", ".join(told))}.</p>' if told else ""
-    return words + figure.to_html(
-        full_html=False,
-        include_plotlyjs=True,
-        include_mathjax=False,
-        div_id="history",
-        config={"displaylogo": False, "responsive": True},
-    )
-
-
-def thin(t: np.ndarray, values: np.ndarray, most: int = MOST) -> tuple[np.ndarray, np.ndarray]:
-    """At most `most` points (t, values) of a curve (n,), the extremes of every stretch among them.
-
-    Points that are not finite are left out where others are in their stretch.
-    """
-    values = np.asarray(values, dtype=float)
-    if values.size <= most:
-        return t, values
-    kept: list[Any] = []
-    for part in np.array_split(np.arange(values.size), most // 2):
-        known = part[np.isfinite(values[part])]
-        if known.size:
-            ends = {int(known[values[known].argmin()]), int(known[values[known].argmax()])}
-            kept += sorted(ends)
-        else:
-            kept.append(int(part[0]))
-    return t[kept], values[kept]
-
 
 TEMPLATES = Path(__file__).resolve().with_name("templates")
 KINDS = {".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4", ".toml": "text/plain"}
@@ -149,6 +57,7 @@ PICTURES = (  # heading, words of `shockgrid plot`
     ("The grids at the end", {"what": "mesh", "at": "end"}),
     ("The interfaces", {"what": "interface"}),
     ("Which cells limit the step, at the end", {"fields": ("rate",), "at": "end"}),
+    ("History", {"what": "history"}),
 )
 
 
@@ -172,7 +81,6 @@ def make_report(
         **describe_run_in_words(run, left_out),
         pictures=draw_pictures(run, dpi, left_out),
         film=embed_film(run, left_out) if film else "",
-        history=make_history_plot(run),
         left_out=left_out,
     )
     for sentence in left_out:
@@ -194,7 +102,8 @@ def load_template(name: str) -> Any:
     try:
         import jinja2
     except ImportError as error:
-        raise BadInput(EXTRA.format(name="jinja2")) from error
+        words = "a report needs jinja2, which is not installed: pip install 'shockgrid[report]'"
+        raise BadInput(words) from error
     loader = jinja2.FileSystemLoader(TEMPLATES)
     environment = jinja2.Environment(
         loader=loader,
@@ -317,6 +226,8 @@ def applies(run: RunData, words: dict[str, Any]) -> bool:
     if not run.dumps:
         return False
     last = run.dumps[-1]
+    if words.get("what") == "history":
+        return len(run.history.get("t", ())) > 1
     if words.get("what") == "interface":
         return len({get_material(block) for block in last.blocks}) > 1
     return set(words.get("fields", ())) <= set(list_fields(last))

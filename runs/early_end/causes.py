@@ -142,25 +142,16 @@ ENDS: dict[str, Cause] = {  # by the id that errors carry
         "of one is not positive", (), "other cells, or an earlier restart point (`--at`)"),
 }  # fmt: skip
 
-# by what limits dt: words, and what helps beside fewer cells
-SHORT_STEPS: dict[str, tuple[str, tuple[Setting, ...]]] = {
-    "stretching": ("stretching: neighbouring nodes of an interface or surface separate fast",
-                   (SMALLER_CFL,)),
-    "touch": ("touch: bodies come to touch, node by node", ()),
-    "tension": ("tension: the shortest capillary waves of an interface or surface are fast", ()),
-    "corner": ("at a key node, where interfaces meet", (MORE_SHARING,)),
-    "sliding": ("in the first cells beside a sliding contact", (MORE_SHARING,)),
-    "line": ("in the first cells beside an interface or a surface", (MORE_SHARING, MORE_BARRIER)),
-    "axis": ("in the first cells beside the axis", (MORE_SHARING,)),
-    "wall": ("in the first cells beside a wall", (MORE_SHARING,)),
-    "inside": ("inside, away from all sides", (MORE_SHARING, MORE_BARRIER)),
+SHORT_STEPS = {  # by what limits dt, where that is no cell: what has helped
+    "stretching": (SMALLER_CFL, FEWER_CELLS), "touch": (FEWER_CELLS,), "tension": (FEWER_CELLS,),
 }  # fmt: skip
+SMALL_CELLS = (MORE_SHARING, MORE_BARRIER, FEWER_CELLS)
 
 
 def describe_settings(limit: str) -> str:
-    """What can be changed where dt is short by one of SHORT_STEPS, in a line."""
-    _, settings = SHORT_STEPS.get(limit, ("", ()))
-    words = [setting.described.replace("`", "") for setting in (*settings, FEWER_CELLS)]
+    """What can be changed where dt is short by a key of SHORT_STEPS, or by a cell, in a line."""
+    settings = SHORT_STEPS.get(limit, SMALL_CELLS)
+    words = [setting.described.replace("`", "") for setting in settings]
     return "; ".join([*words, "run.t_end ends the run before"])
 
 

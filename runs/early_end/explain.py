@@ -2,9 +2,6 @@
 
 Nothing that goes wrong in here may hide the sentence: each part is made by itself, and one that
 cannot be made is reported in its place.
-
-What happened there is measured on the outlines of the last dump: two places of one outline that are
-near each other, but far along it, have thin material between them, or a gap.
 """
 
 from __future__ import annotations
@@ -26,7 +23,7 @@ from matplotlib.patches import Polygon, Rectangle
 
 from regrid.errors import BadInput, Place, RunFailure
 from regrid.measure.quality import compute_corner_areas
-from regrid.sides import get_side, trace_outline
+from regrid.sides import SIDE_NAMES, get_side
 from runs.deck.checking import is_runtime_key
 from runs.deck.reading import ReadDeck, resolve_deck
 from runs.early_end.causes import ENDS, Cause
@@ -46,9 +43,7 @@ from runs.store.files import write_atomically
 from runs.store.history import read_history
 from runs.store.reader import RunData
 
-MET = 0.1  # distances of neighbouring nodes: what is thinner no grid resolves
-DETOUR = 6.0  # times their distance: two places of an outline less far apart along it are one
-NEAR = 10  # distances of neighbouring nodes from the place that failed
+BESIDE = 2  # cells: so near to a side is beside it
 CALM = 0.3  # of the usual dt: with less a run is in trouble already
 SHOWN = 3  # settings
 AROUND = 5  # cells on each side of the marked one in the picture
@@ -171,89 +166,44 @@ def make_command(
     return f"shockgrid run {shlex.quote(str(directory.deck))} {words}"
 
 
-def describe_event(blocks: Sequence, place: Place | None) -> str:
-    """A sentence on the thinnest layer, neck or gap where it failed; "" where none is thin.
-
-    blocks: with `name` and `nodes` (2, ni + 1, nj + 1) [m]; without a place all are looked at.
-    """
+def find_marked(blocks: Sequence, place: Place | None) -> tuple[Any, tuple[int, int], bool]:
+    """The block and the cell (i, j) that a place names, and whether it names a cell: beside the
+    first of a side's nodes.  If not, it is the smallest of the block, or of all blocks."""
     named = [block for block in blocks if place is not None and block.name == place.block]
-    found = []
-    for block in named or blocks:
-        cell = find_cell(block.nodes, place) if named else None
-        centre = None if cell is None else block.nodes[:, cell[0], cell[1]]
-        found.append((*find_narrowest(block.nodes, centre), block.name))
-    share, width, (one, other), (x, y), name = min(found, key=lambda one: one[0])
-    if share > MET:
-        return ""
-    sides = f"two parts of side {one}" if one == other else f"sides {one} and {other}"
-    return (
-        f"between {sides} of block '{name}' {width:.3g} m are left, {share:.2g} of the distance "
-        f"of its nodes, at ({x:.6g}, {y:.6g})"
-    )
-
-
-def find_narrowest(
-    nodes: np.ndarray, centre: np.ndarray | None = None
-) -> tuple[float, float, tuple[str, str], np.ndarray]:
-    """The nearest two places of a block's outline that are far apart along it: their distance over
-    that of neighbouring nodes (infinite where there are none), the same in metres, their sides, and
-    the middle (2,) between them.
-
-    centre (2,): only nodes near it count.
-    """
-    ni, nj = (n - 1 for n in nodes.shape[1:])
-    outline = trace_outline(nodes)  # corners are in it twice
-    names = np.repeat(["j_min", "i_max", "j_max", "i_min"], [ni + 1, nj + 1, ni + 1, nj + 1])[:-1]
-    steps = np.hypot(*np.diff(outline, axis=1))
-    long = steps > 0.0
-    ring, way = outline[:, :-1][:, long], np.diff(outline, axis=1)[:, long]
-    names, steps = names[long], steps[long]
-    arc = np.concatenate(([0.0], np.cumsum(steps)))
-    spacing = np.maximum(steps, np.roll(steps, 1))
-    best = np.inf, np.inf, ("", ""), np.zeros(2)
-    for k, here in enumerate(ring.T):
-        if centre is not None and np.hypot(*(here - centre)) > NEAR * spacing[k]:
-            continue
-        part = np.clip(((here[:, None] - ring) * way).sum(axis=0) / steps**2, 0.0, 1.0)
-        foot = ring + part * way
-        away = np.hypot(*(foot - here[:, None]))
-        along = np.abs(arc[:-1] + part * steps - arc[k])
-        along = np.minimum(along, arc[-1] - along)
-        away[(along <= DETOUR * away) | (along <= spacing[k])] = np.inf
-        m = int(away.argmin())
-        if away[m] / spacing[k] < best[0]:
-            sides = str(names[k]), str(names[m])
-            best = away[m] / spacing[k], away[m], sides, 0.5 * (foot[:, m] + here)
-    return best
-
-
-def find_cell(nodes: np.ndarray, place: Place | None) -> tuple[int, int] | None:
-    """The cell (i, j) of a block that a place means: for nodes of a side the one beside the first
-    of them; None where it names no more than the block."""
-    last = np.array(nodes.shape[1:]) - 2
-    if place is None or not (place.cell or (place.side and place.nodes)):
-        return None
-    if place.cell is not None:
-        cell = np.array(place.cell)
-    else:
-        cell = np.full(2, place.nodes[0])
-        cell["ij".index(place.side[0])] = last.max() if place.side.endswith("max") else 0
+    areas = [measure_areas(block.nodes) for block in named or blocks]
+    number = int(np.argmin([area.min() / np.median(area) for area in areas]))
+    block, last = (named or blocks)[number], np.array(areas[number].shape) - 1
+    cell = np.array(np.unravel_index(areas[number].argmin(), areas[number].shape))
+    known = bool(named and place is not None and (place.cell or (place.side and place.nodes)))
+    if known and place is not None:
+        cell = np.array(place.cell or 2 * place.nodes[:1])
+        if not place.cell and place.side:
+            cell["ij".index(place.side[0])] = last.max() if place.side.endswith("max") else 0
     i, j = np.clip(cell, 0, last).tolist()
-    return i, j
+    return block, (i, j), known
 
 
-def find_marked(blocks: Sequence, place: Place | None) -> tuple[Any, tuple[int, int]]:
-    """The block and the cell (i, j) that a place means.
+def measure_areas(nodes: np.ndarray) -> np.ndarray:
+    """Areas [m2] of cells (ni, nj)."""
+    return 0.5 * np.abs(compute_corner_areas(nodes).sum(axis=0))
 
-    Without a cell the smallest one of the block, without a place that of all blocks.
+
+def describe_event(blocks: Sequence, place: Place | None) -> str:
+    """A sentence on how small the cell where it failed, or the smallest, is, and what is beside.
+
+    blocks: with `name` and `nodes` (2, ni + 1, nj + 1) [m].
     """
-    named = [block for block in blocks if place is not None and block.name == place.block]
-    candidates = named or list(blocks)
-    areas = [np.abs(compute_corner_areas(block.nodes).sum(axis=0)) for block in candidates]
-    number = int(np.argmin([float(area.min() / np.median(area)) for area in areas]))
-    i, j = np.unravel_index(areas[number].argmin(), areas[number].shape)
-    cell = find_cell(candidates[number].nodes, place) if named else None
-    return candidates[number], cell or (int(i), int(j))
+    block, (i, j), _ = find_marked(blocks, place)
+    areas = measure_areas(block.nodes)
+    away = zip(SIDE_NAMES, (i, areas.shape[0] - 1 - i, j, areas.shape[1] - 1 - j), strict=True)
+    beside = [side for side, cells in away if cells < BESIDE]
+    where = f", beside {' and '.join(beside)}" if beside else ""
+    x, y = block.nodes[:, i : i + 2, j : j + 2].mean(axis=(1, 2))
+    share = float(areas[i, j] / np.median(areas))
+    return (
+        f"cell i={i}, j={j} of block '{block.name}' at ({x:.6g}, {y:.6g}) m{where} has {share:.2g} "
+        "of the usual area of the block's cells"
+    )
 
 
 def draw_early_end(run: RunData, title: str, place: Place | None, point: int | None) -> Path:
@@ -269,8 +219,7 @@ def draw_early_end(run: RunData, title: str, place: Place | None, point: int | N
     left, right = figure.subfigures(1, 2, width_ratios=(1.35, 1.0))
     near = left.subplots()
     whole, below = right.subplots(2, 1, height_ratios=(1.25, 1.0))
-    block, (i, j) = find_marked(dump.blocks, place)
-    named = place is not None and place.block == block.name and find_cell(block.nodes, place)
+    block, (i, j), named = find_marked(dump.blocks, place)
     known = dump.field_names()
     name = "rho" if "rho" in known else next(iter(known), "")
     sheets = make_sheets(dump, [name] if name else [], View())

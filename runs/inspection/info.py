@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import os
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,7 +29,6 @@ from runs.inspection.account import (
     describe_verdict,
     judge,
 )
-from runs.inspection.compare import describe_difference
 from runs.store.checksum import NAME as CHECKSUM
 from runs.store.checksum import PARTS, find_fault, find_sum, read_parts
 from runs.store.directory import RunDirectory
@@ -242,8 +242,6 @@ def describe_history(history: Mapping[str, np.ndarray]) -> list[str]:
 LONGEST = 60  # characters of a text that are shown
 SAID = ("units", "long_name")  # attributes that a dataset's own line tells
 SCALES = ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid")  # HDF5's own
-VERSION = "format_version"  # one of dumps in one file, one of those in parts
-MADE = "/provenance"  # differs between machines and versions without any other difference
 
 
 def inspect(file: str | os.PathLike, other: str | os.PathLike | None = None) -> str:
@@ -258,54 +256,50 @@ def inspect(file: str | os.PathLike, other: str | os.PathLike | None = None) -> 
 
 def inspect_file(path: str) -> str:
     """The tree of the file: for each array shape, type, range, unit, bad values, checksum."""
+    head = f"{path}: {Path(path).stat().st_size} bytes" if Path(path).is_file() else path
     with open_hdf5(Path(path)) as file:
-        lines = [f"{path}: {Path(path).stat().st_size} bytes"]
         if (found := find_sum(Path(path))) is not None:
-            lines[0] += f", checksum {'as stored' if found else 'NOT AS STORED'}"
+            head += f", checksum {'as stored' if found else 'NOT AS STORED'}"
+        lines = [head]
         for part, crc in read_parts(file).items():
             fault = find_fault(Path(path), part, crc)
             lines.append(f"  {part}: {fault or 'checksum as stored'}")
-        items = list_items(file)
-        for folder in (name for name, item in items.items() if isinstance(item, h5py.Group)):
-            lines += [f"{folder}/"] * (folder != "/")
-            lines += describe_attributes(items[folder], "  ")
-            arrays = {n: i for n, i in items[folder].items() if isinstance(i, h5py.Dataset)}
-            width = max(map(len, arrays), default=0)
-            for name, data in arrays.items():
-                lines.append(f"  {name:{width}}  {describe_array(data)}")
-                lines += describe_attributes(data, "    ", SAID)
+        for folder, below in describe_tree(file).items():
+            lines += [folder] * (folder != "/") + [f"  {line}" for line in below]
     return "\n".join(lines)
+
+
+def describe_tree(file: h5py.File) -> dict[str, list[str]]:
+    """By folder a line for each attribute and each array with its attributes."""
+    tree = {}
+    items = list_items(file)
+    for folder in (name for name, item in items.items() if isinstance(item, h5py.Group)):
+        arrays = {n: i for n, i in items[folder].items() if isinstance(i, h5py.Dataset)}
+        width = max(map(len, arrays), default=0)
+        lines = tree[f"{folder.rstrip('/')}/"] = describe_attributes(items[folder])
+        for name, data in arrays.items():
+            lines.append(f"{name:{width}}  {describe_array(data)}")
+            lines += [f"  {line}" for line in describe_attributes(data, SAID)]
+    return tree
 
 
 def inspect_differences(a: str, b: str) -> str:
-    """How the file `b` differs from `a`, array by array; what made them does not count."""
+    """Lines of the two trees that are in one alone: - for the file `a`, + for `b`.
+
+    Checksums of whole files and whether their arrays are in parts do not count.
+    """
     with open_hdf5(Path(a)) as one, open_hdf5(Path(b)) as other:
-        parts = {path: len(read_parts(file)) for path, file in ((a, one), (b, other))}
-        stored = [
-            f"  {path} in {count(n, 'part') if n else 'one file'}" for path, n in parts.items()
-        ]
-        stored *= len(set(parts.values())) > 1
-        left, right = list_items(one), list_items(other)
-        lines: list[str] = []
-        made: list[str] = []
-        for path, here in ((a, set(left) - set(right)), (b, set(right) - set(left))):
-            for name in sorted(here):
-                (made if name == MADE else lines).append(f"{name}: only in {path}")
-        common = [name for name in left if name in right]
-        for name in common:
-            words = _compare_attributes(left[name], right[name], VERSION if stored else "")
-            (made if name == MADE else lines).extend(f"{name}{line}" for line in words)
-            if isinstance(left[name], h5py.Dataset) and isinstance(right[name], h5py.Dataset):
-                if told := _compare_arrays(left[name], right[name]):
-                    lines.append(f"{name}: {told}")
-        arrays = sum(isinstance(left[name], h5py.Dataset) for name in common)
-    if not lines:
-        lines = [f"no difference between {a} and {b} in {count(arrays, 'array')}"]
-    if stored:
-        lines += ["stored in different ways:", *stored]
-    if made:
-        lines += ["made by different versions:", *(f"  {line.removeprefix(MADE)}" for line in made)]
-    return "\n".join(lines)
+        texts = [
+            [f"{folder}{line.strip()}" for folder, lines in describe_tree(file).items()
+             for line in lines]
+            for file in (one, other)
+        ]  # fmt: skip
+    found = list(difflib.unified_diff(*texts, n=0, lineterm=""))[2:]
+    stored = tuple(f"/@{name} " for name in (CHECKSUM, "format_version"))
+    lines = [line for line in found if line[:2] != "@@" and not line[1:].startswith(stored)]
+    return (
+        "\n".join([f"- {a}", f"+ {b}", *lines]) if lines else f"no difference between {a} and {b}"
+    )
 
 
 @contextlib.contextmanager
@@ -336,12 +330,10 @@ def list_items(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
     return {n: i for n, i in found.items() if not f"{n}/".startswith(f"/{PARTS}/")}
 
 
-def describe_attributes(
-    item: h5py.Group | h5py.Dataset, margin: str, said: Sequence[str] = ()
-) -> list[str]:
+def describe_attributes(item: h5py.Group | h5py.Dataset, said: Sequence[str] = ()) -> list[str]:
     """A line for each attribute that no other words tell."""
     names = [name for name in item.attrs if name not in (*SCALES, *said)]
-    return [f"{margin}@{name} = {_say_value(item.attrs[name])}" for name in names]
+    return [f"@{name} = {_say_value(item.attrs[name])}" for name in names]
 
 
 def describe_array(data: h5py.Dataset) -> str:
@@ -381,31 +373,3 @@ def _say_value(value: Any) -> str:
     if isinstance(value, np.generic):
         value = value.item()
     return repr(value)
-
-
-def _compare_attributes(one, other, ignored: str) -> list[str]:
-    """A line for each attribute that differs, of two groups or arrays."""
-    left, right = (
-        {n: item.attrs[n] for n in item.attrs if n not in (*SCALES, CHECKSUM, ignored)}
-        for item in (one, other)
-    )
-    return [
-        f" @{name}: {_say_value(left.get(name))} and {_say_value(right.get(name))}"
-        for name in {**left, **right}
-        if not np.array_equal(left.get(name), right.get(name))
-    ]
-
-
-def _compare_arrays(one: h5py.Dataset, other: h5py.Dataset) -> str:
-    """Words for how two arrays differ; "" where they have the same bits (nan agrees with nan)."""
-    try:
-        x, y = one[()], other[()]
-    except (OSError, RuntimeError):
-        return "cannot be read in one of them"
-    if np.shape(x) != np.shape(y) or one.dtype != other.dtype:
-        return f"{np.shape(x)} {one.dtype} and {np.shape(y)} {other.dtype}"
-    if not isinstance(x, np.ndarray):
-        return "" if x == y or (x != x and y != y) else f"{_say_value(x)} and {_say_value(y)}"
-    if x.dtype.kind not in "fiub":
-        return "" if (x == y).all() else f"{int((x != y).sum())} of {x.size} values differ"
-    return describe_difference(x, y)[0]

@@ -177,8 +177,8 @@ class Outlook:
 
         name: of the cause of an early end.
         """
-        marks = [mark._asdict() for mark in self.trend.marks]
-        verdict = judge(status, reason, history, self.size.cells, self.problem, marks, name)
+        marks, cells = self.trend.marks, self.size.cells
+        verdict = judge(status, reason, history, cells, self.problem, marks, name)
         write_verdict(self.directory, verdict)
         clock = getattr(self.evolution, "clock", None)
         if status == "finished" and clock is not None and not self.began:

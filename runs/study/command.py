@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from regrid.errors import BadInput
 from runs.deck.reading import parse_value
-from runs.engines import open_engine
 from runs.inspection.account import count
 from runs.study.computing import Result
-from runs.study.definition import (
-    NUMBER,
-    Definition,
-    check_same_deck,
-    read_vary,
-)
+from runs.study.definition import NUMBER, check_same_deck, read_vary
 from runs.study.orders import describe_series
-from runs.study.study import Study, make_study, terminate_softly
+from runs.study.study import Study, make_study
 
-FAILED, INTERRUPTED = 3, 128 + 2
+FAILED = 3
 MOST_CAUTIONS = 10  # on the screen
 STATES = {"done": "done", "failed": "failed", "half": "half done", "other": "of another deck"}
 
@@ -57,22 +52,16 @@ def study(
         check_same_deck(made.path, made.definition)
         say(describe_plan(made))
         return 0
-    progress = Progress(made.definition, quiet, note)
+    progress = Progress(made, quiet, note)
     with terminate_softly() as caught:
         try:
-            with open_engine(engine, jobs) as opened:
-                if opened is None:  # a rank of MPI that only computes
-                    return 0
-                made.check()
-                with made.claimed():
-                    progress.begin()
-                    made.compute(opened, progress.tell, retry)
+            if not made.run(engine, jobs, progress.tell, retry):
+                return 0  # a rank of MPI that only computes
         except KeyboardInterrupt as stop:  # by now all workers have stopped
             left = count(made.results.count(None), "run")
             note(f"stopped with {left} to do; repeat the command to continue")
-            if signal.SIGTERM in caught or signal.SIGTERM.name in str(stop):  # a run may catch it
-                return 128 + signal.SIGTERM
-            return INTERRUPTED
+            told = signal.SIGTERM in caught or signal.SIGTERM.name in str(stop)  # by a run
+            return 128 + (signal.SIGTERM if told else signal.SIGINT)
         finally:
             progress.close()
     paths = made.write()
@@ -112,34 +101,30 @@ def describe_plan(study: Study) -> str:
 class Progress:
     """How a study is getting on: a bar in a terminal, a line a run elsewhere, failures always."""
 
-    def __init__(self, definition: Definition, quiet: bool, note: Callable[[str], None]):
-        self.definition, self.quiet, self.note = definition, quiet, note
-        self.points = len(definition.points)
+    def __init__(self, study: Study, quiet: bool, note: Callable[[str], None]):
+        self.study, self.quiet, self.note = study, quiet, note
         self.there = self.done = self.failed = self.ended = 0
         self.bar: Any = None
 
-    def begin(self) -> None:
-        """Show the bar, where there is a terminal."""
-        if not self.quiet and sys.stderr.isatty():
-            from tqdm import tqdm
-
-            self.bar = tqdm(total=self.points, unit="run", dynamic_ncols=True, smoothing=0.0)
-
     def tell(self, number: int, result: Result, there: bool) -> None:
         """Take note of a run that has ended, or was there already."""
+        points = self.study.definition.points
+        if self.bar is None and not self.quiet and sys.stderr.isatty():
+            from tqdm import tqdm
+
+            self.bar = tqdm(total=len(points), unit="run", dynamic_ncols=True, smoothing=0.0)
         self.there += there
         self.done += not there and bool(result.digest)  # without one it could not begin
         self.ended += 1
         self.failed += bool(result.failure)
-        name = self.definition.points[number].name
+        name = points[number].name
         if result.failure:
             self._say(f"{name}: failed: {result.failure}")
         elif self.bar is None and not there:
             seconds = f"{result.seconds:.1f} s"
-            self._say(f"{self.ended}/{self.points} {name}: {result.reason}, {seconds}")
+            self._say(f"{self.ended}/{len(points)} {name}: {result.reason}, {seconds}")
         if self.bar is not None:
-            if there:  # no measure of speed
-                self.bar.initial += 1
+            self.bar.initial += there  # no measure of speed
             self.bar.update(1)
             self.bar.set_postfix_str(f"{self.failed} failed" if self.failed else "")
 
@@ -153,7 +138,22 @@ class Progress:
         """Leave the bar as it is."""
         if self.bar is not None:
             self.bar.close()
-            self.bar = None
+
+
+@contextlib.contextmanager
+def terminate_softly() -> Iterator[list[int]]:
+    """In the block SIGTERM is a KeyboardInterrupt; the list then holds its number."""
+    caught: list[int] = []
+
+    def stop(number, frame):
+        caught.append(number)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield caught
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def describe_study(study: Study, progress: Progress, seconds: float) -> str:

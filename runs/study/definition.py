@@ -19,6 +19,7 @@ import math
 import re
 import shlex
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -138,7 +139,7 @@ def read_values(words: str, where: str) -> list[Any]:
 def _spread(first: str, last: str, count: str, log: str | None) -> list[Any]:
     """The values of a range; [] where it is none."""
     start, end = float(first), float(last)
-    number = int(count) if len(count) < 10 else MOST_VALUES + 1
+    number = int(count) if len(count) < 10 else 0
     good = 2 <= number <= MOST_VALUES and start != end and math.isfinite(start - end)
     if not good or (log and min(start, end) <= 0.0):
         return []
@@ -146,10 +147,8 @@ def _spread(first: str, last: str, count: str, log: str | None) -> list[Any]:
     rounded = [float(f"{value:.{DIGITS}g}") for value in values]
     if len(set(rounded)) < number:  # closer than the digits tell
         rounded = values.tolist()
-    whole = not any(sign in first + last for sign in ".eE")
-    if whole and all(value == round(value) for value in rounded):
-        return [round(value) for value in rounded]
-    return rounded
+    whole = not set(".eE") & set(first + last) and all(value.is_integer() for value in rounded)
+    return [int(value) for value in rounded] if whole else rounded
 
 
 def flatten(table: Mapping[str, Any], above: str = "") -> dict[str, Any]:
@@ -170,7 +169,7 @@ def make_product(vary: Mapping[str, Sequence[Any]]) -> list[Point]:
     for key, values in vary.items():
         if not values:
             raise BadInput(f"vary: {key} has no values")
-        _check_different([Point({key: value}).name for value in values], "vary: there is")
+        _check_different([Point({key: value}) for value in values], "vary")
     return [Point(zip(vary, values, strict=True)) for values in itertools.product(*vary.values())]
 
 
@@ -185,14 +184,14 @@ def list_points(points: Iterable[Mapping[str, Any]]) -> list[Point]:
         if missing := [key for key in keys if key not in point]:
             raise BadInput(f"points: number {number} lacks {', '.join(missing)}")
     made = [Point({key: point[key] for key in keys}) for point in flat]
-    _check_different([point.name for point in made], "points: there is")
+    _check_different(made, "points")
     return made
 
 
-def _check_different(texts: Sequence[str], words: str) -> None:
-    twice = next((text for text in texts if texts.count(text) > 1), None)
-    if twice is not None:
-        raise BadInput(f"{words} {twice} twice")
+def _check_different(points: Sequence[Point], what: str) -> None:
+    name, times = Counter(point.name for point in points).most_common(1)[0]
+    if times > 1:
+        raise BadInput(f"{what}: there is {name} twice")
 
 
 FILE = STUDY_FILE
@@ -311,23 +310,14 @@ def is_study(source: str) -> Path | None:
 
 
 def check_same_deck(folder: Path, definition: Definition) -> None:
-    """Raise BadInput where the study in `folder` is of another deck than `definition`.
-
-    A deck file that was moved and kept its name is the same.
-    """
+    """Raise BadInput where the study in `folder` is of a deck of another name than `definition`."""
     file, given = folder / FILE, definition.deck
-    there = read_toml(file).get("deck") if file.is_file() else None
-    if not isinstance(there, str):
-        return
-    if (folder / there).is_file():
-        there = str((folder / there).resolve())
-    moved = not Path(there).exists() and Path(there).parent != Path()
-    if there == given or (moved and Path(there).name == Path(given).name):
-        return
-    raise BadInput(
-        f"{folder} holds a study of {there}, not of {given}; choose another folder with -o, or go "
-        f"on with the study there: shockgrid study {shlex.quote(str(folder))}"
-    )
+    there = str(read_toml(file).get("deck")) if file.is_file() else given
+    if Path(there).name != Path(given).name:
+        raise BadInput(
+            f"{folder} holds a study of {there}, not of {given}; choose another folder with -o, or "
+            f"go on with the study there: shockgrid study {shlex.quote(str(folder))}"
+        )
 
 
 def read_definition(path: Path) -> Definition:
@@ -335,17 +325,9 @@ def read_definition(path: Path) -> Definition:
     table = read_toml(path)
     check_deck(table, StudyFile, lambda key: str(path))
     file = msgspec.convert(table, StudyFile)
-    vary = {}
-    for key, given in flatten(file.vary).items():
-        values = read_values(given, f"{path}: vary.{key}") if isinstance(given, str) else given
-        if not isinstance(values, list):
-            raise BadInput(
-                f'{path}: vary.{key} = {given!r}; it must be a list or a range such as "1:3:5"'
-            )
-        vary[key] = values
     beside = path.parent / file.deck
     source = str(beside) if beside.is_file() else file.deck
     try:
-        return make_definition(source, vary, file.points, flatten(file.set), file.shown)
+        return make_definition(source, file.vary, file.points, flatten(file.set), file.shown)
     except BadInput as error:
         raise BadInput(f"{path}: {error}") from error

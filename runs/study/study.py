@@ -21,8 +21,6 @@ import contextlib
 import csv
 import io
 import re
-import signal
-import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -324,18 +322,29 @@ class Study:
             write_atomically(folder / FILE, self.definition.to_toml())
             yield
 
-    def compute(
+    def run(
         self,
-        engine: Engine,
+        engine: str,
+        jobs: int | None,
         tell: Callable[[int, Result, bool], None] = lambda number, result, there: None,
         retry: bool = False,
-    ) -> None:
-        """Compute what is not there yet in the folder, which is to be claimed.
+    ) -> bool:
+        """Compute what is not there yet; False on a rank of MPI that only helped.
 
         tell: hears the number of a point, its result, and whether it was there already; retry:
         failed runs go on from where they failed.  Raises KeyboardInterrupt where a signal stopped a
         run.
         """
+        with open_engine(engine, jobs) as opened:
+            if opened is not None:
+                self.check()
+                with self.claimed():
+                    self._compute(opened, tell, retry)
+        return opened is not None
+
+    def _compute(
+        self, engine: Engine, tell: Callable[[int, Result, bool], None], retry: bool
+    ) -> None:
 
         def take(number: int, result: Result, there: bool = False) -> None:
             self.results[number] = result
@@ -486,35 +495,12 @@ def study(
     """
     fixed = flatten({**(settings or {}), **keywords})
     made = make_study(deck, vary or {}, output, points, fixed, shown, refine)
-    with open_engine(engine, jobs) as opened:
-        if opened is None:
-            return None
-        made.check()
-        try:
-            with made.claimed():
-                made.compute(opened)
-        except KeyboardInterrupt:
-            left = count(made.results.count(None), "run")
-            words = f"stopped with {left} to do; study({str(output)!r}) continues"
-            raise KeyboardInterrupt(words) from None
-        made.write()
-        return made
-
-
-@contextlib.contextmanager
-def terminate_softly() -> Iterator[list[int]]:
-    """In the block SIGTERM is a KeyboardInterrupt; the list then holds its number."""
-    caught: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield caught
-        return
-
-    def stop(number, frame):
-        caught.append(number)
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, stop)
     try:
-        yield caught
-    finally:
-        signal.signal(signal.SIGTERM, before)
+        if not made.run(engine, jobs):
+            return None
+    except KeyboardInterrupt:
+        left = count(made.results.count(None), "run")
+        words = f"stopped with {left} to do; study({str(output)!r}) continues"
+        raise KeyboardInterrupt(words) from None
+    made.write()
+    return made

@@ -10,7 +10,7 @@ import pytest
 
 from regrid.errors import BadInput, RegridFailure, RunFailure
 from runs.early_end.causes import name_failure
-from runs.forecast import Size, StepTrend, TimeLeft, classify, make_past_run
+from runs.forecast import Size, StepTrend, TimeLeft, describe_place, make_past_run
 from runs.inspection.account import RULES, describe_verdict, judge
 
 
@@ -22,7 +22,7 @@ def make_block(name="a", ni=6, nj=8, squeezed=None):
         i, j = squeezed
         y[i : i + 2, j + 1 :] = y[i : i + 2, j : j + 1] + 0.01 * np.arange(1, nj - j + 1)
         rates[squeezed] = 50.0
-    wall = SimpleNamespace(side="j_min", start=0, stop=ni, kind="wall", follows_flow=False)
+    wall = SimpleNamespace(side="j_min", start=0, stop=ni, kind="wall")
     return SimpleNamespace(name=name, nodes=np.array([x, y]), rates=rates, segments=[wall])
 
 
@@ -48,7 +48,7 @@ def test_a_line_for_every_factor_of_the_root_of_ten_and_settings_once():
     run, trend, noted, said = make_run(squeezed=(3, 4))
     follow(run, trend, np.geomspace(1.0, 1.01e-3, 400))
     assert len(noted) == len(trend.marks) == 5  # 3.2, 10, 32, 100, 316
-    assert [round(np.log10(mark.shrunk), 1) for mark in trend.marks] == [0.5, 1.0, 1.5, 2.0, 2.5]
+    assert [round(np.log10(mark["shrunk"]), 1) for mark in trend.marks] == [0.5, 1.0, 1.5, 2.0, 2.5]
     assert len(said) == 1 and "what can be changed: run.small_cells=0.1" in said[0]
     assert "b i=3, j=4 at (3.5, 4.005) m" in noted[0] and "inside" in noted[0]
 
@@ -191,14 +191,12 @@ def test_an_early_end_has_the_name_of_its_cause(error, name):
     assert line.startswith(f"verdict: ended early, {name};") and "\n" not in line
 
 
-def test_a_thin_cell_is_told_by_what_it_lies_beside():
+def test_a_cell_is_told_by_what_it_lies_beside():
     def part(side, kind, start=0, stop=12):
-        moves = kind in ("interface", "sliding")
-        return SimpleNamespace(side=side, start=start, stop=stop, kind=kind, follows_flow=moves)
+        return SimpleNamespace(side=side, start=start, stop=stop, kind=kind)
 
     block = SimpleNamespace(nodes=np.zeros((2, 13, 13)))
     block.segments = [part("i_max", "interface"), part("j_min", "axis"), part("j_max", "wall")]
-    cells = {(11, 6): "line", (11, 0): "corner", (5, 0): "axis", (5, 11): "wall", (5, 5): "inside"}
-    assert {cell: classify(block, *cell) for cell in cells} == cells
-    block.segments[0] = part("i_max", "sliding")
-    assert classify(block, 11, 6) == "sliding"
+    cells = {(11, 6): "interface", (11, 0): "interface, axis", (5, 0): "axis", (5, 11): "wall"}
+    assert {cell: describe_place(block, *cell).removeprefix("beside: ") for cell in cells} == cells
+    assert describe_place(block, 5, 5) == "inside, away from all sides"

@@ -8,9 +8,9 @@ import sys
 import pytest
 
 import shockgrid
+from benchmarks.bench_calls import count_calls, make_step
 from builders import ROOT
 from regrid.errors import BadInput
-from runs.bench import count_calls, make_step
 from runs.ranks.started import RANKS, SIZES, SLURM, count_started, find_rank, is_for_ranks
 
 

@@ -12,10 +12,11 @@ that runs outwards from a contact.
 import contextlib
 import io
 import itertools
+import math
 import pickle
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from hydro.simulation import Simulation
 from hydro.step import take_step
 from problems.deck import DeckTable, key
 from problems.pictures import draw_field, make_panels
-from problems.problem import find_crossing
+from problems.problem import Problem, find_crossing, say_unreached
 from problems.references.exact_flows import average_points
 from problems.references.hugoniot import Shock, shock_with_mach
 from regrid.errors import BadInput
@@ -119,51 +120,65 @@ def follow_gas(block: Block, dt: float) -> np.ndarray:
     return block.nodes + dt * (total[1:] / total[0])
 
 
-@dataclass(frozen=True)
-class RadialFlow:
-    """A flow that depends on the radius alone, on a rectangular grid that does not know it.
+class RadialProblem(Problem):
+    """A flow of one block, "gas", that depends on the radius alone, on a rectangular grid that does
+    not know it.
 
-    Plane: a strip, the radius being x.  Cylindrical: a quarter of the plane.  Spherical: the
-    quarter between the axis and the plane of symmetry, in axisymmetric flow.
+    By the deck's `geometry`, plane: a strip, the radius being x; cylindrical: a quarter of the
+    plane; spherical: the quarter between the axis and the plane of symmetry, in axisymmetric flow.
+    `peers`: what other codes have with 100 cells, by geometry.
     """
 
-    symmetry: Symmetry
+    counted = ("cells", "cells")
+    peers: ClassVar[dict[str, str]] = {}
 
-    @property
-    def geometry(self) -> str:
-        """That of the `Simulation`."""
-        return "axisymmetric" if self.symmetry == "spherical" else "plane"
+    def __init__(self, deck):
+        super().__init__(deck)
+        self.plane, self.curved = deck.geometry == "plane", deck.geometry == "spherical"
+        self.geometry = "axisymmetric" if self.curved else "plane"  # that of the `Simulation`
 
-    def make_nodes(self, cells: int, size: float) -> np.ndarray:
+    def compute_density(self, r: np.ndarray, t: float) -> np.ndarray:
+        """Exact density at radii r and time t."""
+        raise NotImplementedError
+
+    def lay_nodes(self, size: float) -> np.ndarray:
         """Nodes (2, cells + 1, n) of the rectangle from the centre to `size` [m]."""
-        line = np.linspace(0.0, size, cells + 1)
-        return make_plane_grid(line, line[: STRIP + 1] if self.symmetry == "plane" else line)
+        line = np.linspace(0.0, size, self.deck.cells + 1)
+        return make_plane_grid(line, line[: STRIP + 1] if self.plane else line)
 
-    def close(self, block: Block) -> None:
-        """Put the axis, and walls on the sides that nothing has been put on."""
-        if self.symmetry == "spherical":
-            put(block, "j_min", "axis")
-        put_walls(block)
+    def simulate(self, blocks, links=(), kind=None, **options) -> Simulation:
+        """As the base has it; the axis, and walls on sides that nothing is put on, come first."""
+        if self.curved:
+            put(blocks[0], "j_min", "axis")
+        put_walls(*blocks)
+        return super().simulate(blocks, links, kind, geometry=self.geometry, **options)
 
     def compute_radii(self, points: np.ndarray) -> np.ndarray:
         """Radii (...) of points (2, ...)."""
-        return np.abs(points[0]) if self.symmetry == "plane" else np.hypot(*points)
+        return np.abs(points[0]) if self.plane else np.hypot(*points)
 
-    def measure_error(self, block: Block, function: Callable, within: float = np.inf) -> float:
-        """Relative error of the density, sum |rho - exact| V / sum exact V, in r < within.
-
-        `exact` are the means over the cells of `function`, a density of the radius.
-        """
+    def measure_error(self, evolution, within: float = np.inf) -> float:
+        """At the end the relative error of the density against its means over cells, sum |rho -
+        exact| V / sum exact V, in r < within; NaN before."""
+        if evolution.finished is None:
+            return math.nan
+        (block,) = evolution.blocks
 
         def sample(point, _):
-            weight = point[1] if self.symmetry == "spherical" else 1.0
-            return function(self.compute_radii(point)), weight
+            weight = point[1] if self.curved else 1.0
+            return self.compute_density(self.compute_radii(point), evolution.t), weight
 
         places = [((n + 0.5) / POINTS, 1.0) for n in range(POINTS)]
         exact = average_points(block.nodes, places, sample)
         weight = block.volume * (self.compute_radii(block.centres) < within)
         error = np.abs(block.state[0, 1:-1, 1:-1] - exact)
         return float((error * weight).sum() / (exact * weight).sum())
+
+    def list_notes(self, history) -> list[str]:
+        """Sentences below the report."""
+        deck, notes = self.deck, say_unreached(history, "error_rho")
+        known = deck.cells == 100 and deck.geometry in self.peers
+        return notes + ([f"other codes: {self.peers[deck.geometry]}"] if known else [])
 
     def find_shock(self, block: Block) -> float:
         """Mean radius [m] of a shock that runs outwards into gas of density 1.
@@ -179,19 +194,19 @@ class RadialFlow:
         known = np.isfinite(found)
         return float(found[known].mean()) if level > 1.0 + 0.5 * LEAST_RISE and known.any() else 0.0
 
-    def draw(self, figure, dump, exact, reach: float, **options) -> None:
-        """Density out to `reach` [m], and of every cell against its radius beside `exact(r)`."""
+    def draw(self, figure, dump, reach: float, **options) -> None:
+        """Density out to `reach` [m], and of every cell against its radius beside the exact one."""
         left, right = make_panels(figure, 11.5, 4.8, 1, 2)
         draw_field(left, dump, "rho", low=0.0, bar="density [kg/m3]", **options)
-        if self.symmetry != "plane":
+        if not self.plane:
             left.set(xlim=(0.0, reach), ylim=(0.0, reach))
         gas = dump["gas"]
         r = self.compute_radii(gas.centres)
         right.plot(r.ravel(), gas.rho.ravel(), ".", ms=1.5, color="tab:blue")
         r = np.linspace(1e-3, reach, 2000)
-        right.plot(r, exact(r), color="k", lw=0.8)
+        right.plot(r, self.compute_density(r, max(dump.t, 1e-9)), color="k", lw=0.8)
         right.set(xlim=(0.0, reach), xlabel="r [m]", ylabel="density [kg/m3], exact in black")
-        figure.suptitle(f"{self.symmetry}, t = {dump.t:.3g} s", fontsize="medium")
+        figure.suptitle(f"{self.deck.geometry}, t = {dump.t:.3g} s", fontsize="medium")
 
 
 def mix_states(eos, fraction: np.ndarray, first, second):

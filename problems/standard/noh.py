@@ -10,8 +10,8 @@ Note: every shock-capturing scheme overheats the first gas at the centre ("wall 
 density remains too low.  Source: [Noh1987].
 """
 
-import functools
 import math
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,17 +19,11 @@ from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.initial_states import RadialFlow, Symmetry
-from problems.problem import Problem, Report, Row, compare, get_last, say_unreached
+from problems.initial_states import RadialProblem, Symmetry
+from problems.problem import Report, Row, compare, get_last
 from problems.references.exact_flows import DIMENSIONS
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
-
-# relative L1 of the density at 100 x 100 cells, as published by or measured on other codes
-PEERS = {
-    "cylindrical": "Athena++ .036, pyro2 .051, BookLeaf (polar grid) .033",
-    "spherical": "PENNANT .14",
-}
 
 
 class NohDeck(Deck, kw_only=True):
@@ -42,14 +36,16 @@ class NohDeck(Deck, kw_only=True):
     limiter: Limiter = "monotonised-central"
 
 
-class Noh(Problem):
+class Noh(RadialProblem):
     Deck = NohDeck
-    counted = ("cells", "cells")
+    peers: ClassVar = {  # relative L1 of the density, as published by or measured on other codes
+        "cylindrical": "Athena++ .036, pyro2 .051, BookLeaf (polar grid) .033",
+        "spherical": "PENNANT .14",
+    }
 
     def __init__(self, deck: NohDeck):
         super().__init__(deck)
-        self.flow, self.dimensions = RadialFlow(deck.geometry), DIMENSIONS[deck.geometry]
-        self.shock_speed = 0.5 * (deck.gamma - 1.0)
+        self.dimensions, self.shock_speed = DIMENSIONS[deck.geometry], 0.5 * (deck.gamma - 1.0)
         shock, size = self.shock_speed * deck.run.t_end, 1.0 - deck.shrink * deck.run.t_end
         if shock > 0.9 * size:
             raise BadInput(
@@ -57,8 +53,7 @@ class Noh(Problem):
                 f"grid ends at {size:.3g} (shrink = {deck.shrink:g}); end earlier or shrink less"
             )
 
-    def compute_density(self, r: np.ndarray, t: float) -> np.ndarray:
-        """Exact density at radii r and time t."""
+    def compute_density(self, r, t):
         n, gamma = self.dimensions, self.deck.gamma
         before = (1.0 + t / np.maximum(r, 1e-12)) ** (n - 1)
         behind = ((gamma + 1.0) / (gamma - 1.0)) ** n
@@ -66,15 +61,15 @@ class Noh(Problem):
 
     def compute_stream(self, points: np.ndarray, t: float) -> tuple:
         """Exact rho, u, v, p of the oncoming gas at points (2, n)."""
-        r = self.flow.compute_radii(points)
+        r = self.compute_radii(points)
         rise = (1.0 + t / r) ** (self.dimensions - 1)
         u, v = -points / r if self.dimensions > 1 else (-np.ones_like(r), np.zeros_like(r))
         return rise, u, v, self.deck.pressure * rise**self.deck.gamma
 
     def make_grids(self, t=0.0):
-        nodes, factor = self.flow.make_nodes(self.deck.cells, 1.0), 1.0 - self.deck.shrink * t
+        factor = 1.0 - self.deck.shrink * t
         factors = np.reshape((factor, 1.0 if self.dimensions == 1 else factor), (2, 1, 1))
-        return {"gas": nodes * factors}
+        return {"gas": self.lay_nodes(1.0) * factors}
 
     def build(self):
         deck, nodes = self.deck, self.make_grids()["gas"]
@@ -87,25 +82,19 @@ class Noh(Problem):
                 return self.compute_stream(0.5 * (line[:, 1:] + line[:, :-1]), t)
 
             put(block, side, "inflow", state=beyond)
-        self.flow.close(block)
-        mesh = "given" if deck.shrink > 0.0 else "fixed"
-        return self.simulate([block], mesh=mesh, geometry=self.flow.geometry)
+        return self.simulate([block], mesh="given" if deck.shrink > 0.0 else "fixed")
 
     def measure(self, evolution) -> dict[str, float]:
         """Mean density and pressure behind the shock; at the end the error of the density."""
         (block,) = evolution.blocks
-        t, shock = evolution.t, self.shock_speed * evolution.t
-        r = self.flow.compute_radii(block.centres)
+        shock = self.shock_speed * evolution.t
+        r = self.compute_radii(block.centres)
         weight = block.volume * ((r > 0.3 * shock) & (r < 0.8 * shock))
-        row = dict.fromkeys(("density_behind", "pressure_behind", "error_rho"), math.nan)
-        if weight.any():
-            state = {"density_behind": block.state[0], "pressure_behind": block.state[3]}
-            for name, cells in state.items():
-                row[name] = float(np.average(cells[1:-1, 1:-1], weights=weight))
-        if evolution.finished is not None:
-            exact = functools.partial(self.compute_density, t=t)
-            row["error_rho"] = self.flow.measure_error(block, exact, 2.0 * shock)
-        return row
+        row = dict.fromkeys(("density_behind", "pressure_behind"), math.nan)
+        for name, cells in zip(row, block.state[[0, 3], 1:-1, 1:-1], strict=True):
+            if weight.any():
+                row[name] = float(np.average(cells, weights=weight))
+        return {**row, "error_rho": self.measure_error(evolution, 2.0 * shock)}
 
     def report(self, history, final=None) -> Report:
         deck, t = self.deck, get_last(history, "t") if history else self.t_end
@@ -119,14 +108,11 @@ class Noh(Problem):
             Row("shock_radius", theory=reach),
             compare(history, "error_rho", label=words),
         ]
-        notes = say_unreached(history, "error_rho")
-        if deck.cells == 100 and deck.geometry in PEERS:
-            notes.append(f"other codes: {PEERS[deck.geometry]}")
-        return Report(f"noh, {deck.geometry}, {deck.cells} cells per side, {grid}", rows, notes)
+        head = f"noh, {deck.geometry}, {deck.cells} cells per side, {grid}"
+        return Report(head, rows, self.list_notes(history))
 
     def draw_noh(self, figure, run_data) -> None:
         """Density in the last dump out to twice the shock's radius, and against the radius."""
-        dump, exact = run_data.dumps[-1], self.compute_density
-        high = float(exact(np.zeros(1), max(dump.t, 1e-9))[0])
-        reach = max(2.0 * self.shock_speed * dump.t, 0.05)
-        self.flow.draw(figure, dump, functools.partial(exact, t=dump.t), reach, high=1.1 * high)
+        dump = run_data.dumps[-1]
+        high = float(self.compute_density(np.zeros(1), max(dump.t, 1e-9))[0])
+        self.draw(figure, dump, max(2.0 * self.shock_speed * dump.t, 0.05), high=1.1 * high)

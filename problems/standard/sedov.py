@@ -13,7 +13,7 @@ gas when nodes follow; use a grid at rest.  Source: [Sedov1959], [Kamm2000].
 """
 
 import math
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -21,14 +21,13 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.formulas.geometry import compute_volumes, find_geometry
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.initial_states import RadialFlow, Symmetry, follow_gas
-from problems.problem import Problem, Report, Row, compare, get_last, say_unreached
+from problems.initial_states import RadialProblem, Symmetry, follow_gas
+from problems.problem import Report, Row, compare, get_last
 from problems.references.exact_flows import SedovBlast
 from regrid.errors import BadInput
 
 # of the whole energy in the part that is computed: half a line, a quarter, a quarter a radian
 SHARES = {"plane": 0.5, "cylindrical": 0.25, "spherical": 0.25 / math.pi}
-PEERS = {"cylindrical": "BookLeaf .018", "spherical": "PENNANT gains 11 % of energy"}
 
 
 class SedovDeck(Deck, kw_only=True):
@@ -45,13 +44,12 @@ class SedovDeck(Deck, kw_only=True):
     limiter: Limiter = "van-leer"
 
 
-class Sedov(Problem):
+class Sedov(RadialProblem):
     Deck = SedovDeck
-    counted = ("cells", "cells")
+    peers: ClassVar = {"cylindrical": "BookLeaf .018", "spherical": "PENNANT gains 11 % of energy"}
 
     def __init__(self, deck: SedovDeck):
         super().__init__(deck)
-        self.flow = RadialFlow(deck.geometry)
         alpha = SedovBlast(deck.geometry, deck.gamma).alpha
         self.blast = SedovBlast(deck.geometry, deck.gamma, energy=alpha)
         self.mesh = deck.mesh or ("fixed" if deck.geometry == "plane" else "follow")
@@ -64,33 +62,32 @@ class Sedov(Problem):
                 f"{where}; the sides are {deck.size:g} long, and its mirror image would come back"
             )
 
+    def compute_density(self, r, t):
+        return self.blast.sample(r, t)[0]
+
     def make_grids(self, t=0.0):
-        return {"gas": self.flow.make_nodes(self.deck.cells, self.deck.size)}
+        return {"gas": self.lay_nodes(self.deck.size)}
 
     def build(self):
-        deck, flow, nodes = self.deck, self.flow, self.make_grids()["gas"]
-        volume = compute_volumes(find_geometry(flow.geometry), nodes)
+        deck, nodes = self.deck, self.make_grids()["gas"]
+        volume = compute_volumes(find_geometry(self.geometry), nodes)
         pressure = np.full(volume.shape, deck.pressure)
         first, energy = np.index_exp[:1, :1], SHARES[deck.geometry] * self.blast.energy
         if deck.geometry == "plane":
             first, energy = np.index_exp[:1, :], energy * nodes[1, 0, -1]
         pressure[first] += (deck.gamma - 1.0) * energy / volume[first].sum()
         block = Block("gas", IdealGas(deck.gamma), nodes, 1, 0, 0, pressure, limiter=deck.limiter)
-        flow.close(block)
         follow = lambda name, t: follow_gas(block, t - simulation.t)  # noqa: E731
         mesh = follow if self.mesh == "follow" else "fixed"
-        simulation = self.simulate([block], mesh=mesh, geometry=flow.geometry)
+        simulation = self.simulate([block], mesh=mesh)
         return simulation
 
     def measure(self, evolution) -> dict[str, float]:
         """Radius of the shock and at the end the error."""
         (block,) = evolution.blocks
         most = float(block.state[0, 1:-1, 1:-1].max())
-        found = {"shock_radius": self.flow.find_shock(block), "most_density": most}
-        if evolution.finished is None:
-            return {**found, "error_rho": math.nan}
-        exact = lambda r: self.blast.sample(r, evolution.t)[0]  # noqa: E731
-        return {**found, "error_rho": self.flow.measure_error(block, exact)}
+        found = {"shock_radius": self.find_shock(block), "most_density": most}
+        return {**found, "error_rho": self.measure_error(evolution)}
 
     def report(self, history, final=None) -> Report:
         deck, energy = self.deck, history["total_energy"]
@@ -103,14 +100,11 @@ class Sedov(Problem):
             Row("energy", change, label="relative change of the energy", error="energy", digits=2),
             compare(history, "error_rho", label="relative error of the density", digits=4),
         ]
-        notes = say_unreached(history, "error_rho")
-        if deck.cells == 100 and deck.geometry in PEERS:
-            notes.append(f"other codes: {PEERS[deck.geometry]}")
         grid = "nodes follow the gas" if self.mesh == "follow" else "fixed grid"
-        return Report(f"sedov, {deck.geometry}, {deck.cells} cells per side, {grid}", rows, notes)
+        head = f"sedov, {deck.geometry}, {deck.cells} cells per side, {grid}"
+        return Report(head, rows, self.list_notes(history))
 
     def draw_sedov(self, figure, run_data) -> None:
         """Density in the last dump with the grid, and against the radius."""
         dump = run_data.dumps[-1]
-        exact = lambda r: self.blast.sample(r, max(dump.t, 1e-9))[0]  # noqa: E731
-        self.flow.draw(figure, dump, exact, self.deck.size, every=max(1, self.deck.cells // 33))
+        self.draw(figure, dump, self.deck.size, every=max(1, self.deck.cells // 33))

@@ -101,29 +101,6 @@ def test_plot(shockgrid, run, words):
     assert pixels.shape[0] > 60 and pixels[..., :3].std() > 0.02
 
 
-def test_damaged_files_are_named(shockgrid, run):
-    import h5py
-
-    torn, bare = run.dumps[-1].path, run.dumps[-2].path
-    torn.write_bytes(torn.read_bytes()[:5000])
-    with h5py.File(bare, "r+") as file:
-        del file.attrs["t"]
-    code, _, error = shockgrid("plot", "run", "--dpi", "40")
-    assert code == 2 and f"{bare.name} is truncated or damaged" in error
-    code, text, _ = shockgrid("info", "run")
-    assert code == 2 and all(f"damaged: {path} is truncated" in text for path in (torn, bare))
-    assert f"last restart point: step {run.dumps[-3].step}" in text
-    for words in (("info", str(bare)), ("compare", "run", "run")):
-        code, _, error = shockgrid(*words)
-        assert code == 2 and f"{bare.name} is truncated or damaged" in error
-    lines = run.directory.history.read_text().splitlines()
-    lines[2] = ",".join(["x"] * (lines[2].count(",") + 1))
-    run.directory.history.write_text("\n".join(lines) + "\n")
-    for words in (("info", "run"), ("plot", "run", "--what", "history")):
-        code, text, error = shockgrid(*words)
-        assert code == 2 and "history.csv is damaged, or lacks rows, from line 3" in text + error
-
-
 def test_compare_codes(shockgrid, run):
     shockgrid("run", "toy", "-q", "-o", "same", "--set", "run.t_end=0.2")
     hotter = ("--set", "start={kind='hot',temperature=2.0001}")

@@ -18,7 +18,6 @@ from hydro.links import join
 from hydro.rows import CONSERVED, RHO, P, U, V
 from hydro.simulation import Simulation
 from hydro.sources import make_gravity
-from regrid.errors import BadInput
 
 CU, AL = find_material("Cu"), find_material("Al1100")
 LENGTH, HEIGHT = 2e-3, 1e-3
@@ -116,21 +115,6 @@ def test_a_layer_at_rest_sticks():
     )  # fmt: skip
     march_whole(simulation)
     assert np.abs(layer.state[U, 1:-1, 1]).max() < 0.05 * g * np.sin(tilt) * 5e-7
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [({"friction": -0.1}, "friction = -0.1; Coulomb"), ({"weld": 1}, "weld = 1; it is true or")],
-)
-def test_nonsense_is_bad_input(options, words):
-    with pytest.raises(BadInput, match=rf"block 'layer', side j_min.*{words}"):
-        make_layer("layer", "Cu", 0.0, (4, 2), 0.0, **options)
-
-
-def test_friction_on_a_wall_is_bad_input():
-    block = make_body("b", "Cu", box((0.0, 0.0), (1.0, 1.0), (2, 2)))
-    with pytest.raises(BadInput, match=r"block 'b', side j_min: wall segment: 'friction' is given"):
-        wall_off(block, "j_min", friction=0.1)
 
 
 def test_a_block_slides_off_the_end_of_another():

@@ -45,7 +45,7 @@ def test_dry_run_leaves_nothing(shockgrid):
 @pytest.mark.parametrize(
     ("words", "wanted", "size"),
     [
-        (("interface-instability", "--set", "cells=20000"), 0, "10000 cells"),
+        (("interface-instability", "--set", "cells=4000"), 0, "2000 cells"),
         (("vortex", "--set", "cells=100000"), 2, "1e+10 cells need about"),
     ],
 )

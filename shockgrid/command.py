@@ -12,7 +12,7 @@ import sys
 from shockgrid.shadowing import find_shadow
 
 BAD_INPUT = 2  # exit code, as in runs.cli.main
-UNCOLLECTED = 20_000  # new objects before Python looks for cycles: loading makes no garbage
+UNCOLLECTED = 200_000  # new objects before Python looks for cycles: loading makes no garbage
 
 
 def main(arguments: list[str] | None = None) -> int:

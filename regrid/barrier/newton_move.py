@@ -45,7 +45,7 @@ class NewtonMove:
         self.broken = False
         self.ratio = np.inf
         self.start = "displacement"
-        self.strayed = np.inf
+        self.estimate = self.strayed = np.inf
         self.quality: tuple[float, float, int, int] | None = None
         self.triangles = -1  # not known
         self._begin()

@@ -163,10 +163,13 @@ class BarrierRegridder:
         )  # fmt: skip
         simple = work.block.area > 0.0 and (self.meets_itself or work.is_simple)
         if not (simple and move.is_settled()):
-            if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
-                raise explain_failure(boundary)
-            if not np.isfinite(previous).all():
-                raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
+            if not move.estimate < np.inf:  # else all nodes are numbers
+                if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
+                    raise explain_failure(boundary)
+                if not np.isfinite(previous).all():
+                    raise BadInput(
+                        "regrid: the previous grid has nodes that are not finite numbers"
+                    )
             if not simple:
                 raise explain_failure(boundary, previous=previous)
             if not move.run():

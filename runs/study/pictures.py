@@ -46,8 +46,8 @@ def draw_study(study: Any) -> Figure:
     figure = Figure(figsize=(6.2 * max(1, len(panels)), 4.8), layout="constrained")
     FigureCanvasAgg(figure)
     row = figure.subplots(1, max(1, len(panels)), squeeze=False)[0]
-    for axes, draw in zip(row, panels, strict=False):
-        draw(axes)
+    for axes, panel in zip(row, panels, strict=False):
+        panel(axes)
     words = ", ".join(study.definition.settings)
     title = study.definition.source + (f" ({words})" if words else "")
     figure.suptitle(title if len(title) < 110 else f"{title[:107]}...", fontsize="medium")

@@ -62,7 +62,7 @@ class March:
     @property
     def cost(self) -> float:
         """Median step in microseconds of a processor an inner node; nan where there is none."""
-        inner = (self.nodes.shape[1] - 2) * (self.nodes.shape[2] - 2)
+        inner = np.prod([n - 2 for n in self.nodes.shape[1:]])
         return 1e6 * float(np.median(self.seconds)) / inner if self.seconds and inner else np.nan
 
     @property

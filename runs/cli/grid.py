@@ -103,7 +103,7 @@ def list_names(picture, force) -> None:
 @outputs
 @force
 @picture
-def make(source, family, weight, options, cells, at, steps, passes, block, outputs, force, picture):
+def make(source, outputs, force, picture, **words) -> None:
     """Make a grid: of a named domain, between curves in a file, of a 3D block.
 
     \b
@@ -121,10 +121,7 @@ def make(source, family, weight, options, cells, at, steps, passes, block, outpu
     """
     from runs.grids.commands import make_grid
 
-    request = (family, options, weight)
-    files = (outputs, force, picture)
-    for line in make_grid(source, request, cells, (steps, at, passes), block, files):
-        echo(line)
+    echo("\n".join(make_grid(source, (outputs, force, picture), **words)))
 
 
 @grid.command()
@@ -137,7 +134,7 @@ def make(source, family, weight, options, cells, at, steps, passes, block, outpu
 @outputs
 @force
 @picture
-def regrid(file, family, weight, options, passes, block, outputs, force, picture) -> None:
+def regrid(file, outputs, force, picture, **words) -> None:
     """Regenerate the inside of your own grid; its side nodes stay bitwise.
 
     A grid with non-convex cells is untangled first.  A 3D grid is
@@ -145,9 +142,7 @@ def regrid(file, family, weight, options, passes, block, outputs, force, picture
     """
     from runs.grids.commands import regrid_file
 
-    request = (family, options, weight)
-    for line in regrid_file(file, request, passes, block, (outputs, force, picture)):
-        echo(line)
+    echo("\n".join(regrid_file(file, (outputs, force, picture), **words)))
 
 
 @grid.command()
@@ -163,8 +158,7 @@ def check(file, block, picture, force) -> int:
     from runs.grids.commands import check_file
 
     lines, valid = check_file(file, block, picture, force)
-    for line in lines:
-        echo(line)
+    echo("\n".join(lines))
     return 0 if valid else 1
 
 
@@ -195,7 +189,7 @@ def check(file, block, picture, force) -> int:
 @block
 @click.option("--plot", "picture", metavar="FILE", help="Draw the last grids side by side.")
 @force
-def compare(source, cells, steps, families, weight, settings, block, picture, force) -> None:
+def compare(source, cells, picture, force, **words) -> None:
     """Compare families of grids: a table, and a picture side by side.
 
     Of a named domain; of a deck of a flow, such as interface-instability-mushroom,
@@ -208,7 +202,5 @@ def compare(source, cells, steps, families, weight, settings, block, picture, fo
     from runs.grids.commands import parse_cells
     from runs.grids.compare import compare_families
 
-    size = parse_cells(cells)
-    files = (block, picture, force)
-    for line in compare_families(source, size, steps, families, weight, settings, *files):
+    for line in compare_families(source, picture, force, cells=parse_cells(cells), **words):
         echo(line)

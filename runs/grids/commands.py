@@ -1,13 +1,13 @@
 """What the commands `shockgrid grid list | make | regrid | check` do, as functions.
 
-Each returns the lines to be shown.  Outputs are checked before anything is computed.
+Each gives the lines to be shown.  Outputs are checked before anything is computed.
 """
 
 from __future__ import annotations
 
 import inspect
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,33 +17,12 @@ from regrid.domains_in_space import BLOCKS, SHAPES
 from regrid.errors import BadInput, RunFailure
 from regrid.given import read_grid
 from regrid.registry import find_usable, load_regridder, takes_weight
-from runs.grids.making import (
-    Made,
-    default_cells,
-    make_family,
-    make_in_block,
-    make_moving,
-    make_plane,
-    make_spatial_law,
-    march,
-    parse_options,
-    regrid_plane,
-    regrid_space,
-)
-from runs.grids.quality import (
-    Judgement,
-    check_free,
-    describe,
-    describe_histograms,
-    judge,
-    plan_outputs,
-    write_grid,
-)
+from runs.grids import making
+from runs.grids.making import Grid, name_family, parse_options
+from runs.grids.quality import check_free, describe, describe_histograms, judge, plan_outputs
 
-CELLS_IN_SPACE = (20, 20, 20)
 MOST_CELLS = 4_000_000
 Files = tuple[tuple[str, ...], bool, bool]  # names given with -o, --force, --plot
-Request = tuple[str | None, tuple[str, ...], str | None]  # family, --option words, weight
 
 
 def list_everything() -> str:
@@ -75,8 +54,9 @@ def draw_every_domain(picture: str, force: bool) -> str:
     check_free(path, force)
     marches = []
     for name in DOMAINS:
-        domain = make_domain(name, *default_cells(name))
-        marches.append((name.replace("_", "-"), march(domain, make_family("barrier", {}), 40)))
+        domain = make_domain(name, *making.default_cells(name))
+        found = making.march(domain, making.choose_family("barrier"), making.STEPS)
+        marches.append((name.replace("_", "-"), found))
     return f"picture: {draw_gallery(marches, path)}"
 
 
@@ -105,149 +85,99 @@ def parse_cells(text: str | None, dimensions: int = 2) -> tuple[int, ...] | None
 
 def make_grid(
     source: str,
-    request: Request,
-    cells: str | None,
-    motion: tuple[int, float, int],
-    block: str | None,
     files: Files,
+    *,
+    family: str | None,
+    options: tuple[str, ...],
+    cells: str | None,
+    **words,
 ) -> list[str]:
-    """`grid make`; `motion`: as in `make_plane`."""
-    steps, at, _ = motion
-    family, words, weight = request
-    given, name = parse_options(words), source.replace("-", "_")
-    in_space = name in BLOCKS or name in SHAPES
-    size = parse_cells(cells, 3 if in_space else 2)
-    if name in BLOCKS:
-        _refuse_family(family, source)
-        family, law = "ed3", make_spatial_law(given, weight)
-        plan, label = _plan(files, f"{source}.h5"), source
-        made = make_in_block(name, law, size or CELLS_IN_SPACE, given)
-    else:
-        family = family or "barrier"
-        plan = _plan(files, f"{Path(source).stem}-{family}.h5")
-        label = f"{source}, {family}"
-        if in_space and weight is not None:
-            raise BadInput(f"--weight: {source} moves; its families take none")
-        if in_space:
-            made = make_moving(name, family, given, size or CELLS_IN_SPACE, steps, at)
-        else:
-            regridder = make_family(family, given, weight)
-            made = make_plane(source, family, regridder, size, motion, block, weight)
-    made.made_by = {"source": source, "family": family, "options": " ".join(words)}
-    made.made_by |= {"weight": weight or "", "at": at, "steps": steps}
-    return _finish(made, label, plan)
-
-
-def _refuse_family(family: str | None, source: str) -> None:
-    if family is not None:
-        raise BadInput(f"--family {family}: {source} is in space, where cells are equidistributed")
+    """`grid make`; words: of `making.make`."""
+    size = parse_cells(cells, 3 if making.is_in_space(source) else 2)
+    given, own = parse_options(options), source.replace("-", "_") in BLOCKS
+    used = name_family(family, source, own)
+    label, stem = (source, source) if own else (f"{source}, {used}", f"{Path(source).stem}-{used}")
+    return _write(
+        lambda: making.make(source, family, given, cells=size, **words), label, stem, files
+    )
 
 
 def regrid_file(
-    file: str, request: Request, passes: int, block: str | None, files: Files
+    file: str,
+    files: Files,
+    *,
+    family: str | None,
+    options: tuple[str, ...],
+    block: str | None,
+    **words,
 ) -> list[str]:
-    """`grid regrid`."""
-    family, words, weight = request
-    given = parse_options(words)
-    nodes = read_grid(file, block)
-    stem = Path(file).stem
-    if nodes.shape[0] == 3:
-        _refuse_family(family, file)
-        law, family = make_spatial_law(given, weight), "ed3"
-        plan = _plan(files, f"{stem}-{family}.h5")
-        made = regrid_space(nodes, law, given)
-    else:
-        family = family or "barrier"
-        regridder = make_family(family, given, weight)
-        plan = _plan(files, f"{stem}-{family}.h5")
-        made = regrid_plane(nodes, regridder, passes, weight)
-    before = judge(nodes)
-    made.made_by = {"source": file, "family": family, "options": " ".join(words)}
-    made.made_by |= {"weight": weight or ""}
-    made.notes.insert(
-        0,
-        f"before: {len(before.bad_cells)} cells not convex, minimum scaled Jacobian "
-        f"{before.least_sine:.4f}, worst aspect ratio {before.worst_aspect:.3f}",
-    )
-    return _finish(made, f"{file}, {family}", plan)
+    """`grid regrid`; words: of `making.regrid`."""
+    given, nodes = parse_options(options), read_grid(file, block)
+    used = name_family(family, file, nodes.shape[0] == 3)
+
+    def compute() -> Grid:
+        before, made = judge(nodes), making.regrid(nodes, family, given, source=file, **words)
+        words_before = (
+            f"before: {len(before.bad_cells)} cells not convex, minimum scaled Jacobian "
+            f"{before.least_sine:.4f}, worst aspect ratio {before.worst_aspect:.3f}"
+        )
+        made.notes.insert(0, words_before)
+        return made
+
+    return _write(compute, f"{file}, {used}", f"{Path(file).stem}-{used}", files)
 
 
 def check_file(
     file: str, block: str | None, picture: str | None, force: bool
 ) -> tuple[list[str], bool]:
     """`grid check`: the lines, and whether every cell is convex."""
-    nodes = read_grid(file, block)
+    grid = Grid(read_grid(file, block))
     if picture:
         check_free(Path(picture), force)
-    judgement = judge(nodes)
-    lines = [_title(file, nodes)]
-    lines += ["  " + line for line in describe(judgement)]
-    lines += ["  " + line for line in describe_histograms(judgement)]
+    title = _title(file, grid.nodes)
+    told = [*describe(grid.quality), *describe_histograms(grid.quality)]
+    lines = [title, *("  " + line for line in told)]
     if picture:
-        title = _title(file, nodes)
-        lines.append(f"picture: {_draw(Made(nodes, []), judgement, title, Path(picture))}")
-    return lines, judgement.valid
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Files to write, those of them that were asked for by name, the picture's path or None."""
-
-    paths: list[Path]
-    named: list[Path]
-    picture: Path | None
-
-
-def _plan(files: Files, default: str) -> Plan:
-    outputs, force, picture = files
-    paths = plan_outputs(outputs or (default,), force)
-    drawn = paths[0].with_suffix(".png") if picture else None
-    if drawn:
-        check_free(drawn, force)
-    return Plan(paths, paths if outputs else [], drawn)
+        lines.append(f"picture: {_draw(grid, title, Path(picture))}")
+    return lines, grid.quality.valid
 
 
 def _title(label: str, nodes: np.ndarray) -> str:
     return f"{label}: {' x '.join(str(n - 1) for n in nodes.shape[1:])} cells"
 
 
-def _finish(made: Made, label: str, plan: Plan) -> list[str]:
-    """Judge, write, draw; the lines that tell of it.  RunFailure where there is no grid."""
-    judgement = judge(made.nodes, made.weight)
-    title = _title(label, made.nodes)
-    if made.failure:
-        words = made.failure + _keep_failed(made, judgement, title, plan)
-        raise RunFailure(words, cause="no-grid")
-    lines = [title, *("  " + line for line in (*made.notes, *describe(judgement)))]
-    lines.append("written: " + _write(made, judgement, plan.paths))
-    if plan.picture:
-        lines.append(f"picture: {_draw(made, judgement, title, plan.picture)}")
-    return lines
+def _write(compute: Callable[[], Grid], label: str, stem: str, files: Files) -> list[str]:
+    """Make, judge, write, draw; the lines that tell of it.
 
-
-def _keep_failed(made: Made, judgement: Judgement, title: str, plan: Plan) -> str:
-    """Write and draw what was asked for under names ending in -failed; words about it.
-
-    Older ones are replaced: they hold nothing that anybody wants to keep.
+    Where there is no grid, RunFailure; what was asked for by name is then written and drawn under
+    names ending in -failed.  Older ones are replaced: they hold nothing that anybody wants to keep.
     """
-    made.made_by["failure"] = made.failure
-    paths = [path.with_stem(path.stem + "-failed") for path in plan.named]
-    words = f"; what it came to is in {_write(made, judgement, paths)}" if paths else ""
-    if plan.picture:
-        path = plan.picture.with_stem(plan.picture.stem + "-failed")
-        words += f"; picture: {_draw(made, judgement, f'{title}, FAILED', path)}"
-    return words
+    outputs, force, picture = files
+    paths = plan_outputs(outputs or (f"{stem}.h5",), force)
+    drawn = paths[0].with_suffix(".png")
+    if picture:
+        check_free(drawn, force)
+    made = compute()
+    title, words = _title(label, made.nodes), made.failure
+    if made.failure:
+        made.made_by["failure"] = made.failure
+        title += ", FAILED"
+        drawn, *paths = [p.with_stem(p.stem + "-failed") for p in (drawn, *paths)]
+        paths = paths if outputs else []
+    written = "  ".join(str(path) for path in made.write(*paths, force=True))
+    if picture:
+        _draw(made, title, drawn)
+    if words is not None:
+        words += f"; what it came to is in {written}" if written else ""
+        words += f"; picture: {drawn}" if picture else ""
+        raise RunFailure(words, cause="no-grid")
+    lines = [title, *("  " + line for line in (*made.notes, *describe(made.quality)))]
+    return [*lines, f"written: {written}", *[f"picture: {drawn}"] * picture]
 
 
-def _write(made: Made, judgement: Judgement, paths: list[Path]) -> str:
-    written = [w for p in paths for w in write_grid(p, made.nodes, judgement, made.made_by)]
-    return "  ".join(str(path) for path in written)
-
-
-def _draw(made: Made, judgement: Judgement, title: str, path: Path) -> Path:
+def _draw(made: Grid, title: str, path: Path) -> Path:
     from runs.grids.pictures import draw_block, draw_grid
 
     if made.nodes.shape[0] == 3:
-        spreads = made.equidistributed.spreads if made.equidistributed else None
-        return draw_block(made.nodes, title, path, spreads)
-    return draw_grid(judgement, title, path, made.sides)
+        return draw_block(made.nodes, title, path, made.spreads)
+    return draw_grid(made.quality, title, path, made.sides)

@@ -14,7 +14,7 @@ import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -23,20 +23,13 @@ from problems.registry import PROBLEMS
 from regrid.domains import DOMAINS, make_domain
 from regrid.errors import BadInput, RunFailure
 from regrid.given import is_file_name, read_sides, read_source
+from regrid.marching import March
 from regrid.measure.quality import measure_first_line_gap
 from regrid.registry import find_usable, takes_weight
 from regrid.sides import SIDE_NAMES, get_side, get_sides
 from runs.deck.reading import packaged_decks, read_deck
-from runs.grids.making import (
-    March,
-    default_cells,
-    make_family,
-    make_on_curves,
-    march,
-    parse_options,
-    regrid_plane,
-    warm_up,
-)
+from runs.grids import making
+from runs.grids.making import choose_family, parse_options
 from runs.grids.quality import check_free
 
 HEAD = (
@@ -44,44 +37,38 @@ HEAD = (
     f" {'us/node':>8s} {'sub-moves':>9s} {'folded':>7s}"
 )
 REASON = 110  # characters of a reason that are shown
+Compared = tuple[March, str, np.ndarray]  # what came of a family, its steps, the sides drawn
+Compute = Callable[[str, dict[str, Any]], Compared]  # from the name and options of a family
 
 
-class Family(NamedTuple):
-    """A name of the registry with options, as given on the command line."""
-
-    label: str
-    name: str
-    options: dict[str, Any]
-
-
-def parse_family(words: str) -> Family:
+def parse_family(words: str) -> tuple[str, dict[str, Any]]:
     """`name`, or `name:key=value:key=value`; BadInput for what the registry does not know."""
     name, *options = words.split(":")
-    family = Family(words, name, parse_options(tuple(options)))
-    make_family(family.name, family.options)
+    family = name, parse_options(tuple(options))
+    choose_family(*family)
     return family
 
 
-def every_family() -> list[Family]:
+def every_family() -> list[str]:
     """All that is registered, and the paper's sweeps, which are an option of the barrier."""
-    families = [Family(name, name, {}) for name in find_usable()]
-    sweeps = Family("barrier:method=sweeps", "barrier", {"method": "sweeps"})
-    return [families[0], sweeps, *families[1:]]
+    first, *others = find_usable()
+    return [first, "barrier:method=sweeps", *others]
 
 
 def compare_families(
     domains: str,
+    picture: str | None,
+    force: bool,
+    *,
+    families: Sequence[str],
     cells: tuple[int, int] | None,
     steps: int,
-    words: Sequence[str],
     weight: str | None,
     settings: tuple[str, ...],
     block: str | None,
-    picture: str | None,
-    force: bool,
 ) -> Iterator[str]:
     """Lines of the tables, as they are found; one table a domain, deck or file."""
-    families = [parse_family(word) for word in words] or every_family()
+    known = {words: parse_family(words) for words in families or every_family()}
     names = [name.strip() for name in domains.split(",") if name.strip()]
     kinds = {name: _find_kind(name) for name in names}
     if not names:
@@ -98,37 +85,24 @@ def compare_families(
             title, compute = _prepare_file(name, block, cells, steps)
         else:
             title, compute = _prepare_domain(name, cells, steps)
-        yield title
+        yield f"{name}: {title}"
         yield HEAD
         drawn, reasons = [], []
-        for family in families:
-            found = compute(family, weight if takes_weight(family.name) else None)
-            yield describe_march(family.label, found.march, found.steps)
-            if found.march.failure:
-                words_why = found.march.failure.removeprefix("regrid: ")
-                why = textwrap.shorten(words_why, REASON, placeholder="...")
-                reasons.append(f"  {family.label}{found.when}: {why}")
-            drawn.append((f"{family.label}: {found.title}", found.march, found.sides))
+        for label, (family, options) in known.items():
+            weighted = {} if weight is None or not takes_weight(family) else {"weight": weight}
+            march, done, sides = compute(family, weighted | options)
+            yield describe_march(label, march, done)
+            if march.failure:
+                why = march.failure.removeprefix("regrid: ")
+                why = textwrap.shorten(why, REASON, placeholder="...")
+                reasons.append(f"  {label}, step {march.done + 1}: {why}")
+            drawn.append((f"{label}: {done}", march, sides))
         yield from reasons
         if name in pictures:
             from runs.grids.pictures import draw_comparison
 
             yield f"picture: {draw_comparison(drawn, name, pictures[name])}"
         yield ""
-
-
-class Compared(NamedTuple):
-    """What came of a family: its march, the steps and the title in words, the sides that are drawn,
-    and when it failed."""
-
-    march: March
-    steps: str
-    title: str
-    sides: np.ndarray
-    when: str = ""
-
-
-Compute = Callable[[Family, str | None], Compared]  # from a family and its weight
 
 
 def _find_kind(name: str) -> str:
@@ -155,18 +129,16 @@ def _plan_pictures(picture: str | None, names: list[str], force: bool) -> dict[s
 
 
 def _prepare_domain(name: str, cells, steps: int) -> tuple[str, Compute]:
-    ni, nj = cells or default_cells(name)
+    ni, nj = cells or making.default_cells(name)
     domain = make_domain(name, ni, nj)
 
-    def compute(family: Family, weight: str | None) -> Compared:
-        found = march(domain, make_family(family.name, family.options, weight), steps)
+    def compute(family: str, options: dict[str, Any]) -> Compared:
+        found = making.march(domain, choose_family(family, options), steps)
         last = found.done + 1 if found.failure else steps
-        title, when = f"{found.done} of {steps} steps", f", step {found.done + 1}"
-        return Compared(found, f"{found.done}/{steps}", title, domain.boundary(last / steps), when)
+        return found, f"{found.done}/{steps}", domain.boundary(last / steps)
 
     way = domain.travel_in_cells / steps
-    words = f"{ni} x {nj} cells, {steps} steps of {way:.2g} cells at the fastest node"
-    return f"{name}: {words}", compute
+    return f"{ni} x {nj} cells, {steps} steps of {way:.2g} cells at the fastest node", compute
 
 
 def _prepare_file(name: str, block: str | None, cells, passes: int) -> tuple[str, Compute]:
@@ -176,22 +148,21 @@ def _prepare_file(name: str, block: str | None, cells, passes: int) -> tuple[str
     if sides.shape[0] == 3:
         raise BadInput(f"{name} is a grid in space; families are compared on plane grids")
 
-    def compute(family: Family, weight: str | None) -> Compared:
-        regridder = make_family(family.name, family.options, weight)
-        warm_up(make_domain("swan", 8, 8), regridder)
+    def compute(family: str, options: dict[str, Any]) -> Compared:
+        regridder = choose_family(family, options)
+        making.warm_up(make_domain("swan", 8, 8), regridder)
         if given:
-            made = regrid_plane(sides, regridder, passes)
+            made = making.regrid_plane(sides, regridder, passes)
         else:
-            made = make_on_curves(sides, regridder, passes, name)
+            made = making.make_on_curves(sides, regridder, passes, name)
         found = made.march or March(made.nodes, passes)
         found.nodes, found.failure = made.nodes, made.failure
         if found.done:
             found.gap = max(measure_first_line_gap(found.nodes, side) for side in SIDE_NAMES)
-        title = "no grid" if made.failure else f"sine {found.sine:.2f}"
-        return Compared(found, f"{found.done}/{passes}", title, sides)
+        return found, f"{found.done}/{passes}", sides
 
     size = f"{sides.shape[1] - 1} x {sides.shape[2] - 1} cells"
-    return f"{name}: {size}, the last of at most {passes} passes on its sides", compute
+    return f"{size}, the last of at most {passes} passes on its sides", compute
 
 
 def describe_march(label: str, found: March, steps: str) -> str:
@@ -210,15 +181,12 @@ def _prepare_flow(name: str, settings: tuple[str, ...]) -> tuple[str, Compute]:
         raise BadInput(f"{name}: the problem {read.problem} has no regridder to compare")
     started = read.make_problem().build()
 
-    def compute(family: Family, weight: str | None) -> Compared:
-        options = family.options | ({} if weight is None else {"weight": weight})
-        found, part = _run_flow(read, family.name, options)
-        share = 100.0 * part
-        title = f"{share:.0f} % of the time"
-        return Compared(found, f"{found.done} {share:3.0f}%", title, found.nodes)
+    def compute(family: str, options: dict[str, Any]) -> Compared:
+        found, part = _run_flow(read, family, options)
+        return found, f"{found.done} {100.0 * part:3.0f}%", found.nodes
 
     sizes = ", ".join(f"{b.nodes.shape[1] - 1} x {b.nodes.shape[2] - 1}" for b in started.blocks)
-    return f"{name}: flow to t = {started.t_end:.6g} s, blocks of {sizes} cells", compute
+    return f"flow to t = {started.t_end:.6g} s, blocks of {sizes} cells", compute
 
 
 def _run_flow(read, name: str, options: dict[str, Any]) -> tuple[March, float]:

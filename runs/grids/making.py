@@ -13,10 +13,13 @@ moved a node is told.
 
 from __future__ import annotations
 
-import contextlib
 import inspect
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -25,31 +28,68 @@ from regrid.algebraic import transfinite_grid
 from regrid.barrier.repair import repair_grid
 from regrid.domains import DOMAINS, MovingDomain, make_domain
 from regrid.domains_in_space import BLOCKS, SHAPES, MovingBlock, find_block, make_moving_block
-from regrid.equidistribution.volumes import (
-    Equidistributed,
-    EquidistributionRegridder3D,
-    equidistribute_block,
-    solve_ed3,
-)
+from regrid.equidistribution import volumes
 from regrid.equidistribution.weights import Weight, make_position_weight
 from regrid.errors import BadInput, RegridFailure, suggest
 from regrid.given import check_nodes, describe_repair, find_start, is_file_name, read_sides
 from regrid.hexahedra.regridder import BarrierRegridder3D
 from regrid.marching import March, march_domain
+from regrid.measure import hexahedra
 from regrid.measure.corners import compute_hexahedron_centres
 from regrid.measure.faults import name_cells
-from regrid.measure.hexahedra import (
-    compute_hexahedron_sines,
-    compute_least_corner_volumes,
-    compute_least_jacobian,
-    find_bad_hexahedra,
-)
 from regrid.measure.quality import compute_scaled_jacobians, measure_quality
-from regrid.protocol import call_regridder
+from regrid.protocol import Regridder, call_regridder
 from regrid.registry import call_with_options, make_regridder
 from regrid.sides import compute_area
+from runs.deck.reading import parse_value
+from runs.grids.quality import Judgement, judge, plan_outputs, write_grid
 
 Cells = tuple[int, ...]
+Family = str | Regridder
+NONE: Mapping[str, Any] = MappingProxyType({})
+PASSES = STEPS = 40
+CELLS_IN_SPACE = (20, 20, 20)
+SPATIAL_OPTIONS = ("iterations", "sides", "threads")
+FAMILIES_IN_SPACE = {
+    "barrier": BarrierRegridder3D,
+    "equidistribution": volumes.EquidistributionRegridder3D,
+}
+MOST_LOSS = 0.5  # a pass may leave the minimum scaled Jacobian no smaller than this part of it
+LEAST_PART = 0.02  # of a pass
+SETTLED = 1e-3  # cells: a pass that moves no node further is the last
+
+
+@dataclass(eq=False)
+class Grid:
+    """A grid that was made: `nodes` (2 or 3, ...) [m], how in `notes`, and its `quality`.
+
+    `failure` says why it is not what was asked for; `sides` (2, ni+1, nj+1) then are those for
+    which there is no grid, where they are not the grid's own.  `march` counts passes; `spreads` is
+    that of weight times volume after each iteration in space.
+    """
+
+    nodes: np.ndarray
+    notes: list[str] = field(default_factory=list)
+    failure: str | None = None
+    sides: np.ndarray | None = None
+    march: March | None = None
+    weight: np.ndarray | None = None  # of the cells
+    spreads: np.ndarray | None = None
+    made_by: dict[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def quality(self) -> Judgement:
+        """`valid`, `bad_cells`, `least_sine`, `worst_aspect`, `fields` of the cells."""
+        return judge(self.nodes, self.weight)
+
+    def write(self, *paths: str | Path, force: bool = False) -> list[Path]:
+        """Write files of the kinds their names end in (.h5, .npz, .vts); what was written.
+
+        Raises BadInput for another ending, and for a file that exists unless `force`.
+        """
+        parts = self.nodes, self.quality, self.made_by
+        planned = plan_outputs([str(path) for path in paths], force)
+        return [written for path in planned for written in write_grid(path, *parts)]
 
 
 def parse_options(words: tuple[str, ...]) -> dict[str, Any]:
@@ -59,24 +99,45 @@ def parse_options(words: tuple[str, ...]) -> dict[str, Any]:
         key, sign, text = word.partition("=")
         if not sign or not key.strip():
             raise BadInput(f"--option {word}: write key=value, such as --option epsilon=1e-3")
-        options[key.strip().replace("-", "_")] = _read_value(text.strip())
+        options[key.strip().replace("-", "_")] = parse_value(text)
     return options
 
 
-def _read_value(text: str) -> Any:
-    for kind in (int, float):
-        with contextlib.suppress(ValueError):
-            return kind(text)
-    return {"true": True, "false": False}.get(text.lower(), text)
+def choose_family(
+    family: Family, options: Mapping[str, Any] = NONE, weight: str | None = None
+) -> Regridder:
+    """A regridder of the registry, with a weight if one is given, or one of a user's own.
+
+    BadInput as `make_regridder`, and for what is no regridder.
+    """
+    given = dict(options) if weight is None else {"weight": weight, **(options or {})}
+    if isinstance(family, str):
+        return make_regridder(family, **given)
+    if not hasattr(family, "regrid") or isinstance(family, type):
+        raise BadInput(
+            f"family = {family!r}: the name of one is wanted, or a regridder that has been made, "
+            "with a method regrid(previous, boundary)"
+        )
+    if given:
+        raise BadInput(f"{', '.join(given)}: your own regridder has its options already")
+    return family
 
 
-def make_family(name: str, options: dict[str, Any], weight: str | None = None):
-    """A regridder of the registry, with a weight if one is given; BadInput as `make_regridder`."""
-    weighted = {} if weight is None else {"weight": _read_value(weight)}
-    return make_regridder(name, **{**weighted, **options})
+def name_family(family: Family | None, source: object, spatial: bool) -> str:
+    """The name of a family, left out the default one; `spatial`: the source has no other."""
+    if spatial and family is not None:
+        raise BadInput(f"--family {family}: {source} is in space, where cells are equidistributed")
+    if family is None:
+        return "ed3" if spatial else "barrier"
+    return family if isinstance(family, str) else type(family).__name__
 
 
-def march(domain: MovingDomain, regridder, steps: int, end: float = 1.0) -> March:
+def is_in_space(source: object) -> bool:
+    """Is it the name of a block of space, at rest or moving?"""
+    return isinstance(source, str) and source.replace("-", "_") in (*BLOCKS, *SHAPES)
+
+
+def march(domain: MovingDomain, regridder: Regridder, steps: int, end: float = 1.0) -> March:
     """March `domain` from s = 0 to `end` in equal steps; stops at the first step without a grid.
 
     A grid handed back with a cell that is not convex ends the march as well.  Compiling is not in
@@ -86,37 +147,12 @@ def march(domain: MovingDomain, regridder, steps: int, end: float = 1.0) -> Marc
     return march_domain(regridder, domain, steps, end=end)
 
 
-def warm_up(domain: MovingDomain, regridder) -> None:
+def warm_up(domain: MovingDomain, regridder: Regridder) -> None:
     """One call outside the clock: compiling is not regridding."""
     try:
         regridder.regrid(domain.start, domain.boundary(1e-6))
     except RegridFailure:
         pass
-
-
-PASSES = 40
-SPATIAL_OPTIONS = ("iterations", "sides", "threads")
-MOST_LOSS = 0.5  # a pass may leave the minimum scaled Jacobian no smaller than this part of it
-LEAST_PART = 0.02  # of a pass
-SETTLED = 1e-3  # cells: a pass that moves no node further is the last
-
-
-@dataclass
-class Made:
-    """A grid, the weight of its cells if there is one, and how it was made, in sentences.
-
-    `failure` says why it is not what was asked for; `sides` (2, ni+1, nj+1) then are those for
-    which there is no grid, where they are not the grid's own.  `march` counts passes.
-    """
-
-    nodes: np.ndarray
-    notes: list[str]
-    failure: str | None = None
-    sides: np.ndarray | None = None
-    march: March | None = None
-    weight: np.ndarray | None = None
-    equidistributed: Equidistributed | None = None
-    made_by: dict[str, Any] = field(default_factory=dict)
 
 
 def default_cells(name: str) -> tuple[int, int]:
@@ -125,36 +161,88 @@ def default_cells(name: str) -> tuple[int, int]:
     return parameters["ni"].default, parameters["nj"].default
 
 
-def make_plane(
-    source: str | np.ndarray, family: str, regridder, cells: Cells | None = None,
-    motion: tuple[int, float, int] = (40, 1.0, PASSES), block: str | None = None,
+def make(
+    source: str | np.ndarray,
+    family: Family | None = None,
+    options: Mapping[str, Any] = NONE,
+    *,
+    cells: Cells | None = None,
+    steps: int = STEPS,
+    at: float = 1.0,
+    passes: int = PASSES,
     weight: str | None = None,
-) -> Made:  # fmt: skip
-    """A plane grid of a named domain, on the curves or sides in a file, or on those of an array.
+    block: str | None = None,
+) -> Grid:
+    """A grid of a named domain or block, on the curves or sides in a file, on those of an array.
 
-    motion: steps of a domain's motion, the part of it that is made, passes at most on sides given
-    at once; block: of a file; weight: its values at the finished cells go into what is returned.
-    Raises BadInput for what there is not.
+    steps: of a domain's motion, `at` the part of it that is made; passes: at most on sides given
+    at once; block: of a file.  Raises BadInput for what there is not.
     """
-    steps, at, passes = motion
     if not 0.0 <= at <= 1.0:
         raise BadInput(f"at = {at}: a number from 0 to 1 is wanted")
+    name = source.replace("-", "_") if isinstance(source, str) else ""
+    used = name_family(family, source, name in BLOCKS)
+    made_by = {"at": at, "steps": steps}
+    if name in BLOCKS:
+        law = make_spatial_law(options, weight)
+        size = cells or CELLS_IN_SPACE
+        found = volumes.equidistribute_block(find_block(name), size, law, **options)
+        return _sign(_describe_ed3(found, law), source, used, options, weight, made_by)
+    if name in SHAPES:
+        if weight is not None:
+            raise BadInput(f"--weight: {source} moves; its families take none")
+        made = make_moving(name, used, options, cells or CELLS_IN_SPACE, steps, at)
+        return _sign(made, source, used, options, weight, made_by)
+    regridder = choose_family(family or used, options, weight)
     if isinstance(source, np.ndarray):
-        made = make_on_curves(check_nodes(source, "the array"), regridder, passes, "the array")
-    elif source.replace("-", "_") in DOMAINS:
-        size = cells or default_cells(source)
-        made = make_on_domain(source, family, regridder, size, steps, at)
+        source, nodes = "an array", check_nodes(source, "the array")
+        made = make_on_curves(nodes, regridder, passes, "the array")
+    elif name in DOMAINS:
+        made = make_on_domain(name, used, regridder, cells or default_cells(name), steps, at)
     elif is_file_name(source):
         made = make_on_curves(read_sides(source, block, cells), regridder, passes, source)
     else:
         known = [name.replace("_", "-") for name in (*DOMAINS, *BLOCKS, *SHAPES)]
         raise BadInput(f"no domain and no file is called {source!r}{suggest(source, known)}")
-    if weight is not None and not made.failure:
+    return _sign(made, source, used, options, weight, made_by)
+
+
+def regrid(
+    nodes: np.ndarray,
+    family: Family | None = None,
+    options: Mapping[str, Any] = NONE,
+    *,
+    passes: int = PASSES,
+    weight: str | None = None,
+    source: str = "a grid",
+) -> Grid:
+    """A grid regenerated on its own sides; a plane one that is not valid is untangled first.
+
+    source: what it is called.  Raises BadInput for what there is not.
+    """
+    spatial = nodes.shape[0] == 3
+    used = name_family(family, source, spatial)
+    if spatial:
+        made = regrid_space(nodes, make_spatial_law(options, weight), options)
+    else:
+        made = regrid_plane(nodes, choose_family(family or used, options, weight), passes)
+    return _sign(made, source, used, options, weight, {})
+
+
+def _sign(
+    made: Grid, source: str, family: str, options: Mapping[str, Any], weight: str | None,
+    more: Mapping[str, Any],
+) -> Grid:  # fmt: skip
+    """The grid with what it was made by and, in the plane, the weight at its cells."""
+    words = " ".join(f"{key}={value}" for key, value in options.items())
+    made.made_by = {"source": source, "family": family, "options": words, "weight": weight or ""}
+    made.made_by |= more
+    if weight is not None and not made.failure and made.nodes.shape[0] == 2:
         made.weight = Weight(weight).on(made.nodes, made.nodes)(made.nodes)
     return made
 
 
-def make_on_domain(name: str, family: str, regridder, cells: Cells, steps: int, at: float) -> Made:
+def make_on_domain(name: str, family: str, regridder, cells: Cells, steps: int, at: float) -> Grid:
     """Grid of a named domain at part `at` of its motion; a failure says the step."""
     domain = make_domain(name, *cells)
     if steps == 0:
@@ -167,15 +255,15 @@ def make_on_domain(name: str, family: str, regridder, cells: Cells, steps: int, 
             f"(s = {s:.3g}); {found.failure}"
         )
         if found.folded is not None:
-            return Made(found.folded, [], failure)
-        return Made(found.nodes, [], failure, domain.boundary(s))
+            return Grid(found.folded, [], failure)
+        return Grid(found.nodes, [], failure, domain.boundary(s))
     note = f"marched in {steps} steps, {found.cost:.2f} us per node and step"
     if found.sub_moves or found.rescues:
         note += f", {found.sub_moves} sub-moves, {found.rescues} untangling events"
-    return Made(found.nodes, [note])
+    return Grid(found.nodes, [note])
 
 
-def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> Made:
+def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> Grid:
     """Grid on the sides of `boundary` (2, ni+1, nj+1), by a first grid and passes of the family.
 
     A failure begins with `where`.
@@ -184,7 +272,7 @@ def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> 
     try:
         nodes, words = find_start(turned)
     except RegridFailure as failure:
-        made = Made(transfinite_grid(turned), [], str(failure))
+        made = Grid(transfinite_grid(turned), [], str(failure))
     else:
         made = settle(nodes, turned, regridder, passes, words)
     if made.failure:
@@ -194,24 +282,17 @@ def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> 
     return made
 
 
-def regrid_plane(
-    nodes: np.ndarray, regridder, passes: int = PASSES, weight: str | None = None
-) -> Made:
-    """A user's plane grid regenerated on its sides; one that is not valid is untangled first.
-
-    weight: as in `make_plane`.
-    """
+def regrid_plane(nodes: np.ndarray, regridder: Regridder, passes: int) -> Grid:
+    """A user's plane grid regenerated on its sides; one that is not valid is untangled first."""
     turned = _positive(nodes)
     try:
         repaired = repair_grid(turned)
     except RegridFailure as failure:
-        return Made(nodes, [], str(failure))
+        return Grid(nodes, [], str(failure))
     start, words = repaired.nodes, f"the given grid{describe_repair(repaired.report)}"
     made = settle(start, turned, regridder, passes, words)
     if turned is not nodes:
         made.nodes = np.ascontiguousarray(made.nodes[:, :, ::-1])
-    if weight is not None and not made.failure:
-        made.weight = Weight(weight).on(made.nodes, made.nodes)(made.nodes)
     return made
 
 
@@ -220,7 +301,7 @@ def _positive(nodes: np.ndarray) -> np.ndarray:
     return nodes if compute_area(nodes) > 0.0 else np.ascontiguousarray(nodes[:, :, ::-1])
 
 
-def settle(nodes, boundary, regridder, passes: int, words: str) -> Made:
+def settle(nodes, boundary, regridder, passes: int, words: str) -> Grid:
     """Call the family on the same sides until its grid stays, or it fails.
 
     A pass that would more than halve the minimum scaled Jacobian is gone only part of the way.
@@ -253,43 +334,38 @@ def settle(nodes, boundary, regridder, passes: int, words: str) -> Made:
     note += f", {shortened} of them shortened" * (shortened > 0)
     note += f", the last one moved a node by {moved:.2g} cells"
     shown = nodes if count.folded is None else count.folded
-    return Made(shown, [note], count.failure, march=count)
+    return Grid(shown, [note], count.failure, march=count)
 
 
 def _least_sine(nodes: np.ndarray) -> float:
     return float(compute_scaled_jacobians(nodes).min())
 
 
-def make_in_block(name: str, law, cells: tuple[int, int, int], options: dict[str, Any]) -> Made:
-    """Grid of a named block of space by edges, faces, volume; the options are those of ED3."""
-    return _describe_ed3(equidistribute_block(find_block(name), cells, law, **options), law)
-
-
-def regrid_space(nodes: np.ndarray, law, options: dict[str, Any]) -> Made:
+def regrid_space(nodes: np.ndarray, law, options: Mapping[str, Any]) -> Grid:
     """A user's grid in space equidistributed inside its own faces; valid grids only."""
     if options.get("sides"):
         raise BadInput("--option sides: the faces of a grid from a file stay as they are")
     try:
-        found = solve_ed3(nodes, law, **{k: v for k, v in options.items() if k != "sides"})
+        found = volumes.solve_ed3(nodes, law, **{k: v for k, v in options.items() if k != "sides"})
     except RegridFailure as failure:
-        return Made(nodes, [], str(failure))
+        return Grid(nodes, [], str(failure))
     return _describe_ed3(found, law)
 
 
-def make_spatial_law(options: dict[str, Any], weight: str | None):
+def make_spatial_law(options: Mapping[str, Any], weight: str | None) -> Any:
     """The weight as a function of x, y, z, or 1; BadInput for options that ED3 has not."""
-    for key in options:
+    for key, value in options.items():
         if key not in SPATIAL_OPTIONS:
             known = ", ".join(SPATIAL_OPTIONS)
             raise BadInput(f"--option {key}: a grid in space has the options {known}")
-        if not isinstance(options[key], int):
-            raise BadInput(f"--option {key}={options[key]}: a whole number or true/false is wanted")
+        if not isinstance(value, int):
+            raise BadInput(f"--option {key}={value}: a whole number or true/false is wanted")
     return 1.0 if weight is None else make_position_weight(weight, ("x", "y", "z"))
 
 
-def _describe_ed3(found: Equidistributed, law) -> Made:
-    bad, failure = find_bad_hexahedra(found.nodes), None
-    if len(bad) and len(find_bad_hexahedra(found.nodes[::-1])):
+def _describe_ed3(found: volumes.Equidistributed, law) -> Grid:
+    bad, failure = hexahedra.find_bad_hexahedra(found.nodes), None
+    if len(bad) and len(hexahedra.find_bad_hexahedra(found.nodes[::-1])):
         failure = f"cells {name_cells(bad, 8)} have corners that are not positive"
     first, last = found.spreads[0], found.spreads[found.best]
     note = (
@@ -298,10 +374,7 @@ def _describe_ed3(found: Equidistributed, law) -> Made:
         f"{found.residuals[found.best]:.2e}"
     )
     values = np.asarray(law(*compute_hexahedron_centres(found.nodes))) if callable(law) else None
-    return Made(found.nodes, [note], failure, weight=values, equidistributed=found)
-
-
-FAMILIES_IN_SPACE = {"barrier": BarrierRegridder3D, "equidistribution": EquidistributionRegridder3D}
+    return Grid(found.nodes, [note], failure, weight=values, spreads=found.spreads)
 
 
 @dataclass
@@ -314,19 +387,6 @@ class MarchInSpace(March):
 
     corners: int = 0
     creased: int = 0
-
-    def get_cost(self, mean: bool = False) -> float:
-        """Median, or mean, of a step in microseconds of a processor an inner node."""
-        inner = np.prod([n - 2 for n in self.nodes.shape[1:]])
-        middle = np.mean if mean else np.median
-        return float(1e6 * middle(self.seconds) / inner) if self.seconds else np.nan
-
-
-def make_family_in_space(name: str, options: dict[str, Any]):
-    """A regridder for blocks of space; BadInput for a name or an option that is none."""
-    if name not in FAMILIES_IN_SPACE:
-        raise BadInput(f"--family {name}: not one of space{suggest(name, FAMILIES_IN_SPACE)}")
-    return call_with_options(FAMILIES_IN_SPACE[name], name, options)
 
 
 def march_in_space(block: MovingBlock, regridder, steps: int, end: float = 1.0) -> MarchInSpace:
@@ -346,31 +406,33 @@ def march_in_space(block: MovingBlock, regridder, steps: int, end: float = 1.0) 
         found.reports.append(result.report)
         found.sub_moves += result.report.sub_moves
         found.rescues += result.report.rescues
-        found.corners += int((~(compute_least_corner_volumes(found.nodes) > 0.0)).sum())
-        found.sine = min(found.sine, float(compute_hexahedron_sines(found.nodes).min()))
-    found.creased = int((~(compute_least_jacobian(found.nodes) > 0.0)).sum())
+        found.corners += int((~(hexahedra.compute_least_corner_volumes(found.nodes) > 0.0)).sum())
+        found.sine = min(found.sine, float(hexahedra.compute_hexahedron_sines(found.nodes).min()))
+    found.creased = int((~(hexahedra.compute_least_jacobian(found.nodes) > 0.0)).sum())
     return found
 
 
 def make_moving(
-    name: str, family: str, options: dict[str, Any], cells: Cells, steps: int, at: float
-) -> Made:
+    name: str, family: str, options: Mapping[str, Any], cells: Cells, steps: int, at: float
+) -> Grid:
     """Grid of a named moving block at part `at` of its motion; a failure says the step."""
     if steps < 1:
         raise BadInput(f"--steps {steps}: a moving block of space needs at least 1")
+    if family not in FAMILIES_IN_SPACE:
+        raise BadInput(f"--family {family}: not one of space{suggest(family, FAMILIES_IN_SPACE)}")
+    regridder = call_with_options(FAMILIES_IN_SPACE[family], family, dict(options))
     block = make_moving_block(name, cells)
-    found = march_in_space(block, make_family_in_space(family, options), steps, at)
+    found = march_in_space(block, regridder, steps, at)
     if found.failure:
         words = f"{block.name}, family {family}: no grid at step {found.done + 1} of {steps}"
-        return Made(found.nodes, [], f"{words}; {found.failure}")
+        return Grid(found.nodes, [], f"{words}; {found.failure}")
     note = (
-        f"marched in {steps} steps, {found.get_cost():.2f} us per node and step (mean "
-        f"{found.get_cost(mean=True):.2f}), {found.iterations} iterations, {found.sub_moves} "
-        f"sub-moves, {found.rescues} untangling events"
+        f"marched in {steps} steps, {found.cost:.2f} us per node and step, {found.iterations} "
+        f"iterations, {found.sub_moves} sub-moves, {found.rescues} untangling events"
     )
     worst = (
         f"minimum scaled Jacobian of all steps {found.sine:.4f}; cells with a corner not positive "
         f"in any step: {found.corners}; with a Jacobian not positive at 5x5x5 places, at the end: "
         f"{found.creased}"
     )
-    return Made(found.nodes, [note, worst])
+    return Grid(found.nodes, [note, worst])

@@ -14,9 +14,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 
+from regrid.marching import March
 from regrid.measure.hexahedra import compute_hexahedron_sines
 from regrid.sides import get_sides
-from runs.grids.making import March
 from runs.grids.quality import Judgement
 from runs.pictures.command import new_figure, save
 from runs.pictures.fields import draw_grid_lines, lay_out

@@ -13,7 +13,7 @@ import argparse
 
 from regrid.domains import make_domain
 from regrid.registry import make_regridder
-from runs.grids.compare import HEAD, describe_march
+from runs.grids.commands import HEAD, describe_march
 from runs.grids.making import march
 
 DOMAINS = (

@@ -44,7 +44,7 @@ class Engine(Protocol):
         ...
 
 
-SUSPECT, GUILTY = 2, 3  # deaths from which a task is computed alone, and given up
+DEATHS = 3  # of its process, after which a task is given up
 
 
 class WorkerDied(Exception):
@@ -66,7 +66,11 @@ def _end_with_parent() -> None:
 
 
 class Processes:
-    """A pool of `workers` processes as an `Engine`; to be used in a `with` statement."""
+    """`workers` processes as an `Engine`, to be used in a `with` statement.
+
+    Each is a pool of its own, so that a process that dies breaks no other's pool and takes one
+    task with it, which is known.
+    """
 
     def __init__(self, workers: int):
         if multiprocessing.parent_process() is not None:
@@ -78,80 +82,55 @@ class Processes:
         self._context = multiprocessing.get_context("spawn")
         self._started = self._context.Event()
         self._before = set(multiprocessing.active_children())
-        self._pool: ProcessPoolExecutor | None = None
+        self._pools: list[ProcessPoolExecutor] = []
+        self._idle: list[ProcessPoolExecutor] = []
 
     def __enter__(self) -> Processes:
         return self
 
     def __exit__(self, kind, error, trace) -> None:
         """End the workers; where something went wrong, ask what they compute to stop first."""
-        if self._pool is None:
-            return
         if kind is not None:
             for child in set(multiprocessing.active_children()) - self._before:
                 child.terminate()
-        self._pool.shutdown(wait=True, cancel_futures=True)
+        for pool in self._pools:
+            pool.shutdown(wait=True, cancel_futures=True)
 
     def compute(self, task: Task, arguments: Sequence[Any]) -> Iterator[tuple[int, Any]]:
-        """As `Engine.compute`; a task whose process died GUILTY times gives a WorkerDied."""
+        """As `Engine.compute`; a task whose process died DEATHS times gives a WorkerDied."""
         waiting = collections.deque(range(len(arguments)))
         deaths: collections.Counter[int] = collections.Counter()
-        running: dict[Future, int] = {}
+        running: dict[Future, tuple[int, ProcessPoolExecutor]] = {}
         while waiting or running:
-            lost = self._submit(task, arguments, waiting, running, deaths)
-            if running:
-                done, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in done:
-                    number, error = running[future], future.exception()
-                    if isinstance(error, BrokenProcessPool):
-                        lost = True
+            while waiting and len(running) < self.workers:
+                future, pool = self._submit(task, arguments[waiting[0]])
+                running[future] = waiting.popleft(), pool
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                (number, pool), error = running.pop(future), future.exception()
+                if not isinstance(error, BrokenProcessPool):
+                    self._idle.append(pool)
+                elif not self._started.is_set():
+                    raise BadInput(
+                        "the worker processes end before they begin; in a script, put what starts "
+                        'them under if __name__ == "__main__":'
+                    )
+                else:
+                    deaths[number] += 1
+                    if deaths[number] < DEATHS:
+                        waiting.append(number)
                         continue
-                    del running[future]
-                    yield number, future.result() if error is None else error
-            if lost:
-                yield from self._take_back(waiting, running, deaths)
-
-    def _submit(self, task, arguments, waiting, running, deaths) -> bool:
-        """Fill the pool: no more than it computes at once, suspects alone; True: it is broken."""
-        while waiting and len(running) < self.workers:
-            alone = deaths[waiting[0]] >= SUSPECT
-            if running and (alone or any(deaths[n] >= SUSPECT for n in running.values())):
-                return False
-            if self._pool is None:
-                self._pool = ProcessPoolExecutor(
-                    self.workers, self._context, _begin_worker, (self._started,)
-                )
-            try:
-                future = self._pool.submit(task, arguments[waiting[0]])
-            except BrokenProcessPool:
-                return True
-            running[future] = waiting.popleft()
-        return False
-
-    def _take_back(self, waiting, running, deaths) -> Iterator[tuple[int, Any]]:
-        """After a death: all that was running waits again, or has failed; the pool is given up."""
-        if not self._started.is_set():
-            raise BadInput(
-                "the worker processes end before they begin; in a script, put what starts them "
-                'under if __name__ == "__main__":'
-            )
-        wait(running)
-        for future, number in list(running.items()):
-            del running[future]
-            error = future.exception()
-            if not isinstance(error, BrokenProcessPool):  # it ended before the death
+                    error = WorkerDied(f"its process died {DEATHS} times (out of memory?)")
                 yield number, future.result() if error is None else error
-                continue
-            deaths[number] += 1
-            if deaths[number] >= GUILTY:
-                yield number, WorkerDied(f"its process died {GUILTY} times (out of memory?)")
-            elif deaths[number] >= SUSPECT:
-                waiting.append(number)  # after those that are under no suspicion
-            else:
-                waiting.appendleft(number)
-        if self._pool is not None:
-            self._pool.shutdown(wait=True)
-            self._pool = None
+
+    def _submit(self, task: Task, argument: Any) -> tuple[Future, ProcessPoolExecutor]:
+        """Hand a task to an idle process or a new one."""
+        while self._idle:
+            pool = self._idle.pop()
+            with contextlib.suppress(BrokenProcessPool):  # it has died idle
+                return pool.submit(task, argument), pool
+        pool = ProcessPoolExecutor(1, self._context, _begin_worker, (self._started,))
+        self._pools.append(pool)
+        return pool.submit(task, argument), pool
 
 
 ANSWER = 20.0  # seconds for a scheduler to answer

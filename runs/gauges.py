@@ -129,20 +129,17 @@ def place_points(points: Sequence[Gauge], blocks: Sequence[BlockView]) -> Places
     for number in np.flatnonzero(moves):
         if places.block[number] == NOWHERE:
             x, y = position[:, number]
+            low = np.min([block.nodes.min(axis=(1, 2)) for block in blocks], axis=0)
+            high = np.max([block.nodes.max(axis=(1, 2)) for block in blocks], axis=0)
             raise BadInput(
                 f"deck: gauge {points[number].name!r} moves with the material, but at "
-                f"[{x:g}, {y:g}] there is none; {_describe_extent(blocks)}"
+                f"[{x:g}, {y:g}] there is none; the blocks lie within x = {low[0]:g} to "
+                f"{high[0]:g} m, y = {low[1]:g} to {high[1]:g} m"
             )
         own = materials[places.block[number]]
         places.allowed[:, number] = [material == own for material in materials]
     places.reach[moves] = LEEWAY
     return places
-
-
-def _describe_extent(blocks: Sequence[BlockView]) -> str:
-    low = np.min([block.nodes.min(axis=(1, 2)) for block in blocks], axis=0)
-    high = np.max([block.nodes.max(axis=(1, 2)) for block in blocks], axis=0)
-    return f"the blocks lie within x = {low[0]:g} to {high[0]:g} m, y = {low[1]:g} to {high[1]:g} m"
 
 
 def _check_fields(points: Sequence[Gauge], blocks: Sequence[BlockView]) -> None:

@@ -42,11 +42,11 @@ from runs.pictures.command import (
     fill_figure,
     find_deck_text,
     new_figure,
-    write_figure,
+    save,
 )
 from runs.pictures.fields import list_fields
 from runs.pictures.film import make_film
-from runs.store.files import disk_errors, write_atomically
+from runs.store.files import check_folder, disk_errors, write_atomically
 from runs.store.reader import Dump, RunData
 
 TEMPLATES = Path(__file__).resolve().with_name("templates")
@@ -93,8 +93,7 @@ def check_path(path: Path) -> None:
     """Raise BadInput where a report cannot go, before anything is drawn."""
     if path.suffix.lower() not in (".html", ".htm"):
         raise BadInput(f"{path}: a report's name has to end in .html")
-    if not path.parent.is_dir():
-        raise BadInput(f"{path.parent} is not a folder, so {path.name} cannot be written")
+    check_folder(path)
 
 
 def load_template(name: str) -> Any:
@@ -213,7 +212,7 @@ def draw_pictures(run: RunData, dpi: int, left_out: list[str]) -> list[tuple[str
             try:
                 figure = new_figure()
                 fill_figure(figure, run, Wanted(**words))
-                write_figure(figure, path, dpi, "png", deck_text)
+                save(figure, path, dpi, deck_text)
             except (BadInput, KeyError) as error:
                 left_out.append(f"{heading.format(field=field)} ({error})")
                 continue
@@ -310,7 +309,9 @@ def make_study_report(
     for folder in folders:
         page = folder / PAGE
         try:
-            if is_old(page, folder):
+            log = folder / "run.log"  # written to since?
+            newer = page.exists() and log.exists() and log.stat().st_mtime > page.stat().st_mtime
+            if newer or not page.exists():
                 make_report(folder, page, film=film, dpi=dpi)
             links[folder.name] = Path(os.path.relpath(page, path.parent)).as_posix()
         except BadInput as error:
@@ -350,10 +351,3 @@ def show_number(cell: str) -> str:
         return cell if cell.lstrip("+-").isdigit() else f"{float(cell):.6g}"
     except ValueError:
         return cell
-
-
-def is_old(page: Path, folder: Path) -> bool:
-    """Is there no page of a run, or has its log been written to since?"""
-    log = folder / "run.log"
-    newer = page.exists() and log.exists() and log.stat().st_mtime > page.stat().st_mtime
-    return not page.exists() or newer

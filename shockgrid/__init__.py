@@ -37,9 +37,8 @@ if TYPE_CHECKING:
     from runs.inspection.info import inspect
     from runs.interface import grid
     from runs.interface.calls import film, plot, register, restart, run, verify
-    from runs.interface.case import Case, Hook, load
-    from runs.interface.opened import OpenRun
-    from runs.interface.opened import open_run as open
+    from runs.interface.case import Case, Hook, OpenRun, load
+    from runs.interface.case import open_run as open
     from runs.report import report
     from runs.study.study import Study, study
     from shockgrid import testing
@@ -59,7 +58,7 @@ MODULES = {
     "IdealGas": "hydro.eos.gases",
     "JWL": "hydro.eos.jwl",
     "MieGruneisen": "hydro.eos.mie_gruneisen",
-    "OpenRun": "runs.interface.opened",
+    "OpenRun": "runs.interface.case",
     "Output": "problems.deck",
     "PhaseTransition": "hydro.eos.phase_transition",
     "Problem": "problems.problem",
@@ -82,7 +81,7 @@ MODULES = {
     "join": "hydro.links",
     "load": "runs.interface.case",
     "make_regridder": "regrid.registry",
-    "open": "runs.interface.opened",
+    "open": "runs.interface.case",
     "plot": "runs.interface.calls",
     "put": "hydro.boundary",
     "register": "runs.interface.calls",

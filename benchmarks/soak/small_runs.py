@@ -67,7 +67,7 @@ def compare(one: Path, other: Path) -> Done:
 def find_other_files(one: Path, other: Path) -> list[str]:
     """Dumps and gauges of two directories that differ in their bytes, by name."""
     found = []
-    for step, path in RunDirectory(one).list_files("dump"):
+    for step, path in RunDirectory(one).list_points("dump"):
         like = RunDirectory(other).dump_path(step)
         if not like.exists() or path.read_bytes() != like.read_bytes():
             found.append(path.name)

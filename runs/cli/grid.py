@@ -199,8 +199,7 @@ def compare(source, cells, picture, force, **words) -> None:
     from a deforming side (in a file: any side) over that of the quasi-1D grid,
     us/node the median step.
     """
-    from runs.grids.commands import parse_cells
-    from runs.grids.compare import compare_families
+    from runs.grids.commands import compare_families, parse_cells
 
     for line in compare_families(source, picture, force, cells=parse_cells(cells), **words):
         echo(line)

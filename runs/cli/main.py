@@ -11,23 +11,22 @@ from __future__ import annotations
 
 import os
 import sys
+from functools import partial
 
 import click
 
-from problems.problem_file import describe_mistake
-from regrid.errors import BadInput, RunFailure
+from regrid.errors import BadInput
 from runs.cli.grid import grid
 from runs.cli.terminal import (
+    BAD_INPUT,
     Commands,
-    describe_outside,
+    describe_error,
     echo,
     echo_sentences,
     echo_usage,
     print_what_can_be_shown,
 )
 from runs.ranks.started import is_for_ranks
-
-BAD_INPUT, FAILED, INTERNAL = 2, 3, 70
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
@@ -42,6 +41,7 @@ def cli(debug: bool) -> None:
     """
 
 
+_say = partial(echo, err=True)
 setting = click.option(
     "--set",
     "settings",
@@ -85,13 +85,15 @@ def list_problems(name: str | None) -> None:
 @max_wall
 @with_plot
 @quiet
-def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, picture, quiet) -> int:
+@click.pass_obj  # the ranks of MPI that share the command, or None
+def run(
+    world, deck, settings, output, force, dry_run, ranks, threads, max_wall, picture, quiet
+) -> int:
     """Run a problem, a packaged deck, a deck file (TOML) or a problem's own file (Python)."""
     from runs.deck import reading as deck_reading
     from runs.march.runner import WallLimit
 
     limit = WallLimit(max_wall) if max_wall is not None else None
-
     checked = deck_reading.read_deck(deck, _with_threads(settings, threads))
     if dry_run:
         from regrid.jit import interpreted
@@ -107,7 +109,7 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
         with interpreted():
             lines, cautions = foretell(checked, problem, None, output)
             echo("\n".join([*lines, *cautions]))
-            if count := ranks or getattr(_find_world(), "size", None):
+            if count := ranks or getattr(world, "size", None):
                 size = measure_size(problem)
                 echo("\n".join(describe_map(size.blocks, count, checked.deck.run.cut)))
         return 0
@@ -118,7 +120,6 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
     from runs.march.compiling import compiling
     from runs.march.launching import start_runner
 
-    world = _find_world()
     with compiling(quiet, helped=world is None):
         runner = start_runner(checked, output, force, quiet, _say, world)
         runner.limit, runner.world = limit, world
@@ -137,29 +138,31 @@ def run(deck, settings, output, force, dry_run, ranks, threads, max_wall, pictur
 @max_wall
 @with_plot
 @quiet
-def restart(directory, at, cells, output, force, settings, threads, max_wall, picture, quiet):
+@click.pass_obj
+def restart(
+    world, directory, at, cells, output, force, settings, threads, max_wall, picture, quiet
+) -> int:
     """Continue a run from its last restart point.
 
     Keys that do not affect the state may be changed (run.t_end, output.*, ...;
-    `shockgrid schema` marks them).  With --cells (or --set cells=N) the state is
+    `shockgrid schema` marks them).  With --cells the state is
     remapped to another grid, and the run continues in a directory of its own.
     """
-    from runs.march.launching import continue_runner, remap_runner, wants_other_cells
+    from runs.march.launching import continue_runner, remap_runner
     from runs.march.runner import WallLimit
     from runs.store.directory import open_directory
 
     limit = WallLimit(max_wall) if max_wall is not None else None
     opened = open_directory(directory)
     settings = _with_threads(settings, threads)
-    if wants_other_cells(cells, settings):
+    if cells is not None:
         runner = remap_runner(opened, cells, settings, at, output, force, quiet, _say)
-        runner.limit, runner.world = limit, _find_world()
+        runner.limit, runner.world = limit, world
         return _finish(runner.start(), runner.directory, picture)
     if output is not None or force:
         raise BadInput(
             "restart: -o and --force need --cells; otherwise a run continues in its directory"
         )
-    world = _find_world()
     runner = continue_runner(opened, settings, quiet, at, _say, world)
     runner.limit, runner.world = limit, world
     return _finish(runner.resume(at, _say), opened, picture)
@@ -173,9 +176,7 @@ def restart(directory, at, cells, output, force, settings, threads, max_wall, pi
     metavar="KEY=VALUES",
     help="A:B:N, A:B:N:log or V1,V2,...; several are varied in all combinations.",
 )
-@click.option(
-    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="A key of the deck for all runs."
-)
+@setting
 @click.option("-o", "--output", metavar="DIR", help="Folder of the study.")
 @click.option("--jobs", type=click.IntRange(1), help="Parallel runs [one per processor].")
 @click.option("--engine", default="processes", help="processes, mpi or dask://ADDRESS [processes].")
@@ -183,7 +184,7 @@ def restart(directory, at, cells, output, force, settings, threads, max_wall, pi
 @click.option("--refine", metavar="KEY", help="The key of cells, for orders [cells].")
 @click.option("--retry", is_flag=True, help="Also continue failed runs.")
 @click.option("--dry-run", is_flag=True, help="List the runs and the state of each, and stop.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress, only the summary.")
+@quiet
 def study(deck, **words) -> int:
     """Run a deck at many points: table, orders and picture.
 
@@ -399,15 +400,6 @@ def bench(**words) -> None:
     measure(**words, say=echo)
 
 
-def _say(text: str) -> None:
-    echo(text, err=True)
-
-
-def _find_world():
-    """The ranks of MPI that share the command, or None."""
-    return click.get_current_context().obj
-
-
 def _with_threads(settings: tuple[str, ...], threads: int | None) -> tuple[str, ...]:
     if threads is None:
         return settings
@@ -457,25 +449,9 @@ def _main(arguments: list[str], world: object = None) -> int:
     except Exception as error:
         if debug:
             raise
-        known = {BadInput: BAD_INPUT, MemoryError: BAD_INPUT, RunFailure: FAILED}
-        code = next((code for kind, code in known.items() if isinstance(error, kind)), INTERNAL)
-        if code == INTERNAL and (mistake := describe_mistake(error)):
-            echo(f"shockgrid: {mistake}; --debug shows the traceback", err=True)
-            return BAD_INPUT
-        if code == INTERNAL and (sentence := describe_outside(error)):
-            echo_sentences(sentence)
-            return BAD_INPUT
-        echo_sentences("\n".join([_words(error, code), *getattr(error, "__notes__", [])]))
+        code, words = describe_error(error)
+        echo_sentences("\n".join([words, *getattr(error, "__notes__", [])]))
         return code
-
-
-def _words(error: Exception, code: int) -> str:
-    if isinstance(error, MemoryError):
-        return "not enough memory; fewer cells need less"
-    if code != INTERNAL:
-        return str(error)
-    kind = type(error).__name__
-    return f"a mistake in shockgrid itself ({kind}: {error}); --debug shows where"
 
 
 if __name__ == "__main__":

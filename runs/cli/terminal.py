@@ -12,7 +12,8 @@ from pathlib import Path
 
 import click
 
-from regrid.errors import BadInput, suggest
+from problems.problem_file import describe_mistake
+from regrid.errors import BadInput, RunFailure, suggest
 from regrid.text_files import MOST_IN_LINE, cut, escape_controls
 from runs.store.files import describe_disk_error
 
@@ -51,24 +52,32 @@ def echo_usage(error: click.ClickException) -> None:
         echo(cut(line, MOST_IN_LINE), err=True)
 
 
-NAMES = {  # what Python says where a name is none that a file can have
-    "embedded null byte": "a file's name cannot hold the character \\u0000",
-    "embedded null character": "a file's name cannot hold the character \\u0000",
-}
+BAD_INPUT, FAILED, INTERNAL = 2, 3, 70  # exit codes
+NULL = ("embedded null byte", "embedded null character")  # what Python says of a name
 
 
-def describe_outside(error: BaseException) -> str | None:
-    """A sentence on an error of the system or of a file's name; None for any other error."""
-    if isinstance(error, OSError) and error.errno is not None:
-        if error.filename is None:
-            return f"a given file or device cannot be used: {os.strerror(error.errno)}"
-        return describe_disk_error(error, Path(os.fsdecode(error.filename)))
-    if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
-        return "a given name is not valid UTF-8; rename it, or give another"
+def describe_error(error: Exception) -> tuple[int, str]:
+    """The exit code for an error that ends a command, and the sentence about it."""
+    if isinstance(error, MemoryError):
+        return BAD_INPUT, "not enough memory; fewer cells need less"
+    if isinstance(error, BadInput | RunFailure):
+        return BAD_INPUT if isinstance(error, BadInput) else FAILED, str(error)
+    if mistake := describe_mistake(error):
+        return BAD_INPUT, f"{mistake}; --debug shows the traceback"
     words = str(error)
+    if isinstance(error, OSError) and error.errno is not None:
+        if error.filename is not None:
+            return BAD_INPUT, describe_disk_error(error, Path(os.fsdecode(error.filename)))
+        return BAD_INPUT, f"a given file or device cannot be used: {os.strerror(error.errno)}"
+    if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
+        return BAD_INPUT, "a given name is not valid UTF-8; rename it, or give another"
     if isinstance(error, RuntimeError) and words.startswith("Symlink loop from"):
-        return f"{words.removeprefix('Symlink loop from ')} is a link that leads back to itself"
-    return NAMES.get(words) if isinstance(error, ValueError) else None
+        name = words.removeprefix("Symlink loop from ")
+        return BAD_INPUT, f"{name} is a link that leads back to itself"
+    if isinstance(error, ValueError) and words in NULL:
+        return BAD_INPUT, "a file's name cannot hold the character \\u0000"
+    kind = type(error).__name__
+    return INTERNAL, f"a mistake in shockgrid itself ({kind}: {error}); --debug shows where"
 
 
 def print_what_can_be_shown() -> None:

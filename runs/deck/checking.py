@@ -75,12 +75,14 @@ def find_differences(before: Deck, now: Deck) -> list[Difference]:
     one, two = msgspec.to_builtins(before), msgspec.to_builtins(now)
     known, known_now = (table.pop(DIGESTS, None) or {} for table in (one, two))
 
-    def is_same_file(found: Difference) -> bool:
-        names = found.before, found.now
-        given = all(isinstance(name, str) for name in names) and names[0] in known
-        return given and known[names[0]] == known_now.get(names[1])
+    def find_digest(digests: dict, name: Any) -> Any:
+        return digests.get(name, name) if isinstance(name, str) else name
 
-    return [found for found in find_changes(one, two) if not is_same_file(found)]
+    return [
+        found
+        for found in find_changes(one, two)
+        if find_digest(known, found.before) != find_digest(known_now, found.now)
+    ]
 
 
 def find_changes(before: Any, now: Any, key: str = "") -> Iterator[Difference]:
@@ -168,10 +170,6 @@ BOUNDS = {
     "maximum": "at most",
 }  # fmt: skip
 
-REPLACED = {  # the last name of a key of older decks: what took its place, and what that is
-    "damping": ("thickness", "waves of a contact much shorter decay [m]")
-}
-
 
 def check_deck(table: dict[str, Any], kind: type, where: Where) -> None:
     """Raise BadInput with a line about each thing in `table` that a deck `kind` cannot take."""
@@ -220,7 +218,17 @@ def find_mistakes(value: Any, kind: Any, key: str, deck: type) -> Iterator[tuple
             told = f"{key}.{tag} = {show(value[tag])}; it must be" if tag in value else ""
             yield key, f"{told or f'{key} lacks the key {tag!r}:'} one of {words}"
             return
-        found += _find_in_table(value, table, f"{key}." if key else "", deck)
+        fields = {field.encode_name: field for field in msgspec.structs.fields(table)}
+        prefix = f"{key}." if key else ""
+        for name, part in value.items():
+            if name in fields:
+                found += find_mistakes(part, fields[name].type, prefix + name, deck)
+            elif name != table.__struct_config__.tag_field:
+                hint = _nearest_key(prefix + name, list_keys(deck))
+                found.append((prefix + name, f"there is no key {prefix + name!r}{hint}"))
+        for name, field in fields.items():
+            if field.required and name not in value:
+                found.append((prefix + name, f"the key {prefix + name!r} is missing"))
     for one in choices:
         inner = typing.get_args(one)
         if isinstance(value, dict) and typing.get_origin(one) is dict:
@@ -245,22 +253,6 @@ def find_mistakes(value: Any, kind: Any, key: str, deck: type) -> Iterator[tuple
     if isinstance(value, str) and any("material" in one.__struct_fields__ for one in tables):
         wanted += f", such as {key} = {{ material = {show(value)} }}"
     yield key, f"{key} = {show(value)}; it must be {wanted}"
-
-
-def _find_in_table(
-    value: dict[str, Any], table: type, prefix: str, deck: type
-) -> Iterator[tuple[str, str]]:
-    """Unknown keys, mistakes in those that are known, missing ones."""
-    fields = {field.encode_name: field for field in msgspec.structs.fields(table)}
-    for name, part in value.items():
-        full = prefix + name
-        if name in fields:
-            yield from find_mistakes(part, fields[name].type, full, deck)
-        elif name != table.__struct_config__.tag_field:
-            yield full, f"there is no key {full!r}{_nearest_key(full, list_keys(deck))}"
-    for name, field in fields.items():
-        if field.required and name not in value:
-            yield prefix + name, f"the key {prefix + name!r} is missing"
 
 
 def list_keys(deck: type) -> list[str]:
@@ -306,20 +298,15 @@ def _nearest_key(key: str, known: list[str]) -> str:
     """'; did you mean ...?': the same last name elsewhere first, else the likest spelling."""
     key = re.sub(r"\.\d+(?=\.)", "", key)  # places in lists
     last = key.rsplit(".", 1)[-1]
-    successor, meaning = REPLACED.get(last, ("", ""))
-    successor = key.removesuffix(last) + successor
-    if meaning and successor in known:
-        return f" any more; {successor!r} replaced it: {meaning}"
     same = [other for other in known if other.rsplit(".", 1)[-1] == last]
-    by_key = find_nearest(key, same or known, cutoff=0.0 if same else 0.6)
-    if by_key is not None:
-        return f"; did you mean {by_key!r}?"
+    nearest = find_nearest(key, same or known, cutoff=0.0 if same else 0.6)
+    if nearest is None:
+        lasts = {other.rsplit(".", 1)[-1]: other for other in reversed(known)}
+        nearest = lasts.get(find_nearest(last, lasts, cutoff=0.6) or "")
+    if nearest is not None:
+        return f"; did you mean {nearest!r}?"
     prefix = key.rpartition(".")[0]
     beside = [other for other in known if other.rpartition(".")[0] == prefix]
-    lasts = {other.rsplit(".", 1)[-1]: other for other in reversed(known)}
-    by_last = find_nearest(last, lasts, cutoff=0.6)
-    if by_last is not None:
-        return f"; did you mean {lasts[by_last]!r}?"
     return f"; known there are: {', '.join(beside)}" if beside else ""
 
 
@@ -335,37 +322,31 @@ def describe(schema: Part, part: Part) -> str:
     if part.keys() <= {"$schema", "$defs"}:
         return "a value"
     if "enum" in part:
-        return _any_of([show(one) for one in part["enum"]])
+        *others, last = map(show, part["enum"])
+        return f"{', '.join(others)} or {last}" if others else last
     if "anyOf" in part:
         return " or ".join(dict.fromkeys(describe(schema, one) for one in part["anyOf"]))
-    kind = part.get("type", "object")
+    kind, items = part.get("type", "object"), part.get("items", {})
+    if kind == "array" and isinstance(items, list):
+        words = ", ".join(describe(schema, one) for one in items)
+        return f"a list of {len(items)} values: {words}"
     if kind == "array":
-        return _describe_list(schema, part)
+        low, high = part.get("minItems", 0), part.get("maxItems")
+        count = f" of at least {low} values" if low else ""
+        if high is not None:
+            count = f" of {high} values" if low == high else f" of {low} to {high} values"
+        return f"a list{count}, each {describe(schema, items)}"
     bounds = " and ".join(f"{words} {part[k]:g}" for k, words in BOUNDS.items() if k in part)
     bounds = f" of {bounds}" if bounds.startswith("at ") else bounds and f" {bounds}"
     form = f" of the form {part['pattern']}" if "pattern" in part else ""
     return TYPES.get(kind, "something else") + bounds + form
 
 
-def _describe_list(schema: Part, part: Part) -> str:
-    items = part.get("items", {})
-    if isinstance(items, list):
-        words = ", ".join(describe(schema, one) for one in items)
-        return f"a list of {len(items)} values: {words}"
-    low, high = part.get("minItems", 0), part.get("maxItems")
-    count = f" of at least {low} values" if low else ""
-    if high is not None:
-        count = f" of {high} values" if low == high else f" of {low} to {high} values"
-    return f"a list{count}, each {describe(schema, items)}"
-
-
-def _any_of(words: list[str]) -> str:
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " or " + words[-1]
-
-
 def show(value: Any) -> str:
-    """A value as it stands in a deck, cut where it is long."""
-    if isinstance(value, bool):
+    """A value as it stands in a deck, cut where it is long; None: the key is left out."""
+    if value is None:
+        text = "left out"
+    elif isinstance(value, bool):
         text = "true" if value else "false"
     elif isinstance(value, str):
         text = '"' + value.replace("\n", "\\n") + '"'
@@ -382,11 +363,12 @@ HEAD = "# keys without a value, and what that means or what they could be:"
 
 def describe_unset(deck: Deck) -> str:
     """Comment lines on the keys of a deck without a value; "" where all have one."""
-    lines = []
-    for key, words in _find_unset(deck, ""):
-        lines += textwrap.wrap(
-            f"{key}: {words}", WIDTH, initial_indent="# ", subsequent_indent="#     "
-        )
+    indents = {"initial_indent": "# ", "subsequent_indent": "#     "}
+    lines = [
+        line
+        for key, words in _find_unset(deck, "")
+        for line in textwrap.wrap(f"{key}: {words}", WIDTH, **indents)  # type: ignore[arg-type]
+    ]
     return "".join(f"{line}\n" for line in (["", HEAD, *lines] if lines else []))
 
 
@@ -395,9 +377,8 @@ def _find_unset(table: Any, prefix: str) -> Iterator[tuple[str, str]]:
     for field in msgspec.structs.fields(table) if isinstance(table, DeckTable) else ():
         key, value = prefix + field.name, getattr(table, field.name)
         if value is not None:
-            entries = value if isinstance(value, list | tuple) else ()
             yield from _find_unset(value, f"{key}.")
-            for k, entry in enumerate(entries):
+            for k, entry in enumerate(value if isinstance(value, list | tuple) else ()):
                 yield from _find_unset(entry, f"{key}.{k}.")
             continue
         part = make_parts(field.type)

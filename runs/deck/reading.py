@@ -180,18 +180,13 @@ def resolve_deck(
 
     check_deck(table, kind, where)
     try:
-        deck = msgspec.convert(merge_defaults(table, kind()), kind).find_files(_find_folder(origin))
+        home = Path(origin).parent if Path(origin).is_file() else Path()  # of files a deck names
+        if origin.startswith("deck ") and (DECKS / origin.removeprefix("deck ")).is_file():
+            home = DECKS
+        deck = msgspec.convert(merge_defaults(table, kind()), kind).find_files(home)
         return ReadDeck(problem, deck, origin, tuple(settings), file)
     except msgspec.ValidationError as error:  # a rule that check_deck does not know
         raise BadInput(f"{origin}: {error}") from error
-
-
-def _find_folder(origin: str) -> Path:
-    """Where the files that a deck names lie: beside it."""
-    if origin.startswith("deck ") and (DECKS / origin.removeprefix("deck ")).is_file():
-        return DECKS
-    path = Path(origin)
-    return path.parent if path.is_file() else Path()
 
 
 def merge_defaults(table: dict[str, Any], default: DeckTable) -> dict[str, Any]:

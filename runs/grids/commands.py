@@ -1,25 +1,40 @@
-"""What the commands `shockgrid grid list | make | regrid | check` do, as functions.
+"""What the commands `shockgrid grid list | make | regrid | check | compare` do, as functions.
 
 Each gives the lines to be shown.  Outputs are checked before anything is computed.
+
+To compare families a domain is marched from its simple shape to its last one; a flow is run from
+its start to its end, with each family; on the sides in a file a family is called until its grid
+stays.  Note: figures are the worst over the steps that a family survived (in a file those of the
+last grid); one that ends early looks better than it is, so the steps come first.
 """
 
 from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 
+from problems.registry import PROBLEMS
 from regrid.domains import DOMAINS, make_domain
 from regrid.domains_in_space import BLOCKS, SHAPES
 from regrid.errors import BadInput, RunFailure
-from regrid.given import read_grid
+from regrid.given import is_file_name, read_grid, read_sides, read_source
+from regrid.marching import March
+from regrid.measure.quality import measure_first_line_gap
 from regrid.registry import find_usable, load_regridder, takes_weight
+from regrid.sides import SIDE_NAMES, get_side, get_sides
+from runs.deck.reading import packaged_decks, read_deck
 from runs.grids import making
-from runs.grids.making import Grid, name_family, parse_options
-from runs.grids.quality import check_free, describe, describe_histograms, judge, plan_outputs
+from runs.grids.making import Grid, choose_family, name_family, parse_options
+from runs.grids.quality import describe, describe_histograms, plan_outputs
+from runs.store.files import check_free
 
 MOST_CELLS = 4_000_000
 Files = tuple[tuple[str, ...], bool, bool]  # names given with -o, --force, --plot
@@ -55,7 +70,7 @@ def draw_every_domain(picture: str, force: bool) -> str:
     marches = []
     for name in DOMAINS:
         domain = make_domain(name, *making.default_cells(name))
-        found = making.march(domain, making.choose_family("barrier"), making.STEPS)
+        found = making.march(domain, choose_family("barrier"), making.STEPS)
         marches.append((name.replace("_", "-"), found))
     return f"picture: {draw_gallery(marches, path)}"
 
@@ -93,12 +108,14 @@ def make_grid(
     **words,
 ) -> list[str]:
     """`grid make`; words: of `making.make`."""
-    size = parse_cells(cells, 3 if making.is_in_space(source) else 2)
-    given, own = parse_options(options), source.replace("-", "_") in BLOCKS
-    used = name_family(family, source, own)
-    label, stem = (source, source) if own else (f"{source}, {used}", f"{Path(source).stem}-{used}")
+    name, given = source.replace("-", "_"), parse_options(options)
+    size = parse_cells(cells, 3 if name in (*BLOCKS, *SHAPES) else 2)
+    used = name_family(family, source, name in BLOCKS)
+    label, stem = f"{source}, {used}", f"{Path(source).stem}-{used}"
+    if name in BLOCKS:
+        label = stem = source
     return _write(
-        lambda: making.make(source, family, given, cells=size, **words), label, stem, files
+        lambda: making.make(source, family, cells=size, **words, **given), label, stem, files
     )
 
 
@@ -112,16 +129,16 @@ def regrid_file(
     **words,
 ) -> list[str]:
     """`grid regrid`; words: of `making.regrid`."""
-    given, nodes = parse_options(options), read_grid(file, block)
-    used = name_family(family, file, nodes.shape[0] == 3)
+    given, grid = parse_options(options), Grid(read_grid(file, block), made_by={"source": file})
+    used, before = name_family(family, file, grid.nodes.shape[0] == 3), grid.quality
 
     def compute() -> Grid:
-        before, made = judge(nodes), making.regrid(nodes, family, given, source=file, **words)
-        words_before = (
+        made = making.regrid(grid, family, **words, **given)
+        made.notes.insert(
+            0,
             f"before: {len(before.bad_cells)} cells not convex, minimum scaled Jacobian "
-            f"{before.least_sine:.4f}, worst aspect ratio {before.worst_aspect:.3f}"
+            f"{before.least_sine:.4f}, worst aspect ratio {before.worst_aspect:.3f}",
         )
-        made.notes.insert(0, words_before)
         return made
 
     return _write(compute, f"{file}, {used}", f"{Path(file).stem}-{used}", files)
@@ -157,20 +174,22 @@ def _write(compute: Callable[[], Grid], label: str, stem: str, files: Files) -> 
     drawn = paths[0].with_suffix(".png")
     if picture:
         check_free(drawn, force)
-    made = compute()
-    title, words = _title(label, made.nodes), made.failure
-    if made.failure:
+    try:
+        made = compute()
+        title = _title(label, made.nodes)
+    except making.NoGrid as error:
+        made = error.made
         made.made_by["failure"] = made.failure
-        title += ", FAILED"
+        title = f"{_title(label, made.nodes)}, FAILED"
         drawn, *paths = [p.with_stem(p.stem + "-failed") for p in (drawn, *paths)]
         paths = paths if outputs else []
     written = "  ".join(str(path) for path in made.write(*paths, force=True))
     if picture:
         _draw(made, title, drawn)
-    if words is not None:
-        words += f"; what it came to is in {written}" if written else ""
+    if made.failure:
+        words = f"; what it came to is in {written}" if written else ""
         words += f"; picture: {drawn}" if picture else ""
-        raise RunFailure(words, cause="no-grid")
+        raise RunFailure(made.failure + words, cause="no-grid")
     lines = [title, *("  " + line for line in (*made.notes, *describe(made.quality)))]
     return [*lines, f"written: {written}", *[f"picture: {drawn}"] * picture]
 
@@ -181,3 +200,216 @@ def _draw(made: Grid, title: str, path: Path) -> Path:
     if made.nodes.shape[0] == 3:
         return draw_block(made.nodes, title, path, made.spreads)
     return draw_grid(made.quality, title, path, made.sides)
+
+
+HEAD = (
+    f"{'family':34s} {'steps':>12s} {'gap':>7s} {'min. sine':>10s} {'aspect':>8s}"
+    f" {'us/node':>8s} {'sub-moves':>9s} {'folded':>7s}"
+)
+REASON = 110  # characters of a reason that are shown
+Compared = tuple[March, str, np.ndarray]  # what came of a family, its steps, the sides drawn
+Compute = Callable[[str, dict[str, Any]], Compared]  # from the name and options of a family
+
+
+def parse_family(words: str) -> tuple[str, dict[str, Any]]:
+    """`name`, or `name:key=value:key=value`; BadInput for what the registry does not know."""
+    name, *options = words.split(":")
+    family = name, parse_options(tuple(options))
+    choose_family(*family)
+    return family
+
+
+def every_family() -> list[str]:
+    """All that is registered, and the paper's sweeps, which are an option of the barrier."""
+    first, *others = find_usable()
+    return [first, "barrier:method=sweeps", *others]
+
+
+def compare_families(
+    domains: str,
+    picture: str | None,
+    force: bool,
+    *,
+    families: Sequence[str],
+    cells: tuple[int, int] | None,
+    steps: int,
+    weight: str | None,
+    settings: tuple[str, ...],
+    block: str | None,
+) -> Iterator[str]:
+    """Lines of the tables, as they are found; one table a domain, deck or file."""
+    known = {words: parse_family(words) for words in families or every_family()}
+    names = [name.strip() for name in domains.split(",") if name.strip()]
+    kinds = {name: _find_kind(name) for name in names}
+    if not names:
+        raise BadInput(
+            "name a domain, a deck of a flow or a file; `shockgrid grid list` shows the domains"
+        )
+    if settings and "flow" not in kinds.values():
+        raise BadInput(f"--set changes the deck of a flow; a {kinds[names[0]]} has none")
+    pictures = _plan_pictures(picture, names, force)
+    for name in names:
+        if kinds[name] == "flow":
+            title, compute = _prepare_flow(name, settings)
+        elif kinds[name] == "file":
+            title, compute = _prepare_file(name, block, cells, steps)
+        else:
+            title, compute = _prepare_domain(name, cells, steps)
+        yield f"{name}: {title}"
+        yield HEAD
+        drawn, reasons = [], []
+        for label, (family, options) in known.items():
+            weighted = {} if weight is None or not takes_weight(family) else {"weight": weight}
+            march, done, sides = compute(family, weighted | options)
+            yield describe_march(label, march, done)
+            if march.failure:
+                why = march.failure.removeprefix("regrid: ")
+                why = textwrap.shorten(why, REASON, placeholder="...")
+                reasons.append(f"  {label}, step {march.done + 1}: {why}")
+            drawn.append((f"{label}: {done}", march, sides))
+        yield from reasons
+        if name in pictures:
+            from runs.grids.pictures import draw_comparison
+
+            yield f"picture: {draw_comparison(drawn, name, pictures[name])}"
+        yield ""
+
+
+def _find_kind(name: str) -> str:
+    """`domain`, `flow` or `file`; BadInput where there is none of that name."""
+    if name.replace("-", "_") in DOMAINS:
+        return "domain"
+    if name in PROBLEMS or name in packaged_decks() or name.endswith(".toml"):
+        return "flow"
+    if is_file_name(name):
+        return "file"
+    make_domain(name, 4, 4)  # says which names are near
+    return "domain"
+
+
+def _plan_pictures(picture: str | None, names: list[str], force: bool) -> dict[str, Path]:
+    if picture is None:
+        return {}
+    path = Path(picture)
+    one = len(names) == 1
+    found = {n: path if one else path.with_stem(f"{path.stem}-{Path(n).stem}") for n in names}
+    for target in found.values():
+        check_free(target, force)
+    return found
+
+
+def _prepare_domain(name: str, cells, steps: int) -> tuple[str, Compute]:
+    ni, nj = cells or making.default_cells(name)
+    domain = make_domain(name, ni, nj)
+
+    def compute(family: str, options: dict[str, Any]) -> Compared:
+        found = making.march(domain, choose_family(family, options), steps)
+        last = found.done + 1 if found.failure else steps
+        return found, f"{found.done}/{steps}", domain.boundary(last / steps)
+
+    way = domain.travel_in_cells / steps
+    return f"{ni} x {nj} cells, {steps} steps of {way:.2g} cells at the fastest node", compute
+
+
+def _prepare_file(name: str, block: str | None, cells, passes: int) -> tuple[str, Compute]:
+    source = read_source(name, block)
+    given = not isinstance(source, dict) and cells is None  # a grid, whose own inside is the start
+    sides = source if given else read_sides(name, block, cells)
+    if sides.shape[0] == 3:
+        raise BadInput(f"{name} is a grid in space; families are compared on plane grids")
+
+    def compute(family: str, options: dict[str, Any]) -> Compared:
+        regridder = choose_family(family, options)
+        making.warm_up(make_domain("swan", 8, 8), regridder)
+        if given:
+            made = making.regrid_plane(sides, regridder, passes)
+        else:
+            made = making.make_on_curves(sides, regridder, passes, name)
+        found = made.march or March(made.nodes, passes)
+        found.nodes, found.failure = made.nodes, made.failure
+        if found.done:
+            found.gap = max(measure_first_line_gap(found.nodes, side) for side in SIDE_NAMES)
+        return found, f"{found.done}/{passes}", sides
+
+    size = f"{sides.shape[1] - 1} x {sides.shape[2] - 1} cells"
+    return f"{size}, the last of at most {passes} passes on its sides", compute
+
+
+def describe_march(label: str, found: March, steps: str) -> str:
+    """A line of the table under HEAD; `steps` is shown as it is."""
+    if found.done == 0:
+        return f"{label:34s} {steps:>12s} {'-':>7s} {'-':>10s} {'-':>8s} {'-':>8s}"
+    return (
+        f"{label:34s} {steps:>12s} {found.gap:7.2f} {found.sine:10.3g} {found.aspect:8.2f}"
+        f" {found.cost:8.2f} {found.sub_moves:9d} {found.rescues:7d}"
+    )
+
+
+def _prepare_flow(name: str, settings: tuple[str, ...]) -> tuple[str, Compute]:
+    read = read_deck(name, settings)
+    if not hasattr(read.deck, "regrid") or read.problem == "grid-march":
+        raise BadInput(f"{name}: the problem {read.problem} has no regridder to compare")
+    started = read.make_problem().build()
+
+    def compute(family: str, options: dict[str, Any]) -> Compared:
+        found, part = _run_flow(read, family, options)
+        return found, f"{found.done} {100.0 * part:3.0f}%", found.nodes
+
+    sizes = ", ".join(f"{b.nodes.shape[1] - 1} x {b.nodes.shape[2] - 1}" for b in started.blocks)
+    return f"flow to t = {started.t_end:.6g} s, blocks of {sizes} cells", compute
+
+
+def _run_flow(read, name: str, options: dict[str, Any]) -> tuple[March, float]:
+    """Run one flow as far as it goes; `nodes` of the result are those of the interface's block."""
+    own = {"epsilon", "method", "edge_lengths"} & options.keys() if name == "barrier" else set()
+    chosen = msgspec.structs.replace(
+        read.deck.regrid,
+        name=name,
+        options={key: value for key, value in options.items() if key not in own},
+        **{key: options[key] for key in own},
+    )
+    deck = msgspec.structs.replace(read.deck, regrid=chosen)
+    evolution = replace(read, deck=deck).make_problem().build()
+    block, sides = _find_interface(evolution.blocks)
+    found = March(block.nodes.copy(), 0)
+    inner = [(b.nodes.shape[1] - 2) * (b.nodes.shape[2] - 2) for b in (block, *evolution.blocks)]
+    while evolution.finished is None:
+        if deck.run.max_steps is not None and found.done >= deck.run.max_steps:
+            found.failure = f"stopped after run.max_steps = {deck.run.max_steps} steps"
+            break
+        try:
+            row = evolution.advance()
+        except RunFailure as failure:
+            found.failure = str(failure)
+            break
+        found.done = evolution.step
+        # Of one node, whichever block it is in: `cost` divides by the shown block's own count.
+        found.seconds.append(row.get("seconds_regrid", np.nan) * inner[0] / sum(inner[1:]))
+        found.sine = min(found.sine, row["least_scaled_jacobian"])
+        found.aspect = max(found.aspect, row["worst_aspect"])
+        found.sub_moves += int(row.get("regrid_sub_moves", 0))
+        found.rescues += int(row.get("regrid_rescues", 0))
+        found.gap = max(found.gap, *(measure_first_line_gap(b.nodes, side) for b, side in sides))
+    found.nodes = block.nodes.copy()
+    found.steps = found.done
+    return found, evolution.t / evolution.t_end
+
+
+def _find_interface(blocks):
+    """The block whose picture is drawn, and the sides that two blocks have in common.
+
+    A flow of one block: all its sides.
+    """
+    sides = [
+        (block, side)
+        for block in blocks
+        for side in SIDE_NAMES
+        if any(
+            other is not block and np.array_equal(get_side(block.nodes, side), line)
+            for other in blocks
+            for line in get_sides(other.nodes)
+        )
+    ]
+    if not sides:
+        return blocks[0], [(blocks[0], side) for side in SIDE_NAMES]
+    return sides[-1][0], sides

@@ -31,7 +31,14 @@ from regrid.domains_in_space import BLOCKS, SHAPES, MovingBlock, find_block, mak
 from regrid.equidistribution import volumes
 from regrid.equidistribution.weights import Weight, make_position_weight
 from regrid.errors import BadInput, RegridFailure, suggest
-from regrid.given import check_nodes, describe_repair, find_start, is_file_name, read_sides
+from regrid.given import (
+    check_nodes,
+    describe_repair,
+    find_start,
+    is_file_name,
+    read_grid,
+    read_sides,
+)
 from regrid.hexahedra.regridder import BarrierRegridder3D
 from regrid.marching import March, march_domain
 from regrid.measure import hexahedra
@@ -132,11 +139,6 @@ def name_family(family: Family | None, source: object, spatial: bool) -> str:
     return family if isinstance(family, str) else type(family).__name__
 
 
-def is_in_space(source: object) -> bool:
-    """Is it the name of a block of space, at rest or moving?"""
-    return isinstance(source, str) and source.replace("-", "_") in (*BLOCKS, *SHAPES)
-
-
 def march(domain: MovingDomain, regridder: Regridder, steps: int, end: float = 1.0) -> March:
     """March `domain` from s = 0 to `end` in equal steps; stops at the first step without a grid.
 
@@ -161,10 +163,17 @@ def default_cells(name: str) -> tuple[int, int]:
     return parameters["ni"].default, parameters["nj"].default
 
 
+class NoGrid(RegridFailure):
+    """No valid grid was found; `made` is what it came to."""
+
+    def __init__(self, made: Grid):
+        super().__init__(str(made.failure), grid=made.nodes)
+        self.made = made
+
+
 def make(
-    source: str | np.ndarray,
+    source: str | Path | np.ndarray,
     family: Family | None = None,
-    options: Mapping[str, Any] = NONE,
     *,
     cells: Cells | None = None,
     steps: int = STEPS,
@@ -172,72 +181,85 @@ def make(
     passes: int = PASSES,
     weight: str | None = None,
     block: str | None = None,
+    **options: Any,
 ) -> Grid:
     """A grid of a named domain or block, on the curves or sides in a file, on those of an array.
 
-    steps: of a domain's motion, `at` the part of it that is made; passes: at most on sides given
-    at once; block: of a file.  Raises BadInput for what there is not.
+    source: a name of `shockgrid grid list`, a file, or nodes (2, ni+1, nj+1) of which the sides
+    count.  family: a name with `options` ["barrier"], or your own regridder.  cells: along i and
+    j, where the source leaves it open.  steps, at: of a domain's motion and the part of it that is
+    made; passes: at most, on sides given at once.  weight: a formula, as `--weight`.  Raises
+    BadInput for what there is not, RegridFailure where no valid grid was found.
     """
     if not 0.0 <= at <= 1.0:
         raise BadInput(f"at = {at}: a number from 0 to 1 is wanted")
-    name = source.replace("-", "_") if isinstance(source, str) else ""
-    used = name_family(family, source, name in BLOCKS)
-    made_by = {"at": at, "steps": steps}
+    told = "an array" if isinstance(source, np.ndarray) else str(source)
+    name = told.replace("-", "_")
+    used = name_family(family, told, name in BLOCKS)
     if name in BLOCKS:
         law = make_spatial_law(options, weight)
         size = cells or CELLS_IN_SPACE
         found = volumes.equidistribute_block(find_block(name), size, law, **options)
-        return _sign(_describe_ed3(found, law), source, used, options, weight, made_by)
-    if name in SHAPES:
+        made = _describe_ed3(found, law)
+    elif name in SHAPES:
         if weight is not None:
-            raise BadInput(f"--weight: {source} moves; its families take none")
+            raise BadInput(f"--weight: {told} moves; its families take none")
         made = make_moving(name, used, options, cells or CELLS_IN_SPACE, steps, at)
-        return _sign(made, source, used, options, weight, made_by)
-    regridder = choose_family(family or used, options, weight)
-    if isinstance(source, np.ndarray):
-        source, nodes = "an array", check_nodes(source, "the array")
-        made = make_on_curves(nodes, regridder, passes, "the array")
-    elif name in DOMAINS:
-        made = make_on_domain(name, used, regridder, cells or default_cells(name), steps, at)
-    elif is_file_name(source):
-        made = make_on_curves(read_sides(source, block, cells), regridder, passes, source)
     else:
-        known = [name.replace("_", "-") for name in (*DOMAINS, *BLOCKS, *SHAPES)]
-        raise BadInput(f"no domain and no file is called {source!r}{suggest(source, known)}")
-    return _sign(made, source, used, options, weight, made_by)
+        regridder = choose_family(family or used, options, weight)
+        if isinstance(source, np.ndarray):
+            nodes = check_nodes(source, "the array")
+            made = make_on_curves(nodes, regridder, passes, "the array")
+        elif name in DOMAINS:
+            made = make_on_domain(name, used, regridder, cells or default_cells(name), steps, at)
+        elif is_file_name(told):
+            made = make_on_curves(read_sides(told, block, cells), regridder, passes, told)
+        else:
+            known = [name.replace("_", "-") for name in (*DOMAINS, *BLOCKS, *SHAPES)]
+            raise BadInput(f"no domain and no file is called {told!r}{suggest(told, known)}")
+    made.made_by = {"source": told, "family": used, "at": at, "steps": steps}
+    return _finish(made, options, weight)
 
 
 def regrid(
-    nodes: np.ndarray,
+    grid: Grid | np.ndarray | str | Path,
     family: Family | None = None,
-    options: Mapping[str, Any] = NONE,
     *,
     passes: int = PASSES,
     weight: str | None = None,
-    source: str = "a grid",
+    **options: Any,
 ) -> Grid:
     """A grid regenerated on its own sides; a plane one that is not valid is untangled first.
 
-    source: what it is called.  Raises BadInput for what there is not.
+    grid: nodes (2 or 3, ...), a `Grid`, or a file.  Other arguments and what is raised: `make`.
     """
-    spatial = nodes.shape[0] == 3
-    used = name_family(family, source, spatial)
-    if spatial:
+    nodes = find_nodes(grid)
+    source = grid.made_by.get("source", "a grid") if isinstance(grid, Grid) else "a grid"
+    used = name_family(family, source, nodes.shape[0] == 3)
+    if nodes.shape[0] == 3:
         made = regrid_space(nodes, make_spatial_law(options, weight), options)
     else:
         made = regrid_plane(nodes, choose_family(family or used, options, weight), passes)
-    return _sign(made, source, used, options, weight, {})
+    made.made_by = {"source": source, "family": used}
+    return _finish(made, options, weight)
 
 
-def _sign(
-    made: Grid, source: str, family: str, options: Mapping[str, Any], weight: str | None,
-    more: Mapping[str, Any],
-) -> Grid:  # fmt: skip
+def find_nodes(grid: Grid | np.ndarray | str | Path) -> np.ndarray:
+    """The nodes (2 or 3, ...) [m] of a grid, an array or a file."""
+    if isinstance(grid, Grid):
+        return grid.nodes
+    if isinstance(grid, np.ndarray):
+        return check_nodes(grid, "the array")
+    return read_grid(str(grid))
+
+
+def _finish(made: Grid, options: Mapping[str, Any], weight: str | None) -> Grid:
     """The grid with what it was made by and, in the plane, the weight at its cells."""
     words = " ".join(f"{key}={value}" for key, value in options.items())
-    made.made_by = {"source": source, "family": family, "options": words, "weight": weight or ""}
-    made.made_by |= more
-    if weight is not None and not made.failure and made.nodes.shape[0] == 2:
+    made.made_by |= {"options": words, "weight": weight or ""}
+    if made.failure:
+        raise NoGrid(made)
+    if weight is not None and made.nodes.shape[0] == 2:
         made.weight = Weight(weight).on(made.nodes, made.nodes)(made.nodes)
     return made
 
@@ -377,21 +399,10 @@ def _describe_ed3(found: volumes.Equidistributed, law) -> Grid:
     return Grid(found.nodes, [note], failure, weight=values, spreads=found.spreads)
 
 
-@dataclass
-class MarchInSpace(March):
-    """As `March`, of nodes (3, ...).
-
-    `corners` are cells of which a corner volume is not positive, counted in every step, `creased`
-    those of the last grid whose trilinear Jacobian is not positive at one of 5³ places.
-    """
-
-    corners: int = 0
-    creased: int = 0
-
-
-def march_in_space(block: MovingBlock, regridder, steps: int, end: float = 1.0) -> MarchInSpace:
-    """March from s = 0 to `end` in equal steps; stops at the first step without a grid."""
-    found = MarchInSpace(block.start.copy(), steps)
+def march_in_space(block: MovingBlock, regridder, steps: int, end: float = 1.0) -> March:
+    """March from s = 0 to `end` in equal steps; stops at the first step without a grid, or with one
+    of which a cell has a corner volume that is not positive."""
+    found = March(block.start.copy(), steps)
     regridder.regrid(block.start, block.boundary(0.0))  # compiling is not regridding
     for step in range(1, steps + 1):
         boundary = block.boundary(end * step / steps)
@@ -402,13 +413,15 @@ def march_in_space(block: MovingBlock, regridder, steps: int, end: float = 1.0) 
             found.failure = str(failure)
             break
         found.seconds.append(time.process_time() - begun)
+        if (bad := ~(hexahedra.compute_least_corner_volumes(result.nodes) > 0.0)).any():
+            named = name_cells(np.argwhere(bad), 8)
+            found.failure = f"cells {named} have corners that are not positive"
+            break
         found.nodes, found.done = result.nodes, step
         found.reports.append(result.report)
         found.sub_moves += result.report.sub_moves
         found.rescues += result.report.rescues
-        found.corners += int((~(hexahedra.compute_least_corner_volumes(found.nodes) > 0.0)).sum())
         found.sine = min(found.sine, float(hexahedra.compute_hexahedron_sines(found.nodes).min()))
-    found.creased = int((~(hexahedra.compute_least_jacobian(found.nodes) > 0.0)).sum())
     return found
 
 
@@ -430,9 +443,9 @@ def make_moving(
         f"marched in {steps} steps, {found.cost:.2f} us per node and step, {found.iterations} "
         f"iterations, {found.sub_moves} sub-moves, {found.rescues} untangling events"
     )
+    creased = int((~(hexahedra.compute_least_jacobian(found.nodes) > 0.0)).sum())
     worst = (
-        f"minimum scaled Jacobian of all steps {found.sine:.4f}; cells with a corner not positive "
-        f"in any step: {found.corners}; with a Jacobian not positive at 5x5x5 places, at the end: "
-        f"{found.creased}"
+        f"minimum scaled Jacobian of all steps {found.sine:.4f}; at the end, cells with a Jacobian "
+        f"not positive at 5x5x5 places: {creased}"
     )
     return Grid(found.nodes, [note, worst])

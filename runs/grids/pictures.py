@@ -22,12 +22,13 @@ from runs.pictures.command import new_figure, save
 from runs.pictures.fields import draw_grid_lines, lay_out
 
 LONG = 6.0  # a domain longer than this, in its widths, is shown in part
+DPI = 120
 LINE, BAD = "0.2", "tab:red"
 COLOURS = "viridis"
 
 
 def draw_grid(
-    judgement: Judgement, title: str, path: Path, sides: np.ndarray | None = None, dpi: int = 130
+    judgement: Judgement, title: str, path: Path, sides: np.ndarray | None = None
 ) -> Path:
     """The grid with its bad cells in red, its cells' corner sines, and how many cells have which.
 
@@ -66,13 +67,13 @@ def draw_grid(
     plain.set_title(title, fontsize=10)
     number = len(judgement.bad_cells)
     words = f"{number} cells not convex" if number else "every cell convex"
-    words += "; red: the sides without a grid" if sides is not None else ""
+    words += "; red: the sides without a grid" * (sides is not None)
     coloured.set_title(words, fontsize=10)
-    return save(figure, path, dpi)
+    return save(figure, path, DPI)
 
 
 def draw_comparison(
-    marches: Sequence[tuple[str, March, np.ndarray]], title: str, path: Path, dpi: int = 110
+    marches: Sequence[tuple[str, March, np.ndarray]], title: str, path: Path
 ) -> Path:
     """The last grid of every family side by side; where one ended early, the next sides in red.
 
@@ -93,10 +94,10 @@ def draw_comparison(
         axes.set_title(name, fontsize=9)
         axes.tick_params(labelsize=7)
     figure.suptitle(title, fontsize=11)
-    return save(figure, path, dpi)
+    return save(figure, path, DPI)
 
 
-def draw_gallery(marches: Sequence[tuple[str, March]], path: Path, dpi: int = 100) -> Path:
+def draw_gallery(marches: Sequence[tuple[str, March]], path: Path) -> Path:
     """A panel for each named domain, with the worst corner sine and aspect ratio of its march."""
     figure = new_figure()
     panels = lay_out(figure, len(marches), 6, (2.6, 2.9))
@@ -105,7 +106,7 @@ def draw_gallery(marches: Sequence[tuple[str, March]], path: Path, dpi: int = 10
         frame(axes, march.nodes)
         axes.set_title(f"{name}\nsine {march.sine:.2f}, aspect {march.aspect:.0f}", fontsize=9)
         axes.set_axis_off()
-    return save(figure, path, dpi)
+    return save(figure, path, DPI)
 
 
 def _outline(sides: np.ndarray) -> np.ndarray:
@@ -114,7 +115,7 @@ def _outline(sides: np.ndarray) -> np.ndarray:
 
 def plot_sides(axes, sides: np.ndarray, colour: str) -> None:
     """The four sides alone."""
-    edges = [sides[:, 0].T, sides[:, -1].T, sides[:, :, 0].T, sides[:, :, -1].T]
+    edges = [side.T for side in get_sides(sides)]
     axes.add_collection(LineCollection(edges, colors=colour, linewidths=0.9))
 
 
@@ -128,13 +129,9 @@ def frame(axes, nodes: np.ndarray, everything: np.ndarray | None = None) -> None
     size = high - low
     long = int(np.argmax(size))
     if size[long] > LONG * size[1 - long]:
-        first, last = np.abs(np.diff(nodes[long, :, 0])), np.abs(np.diff(nodes[long, 0]))
-        steps, line = max(
-            ((s, v) for s, v in ((first, nodes[long, :, 0]), (last, nodes[long, 0]))),
-            key=lambda pair: np.nansum(pair[0]),
-        )
-        reach = 2.0 * size[1 - long]
-        if line[int(np.nanargmin(steps))] < 0.5 * (low[long] + high[long]):
+        line = max((nodes[long, :, 0], nodes[long, 0]), key=np.ptp)  # the side along it
+        finest, reach = line[np.nanargmin(np.abs(np.diff(line)))], 2.0 * size[1 - long]
+        if finest < 0.5 * (low[long] + high[long]):
             high[long] = low[long] + reach
         else:
             low[long] = high[long] - reach
@@ -145,7 +142,7 @@ def frame(axes, nodes: np.ndarray, everything: np.ndarray | None = None) -> None
 
 
 def draw_block(
-    nodes: np.ndarray, title: str, path: Path, spreads: np.ndarray | None = None, dpi: int = 110
+    nodes: np.ndarray, title: str, path: Path, spreads: np.ndarray | None = None
 ) -> Path:
     """A block of space: its surface, three cut planes coloured by quality, the convergence."""
     figure = new_figure()
@@ -161,7 +158,11 @@ def draw_block(
                 shade=False,
             )  # fmt: skip
         middle = sines.shape[axis] // 2
-        _plot_cut(cuts, nodes, sines, axis, middle, norm)
+        colours = colormaps[COLOURS](norm(np.take(sines, middle, axis=axis)))
+        cuts.plot_surface(
+            *np.take(nodes, middle, axis=axis + 1), rstride=1, cstride=1, facecolors=colours,
+            shade=False, edgecolor=(0.0, 0.0, 0.0, 0.35), linewidth=0.15,
+        )  # fmt: skip
     for axes, words in ((surface, title), (cuts, "cut planes: scaled Jacobian")):
         axes.set_box_aspect(np.ptp(nodes.reshape(3, -1), axis=1))
         axes.set_title(words, fontsize=10)
@@ -179,13 +180,4 @@ def draw_block(
         side.hist(sines.ravel(), bins=30, color="0.4")
         side.set_xlabel("scaled Jacobian")
         side.set_ylabel("cells")
-    return save(figure, path, dpi)
-
-
-def _plot_cut(axes, nodes, sines, axis: int, index: int, norm) -> None:
-    sheet = np.take(nodes, index, axis=axis + 1)
-    values = np.take(sines, min(index, sines.shape[axis] - 1), axis=axis)
-    axes.plot_surface(
-        *sheet, rstride=1, cstride=1, facecolors=colormaps[COLOURS](norm(values)), shade=False,
-        edgecolor=(0.0, 0.0, 0.0, 0.35), linewidth=0.15,
-    )  # fmt: skip
+    return save(figure, path, DPI)

@@ -10,28 +10,17 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
 
 from regrid.errors import BadInput
+from regrid.measure import hexahedra, quality
 from regrid.measure.corners import compute_corner_signs, find_excluded_corners
 from regrid.measure.faults import name_cells
-from regrid.measure.hexahedra import (
-    compute_hexahedron_aspects,
-    compute_hexahedron_sines,
-    compute_volumes,
-    find_bad_hexahedra,
-)
-from regrid.measure.quality import (
-    compute_aspect_ratio,
-    compute_corner_areas,
-    compute_scaled_jacobians,
-    compute_skew,
-    find_best_sine,
-)
 from runs.store.dumps import write_block
-from runs.store.files import check_not_of_a_run, write_atomically
+from runs.store.files import check_free, write_atomically
 from runs.store.paraview import HEAD, TAIL, describe_block, write_vts
 from runs.store.provenance import describe_software, find_provenance
 
@@ -74,38 +63,33 @@ def judge(nodes: np.ndarray, weight: np.ndarray | None = None) -> Judgement:
     """Measure nodes (2 or 3, ...); `weight` of the cells adds the field weight_times_size."""
     with np.errstate(all="ignore"):
         plane = nodes.shape[0] == 2
-        corners = compute_corner_areas(nodes) if plane else None
-        size = 0.5 * corners.sum(axis=0) if plane else compute_volumes(nodes)
+        areas = quality.compute_corner_areas(nodes) if plane else None
+        size = hexahedra.compute_volumes(nodes) if areas is None else 0.5 * areas.sum(axis=0)
         left_handed = bool(size.sum() < 0.0)
         if left_handed:  # mirrored, so that the cells keep their indices
             nodes = nodes.copy()
             nodes[0] = -nodes[0]
             size = -size
-        fields = {
-            "scaled_jacobian": compute_scaled_jacobians(nodes).min(axis=0)
-            if plane
-            else compute_hexahedron_sines(nodes),
-            "aspect_ratio": (compute_aspect_ratio if plane else compute_hexahedron_aspects)(nodes),
-            "size": size,
-        }
         if plane:
-            fields["skew"] = compute_skew(nodes)
+            sines = quality.compute_scaled_jacobians(nodes).min(axis=0)
+            aspect = quality.compute_aspect_ratio(nodes)
+        else:
+            sines = hexahedra.compute_hexahedron_sines(nodes)
+            aspect = hexahedra.compute_hexahedron_aspects(nodes)
+        fields = {"scaled_jacobian": sines, "aspect_ratio": aspect, "size": size}
+        if plane:
+            fields["skew"] = quality.compute_skew(nodes)
         if weight is not None:
             product = weight * size
             fields["weight_times_size"] = product / product.mean()
     if not plane:
-        return Judgement(nodes, find_bad_hexahedra(nodes), fields, left_handed)
-    bad, forced = find_exactly(nodes)
-    return Judgement(nodes, bad, fields, left_handed, forced)
-
-
-def find_exactly(nodes: np.ndarray) -> tuple[np.ndarray, int]:
-    """Cells (n, 2) that are not convex by exact signs, worst first, and how many must be so."""
-    wrong = compute_corner_signs(nodes) <= 0
+        return Judgement(nodes, hexahedra.find_bad_hexahedra(nodes), fields, left_handed)
+    wrong = compute_corner_signs(nodes) <= 0  # exactly
     cells = np.argwhere(wrong.any(axis=0))
     free = (wrong & ~find_excluded_corners(nodes)).any(axis=0)
-    least = compute_corner_areas(nodes).min(axis=0)[tuple(cells.T)]
-    return cells[np.argsort(least, kind="stable")], int(len(cells) - free.sum())
+    least = quality.compute_corner_areas(nodes).min(axis=0)[tuple(cells.T)]
+    bad = cells[np.argsort(least, kind="stable")]
+    return Judgement(nodes, bad, fields, left_handed, int(len(bad) - free.sum()))
 
 
 def describe(judgement: Judgement) -> list[str]:
@@ -135,7 +119,7 @@ def describe(judgement: Judgement) -> list[str]:
         where = ", ".join(str(int(k)) for k in cell)
         line = f"{label:22s}{fields[name][cell]:10.{digits}f}   in cell ({where})"
         if plane and name == "scaled_jacobian":
-            best, side, node = find_best_sine(judgement.nodes)
+            best, side, node = quality.find_best_sine(judgement.nodes)
             line += f"; the sides allow {best:.4f} at most ({side}, node {node})"
         lines.append(line)
     size = fields["size"]
@@ -151,46 +135,27 @@ def describe(judgement: Judgement) -> list[str]:
 
 def describe_histograms(judgement: Judgement) -> list[str]:
     """Lines: how many cells have which corner sine and which aspect ratio."""
-    return [
-        "cells by scaled Jacobian",
-        *_draw_bars(judgement.fields["scaled_jacobian"], SINE_EDGES),
-        "cells by aspect ratio",
-        *_draw_bars(judgement.fields["aspect_ratio"], ASPECT_EDGES),
-    ]
-
-
-def _draw_bars(values: np.ndarray, edges) -> list[str]:
-    values = values[np.isfinite(values)]
-    bounds = np.array([*edges[:-1], np.inf])
-    counts, _ = np.histogram(np.maximum(values, edges[0]), bounds)
-    most = max(1, counts.max())
-    rows = [
-        f"  {low:6g} to {high:<6g} {count:8d} {'#' * int(np.ceil(BAR * count / most))}".rstrip()
-        for low, high, count in zip(edges[:-1], edges[1:], counts, strict=True)
-    ]
-    filled = np.flatnonzero(counts)
-    return rows[filled[0] : filled[-1] + 1] if filled.size else ["  none"]
+    lines = []
+    for name, words, edges in (
+        ("scaled_jacobian", "scaled Jacobian", SINE_EDGES),
+        ("aspect_ratio", "aspect ratio", ASPECT_EDGES),
+    ):
+        values = judgement.fields[name]
+        bounds = [*edges[:-1], np.inf]
+        counts, _ = np.histogram(np.maximum(values[np.isfinite(values)], edges[0]), bounds)
+        longest = max(1, counts.max())
+        bars = [
+            f"  {low:6g} to {high:<6g} {count:8d} {'#' * int(np.ceil(BAR * count / longest))}"
+            for low, high, count in zip(edges[:-1], edges[1:], counts, strict=True)
+        ]
+        filled = np.flatnonzero(counts)
+        shown = bars[filled[0] : filled[-1] + 1] if filled.size else ["  none"]
+        lines += [f"cells by {words}", *shown]
+    return lines
 
 
 FORMAT, FORMAT_VERSION = "shockgrid grid", 1
 ENDINGS = (".h5", ".vts", ".npz")
-
-
-@dataclass(frozen=True)
-class GridBlock:
-    """A grid as `write_block` takes it."""
-
-    nodes: np.ndarray
-    cell_fields: Mapping[str, np.ndarray]
-    name: str = "grid"
-
-    @property
-    def units(self) -> Mapping[str, str]:
-        return {"size": "m2" if self.nodes.shape[0] == 2 else "m3"}
-
-    @property
-    def long_names(self) -> Mapping[str, str]:
-        return LONG_NAMES
 
 
 def plan_outputs(names: Sequence[str], force: bool) -> list[Path]:
@@ -207,17 +172,6 @@ def plan_outputs(names: Sequence[str], force: bool) -> list[Path]:
     for path in [*planned, *(p.with_suffix(".xdmf") for p in planned if p.suffix.lower() == ".h5")]:
         check_free(path, force)
     return planned
-
-
-def check_free(path: Path, force: bool) -> None:
-    """BadInput where `path` exists and may not be replaced, or its folder does not exist."""
-    if path.is_dir():
-        raise BadInput(f"{path} is a folder, a file is needed")
-    check_not_of_a_run(path)
-    if path.exists() and not force:
-        raise BadInput(f"{path} exists; --force replaces it, -o chooses another name")
-    if not path.parent.is_dir():
-        raise BadInput(f"{path.parent} is not a folder, so {path.name} cannot be written")
 
 
 def write_grid(
@@ -252,8 +206,10 @@ def _make_image(nodes, fields, made_by) -> bytes:
         made = file.create_group("provenance", track_order=True)
         made.attrs.update(find_provenance())
         group = file.create_group("blocks").create_group("grid", track_order=True)
-        write_block(
-            group, GridBlock(nodes, fields), [*zip("xyz", nodes, strict=False), *fields.items()]
+        units = {"size": "m2" if nodes.shape[0] == 2 else "m3"}
+        block = SimpleNamespace(
+            name="grid", nodes=nodes, cell_fields=fields, units=units, long_names=LONG_NAMES
         )
+        write_block(group, block, [*zip("xyz", nodes, strict=False), *fields.items()])
         file.flush()
         return file.id.get_file_image()

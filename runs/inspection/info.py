@@ -29,10 +29,8 @@ from runs.inspection.account import (
     describe_verdict,
     judge,
 )
-from runs.store.checksum import NAME as CHECKSUM
-from runs.store.checksum import PARTS, find_fault, find_sum, read_parts
-from runs.store.directory import RunDirectory
-from runs.store.guards import read_stored_deck
+from runs.store.directory import RunDirectory, read_stored_deck
+from runs.store.files import CHECKSUM, PARTS, find_fault, find_sum, read_parts
 from runs.store.provenance import describe_provenance
 from runs.store.reader import Dump, RunData
 

@@ -22,12 +22,15 @@ from runs.deck.reading import ReadDeck, read_toml, resolve_deck
 from runs.interface.case import (
     Case,
     HooksGiven,
+    OpenRun,
+    finish,
     join_hooks,
     load,
     make_settings,
+    open_run,
     said_in_python,
+    say,
 )
-from runs.interface.opened import OpenRun, finish, open_run
 from runs.march.launching import check_changeable, read_restart_deck
 from runs.march.runner import Runner, check_output
 from runs.ranks.started import check_single
@@ -50,7 +53,8 @@ def make_case(
     """A case of a simulation that a script has made; `begun`: goes on with the run there.
 
     settings: `key=value` of run.max_steps, output.* and gauge; all else is the simulation's own.
-    Raises BadInput for other keys and for what is no simulation.
+    Raises BadInput for other keys, for what is no simulation, and where that of a run that goes on
+    has marched already or has blocks of other materials.
     """
     table: dict[str, Any] = {"problem": NAME, "run": _describe_march(simulation)}
     table |= {"script": _find_script(), "materials": _describe_materials(simulation)}
@@ -58,7 +62,27 @@ def make_case(
     if begun is not None:
         origin = str(begun.deck)
         check_changeable(settings, OwnSimulationDeck)
-        _take_over(table, begun, simulation)
+        before, now = read_toml(begun.deck), table["materials"]
+        if before.get("problem") != NAME:
+            raise BadInput(
+                f"{begun} is a run of {before.get('problem')}, which makes its blocks itself: "
+                "restart it without simulation="
+            )
+        if simulation.step:
+            raise BadInput(
+                f"the simulation has made {simulation.step} steps already; a restart needs one as "
+                "it was before its first step"
+            )
+        was = before.get("materials", {})
+        for name in {**was, **now}:
+            if was.get(name) != now.get(name):
+                raise BadInput(
+                    f"block {name!r} is of {now.get(name, 'no block')} in this simulation, of "
+                    f"{was.get(name, 'no block')} in the run in {begun}: that is another flow"
+                )
+        table |= {key: before[key] for key in ("output", "gauge") if key in before}
+        most = before.get("run", {}).get("max_steps")
+        table["run"] |= {} if most is None else {"max_steps": most}
     for setting in settings:
         key = setting.partition("=")[0].strip()
         if not any(f"{key}.".startswith(f"{own}.") for own in OWN_KEYS):
@@ -70,35 +94,6 @@ def make_case(
     return Case(read, OwnSimulation(read.deck, simulation, measure))  # type: ignore[arg-type]
 
 
-def _take_over(table: dict[str, Any], begun: RunDirectory, simulation: Evolution) -> None:
-    """Take what a run's deck has beyond its script.
-
-    Raises BadInput for a run of something else, for a simulation that has marched already, and
-    where its blocks have other materials.
-    """
-    before = read_toml(begun.deck)
-    if before.get("problem") != NAME:
-        raise BadInput(
-            f"{begun} is a run of {before.get('problem')}, which makes its blocks itself: "
-            "restart it without simulation="
-        )
-    if simulation.step:
-        raise BadInput(
-            f"the simulation has made {simulation.step} steps already; a restart needs one as it "
-            "was before its first step"
-        )
-    was, now = before.get("materials", {}), table["materials"]
-    for name in {**was, **now}:
-        if was.get(name) != now.get(name):
-            raise BadInput(
-                f"block {name!r} is of {now.get(name, 'no block')} in this simulation, of "
-                f"{was.get(name, 'no block')} in the run in {begun}: that is another flow"
-            )
-    table |= {key: before[key] for key in ("output", "gauge") if key in before}
-    most = before.get("run", {}).get("max_steps")
-    table["run"] |= {} if most is None else {"max_steps": most}
-
-
 def _describe_march(simulation: Evolution) -> dict[str, Any]:
     """What the deck can say of how a simulation marches; BadInput where it is none."""
     if not isinstance(simulation, Evolution):
@@ -106,9 +101,8 @@ def _describe_march(simulation: Evolution) -> dict[str, Any]:
             f"a {type(simulation).__name__} is not a simulation; give a shockgrid.Simulation, a "
             "case of shockgrid.load, or the name of a problem or deck"
         )
-    clock = getattr(simulation, "clock", None)
     march: dict[str, Any] = {"t_end": float(simulation.t_end)}
-    if clock is not None:
+    if clock := getattr(simulation, "clock", None):
         march |= {"cfl": float(clock.cfl), "threads": int(getattr(simulation, "threads", 1))}
     return march
 
@@ -117,11 +111,10 @@ def _describe_materials(simulation: Evolution) -> dict[str, str]:
     """Material and equation of state of each block, by which a run is known again."""
     words = {}
     for block in simulation.blocks:
-        eos = getattr(block, "eos", None)
-        kind = getattr(eos, "kind", type(eos).__name__)
-        numbers = getattr(eos, "parameters", ())
-        told = "" if eos is None else f", {kind} {' '.join(f'{n:.6g}' for n in numbers[:8])}"
-        words[block.name] = f"{get_material(block)}{told}".rstrip()
+        words[block.name] = get_material(block)
+        if eos := getattr(block, "eos", None):
+            numbers = " ".join(f"{n:.6g}" for n in getattr(eos, "parameters", ())[:8])
+            words[block.name] += f", {getattr(eos, 'kind', type(eos).__name__)} {numbers}".rstrip()
     return words
 
 
@@ -152,7 +145,7 @@ def run(
     same names always.  directory, dumps, hooks, force, quiet and what is raised: `Case.run`.
     """
     check_single("shockgrid.run", "run DECK")
-    if measure is not None and (isinstance(what, Case) or isinstance(what, str | Path)):
+    if measure is not None and isinstance(what, Case | str | Path):
         raise BadInput("measure is for your own simulation; a problem has its own columns")
     if isinstance(what, Case):
         if settings:
@@ -198,10 +191,10 @@ def restart(
             raise BadInput(
                 "hooks: a restart on other cells has none; restart the result with hooks"
             )
-        number = ",".join(str(n) for n in ([cells] if isinstance(cells, int) else cells))
+        number = str(cells).strip("[()] ")
         place = None if output is None else str(output)
         with said_in_python():
-            runner = remap_runner(opened, number, words, at, place, force, quiet, _say)
+            runner = remap_runner(opened, number, words, at, place, force, quiet, say)
         return finish(runner, runner.start(), quiet)
     if output is not None or force:
         raise BadInput("output and force need cells; otherwise a run continues in its directory")
@@ -216,10 +209,6 @@ def restart(
     after_step = join_hooks(case, hooks)
     runner = Runner(case.read, opened, case.problem, case.simulation, quiet, after_step=after_step)
     return case.march(runner, lambda: runner.resume(at), quiet)
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr)
 
 
 def plot(directory: Run, *fields: str, **options: Any) -> Figure:
@@ -261,24 +250,22 @@ def register(name: str, thing: type) -> None:
     if not PLAIN.fullmatch(name):
         raise BadInput(f"{name!r} is not a valid name: use lower-case letters, digits and hyphens")
     place = f"{thing.__module__}:{thing.__qualname__}"
-    registry: MutableMapping[str, Any]
-    value: Any
-    if issubclass(thing, Problem):
-        kind, registry, value = "problem", PROBLEMS, place
-    elif issubclass(thing, EquationOfState):
-        kind, registry, value = "equation of state", EQUATIONS_OF_STATE, thing
-    elif issubclass(thing, Segment):
-        kind, registry, value = "boundary kind", SEGMENTS, thing
-    elif callable(getattr(thing, "regrid", None)):
-        kind, registry, value = "regridder", REGRIDDERS, place
-    else:
-        raise BadInput(
-            f"{thing.__name__} is not a problem, equation of state, boundary kind or regridder: it "
-            "is derived from none of them and has no method regrid"
-        )
-    if "<locals>" in place:
-        raise BadInput(f"{thing.__qualname__}: a class inside a function cannot be registered")
-    if name in registry and _OWN.get((kind, name)) != place:
-        raise BadInput(f"there is a {kind} {name!r} already; choose another name")
-    registry[name] = value
-    _OWN[kind, name] = place
+    kinds: tuple[tuple[str, MutableMapping[str, Any], bool, Any], ...] = (
+        ("problem", PROBLEMS, issubclass(thing, Problem), place),
+        ("equation of state", EQUATIONS_OF_STATE, issubclass(thing, EquationOfState), thing),
+        ("boundary kind", SEGMENTS, issubclass(thing, Segment), thing),
+        ("regridder", REGRIDDERS, callable(getattr(thing, "regrid", None)), place),
+    )
+    for kind, registry, fits, value in kinds:
+        if not fits:
+            continue
+        if "<locals>" in place:
+            raise BadInput(f"{thing.__qualname__}: a class inside a function cannot be registered")
+        if name in registry and _OWN.get((kind, name)) != place:
+            raise BadInput(f"there is a {kind} {name!r} already; choose another name")
+        registry[name], _OWN[kind, name] = value, place
+        return
+    raise BadInput(
+        f"{thing.__name__} is not a problem, equation of state, boundary kind or regridder: it "
+        "is derived from none of them and has no method regrid"
+    )

@@ -1,7 +1,8 @@
-"""A problem with its deck, to inspect, step, run and draw: what `shockgrid.load` returns.
+"""A problem with its deck, to inspect, step, run and draw, and a run's directory as data.
 
-Keywords are settings of the deck, `cells=32, run={"t_end": 1e-3}` or `"run.t_end": 1e-3`: they
-become the words of `--set`, so that the command line and Python have the same checks.
+`shockgrid.load` returns the first, `shockgrid.open` and `shockgrid.run` the second.  Keywords are
+settings of the deck, `cells=32, run={"t_end": 1e-3}` or `"run.t_end": 1e-3`: they become the words
+of `--set`, so that the command line and Python have the same checks.
 
 Note: blocks are built when they are first asked for, which may compile kernels for a minute;
 their arrays are live.
@@ -9,18 +10,19 @@ their arrays are live.
 
 from __future__ import annotations
 
+import html
 import math
+import os
 import sys
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from problems.deck import Deck
 from problems.evolution import (
     BlockView,
     Evolution,
@@ -33,25 +35,186 @@ from problems.evolution import (
 from problems.problem import Problem, check_memory
 from regrid.errors import BadInput, suggest
 from runs.deck.reading import ReadDeck, read_deck, resolve_deck
-from runs.inspection.account import describe_cautions
-from runs.interface.opened import Curve, Drawn, OpenRun, find_interface, finish, make_table
-from runs.march.compiling import compiling
-from runs.march.launching import check_requests
-from runs.march.runner import Runner
+from runs.inspection.account import describe_time
+from runs.march.launching import start_runner
+from runs.march.runner import Ending, Runner
 from runs.ranks.started import check_single
-from runs.store.directory import create_directory
-from runs.store.reader import BlockData, Fields, Snapshot, Table
+from runs.store.reader import BlockData, Fields, RunData, Snapshot, Table
 from runs.study.definition import flatten, write_settings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def make_settings(keywords: Mapping[str, Any]) -> tuple[str, ...]:
-    """`key=value` for each value, keys of tables joined by dots.
+FIRST_SIGNAL = 128  # exit codes from here on: stopped by a signal
+INTERRUPTED = 130
 
-    Raises BadInput for None and for values that no deck can hold.
+
+class Drawn:
+    """What can be drawn: the dumps of a run, or the present state of a case."""
+
+    problem: Problem
+    pictures: Sequence[str]  # words for `what` of `plot`
+
+    def list_facts(self) -> list[tuple[str, str]]:
+        """What a notebook shows of it: names and words."""
+        raise NotImplementedError
+
+    def _repr_html_(self) -> str:
+        theory = self.problem.predict().items()
+        rows = [*self.list_facts(), *((f"theory: {name}", f"{v:.6g}") for name, v in theory)]
+        line = "<tr><th style='text-align:left'>{}</th><td style='text-align:left'>{}</td></tr>"
+        lines = (line.format(html.escape(what), html.escape(value)) for what, value in rows)
+        return f"<table>{''.join(lines)}</table>"
+
+    def plot(
+        self,
+        *fields: str,
+        what: str | None = None,
+        at: float | str | Sequence[float] | None = None,
+        mesh: bool = False,
+        zoom: Sequence[float] | None = None,
+        mirror: str | None = None,
+        beside: str | Path | None = None,
+        line: Sequence[float] | None = None,
+        limits: Sequence[float] | None = None,
+        colours: str | None = None,
+    ) -> Figure:
+        """The figure that `shockgrid plot` draws: fields (the density where none is named), ...
+
+        what: "fields", "mesh", "interface", "line", of a run also "history" (`fields` then are its
+        columns), "gauges" or a picture of the problem's own; a single word that is one of these may
+        stand in place of a field.  at: times [s] of dumps, "start" or "end"; mesh: draw the grid
+        over the fields; zoom: x0, x1, y0, y1 [m]; mirror: "x" or "y" completes a half domain;
+        beside: the directory of another run, drawn to the same scale; line: x0, y0, x1, y1 [m], the
+        fields along it are drawn; limits: low, high of the colours in SI units; colours: a colour
+        map.  Raises BadInput for what there is not.
+        """
+        from runs.pictures.command import Wanted, fill_figure, new_figure
+
+        if what is None and len(fields) == 1 and fields[0] in self.pictures:
+            what, fields = fields[0], ()
+        if mirror not in (None, "x", "y"):
+            raise BadInput(f"mirror = {mirror!r}: 'x' or 'y' is wanted")
+        wanted = Wanted(fields, what, at, mesh, zoom, mirror, beside, line, limits, colours)
+        fill_figure(figure := new_figure(), self, wanted)  # type: ignore[arg-type]
+        return figure
+
+
+class Curve(NamedTuple):
+    """Where two materials meet at time t [s]: x and y [m], one array each, along the line.
+
+    Where there are several lines a nan stands between them.
     """
+
+    x: np.ndarray
+    y: np.ndarray
+    t: float
+
+
+def find_interface(blocks: Sequence[BlockData], t: float, where: str) -> Curve:
+    """The lines between blocks of different materials; BadInput where there are none."""
+    from runs.pictures.curves import find_curves
+
+    lines = [curve[:2] for curve in find_curves(blocks).values()]
+    if not lines:
+        raise BadInput(f"{where}: no two materials touch, so there is no interface")
+    gap = np.full((2, 1), np.nan)
+    x, y = np.concatenate([part for line in lines for part in (gap, line)][1:], axis=1)
+    return Curve(x, y, t)
+
+
+class OpenRun(Drawn, RunData):
+    """A run: `.deck`, `.history`, `.dumps[-1]["second"].rho`, `.problem`, and what follows.
+
+    Everything is read at first use; a run that is still marching is opened again to
+    see more of it.  `dumps` are in order of time; `reason` says why the run that was just made
+    ended, and is "" where the directory was opened.
+    """
+
+    reason: str = ""
+    final: Evolution | None = None  # the state in memory of the run that was just made
+
+    def interface(self, t: float | None = None) -> Curve:
+        """The curve between blocks of different materials in the dump nearest to `t` [s].
+
+        Arrays x and y [m], and the time t of that dump; without `t` the last.  Raises BadInput
+        where there is no dump, or no two materials touch.
+        """
+        dump = self.dump_at(t)
+        return find_interface(dump.blocks, dump.t, str(dump.path))
+
+    @property
+    def pictures(self) -> list[str]:  # type: ignore[override]
+        """Words for `what` of `plot`."""
+        gauges = ["gauges"] if self.deck.gauge else []
+        return ["mesh", "interface", "history", *gauges, *self.problem.figures()]
+
+    def film(
+        self, field: str | None = None, output: str | Path | None = None, **options: Any
+    ) -> Path:
+        """Make a film of a field over the dumps, mp4 with ffmpeg, else GIF; returns its path.
+
+        field: the density where none is named; output: FILE [DIR/film-FIELD.mp4 or .gif];
+        options: zoom (x0, x1, y0, y1 [m]), follow, mesh (bool), mirror "x" or "y", fps, dpi.
+        Raises BadInput.
+        """
+        from runs.pictures.film import make_film
+
+        return make_film(self.path, field, output, **options)
+
+    def report(self, output: str | Path | None = None, **options: Any) -> Path:
+        """Write one HTML file that tells the run; returns its path [DIR/report.html].
+
+        options: film (bool), dpi.  Raises BadInput where the extra `report` is not installed.
+        """
+        from runs.report import report
+
+        return report(self.path, output, **options)
+
+    @property
+    def _state(self) -> str:
+        if not self.dumps:
+            return "no dump that can be read"
+        last = self.dumps[-1]
+        ending = self.reason or last.finished or "not finished"
+        return f"{ending}: step {last.step}, {describe_time(last.t, last.t_unit)}"
+
+    def __repr__(self) -> str:
+        return f"<run of {self.problem_name} in {self.path}: {self._state}>"
+
+    def list_facts(self) -> list[tuple[str, str]]:
+        rows = [("run", str(self.path)), ("problem", self.problem_name), ("state", self._state)]
+        return [*rows, ("dumps", str(len(self.dumps)))]
+
+
+def open_run(directory: str | os.PathLike) -> OpenRun:
+    """The run in a directory, or one that is opened already; BadInput where there is none."""
+    if isinstance(directory, OpenRun):
+        return directory
+    try:
+        path = os.fspath(directory)
+    except TypeError:
+        words = f"a {type(directory).__name__} is not the directory of a run"
+        raise BadInput(f"{words}; a case gets one by its run()") from None
+    return OpenRun(path)
+
+
+def finish(runner: Runner, ending: Ending, quiet: bool) -> OpenRun:
+    """The data of a run that has ended; KeyboardInterrupt or SystemExit where it was stopped."""
+    if ending.exit_code == INTERRUPTED:
+        raise KeyboardInterrupt(f"{ending.reason}; {runner.directory} can be restarted from")
+    if ending.exit_code >= FIRST_SIGNAL:
+        raise SystemExit(ending.exit_code)
+    if not quiet:
+        print(ending.screen)
+    run = OpenRun(runner.directory.path)
+    run.reason, run.final = ending.reason, runner.evolution
+    return run
+
+
+def make_settings(keywords: Mapping[str, Any]) -> tuple[str, ...]:
+    """`key=value` for each value, tables with dots; BadInput for what no deck holds."""
     return write_settings(flatten(keywords))
 
 
@@ -79,6 +242,11 @@ def said_in_python() -> Iterator[None]:
         raise BadInput(words) from error
 
 
+def say(text: str) -> None:
+    """A line for the person on standard error."""
+    print(text, file=sys.stderr)
+
+
 HookFunction = Callable[[Any], Any]  # of the case; None, or words on why to stop
 
 
@@ -101,20 +269,18 @@ class Hook:
         if not callable(function):
             raise BadInput(f"a hook is a function of the case, not a {type(function).__name__}")
         if steps is not None and time is not None:
-            raise BadInput(
-                "a hook is called every so many steps or every so many seconds, not both"
-            )
+            raise BadInput("a hook is called every so many steps or seconds: steps= or time=")
         if steps is not None and not is_count(steps):
             raise BadInput(f"steps = {steps!r} of a hook: a whole number of at least 1 is wanted")
-        if time is not None and not (math.isfinite(time) and time > 0.0):
+        if time is not None and not 0.0 < time < math.inf:
             raise BadInput(f"time = {time!r} s of a hook: a positive number is wanted")
-        self.function, self.steps, self.time = function, steps, time
+        self.function, self.steps, self.time = function, steps or 1, time
 
     def is_due(self, case: Any, t_before: float) -> bool:
         """Is it to be called after the step from `t_before` to the time of the case?"""
         if self.time is not None:
             return math.floor(case.t / self.time) > math.floor(t_before / self.time)
-        return case.step % (self.steps or 1) == 0
+        return case.step % self.steps == 0
 
 
 HooksGiven = Sequence[Hook | HookFunction] | Hook | HookFunction
@@ -130,9 +296,9 @@ def join_hooks(case: Any, given: HooksGiven) -> Callable[[float], str | None]:
     hooks = [hook if isinstance(hook, Hook) else Hook(hook) for hook in several]
 
     def call(t_before: float) -> str | None:
-        for hook in [one for one in hooks if one.is_due(case, t_before)]:
-            reason = hook.function(case)
-            if reason is not None and not isinstance(reason, str):
+        for hook in hooks:
+            reason = hook.function(case) if hook.is_due(case, t_before) else None
+            if not isinstance(reason, str | None):
                 name = getattr(hook.function, "__name__", "hook")
                 raise BadInput(
                     f"{name} returned {reason!r}: a hook returns None, or words on why to stop"
@@ -155,11 +321,7 @@ def _view(block: BlockView, axes: tuple[str, str]) -> BlockData:
     def make_fields(get: Callable[[], Mapping[str, np.ndarray]]) -> Fields:
         return Fields(f"block {block.name!r}", get(), lambda name: lock(get()[name]))
 
-    def get_rates() -> dict[str, np.ndarray]:
-        rates = getattr(block, "rates", None)
-        return {} if rates is None else {"rates": rates}
-
-    words = get_long_names(block)
+    words, rates = get_long_names(block), getattr(block, "rates", None)
     return BlockData(
         block.name,
         get_material(block),
@@ -167,7 +329,7 @@ def _view(block: BlockView, axes: tuple[str, str]) -> BlockData:
         lambda: lock(block.nodes),
         make_fields(lambda: block.cell_fields),
         make_fields(lambda: get_node_fields(block)),
-        make_fields(get_rates),
+        make_fields(lambda: {} if rates is None else {"rates": block.rates}),  # type: ignore[attr-defined]
         block.units,
         {name: words.get(name, name) for name in (*block.cell_fields, *get_node_fields(block))},
     )
@@ -184,27 +346,21 @@ class Blocks(dict[str, BlockData]):
 
 
 class Case(Drawn):
-    """One problem with one deck, at the time that it has been marched to."""
+    """One problem with one deck, at the time that it has been marched to.
+
+    `name` is that of the problem, or of the file that it is in; `deck` is checked and cannot be
+    changed: `case.deck.run.t_end`.
+    """
 
     history = Table({}, "history of a case")  # with `skipped`: a case is drawn as a run is
     skipped: tuple[str, ...] = ()
     pictures = ("mesh", "interface", "line")
 
     def __init__(self, read: ReadDeck, problem: Problem):
-        self.read = read
-        self.problem, self.problem_name = problem, read.label
+        self.read, self.problem, self.deck = read, problem, read.deck
+        self.name = self.problem_name = read.label
         self.path = Path(read.label)  # as it is named in messages
         self._runs = False
-
-    @property
-    def name(self) -> str:
-        """The name of the problem, or of the file that it is in."""
-        return self.read.label
-
-    @property
-    def deck(self) -> Deck:
-        """The checked deck: `case.deck.run.t_end` and so on; it cannot be changed."""
-        return self.read.deck
 
     @property
     def deck_text(self) -> str:
@@ -271,18 +427,21 @@ class Case(Drawn):
 
         Raises BadInput at the end and from a hook, RunFailure with block, cell and time.
         """
-        if self._runs:
-            raise BadInput("a hook sees the run between two steps; it cannot advance it")
+        self._check_ready("a hook sees the run between two steps; it cannot advance it")
         if not is_count(steps):
             raise BadInput(f"advance({steps!r}): a whole number of steps, at least 1, is wanted")
-        if self.finished:
-            raise BadInput(f"{self.name} is at its end already: {self.finished}")
         row: dict[str, Scalar] = {}
         for _ in range(steps):
             row = self.simulation.advance()
             if self.simulation.finished is not None:
                 break
         return {"step": self.step, **row, **self.measure()}
+
+    def _check_ready(self, words: str) -> None:
+        if self._runs:
+            raise BadInput(words)
+        if self.finished:
+            raise BadInput(f"{self.name} is at its end already: {self.finished}")
 
     def run(
         self,
@@ -303,10 +462,7 @@ class Case(Drawn):
         where the physics fails, KeyboardInterrupt where it was stopped; then the directory can be
         restarted from.
         """
-        if self._runs:
-            raise BadInput("a hook cannot start the run that it is called from")
-        if self.finished:
-            raise BadInput(f"{self.name} is at its end already: {self.finished}")
+        self._check_ready("a hook cannot start the run that it is called from")
         check_single("Case.run", "run DECK")
         after_step = join_hooks(self, hooks)  # refused before there is a directory
         given = {"output.dumps": dumps, "run.max_steps": max_steps}
@@ -322,17 +478,12 @@ class Case(Drawn):
                 f"{self.name} has made {self.step} steps already, and max_steps = {most}: nothing "
                 "is left to do; give a larger one, or make a new simulation"
             )
-        with compiling(quiet):
-            check_memory(self.problem)
-            check_requests(read, self.simulation)
-            self.measure()
+        self.measure()
         with said_in_python():
             wanted = None if directory is None else str(directory)
-            place = create_directory(wanted, self.name, force)
-        if not quiet:
-            head = f"{read.problem} ({read.origin}) in {place}"
-            print("\n".join([head, *describe_cautions(self.problem)]), file=sys.stderr)
-        runner = Runner(read, place, self.problem, self.simulation, quiet, after_step=after_step)
+            built = self.problem, self.simulation
+            runner = start_runner(read, wanted, force, quiet, say, built=built)
+        runner.after_step = after_step
         return self.march(runner, runner.start, quiet)
 
     def march(self, runner: Runner, start: Any, quiet: bool) -> OpenRun:
@@ -359,8 +510,7 @@ class Case(Drawn):
                 f"{what!r} is a picture of a run's directory: run the case, and plot its data; "
                 f"the state in memory shows fields, {', '.join(self.pictures)}"
             )
-        if options.get("at") is not None:
-            raise BadInput("at: the state in memory has one time; run the case, and plot its data")
+        options.pop("at", None)  # the state in memory has one time
         return super().plot(*fields, **options)
 
     def __repr__(self) -> str:
@@ -369,7 +519,7 @@ class Case(Drawn):
         names = ", ".join(self.blocks)
         return f"<case {self.name}: t = {self.t:.6g} s, step {self.step}, blocks {names}>"
 
-    def _repr_html_(self) -> str:
+    def list_facts(self) -> list[tuple[str, str]]:
         rows = [("problem", self.name), ("deck", self.read.origin)]
         if "simulation" in self.__dict__:
             rows += [("t", f"{self.t:.6g} s of {self.simulation.t_end:.6g} s")]
@@ -377,7 +527,7 @@ class Case(Drawn):
             for name, block in self.blocks.items():
                 ni, nj = block.cells
                 rows.append((f"block {name}", f"{block.material}, {ni} x {nj} cells"))
-        return make_table(rows, self.theory)
+        return rows
 
 
 def load(deck: str | Path, **settings: Any) -> Case:

@@ -82,14 +82,9 @@ def _watch(done: threading.Event, stream: Any, quiet: bool, helped: bool) -> Non
                 print(f"{WORDS}: a minute, several on a busy one ...", file=stream, flush=True)
 
 
-def compile_grid_kernels() -> None:
-    """Call the kernels of the default regridder: some steps of a small grid."""
+if __name__ == "__main__":  # the kernels of the default regridder: some steps of a small grid
     from problems.grid_march import GridMarch, GridMarchDeck
 
     evolution = GridMarch(GridMarchDeck(domain="three_fingers", ni=24, nj=16)).build()
     for _ in range(STEPS):
         evolution.advance()
-
-
-if __name__ == "__main__":
-    compile_grid_kernels()

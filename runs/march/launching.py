@@ -1,9 +1,18 @@
-"""Making the runner of a new or a continued run."""
+"""Making the runner of a new or a continued run.
+
+Of the deck of a run that goes on, what shapes the state stays as it was.  An end that moves moves
+nothing else: lengths and motions that a problem makes for its end time are made for the old one,
+which `run.t_set_up` keeps.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+import tomllib
 from collections.abc import Callable
 from operator import attrgetter
+
+import msgspec
 
 from hydro.history import compute_chosen_columns, find_columns
 from hydro.simulation import Simulation
@@ -12,21 +21,26 @@ from problems.evolution import Evolution
 from problems.problem import Problem, check_memory
 from regrid.errors import BadInput
 from regrid.jit import interpreted
-from runs.deck.checking import is_runtime_key, list_runtime_keys, show
-from runs.deck.reading import ReadDeck, parse_value
+from runs.deck.checking import find_differences, is_runtime_key, list_runtime_keys, show
+from runs.deck.reading import ReadDeck, resolve_deck
 from runs.forecast import foretell
 from runs.gauges import make_gauges
 from runs.inspection.account import describe_cautions
 from runs.march.compiling import compiling
-from runs.march.restart import CELLS, settle_deck
-from runs.march.runner import Runner, check_output, check_times, find_restart_point, restore
+from runs.march.runner import Runner, check_output, check_times
 from runs.ranks.map import check_cut
 from runs.ranks.world import World
-from runs.store.directory import RunDirectory, create_directory
+from runs.store.directory import (
+    RunDirectory,
+    create_directory,
+    read_run_deck,
+    read_stored_deck,
+)
 from runs.store.files import write_atomically
-from runs.store.guards import read_run_deck
-from runs.store.history import read_rows, truncate_history
+from runs.store.history import find_restart_point, restore, truncate_history
 
+CELLS = "cells"
+SET_UP = "run.t_set_up"
 MOST_CELLS = 1_000_000  # that are built to look
 
 
@@ -79,19 +93,20 @@ def start_runner(
     quiet: bool,
     say: Callable[[str], None],
     world: World | None = None,
+    built: tuple[Problem, Evolution] | None = None,
 ) -> Runner:
     """A runner at the first step; its directory is made once all else has been found good.
 
-    world: the ranks of MPI that are to share it.
+    world: the ranks of MPI that are to share it; built: problem and evolution, where they are.
     """
-    problem = deck.make_problem()
+    problem = built[0] if built else deck.make_problem()
     with compiling(quiet), deck.numbers_in_reach():
         check_memory(problem)
         cautions = describe_cautions(problem)
         check_regridder(problem)
         if world is not None:
             world.build(deck)
-        evolution = problem.build()
+        evolution = built[1] if built else problem.build()
         check_requests(deck, evolution)  # refused before there is a directory
         if world is not None:
             world.check(evolution)
@@ -144,6 +159,49 @@ def read_restart_deck(
     return settle_deck(directory, deck, at)
 
 
+def settle_deck(
+    directory: RunDirectory, deck: ReadDeck, at: int | None = None, cells: bool = False
+) -> ReadDeck:
+    """The deck that a restart from `directory` marches with: `deck`, with run.t_set_up if it needs.
+
+    at: step of the restart point, None the last; cells: may the key `cells` differ?  Raises
+    BadInput where `deck` is one of another state than the dump's.
+    """
+    kept = read_stored_deck(directory, at)
+    if kept is None:
+        return deck
+    try:
+        before = resolve_deck(tomllib.loads(kept.text), str(kept.path), file=deck.file)
+    except (BadInput, tomllib.TOMLDecodeError):  # another version's, with keys that are none now
+        return deck
+    if before.problem != deck.problem and not deck.file:
+        raise BadInput(
+            f"{directory.deck}: problem = {show(deck.problem)}, and {kept.path.name} holds a run "
+            f"of {before.problem}; another problem is another run (shockgrid run)"
+        )
+    run, made_for = deck.deck.run, before.deck.run.t_set_up or kept.t_end
+    found = find_differences(before.deck, deck.deck)
+    refused = [one for one in found if not is_runtime_key(one.key, type(deck.deck))]
+    may_differ = {CELLS} if cells else set()
+    if run.t_set_up in (None, made_for):
+        may_differ.add(SET_UP)
+    refused = [one for one in refused if one.key not in may_differ]
+    if refused:
+        raise BadInput(
+            "\n".join(
+                f"{directory.deck}: {one.key} is {show(one.now)}, and {show(one.before)} in "
+                f"{kept.path}: it affects the state, so a restart cannot change it; start a new "
+                "run with it (shockgrid run)"
+                for one in refused
+            )
+        )
+    moves = [one for one in found if one.key == "run.t_end" or "." not in one.key]
+    if run.t_set_up is not None or not (moves or before.deck.run.t_set_up):
+        return deck
+    run = msgspec.structs.replace(run, t_set_up=made_for)
+    return dataclasses.replace(deck, deck=msgspec.structs.replace(deck.deck, run=run))
+
+
 def _list_keys(settings: tuple[str, ...]) -> list[str]:
     return [setting.partition("=")[0].strip() for setting in settings]
 
@@ -159,30 +217,24 @@ def check_effect(settings: tuple[str, ...], deck: Deck) -> None:
             )
 
 
-def check_changeable(
-    settings: tuple[str, ...], kind: type[Deck], besides: tuple[str, ...] = ()
-) -> None:
-    """Raise BadInput for a setting of a deck `kind` that a restart cannot change.
-
-    besides: keys that this restart can change, too.
-    """
+def check_changeable(settings: tuple[str, ...], kind: type[Deck]) -> None:
+    """Raise BadInput for a setting of a deck `kind` that a restart cannot change."""
     for key in _list_keys(settings):
-        if not is_runtime_key(key, kind) and key not in besides:
-            keys = ", ".join((*besides, *list_runtime_keys(kind)))
-            raise BadInput(
-                f"--set {key}: it shapes the state, and a restart can change only {keys}; another "
-                f"{key} is another run (shockgrid run)"
+        if not is_runtime_key(key, kind):
+            keys = ", ".join(list_runtime_keys(kind))
+            way = (
+                "--cells continues on other cells"
+                if key == CELLS
+                else f"another {key} is another run"
             )
-
-
-def wants_other_cells(cells: str | None, settings: tuple[str, ...]) -> bool:
-    """Do `--cells` or a `--set cells=...` ask for another grid?"""
-    return cells is not None or CELLS in _list_keys(settings)
+            raise BadInput(
+                f"--set {key}: it shapes the state, and a restart can change only {keys}; {way}"
+            )
 
 
 def remap_runner(
     old: RunDirectory,
-    cells: str | None,
+    cells: str,
     settings: tuple[str, ...],
     at: int | None,
     output: str | None,
@@ -200,7 +252,14 @@ def remap_runner(
 
     before = read_run_deck(old, strict=True, say=say)
     settle_deck(old, before, at)
-    deck = read_run_deck(old, _add_cells(before, cells, settings), strict=True)
+    check_changeable(settings, type(before.deck))
+    if getattr(before.deck, CELLS, None) is None:
+        raise BadInput(
+            f"--cells: the deck of {before.problem} has no key `cells`, so its grid cannot be "
+            "changed in a restart; begin a new run"
+        )
+    wanted = f"{CELLS}=[{cells}]" if "," in cells else f"{CELLS}={cells}"
+    deck = read_run_deck(old, (*settings, wanted), strict=True)
     check_effect(settings, deck.deck)
     deck = settle_deck(old, deck, at, cells=True)
     if output:
@@ -217,16 +276,14 @@ def remap_runner(
             "be laid on other cells; begin a new run with the cells wanted"
         )
     gauges = make_gauges(deck.deck, target)  # points of the material are those of the first state
-    state, step, _ = find_restart_point(old, at, say)
+    state, step, (rows,) = find_restart_point(old, at, say, [old.history])
     restore(source, state, old, step)
-    before_rows = read_rows(old.history)
-    before_rows.check(f"shockgrid restart {old.quoted} cuts it back and computes it again")
     with compiling(quiet):
         blocks = take_over(source, target)
     gauges.set_state(state, other_cells=True)
     directory = create_directory(output, deck.label, force)
     write_atomically(directory.deck, deck.to_toml())  # by which the directory is known
-    columns = truncate_history(directory.history, step, before_rows)
+    columns = truncate_history(directory.history, step, rows)
     words = "; ".join("{} {} x {} -> {} x {}".format(b.name, *b.before, *b.now) for b in blocks)
     slivers = sum(block.slivers.count for block in blocks)
     note = f"continues from step {step} of {old} on other cells: {words}"
@@ -243,27 +300,6 @@ def remap_runner(
     runner = Runner(deck, directory, deck.make_problem(), target, quiet, gauges=gauges)
     runner.columns, runner.restored = columns, True
     return runner
-
-
-def _add_cells(before: ReadDeck, cells: str | None, settings: tuple[str, ...]) -> tuple[str, ...]:
-    """The settings with the cells among them; BadInput where the deck or a restart has no such."""
-    check_changeable(settings, type(before.deck), besides=(CELLS,))
-    present = getattr(before.deck, CELLS, None)
-    if present is None:
-        raise BadInput(
-            f"--cells: the deck of {before.problem} has no key `cells`, so its grid cannot be "
-            "changed in a restart; begin a new run"
-        )
-    if cells is None:
-        return settings
-    if CELLS in _list_keys(settings):
-        raise BadInput("--cells and --set cells say the same; give one of them")
-    many = [parse_value(word) for word in cells.split(",")]
-    wanted = len(present) if isinstance(present, list | tuple) else 1
-    if len(many) != wanted or not all(type(number) is int and number > 0 for number in many):
-        words = "a whole number such as 64" if wanted == 1 else f"{wanted} whole numbers: 64,32"
-        raise BadInput(f"--cells {cells}: the key `cells` of {before.problem} is {words}, above 0")
-    return (*settings, f"{CELLS}={cells if wanted == 1 else list(many)}")
 
 
 def _build(deck: ReadDeck, quiet: bool) -> Evolution:

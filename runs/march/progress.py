@@ -20,8 +20,7 @@ from runs.early_end.causes import name_failure
 from runs.forecast import StepTrend, TimeLeft, find_past, keep_run, measure_size, name_flow
 from runs.gauges import NO_BLOCK
 from runs.inspection.account import count, count_cells, describe_seconds, describe_time, judge
-from runs.store.directory import RunDirectory
-from runs.store.guards import write_verdict
+from runs.store.directory import RunDirectory, write_verdict
 from runs.store.history import read_history
 
 LINE_EVERY = 15.0  # wall seconds between lines when there is no terminal
@@ -65,25 +64,27 @@ class Progress:
         if self.quiet:
             return
         if not self._foretold and now - self._began > FIRST_WORD:
-            self._foretell(evolution, now)
+            found = self.left.foretell(self.steps, evolution.t, now)
+            self._foretold = found is not None
+            if found is not None and found[1] >= WORTH_A_WORD:
+                a_step, ends = (
+                    (now - self._began) / self.steps,
+                    describe_seconds(found[0], found[2]),
+                )
+                self.say(f"measured: {a_step * 1e3:.3g} ms per step; {ends} to the end")
+        if self.bar is None and now - self._said < LINE_EVERY:
+            return
+        t, t_end = evolution.t, evolution.t_end
+        when = describe_time(t, self.t_unit, 4)
+        words = f"{self.remaining(evolution, now)} left, {self.describe(evolution, row, now)}"
         if self.bar is not None:
-            self.bar.set_description_str(self.say_time(evolution.t), refresh=False)
-            left = self.remaining(evolution, now)
-            words = f"{left} left, {self.describe(evolution, row, now)}"
+            self.bar.set_description_str(when, refresh=False)
             self.bar.set_postfix_str(words, refresh=False)
-            self.bar.update(min(evolution.t, evolution.t_end) - self._t)
-            self._t = min(evolution.t, evolution.t_end)
-        elif now - self._said >= LINE_EVERY:
+            self.bar.update(min(t, t_end) - self._t)
+            self._t = min(t, t_end)
+        else:
             self._said = now
-            share = evolution.t / evolution.t_end
-            left = self.remaining(evolution, now)
-            self.say(
-                f"{self.say_time(evolution.t)} of {evolution.t_end:.4g} ({share:.0%}), "
-                f"{left} left, {self.describe(evolution, row, now)}"
-            )
-
-    def say_time(self, t: float) -> str:
-        return describe_time(t, self.t_unit, 4)
+            self.say(f"{when} of {t_end:.4g} ({t / t_end:.0%}), {words}")
 
     def describe(self, evolution: Evolution, row: Mapping[str, Any], now: float) -> str:
         """Steps, dt, speed and corner quality in a few words."""
@@ -107,20 +108,6 @@ class Progress:
             words = describe_seconds(found[0], found[2]) if found else "?"
             self._left_said = now, words
         return words
-
-    def _foretell(self, evolution: Evolution, now: float) -> None:
-        """Say once, from the speed of the first steps, how long the run will take."""
-        found = self.left.foretell(self.steps, evolution.t, now)
-        if found is None:
-            return
-        self._foretold = True
-        low, likely, high = found
-        if likely < WORTH_A_WORD:
-            return
-        a_step = (now - self._began) / self.steps
-        self.say(
-            f"measured: {a_step * 1e3:.3g} ms per step; {describe_seconds(low, high)} to the end"
-        )
 
     def say(self, text: str) -> None:
         """A line for the person, above the bar if there is one; nothing when quiet."""
@@ -204,11 +191,10 @@ def describe_gauges(deck: Deck, directory: RunDirectory) -> list[str]:
 
 def describe_threads(wanted: int | None, evolution: Evolution) -> str:
     """Threads that the blocks asked for, those there are, and how they are started."""
-    workers = getattr(evolution, "workers", None)
+    workers, numba = getattr(evolution, "workers", None), sys.modules.get("numba")
     if workers and workers.side_by_side:
         return f"{workers.threads}, blocks side by side"
     wanted = workers.threads if workers else wanted or 1
-    numba = sys.modules.get("numba")
     if wanted == 1 or numba is None:
         return "1"
     allowed = numba.config.NUMBA_NUM_THREADS
@@ -216,9 +202,7 @@ def describe_threads(wanted: int | None, evolution: Evolution) -> str:
         layer = numba.threading_layer()
     except ValueError:  # nothing has run on more than one
         return f"{wanted} wanted, 1 used: the blocks are too small to gain by more"
-    text = f"{min(wanted, allowed)} ({layer})"
-    if wanted > allowed:
-        text += f"; {wanted} wanted, but this machine has {allowed}"
+    more = f"; {wanted} wanted, but this machine has {allowed}" if wanted > allowed else ""
     if layer == "workqueue":
-        text += "; omp is missing here (install libgomp): threads start more slowly"
-    return text
+        more += "; omp is missing here (install libgomp): threads start more slowly"
+    return f"{min(wanted, allowed)} ({layer}){more}"

@@ -17,7 +17,7 @@ import re
 import signal
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,75 +34,56 @@ from regrid.jit import read_clock
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import ENDS
 from runs.gauges import Gauges, make_gauges
-from runs.inspection.account import (
-    count,
-    count_cells,
-    describe_cautions,
-    describe_own,
-    describe_run,
-    describe_seconds,
-    describe_time,
-    describe_verdict,
-)
+from runs.inspection import account
 from runs.march.compiling import compiling
 from runs.march.progress import Outlook, Progress, describe_gauges, describe_threads
-from runs.march.restart import find_restart_point, is_light, restore
 from runs.ranks.map import check_cut
 from runs.ranks.world import World, describe_ranks, loss_told, write_on_ranks
-from runs.store.checksum import write_sealed
-from runs.store.directory import RunDirectory
-from runs.store.dumps import Names, make_image
-from runs.store.files import write_atomically
-from runs.store.guards import keep_problem_file, write_noted
-from runs.store.history import HistoryWriter, check_columns, read_history, truncate_history
+from runs.store.directory import RunDirectory, keep_problem_file, write_noted
+from runs.store.dumps import EMPTY, Names, make_image
+from runs.store.files import write_atomically, write_sealed
+from runs.store.history import (
+    HistoryWriter,
+    check_columns,
+    find_restart_point,
+    is_light,
+    read_history,
+    restore,
+    truncate_history,
+)
 from runs.store.paraview import Sidecar
 from runs.store.provenance import describe_provenance, find_provenance
 
 
 class Background:
-    """A file that a thread writes while the run continues, one at a time.
-
-    What follows a file (older restart points go, the sidecar shows it) is done by the thread of the
-    run, when that looks and the file is on the disk.  As a context it is left when that is so.
-    """
+    """A file that a thread writes while the run continues, one at a time."""
 
     def __init__(self) -> None:
-        self._executor: ThreadPoolExecutor | None = None
         self._writing: Future[Any] | None = None
-        self._then: Callable[[], None] = lambda: None
 
-    def start(self, write: Callable[[], Any], then: Callable[[], None]) -> None:
-        """Call `write` in the thread, when what is being written is; `then` follows in `finish`."""
+    def start(self, write: Callable[[], Any]) -> None:
+        """Call `write` in the thread, when what is being written is."""
         self.finish()
-        self._executor = self._executor or ThreadPoolExecutor(1, thread_name_prefix="dump")
-        self._writing, self._then = self._executor.submit(write), then
+        self._writing = self._executor.submit(write)
 
-    def look(self) -> None:
-        """`finish`, where that needs no waiting."""
-        if self._writing is not None and self._writing.done():
+    def finish(self, wait: bool = True) -> None:
+        """Wait for the file, or only look; raises what its writing has raised, once."""
+        if self._writing is not None and (wait or self._writing.done()):
+            self._writing.exception()  # waits; interrupted, it can be waited for again
+            writing, self._writing = self._writing, None
+            writing.result()
+
+    @contextlib.contextmanager
+    def running(self) -> Iterator[None]:
+        """For the block; where something has failed in it, that is what is told."""
+        with ThreadPoolExecutor(1, thread_name_prefix="dump") as self._executor:
+            try:
+                yield
+            except BaseException:
+                with contextlib.suppress(BadInput):
+                    self.finish()
+                raise
             self.finish()
-
-    def finish(self) -> None:
-        """Wait for the file and do what follows.  Raises what its writing has raised, once."""
-        if self._writing is None:
-            return
-        self._writing.exception()  # waits; interrupted, it can be waited for again
-        writing, self._writing = self._writing, None
-        writing.result()
-        self._then()
-
-    def __enter__(self) -> Background:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
-        """Finish; where something else has failed before, that is what is told."""
-        try:
-            with contextlib.suppress(BadInput) if kind else contextlib.nullcontext():
-                self.finish()
-        finally:
-            if self._executor is not None:
-                self._executor.shutdown()
-                self._executor = None
 
 
 MARGIN = 2.0  # times the longest of the last steps and the longest write: time left for both
@@ -116,14 +97,9 @@ def parse_duration(text: str) -> float:
 
     Raises BadInput for anything else, and for no time at all.
     """
-    word = text.strip()
-    clock, form = CLOCK.fullmatch(word), FORM.fullmatch(word)
-    parts = clock.groups() if clock else form.groups() if form else ()
-    seconds = sum(
-        float(part) * scale
-        for part, scale in zip(parts, (3600.0, 60.0, 1.0), strict=False)
-        if part is not None
-    )
+    found = CLOCK.fullmatch(text.strip()) or FORM.fullmatch(text.strip())
+    parts = zip(found.groups() if found else (), (3600.0, 60.0, 1.0), strict=False)
+    seconds = sum(float(part) * scale for part, scale in parts if part is not None)
     if not 0.0 < seconds < float("inf"):
         raise BadInput(
             f"--max-wall {text!r} is not a time; write 2h, 90m, 1h30m, 1:30:00 or seconds, above 0"
@@ -278,7 +254,7 @@ class Runner:
                 )
             moved = self.directory.set_aside_after(step)
             if moved:
-                say(f"{count(moved, 'later file')} moved to {self.directory}/superseded")
+                say(f"{account.count(moved, 'later file')} moved to {self.directory}/superseded")
             self._note_start(f"restart from step {step}")
             write_atomically(self.directory.deck, self.deck_text)
             self.last_point = step
@@ -303,7 +279,7 @@ class Runner:
         self.progress.left.course = self.outlook.find_course()
         try:
             lost = loss_told(self.world is not None, lambda: self._signal, self._way_on)
-            with self._signals_caught(), lost, self.writing, compiling(self.quiet):
+            with self._signals_caught(), lost, self.writing.running(), compiling(self.quiet):
                 reason = self._march()
             missed = get_missed(self.evolution)
             reason, code = (f"{reason}, {missed}", 3) if missed else (reason, 0)
@@ -330,15 +306,14 @@ class Runner:
         cpu_seconds = time.process_time() - cpu_began  # of all threads
         self.directory.note(
             f"{reason} at step {self.evolution.step}, "
-            f"{describe_time(self.evolution.t, self.problem.t_unit)}, {seconds:.1f} s "
+            f"{account.describe_time(self.evolution.t, self.problem.t_unit)}, {seconds:.1f} s "
             f"of wall time, {cpu_seconds:.1f} s of processor time"
         )
         history = read_history(self.directory.history)
         name = ENDS[MISSED].name if code == 3 else ""
         verdict = self.outlook.close(status, reason, history, name)
         try:
-            head = f"{reason}: {self._describe_march()}, {describe_seconds(seconds)}"
-            screen = "\n".join([head, describe_verdict(verdict), *self._describe_run(history)])
+            screen = "\n".join(self._describe_run(f"{reason}: ", seconds, history, verdict))
         except RunFailure as error:  # of what is computed for the screen alone
             self.outlook.fail(error)
             raise self._explain(error) from error
@@ -348,30 +323,36 @@ class Runner:
         write_noted(self.directory, self.directory.summary, screen + "\n")
         return Ending(reason, code, screen)
 
-    def _describe_march(self) -> str:
-        """Where the run has come to, and the size of it."""
-        evolution, t_unit = self.evolution, self.problem.t_unit
-        blocks = count(len(evolution.blocks), "block")
-        steps = f", {count(evolution.step, 'step')}" if t_unit == "s" else ""
-        cells = f"{count_cells(evolution)} cells in {blocks}"
-        return f"{describe_time(evolution.t, t_unit)}{steps}, {cells}"
-
-    def _describe_run(self, history: Mapping[str, np.ndarray]) -> list[str]:
-        """The lines of the screen at the end, but for the first two."""
+    def _describe_run(
+        self,
+        reason: str,
+        seconds: float,
+        history: Mapping[str, np.ndarray],
+        verdict: Mapping[str, Any],
+    ) -> list[str]:
+        """The lines of the screen at the end."""
         evolution, problem, directory = self.evolution, self.problem, self.directory
+        t_unit, cells = problem.t_unit, account.count_cells(evolution)
         names = [block.name for block in evolution.blocks]
-        lines = describe_run(history, count_cells(evolution), names)
-        lines += describe_gauges(problem.deck, directory)
+        steps = f", {account.count(evolution.step, 'step')}" if t_unit == "s" else ""
+        lines = [
+            f"{reason}{account.describe_time(evolution.t, t_unit)}{steps}, {cells} cells in "
+            f"{account.count(len(names), 'block')}, {account.describe_seconds(seconds)}",
+            account.describe_verdict(verdict),
+            *account.describe_run(history, cells, names),
+            *describe_gauges(problem.deck, directory),
+        ]
         motion = getattr(evolution, "motion", None)
         if motion is not None and motion.blocks.size > 1:
             lines.append(f"ranks of MPI: {motion.blocks.size}; on the first of them")
         lines.append(f"threads: {describe_threads(problem.deck.run.threads, evolution)}")
         lines += describe_ranks(self.world, directory.note)
-        if len(history.get("step", ())) > 1 and (own := describe_own(problem, history, evolution)):
-            lines += ["", own]
-        cautions = describe_cautions(problem, history)
+        if len(history.get("step", ())) > 1:
+            own = account.describe_own(problem, history, evolution)
+            lines += ["", own] if own else []
+        cautions = account.describe_cautions(problem, history)
         lines += ["", *cautions] if cautions else []
-        dumps = count(len(directory.list_files("dump")), "dump")
+        dumps = account.count(len(directory.list_points("dump")), "dump")
         lines += [
             "",
             f"in {directory}: {dumps}, history.csv, run.xmf (ParaView)",
@@ -416,7 +397,7 @@ class Runner:
             row = evolution.advance()
             seconds = read_clock() - clock
             self._record(row, seconds)
-            self.writing.look()
+            self.writing.finish(wait=False)
             if self.limit is not None:
                 self.limit.note_step(seconds)
             light = self.deck.deck.output.light
@@ -431,18 +412,15 @@ class Runner:
             elif 0 < self.deck.deck.output.restart_every <= time.monotonic() - written:
                 self._write_restart_point(wait=False)
                 written = time.monotonic()
-            if self.after_step and (reason := self._call_after_step(t_before)):
+            try:
+                reason = self.after_step(t_before) if self.after_step else None
+            except Exception as error:
+                self._write_restart_point()
+                self.directory.note(f"stopped by a hook: {type(error).__name__}: {error}")
+                raise
+            if reason:
                 self._dump()
                 return reason
-
-    def _call_after_step(self, t_before: float) -> str | None:
-        """The reason to stop, if there is one; where the call fails, a restart point is left."""
-        try:
-            return self.after_step(t_before) if self.after_step else None
-        except Exception as error:
-            self._write_restart_point()
-            self.directory.note(f"stopped by a hook: {type(error).__name__}: {error}")
-            raise
 
     def _measure(self) -> dict[str, Any]:
         """Columns of the deck's chosen groups and of the problem."""
@@ -477,18 +455,12 @@ class Runner:
 
     def _show_dumps(self) -> None:
         self.directory.drop_old_restarts()
-        self.sidecar.write([path for _, path in self.directory.list_files("dump")])
+        self.sidecar.write([path for _, path in self.directory.list_points("dump")])
 
     def _dump_light(self) -> None:
         """A dump at this step that is no restart point, and the sidecar that lists it."""
-        output, evolution = self.deck.deck.output, self.evolution
-        path = self.directory.dump_path(evolution.step)
-        self._sync()
-        if self._ranked:
-            write_on_ranks(self._ranked, path, evolution, self._names, {}, output)
-        else:
-            write_sealed(path, make_image(evolution, self._names, {}, output))
-        self.sidecar.write([path for _, path in self.directory.list_files("dump")])
+        path = self.directory.dump_path(self.evolution.step)
+        self._write(path, self._show_dumps, self.deck.deck.output)
 
     def _write_restart_point(self, wait: bool = True) -> None:
         step = self.evolution.step
@@ -498,27 +470,32 @@ class Runner:
         if wait:
             self.writing.finish()
 
-    def _write(self, path: Path, then: Callable[[], None]) -> None:
-        """A whole dump of this step, and `then` what follows when it is on the disk.
+    def _write(self, path: Path, then: Callable[[], None], output: Output | None = None) -> None:
+        """A dump of this step, and `then` what follows when it is on the disk.
 
-        It is written while the run goes on.
+        output: what is in a light one; a whole one is written while the run goes on.
         """
-        began = time.monotonic()
+        began, step, evolution = time.monotonic(), self.evolution.step, self.evolution
         self._sync()
-        besides, step = self.gauges.get_state(), self.evolution.step
+        besides = EMPTY if output else self.gauges.get_state()
 
         def follow() -> None:
-            self.last_point = step
+            if output is None:
+                self.last_point = step
             if self.limit is not None:
                 self.limit.note_write(time.monotonic() - began)
             then()
 
         if self._ranked:
-            write_on_ranks(self._ranked, path, self.evolution, self._names, besides)
+            write_on_ranks(self._ranked, path, evolution, self._names, besides, output)
             follow()
             return
-        image = make_image(self.evolution, self._names, besides)
-        self.writing.start(lambda: write_sealed(path, image), follow)
+        image = make_image(evolution, self._names, besides, output)
+        if output:
+            write_sealed(path, image)
+            follow()
+        else:
+            self.writing.start(lambda: (write_sealed(path, image), follow()))
 
     @property
     def _ranked(self) -> World | None:
@@ -559,22 +536,19 @@ class Runner:
         """
 
         def ask(number, frame):
+            if number not in (signal.SIGINT, signal.SIGTERM):
+                self._point_wanted = True
+                return
             self._signal = number
             signal.signal(signal.SIGINT, signal.default_int_handler)
             if not self.quiet:
                 os.write(2, b"\nstopping after this step (again Ctrl-C: at once)\n")
 
-        def ask_for_point(number, frame):
-            self._point_wanted = True
-
-        wanted = {signal.SIGINT: ask, signal.SIGTERM: ask}
-        if hasattr(signal, "SIGUSR1"):  # not on Windows
-            wanted[signal.SIGUSR1] = ask_for_point
-        try:
-            before = {number: signal.signal(number, wanted[number]) for number in wanted}
-        except ValueError:  # not in the main thread: somebody else owns the signals
-            yield
-            return
+        names = ("SIGINT", "SIGTERM", "SIGUSR1")  # the last one not on Windows
+        numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+        before = {}
+        with contextlib.suppress(ValueError):  # not in the main thread: somebody else owns them
+            before = {number: signal.signal(number, ask) for number in numbers}
         try:
             yield
         finally:

@@ -5,13 +5,14 @@ matplotlib is used through its objects, without pyplot: faster to load and no di
 
 from __future__ import annotations
 
+import contextlib
 import io
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -31,7 +32,7 @@ from runs.pictures.curves import (
 )
 from runs.pictures.fields import View, draw_fields, time_titles
 from runs.pictures.history import draw_gauges, draw_history
-from runs.store.files import check_not_of_a_run, check_replaceable, disk_errors
+from runs.store.files import check_folder, check_free, disk_errors
 from runs.store.provenance import describe_software, hash_deck
 from runs.store.reader import Dump, RunData
 
@@ -50,7 +51,10 @@ def write_figure(
     Raises OSError where the disk does not take it.
     """
     clean_words(figure)
-    metadata = make_metadata(ending, deck_text)
+    maker, content = NAMES.get(ending, (None, None))
+    metadata = {maker: describe_software()} if maker else {}
+    if content and deck_text is not None:
+        metadata[content] = f"deck SHA-256 {hash_deck(deck_text)}"
     figure.savefig(target, dpi=dpi, format=ending, metadata=metadata or None)
 
 
@@ -60,28 +64,11 @@ def clean_words(figure: Figure) -> None:
         words = text.get_text()
         if (plain := escape_controls(words)) != words:
             text.set_text(plain)
-        if "$" in plain and not _is_formula(plain):
+        try:
+            for line in plain.splitlines() if "$" in plain and is_math_text(plain) else ():
+                MathTextParser("path").parse(line)
+        except ValueError:
             text.set_parse_math(False)
-
-
-def _is_formula(words: str) -> bool:
-    if not is_math_text(words):
-        return True
-    try:
-        for line in words.splitlines():
-            MathTextParser("path").parse(line)
-    except ValueError:
-        return False
-    return True
-
-
-def make_metadata(ending: str, deck_text: str | None) -> dict[str, Any]:
-    """Names and words on what made a file; {} for formats without a place for them."""
-    maker, content = NAMES.get(ending.lower(), (None, None))
-    words = {maker: describe_software()} if maker else {}
-    if content and deck_text is not None:
-        words[content] = f"deck SHA-256 {hash_deck(deck_text)}"
-    return words
 
 
 OPTIONS = ("at", "mesh", "zoom", "mirror", "line", "limits", "colours")  # that name a picture
@@ -100,6 +87,9 @@ PAD = 0.1  # inches around each panel: less cuts titles at the edge
 FIRST_CHOICE = ("rho", "p")
 
 
+Numbers = str | Sequence[float] | None  # of the command line, with commas between, or of Python
+
+
 class Wanted(NamedTuple):
     """What picture, in the words of `shockgrid plot`.
 
@@ -110,13 +100,13 @@ class Wanted(NamedTuple):
 
     fields: tuple[str, ...] = ()
     what: str | None = None
-    at: str | None = None
+    at: Numbers | float = None
     mesh: bool = False
-    zoom: str | None = None
+    zoom: Numbers = None
     mirror: str | None = None
-    beside: str | None = None
-    line: str | None = None
-    limits: str | None = None
+    beside: str | Path | None = None
+    line: Numbers = None
+    limits: Numbers = None
     colours: str | None = None
 
 
@@ -138,11 +128,10 @@ def draw(
     """
     run, figure = RunData(directory), new_figure()
     stem, write_table = fill_figure(figure, run, wanted, say)
-    if table and not write_table:
-        raise BadInput(f"--csv {table}: it is for the values along a line; --line says which")
     if table:
-        check_replaceable(Path(table))
-        check_not_of_a_run(Path(table))
+        if not write_table:
+            raise BadInput(f"--csv {table}: it is for the values along a line; --line says which")
+        check_free(Path(table))
     path = Path(output) if output else run.path / f"{stem}.png"
     paths = [save(figure, path, dpi, find_deck_text(run))]
     return paths + [write_table(Path(table))] if table and write_table else paths
@@ -156,14 +145,17 @@ def fill_figure(
     Returns the stem of a name for it, and what writes the table of a line's values, if it is one.
     """
     at, beside, line = wanted.at, wanted.beside, wanted.line
-    limits = wanted.limits and parse_numbers(
-        "--limits", wanted.limits, "low,high with low < high", 1
-    )
-    colours = check_colours(wanted.colours)
-    view = View(parse_zoom(wanted.zoom), wanted.mirror, wanted.mesh, limits or None, colours)
+    limits = None
+    if wanted.limits is not None:
+        limits = parse_numbers("--limits", wanted.limits, "low,high with low < high", 1)
+    if wanted.colours is not None and wanted.colours not in colormaps:
+        hint = suggest(wanted.colours, colormaps)
+        raise BadInput(f"--colours {wanted.colours}: there is no such colour map{hint}")
+    view = View(parse_zoom(wanted.zoom), wanted.mirror, wanted.mesh, limits, wanted.colours)
     names = [name for entry in wanted.fields for name in entry.split(",") if name]
-    given = {"FIELDS": names, **{f"--{name}": getattr(wanted, name) for name in OPTIONS}}
-    what = wanted.what or ("line" if line else "fields")
+    given = {f"--{name}": getattr(wanted, name) for name in OPTIONS} | {"FIELDS": names or None}
+    given = {n: value for n, value in given.items() if value is not None and value is not False}
+    what = wanted.what or ("fields" if line is None else "line")
     shown, write_table = [what], None
     if beside and what not in BESIDE:
         raise BadInput(f"--beside {beside}: for {' and '.join(BESIDE)}, not for {what!r}")
@@ -173,11 +165,16 @@ def fill_figure(
         shown += names
     if what == "fields":
         dumps = choose_pairs(runs, at, say) if beside else choose_dumps(run, at, say=say)
-        draw_fields(figure, dumps, names, view, name_runs(runs, dumps) if beside else ())
+        told = zip(name_paths(runs) * len(dumps), time_titles(dumps), strict=False)
+        titles = [f"{name}: {when}" for name, when in told] if beside else ()
+        draw_fields(figure, dumps, names, view, titles)
     elif what == "line":
-        if not line:
+        if line is None:
             raise BadInput("--what line: --line X0,Y0,X1,Y1 says which line [m]")
-        dumps, way, titles = choose_pairs(runs, at, say), parse_line(line), name_paths(runs)
+        way = parse_numbers("--line", line, "x0,y0,x1,y1, two points in metres")
+        if way[:2] == way[2:]:
+            raise BadInput(f"--line {line}: two points in metres are wanted, these are the same")
+        dumps, titles = choose_pairs(runs, at, say), name_paths(runs)
         lineouts = [
             take_lineouts(dumps[k :: len(runs)], names, way, view, say) for k in range(len(runs))
         ]
@@ -188,7 +185,6 @@ def fill_figure(
     elif what == "interface":
         draw_interfaces(figure, choose_dumps(run, at, 12, say), view)
     elif what == "history":
-        check_history(run)
         draw_history(figure, run, names)
     elif what == "gauges" and (run.deck.gauge or what not in run.problem.figures()):
         draw_gauges(figure, run, names)
@@ -199,30 +195,20 @@ def fill_figure(
             raise BadInput(f"there is no picture {what!r} of {run.problem_name}{hint}")
         try:
             own[what](figure, run)
-        except KeyError:  # perhaps of a column, where there is no history
-            check_history(run)
-            raise
-    idle = [name for name in given if given[name] and name not in HEEDED.get(what, ())]
+        except KeyError as error:  # perhaps of a column, where there is no history
+            if len(run.history.get("t", ())):
+                raise
+            raise BadInput(f"{run.path} has no history yet: no step was made") from error
+    idle = [name for name in given if name not in HEEDED.get(what, ())]
     if idle and say:
         say(f"{', '.join(idle)}: not heeded by the picture {what!r}")
     if what not in BESIDE:
         shown += names
     for name in OPTIONS:
-        if value := given[f"--{name}"]:
+        if (value := given.get(f"--{name}")) is not None:
             shown.append(name if value is True else f"{name}-{value}")
     shown += [f"beside-{Path(beside).name}"] if beside else []
     return "-".join(re.sub(r"[^\w.+-]+", "_", word) for word in shown), write_table
-
-
-def check_history(run: RunData) -> None:
-    """Raise BadInput where a run has no history to draw, and say why."""
-    if len(run.history.get("t", ())):
-        return
-    points = run.directory.list_points()
-    if points and points[-1][0] > 0:
-        state = "empty" if run.directory.history.exists() else "missing"
-        raise BadInput(f"{run.directory.history} is {state}, so there is no history to draw")
-    raise BadInput(f"{run.path} has no history yet: no step was made")
 
 
 def draw_all(directory: str, dpi: int = 140) -> list[Path]:
@@ -252,19 +238,13 @@ def new_figure() -> Figure:
 
 def save(figure: Figure, path: Path, dpi: int, deck_text: str | None = None) -> Path:
     """Write the figure; the name's ending says the format; `deck_text`: of the run it shows."""
-    known = figure.canvas.get_supported_filetypes()
-    if path.suffix.lstrip(".").lower() not in known:
+    ending = path.suffix.lstrip(".").lower()
+    if ending not in figure.canvas.get_supported_filetypes():
         raise BadInput(f"{path}: a picture's name has to end in .png, .pdf or .svg")
     check_folder(path)
     with disk_errors(path):
-        write_figure(figure, path, dpi, path.suffix.lstrip(".").lower(), deck_text)
+        write_figure(figure, path, dpi, ending, deck_text)
     return path
-
-
-def check_folder(path: Path) -> None:
-    """Raise BadInput where the folder of a file to be written does not exist."""
-    if not path.parent.is_dir():
-        raise BadInput(f"{path.parent} is not a folder, so {path.name} cannot be written")
 
 
 def find_deck_text(run: RunData) -> str | None:
@@ -283,7 +263,7 @@ def default_fields(run: RunData) -> list[str]:
 
 
 def choose_dumps(
-    run: RunData, at: str | None, count: int = TIMES, say: Callable[[str], None] | None = None
+    run: RunData, at: Numbers | float, count: int = TIMES, say: Callable[[str], None] | None = None
 ) -> list[Dump]:
     """The dumps nearest to the times in `at`, or `count` of them from first to last.
 
@@ -300,6 +280,7 @@ def choose_dumps(
         numbers = np.unique(np.linspace(0, len(run.dumps) - 1, min(count, len(run.dumps))).round())
         return [run.dumps[int(k)] for k in numbers]
     words = {"start": run.dumps[0].t, "end": run.dumps[-1].t}
+    at = at if isinstance(at, str) else ",".join(map(str, np.atleast_1d(at)))
     times = [words[w] if w in words else parse_number("--at", at, w) for w in at.split(",")]
     chosen = list(dict.fromkeys(run.dump_at(t) for t in times))
     first, last = words["start"], words["end"]
@@ -313,7 +294,7 @@ def choose_dumps(
 
 
 def choose_pairs(
-    runs: list[RunData], at: str | None, say: Callable[[str], None] | None = None
+    runs: list[RunData], at: Numbers | float, say: Callable[[str], None] | None = None
 ) -> list[Dump]:
     """Dumps of the first run, after each the one of every other run that is nearest in time.
 
@@ -325,19 +306,13 @@ def choose_pairs(
     return [dump for one in first for dump in (one, *(run.dump_at(one.t) for run in runs[1:]))]
 
 
-def name_runs(runs: list[RunData], dumps: list[Dump]) -> list[str]:
-    """Titles of dumps that `choose_pairs` chose: name of the run and time."""
-    names = name_paths(runs)
-    return [f"{names[k % len(runs)]}: {title}" for k, title in enumerate(time_titles(dumps))]
-
-
 def name_paths(runs: list[RunData]) -> list[str]:
     """Short names of runs: those of their folders, whole paths where these are the same."""
     same = len({run.path.name for run in runs}) < len(runs)
     return [str(run.path) if same else run.path.name for run in runs]
 
 
-def parse_zoom(zoom: str | None) -> tuple[float, ...] | None:
+def parse_zoom(zoom: Numbers) -> tuple[float, ...] | None:
     """x0,x1,y0,y1 in metres."""
     if zoom is None:
         return None
@@ -347,24 +322,12 @@ def parse_zoom(zoom: str | None) -> tuple[float, ...] | None:
     return x0, x1, y0, y1
 
 
-def check_colours(name: str | None) -> str | None:
-    """The name of a colour map of matplotlib; BadInput for any other."""
-    if name is not None and name not in colormaps:
-        raise BadInput(f"--colours {name}: there is no such colour map{suggest(name, colormaps)}")
-    return name
-
-
-def parse_line(text: str) -> tuple[float, ...]:
-    """x0,y0,x1,y1 in metres; BadInput where these are no two points."""
-    x0, y0, x1, y1 = parse_numbers("--line", text, "x0,y0,x1,y1, two points in metres")
-    if (x0, y0) == (x1, y1):
-        raise BadInput(f"--line {text}: two points in metres are wanted, these are the same")
-    return x0, y0, x1, y1
-
-
-def parse_numbers(option: str, text: str, form: str, rising: int = 0) -> tuple[float, ...]:
+def parse_numbers(
+    option: str, given: str | Sequence[float], form: str, rising: int = 0
+) -> tuple[float, ...]:
     """As many finite numbers as `form` names between its commas; the first `rising` pairs rise."""
     wanted = form.partition(" ")[0].strip(",").count(",") + 1
+    text = given if isinstance(given, str) else ",".join(map(str, given))
     numbers = tuple(parse_number(option, text, word) for word in text.split(","))
     pairs = zip(numbers[0 : 2 * rising : 2], numbers[1 : 2 * rising : 2], strict=False)
     if len(numbers) != wanted or not all(low < high for low, high in pairs):
@@ -374,10 +337,7 @@ def parse_numbers(option: str, text: str, form: str, rising: int = 0) -> tuple[f
 
 def parse_number(option: str, text: str, word: str) -> float:
     """A finite number, one of those in the `text` of an option."""
-    try:
-        number = float(word)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise BadInput(f"{option} {text}: {word!r} is not a number")
-    return number
+    with contextlib.suppress(ValueError):
+        if math.isfinite(number := float(word)):
+            return number
+    raise BadInput(f"{option} {text}: {word!r} is not a number")

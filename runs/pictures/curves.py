@@ -11,23 +11,15 @@ from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from regrid.errors import BadInput
 from runs.inspection.account import pick_prefix
-from runs.pictures.fields import (
-    View,
-    check_fields,
-    check_zoom,
-    find_extent,
-    get_style,
-    make_sheets,
-    scale_times,
-    split_outline,
-    time_titles,
-    trace_outline,
-)
-from runs.store.files import check_not_of_a_run, write_atomically
+from runs.pictures import fields
+from runs.pictures.fields import View
+from runs.store.files import check_free, write_atomically
 from runs.store.reader import Dump, RunData
 
 CLOSE = 1e-9  # of the interfaces' extent: ends so near are one point
@@ -38,7 +30,7 @@ def find_curves(blocks: Sequence) -> dict[str, np.ndarray]:
     """All interfaces of some blocks by name, after their materials in the blocks' order: x, y and
     the length along the curve from its first node, (3, n) [m]."""
     found: dict[tuple[str, str], list[np.ndarray]] = {}
-    for pair, line in trace_outline(blocks)[0]:
+    for pair, line in fields.trace_outline(blocks)[0]:
         pair = pair if pair[::-1] not in found else pair[::-1]
         found.setdefault(pair, []).append(line)
     curves = {}
@@ -79,7 +71,7 @@ def export_interfaces(directory: str, output: str | None = None) -> list[Path]:
     for path in paths:
         if path.suffix not in WRITERS:
             raise BadInput(f"-o {path}: curves are written to a file ending in .csv or .h5")
-        check_not_of_a_run(path)
+        check_free(path)
     if not run.dumps:
         raise BadInput(f"{run.path} has no dump that can be read")
     moments = [(dump, find_curves(dump.blocks)) for dump in run.dumps]
@@ -128,13 +120,12 @@ WRITERS = {".csv": _make_table, ".h5": _make_hdf5}
 
 def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
     """All interfaces at the times of `dumps`, coloured by time; centred if they travel far."""
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-
-    moments = [make_sheets(dump, (), view) for dump in dumps]
+    moments = [fields.make_sheets(dump, (), view) for dump in dumps]
     if view.zoom is not None:
-        check_zoom(view.zoom, find_extent(moments))
-    shapes = [(d.t, split_outline(sheets)[0]) for d, sheets in zip(dumps, moments, strict=True)]
+        fields.check_zoom(view.zoom, fields.find_extent(moments))
+    shapes = [
+        (d.t, fields.find_interfaces(sheets)) for d, sheets in zip(dumps, moments, strict=True)
+    ]
     shapes = [(t, lines) for t, lines in shapes if lines]
     if not shapes:
         raise BadInput(f"{dumps[0].path}: no two materials touch, so there is no interface to draw")
@@ -145,7 +136,7 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
     centred = (travel > 0.5 * sizes.max()) & (view.zoom is None)
     largest = float(max(sizes.max(), 0.0 if centred.any() else np.abs(every[0]).max()))
     scale, length = pick_prefix(largest, "m")
-    factor, unit = scale_times(dumps)
+    factor, unit = fields.scale_times(dumps)
     norm = Normalize(shapes[0][0] * factor, max(shapes[-1][0] * factor, 1e-300))
     colours = colormaps["viridis_r"]
     figure.set_size_inches(8.0, 6.5)
@@ -219,49 +210,49 @@ def take_lineouts(
 
     Raises BadInput where it meets no cell of any of them, or a field is missing.
     """
-    lineouts = [take_lineout(dump, names, line, view) for dump in dumps]
-    missed = [one.dump for one in lineouts if not len(one.columns["way"])]
+    (x0, y0, x1, y1), lineouts, missed = line, [], []
     given = ",".join(f"{number:g}" for number in line)
-    if len(missed) == len(lineouts):
-        raise BadInput(f"--line {given}: it meets no cell of {missed[0].path}")
-    for dump in missed if say else ():
-        say(f"--line {given}: it meets no cell of {dump.path}")
-    return [one for one in lineouts if len(one.columns["way"])]
-
-
-def take_lineout(dump: Dump, names: Sequence[str], line: Line, view: View) -> Lineout:
-    """The cells of a dump along the line; BadInput where a field is missing."""
-    check_fields([dump], names)
-    (x0, y0, x1, y1), rows = line, []
-    for sheet in make_sheets(dump, names, view):
-        for (i, j), ends in zip(*find_pieces(sheet.nodes, line), strict=True):
-            part = float(ends.mean())
-            values = [float(sheet.fields[n][i, j]) if n in sheet.fields else np.nan for n in names]
-            point = x0 + part * (x1 - x0), y0 + part * (y1 - y0)
-            way = part * float(np.hypot(x1 - x0, y1 - y0))
-            rows.append((sheet.name, int(i), int(j), *point, way, *values))
     heads = ("block", "i", "j", "x", "y", "way", *names)
-    rows.sort(key=operator.itemgetter(heads.index("way")))
-    columns = zip(*rows, strict=True) if rows else [()] * len(heads)
-    return Lineout(dump, {n: np.array(c) for n, c in zip(heads, columns, strict=True)})
+    for dump in dumps:
+        rows = []
+        for sheet in fields.make_sheets(dump, names, view):
+            for (i, j), ends in zip(*find_pieces(sheet.nodes, line), strict=True):
+                part = float(ends.mean())
+                point = x0 + part * (x1 - x0), y0 + part * (y1 - y0)
+                way = part * float(np.hypot(x1 - x0, y1 - y0))
+                values = [sheet.fields[n][i, j] if n in sheet.fields else np.nan for n in names]
+                rows.append((sheet.name, int(i), int(j), *point, way, *map(float, values)))
+        rows.sort(key=operator.itemgetter(heads.index("way")))
+        columns = zip(heads, zip(*rows, strict=True), strict=True) if rows else ()
+        if rows:
+            lineouts.append(Lineout(dump, {name: np.array(column) for name, column in columns}))
+        else:
+            missed.append(f"--line {given}: it meets no cell of {dump.path}")
+    if not lineouts:
+        raise BadInput(missed[0])
+    for words in missed if say else ():
+        say(words)
+    return lineouts
 
 
 def draw_lineouts(
     figure, lineouts: Sequence[Sequence[Lineout]], names: Sequence[str], runs: Sequence[str]
 ) -> None:
     """A panel for each field: a curve for each dump, colour by time, style by run."""
-    first = lineouts[0][0]
-    way, label = choose_abscissa(first)
+    first, way, label = lineouts[0][0], "way", "distance along the line"
+    for axis, other, name in zip("xy", "yx", first.dump.axes, strict=True):
+        if np.ptp(first.columns[other]) == 0.0:  # a line along an axis
+            way, label = axis, name
     largest = max(float(np.abs(one.columns[way]).max()) for run in lineouts for one in run)
     scale, length = pick_prefix(largest, "m")
     figure.set_size_inches(WIDTH, HEIGHT * len(names) + 0.8)
     panels = figure.subplots(len(names), 1, squeeze=False, sharex=True)[:, 0]
     for axes, name in zip(panels, names, strict=True):
-        style = get_style(first.dump, name)
+        style = fields.get_style(first.dump, name)
         sizes = [np.nanmax(np.abs(one.columns[name])) for run in lineouts for one in run]
         factor, unit = pick_prefix(float(max(sizes)), style.unit)
         for run, dash, title in zip(lineouts, STYLES, runs, strict=False):
-            titles = time_titles([one.dump for one in run])
+            titles = fields.time_titles([one.dump for one in run])
             for k, (one, when) in enumerate(zip(run, titles, strict=True)):
                 x, values = one.columns[way] * scale, one.columns[name] * factor
                 blocks = one.columns["block"]
@@ -278,22 +269,14 @@ def draw_lineouts(
     panels[0].legend(fontsize=7, ncols=2 if len(lineouts) > 1 else 1)
 
 
-def choose_abscissa(lineout: Lineout) -> tuple[str, str]:
-    """The column over which values are drawn, and its name: x or y of a line along it, else way."""
-    for k, (axis, other) in enumerate((("x", "y"), ("y", "x"))):
-        if np.ptp(lineout.columns[other]) == 0.0:
-            return axis, lineout.dump.axes[k]
-    return "way", "distance along the line"
-
-
 def write_csv(
     path: Path, lineouts: Sequence[Sequence[Lineout]], names: Sequence[str], runs: Sequence[str]
 ) -> Path:
     """One row a cell: run, step, t, block, i, j, x, y, way, fields; the head has SI units."""
     first = lineouts[0][0].dump
-    fields = [f"{name} [{get_style(first, name).unit}]" for name in names]
+    units = [f"{name} [{fields.get_style(first, name).unit}]" for name in names]
     heads = ["run", "step", f"t [{first.t_unit}]", "block", "i", "j"]
-    rows = [[*heads, f"{first.axes[0]} [m]", f"{first.axes[1]} [m]", "way [m]", *fields]]
+    rows = [[*heads, f"{first.axes[0]} [m]", f"{first.axes[1]} [m]", "way [m]", *units]]
     for run, title in zip(lineouts, runs, strict=True):
         for dump, columns in run:
             cells = zip(*(column.tolist() for column in columns.values()), strict=True)

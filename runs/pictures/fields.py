@@ -25,19 +25,14 @@ from runs.store.reader import BlockData, Dump
 CLOSE = 0.05  # of an edge: beyond the gap that chords of one curve leave between them
 
 
-def split_outline(blocks: Sequence) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """(interfaces, outer lines): polylines (2, n); seams are in neither.
+Outline = tuple[list[tuple[tuple[str, str], np.ndarray]], list[np.ndarray]]
+
+
+def trace_outline(blocks: Sequence) -> Outline:
+    """Interfaces, each as (its two materials, polyline (2, n)), and outer lines; seams are neither.
 
     An interface is listed once, from the first of its two blocks.
     """
-    interfaces, outer = trace_outline(blocks)
-    return [line for _, line in interfaces], outer
-
-
-def trace_outline(
-    blocks: Sequence,
-) -> tuple[list[tuple[tuple[str, str], np.ndarray]], list[np.ndarray]]:
-    """As `split_outline`, each interface with the names of its two materials before it."""
     interfaces, outer = [], []
     for k, block in enumerate(blocks):
         material = get_material(block)
@@ -47,7 +42,9 @@ def trace_outline(
             reach = CLOSE * float(np.median(edges)) if edges.size else 0.0
             touched = np.zeros(edges.size, dtype=bool)
             for m, other in enumerate(blocks):
-                if m == k or not _boxes_touch(line, other.nodes, reach):
+                low, high = other.nodes.min(axis=(1, 2)), other.nodes.max(axis=(1, 2))
+                apart = line.max(axis=1) < low - reach, line.min(axis=1) > high + reach
+                if m == k or np.any(apart):
                     continue
                 on_it = _edges_on(line, other.nodes, reach) & ~touched
                 touched |= on_it
@@ -58,9 +55,9 @@ def trace_outline(
     return interfaces, outer
 
 
-def _boxes_touch(line: np.ndarray, nodes: np.ndarray, reach: float) -> bool:
-    low, high = nodes.min(axis=(1, 2)) - reach, nodes.max(axis=(1, 2)) + reach
-    return bool(np.all(line.max(axis=1) >= low) and np.all(line.min(axis=1) <= high))
+def find_interfaces(blocks: Sequence) -> list[np.ndarray]:
+    """The interfaces alone, as polylines (2, n)."""
+    return [line for _, line in trace_outline(blocks)[0]]
 
 
 def _edges_on(line: np.ndarray, nodes: np.ndarray, reach: float) -> np.ndarray:
@@ -112,27 +109,19 @@ def compute_gradient(block: BlockData, name: str) -> np.ndarray:
     return np.array(solve(along_i, along_j, (x_i, y_i), (x_j, y_j), inverse))
 
 
-def measure_gradient(block: BlockData, name: str) -> np.ndarray:
-    """Size (ni, nj) of the gradient of a field, in its unit per metre."""
-    return np.hypot(*compute_gradient(block, name))
-
-
-def compute_vorticity(block: BlockData) -> np.ndarray:
-    """Vorticity dv/dx - du/dy (ni, nj) [1/s], 2 omega in solid rotation; about the axis normal to
-    the plane, also where y is a radius."""
-    return compute_gradient(block, "v")[0] - compute_gradient(block, "u")[1]
-
-
 DERIVED = {
     "schlieren": Field(
-        lambda block: measure_gradient(block, "rho"),
+        lambda block: np.hypot(*compute_gradient(block, "rho")),
         "kg/m4", "density gradient, its size", ("rho",), "Greys", 0.4,
     ),
     "pressure_gradient": Field(
-        lambda block: measure_gradient(block, "p"),
+        lambda block: np.hypot(*compute_gradient(block, "p")),
         "Pa/m", "pressure gradient, its size", ("p",), "magma_r", 0.4,
     ),
-    "vorticity": Field(compute_vorticity, "1/s", "vorticity", ("u", "v")),
+    "vorticity": Field(  # 2 omega in solid rotation, also where y is a radius
+        lambda block: compute_gradient(block, "v")[0] - compute_gradient(block, "u")[1],
+        "1/s", "vorticity", ("u", "v"),
+    ),
     "rate": Field(
         lambda block: block.state_fields["rates"],
         "1/s", "rate of the cells; the largest (marked) limits dt", ("state/rates",), marked=True,
@@ -149,13 +138,6 @@ def find_field(block: BlockData, name: str) -> Field | None:
         return None
     known = {*block.cell_fields, *(f"state/{one}" for one in block.state_fields)}
     return DERIVED[name] if known.issuperset(DERIVED[name].needs) else None
-
-
-def get_field(block: BlockData, name: str) -> np.ndarray:
-    """A field of cells (ni, nj) in its SI unit, from the dump or derived; KeyError if neither."""
-    if (field := find_field(block, name)) is None:
-        raise KeyError(name)
-    return field.compute(block)
 
 
 def get_style(dump: Dump, name: str) -> Field:
@@ -193,6 +175,9 @@ class View:
     colours: str | None = None  # name of a colour map
 
 
+PLAIN = View()
+
+
 @dataclass(frozen=True)
 class Sheet:
     """One block as it is drawn, perhaps its mirror image."""
@@ -204,11 +189,25 @@ class Sheet:
 
 
 def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
-    """The blocks of a dump with the named fields, completed by their mirror images."""
-    check_nodes(dump)
+    """The blocks of a dump with the named fields, completed by their mirror images.
+
+    Raises BadInput where no block has a field and none can be derived, and where a node of the dump
+    has no place, so that nothing can be drawn there.
+    """
+    for name in names:
+        if not any(find_field(block, name) for block in dump.blocks):
+            known = ", ".join(list_fields(dump))
+            raise BadInput(f"{dump.path} has no field {name!r}; there are: {known}")
     sheets = []
     for block in dump.blocks:
-        fields = {name: get_field(block, name) for name in names if find_field(block, name)}
+        bad = np.argwhere(~np.isfinite(block.nodes).all(axis=0)).tolist()
+        if bad:
+            raise BadInput(
+                f"{dump.path}, block {block.name!r}: node ({bad[0][0]}, {bad[0][1]}) of step "
+                f"{dump.step} is not finite, so its cells cannot be drawn; --at takes other times"
+            )
+        found = {name: find_field(block, name) for name in names}
+        fields = {name: field.compute(block) for name, field in found.items() if field}
         sheets.append(Sheet(block.nodes, block.material, block.name, fields))
     if view.mirror:
         axis = "xy".index(view.mirror)
@@ -216,33 +215,10 @@ def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
         for sheet in list(sheets):
             nodes = sheet.nodes.copy()
             nodes[axis] = 2 * centre - nodes[axis]
-            fields = {
-                name: -values if name in FLIPPED[view.mirror] else values
-                for name, values in sheet.fields.items()
-            }
+            signs = {name: -1.0 if name in FLIPPED[view.mirror] else 1.0 for name in sheet.fields}
+            fields = {name: signs[name] * values for name, values in sheet.fields.items()}
             sheets.append(Sheet(nodes, sheet.material, sheet.name + " mirrored", fields))
     return sheets
-
-
-def check_nodes(dump: Dump) -> None:
-    """Raise BadInput where a node of a dump has no place, so that nothing can be drawn there."""
-    for block in dump.blocks:
-        bad = ~np.isfinite(block.nodes).all(axis=0)
-        if bad.any():
-            i, j = (int(index) for index in np.argwhere(bad)[0])
-            raise BadInput(
-                f"{dump.path}, block {block.name!r}: node ({i}, {j}) of step {dump.step} is not "
-                "finite, so its cells cannot be drawn; --at takes other times"
-            )
-
-
-def check_fields(dumps: Sequence[Dump], names: Sequence[str]) -> None:
-    """Raise BadInput where a dump has no such field and none can be derived."""
-    for dump in dumps:
-        for name in names:
-            if not any(find_field(block, name) for block in dump.blocks):
-                known = ", ".join(list_fields(dump))
-                raise BadInput(f"{dump.path} has no field {name!r}; there are: {known}")
 
 
 def draw_fields(
@@ -252,7 +228,6 @@ def draw_fields(
 
     Without names the grids are drawn, a colour for each block.
     """
-    check_fields(dumps, names)
     moments = [make_sheets(dump, names, view) for dump in dumps]
     boxes, following = choose_boxes([measure_extent(sheets) for sheets in moments], view)
     scale, unit = pick_prefix(np.abs(boxes).max(), "m")
@@ -260,7 +235,9 @@ def draw_fields(
     panels = make_panels(figure, boxes[0], max(len(names), 1), len(dumps), lengths, following)
     titles = titles or time_titles(dumps)
     for k, name in enumerate(names or ("",)):
-        look = find_colours(dumps[0], moments, name, boxes, view) if name else None
+        pairs = zip(moments, boxes, strict=True)
+        ranges = [find_range(sheets, name, box) for sheets, box in pairs] if name else []
+        look = choose_colours(dumps[0], name, ranges, view) if name else None
         for axes, sheets, box, title in zip(panels[k], moments, boxes, titles, strict=True):
             draw_panel(axes, sheets, name, look, scale, box, view.mesh)
             if name and get_style(dumps[0], name).marked:
@@ -286,11 +263,13 @@ def draw_panel(
             norm, colours, factor, _ = look
             nodes, values = sheet.nodes * scale, sheet.fields[name] * factor
             axes.pcolormesh(*nodes, values, norm=norm, cmap=colours, rasterized=True)
-    if mesh or not name:
-        draw_mesh(axes, sheets, scale, *(("k", 0.35) if name else (None, 1.0)))
-    interfaces, outer = split_outline(sheets)
+    names = list(dict.fromkeys(sheet.name.removesuffix(" mirrored") for sheet in sheets))
+    for sheet in sheets if mesh or not name else ():
+        own = f"C{names.index(sheet.name.removesuffix(' mirrored')) % 10}"
+        draw_grid_lines(axes, sheet.nodes * scale, *(("k", 0.35) if name else (own, 1.0)))
+    interfaces, outer = trace_outline(sheets)
     axes.add_collection(LineCollection([line.T * scale for line in outer], **OUTLINE))
-    axes.add_collection(LineCollection([line.T * scale for line in interfaces], **INTERFACE))
+    axes.add_collection(LineCollection([line.T * scale for _, line in interfaces], **INTERFACE))
     axes.set_aspect("equal")
     axes.set_xlim(box[0] * scale, box[1] * scale)
     axes.set_ylim(box[2] * scale, box[3] * scale)
@@ -310,16 +289,6 @@ def mark_largest(axes, sheets: Sequence[Sheet], name: str, scale: float, box) ->
     axes.text(0.01, 0.98, words, transform=at, va="top", fontsize=8, color="tab:red", bbox=frame)
 
 
-def draw_mesh(
-    axes, sheets: Sequence[Sheet], scale: float, colour: str | None, alpha: float
-) -> None:
-    """All grid lines, in one colour or in one of their own for each block."""
-    names = list(dict.fromkeys(sheet.name.removesuffix(" mirrored") for sheet in sheets))
-    for sheet in sheets:
-        own = f"C{names.index(sheet.name.removesuffix(' mirrored')) % 10}"
-        draw_grid_lines(axes, sheet.nodes * scale, colour or own, alpha)
-
-
 def draw_grid_lines(axes, nodes: np.ndarray, colour: str, alpha: float = 1.0) -> None:
     """Every line of both families; thinner where they are many."""
     width = float(np.clip(40.0 / max(nodes.shape[1:]), 0.12, 0.6))
@@ -334,7 +303,7 @@ def measure_extent(sheets: Sequence[Sheet], follow: bool = True) -> tuple[Box, B
     """What all sheets and what the interfaces in them take up; None: there are none, or they are
     not wanted (`follow`)."""
     every = np.concatenate([sheet.nodes.reshape(2, -1) for sheet in sheets], axis=1)
-    lines = split_outline(sheets)[0] if follow else []
+    lines = find_interfaces(sheets) if follow else []
     return _bound(every), _bound(np.concatenate(lines, axis=1)) if lines else None
 
 
@@ -438,52 +407,47 @@ def make_panels(
     return (grid if across else grid.T).tolist()
 
 
-def find_colours(dump: Dump, moments, name: str, boxes, view: View):
-    """Norm, colour map, factor and label for a field, from all visible cells at all times."""
-    pairs = zip(moments, boxes, strict=True)
-    ranges = [find_range(sheets, name, box) for sheets, box in pairs]
-    norm, colours, factor, label = choose_colours(
-        dump, name, (view.limits and [view.limits]) or ranges
-    )
-    if view.limits:
-        norm = Normalize(view.limits[0] * factor, view.limits[1] * factor)
-    return norm, view.colours or colours, factor, label
-
-
 def find_range(sheets: Sequence[Sheet], name: str, box) -> tuple[float, float]:
     """Least and largest visible value of a field; (inf, -inf) where none is finite."""
-    there = [_visible(sheet, name, box) for sheet in sheets if name in sheet.fields]
-    values = np.concatenate(there) if there else np.empty(0)
+    values = np.empty(0)
+    for sheet in sheets:
+        if name in sheet.fields:
+            x, y = compute_centres(sheet.nodes)
+            inside = (x >= box[0]) & (x <= box[1]) & (y >= box[2]) & (y <= box[3])
+            values = np.append(values, sheet.fields[name][inside])
     values = values[np.isfinite(values)]
     return float(values.min(initial=np.inf)), float(values.max(initial=-np.inf))
 
 
-def choose_colours(dump: Dump, name: str, ranges: Sequence[tuple[float, float]]):
+def choose_colours(
+    dump: Dump, name: str, ranges: Sequence[tuple[float, float]], view: View = PLAIN
+):
     """Norm, colour map, factor and label for a field with values in these ranges, SI units."""
+    if view.limits:
+        ranges = [view.limits]
     low, high = min(one[0] for one in ranges), max(one[1] for one in ranges)
     if low > high:
         low, high = 0.0, 1.0
     style = get_style(dump, name)
     factor, unit = pick_prefix(max(abs(low), abs(high)), style.unit)
     label = f"{style.words} [{unit}]" if unit else style.words
-    if style.colours:
-        norm = PowerNorm(style.power, 0.0, high * factor or 1.0)
-        return norm, style.colours, factor, label
-    if low < 0 < high and min(-low, high) > 0.05 * max(-low, high):
-        reach = max(-low, high) * factor
-        return Normalize(-reach, reach), "RdBu_r", factor, label
+    both_signs = low < 0 < high and min(-low, high) > 0.05 * max(-low, high)
+    colours = style.colours or ("RdBu_r" if both_signs else "viridis")
     velocity = style.unit == "m/s"  # zero is its middle, whatever it is in this picture
-    if low > 0 and not velocity and np.log10(high / low) > DECADES:
-        return LogNorm(low * factor, high * factor), "viridis", factor, label
-    if low == high:
-        low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
-    return Normalize(low * factor, high * factor), "viridis", factor, label
-
-
-def _visible(sheet: Sheet, name: str, box) -> np.ndarray:
-    x, y = compute_centres(sheet.nodes)
-    inside = (x >= box[0]) & (x <= box[1]) & (y >= box[2]) & (y <= box[3])
-    return sheet.fields[name][inside]
+    norm = Normalize(low * factor, high * factor)
+    if view.limits:
+        pass
+    elif style.colours:
+        norm = PowerNorm(style.power, 0.0, high * factor or 1.0)
+    elif both_signs:
+        reach = max(-low, high) * factor
+        norm = Normalize(-reach, reach)
+    elif low > 0 and not velocity and np.log10(high / low) > DECADES:
+        norm = LogNorm(low * factor, high * factor)
+    elif low == high:
+        margin = 0.5 * factor * (abs(low) or 1.0)
+        norm = Normalize(low * factor - margin, high * factor + margin)
+    return norm, view.colours or colours, factor, label
 
 
 def time_titles(dumps: Sequence[Dump]) -> list[str]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,25 +20,10 @@ from tqdm import tqdm
 
 from regrid.errors import BadInput
 from runs.inspection.account import pick_prefix
-from runs.pictures.command import (
-    check_folder,
-    clean_words,
-    default_fields,
-    new_figure,
-    parse_zoom,
-)
-from runs.pictures.fields import (
-    View,
-    check_fields,
-    choose_boxes,
-    choose_colours,
-    draw_panel,
-    find_range,
-    make_sheets,
-    measure_extent,
-    time_titles,
-)
-from runs.store.files import disk_errors
+from runs.pictures import command, fields
+from runs.pictures.command import Numbers
+from runs.pictures.fields import View
+from runs.store.files import check_folder, disk_errors
 from runs.store.provenance import describe_software, hash_deck
 from runs.store.reader import Dump, RunData
 
@@ -55,7 +40,7 @@ def make_film(
     output: str | Path | None = None,
     *,
     follow: bool = False,
-    zoom: str | None = None,
+    zoom: Numbers = None,
     mesh: bool = False,
     mirror: str | None = None,
     fps: int | None = None,
@@ -70,38 +55,52 @@ def make_film(
     the interface.  fps: frames per second, one each dump.  Raises BadInput.
     """
     run = RunData(directory)
-    view = View(parse_zoom(zoom), mirror, mesh)
+    view = View(command.parse_zoom(zoom), mirror, mesh)
     if follow and view.zoom:
         raise BadInput("--follow and --zoom: the window follows the interface or is fixed; use one")
-    name = field or default_fields(run)[0]
+    name = field or command.default_fields(run)[0]
     marks = ["follow"] * follow + ["mesh"] * mesh + [f"mirror-{mirror}"] * bool(mirror)
     marks += [re.sub(r"[^\w.+-]+", "_", f"zoom-{zoom}")] * bool(zoom)
-    path = choose_path(run, output, "-".join(["film", name, *marks]))
+    has_ffmpeg = animation.writers.is_available("ffmpeg")
+    stem = "-".join(["film", name, *marks])
+    path = Path(output) if output else run.path / f"{stem}{KINDS[0] if has_ffmpeg else KINDS[1]}"
+    kind = path.suffix.lower()
+    if kind not in KINDS:
+        raise BadInput(f"{path}: a film's name has to end in .mp4 or .gif")
+    if kind == ".mp4" and not has_ffmpeg:
+        raise BadInput(f"{path}: an mp4 needs the program ffmpeg, which is not here; take a .gif")
+    check_folder(path)
     paths = [dump.path for dump in run.dumps]
     if len(paths) < 2:
         raise BadInput(f"{run.path} has {len(paths)} dump: a film needs two or more")
-    extents = [measure_extent(make_sheets(Dump(one), (), view), view.zoom is None) for one in paths]
+    extents = [
+        fields.measure_extent(fields.make_sheets(Dump(one), (), view), view.zoom is None)
+        for one in paths
+    ]
     if follow and not all(span for _, span in extents):
         raise BadInput(f"--follow: no two materials touch in {paths[0]}, there is no interface")
-    boxes, _ = choose_boxes(extents, view, follow)
-    check_fields([Dump(paths[0])], [name])
+    boxes, _ = fields.choose_boxes(extents, view, follow)
     ranges = [
-        find_range(make_sheets(Dump(one), [name], view), name, box)
+        fields.find_range(fields.make_sheets(Dump(one), [name], view), name, box)
         for one, box in zip(paths, boxes, strict=True)
     ]
     rate = fps or int(np.clip(round(len(paths) / SECONDS), SLOWEST, FASTEST))
-    figure = new_figure()
+    figure = command.new_figure()
     ratio = (boxes[0][3] - boxes[0][2]) / (boxes[0][1] - boxes[0][0])
     figure.set_size_inches(WIDTH, float(np.clip(0.8 * WIDTH * ratio + 1.0, LOWEST, TALLEST)))
-    frames = Frames(figure, run.dumps, name, view, boxes, ranges)
-    clean_words(figure)
+    draw_frame = make_frames(figure, run.dumps, name, view, boxes, ranges)
+    command.clean_words(figure)
     part = path.with_name(f".{path.stem}.part{path.suffix}")
     with disk_errors(path):
         try:
-            writer = make_writer(path, rate, run.dumps[-1].deck_text)
+            digest = hash_deck(run.dumps[-1].deck_text)
+            made = {"comment": f"{describe_software()}; deck SHA-256 {digest}"}
+            words = {"codec": "h264", "extra_args": ["-movflags", "+faststart"]}
+            make, more = (animation.FFMpegWriter, words) if kind == ".mp4" else (CommentedGif, {})
+            writer = make(fps=rate, metadata=made, **more)
             with writer.saving(figure, str(part), dpi):
                 for number in tqdm(range(len(paths)), "frames", leave=False, disable=None):
-                    frames.draw(number)
+                    draw_frame(number)
                     writer.grab_frame()
             os.replace(part, path)
         except subprocess.CalledProcessError as error:
@@ -113,61 +112,31 @@ def make_film(
     return path
 
 
-class Frames:
-    """The frames of a film, drawn one after another into the same axes of a figure."""
+def make_frames(
+    figure, dumps: Sequence[Dump], name: str, view: View, boxes, ranges
+) -> Callable[[int], None]:
+    """What draws the frame of a dump, by its number from 0, into the same axes of a figure."""
+    paths, titles = [dump.path for dump in dumps], fields.time_titles(dumps)
+    first, axes, box = Dump(paths[0]), figure.subplots(), boxes[0]
+    look = fields.choose_colours(first, name, ranges)
+    scale, unit = pick_prefix(float(np.abs(boxes).max()), "m")
+    labels = [f"{axis} [{unit}]" for axis in first.axes]
+    place = {"shrink": 0.9, "pad": 0.015}
+    if box[3] - box[2] < SLENDER * (box[1] - box[0]):  # no room for words at the side
+        place = {"location": "bottom", "aspect": 50}
+    figure.colorbar(ScalarMappable(*look[:2]), ax=axes, label=look[3], **place)
 
-    def __init__(self, figure, dumps: Sequence[Dump], name: str, view: View, boxes, ranges):
-        self.paths, self.name, self.view, self.boxes = [d.path for d in dumps], name, view, boxes
-        self.titles = time_titles(dumps)
-        first = Dump(self.paths[0])
-        self.look = choose_colours(first, name, ranges)
-        self.scale, unit = pick_prefix(float(np.abs(boxes).max()), "m")
-        self.labels = [f"{axis} [{unit}]" for axis in first.axes]
-        self.figure, self.axes = figure, figure.subplots()
-        bar = ScalarMappable(*self.look[:2])
-        box = boxes[0]
-        place = {"shrink": 0.9, "pad": 0.015}
-        if box[3] - box[2] < SLENDER * (box[1] - box[0]):  # no room for words at the side
-            place = {"location": "bottom", "aspect": 50}
-        figure.colorbar(bar, ax=self.axes, label=self.look[3], **place)
-        self.draw(0)
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")  # the same frame in every picture
-
-    def draw(self, number: int) -> None:
-        """Draw the frame of a dump, by its number from 0."""
-        axes = self.axes
+    def draw(number: int) -> None:
         axes.clear()
-        sheets = make_sheets(Dump(self.paths[number]), [self.name], self.view)
-        draw_panel(
-            axes, sheets, self.name, self.look, self.scale, self.boxes[number], self.view.mesh
-        )
-        axes.set_title(self.titles[number], fontsize=10)
-        axes.set(xlabel=self.labels[0], ylabel=self.labels[1])
+        sheets = fields.make_sheets(Dump(paths[number]), [name], view)
+        fields.draw_panel(axes, sheets, name, look, scale, boxes[number], view.mesh)
+        axes.set_title(titles[number], fontsize=10)
+        axes.set(xlabel=labels[0], ylabel=labels[1])
 
-
-def choose_path(run: RunData, output: str | Path | None, stem: str) -> Path:
-    """Where the film goes; BadInput where that cannot be, before anything is drawn."""
-    has_ffmpeg = animation.writers.is_available("ffmpeg")
-    ending = KINDS[0] if has_ffmpeg else KINDS[1]
-    path = Path(output) if output else run.path / f"{stem}{ending}"
-    if path.suffix.lower() not in KINDS:
-        raise BadInput(f"{path}: a film's name has to end in .mp4 or .gif")
-    if path.suffix.lower() == ".mp4" and not has_ffmpeg:
-        raise BadInput(f"{path}: an mp4 needs the program ffmpeg, which is not here; take a .gif")
-    check_folder(path)
-    return path
-
-
-def make_writer(path: Path, fps: int, deck_text: str) -> animation.AbstractMovieWriter:
-    """What makes a film of this name's kind; `deck_text`: of the run, for the film's comment."""
-    made = f"{describe_software()}; deck SHA-256 {hash_deck(deck_text)}"
-    if path.suffix.lower() == ".gif":
-        return CommentedGif(fps=fps, metadata={"comment": made})
-    extra = ["-movflags", "+faststart"]
-    return animation.FFMpegWriter(
-        fps=fps, codec="h264", extra_args=extra, metadata={"comment": made}
-    )
+    draw(0)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # the same frame in every picture
+    return draw
 
 
 class CommentedGif(animation.PillowWriter):

@@ -66,7 +66,10 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
 def choose_panels(
     history: Mapping[str, np.ndarray], units: Mapping[str, str]
 ) -> tuple[list[Panel], list[str]]:
-    """Panels in their order, and the columns that are constant and need none."""
+    """Panels in their order, and the columns that are constant and need none.
+
+    Measured columns of one first word, one unit and one size share a panel.
+    """
     known = [
         name
         for name, values in history.items()
@@ -81,17 +84,10 @@ def choose_panels(
     panels = [] if moving and _is_flat(history["dt"]) else [["dt"]]
     panels += [["drift"]] if compute_drifts(history) else []
     panels += [[name] for name in grid]
-    return panels + join_alike([n for n in moving if n not in grid], history, units), constant
-
-
-def join_alike(
-    names: list[str], history: Mapping[str, np.ndarray], units: Mapping[str, str]
-) -> list[Panel]:
-    """Panels, in the order of `names`: those of one first word, one unit and one size together."""
-    panels: list[Panel] = []
-    for name in names:
+    alone, measured = len(panels), [name for name in moving if name not in grid]
+    for name in measured:
         size = np.nanmax(np.abs(history[name]))
-        for together in panels:
+        for together in panels[alone:]:
             first = together[0]
             other = np.nanmax(np.abs(history[first]))
             alike = name.split("_")[0] == first.split("_")[0]
@@ -101,7 +97,7 @@ def join_alike(
                 break
         else:
             panels.append([name])
-    return panels
+    return panels, constant
 
 
 def _is_flat(values: np.ndarray) -> bool:
@@ -165,7 +161,6 @@ WORDS = {
     "e": "specific internal energy", "c": "sound speed",
 }  # fmt: skip
 MOST_NAMED = 10  # gauges with a line in the legend; more are told apart by a row of colours
-MOST_EMPTY = 3  # gauges without values that a panel names
 COLUMNS = 3
 GAUGES_WIDTH, GAUGES_HEIGHT = 4.4, 3.0  # inches of a panel
 
@@ -194,34 +189,24 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
     columns = min(COLUMNS, len(fields))
     size = max(GAUGES_WIDTH, 7.0 / columns), GAUGES_HEIGHT
     grid = lay_out(figure, len(fields), columns, size, sharex=True)
+    lines = {}
     for axes, field in zip(grid, fields, strict=True):
         writers = [(k, p) for k, p in enumerate(chosen) if field in p.fields]
-        values = {p.name: np.asarray(table[f"{p.name}_{field}"], dtype=float) for _, p in writers}
-        sizes = [np.abs(v[np.isfinite(v)]).max(initial=0.0) for v in values.values()]
-        scale, field_unit = pick_prefix(float(max(sizes)), UNITS[field])
-        for k, point in writers:
+        values = [np.asarray(table[f"{p.name}_{field}"], dtype=float) for _, p in writers]
+        largest = max(np.abs(v[np.isfinite(v)]).max(initial=0.0) for v in values)
+        scale, field_unit = pick_prefix(float(largest), UNITS[field])
+        for (k, point), curve in zip(writers, values, strict=True):
             style = "--" if point.moves else "-"
-            curve = scale * values[point.name]
-            axes.plot(factor * table["t"], curve, style, color=colours[k], lw=1, label=point.name)
-        _name_empty(axes, [name for name, v in values.items() if not np.isfinite(v).any()])
+            words = point.name + " (outside of all blocks)" * (not np.isfinite(curve).any())
+            lines[k] = axes.plot(
+                factor * table["t"], scale * curve, style, color=colours[k], lw=1, label=words
+            )[0]
         axes.set_title(f"{WORDS[field]} [{field_unit}]", fontsize=9)
         axes.tick_params(labelsize=8)
         axes.grid(alpha=0.3)
     moving = "; dashed: moves with the material" * any(point.moves for point in chosen)
     figure.supxlabel(f"t [{unit}]{moving}", fontsize=9)
-    named = chosen
-    if len(chosen) > MOST_NAMED:
-        named = [chosen[k] for k in np.linspace(0, len(chosen) - 1, MOST_NAMED).round().astype(int)]
-    lines = {line.get_label(): line for axes in grid for line in axes.get_lines()}
-    handles = [lines[point.name] for point in named if point.name in lines]
-    title = f"{len(named)} of {len(chosen)}" if len(named) < len(chosen) else None
-    figure.legend(handles=handles, loc="outside right upper", fontsize=8, title=title)
-
-
-def _name_empty(axes, names: list[str]) -> None:
-    """Say in the panel which gauges have no value at any time: they lie outside of all blocks."""
-    if names:
-        more = f" and {len(names) - MOST_EMPTY} more" if len(names) > MOST_EMPTY else ""
-        words = f"outside of all blocks: {', '.join(names[:MOST_EMPTY])}{more}"
-        place = {"transform": axes.transAxes, "ha": "left", "va": "bottom", "color": "0.3"}
-        axes.text(0.02, 0.03, words, fontsize=7, **place)
+    handles = [lines[k] for k in sorted(lines)]
+    named = handles[:: -(-len(handles) // MOST_NAMED)]
+    title = f"{len(named)} of {len(handles)}" if len(named) < len(handles) else None
+    figure.legend(handles=named, loc="outside right upper", fontsize=8, title=title)

@@ -107,10 +107,16 @@ def describe_map(
     if ranks > MOST_NAMED:
         lines.append(f"and {ranks - MOST_NAMED} more ranks")
     likely, most = foretell_speed(cells, shares, ranks), total / max(loads)
+    advice, idle = "", loads.count(0)
+    if idle:
+        advice = (
+            f"; {idle} of {ranks} ranks would have nothing to do: blocks are cut between rows of "
+            f"tiles, {TILE_ROWS} rows of cells each"
+        )
     lines += [
         f"memory of all ranks about {sum(memories) / 1e6:.0f} MB",
         f"likely {min(likely, most):.2g} times as fast as one rank, on a machine with a core for "
-        f"each; at most {most:.3g} times{_advise(loads)}",
+        f"each; at most {most:.3g} times{advice}",
     ]
     return lines
 
@@ -132,16 +138,6 @@ def estimate_memories(cells: Sequence[tuple[int, int]], shares: Shares, ranks: i
             if rank > 0:
                 held[rank].append(rows * nj)
     return [estimate_memory(sum(blocks), blocks) for blocks in held]
-
-
-def _advise(loads: Sequence[int]) -> str:
-    idle = sum(load == 0 for load in loads)
-    if idle:
-        return (
-            f"; {idle} of {len(loads)} ranks would have nothing to do: blocks are cut between "
-            f"rows of tiles, {TILE_ROWS} rows of cells each"
-        )
-    return ""
 
 
 def describe_shares(names: Sequence[str], shares: Shares, ranks: int) -> str:

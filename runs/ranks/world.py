@@ -21,7 +21,7 @@ import sys
 import threading
 import time
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -123,30 +123,10 @@ def share_flow(
     if taken and shared is None:
         built.set_state(taken)
     ranks = Ranks(comm, built.blocks, *shares)
-    built.spread(ranks, count_own_processors(comm))
-    return built, ranks
-
-
-def open_world() -> Any:
-    """mpi4py's communicator of all ranks that were started.
-
-    Raises BadInput where mpi4py or an MPI library is missing.
-    """
-    try:
-        from mpi4py import MPI
-    except (ImportError, RuntimeError) as error:  # RuntimeError: no MPI library
-        raise BadInput(
-            f"{count_started()} ranks of MPI were started, which needs mpi4py and an MPI library: "
-            f"pip install 'shockgrid[mpi]' ({error})"
-        ) from error
-    return MPI.COMM_WORLD
-
-
-def count_own_processors(comm: Any) -> int:
-    """Processors for this rank, where those of one machine share them; all ranks ask at once."""
     machines = comm.allgather(platform.node())
-    beside = machines.count(platform.node())
-    return max(1, min(count_processors(), (os.cpu_count() or 1) // beside))
+    beside = machines.count(platform.node())  # ranks that share the processors of a machine
+    built.spread(ranks, max(1, min(count_processors(), (os.cpu_count() or 1) // beside)))
+    return built, ranks
 
 
 PATIENCE = 0.05  # seconds: less than mpiexec has
@@ -188,6 +168,7 @@ def loss_told(several: bool, is_heard: Callable, describe: Callable[[], str]):
 def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str]:
     """The line of the summary, none for a run in one process; all ranks have to be alive.
 
+    It has messages and megabytes of a step, and the part of it that the ranks wait for them.
     note: takes the line of run.log, the message counts of all ranks
     (`hydro.ranks.messages.Book.gather`).
     """
@@ -195,11 +176,6 @@ def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str
         return []
     books = world.ranks.count()
     note(f"ranks: {json.dumps(books)}")
-    return [f"messages of ranks: {describe_books(books)}"]
-
-
-def describe_books(books: Mapping[str, Any]) -> str:
-    """Messages and megabytes of a step, and the part of it that the ranks wait for them."""
     steps, words = books["steps"], list[str]()
     if steps:
         kinds = [kind for kind, calls in books["calls"].items() if calls]
@@ -213,7 +189,7 @@ def describe_books(books: Mapping[str, Any]) -> str:
         ]
         if parts:
             words.append(f"{min(parts):.0f}% to {max(parts):.0f}% of a step are waits for them")
-    return "; ".join(words) or "none"
+    return [f"messages of ranks: {'; '.join(words) or 'none'}"]
 
 
 WRITE = BEGIN + 1  # told; where to, and the words of the dump, follow
@@ -270,24 +246,24 @@ def run_on_ranks(command: Callable[[World | None], int], say: Callable[[str], No
     say: takes a sentence for the person.  Returns the exit code, the same on all ranks.
     """
     try:
-        comm = open_world()
-    except BadInput as error:
+        from mpi4py import MPI
+    except (ImportError, RuntimeError) as error:  # RuntimeError: no MPI library
         if find_rank() == 0:
-            say(str(error))
+            say(
+                f"{count_started()} ranks of MPI were started, which needs mpi4py and an MPI "
+                f"library: pip install 'shockgrid[mpi]' ({error})"
+            )
         return BAD_INPUT
+    comm = MPI.COMM_WORLD
     if comm.size == 1:
         return command(None)
-    if comm.rank > 0:
-        return _follow_silently(comm)
-    world, code = World(comm), INTERNAL
-    try:
-        code = command(world)
-    finally:
-        world.dismiss(code)
-    return code
-
-
-def _follow_silently(comm: Any) -> int:
+    if comm.rank == 0:
+        world, code = World(comm), INTERNAL
+        try:
+            code = command(world)
+        finally:
+            world.dismiss(code)
+        return code
     for name in ("SIGINT", "SIGTERM", "SIGUSR1"):  # the first rank says when it is time to end
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)

@@ -1,30 +1,48 @@
-"""A run directory: what lies where, and who may write there.
+"""A run directory: what lies where, who may write there, and what does not fit together there.
 
-docs/files.md lists the files of a run.
+docs/files.md lists the files of a run.  The log notes the digest of the deck at each start, and
+those of summary and verdict at each end; a file that has none of the noted digests was edited or
+damaged.  Of a deck the dumps are the judge: the log itself is guarded by nothing.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import json
 import os
 import re
 import shlex
 import time
+import tomllib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, NamedTuple
 
+import msgspec
+
+from problems.problem_file import ProblemFile, compute_digest, is_problem_file, read_problem_file
+from problems.registry import is_problem, load_problem
 from regrid.errors import BadInput
 from regrid.text_files import check_regular, escape_controls
-from runs.store.checksum import PART_NAME, find_parts_by_name
+from runs.deck.checking import find_changes, show
+from runs.deck.reading import ReadDeck, read_toml, resolve_deck
+from runs.store.dumps import open_dump
 from runs.store.files import (
     DUMPS,
     KEPT_NAMES,
     LOCK,
+    PART_NAME,
     disk_errors,
+    find_parts_by_name,
     get_part,
     replace_file,
     try_lock,
+    write_atomically,
 )
+from runs.store.provenance import NOTED, hash_deck
 
+SHOWN = 3  # changed keys
 KEPT_RESTARTS = 2
 STUDY_FILE = "study.toml"  # what a study is known by; its runs lie in its folder `runs`
 _TEMPORARY = re.compile(r"\.(.+)\.part")
@@ -64,29 +82,18 @@ class RunDirectory:
     def restart_path(self, step: int) -> Path:
         return self.dumps_folder / f"restart_{step:06d}.h5"
 
-    def list_files(self, kind: str = "dump") -> list[tuple[int, Path]]:
-        """Steps and paths of the dumps (or the "restart" files), by step."""
-        return [entry for entry in self.list_points() if entry[1].name.startswith(kind)]
-
-    def list_points(self) -> list[tuple[int, Path]]:
-        """Everything to restart from, by step."""
-        if not self.dumps_folder.is_dir():
-            return []
-        found = []
-        for path in self.dumps_folder.iterdir():
-            match = _NAME.fullmatch(path.name)
-            if match:
-                found.append((int(match[2]), path))
-        return sorted(found)
+    def list_points(self, kind: str = "") -> list[tuple[int, Path]]:
+        """Steps and paths of the dumps and restart points, or of those of one `kind`, by step."""
+        there = self.dumps_folder.iterdir() if self.dumps_folder.is_dir() else ()
+        named = [(match, path) for path in there if (match := _NAME.fullmatch(path.name))]
+        return sorted((int(m[2]), path) for m, path in named if m[1].startswith(kind))
 
     def drop_old_restarts(self, keep: int = KEPT_RESTARTS) -> None:
         """Remove all but the newest restart files; dumps stay."""
-        restarts = self.list_files("restart")
+        restarts = self.list_points("restart")
         for _, path in restarts[: max(0, len(restarts) - keep)]:
-            parts = find_parts_by_name(path)
-            path.unlink(missing_ok=True)  # first: then its parts are no restart point's
-            for part in parts:
-                part.unlink(missing_ok=True)
+            for one in (path, *find_parts_by_name(path)):  # then its parts are no restart point's
+                one.unlink(missing_ok=True)
 
     def set_aside_after(self, step: int) -> int:
         """Move dumps of later steps into `superseded`; returns how many there were."""
@@ -154,7 +161,7 @@ def create_directory(wanted: str | None, problem: str, force: bool = False) -> R
         except FileNotFoundError as error:  # such as /proc, where no folders are made
             words = f"the output directory {wanted} cannot be created; choose another with -o"
             raise BadInput(words) from error
-        inside = sorted(path.name for path in directory.path.iterdir())
+        inside = _list_inside(directory)
     if inside and not force:
         shown = ", ".join(inside[:4]) + (", ..." if len(inside) > 4 else "")
         raise BadInput(
@@ -186,7 +193,7 @@ def _next_free(problem: str) -> RunDirectory:
 
 
 def _remove_run(directory: RunDirectory) -> None:
-    if not directory.deck.exists() and not _holds_beginning(directory):
+    if not directory.deck.exists():
         raise BadInput(
             f"{directory} holds no run (no deck.toml), so --force does not clear it; "
             "choose another directory with -o"
@@ -214,12 +221,12 @@ def _find_leftovers(directory: RunDirectory) -> list[Path]:
     return found
 
 
-def _holds_beginning(directory: RunDirectory) -> bool:
-    """Is this what a run leaves that was killed before its deck was written, and nothing else?"""
-    dumps = directory.dumps_folder
-    own = {dumps, directory.lock, get_part(directory.deck)}
-    there = set(directory.path.iterdir())
-    return dumps.is_dir() and there <= own and not any(dumps.iterdir())
+def _list_inside(directory: RunDirectory) -> list[str]:
+    """Names in a folder, but for what a run leaves that was killed before its deck was written."""
+    own = {directory.lock, get_part(directory.deck)}
+    if directory.dumps_folder.is_dir() and not any(directory.dumps_folder.iterdir()):
+        own.add(directory.dumps_folder)
+    return sorted(path.name for path in directory.path.iterdir() if path not in own)
 
 
 def open_directory(path: str | os.PathLike) -> RunDirectory:
@@ -229,19 +236,169 @@ def open_directory(path: str | os.PathLike) -> RunDirectory:
         raise BadInput(f"{path} does not exist")
     if not directory.path.is_dir():
         raise BadInput(f"{path} is a file; a run directory is wanted")
-    if not directory.deck.exists() and (directory.path / STUDY_FILE).exists():
-        raise BadInput(
-            f"{path} is a study, no run: its runs lie in {directory.path / 'runs'}; its table: "
-            f"shockgrid study {directory.quoted}"
-        )
-    if not directory.deck.exists() and _holds_beginning(directory):
-        raise BadInput(
-            f"{path} has no deck yet: a run is just starting there, or ended before a step; "
-            f"if it ended, start it again: shockgrid run PROBLEM_OR_DECK -o {directory.quoted} "
-            "--force"
-        )
     if not directory.deck.exists():
-        raise BadInput(f"{path} is not a run directory: it has no deck.toml")
+        words = "it has no deck.toml"
+        if (directory.path / STUDY_FILE).exists():
+            words = f"its runs lie in {directory.path / 'runs'}; its table: shockgrid study {path}"
+        elif not _list_inside(directory):
+            words += (
+                " yet: a run is just starting there, or ended before a step; if it ended, start it "
+                f"again: shockgrid run PROBLEM_OR_DECK -o {directory.quoted}"
+            )
+        raise BadInput(f"{path} is not a run directory: {words}")
     for file in (directory.deck, directory.history, directory.summary, directory.log):
         check_regular(file)
     return directory
+
+
+def write_noted(directory: RunDirectory, path: Path, text: str) -> None:
+    """Write a file of the run whose digest the log notes first; see `is_noted`."""
+    directory.note(f"{path.stem}: SHA-256 {hash_deck(text)[:NOTED]}")
+    write_atomically(path, text)
+
+
+def is_noted(directory: RunDirectory, path: Path) -> bool:
+    """Has a file one of the digests that the log has noted of it?  True where it has none."""
+    try:
+        log = directory.log.read_text(encoding="utf-8", errors="replace")
+        noted = re.findall(rf"\b{path.stem}: SHA-256 ([0-9a-f]{{{NOTED}}})", log)
+        return not noted or hashlib.sha256(path.read_bytes()).hexdigest()[:NOTED] in noted
+    except OSError:  # told of where it is read
+        return True
+
+
+def check_noted(directory: RunDirectory, path: Path) -> None:
+    """Raise BadInput where a file is not as it was written."""
+    if not is_noted(directory, path):
+        raise BadInput(f"{path} is not as it was written: edited or damaged")
+
+
+def check_deck(directory: RunDirectory) -> str:
+    """Raise BadInput where deck.toml is neither the deck of a start nor that of the last dump.
+
+    Key by key the dump is the judge, since its checksum guards it.  Returns a sentence where it
+    says that the deck is right and the log knows it not; "" where all agree.
+    """
+    if is_noted(directory, directory.deck):
+        return ""
+    found, told, way = read_stored_deck(directory), "", "no dump that can be read has it"
+    if found is not None:
+        text = directory.deck.read_text(encoding="utf-8", errors="replace")
+        with contextlib.suppress(tomllib.TOMLDecodeError):
+            changed = list(find_changes(tomllib.loads(found.text), tomllib.loads(text)))
+            if not changed:
+                return (
+                    f"{directory.log} has no start with the digest of {directory.deck.name}, whose "
+                    f"keys are those in {found.path.name}: the log was edited or damaged, the deck "
+                    "is taken"
+                )
+            words = [f"{one.key} is {show(one.now)}, was {show(one.before)}" for one in changed]
+            more = [f"and {len(words) - SHOWN} more"] * (len(words) > SHOWN)
+            told = f" ({'; '.join(words[:SHOWN] + more)})"
+        way = (
+            f"the last dump has it: shockgrid info --deck {shlex.quote(str(found.path))} > "
+            f"{shlex.quote(str(directory.deck))}"
+        )
+    raise BadInput(
+        f"{directory.deck} is not as it was written{told}; set it right ({way}), and change keys "
+        "with restart --set, or with --set in a new run"
+    )
+
+
+class StoredDeck(NamedTuple):
+    """The deck in a dump: its text, the file it is from, the end time [s] of the run then."""
+
+    text: str
+    path: Path
+    t_end: float
+
+
+def read_stored_deck(directory: RunDirectory, at: int | None = None) -> StoredDeck | None:
+    """The deck of the last dump that can be read, or of step `at`; None where there is none."""
+    for step, path in reversed(directory.list_points()):
+        if at in (None, step):
+            with contextlib.suppress(BadInput, KeyError, OSError):  # told where its state is read
+                with open_dump(path) as file:
+                    return StoredDeck(str(file.attrs["deck"]), path, float(file.attrs["t_end"]))
+    return None
+
+
+def keep_problem_file(directory: RunDirectory, file: ProblemFile) -> None:
+    """Copy a problem's file into the directory of its run, with its place and digest."""
+    if file.path.resolve() == directory.problem_copy.resolve():
+        return  # a run that goes on with its copy
+    note = {"file": str(file.path.resolve()), "sha256": file.digest}
+    write_atomically(directory.problem_note, json.dumps(note, indent=1) + "\n")
+    write_atomically(directory.problem_copy, file.text)
+
+
+def read_run_deck(
+    directory: RunDirectory,
+    settings: tuple[str, ...] = (),
+    strict: bool = False,
+    say: Callable[[str], None] = lambda text: None,
+) -> ReadDeck:
+    """The checked deck of a run, `settings` laid over it.
+
+    strict: for going on; raises BadInput where the problem's file is no longer as it was.  say: is
+    then given what is wrong with the log alone.  Raises BadInput, too, for a deck or a
+    kept file that cannot be read.
+    """
+    if strict and (fault := check_deck(directory)):
+        say(fault)
+    table = read_toml(directory.deck)
+    file = None
+    if is_problem_file(table.get("problem")):
+        file = _read_kept(directory, strict)
+    elif is_problem(table.get("problem")):
+        table = {**load_problem(table["problem"]).Deck.absent, **table}
+    return resolve_deck(table, str(directory.deck), settings, file)
+
+
+def _read_kept(directory: RunDirectory, strict: bool) -> ProblemFile:
+    """The file of the problem of a run: where it was, if it is as it was, else the copy."""
+    try:
+        note = json.loads(directory.problem_note.read_text(encoding="utf-8"))
+        place, digest = Path(note["file"]), str(note["sha256"])
+        copy = compute_digest(directory.problem_copy.read_bytes())
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise BadInput(
+            f"{directory}: {directory.problem_copy.name} or {directory.problem_note.name}, which "
+            "store the file of its problem, is missing or damaged; start it again: shockgrid run "
+            f"PROBLEM_FILE -o {directory.quoted} --force"
+        ) from error
+    if copy != digest:
+        raise BadInput(
+            f"{directory.problem_copy} has changed since the run started; it was the copy of the "
+            "file of the problem, which is lost"
+        )
+    if place.is_file() and compute_digest(place.read_bytes()) == digest:
+        return read_problem_file(place)
+    if strict and place.is_file():
+        raise BadInput(
+            f"{place} has changed since the run in {directory} started, and a run continues only "
+            f"with the same file: restore it from {directory.problem_copy}, or start a new run"
+        )
+    return read_problem_file(directory.problem_copy, name=place.name, beside=place.parent)
+
+
+def write_verdict(directory: RunDirectory, verdict: dict[str, Any]) -> None:
+    """Write a verdict; numbers that are not finite become null, which JSON has."""
+    plain = msgspec.json.encode(verdict, enc_hook=lambda value: value.item())
+    text = msgspec.json.format(plain, indent=1).decode("utf-8")
+    write_noted(directory, directory.verdict, text + "\n")
+
+
+def read_verdict(directory: RunDirectory) -> dict[str, Any] | None:
+    """The verdict of a run; None where it has not ended, or was ended by force.
+
+    Raises BadInput for a file that is not as it was written.
+    """
+    path = directory.verdict
+    if not path.exists():
+        return None
+    check_noted(directory, path)
+    try:
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError, RecursionError) as error:
+        raise BadInput(f"{path} is damaged: it cannot be read") from error

@@ -14,10 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import h5py
 import numpy as np
@@ -33,8 +32,7 @@ from problems.evolution import (
     is_axisymmetric,
 )
 from regrid.errors import BadInput
-from runs.store.checksum import BLANK, PARTS, check_parts, find_sum
-from runs.store.checksum import NAME as CHECKSUM
+from runs.store.files import BLANK, CHECKSUM, PARTS, check_parts, find_sum
 from runs.store.provenance import find_provenance
 
 FORMAT = "shockgrid dump"
@@ -62,8 +60,7 @@ COORDINATES = "x", "y", "z"
 EMPTY: Mapping[str, Any] = MappingProxyType({})
 
 
-@dataclass(frozen=True)
-class Names:
+class Names(NamedTuple):
     """What a dump says of its run: the problem, the resolved deck as TOML, the unit of time."""
 
     problem: str
@@ -71,8 +68,7 @@ class Names:
     t_unit: str = "s"
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(NamedTuple):
     """A stored array of `shape`, in a file beside this one or in this one ("."); of it the first
     entries lie in a larger array from `corner` on, `shown` of them along each axis there."""
 
@@ -83,8 +79,7 @@ class Source:
     shown: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class Virtual:
+class Virtual(NamedTuple):
     """An array that is stored elsewhere, in pieces."""
 
     dtype: np.dtype
@@ -282,15 +277,12 @@ def list_arrays(block: BlockView, output: Output | None = None) -> list[tuple[st
     ]
     if output is None:
         return arrays
-    chosen = []
-    for name, values in arrays:
-        if name not in COORDINATES:
-            if output.fields and name not in output.fields:
-                continue
-            if output.precision == "single" and values.dtype == np.float64:
-                values = values.astype(np.float32)
-        chosen.append((name, values))
-    return chosen
+    kept = [(n, v) for n, v in arrays if n in (*COORDINATES, *(output.fields or [n]))]
+    single = output.precision == "single"
+    return [
+        (n, v.astype(np.float32) if single and v.dtype == float and n not in COORDINATES else v)
+        for n, v in kept
+    ]
 
 
 def write_block(
@@ -361,7 +353,18 @@ def open_dump(path: Path) -> h5py.File:
         ) from error
     try:
         with damage_told(path, "its format"):
-            _check_format(path, file)
+            kind, version = file.attrs.get("format"), file.attrs.get("format_version")
+            if kind == FORMAT_OF_PARTS:
+                raise BadInput(f"{path} holds a part of a dump; the dump is what lists it")
+            if kind != FORMAT:
+                words = f"{path} is HDF5 but not a shockgrid dump (its 'format' is {kind!r})"
+                raise BadInput(words)
+            if version != FORMAT_VERSION:
+                found = "no format_version" if version is None else f"format_version {version}"
+                raise BadInput(
+                    f"{path} has {found}, and this shockgrid reads {FORMAT_VERSION} alone: use the "
+                    "version of shockgrid that wrote it"
+                )
             if crc is None:
                 raise BadInput(f"{path} is damaged: it has lost its checksum")
             check_parts(path, file)
@@ -369,21 +372,6 @@ def open_dump(path: Path) -> h5py.File:
         file.close()
         raise
     return file
-
-
-def _check_format(path: Path, file: h5py.File) -> None:
-    """Raise BadInput where a file is no dump, or one of a format that is not read here."""
-    kind, version = file.attrs.get("format"), file.attrs.get("format_version")
-    if kind == FORMAT_OF_PARTS:
-        raise BadInput(f"{path} holds a part of a dump; the dump is what lists it, beside it")
-    if kind != FORMAT:
-        raise BadInput(f"{path} is HDF5 but not a shockgrid dump (its 'format' is {kind!r})")
-    if version != FORMAT_VERSION:
-        found = "no format_version" if version is None else f"format_version {version}"
-        raise BadInput(
-            f"{path} has {found}, and this shockgrid reads {FORMAT_VERSION} alone: use the "
-            "version of shockgrid that wrote it"
-        )
 
 
 def has_state(path: Path) -> bool:

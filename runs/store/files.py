@@ -1,7 +1,13 @@
-"""Writing a file so that a reader sees the old one or the new one, never half of one.
+"""Writing a file so that a reader sees the old one or the new one, and knows whether it is whole.
 
 Errors of the disk come out as BadInput with the file's name: a full disk, a folder that cannot be
 written, are for the user to repair.
+
+A dump has one checksum, the CRC-32 of all its bytes but the eight digits that tell it: in the
+attribute `checksum` of the file's root, as text of fixed length, so that the HDF5 library reads it
+like any other attribute and this module finds it without that library.  A file is judged before
+anything in it is trusted.  Note: what changes a file on purpose (h5repack, an attribute added by
+hand) changes the sum.
 """
 
 from __future__ import annotations
@@ -9,13 +15,18 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import time
+import zlib
 from collections.abc import Iterable
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from regrid.errors import BadInput
+
+if TYPE_CHECKING:
+    import h5py
 
 fcntl: Any = None  # on Windows
 msvcrt: Any = None  # everywhere else
@@ -97,13 +108,25 @@ def check_replaceable(path: Path) -> None:
         raise BadInput(f"{path} is not a file but a device, a pipe or a socket; name a file")
 
 
-def check_not_of_a_run(path: Path) -> None:
-    """Raise BadInput for a name under which a run keeps its own: its deck, history, dumps."""
-    for home, known in ((path.parent, OWN_NAMES), (path.parent.parent, None)):
-        if known is None and path.parent.name != DUMPS:
-            continue
-        if (home / "deck.toml").exists() and (known is None or path.name in known):
-            raise BadInput(f"{path} is a file of the run in {home}; give another name")
+def check_free(path: Path, force: bool = True) -> None:
+    """Raise BadInput where a file that is asked for cannot or must not be written.
+
+    A run keeps its own under some names, and what exists is replaced with `force` alone.
+    """
+    check_replaceable(path)
+    home = path.parent.parent if path.parent.name == DUMPS else path.parent
+    own = home != path.parent or path.name in OWN_NAMES
+    if own and (home / "deck.toml").exists():
+        raise BadInput(f"{path} is a file of the run in {home}; give another name")
+    if path.exists() and not force:
+        raise BadInput(f"{path} exists; --force replaces it, -o chooses another name")
+    check_folder(path)
+
+
+def check_folder(path: Path) -> None:
+    """Raise BadInput where the folder of a file to be written does not exist."""
+    if not path.parent.is_dir():
+        raise BadInput(f"{path.parent} is not a folder, so {path.name} cannot be written")
 
 
 def sync_folder(folder: Path) -> None:
@@ -163,3 +186,100 @@ def try_lock(file: IO) -> bool:
         except PermissionError:
             return False
     return True
+
+
+CHECKSUM = "checksum"  # name of the attribute
+SUM_HEAD = b"crc32 of all other bytes: "
+DIGITS = 8
+BLANK = SUM_HEAD + b"0" * DIGITS  # the text of the attribute before the sum is known
+SEARCHED = 1 << 20  # bytes from a file's start in which the attribute lies
+CHUNK = 1 << 22  # bytes that are read at a time
+
+judged: dict[tuple, str | None] = {}  # sums of the files that this process has read
+
+
+def seal(image: bytes) -> list[memoryview | bytes]:
+    """The bytes of a file with its checksum in place of the blank one, in parts that follow one
+    another.  Raises ValueError where it has no attribute for it."""
+    view = memoryview(image)
+    place = bytes(view[:SEARCHED]).find(SUM_HEAD)
+    if place < 0:
+        raise ValueError("a file without the attribute for its checksum")
+    start = place + len(SUM_HEAD)
+    head, tail = view[:start], view[start + DIGITS :]
+    return [head, b"%08x" % zlib.crc32(tail, zlib.crc32(head)), tail]
+
+
+def write_sealed(path: Path, image: bytes) -> str:
+    """Put the bytes of a dump with a blank checksum at `path`, as `write_atomically`.
+
+    Returns the checksum.
+    """
+    pieces = seal(image)
+    write_atomically(path, pieces)
+    return bytes(pieces[1]).decode("ascii")
+
+
+def find_sum(path: Path) -> str | None:
+    """The checksum of a file that has the bytes that were written; "" where it has others, None
+    where it has no checksum.
+
+    Each file is read once a process, as long as nobody writes it.  Raises BadInput where it cannot
+    be read.
+    """
+    with disk_errors(path), open(path, "rb") as file:
+        now = os.fstat(file.fileno())
+        key = str(path.absolute()), now.st_ino, now.st_size, now.st_mtime_ns
+        if key not in judged:
+            first = file.read(SEARCHED)
+            place = first.find(SUM_HEAD)
+            start = place + len(SUM_HEAD)
+            found = zlib.crc32(first[start + DIGITS :], zlib.crc32(first[:start]))
+            while place >= 0 and (chunk := file.read(CHUNK)):
+                found = zlib.crc32(chunk, found)
+            sound = first[start : start + DIGITS] == b"%08x" % found
+            judged[key] = None if place < 0 else f"{found:08x}" if sound else ""
+        return judged[key]
+
+
+PARTS = "parts"  # the group of an index, whose attributes are its parts
+PART_NAME = re.compile(r"(.+)\.part-(\d+)-of-(\d+)\.h5")
+
+
+def find_parts_by_name(path: Path) -> list[Path]:
+    """The files beside the dump at `path` that are called parts of it."""
+    found = path.parent.glob(f"{path.stem}.part-*-of-*.h5")
+    return sorted(part for part in found if PART_NAME.fullmatch(part.name))
+
+
+def read_parts(file: h5py.File) -> dict[str, str]:
+    """The parts that an open dump lists: names of the files beside it, and their checksums.
+
+    {} for one that is whole in one file.  Raises KeyError where the list is lost.
+    """
+    if PARTS not in file:
+        return {}
+    parts = {name: str(crc) for name, crc in file[PARTS].attrs.items()}
+    if not parts:
+        raise KeyError(PARTS)
+    return parts
+
+
+def find_fault(path: Path, part: str, crc: str) -> str:
+    """What is wrong with a part of the index at `path`, in words that name it; "" for nothing."""
+    there = path.parent / part
+    if there.name != part or not there.is_file():
+        return f"its part {part} is not beside it"
+    found = find_sum(there)
+    if not found:
+        return f"its part {part} is truncated or damaged: its checksum is wrong"
+    if found != crc:
+        return f"its part {part} is of another dump (its checksum is {found}, not {crc})"
+    return ""
+
+
+def check_parts(path: Path, file: h5py.File) -> None:
+    """Raise BadInput where a part of an open dump is missing, damaged or another dump's."""
+    for part, crc in read_parts(file).items():
+        if fault := find_fault(path, part, crc):
+            raise BadInput(f"{path} cannot be read: {fault}")

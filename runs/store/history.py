@@ -1,4 +1,6 @@
-"""history.csv: one row a step, appended and flushed, so that a kill leaves it readable.
+"""history.csv, one row a step, and the restart point up to which it is whole.
+
+A row is appended and flushed, so that a kill leaves the file readable.
 
 The first row is step 0, where only some columns have a value; an empty field reads as nan (as ""
 in a column of words).  A last line without its end is an incomplete write; reading drops it.
@@ -11,6 +13,7 @@ follows the first such row is not trusted: a restart cuts the file there and com
 
 from __future__ import annotations
 
+import contextlib
 import os
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,8 +23,10 @@ from typing import Any
 
 import numpy as np
 
-from problems.evolution import Evolution, get_start_row
+from problems.evolution import Evolution, get_start_row, take_cells
 from regrid.errors import BadInput
+from runs.store.directory import RunDirectory
+from runs.store.dumps import has_state, open_dump, read_state
 from runs.store.files import disk_errors, write_atomically
 
 SUM = "crc32"
@@ -52,6 +57,14 @@ class Rows:
         if self.fault:
             raise BadInput("; ".join([f"{self.path} {self.fault}", *filter(None, [words])]))
 
+    def drop_foreign(self, step: int, t: float) -> None:
+        """Trust no row where that of `step` has another time than the dump of that step, `t`."""
+        text = dict(self.rows).get(step)
+        if text is not None and self.columns is not None and "t" in self.columns:
+            if float(text.split(",")[self.columns.index("t")]) != t:
+                self.rows, self.columns = [], None
+                self.fault = f"has a row of step {step} that is not of t = {t:.6g} s"
+
 
 def read_rows(path: Path, newest: int = 0) -> Rows:
     """The rows of a file up to the first that is damaged; BadInput where it cannot be opened.
@@ -62,8 +75,24 @@ def read_rows(path: Path, newest: int = 0) -> Rows:
     with disk_errors(path):
         lines = path.read_bytes().split(b"\n")[:-1] if path.exists() else []  # the last is torn
     if lines:
-        _read_lines(found, lines)
-    if not found.fault and newest and found.last < newest:
+        names = lines[0].decode("utf-8", "replace").split(",")
+        if "step" not in names or names[-1] != SUM:
+            found.fault = "is damaged in its first line, that of the names"
+            return found
+        found.columns = names[:-1]
+        start, where = zlib.crc32(lines[0]), names.index("step")
+    for number, line in enumerate(lines[1:], start=2):
+        text, _, digits = line.rpartition(b",")
+        try:
+            good = int(digits) == _sum(start, found.last, text)
+            found.rows += [(int(text.split(b",")[where]), line.decode("utf-8", "replace"))] * good
+        except (ValueError, IndexError):
+            good = False
+        if not good:
+            after = f"step {found.last}" if found.rows else "its names"
+            found.fault = f"is damaged, or lacks rows, from line {number} on (after {after})"
+            return found
+    if newest and found.last < newest:
         there = (
             f"ends at step {found.last}" if found.rows else "is empty" if lines else "is missing"
         )
@@ -71,30 +100,9 @@ def read_rows(path: Path, newest: int = 0) -> Rows:
     return found
 
 
-def _read_lines(found: Rows, lines: Sequence[bytes]) -> None:
-    names = lines[0].decode("utf-8", "replace").split(",")
-    if "step" not in names or names[-1] != SUM:
-        found.fault = "is damaged in its first line, that of the names"
-        return
-    found.columns = names[:-1]
-    start, where, last = zlib.crc32(lines[0]), names.index("step"), None
-    for number, line in enumerate(lines[1:], start=2):
-        text, _, digits = line.rpartition(b",")
-        try:
-            good = int(digits) == _sum(start, last, text)
-            step = int(text.split(b",")[where])
-        except (ValueError, IndexError):
-            good = False
-        if not good:
-            after = "its names" if last is None else f"step {last}"
-            found.fault = f"is damaged, or lacks rows, from line {number} on (after {after})"
-            return
-        found.rows.append((step, line.decode("utf-8", "replace")))
-        last = step
-
-
-def _sum(start: int, after: int | None, text: bytes) -> int:
-    before = b"" if after is None else str(after).encode("ascii")
+def _sum(start: int, after: int, text: bytes) -> int:
+    """The checksum of a row behind that of step `after`, -1 for none."""
+    before = b"" if after < 0 else str(after).encode("ascii")
     return zlib.crc32(before + b":" + text, start)
 
 
@@ -105,8 +113,7 @@ class HistoryWriter:
         self.path = path
         self.columns = columns
         self._waiting: list[dict[str, Any]] = []
-        # step of the last row
-        self._last: int | None = None if columns is None else read_rows(path).last
+        self._last = -1 if columns is None else read_rows(path).last  # step of the last row
         with disk_errors(path):
             self._file = open(path, "a", encoding="utf-8", newline="")
 
@@ -126,7 +133,7 @@ class HistoryWriter:
             raise BadInput(f"{self.path}: {describe_change(self.columns, row)}")
         start = zlib.crc32(",".join([*self.columns, SUM]).encode("utf-8"))
         for one in rows:
-            text = format_row(self.columns, one)
+            text = ",".join([_format_value(one.get(name, "")) for name in self.columns])
             lines.append(f"{text},{_sum(start, self._last, text.encode('utf-8'))}")
             self._last = int(one["step"])
         with disk_errors(self.path):
@@ -141,21 +148,13 @@ class HistoryWriter:
 
     def close(self) -> None:
         """Close the file; more rows cannot follow."""
-        try:
+        with contextlib.suppress(OSError):  # what could not be flushed `append` has reported
             self._file.close()
-        except OSError:
-            pass  # what could not be flushed has been reported by `append`
-
-
-def format_row(columns: Sequence[str], row: Mapping[str, Any]) -> str:
-    """The text of a row without its checksum; empty for what the row does not have."""
-    values = [row.get(name, "") for name in columns]
-    return ",".join(
-        [repr(value) if type(value) in NUMBERS else _format_value(value) for value in values]
-    )
 
 
 def _format_value(value: Any) -> str:
+    if type(value) in NUMBERS:
+        return repr(value)
     if isinstance(value, str):
         return value.replace(",", ";").replace('"', "'").replace("\n", " ")
     if isinstance(value, bool | np.bool_ | int | np.integer):
@@ -193,14 +192,11 @@ def read_columns(found: Rows) -> dict[str, np.ndarray]:
 
 
 def _to_array(texts: tuple[str, ...]) -> np.ndarray:
-    try:
+    with contextlib.suppress(ValueError, OverflowError):
         return np.array([int(text) for text in texts], dtype=np.int64)
-    except (ValueError, OverflowError):
-        pass
-    try:
+    with contextlib.suppress(ValueError):
         return np.array([float(text) if text else np.nan for text in texts], dtype=np.float64)
-    except ValueError:
-        return np.array(texts, dtype=str)
+    return np.array(texts, dtype=str)
 
 
 def check_columns(path: Path, evolution: Evolution, measured: Iterable[str]) -> None:
@@ -241,3 +237,76 @@ def truncate_history(path: Path, step: int, found: Rows) -> list[str] | None:
     kept = [line for number, line in found.rows if number <= step]
     write_atomically(path, "\n".join([",".join([*found.columns, SUM]), *kept, ""]))
     return found.columns
+
+
+def find_restart_point(
+    directory: RunDirectory, at: int | None, say=lambda text: None, tables: Sequence[Path] = ()
+) -> tuple[dict[str, Any], int, list[Rows]]:
+    """State and step of the last restart point that can be read, or of step `at`; rows of `tables`.
+
+    tables: the history, and the table of gauges of a deck that has some.  Where one of them is
+    damaged, or ends before a point, the point is one from before that; at step 0 they start again.
+    """
+    points = [entry for entry in directory.list_points() if not is_light(entry[1])]
+    newest = points[-1][0] if points else 0
+    found = [read_rows(path, newest) for path in tables]
+    if at is not None:
+        steps = ", ".join(str(step) for step in sorted({step for step, _ in points})) or "none"
+        points = [entry for entry in points if entry[0] == at]
+        if not points:
+            raise BadInput(f"{directory} has no restart point of step {at}; there are: {steps}")
+    for step, path in reversed(points):
+        try:
+            for rows in found:
+                with open_dump(path) as file:
+                    rows.drop_foreign(step, float(file.attrs["t"]))
+            behind = [rows for rows in found if step and rows.last < step]
+            if not behind:
+                return read_state(path), step, found
+            if at is not None:
+                behind[0].check("choose an earlier restart point with --at")
+        except BadInput as error:
+            if at is not None:
+                raise
+            say(f"skipped: {error}")
+    if not directory.list_points():
+        raise BadInput(
+            f"nothing was computed yet in {directory}, so there is nothing to continue; start it "
+            f"again: shockgrid run {directory.quoted}/deck.toml -o {directory.quoted} --force"
+        )
+    for rows in found:
+        rows.check("no restart point is earlier; start the run again")
+    raise BadInput(f"{directory} has no readable restart point; start the run again")
+
+
+def is_light(path: Path) -> bool:
+    """Is the dump at `path` one without a state?"""
+    try:
+        return not has_state(path)
+    except BadInput:  # torn: told of when it is read
+        return False
+
+
+def restore(
+    evolution: Evolution, state: dict[str, Any], directory: RunDirectory, step: int
+) -> None:
+    """Give `state` to a freshly built evolution; BadInput where the two do not fit."""
+    take_cells(evolution, state)
+    expected = evolution.get_state()
+    missing = sorted(set(expected) - set(state))
+    if missing:
+        raise BadInput(
+            f"the restart point of step {step} in {directory} was written by another version: "
+            f"it lacks {', '.join(missing[:4])}"
+        )
+    for name, value in expected.items():
+        shape, stored = np.shape(value), np.shape(state[name])
+        if shape != stored:
+            raise BadInput(
+                f"the restart point of step {step} in {directory} has {name} of shape {stored}, "
+                f"with this deck it would be {shape}: the deck's changes change the grid; "
+                "begin a new run instead"
+            )
+    evolution.set_state(state)
+    if evolution.step != step:
+        raise BadInput(f"the restart point of step {step} holds step {evolution.step}")

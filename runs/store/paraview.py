@@ -17,9 +17,8 @@ import h5py
 import numpy as np
 
 from regrid.errors import BadInput
-from runs.store.checksum import find_sum
 from runs.store.dumps import damage_told, open_dump
-from runs.store.files import write_atomically
+from runs.store.files import find_sum, write_atomically
 from runs.store.provenance import describe_software
 
 
@@ -70,21 +69,16 @@ class Sidecar:
             with contextlib.suppress(BadInput):
                 key = dump, find_sum(dump)
                 if key not in self._known:
+                    place = os.path.relpath(dump, self.path.parent)
                     with open_dump(dump) as file, damage_told(dump, "its blocks"):
-                        self._known[key] = self._describe(dump, file)
+                        blocks = "".join(describe_block(g, place) for g in file["blocks"].values())
+                        time = f'<Time Value="{float(file.attrs["t"])!r}"/>'
+                    grid = '<Grid Name="blocks" GridType="Collection" CollectionType="Spatial">'
+                    self._known[key] = f"{grid}\n{time}\n{blocks}</Grid>\n"
                 steps.append(self._known[key])
         grid = '<Grid Name="run" GridType="Collection" CollectionType="Temporal">\n'
         content = "".join([HEAD, grid, *steps, "</Grid>\n", TAIL])
         write_atomically(self.path, content, durable=False)
-
-    def _describe(self, dump: Path, file: h5py.File) -> str:
-        """One moment: a spatial collection of all blocks of the dump."""
-        reference = os.path.relpath(dump, self.path.parent)
-        blocks = "".join(describe_block(group, reference) for group in file["blocks"].values())
-        return (
-            '<Grid Name="blocks" GridType="Collection" CollectionType="Spatial">\n'
-            f'<Time Value="{float(file.attrs["t"])!r}"/>\n{blocks}</Grid>\n'
-        )
 
 
 def describe_block(group: h5py.Group, reference: str) -> str:

@@ -13,21 +13,20 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from problems.deck import Output
 from problems.evolution import BlockView, Evolution, State, get_state_of
 from regrid.errors import BadInput
-from runs.store.checksum import write_sealed
 from runs.store.dumps import FORMAT_OF_PARTS, Names, Source, Virtual, list_arrays, make_tree
+from runs.store.files import write_sealed
 
 
-@dataclass(frozen=True)
-class Share:
+class Share(NamedTuple):
     """What of a run one process writes: its number, how many there are, its rows of each block.
 
     rows: by block (first, end), in cells; a block of which nothing is the process's own is left
@@ -41,8 +40,7 @@ class Share:
     gather: Callable[[Any], list[Any]]
 
 
-@dataclass(frozen=True)
-class Band:
+class Band(NamedTuple):
     """Rows of an array in a part: type, shape and, among those of the whole, the first of them.
 
     axis: along which the rows run.
@@ -74,28 +72,24 @@ def write_dump_in_parts(
     Raises BadInput in all processes where the disk has refused one of them.
     """
     there = path.with_name(f"{path.stem}.part-{share.rank}-of-{share.size}.h5")
-    told = share.gather(_try(lambda: _write_part(there, evolution, names, output, share.rows)))
-    failures = _find_errors(told)
-    done = None
-    if share.rank == 0 and not failures:
-        done = _try(lambda: _write_index(path, told, evolution, names, besides, output))
-    failures += _find_errors(share.gather(done))
-    if failures:
-        there.unlink(missing_ok=True)
-        raise BadInput(failures[0])
 
+    def agree(call: Callable[[], Any]) -> list[Any]:
+        """What all processes have called it for; one that has failed ends it in all."""
+        try:
+            with _MAKING:
+                told = call()
+        except BadInput as error:
+            told = error
+        everything = share.gather(told)
+        for failure in everything:
+            if isinstance(failure, BadInput):
+                there.unlink(missing_ok=True)
+                raise BadInput(str(failure))
+        return everything
 
-def _try(call: Callable[[], Any]) -> Any:
-    """What a call returns, or the sentence of a BadInput that it raises."""
-    try:
-        with _MAKING:
-            return call()
-    except BadInput as error:
-        return str(error)
-
-
-def _find_errors(told: Sequence[Any]) -> list[str]:
-    return [words for words in told if isinstance(words, str)]
+    receipts = agree(lambda: _write_part(there, evolution, names, output, share.rows))
+    index = partial(_write_index, path, receipts, evolution, names, besides, output)
+    agree(index if share.rank == 0 else lambda: None)
 
 
 def _write_part(

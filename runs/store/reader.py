@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,15 @@ from problems.problem import Problem
 from regrid.errors import BadInput, suggest
 from regrid.measure.corners import compute_centres
 from runs.deck.reading import ReadDeck, read_toml
-from runs.store.directory import RunDirectory, open_directory
-from runs.store.dumps import damage_told, has_state, open_dump, read_state
-from runs.store.guards import check_deck, check_summary, read_run_deck, read_verdict
+from runs.store.directory import (
+    RunDirectory,
+    check_deck,
+    check_noted,
+    open_directory,
+    read_run_deck,
+    read_verdict,
+)
+from runs.store.dumps import damage_told, open_dump, read_state
 from runs.store.history import read_columns, read_history, read_rows
 
 MOST_ROWS = 30  # of a table on the screen
@@ -126,10 +133,16 @@ def load_package(name: str, call: str) -> Any:
 
 
 class Fields(Mapping[str, np.ndarray]):
-    """Fields of a block by name; an array is read when it is asked for."""
+    """Fields of a block by name; an array is read when it is asked for, once if it is to be kept.
 
-    def __init__(self, where: str, names: Iterable[str], read: Callable[[str], np.ndarray]):
-        self._where, self._names, self._read = where, tuple(names), read
+    read: gives the array of a name; it can be copied to another process where it is no closure.
+    """
+
+    def __init__(
+        self, where: str, names: Iterable[str], read: Callable[[str], np.ndarray], keep=False
+    ):
+        self._where, self._names, self._read, self._keep = where, tuple(names), read, keep
+        self._known: dict[str, np.ndarray] = {}
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self._names:
@@ -138,7 +151,12 @@ class Fields(Mapping[str, np.ndarray]):
                 f"{self._where} has no field {name!r}; there are: {there} "
                 "(output.fields of a deck chooses those of dumps)"
             )
-        return self._read(name)
+        if name in self._known:
+            return self._known[name]
+        values = self._read(name)
+        if self._keep:
+            self._known[name] = values
+        return values
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
@@ -198,17 +216,9 @@ class BlockData:
         return f"<block {self.name}: {self.material}, {ni} x {nj} cells>"
 
 
-class _Stored(dict[str, np.ndarray]):
-    """Arrays of a group of a dump, each read at its first use; unlike a function it can be copied
-    to another process."""
-
-    def __init__(self, path: Path, group: str):
-        self.path, self.group = path, group
-
-    def __missing__(self, name: str) -> np.ndarray:
-        with open_dump(self.path) as file, damage_told(self.path, f"{self.group}/{name}"):
-            self[name] = file[self.group][name][()]
-        return self[name]
+def _read_array(path: Path, group: str, name: str) -> np.ndarray:
+    with open_dump(path) as file, damage_told(path, f"{group}/{name}"):
+        return file[group][name][()]
 
 
 def _read_block(path: Path, group: Any) -> BlockData:
@@ -216,24 +226,23 @@ def _read_block(path: Path, group: Any) -> BlockData:
     name: str = group.name.rsplit("/", 1)[-1]
     nodes = np.stack([group["x"][()], group["y"][()]])
     radial = str(group["y"].attrs.get("long_name", "")).startswith("r ")
-    fields = {n: d for n, d in group.items() if d.ndim == 2 and n not in ("x", "y")}
-    at_nodes = [n for n, d in fields.items() if d.shape == nodes.shape[1:]]
     cells = tuple(n - 1 for n in nodes.shape[1:])
+    fields = {n: d for n, d in group.items() if d.ndim == 2 and n not in ("x", "y")}
     state = group.file.get(f"state/{name}", {})
-    stored = [n for n, d in state.items() if getattr(d, "shape", ()) == cells]
 
-    def make_fields(names: Iterable[str], folder: str = "blocks") -> Fields:
-        read = _Stored(path, f"{folder}/{name}").__getitem__
-        return Fields(f"{path}: block {name!r}", names, read)
+    def make_fields(there: Mapping[str, Any], shape: tuple, folder: str = "blocks") -> Fields:
+        names = [n for n, data in there.items() if getattr(data, "shape", ()) == shape]
+        read = partial(_read_array, path, f"{folder}/{name}")
+        return Fields(f"{path}: block {name!r}", names, read, keep=True)
 
     return BlockData(
         name,
         str(group.attrs["material"]),
         ("x", "r" if radial else "y"),
         nodes.view,
-        make_fields([n for n in fields if n not in at_nodes]),
-        make_fields(at_nodes),
-        make_fields(stored, "state"),
+        make_fields(fields, cells),
+        make_fields(fields, nodes.shape[1:]),
+        make_fields(state, cells, "state"),
         {n: str(data.attrs.get("units", "1")) for n, data in fields.items()},
         {n: str(data.attrs.get("long_name", n)) for n, data in fields.items()},
     )
@@ -295,6 +304,7 @@ class Dump(Snapshot):
             self.finished = str(at["finished"])
             self.deck_text = str(at["deck"])
             made = dict(file["provenance"].attrs) if "provenance" in file else {}
+            self.has_state = "state" in file  # can a run go on from it?  Not so for light dumps
         self.provenance = {name: str(words) for name, words in made.items()}  # what made it
         self.is_restart_point = path.name.startswith("restart")
 
@@ -302,11 +312,6 @@ class Dump(Snapshot):
     def blocks(self) -> list[BlockData]:  # type: ignore[override]
         with open_dump(self.path) as file, damage_told(self.path, "its blocks"):
             return [_read_block(self.path, group) for group in file["blocks"].values()]
-
-    @cached_property
-    def has_state(self) -> bool:
-        """Can a run go on from it?  Not so for light dumps."""
-        return has_state(self.path)
 
     def state(self) -> dict[str, Any]:
         """The restart state."""
@@ -328,7 +333,7 @@ class RunData:
         self.table = read_toml(self.directory.deck)
         self.problem_name = str(self.table.get("problem", ""))
         self.said: list[str] = []  # sentences about what is wrong and harms nothing
-        for check in (check_deck, check_summary):
+        for check in (check_deck, lambda home: check_noted(home, home.summary)):
             try:
                 self.said += filter(None, [check(self.directory)])
             except BadInput as error:
@@ -403,7 +408,7 @@ class RunData:
     @cached_property
     def outputs(self) -> list[Dump]:
         """The dumps that the deck asks for, in order of time."""
-        read = (self._try(path) for _, path in self.directory.list_files("dump"))
+        read = (self._try(path) for _, path in self.directory.list_points("dump"))
         return [dump for dump in read if dump]
 
     @cached_property
@@ -413,7 +418,7 @@ class RunData:
         So the last dump shows the last state that is known of a run that was stopped or failed.
         """
         last = self.outputs[-1].step if self.outputs else -1
-        newer = [path for step, path in self.directory.list_files("restart") if step > last]
+        newer = [path for step, path in self.directory.list_points("restart") if step > last]
         read = (self._try(path) for path in reversed(newer))
         return [*self.outputs, *[dump for dump in read if dump][:1]]
 
@@ -421,11 +426,9 @@ class RunData:
     def restart_step(self) -> int | None:
         """Step of the last restart point that can be read; None where there is none."""
         for step, path in reversed(self.directory.list_points()):
-            try:
+            with contextlib.suppress(BadInput):  # torn
                 if Dump(path).has_state:
                     return step
-            except BadInput:  # torn
-                continue
         return None
 
     def _try(self, path: Path) -> Dump | None:

@@ -34,9 +34,8 @@ from runs.deck.reading import ReadDeck, packaged_decks, read_deck, read_toml, to
 from runs.inspection.account import HEAD, describe_cautions
 from runs.march.launching import continue_runner, start_runner
 from runs.march.runner import Runner
-from runs.store.directory import RunDirectory
+from runs.store.directory import RunDirectory, read_run_deck
 from runs.store.files import disk_errors, write_atomically
-from runs.store.guards import read_run_deck
 from runs.store.history import read_history
 from runs.verify import CASES
 

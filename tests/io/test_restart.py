@@ -46,7 +46,7 @@ def test_signal_leaves_a_restart_point(shockgrid, spawn, toy, number, code):
     shockgrid("run", "toy", "-o", "whole", "-q", *words)
     code, text, _ = shockgrid("compare", "whole", "stopped")
     assert code == 0, text
-    assert not RunData("stopped").directory.list_files("restart")
+    assert not RunData("stopped").directory.list_points("restart")
 
 
 def test_damaged_last_dump_is_skipped(shockgrid):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from regrid.errors import BadInput
-from runs.store.checksum import find_sum, seal
 from runs.store.dumps import open_dump
+from runs.store.files import find_sum, seal
 from runs.store.reader import RunData
 
 LIGHT = ("--set", "output.precision=single")

@@ -16,8 +16,8 @@ from in_parts import cut_in_bands, deal_blocks, write_in_parts
 from processes import forks, run_and_die
 
 from regrid.errors import BadInput
-from runs.store.checksum import find_parts_by_name, read_parts
 from runs.store.dumps import open_dump, read_state
+from runs.store.files import find_parts_by_name, read_parts
 from runs.store.reader import RunData
 
 RUN = ("run", "toy", "-q", "--set", "cells=6", "--set", "output.dumps=3")

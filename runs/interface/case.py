@@ -36,6 +36,7 @@ from problems.problem import Problem, check_memory
 from regrid.errors import BadInput, suggest
 from runs.deck.reading import ReadDeck, read_deck, resolve_deck
 from runs.inspection.account import describe_time
+from runs.march.compiling import compiling
 from runs.march.launching import start_runner
 from runs.march.runner import Ending, Runner
 from runs.ranks.started import check_single
@@ -478,7 +479,8 @@ class Case(Drawn):
                 f"{self.name} has made {self.step} steps already, and max_steps = {most}: nothing "
                 "is left to do; give a larger one, or make a new simulation"
             )
-        self.measure()
+        with compiling(quiet):
+            self.measure()
         with said_in_python():
             wanted = None if directory is None else str(directory)
             built = self.problem, self.simulation

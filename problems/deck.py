@@ -68,7 +68,7 @@ class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
 
     merges: ClassVar[bool] = False
     overruled: ClassVar[dict[str, str]] = {}
-    absent: ClassVar[dict[str, str]] = {}
+    absent: ClassVar[dict[str, str | float]] = {}
     runtime: ClassVar[tuple[str, ...]] = ()
 
     @classmethod

@@ -13,7 +13,7 @@ number of its first face, and where its law begins in an array of several lines'
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -295,17 +295,37 @@ def fill_line_damping(line, rim, start, strength, bend, most, out):
 
 
 @dataclass(frozen=True)
+class Respacing:
+    """Spacings of sides that change on the way, smoothly, from the first ones to others.
+
+    `laws`: by the block's name, the last spacing (ni + 1,) from 0 to 1 of its sides j_min and
+    j_max; `start`, `end` [s]: when they begin to change and when they have done so.
+    """
+
+    laws: Mapping[str, np.ndarray]
+    start: float
+    end: float
+
+    def compute_share(self, t: float) -> float:
+        """How far the change has come at t [s], from 0 to 1."""
+        part = min(1.0, max(0.0, (t - self.start) / (self.end - self.start)))
+        return part * part * (3.0 - 2.0 * part)
+
+
+@dataclass(frozen=True)
 class LineRule:
-    """How moving lines are kept in shape.
+    """How lines are kept in shape.
 
     `shape` of the line between nodes when they are re-spaced, "chord" or "spline"; `relax`: part
     of the way to the spacing in a full step; `thickness` [m] of interfaces, see
-    `hydro.motion.thickness`, None: THICK_CELLS of their first cells.
+    `hydro.motion.thickness`, None: THICK_CELLS of their first cells; `respacing` of straight sides
+    and of seams.
     """
 
     shape: str = "spline"
     relax: float = 0.05
     thickness: float | None = None
+    respacing: Respacing | None = None
 
 
 class Line:
@@ -323,6 +343,9 @@ class Line:
         line = np.ascontiguousarray(segment.line(segment.block.nodes))
         self.track = Track(line)
         self.law = curves.arc_law(line)
+        self.last_law = None  # where the spacing changes on the way
+        if rule.respacing is not None and segment.side in ("j_min", "j_max"):
+            self.last_law = rule.respacing.laws.get(segment.block.name)
         self.walls = [curves.FREE_END, curves.FREE_END]
         self.period: np.ndarray | None = None  # from the first node to the last, where they repeat
         self.neighbours: list[tuple[Line, int] | None] = [None, None]  # that go on, at which end
@@ -341,6 +364,12 @@ class Line:
         self.at_contact = False  # goes on from an end of a sliding contact
         self.is_kinked = False  # does it lie on another body's surface in part?
         self.follows_contact = False  # lies opposite to a contact point, whose law it shares
+
+    def find_law(self, t: float) -> np.ndarray:
+        """The spacing at t [s]."""
+        if self.last_law is None:
+            return self.law
+        return self.law + self.rule.respacing.compute_share(t) * (self.last_law - self.law)
 
     def beside(self, end: int, new: bool = False) -> np.ndarray:
         """The two old (or new) nodes (2, 2) next to an end, the nearer first."""
@@ -513,6 +542,9 @@ class JoinedLine(Line):
         self.moved[:, 1:-1] = old[:, 1:-1] + (
             step[:, :1] * (1.0 - self.law[1:-1]) + step[:, 1:] * self.law[1:-1]
         )
+        if self.last_law is not None:
+            change = self.find_law(span.t + span.dt) - self.find_law(span.t)
+            self.moved[:, 1:-1] += (new[:, -1:] - new[:, :1]) * change[1:-1]
 
 
 LINES: dict[NodeMotion, type[Line]] = {

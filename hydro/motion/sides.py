@@ -39,6 +39,13 @@ class StraightSides:
         self.spans = np.array([line.span for line in lines])
         counts = [line.law.size for line in lines]
         self.spans[:, -1] = np.cumsum(counts) - counts
+        self.respaced = any(line.last_law is not None for line in lines)
+
+    def spread(self, t: float) -> None:
+        """Lay their new nodes, by their spacings at t [s], between their new ends."""
+        if self.respaced:
+            self.laws = np.concatenate([line.find_law(t) for line in self.lines])
+        spread_straight(self.block.nodes_new, self.spans, self.laws)
 
     @classmethod
     def find(cls, lines: list[Line]) -> list[StraightSides]:
@@ -305,7 +312,7 @@ def lay_slaves(sides: Sides, span: Span) -> None:
 
 def spread_lines(sides: Sides, span: Span) -> None:
     for straight in sides.straight:
-        spread_straight(straight.block.nodes_new, straight.spans, straight.laws)
+        straight.spread(span.t + span.dt)
     for line in sides.cut:
         line.settle(span.fraction)
     for line in sides.waiting:

@@ -166,25 +166,26 @@ def _lay_sides(old: Simulation, new: Simulation) -> None:
             here = block.nodes_new[:, i, j]
             node.shift(track.at(track.locate(here)) - here)
     for before, line in pairs:
-        _lay_line(before, line)
+        _lay_line(before, line, old.t)
     for link in new.exchange.links:
         link.swap_line()
 
 
-def _lay_line(before: Line, line: Line) -> None:
-    """The inner nodes of a line between its new ends."""
+def _lay_line(before: Line, line: Line, t: float) -> None:
+    """The inner nodes of a line between its new ends, by the spacings at t [s]."""
+    law = line.find_law(t)
     target = line.segment.line(line.segment.block.nodes_new)
     if line.segment.motion is NodeMotion.SLIDE:
         if line.track.straight:
             first, last = target[:, :1].copy(), target[:, -1:].copy()
-            target[:, 1:-1] = (first + (last - first) * line.law)[:, 1:-1]
+            target[:, 1:-1] = (first + (last - first) * law)[:, 1:-1]
         else:
-            target[:, 1:-1] = line.track.spread(target[:, 0], target[:, -1], line.law)[:, 1:-1]
+            target[:, 1:-1] = line.track.spread(target[:, 0], target[:, -1], law)[:, 1:-1]
         return
     curve = before.segment.line(before.segment.block.nodes)
-    spread = spread_anew(curve, before.law, line.law)
+    spread = spread_anew(curve, before.find_law(t), law)
     miss = target[:, [0, -1]] - spread[:, [0, -1]]  # ends that went on to a finer track
-    spread += miss[:, :1] * (1.0 - line.law) + miss[:, 1:] * line.law
+    spread += miss[:, :1] * (1.0 - law) + miss[:, 1:] * law
     target[:, 1:-1] = spread[:, 1:-1]
 
 

@@ -58,7 +58,7 @@ class InterfaceDeck(Deck, kw_only=True):
     """Deck of `interface-instability`; the defaults are the 1:3 gas at Mach 1.5."""
 
     runtime = ("kct_end",)
-    absent: ClassVar[dict[str, str]] = {"start": "incident"}
+    absent: ClassVar[dict[str, str | float]] = {"start": "incident", "passage_refinement": 1.0}
     overruled: ClassVar[dict[str, str]] = {"kct_end": "run.t_end"}
 
     run: RunControl = RunControl(cfl=0.8)
@@ -93,7 +93,7 @@ class InterfaceDeck(Deck, kw_only=True):
     )
     uniform: key(float, "evenly spaced zone on each side, in wavelengths", ge=0) = 1.0
     stretch: key(float, "growth of cells from one to the next beyond it", ge=1, le=1.5) = 1.01
-    reach: key(float, "distance from the interface, in waves, where grid lines bend", gt=0) = 0.25
+    reach: key(float, "distance from the interface, in waves, where grid lines bend", gt=0) = 0.1
     lengths: key(
         tuple[float, float] | None,
         "lengths of the two materials [m]; left out: too long for a reflection to return",
@@ -113,6 +113,13 @@ class InterfaceDeck(Deck, kw_only=True):
     gap: key(float, "first distance of the shock from the interface, in waves", ge=0.01, le=20) = (
         0.3
     )
+    passage_refinement: key(
+        float,
+        "start incident: how many times finer cells are across the interface until the shock has "
+        "passed it",
+        ge=1,
+        le=64,
+    ) = 4.0
     kct_end: key(
         float, "end: k c t after arrival, c of the shocked second material", gt=0, le=10000
     ) = 30.0

@@ -22,7 +22,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.boundary import put
 from hydro.links import Link, join
-from hydro.motion.line import THICK_CELLS, LineRule
+from hydro.motion.line import THICK_CELLS, LineRule, Respacing
 from hydro.rows import V
 from hydro.simulation import Simulation
 from problems.deck import MOST_CELLS, check_digests
@@ -46,6 +46,7 @@ from problems.interface_instability.report import (
     draw_spectrum,
     make_report,
 )
+from problems.interface_instability.spacing import NODE_SPEED, ZONE, Spacing
 from problems.interface_instability.theories import find_cautions
 from problems.problem import BlockPlan, Problem, Report
 from problems.references.hugoniot import (
@@ -328,41 +329,34 @@ class InterfaceInstability(Problem):
         late = second * (front - self.theory.base.u + back) / (front * back)
         return {"first": self._find_first_echo(first), "second": self.arrival + late}
 
-    def make_spacing(self, length: float) -> np.ndarray:
-        """Distances of the nodes from the interface, from 0 to `length`."""
-        self.count_columns(length)
-        deck = self.deck
-        size = deck.wavelength / deck.cells
-        even = min(length, deck.uniform * deck.wavelength)
-        steps = [size] * max(1, round(even / size))
-        reach = sum(steps)
-        while reach < length * (1.0 - 1e-9):
-            steps.append(steps[-1] * deck.stretch)
-            reach += steps[-1]
-        positions = np.concatenate([[0.0], np.cumsum(steps)])
-        return positions * (length / positions[-1])
+    @functools.cached_property
+    def spacing(self) -> Spacing:
+        """Cells across the interface of a run that begins before the shock's passage.
+
+        A weight of the regridder places its cells itself.
+        """
+        finer = self.start == "incident" and not self.deck.regrid.weight
+        return Spacing(self.deck, self.deck.passage_refinement if finer else 1.0)
+
+    def make_respacing(self) -> Respacing | None:
+        """How cells that are finer for the passage grow when its waves have left them."""
+        if self.spacing.finer == 1.0:
+            return None
+        base, laws, ways = self.theory.base, {}, []
+        for name, length in zip(("first", "second"), self.choose_lengths(), strict=True):
+            law = self.spacing.make_last_law(length)
+            ways.append(np.abs(law * length - self.spacing.make(length)).max())
+            laws[name] = law if name == "second" else (1.0 - law)[::-1]
+        start = self._find_last_arrival() + ZONE * self.deck.wavelength / find_nearer_speed(base)
+        slowest = min(
+            self.theory.sound_speed, float(self.eos_first.sound_speed(base.rho_left, base.p))
+        )
+        return Respacing(laws, start, start + 1.5 * max(ways) / (NODE_SPEED * slowest))
 
     def estimate_cells(self) -> int:
-        """Rows of the interface times the columns of `make_spacing`, without making them."""
-        columns = sum(map(self.count_columns, self.choose_lengths()))
+        """Rows of the interface times the columns of `spacing`, without making them."""
+        columns = sum(map(self.spacing.count, self.choose_lengths()))
         return math.ceil(columns * self.count_rows())
-
-    def count_columns(self, length: float) -> float:
-        """Cells of `make_spacing` by arithmetic; BadInput for more than a side may have."""
-        deck = self.deck
-        size = deck.wavelength / deck.cells
-        even = min(length, deck.uniform * deck.wavelength)
-        growing = max(0.0, length - even) / size
-        if deck.stretch > 1.0:
-            rate = deck.stretch - 1.0
-            growing = math.log1p(growing * rate) / math.log1p(rate)
-        columns = max(1.0, even / size) + growing
-        if columns > 10.0 * MOST_CELLS:
-            raise BadInput(
-                f"deck: a block {length:g} m long would have {columns:.3g} cells along it; it may "
-                f"have {10 * MOST_CELLS}: take fewer `cells`, shorter `lengths`, more `stretch`"
-            )
-        return columns
 
     def make_interface(self) -> np.ndarray:
         """First nodes (2, n) of the interface, checked."""
@@ -389,7 +383,7 @@ class InterfaceInstability(Problem):
         """End time and sizes of both blocks."""
         front, y = self.make_interface()
         low, high = self.find_ends()
-        columns = [len(self.make_spacing(length)) - 1 for length in self.choose_lengths()]
+        columns = [len(self.spacing.make(length)) - 1 for length in self.choose_lengths()]
         if self.start == "crossed":  # whose cells fit to the fronts
             columns = self.crossed.count_columns()
             front = front - self.theory.base.u * self.arrival
@@ -413,7 +407,7 @@ class InterfaceInstability(Problem):
         reach = max(self.deck.reach * self.deck.wavelength, BENDS * np.abs(front).max())
         grids = []
         for sign, length in zip((-1.0, 1.0), self.choose_lengths(), strict=True):
-            away = self.make_spacing(length)
+            away = self.spacing.make(length)
             away = away[::-1] if sign < 0.0 else away
             left = np.maximum(0.0, 1.0 - away / min(reach, length))
             part = left * left * (3.0 - 2.0 * left)
@@ -435,7 +429,9 @@ class InterfaceInstability(Problem):
         return self.simulate(
             blocks,
             links,
-            line_rule=LineRule(deck.line.shape, deck.line.relax, self.thickness),
+            line_rule=LineRule(
+                deck.line.shape, deck.line.relax, self.thickness, self.make_respacing()
+            ),
             make_regridder=make_regridder,
             measure_block=measure_far_speed,
             refining=refining,
@@ -446,7 +442,7 @@ class InterfaceInstability(Problem):
         deck = self.deck
         if self.start == "crossed":
             return self.crossed.make_states()
-        spacing = -self.make_spacing(self.choose_lengths()[0])[::-1]
+        spacing = -self.spacing.make(self.choose_lengths()[0])[::-1]
         position = -(deck.gap * deck.wavelength + self.amplitude)
         choice = {"cfl": deck.run.cfl, "limiter": deck.limiter}
         shock = settle_shock(self.eos_first, spacing, position, self.shock, **choice)
@@ -494,14 +490,27 @@ class InterfaceInstability(Problem):
         keeps = regrid.method == "newton" and "family" not in regrid.options
         return {"family": "i", "first_grid": nodes} if keeps else {"family": "i"}
 
+    def _make_second_shock(self) -> tuple[float, Shock]:
+        """When [s] the piston sends it, and what it is in the first material."""
+        late = self.deck.second_shock
+        later = shock_to_pressure(self.eos_first, self.shock.rho, self.shock.p, late.pressure)
+        return self.arrival + late.kct / self._rate, later
+
+    def _find_last_arrival(self) -> float:
+        """When [s] the last shock meets the interface, about."""
+        if self.deck.second_shock is None:
+            return self.arrival
+        start, later = self._make_second_shock()
+        piston, interface = self.shock.particle_speed, self.theory.base.u
+        between = interface * (start - self.arrival) + self.choose_lengths()[0] - piston * start
+        return start + max(0.0, between / (piston + later.shock_speed - interface))
+
     def make_piston(self):
         """Velocity of the piston as a function of time."""
         speed = self.shock.particle_speed
-        late = self.deck.second_shock
-        if late is None:
+        if self.deck.second_shock is None:
             return (speed, 0.0)
-        later = shock_to_pressure(self.eos_first, self.shock.rho, self.shock.p, late.pressure)
-        start = self.arrival + late.kct / (self.k * self.theory.sound_speed)
+        start, later = self._make_second_shock()
 
         def velocity(t):
             return (speed if t < start else speed + later.particle_speed, 0.0)

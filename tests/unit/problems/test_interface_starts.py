@@ -41,7 +41,7 @@ def measure_distances(problem: InterfaceInstability):
     for sign, grid, length in zip(
         (-1.0, 1.0), problem.make_grids(), problem.choose_lengths(), strict=True
     ):
-        yield grid[:, ::-1] if sign < 0.0 else grid, problem.make_spacing(length), sign
+        yield grid[:, ::-1] if sign < 0.0 else grid, problem.spacing.make(length), sign
 
 
 def find_reach(problem: InterfaceInstability, length: float) -> float:

@@ -82,6 +82,7 @@ def make_march(**regrid):
 
 def make_flow(**regrid):
     table = {"cells": 8, "lengths": (1.0, 1.0), "modes": [{"ka0": 0.3}], "regrid": regrid}
+    table["passage_refinement"] = 1.0  # as with a weight
     return InterfaceInstability(msgspec.convert(table, InterfaceDeck))
 
 

@@ -1,0 +1,79 @@
+"""Spacing of the cells across the interface.
+
+Cells are even near the interface and grow beyond.  Where the shock is on its way, they are finer
+at the interface until it has passed: a captured shock is a few cells thick, and what it does to a
+wave of the interface is wrong by its thickness over the wavelength, to first order.  When the waves
+that it leaves are beyond the finer cells, these grow to the size of the others, by a respacing of
+the sides.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from problems.deck import MOST_CELLS
+from problems.interface_instability.deck import InterfaceDeck
+from regrid.errors import BadInput
+
+ZONE = 0.1  # wavelengths on each side with the finest cells while the shock passes
+GROWTH = 1.1  # of the finer cells, from one to the next beyond that
+NODE_SPEED = 0.25  # most speed of nodes that are respaced, over that of sound
+
+
+@dataclass(frozen=True)
+class Spacing:
+    """The deck's cells across the interface, `finer` times as fine at the interface."""
+
+    deck: InterfaceDeck
+    finer: float = 1.0
+
+    def make(self, length: float) -> np.ndarray:
+        """Distances (n,) [m] of the nodes from the interface, from 0 to `length`."""
+        self.count(length)
+        deck = self.deck
+        size = deck.wavelength / deck.cells
+        steps = list(self._make_finer_steps(size, length))
+        even = min(length, deck.uniform * deck.wavelength) - sum(steps)
+        steps += [size] * max(0 if steps else 1, round(even / size))
+        reach = sum(steps)
+        while reach < length * (1.0 - 1e-9):
+            steps.append(steps[-1] * deck.stretch)
+            reach += steps[-1]
+        positions = np.concatenate([[0.0], np.cumsum(steps)])
+        return positions * (length / positions[-1])
+
+    def _make_finer_steps(self, size: float, length: float) -> np.ndarray:
+        """Sizes (n,) [m] of the finer cells."""
+        if self.finer == 1.0:
+            return np.empty(0)
+        first = size / self.finer
+        growing = first * GROWTH ** np.arange(1, math.log(self.finer) / math.log(GROWTH))
+        steps = np.append(np.full(round(ZONE * self.deck.wavelength / first), first), growing)
+        return steps[np.cumsum(steps) <= length]
+
+    def make_last_law(self, length: float) -> np.ndarray:
+        """Places (n,), from 0 at the interface to 1, of the nodes when no cell is finer."""
+        last = Spacing(self.deck).make(length)
+        nodes = np.linspace(0.0, last.size - 1.0, self.make(length).size)
+        return np.interp(nodes, np.arange(last.size), last) / length
+
+    def count(self, length: float) -> float:
+        """Cells of `make` by arithmetic; BadInput for more than a side may have."""
+        deck = self.deck
+        size = deck.wavelength / deck.cells
+        finer = self._make_finer_steps(size, length)
+        even = max(0.0, min(length, deck.uniform * deck.wavelength) - finer.sum())
+        growing = max(0.0, length - even - finer.sum()) / size
+        if deck.stretch > 1.0:
+            rate = deck.stretch - 1.0
+            growing = math.log1p(growing * rate) / math.log1p(rate)
+        columns = max(1.0, even / size) + growing + finer.size
+        if columns > 10.0 * MOST_CELLS:
+            raise BadInput(
+                f"deck: a block {length:g} m long would have {columns:.3g} cells along it; it may "
+                f"have {10 * MOST_CELLS}: take fewer `cells`, shorter `lengths`, more `stretch`"
+            )
+        return columns

@@ -18,7 +18,7 @@ from problems.deck import MOST_CELLS
 from problems.interface_instability.deck import InterfaceDeck
 from regrid.errors import BadInput
 
-ZONE = 0.1  # wavelengths on each side with the finest cells while the shock passes
+ZONE = 0.05  # wavelengths on each side with the finest cells while the shock passes
 GROWTH = 1.1  # of the finer cells, from one to the next beyond that
 NODE_SPEED = 0.25  # most speed of nodes that are respaced, over that of sound
 

@@ -100,7 +100,7 @@ def test_growth_at_32_cells():
 
 @pytest.mark.parametrize("mach", [1.2, 1.5])
 def test_growth_through_the_passage(mach):
-    """Measured: -.6 and -.7 %; +3.6 and +2.7 % where cells are not finer for the passage."""
+    """Measured: -.6 and -.6 %; +3.6 and +2.7 % where cells are not finer for the passage."""
     run = Finished(cells=32, mach=mach, start="incident")
     assert abs(compute_error(run)) < 0.012
     steps = np.diff(run.evolution.blocks[1].nodes[0, :, 0])

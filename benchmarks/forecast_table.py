@@ -27,7 +27,7 @@ sys.path.insert(0, str(ROOT))
 from hydro.clock import START_FACTORS  # noqa: E402
 from runs.deck.reading import read_deck  # noqa: E402
 from runs.forecast import (  # noqa: E402
-    DELIVERED,
+    PAST_RUNS,
     TimeLeft,
     drop_events,
     find_past,
@@ -35,7 +35,7 @@ from runs.forecast import (  # noqa: E402
     make_past_run,
     measure_size,
     name_flow,
-    read_delivered,
+    read_past,
 )
 from runs.store.reader import RunData  # noqa: E402
 
@@ -98,8 +98,7 @@ def make_past(deck: str, setting: str, folder: Path) -> Any:
     size = measure_size(data.problem)
     row = data.history
     first_dt = float(row["dt"][1]) / START_FACTORS[0]
-    past = make_past_run(name_flow(read.problem, read.deck), size, first_dt, row)
-    return msgspec.structs.replace(past, seconds=0.0)
+    return make_past_run(name_flow(read.problem, read.deck), size, first_dt, row)
 
 
 def judge(deck: str, setting: str, folder: Path) -> dict[str, Any]:
@@ -111,8 +110,8 @@ def judge(deck: str, setting: str, folder: Path) -> dict[str, Any]:
     history = data.history
     first_dt = float(history["dt"][1]) / START_FACTORS[0]
     steps = int(history["step"][-1])
-    foretold = foretell_steps(read, size, first_dt, own=False)
-    past = find_past(name_flow(read.problem, read.deck), size.cells, own=False)
+    foretold = foretell_steps(read, size, first_dt)
+    past = find_past(name_flow(read.problem, read.deck), size.cells)
     t, seconds = history["t"][1:], history["seconds_step"][1:].copy()
     seconds[0] = np.median(seconds)  # loading kernels
     wall = np.cumsum(drop_events(seconds))
@@ -152,8 +151,8 @@ def main() -> int:
             rows.append(make(deck, setting, Path(folder)))
     if kind == "past":
         lines = ",\n".join(msgspec.json.encode(row).decode() for row in rows)
-        DELIVERED.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
-        read_delivered.cache_clear()
+        PAST_RUNS.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+        read_past.cache_clear()
     else:
         command = "python benchmarks/forecast_table.py judge"
         text = json.dumps({"command": command, "rows": rows}, indent=1)

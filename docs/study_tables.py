@@ -19,8 +19,6 @@ from typing import Any
 
 from accuracy_tables import MARKS, make_table, mark
 
-from runs.study.orders import write_apart
-
 RESULTS = Path(__file__).resolve().parent / "results"
 DIGITS = 6
 WORST = 6  # runs named in a sentence
@@ -102,6 +100,16 @@ def table_orders(orders: Rows, quantity: str) -> list[str]:
             rest = [_shorten(line[name], 3) for name in ("extrapolated", "uncertainty")]
             body.append([line["series"], line["cells"], values, order, *rest])
     return make_table(heads, body)
+
+
+def write_apart(values: Sequence[float]) -> list[str]:
+    """Numbers with four digits, or as many more, up to ten, as tell them apart."""
+    different = len(set(values))
+    for digits in range(4, 11):
+        texts = [f"{value:.{digits}g}" for value in values]
+        if len(set(texts)) == different:
+            return texts
+    return [f"{value:.4g}" for value in values]
 
 
 def _shorten(text: str, digits: int) -> str:

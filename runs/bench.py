@@ -19,6 +19,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numba
 import numpy as np
 
@@ -148,12 +149,9 @@ class Tables:
         if self.path is None or not self.path.exists():
             return {}
         try:
-            known = json.loads(self.path.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError) as error:
+            return msgspec.json.decode(self.path.read_bytes(), type=dict[str, Any])
+        except (OSError, msgspec.MsgspecError, RecursionError) as error:
             raise BadInput(f"{self.path} is not a JSON file of measurements: {error}") from None
-        if not isinstance(known, dict):
-            raise BadInput(f"{self.path} is not a JSON file of measurements")
-        return known
 
     def add(self, table: str, **row: str | int | float) -> None:
         """One more row; numbers are rounded to three digits."""
@@ -166,11 +164,8 @@ class Tables:
         if self.path is None:
             return
         for table, rows in self.rows.items():
-            self.known[table] = {
-                "command": self.command,
-                "machine": describe_machine(),
-                "rows": rows,
-            }
+            made = {"command": self.command, "machine": describe_machine()}
+            self.known[table] = {**made, "rows": rows}
         text = json.dumps(self.known, indent=1, ensure_ascii=False) + "\n"
         self.path.write_text(text, encoding="utf-8")
 

@@ -2,9 +2,8 @@
 
 Before the run: the steps of the most similar past run, scaled with the first stable dt, or where
 nothing is built yet with the width of the finest cells.  A past run of the same flow has the same
-problem and the same keys of the deck, but for cells, `run`, `output` and gauges.  past_runs.json
-beside this file is delivered and knows steps alone; runs that finish here are kept in the cache
-directory, with the wall time of a step.  A cache that cannot be read or written is none.
+problem and the same keys of the deck, but for cells, `run`, `output` and gauges.  past_runs.json,
+beside this file, is written by `python benchmarks/forecast_table.py past`.
 
 During the run: the steps that are left by the trend of dt, times the wall time of a step; and the
 share of its wall time that a past run of the same flow had taken by the same part of the end time.
@@ -17,10 +16,8 @@ not count: the first five, the last two, those repeated with a smaller dt.
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import math
-import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -43,7 +40,6 @@ from runs.inspection.account import (
     measure_shrinkage,
 )
 from runs.store.directory import KEPT_RESTARTS
-from runs.store.files import write_atomically
 
 DUMP_BYTES = 64  # a cell in a dump: nodes, five fields and a rate
 BLOCK_BYTES = 30_000  # of a block in a dump, for the form of the file; measured
@@ -53,12 +49,10 @@ SAME, LIKE = (0.75, 1.5), (0.5, 5.0)
 TIGHT = 0.9  # part of the free disk that a run may be foretold to fill without a word
 MOST_NAMED = 6  # blocks in a line
 
-DELIVERED = Path(__file__).with_name("past_runs.json")
-KEPT = 300  # runs of this machine
-SURE = 1.4  # a step's wall time may be so many times what it was in runs before, or less
+PAST_RUNS = Path(__file__).with_name("past_runs.json")
+SURE = 1.6  # a step's wall time may be so many times that of a past run, or less
 UNSURE = 0.25  # power of the ratio of cells by which that grows
 WORK = 0.8  # power of the number of cells with which a step's wall time grows
-LEAST_STEPS = 40  # of a run that says something about others
 OTHER = ("run", "output", "gauge", "cells")  # keys of a deck that leave the flow as it is
 
 FIRST_STEPS = 12  # until there is a word: the first five are shortened on purpose
@@ -79,7 +73,7 @@ class PastRun(msgspec.Struct, frozen=True):
 
     finest: the least width [m] of a block over its cells; first_dt: the first stable step [s];
     course: the share of its wall time that was over at PARTS of t_end; seconds: wall time [s] of a
-    step here, 0 where it is of another machine.
+    step, with nothing else on the machine.
     """
 
     flow: str
@@ -89,7 +83,7 @@ class PastRun(msgspec.Struct, frozen=True):
     first_dt: float
     steps: int
     course: tuple[float, ...]
-    seconds: float = 0.0
+    seconds: float
 
     def is_off(self, cells: int) -> float:
         """How far the number of cells is from another, as the size of a logarithm."""
@@ -122,50 +116,22 @@ def name_flow(problem: str, deck: Any) -> str:
     return "; ".join([problem, *sorted(f"{one.key}={one.now}" for one in changes)])
 
 
-def find_home() -> Path:
-    """Where this machine's past runs are kept: beside the compiled kernels."""
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    return Path(os.environ.get("SHOCKGRID_CACHE_DIR") or os.path.join(home, "shockgrid"))
-
-
 @functools.cache
-def read_delivered() -> list[PastRun]:
+def read_past() -> list[PastRun]:
     """The runs that come with shockgrid."""
-    return msgspec.json.decode(DELIVERED.read_bytes(), type=list[PastRun])
-
-
-def read_own() -> list[PastRun]:
-    """The runs that finished on this machine, the newest last; [] where none can be read."""
-    try:
-        text = (find_home() / DELIVERED.name).read_bytes()
-        return msgspec.json.decode(text, type=list[PastRun])
-    except (OSError, msgspec.MsgspecError):
-        return []
-
-
-def keep_run(flow: str, size: Size, first_dt: float, history: Mapping[str, np.ndarray]) -> None:
-    """Keep a run of this machine in place of one of the same flow with the same cells."""
-    run = make_past_run(flow, size, first_dt, history)
-    if run is not None:
-        others = [one for one in read_own() if (one.flow, one.cells) != (flow, size.cells)]
-        with contextlib.suppress(OSError, BadInput):
-            find_home().mkdir(parents=True, exist_ok=True)
-            text = msgspec.json.encode([*others, run][-KEPT:])
-            write_atomically(find_home() / DELIVERED.name, text, durable=False)
+    return msgspec.json.decode(PAST_RUNS.read_bytes(), type=list[PastRun])
 
 
 def make_past_run(
     flow: str, size: Size, first_dt: float, history: Mapping[str, np.ndarray]
-) -> PastRun | None:
-    """A past run from the history of a whole run; None where it is too short to say anything."""
+) -> PastRun:
+    """A past run from the history of a whole run."""
     steps = history["step"]
-    if len(steps) < LEAST_STEPS or "seconds_step" not in history or not first_dt > 0.0:
-        return None
     seconds = drop_events(np.nan_to_num(history["seconds_step"]))
     done = np.interp(PARTS * size.t_end, history["t"], seconds.cumsum() / seconds.sum())
     return PastRun(
         flow, size.cells, size.t_end, size.finest, first_dt, int(steps[-1]),
-        tuple(done.round(4).tolist()), float(np.median(seconds[2:])),
+        tuple(done.round(4).tolist()), float(f"{np.quantile(seconds[2:], 0.25):.3g}"),
     )  # fmt: skip
 
 
@@ -176,18 +142,15 @@ def drop_events(seconds: np.ndarray) -> np.ndarray:
     return np.where(seconds <= UNUSUAL * usual, seconds, usual)
 
 
-def find_past(flow: str, cells: int, own: bool = True) -> PastRun | None:
+def find_past(flow: str, cells: int) -> PastRun | None:
     """The past run most like a flow: of the same one, or else of the problem with its defaults, or
-    else of the problem; of this machine (`own`) rather than delivered; cells nearest in number."""
-    problem, mine = flow.partition("; ")[0], read_own() if own else []
+    else of the problem; with cells nearest in number."""
+    problem = flow.partition("; ")[0]
     return min(
-        (run for run in (*mine, *read_delivered()) if run.flow.partition("; ")[0] == problem),
-        key=lambda run: (
-            run.flow != flow, run.flow != problem, run.flow == flow and not run.seconds,
-            run.is_off(cells),
-        ),
+        (run for run in read_past() if run.flow.partition("; ")[0] == problem),
+        key=lambda run: (run.flow != flow, run.flow != problem, run.is_off(cells)),
         default=None,
-    )  # fmt: skip
+    )
 
 
 def measure_size(problem: Problem, evolution: Any = None) -> Size:
@@ -208,15 +171,14 @@ def measure_size(problem: Problem, evolution: Any = None) -> Size:
 
 
 def foretell_steps(
-    read: ReadDeck, size: Size, first_dt: float | None, own: bool = True
+    read: ReadDeck, size: Size, first_dt: float | None
 ) -> tuple[float, float, float] | None:
     """Steps of a run: the least, the likely, the most; None where nothing is known.
 
-    first_dt: the first stable step [s], None where nothing is built; own: from runs of this machine
-    too.
+    first_dt: the first stable step [s], None where nothing is built.
     """
     flow = name_flow(read.problem, read.deck)
-    past = find_past(flow, size.cells, own)
+    past = find_past(flow, size.cells)
     same = past is not None and past.flow == flow
     if not 0.0 < size.t_end < math.inf or (first_dt is None and not same):
         return None  # the speeds of another flow are others: without a first step they tell nothing
@@ -235,8 +197,8 @@ def foretell(
     """Lines on the cost of a run of a checked deck into the folder `output`, and cautions on the
     disk.
 
-    evolution: as built, where it is.  Raises BadInput where the disk does not hold two dumps, which
-    a run cannot do without.
+    evolution: as built, where it is.  Raises BadInput where it is, and the disk does not hold two
+    dumps, which a run cannot do without.
     """
     with read.numbers_in_reach():
         size = measure_size(problem, evolution)
@@ -246,15 +208,14 @@ def foretell(
     if steps is not None:
         low, likely, high = (max(round(float(f"{number:.2g}")), 1) for number in steps)
         words = f"about {likely}{f' ({low} to {high})' * (low < high)} steps; "
-        alike = [run for run in read_own() if run.flow.partition("; ")[0] == read.problem]
-        past = min(alike, key=lambda run: run.is_off(size.cells), default=None)
+        past = find_past(name_flow(read.problem, read.deck), size.cells)
         if past is None:
-            words += "the time of a step on this computer is not known yet"
+            words += "the time of a step is measured in the run"
         else:
             a_step = past.seconds * (max(size.cells, 1) / past.cells) ** WORK
             sure = SURE * math.exp(UNSURE * past.is_off(size.cells))
             seconds = describe_seconds(steps[0] * a_step / sure, steps[2] * a_step * sure)
-            words += f"time stepping will take {seconds} on this machine"
+            words += f"time stepping will take {seconds} on a desktop computer"
     named = [f"{name} {' x '.join(map(str, cells))}" for name, cells in size.blocks[:MOST_NAMED]]
     more = len(size.blocks) - len(named)
     cells = f"{size.cells} cells ({', '.join(named)}{f' and {more} more blocks' * (more > 0)})"
@@ -269,16 +230,19 @@ def foretell(
     folder = Path(output or "out")
     free = find_free(folder)
     a_dump, needed, there = map(describe_bytes, (size.dump, disk, free))
+    told = (
+        f"the run will need about {needed} of disk, where {there} are free (the disk of {folder}): "
+        "free some, or take fewer dumps (output.dumps) or lighter ones (output.fields, "
+        "output.precision, output.compression)"
+    )
     if free < 2.0 * size.dump:
-        raise BadInput(
+        told = (
             f"the disk of {folder} has {there} free, and a run needs two dumps of {a_dump} at the "
             "least; free some, choose another folder with -o or take fewer cells"
         )
-    cautions = [
-        f"caution: the run will need about {needed} of disk, where {there} are free (the disk of "
-        f"{folder}): free some, or take fewer dumps (output.dumps) or lighter ones "
-        "(output.fields, output.precision, output.compression)"
-    ] * (disk > TIGHT * free)
+        if evolution is not None:
+            raise BadInput(told)
+    cautions = [f"caution: {told}"] * (disk > TIGHT * free)
     return [
         f"cost: {cells}; {words}",
         f"cost: memory about {describe_bytes(size.memory)}; disk about {needed} "

@@ -68,24 +68,20 @@ class Places:
         self, number: int, block: BlockView, tried: np.ndarray, reach: float = 0.0
     ) -> np.ndarray:
         """Look for the points of a mask in one block; the mask of those that are found."""
-        found = np.zeros_like(tried)
-        chosen = np.flatnonzero(tried)
+        found, chosen = np.zeros_like(tried), np.flatnonzero(tried)
         if not chosen.size:
             return found
-        cells = np.ascontiguousarray(self.cell[:, chosen])
-        strangers = self.block[chosen] != number
-        sizes = np.array(block.nodes.shape[1:])[:, None]
-        cells[:, strangers] = sizes // 2
-        cells = np.minimum(cells, sizes - 2)  # where grid lines have gone since
+        sizes, here = np.array(block.nodes.shape[1:])[:, None], self.block[chosen] == number
+        # from the last cell, which may be gone, or else from the middle
+        cells = np.minimum(np.where(here, self.cell[:, chosen], sizes // 2), sizes - 2)
         quads, parts = np.zeros_like(cells), np.zeros(cells.shape)
         where = np.zeros(chosen.size, dtype=np.int64)
-        nodes = np.ascontiguousarray(block.nodes)
-        points = np.ascontiguousarray(self.position[:, chosen])
+        nodes, points = map(np.ascontiguousarray, (block.nodes, self.position[:, chosen]))
         find_places(nodes, points, float(reach), cells, quads, parts, where)
         here = where != OUTSIDE
         chosen = chosen[here]
-        self.cell[:, chosen], self.quad[:, chosen] = cells[:, here], quads[:, here]
-        self.part[:, chosen] = parts[:, here]
+        for kept, new in ((self.cell, cells), (self.quad, quads), (self.part, parts)):
+            kept[:, chosen] = new[:, here]
         self.block[chosen] = number
         found[chosen] = True
         return found

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import csv
+import io
 import os
 import tempfile
 from collections.abc import Callable
@@ -303,15 +304,14 @@ def make_study_report(
     """
     path = Path(output) if output else home / PAGE
     check_path(path)
-    heads, rows = read_table(home / TABLE)
+    with disk_errors(home / TABLE), open(home / TABLE, encoding="utf-8", newline="") as file:
+        heads, *rows = list(csv.reader(file)) or [[]]
     folders = sorted(one.parent for one in (home / RUNS).glob("*/deck.toml"))
     links, failed = {}, []
     for folder in folders:
-        page = folder / PAGE
+        page, log = folder / PAGE, folder / "run.log"
         try:
-            log = folder / "run.log"  # written to since?
-            newer = page.exists() and log.exists() and log.stat().st_mtime > page.stat().st_mtime
-            if newer or not page.exists():
+            if not (page.exists() and log.exists()) or log.stat().st_mtime > page.stat().st_mtime:
                 make_report(folder, page, film=film, dpi=dpi)
             links[folder.name] = Path(os.path.relpath(page, path.parent)).as_posix()
         except BadInput as error:
@@ -334,15 +334,6 @@ def make_study_report(
         say(f"no report of {sentence}")
     write_atomically(path, page_text, durable=False)
     return path
-
-
-def read_table(path: Path) -> tuple[list[str], list[list[str]]]:
-    """Heads and rows of a table in CSV; lines that begin with # are remarks."""
-    with disk_errors(path), open(path, encoding="utf-8", newline="") as file:
-        lines = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
-    if not lines:
-        raise BadInput(f"{path} is empty: the study has no table yet")
-    return lines[0], lines[1:]
 
 
 def show_number(cell: str) -> str:

@@ -19,7 +19,7 @@ import numpy as np
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import read_deck, suggest_deck
 from runs.engines import Engine, InTurn, open_engine
-from runs.store.files import check_replaceable
+from runs.store.files import check_replaceable, disk_errors
 from runs.store.provenance import describe_software
 
 
@@ -257,9 +257,9 @@ def choose_cases(names: tuple[str, ...]) -> list[Case]:
     return [case for case in CASES if not names or case.deck in names]
 
 
-def march(deck: str, settings: tuple[str, ...]) -> tuple[dict[str, np.ndarray], dict, float]:
+def march(name: RunName) -> tuple[dict[str, np.ndarray], dict, float]:
     """History, errors and CPU seconds of a run in memory."""
-    problem = read_deck(deck, settings).make_problem()
+    problem = read_deck(*name).make_problem()
     start = time.process_time()
     evolution = problem.build()
     rows = [{"t": 0.0, **evolution.start_row(), **problem.measure(evolution)}]
@@ -286,7 +286,7 @@ def compute_records(
     wanted = [(case, size) for case in cases for size in sizes[case] if size is not None]
     names = [(case.deck, (*case.settings, *case.refine(size))) for case, size in wanted]
     keys = list(dict.fromkeys(names))
-    computed = (engine or InTurn()).compute(march_named, keys)
+    computed = (engine or InTurn()).compute(march, keys)
     runs: dict[RunName, Any] = {}
     before: tuple[Case, int, float] | None = None
     for (case, size), name in zip(wanted, names, strict=True):
@@ -340,36 +340,10 @@ def _judge(
     return None, None
 
 
-def march_named(name: RunName) -> tuple[dict[str, np.ndarray], dict, float]:
-    """`march` with deck and settings in one argument, as engines pass it."""
-    return march(*name)
-
-
-def make_page(document: Mapping[str, Any]) -> str:
-    """The Markdown page of a document: how it was made, how many bars are met, the table."""
-    rows = [HEADS, ("---",) * len(HEADS), *map(format_record, document["rows"])]
-    head = f"Written by `{document['command']}`;\n{describe_bars(document['rows'])}.\n"
-    table = [f"| {' | '.join(row)} |" for row in rows]
-    return "\n".join(["# Standard problems", "", head, *table, ""])
-
-
 def describe_bars(records: list[Mapping[str, Any]]) -> str:
     """`44 of 44 thresholds met`."""
     met = [record["met"] for record in records if record["met"] is not None]
     return f"{sum(met)} of {len(met)} thresholds met"
-
-
-def write_results(path: Path, records: list[dict[str, Any]], command: str) -> list[Path]:
-    """Write the records as JSON and, unless `path` is the JSON file itself, the page from them."""
-    document = {"command": command, "made_by": describe_software(), "rows": records}
-    data = path.with_suffix(".json")
-    for one in (data, path):
-        check_replaceable(one)
-    data.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    if data == path:
-        return [data]
-    path.write_text(make_page(json.loads(data.read_text(encoding="utf-8"))), encoding="utf-8")
-    return [path, data]
 
 
 def verify(
@@ -379,16 +353,15 @@ def verify(
     say: Callable[[str], None],
     jobs: int = 1,
 ) -> int:
-    """Run, print line by line, write the results; 1 where a bar is missed, else 0.
+    """Run, print line by line, write the records as JSON; 1 where a bar is missed, else 0.
 
-    `output` is the Markdown page, with a JSON file of the same name beside it, or "NAME.json";
-    `jobs`: runs at once.
+    `output`: the JSON file; `jobs`: runs at once.
     """
     cases = choose_cases(problems)
-    if output is not None and not Path(output).parent.is_dir():
-        raise BadInput(f"verify: there is no folder {str(Path(output).parent)!r} to write into")
-    if output is not None and Path(output).is_dir():
-        raise BadInput(f"verify: {output} is a folder, a file is needed")
+    if output is not None:
+        check_replaceable(Path(output))
+        if not Path(output).parent.is_dir():
+            raise BadInput(f"verify: there is no folder {str(Path(output).parent)!r} to write into")
     widths = [15, 59, 4, 9, 5, 9, 3, 6]
     say("  ".join(f"{head:{width}}" for head, width in zip(HEADS, widths, strict=False)).rstrip())
     records = []
@@ -400,6 +373,9 @@ def verify(
             say(f"{line}  {cells[-1]}".rstrip())
     if output is not None:
         words = ["shockgrid verify", *problems, *(["--short"] if short else []), "-o", output]
-        written = write_results(Path(output), records, " ".join(words))
-        say(f"written: {', '.join(map(str, written))}")
+        made = {"command": " ".join(words), "made_by": describe_software(), "rows": records}
+        with disk_errors(Path(output)):
+            text = json.dumps(made, indent=1, allow_nan=False) + "\n"
+            Path(output).write_text(text, encoding="utf-8")
+        say(f"written: {output}")
     return 1 if any(record["met"] is False for record in records) else 0

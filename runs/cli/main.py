@@ -367,7 +367,7 @@ cli.add_command(grid)
 @cli.command()
 @click.argument("problems", nargs=-1)
 @click.option("--short", is_flag=True, help="One small size of each, a minute in all.")
-@click.option("-o", "--output", metavar="FILE", help="Write a table (FILE.md) and FILE.json.")
+@click.option("-o", "--output", metavar="FILE", help="Write the results as JSON.")
 @click.option("--jobs", type=click.IntRange(1), default=1, help="Parallel runs [1].")
 def verify(**words) -> int:
     """Run the standard problems (or PROBLEMS) at stated sizes: errors, orders, bars.

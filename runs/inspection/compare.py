@@ -12,7 +12,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -210,22 +210,6 @@ def _describe_makers(a: Side, b: Side) -> list[str]:
     return [f"made by different versions: {words}"] if names else []
 
 
-class Norms(NamedTuple):
-    """Norms of one field's difference in one block: L1, L2, Linf, and the field's largest size."""
-
-    block: str
-    field: str
-    l1: float
-    l2: float
-    largest: float
-    scale: float
-
-    @property
-    def relative(self) -> float:
-        """L1 over the field's size."""
-        return self.l1 / self.scale if self.scale else 0.0
-
-
 def _needs_norms(a: Side, b: Side) -> bool:
     """Are they of the same blocks with other cells, or runs with other steps?"""
     if a.dumps[0].problem != b.dumps[0].problem:
@@ -243,16 +227,13 @@ def find_other_steps(a: Side, b: Side) -> str:
     if min(len(history.get("t", ())) for history in (one, other)) < 2:
         return ""
     common, i, j = np.intersect1d(one["step"], other["step"], return_indices=True)
-    marched = np.flatnonzero((one["t"][i] > 0.0) | (other["t"][j] > 0.0))
-    if not marched.size:
-        return (
-            f"they have no step in common ({a.path} begins at {one['step'][0]:.0f}, {b.path} at "
-            f"{other['step'][0]:.0f})"
-        )
-    k = marched[0]
-    t, t_other = float(one["t"][i[k]]), float(other["t"][j[k]])
-    near = abs(t - t_other) <= SAME_TIME * max(abs(t), abs(t_other))
-    return "" if near else f"step {common[k]:.0f} is at t = {t:.6g} and {t_other:.6g}"
+    for step, t, t_other in zip(common, one["t"][i], other["t"][j], strict=True):
+        if max(t, t_other) > 0.0:
+            near = abs(t - t_other) <= SAME_TIME * max(abs(t), abs(t_other))
+            return "" if near else f"step {step:.0f} is at t = {t:.6g} and {t_other:.6g}"
+    return (
+        f"they begin at steps {one['step'][0]:.0f} and {other['step'][0]:.0f}, with none in common"
+    )
 
 
 def compare_by_norms(a: Side, b: Side, rtol: float, atol: float) -> tuple[list[str], bool]:
@@ -269,27 +250,25 @@ def compare_by_norms(a: Side, b: Side, rtol: float, atol: float) -> tuple[list[s
         [row for block in one.blocks for row in _compare_blocks(block, other.block(block.name))]
         for one, other in pairs
     ]
-    beyond = [any(not r.l1 <= atol + rtol * r.scale for r in rows) for rows in found]
+    within = sum(all(l1 <= atol + rtol * size for *_, l1, _, _, size in rows) for rows in found)
     lines = [f"other cells: {b.path} laid on the grid of {a.path}"]
     same_cells = all(one.cells == b.dumps[0].block(one.name).cells for one in a.dumps[0].blocks)
     if same_cells and (parted := find_other_steps(a, b)):
         nearest = "dumps are compared by the nearest time, histories by time"
         lines = [f"other steps: {parted}; {nearest}", *compare_histories_by_time(a, b)]
-    lines[0] += (
-        f"; {count(len(pairs), 'dump')} of about the same time, {beyond.count(False)} within the "
-        "tolerances"
-    )
-    for (one, other), rows in list(zip(pairs, found, strict=True))[:-1][-SHOWN:]:
-        most = max(rows, key=lambda row: row.relative, default=None)
+    dumps = count(len(pairs), "dump")
+    lines[0] += f"; {dumps} of about the same time, {within} within the tolerances"
+    for (one, other), rows in zip(pairs[:-1][-SHOWN:], found[:-1][-SHOWN:], strict=True):
         words = "no fields of cells that both have"
-        if most:
-            words = f"L1 up to {most.relative:.2g} of {most.block}, {most.field}"
+        if rows:
+            most, block, name = max((l1 / (size or 1.0), *row) for *row, l1, _, _, size in rows)
+            words = f"L1 up to {most:.2g} of {block}, {name}"
         lines.append(f"{_describe_times(one, other)}: {words}")
     lines.append(f"{_describe_times(*pairs[-1])}:")
     lines.append(f"  {'block':14s} {'field':8s} {'L1':>10s} {'L2':>10s} {'Linf':>10s} {'of':>10s}")
     for block, field, *norms in found[-1]:
         lines.append(f"  {block:14s} {field:8s} " + " ".join(f"{norm:10.3g}" for norm in norms))
-    return lines, any(beyond)
+    return lines, within < len(pairs)
 
 
 def compare_histories_by_time(a: Side, b: Side) -> list[str]:
@@ -303,49 +282,45 @@ def compare_histories_by_time(a: Side, b: Side) -> list[str]:
     here = (one["t"] >= begin) & (one["t"] <= end)
     if not here.any():
         return ["history: no times in common"]
-    t = one["t"][here]
-    found = []
-    for name in one:
-        if name in ("step", "t", "dt") or name.startswith("seconds_") or name not in other:
-            continue
-        if one[name].dtype.kind not in "fi" or other[name].dtype.kind not in "fi":
+    t, found = one["t"][here], []
+    for name in one.keys() & other.keys() - {"step", "t", "dt"}:
+        if name.startswith("seconds_") or {one[name].dtype.kind, other[name].dtype.kind} - set(
+            "fi"
+        ):
             continue
         ours, theirs = one[name][here], np.interp(t, other["t"], other[name])
         there = np.isfinite(ours) & np.isfinite(theirs)
-        scale = max(np.abs(ours[there]).max(initial=0.0), np.abs(theirs[there]).max(initial=0.0))
+        size = np.abs([ours[there], theirs[there]]).max(initial=0.0)
         apart = np.where(there, np.abs(ours - theirs), 0.0)
         if apart.any():
-            found.append((float(apart.max() / scale), name, int(apart.argmax()), float(scale)))
+            found.append((float(apart.max() / size), name, t[apart.argmax()], float(size)))
     found.sort(reverse=True)
     lines = [
-        f"history {name}: up to {part:.2g} of its size {scale:.3g}, at t = {t[k]:.6g}"
-        for part, name, k, scale in found[:SHOWN_COLUMNS]
+        f"history {name}: up to {part:.2g} of its size {size:.3g}, at t = {when:.6g}"
+        for part, name, when, size in found[:SHOWN_COLUMNS]
     ]
     more = len(found) - len(lines)
     return [*lines, f"history: {more} more columns differ by less"] if more > 0 else lines
 
 
-def _compare_blocks(one: BlockData, other: BlockData) -> list[Norms]:
-    """Norms of all fields of cells that both blocks have, on the grid of `one`."""
+def _compare_blocks(one: BlockData, other: BlockData) -> list[tuple[Any, ...]]:
+    """Block, field, norms L1, L2, Linf of the difference and the field's largest size, of all
+    fields of cells that both blocks have, on the grid of `one`."""
     for block in (one, other):
         check_convex(block.name, block.nodes)
     curved = one.axes[1] == "r"
     names = [name for name in one.cell_fields if name in other.cell_fields]
     if not names:
         return []
-    means = np.array([other.cell_fields[name] for name in names], dtype=float)
-    same = np.array_equal(one.nodes, other.nodes)
-    laid = means if same else remap_means(means, other.nodes, one.nodes, curved)
-    weight, _ = compute_cell_moments(one.nodes, curved)
-    weight /= weight.sum()
-    rows = []
-    for name, theirs in zip(names, laid, strict=True):
-        ours = np.asarray(one.cell_fields[name], dtype=float)
-        away = np.abs(ours - theirs)
-        l1, l2 = float((away * weight).sum()), float(np.sqrt((away**2 * weight).sum()))
-        scale = float(max(np.abs(ours).max(), np.abs(theirs).max()))
-        rows.append(Norms(one.name, name, l1, l2, float(away.max()), scale))
-    return rows
+    theirs = np.array([other.cell_fields[name] for name in names], dtype=float)
+    if not np.array_equal(one.nodes, other.nodes):
+        theirs = remap_means(theirs, other.nodes, one.nodes, curved)
+    ours = np.array([one.cell_fields[name] for name in names], dtype=float)
+    volumes, _ = compute_cell_moments(one.nodes, curved)
+    away, weight, cells = np.abs(ours - theirs), volumes / volumes.sum(), (1, 2)
+    l1, l2 = (away * weight).sum(cells), np.sqrt((away**2 * weight).sum(cells))
+    size = np.abs([ours, theirs]).max(axis=(0, 2, 3))
+    return list(zip([one.name] * len(names), names, l1, l2, away.max(cells), size, strict=True))
 
 
 def _pair(ours: list[Dump], theirs: list[Dump]) -> list[tuple[Dump, Dump]]:

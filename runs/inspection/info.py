@@ -14,7 +14,6 @@ import h5py
 import msgspec
 import numpy as np
 
-from problems.deck import Gauge
 from problems.evolution import get_material
 from problems.problem_file import read_head
 from problems.registry import PROBLEMS, summary_line
@@ -143,7 +142,6 @@ def describe_directory(path: str) -> str:
         names = [block.name for block in last.blocks] if last else []
         cells = last.cells if last else 0
         lines += ["", *describe_history(history), *describe_run(history, cells, names)]
-        lines += _find_threads(run)
     if last:
         first, number = run.dumps[0], len(run.outputs)
         newer = " and a newer restart point" if len(run.dumps) > number else ""
@@ -190,15 +188,6 @@ def find_verdict(run: RunData) -> dict[str, Any] | None:
     return verdict
 
 
-def _find_threads(run: RunData) -> list[str]:
-    """What the summary said of threads, where there is one."""
-    try:
-        screen = run.directory.summary.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError):
-        return []
-    return [line for line in screen if line.startswith("threads: ")]
-
-
 def describe_settings(run: RunData) -> list[str]:
     """Those keys of the deck that differ from the problem's defaults."""
     try:
@@ -207,21 +196,9 @@ def describe_settings(run: RunData) -> list[str]:
         return []
     changed = {one.key: one.now for one in find_changes(usual, now)}
     if "gauge" in changed:
-        changed["gauge"] = _say_gauges(run.deck.gauge)
+        changed["gauge"] = ", ".join(gauge.name for gauge in run.deck.gauge)
     lines = [f"  {key} = {value}" for key, value in changed.items()]
     return ["deck, where not default:", *lines] if lines else ["deck: all defaults"]
-
-
-def _say_gauges(gauges: Sequence[Gauge]) -> str:
-    """Names and places [m] of gauges."""
-    words = []
-    for gauge in gauges:
-        x, y = gauge.at
-        line = f"{gauge.name} at [{x:g}, {y:g}]"
-        if gauge.to is not None:
-            line += f" to [{gauge.to[0]:g}, {gauge.to[1]:g}], {gauge.count} points"
-        words.append(line + ", moving" * gauge.moves)
-    return "; ".join(words)
 
 
 def describe_history(history: Mapping[str, np.ndarray]) -> list[str]:

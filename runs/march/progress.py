@@ -17,7 +17,7 @@ from regrid.jit import read_clock
 from regrid.text_files import escape_controls
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import name_failure
-from runs.forecast import StepTrend, TimeLeft, find_past, keep_run, measure_size, name_flow
+from runs.forecast import StepTrend, TimeLeft, find_past, measure_size, name_flow
 from runs.gauges import NO_BLOCK
 from runs.inspection.account import count, count_cells, describe_seconds, describe_time, judge
 from runs.store.directory import RunDirectory, write_verdict
@@ -160,16 +160,10 @@ class Outlook:
     def close(
         self, status: str, reason: str, history: Mapping[str, np.ndarray], name: str = ""
     ) -> dict[str, Any]:
-        """Write the verdict, which is returned; keep what a whole run tells of later ones.
-
-        name: of the cause of an early end.
-        """
+        """Write the verdict, which is returned; name: of the cause of an early end."""
         marks, cells = self.trend.marks, self.size.cells
         verdict = judge(status, reason, history, cells, self.problem, marks, name)
         write_verdict(self.directory, verdict)
-        clock = getattr(self.evolution, "clock", None)
-        if status == "finished" and clock is not None and not self.began:
-            keep_run(self.flow, self.size, clock.first_stable_dt, history)
         return verdict
 
 

@@ -201,9 +201,10 @@ def _call(work: Work) -> Result:
 def _compute(work: Work) -> Result:
     deck = read_deck(work.source, work.settings)
     digest, directory = compute_digest(deck), RunDirectory(work.folder)
-    state, known = find_state(work.folder, digest), read_result(work.folder, digest)
+    known = read_result(work.folder, digest)
     if known is not None and not (known.failure and work.retry):
         return known
+    state = find_state(work.folder, digest)
     share = work.share if deck.deck.run.threads is None else ()
     if state == "other":
         _set_aside(directory)

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from problems.problem import align
 from regrid.errors import BadInput, suggest
 from regrid.roots import find_root
 from runs.study.computing import Result, find_names
@@ -123,7 +124,6 @@ def find_order(h1: float, h2: float, h3: float, ratio: float) -> float:
 
 
 CELLS = "cells"
-LEAST_DIGITS, MOST_DIGITS = 4, 10
 HEADS = ("series", "quantity", "cells", "values", "orders", "kind", "order", "extrapolated",
          "uncertainty", "relative")  # fmt: skip
 
@@ -215,57 +215,19 @@ def find_series(definition: Definition, results: Sequence[Result | None], key: s
     return found
 
 
-def make_row(one: Series) -> list[str]:
+def make_row(one: Series, digits: int = 8) -> list[str]:
     """A series as a line of orders.csv; HEADS says what stands where."""
     refined, last = one.refined, float(one.values[-1])
     relative = refined.uncertainty / abs(last) if last else math.nan
     numbers = refined.order, refined.extrapolated, refined.uncertainty, relative
-    lists = _join(one.cells), _join(one.values), _join(refined.orders)
-    told = ("" if math.isnan(number) else f"{number:.6g}" for number in numbers)
+    lists = (
+        " ".join(f"{float(value):.{digits}g}" for value in values)
+        for values in (one.cells, one.values, refined.orders)
+    )
+    told = ("" if math.isnan(number) else f"{number:.{digits - 2}g}" for number in numbers)
     return [one.words, one.quantity, *lists, refined.kind, *told]
 
 
-def _join(values: Sequence[float] | np.ndarray) -> str:
-    return " ".join(f"{float(value):.8g}" for value in values)
-
-
 def describe_series(series: Sequence[Series], shown: Sequence[str]) -> list[str]:
-    """A line for each series of the quantities `shown`."""
-    lines = []
-    for one in series:
-        if one.quantity not in shown:
-            continue
-        name = f"{one.quantity}, {one.words}" if one.words else one.quantity
-        grids = " / ".join(write_apart(one.values))
-        lines.append(f"  {name}: {grids} ({_join(one.cells)} cells): {describe_order(one)}")
-    return lines
-
-
-def write_apart(values: Sequence[float] | np.ndarray) -> list[str]:
-    """Numbers with four digits, or as many more as tell them apart; four where ten do not."""
-    different = len({float(value) for value in values})
-    for digits in range(LEAST_DIGITS, MOST_DIGITS + 1):
-        texts = [f"{float(value):.{digits}g}" for value in values]
-        if len(set(texts)) == different:
-            return texts
-    return [f"{float(value):.{LEAST_DIGITS}g}" for value in values]
-
-
-def describe_order(one: Series) -> str:
-    """What the grids show, in words."""
-    refined, last = one.refined, float(one.values[-1])
-    share = f" ({100.0 * refined.uncertainty / abs(last):.2g} %)" if last else ""
-    if one.error:
-        known = [f"{order:.2f}" for order in refined.orders if not math.isnan(order)]
-        none = "no order" if refined.kind == "error" else f"{refined.kind}, no order"
-        return f"observed order {', '.join(known)}" if known else none
-    return {
-        "monotone": f"observed order {refined.order:.2f}, for h = 0 {refined.extrapolated:.5g}, "
-        f"uncertainty of the finest (GCI) {refined.uncertainty:.2g}{share}",
-        "not monotone": f"not monotone, no order; half the range is {refined.uncertainty:.2g}",
-        "not asymptotic": f"not asymptotic (order above {MOST_CREDIBLE:g}): no order, no "
-        "uncertainty",
-        "diverging": "changes do not fall with the cells: no order, no uncertainty",
-        "two grids": f"two grids only: uncertainty {refined.uncertainty:.2g} with order 1 taken "
-        "for granted and a factor of safety of 3",
-    }.get(refined.kind, "the same to round-off")
+    """The table of the series of the quantities `shown`; `relative`: uncertainty over the value."""
+    return align([HEADS, *(make_row(one, 5) for one in series if one.quantity in shown)])

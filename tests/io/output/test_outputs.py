@@ -9,7 +9,6 @@ import h5py
 import numpy as np
 import pytest
 
-from runs import forecast
 from runs.store.reader import RunData
 
 DECK = ("interface-instability", "--set", "cells=16", "--set", "lengths=[2, 2]", "--set", "mach=2")
@@ -74,14 +73,6 @@ def test_what_a_run_takes_passes(shockgrid):
     Path("mine.toml").write_text(HEAD + lines)
     assert shockgrid("check", "mine.toml")[0] == 0
     assert shockgrid("run", "--dry-run", "mine.toml")[0] == 0
-
-
-@pytest.fixture(autouse=True)
-def own_cache(monkeypatch, tmp_path):
-    """Past runs of these tests are kept among themselves; no kernels are needed."""
-    home = tmp_path / "cache"
-    monkeypatch.setattr(forecast, "find_home", lambda: home)
-    return home
 
 
 def test_the_first_lines_and_a_dry_run_say_cells_memory_and_disk(shockgrid):

@@ -112,7 +112,7 @@ def test_bad_input_is_one_sentence(deck, settings, words):
     ],
 )
 def test_small_runs_against_theory(deck, settings, name, most):
-    history, errors, _ = march(deck, settings)
+    history, errors, _ = march((deck, settings))
     values = history[name] if name in history else [errors[name]]
     known = [value for value in values if math.isfinite(value)]
     assert known[-1] < most
@@ -129,7 +129,7 @@ def test_small_runs_against_theory(deck, settings, name, most):
     ],
 )  # fmt: skip
 def test_orders_on_moving_grids(deck, column, coarse, fine, least):
-    found = [march(deck, settings)[0] for settings in (coarse, fine)]
+    found = [march((deck, settings))[0] for settings in (coarse, fine)]
     assert math.log2(found[0][column][-1] / found[1][column][-1]) > least
     if deck == "kidder":
         assert found[1]["outer_error"][-1] < 2.6e-4
@@ -137,7 +137,7 @@ def test_orders_on_moving_grids(deck, column, coarse, fine, least):
 
 
 def test_kidders_slab_shrinks_as_theory_says():
-    coarse, fine = (march("kidder", ("n=1", f"cells={cells}", "rays=4"))[0] for cells in (20, 40))
+    coarse, fine = (march(("kidder", ("n=1", f"cells={cells}", "rays=4")))[0] for cells in (20, 40))
     for column in ("inner_worst", "outer_worst", "error_rho"):
         assert math.log2(coarse[column][-1] / fine[column][-1]) > 1.6, column
     assert fine["outer_worst"][-1] < 1e-4

@@ -283,7 +283,7 @@ class TimeLeft:
         steps, times, walls = np.array([*self.marks, *fresh], dtype=float).T
         if not (math.isfinite(self.t_end) and t > times[0]):
             return None
-        counts, flow = np.diff(steps), np.diff(times)
+        counts, flow = np.diff(steps), np.maximum(np.diff(times), 1e-300)  # dt may collapse
         each = drop_events(np.diff(walls) / counts)
         half = slice(max(int(np.searchsorted(steps, steps.mean())) - 1, 0), None)
         a_step = np.average(each[half], weights=counts[half])

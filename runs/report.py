@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 import csv
-import io
 import os
 import tempfile
 from collections.abc import Callable

@@ -6,21 +6,17 @@ over a product of some size and there is theory, a map shows how far from it eac
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from runs.pictures.command import write_figure
-from runs.store.files import write_atomically
+from runs.pictures.command import new_figure
 from runs.study.definition import make_column
 from runs.study.orders import Series
 from runs.verify import CASES
@@ -43,8 +39,8 @@ def draw_study(study: Any) -> Figure:
             panels.append(partial(_draw_lines, study=study, name=name))
             if _is_map(study, name):
                 panels.append(partial(_draw_map, study=study, name=name))
-    figure = Figure(figsize=(6.2 * max(1, len(panels)), 4.8), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure()
+    figure.set_size_inches(6.2 * max(1, len(panels)), 4.8)
     row = figure.subplots(1, max(1, len(panels)), squeeze=False)[0]
     for axes, panel in zip(row, panels, strict=False):
         panel(axes)
@@ -52,16 +48,6 @@ def draw_study(study: Any) -> Figure:
     title = study.definition.source + (f" ({words})" if words else "")
     figure.suptitle(title if len(title) < 110 else f"{title[:107]}...", fontsize="medium")
     return figure
-
-
-def save_figure(figure: Figure, path: Path, deck_text: str | None = None) -> None:
-    """Write the figure, in the format of the file ending; whole or not at all.
-
-    deck_text: the study's definition as TOML, for the metadata.
-    """
-    image = io.BytesIO()
-    write_figure(figure, image, 130, path.suffix.lstrip(".") or "png", deck_text)
-    write_atomically(path, image.getvalue(), durable=False)
 
 
 def _numbers(study: Any, key: str) -> np.ndarray | None:

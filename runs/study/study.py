@@ -189,11 +189,12 @@ class Study:
 
     def plot(self, path: Path | str | None = None) -> Figure:
         """The figure of `shown`, written to `path` where there is one."""
-        from runs.study.pictures import draw_study, save_figure
+        from runs.pictures.command import save
+        from runs.study.pictures import draw_study
 
         figure = draw_study(self)
         if path is not None:
-            save_figure(figure, Path(path), self.definition.to_toml())
+            save(figure, Path(path), 130, self.definition.to_toml())
         return figure
 
     def write(self) -> list[Path]:

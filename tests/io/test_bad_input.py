@@ -69,6 +69,8 @@ NO_HEAT = [f"{side}.{key}" for side in ("left", "right") for key in ("heat=adiab
         (("heated-cavity", *NO_STEADY), "which no steady state can"),
         (("heated-cavity", *NO_HEAT), "no wall is isothermal"),
         (("convection-1d", "rayleigh=0"), "nothing would rise"),
+        (("riemann", "cells=2000", "grading=1.1"), "with grading 1.1 the last of 1000 cells"),
+        (("vortex", "beta=20"), "beta = 20; it must be a number of at least 0 and at most 10"),
     ],
 )
 def test_keys_that_contradict_each_other(shockgrid, deck, words):

@@ -171,17 +171,12 @@ class Tables:
 
 
 PARTS = ("sides", "regrid", "flow")
-# which commands each choice of `--runs` measures
-RUNS: dict[str, tuple[tuple[str, ...], ...]] = {
-    "none": (),
-    "default": (("interface-instability",),),
-    "long": (("interface-instability",), ("interface-instability-mushroom",)),
-    "large": (
-        ("interface-instability",),
-        ("interface-instability-mushroom",),
-        ("interface-instability", "--set", "cells=256"),
-    ),
-}
+RUNS = ("none", "default", "long", "large")  # choices of `--runs`: so many of COMMANDS
+COMMANDS: tuple[tuple[str, ...], ...] = (
+    ("interface-instability",),
+    ("interface-instability-mushroom",),
+    ("interface-instability", "--set", "cells=256"),
+)
 
 
 def measure_command(tables: Tables, words: tuple[str, ...], rounds: int, peer: Peer | None) -> None:
@@ -334,7 +329,7 @@ def bench(
 ) -> None:
     """Measure and print; into the JSON file `path`, if one is named.
 
-    runs: a key of `RUNS`; peer: a built checkout of CloverLeaf_ref to measure beside, or None.
+    runs: one of `RUNS`; peer: a built checkout of CloverLeaf_ref to measure beside, or None.
     Raises BadInput.
     """
     words = ["shockgrid bench", f"--cells {cells}", f"--rounds {rounds}"]
@@ -345,6 +340,6 @@ def bench(
     say(EXPLANATION)
     measure_flow(tables, cells, rounds, beside)
     measure_threads(tables, (cells // 2, cells), rounds)
-    for words_of_run in RUNS[runs]:
+    for words_of_run in COMMANDS[: RUNS.index(runs)]:
         measure_command(tables, words_of_run, rounds, beside)
     tables.write()

@@ -24,14 +24,8 @@ from matplotlib.text import Text
 
 from regrid.errors import BadInput, suggest
 from regrid.text_files import escape_controls
-from runs.pictures.curves import (
-    draw_interfaces,
-    draw_lineouts,
-    take_lineouts,
-    write_csv,
-)
+from runs.pictures import curves
 from runs.pictures.fields import View, draw_fields, time_titles
-from runs.pictures.history import draw_gauges, draw_history
 from runs.store.files import check_folder, check_free, disk_errors
 from runs.store.provenance import describe_software, hash_deck
 from runs.store.reader import Dump, RunData
@@ -176,18 +170,19 @@ def fill_figure(
             raise BadInput(f"--line {line}: two points in metres are wanted, these are the same")
         dumps, titles = choose_pairs(runs, at, say), name_paths(runs)
         lineouts = [
-            take_lineouts(dumps[k :: len(runs)], names, way, view, say) for k in range(len(runs))
+            curves.take_lineouts(dumps[k :: len(runs)], names, way, view, say)
+            for k in range(len(runs))
         ]
-        draw_lineouts(figure, lineouts, names, titles)
-        write_table = partial(write_csv, lineouts=lineouts, names=names, runs=titles)
+        curves.draw_lineouts(figure, lineouts, names, titles)
+        write_table = partial(curves.write_csv, lineouts=lineouts, names=names, runs=titles)
     elif what == "mesh":
         draw_fields(figure, choose_dumps(run, at, say=say), (), view)
     elif what == "interface":
-        draw_interfaces(figure, choose_dumps(run, at, 12, say), view)
+        curves.draw_interfaces(figure, choose_dumps(run, at, 12, say), view)
     elif what == "history":
-        draw_history(figure, run, names)
+        curves.draw_history(figure, run, names)
     elif what == "gauges" and (run.deck.gauge or what not in run.problem.figures()):
-        draw_gauges(figure, run, names)
+        curves.draw_gauges(figure, run, names)
     else:
         own = run.problem.figures()
         if what not in own:

@@ -9,7 +9,7 @@ import pytest
 
 from problems.registry import PROBLEMS
 from runs.pictures.command import new_figure
-from runs.pictures.history import draw_history
+from runs.pictures.curves import draw_history
 from runs.store.reader import RunData
 
 

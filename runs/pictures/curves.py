@@ -316,9 +316,7 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
         if history[name].dtype.kind not in "fi":
             raise BadInput(f"the column {name!r} of {run.path} holds words, no numbers")
     units = run.find_units()
-    factor, unit = (
-        fields.scale_times(run.dumps) if run.dumps else pick_prefix(history["t"][-1], "s")
-    )
+    factor, unit = fields.scale_times(run.dumps, history["t"][-1])
     label = f"t [{unit}]"
     if run.dumps and run.dumps[-1].t_unit != "s":
         label = unit
@@ -460,7 +458,7 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
     chosen = [p for p in points if p.name in names] or points
     shown = [name for name in shown if name in names] or shown
     shown = [name for name in shown if any(name in point.fields for point in chosen)]
-    factor, unit = fields.scale_times(run.dumps) if run.dumps else pick_prefix(table["t"][-1], "s")
+    factor, unit = fields.scale_times(run.dumps, table["t"][-1])
     colours = colormaps["turbo"](np.linspace(0.05, 0.95, len(chosen)))
     columns = min(COLUMNS, len(shown))
     size = max(GAUGES_WIDTH, 7.0 / columns), GAUGES_HEIGHT

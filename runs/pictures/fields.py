@@ -460,6 +460,8 @@ def time_titles(dumps: Sequence[Dump]) -> list[str]:
     ]
 
 
-def scale_times(dumps: Sequence[Dump]) -> tuple[float, str]:
-    """Factor and unit for the times of `dumps`."""
+def scale_times(dumps: Sequence[Dump], last: float = 0.0) -> tuple[float, str]:
+    """Factor and unit for the times of `dumps`, or for one of `last` [s] where there are none."""
+    if not dumps:
+        return pick_prefix(last, "s")
     return pick_prefix(max(dump.t for dump in dumps), dumps[-1].t_unit)

@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -34,22 +34,6 @@ NAMES = {  # of the fields of metadata: what made it, what of
     "png": ("Software", "Description"), "pdf": ("Creator", "Subject"),
     "svg": ("Creator", "Description"), "eps": ("Creator", None), "ps": ("Creator", None),
 }  # fmt: skip
-
-
-def write_figure(
-    figure: Figure, target: Path | IO[bytes], dpi: int, ending: str, deck_text: str | None = None
-) -> None:
-    """Write a figure in the format of that ending.
-
-    deck_text: the resolved deck as TOML of the run that is shown; its digest goes into the file.
-    Raises OSError where the disk does not take it.
-    """
-    clean_words(figure)
-    maker, content = NAMES.get(ending, (None, None))
-    metadata = {maker: describe_software()} if maker else {}
-    if content and deck_text is not None:
-        metadata[content] = f"deck SHA-256 {hash_deck(deck_text)}"
-    figure.savefig(target, dpi=dpi, format=ending, metadata=metadata or None)
 
 
 def clean_words(figure: Figure) -> None:
@@ -232,13 +216,21 @@ def new_figure() -> Figure:
 
 
 def save(figure: Figure, path: Path, dpi: int, deck_text: str | None = None) -> Path:
-    """Write the figure; the name's ending says the format; `deck_text`: of the run it shows."""
+    """Write the figure; the name's ending says the format.
+
+    deck_text: the resolved deck as TOML of the run that is shown; its digest goes into the file.
+    """
     ending = path.suffix.lstrip(".").lower()
     if ending not in figure.canvas.get_supported_filetypes():
         raise BadInput(f"{path}: a picture's name has to end in .png, .pdf or .svg")
     check_folder(path)
+    clean_words(figure)
+    maker, content = NAMES.get(ending, (None, None))
+    metadata = {maker: describe_software()} if maker else {}
+    if content and deck_text is not None:
+        metadata[content] = f"deck SHA-256 {hash_deck(deck_text)}"
     with disk_errors(path):
-        write_figure(figure, path, dpi, ending, deck_text)
+        figure.savefig(path, dpi=dpi, format=ending, metadata=metadata or None)
     return path
 
 

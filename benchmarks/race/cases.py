@@ -100,7 +100,7 @@ def make_growth(name: str = "growth") -> Case:
     cells: dict[str, tuple[int, ...]] = {"shockgrid": (16, 24, 32, 64, 128)}
     if name == "growth":
         cells = {
-            "shockgrid": (32, 64, 96, 128),
+            "shockgrid": (16, 24, 32, 48, 64, 96),
             "cloverleaf": (32, 64, 128, 256),
             "pyclaw": (32, 64, 128, 256),
             "amrclaw": (64, 128, 256, 512),

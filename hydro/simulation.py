@@ -222,9 +222,9 @@ class Simulation:
         self._flow = replace(self._flow, blocks=ranks)
 
     @property
-    def threads(self) -> int:
-        """Threads that the blocks have in all."""
-        return self._shared.workers.threads
+    def workers(self) -> Workers:
+        """Threads over blocks and inside them."""
+        return self._shared.workers
 
     @property
     def t(self) -> float:

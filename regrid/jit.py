@@ -24,6 +24,10 @@ from collections.abc import Callable
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 
+# threads of a kernel that wait for others sleep after some 50 us, before OpenMP is loaded: spinning
+# on a busy machine they take the time of those that work
+os.environ.setdefault("GOMP_SPINCOUNT", "1000")
+
 import llvmlite
 import llvmlite.binding
 import numba

@@ -226,8 +226,8 @@ class Problem:
         chosen["small_cells"] = run.small_cells
         if fill is not None:
             chosen["void_fill"] = (fill.pressure, fill.gamma)
-        mesh = options.get("mesh", "regrid")
-        if isinstance(mesh, str) and mesh not in ("regrid", "fixed"):
+        mesh, own = options.get("mesh", "regrid"), type(self).make_grids is not Problem.make_grids
+        if own and isinstance(mesh, str) and mesh not in ("regrid", "fixed"):
             options["mesh"] = lambda name, t: self.make_grids(t)[name]
         if regrid is not None:
             chosen["make_regridder"] = lambda: regrid.make(threads=run.threads)

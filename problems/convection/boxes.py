@@ -40,9 +40,10 @@ class ConvectionBlock:
     units: Mapping[str, str] = {"T": "K", "u": "m/s", "v": "m/s", "psi": "m2/s"}
     long_names: Mapping[str, str] = {"T": "temperature", "psi": "stream function"}
 
-    def __init__(self, name: str, equations: Equations, psi: np.ndarray, temperature: np.ndarray):
-        self.name, self.equations = name, equations
-        self.psi, self.temperature = psi, temperature
+    name = "box"
+
+    def __init__(self, equations: Equations, psi: np.ndarray, temperature: np.ndarray):
+        self.equations, self.psi, self.temperature = equations, psi, temperature
         self.nodes = make_plane_grid(*(axis.nodes for axis in equations.axes))
 
     @property
@@ -69,8 +70,8 @@ def measure_mass(equations: Equations, psi: np.ndarray) -> float:
 class _Box:
     """A box that marches: `solver` has its fluid, its `level` equations, psi and temperature."""
 
-    def __init__(self, name: str, solver: SteadySolver | March, t_end: float):
-        self.name, self.solver, self.t_end = name, solver, t_end
+    def __init__(self, solver: SteadySolver | March, t_end: float):
+        self.solver, self.t_end = solver, t_end
 
     level = property(attrgetter("solver.level"))
     fluid = property(attrgetter("solver.fluid"))  # in a steady run that of the present stage
@@ -80,7 +81,7 @@ class _Box:
 
     @property
     def blocks(self) -> list[ConvectionBlock]:
-        return [ConvectionBlock(self.name, self.equations, self.psi, self.temperature)]
+        return [ConvectionBlock(self.equations, self.psi, self.temperature)]
 
     def get_state(self):
         return self.solver.get_state()
@@ -138,8 +139,8 @@ class TimeEvolution(_Box):
     step = property(attrgetter("solver.step"))
     t = property(attrgetter("solver.t"))
 
-    def __init__(self, name: str, march: March, grid: GridControl, t_end: float, coldest: float):
-        super().__init__(name, march, t_end)
+    def __init__(self, march: March, grid: GridControl, t_end: float, coldest: float):
+        super().__init__(march, t_end)
         self.grid, self.coldest = grid, coldest
 
     @property
@@ -250,7 +251,7 @@ class BoxProblem(Problem):
         run = self.deck.run
         longest = self.deck.longest_step or self.longest_part * (run.t_set_up or self.t_end)
         march = March(equations, self.fluid, psi, temperature, cfl=run.cfl, longest=longest)
-        return TimeEvolution("box", march, self.deck.grid.control(), self.t_end, coldest)
+        return TimeEvolution(march, self.deck.grid.control(), self.t_end, coldest)
 
     def say_lost_volume(self, history) -> str:
         """A sentence on the conservation of volume in the last step."""

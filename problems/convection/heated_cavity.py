@@ -114,7 +114,7 @@ class HeatedCavity(BoxProblem):
         deck, equations = self.deck, self.make_first_equations()
         if deck.method == "steady":
             solver = SteadySolver(equations, self.fluid, deck.grid.control(), deck.tolerance)
-            return SteadyEvolution("box", solver, self.t_end)
+            return SteadyEvolution(solver, self.t_end)
         sides = (deck.left, deck.right, deck.bottom, deck.top)
         coldest = min((s.value for s in sides if s.heat == "isothermal"), default=0.0)
         return self.make_march(equations, *make_rest(equations), coldest)

@@ -190,6 +190,9 @@ class PlateOnWedge(Results, Problem):
         self.wedge_spacing = self.coarse_spacing / math.sqrt(self.refinement)
         parts = deck.edge / self.wedge_spacing, deck.face / self.wedge_spacing
         self.on_edge, self.on_face = (max(3, round(part)) for part in parts)  # faces of the wedge
+        drive, self.flyer_rows = deck.drive, 0
+        if drive.kind == "flyer":
+            self.flyer_rows = max(4, round(drive.thickness / deck.thickness * nj))
         turn = math.radians(deck.turn)  # `frame`: from the set-up as described here to the deck's
         matrix = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
         self.frame = matrix @ np.diag([-1.0, 1.0]) if deck.mirror else matrix
@@ -275,9 +278,9 @@ class PlateOnWedge(Results, Problem):
         bottom = np.array([arc_law(top) * self.foot, np.full(top.shape[1], self.base)])
         part = self.lay_rows(max(6, round(deck.depth / self.coarse_spacing)), 1.0, from_end=True)
         grids["wedge"] = bottom[:, :, None] * (1.0 - part) + top[:, :, None] * part
-        if drive.kind == "flyer":
-            rows = max(4, round(drive.thickness / deck.thickness * nj))
-            y = deck.gap + deck.thickness + np.linspace(0.0, drive.thickness, rows + 1)
+        if self.flyer_rows:
+            across = np.linspace(0.0, drive.thickness, self.flyer_rows + 1)
+            y = deck.gap + deck.thickness + across
             grids["flyer"] = make_plane_grid(x, y)
         return grids
 
@@ -289,10 +292,12 @@ class PlateOnWedge(Results, Problem):
         return length * clustered_law(rows + 1, least, from_end)
 
     def estimate_cells(self) -> int:
-        """Cells of the plate and of the wedge, counted from the sizes that the deck asks for."""
+        """Cells of all blocks, counted from the sizes that the deck asks for."""
         (ni, nj), deck = self.deck.cells, self.deck
         along = 6.0 + (deck.edge + deck.face) / self.wedge_spacing
-        return ni * nj + math.ceil(along * max(6.0, 1.0 + deck.depth / self.coarse_spacing))
+        return ni * (nj + self.flyer_rows) + math.ceil(
+            along * max(6.0, 1.0 + deck.depth / self.coarse_spacing)
+        )
 
     def turn_faces(self, block: Block, side: str, start: int = 0, stop: int | None = None):
         """(block, side, start, stop) of faces counted in the set-up as described here."""

@@ -23,7 +23,7 @@ from problems.problem import Problem, Report, compare, find_crossing
 from problems.references.shock_polars import Body, ShockPolar, search_pressure, solve_collision
 from regrid.errors import BadInput
 
-LENGTH, BEFORE, HEIGHT = 1.0, 0.25, 1.0
+BEFORE = 0.25  # length before the wedge; it is 1 long, and the top is 1 above its start
 
 
 class ObliqueShockDeck(Deck, kw_only=True):
@@ -43,8 +43,7 @@ class ObliqueShock(Problem):
 
     def __init__(self, deck: ObliqueShockDeck):
         super().__init__(deck)
-        self.angle = math.radians(deck.angle)
-        self.ahead = 1.0 / deck.gamma
+        self.angle, self.ahead = math.radians(deck.angle), 1.0 / deck.gamma
         gas, fall = Body(IdealGas(deck.gamma), 1.0, self.ahead), deck.mach * math.tan(self.angle)
         found = solve_collision(gas, None, fall, self.angle)  # as a plate thrown onto a rigid wedge
         if not found.attached:
@@ -54,20 +53,18 @@ class ObliqueShock(Problem):
                 f"attached up to {most:.4g} degrees only"
             )
         self.beta, self.pressure = found.plate.wave_angle, found.p
-        if math.tan(self.beta) * LENGTH >= HEIGHT:
-            raise BadInput(
-                f"deck: the shock's angle is {math.degrees(self.beta):.3g} degrees; above "
-                f"{math.degrees(math.atan(HEIGHT / LENGTH)):g} it leaves through the top"
-            )
+        if math.tan(self.beta) >= 1.0:
+            words = f"the shock's angle is {math.degrees(self.beta):.3g} degrees"
+            raise BadInput(f"deck: {words}; above 45 it leaves through the top")
 
     def make_grids(self, t=0.0):
         """Straight upright lines between the wall and the top."""
         cells = self.deck.cells
-        before = round(cells * BEFORE / (LENGTH + BEFORE))
+        before = round(cells * BEFORE / (1.0 + BEFORE))
         upstream = np.linspace(-BEFORE, 0.0, before + 1)[:-1]
-        x = np.concatenate([upstream, np.linspace(0.0, LENGTH, cells - before + 1)])[:, None]
+        x = np.concatenate([upstream, np.linspace(0.0, 1.0, cells - before + 1)])[:, None]
         wall = math.tan(self.angle) * np.maximum(x, 0.0)
-        y = wall + (HEIGHT - wall) * np.linspace(0.0, 1.0, round(0.8 * cells) + 1)
+        y = wall + (1.0 - wall) * np.linspace(0.0, 1.0, round(0.8 * cells) + 1)
         return {"gas": np.array([np.broadcast_to(x, y.shape), y])}
 
     def estimate_cells(self) -> int:
@@ -87,17 +84,14 @@ class ObliqueShock(Problem):
         """Pressure on the last half of the wedge over the exact one, and the shock's angle."""
         (block,) = evolution.blocks
         x, y = block.centres
-        p, x = block.state[3, 1:-1, 1:-1], x[:, 0]
-        level = 0.5 * (self.ahead + self.pressure)
+        p, x, level = block.state[3, 1:-1, 1:-1], x[:, 0], 0.5 * (self.ahead + self.pressure)
         heights = np.array([find_crossing(*column, level) for column in zip(y, p, strict=True)])
-        chosen, slope = (x > 0.3 * LENGTH) & (x < 0.9 * LENGTH) & np.isfinite(heights), math.nan
+        chosen, slope = (x > 0.3) & (x < 0.9) & np.isfinite(heights), math.nan
         if chosen.sum() > 2:
             slope = math.degrees(math.atan(np.polyfit(x[chosen], heights[chosen], 1)[0]))
-        return {
-            "wall_pressure_ratio": float(p[x > 0.5 * LENGTH, 0].mean()) / self.pressure,
-            "shock_angle": slope,
-            "shock_angle_error": abs(slope / math.degrees(self.beta) - 1.0),
-        }
+        off = abs(slope / math.degrees(self.beta) - 1.0)
+        ratio = float(p[x > 0.5, 0].mean()) / self.pressure
+        return {"wall_pressure_ratio": ratio, "shock_angle": slope, "shock_angle_error": off}
 
     def report(self, history, final=None) -> Report:
         deck, beta = self.deck, math.degrees(self.beta)
@@ -113,13 +107,13 @@ class ObliqueShock(Problem):
     def draw_oblique_shock(self, figure, run_data) -> None:
         """Pressure with the grid and the exact shock, and pressure along the wall."""
         left, right = make_panels(figure, 11.5, 4.6, 1, 2, width_ratios=(1.3, 1.0))
-        dump, end = run_data.dumps[-1], LENGTH * math.tan(self.beta)
+        dump, end = run_data.dumps[-1], math.tan(self.beta)
         draw_field(left, dump, "p", every=5, bar="pressure [Pa]")
-        left.plot((0.0, LENGTH), (0.0, end), "r--", lw=1.5, zorder=5, label="exact shock")
+        left.plot((0.0, 1.0), (0.0, end), "r--", lw=1.5, zorder=5, label="exact shock")
         left.legend(loc="upper left")
         x, p = dump["gas"].centres[0][:, 0], dump["gas"].p[:, 0]
         right.plot(x, p, ".-", ms=4, lw=0.8, label="computed")
         exact = (float(p[0]),) * 2 + (self.pressure,) * 2
-        right.plot((x[0], 0.0, 0.0, LENGTH), exact, "k--", lw=0.9, label="exact")
+        right.plot((x[0], 0.0, 0.0, 1.0), exact, "k--", lw=0.9, label="exact")
         right.legend(loc="lower right")
         right.set(xlabel="x [m]", ylabel="pressure on the wall [Pa]")

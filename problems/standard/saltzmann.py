@@ -58,10 +58,8 @@ class Saltzmann(Problem):
     def __init__(self, deck: SaltzmannDeck):
         super().__init__(deck)
         if deck.run.t_end > LAST:
-            raise BadInput(
-                f"deck: run.t_end is {deck.run.t_end:g}; it must not be above {LAST:g} s, when the "
-                "third shock meets the wall"
-            )
+            words = f"it must not be above {LAST:g} s, when the third shock meets the wall"
+            raise BadInput(f"deck: run.t_end is {deck.run.t_end:g}; {words}")
 
     def make_grids(self, t=0.0):
         x, y = make_box((self.deck.cells, self.deck.rows), (0.0, 0.0), (1.0, 0.1))
@@ -103,9 +101,10 @@ class Saltzmann(Problem):
             for last in np.flatnonzero(np.isfinite(history[f"mean_error_{n}"]))[-1:]:
                 when = f"density {exact:g}, t = {history['t'][last]:.3f}"
                 for kind, words in KINDS.items():
-                    name, label = f"{kind}_error_{n}", f"{when}: {words} [%]"
-                    value = float(history[name][last])
-                    rows.append(Row(name, value, label=label, unit=0.01, digits=3))
+                    name, more = f"{kind}_error_{n}", {"unit": 0.01, "digits": 3}
+                    rows.append(
+                        Row(name, history[name][last], label=f"{when}: {words} [%]", **more)
+                    )
         most, words = find_most(history, "transverse_speed"), "largest speed across [m/s]"
         rows.append(Row("largest_transverse_speed", most, label=words, digits=2))
         head = f"saltzmann, {deck.cells} x {deck.rows} cells, {deck.regrid.name}"

@@ -14,7 +14,7 @@ import io
 import itertools
 import math
 import pickle
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar, Literal
 
@@ -29,7 +29,7 @@ from hydro.simulation import Simulation
 from hydro.step import take_step
 from problems.deck import DeckTable, key
 from problems.pictures import draw_field, make_panels
-from problems.problem import Problem, find_crossing, say_unreached
+from problems.problem import BlockPlan, Problem, find_crossing, say_unreached
 from problems.references.exact_flows import average_points
 from problems.references.hugoniot import Shock, shock_with_mach
 from regrid.errors import BadInput
@@ -72,11 +72,6 @@ def make_plane_grid(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.array(np.meshgrid(x, y, indexing="ij"))
 
 
-def make_box(cells: tuple[int, int], low: Sequence[float], high: Sequence[float]) -> np.ndarray:
-    """Nodes (2, ni + 1, nj + 1) of even cells in a rectangle between two corners [m]."""
-    return make_plane_grid(*map(np.linspace, low, high, np.add(cells, 1)))
-
-
 def swing_square(cells: int, low: float, period: float, swing: float) -> np.ndarray:
     """Nodes (2, cells+1, cells+1) of a periodic square displaced by a sine wave each way [m].
 
@@ -84,7 +79,7 @@ def swing_square(cells: int, low: float, period: float, swing: float) -> np.ndar
     sin(k (x - low)) sin(k (y - low)), k = 2 pi/period, and y down by as much.  Bitwise periodic:
     the far sides take the displacement of the near ones.
     """
-    x, y = make_box((cells, cells), (low, low), (low + period, low + period))
+    x, y = BlockPlan("", (cells, cells), (low, low), (low + period, low + period)).make_nodes()
     k = 2.0 * np.pi / period
     wave = np.sin(k * (x - low)) * np.sin(k * (y - low))
     wave[-1] = wave[0]

@@ -42,6 +42,11 @@ class BlockPlan:
     low: tuple[float, float]
     high: tuple[float, float]
 
+    def make_nodes(self) -> np.ndarray:
+        """Nodes (2, ni + 1, nj + 1) of even cells in a rectangle of this extent [m]."""
+        lines = map(np.linspace, self.low, self.high, np.add(self.cells, 1))
+        return np.array(np.meshgrid(*lines, indexing="ij"))
+
 
 def plan_blocks(grids: Mapping[str, np.ndarray]) -> list[BlockPlan]:
     """Sizes of blocks whose first nodes (2, ni + 1, nj + 1) are made, by name."""
@@ -233,24 +238,30 @@ class Problem:
             chosen["make_regridder"] = lambda: regrid.make(threads=run.threads)
         return (kind or Simulation)(list(blocks), list(links), **(chosen | options))
 
+    def list_boxes(self) -> list[BlockPlan]:
+        """The blocks where they are rectangles of even cells, or may be planned as such."""
+        return []
+
     def make_grids(self, t: float = 0.0) -> dict[str, np.ndarray]:
         """Nodes (2, ni + 1, nj + 1) [m] of the blocks by name at the start, and at time t where
-        their motion is given; {} where `build` is the only way to know (for small problems)."""
-        return {}
+        their motion is given: those of the boxes; {} where `build` is the only way to know."""
+        return {box.name: box.make_nodes() for box in self.list_boxes()}
 
     def plan(self) -> tuple[float, list[BlockPlan]] | None:
         """End time and blocks of the run without allocating it, after all checks of the deck; None
         where they are unknown before `build`."""
-        check_memory(self)
-        grids = self.make_grids()
-        return (self.t_end, plan_blocks(grids)) if grids else None
+        if not (boxes := self.list_boxes()):
+            check_memory(self)
+            boxes = plan_blocks(self.make_grids())
+        return (self.t_end, boxes) if boxes else None
 
     def estimate_cells(self) -> int:
         """Cells of all blocks by arithmetic alone, or somewhat more: asked before `plan` and
         `build`, so that too many are refused before an array of them is made."""
         if self.counted:
             return math.prod(getattr(self.deck, name) for name in self.counted)
-        plan = self.plan() if type(self).plan is not Problem.plan else None
+        known = self.list_boxes() or type(self).plan is not Problem.plan
+        plan = self.plan() if known else None
         return sum(math.prod(block.cells) for block in plan[1]) if plan else 0
 
     def measure(self, evolution: Evolution) -> dict[str, float]:

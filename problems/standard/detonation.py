@@ -25,9 +25,9 @@ from hydro.eos import JWL
 from hydro.eos.materials import find_material
 from hydro.sources import ProgrammedBurn
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.initial_states import make_box, put_walls
+from problems.initial_states import put_walls
 from problems.pictures import draw_field, make_panels, spread_dumps
-from problems.problem import Problem, Report, Row, compare, find_crossing, get_last
+from problems.problem import BlockPlan, Problem, Report, Row, compare, find_crossing, get_last
 from problems.references.exact_flows import compute_taylor_wave
 from regrid.errors import BadInput
 
@@ -69,13 +69,10 @@ class Detonation(Problem):
         self.t_end = deck.run.t_end or WAY * deck.length / self.speed
         self.taylor_wave = compute_taylor_wave(eos) if deck.behind == "wall" else None
 
-    def estimate_cells(self) -> int:
-        return self.deck.cells * (self.deck.cells if self.deck.behind == "point" else 4)
-
-    def make_grids(self, t=0.0):
+    def list_boxes(self):
         length, cells = self.deck.length, self.deck.cells
-        rows = self.estimate_cells() // cells
-        return {"explosive": make_box((cells, rows), (0.0, 0.0), (length, length / cells * rows))}
+        rows = cells if self.deck.behind == "point" else 4
+        return [BlockPlan("explosive", (cells, rows), (0.0, 0.0), (length, length / cells * rows))]
 
     def build(self):
         deck, eos, size = self.deck, self.eos, self.deck.length / self.deck.cells

@@ -22,9 +22,9 @@ from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.rows import P, U
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, VoidFill, key
-from problems.initial_states import make_box, put_walls
+from problems.initial_states import put_walls
 from problems.pictures import draw_columns
-from problems.problem import Problem, Report, Row, find_time
+from problems.problem import BlockPlan, Problem, Report, Row, find_time
 from problems.references.plate_impact import compute_plate_impact
 from regrid.errors import BadInput
 
@@ -70,16 +70,13 @@ class FlyerTarget(Problem):
         self.is_pair = not more
         self.names = [f"plate-{number}" for number in range(1, len(deck.plates) + 1)]
 
-    def estimate_cells(self) -> int:
-        return self.deck.rows * sum(plate.cells for plate in self.deck.plates)
-
-    def make_grids(self, t=0.0):
-        rows, grids, x = self.deck.rows, {}, 0.0
+    def list_boxes(self):
+        rows, boxes, x = self.deck.rows, [], 0.0
         height = TALL * rows * min(one.thickness / one.cells for one in self.deck.plates)
         for name, plate in zip(self.names, self.deck.plates, strict=True):
             low, x = x + plate.gap, x + plate.gap + plate.thickness
-            grids[name] = make_box((plate.cells, rows), (low, 0.0), (x, height))
-        return grids
+            boxes.append(BlockPlan(name, (plate.cells, rows), (low, 0.0), (x, height)))
+        return boxes
 
     def build(self):
         blocks = []

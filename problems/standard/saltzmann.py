@@ -23,9 +23,9 @@ from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.initial_states import make_box, put_walls
+from problems.initial_states import put_walls
 from problems.pictures import draw_field, find_dump
-from problems.problem import Problem, Report, Row, find_most
+from problems.problem import BlockPlan, Problem, Report, Row, find_most
 from regrid.errors import BadInput
 
 # times at which a shock starts and ends, its first place, its speed, density behind it
@@ -53,7 +53,6 @@ class SaltzmannDeck(Deck, kw_only=True):
 class Saltzmann(Problem):
     Deck = SaltzmannDeck
     units: ClassVar = {"transverse_speed": "m/s"}
-    counted = ("cells", "rows")
 
     def __init__(self, deck: SaltzmannDeck):
         super().__init__(deck)
@@ -61,8 +60,11 @@ class Saltzmann(Problem):
             words = f"it must not be above {LAST:g} s, when the third shock meets the wall"
             raise BadInput(f"deck: run.t_end is {deck.run.t_end:g}; {words}")
 
+    def list_boxes(self):
+        return [BlockPlan("gas", (self.deck.cells, self.deck.rows), (0.0, 0.0), (1.0, 0.1))]
+
     def make_grids(self, t=0.0):
-        x, y = make_box((self.deck.cells, self.deck.rows), (0.0, 0.0), (1.0, 0.1))
+        x, y = self.list_boxes()[0].make_nodes()
         bend = np.sin(math.pi * x)
         bend[-1] = 0.0
         return {"gas": np.array([x + self.deck.skew * (1.0 - 10.0 * y) * bend, y])}

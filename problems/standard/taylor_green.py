@@ -19,9 +19,9 @@ import numpy as np
 from hydro.block import Block
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.initial_states import make_box, put_walls
+from problems.initial_states import put_walls
 from problems.pictures import draw_field, find_dump, make_panels
-from problems.problem import Problem, Report, compare
+from problems.problem import BlockPlan, Problem, Report, compare
 from problems.references import taylor_green
 from regrid.measure.corners import compute_centres
 
@@ -45,7 +45,8 @@ class TaylorGreen(Problem):
 
     def make_grids(self, t=0.0):
         """Nodes swing as the vortex turns, back and forth, or are on the paths of gas."""
-        nodes = make_box((self.deck.cells, self.deck.cells), (0.0, 0.0), (1.0, 1.0))
+        cells = self.deck.cells, self.deck.cells
+        nodes = BlockPlan("square", cells, (0.0, 0.0), (1.0, 1.0)).make_nodes()
         if self.deck.mesh == "follow":
             return {"square": taylor_green.follow_flow(nodes, t, PATH_STEPS)}
         swing = self.deck.amplitude * math.sin(2.0 * math.pi * t / PERIOD)

@@ -23,9 +23,9 @@ from hydro.eos import IdealGas
 from hydro.links import join
 from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.initial_states import make_box, put_walls
+from problems.initial_states import put_walls
 from problems.pictures import draw_field, draw_grid, make_panels
-from problems.problem import Problem, Report, Row, average_plateau, get_last
+from problems.problem import BlockPlan, Problem, Report, Row, average_plateau, get_last
 from problems.references.riemann import solve_riemann
 from regrid.errors import BadInput
 
@@ -63,14 +63,12 @@ class TriplePoint(Problem):
                 f"deck: cells is {deck.cells}; it must be even, the point is half a length up"
             )
 
-    def estimate_cells(self) -> int:
-        return 21 * self.deck.cells**2
-
-    def make_grids(self, t=0.0):
-        return {
-            name: make_box(np.rint(self.deck.cells * np.subtract(high, low)).astype(int), low, high)
-            for name, (_, _, low, high) in GASES.items()
-        }
+    def list_boxes(self):
+        boxes = []
+        for name, (_, _, low, high) in GASES.items():
+            i, j = (round(self.deck.cells * size) for size in np.subtract(high, low))
+            boxes.append(BlockPlan(name, (i, j), low, high))
+        return boxes
 
     def build(self):
         deck, blocks = self.deck, []

@@ -19,7 +19,7 @@ from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import swing_square
 from problems.pictures import draw_field
-from problems.problem import Problem, Report, compare, get_last, say_unreached
+from problems.problem import BlockPlan, Problem, Report, compare, get_last, say_unreached
 from problems.references.exact_flows import Vortex as ExactVortex
 
 # mean |rho - exact| at t = 10, beta 5, on a fixed grid; computed independently
@@ -39,11 +39,14 @@ class VortexDeck(Deck, kw_only=True):
 
 class Vortex(Problem):
     Deck = VortexDeck
-    counted = ("cells", "cells")
 
     def __init__(self, deck: VortexDeck):
         super().__init__(deck)
         self.exact = ExactVortex(beta=deck.beta)
+
+    def list_boxes(self):
+        n, period = self.deck.cells, float(self.exact.period)
+        return [BlockPlan("square", (n, n), (0.0, 0.0), (period, period))]
 
     def make_grids(self, t=0.0):
         """Every node swings about its position, twice during the run."""

@@ -43,20 +43,20 @@ def test_dry_run_leaves_nothing(shockgrid):
 
 
 @pytest.mark.parametrize(
-    ("words", "wanted", "size"),
+    ("words", "size"),
     [
-        (("interface-instability", "--set", "cells=4000"), 0, "2000 cells"),
-        (("vortex", "--set", "cells=100000"), 2, "1e+10 cells need about"),
+        (("interface-instability", "--set", "cells=4000"), "2000 cells"),
+        (("vortex", "--set", "cells=100000"), "100000 x 100000 cells"),
     ],
 )
-def test_dry_run_of_a_huge_run_allocates_nothing(shockgrid, words, wanted, size):
+def test_dry_run_of_a_huge_run_allocates_nothing(shockgrid, words, size):
     import tracemalloc
 
     tracemalloc.start()
-    code, text, error = shockgrid("run", *words, "--dry-run")
+    code, text, _ = shockgrid("run", *words, "--dry-run")
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert code == wanted and size in text + error and "GB" in text + error, text + error
+    assert code == 0 and size in text and "GB" in text, text
     assert peak < 200e6
     code, _, error = shockgrid("run", *words, "--set", "run.t_end=-1", "--dry-run")
     assert code == 2 and "t_end" in error

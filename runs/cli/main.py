@@ -60,6 +60,8 @@ max_wall = click.option(
     metavar="TIME",
     help="Stop with a restart point before this time (2h, 90m, 1:30:00).",
 )
+limits = click.option("--limits", metavar="LOW,HIGH", help="Limits of the colours, SI units.")
+colours = click.option("--colours", metavar="NAME", help="A colour map of matplotlib.")
 
 
 @cli.command("list")
@@ -277,8 +279,8 @@ def inspect(file, other) -> None:
 @mirror
 @click.option("--beside", metavar="DIR2", help="Another run, drawn to the same scale.")
 @click.option("--line", metavar="X0,Y0,X1,Y1", help="Values of the cells that this line [m] meets.")
-@click.option("--limits", metavar="LOW,HIGH", help="Limits of the colours, in SI units.")
-@click.option("--colours", metavar="NAME", help="A colour map of matplotlib, such as magma.")
+@limits
+@colours
 @click.option("--csv", "table", metavar="FILE", help="Write the values along --line, too.")
 @click.option("-o", "--output", metavar="FILE", help="Picture to write [DIR/<what>.png].")
 @click.option("--dpi", type=click.IntRange(20, 1200), default=140, help="Dots per inch [140].")
@@ -316,6 +318,8 @@ def export(directory, output) -> None:
 @zoom
 @mesh
 @mirror
+@limits
+@colours
 @click.option("--fps", type=click.IntRange(1, 60), help="Frames per second [a film of 8 s].")
 @click.option("--dpi", type=click.IntRange(20, 600), default=110, help="Dots per inch [110].")
 @click.option("-o", "--output", metavar="FILE", help="Film [DIR/film-FIELD.mp4 or .gif].")

@@ -123,13 +123,7 @@ def fill_figure(
     Returns the stem of a name for it, and what writes the table of a line's values, if it is one.
     """
     at, beside, line = wanted.at, wanted.beside, wanted.line
-    limits = None
-    if wanted.limits is not None:
-        limits = parse_numbers("--limits", wanted.limits, "low,high with low < high", 1)
-    if wanted.colours is not None and wanted.colours not in colormaps:
-        hint = suggest(wanted.colours, colormaps)
-        raise BadInput(f"--colours {wanted.colours}: there is no such colour map{hint}")
-    view = View(parse_zoom(wanted.zoom), wanted.mirror, wanted.mesh, limits, wanted.colours)
+    view = make_view(wanted.zoom, wanted.mirror, wanted.mesh, wanted.limits, wanted.colours)
     names = [name for entry in wanted.fields for name in entry.split(",") if name]
     given = {f"--{name}": getattr(wanted, name) for name in OPTIONS} | {"FIELDS": names or None}
     given = {n: value for n, value in given.items() if value is not None and value is not False}
@@ -297,6 +291,16 @@ def name_paths(runs: list[RunData]) -> list[str]:
     """Short names of runs: those of their folders, whole paths where these are the same."""
     same = len({run.path.name for run in runs}) < len(runs)
     return [str(run.path) if same else run.path.name for run in runs]
+
+
+def make_view(zoom: Numbers, mirror, mesh: bool, limits: Numbers, colours: str | None) -> View:
+    """What a picture or a film shows of a field, and how; BadInput for what there is not."""
+    if limits is not None:
+        limits = parse_numbers("--limits", limits, "low,high with low < high", 1)
+    if colours is not None and colours not in colormaps:
+        hint = suggest(colours, colormaps)
+        raise BadInput(f"--colours {colours}: there is no such colour map{hint}")
+    return View(parse_zoom(zoom), mirror, mesh, limits, colours)
 
 
 def parse_zoom(zoom: Numbers) -> tuple[float, ...] | None:

@@ -43,6 +43,8 @@ def make_film(
     zoom: Numbers = None,
     mesh: bool = False,
     mirror: str | None = None,
+    limits: Numbers = None,
+    colours: str | None = None,
     fps: int | None = None,
     dpi: int = 110,
 ) -> Path:
@@ -52,14 +54,16 @@ def make_film(
 
     field: of the dumps or derived, the density if not said; follow: the window goes with the
     interface, else it is `zoom` (x0,x1,y0,y1 [m]) or the domain, in a long one again what is about
-    the interface.  fps: frames per second, one each dump.  Raises BadInput.
+    the interface.  limits: low,high of the colours; colours: a map of matplotlib; fps: frames
+    per second, one each dump.  Raises BadInput.
     """
     run = RunData(directory)
-    view = View(command.parse_zoom(zoom), mirror, mesh)
+    view = command.make_view(zoom, mirror, mesh, limits, colours)
     if follow and view.zoom:
         raise BadInput("--follow and --zoom: the window follows the interface or is fixed; use one")
     name = field or command.default_fields(run)[0]
     marks = ["follow"] * follow + ["mesh"] * mesh + [f"mirror-{mirror}"] * bool(mirror)
+    marks += [colours] if colours else []
     marks += [re.sub(r"[^\w.+-]+", "_", f"zoom-{zoom}")] * bool(zoom)
     has_ffmpeg = animation.writers.is_available("ffmpeg")
     stem = "-".join(["film", name, *marks])
@@ -118,7 +122,7 @@ def make_frames(
     """What draws the frame of a dump, by its number from 0, into the same axes of a figure."""
     paths, titles = [dump.path for dump in dumps], fields.time_titles(dumps)
     first, axes, box = Dump(paths[0]), figure.subplots(), boxes[0]
-    look = fields.choose_colours(first, name, ranges)
+    look = fields.choose_colours(first, name, ranges, view)
     scale, unit = pick_prefix(float(np.abs(boxes).max()), "m")
     labels = [f"{axis} [{unit}]" for axis in first.axes]
     place = {"shrink": 0.9, "pad": 0.015}

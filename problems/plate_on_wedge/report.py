@@ -387,13 +387,15 @@ class Results:
             order = np.argsort(speed[there])
             weight = np.cumsum(np.gradient(t)[there][order]) if t.size > 1 else np.ones(1)
             jet = float(speed[there][order][np.searchsorted(weight, 0.5 * weight[-1])])
-            ideal = compute_jet_speed(self.plate_speed, self.angle)
-            notes.append(
-                f"{'behind B' if theory.attached else 'jet'}: fastest material {jet / 1e3:.3g} "
-                f"km/s (median in time), {history['jet_mass'][-1]:.3g} kg/m at the end "
-                f"(incompressible theory on a rigid wedge: {ideal / 1e3:.3g} km/s)"
-            )
-            if not theory.attached:
+            fastest = f"{jet / 1e3:.3g} km/s (median in time), {history['jet_mass'][-1]:.3g} kg/m"
+            if theory.attached:
+                notes.append(f"behind B: fastest material {fastest} at the end")
+            else:
+                ideal = compute_jet_speed(self.plate_speed, self.angle)
+                notes.append(
+                    f"jet: fastest material {fastest} at the end (incompressible theory on a rigid "
+                    f"wedge: {ideal / 1e3:.3g} km/s)"
+                )
                 notes.append(
                     "the jet ahead of A is thinner than a cell: its speed and mass are estimates"
                 )

@@ -48,7 +48,7 @@ class Refining(Protocol):
         ...
 
     def lay(
-        self, places: np.ndarray, blocks: Sequence[Block], motion: GridMotion
+        self, places: np.ndarray, blocks: Sequence[Block], motion: GridMotion, t: float
     ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Nodes, states and void energies of all blocks, whose new ones `motion` moves."""
         ...
@@ -290,7 +290,7 @@ class Simulation:
         inside = [block.state[:, 1:-1, 1:-1][..., places[:-1].astype(int)] for block in old]
         self._lay_cells(refining, places.size - 1, inside)
         try:
-            found = refining.lay(places, old, self.motion)
+            found = refining.lay(places, old, self.motion, self.t)
         except RunFailure:
             self.__dict__.update(before)
             return

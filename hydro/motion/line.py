@@ -491,16 +491,16 @@ class StraightLine(Line):
     def move(self, span):
         if not self.lies_straight():
             return super().move(span)
-        self.spread_straight()
+        self.spread_straight(span.t + span.dt)
         return 0.0
 
     def fill_moved(self, old, new, span):
-        self.spread_straight()
+        self.spread_straight(span.t + span.dt)
         self.moved[...] = new
 
-    def spread_straight(self) -> None:
-        """New nodes by its spacing on the straight line between the new ends."""
-        spread_straight(self.segment.block.nodes_new, self.span[None], self.law)
+    def spread_straight(self, t: float) -> None:
+        """New nodes by its spacing at t [s] on the straight line between the new ends."""
+        spread_straight(self.segment.block.nodes_new, self.span[None], self.find_law(t))
 
 
 class GivenLine(StraightLine):

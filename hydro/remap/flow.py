@@ -312,19 +312,19 @@ class Refinement:
         return np.delete(np.arange(count + 1.0), removed) if fits else None
 
     def lay(
-        self, places: np.ndarray, blocks: Sequence[Block], motion: GridMotion
+        self, places: np.ndarray, blocks: Sequence[Block], motion: GridMotion, t: float
     ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Nodes, states and void energies of all blocks on lines at these places.
 
         The nodes of interfaces stay, or lie half way between two of them; straight sides are spread
-        by their laws, and the grids inside settle before they get the states.  `motion`: of the new
-        blocks.  Raises RunFailure, and nothing has changed.
+        by their laws at t [s], and the grids inside settle before they get the states.  `motion`:
+        of the new blocks.  Raises RunFailure, and nothing has changed.
         """
         for one, other in zip(blocks, motion.blocks, strict=True):
             other.nodes_new[...] = sample_lines(one.nodes, places)
         for line in motion.lines:
             if isinstance(line, StraightLine) and line.track.straight:
-                line.spread_straight()
+                line.spread_straight(t)
         found = []
         parents = places[:-1].astype(int)
         for number, (one, other) in enumerate(zip(blocks, motion.blocks, strict=True)):

@@ -56,7 +56,7 @@ def make_report(problem, history) -> Report:
         f"{deck.cells} cells per wavelength, to k c t = {kct:.3g}",
         f"  reflected wave: {reflected}, Atwood number after the shock {theory.atwood:.3f}",
         f"  smoothing length of the interface: {problem.thickness:.3g} m "
-        f"({problem.thickness * deck.cells / deck.wavelength:.2g} of a first cell)",
+        f"({problem.thickness * deck.cells / deck.wavelength:.2g} of a cell)",
     ]
     rows, notes = [], ["growth: there is no theory for two shocks"]
     if deck.second_shock is None:

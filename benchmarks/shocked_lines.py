@@ -72,6 +72,10 @@ class FlatLine:
         return np.polyval(np.polyfit(self.s, self.place, 1), self.s)
 
 
+# the shock on its way, and cells of one size before and behind it
+EVEN = {"start": "incident", "passage_refinement": 1.0, "reach": 0.25}
+
+
 def sweep_flat_line(deck: InterfaceDeck, parts: int = 10) -> FlatLine:
     """One run for each s = 0, 1/parts ... 1 cell; the deck's materials, shock, cells and scheme."""
     size = 1.0 / deck.cells
@@ -80,7 +84,7 @@ def sweep_flat_line(deck: InterfaceDeck, parts: int = 10) -> FlatLine:
         modes=[Mode(ka0=0.0)],
         width=ROWS * size,
         sides="periodic",
-        start="incident",
+        **EVEN,
         lengths=None,
         gap=GAP + size,
         second_shock=None,
@@ -148,7 +152,7 @@ def measure_null_line(
     problem = InterfaceInstability(
         msgspec.structs.replace(
             deck,
-            start="incident",
+            **EVEN,
             second=deck.first,
             modes=[Mode(ka0=ka0)],
             kct_end=times[-1],

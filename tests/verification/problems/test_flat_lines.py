@@ -23,14 +23,10 @@ def test_a_flat_line_does_not_know_where_in_a_cell_the_shock_began(ratio):
     assert abs(line.late_speed.mean()) < 1e-3
 
 
-# cells of one size before and after the shock, for what is of a step's or a cell's size
-EVEN = {"passage_refinement": 1.0, "reach": 0.25}
-
-
-@pytest.mark.parametrize(("ka0", "deck"), [(0.02, {}), (0.02, EVEN), (1e-6, EVEN)])
-def test_a_shock_in_one_gas_flattens_a_line_and_adds_no_waves(ka0, deck):
+@pytest.mark.parametrize("ka0", [0.02, 1e-6])
+def test_a_shock_in_one_gas_flattens_a_line_and_adds_no_waves(ka0):
     """Mach 5 leaves .20 of the first mode."""
-    (line,) = measure_null_line(InterfaceDeck(mach=5.0, cells=64, **deck), ka0, times=[1.0])
+    (line,) = measure_null_line(InterfaceDeck(mach=5.0, cells=64), ka0, times=[1.0])
     assert line.exact == pytest.approx(0.2)
     assert abs(line.error) < 0.01
     assert line.others < 0.005

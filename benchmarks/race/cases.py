@@ -146,7 +146,7 @@ def make_contact() -> Case:
     }
     return Case(
         "contact",
-        "a dense slab (10 : 1) carried over ten of its widths",
+        "a slab ten times as dense, advected over ten of its widths",
         "L1 of the density",
         numbers,
         {"shockgrid": (8, 16), "pyclaw": (16, 32, 64, 128, 256), "pyro": (16, 32, 64, 128)},
@@ -158,7 +158,7 @@ def make_noh() -> Case:
     numbers = {"gamma": 5.0 / 3.0, "t_end": 0.6, "radius": 0.4, "size": 1.0}
     return Case(
         "noh",
-        "Noh's sphere on a rectangular axisymmetric grid",
+        "spherical Noh problem on a rectangular axisymmetric grid",
         "L1 of the density out to twice the shock's radius",
         numbers | {"geometry": "spherical"},
         {"shockgrid": (50, 100, 200, 400), "pennant": (50, 100, 200)},
@@ -174,7 +174,7 @@ def make_sedov(geometry: str = "spherical") -> Case:
     peers = ("pennant",) if sphere else ("pyclaw", "pyro")
     return Case(
         "sedov" if sphere else "sedov-cylinder",
-        f"Sedov's {'sphere' if sphere else 'cylinder'} on a rectangular grid",
+        f"{'spherical' if sphere else 'cylindrical'} Sedov blast on a rectangular grid",
         "L1 of the density",
         numbers | {"geometry": geometry},
         {"shockgrid": (50, 100, 200, 400)} | dict.fromkeys(peers, (50, 100, 200)),

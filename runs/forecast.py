@@ -53,6 +53,7 @@ PAST_RUNS = Path(__file__).with_name("past_runs.json")
 SURE = 1.6  # a step's wall time may be so many times that of a past run, or less
 UNSURE = 0.25  # power of the ratio of cells by which that grows
 WORK = 0.8  # power of the number of cells with which a step's wall time grows
+WIDEST = 50.0  # of the longest time over the shortest: beyond, nothing is foretold
 OTHER = ("run", "output", "gauge", "cells")  # keys of a deck that leave the flow as it is
 
 FIRST_STEPS = 12  # until there is a word: the first five are shortened on purpose
@@ -209,11 +210,11 @@ def foretell(
         low, likely, high = (max(round(float(f"{number:.2g}")), 1) for number in steps)
         words = f"about {likely}{f' ({low} to {high})' * (low < high)} steps; "
         past = find_past(name_flow(read.problem, read.deck), size.cells)
-        if past is None:
+        sure = SURE * math.exp(UNSURE * past.is_off(size.cells)) if past else math.inf
+        if past is None or steps[2] / steps[0] * sure**2 > WIDEST:
             words += "the time of a step is measured in the run"
         else:
             a_step = past.seconds * (max(size.cells, 1) / past.cells) ** WORK
-            sure = SURE * math.exp(UNSURE * past.is_off(size.cells))
             seconds = describe_seconds(steps[0] * a_step / sure, steps[2] * a_step * sure)
             words += f"time stepping will take {seconds} on a desktop computer"
     named = [f"{name} {' x '.join(map(str, cells))}" for name, cells in size.blocks[:MOST_NAMED]]

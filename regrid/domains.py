@@ -239,22 +239,22 @@ def _on_walls(curve_at: Callable[[float], np.ndarray]) -> Callable[[float], np.n
 
 
 def three_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """Three straight tongues, lengths .75, 1 and .5 of the height, widths .12, .10 and .15."""
+    """Three straight tongues, lengths 0.75, 1 and 0.5 of the height, widths 0.12, 0.10 and 0.15."""
     return _fingers("three_fingers", ni, nj, TONGUES)
 
 
 def five_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """Five straight tongues, lengths .5 to 1 of the height, widths .07 to .09."""
+    """Five straight tongues, lengths 0.5 to 1 of the height, widths 0.07 to 0.09."""
     return _fingers("five_fingers", ni, nj, FIVE_TONGUES)
 
 
 def curled_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """The three tongues, bending by .4 to .8 radians: as far as they stay between the walls."""
+    """The three tongues, bending by 0.4 to 0.8 radians: as far as they stay between the walls."""
     return _bent_fingers("curled_fingers", ni, nj, (-0.4, 0.8, 0.5))
 
 
 def overhung_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """The three tongues, bending by .8 to 1.2 radians, the outer ones beyond the walls' feet.
+    """The three tongues, bending by 0.8 to 1.2 radians, the outer ones beyond the walls' feet.
 
     Straight lines from there to the opposite side would leave the domain: the first line gap cannot
     be 1.
@@ -273,15 +273,15 @@ def _bent_fingers(name: str, ni: int, nj: int, curls: tuple[float, float, float]
 
 
 def single_finger(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """One tongue of width .05 and length .5: ten times as long as wide, as the longest of three."""
+    """One tongue of width 0.05, length 0.5: ten times as long as wide, as the longest of three."""
     return _fingers("single_finger", ni, nj, [{"centre": 0.5, "width": 0.05, "length": 0.5}])
 
 
 def slender_finger(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """One tongue of width .05 and length 1, as long as the block is high: the harshest case.
+    """One tongue of width 0.05 and length 1, as long as the block is high: the harshest case.
 
     The straight lines out of a tongue meet its flanks at angles of half its width over its depth:
-    .025 at the tip, whatever the grid.
+    0.025 at the tip, whatever the grid.
     """
     return _fingers("slender_finger", ni, nj, [{"centre": 0.5, "width": 0.05, "length": 1.0}])
 
@@ -304,7 +304,7 @@ def valley(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 
 def chevron(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """The lower side becomes a zigzag with corners, amplitude .3, two periods."""
+    """The lower side becomes a zigzag with corners, amplitude 0.3, two periods."""
     return _graph(
         "chevron",
         ni,
@@ -317,7 +317,7 @@ def chevron(ni: int = 60, nj: int = 40) -> MovingDomain:
 def strip(ni: int = 120, nj: int = 40) -> MovingDomain:
     """100:1 rectangle clustered to a growing interface, square cells there ([CharakhchyanND] Fig 4)
 
-    The interface is a cosine of one wavelength across the width 1, amplitude up to .5.
+    The interface is a cosine of one wavelength across the width 1, amplitude up to 0.5.
     """
     heights = 100.0 * clustered_law(ni + 1, 0.01 / nj)
     start = make_box(1.0, heights, np.linspace(0.0, 1.0, nj + 1))
@@ -325,7 +325,7 @@ def strip(ni: int = 120, nj: int = 40) -> MovingDomain:
 
 
 def jet(ni: int = 40, nj: int = 120) -> MovingDomain:
-    """A jet of radius 1 pinched to .15 at two necks; the surface is i_min, the axis i_max."""
+    """A jet of radius 1 pinched to 0.15 at two necks; the surface is i_min, the axis i_max."""
     width = 6.0
     start = make_box(width, np.linspace(0.0, 1.0, ni + 1), np.linspace(0.0, 1.0, nj + 1))
     wave = 2.0 * np.pi * 2.0 / width
@@ -333,7 +333,7 @@ def jet(ni: int = 40, nj: int = 120) -> MovingDomain:
 
 
 def rectangle_shift(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """Rectangle of square cells that moves by .9 cell along i ([CharakhchyanND] Fig 2)."""
+    """Rectangle of square cells that moves by 0.9 cell along i ([CharakhchyanND] Fig 2)."""
     start = make_box(1.0, np.linspace(0.0, ni / nj, ni + 1), np.linspace(0.0, 1.0, nj + 1))
 
     def move(s: float) -> np.ndarray:
@@ -372,7 +372,7 @@ def swan(ni: int = 60, nj: int = 40) -> MovingDomain:
     """Unit square whose right side becomes x = 1 + 2y - 2y² and whose top y = 1 - 3x + 3x².
 
     i to the right, j up.  The corner at (0, 1) closes to 18.4 degrees: no grid can have a corner
-    sine above .316 there.
+    sine above 0.316 there.
     """
     r, t = _parameters(ni, nj)
     square = np.array(np.meshgrid(r, t, indexing="ij"))
@@ -475,7 +475,7 @@ def _c_shape(tail: float) -> np.ndarray:
 
 
 def chicane(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """A straight strip of three legs, .3 wide and 3 long, folded to a Z, nodes equidistant.
+    """A straight strip of three legs, 0.3 wide and 3 long, folded to a Z, nodes equidistant.
 
     i along it, j across.  Both turns grow to 135 degrees with mitred corners, 45 degrees between
     the legs.  The sides' nodes stay equidistant, so that an inner corner comes to lie opposite to
@@ -531,7 +531,7 @@ def _bend_rectangle(name: str, ni: int, nj: int, low, high, near, far) -> Moving
 
 
 def nozzle(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """A duct 2 long and 2 high whose throat closes to .6, both of its ends bulged downstream by .3.
+    """A duct 2 long and 2 high: its throat closes to 0.6, both ends bulge downstream by 0.3.
 
     i along the duct, j across.  Half its height is `1 - .7 a sin²(pi x/2)`.
     """
@@ -548,7 +548,7 @@ def nozzle(ni: int = 60, nj: int = 40) -> MovingDomain:
 def waves(ni: int = 60, nj: int = 40) -> MovingDomain:
     """Rectangle 1.5 x 1 with a wave on each side: two and a half, one and a half, one, two of them.
 
-    Their amplitudes grow to .1 (j_min, j_max) and .08 (i_min, i_max).
+    Their amplitudes grow to 0.1 (j_min, j_max) and 0.08 (i_min, i_max).
     """
 
     def wave(p: np.ndarray, a: float, high: float, count: float) -> np.ndarray:
@@ -574,19 +574,19 @@ def _bulged(name: str, ni: int, nj: int, height: float) -> MovingDomain:
 
 
 def cushion(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """Rectangle 1.5 x 1 whose sides all bulge outwards by .2: its corners open to 150 degrees."""
+    """Rectangle 1.5 x 1 whose sides all bulge outwards by 0.2: its corners open to 150 degrees."""
     return _bulged("cushion", ni, nj, 0.2)
 
 
 def pinched(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """Rectangle 1.5 x 1 whose sides all bulge inwards by .2: its corners close to 34 degrees."""
+    """Rectangle 1.5 x 1 whose sides all bulge inwards by 0.2: its corners close to 34 degrees."""
     return _bulged("pinched", ni, nj, -0.2)
 
 
 def crescent(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """A rectangle bent to half a ring between the radii 1 and 2, both of its ends bulged by .3.
+    """A rectangle bent to half a ring between the radii 1 and 2, both of its ends bulged by 0.3.
 
-    i outwards, j round; the inner side has a wave of amplitude .1, three of them along the ring.
+    i outwards, j round; the inner side has a wave of amplitude 0.1, three of them along the ring.
     """
     length = 1.5 * np.pi
 
@@ -614,7 +614,7 @@ def crescent(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 
 def bulged_chevron(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """A chevron 1.5 x 1, its kink .3 deep on j_min and j_max, between ends that bulge by .15."""
+    """A chevron 1.5 x 1, its kink 0.3 deep on j_min and j_max, between ends that bulge by 0.15."""
 
     def kink(p: np.ndarray, a: float) -> np.ndarray:
         return a * 0.3 * (1.0 - np.abs(2.0 * p - 1.0))

@@ -39,8 +39,8 @@ class NohDeck(Deck, kw_only=True):
 class Noh(RadialProblem):
     Deck = NohDeck
     peers: ClassVar = {  # relative L1 of the density, as published by or measured on other codes
-        "cylindrical": "Athena++ .036, pyro2 .051, BookLeaf (polar grid) .033",
-        "spherical": "PENNANT .14",
+        "cylindrical": "Athena++ 0.036, pyro2 0.051, BookLeaf (polar grid) 0.033",
+        "spherical": "PENNANT 0.14",
     }
 
     def __init__(self, deck: NohDeck):

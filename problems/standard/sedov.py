@@ -46,7 +46,7 @@ class SedovDeck(Deck, kw_only=True):
 
 class Sedov(RadialProblem):
     Deck = SedovDeck
-    peers: ClassVar = {"cylindrical": "BookLeaf .018", "spherical": "PENNANT gains 11 % of energy"}
+    peers: ClassVar = {"cylindrical": "BookLeaf 0.018", "spherical": "PENNANT gains 11 % of energy"}
 
     def __init__(self, deck: SedovDeck):
         super().__init__(deck)

@@ -74,7 +74,7 @@ def misspell_key(text: str, chance: random.Random) -> str:
     if not found:
         return text
     key = chance.choice(found)["key"].strip()
-    place = chance.randrange(len(key))
+    place = chance.randrange(max(1, len(key)))  # an earlier change may have emptied it
     other = chance.choice(
         (key[:place] + key[place + 1 :], key[:place] + "x" + key[place:], key.upper(), key[::-1])
     )

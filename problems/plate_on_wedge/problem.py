@@ -115,8 +115,6 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
 MOST_REFINED = 3.0  # times finer cells at A where the zone of constant states behind A is short
 FINER_ROWS = 0.75  # power of the refinement by which rows are finer: torn cells get too thin at 1
 CLOSEST = 0.85  # of the compression at which a Mie-Grueneisen Hugoniot's pressure is infinite
-# Less than elsewhere: cells of the wedge's tongue behind B are as thin as its sides make them.
-COST_WEIGHT = 0.3
 
 
 class PlateOnWedge(Results, Problem):
@@ -358,13 +356,7 @@ class PlateOnWedge(Results, Problem):
                 self.put(end, block, "i_max")
         self.put("free-surface", wedge, "i_max")
         self.put("wall", wedge, "j_min")
-        weights = {"cost_weight": COST_WEIGHT} if deck.regrid.name.startswith("barrier") else {}
-        return self.simulate(
-            blocks,
-            links,
-            kind=functools.partial(PlateRun, self),
-            make_regridder=lambda: deck.regrid.make(threads=deck.run.threads, **weights),
-        )
+        return self.simulate(blocks, links, kind=functools.partial(PlateRun, self))
 
     def measure(self, evolution: PlateRun) -> dict[str, float]:
         return evolution.measure()

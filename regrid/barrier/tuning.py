@@ -19,7 +19,7 @@ class Tuning:
     area_weight: float = 2.0  # R4.1: lam, weight of the area term
     least_sine: float = 0.3  # R4.3: cells with a sharper corner have more barrier, in proportion,
     strengthening: float = 30.0  # R4.3: up to this many times
-    cost_weight: float = 0.5  # R4.10: mu, weight of cells that limit the time step
+    cost_weight: float = 0.15  # R4.10: mu, weight of cells that limit the time step
     cost_margin: float = 1.05  # R4.11: of the rate that the sides themselves ask for
     open_side: float = 0.5  # R4.16: chord over arc from which a side's shape counts in full,
     closed_side: float = 0.25  # R4.16: and up to which it does not count

@@ -113,6 +113,7 @@ class HistoryWriter:
         self.path = path
         self.columns = columns
         self._waiting: list[dict[str, Any]] = []
+        self._start = 0  # checksum of the first line, that of the names
         self._last = -1 if columns is None else read_rows(path).last  # step of the last row
         with disk_errors(path):
             self._file = open(path, "a", encoding="utf-8", newline="")
@@ -129,12 +130,13 @@ class HistoryWriter:
             self.columns = [*row, *dict.fromkeys(first)]
             rows, self._waiting = [*self._waiting, row], []
             lines = [",".join([*self.columns, SUM])]
-        elif len(row) != len(self.columns) or any(name not in row for name in self.columns):
+        elif row.keys() != set(self.columns):
             raise BadInput(f"{self.path}: {describe_change(self.columns, row)}")
-        start = zlib.crc32(",".join([*self.columns, SUM]).encode("utf-8"))
+        self._start = self._start or zlib.crc32(",".join([*self.columns, SUM]).encode("utf-8"))
         for one in rows:
-            text = ",".join([_format_value(one.get(name, "")) for name in self.columns])
-            lines.append(f"{text},{_sum(start, self._last, text.encode('utf-8'))}")
+            values = [one.get(name, "") for name in self.columns]
+            text = ",".join([repr(v) if type(v) in NUMBERS else _format_value(v) for v in values])
+            lines.append(f"{text},{_sum(self._start, self._last, text.encode('utf-8'))}")
             self._last = int(one["step"])
         with disk_errors(self.path):
             self._file.write("\n".join(lines) + "\n")
@@ -153,8 +155,6 @@ class HistoryWriter:
 
 
 def _format_value(value: Any) -> str:
-    if type(value) in NUMBERS:
-        return repr(value)
     if isinstance(value, str):
         return value.replace(",", ";").replace('"', "'").replace("\n", " ")
     if isinstance(value, bool | np.bool_ | int | np.integer):

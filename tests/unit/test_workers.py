@@ -11,7 +11,7 @@ from hydro.workers import Workers
 
 def make(count, threads):
     """Workers that put `count` equal blocks side by side."""
-    workers = Workers([2000] * count, threads)
+    workers = Workers([10_000] * count, threads)
     assert workers.side_by_side and workers.inside == 1
     return workers
 

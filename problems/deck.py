@@ -83,7 +83,7 @@ class RunControl(DeckTable, kw_only=True):
     merges = True
     runtime = ("t_end", "max_steps", "cfl", "small_cells", "threads", "cut")
 
-    t_end: key(float | None, "end time [s]; left out: the problem's choice", gt=0) = None
+    t_end: key(float | None, "end time [s]; left out: the problem's choice", ge=1e-300) = None
     t_set_up: key(
         float | None,
         "end time [s] that lengths and given motions are made for; left out: "

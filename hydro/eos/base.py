@@ -114,12 +114,10 @@ class EquationOfState:
         return self.energy_part(np.asarray(rho, float), np.asarray(p, float), self.parameters)
 
     def sound_speed(self, rho, p):
-        """Sound speed from density and pressure (arrays of one shape)."""
-        return np.sqrt(
-            self.sound_speed_squared_part(
-                np.asarray(rho, float), np.asarray(p, float), self.parameters
-            )
-        )
+        """Sound speed from density and pressure (arrays of one shape), NaN where c² < 0."""
+        rho, p = np.asarray(rho, float), np.asarray(p, float)
+        with np.errstate(invalid="ignore"):
+            return np.sqrt(self.sound_speed_squared_part(rho, p, self.parameters))
 
 
 PARTS = ("pressure_part", "energy_part", "sound_speed_squared_part", "least_pressure_part")

@@ -136,7 +136,7 @@ def test_a_run_with_a_cut_block_and_its_restart_on_another_cut(tmp_path):
     whole, part = tmp_path / "whole", tmp_path / "part"
     cut = ("--set", "run.cut.first=3", "--set", "run.max_steps=60")
     run_on_ranks(3, "run", *RANKS_DECK, *cut, "-o", part, "-q")
-    assert "rows 64-92 of 'first'" in (part / "run.log").read_text()
+    assert "rows 64-95 of 'first'" in (part / "run.log").read_text()
     more = ("--set", "run.max_steps=120")
     run_on_ranks(2, "restart", part, *more, "--set", "run.cut.first=2", "-q")
     assert (

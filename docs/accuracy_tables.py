@@ -169,10 +169,9 @@ def doubt_rates(rows: Iterable[Measured]) -> list[str]:
         kind = {"gas": "gases", "condensed": "condensed materials"}[materials]
         counts = [sum(abs(r.rate_error) <= most for r in group) for most, _ in MARKS]
         told.append(
-            f"- Growth of {kind} at {cells:g} cells: of {len(group)} rates "
+            f"- Growth rates of {kind}, {cells:g} cells: of {len(group)}, "
             + ", ".join(
-                f"{n} are within {100.0 * most:g} %"
-                for n, (most, _) in zip(counts, MARKS, strict=True)
+                f"{n} within {100.0 * most:g} %" for n, (most, _) in zip(counts, MARKS, strict=True)
             )
             + _list_rates(group, materials)
             + _list_rough(group, materials)
@@ -220,16 +219,16 @@ def doubt_polars(rows: Rows) -> list[str]:
         over = [row for row in known if abs(float(row["error in p, %"])) > POLAR_BAR]
         without = len(group) - len(known)
         told.append(
-            f"- Pressure behind A, {words} {NEAR:g} degrees below the critical angle: "
-            f"{len(known) - len(over)} of {len(group)} errors are within {POLAR_BAR:g} %; the "
-            f"worst is {_name_polar(worst)}, {worst['error in p, %']} %."
+            f"- Pressure behind the collision point, {words} {NEAR:g} degrees below the critical "
+            f"angle: {len(known) - len(over)} of {len(group)} within {POLAR_BAR:g} %; worst "
+            f"{worst['error in p, %']} % ({_name_polar(worst)})."
             + (f" Without a value: {without}." if without else "")
         )
     past = [row for row in rows if float(row["below critical"]) < 0.0]
     if past:
         told.append(
-            f"- Past the critical angle no error is quoted ({len(past)} runs): no attached shock "
-            "exists, and only the presence or absence of a jet is compared with theory."
+            f"- Past the critical angle ({len(past)} runs) there is no attached shock, so only the "
+            "presence or absence of a jet is compared with theory."
         )
     died = [row for row in rows if row["behind A"] == "died"]
     if died:
@@ -239,8 +238,8 @@ def doubt_polars(rows: Rows) -> list[str]:
 
 def _name_polar(row: dict[str, Any]) -> str:
     return (
-        f"{row['plate on wedge']} at {row['V, km/s']} km/s, {row['below critical']} degrees below "
-        f"({row['cells']} cells)"
+        f"{row['plate on wedge']} at {row['V, km/s']} km/s, {row['below critical']} degrees below, "
+        f"{row['cells']} cells"
     )
 
 
@@ -248,18 +247,18 @@ def doubt_lines(rows: Rows) -> list[str]:
     """How the position of a flat interface depends on the sub-cell phase of the shock."""
     told = []
     for key, bar, words, unit in (
-        ("unevenness", LINE_BAR, "end position is linear in the start distance s", "cell"),
-        ("speed_scatter", SPEED_BAR, "late speed does not vary with s", "of the shock's"),
+        ("unevenness", LINE_BAR, "final position linear in the start distance s", "cell"),
+        ("speed_scatter", SPEED_BAR, "late speed independent of s", "of the shock's speed"),
     ):
         over = sorted((row for row in rows if row[key] > bar), key=lambda row: -row[key])
         met = f"{len(rows) - len(over)} of {len(rows)}"
-        text = f"- The {words}, to {bar:g} {unit}, for {met} flat interfaces"
+        text = f"- Flat interfaces: {words}, to {bar:g} {unit}, in {met} runs"
         if over:
-            text += f"; the worst is {_name_line(over[0])}, {over[0][key]:.2g} {unit}"
+            text += f"; worst {over[0][key]:.2g} {unit} ({_name_line(over[0])})"
         told.append(text + ".")
     worst = max(rows, key=lambda row: abs(row["speed_error"]))
     told.append(
-        f"- The error of the mean late speed of a flat interface is at most "
+        "- Flat interfaces: error of the mean late speed at most "
         f"{abs(worst['speed_error']):.1e} of the shock's speed ({_name_line(worst)})."
     )
     return told
@@ -281,11 +280,11 @@ def doubt_null(rows: Rows) -> list[str]:
     }
     count = "All" if len(bad) == len(runs) else f"{len(bad)} of"
     return [
-        f"- {count} {len(runs)} runs with one gas on both sides fail the tolerance (first mode "
-        f"within {NULL_BAR:g} of its exact value, all others below {OTHERS_BAR:g}). The largest "
-        f"error is that of mode 1 at {_name_null(first)}: {first['mode_1']:.4f} instead of "
-        f"{first['exact']:.4f}; the largest of the others, {other['others']:.4f}, occurs at "
-        f"{_name_null(other)}."
+        f"- One gas on both sides: {count.lower()} {len(runs)} runs, on even cells, miss the "
+        f"tolerance (first mode within {NULL_BAR:g} of its exact value, all others below "
+        f"{OTHERS_BAR:g}). Worst first mode: {first['mode_1']:.4f} instead of "
+        f"{first['exact']:.4f} ({_name_null(first)}); worst other mode: {other['others']:.4f} "
+        f"({_name_null(other)})."
     ]
 
 
@@ -301,9 +300,9 @@ def doubt_pairs(rows: Rows) -> list[str]:
     errors = sorted(row["error"] for row in rows if row["error"] is not None)
     over = sum(error > PAIR_STEPS[-1] for error in errors)
     told = (
-        f"- Riemann problems of random gases: {over} of {len(rows)} have a star-state error "
-        f"above {100.0 * PAIR_STEPS[-1]:g} %; the median is "
-        f"{100.0 * errors[len(errors) // 2]:.2g} %, the worst {100.0 * errors[-1]:.2g} %."
+        f"- Riemann problems of random gases: {over} of {len(rows)} with a star-state error "
+        f"above {100.0 * PAIR_STEPS[-1]:g} %; median {100.0 * errors[len(errors) // 2]:.2g} %, "
+        f"worst {100.0 * errors[-1]:.2g} %."
     )
     said = [row for row in rows if row["error"] is None]
     return [told + (f" No value, seed {said[0]['seed']}: {said[0]['said']}." if said else "")]

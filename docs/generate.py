@@ -9,6 +9,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     head PROBLEM                docstring of the problem's module
     verify PROBLEM...           rows of results/verify.json ("*": all, with the problem's name)
     runs NAME... | COLUMN; ...  a table, one run a row; see `find_cell` for what a column may be
+    sizes NAME... | SIZE... | COLUMN; ... | ERROR   runs NAME-SIZE a row, ERROR in a column a size
     output NAME                 the command and its output, of a run the problem's summary
     bench [FILE: ]TABLE         a table of results/bench.json, or of another file there
     accuracy PART...            a part of the page of `make accuracy`; see docs/accuracy_tables.py
@@ -221,6 +222,20 @@ def fill_runs(arguments: str) -> list[str]:
     return make_table(["run", *(head for head, _ in pairs)], rows)
 
 
+def fill_sizes(arguments: str) -> list[str]:
+    """`NAME... | SIZE... | COLUMN; HEAD=COLUMN | ERROR`: COLUMN of the finest run, ERROR of all."""
+    names, sizes, columns, error = (part.strip() for part in arguments.split("|"))
+    pairs = [column.strip().split("=", 1) for column in columns.split(";")]
+    rows = []
+    for name in names.split():
+        results = [read_result(f"{name}-{size}") for size in sizes.split()]
+        label = results[-1]["label"].partition(f", {sizes.split()[-1]} cells")[0]
+        known = [find_cell(results[-1], column) for _, column in pairs]
+        rows.append([label, *known, *(find_cell(result, error) for result in results)])
+    heads = [f"error with {size} cells" for size in sizes.split()]
+    return make_table(["run", *(head for head, _ in pairs), *heads], rows)
+
+
 def fill_verify(arguments: str) -> list[str]:
     """Rows of the named problems; all, with the sum of bars, for `*`."""
     document = read_result("verify")
@@ -246,7 +261,8 @@ def fill_bench(arguments: str) -> list[str]:
     found = read_result(file or "bench")[table]
     rows = found["rows"]
     table = make_table(rows[0], [[str(value) for value in row.values()] for row in rows])
-    return [f"`{found['command']}`, {found['machine']}.", "", *table]
+    machine = f", {found['machine']}" if "machine" in found else ""
+    return [f"`{found['command']}`{machine}.", "", *table]
 
 
 def fill_causes(arguments: str) -> list[str]:
@@ -262,6 +278,7 @@ KINDS = {
     "head": lambda name: read_docstring(name.strip()).splitlines(),
     "verify": fill_verify,
     "runs": fill_runs,
+    "sizes": fill_sizes,
     "output": fill_output,
     "bench": fill_bench,
     "accuracy": fill_accuracy,

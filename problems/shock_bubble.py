@@ -53,7 +53,7 @@ UPWIND, DOWNWIND = 0.1, 0.16  # lengths of the tube before and behind the box [m
 GAP = 0.1  # first distance of shock and bubble over the radius
 BUBBLE = ("core", "west", "north", "east")
 DECADES = 1.3  # of gradients that are drawn, from those that 1 % of a picture's nodes exceed
-# Times of photographs [us] after the shock's arrival, the heavy gas's 115, 187 and 318 from memory;
+# Times of photographs [us] after the shock's arrival, the heavy gas's 115, 187 and 318 unchecked;
 # 340 added.
 PHOTOGRAPHS = {
     "helium": (32, 62, 102, 245, 340, 427, 674),
@@ -66,7 +66,7 @@ class Feature(NamedTuple):
 
     Window in microseconds after the shock's arrival; a name stands for the moment the refracted
     shock leaves the bubble, `exit`, some microseconds added.  measured: Haas and Sturtevant's (the
-    light gas's confirmed in other publications, the heavy gas's from memory but for the incident
+    light gas's confirmed in other publications, the heavy gas's unchecked but for the incident
     shock's); computed: Quirk and Karni's; fixed_grid: on 200 cells per diameter, of
     benchmarks/bubble_on_fixed_grid.py.
     """
@@ -319,7 +319,7 @@ class ShockBubble(Problem):
             f"high, {volume[-1] / volume[0]:.4f} of its first volume",
         ]
         if deck.gas != "helium" and len(table) > 1:
-            notes.append("published velocities from memory")
+            notes.append("published velocities: not checked against the papers")
         return Report("\n".join(lines), rows, notes)
 
     def draw_shock_bubble(self, figure, run_data) -> None:

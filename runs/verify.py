@@ -183,13 +183,13 @@ CASES = (
             settings=HEAVY_BUBBLE, others=others,
         )
         for words, quantity, bar, others in (
-            ("refracted shock", "refracted shock", 0.10, "experiment 240 m/s (from memory)"),
+            ("refracted shock", "refracted shock", 0.10, "experiment 240 m/s (unchecked)"),
             ("upwind end until the refracted shock leaves", "upwind end", 0.10,
-             "experiment 73 m/s (from memory)"),
+             "experiment 73 m/s (unchecked)"),
             ("upwind end to 400 us", "upwind end to 400 us", 0.02, "fixed grid 65.0 m/s"),
             ("downwind end's turn", "focus", 0.02, "fixed grid 200.8 us"),
             ("downwind end, no threshold: finer grids pierce farther", "downwind end", None,
-             "experiment 78 m/s (from memory), fixed grids 72, 78, 92 m/s"),
+             "experiment 78 m/s (unchecked), fixed grids 72, 78, 92 m/s"),
         )
     ),
     Case(

@@ -22,7 +22,7 @@ from benchmarks.race.compiled_peers import (
     spend,
 )
 from benchmarks.race.ours import run_ours
-from benchmarks.race.tables import BAR, NAMES, RESULTS, write_tables
+from benchmarks.race.tables import BAR, NAMES, NOT_SUMMED_UP, RESULTS, write_tables
 
 REFERENCE_CELLS = 256
 ROOT = Path(__file__).resolve().parents[2]
@@ -100,7 +100,8 @@ def draw(document: dict[str, Any]) -> None:
 
     rows = document["rows"]
     titles = {name: case["title"] for name, case in document["cases"].items()}
-    names = [name for name in CASES if any(r["case"] == name for r in rows)]
+    known = {row["case"] for row in rows} - {*NOT_SUMMED_UP}
+    names = [name for name in CASES if name in known]
     columns = 3 if len(names) > 2 else len(names)
     lines = -(-len(names) // columns)
     figure, axes = plt.subplots(
@@ -119,8 +120,10 @@ def draw(document: dict[str, Any]) -> None:
         axis.axhline(100.0 * BAR, color="0.6", lw=0.8, ls="--")
         axis.set(xlabel="CPU seconds", ylabel="error [%]")
         axis.xaxis.set_minor_formatter("")
-        axis.set_title(textwrap.fill(titles[name], 44), fontsize=9)
-        axis.legend(fontsize=8)
+        axis.set_title(textwrap.fill(titles[name], 38), fontsize=9)
+    lines_by_label = {h.get_label(): h for a in axes.flat for h in a.get_lines()}
+    handles = [lines_by_label[label] for label in NAMES.values() if label in lines_by_label]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     figure.savefig(PICTURE, dpi=110)
 
 

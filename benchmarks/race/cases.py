@@ -149,7 +149,7 @@ def make_contact() -> Case:
         "a slab ten times as dense, advected over ten of its widths",
         "L1 of the density",
         numbers,
-        {"shockgrid": (8, 16), "pyclaw": (16, 32, 64, 128, 256), "pyro": (16, 32, 64, 128)},
+        {"shockgrid": (8, 16), "pyclaw": (16, 32, 64, 128, 256, 512), "pyro": (16, 32, 64, 128)},
     )
 
 

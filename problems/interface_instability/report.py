@@ -55,8 +55,8 @@ def make_report(problem, history) -> Report:
         f"{problem.rho_second:g}; {_describe_modes(problem)}, "
         f"{deck.cells} cells per wavelength, to k c t = {kct:.3g}",
         f"  reflected wave: {reflected}, Atwood number after the shock {theory.atwood:.3f}",
-        f"  smoothing length of the interface: {problem.thickness:.3g} m "
-        f"({problem.thickness * deck.cells / deck.wavelength:.2g} of a cell)",
+        f"  smoothing length of the interface: {problem.thickness / deck.wavelength:.3g} "
+        f"wavelengths ({problem.thickness * deck.cells / deck.wavelength:.2g} of a cell)",
     ]
     rows, notes = [], ["growth: there is no theory for two shocks"]
     if deck.second_shock is None:

@@ -183,8 +183,8 @@ def compute_atwood_number(rho_first: float, rho_second: float) -> float:
 
 @dataclass(frozen=True)
 class PadeModel:
-    """Non-linear growth of the half height of bubble and spike [ZhangSohn1997], from memory of the
-    literature: with `amplitude` a0 [m] and the linear `rate` v0 > 0 [m/s] just after the shock,
+    """Non-linear growth of the half height of bubble and spike [ZhangSohn1997]:
+    with `amplitude` a0 [m] and the linear `rate` v0 > 0 [m/s] just after the shock,
 
         v = v0/(1 + v0 a0 k² t + max(0, c) v0² k² t²),   c = a0² k² - A² + 1/2.
     """

@@ -240,7 +240,7 @@ def draw_rates(rows: Iterable[Measured], path: Path) -> None:
     gases = [row for row in rows if row.materials == "gas"]
     sizes = sorted({row.cells for row in gases})
     machs, ratios = (sorted({getattr(row, key) for row in gases}) for key in ("mach", "ratio"))
-    norm = BoundaryNorm([0.0, *(100.0 * most for most, _ in tables.MARKS), 100.0], len(COLOURS))
+    norm = BoundaryNorm([0.0, *(100.0 * most for most in tables.LEVELS), 100.0], len(COLOURS))
     figure, axes = plt.subplots(
         1, len(sizes), figsize=(4.6 * len(sizes), 4.4), squeeze=False, layout="constrained"
     )

@@ -27,8 +27,7 @@ from hydro.eos.materials import find_material
 from problems.interface_instability.theories import Measured, read_rows
 
 RESULTS = Path(__file__).resolve().parent / "results"
-MARKS = ((0.01, "🟩"), (0.02, "🟨"), (0.05, "🟧"))  # up to this error; beyond all of them BAD
-BAD = "🟥"
+LEVELS = (0.01, 0.02, 0.05)  # errors that are counted; those above the first are bold
 ROUGH = 0.05  # roughness of a line that screens caution of
 SAME = 1.0  # ratio of densities where nothing grows, so that roughness has no mode to be over
 NEAR = 0.5  # degrees below the critical angle: nearer is its own sentence
@@ -39,9 +38,10 @@ PAIRS_SHOWN, NAMED = 5, 6  # the worst pairs in the table; the worst rates in a 
 Rows = Sequence[dict[str, Any]]
 
 
-def mark(error: float) -> str:
-    """The colour of a relative error."""
-    return next((colour for most, colour in MARKS if abs(error) <= most), BAD)
+def say_error(percent: float, digits: int = 2) -> str:
+    """An error in per cent, bold above the first level."""
+    said = f"{percent:+.{digits}f}"
+    return f"**{said}**" if abs(percent) > 100.0 * LEVELS[0] else said
 
 
 def make_table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
@@ -62,7 +62,7 @@ def name_ratio(materials: str, ratio: float) -> str:
 
 
 def table_rates(rows: Iterable[Measured], materials: str, cells: float) -> list[str]:
-    """Errors of growth rates with their colours; `-` where there is no value."""
+    """Errors of growth rates; `-` where there is no value."""
     known = {(r.mach, r.ratio): r for r in rows if (r.materials, r.cells) == (materials, cells)}
     machs, ratios = (sorted({key[n] for key in known}) for n in (0, 1))
     body = [
@@ -72,7 +72,7 @@ def table_rates(rows: Iterable[Measured], materials: str, cells: float) -> list[
 
 
 def _say_rate(row: Measured | None) -> str:
-    return "-" if row is None else f"{mark(row.rate_error)} {100.0 * row.rate_error:+.2f}"
+    return "-" if row is None else say_error(100.0 * row.rate_error)
 
 
 def table_polars(rows: Rows) -> list[str]:
@@ -94,7 +94,7 @@ def table_polars(rows: Rows) -> list[str]:
 def _say_polar(row: dict[str, Any]) -> str:
     if row["error in p, %"] == "":
         return row["behind A"]
-    return f"{mark(float(row['error in p, %']) / 100.0)} {row['error in p, %']}"
+    return say_error(float(row["error in p, %"]))
 
 
 def table_lines(rows: Rows) -> list[str]:
@@ -167,11 +167,11 @@ def doubt_rates(rows: Iterable[Measured]) -> list[str]:
     told = []
     for (materials, cells), group in sorted(groups.items(), key=lambda item: item[0][::-1])[::-1]:
         kind = {"gas": "gases", "condensed": "condensed materials"}[materials]
-        counts = [sum(abs(r.rate_error) <= most for r in group) for most, _ in MARKS]
+        counts = [sum(abs(r.rate_error) <= most for r in group) for most in LEVELS]
         told.append(
             f"- Growth rates of {kind}, {cells:g} cells: of {len(group)}, "
             + ", ".join(
-                f"{n} within {100.0 * most:g} %" for n, (most, _) in zip(counts, MARKS, strict=True)
+                f"{n} within {100.0 * most:g} %" for n, most in zip(counts, LEVELS, strict=True)
             )
             + _list_rates(group, materials)
             + _list_rough(group, materials)
@@ -180,7 +180,7 @@ def doubt_rates(rows: Iterable[Measured]) -> list[str]:
 
 
 def _list_rates(group: list[Measured], materials: str) -> str:
-    bar = MARKS[1][0]
+    bar = LEVELS[1]
     worst = sorted((r for r in group if abs(r.rate_error) > bar), key=lambda r: -abs(r.rate_error))
     named = [_name_rate(row, materials, f"{100.0 * row.rate_error:+.1f} %") for row in worst]
     return f". Errors above {100.0 * bar:g} %: {_cut(named)}." if named else "."

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from accuracy_tables import MARKS, make_table, mark
+from accuracy_tables import LEVELS, make_table, say_error
 
 RESULTS = Path(__file__).resolve().parent / "results"
 DIGITS = 6
@@ -64,14 +64,14 @@ def table_map(rows: Rows, keys: Sequence[str], quantity: str) -> list[str]:
 
 
 def _say(error: float | None) -> str:
-    return "-" if error is None else f"{mark(error)} {100.0 * error:+.1f}"
+    return "-" if error is None else say_error(100.0 * error, 1)
 
 
 def describe_counts(rows: Rows, keys: Sequence[str], quantity: str) -> list[str]:
     """Within which bars how many runs are; the worst by name."""
     errors = [abs(row[quantity]) for row in rows if row[quantity] is not None]
     counts = ", ".join(
-        f"{sum(error <= most for error in errors)} within {100.0 * most:g} %" for most, _ in MARKS
+        f"{sum(error <= most for error in errors)} within {100.0 * most:g} %" for most in LEVELS
     )
     middle = sorted(errors)[len(errors) // 2]
     known = [row for row in rows if row[quantity] is not None]

@@ -96,7 +96,7 @@ def make_growth(name: str = "growth") -> Case:
     first, last = (float(problem.theory.get_amplitude(wavenumber, t)) for t in times)
     scale = numbers["a0"]  # theory's amplitude is in parts of the first
     numbers |= {"times": times, "rate": scale * (last - first) / (times[1] - times[0])}
-    title = "growth of a shocked interface, Mach 1.5, 1 : 3, k a0 = 0.02"
+    title = "growth of a shocked interface, Mach 1.5, density ratio 3, k a0 = 0.02"
     cells: dict[str, tuple[int, ...]] = {"shockgrid": (16, 24, 32, 64, 128)}
     if name == "growth":
         cells = {
@@ -118,7 +118,7 @@ def make_mushroom() -> Case:
     numbers |= {"times": [15.0 / numbers["k_c"]], "amplitude": math.nan}
     return Case(
         "mushroom",
-        "large-amplitude growth, Mach 1.2, 1 : 5.1, gamma 1.4, k a0 = 0.5, to k c t = 15",
+        "large-amplitude growth, Mach 1.2, density ratio 5.1, gamma 1.4, k a0 = 0.5, to k c t = 15",
         "half the width of the interface, against shockgrid on 256 cells",
         numbers,
         {

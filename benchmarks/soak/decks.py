@@ -179,7 +179,7 @@ class Decks:
             return fault
         if done.code == 2 and "not enough memory" in done.err:
             return Outcome("out of memory", True, "the size was not seen beforehand")
-        return Outcome("refused with a sentence" if done.code else "accepted")
+        return Outcome("refused with a message" if done.code else "accepted")
 
 
 class DeckRuns(Decks):
@@ -202,4 +202,4 @@ class DeckRuns(Decks):
             return fault
         if done.code == 2 and not path.exists():
             return Outcome("accepted by check, refused by run", False, done.err.strip()[:300])
-        return Outcome({0: "ran", 2: "refused late", 3: "ended with a sentence"}[done.code])
+        return Outcome({0: "ran", 2: "refused late", 3: "ended with a message"}[done.code])

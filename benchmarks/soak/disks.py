@@ -54,7 +54,7 @@ class Disks(TrialsOfRuns):
             if not any(
                 word in done.err for word in ("no space left", "too large", "free, and a run needs")
             ):
-                return Outcome("another sentence", True, tell_last(done))
+                return Outcome("another message", True, tell_last(done))
             if has_deck(path) and (fault := find_fault(call(["info", str(path)], folder), (0, 2))):
                 return Outcome(f"info: {fault.label}", True, fault.words)
             (folder / "disk" / "filler").unlink(missing_ok=True)
@@ -63,7 +63,7 @@ class Disks(TrialsOfRuns):
             if outcome.defect:
                 words = f"{problem}, {free} bytes free: {outcome.words}"
                 return Outcome(outcome.label, True, words)
-            return Outcome(f"a sentence; {outcome.label}")
+            return Outcome(f"a message; {outcome.label}")
 
 
 def measure_pages(directory: Path) -> int:

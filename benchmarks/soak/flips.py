@@ -82,17 +82,17 @@ class Flips:
             return Outcome(label, False, tell_last(done))
         spoiled = find_spoiled(run, whole, target)
         if spoiled:
-            label = "told, restart goes on with it" if said else "SILENT: restart goes on with it"
+            label = "damage reported, restart continues" if said else "SILENT: restart continues"
             return Outcome(label, not said, ", ".join(spoiled[:4]))
         if said:
-            return Outcome("told, gone round it to the same bits")
+            return Outcome("damage reported and bypassed, bitwise equal")
         # the damaged file itself may hold other numbers still: is that seen by who reads it?
         compared = call(["compare", str(whole), str(run)], run.parent)
         if fault := find_fault(compared, (0, 1, 2, 3)):
             return fault
         if compared.code == 1 and not is_said(compared.out + compared.err, target):
             return Outcome("kept in its file, seen by compare alone", True, tell_last(compared))
-        return Outcome("harmless, the same bits" if not compared.code else "named by compare")
+        return Outcome("harmless, bitwise equal" if not compared.code else "named by compare")
 
     def _look(self, use: str, run: Path, half: Path, target: Path, folder: Path) -> Outcome:
         words = {
@@ -107,7 +107,7 @@ class Flips:
         if use == "plot":
             picture = (folder / "a.png").read_bytes() if (folder / "a.png").exists() else b""
         if done.code == 2 or is_said(done.out + done.err, target):
-            return Outcome("refused by name" if done.code else "told")
+            return Outcome("refused by name" if done.code else "damage reported")
         if done.code == 1:
             return Outcome("seen by compare")
         like = call(words[1], folder)

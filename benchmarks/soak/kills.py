@@ -44,7 +44,7 @@ class Kills(TrialsOfRuns):
         if outcome.defect:
             return Outcome(outcome.label, True, f"{problem}, {killed} kills: {outcome.words}")
         if not killed:
-            return Outcome("ended before the kill, the same bits")
+            return Outcome("ended before the kill, bitwise equal")
         return outcome
 
     def _kill(self, words, problem, path, folder, chance) -> Done:
@@ -66,10 +66,10 @@ def finish(problem: str, path: Path, whole: Path, folder: Path) -> Outcome:
     The ways are those that a person is told: `restart`; where that is refused for want of a
     restart point, `run --force`.
     """
-    label = "restarted, the same bits"
+    label = "restarted, bitwise equal"
     if not path.exists():
         label, done = (
-            "nothing made yet, run, the same bits",
+            "killed before the first file, run again, bitwise equal",
             call(list_words(problem, path), folder),
         )
     else:
@@ -77,7 +77,7 @@ def finish(problem: str, path: Path, whole: Path, folder: Path) -> Outcome:
         if done.code == 2:
             if fault := find_fault(done):
                 return fault
-            label = "no restart point yet, run anew, the same bits"
+            label = "no restart point yet, run again, bitwise equal"
             done = call(list_words(problem, path, "--force"), folder)
     if fault := find_fault(done, (0,)):
         return Outcome(f"cannot go on: {fault.label}", True, fault.words)

@@ -56,15 +56,15 @@ class Rivals(TrialsOfRuns):
             if fault := find_fault(done, (0, 1, 2) if done is other and looks else (0, 2)):
                 return Outcome(fault.label, True, f"{' and '.join(pair)}: {fault.words}")
             if done.code == 2 and not any(word in done.err for word in REFUSALS):
-                return Outcome("another sentence", True, f"{pair}: {tell_last(done)}")
+                return Outcome("another message", True, f"{pair}: {tell_last(done)}")
         codes = tuple(done.code for done in both)
         if 0 not in codes and "restart" not in pair:
             return Outcome("neither went through", True, f"{pair}: {[tell_last(d) for d in both]}")
         outcome = finish(problem, path, whole, folder)
         if outcome.defect:
             return Outcome(outcome.label, True, f"{pair}, {codes}: {outcome.words}")
-        what = "one looks on" if looks else "one refused" if 2 in codes else "one after the other"
-        return Outcome(f"{what}, the same bits")
+        what = "one waits" if looks else "one refused" if 2 in codes else "one after the other"
+        return Outcome(f"{what}, bitwise equal")
 
 
 class Clocks(TrialsOfRuns):
@@ -93,7 +93,7 @@ class Clocks(TrialsOfRuns):
         if other := find_other_files(whole, path):
             return Outcome("other bytes of files", True, f"{problem}: {', '.join(other[:4])}")
         shutil.rmtree(path)
-        return Outcome("stopped early by --max-wall, the same bits" if stopped else "the same bits")
+        return Outcome("stopped early by --max-wall, bitwise equal" if stopped else "bitwise equal")
 
 
 def make_clocks_jump(seed: int) -> None:

@@ -61,9 +61,9 @@ class Settings:
             return Outcome(
                 "these cells are refused", False, f"{name} {settings}: {tell_last(done)}"
             )
-        label = {0: "finished", 2: "refused with a sentence", 3: "ended with a sentence"}[done.code]
+        label = {0: "finished", 2: "refused with a message", 3: "ended with a message"}[done.code]
         if done.code == 0 and f"--max-wall {self.seconds}s reached" in done.out:
-            label = "still well at the end of its seconds"
+            label = "still running without trouble at the time limit"
         return Outcome(label, False, f"{name} {settings}: {tell_last(done)}")
 
 

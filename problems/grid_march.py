@@ -24,7 +24,7 @@ from problems.deck import Deck, Regrid, RunControl, key
 from problems.pictures import draw_grid, make_panels
 from problems.problem import Problem, Report, Row
 from regrid.domains import DOMAINS, MovingDomain, make_domain
-from regrid.errors import BadInput, RegridFailure
+from regrid.errors import RegridFailure
 from regrid.measure.quality import (
     compute_aspect_ratio,
     compute_scaled_jacobians,
@@ -108,10 +108,7 @@ class GridMarch(Problem):
     def __init__(self, deck: GridMarchDeck):
         super().__init__(deck)
         deck.regrid.check_weight(())
-        if deck.run.t_end is not None and deck.run.t_end > 1.0:
-            raise BadInput(
-                f"grid-march: t_end = {deck.run.t_end} is beyond the motion's end; take at most 1"
-            )
+        self.check_end(1.0, "the motion is at its end")
 
     def make_domain(self) -> MovingDomain:
         domain = make_domain(self.deck.domain, self.deck.ni, self.deck.nj)

@@ -119,17 +119,17 @@ class RadialProblem(Problem):
     """A flow of one block, "gas", that depends on the radius alone, on a rectangular grid that does
     not know it.
 
-    By the deck's `geometry`, plane: a strip, the radius being x; cylindrical: a quarter of the
-    plane; spherical: the quarter between the axis and the plane of symmetry, in axisymmetric flow.
-    `peers`: what other codes have with 100 cells, by geometry.
+    In one dimension a strip, the radius being x; in two a quarter of the plane; in three the
+    quarter between the axis and the plane of symmetry, in axisymmetric flow.  `peers`: what other
+    codes have with 100 cells, by the deck's `geometry`.
     """
 
     counted = ("cells", "cells")
     peers: ClassVar[dict[str, str]] = {}
 
-    def __init__(self, deck):
+    def __init__(self, deck, dimensions: int):
         super().__init__(deck)
-        self.plane, self.curved = deck.geometry == "plane", deck.geometry == "spherical"
+        self.dimensions, self.plane, self.curved = dimensions, dimensions == 1, dimensions == 3
         self.geometry = "axisymmetric" if self.curved else "plane"  # that of the `Simulation`
 
     def compute_density(self, r: np.ndarray, t: float) -> np.ndarray:

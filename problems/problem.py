@@ -211,6 +211,13 @@ class Problem:
         assert self.deck.run.t_end is not None
         return self.deck.run.t_end
 
+    def check_end(self, last: float, words: str) -> None:
+        """Raise BadInput where the end time is beyond `last` [s], when what `words` say is so."""
+        if self.t_end > last:
+            raise BadInput(
+                f"deck: run.t_end is {self.t_end:g}; at {last:g} s {words}, the run must end before"
+            )
+
     def build(self) -> Evolution:
         """The initial state, ready for its first step."""
         raise NotImplementedError

@@ -29,7 +29,7 @@ import numpy as np
 from hydro.boundary import put
 from hydro.links import join, slide
 from problems.initial_states import make_plane_grid, put_walls
-from problems.references.hugoniot import shock_with_particle_speed
+from problems.references.hugoniot import shock_to_pressure, shock_with_particle_speed
 from problems.references.riemann import solve_riemann
 from problems.references.shock_polars import Body, CrossedLine, cross_line
 from regrid.errors import BadInput
@@ -61,10 +61,10 @@ class SideFrame:
 
 
 class Ripple:
-    """The ripple that a deck of `conical-target` asks for; `materials` as its problem has them."""
+    """The ripple of a deck of `conical-target`; `materials`, `impact` as its problem has them."""
 
-    def __init__(self, deck, materials: dict):
-        self.deck, self.materials = deck, materials
+    def __init__(self, deck, materials: dict, impact: tuple[float, float, float]):
+        self.deck, self.materials, self.impact = deck, materials, impact
         self.frame = SideFrame(deck)
         self.amplitude, self.wavelength = deck.ripple_amplitude, deck.ripple_wavelength
         self.wavenumber, length = 2.0 * math.pi / self.wavelength, self.frame.length
@@ -106,17 +106,15 @@ class Ripple:
     @cached_property
     def first_shock(self) -> tuple[float, float]:
         """When the plane shock reaches the cone's base [s], and its speed in it [m/s]."""
-        deck, made = self.deck, self.materials
-        impactor, shell, filling = (made[name] for name in ("impactor", "shell", "filling"))
-        impact = solve_riemann(
-            impactor.eos, (impactor.rho0, deck.speed, 0.0), shell.eos, (shell.rho0, 0.0, 0.0)
+        shell, filling, (p, u, arrival) = (
+            self.materials["shell"],
+            self.materials["filling"],
+            self.impact,
         )
-        in_shell = shock_with_particle_speed(shell.eos, shell.rho0, 0.0, impact.u)
-        base = solve_riemann(
-            shell.eos, (in_shell.rho, impact.u, in_shell.p), filling.eos, (filling.rho0, 0.0, 0.0)
-        )
+        in_shell = shock_to_pressure(shell.eos, shell.rho0, 0.0, p)
+        base = solve_riemann(shell.eos, (in_shell.rho, u, p), filling.eos, (filling.rho0, 0.0, 0.0))
         in_cone = shock_with_particle_speed(filling.eos, filling.rho0, 0.0, base.u)
-        return deck.front / in_shell.shock_speed, in_cone.shock_speed
+        return arrival, in_cone.shock_speed
 
     def cross(self, speed: float | None = None) -> CrossedLine | None:
         """Theory of the shock that passes the side at `speed` (None: of the plane shock).
@@ -252,18 +250,6 @@ class Layout:
             "side": make_plane_grid(deep, outside),
         }
         return {name: nodes for name, nodes in grids.items() if self.open or name != "ring"}
-
-    def find_following(self) -> set[tuple[str, str]]:
-        """Blocks and sides whose nodes are laid on the line of others."""
-        contact = self.deck.contact
-        sides = {
-            ("impactor", "i_max"): contact.impactor,
-            ("front", "i_max"): contact.front,
-            ("front", "j_max"): contact.front if self.open else "",
-            ("side", "j_min"): contact.side,
-            ("cone", "j_max"): contact.cone,
-        }
-        return {side for side, how in sides.items() if how == "sliding"}
 
     def connect(self, blocks: dict[str, Block]) -> list:
         """Links and contacts of all blocks, the walls, the axis and the free surface."""

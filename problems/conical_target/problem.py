@@ -34,7 +34,7 @@ from problems.conical_target import report as seen
 from problems.conical_target.layout import MATERIALS, Layout, Ripple
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, check_solid, key
 from problems.problem import Problem, check_memory, find_crossing
-from problems.references.hugoniot import find_rise, shock_to_pressure
+from problems.references.riemann import solve_riemann
 from regrid.errors import BadInput
 
 Touch = Literal["joined", "sliding"]
@@ -151,7 +151,7 @@ class ConicalTarget(seen.Results, Problem):
                     f"between {low * deck.radius:g} and {high * deck.radius:g} m"
                 )
         self.impact = self._match_impact()
-        self.ripple = Ripple(deck, self.materials)
+        self.ripple = Ripple(deck, self.materials, self.impact)
         self.layout = Layout(deck, self.ripple)
         if self.ripple:
             check_memory(self)  # grids are made here
@@ -162,36 +162,22 @@ class ConicalTarget(seen.Results, Problem):
 
         Raises BadInput past the speeds at which the materials' Hugoniots were measured.
         """
-        deck, solids = self.deck, [self.materials[name] for name in ("impactor", "shell")]
-        limits = [float(solid.eos.sound_speed(solid.rho0, 0.0)) for solid in solids]
-        refusal = BadInput(
-            f"deck: speed is {deck.speed:g} m/s; behind its shocks {deck.impactor} or {deck.shell} "
-            "would move faster than sound does in it at rest "
-            f"({limits[0]:.0f} and {limits[1]:.0f} m/s), for which their equations of state are "
-            "not made; take a slower impactor"
-        )
-        if deck.speed > sum(limits):
-            raise refusal
-
-        def excess(p):
-            shocks = [shock_to_pressure(solid.eos, solid.rho0, 0.0, p) for solid in solids]
-            return shocks[0].particle_speed + shocks[1].particle_speed - deck.speed
-
-        stiffness = [solid.rho0 * c for solid, c in zip(solids, limits, strict=True)]
+        deck, (one, two) = self.deck, (self.materials[name] for name in ("impactor", "shell"))
         try:
-            p = find_rise(excess, deck.speed / sum(1.0 / value for value in stiffness))
+            hit = solve_riemann(one.eos, (one.rho0, deck.speed, 0.0), two.eos, (two.rho0, 0.0, 0.0))
         except BadInput as error:
-            if all(solid.eos.kind != "tabular" for solid in solids):
-                raise
             raise BadInput(
-                f"deck: the shocks that {deck.impactor!r} at {deck.speed:g} m/s and {deck.shell!r} "
-                f"give each other are not in the table: {error}"
+                f"deck: speed is {deck.speed:g} m/s; take a slower impactor: {error}"
             ) from None
-        shock = shock_to_pressure(solids[1].eos, solids[1].rho0, 0.0, p)
-        u = shock.particle_speed
-        if deck.speed - u > limits[0] or u > limits[1]:
-            raise refusal
-        return p, u, deck.front / shock.shock_speed
+        limits = [float(solid.eos.sound_speed(solid.rho0, 0.0)) for solid in (one, two)]
+        if deck.speed - hit.u > limits[0] or hit.u > limits[1]:
+            raise BadInput(
+                f"deck: speed is {deck.speed:g} m/s; behind its shocks {deck.impactor} or "
+                f"{deck.shell} would move faster than sound does in it at rest "
+                f"({limits[0]:.0f} and {limits[1]:.0f} m/s), for which their equations of state "
+                "are not made; take a slower impactor"
+            )
+        return hit.p, hit.u, deck.front / hit.right_wave.head
 
     def estimate_cells(self) -> int:
         return self.layout.estimate_cells()

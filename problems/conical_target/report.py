@@ -17,8 +17,9 @@ from problems.pictures import draw_field, draw_grid, make_panels, spread_dumps
 from problems.problem import Report, Row
 from problems.references.hugoniot import shock_to_pressure
 from problems.references.shock_polars import CrossedLine
+from regrid.curves import compute_arc_lengths
 from regrid.errors import BadInput
-from regrid.sides import SIDE_NAMES, get_sides, trace_outline
+from regrid.sides import trace_outline
 
 PARTS = ("impactor", "shell", "target", "filling")
 MM, GPA, US = 1e3, 1e-9, 1e6
@@ -84,13 +85,10 @@ def measure_departure(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     That line is the one of least squares along the arc; departures are normal to it.  Second: the
     nodes' places along the arc as parts of its length.
     """
-    step = np.hypot(*np.diff(line, axis=1))
-    arc = np.concatenate(([0.0], np.cumsum(step)))
-    weight = np.zeros(arc.size)
-    weight[:-1] += 0.5 * step
-    weight[1:] += 0.5 * step
-    away = line - (line * weight).sum(axis=1, keepdims=True) / weight.sum()
-    xx, yy, xy = ((away[a] * away[b] * weight).sum() for a, b in ((0, 0), (1, 1), (0, 1)))
+    arc = compute_arc_lengths(line)
+    weight = np.convolve(np.diff(arc), (0.5, 0.5))
+    (xx, xy), (_, yy) = np.cov(line, aweights=weight)
+    away = line - np.average(line, axis=1, weights=weight)[:, None]
     angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
     return math.cos(angle) * away[1] - math.sin(angle) * away[0], arc / arc[-1]
 
@@ -208,25 +206,8 @@ PAINTED = ("impactor", "front", "side", "cone", "ring", "beside", "behind")
 SHOWN = 6  # dumps in a picture that shows several times
 
 
-def _find_outlines(dump, following: set[tuple[str, str]]) -> list[np.ndarray]:
-    """Polylines (2, n) [m] of the blocks' sides, cut where they are seams in one material.
-
-    Sides that are laid on another's line are left out: that line is where they touch.
-    """
-    lines = []
-    for block in dump.blocks:
-        own = [b for b in dump.blocks if b.name != block.name and b.material == block.material]
-        inside = {tuple(point) for b in own for line in get_sides(b.nodes) for point in line.T}
-        for side, line in zip(SIDE_NAMES, get_sides(block.nodes), strict=True):
-            if (block.name, side) not in following:
-                shared = np.array([tuple(point) in inside for point in line.T])
-                cuts = np.flatnonzero(shared[1:] & shared[:-1]) + 1
-                lines.append(np.insert(line, cuts, np.nan, axis=1))
-    return lines
-
-
-def _draw_materials(axis, dump, names: dict[str, str], following, grid: bool) -> None:
-    """Blocks filled with their materials' colours, the lines between, and the grid if asked for.
+def _draw_materials(axis, dump, names: dict[str, str], grid: bool) -> None:
+    """Blocks filled with their materials' colours, with names or the grid.
 
     Blocks that follow come first: where their chords leave the line, others cover them.
     """
@@ -237,12 +218,8 @@ def _draw_materials(axis, dump, names: dict[str, str], following, grid: bool) ->
         if grid:
             draw_grid(axis, nodes, color=COLOURS[block.material], lw=0.25)
         if block.name in names:
-            position = 0.5 * (x.min() + x.max()), 0.5 * (y.min() + y.max())
-            if block.name == "cone":
-                position = x.mean(), 0.3 * y.max()
+            position = x.mean(), y.mean() if y.min() > 0.0 else 0.3 * y.max()
             axis.text(*position, names[block.name], ha="center", va="center", fontsize="small")
-    for line in _find_outlines(dump, following):
-        axis.plot(*(MM * line), color="k", lw=0.8)
     axis.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
 
 
@@ -323,40 +300,32 @@ class Results:
             shape.plot(*line, lw=1.4, label=f"{US * dump.t:.2g} us", color=colour)
         shape.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
         shape.set_title("line between graphite and lead", fontsize="medium")
-        shape.legend(fontsize="small", frameon=False, loc="upper right")
-        crossed, waves = measure_waves(self, run.history)
-        t = run.history["t"]
+        (crossed, waves), t = measure_waves(self, run.history), run.history["t"]
         top = max((np.nanmax(wave.amplitude) for wave in waves), default=math.nan)
         for number, wave in enumerate(waves):
             style, grown = {"color": f"C{number}"}, wave.age > 0.0
             label, first = f"wave {number + 1}", wave.amplitude[0]
             amplitude.plot(US * t, MM * wave.amplitude, label=label, **style)
             growth.plot(US * wave.age[grown], wave.amplitude[grown] / first, label=label, **style)
-            if crossed is not None:
-                theory = first * crossed.compute_growth(k, wave.age)
-                gentle = theory < 1.5 * top
-                amplitude.plot(US * t[gentle], MM * theory[gentle], "--", lw=0.9, **style)
-        amplitude.axhline(MM / k, color="0.6", lw=0.7)
-        amplitude.text(0.05, MM / k, "k a = 1", color="0.4", fontsize="small", va="bottom")
+            theory = first * crossed.compute_growth(k, wave.age) if crossed else np.zeros(0)
+            gentle = theory < 1.5 * top
+            amplitude.plot(US * t[gentle], MM * theory[gentle], "--", lw=0.9, **style)
+        amplitude.axhline(MM / k, color="0.6", lw=0.7, label="k a = 1")
         if crossed is not None:
             age = np.linspace(0.0, max(wave.age[-1] for wave in waves), 200)
             (impulse, shear), plus = crossed.compute_rates(k), crossed.compression
-            for values, colour, style, lw, words in (
-                (crossed.compute_growth(k, age), "k", "--", 1.0, "theory"),
-                (plus * (1.0 + impulse * age), "0.5", "-.", 0.8, "impulse alone"),
-                (plus * np.cosh(shear * age), "0.5", ":", 1.0, "slip alone"),
+            for values, style, words in (
+                (crossed.compute_growth(k, age), "k--", "theory"),
+                (plus * (1.0 + impulse * age), "k-.", "impulse alone"),
+                (plus * np.cosh(shear * age), "k:", "slip alone"),
             ):
-                growth.plot(US * age, values, style, label=words, color=colour, lw=lw)
-            growth.set_yscale("log")
-            ticks = (0.8, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0)
-            growth.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
-            growth.set_yticks([], minor=True)
+                growth.semilogy(US * age, values, style, lw=0.9, label=words)
             growth.set_ylim(0.75, 2.0 * top / np.nanmean([wave.amplitude[0] for wave in waves]))
         amplitude.set(xlabel="t [us]", ylabel="amplitude [mm]")
-        amplitude.legend(fontsize="small", frameon=False)
         amplitude.set_title("dashed: theory of small slopes", fontsize="medium")
         growth.set(xlabel="time since the shock was at the wave [us]", ylabel="a / a0")
-        growth.legend(fontsize="small", frameon=False, ncols=2)
+        for axes in (shape, amplitude, growth):
+            axes.legend(fontsize="small", frameon=False)
 
     def draw_conical_target(self, figure, run) -> None:
         """Materials at the start and the end, pressure at the end; graphite and its corner near."""
@@ -365,27 +334,16 @@ class Results:
         top = [figure.add_subplot(grid[0, 2 * n : 2 * n + 2]) for n in range(3)]
         near, corner = figure.add_subplot(grid[1, :3]), figure.add_subplot(grid[1, 3:])
         first, last = run.dumps[0], run.dumps[-1]
-        following = self.layout.find_following()
-        times = [f"t = {dump.t * US:.3g} us" for dump in (first, last)]
-        names = {block: getattr(self.deck, part) for block, part in LABELS.items()}
-        names["cone"] = names["cone"].split("-")[0]
-        for axis, dump, time in zip(top, (first, last), times, strict=False):
-            _draw_materials(axis, dump, names, following, grid=False)
-            axis.set_title(time, fontsize="medium")
-        words = {"title": f"{times[1]}, pressure", "lines": _find_outlines(last, following)}
-        picture = draw_field(top[2], last, "p", unit=1e9, mm=True, **words)
-        blocks = [block.nodes.reshape(2, -1) for block in (*first.blocks, *last.blocks)]
-        nodes = MM * np.concatenate(blocks, axis=1)
-        for axis in top:
-            ends = nodes[0].min() - 1.0, nodes[0].max() + 1.0
-            axis.set(xlim=ends, ylim=(0.0, 1.32 * nodes[1].max()))
-        inset = top[2].inset_axes([0.08, 0.9, 0.84, 0.045])
-        bar = figure.colorbar(picture, cax=inset, orientation="horizontal")
-        bar.ax.tick_params(labelsize="small", pad=1.0)
-        bar.ax.set_title("GPa", fontsize="small", loc="right", x=1.08, y=-1.6)
+        names = {block: getattr(self.deck, part).split("-")[0] for block, part in LABELS.items()}
+        for axis, dump in zip(top, (first, last), strict=False):
+            _draw_materials(axis, dump, names, grid=False)
+            axis.set_title(f"t = {dump.t * US:.3g} us", fontsize="medium")
+        lines = [trace_outline(block.nodes) for block in last.blocks]
+        words = {"title": f"t = {last.t * US:.3g} us", "bar": "pressure [GPa]", "lines": lines}
+        draw_field(top[2], last, "p", unit=1e9, mm=True, **words)
         for axis in (near, corner):
             axis.set_facecolor(FACES["shell"])  # what shows between chords and the line
-            _draw_materials(axis, last, {}, following, grid=True)
+            _draw_materials(axis, last, {}, grid=True)
         cone = MM * last.block("cone").nodes
         (left, _), (right, high) = cone.min(axis=(1, 2)), cone.max(axis=(1, 2))
         near.set(xlim=(left - 1.5, right + 1.5), ylim=(0.0, high + 1.5))
@@ -406,17 +364,14 @@ class Results:
         axis.plot(t, history["pressure_impact"] * GPA, color="0.6", label="impact face")
         axis.axhline(impact * GPA, color="0.6", lw=0.6)
         axis.set_ylabel("pressure [GPa]")
-        for column, words, colour in (("x", "x", "k"), ("y", "r", "tab:red")):
+        for column, words in (("x", "x"), ("y", "r")):
             values = np.where(top > 0.01 * impact, MM * history[f"greatest_{column}"], np.nan)
-            places.plot(t, values, ".", ms=2.0, color=colour, label=words)
-        peak = t[int(np.nanargmax(top))]
-        places.axvline(peak, color="0.7", lw=0.8)
-        places.text(peak, 0.5, " peak", color="0.4", fontsize="small", va="bottom")
+            places.plot(t, values, ".", ms=2.0, label=words)
+        places.axvline(t[int(np.nanargmax(top))], color="0.7", lw=0.8, label="at its peak")
         places.set_ylabel("place of the greatest pressure in the cone [mm]")
-        above = {"ncols": 3, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
         for panel in (axis, places):
             panel.set(xlabel="t [us]", xlim=(0.0, t[-1]), ylim=(0.0, None))
-            panel.legend(fontsize="small", frameon=False, **above)
+            panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)
 
     def draw_graphite(self, figure, run) -> None:
         """Part in the second phase over time; states beside the Hugoniot; where the phase is."""
@@ -429,25 +384,19 @@ class Results:
         tops = [float(dump["cone"].p.max()) for dump in run.dumps]
         shares = [float(np.interp(dump.t, t, share)) for dump in run.dumps]
         most = run.dumps[int(np.argmax(shares if max(shares) > 0.0 else tops))]
-        lowest = 0.0
-        for dump in sorted({*spread_dumps(run, SHOWN)[1:], most}, key=lambda dump: dump.t):
+        for dump in spread_dumps(run, SHOWN)[1:]:
             rho, p = dump["cone"].rho.ravel(), GPA * dump["cone"].p.ravel()
             states.plot(rho, p, ".", ms=1.5, zorder=2, label=f"{US * dump.t:.3g} us")
-            lowest = min(lowest, p.min())
         shocks = [(material.rho0, 0.0)]
         with contextlib.suppress(BadInput):  # beyond its table
             for p in np.linspace(0.0, 1.05 * max(tops), 60)[1:]:
                 shocks.append((shock_to_pressure(eos, material.rho0, 0.0, p).rho, p))
         rho, p = np.array(shocks).T
         states.plot(rho, GPA * p, color="k", lw=0.9, zorder=3, label="Hugoniot")
+        states.set(xlim=(0.9 * rho[0], 1.15 * rho[-1]), ylim=(None, 1.1 * GPA * max(tops)))
         if eos.mixed_region is not None:
             edges = [eos.rho0 / (1.0 - eta) for eta in eos.mixed_region]
-            states.axvspan(*edges, color="0.9", zorder=0)
-            states.text(edges[0], 0.0, " mixed", color="0.4", fontsize="small", va="bottom")
-            right = min(1.02 * edges[1], max(1.05 * rho[-1], 1.15 * edges[0]))
-            states.set_xlim(0.9 * rho[0], right)
-        states.set_ylim(1.1 * lowest, 1.1 * GPA * max(tops))
-        states.locator_params(axis="x", nbins=5)
+            states.axvspan(*edges, color="0.9", zorder=0, label="both phases")
         states.set(xlabel="density [kg/m3]", ylabel="pressure [GPa]")
         states.legend(fontsize="x-small", markerscale=4.0, loc="upper left")
         cone, style = most["cone"], {"cmap": "magma_r", "vmin": 0.0, "rasterized": True}

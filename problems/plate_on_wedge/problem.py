@@ -83,7 +83,6 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     edge: key(float, "length of the flat edge on which the plate lies [m]", gt=0) = 10e-3
     overhang: key(float, "of the plate beyond the end of the face [m]", gt=0) = 10e-3
     depth: key(float, "height of the face's end over the base [m]", gt=0) = 12e-3
-    end_angle: key(float, "of the wedge's end face; 90: upright [degrees]", gt=30, lt=150) = 90.0
     right: key(
         Literal["symmetry", "free"], "the plate's far end: a plane of symmetry, or a free end face"
     ) = "symmetry"
@@ -92,9 +91,6 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
         tuple[Annotated[int, Meta(ge=1, le=MOST_CELLS)], Annotated[int, Meta(ge=1, le=MOST_CELLS)]],
         "cells of the plate along and across it",
     ) = (80, 24)
-    contact_cells: key(float, "part of the plate's cells that lie on the wedge", gt=0.1, lt=0.9) = (
-        0.6
-    )
     refinement: key(
         float | None,
         "how many times finer the cells are at the collision point A; left out: "
@@ -102,16 +98,14 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
         ge=1,
         le=8,
     ) = None
-    wedge_spacing: key(float, "spacing of the wedge's nodes over the plate's", gt=0.2, lt=5) = 1.0
     until: key(
         Literal["auto", "arrival", "end"],
         "end of the run: A's arrival at the end B of the face, or what comes "
         "later; auto: arrival where cells at A are refined",
     ) = "auto"
-    turn: key(float, "turn of the whole set-up [degrees]") = 0.0
-    mirror: key(bool, "run the mirror image of the set-up") = False
 
 
+OVER_EDGE = 0.6  # of the plate's cells: those that lie on the wedge at first
 MOST_REFINED = 3.0  # times finer cells at A where the zone of constant states behind A is short
 FINER_ROWS = 0.75  # power of the refinement by which rows are finer: torn cells get too thin at 1
 CLOSEST = 0.85  # of the compression at which a Mie-Grueneisen Hugoniot's pressure is infinite
@@ -137,7 +131,7 @@ class PlateOnWedge(Results, Problem):
         for name, material in self.materials.items():
             check_solid(name, getattr(deck, name), material)
         ni, nj = deck.cells
-        self.contact = round(deck.contact_cells * ni)
+        self.contact = round(OVER_EDGE * ni)
         if min(self.contact, ni - self.contact) < 4 or nj < 4:
             raise BadInput(
                 f"deck: cells is ({ni}, {nj}), which are {self.contact} on the wedge, "
@@ -148,18 +142,6 @@ class PlateOnWedge(Results, Problem):
         self.end = np.array([deck.edge + along, -down])
         self.length = float(self.end[0]) + deck.overhang
         self.base = float(self.end[1]) - deck.depth
-        lean = deck.depth / math.tan(math.radians(deck.end_angle))
-        self.foot = float(self.end[0]) + lean
-        if not self.foot > 0.2 * self.end[0]:
-            raise BadInput(
-                f"deck: end_angle {deck.end_angle:g} undercuts the wedge by {-lean:g} m over its "
-                "depth; no base would remain"
-            )
-        if deck.right == "symmetry" and self.foot >= self.length:
-            raise BadInput(
-                f"deck: the end face reaches x = {self.foot:g} m, beyond the symmetry plane at "
-                f"{self.length:g} m; enlarge overhang or end_angle"
-            )
         if deck.gap and deck.refinement:
             raise BadInput(
                 f"deck: refinement is {deck.refinement:g} and gap {deck.gap:g} m: cells are finer "
@@ -184,16 +166,13 @@ class PlateOnWedge(Results, Problem):
         self.refinement = deck.refinement or self.find_refinement()
         until_arrival = deck.until == "auto" and self.refinement > 1.0
         self.ends_at_arrival = deck.until == "arrival" or until_arrival
-        self.coarse_spacing = deck.wedge_spacing * self.length / ni
+        self.coarse_spacing = self.length / ni
         self.wedge_spacing = self.coarse_spacing / math.sqrt(self.refinement)
         parts = deck.edge / self.wedge_spacing, deck.face / self.wedge_spacing
         self.on_edge, self.on_face = (max(3, round(part)) for part in parts)  # faces of the wedge
         drive, self.flyer_rows = deck.drive, 0
         if drive.kind == "flyer":
             self.flyer_rows = max(4, round(drive.thickness / deck.thickness * nj))
-        turn = math.radians(deck.turn)  # `frame`: from the set-up as described here to the deck's
-        matrix = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-        self.frame = matrix @ np.diag([-1.0, 1.0]) if deck.mirror else matrix
 
     def find_particle_speed(self) -> float:
         """Velocity behind the drive's first shock in the plate [m/s]; BadInput without one."""
@@ -260,7 +239,7 @@ class PlateOnWedge(Results, Problem):
         return min(max((WIDE_ZONE / zone) ** 1.5, 1.0), MOST_REFINED)
 
     def make_grids(self, t=0.0):
-        """Those of plate and wedge, and of a flyer, as they stand in the set-up."""
+        """Those of plate and wedge, and of a flyer."""
         deck, (ni, nj), drive = self.deck, self.deck.cells, self.deck.drive
         lengths = (deck.edge, self.length - deck.edge)
         counts = (self.contact + 1, ni - self.contact + 1)
@@ -273,7 +252,7 @@ class PlateOnWedge(Results, Problem):
         along = np.concatenate((edge, 1.0 + face[1:]))
         ends = (0.0, deck.edge, self.end[0]), (0.0, 0.0, self.end[1])
         top = np.array([np.interp(along, (0.0, 1.0, 2.0), places) for places in ends])
-        bottom = np.array([arc_law(top) * self.foot, np.full(top.shape[1], self.base)])
+        bottom = np.array([arc_law(top) * self.end[0], np.full(top.shape[1], self.base)])
         part = self.lay_rows(max(6, round(deck.depth / self.coarse_spacing)), 1.0, from_end=True)
         grids["wedge"] = bottom[:, :, None] * (1.0 - part) + top[:, :, None] * part
         if self.flyer_rows:
@@ -297,23 +276,6 @@ class PlateOnWedge(Results, Problem):
             along * max(6.0, 1.0 + deck.depth / self.coarse_spacing)
         )
 
-    def turn_faces(self, block: Block, side: str, start: int = 0, stop: int | None = None):
-        """(block, side, start, stop) of faces counted in the set-up as described here."""
-        if not self.deck.mirror:
-            return block, side, start, stop
-        if side in ("i_min", "i_max"):
-            return block, {"i_min": "i_max", "i_max": "i_min"}[side], start, stop
-        return block, side, block.ni - (block.ni if stop is None else stop), block.ni - start
-
-    def put(self, kind: str, block: Block, side: str, start=0, stop=None, **options) -> None:
-        """Put a segment on faces of the set-up as described here."""
-        block, side, start, stop = self.turn_faces(block, side, start, stop)
-        put(block, side, kind, start, stop, **options)
-
-    def to_set_up(self, points: np.ndarray) -> np.ndarray:
-        """Points (2, ...) of the deck's frame in the set-up as described here."""
-        return np.einsum("ba,b...->a...", self.frame, points)
-
     def build(self) -> PlateRun:
         deck, drive, grids, blocks = self.deck, self.deck.drive, self.make_grids(), []
         strength = lambda t: 1.0  # noqa: E731
@@ -323,39 +285,33 @@ class PlateOnWedge(Results, Problem):
         speeds = {"plate": -drive.speed if drive.kind == "moving" else 0.0, "flyer": -drive.speed}
         solids = {**self.materials, "flyer": find_material(drive.material)}
         for name, nodes in grids.items():
-            nodes = np.einsum("ab,bij->aij", self.frame, nodes)
-            nodes = nodes[:, ::-1] if deck.mirror else nodes
-            state = solids[name].rho0, *(self.frame @ (0.0, speeds.get(name, 0.0))), 0.0
+            state = solids[name].rho0, 0.0, speeds.get(name, 0.0), 0.0
             blocks.append(Block(name, solids[name].eos, nodes, *state))
         plate, wedge, *flyer = blocks
-        edge = self.turn_faces(wedge, "j_max", 0, self.on_edge)
-        face, links = self.turn_faces(wedge, "j_max", self.on_edge), []
+        edge, face = (wedge, "j_max", 0, self.on_edge), (wedge, "j_max", self.on_edge, None)
+        links = []
         if deck.gap:
-            for body, side, start, stop in (edge, face):
-                put(body, side, "free-surface", start, stop)
-            self.put("free-surface", plate, "j_min")
+            for side in (edge, face):
+                put(side[0], side[1], "free-surface", *side[2:])
+            put(plate, "j_min", "free-surface")
         else:
-            master = [face, edge] if deck.mirror else [edge, face]
-            links.append(slide(master, self.turn_faces(plate, "j_min", 0, self.contact)))
-            self.put("free-surface", plate, "j_min", self.contact)
+            links.append(slide([edge, face], (plate, "j_min", 0, self.contact)))
+            put(plate, "j_min", "free-surface", self.contact)
         if drive.kind == "piston":
-            velocity = self.frame @ (0.0, -drive.speed)
-            self.put("piston", plate, "j_max", velocity=lambda t: tuple(strength(t) * velocity))
+            put(plate, "j_max", "piston", velocity=lambda t: (0.0, -strength(t) * drive.speed))
         elif drive.kind == "pressure":
             pressure = lambda t: strength(t) * drive.pressure  # noqa: E731
-            self.put("free-surface", plate, "j_max", pressure=pressure)
+            put(plate, "j_max", "free-surface", pressure=pressure)
         elif flyer:
-            pair = self.turn_faces(plate, "j_max"), self.turn_faces(flyer[0], "j_min")
-            links.append(join("interface", *pair))
+            links.append(join("interface", (plate, "j_max"), (flyer[0], "j_min")))
         if drive.kind in ("moving", "flyer"):
-            self.put("free-surface", *flyer or [plate], "j_max")
+            put(*flyer or [plate], "j_max", "free-surface")
         for block in blocks:
-            self.put("wall", block, "i_min")
+            put(block, "i_min", "wall")
             if block is not wedge:
-                end = "wall" if deck.right == "symmetry" else "free-surface"
-                self.put(end, block, "i_max")
-        self.put("free-surface", wedge, "i_max")
-        self.put("wall", wedge, "j_min")
+                put(block, "i_max", "wall" if deck.right == "symmetry" else "free-surface")
+        put(wedge, "i_max", "free-surface")
+        put(wedge, "j_min", "wall")
         return self.simulate(blocks, links, kind=functools.partial(PlateRun, self))
 
     def measure(self, evolution: PlateRun) -> dict[str, float]:

@@ -484,8 +484,7 @@ class Results:
             dump = run.dumps[number]
             title = f"{words}, t = {1e6 * dump.t:.2f} us"
             _draw_pressure(axes, self, run, dump, bar="pressure [GPa]", title=title)
-            place = [np.interp(dump.t, t, history[name]) for name in ("contact_x", "contact_y")]
-            x, y = MM * self.frame @ place
+            x, y = (MM * np.interp(dump.t, t, history[f"contact_{name}"]) for name in "xy")
             axes.set(xlim=(x - size, x + size), ylim=(y - 0.8 * size, y + 0.8 * size))
         paths.plot(1e6 * t, MM * path, label="computed")
         rows = choose_rows(self, history, (0.02, 1.0))

@@ -1,7 +1,4 @@
-"""The run of a plate on a wedge: where the collision point is, which phase it is, when it ends.
-
-All places and angles are those of the set-up before the deck turns or mirrors it.
-"""
+"""The run of a plate on a wedge: where the collision point is, which phase it is, when it ends."""
 
 import math
 from collections.abc import Container
@@ -14,7 +11,9 @@ from hydro.simulation import Simulation
 from hydro.sliding.contact import SlidingContact
 from hydro.sliding.pieces import project
 from problems.plate_on_wedge import report
+from problems.problem import find_crossing
 from regrid.curves import compute_arc_lengths
+from regrid.measure.corners import compute_centres
 
 LEAST_JET = 3  # cells that make a jet
 NEAR = 0.5  # of the local spacing: lines as near as this have met
@@ -32,23 +31,17 @@ class PlateRun(Simulation):
         super().__init__(blocks, links, **options)
         self.problem = problem
         self.plate, self.wedge = blocks[0], blocks[1]
-        self.end = 0 if problem.deck.mirror else 1  # of the contact that runs
         self.times = dict.fromkeys(report.PHASES, math.nan)
         self.start = np.array([problem.deck.edge, 0.0])
         self.contact: SlidingContact | None = None  # where plate and wedge are bodies of their own
         if not problem.deck.gap:
             self.contact = self.exchange.contacts[0]
             self.contact.refinement = problem.refinement
-            self.start = self.find_contact_point()
-
-    def see(self, block: Block) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes (2, ni + 1, nj + 1) and states (4, ni, nj) of a block as they are in the set-up."""
-        nodes, state = self.problem.to_set_up(block.nodes), block.state[:, 1:-1, 1:-1]
-        return (nodes, state) if self.end else (nodes[:, ::-1], state[:, ::-1])
+            self.start = self.find_contact_point().copy()
 
     def get_lower_line(self) -> np.ndarray:
         """Nodes (2, n) of the plate's lower side, from the wedge's edge outwards."""
-        return self.see(self.plate)[0][:, :, 0]
+        return self.plate.nodes[:, :, 0]
 
     def find_touching(self) -> tuple[int, np.ndarray]:
         """Faces of the plate's lower side before A, and A's place (2,), with a gap at the start.
@@ -65,9 +58,9 @@ class PlateRun(Simulation):
                 continue
             for surface, positions in parts:
                 touching = np.flatnonzero(positions >= 0.0)
-                points += list(self.problem.to_set_up(surface.line[:, touching]).T)
+                points += list(surface.line[:, touching].T)
                 if surface.block is self.plate:
-                    nodes += list(touching if self.end else self.plate.ni - touching)
+                    nodes += list(touching)
         return int(max(nodes)), max(points, key=self.measure_along)
 
     def count_contact(self) -> int:
@@ -86,12 +79,12 @@ class PlateRun(Simulation):
 
     def get_end_face(self) -> np.ndarray:
         """Nodes (2, n) of the wedge's end face, from the top down."""
-        return self.see(self.wedge)[0][:, -1, ::-1]
+        return self.wedge.nodes[:, -1, ::-1]
 
     def is_at_end(self) -> bool:
         """Has A come to the end B of the face?"""
         if self.contact:
-            return self.contact.fixed[self.end] >= 0
+            return self.contact.fixed[1] >= 0  # its end that runs
         free = self.get_free_line()
         away = self.get_end_face()[:, 0] - self.find_contact_point()
         step = free[:, 1] - free[:, 0] if free.shape[1] > 1 else np.full(2, np.inf)
@@ -125,7 +118,7 @@ class PlateRun(Simulation):
         """Columns of the history: A, the states behind it, the jet, the phase."""
         point, count, (first, last) = self.find_contact_point(), self.count_contact(), BEHIND
         line = self.get_lower_line()[:, count::-1]  # of the contact, from A backwards
-        _, u, v, pressure = self.see(self.plate)[1][:, :, 0]
+        _, u, v, pressure = self.plate.state[:, 1:-1, 1]
         surface, arrived = np.hypot(u, v), math.isfinite(self.times["arrived"])
         behind, direction = math.nan, np.full(2, math.nan)
         if count >= last:
@@ -179,23 +172,19 @@ class PlateRun(Simulation):
         pressure falls through half of theory's (or of its own largest value); the angle is that of
         the straight line from A through these places.
         """
-        nodes, (*_, p) = self.see(block)
+        nodes, p = block.nodes, block.state[3, 1:-1, 1:-1]
         rows = np.arange(*SHOCK_ROWS)
         rows = -1 - rows[rows < block.nj] if in_wedge else rows[rows < block.nj]
         low, high = np.sort((rows[0], rows[-1])) + (block.nj if in_wedge else 0)
-        part = nodes[:, :, low : high + 2]
-        centres = 0.25 * (part[:, 1:, 1:] + part[:, :-1, 1:] + part[:, 1:, :-1] + part[:, :-1, :-1])
-        p = p[:, low : high + 1]
-        collision = self.problem.collision
+        centres, p = compute_centres(nodes[:, :, low : high + 2]), p[:, low : high + 1]
+        collision, cells = self.problem.collision, np.arange(float(p.shape[0]))
         level = 0.5 * (collision.p if collision.attached else float(p.max()))
-        above = p > level
-        found = above.any(axis=0)
-        last = p.shape[0] - 1 - above[::-1].argmax(axis=0)
-        positions = []
-        for j in np.flatnonzero(found & (last < p.shape[0] - 1)).tolist():
-            k = int(last[j])
-            share = (p[k, j] - level) / (p[k, j] - p[k + 1, j])
-            positions.append(centres[:, k, j] + share * (centres[:, k + 1, j] - centres[:, k, j]))
+        fronts = [find_crossing(cells, column, level) for column in p.T]
+        positions = [
+            [np.interp(front, cells, places[:, j]) for places in centres]
+            for j, front in enumerate(fronts)
+            if math.isfinite(front)
+        ]
         if len(positions) < 3:
             return math.nan
         away = np.array(positions).T - point[:, None]
@@ -264,9 +253,8 @@ class PlateRun(Simulation):
 
         Both lines begin at A, where no contact is between them.
         """
-        wedge = self.problem.to_set_up(self.wedge.nodes)
         for k, (x, y) in enumerate(free[:, 1:APART].T, 1):
-            if is_inside((x, y), wedge):
+            if is_inside((x, y), self.wedge.nodes):
                 away = min(project(face, a, x, y)[1] for a in range(face.shape[1] - 1))
                 if away > near[k] ** 2:
                     return True

@@ -21,11 +21,10 @@ from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
-from problems.initial_states import put_walls
+from problems.initial_states import RadialProblem
 from problems.pictures import draw_field, make_panels
-from problems.problem import Problem, Report, compare, get_last
+from problems.problem import Report, compare, get_last
 from problems.references.exact_flows import RADII, Shell
-from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
 END = math.sqrt(0.75)  # of tau: h is one half
@@ -40,23 +39,15 @@ class KidderDeck(Deck, kw_only=True):
     rays: key(int, "cells along a quarter of the shell, 1 m of a slab", ge=4, le=MOST_CELLS) = 60
 
 
-class Kidder(Problem):
+class Kidder(RadialProblem):
     Deck = KidderDeck
     counted = ("cells", "rays")
 
     def __init__(self, deck: KidderDeck):
-        super().__init__(deck)
+        super().__init__(deck, deck.n)
         self.shell = Shell(deck.n)
         self.t_end = deck.run.t_end or END * self.shell.tau
-        if self.t_end >= self.shell.tau:
-            raise BadInput(
-                f"deck: run.t_end is {deck.run.t_end:g}; the shell has collapsed to the centre at "
-                f"{self.shell.tau:g} s, before which the run must end"
-            )
-
-    def compute_radii(self, points: np.ndarray) -> np.ndarray:
-        """Distance of points (2, ...) from the centre; from the plane x = 0 of a slab [m]."""
-        return points[0] if self.deck.n == 1 else np.hypot(*points)
+        self.check_end(0.9999 * self.shell.tau, "the shell has collapsed to the centre")
 
     def compute_layers(self, nodes: np.ndarray) -> np.ndarray:
         """Mean radius (ni, nj) of every cell's four nodes [m].
@@ -83,10 +74,7 @@ class Kidder(Problem):
         block = Block("shell", IdealGas(shell.gamma), nodes, rho, 0.0, 0.0, p)
         put(block, "i_min", "free-surface", pressure=lambda t: shell.compute_pressures(t)[0])
         put(block, "i_max", "free-surface", pressure=lambda t: shell.compute_pressures(t)[1])
-        if self.deck.n == 3:
-            put(block, "j_min", "axis")
-        put_walls(block)
-        return self.simulate([block], geometry="axisymmetric" if self.deck.n == 3 else "plane")
+        return self.simulate([block])
 
     def measure(self, evolution) -> dict[str, float]:
         """Relative errors of both radii, how round they are, and of the density."""
@@ -120,14 +108,13 @@ class Kidder(Problem):
         left, right = make_panels(figure, 11.5, 5.0, 1, 2)
         dumps, shrink = run_data.dumps, self.shell.compute_shrinking
         high = float(dumps[-1]["shell"].rho.max())
-        middle = min(dumps, key=lambda dump: abs(shrink(dump.t) - 0.75))
-        for dump, bar in ((dumps[0], ""), (middle, ""), (dumps[-1], "density [kg/m3]")):
+        for h, bar in ((1.0, ""), (0.75, ""), (0.5, "density [kg/m3]")):
+            dump = min(dumps, key=lambda dump: abs(shrink(dump.t) - h))
             draw_field(left, dump, "rho", low=0.0, high=high, every=4, bar=bar)
-            height = 1.01 * RADII[1] * shrink(dump.t)
-            left.text(0.02, height, f"{1e3 * dump.t:.3g} ms", size="small")
+            words = f"{1e3 * dump.t:.3g} ms"
+            left.text(0.02, 1.01 * RADII[1] * shrink(dump.t), words, size="small")
         left.set(xlim=(0.0, 1.08), ylim=(0.0, 1.08))
-        times = 1e3 * np.array([dump.t for dump in dumps])
-        h = np.array([shrink(dump.t) for dump in dumps])
+        times, h = 1e3 * np.array([(dump.t, 1e-3 * shrink(dump.t)) for dump in dumps]).T
         for edge, words, exact in ((-1, "outer", None), (0, "inner", "exact")):
             radius = [self.compute_radii(d["shell"].nodes[:, edge, :]).mean() for d in dumps]
             right.plot(times, radius, "o", ms=4, label=f"{words} surface")

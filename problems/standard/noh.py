@@ -44,8 +44,8 @@ class Noh(RadialProblem):
     }
 
     def __init__(self, deck: NohDeck):
-        super().__init__(deck)
-        self.dimensions, self.shock_speed = DIMENSIONS[deck.geometry], 0.5 * (deck.gamma - 1.0)
+        super().__init__(deck, DIMENSIONS[deck.geometry])
+        self.shock_speed = 0.5 * (deck.gamma - 1.0)
         shock, size = self.shock_speed * deck.run.t_end, 1.0 - deck.shrink * deck.run.t_end
         if shock > 0.9 * size:
             raise BadInput(

@@ -26,7 +26,6 @@ from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import put_walls
 from problems.pictures import draw_field, find_dump
 from problems.problem import BlockPlan, Problem, Report, Row, find_most
-from regrid.errors import BadInput
 
 # times at which a shock starts and ends, its first place, its speed, density behind it
 PHASES = (
@@ -34,8 +33,8 @@ PHASES = (
     (0.9, 0.95, 0.9, 2.0, 20.0),
 )  # fmt: skip
 KINDS = {"mean": "mean", "rms": "root mean square", "worst": "worst cell"}  # of errors
-LAST = PHASES[-1][1]  # when the third shock meets the wall
 FIRST_STEP = 0.02  # of a cell that the shock crosses in the first step
+SHOWN = (0.6, 0.85, 0.93)  # times of the picture [s]
 MIDDLE = 0.15  # of the length behind the shock that is left out at either end
 
 
@@ -56,9 +55,7 @@ class Saltzmann(Problem):
 
     def __init__(self, deck: SaltzmannDeck):
         super().__init__(deck)
-        if deck.run.t_end > LAST:
-            words = f"it must not be above {LAST:g} s, when the third shock meets the wall"
-            raise BadInput(f"deck: run.t_end is {deck.run.t_end:g}; {words}")
+        self.check_end(PHASES[-1][1], "the third shock meets the wall")
 
     def list_boxes(self):
         return [BlockPlan("gas", (self.deck.cells, self.deck.rows), (0.0, 0.0), (1.0, 0.1))]
@@ -103,10 +100,8 @@ class Saltzmann(Problem):
             for last in np.flatnonzero(np.isfinite(history[f"mean_error_{n}"]))[-1:]:
                 when = f"density {exact:g}, t = {history['t'][last]:.3f}"
                 for kind, words in KINDS.items():
-                    name, more = f"{kind}_error_{n}", {"unit": 0.01, "digits": 3}
-                    rows.append(
-                        Row(name, history[name][last], label=f"{when}: {words} [%]", **more)
-                    )
+                    name, label = f"{kind}_error_{n}", f"{when}: {words} [%]"
+                    rows.append(Row(name, history[name][last], label=label, unit=0.01, digits=3))
         most, words = find_most(history, "transverse_speed"), "largest speed across [m/s]"
         rows.append(Row("largest_transverse_speed", most, label=words, digits=2))
         head = f"saltzmann, {deck.cells} x {deck.rows} cells, {deck.regrid.name}"
@@ -114,11 +109,9 @@ class Saltzmann(Problem):
 
     def draw_saltzmann(self, figure, run_data) -> None:
         """Grid and density at three times, and density against x of all cells."""
-        last = run_data.dumps[-1].t
-        times = dict.fromkeys([*(t for t in (0.6, 0.85, 0.93) if t < last), last])
-        dumps = [find_dump(run_data, t) for t in times]
-        panels = figure.subplots(len(dumps), 2, squeeze=False, width_ratios=(2, 1))
-        for (left, right), dump in zip(panels, dumps, strict=True):
+        panels = figure.subplots(len(SHOWN), 2, width_ratios=(2, 1))
+        for (left, right), t in zip(panels, SHOWN, strict=True):
+            dump = find_dump(run_data, t)
             draw_field(left, dump, "rho", every=1, bar="density", title="t")
             left.set_aspect("auto")
             gas = dump["gas"]

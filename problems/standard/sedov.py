@@ -23,7 +23,7 @@ from hydro.formulas.geometry import compute_volumes, find_geometry
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import RadialProblem, Symmetry, follow_gas
 from problems.problem import Report, Row, compare, get_last
-from problems.references.exact_flows import SedovBlast
+from problems.references.exact_flows import DIMENSIONS, SedovBlast
 from regrid.errors import BadInput
 
 # of the whole energy in the part that is computed: half a line, a quarter, a quarter a radian
@@ -49,7 +49,7 @@ class Sedov(RadialProblem):
     peers: ClassVar = {"cylindrical": "BookLeaf 0.018", "spherical": "PENNANT gains 11 % of energy"}
 
     def __init__(self, deck: SedovDeck):
-        super().__init__(deck)
+        super().__init__(deck, DIMENSIONS[deck.geometry])
         alpha = SedovBlast(deck.geometry, deck.gamma).alpha
         self.blast = SedovBlast(deck.geometry, deck.gamma, energy=alpha)
         self.mesh = deck.mesh or ("fixed" if deck.geometry == "plane" else "follow")

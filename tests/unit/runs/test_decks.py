@@ -89,6 +89,7 @@ NONSENSE = [
     ("detonation", "length=1e-12"),
     ("triple-point", "thickness=1e12"),
     ("rayleigh-taylor", "sound_speed=1e12"),
+    ("rayleigh-taylor", "sound_speed=0.5"),
     ("rayleigh-taylor", "amplitude=1e-12"),
     ("free-stream", "mach=1e12"),
     ("free-stream", "angle=1e12"),

@@ -13,9 +13,7 @@ from runs.deck.reading import read_deck
     [
         ("plate-on-wedge-apart", ("cells=[48,14]",), 1e-2),
         ("plate-on-wedge-al-al", ("cells=[48,14]", "gap=5e-4"), 1e-2),
-        pytest.param(
-            "plate-on-wedge-apart", ("mirror=true", "turn=30"), 5e-3, marks=pytest.mark.slow
-        ),
+        pytest.param("plate-on-wedge-apart", (), 5e-3, marks=pytest.mark.slow),
         pytest.param("plate-on-wedge", ("gap=1e-3",), 1e-2, marks=pytest.mark.slow),
     ],
 )

@@ -32,6 +32,7 @@ from regrid.errors import BadInput
 
 TIME = 1.5
 SMALL = 1e-2  # of the last kinetic energy: below it a disturbance grows by linear theory
+LEAST_ROWS = 12  # of a history, for a rate of growth
 ONSET_BRACKET = (0.3, 3.0)  # of the reference, or of the deck's Rayleigh number
 STILL = 1e-9  # kinetic energy over the squared disturbance: less is no flow [m4/s2/K2]
 WIDENINGS = 3  # of the bracket, tenfold both ways
@@ -184,9 +185,11 @@ def measure_growth(t: np.ndarray, energy: np.ndarray) -> float:
     """
     known = np.isfinite(energy) & (energy > 0.0)
     t, energy = t[known], energy[known]
+    if energy.size < LEAST_ROWS:
+        return math.nan
     decays = energy[-1] < energy[0]
     small = energy < (np.inf if decays else SMALL * energy.max())
     end = int(np.argmin(small)) if not small.all() else small.size
-    if end < 12:
+    if end < LEAST_ROWS:
         return math.nan
     return float(np.median(0.5 * np.diff(np.log(energy[4:end])) / np.diff(t[4:end])))

@@ -57,7 +57,7 @@ from problems.references.hugoniot import (
 )
 from problems.references.linear_growth import LinearGrowth, compute_linear_growth
 from regrid.errors import BadInput
-from regrid.measure.quality import measure_turns
+from regrid.measure.quality import find_bad_cells, measure_turns
 from regrid.roots import find_root
 
 BENDS = 6.0  # least reach over the amplitude: cells shrink or grow by no more than a quarter
@@ -399,7 +399,14 @@ class InterfaceInstability(Problem):
         """
         front, y = self.make_interface()
         if self.start == "crossed":
-            return self.crossed.make_grids()
+            grids = self.crossed.make_grids()
+            if any(len(find_bad_cells(grid)) for grid in grids):
+                raise BadInput(
+                    "deck: start = 'crossed': the interface or a wave is too steep for linear "
+                    f"theory's first grid with {self.deck.cells} cells per wavelength; take start "
+                    "= 'incident'"
+                )
+            return grids
         reach = max(self.deck.reach * self.deck.wavelength, BENDS * np.abs(front).max())
         grids = []
         for sign, length in zip((-1.0, 1.0), self.choose_lengths(), strict=True):

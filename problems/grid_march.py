@@ -31,7 +31,7 @@ from regrid.measure.quality import (
     measure_first_line_gap,
     measure_quality,
 )
-from regrid.node_speeds import limit_node_speeds, measure_node_speeds
+from regrid.node_speeds import measure_node_speeds
 from regrid.protocol import call_regridder
 from regrid.sides import get_side
 
@@ -65,9 +65,6 @@ class GridMarchDeck(Deck, kw_only=True):
     ) = 0.5
     noise: key(float, "normal noise of deforming sides, in node spacings (std)", ge=0, le=0.5) = 0.0
     seed: key(int, "seed of the noise", ge=0, le=2**63 - 1) = 0
-    speed_factor: key(
-        float, "largest ratio of inner nodes' speed to the boundary's; 0: any", ge=0
-    ) = 0.0
     regrid: Regrid = Regrid()
 
 
@@ -166,7 +163,6 @@ class GridMarch(Problem):
         for axes, name, label in zip(panels, columns, words, strict=True):
             axes.plot(run_data.history["t"], run_data.history[name], linewidth=1.2)
             axes.set_ylabel(label)
-            axes.grid(alpha=0.3)
         axes.set_xlabel("part of the motion done")
 
 
@@ -207,10 +203,7 @@ class GridMarchEvolution:
             names = "side", "nodes", "grid", "cell", "cause"
             known = {name: getattr(failure, name) for name in names}
             raise RegridFailure(f"{failure.what}, {where}", block="grid", **known) from failure
-        nodes, too_fast = result.nodes, 0
-        if self.deck.speed_factor > 0.0:
-            nodes = limit_node_speeds(self.nodes, nodes, self.deck.speed_factor)
-            too_fast = int((nodes != result.nodes).any(axis=0).sum())
+        nodes = result.nodes
         seconds = time.perf_counter() - begun
         ratio = measure_node_speeds(self.nodes, nodes).ratio
         self.nodes = self.blocks[0].nodes = nodes
@@ -224,7 +217,7 @@ class GridMarchEvolution:
             **self._measure(),
             "node_speed_ratio": min(ratio, 1e300),
             **{f"regrid_{name}": getattr(result.report, name) for name in REPORTED},
-            "regrid_limited_nodes": result.report.limited_nodes + too_fast,
+            "regrid_limited_nodes": result.report.limited_nodes,
             "seconds_regrid": seconds,
         }
 

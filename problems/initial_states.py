@@ -355,7 +355,6 @@ ROOM = 0.8  # part of the room between piston and shock that it may use
 MOST_KEPT = 24  # cells behind the shock that keep what was computed, at most:
 CLEAN = 0.5  # part of the way to the spot that the shock's start as a jump has left
 BEYOND = 12  # cells that the strip goes on beyond the last node, for the shock's foot
-SLAB = 128  # rows of cells that get their states at a time
 
 
 @dataclass(frozen=True)
@@ -379,35 +378,18 @@ class SettledShock:
         """
         momentum = self.rho * self.u
         energy = self.rho * self.eos.energy(self.rho, self.p) + 0.5 * momentum * self.u
-        slabs = [slice(i, i + SLAB) for i in range(0, nodes.shape[1] - 1, SLAB)]
-        x = self.x.copy()
-        for rows in slabs:
-            ends = self._find_ends(nodes, rows)
-            x[0], x[-1] = min(x[0], ends.min()), max(x[-1], ends.max())
-        # of what is over the state ahead, which comes out as it is, to the last bit
-        totals = [
-            (density[-1], np.concatenate([[0.0], np.cumsum((density - density[-1]) * np.diff(x))]))
-            for density in (self.rho, momentum, energy)
-        ]
-        out = np.empty((3, nodes.shape[1] - 1, nodes.shape[2] - 1))
-        for rows in slabs:
-            ends = self._find_ends(nodes, rows)
-            width = np.diff(ends, axis=0)
-            rho, momentum, energy = (
-                ahead + np.diff(np.interp(ends, x, total), axis=0) / width
-                for ahead, total in totals
-            )
-            u = momentum / rho
-            p = self.eos.pressure(rho, energy / rho - 0.5 * u * u)
-            ahead = (rho == self.rho[-1]) & (u == self.u[-1])
-            out[:, rows] = rho, u, np.where(ahead, self.p[-1], p)
-        return out[0], out[1], out[2]
-
-    @staticmethod
-    def _find_ends(nodes: np.ndarray, rows: slice) -> np.ndarray:
-        """Means x [m] of the nodes (rows + 1, nj) before and after each of some rows of cells."""
-        x = nodes[0, rows.start : rows.stop + 1]
-        return 0.5 * (x[:, 1:] + x[:, :-1])
+        ends = 0.5 * (nodes[0, :, 1:] + nodes[0, :, :-1])
+        x, width, means = self.x.copy(), np.diff(ends, axis=0), []
+        x[0], x[-1] = min(x[0], ends.min()), max(x[-1], ends.max())
+        for density in (self.rho, momentum, energy):
+            # of what is over the state ahead, which comes out as it is, to the last bit
+            total = np.concatenate([[0.0], np.cumsum((density - density[-1]) * np.diff(x))])
+            means.append(density[-1] + np.diff(np.interp(ends, x, total), axis=0) / width)
+        rho, momentum, energy = means
+        u = momentum / rho
+        p = self.eos.pressure(rho, energy / rho - 0.5 * u * u)
+        ahead = (rho == self.rho[-1]) & (u == self.u[-1])
+        return rho, u, np.where(ahead, self.p[-1], p)
 
 
 def settle_shock(

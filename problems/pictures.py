@@ -68,10 +68,17 @@ def draw_grid(axis, nodes: np.ndarray, every: int = 1, color="k", lw=0.2) -> Non
 
 
 def draw_columns(axis, history, labels: Mapping[str, str], words: str = "", unit="s") -> None:
-    """Columns of a history over time [unit], with a legend of their labels that are not empty."""
+    """Columns of a history over time [unit], with their labels."""
     t = UNITS[unit] * history["t"]
     for name, label in labels.items():
         axis.plot(t, history[name], label=label)
     axis.set(xlabel=f"t [{unit}]", ylabel=words)
-    if any(labels.values()):
-        axis.legend()
+
+
+def finish_panels(figure) -> None:
+    """Fine lines behind the panels that are no maps; a legend where curves have labels."""
+    for axes in figure.axes:
+        if axes.get_aspect() == "auto" and axes.lines and not axes.collections:
+            axes.grid(alpha=0.3)
+        if not axes.get_legend() and axes.get_legend_handles_labels()[1]:
+            axes.legend(fontsize="small", frameon=False)

@@ -20,6 +20,7 @@ import numpy as np
 
 from problems.deck import Deck
 from problems.evolution import Evolution
+from problems.pictures import finish_panels
 from regrid.errors import BadInput
 
 if TYPE_CHECKING:
@@ -312,13 +313,22 @@ class Problem:
         return ""
 
     def figures(self) -> dict[str, DrawFigure]:
-        """Pictures of this problem by name: its methods `draw_<name>(figure, run_data)`.
+        """Pictures of this problem by name: its methods `draw_<name>(figure, run_data)`, to which
+        legends and fine lines are added.
 
         `run_data` (runs.store.reader.RunData) has `.deck`, `.history` (dict of arrays), `.dumps`.
         """
         own = [name for kind in reversed(type(self).__mro__) for name in vars(kind)]
         drawn = [name for name in dict.fromkeys(own) if name.startswith("draw_")]
-        return {name[5:].replace("_", "-"): getattr(self, name) for name in drawn}
+        return {name[5:].replace("_", "-"): self._finish(getattr(self, name)) for name in drawn}
+
+    @staticmethod
+    def _finish(draw: DrawFigure) -> DrawFigure:
+        def draw_whole(figure, run_data):
+            draw(figure, run_data)
+            finish_panels(figure)
+
+        return draw_whole
 
     def summary(self, history: History, final: Evolution | None) -> str:
         """The report as text."""

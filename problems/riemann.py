@@ -206,9 +206,7 @@ class RiemannDeck(Deck, kw_only=True):
         "on-line: a grid line between two blocks; captured: inside one block",
     ) = "on-line"
     mesh: key(
-        Literal["fixed", "wave", "follow"],
-        "grid of a captured contact: at rest; nodes swinging as a standing wave; all drifting with "
-        "the contact",
+        Literal["fixed", "wave"], "grid of a captured contact: at rest, or swinging as a wave"
     ) = "fixed"
     cells: key(int, "cells along x", ge=8, le=MOST_CELLS) = 100
     rows: key(int, "cells across", ge=2, le=MOST_CELLS) = 4
@@ -285,21 +283,19 @@ class Riemann(Problem):
             cells = deck.cells // 2, deck.cells - deck.cells // 2
             domain = choose_domain(exact, cells, made_for)
         else:
-            speed = exact.u if deck.mesh == "follow" else 0.0
-            left = max(speed - exact.left_wave.head, 0.0)
-            right = max(exact.right_wave.head - speed, 0.0)
+            left, right = max(-exact.left_wave.head, 0.0), max(exact.right_wave.head, 0.0)
             beyond = BEYOND * (left + right)
             span = left + right + 2.0 * beyond
             t = 1.0 / span if made_for is None else made_for
             lengths = (left + beyond) * t, (right + beyond) * t
-            domain = Domain(lengths, (1.0, 1.0), (speed, speed), t, span * t)
+            domain = Domain(lengths, (1.0, 1.0), (0.0, 0.0), t, span * t)
         growths = domain.growths if deck.grading is None else (deck.grading,) * 2
         return replace(domain, t_end=deck.run.t_end or domain.t_end, growths=growths)
 
     def make_grids(self, t=0.0):
         """Straight lines, cells about as wide as long.  A captured contact is on a grid at rest,
-        one that drifts with it, or one that swings as a standing wave of one period, which
-        stretches cells by a fifth at most and is back at its start at the end."""
+        or one that swings as a standing wave of one period, which stretches cells by a fifth at
+        most and is back at its start at the end."""
         deck, domain, half = self.deck, self.domain, self.deck.cells // 2
         across = np.linspace(0.0, domain.span / deck.cells * deck.rows, deck.rows + 1)
         left, right = domain.lengths
@@ -310,9 +306,7 @@ class Riemann(Problem):
             }
         else:
             x = np.linspace(-left, right, deck.cells + 1)
-            if deck.mesh == "follow":
-                x = x + self.exact.u * t
-            elif deck.mesh == "wave":
+            if deck.mesh == "wave":
                 turn, length, period = 2.0 * math.pi, x[-1] - x[0], deck.run.t_set_up or self.t_end
                 wave = 0.2 * length / turn * np.sin(turn * (x - x[0]) / length)
                 x = x + wave * math.sin(turn * t / period)
@@ -421,5 +415,4 @@ class Riemann(Problem):
             values = np.concatenate([block.cell_fields[name][:, 0] for block in dump.blocks])
             if name != "u" and values.min() > 0.0 and values.max() > 300.0 * values.min():
                 axis.set_yscale("log")
-        axes[0].legend(fontsize="small")
         figure.suptitle(f"{self.name}, t = {dump.t:.4g} s", fontsize="medium")

@@ -366,7 +366,6 @@ class ShockBubble(Problem):
         far = 1e3 * max(float(history["downwind"].max()) + 0.03, 0.08)
         axis.set(xlim=(-40.0, far), ylim=(min(t[0], 0.0), t[-1]))
         axis.set(xlabel="x [mm]", ylabel="time after the shock's arrival [µs]")
-        axis.legend(loc="lower right", frameon=False)
         axis.set_title(f"{self.deck.gas}, {self.deck.cells} cells", fontsize="medium")
 
 

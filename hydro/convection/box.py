@@ -83,17 +83,11 @@ def turn_gravity(tilt: float) -> tuple[float, float]:
     return x + 0.0, y + 0.0
 
 
-def make_fluid(
-    rayleigh: float,
-    prandtl: float,
-    tilt: float = 0.0,
-    gravity: tuple[float, float] | None = None,
-) -> Fluid:
+def make_fluid(rayleigh: float, prandtl: float, tilt: float = 0.0) -> Fluid:
     """The fluid of given numbers in the scales L, kappa/L, dT.
 
-    `gravity` (x, y) is a direction, of any length but zero; without it gravity points down, turned
-    by `tilt` degrees anticlockwise.  Raises BadInput for Ra < 0, Pr <= 0, or zero gravity with
-    Ra > 0.
+    Gravity points down, turned by `tilt` degrees anticlockwise.  Raises BadInput for Ra < 0 and
+    Pr <= 0.
     """
     if not (math.isfinite(rayleigh) and rayleigh >= 0.0):
         raise BadInput(
@@ -105,15 +99,8 @@ def make_fluid(
         raise BadInput(f"Pr = {prandtl:g} must be positive")
     if not math.isfinite(tilt):
         raise BadInput(f"tilt = {tilt} is not an angle in degrees")
-    x, y = turn_gravity(tilt) if gravity is None else gravity
-    size = math.hypot(x, y)
-    if size == 0.0:
-        if rayleigh > 0.0:
-            raise BadInput(
-                f"gravity is zero but Ra = {rayleigh:g} needs buoyancy; set Ra = 0 or give gravity"
-            )
-        return Fluid(prandtl, 1.0, (0.0, 0.0))
-    strength = rayleigh * prandtl / size
+    x, y = turn_gravity(tilt)
+    strength = rayleigh * prandtl
     return Fluid(prandtl, 1.0, (-strength * x, -strength * y))
 
 

@@ -6,16 +6,12 @@ on the cone's side lead is, at the impact face the impactor follows.  So where m
 line they are all on the master's side.  Note: a corner of a block is an end of two contacts; the
 one that moves it must be placed before the one that is laid on it.
 
-The ripple is a wave of one length along the cone's side, put on it across the side.  Over one wave
-at either end it rises from nothing, so that the ends and the angles there stay: graphite that
-begins as a sharper edge between steel and lead is squeezed out of it.  The whole side bends while
-the shock runs along it and after.  Therefore the amplitude is measured place by place: the line
-within a wavelength to either side is fitted by a parabola and a sine and cosine of that length,
-weighted by a squared cosine that is nothing at the window's ends, and the amplitude is that of the
-latter two.  The window goes with the wave, which drifts after the shock's passage
-(`problems.references.shock_polars`).  In a window of one wavelength parabola and wave cannot be
-distinguished; while the shock is within a window the line has a kink there, and the fit is
-meaningless.
+The ripple is a wave along the cone's side that rises from nothing over one wave at either end, so
+that the ends and the angles there stay.  The whole side bends while the shock runs along it and
+after; therefore the amplitude is measured place by place (`fit_wave`), in windows that go with the
+wave as it drifts after the shock's passage (`problems.references.shock_polars`).  Note: in a window
+of one wavelength parabola and wave cannot be distinguished, and while the shock is within a window
+the line has a kink there: the fit is meaningless.
 """
 
 from __future__ import annotations

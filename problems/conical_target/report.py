@@ -319,13 +319,11 @@ class Results:
                 (plus * (1.0 + impulse * age), "k-.", "impulse alone"),
                 (plus * np.cosh(shear * age), "k:", "slip alone"),
             ):
-                growth.semilogy(US * age, values, style, lw=0.9, label=words)
+                growth.plot(US * age, values, style, lw=0.9, label=words)
             growth.set_ylim(0.75, 2.0 * top / np.nanmean([wave.amplitude[0] for wave in waves]))
         amplitude.set(xlabel="t [us]", ylabel="amplitude [mm]")
         amplitude.set_title("dashed: theory of small slopes", fontsize="medium")
         growth.set(xlabel="time since the shock was at the wave [us]", ylabel="a / a0")
-        for axes in (shape, amplitude, growth):
-            axes.legend(fontsize="small", frameon=False)
 
     def draw_conical_target(self, figure, run) -> None:
         """Materials at the start and the end, pressure at the end; graphite and its corner near."""
@@ -422,7 +420,6 @@ class Results:
         pressure.set(xlabel="x of the shock [mm]", ylabel="greatest pressure just behind [GPa]")
         speed.set(xlabel="x of the shock [mm]", ylabel="speed [km/s]")
         path.set(xlabel="t [us]", ylabel="x of the shock [mm]")
-        path.legend(fontsize="small")
 
     def draw_cone_side(self, figure, run) -> None:
         """The line between graphite and lead, its departure from its own straight line, growth."""
@@ -437,9 +434,7 @@ class Results:
         away.set(xlabel="part of the side's length, from the base", ylabel=words)
         for end in MIDDLE:
             away.axvline(end, color="0.7", lw=0.6)
-        away.legend(fontsize="x-small")
         t, history = US * run.history["t"], run.history
         growth.plot(t, MM * history["line_amplitude"], label="amplitude: half of peak to peak")
         growth.plot(t, MM * history["line_bend"], ls="--", label="greatest distance from the chord")
         growth.set(xlabel="t [us]", ylabel="[mm]")
-        growth.legend(fontsize="small")

@@ -310,8 +310,6 @@ class BoxProblem(Problem):
                 words = f"reference {peak:.4g} at {position:.4f}"
                 axis.plot(position, peak, "o", label=words, mfc="none", color="0.3", ms=9)
         axis.set(xlabel="y [m]" if hot == "i_min" else "x [m]", ylabel="local Nusselt number")
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize="small")
 
     def draw_grid(self, figure, run_data) -> None:
         """The grid of the last dump over the speed, and its steps along both axes."""
@@ -328,5 +326,3 @@ class BoxProblem(Problem):
             middle = (0.5 * (nodes[1:] + nodes[:-1]) - nodes[0]) / np.ptp(nodes)
             right.plot(middle, steps * steps.size / np.ptp(nodes), ".-", ms=3, lw=0.8, label=name)
         right.set(xlabel="place, part of the length", ylabel="step over the uniform one")
-        right.grid(alpha=0.3)
-        right.legend()

@@ -8,10 +8,10 @@ the flow is steady.
 
 Scales: width of the slot 1 m, diffusivity 1 m2/s, 1 K between the plates.
 
-The grid may follow the speed as Polevikov's does, gradients, or both (`grid.kind`); the summary
-compares all of them at three sizes, and the schemes of the through-flow's flux, with the exact
-solution.  Note: Polevikov's grid has its longest steps at the plates, where they decrease only with
-the square root of the number of cells: v is first order on it, not second.
+The grid may follow the speed as Polevikov's does, gradients, or both (`grid.kind`);
+`benchmarks/convection_1d_tables.py` compares all of them, and the schemes of the through-flow's
+flux.  Note: Polevikov's grid has its longest steps at the plates, where they decrease only with the
+square root of the number of cells: v is first order on it, not second.
 """
 
 import functools
@@ -22,16 +22,12 @@ from typing import Literal
 import numpy as np
 
 from hydro.convection import columns
-from hydro.convection.tensor_grids import KINDS, compute_grid_reynolds, make_axis
 from problems.convection.boxes import AxisGrid
 from problems.deck import Deck, Output, RunControl, key
-from problems.problem import Problem, Report, align
+from problems.problem import Problem, Report, compare, get_last, say_unreached
 from problems.references.convection import VerticalPlates
 from regrid.errors import BadInput
 
-SIZES = (1, 2, 4)  # times the deck's cells, in the table of grids
-GRIDS = {kind: (kind, {}) for kind in KINDS}  # name -> kind and what differs from the deck's grid
-GRIDS["combined, 1/4"] = ("combined", {"share": 0.25})
 NOTHING = 1e-12  # relative: differences below are rounding, no swing
 LASTING = 50.0  # slowest diffusive times that a run may take: steady long before
 ERRORS = ("error_T", "error_v", "swings_T", "swings_v")
@@ -86,58 +82,25 @@ class Convection1D(Problem):
             return dict.fromkeys(ERRORS, math.nan)
         return measure_errors(self.exact, evolution.x, evolution.temperature, evolution.velocity)
 
-    def settle_grid(self, name: str, cells: int) -> tuple[np.ndarray, dict[str, float]]:
-        """Axis and errors of the grid `name` of GRIDS with so many cells, settled; `reynolds` is
-        the largest grid Reynolds number of its steps, through-flow included."""
-        grid, (kind, change), column = self.deck.grid, GRIDS[name], self.make_column()
-        first = make_axis(kind, cells, walls=grid.walls, clustering=grid.clustering)
-        x, *found = columns.settle_column(column, kind, first, **{**grid.options(), **change})[:3]
-        speed = np.hypot(columns.to_nodes(x, found[1], (0.0, 0.0)), column.through_flow)
-        reynolds = float(compute_grid_reynolds(x, speed, column.viscosity).max())
-        return x, measure_errors(self.exact, x, *found) | {"reynolds": reynolds}
-
     def report(self, history, final=None) -> Report:
-        return Report(lambda: self.make_summary(history))
-
-    def make_summary(self, history) -> str:
-        """Errors of this run, of all kinds of grid at three sizes, and of the schemes."""
-        deck = self.deck
-        error_t, error_v, change = (history[n][-1] for n in ("error_T", "error_v", "change"))
-        where = f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}"
-        if math.isnan(error_v):
-            return f"{where}: the profiles are compared at the end, which was not reached"
-        lines = [
-            f"{where}, {deck.cells} cells, grid {deck.grid.kind}, scheme {deck.scheme}:",
-            f"  largest error of T {error_t:.2e} K, of v {error_v:.2e} of its largest; "
-            f"heat {history['nusselt'][-1]:.9g}, exact {self.exact.compute_nusselt():.9g}",
+        """Errors of the profiles at the end, and the heat through the slot."""
+        deck, change = self.deck, get_last(history, "change")
+        head = (
+            f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}, {deck.cells} cells, "
+            f"grid {deck.grid.kind}, scheme {deck.scheme}"
+        )
+        rows = [
+            compare(history, "error_T", label="largest error of T [K]", digits=3),
+            compare(history, "error_v", label="largest error of v, of its largest", digits=3),
+            compare(history, "nusselt", self.exact.compute_nusselt(), "heat", digits=9),
         ]
-        if not change < columns.SETTLED:
-            lines.append(
-                f"  NOT STEADY: the state still changes by {change:.1e} in a diffusive time, and "
-                "the exact profiles are the steady ones; a longer time (run.t_end)"
+        notes = say_unreached(history, "error_v")
+        if change >= columns.SETTLED and not notes:
+            notes.append(
+                f"NOT STEADY: the state still changes by {change:.1e} in a diffusive time, and the "
+                "exact profiles are the steady ones; a longer time (run.t_end)"
             )
-        counts = [size * deck.cells for size in SIZES]
-        head = ["grid (settled)  error of v on", *map(str, counts), "order", "of T there"]
-        table = [[*head, "shortest step", "most grid Re"]]
-        for name in GRIDS:
-            axes, found = zip(*(self.settle_grid(name, count) for count in counts), strict=True)
-            errors, last = [row["error_v"] for row in found], found[-1]
-            order, least = math.log2(errors[-2] / errors[-1]), np.diff(axes[-1]).min()
-            row = [f"{order:.2f}", f"{last['error_T']:.1e}", f"{least:.2e}"]
-            row.append(f"{last['reynolds']:.3g}")
-            table.append([name, *(f"{error:.2e}" for error in errors), *row])
-        lines += ["", *align(table)]
-        if deck.peclet == 0.0:
-            return "\n".join(lines)
-        local, x = abs(deck.peclet) / deck.cells, make_axis("uniform", deck.cells)
-        table = [["  scheme", "error of T", "of v", "turns too many of T", "of v"]]
-        for scheme in columns.SCHEMES:
-            solution = columns.solve_column(self.make_column(scheme), x)[:2]
-            found = measure_errors(self.exact, x, *solution)
-            sizes = (f"{found[name]:{'.1e' if 'error' in name else '.0f'}}" for name in ERRORS)
-            table.append([f"  {scheme}", *sizes])
-        title = f"  uniform grid, grid Péclet number {local:.3g}"
-        return "\n".join([*lines, "", title, *align(table)])
+        return Report(head, rows, notes)
 
     def draw_profiles(self, figure, run_data) -> None:
         """Temperature and velocity in the last dump over the exact profiles, nodes below.
@@ -174,30 +137,6 @@ class Convection1D(Problem):
                 axes.plot(nodes, np.full_like(nodes, position), "|", color="k", ms=7, mew=0.6)
                 axes.set_xlabel("x [m], nodes below")
                 axes.set_title(labels[name], fontsize="medium")
-                axes.legend(fontsize="small")
-
-    def draw_grids(self, figure, run_data) -> None:
-        """Steps of all kinds of grid, settled, and how their error of v falls with the cells."""
-        cells = self.deck.cells
-        figure.set_size_inches(9.0, 4.2)
-        steps, errors = figure.subplots(1, 2)
-        counts = np.array([max(3, int(size * cells)) for size in (0.5, *SIZES)])
-        for name in GRIDS:
-            axes, found = zip(*(self.settle_grid(name, int(n)) for n in counts), strict=True)
-            x, found = axes[1], [row["error_v"] for row in found]
-            steps.plot(0.5 * (x[1:] + x[:-1]), np.diff(x), ".-", ms=3, lw=0.7, label=name)
-            errors.loglog(counts, found, "o-", ms=3, lw=0.9, label=name)
-        for order, style in ((1, ":"), (2, "--")):
-            base = found[0] * (counts[0] / counts) ** order
-            errors.loglog(counts, base, style, color="0.5", lw=0.8, label=f"order {order}")
-        steps.set_yscale("log")
-        steps.set_xlabel("x [m]")
-        steps.set_title(f"steps of {cells} cells [m]", fontsize="medium")
-        errors.set_xticks(counts, [str(count) for count in counts])
-        errors.xaxis.set_minor_formatter("")
-        errors.set_xlabel("cells")
-        errors.set_title("largest error of v over its largest", fontsize="medium")
-        errors.legend(fontsize="x-small")
 
 
 def count_turns(values: np.ndarray) -> int:

@@ -75,7 +75,6 @@ class HeatedCavityDeck(Deck, kw_only=True):
     tilt: key(
         float, "gravity turned anticlockwise from straight down [degrees]", ge=-360, le=360
     ) = 0.0
-    gravity: key(list[float] | None, "its direction x, y", min_length=2, max_length=2) = None
     left: Side = Side(heat="isothermal", value=0.5)
     right: Side = Side(heat="isothermal", value=-0.5)
     bottom: Side = Side()
@@ -95,12 +94,7 @@ class HeatedCavity(BoxProblem):
 
     def __init__(self, deck: HeatedCavityDeck):
         super().__init__(deck)
-        if deck.gravity is not None and deck.tilt != 0.0:
-            raise BadInput(
-                f"tilt = {deck.tilt:g} and gravity are both given; leave one of them out"
-            )
-        direction = None if deck.gravity is None else tuple(deck.gravity)
-        self.fluid = make_fluid(deck.rayleigh, deck.prandtl, deck.tilt, direction)
+        self.fluid = make_fluid(deck.rayleigh, deck.prandtl, deck.tilt)
         self.extent = 1.0, deck.aspect
         self.walls = {side: getattr(deck, name).make(name) for side, name in SIDES.items()}
         known = deck.left.heat == "isothermal" and deck.right.heat == "isothermal"

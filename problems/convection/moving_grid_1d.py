@@ -9,10 +9,10 @@ known.  Four columns with the same number of cells solve it side by side in equa
 - first: nodes placed first, and the fluxes of the same step use their motion (as in the flow
   solver).
 
-The summary lists error, order, lost sum and cost of the four at three sizes.  Note: `after` shifts
-the front, its profile stays smooth, and a single front at one speed hides the lag (nothing
-accelerates); orders of grids with bounded neighbours look low because the bound helps the coarse
-ones most (`grid.ratio = 1000` shows the second order).
+The summary lists error, lost sum and cost of the four (`benchmarks/convection_1d_tables.py`: at
+three sizes).  Note: `after` shifts the front, its profile stays smooth, and a single front at one
+speed hides the lag (nothing accelerates); orders of grids with bounded neighbours look low because
+the bound helps the coarse ones most (`grid.ratio = 1000` shows the second order).
 """
 
 import math
@@ -36,7 +36,6 @@ WORDS = {
     "first": "placed first",
 }
 COLOURS = dict(zip(FAMILIES, ("0.3", "C3", "C1", "C0"), strict=True))
-PARTS = (4, 2)  # of the deck's cells, run again for the summary
 
 
 class PlacingPart(DeckTable, kw_only=True):
@@ -111,45 +110,26 @@ class MovingGrid1D(Problem):
         """Mean errors of the four."""
         return evolution.measure_errors()
 
-    def repeat(self, cells: int) -> dict[str, tuple[float, float]]:
-        """Error and CPU seconds of each family after a whole run with so many cells."""
-        race, seconds = self.make_race(cells), dict.fromkeys(FAMILIES, 0.0)
-        while race.finished is None:
-            row = race.advance()
-            for family in FAMILIES:
-                seconds[family] += row[f"seconds_{family}"]
-        errors = race.measure_errors()
-        return {family: (errors[f"error_{family}"], seconds[family]) for family in FAMILIES}
-
     def report(self, history, final=None) -> Report:
-        return Report(lambda: self.make_summary(history))
-
-    def make_summary(self, history) -> str:
-        """The table of the four families at a quarter, a half and all of the cells."""
-        deck = self.deck
-        if history["t"][-1] < 0.999999 * self.t_end:
-            return "moving-grid-1d: the families are compared at the end time, which is not reached"
-        counts = sorted({max(16, deck.cells // part) for part in PARTS} - {deck.cells})
-        coarse = [self.repeat(count) for count in counts]
-        counts.append(deck.cells)
-        steps = int(history["step"][-1])
-        fronts = f"{len(deck.fronts)} front" + "s" * (len(deck.fronts) > 1)
-        head = f"{fronts}, viscosity {deck.viscosity:g} m2/s, {steps} steps; mean |u - exact| on"
-        words = ["order", "worst in time", "sum lost", "CPU ms/step"]
-        table = [["", *map(str, counts), *words]]
+        """The table of the four families at the end time."""
+        deck, steps = self.deck, max(1, len(history["t"]) - 1)
+        if not history or history["t"][-1] < 0.999999 * self.t_end:
+            words = "the families are compared at the end time, which is not reached"
+            return Report(f"moving-grid-1d: {words}" if history else "")
+        head = (
+            f"{len(deck.fronts)} front{'s' * (len(deck.fronts) > 1)}, viscosity {deck.viscosity:g} "
+            f"m2/s, {deck.cells} cells, {steps} steps"
+        )
+        table = [["", "mean |u - exact|", "worst in time", "sum lost", "CPU ms/step"]]
         for family in FAMILIES:
-            errors = [run[family][0] for run in coarse] + [history[f"error_{family}"][-1]]
-            order = math.nan
-            if len(errors) > 1:
-                order = math.log2(errors[-2] / errors[-1]) / math.log2(counts[-1] / counts[-2])
-            seconds = float(np.nansum(history[f"seconds_{family}"])) / max(1, steps)
-            worst, total = np.nanmax(history[f"error_{family}"]), history[f"total_u_{family}"]
+            errors, total = history[f"error_{family}"], history[f"total_u_{family}"]
             through = history[f"boundary_u_{family}"]
             lost = abs(total[-1] - total[0] - (through[-1] - through[0]))
             lost /= max(abs(total[-1]), abs(total[0]))  # of u dx beyond what came in
-            row = [f"{order:.2f}", f"{worst:.2e}", f"{lost:.1e}", f"{1e3 * seconds:.2f}"]
-            table.append([WORDS[family], *(f"{error:.2e}" for error in errors), *row])
-        return "\n".join([head, *align(table)])
+            seconds = float(np.nansum(history[f"seconds_{family}"])) / steps
+            numbers = f"{errors[-1]:.2e}", f"{np.nanmax(errors):.2e}", f"{lost:.1e}"
+            table.append([WORDS[family], *numbers, f"{1e3 * seconds:.2f}"])
+        return Report("\n".join([head, *align(table)]))
 
     def draw_fronts(self, figure, run_data) -> None:
         """The steepest front at the end with its error, and the ways of the nodes."""
@@ -172,7 +152,6 @@ class MovingGrid1D(Problem):
             error = np.abs(u - self.exact.compute_cell_averages(x, dump.t))
             wrong.semilogy(centres, np.maximum(error, 1e-12), ".-", lw=0.5, ms=2.5, **style)
         profile.set_title(f"u [m/s] about the front, t = {dump.t:.3g} s", fontsize="medium")
-        profile.legend(fontsize="small")
         wrong.set_title("|u - exact| [m/s]", fontsize="medium")
         wrong.set_ylim(1e-9, 2.0)
         times = [one.t for one in run_data.dumps]
@@ -184,24 +163,3 @@ class MovingGrid1D(Problem):
         for axes in figure.axes:
             axes.set_xlabel("x [m]")
         figure.axes[2].set_ylabel("t [s]")
-
-    def draw_errors(self, figure, run_data) -> None:
-        """Errors over time, and error against cost at several sizes."""
-        figure.set_size_inches(9.0, 4.2)
-        over_time, over_cost = figure.subplots(1, 2)
-        history, cells = run_data.history, self.deck.cells
-        counts = sorted({max(16, int(part * cells)) for part in (0.125, 0.25, 0.5, 1)})
-        runs = [self.repeat(count) for count in counts]
-        for family, colour in COLOURS.items():
-            style = {"color": colour, "lw": 1.0}
-            error = history[f"error_{family}"]
-            over_time.semilogy(history["t"], error, label=WORDS[family], **style)
-            errors, seconds = zip(*(run[family] for run in runs), strict=True)
-            over_cost.loglog(seconds, errors, "o-", ms=3.5, **style)
-        over_time.set_xlabel("t [s]")
-        over_time.set_title(f"mean |u - exact|, {cells} cells", fontsize="medium")
-        over_time.legend(fontsize="small")
-        over_cost.xaxis.set_minor_formatter("")
-        over_cost.set_xlabel("CPU seconds of the run")
-        sizes = f"{counts[0]} to {counts[-1]} cells"
-        over_cost.set_title(f"mean |u - exact| at the end, {sizes}", fontsize="medium")

@@ -172,9 +172,6 @@ class RayleighBenard(BoxProblem):
         right.plot(t, run_data.history["nusselt"], lw=1.2, label="floor")
         right.plot(t, run_data.history["nusselt_top"], "--", lw=1.2, label="ceiling")
         right.set(xlabel="t [s]", ylabel="Nusselt number")
-        for axis in (left, right):
-            axis.legend(fontsize="small")
-            axis.grid(alpha=0.3)
 
 
 def measure_growth(t: np.ndarray, energy: np.ndarray) -> float:

@@ -4,13 +4,12 @@ A captured shock that runs over a bent line leaves waves of a few cells on it an
 density beside it.  Here the run begins a time T after the shock met the mean line, T being such
 that the nearer of the two waves that it leaves is `layer` cells away.  Everything is known then:
 
-- Each row of cells sees the plane Riemann problem, at its own time and place (theory F15.1): the
-  shock met the line at x = h(y) at the time h/Ws.
+- Each row of cells sees the plane Riemann problem, at its own time and place (theory F15.1).
 - Linear compressible theory gives what has grown since then, harmonic by harmonic of the line
-  (theory F15.2 to F15.4): its amplitude, the shocks' shapes, pressure, velocities and density.
+  (theory F15.2 to F15.4).
 - A shock stands on a grid line, with the discrete profile that it has on cells that move as those
-  of the run (`problems.initial_states`), and meets the lines beyond at once in all
-  rows (theory F15.6).  Head and tail of a rarefaction are grid lines.
+  of the run (`problems.initial_states`), and meets the lines beyond at once in all rows (theory
+  F15.6).  Head and tail of a rarefaction are grid lines.
 """
 
 from __future__ import annotations

@@ -40,15 +40,10 @@ from problems.interface_instability.line import (
     measure_roughness,
     read_line,
 )
-from problems.interface_instability.report import (
-    MOST_CURVES,
-    draw_growth,
-    draw_spectrum,
-    make_report,
-)
+from problems.interface_instability.report import Results
 from problems.interface_instability.spacing import NODE_SPEED, ZONE, Spacing
 from problems.interface_instability.theories import find_cautions
-from problems.problem import BlockPlan, Problem, Report
+from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import (
     Shock,
     shock_to_pressure,
@@ -66,7 +61,7 @@ MOST_SLOPE = 0.3  # sum of the k a0 up to which the state after the passage is t
 FAR = 0.25  # part of each block, counted from its far side, that is called the far field
 
 
-class InterfaceInstability(Problem):
+class InterfaceInstability(Results, Problem):
     """Two blocks, one interface, one shock or two."""
 
     Deck = InterfaceDeck
@@ -540,17 +535,8 @@ class InterfaceInstability(Problem):
             "far_transverse_speed": max(evolution.measured)[0],
         }
 
-    def report(self, history, final=None) -> Report:
-        return make_report(self, history)
-
     def cautions(self, history=None) -> list[str]:
         return find_cautions(self, history)
-
-    def figures(self):
-        found = {"growth": functools.partial(draw_growth, self)}
-        if len(self.harmonics) > MOST_CURVES:
-            found["spectrum"] = functools.partial(draw_spectrum, self)
-        return found
 
 
 def measure_far_speed(block: Block) -> tuple[float]:

@@ -37,38 +37,6 @@ def _columns(problem, history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray
     return {name: values[known] for name, values in column.items()}
 
 
-def make_report(problem, history) -> Report:
-    """Growth rates (da/dt)/(k a0) of the modes [m/s], each over the window where theory applies,
-    and the speed of the interface [m/s], which studies draw; sizes by the models.
-
-    No numbers for two shocks, for which there is no theory.
-    """
-    theory, deck = problem.theory, problem.deck
-    if not history:
-        return Report(rows=_predict(problem))
-    column = _columns(problem, history)
-    kct = float(get_kct(problem, column["t"][-1]))
-    jump = abs(theory.base.p - problem.shock.p)
-    reflected = theory.reflected if jump > NO_WAVE * problem.shock.p else "none"
-    head = [
-        f"shock to p = {problem.shock.p:g} through rho = {problem.rho_first:g} onto rho = "
-        f"{problem.rho_second:g}; {_describe_modes(problem)}, "
-        f"{deck.cells} cells per wavelength, to k c t = {kct:.3g}",
-        f"  reflected wave: {reflected}, Atwood number after the shock {theory.atwood:.3f}",
-        f"  smoothing length of the interface: {problem.thickness / deck.wavelength:.3g} "
-        f"wavelengths ({problem.thickness * deck.cells / deck.wavelength:.2g} of a cell)",
-    ]
-    rows, notes = [], ["growth: there is no theory for two shocks"]
-    if deck.second_shock is None:
-        rows, notes = _compare(problem, column, kct)
-    far = column["far_transverse_speed"].max() / theory.sound_speed
-    notes.append(
-        f"amplitude {column['amplitude'][0]:.4g} -> {column['amplitude'][-1]:.4g}, largest "
-        f"transverse speed in the far field {far:.1e} of the sound speed"
-    )
-    return Report("\n".join(head), rows, notes)
-
-
 def _predict(problem) -> list[Row]:
     """Theory alone; growth_rate is the mean over the part of WINDOW that the run reaches."""
     theory = problem.theory
@@ -271,76 +239,109 @@ def _draw_rates(problem, axes, kct, t, curves: list[_Curve], theory: bool) -> No
         axes.plot(middle[shown], speed[shown], color=f"C{n}", label=label)
 
 
-def draw_growth(problem, figure, run) -> None:
-    """Amplitude and growth rate against theory, and the interface with its grid at the end."""
-    grid = figure.add_gridspec(2, SHOWN, height_ratios=(1.0, 1.1))
-    amplitude, rate = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1:])
-    column = _columns(problem, run.history)
-    kct, several = get_kct(problem, column["t"]), len(problem.harmonics) > 1
-    growth = Growth(problem) if problem.deck.second_shock is None and problem.harmonics else None
-    curves = _choose_curves(problem, growth, column)
-    for n, curve in enumerate(curves):
-        amplitude.plot(kct, curve.values / curve.first, color=f"C{n}", label=curve.label)
-    if growth is not None:
-        _draw_theory(amplitude, rate, growth, curves, column, kct)
-    if len(kct) > 3:
-        _draw_rates(problem, rate, kct, column["t"], curves, growth is not None)
-    for axes, words in ((amplitude, "a / a0"), (rate, "(da/dt) / (k a0)")):
-        axes.set(xlabel="k c t after the shock's arrival" + ", k of mode 1" * several, ylabel=words)
-        axes.legend(fontsize=8, frameon=False)
-        axes.grid(alpha=0.3)
-    windows, shown = [], []
-    dumps, margin = spread_dumps(run, SHOWN), 0.05 * problem.deck.wavelength
-    lines = [dump.blocks[0].nodes[:, -1, :] for dump in dumps]
-    # all panels are as wide as the widest needs
-    reach = max((max(0.6 * np.ptp(x) + margin, 0.5 * np.ptp(y)) for x, y in lines), default=0.0)
-    for dump, (x, _) in zip(dumps, lines, strict=True):
-        middle = 0.5 * (x.min() + x.max())
-        windows.append((middle - reach, middle + reach))
-        for block in dump.blocks:
-            inside = np.abs(compute_centres(block.nodes)[0] - middle) <= reach
-            shown.append(block.cell_fields["rho"][inside])
-    rho = np.concatenate(shown) if shown else np.empty(0)
-    panels = [figure.add_subplot(grid[1, column]) for column in range(len(dumps))]
-    for axes, dump, line, window in zip(panels, dumps, lines, windows, strict=True):
-        title = f"density and grid, k c t = {float(get_kct(problem, dump.t)):.1f}"
-        style = {"low": rho.min(), "high": rho.max(), "every": 1, "lines": [line]}
-        picture = draw_field(axes, dump, "rho", title=title, **style)
-        axes.set_xlim(*window)
-    if panels:
-        figure.colorbar(picture, ax=panels, label="density [kg/m3]")
+class Results:
+    """What the problem says of a run, a part of its class: its report and its pictures."""
 
+    def report(self, history, final=None) -> Report:
+        """Growth rates (da/dt)/(k a0) of the modes [m/s], each over the window where theory holds,
+        and the speed of the interface [m/s], which studies draw; sizes by the models.
 
-def draw_spectrum(problem, figure, run) -> None:
-    """k a of each mode by its number at some times, and the line at these times.
+        No numbers for two shocks, for which there is no theory.
+        """
+        theory, deck = self.theory, self.deck
+        if not history:
+            return Report(rows=_predict(self))
+        column = _columns(self, history)
+        kct = float(get_kct(self, column["t"][-1]))
+        jump = abs(theory.base.p - self.shock.p)
+        reflected = theory.reflected if jump > NO_WAVE * self.shock.p else "none"
+        head = [
+            f"shock to p = {self.shock.p:g} through rho = {self.rho_first:g} onto rho = "
+            f"{self.rho_second:g}; {_describe_modes(self)}, "
+            f"{deck.cells} cells per wavelength, to k c t = {kct:.3g}",
+            f"  reflected wave: {reflected}, Atwood number after the shock {theory.atwood:.3f}",
+            f"  smoothing length of the interface: {self.thickness / deck.wavelength:.3g} "
+            f"wavelengths ({self.thickness * deck.cells / deck.wavelength:.2g} of a cell)",
+        ]
+        rows, notes = [], ["growth: there is no theory for two shocks"]
+        if deck.second_shock is None:
+            rows, notes = _compare(self, column, kct)
+        far = column["far_transverse_speed"].max() / theory.sound_speed
+        notes.append(
+            f"amplitude {column['amplitude'][0]:.4g} -> {column['amplitude'][-1]:.4g}, largest "
+            f"transverse speed in the far field {far:.1e} of the sound speed"
+        )
+        return Report("\n".join(head), rows, notes)
 
-    Theory is drawn where there is one: for a single shock, and for small slopes alone right.
-    """
-    from matplotlib.ticker import MaxNLocator
+    def figures(self):
+        found, many = super().figures(), len(self.harmonics) > MOST_CURVES
+        return {name: draw for name, draw in found.items() if name != "spectrum" or many}
 
-    history, modes = run.history, problem.harmonics
-    known = np.flatnonzero(np.isfinite(history["amplitude"]))
-    numbers, first = np.array([(mode.number, mode.amplitude) for mode in modes]).T
-    kct = np.asarray(get_kct(problem, history["t"]), dtype=float)
-    axes, lines = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
-    axes.semilogy(numbers, np.abs(first) * problem.k, "o-", color="0.6", ms=3, label="start")
-    for n in range(SHOWN):
-        row = known[np.argmin(np.abs(kct[known] - kct[known[-1]] * (n + 1) / SHOWN))]
-        size = np.array([history[mode.column][row] for mode in modes])
-        colour, words = f"C{n}", f"k c t = {kct[row]:.3g}"
-        axes.semilogy(numbers, np.abs(size) * problem.k, "o", color=colour, ms=4, label=words)
-        if problem.deck.second_shock is None and kct[row] > 0.0:
-            theory = first * predict_amplitude(problem.theory, numbers * kct[row])
-            axes.semilogy(numbers, np.abs(theory) * problem.k, "--", color=colour, lw=1)
-        if run.dumps:
-            x, y = find_dump(run, float(history["t"][row])).blocks[0].nodes[:, -1, :]
-            lines.plot(x - x.mean(), y, color=colour, lw=1)
-    axes.plot([], [], "k--", lw=1, label="linear compressible")
-    axes.set(xlabel="number of the mode", ylabel="k |a| of the mode, k of the wavelength")
-    axes.legend(fontsize=8, frameon=False)
-    lines.set(xlabel="x minus its mean [m]", ylabel="y [m]")
-    lines.set_title("the interface at these times", fontsize=9)
-    lines.xaxis.set_major_locator(MaxNLocator(4))
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    for panel in (axes, lines):
-        panel.grid(alpha=0.3)
+    def draw_growth(self, figure, run) -> None:
+        """Amplitude and growth rate against theory, and the interface with its grid at the end."""
+        grid = figure.add_gridspec(2, SHOWN, height_ratios=(1.0, 1.1))
+        amplitude, rate = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1:])
+        column = _columns(self, run.history)
+        kct, several = get_kct(self, column["t"]), len(self.harmonics) > 1
+        growth = Growth(self) if self.deck.second_shock is None and self.harmonics else None
+        curves = _choose_curves(self, growth, column)
+        for n, curve in enumerate(curves):
+            amplitude.plot(kct, curve.values / curve.first, color=f"C{n}", label=curve.label)
+        if growth is not None:
+            _draw_theory(amplitude, rate, growth, curves, column, kct)
+        if len(kct) > 3:
+            _draw_rates(self, rate, kct, column["t"], curves, growth is not None)
+        words = "k c t after the shock's arrival" + ", k of mode 1" * several
+        amplitude.set(xlabel=words, ylabel="a / a0")
+        rate.set(xlabel=words, ylabel="(da/dt) / (k a0)")
+        windows, shown = [], []
+        dumps, margin = spread_dumps(run, SHOWN), 0.05 * self.deck.wavelength
+        lines = [dump.blocks[0].nodes[:, -1, :] for dump in dumps]
+        # all panels are as wide as the widest needs
+        reach = max((max(0.6 * np.ptp(x) + margin, 0.5 * np.ptp(y)) for x, y in lines), default=0.0)
+        for dump, (x, _) in zip(dumps, lines, strict=True):
+            middle = 0.5 * (x.min() + x.max())
+            windows.append((middle - reach, middle + reach))
+            for block in dump.blocks:
+                inside = np.abs(compute_centres(block.nodes)[0] - middle) <= reach
+                shown.append(block.cell_fields["rho"][inside])
+        rho = np.concatenate(shown) if shown else np.empty(0)
+        panels = [figure.add_subplot(grid[1, column]) for column in range(len(dumps))]
+        for axes, dump, line, window in zip(panels, dumps, lines, windows, strict=True):
+            title = f"density and grid, k c t = {float(get_kct(self, dump.t)):.1f}"
+            style = {"low": rho.min(), "high": rho.max(), "every": 1, "lines": [line]}
+            picture = draw_field(axes, dump, "rho", title=title, **style)
+            axes.set_xlim(*window)
+        if panels:
+            figure.colorbar(picture, ax=panels, label="density [kg/m3]")
+
+    def draw_spectrum(self, figure, run) -> None:
+        """k a of each mode by its number at some times, and the line at these times.
+
+        Theory is drawn where there is one: for a single shock, and for small slopes alone right.
+        """
+        from matplotlib.ticker import MaxNLocator
+
+        history, modes = run.history, self.harmonics
+        known = np.flatnonzero(np.isfinite(history["amplitude"]))
+        numbers, first = np.array([(mode.number, mode.amplitude) for mode in modes]).T
+        kct = np.asarray(get_kct(self, history["t"]), dtype=float)
+        axes, lines = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
+        axes.semilogy(numbers, np.abs(first) * self.k, "o-", color="0.6", ms=3, label="start")
+        for n in range(SHOWN):
+            row = known[np.argmin(np.abs(kct[known] - kct[known[-1]] * (n + 1) / SHOWN))]
+            size = np.array([history[mode.column][row] for mode in modes])
+            colour, words = f"C{n}", f"k c t = {kct[row]:.3g}"
+            axes.semilogy(numbers, np.abs(size) * self.k, "o", color=colour, ms=4, label=words)
+            if self.deck.second_shock is None and kct[row] > 0.0:
+                theory = first * predict_amplitude(self.theory, numbers * kct[row])
+                axes.semilogy(numbers, np.abs(theory) * self.k, "--", color=colour, lw=1)
+            if run.dumps:
+                x, y = find_dump(run, float(history["t"][row])).blocks[0].nodes[:, -1, :]
+                lines.plot(x - x.mean(), y, color=colour, lw=1)
+        axes.plot([], [], "k--", lw=1, label="linear compressible")
+        axes.set(xlabel="number of the mode", ylabel="k |a| of the mode, k of the wavelength")
+        lines.set(xlabel="x minus its mean [m]", ylabel="y [m]")
+        lines.set_title("the interface at these times", fontsize=9)
+        lines.xaxis.set_major_locator(MaxNLocator(4))
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -1,36 +1,17 @@
 """What the growth of a shocked interface is compared with, and how far each theory goes.
 
-Linear compressible theory [Yang1994] applies to one mode while the next term of perturbation theory
-takes less than LOSS off its rate.  A mode that grows from next to nothing in incompressible flow is
-k a = s - (4 A² + 1) s³/24 with s = k v0 t (A: Atwood number), so that is while
-(4 A² + 1) (k a)²/8 <= LOSS, and k a <= 0.3 where A is small; a mean over the window then loses less
-than 1 %.  For several modes the sum of
-their k a is to be <= 0.1: waves that two of them make are k a times as large as they [Haan1991].
-The Padé model [ZhangSohn1997] is one for a single mode and a reflected shock, with k a+ < 1, growth
-slower than 0.3 of the sound speed (its flow is incompressible) and as long as its growth falls no
-faster than 1/t (`PadeModel.reach`).  The impulsive models are nowhere exact: they are shown without
-a difference.
+Linear compressible theory [Yang1994] applies to one mode while (4 A² + 1) (k a)²/8 <= LOSS, which
+is the next term of perturbation theory (A: Atwood number), and k a <= LINEAR; to several while the
+sum of their k a is <= COUPLED [Haan1991].  The Padé model [ZhangSohn1997] is one for a single mode
+and a reflected shock, with k a+ < 1 and growth slower than INCOMPRESSIBLE, up to `PadeModel.reach`.
+k is the mode's own wavenumber, and so are its times k c t; c is the sound speed of the shocked
+second material, t counts from the shock's arrival at the mean interface.
 
-k is the mode's own wavenumber, n times the deck's, and so are its times k c t; c is the sound speed
-of the shocked second material, t counts from the shock's arrival at the mean interface.
-
-Where growth is not to be trusted (`find_cautions`): by the roughness of the line in a run, and by a
-deck's place in what was measured.
-
-`accuracy.json` beside this file holds the rows: one run of `benchmarks/growth_accuracy.py` each.
-
-`materials`: "gas", two ideal gases, or "condensed", two of the others; `mach`: of the shock in the
-first material; `ratio`: density of the second over the first; `cells`: in a wavelength of the mode;
-`rate_error`: mean rate over theory's less 1, or where theory's is next to nothing the difference
-over the interface's speed; `roughness`: harmonics above the fourth in the line, over its mode,
-now or just after the shock.
-
-The look-up asks the corners of the box of Mach numbers and ratios around a deck, each at the
-greatest measured number of cells that is not above the deck's.  A ratio more than NEAR times the
-deck's, or less than the deck's over NEAR, is left out where the other one is nearer; where none is,
-the sentence says so.  Rows of ratio 1 are of one gas, where nothing grows: their errors are parts
-of the interface's speed, and are told as parts of the deck's own rate.  Note: between two corners
-an error may be larger than at both, and all gases measured have gamma 1.4.
+`accuracy.json` beside this file has a row for each run of `benchmarks/growth_accuracy.py`, see
+`Measured`.  A deck is looked up at the corners of the box of Mach numbers and density ratios around
+it, each at the greatest measured number of cells that is not above the deck's; a ratio more than
+NEAR times off is left out where the other one is nearer.  Note: between two corners an error may be
+larger than at both, and all gases measured have gamma 1.4.
 """
 
 from __future__ import annotations
@@ -211,7 +192,14 @@ MATERIALS = {"gas": "two gases", "condensed": "two condensed materials"}
 
 @dataclass(frozen=True)
 class Measured:
-    """One row: a run compared with theory."""
+    """One row: a run compared with theory.
+
+    `materials`: "gas", two ideal gases, or "condensed", two of the others; `mach`: of the shock in
+    the first material; `ratio`: density of the second over the first (1: of one gas, where nothing
+    grows); `cells`: in a wavelength of the mode; `rate_error`: mean rate over theory's less 1, or
+    where theory's is next to nothing the difference over the interface's speed; `roughness`:
+    harmonics above the fourth in the line, over its mode, now or just after the shock.
+    """
 
     materials: str
     mach: float
@@ -314,11 +302,8 @@ FREE = 0.25  # phase of a capillary wave up to which its growth is within 1 % of
 def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str]:
     """Sentences for the deck of an `InterfaceInstability`; with a history, for the run as well."""
     told = [words for some in sort_deck(problem) for words in some] if problem.harmonics else []
-    single, tension, base = (
-        problem.deck.second_shock is None,
-        problem.deck.line.tension,
-        problem.theory.base,
-    )
+    deck, base = problem.deck, problem.theory.base
+    single, tension = deck.second_shock is None, deck.line.tension
     if single:  # waves that are back from the far ends before the run's end
         told += [
             f"waves return to the interface from the far end of the {name} material at t = "

@@ -31,7 +31,7 @@ from problems.initial_states import make_plane_grid
 from problems.plate_on_wedge.report import COLUMNS, WIDE_ZONE, Results
 from problems.plate_on_wedge.run import PlateRun
 from problems.problem import Problem
-from problems.references.hugoniot import shock_to_pressure, shock_with_particle_speed
+from problems.references.hugoniot import Shock, shock_to_pressure, shock_with_particle_speed
 from problems.references.riemann import solve_riemann
 from problems.references.shock_polars import (
     Body,
@@ -108,7 +108,6 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
 OVER_EDGE = 0.6  # of the plate's cells: those that lie on the wedge at first
 MOST_REFINED = 3.0  # times finer cells at A where the zone of constant states behind A is short
 FINER_ROWS = 0.75  # power of the refinement by which rows are finer: torn cells get too thin at 1
-CLOSEST = 0.85  # of the compression at which a Mie-Grueneisen Hugoniot's pressure is infinite
 
 
 class PlateOnWedge(Results, Problem):
@@ -153,10 +152,10 @@ class PlateOnWedge(Results, Problem):
         # the plate as it flies, its speed V [m/s], and when the drive's shock is at its lower side
         self.flying, self.plate_speed, arrival = Body(solid.eos, solid.rho0), deck.drive.speed, 0.0
         if deck.drive.kind != "moving":
-            particle_speed = self.find_particle_speed()
-            shock = shock_with_particle_speed(solid.eos, solid.rho0, 0.0, particle_speed)
+            shock = self.find_drive_shock()
             arrival = deck.thickness / shock.shock_speed
-            self.flying, self.plate_speed = release_driven_plate(self.flying, particle_speed)
+            driven = self.flying, shock.particle_speed
+            self.flying, self.plate_speed = release_driven_plate(*driven)
         # time enough for a jet to reach the base
         path = deck.face * math.sin(self.angle) / self.plate_speed
         fall = deck.gap + deck.depth / 1.2
@@ -174,36 +173,23 @@ class PlateOnWedge(Results, Problem):
         if drive.kind == "flyer":
             self.flyer_rows = max(4, round(drive.thickness / deck.thickness * nj))
 
-    def find_particle_speed(self) -> float:
-        """Velocity behind the drive's first shock in the plate [m/s]; BadInput without one."""
+    def find_drive_shock(self) -> Shock:
+        """The drive's first shock in the plate; BadInput without one."""
         drive, solid = self.deck.drive, self.materials["plate"]
+        at_rest, speed = (solid.rho0, 0.0), drive.speed
         try:
-            if drive.kind == "piston":
-                shock = shock_with_particle_speed(solid.eos, solid.rho0, 0.0, drive.speed)
-                found = shock.particle_speed
-            elif drive.kind == "pressure":
-                shock = shock_to_pressure(solid.eos, solid.rho0, 0.0, drive.pressure)
-                found = shock.particle_speed
-            else:
+            if drive.kind == "pressure":
+                return shock_to_pressure(solid.eos, *at_rest, drive.pressure)
+            if drive.kind == "flyer":
                 flyer = find_material(drive.material)
-                impact = solve_riemann(
-                    flyer.eos, (flyer.rho0, drive.speed, 0.0), solid.eos, (solid.rho0, 0.0, 0.0)
-                )
-                found = impact.u
+                hit = (flyer.rho0, speed, 0.0), solid.eos, (solid.rho0, 0.0, 0.0)
+                speed = solve_riemann(flyer.eos, *hit).u
+            return shock_with_particle_speed(solid.eos, *at_rest, speed)
         except (BadInput, ValueError) as error:
             raise BadInput(
                 f"deck: drive: the equation of state of {self.deck.plate} allows no such shock "
                 f"({error}); take a slower or weaker drive"
             ) from None
-        if solid.eos.kind == "mie-gruneisen":
-            most = CLOSEST / (1.0 - CLOSEST) * solid.eos.c0 / solid.eos.s
-            if found > most:
-                raise BadInput(
-                    f"deck: drive: it sets the plate in motion at {found:g} m/s; the equation of "
-                    f"state of {self.deck.plate} allows at most {most:.0f}, near its greatest "
-                    "compression; take a slower or weaker drive"
-                )
-        return found
 
     @functools.cached_property
     def critical(self) -> float:

@@ -2,15 +2,10 @@
 
 The pressure behind A is a plateau found in the data, or none.  Nothing but A's path sets a length
 in the flow around A, so pressures at equal parts of the path behind A are compared: in every step
-on a fixed set of parts, then over all steps.  From A backwards there come
-
-1. the numerical rise and its ringing, as many faces long in any cells: left out of every step;
-2. the plateau, the zone of constant states that only A has seen;
-3. the fall, where sound from elsewhere (the wedge's edge, the plate's back) has come.
-
-Near the critical angle there is no plateau: the fall begins at A.  Then the line of the fall is
-continued to A.  Note: behind the rise the scheme's own crest and dip are a few faces long
-each, and a mean over so few faces may pass for a plateau of the wrong pressure.
+on a fixed set of parts, then over all steps.  The numerical rise and its ringing, as many faces
+long in any cells, are left out of every step.  Near the critical angle there is no plateau: the
+pressure falls from A on, and the line of the fall is continued to A.  Note: the scheme's own crest
+and dip are a few faces long each, and a mean over so few faces may pass for a plateau.
 """
 
 import math
@@ -19,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from problems.pictures import draw_field, make_panels
+from problems.pictures import draw_field, make_panels, spread_dumps
 from problems.problem import Report, Row
 from problems.references.shock_polars import compute_jet_speed
 from regrid.sides import trace_outline
@@ -277,63 +272,22 @@ def describe_jet(problem, history) -> str:
     return f"jet: {words}; {ahead} of the plate is ahead before {STEADY[1]:.0%} of the face"
 
 
-PANELS = 6  # of the pictures that show phases
+SHOWN = 6  # times in a picture
 SHADES = ("#c9d4e2", "#8c99a8", "#e2cfa9")
-TITLES = (
-    "before the collision point runs",
-    "the collision point A runs",
-    "A has arrived at B",
-    "jet",
-    "closed",
-)
 
 
-def _choose_dumps(run) -> list[tuple[str, object]]:
-    """Titles and dumps of up to PANELS panels: the first, the phases, the widest gaps, the last.
-
-    Of a phase the dump nearest to the middle of its time.
-    """
-    history, dumps = run.history, run.dumps
-    times = np.array([dump.t for dump in dumps])
-    t, phase = history["t"], history["phase"]
-    chosen = {0, len(dumps) - 1}
-    for number in range(1, len(PHASES)):
-        rows = np.flatnonzero(phase == number)
-        if rows.size:
-            chosen.add(int(np.abs(times - t[rows[rows.size // 2]]).argmin()))
-    while len(chosen) < min(PANELS, len(dumps)):
-        shown = times[sorted(chosen)]
-        chosen.add(int(np.argmax([np.abs(shown - time).min() for time in times])))
-    named = []
-    for number in sorted(chosen):
-        before = phase[t <= times[number] * (1.0 + 1e-9)]
-        latest = int(before[-1]) if before.size else 0
-        name = "at the start" if number == 0 else TITLES[latest]
-        named.append((f"{name}, t = {1e6 * times[number]:.2f} us", dumps[number]))
-    return named
-
-
-def _make_panels(figure, chosen, room: float):
-    """Axes of equal frames that hold all bodies, in rows of three; `room` [inch]: to the right.
-
-    The figure is made as high as the frames need.
-    """
-    nodes = [block.nodes.reshape(2, -1) for _, dump in chosen for block in dump.blocks]
-    places = MM * np.concatenate(nodes, axis=1)
-    low, high = places.min(axis=1), places.max(axis=1)
-    margin, width = 0.03 * (high - low).max(), 4.6
-    low, high = low - margin, high + margin
-    columns = min(3, len(chosen))
-    rows = -(-len(chosen) // columns)
-    height = width * (high[1] - low[1]) / (high[0] - low[0]) + 0.25
-    figure.set_size_inches(width * columns + room, height * rows + 0.35)
-    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for panel, (title, _) in zip(axes, chosen, strict=False):
-        panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-        panel.set_title(title, fontsize=10)
-    for panel in axes[len(chosen) :]:
-        panel.set_visible(False)
-    return axes[: len(chosen)]
+def _make_panels(figure, run) -> list[tuple]:
+    """Panels of one frame in rows of three, each with a dump, evenly over the run."""
+    dumps = spread_dumps(run, SHOWN)
+    columns = min(3, len(dumps))
+    shape = -(-len(dumps) // columns), columns
+    frames = make_panels(
+        figure, 15.0, 4.0 * shape[0], *shape, sharex=True, sharey=True, squeeze=False
+    )
+    for panel, dump in zip(frames.flat, dumps, strict=False):
+        panel.set_title(f"t = {1e6 * dump.t:.2f} us", fontsize="medium")
+        panel.set_aspect("equal")
+    return list(zip(frames.flat, dumps, strict=False))
 
 
 def _draw_pressure(axes, problem, run, dump, **more):
@@ -460,13 +414,13 @@ class Results:
         return []
 
     def draw_phases(self, figure, run) -> None:
-        """Pressure with the grid at the phases, side by side, all in one frame."""
-        chosen = _choose_dumps(run)
-        panels = _make_panels(figure, chosen, 0.9)
-        for axes, (_, dump) in zip(panels, chosen, strict=True):
+        """Pressure with the grid at several times, all in one frame."""
+        panels = _make_panels(figure, run)
+        for axes, dump in panels:
             image = _draw_pressure(axes, self, run, dump)
             axes.label_outer()
-        figure.colorbar(image, ax=panels, label="pressure [GPa]", extend="max", pad=0.01)
+        axes = [panel for panel, _ in panels]
+        figure.colorbar(image, ax=axes, label="pressure [GPa]", extend="max", pad=0.01)
 
     def draw_contact(self, figure, run) -> None:
         """Zooms at the collision point and the face's end; A's path and speed against theory."""
@@ -500,25 +454,18 @@ class Results:
             speeds.plot(middles, mean, "o-", ms=3, label="mean over a fifteenth of the path")
             speeds.axhline(theory / 1e3, color="k", ls="--", label="theory")
             speeds.set_ylim(0.8 * speed.min(), 1.1 * np.percentile(speed, 98.0))
-            speeds.legend(frameon=False, fontsize=8)
         paths.set(xlabel="t [us]", ylabel="path of A along the face [mm]")
         speeds.set(xlabel="path of A along the face [mm]", ylabel="speed of A [km/s]")
-        paths.legend(frameon=False, fontsize=8)
-        for axes in (paths, speeds):
-            axes.grid(alpha=0.3)
 
     def draw_configuration(self, figure, run) -> None:
         """Outlines of all bodies at several times, as the paper draws them (its Fig 6)."""
-        chosen, deck = _choose_dumps(run), self.deck
+        deck, fills = self.deck, {}
         materials = {"plate": deck.plate, "wedge": deck.wedge, "flyer": deck.drive.material}
-        panels = _make_panels(figure, chosen, 0.0)
-        for axes, (_, dump) in zip(panels, chosen, strict=True):
+        for axes, dump in _make_panels(figure, run):
             for block, shade in zip(dump.blocks, SHADES, strict=False):
-                label = f"{block.name} ({materials[block.name]})"
                 outline = MM * trace_outline(block.nodes)
-                axes.fill(*outline, facecolor=shade, edgecolor="k", lw=0.9, label=label)
+                fills[block.name] = axes.fill(*outline, facecolor=shade, edgecolor="k", lw=0.9)[0]
             axes.set(xlabel="x [mm]", ylabel="y [mm]")
             axes.label_outer()
-        figure.set_figheight(figure.get_figheight() + 0.35)
-        handles = panels[0].get_legend_handles_labels()[0]
-        figure.legend(handles=handles, frameon=False, ncols=3, loc="outside lower center")
+        words = [f"{name} ({materials[name]})" for name in fills]
+        figure.legend(fills.values(), words, frameon=False, ncols=3, loc="outside lower center")

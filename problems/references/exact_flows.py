@@ -1,4 +1,4 @@
-"""Exact flows: blast wave, wave behind a detonation, vortex, Kidder's shell."""
+"""Exact flows: blast wave, wave behind a detonation, vortices, Kidder's shell, plate impact."""
 
 from __future__ import annotations
 
@@ -6,11 +6,16 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from hydro.eos import JWL
+from hydro.eos.materials import Material
+from problems.references.hugoniot import make_isentrope, release
+from problems.references.riemann import solve_riemann
 from regrid.errors import BadInput
+from regrid.roots import find_root
 
 DIMENSIONS = {"plane": 1, "cylindrical": 2, "spherical": 3}
 SHELLS = 4000  # points of the tabulated profile
@@ -97,8 +102,7 @@ def _make_profile(n: int, gamma: float) -> tuple[np.ndarray, np.ndarray]:
     return position, profile
 
 
-POINTS = 4001  # of the quadrature
-WIDEST = 5.0  # V up to which u = 0 is looked for
+POINTS = 4001  # of the tabulated wave
 
 
 @dataclass(frozen=True)
@@ -124,37 +128,15 @@ def compute_taylor_wave(eos: JWL) -> TaylorWave:
     """The wave of the explosive `eos` between its front and a wall at x = 0.
 
     From the Chapman–Jouguet state at x/t = D the products expand on one isentrope with x/t = u + c
-    and du = (c/rho) drho until u = 0; between there and the wall they rest [Taylor1950].  On a JWL
-    isentrope, with V = rho0/rho and C from the CJ state [LeeHornigKury1968],
-
-        p = A exp(-R1 V) + B exp(-R2 V) + C V^-(1 + w),    c² = -(V²/rho0) dp/dV.
+    and du = dp/(rho c) until u = 0; between there and the wall they rest [Taylor1950].
     """
-    from scipy.integrate import cumulative_simpson  # slow to load
-
     speed, pressure, density = eos.find_detonation()
-    start = eos.rho0 / density
-    volume = start + (WIDEST - start) * np.linspace(0.0, 1.0, POINTS) ** 2
-    power = 1.0 + eos.omega
-
-    def solid(v):
-        return eos.a * np.exp(-eos.r1 * v) + eos.b * np.exp(-eos.r2 * v)
-
-    gas = (pressure - solid(start)) * start**power
-    p = solid(volume) + gas * volume**-power
-    fall = (
-        eos.a * eos.r1 * np.exp(-eos.r1 * volume)
-        + eos.b * eos.r2 * np.exp(-eos.r2 * volume)
-        + power * gas * volume ** -(power + 1.0)
-    )
-    c = volume * np.sqrt(fall / eos.rho0)
-    u = speed * (1.0 - start) - cumulative_simpson(c / volume, x=volume, initial=0.0)
-    last = int(np.argmax(u <= 0.0))  # the first point of the fluid at rest, brought to u = 0
-    part = u[last - 1] / (u[last - 1] - u[last])
-    keep = slice(0, last + 1)
-    curves = [q[keep].copy() for q in (u + c, p, eos.rho0 / volume, u)]
-    for curve in curves:
-        curve[-1] = curve[-2] + part * (curve[-1] - curve[-2])
-    return TaylorWave(speed, *(curve[::-1] for curve in curves), eos.rho0)
+    products = make_isentrope(eos, density, pressure)
+    first = speed * (1.0 - eos.rho0 / density)
+    rest = find_root(lambda p: first - products.velocity_gain(p), 0.05 * pressure, pressure)
+    p = np.linspace(rest, pressure, POINTS)
+    u, rho, c = first - products.velocity_gain(p), products.density(p), products.sound_speed(p)
+    return TaylorWave(speed, u + c, p, rho, u, eos.rho0)
 
 
 # places in 0..1 and weights of four Gauss points
@@ -267,3 +249,83 @@ class Shell:
         part = ((r / h) ** 2 - RADII[0] ** 2) / (RADII[1] ** 2 - RADII[0] ** 2)
         inner, outer = (rho**power for rho in self.densities)
         return ((1.0 - part) * inner + part * outer) ** (1.0 / power) / h**self.n
+
+
+CELL_GAMMA = 5.0 / 3.0
+
+
+def compute_cell(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """u, v [m/s] and p [Pa] of the cell of turning gas in the unit square that heat keeps steady.
+
+    u = sin(pi x) cos(pi y), v = -cos(pi x) sin(pi y), p = 1 + (cos 2 pi x + cos 2 pi y)/4, rho = 1,
+    with rho de/dt = pi/(4 (g - 1)) (cos 3 pi x cos pi y - cos pi x cos 3 pi y), g = CELL_GAMMA.
+    """
+    a, b = math.pi * x, math.pi * y
+    p = 1.0 + 0.25 * (np.cos(2.0 * a) + np.cos(2.0 * b))
+    return np.sin(a) * np.cos(b), -np.cos(a) * np.sin(b), p
+
+
+def compute_cell_velocity(nodes: np.ndarray) -> np.ndarray:
+    """Velocity [m/s] of the flow at nodes (2, ni + 1, nj + 1) of a grid between the walls."""
+    velocity = np.array(compute_cell(*nodes)[:2])
+    velocity[0, [0, -1]], velocity[1, :, [0, -1]] = 0.0, 0.0  # sin(pi) is not zero
+    return velocity
+
+
+def follow_cell(nodes: np.ndarray, t: float, steps: int) -> np.ndarray:
+    """Nodes that have followed the flow for t [s], by so many steps of Runge and Kutta."""
+    step = t / steps
+    for _ in range(steps):
+        first = compute_cell_velocity(nodes)
+        second = compute_cell_velocity(nodes + 0.5 * step * first)
+        third = compute_cell_velocity(nodes + 0.5 * step * second)
+        fourth = compute_cell_velocity(nodes + step * third)
+        nodes = nodes + step / 6.0 * ((first + fourth) + 2.0 * (second + third))
+    return nodes
+
+
+def heat_cell(block, x, y, t, dt):
+    """The source (`hydro.sources`): heat per mass that keeps the flow steady."""
+    pi = math.pi
+    wave = np.cos(3 * pi * x) * np.cos(pi * y) - np.cos(pi * x) * np.cos(3 * pi * y)
+    return 0.0, 0.0, dt * pi / (4.0 * (CELL_GAMMA - 1.0)) * wave
+
+
+class PlateImpact(NamedTuple):
+    """A plate hits another: plane waves by the Hugoniots and isentropes of both, first without p.
+
+    In mass coordinates the release from the flyer's back crosses the flyer and follows the shock
+    through the target; in the fan from the free surface m (t - out) is constant along it.
+
+    Of the first impact: pressure [Pa] and speed [m/s] behind it, its time [s], and the time
+    until the release from the flyer's back is at the contact, `back` [s].
+
+    Of the target's free surface: speed `free` [m/s] from `out` to `end` [s]; `end` is NaN where the
+    release has met the shock before.
+    """
+
+    pressure: float
+    u: float
+    impact: float
+    back: float
+    free: float
+    out: float
+    end: float
+
+
+def compute_plate_impact(
+    flyer: Material, target: Material, speed: float, gap: float, thickness: float, depth: float
+) -> PlateImpact:
+    """A flyer of `thickness` [m] at `speed` [m/s], first `gap` [m] before a target of `depth`."""
+    bodies = (flyer.eos, (flyer.rho0, speed, 0.0)), (target.eos, (target.rho0, 0.0, 0.0))
+    hit = solve_riemann(*bodies[0], *bodies[1])
+    free = hit.u + release(target.eos, hit.rho_right, hit.p)[1]
+    impact = gap / speed
+    out = impact + depth / hit.right_wave.head
+    z_flyer = hit.rho_left * float(flyer.eos.sound_speed(hit.rho_left, hit.p))
+    z = hit.rho_right * float(target.eos.sound_speed(hit.rho_right, hit.p))
+    z_free = target.rho0 * float(target.eos.sound_speed(target.rho0, 0.0))
+    back = thickness / (speed - hit.left_wave.head) + flyer.rho0 * thickness / z_flyer
+    catch = (target.rho0 * depth + z * (impact + back - out)) / (2.0 * z)  # after `out`, at the fan
+    end = out + 2.0 * catch * math.sqrt(z / z_free) if catch > 0.0 else math.nan
+    return PlateImpact(hit.p, hit.u, impact, back, free, out, end)

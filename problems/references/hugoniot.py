@@ -64,9 +64,7 @@ class StiffenedIsentrope:
 
         Positive where `p` is lower: the speed that a release to `p` adds.
         """
-        power = (self.gamma - 1.0) / (2.0 * self.gamma)
-        ratio = ((p + self.p_inf) / (self.p + self.p_inf)) ** power
-        return 2.0 * self.c / (self.gamma - 1.0) * (1.0 - ratio)
+        return 2.0 / (self.gamma - 1.0) * (self.c - self.sound_speed(p))
 
     def sound_speed(self, p):
         """Sound speed at the pressures `p` (any shape)."""

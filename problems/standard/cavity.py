@@ -160,7 +160,7 @@ class Cavity(Problem):
             picture = draw_field(axis, dump, "p", low=0.0, high=high, every=1, **words)
             axis.set(xlim=(-1.6 * radius, 2.4 * radius), ylim=(0.0, 2.0 * radius))
         figure.colorbar(picture, ax=axes[:, :2], shrink=0.7, label="pressure [GPa]")
-        part = {**history, "part": history["void_size"] / history["void_size"][0]}
+        part = {"t": history["t"], "part": history["void_size"] / history["void_size"][0]}
         draw_columns(axes[0, 2], part, {"part": ""}, "size of the void, of its first one", "µs")
         axes[1, 2].axhline(self.near_speed, color="k", lw=0.8, ls="--", label="plane free surface")
         speeds = {"jet_speed": "near side, jet", "far_speed": "far side"}

@@ -155,4 +155,3 @@ class Detonation(Problem):
         right.plot(1e6 * t, 1e3 * (self.speed * t - front), lw=1.2, label="D t - front")
         right.axhline(size, color="k", ls=":", lw=0.8, label="size of a cell")
         right.set(xlabel="t [µs]", ylabel="front, where p = pCJ/2, behind D t [mm]")
-        right.legend(frameon=False)

@@ -25,7 +25,7 @@ from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, VoidF
 from problems.initial_states import put_walls
 from problems.pictures import draw_columns
 from problems.problem import BlockPlan, Problem, Report, Row, find_time
-from problems.references.plate_impact import compute_plate_impact
+from problems.references.exact_flows import compute_plate_impact
 from regrid.errors import BadInput
 
 TALL = 8.0  # heights of cells over their least width: square ones would halve the time step
@@ -137,7 +137,6 @@ class FlyerTarget(Problem):
             t = 1e6 * np.array([0.0, theory.out, theory.out, end])
             trace = 0.0, 0.0, theory.free, theory.free
             left.plot(t, trace, "k--", lw=0.8, label="theory, until the release")
-            left.legend()
         plates = zip(self.names, self.deck.plates, strict=True)
         words = {f"speed_{name}": f"{name}, {plate.material}" for name, plate in plates}
         draw_columns(right, run_data.history, words, "mean speed [m/s]", "µs")

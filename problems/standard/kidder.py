@@ -120,4 +120,3 @@ class Kidder(RadialProblem):
             right.plot(times, radius, "o", ms=4, label=f"{words} surface")
             right.plot(times, RADII[edge] * h, "k", lw=0.8, label=exact)
         right.set(xlabel="t [ms]", ylabel="radius [m]")
-        right.legend(frameon=False)

@@ -110,10 +110,8 @@ class ObliqueShock(Problem):
         dump, end = run_data.dumps[-1], math.tan(self.beta)
         draw_field(left, dump, "p", every=5, bar="pressure [Pa]")
         left.plot((0.0, 1.0), (0.0, end), "r--", lw=1.5, zorder=5, label="exact shock")
-        left.legend(loc="upper left")
         x, p = dump["gas"].centres[0][:, 0], dump["gas"].p[:, 0]
         right.plot(x, p, ".-", ms=4, lw=0.8, label="computed")
         exact = (float(p[0]),) * 2 + (self.pressure,) * 2
         right.plot((x[0], 0.0, 0.0, 1.0), exact, "k--", lw=0.9, label="exact")
-        right.legend(loc="lower right")
         right.set(xlabel="x [m]", ylabel="pressure on the wall [Pa]")

@@ -71,10 +71,8 @@ class RayleighTaylor(Problem):
         self.pressure = deck.sound_speed**2 / GAMMA  # of both gases at y = 0
         square = compute_square(deck.above, deck.tension)
         if square == 0.0:
-            raise BadInput(
-                f"deck: at tension = {deck.tension!r} the wave neither grows nor swings; take more "
-                "or less"
-            )
+            words = "the wave neither grows nor swings; take more or less"
+            raise BadInput(f"deck: at tension = {deck.tension!r} {words}")
         self.grows, self.exact = square > 0.0, math.sqrt(abs(square))
         self.amplitude = deck.amplitude or (1e-4 if self.heavy else 1e-3)
         rate = math.sqrt(abs(compute_square(deck.above, 0.0)))
@@ -154,13 +152,11 @@ class RayleighTaylor(Problem):
         left.plot(t, self.amplitude * theory(self.exact * t), "k--", lw=0.9, label=f"a0 {name}")
         if self.grows:
             left.set_yscale("log")
-        left.legend(loc="upper left")
         for dump in spread_dumps(run_data, 4):
             x, y = dump.blocks[0].nodes[:, :, -1]
             middle.plot(x, y, ".-", ms=3, lw=0.8, label=f"{dump.t:.3g} s")
         middle.set(xlabel="x [m]", ylabel="height of the interface [m]")
         middle.ticklabel_format(axis="y", scilimits=(-2, 3))
-        middle.legend(loc="best", fontsize="small")
         dump = run_data.dumps[-1]
         most = max(float(np.abs(block.v[:, 4:-4]).max()) for block in dump.blocks)
         lines = [dump.blocks[0].nodes[:, :, -1]] if len(dump.blocks) > 1 else []

@@ -22,7 +22,13 @@ from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import put_walls
 from problems.pictures import draw_field, find_dump, make_panels
 from problems.problem import BlockPlan, Problem, Report, compare
-from problems.references import taylor_green
+from problems.references.exact_flows import (
+    CELL_GAMMA,
+    compute_cell,
+    compute_cell_velocity,
+    follow_cell,
+    heat_cell,
+)
 from regrid.measure.corners import compute_centres
 
 PERIOD = 0.6  # of the swinging grid [s]: at t = 0.75 it is as far as it goes
@@ -48,21 +54,21 @@ class TaylorGreen(Problem):
         cells = self.deck.cells, self.deck.cells
         nodes = BlockPlan("square", cells, (0.0, 0.0), (1.0, 1.0)).make_nodes()
         if self.deck.mesh == "follow":
-            return {"square": taylor_green.follow_flow(nodes, t, PATH_STEPS)}
+            return {"square": follow_cell(nodes, t, PATH_STEPS)}
         swing = self.deck.amplitude * math.sin(2.0 * math.pi * t / PERIOD)
-        return {"square": nodes + swing * taylor_green.compute_velocity(nodes)}
+        return {"square": nodes + swing * compute_cell_velocity(nodes)}
 
     def build(self):
-        gas, nodes = IdealGas(taylor_green.GAMMA), self.make_grids()["square"]
-        flow = taylor_green.compute_flow(*compute_centres(nodes))
+        gas, nodes = IdealGas(CELL_GAMMA), self.make_grids()["square"]
+        flow = compute_cell(*compute_centres(nodes))
         block = Block("square", gas, nodes, 1.0, *flow, limiter=self.deck.limiter)
         put_walls(block)
-        return self.simulate([block], mesh=self.deck.mesh, source=taylor_green.heat)
+        return self.simulate([block], mesh=self.deck.mesh, source=heat_cell)
 
     def measure(self, evolution) -> dict[str, float]:
         """Mean errors of velocity and pressure against the values at the cells' centres."""
         (block,) = evolution.blocks
-        u, v, p = taylor_green.compute_flow(*block.centres)
+        u, v, p = compute_cell(*block.centres)
         _, u_cell, v_cell, p_cell = block.state[:, 1:-1, 1:-1]
         errors = {"error_velocity": np.hypot(u_cell - u, v_cell - v), "error_p": np.abs(p_cell - p)}
         return {name: float((e * block.volume).sum()) for name, e in errors.items()}
@@ -86,7 +92,7 @@ class TaylorGreen(Problem):
             draw_field(axis, dump, "p", low=0.5, high=1.5, bar="pressure [Pa]", **options)
 
         def compute_error(block):
-            u, v, _ = taylor_green.compute_flow(*block.centres)
+            u, v, _ = compute_cell(*block.centres)
             return np.hypot(block.u - u, block.v - v)
 
         options |= {"bar": "error of the velocity [m/s]", "colours": "magma_r"}

@@ -47,7 +47,6 @@ def test_settings(shockgrid, setting, words):
     assert words in error and error.count("\n") == 1, error
 
 
-GIVEN = ("heated-cavity", "gravity=[0.0,-1.0]", "tilt=10")
 NO_STEADY = ("left.heat=adiabatic", "left.value=0", "right.heat=flux", "right.value=1")
 NO_HEAT = [f"{side}.{key}" for side in ("left", "right") for key in ("heat=adiabatic", "value=0")]
 
@@ -63,8 +62,6 @@ NO_HEAT = [f"{side}.{key}" for side in ("left", "right") for key in ("heat=adiab
         (("heated-cavity", "rayleigh=nan"), "rayleigh"),
         (("heated-cavity", "tilt=inf"), "tilt"),
         (("heated-cavity", "prandtl=0"), "Pr = 0 must be positive"),
-        (("heated-cavity", "gravity=[0.0,0.0]"), "gravity is zero but Ra = 100000"),
-        (GIVEN, "are both given"),
         (("heated-cavity", "top.value=1"), "top.value = 1 contradicts top.heat = 'adiabatic'"),
         (("heated-cavity", *NO_STEADY), "which no steady state can"),
         (("heated-cavity", *NO_HEAT), "no wall is isothermal"),

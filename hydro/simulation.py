@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -368,10 +368,6 @@ class Simulation:
 
     def get_state(self) -> dict:
         """All that the next step depends on."""
-        return self.get_state_of({block.name for block in self.blocks})
-
-    def get_state_of(self, names: Container[str]) -> dict:
-        """`get_state`, with the arrays of the blocks of these names and no others."""
         state: dict[str, Any] = {
             "t": self.t,
             "step": self.step,
@@ -385,8 +381,6 @@ class Simulation:
         for number, contact in enumerate(self.exchange.contacts):
             state[f"contact{number}/fixed"] = contact.fixed.copy()
         for block in self.blocks:
-            if block.name not in names:
-                continue
             for name, array in (
                 ("nodes", block.nodes),
                 ("state", block.state[:, 1:-1, 1:-1]),

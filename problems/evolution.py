@@ -26,7 +26,6 @@ of an Evolution
 - `missed`: what a run that ends now has not reached, in a few words; such a run has exit code 3
 - `geometry.curved`: is y the distance from the axis x?
 - `take_cells(state)`: have as many cells as a state of `get_state`, before `set_state` takes it up
-- `get_state_of(names)`: `get_state`, with the arrays of these blocks alone, the others not touched
 
 of a block
 - `material`: its name
@@ -39,7 +38,7 @@ ends in other bits than an unbroken one.
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -100,12 +99,6 @@ def is_axisymmetric(evolution: Evolution) -> bool:
 def take_cells(evolution: Evolution, state: State) -> None:
     """Let the evolution have as many cells as the state, where it can have others."""
     getattr(evolution, "take_cells", lambda state: None)(state)
-
-
-def get_state_of(evolution: Evolution, names: Container[str]) -> State:
-    """The state, at least with the arrays `<block>/...` of the blocks of these names."""
-    get = getattr(evolution, "get_state_of", lambda names: evolution.get_state())
-    return get(names)
 
 
 def get_material(block: BlockView) -> str:

@@ -1,7 +1,6 @@
 """The run of a plate on a wedge: where the collision point is, which phase it is, when it ends."""
 
 import math
-from collections.abc import Container
 
 import numpy as np
 
@@ -260,11 +259,11 @@ class PlateRun(Simulation):
                     return True
         return False
 
-    def get_state_of(self, names: Container[str]) -> dict:
-        """The state of the flow in these blocks, and the times of the phases."""
+    def get_state(self) -> dict:
+        """The state of the flow, and the times of the phases."""
         times = np.array([self.times[phase] for phase in report.PHASES])
         own = {"phase_times": times, "plate_start": self.start.copy()}
-        return super().get_state_of(names) | own
+        return super().get_state() | own
 
     def set_state(self, state) -> None:
         """Take up a state of `get_state`."""

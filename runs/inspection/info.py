@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import os
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,7 +28,7 @@ from runs.inspection.account import (
     judge,
 )
 from runs.store.directory import RunDirectory, read_stored_deck
-from runs.store.files import CHECKSUM, PARTS, find_fault, find_sum, read_parts
+from runs.store.files import find_sum
 from runs.store.provenance import describe_provenance
 from runs.store.reader import Dump, RunData
 
@@ -219,62 +218,26 @@ SAID = ("units", "long_name")  # attributes that a dataset's own line tells
 SCALES = ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid")  # HDF5's own
 
 
-def inspect(file: str | os.PathLike, other: str | os.PathLike | None = None) -> str:
-    """The tree of an HDF5 file in words, or how `other` differs from it: `shockgrid inspect`.
+def inspect(file: str | os.PathLike) -> str:
+    """The tree of an HDF5 file in words: for each array shape, type, range, unit, bad values.
 
-    Each is a file or a dump of an opened run.  Raises BadInput where one is no HDF5 file.
+    file: a file or a dump of an opened run.  Raises BadInput where it is no HDF5 file.
     """
-    if other is None:
-        return inspect_file(os.fspath(file))
-    return inspect_differences(os.fspath(file), os.fspath(other))
-
-
-def inspect_file(path: str) -> str:
-    """The tree of the file: for each array shape, type, range, unit, bad values, checksum."""
-    head = f"{path}: {Path(path).stat().st_size} bytes" if Path(path).is_file() else path
-    with open_hdf5(Path(path)) as file:
-        if (found := find_sum(Path(path))) is not None:
+    path = Path(file)
+    with open_hdf5(path) as tree:
+        head = f"{path}: {path.stat().st_size} bytes"
+        if (found := find_sum(path)) is not None:
             head += f", checksum {'as stored' if found else 'NOT AS STORED'}"
-        lines = [head]
-        for part, crc in read_parts(file).items():
-            fault = find_fault(Path(path), part, crc)
-            lines.append(f"  {part}: {fault or 'checksum as stored'}")
-        for folder, below in describe_tree(file).items():
-            lines += [folder] * (folder != "/") + [f"  {line}" for line in below]
+        lines, items = [head], list_items(tree)
+        for folder in (name for name, item in items.items() if isinstance(item, h5py.Group)):
+            arrays = {n: i for n, i in items[folder].items() if isinstance(i, h5py.Dataset)}
+            width = max(map(len, arrays), default=0)
+            lines += [f"{folder}/"] * (folder != "/")
+            lines += [f"  {line}" for line in describe_attributes(items[folder])]
+            for name, data in arrays.items():
+                lines.append(f"  {name:{width}}  {describe_array(data)}")
+                lines += [f"    {line}" for line in describe_attributes(data, SAID)]
     return "\n".join(lines)
-
-
-def describe_tree(file: h5py.File) -> dict[str, list[str]]:
-    """By folder a line for each attribute and each array with its attributes."""
-    tree = {}
-    items = list_items(file)
-    for folder in (name for name, item in items.items() if isinstance(item, h5py.Group)):
-        arrays = {n: i for n, i in items[folder].items() if isinstance(i, h5py.Dataset)}
-        width = max(map(len, arrays), default=0)
-        lines = tree[f"{folder.rstrip('/')}/"] = describe_attributes(items[folder])
-        for name, data in arrays.items():
-            lines.append(f"{name:{width}}  {describe_array(data)}")
-            lines += [f"  {line}" for line in describe_attributes(data, SAID)]
-    return tree
-
-
-def inspect_differences(a: str, b: str) -> str:
-    """Lines of the two trees that are in one alone: - for the file `a`, + for `b`.
-
-    Checksums of whole files and whether their arrays are in parts do not count.
-    """
-    with open_hdf5(Path(a)) as one, open_hdf5(Path(b)) as other:
-        texts = [
-            [f"{folder}{line.strip()}" for folder, lines in describe_tree(file).items()
-             for line in lines]
-            for file in (one, other)
-        ]  # fmt: skip
-    found = list(difflib.unified_diff(*texts, n=0, lineterm=""))[2:]
-    stored = tuple(f"/@{name} " for name in (CHECKSUM, "format_version"))
-    lines = [line for line in found if line[:2] != "@@" and not line[1:].startswith(stored)]
-    return (
-        "\n".join([f"- {a}", f"+ {b}", *lines]) if lines else f"no difference between {a} and {b}"
-    )
 
 
 @contextlib.contextmanager
@@ -299,10 +262,10 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
 
 
 def list_items(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
-    """Everything in the file by its path, the root "/" first, but where an index has its arrays."""
+    """Everything in the file by its path, the root "/" first."""
     found: dict[str, h5py.Group | h5py.Dataset] = {"/": file}
     file.visititems(lambda name, item: found.__setitem__(f"/{name}", item))
-    return {n: i for n, i in found.items() if not f"{n}/".startswith(f"/{PARTS}/")}
+    return found
 
 
 def describe_attributes(item: h5py.Group | h5py.Dataset, said: Sequence[str] = ()) -> list[str]:

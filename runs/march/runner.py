@@ -38,7 +38,7 @@ from runs.inspection import account
 from runs.march.compiling import compiling
 from runs.march.progress import Outlook, Progress, describe_gauges, describe_threads
 from runs.ranks.map import check_cut
-from runs.ranks.world import World, describe_ranks, loss_told, write_on_ranks
+from runs.ranks.world import World, describe_ranks, loss_told
 from runs.store.directory import RunDirectory, keep_problem_file, write_noted
 from runs.store.dumps import EMPTY, Names, make_image
 from runs.store.files import write_atomically, write_sealed
@@ -475,7 +475,7 @@ class Runner:
 
         output: what is in a light one; a whole one is written while the run goes on.
         """
-        began, step, evolution = time.monotonic(), self.evolution.step, self.evolution
+        began, step = time.monotonic(), self.evolution.step
         self._sync()
         besides = EMPTY if output else self.gauges.get_state()
 
@@ -486,25 +486,13 @@ class Runner:
                 self.limit.note_write(time.monotonic() - began)
             then()
 
-        if self._ranked:
-            write_on_ranks(self._ranked, path, evolution, self._names, besides, output)
-            follow()
-            return
-        image = make_image(evolution, self._names, besides, output)
+        names = Names(self.deck.problem, self.deck_text, self.problem.t_unit)
+        image = make_image(self.evolution, names, besides, output)
         if output:
             write_sealed(path, image)
             follow()
         else:
             self.writing.start(lambda: (write_sealed(path, image), follow()))
-
-    @property
-    def _ranked(self) -> World | None:
-        """The ranks that write a dump together; None in one process, and before they begin."""
-        return self.world if self.world is not None and self.world.ranks is not None else None
-
-    @property
-    def _names(self) -> Names:
-        return Names(self.deck.problem, self.deck_text, self.problem.t_unit)
 
     def _sync(self) -> None:
         """Force all rows to the disk: a dump must not outlive them."""

@@ -22,14 +22,12 @@ import threading
 import time
 import tomllib
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TextIO
 
 from hydro.ranks.cutting import Shares
 from hydro.ranks.ranks import COLLECT, COUNT, END, STEP, Ranks, hear, tell
 from hydro.simulation import Simulation
 from hydro.workers import count_processors
-from problems.deck import Output
 from problems.evolution import Evolution, State
 from problems.problem import Problem
 from problems.problem_file import read_problem_file
@@ -37,8 +35,7 @@ from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck, resolve_deck
 from runs.ranks.map import describe_shares, share_evolution
 from runs.ranks.started import count_started, find_rank
-from runs.store.dumps import EMPTY, Names
-from runs.store.parts import Share, write_dump_in_parts
+from runs.store.dumps import EMPTY
 
 BUILD = END + 1  # told first: the deck follows
 BEGIN = END + 2  # told once: who has what and, of a run that goes on, the state follow
@@ -192,51 +189,6 @@ def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str
     return [f"messages of ranks: {'; '.join(words) or 'none'}"]
 
 
-WRITE = BEGIN + 1  # told; where to, and the words of the dump, follow
-
-
-def write_on_ranks(
-    world: World,
-    path: Path,
-    evolution: Any,
-    names: Names,
-    besides: State,
-    output: Output | None = None,
-) -> None:
-    """Write a dump with all ranks.  For the first rank, between two steps.
-
-    besides, output: as of `make_image`.  Raises BadInput where a disk has refused it.
-    """
-    if world.ranks is None:
-        raise ValueError("the ranks have not started")
-    tell(world.comm, WRITE)
-    write_share(world.comm, world.ranks, evolution, (str(path.absolute()), names, output), besides)
-
-
-def write_share(
-    comm: Any,
-    ranks: Ranks,
-    evolution: Simulation,
-    order: tuple[str, Names, Output | None] | None = None,
-    besides: State = EMPTY,
-) -> None:
-    """Write what is this rank's own of a dump; the first rank, which has the `order`, its index.
-
-    Until they have agreed that it has been written or has failed, all ranks are busy.
-    """
-    path, names, output = comm.bcast(order, root=0)
-    rows = {ranks[number].name: (first, last) for number, first, last in ranks.pieces}
-    share = Share(ranks.rank, ranks.size, rows, comm.allgather)
-    ranks.busy = True
-    try:
-        write_dump_in_parts(Path(path), evolution, names, besides, output, share)
-    except BadInput:
-        if order:  # the first rank tells it
-            ranks.busy = False
-            raise
-    ranks.busy = False
-
-
 BAD_INPUT, INTERNAL = 2, 70  # exit codes, as in `runs.cli.main`
 
 
@@ -299,8 +251,6 @@ def follow(comm: Any, screen: TextIO) -> int:
                     Simulation.advance(evolution)  # what a problem adds is for the first rank
             elif word == COLLECT:
                 ranks.collect()
-            elif word == WRITE:
-                write_share(comm, ranks, evolution)
             elif word == COUNT:
                 ranks.count()
     except BaseException as error:

@@ -32,9 +32,7 @@ from runs.store.files import (
     DUMPS,
     KEPT_NAMES,
     LOCK,
-    PART_NAME,
     disk_errors,
-    find_parts_by_name,
     get_part,
     replace_file,
     try_lock,
@@ -45,8 +43,8 @@ from runs.store.provenance import NOTED, hash_deck
 SHOWN = 3  # changed keys
 KEPT_RESTARTS = 2
 STUDY_FILE = "study.toml"  # what a study is known by; its runs lie in its folder `runs`
-_TEMPORARY = re.compile(r"\.(.+)\.part")
 _NAME = re.compile(r"(dump|restart)_(\d+)\.h5")
+_TEMPORARY = re.compile(rf"\.{_NAME.pattern}\.part")
 
 
 class RunDirectory:
@@ -92,8 +90,7 @@ class RunDirectory:
         """Remove all but the newest restart files; dumps stay."""
         restarts = self.list_points("restart")
         for _, path in restarts[: max(0, len(restarts) - keep)]:
-            for one in (path, *find_parts_by_name(path)):  # then its parts are no restart point's
-                one.unlink(missing_ok=True)
+            path.unlink(missing_ok=True)
 
     def set_aside_after(self, step: int) -> int:
         """Move dumps of later steps into `superseded`; returns how many there were."""
@@ -109,15 +106,11 @@ class RunDirectory:
                 path.unlink(missing_ok=True)
 
     def set_aside(self, path: Path) -> None:
-        """Move a file of the run into `superseded`, in place of one of its name there.
-
-        The parts of a dump go first: as long as its index stays, they are not taken for leftovers.
-        """
+        """Move a file of the run into `superseded`, in place of one of its name there."""
         folder = self.path / "superseded"
         with disk_errors(folder):
             folder.mkdir(exist_ok=True)
-            for one in (*find_parts_by_name(path), path):
-                replace_file(one, folder / one.name)
+            replace_file(path, folder / path.name)
 
     def note(self, text: str) -> None:
         """Append a line to run.log, with the time of day."""
@@ -200,7 +193,7 @@ def _remove_run(directory: RunDirectory) -> None:
         )
     with directory.claimed(), disk_errors(directory.path):
         for _, path in directory.list_points():
-            path.unlink()  # then its parts have no index, and are among the leftovers
+            path.unlink()
         for path in _find_leftovers(directory):
             path.unlink()
         for name in KEPT_NAMES:
@@ -208,16 +201,10 @@ def _remove_run(directory: RunDirectory) -> None:
 
 
 def _find_leftovers(directory: RunDirectory) -> list[Path]:
-    """Files that a killed run was about to write, and parts of dumps without an index."""
+    """Files that a killed run was about to write."""
     found = [part for name in KEPT_NAMES if (part := get_part(directory.path / name)).is_file()]
     if directory.dumps_folder.is_dir():
-        for path in directory.dumps_folder.iterdir():
-            temporary = _TEMPORARY.fullmatch(path.name)
-            name = temporary[1] if temporary else path.name
-            of_dump = PART_NAME.fullmatch(name)
-            dump = path.with_name(f"{of_dump[1]}.h5" if of_dump else name)
-            if _NAME.fullmatch(dump.name) and (temporary or not dump.exists()):
-                found.append(path)
+        found += [p for p in directory.dumps_folder.iterdir() if _TEMPORARY.fullmatch(p.name)]
     return found
 
 

@@ -32,11 +32,10 @@ from problems.evolution import (
     is_axisymmetric,
 )
 from regrid.errors import BadInput
-from runs.store.files import BLANK, CHECKSUM, PARTS, check_parts, find_sum
+from runs.store.files import BLANK, CHECKSUM, find_sum
 from runs.store.provenance import find_provenance
 
 FORMAT = "shockgrid dump"
-FORMAT_OF_PARTS = "shockgrid dump part"
 FORMAT_VERSION = 4
 LONG_NAMES = {
     "x": "x of the nodes",
@@ -124,34 +123,14 @@ def make_image(
     whole one.
     """
     arrays = {block.name: list_arrays(block, output) for block in evolution.blocks}
-    state = None if output else {**evolution.get_state(), **besides}
-    return make_tree(evolution, names, arrays, state, output)
-
-
-def make_tree(
-    evolution: Evolution,
-    names: Names,
-    arrays: Arrays,
-    state: Mapping[str, Any] | None,
-    output: Output | None = None,
-    kind: str = FORMAT,
-    first_rows: Mapping[str, int] = EMPTY,
-    parts: Mapping[str, str] = EMPTY,
-) -> bytes:
-    """The bytes of a dump, a part of one or an index, its checksum blank.
-
-    arrays: what is shown of which blocks, their rows from those of `first_rows` on; state: None in
-    a light dump, of which `output` gives the compression; parts: of an index, with checksums.
-    """
-    linked = None if state is None else _link_shown(arrays, state)
-    kept = output is None and not parts
-    form = repr((names, kind, first_rows, evolution.finished, is_axisymmetric(evolution)))
+    linked = None if output else _link_shown(arrays, {**evolution.get_state(), **besides})
+    form = repr((names, evolution.finished, is_axisymmetric(evolution)))
     form += repr([_describe(block, arrays) for block in evolution.blocks])
     form += repr({key: _describe_kind(value) for key, value in (linked or {}).items()})
-    if kept and form in _KEPT:
-        return _refill(_KEPT[form], evolution, arrays, linked or {})
+    if linked is not None and form in _KEPT:
+        return _refill(_KEPT[form], evolution, arrays, linked)
     with h5py.File("dump", "w", driver="core", backing_store=False) as file:
-        file.attrs["format"] = kind
+        file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
         file.attrs[CHECKSUM] = np.bytes_(BLANK)
         file.attrs["problem"] = names.problem
@@ -162,26 +141,23 @@ def make_tree(
         radial = RADIAL if is_axisymmetric(evolution) else EMPTY
         blocks = file.create_group("blocks", track_order=True)
         for block in evolution.blocks:
-            if block.name in arrays:
-                group = blocks.create_group(block.name, track_order=True)
-                first, level = first_rows.get(block.name, 0), output.compression if output else 0
-                write_block(group, block, arrays[block.name], radial, first, level)
+            group = blocks.create_group(block.name, track_order=True)
+            level = output.compression if output else 0
+            write_block(group, block, arrays[block.name], radial, level)
         if linked is not None:
             group = file.create_group("state")
             for key, value in linked.items():
                 _create(group, key, value)
             made = file.create_group("provenance", track_order=True)
             made.attrs.update(find_provenance(names.deck_text))
-        if parts:
-            file.create_group(PARTS, track_order=True).attrs.update(parts)
         file.flush()
         image = file.id.get_file_image()
-    if not kept:
+    if linked is None:
         return image
     while _KEPT:
         _KEPT.popitem()[1].close()
     _KEPT[form] = h5py.File(h5py.h5f.open_file_image(image, WRITABLE))
-    return _refill(_KEPT[form], evolution, arrays, linked or {})
+    return _refill(_KEPT[form], evolution, arrays, linked)
 
 
 # HDF5 takes its time over groups, scales and attributes, which are the same in all dumps of a run:
@@ -193,7 +169,7 @@ WRITABLE = 1  # H5LT_FILE_IMAGE_OPEN_RW
 def _describe(block: BlockView, arrays: Arrays) -> tuple:
     """All of a block's group in a dump but numbers."""
     words = get_material(block), dict(block.units), dict(get_long_names(block))
-    kinds = [(name, _describe_kind(values)) for name, values in arrays.get(block.name, ())]
+    kinds = [(name, _describe_kind(values)) for name, values in arrays[block.name]]
     return block.name, *words, kinds
 
 
@@ -290,13 +266,12 @@ def write_block(
     block: BlockView,
     arrays: Iterable[tuple[str, Array]],
     names: Mapping[str, str] = EMPTY,
-    first_row: int = 0,
     compression: int = 0,
 ) -> None:
     """Write nodes (2 or 3, ...) and fields of a block, with dimension scales, into its group.
 
-    arrays: those to write, x first; names: `long_name`s that go before the block's own; first_row:
-    number of the first row of cells; a level of `compression` from 1 is that of gzip.
+    arrays: those to write, x first; names: `long_name`s that go before the block's own; a level
+    of `compression` from 1 is that of gzip.
     """
     group.attrs["material"] = get_material(block)
     arrays = list(arrays)
@@ -305,8 +280,7 @@ def write_block(
     at = {tuple(n - 1 for n in nodes): tuple(axes), nodes: tuple(f"{axis}_node" for axis in axes)}
     for shape, scales in at.items():
         for name, size in zip(scales, shape, strict=True):
-            start = first_row if name[0] == "i" else 0
-            scale = group.create_dataset(name, data=np.arange(start, start + size))
+            scale = group.create_dataset(name, data=np.arange(size))
             scale.make_scale(name)
             what = "node" if "node" in name else "cell"
             scale.attrs["units"] = "1"
@@ -354,8 +328,6 @@ def open_dump(path: Path) -> h5py.File:
     try:
         with damage_told(path, "its format"):
             kind, version = file.attrs.get("format"), file.attrs.get("format_version")
-            if kind == FORMAT_OF_PARTS:
-                raise BadInput(f"{path} holds a part of a dump; the dump is what lists it")
             if kind != FORMAT:
                 words = f"{path} is HDF5 but not a shockgrid dump (its 'format' is {kind!r})"
                 raise BadInput(words)
@@ -365,9 +337,10 @@ def open_dump(path: Path) -> h5py.File:
                     f"{path} has {found}, and this shockgrid reads {FORMAT_VERSION} alone: use the "
                     "version of shockgrid that wrote it"
                 )
+            if "parts" in file:
+                raise BadInput(f"{path} is in parts: use the version of shockgrid that wrote it")
             if crc is None:
                 raise BadInput(f"{path} is damaged: it has lost its checksum")
-            check_parts(path, file)
     except BadInput:
         file.close()
         raise

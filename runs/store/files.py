@@ -15,18 +15,14 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import re
 import time
 import zlib
 from collections.abc import Iterable
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 from regrid.errors import BadInput
-
-if TYPE_CHECKING:
-    import h5py
 
 fcntl: Any = None  # on Windows
 msvcrt: Any = None  # everywhere else
@@ -210,14 +206,9 @@ def seal(image: bytes) -> list[memoryview | bytes]:
     return [head, b"%08x" % zlib.crc32(tail, zlib.crc32(head)), tail]
 
 
-def write_sealed(path: Path, image: bytes) -> str:
-    """Put the bytes of a dump with a blank checksum at `path`, as `write_atomically`.
-
-    Returns the checksum.
-    """
-    pieces = seal(image)
-    write_atomically(path, pieces)
-    return bytes(pieces[1]).decode("ascii")
+def write_sealed(path: Path, image: bytes) -> None:
+    """Put the bytes of a dump with a blank checksum at `path`, as `write_atomically`."""
+    write_atomically(path, seal(image))
 
 
 def find_sum(path: Path) -> str | None:
@@ -240,46 +231,3 @@ def find_sum(path: Path) -> str | None:
             sound = first[start : start + DIGITS] == b"%08x" % found
             judged[key] = None if place < 0 else f"{found:08x}" if sound else ""
         return judged[key]
-
-
-PARTS = "parts"  # the group of an index, whose attributes are its parts
-PART_NAME = re.compile(r"(.+)\.part-(\d+)-of-(\d+)\.h5")
-
-
-def find_parts_by_name(path: Path) -> list[Path]:
-    """The files beside the dump at `path` that are called parts of it."""
-    found = path.parent.glob(f"{path.stem}.part-*-of-*.h5")
-    return sorted(part for part in found if PART_NAME.fullmatch(part.name))
-
-
-def read_parts(file: h5py.File) -> dict[str, str]:
-    """The parts that an open dump lists: names of the files beside it, and their checksums.
-
-    {} for one that is whole in one file.  Raises KeyError where the list is lost.
-    """
-    if PARTS not in file:
-        return {}
-    parts = {name: str(crc) for name, crc in file[PARTS].attrs.items()}
-    if not parts:
-        raise KeyError(PARTS)
-    return parts
-
-
-def find_fault(path: Path, part: str, crc: str) -> str:
-    """What is wrong with a part of the index at `path`, in words that name it; "" for nothing."""
-    there = path.parent / part
-    if there.name != part or not there.is_file():
-        return f"its part {part} is not beside it"
-    found = find_sum(there)
-    if not found:
-        return f"its part {part} is truncated or damaged: its checksum is wrong"
-    if found != crc:
-        return f"its part {part} is of another dump (its checksum is {found}, not {crc})"
-    return ""
-
-
-def check_parts(path: Path, file: h5py.File) -> None:
-    """Raise BadInput where a part of an open dump is missing, damaged or another dump's."""
-    for part, crc in read_parts(file).items():
-        if fault := find_fault(path, part, crc):
-            raise BadInput(f"{path} cannot be read: {fault}")

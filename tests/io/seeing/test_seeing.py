@@ -15,7 +15,6 @@ from PIL import Image
 
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
-from runs.inspection.info import inspect_differences
 from runs.pictures import film
 from runs.pictures.fields import find_field
 from runs.pictures.film import make_film
@@ -49,8 +48,7 @@ def test_what_made_a_run_is_no_difference(shockgrid):
         file["provenance"].attrs["version"] = "0.0.1"
     path.write_bytes(b"".join(seal(path.read_bytes())))
     assert shockgrid("compare", "one", "other")[0] == 0
-    words = inspect_differences(str(one.dumps[-1].path), str(path))
-    assert "+/provenance/@version = '0.0.1'" in words and words.count("\n") == 3
+    assert "@version = '0.0.1'" in shockgrid("inspect", str(path))[1]
     with h5py.File(path, "r+") as file:  # as a dump of an older version
         del file["provenance"]
     path.write_bytes(b"".join(seal(path.read_bytes())))

@@ -133,9 +133,6 @@ class Processes:
         return pool.submit(task, argument), pool
 
 
-ANSWER = 20.0  # seconds for a scheduler to answer
-
-
 class Cluster:
     """An executor as an `Engine`: all tasks are handed over at once."""
 
@@ -173,39 +170,6 @@ def open_mpi() -> Iterator[Cluster | None]:
         yield None if executor is None else Cluster(cast(Executor, executor), workers)
 
 
-@contextlib.contextmanager
-def open_dask(address: str) -> Iterator[Cluster]:
-    """The workers of the dask scheduler at `address` ("127.0.0.1:8786").
-
-    A task whose worker dies is given to another.  BadInput where dask is missing, nothing answers,
-    or a worker computes several tasks in one process, which kernels do not allow.
-    """
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise BadInput(
-            f"--engine dask:// needs dask: pip install 'shockgrid[dask]' ({error})"
-        ) from error
-    try:
-        client = Client(address, timeout=ANSWER)
-    except (OSError, ValueError) as error:  # TimeoutError is an OSError
-        raise BadInput(f"--engine dask://{address}: no scheduler answers there") from error
-    with client:
-        workers = client.scheduler_info(n_workers=-1)["workers"]
-        if not workers:
-            raise BadInput(f"--engine dask://{address}: this scheduler has no workers")
-        if any(worker["nthreads"] > 1 for worker in workers.values()):
-            raise BadInput(
-                f"--engine dask://{address}: start the workers with --nthreads 1 "
-                "(--nworkers N for more of them)"
-            )
-        with client.get_executor() as executor:
-            yield Cluster(executor, len(workers))
-
-
-ENGINES = ("processes", "mpi", "dask://ADDRESS")
-
-
 class InTurn:
     """All tasks one after another in this process."""
 
@@ -222,25 +186,24 @@ class InTurn:
 
 
 @contextlib.contextmanager
-def open_engine(name: str = "processes", jobs: int | None = None) -> Iterator[Engine | None]:
-    """The engine `name`, one of ENGINES, with `jobs` workers (None: one a processor).
+def open_engine(
+    engine: str | Executor = "processes", jobs: int | None = None
+) -> Iterator[Engine | None]:
+    """The engine called "processes" or "mpi", or that of an executor, with `jobs` workers.
 
-    None on the ranks of MPI that only compute.  BadInput for an unknown name, for `jobs` where the
-    engine brings its own workers, and where a package or a scheduler is missing.
+    jobs: left out, one a processor, or one of an executor.  None on the ranks of MPI that only
+    compute.  BadInput for an unknown name, for `jobs` with MPI, and where mpi4py is missing.
     """
-    kind, _, address = name.partition("://")
-    if kind == "processes" and not address:
+    if isinstance(engine, Executor):
+        yield Cluster(engine, jobs or 1)
+    elif engine == "processes":
         jobs = jobs or count_processors()
-        if jobs == 1:
-            yield InTurn()
-            return
-        with Processes(jobs) as processes:
-            yield processes
-        return
-    if name != "mpi" and not (kind == "dask" and address):
-        raise BadInput(f"--engine {name!r}: there are {', '.join(ENGINES)}")
-    if jobs is not None:
-        raise BadInput(f"--jobs needs --engine processes; {name} has its own workers")
-
-    with open_mpi() if name == "mpi" else open_dask(address) as engine:
-        yield engine
+        with contextlib.nullcontext(InTurn()) if jobs == 1 else Processes(jobs) as opened:
+            yield opened
+    elif engine != "mpi":
+        raise BadInput(f"--engine {engine!r}: there are processes and mpi")
+    elif jobs is not None:
+        raise BadInput("--jobs needs --engine processes; mpi has its own workers")
+    else:
+        with open_mpi() as opened:
+            yield opened

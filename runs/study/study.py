@@ -23,6 +23,7 @@ import io
 import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -325,7 +326,7 @@ class Study:
 
     def run(
         self,
-        engine: str,
+        engine: str | Executor,
         jobs: int | None,
         tell: Callable[[int, Result, bool], None] = lambda number, result, there: None,
         retry: bool = False,
@@ -477,7 +478,7 @@ def study(
     settings: Mapping[str, Any] | None = None,
     shown: Sequence[str] = (),
     jobs: int | None = 1,
-    engine: str = "processes",
+    engine: str | Executor = "processes",
     refine: str | None = None,
     **keywords: Any,
 ) -> Study | None:
@@ -487,8 +488,9 @@ def study(
     takes the varied keys as keywords and returns numbers by name; vary: values by key, or words as
     `--vary` takes them ("1.2:3:7"), their product is computed; points: instead of it; settings, or
     keywords as for `run` (cells=32): keys for all points; output: the folder, made if need be;
-    shown: quantities of the picture; jobs, engine: as `open_engine` takes them (with several jobs a
-    script calls this under `if __name__ == "__main__":`, and a function is one of a module).
+    shown: quantities of the picture; jobs, engine: as `open_engine` takes them, an executor of
+    `concurrent.futures`, dask or mpi4py among them (with several jobs a script calls this under
+    `if __name__ == "__main__":`, and a function is one of a module).
 
     None on the ranks of MPI that only compute.  Raises BadInput for what cannot be a study; runs
     that fail are in `Study.failures`.  KeyboardInterrupt where it was stopped; it can be gone on

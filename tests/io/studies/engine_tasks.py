@@ -45,12 +45,6 @@ def square_or_die(argument: tuple[str, int]) -> int:
     return number * number
 
 
-def square_slowly(argument: tuple[str, int]) -> int:
-    """As `square`, a quarter of a second long."""
-    time.sleep(0.25)
-    return square(argument)
-
-
 def note_and_wait(folder: str) -> None:
     """Say which process this is, and do not end."""
     Path(folder, f"pid-{os.getpid()}").touch()

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import signal
 import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import engine_tasks
@@ -103,8 +103,7 @@ def is_alive(note: Path) -> bool:
 @pytest.mark.parametrize(
     ("name", "jobs", "words"),
     [
-        ("threads", None, "processes, mpi, dask://ADDRESS"),
-        ("dask://", None, "processes, mpi, dask://ADDRESS"),
+        ("threads", None, "processes and mpi"),
         ("mpi", 2, "has its own workers"),
     ],
 )
@@ -113,47 +112,11 @@ def test_wrong_engines_are_told(name, jobs, words):
         pass
 
 
-@contextlib.contextmanager
-def run_dask(tmp_path, *workers: str):
-    """A real scheduler and its workers on the loopback; its address and the workers' processes."""
-    pytest.importorskip("distributed", reason="dask is not installed (extra [dask])")
-    file = tmp_path / "scheduler.json"
-    dask = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
-    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(file)]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
-    options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
-    started = [subprocess.Popen([*dask, *options, "--scheduler-file", str(file)], **quiet)]
-    try:
-        while not file.exists():
-            assert started[0].poll() is None
-            time.sleep(0.02)
-        threads = workers or ("1", "1")
-        extra = ["--no-nanny", "--no-dashboard", "--host", "127.0.0.1", "--nthreads"]
-        started += [subprocess.Popen([*worker, *extra, count], **quiet) for count in threads]
-        import json
-
-        address = json.loads(file.read_text())["address"]
-        from distributed import Client
-
-        with Client(address) as client:
-            client.wait_for_workers(len(threads))
-        yield address.removeprefix("tcp://"), started[1:]
-    finally:
-        for process in started:
-            process.kill()
-            process.wait()
-
-
-def test_dask_computes_all_though_a_worker_is_killed(tmp_path, environment):
-    with run_dask(tmp_path) as (address, workers):
-        with open_engine(f"dask://{address}") as engine:
-            assert engine.workers == 2
-            arguments = [(str(tmp_path), number) for number in SQUARES]
-            found = {}
-            for place, result in engine.compute(engine_tasks.square_slowly, arguments):
-                if not found:
-                    workers[0].send_signal(signal.SIGKILL)
-                found[place + 1] = result
+def test_an_executor_is_an_engine(tmp_path):
+    with ThreadPoolExecutor(2) as executor, open_engine(executor, 2) as engine:
+        assert engine.workers == 2
+        found = compute(engine, engine_tasks.square, tmp_path, (0, *SQUARES))
+    assert isinstance(found.pop(0), ValueError)
     assert found == SQUARES
 
 

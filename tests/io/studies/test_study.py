@@ -117,7 +117,7 @@ def test_failures_are_rows_with_a_sentence(shockgrid, toy):
         (("--vary", "cells=4", "--vary", "cells=6", "-o", "s"), "given twice"),
         (("--vary", "cells=4,6", "--set", "cells=8", "-o", "s"), "is set, too"),
         (("--vary", "cells=4,6", "--refine", "cell", "-o", "s"), "did you mean 'cells'"),
-        (("--vary", "density=1,2", "--engine", "dusk://x", "-o", "s"), "dask://ADDRESS"),
+        (("--vary", "density=1,2", "--engine", "dusk", "-o", "s"), "processes and mpi"),
         (("--vary", "density=1,2", "--of", "hot", "-o", "s"), "there are: hottest"),
         (("--vary", "density=1,2", "-o", "full"), "holds something else (mine)"),
         (("--vary", "density=1,2", "-o", "file"), "is a file"),

@@ -1,4 +1,4 @@
-"""What a run costs: before it starts, how long it still takes, and why its steps become short.
+"""What a run costs: before it starts, how long it still takes, and that its steps become short.
 
 Before the run: the steps of the most similar past run, scaled with the first stable dt, or where
 nothing is built yet with the width of the finest cells.  A past run of the same flow has the same
@@ -7,11 +7,6 @@ beside this file, is written by `python benchmarks/forecast_table.py past`.
 
 During the run: the steps that are left by the trend of dt, times the wall time of a step; and the
 share of its wall time that a past run of the same flow had taken by the same part of the end time.
-
-Each time that dt has shrunk by another factor of the root of ten below its largest value so far, a
-line of run.log and an entry of the verdict say which cell sets it and where that lies.  Once, when
-it has shrunk a hundredfold, the user reads what can be changed.  Steps that are short on purpose do
-not count: the first five, the last two, those repeated with a smaller dt.
 """
 
 from __future__ import annotations
@@ -64,9 +59,7 @@ PARTS = np.linspace(0.0, 1.0, 21)  # of the end time of a past run
 # what was left over what was foretold, at its least and most, at the very start of runs
 FITTED, REMEMBERED = (0.8, 3.0), (0.65, 1.8)
 
-MOST = 4  # times the root of ten: a hundredfold
-NEAR = 2  # cells: so near to a side is beside it
-EQUAL = 1e-6  # relative: so near to the step's rate is the rate of the cell that set it
+FALLEN = 100.0  # times below its largest value: dt is worth a word
 
 
 class PastRun(msgspec.Struct, frozen=True):
@@ -308,79 +301,39 @@ class TimeLeft:
         return tuple(float(left * x**unknown) for x in (limits[0], 1.0, limits[1]))
 
 
-class StepTrend:
-    """Follows dt; note: takes a line for run.log, say: one for the screen, both seldom.
+class ShortSteps:
+    """Says once where dt has fallen FALLEN times below its largest value; say: takes the line.
 
-    marks: by `step`, `t`, `dt` how many times dt was `shrunk`; of the limiting cell `block`, `i`,
-    `j`, its centre `x`, `y` [m], None where it is no cell; `meaning`: what it lies beside.
+    Steps that are short on purpose do not count: the first five, the last two, those repeated with
+    a smaller dt.
     """
 
-    def __init__(self, evolution: Any, note: Callable[[str], None], say: Callable[[str], None]):
-        self.evolution, self.note, self.say = evolution, note, say
-        self.largest, self.level = 0.0, 0  # level: times the root of ten below the largest
-        self.marks: list[dict[str, Any]] = []
+    def __init__(self, evolution: Any, say: Callable[[str], None]):
+        self.evolution, self.say = evolution, say
+        self.largest, self.told = 0.0, False
 
     def resume(self, history: Mapping[str, np.ndarray]) -> None:
         """Continue where a restarted run was, from its history."""
         if math.isfinite(shrunk := measure_shrinkage(history)):
             counts = ~np.isin(history["dt_limit"], OWN_REASONS)
             self.largest = float(np.nanmax(history["dt"][counts]))
-            self.level = count_factors(shrunk)
+            self.told = shrunk >= FALLEN
 
     def follow(self, row: Mapping[str, Any]) -> None:
         """Take note of a step's history row."""
         dt, limit = row.get("dt"), row.get("dt_limit")
-        if dt is None or limit in OWN_REASONS or not dt > 0.0:
+        if self.told or dt is None or limit in OWN_REASONS or not dt > 0.0:
             return
         self.largest = max(self.largest, dt)
-        before, level, shrunk = self.level, count_factors(self.largest / dt), self.largest / dt
-        if level <= before:
+        if self.largest < FALLEN * dt:
             return
-        self.level, step, t = level, self.evolution.step, self.evolution.t
-        flow, meaning, words = getattr(self.evolution, "flow", None), str(limit or "step"), ""
-        cell: dict[str, Any] = dict.fromkeys(("block", "i", "j", "x", "y"))
-        if flow is not None and limit not in SHORT_STEPS:
-            block, i, j = find_limiting_cell(flow)
-            x, y = block.nodes[:, i : i + 2, j : j + 2].mean(axis=(1, 2)).tolist()
-            cell = {"block": block.name, "i": i, "j": j, "x": x, "y": y}
-            meaning = describe_place(block, i, j)
-            words = f", {block.name} i={i}, j={j} at ({x:.4g}, {y:.4g}) m"
-        mark = {"step": step, "t": t, "dt": float(dt), "shrunk": shrunk, **cell, "meaning": meaning}
-        self.marks.append(mark)
-        line = (
-            f"dt is {shrunk:.3g} times below its largest: {dt:.3g} s at step {step}, t = {t:.6g} s"
-            f"{words}; {meaning}"
+        self.told, where = True, ""
+        if limit not in SHORT_STEPS and math.isfinite(row.get("fastest_i", math.nan)):
+            block = self.evolution.blocks[int(row["fastest_block"])].name
+            where = f"; fastest cell: {block}, i={row['fastest_i']}, j={row['fastest_j']}"
+        step, t = self.evolution.step, self.evolution.t
+        self.say(
+            f"dt is {self.largest / dt:.3g} times below its largest: {dt:.3g} s at step {step}, "
+            f"t = {t:.6g} s, limited by {limit or 'step'}{where}; what can be changed: "
+            f"{describe_settings(str(limit))}"
         )
-        self.note(line)
-        if level >= MOST > before:
-            self.say(f"{line}; what can be changed: {describe_settings(meaning)}")
-
-
-def count_factors(ratio: float) -> int:
-    """How many times a ratio holds the root of ten."""
-    return math.floor(2.0 * math.log10(ratio) + 1e-9)
-
-
-def find_limiting_cell(flow: Any) -> tuple[Any, int, int]:
-    """Block, i and j of the cell that sets the next step.
-
-    Cells that share their states are faster than that: it is the one whose rate is the clock's, or
-    the nearest below.
-    """
-    most = flow.clock.rate * (1.0 + EQUAL)
-    rates = [np.where(block.rates <= most, block.rates, -1.0) for block in flow.blocks]
-    number = int(np.argmax([one.max() for one in rates]))
-    i, j = np.unravel_index(rates[number].argmax(), rates[number].shape)
-    return flow.blocks[number], int(i), int(j)
-
-
-def describe_place(block: Any, i: int, j: int) -> str:
-    """What a cell lies beside: the kinds of the segments within NEAR cells of it."""
-    ni, nj = (n - 1 for n in block.nodes.shape[1:])
-    away = {"i_min": i, "i_max": ni - 1 - i, "j_min": j, "j_max": nj - 1 - j}
-    kinds = dict.fromkeys(
-        one.kind
-        for one in block.segments
-        if away[one.side] < NEAR and one.start <= (j if one.side[0] == "i" else i) < one.stop
-    )
-    return f"beside: {', '.join(kinds)}" if kinds else "inside, away from all sides"

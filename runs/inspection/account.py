@@ -2,7 +2,7 @@
 
 A verdict is plain data: `status` ("finished", "stopped", "ended early", "unfinished"), `name` (the
 reason in a word or two), `reason` (its sentence), `trust` (list of what RULES found, each with
-`rule`, `value`, `limit`, `words`), and `dt_trend` (marks of `runs.forecast`).
+`rule`, `value`, `limit`, `words`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from regrid.errors import RunFailure
 
 History = Mapping[str, np.ndarray]
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
-PREFIXED = ("m", "s", "m/s", "Pa", "J", "J/kg", "N")
+PREFIXED = ("m", "s", "m/s", "Pa", "J", "J/kg", "N", "B")
 HEAD = "caution: "
 OWN_REASONS = ("start", "t_end", "end", "dump", "retry")  # of a step's length: no trend
 NONE = np.zeros(0)
@@ -50,9 +50,8 @@ def describe_seconds(low: float, high: float | None = None) -> str:
 
 def describe_bytes(number: float) -> str:
     """A number of bytes in the unit a person would choose."""
-    units = ((1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
-    size, unit = next((pair for pair in units if number >= pair[0]), units[-1])
-    return f"{number / size:.3g} {unit}"
+    factor, unit = pick_prefix(number, "B")
+    return f"{number * factor:.3g} {unit}"
 
 
 def describe_share(share: float) -> str:
@@ -305,7 +304,6 @@ def judge(
     history: History,
     cells: int,
     problem: Problem | None = None,
-    dt_trend: Sequence[Mapping[str, Any]] = (),
     name: str = "",
 ) -> dict[str, Any]:
     """The verdict on a run from its history; `cells`: of all its blocks; see the module.
@@ -322,10 +320,7 @@ def judge(
         found.append({"rule": "cautions", "value": number, "limit": 0, "words": words})
     if status != "ended early":
         name = reason.partition(" = ")[0].partition(",")[0]
-    return {
-        "status": status, "name": name or "failed", "reason": reason, "trust": found,
-        "dt_trend": [dict(mark) for mark in dt_trend],
-    }  # fmt: skip
+    return {"status": status, "name": name or "failed", "reason": reason, "trust": found}
 
 
 def describe_verdict(verdict: Mapping[str, Any]) -> str:

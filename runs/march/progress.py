@@ -17,7 +17,7 @@ from regrid.jit import read_clock
 from regrid.text_files import escape_controls
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import name_failure
-from runs.forecast import StepTrend, TimeLeft, find_past, measure_size, name_flow
+from runs.forecast import ShortSteps, TimeLeft, find_past, measure_size, name_flow
 from runs.gauges import NO_BLOCK
 from runs.inspection.account import count, count_cells, describe_seconds, describe_time, judge
 from runs.store.directory import RunDirectory, write_verdict
@@ -140,7 +140,7 @@ class Outlook:
         self.directory = directory
         self.began = evolution.step
         self.flow, self.size = name_flow(deck.problem, deck.deck), measure_size(problem, evolution)
-        self.trend = StepTrend(evolution, directory.note, say)
+        self.trend = ShortSteps(evolution, lambda line: (directory.note(line), say(line)))
         directory.verdict.unlink(missing_ok=True)
         if self.began:
             self.trend.resume(read_history(directory.history))
@@ -161,8 +161,7 @@ class Outlook:
         self, status: str, reason: str, history: Mapping[str, np.ndarray], name: str = ""
     ) -> dict[str, Any]:
         """Write the verdict, which is returned; name: of the cause of an early end."""
-        marks, cells = self.trend.marks, self.size.cells
-        verdict = judge(status, reason, history, cells, self.problem, marks, name)
+        verdict = judge(status, reason, history, self.size.cells, self.problem, name)
         write_verdict(self.directory, verdict)
         return verdict
 

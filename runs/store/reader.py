@@ -396,7 +396,7 @@ class RunData:
     def verdict(self) -> dict[str, Any] | None:
         """How the run ended (`status`, `name`, `reason`) and what limits `trust`; None: it did not.
 
-        Made by `runs.inspection.account`; `dt_trend` tells how dt fell, by which cell.
+        Made by `runs.inspection.account`.
         """
         return read_verdict(self.directory)
 

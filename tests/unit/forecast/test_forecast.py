@@ -10,57 +10,38 @@ import pytest
 
 from regrid.errors import BadInput, RegridFailure, RunFailure
 from runs.early_end.causes import name_failure
-from runs.forecast import Size, StepTrend, TimeLeft, describe_place, make_past_run
+from runs.forecast import ShortSteps, Size, TimeLeft, make_past_run
 from runs.inspection.account import RULES, describe_verdict, judge
 
 
-def make_block(name="a", ni=6, nj=8, squeezed=None):
-    """A block of squares; one cell thin."""
-    x, y = np.meshgrid(np.arange(ni + 1.0), np.arange(nj + 1.0), indexing="ij")
-    rates = np.ones((ni, nj))
-    if squeezed:  # a node line brought near to the one before it
-        i, j = squeezed
-        y[i : i + 2, j + 1 :] = y[i : i + 2, j : j + 1] + 0.01 * np.arange(1, nj - j + 1)
-        rates[squeezed] = 50.0
-    wall = SimpleNamespace(side="j_min", start=0, stop=ni, kind="wall")
-    return SimpleNamespace(name=name, nodes=np.array([x, y]), rates=rates, segments=[wall])
-
-
-def make_run(**options):
-    first, second = make_block("a"), make_block("b")
-    clock = SimpleNamespace(rate=1.0)
-    flow = SimpleNamespace(blocks=[first, second], clock=clock)
-    run = SimpleNamespace(flow=flow, step=0, t=0.0)
-    noted, said = [], []
-    trend = StepTrend(run, noted.append, said.append)
-    flow.blocks[1] = make_block("b", **options)
-    clock.rate = max(float(block.rates.max()) for block in flow.blocks)
-    return run, trend, noted, said
-
-
-def follow(run, trend, dts, limit="sound"):
+def follow(dts, limit="sound", history=None):
+    """The lines on steps of these lengths, behind those of a history."""
+    blocks = [SimpleNamespace(name="a"), SimpleNamespace(name="b")]
+    run, said = SimpleNamespace(blocks=blocks, step=0, t=0.0), []
+    short = ShortSteps(run, said.append)
+    short.resume(history or {})
     for dt in dts:
         run.step, run.t = run.step + 1, run.t + dt
-        trend.follow({"dt": dt, "dt_limit": limit})
+        cell = {"fastest_block": 1, "fastest_i": 3, "fastest_j": 4}
+        short.follow({"dt": dt, "dt_limit": limit, **cell})
+    return said
 
 
-def test_a_line_for_every_factor_of_the_root_of_ten_and_settings_once():
-    run, trend, noted, said = make_run(squeezed=(3, 4))
-    follow(run, trend, np.geomspace(1.0, 1.01e-3, 400))
-    assert len(noted) == len(trend.marks) == 5  # 3.2, 10, 32, 100, 316
-    assert [round(np.log10(mark["shrunk"]), 1) for mark in trend.marks] == [0.5, 1.0, 1.5, 2.0, 2.5]
-    assert len(said) == 1 and "what can be changed: run.small_cells=0.1" in said[0]
-    assert "b i=3, j=4 at (3.5, 4.005) m" in noted[0] and "inside" in noted[0]
+def test_a_hundredth_of_the_largest_dt_is_told_once_with_cell_and_settings():
+    (line,) = follow(np.geomspace(1.0, 1.01e-3, 400))
+    assert "limited by sound; fastest cell: b, i=3, j=4; " in line
+    assert "what can be changed: run.small_cells=0.1" in line
+    (line,) = follow([1.0, 5e-3], "stretching")
+    assert "cell:" not in line and "what can be changed: run.cfl halved" in line
+    assert not follow([1.0, 0.011, 0.5, 0.02]) and not follow([1.0, 1e-6], "retry")
 
 
-def test_a_larger_dt_is_a_new_start_and_a_fall_is_not_told_twice():
-    run, trend, noted, _ = make_run()
-    follow(run, trend, [1.0, 0.2, 1.0, 0.2, 0.31])
-    assert len(noted) == 1
-    follow(run, trend, [10.0, 2.0])
-    assert len(noted) == 1, "a fifth of the largest was told of already"
-    follow(run, trend, [0.9])
-    assert len(noted) == 2
+def test_a_restarted_run_knows_what_was_told_before():
+    words = np.array(["", "start", "sound", "sound"])
+    before = {"dt": np.array([np.nan, 5.0, 1.0, 0.02]), "dt_limit": words}
+    assert len(follow([0.009], history=before)) == 1
+    before["dt"][-1] = 0.009
+    assert not follow([0.008, 0.001], history=before)
 
 
 def march(step_of, t_end=1.0, seconds=lambda t: 0.01):
@@ -189,14 +170,3 @@ def test_an_early_end_has_the_name_of_its_cause(error, name):
     assert verdict["name"] == name
     line = describe_verdict(verdict)
     assert line.startswith(f"verdict: ended early, {name};") and "\n" not in line
-
-
-def test_a_cell_is_told_by_what_it_lies_beside():
-    def part(side, kind, start=0, stop=12):
-        return SimpleNamespace(side=side, start=start, stop=stop, kind=kind)
-
-    block = SimpleNamespace(nodes=np.zeros((2, 13, 13)))
-    block.segments = [part("i_max", "interface"), part("j_min", "axis"), part("j_max", "wall")]
-    cells = {(11, 6): "interface", (11, 0): "interface, axis", (5, 0): "axis", (5, 11): "wall"}
-    assert {cell: describe_place(block, *cell).removeprefix("beside: ") for cell in cells} == cells
-    assert describe_place(block, 5, 5) == "inside, away from all sides"

@@ -90,7 +90,7 @@ soak: $(DEVELOP)
 
 # PEER: a built checkout of CloverLeaf_ref to measure beside
 bench: $(INSTALL)
-	@$(BIN)/shockgrid bench --runs long --json docs/results/bench.json $(PEER:%=--peer %)
+	@$(BIN)/python benchmarks/flow_speed.py --runs long --json docs/results/bench.json $(PEER:%=--peer %)
 	@for file in benchmarks/bench_*.py; do echo "== $$file"; \
 	  $(BIN)/python $$file --json docs/results/bench.json || exit 1; done
 	@$(BIN)/python docs/generate.py

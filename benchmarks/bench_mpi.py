@@ -21,13 +21,12 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from result_tables import Tables  # noqa: E402
+from result_tables import Tables, describe_machine  # noqa: E402
 
 from benchmarks.mpi_scaling.cases import Case, Timing, find_mpiexec, measure  # noqa: E402
 from benchmarks.mpi_scaling.model import describe_load, fit, predict  # noqa: E402
 from benchmarks.mpi_scaling.picture import draw  # noqa: E402
 from benchmarks.mpi_scaling.projection import project  # noqa: E402
-from runs.bench import describe_machine  # noqa: E402
 
 RESULT = ROOT / "docs" / "results" / "mpi.json"
 PICTURE = ROOT / "docs" / "pictures" / "scaling.png"

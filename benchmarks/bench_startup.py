@@ -11,9 +11,7 @@ import subprocess
 import sys
 import tempfile
 
-from result_tables import Tables
-
-from runs.bench import read_child_time
+from result_tables import Tables, read_child_time
 
 REPEATS = 5
 RUN = """

@@ -1,16 +1,51 @@
-"""Tables of the benchmarks: those of `runs.bench`, kept as JSON by `--json FILE`."""
+"""Tables of the benchmarks, kept as JSON by `--json FILE`; the machine; time of ended commands."""
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
+import platform
 import sys
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
-from runs import bench as tables
+import msgspec
+
+from regrid.errors import BadInput
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None  # type: ignore[assignment]
 
 
-class Tables(tables.Tables):
-    """Tables of a script; `options` are what its `parser` has read."""
+def read_child_time() -> Any:
+    """Use of ended child processes (`ru_utime`, `ru_stime` [s]); BadInput if it is not counted."""
+    if resource is None:
+        raise BadInput(
+            "bench: this system does not tell the CPU time of a command that has ended; "
+            "flow_speed.py can with --runs none and without --peer"
+        )
+    return resource.getrusage(resource.RUSAGE_CHILDREN)
+
+
+def describe_machine() -> str:
+    """Kind of processor, its threads, the load and the versions that decide speed."""
+    words = [f"{platform.machine()}, {os.cpu_count()} hardware threads"]
+    if hasattr(os, "getloadavg"):
+        words.append(f"load {os.getloadavg()[0]:.1f} at the end")
+    words += [f"Python {platform.python_version()}"]
+    words += [f"{name} {version(name)}" for name in ("numpy", "numba", "scipy")]
+    return ", ".join(words)
+
+
+class Tables:
+    """Rows by table, of a script; `options` are what its `parser` has read.
+
+    Each row is printed at once; `write` puts all into the file of --json, if one is named.
+    """
 
     def __init__(self, parser: argparse.ArgumentParser):
         parser.add_argument("--json", metavar="FILE", help="keep the tables in this file, too")
@@ -24,5 +59,34 @@ class Tables(tables.Tables):
         words = [f"python {here.as_posix()}"]
         if getattr(sys.modules["__main__"], "__spec__", None) is not None:
             words = ["python -m", ".".join(here.with_suffix("").parts)]
-        command = " ".join([*words, *given])
-        super().__init__(self.options.json, command, lambda line: print(line, flush=True))
+        self.command = " ".join([*words, *given])
+        self.path = Path(self.options.json) if self.options.json else None
+        self.rows: dict[str, list[dict[str, Any]]] = {}
+        if self.path and not self.path.parent.is_dir():
+            raise BadInput(f"{self.path}: there is no directory {self.path.parent}")
+        self.known = self._read()
+
+    def _read(self) -> dict[str, Any]:
+        if self.path is None or not self.path.exists():
+            return {}
+        try:
+            return msgspec.json.decode(self.path.read_bytes(), type=dict[str, Any])
+        except (OSError, msgspec.MsgspecError, RecursionError) as error:
+            raise BadInput(f"{self.path} is not a JSON file of measurements: {error}") from None
+
+    def add(self, table: str, **row: str | int | float) -> None:
+        """One more row; numbers are rounded to three digits."""
+        kept = {k: float(f"{v:.3g}") if isinstance(v, float) else v for k, v in row.items()}
+        self.rows.setdefault(table, []).append(kept)
+        words = "  ".join(f"{head} {value}" for head, value in kept.items())
+        print(f"{table}: {words}", flush=True)
+
+    def write(self) -> None:
+        """Put the tables into the file, if one is named."""
+        if self.path is None:
+            return
+        for table, rows in self.rows.items():
+            made = {"command": self.command, "machine": describe_machine()}
+            self.known[table] = {**made, "rows": rows}
+        text = json.dumps(self.known, indent=1, ensure_ascii=False) + "\n"
+        self.path.write_text(text, encoding="utf-8")

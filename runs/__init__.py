@@ -2,5 +2,5 @@
 
 Rooms, each importing only those to its left:
 
-    deck, engines <- store <- inspection <- march, pictures <- grids, verify, bench <- study <- cli
+    deck, engines <- store <- inspection <- march, pictures <- grids, verify <- study <- cli
 """

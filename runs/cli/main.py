@@ -1,5 +1,5 @@
 """The command line: `shockgrid list | run | restart | study | check | schema | info | inspect |
-plot | film | export | report | compare | grid | verify | bench`.
+plot | film | export | report | compare | grid | verify`.
 
 Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes:
 0 well, 1 `compare` found a difference or `verify` a missed bar, 2 bad input, 3 the physics
@@ -181,7 +181,7 @@ def restart(
 @setting
 @click.option("-o", "--output", metavar="DIR", help="Folder of the study.")
 @click.option("--jobs", type=click.IntRange(1), help="Parallel runs [one per processor].")
-@click.option("--engine", default="processes", help="processes, mpi or dask://ADDRESS [processes].")
+@click.option("--engine", default="processes", help="processes or mpi [processes].")
 @click.option("--of", "shown", multiple=True, metavar="NAME", help="Quantity to draw and print.")
 @click.option("--refine", metavar="KEY", help="The key of cells, for orders [cells].")
 @click.option("--retry", is_flag=True, help="Also continue failed runs.")
@@ -254,15 +254,11 @@ def info(path, deck) -> int:
 
 @cli.command()
 @click.argument("file")
-@click.argument("other", required=False)
-def inspect(file, other) -> None:
-    """Print a dump's contents: names, shapes, units, ranges, NaNs, checksums.
-
-    With OTHER, print how that file differs from FILE, array by array.
-    """
+def inspect(file) -> None:
+    """Print a dump's contents: names, shapes, units, ranges, NaNs, checksums."""
     from runs.inspection.info import inspect as describe
 
-    echo(describe(file, other))
+    echo(describe(file))
 
 
 @cli.command()
@@ -381,27 +377,6 @@ def verify(**words) -> int:
     from runs.verify import verify as run_all
 
     return run_all(**words, say=echo)
-
-
-@cli.command()
-@click.option("--cells", type=click.IntRange(8, 4000), default=400, help="Square of cells [400].")
-@click.option("--rounds", type=click.IntRange(1), default=5, help="Timings of each case [5].")
-@click.option(
-    "--runs",
-    type=click.Choice(["none", "default", "long", "large"]),
-    default="default",
-    help="Whole commands: the default problem's; long: a mushroom, too; large: 25 minutes.",
-)
-@click.option("--json", "path", metavar="FILE", help="Also write the tables to this file.")
-@click.option("--peer", metavar="DIR", help="A built CloverLeaf_ref to measure beside.")
-def bench(**words) -> None:
-    """Measure how fast this computer is, and where the time goes.
-
-    Run nothing else meanwhile: other work distorts the timings.
-    """
-    from runs.bench import bench as measure
-
-    measure(**words, say=echo)
 
 
 def _with_threads(settings: tuple[str, ...], threads: int | None) -> tuple[str, ...]:

@@ -60,7 +60,7 @@ ROOMS = (
     ("runs.early_end",),
     ("runs.forecast",),
     ("runs.march",),
-    ("runs.grids", "runs.verify", "runs.bench"),
+    ("runs.grids", "runs.verify"),
     ("runs.study",),
     ("runs.report",),
     ("runs.interface",),

@@ -1,13 +1,15 @@
-"""`shockgrid bench`: how fast this machine computes, and where the time of a step goes.
+"""How fast this machine computes, and where the time of a step goes.
 
-CloverLeaf_ref, compiled Fortran on a grid at rest, can be measured beside it (`--peer`).
+    python benchmarks/flow_speed.py [--runs long] [--peer CHECKOUT]
+
+CloverLeaf_ref, compiled Fortran on a grid at rest, can be measured beside it (`--peer`).  Run
+nothing else meanwhile: other work distorts the timings.
 """
 
 from __future__ import annotations
 
-import json
+import argparse
 import os
-import platform
 import shutil
 import statistics
 import subprocess
@@ -15,13 +17,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
-import msgspec
 import numba
 import numpy as np
+from result_tables import Tables, describe_machine, read_child_time
 
 from hydro.block import Block
 from hydro.boundary import put
@@ -32,22 +32,6 @@ from hydro.simulation import Simulation
 from regrid.errors import BadInput
 from regrid.registry import make_regridder
 from runs.store.reader import RunData
-
-try:
-    import resource
-except ImportError:  # Windows
-    resource = None  # type: ignore[assignment]
-
-
-def read_child_time() -> Any:
-    """Use of ended child processes (`ru_utime`, `ru_stime` [s]); BadInput if it is not counted."""
-    if resource is None:
-        raise BadInput(
-            "bench: this system does not tell the CPU time of a command that has ended; "
-            "take --runs none and leave out --peer"
-        )
-    return resource.getrusage(resource.RUSAGE_CHILDREN)
-
 
 CELLS, STEPS = 400, 87
 DECK = """*clover
@@ -125,53 +109,8 @@ def compare_speeds(speeds: list[float], others: list[float], peer: Peer | None) 
     return row
 
 
-def describe_machine() -> str:
-    """Kind of processor, its threads, the load and the versions that decide speed."""
-    words = [f"{platform.machine()}, {os.cpu_count()} hardware threads"]
-    if hasattr(os, "getloadavg"):
-        words.append(f"load {os.getloadavg()[0]:.1f} at the end")
-    words += [f"Python {platform.python_version()}"]
-    words += [f"{name} {version(name)}" for name in ("numpy", "numba", "scipy")]
-    return ", ".join(words)
-
-
-class Tables:
-    """Rows by table; `path`: of the JSON file, or None; `say` receives each row at once."""
-
-    def __init__(self, path: str | None, command: str, say: Callable[[str], None]):
-        self.path, self.command, self.say = Path(path) if path else None, command, say
-        self.rows: dict[str, list[dict[str, Any]]] = {}
-        if self.path and not self.path.parent.is_dir():
-            raise BadInput(f"{self.path}: there is no directory {self.path.parent}")
-        self.known = self._read()
-
-    def _read(self) -> dict[str, Any]:
-        if self.path is None or not self.path.exists():
-            return {}
-        try:
-            return msgspec.json.decode(self.path.read_bytes(), type=dict[str, Any])
-        except (OSError, msgspec.MsgspecError, RecursionError) as error:
-            raise BadInput(f"{self.path} is not a JSON file of measurements: {error}") from None
-
-    def add(self, table: str, **row: str | int | float) -> None:
-        """One more row; numbers are rounded to three digits."""
-        kept = {k: float(f"{v:.3g}") if isinstance(v, float) else v for k, v in row.items()}
-        self.rows.setdefault(table, []).append(kept)
-        self.say(f"{table}: " + "  ".join(f"{head} {value}" for head, value in kept.items()))
-
-    def write(self) -> None:
-        """Put the tables into the file, if one is named."""
-        if self.path is None:
-            return
-        for table, rows in self.rows.items():
-            made = {"command": self.command, "machine": describe_machine()}
-            self.known[table] = {**made, "rows": rows}
-        text = json.dumps(self.known, indent=1, ensure_ascii=False) + "\n"
-        self.path.write_text(text, encoding="utf-8")
-
-
 PARTS = ("sides", "regrid", "flow")
-RUNS = ("none", "default", "long", "large")  # choices of `--runs`: so many of COMMANDS
+RUNS = ("none", "default", "long", "large")  # so many of COMMANDS; the last take 25 minutes
 COMMANDS: tuple[tuple[str, ...], ...] = (
     ("interface-instability",),
     ("interface-instability-mushroom",),
@@ -319,27 +258,26 @@ flow-parts: how the time of such a step divides. commands: whole commands, start
 included, kernels compiled before; what their shares leave of the wall time is start and output."""
 
 
-def bench(
-    cells: int,
-    rounds: int,
-    runs: str,
-    path: str | None,
-    peer: str | None,
-    say: Callable[[str], None],
-) -> None:
-    """Measure and print; into the JSON file `path`, if one is named.
-
-    runs: one of `RUNS`; peer: a built checkout of CloverLeaf_ref to measure beside, or None.
-    Raises BadInput.
-    """
-    words = ["shockgrid bench", f"--cells {cells}", f"--rounds {rounds}"]
-    command = " ".join([*words, f"--runs {runs}", *["--peer CHECKOUT"] * (peer is not None)])
-    tables = Tables(path, command, say)
-    beside = Peer(peer) if peer else None
-    say(describe_machine().replace(" at the end", " now"))
-    say(EXPLANATION)
-    measure_flow(tables, cells, rounds, beside)
-    measure_threads(tables, (cells // 2, cells), rounds)
-    for words_of_run in COMMANDS[: RUNS.index(runs)]:
-        measure_command(tables, words_of_run, rounds, beside)
+def main() -> None:
+    """Measure and print; into the JSON file of --json, if one is named."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--cells", type=int, default=400, help="square of cells [400]")
+    parser.add_argument("--rounds", type=int, default=5, help="timings of each case [5]")
+    parser.add_argument("--runs", choices=RUNS, default="default", help="whole commands [default]")
+    parser.add_argument("--peer", metavar="DIR", help="a built CloverLeaf_ref to measure beside")
+    tables = Tables(parser)
+    words = tables.options
+    beside = Peer(words.peer) if words.peer else None
+    if words.peer:  # a path of this machine says nothing elsewhere
+        tables.command = tables.command.replace(words.peer, "CHECKOUT")
+    print(describe_machine().replace(" at the end", " now"))
+    print(EXPLANATION)
+    measure_flow(tables, words.cells, words.rounds, beside)
+    measure_threads(tables, (words.cells // 2, words.cells), words.rounds)
+    for command in COMMANDS[: RUNS.index(words.runs)]:
+        measure_command(tables, command, words.rounds, beside)
     tables.write()
+
+
+if __name__ == "__main__":
+    main()

@@ -27,12 +27,13 @@ sys.path.insert(0, str(ROOT))
 from hydro.clock import START_FACTORS  # noqa: E402
 from runs.deck.reading import read_deck  # noqa: E402
 from runs.forecast import (  # noqa: E402
+    PARTS,
     PAST_RUNS,
+    PastRun,
     TimeLeft,
     drop_events,
     find_past,
     foretell_steps,
-    make_past_run,
     measure_size,
     name_flow,
     read_past,
@@ -91,14 +92,18 @@ def run(deck: str, setting: str, folder: Path) -> tuple[RunData, int]:
     return RunData(folder / deck), usage.ru_maxrss * 1024
 
 
-def make_past(deck: str, setting: str, folder: Path) -> Any:
+def make_past(deck: str, setting: str, folder: Path) -> PastRun:
     """The entry of past_runs.json."""
     data, _ = run(deck, setting, folder)
-    read = read_deck(deck, (setting,))
-    size = measure_size(data.problem)
-    row = data.history
+    read, size, row = read_deck(deck, (setting,)), measure_size(data.problem), data.history
     first_dt = float(row["dt"][1]) / START_FACTORS[0]
-    return make_past_run(name_flow(read.problem, read.deck), size, first_dt, row)
+    seconds = drop_events(np.nan_to_num(row["seconds_step"]))
+    done = np.interp(PARTS * size.t_end, row["t"], seconds.cumsum() / seconds.sum())
+    return PastRun(
+        name_flow(read.problem, read.deck), size.cells, size.t_end, size.finest, first_dt,
+        int(row["step"][-1]), tuple(done.round(4).tolist()),
+        float(f"{np.quantile(seconds[2:], 0.25):.3g}"),
+    )  # fmt: skip
 
 
 def judge(deck: str, setting: str, folder: Path) -> dict[str, Any]:
@@ -110,8 +115,8 @@ def judge(deck: str, setting: str, folder: Path) -> dict[str, Any]:
     history = data.history
     first_dt = float(history["dt"][1]) / START_FACTORS[0]
     steps = int(history["step"][-1])
-    foretold = foretell_steps(read, size, first_dt)
     past = find_past(name_flow(read.problem, read.deck), size.cells)
+    foretold = foretell_steps(size, past, first_dt, read.deck.run.max_steps)
     t, seconds = history["t"][1:], history["seconds_step"][1:].copy()
     seconds[0] = np.median(seconds)  # loading kernels
     wall = np.cumsum(drop_events(seconds))

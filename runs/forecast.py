@@ -1,12 +1,7 @@
 """What a run costs: before it starts, how long it still takes, and that its steps become short.
 
-Before the run: the steps of the most similar past run, scaled with the first stable dt, or where
-nothing is built yet with the width of the finest cells.  A past run of the same flow has the same
-problem and the same keys of the deck, but for cells, `run`, `output` and gauges.  past_runs.json,
-beside this file, is written by `python benchmarks/forecast_table.py past`.
-
-During the run: the steps that are left by the trend of dt, times the wall time of a step; and the
-share of its wall time that a past run of the same flow had taken by the same part of the end time.
+docs/cost.md says how; past_runs.json, beside this file, is written by `python
+benchmarks/forecast_table.py past`.
 """
 
 from __future__ import annotations
@@ -27,22 +22,16 @@ from regrid.errors import BadInput
 from runs.deck.checking import find_changes
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import SHORT_STEPS, describe_settings
-from runs.inspection.account import (
-    OWN_REASONS,
-    count,
-    describe_bytes,
-    describe_seconds,
-    measure_shrinkage,
-)
+from runs.inspection.account import OWN_REASONS
+from runs.quantities import count, describe_bytes, describe_seconds
 from runs.store.directory import KEPT_RESTARTS
 
 DUMP_BYTES = 64  # a cell in a dump: nodes, five fields and a rate
 BLOCK_BYTES = 30_000  # of a block in a dump, for the form of the file; measured
 ROW_BYTES = 600  # of a step in history.csv; measured
-# steps over those foretold, at the least and most: from a run of this flow to this time, or else
+# steps over those foretold, at the least and most: from a run to this time, or to another
 SAME, LIKE = (0.75, 1.5), (0.5, 5.0)
 TIGHT = 0.9  # part of the free disk that a run may be foretold to fill without a word
-MOST_NAMED = 6  # blocks in a line
 
 PAST_RUNS = Path(__file__).with_name("past_runs.json")
 SURE = 1.6  # a step's wall time may be so many times that of a past run, or less
@@ -86,10 +75,8 @@ class PastRun(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class Size:
-    """Cells of all blocks, which are named with their cells both ways, and their least width [m].
-
-    t_end: the end [s]; memory, dump: bytes.
-    """
+    """Cells of all blocks, which are named with their cells both ways, their least width [m], the
+    end [s], and bytes of memory and of a dump."""
 
     cells: int
     blocks: tuple[tuple[str, tuple[int, ...]], ...]
@@ -116,19 +103,6 @@ def read_past() -> list[PastRun]:
     return msgspec.json.decode(PAST_RUNS.read_bytes(), type=list[PastRun])
 
 
-def make_past_run(
-    flow: str, size: Size, first_dt: float, history: Mapping[str, np.ndarray]
-) -> PastRun:
-    """A past run from the history of a whole run."""
-    steps = history["step"]
-    seconds = drop_events(np.nan_to_num(history["seconds_step"]))
-    done = np.interp(PARTS * size.t_end, history["t"], seconds.cumsum() / seconds.sum())
-    return PastRun(
-        flow, size.cells, size.t_end, size.finest, first_dt, int(steps[-1]),
-        tuple(done.round(4).tolist()), float(f"{np.quantile(seconds[2:], 0.25):.3g}"),
-    )  # fmt: skip
-
-
 def drop_events(seconds: np.ndarray) -> np.ndarray:
     """Wall times [s] of steps (n,), those of far slower ones made usual: kernels that compile when
     they are first needed, another program on the machine."""
@@ -137,14 +111,9 @@ def drop_events(seconds: np.ndarray) -> np.ndarray:
 
 
 def find_past(flow: str, cells: int) -> PastRun | None:
-    """The past run most like a flow: of the same one, or else of the problem with its defaults, or
-    else of the problem; with cells nearest in number."""
-    problem = flow.partition("; ")[0]
-    return min(
-        (run for run in read_past() if run.flow.partition("; ")[0] == problem),
-        key=lambda run: (run.flow != flow, run.flow != problem, run.is_off(cells)),
-        default=None,
-    )
+    """The past run of a flow with cells nearest in number; None where there is none."""
+    same = (run for run in read_past() if run.flow == flow)
+    return min(same, key=lambda run: run.is_off(cells), default=None)
 
 
 def measure_size(problem: Problem, evolution: Any = None) -> Size:
@@ -153,8 +122,7 @@ def measure_size(problem: Problem, evolution: Any = None) -> Size:
     plan = problem.plan() if evolution is None else None
     if plan is None:
         evolution = evolution or problem.build()
-        blocks = {block.name: block.nodes for block in evolution.blocks}
-        plan = evolution.t_end, plan_blocks(blocks)
+        plan = evolution.t_end, plan_blocks({b.name: b.nodes for b in evolution.blocks})
     t_end, planned = plan
     sizes = [math.prod(block.cells) for block in planned]
     widths = np.ravel([np.subtract(b.high, b.low) / b.cells for b in planned])
@@ -165,23 +133,18 @@ def measure_size(problem: Problem, evolution: Any = None) -> Size:
 
 
 def foretell_steps(
-    read: ReadDeck, size: Size, first_dt: float | None
+    size: Size, past: PastRun | None, first_dt: float | None, most: int | None = None
 ) -> tuple[float, float, float] | None:
-    """Steps of a run: the least, the likely, the most; None where nothing is known.
+    """Steps of a run, `most` at most: the least, the likely, the most; None without a past run.
 
     first_dt: the first stable step [s], None where nothing is built.
     """
-    flow = name_flow(read.problem, read.deck)
-    past = find_past(flow, size.cells)
-    same = past is not None and past.flow == flow
-    if not 0.0 < size.t_end < math.inf or (first_dt is None and not same):
-        return None  # the speeds of another flow are others: without a first step they tell nothing
-    steps, limits = size.t_end / (first_dt or size.finest), LIKE
-    if past is not None:
-        steps *= past.steps * (past.first_dt if first_dt else past.finest) / past.t_end
-        limits = SAME if same and 0.95 < size.t_end / past.t_end < 1.05 else LIKE
-    most = read.deck.run.max_steps or math.inf
-    low, likely, high = (min(factor * steps, most) for factor in (limits[0], 1.0, limits[1]))
+    if past is None or not 0.0 < size.t_end < math.inf:
+        return None
+    steps = past.steps * size.t_end / past.t_end
+    steps *= past.first_dt / first_dt if first_dt else past.finest / size.finest
+    low, high = SAME if 0.95 < size.t_end / past.t_end < 1.05 else LIKE
+    low, likely, high = (min(factor * steps, most or math.inf) for factor in (low, 1.0, high))
     return low, likely, high
 
 
@@ -197,22 +160,21 @@ def foretell(
     with read.numbers_in_reach():
         size = measure_size(problem, evolution)
     clock, wanted = getattr(evolution, "clock", None), read.deck.output
-    steps = foretell_steps(read, size, None if clock is None else clock.first_stable_dt)
+    past = find_past(name_flow(read.problem, read.deck), size.cells)
+    first_dt = None if clock is None else clock.first_stable_dt
+    steps = foretell_steps(size, past, first_dt, read.deck.run.max_steps)
     words = "steps and time are unknown before the start: no run of this flow yet"
-    if steps is not None:
+    if past is not None and steps is not None:
         low, likely, high = (max(round(float(f"{number:.2g}")), 1) for number in steps)
         words = f"about {likely}{f' ({low} to {high})' * (low < high)} steps; "
-        past = find_past(name_flow(read.problem, read.deck), size.cells)
-        sure = SURE * math.exp(UNSURE * past.is_off(size.cells)) if past else math.inf
-        if past is None or steps[2] / steps[0] * sure**2 > WIDEST:
+        sure = SURE * math.exp(UNSURE * past.is_off(size.cells))
+        if steps[2] / steps[0] * sure**2 > WIDEST:
             words += "the time of a step is measured in the run"
         else:
             a_step = past.seconds * (max(size.cells, 1) / past.cells) ** WORK
             seconds = describe_seconds(steps[0] * a_step / sure, steps[2] * a_step * sure)
             words += f"time stepping will take {seconds} on a desktop computer"
-    named = [f"{name} {' x '.join(map(str, cells))}" for name, cells in size.blocks[:MOST_NAMED]]
-    more = len(size.blocks) - len(named)
-    cells = f"{size.cells} cells ({', '.join(named)}{f' and {more} more blocks' * (more > 0)})"
+    cells = f"{size.cells} cells in {count(len(size.blocks), 'block')}"
     if getattr(read.deck, "refine", False):
         cells += " initially, more where the interface needs them later (refine)"
     between = max(wanted.dumps - 1, 0)  # besides the first and the last
@@ -225,23 +187,17 @@ def foretell(
     free = find_free(folder)
     a_dump, needed, there = map(describe_bytes, (size.dump, disk, free))
     told = (
-        f"the run will need about {needed} of disk, where {there} are free (the disk of {folder}): "
-        "free some, or take fewer dumps (output.dumps) or lighter ones (output.fields, "
-        "output.precision, output.compression)"
+        f"the run will need about {needed} of disk, two dumps of {a_dump} at least, where {there} "
+        f"are free (the disk of {folder}): free some, choose another folder with -o, or take fewer "
+        "dumps (output.dumps) or lighter ones (output.fields, output.precision, output.compression)"
     )
-    if free < 2.0 * size.dump:
-        told = (
-            f"the disk of {folder} has {there} free, and a run needs two dumps of {a_dump} at the "
-            "least; free some, choose another folder with -o or take fewer cells"
-        )
-        if evolution is not None:
-            raise BadInput(told)
-    cautions = [f"caution: {told}"] * (disk > TIGHT * free)
+    if free < 2.0 * size.dump and evolution is not None:
+        raise BadInput(told)
     return [
         f"cost: {cells}; {words}",
         f"cost: memory about {describe_bytes(size.memory)}; disk about {needed} "
         f"({count(round(dumps), 'dump')} of {a_dump}{f', {there} free' * math.isfinite(free)})",
-    ], cautions
+    ], [f"caution: {told}"] * (disk > TIGHT * free)
 
 
 def find_free(folder: Path) -> float:
@@ -311,13 +267,6 @@ class ShortSteps:
     def __init__(self, evolution: Any, say: Callable[[str], None]):
         self.evolution, self.say = evolution, say
         self.largest, self.told = 0.0, False
-
-    def resume(self, history: Mapping[str, np.ndarray]) -> None:
-        """Continue where a restarted run was, from its history."""
-        if math.isfinite(shrunk := measure_shrinkage(history)):
-            counts = ~np.isin(history["dt_limit"], OWN_REASONS)
-            self.largest = float(np.nanmax(history["dt"][counts]))
-            self.told = shrunk >= FALLEN
 
     def follow(self, row: Mapping[str, Any]) -> None:
         """Take note of a step's history row."""

@@ -19,7 +19,7 @@ import numpy as np
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import read_deck, suggest_deck
 from runs.engines import Engine, InTurn, open_engine
-from runs.store.files import check_replaceable, disk_errors
+from runs.store.files import check_free, write_atomically
 from runs.store.provenance import describe_software
 
 
@@ -359,9 +359,7 @@ def verify(
     """
     cases = choose_cases(problems)
     if output is not None:
-        check_replaceable(Path(output))
-        if not Path(output).parent.is_dir():
-            raise BadInput(f"verify: there is no folder {str(Path(output).parent)!r} to write into")
+        check_free(Path(output))
     widths = [15, 59, 4, 9, 5, 9, 3, 6]
     say("  ".join(f"{head:{width}}" for head, width in zip(HEADS, widths, strict=False)).rstrip())
     records = []
@@ -374,8 +372,7 @@ def verify(
     if output is not None:
         words = ["shockgrid verify", *problems, *(["--short"] if short else []), "-o", output]
         made = {"command": " ".join(words), "made_by": describe_software(), "rows": records}
-        with disk_errors(Path(output)):
-            text = json.dumps(made, indent=1, allow_nan=False) + "\n"
-            Path(output).write_text(text, encoding="utf-8")
+        text = json.dumps(made, indent=1, allow_nan=False) + "\n"
+        write_atomically(Path(output), text)
         say(f"written: {output}")
     return 1 if any(record["met"] is False for record in records) else 0

@@ -36,9 +36,10 @@ if TYPE_CHECKING:
     from runs.inspection.compare import compare
     from runs.inspection.info import inspect
     from runs.interface import grid
-    from runs.interface.calls import film, plot, register, restart, run, verify
+    from runs.interface.calls import plot, register, restart, run, verify
     from runs.interface.case import Case, Hook, OpenRun, load
     from runs.interface.case import open_run as open
+    from runs.pictures.film import make_film as film
     from runs.report import report
     from runs.study.study import Study, study
     from shockgrid import testing
@@ -72,7 +73,7 @@ MODULES = {
     "StiffenedGas": "hydro.eos.gases",
     "Tabular": "hydro.eos.tabular",
     "compare": "runs.inspection.compare",
-    "film": "runs.interface.calls",
+    "film": "runs.pictures.film",
     "find_material": "hydro.eos.materials",
     "gravity": "hydro.sources",
     "grid": "runs.interface",
@@ -95,7 +96,11 @@ MODULES = {
     "transfinite_grid": "regrid.algebraic",
     "verify": "runs.interface.calls",
 }
-ELSEWHERE = {"gravity": "make_gravity", "open": "open_run"}  # names in the module, where others
+ELSEWHERE = {
+    "film": "make_film",
+    "gravity": "make_gravity",
+    "open": "open_run",
+}  # other names there
 SUBMODULES = ("grid", "testing")  # names that are modules themselves
 
 __all__ = [

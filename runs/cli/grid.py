@@ -60,12 +60,6 @@ outputs = click.option(
 )
 force = click.option("--force", is_flag=True, help="Replace files that exist.")
 block = click.option("--block", metavar="NAME", help="Which block of an HDF5 file.")
-passes = click.option(
-    "--passes",
-    type=click.IntRange(1, 10000),
-    default=40,
-    help="On given sides: most calls of the family [40].",
-)
 picture = click.option(
     "--plot", "picture", is_flag=True, help="Draw the grid: a .png beside the file."
 )
@@ -98,7 +92,6 @@ def list_names(picture, force) -> None:
     default=40,
     help="Steps of a domain's motion [40]; 0: at once, as between curves.",
 )
-@passes
 @block
 @outputs
 @force
@@ -129,7 +122,6 @@ def make(source, outputs, force, picture, **words) -> None:
 @family
 @weight
 @options
-@passes
 @block
 @outputs
 @force
@@ -151,7 +143,7 @@ def regrid(file, outputs, force, picture, **words) -> None:
 @click.option("--plot", "picture", metavar="FILE", help="Draw it into this picture (.png, .pdf).")
 @force
 def check(file, block, picture, force) -> int:
-    """Check a grid: non-convex cells, corner sines, aspect ratios, histograms.
+    """Check a grid: non-convex cells, corner sines, aspect ratios; --plot has a histogram.
 
     The exit code is 1 if a cell is not convex.
     """

@@ -295,7 +295,7 @@ def plot(directory, output, dpi, table, **words) -> None:
 
 @cli.command()
 @click.argument("directory", metavar="DIR")
-@click.option("-o", "--output", metavar="FILE", help="One .csv or .h5 [DIR/interfaces.csv, .h5].")
+@click.option("-o", "--output", metavar="FILE", help="CSV file [DIR/interfaces.csv].")
 def export(directory, output) -> None:
     """Write the interfaces of a run as curves.
 
@@ -303,8 +303,7 @@ def export(directory, output) -> None:
     """
     from runs.pictures.curves import export_interfaces
 
-    for path in export_interfaces(directory, output):
-        echo(path)
+    echo(export_interfaces(directory, output))
 
 
 @cli.command()

@@ -13,7 +13,7 @@ import math
 import re
 import textwrap
 import typing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -264,28 +264,15 @@ def list_keys(deck: type) -> list[str]:
     ]
 
 
-def find_type(kind: Any, names: list[str]) -> Any:
-    """The type of what lies at the dotted key `names` in a value of `kind`; None where nothing."""
-    if not names:
-        return kind
-    for one in list_choices(kind):
-        inner = typing.get_args(one)
-        if isinstance(one, type) and issubclass(one, msgspec.Struct):
-            inner = {field.name: field.type for field in msgspec.structs.fields(one)}.get(names[0])
-        elif typing.get_origin(one) is dict:
-            inner = inner[1]
-        elif names[0].isdigit() and inner:
-            inner = inner[min(int(names[0]), len(inner) - 1)] if inner[-1] is not ... else inner[0]
-        if inner and (found := find_type(inner, names[1:])) is not None:
-            return found
-    return None
-
-
-def wants_text(kind: type, key: str, value: Any) -> bool:
-    """Does the field at the dotted `key` of a deck take text, but nothing like `value`?"""
-    found = list_choices(find_type(kind, key.split(".")))
-    like = {bool: (bool,), int: (int, float), float: (float,)}[type(value)]
-    return str in found and not set(like) & set(found)
+def wants_text(kind: type, names: Sequence[str], value: Any) -> bool:
+    """Does the field at the dotted key `names` of a deck take text, but nothing like `value`?"""
+    for name in reversed(names):
+        value = {name: value}
+    try:
+        msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        return str(error).startswith("Expected `str")
+    return False
 
 
 def resolve(schema: Part, part: Part) -> Part:

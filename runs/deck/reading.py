@@ -226,7 +226,7 @@ def apply_setting(table: dict[str, Any], setting: str, kind: type[Deck] | None =
         if not isinstance(branch, dict | list):
             raise BadInput(f"--set {key}: {'.'.join(names[:depth])} is a value, not a table")
     value = parse_value(text)
-    if kind and isinstance(value, bool | int | float) and wants_text(kind, key, value):
+    if kind and isinstance(value, bool | int | float) and wants_text(kind, names, value):
         value = text.strip()
     if isinstance(branch, list):
         _list_entry(branch, names[-1], key)

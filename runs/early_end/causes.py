@@ -7,7 +7,6 @@ packaged problem; docs/notes/decisions.md has the runs, and those that did not h
 
 from __future__ import annotations
 
-import errno
 from dataclasses import dataclass
 from typing import Any
 
@@ -156,12 +155,9 @@ def describe_settings(limit: str) -> str:
 
 
 def name_failure(error: Exception) -> str:
-    """Why a run has ended early in a word or two: the name of its cause, or what the disk refused;
-    "" for what has no name."""
+    """Why a run has ended early in a word or two: the name of its cause, or what the system says of
+    the disk; "" for what has no name."""
     if isinstance(error, RunFailure):
         return ENDS[error.cause].name if error.cause in ENDS else ""
     system = error.__cause__
-    if not isinstance(system, OSError):
-        return ""
-    full = system.errno in (errno.ENOSPC, errno.EDQUOT)
-    return "disk full" if full else "disk not writable"
+    return str(system.strerror).lower() if isinstance(system, OSError) else ""

@@ -27,16 +27,10 @@ from regrid.sides import SIDE_NAMES, get_side
 from runs.deck.checking import is_runtime_key
 from runs.deck.reading import ReadDeck, resolve_deck
 from runs.early_end.causes import ENDS, Cause
-from runs.inspection.account import pick_prefix
-from runs.pictures.command import new_figure, save
-from runs.pictures.fields import (
-    View,
-    choose_colours,
-    draw_panel,
-    find_extent,
-    find_range,
-    make_sheets,
-)
+from runs.pictures import fields
+from runs.pictures.command import default_fields, new_figure, save
+from runs.pictures.curves import draw_panel
+from runs.quantities import pick_prefix
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state
 from runs.store.files import write_atomically
@@ -220,10 +214,9 @@ def draw_early_end(run: RunData, title: str, place: Place | None, point: int | N
     near = left.subplots()
     whole, below = right.subplots(2, 1, height_ratios=(1.25, 1.0))
     block, (i, j), named = find_marked(dump.blocks, place)
-    known = dump.field_names()
-    name = "rho" if "rho" in known else next(iter(known), "")
-    sheets = make_sheets(dump, [name] if name else [], View())
-    extent = find_extent([sheets])
+    name = default_fields(run)[0]
+    sheets = fields.make_sheets(dump, [name], fields.View())
+    extent = fields.find_extent([sheets])
     scale, unit = pick_prefix(float(np.abs(extent).max()), "m")
     part = block.nodes[:, max(i - AROUND, 0) : i + AROUND + 2, max(j - AROUND, 0) : j + AROUND + 2]
     corners = block.nodes[:, [i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
@@ -233,10 +226,9 @@ def draw_early_end(run: RunData, title: str, place: Place | None, point: int | N
     window = x - reach, x + reach, y - reach, y + reach
     words = f"block {block.name!r}, cell i={i}, j={j}{'' if named else ': the smallest'}"
     for axes, box, title in ((near, window, words), (whole, extent, "the whole domain")):
-        look = choose_colours(dump, name, [find_range(sheets, name, box)]) if name else None
-        draw_panel(axes, sheets, name, look, scale, box)
-        if look:
-            figure.colorbar(ScalarMappable(*look[:2]), ax=axes, label=look[3], shrink=0.9)
+        look = fields.choose_colours(dump, name, [fields.find_range(sheets, name, box)])
+        fields.draw_blocks(axes, sheets, name, look, scale, box)
+        figure.colorbar(ScalarMappable(*look[:2]), ax=axes, label=look[3], shrink=0.9)
         axes.set_title(title, fontsize=10, color=MARK if axes is near else "k")
         axes.set(xlabel=f"{dump.axes[0]} [{unit}]", ylabel=f"{dump.axes[1]} [{unit}]")
         ring = {"markersize": 16, "markeredgewidth": 1.8, "fillstyle": "none", "zorder": 6}
@@ -248,19 +240,12 @@ def draw_early_end(run: RunData, title: str, place: Place | None, point: int | N
         near.plot(*(line[:, there] * scale), "o", markersize=5, color=MARK, zorder=7)
     box = (window[0] * scale, window[2] * scale), 2 * reach * scale, 2 * reach * scale
     whole.add_patch(Rectangle(*box, fill=False, edgecolor=MARK, zorder=5))
-    draw_steps(below, run, dump.step, point)
-    return save(figure, run.directory.early_picture, 120)
-
-
-def draw_steps(axes: Any, run: RunData, step: int, point: int | None) -> None:
-    """dt over the steps, those that were retried, the end, the restart point."""
-    steps, dt = run.history.get("step", np.zeros(0)), run.history.get("dt", np.zeros(0))
-    again = run.history.get("retries", np.zeros(len(steps))) > 0
-    axes.semilogy(steps, np.where(dt > 0.0, dt, np.nan), "k-", linewidth=0.9)
-    axes.semilogy(steps[again], dt[again], ".", color=MARK, markersize=4, label="retried")
-    axes.axvline(step, color=MARK, linewidth=1.2, label=f"end, step {step}")
+    if len(run.history.get("dt", ())):
+        draw_panel(below, run.history["step"], run.history, ["dt"], {"dt": "s"})
+    below.axvline(dump.step, color=MARK, label=f"end, step {dump.step}")
     if point is not None:
-        axes.axvline(point, color="tab:blue", ls="--", label=f"restart point, step {point}")
-    axes.set(xlabel="step", ylabel="dt [s]")
-    axes.legend(fontsize=8, loc="lower left")
-    axes.grid(alpha=0.3)
+        below.axvline(point, color="tab:blue", ls="--", label=f"restart point, step {point}")
+    below.set(xlabel="step", yscale="log")
+    below.autoscale(axis="y")
+    below.legend(fontsize=8, loc="lower left")
+    return save(figure, run.directory.early_picture, 120)

@@ -33,7 +33,7 @@ from regrid.sides import SIDE_NAMES, get_side, get_sides
 from runs.deck.reading import packaged_decks, read_deck
 from runs.grids import making
 from runs.grids.making import Grid, choose_family, name_family, parse_options
-from runs.grids.quality import describe, describe_histograms, plan_outputs
+from runs.grids.quality import describe, plan_outputs
 from runs.store.files import check_free
 
 MOST_CELLS = 4_000_000
@@ -152,8 +152,7 @@ def check_file(
     if picture:
         check_free(Path(picture), force)
     title = _title(file, grid.nodes)
-    told = [*describe(grid.quality), *describe_histograms(grid.quality)]
-    lines = [title, *("  " + line for line in told)]
+    lines = [title, *("  " + line for line in describe(grid.quality))]
     if picture:
         lines.append(f"picture: {_draw(grid, title, Path(picture))}")
     return lines, grid.quality.valid

@@ -178,7 +178,6 @@ def make(
     cells: Cells | None = None,
     steps: int = STEPS,
     at: float = 1.0,
-    passes: int = PASSES,
     weight: str | None = None,
     block: str | None = None,
     **options: Any,
@@ -188,7 +187,7 @@ def make(
     source: a name of `shockgrid grid list`, a file, or nodes (2, ni+1, nj+1) of which the sides
     count.  family: a name with `options` ["barrier"], or your own regridder.  cells: along i and
     j, where the source leaves it open.  steps, at: of a domain's motion and the part of it that is
-    made; passes: at most, on sides given at once.  weight: a formula, as `--weight`.  Raises
+    made.  weight: a formula, as `--weight`.  Raises
     BadInput for what there is not, RegridFailure where no valid grid was found.
     """
     if not 0.0 <= at <= 1.0:
@@ -209,11 +208,11 @@ def make(
         regridder = choose_family(family or used, options, weight)
         if isinstance(source, np.ndarray):
             nodes = check_nodes(source, "the array")
-            made = make_on_curves(nodes, regridder, passes, "the array")
+            made = make_on_curves(nodes, regridder, PASSES, "the array")
         elif name in DOMAINS:
             made = make_on_domain(name, used, regridder, cells or default_cells(name), steps, at)
         elif is_file_name(told):
-            made = make_on_curves(read_sides(told, block, cells), regridder, passes, told)
+            made = make_on_curves(read_sides(told, block, cells), regridder, PASSES, told)
         else:
             known = [name.replace("_", "-") for name in (*DOMAINS, *BLOCKS, *SHAPES)]
             raise BadInput(f"no domain and no file is called {told!r}{suggest(told, known)}")
@@ -225,7 +224,6 @@ def regrid(
     grid: Grid | np.ndarray | str | Path,
     family: Family | None = None,
     *,
-    passes: int = PASSES,
     weight: str | None = None,
     **options: Any,
 ) -> Grid:
@@ -239,7 +237,7 @@ def regrid(
     if nodes.shape[0] == 3:
         made = regrid_space(nodes, make_spatial_law(options, weight), options)
     else:
-        made = regrid_plane(nodes, choose_family(family or used, options, weight), passes)
+        made = regrid_plane(nodes, choose_family(family or used, options, weight), PASSES)
     made.made_by = {"source": source, "family": used}
     return _finish(made, options, weight)
 

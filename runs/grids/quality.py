@@ -24,9 +24,6 @@ from runs.store.files import check_free, write_atomically
 from runs.store.paraview import HEAD, TAIL, describe_block, write_vts
 from runs.store.provenance import describe_software, find_provenance
 
-BAR = 40  # characters of the longest bar of a histogram
-SINE_EDGES = (-1.0, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-ASPECT_EDGES = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)
 LONG_NAMES = {
     "scaled_jacobian": "scaled Jacobian: smallest sine of a corner",
     "aspect_ratio": "aspect ratio",
@@ -130,27 +127,6 @@ def describe(judgement: Judgement) -> list[str]:
     if "weight_times_size" in fields:
         spread = fields["weight_times_size"].std()
         lines.append(f"weight times size     {spread:10.4f}   standard deviation over the mean")
-    return lines
-
-
-def describe_histograms(judgement: Judgement) -> list[str]:
-    """Lines: how many cells have which corner sine and which aspect ratio."""
-    lines = []
-    for name, words, edges in (
-        ("scaled_jacobian", "scaled Jacobian", SINE_EDGES),
-        ("aspect_ratio", "aspect ratio", ASPECT_EDGES),
-    ):
-        values = judgement.fields[name]
-        bounds = [*edges[:-1], np.inf]
-        counts, _ = np.histogram(np.maximum(values[np.isfinite(values)], edges[0]), bounds)
-        longest = max(1, counts.max())
-        bars = [
-            f"  {low:6g} to {high:<6g} {count:8d} {'#' * int(np.ceil(BAR * count / longest))}"
-            for low, high, count in zip(edges[:-1], edges[1:], counts, strict=True)
-        ]
-        filled = np.flatnonzero(counts)
-        shown = bars[filled[0] : filled[-1] + 1] if filled.size else ["  none"]
-        lines += [f"cells by {words}", *shown]
     return lines
 
 

@@ -16,52 +16,12 @@ import numpy as np
 from problems.evolution import Evolution
 from problems.problem import Problem
 from regrid.errors import RunFailure
+from runs.quantities import count, describe_share
 
 History = Mapping[str, np.ndarray]
-PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
-PREFIXED = ("m", "s", "m/s", "Pa", "J", "J/kg", "N", "B")
 HEAD = "caution: "
 OWN_REASONS = ("start", "t_end", "end", "dump", "retry")  # of a step's length: no trend
 NONE = np.zeros(0)
-
-
-def pick_prefix(largest: float, unit: str) -> tuple[float, str]:
-    """Factor and unit that bring a quantity of size `largest` near 1 to 1000: (1e-9, "GPa")."""
-    if unit not in PREFIXED or not math.isfinite(largest) or largest == 0:
-        return 1.0, "" if unit == "1" else unit
-    power = 3 * math.floor(math.log10(abs(largest) * 1.0000001) / 3)
-    power = min(max(power, -12), {"m": 3, "s": 0}.get(unit, 12))
-    return 10.0**-power, PREFIXES[power] + unit
-
-
-def describe_time(t: float, unit: str = "s", digits: int = 6) -> str:
-    """`t = 1.5 s`; what counts something else than seconds: `13 iterations`."""
-    return f"t = {t:.{digits}g} s" if unit == "s" else f"{t:.{digits}g} {unit}"
-
-
-def describe_seconds(low: float, high: float | None = None) -> str:
-    """A wall time, or a range, in the unit a person would choose: `34 s`, `6 to 9 min`."""
-    high = low if high is None else high
-    units = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"), (1.0, "s"))
-    size, unit = next((pair for pair in units if high >= 1.5 * pair[0]), units[-1])
-    first, last = (f"{one:.2g}" if one < 100 else f"{one:.0f}" for one in (low / size, high / size))
-    return f"{first} {unit}" if first == last else f"{first} to {last} {unit}"
-
-
-def describe_bytes(number: float) -> str:
-    """A number of bytes in the unit a person would choose."""
-    factor, unit = pick_prefix(number, "B")
-    return f"{number * factor:.3g} {unit}"
-
-
-def describe_share(share: float) -> str:
-    """A share in per cent; a small one is not called nothing."""
-    return "<1%" if 0 < share < 0.01 else f"{share:.0%}"
-
-
-def count(number: int, thing: str) -> str:
-    """`1 block`, `2 blocks`."""
-    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
 def count_cells(evolution: Evolution) -> int:
@@ -245,17 +205,20 @@ class Rule(NamedTuple):
     meaning: str
 
 
-def find_most(history: History, name: str) -> float:
-    """The largest value of a column; nan where none is known."""
-    values = history.get(name, NONE)
-    return float(np.nanmax(values)) if np.isfinite(values).any() else np.nan
+def most(name: str) -> Callable[[History, int], float]:
+    """The largest value of a column."""
+    return lambda history, cells: mean(name, lambda n, _: np.max(n))(history, cells)
 
 
-def find_mean(history: History, name: str, part: Callable[[np.ndarray], Any]) -> float:
-    """The mean over all steps of what `part` makes of a column; nan where none is known."""
-    values = np.asarray(history.get(name, NONE), dtype=float)[1:]
-    values = values[np.isfinite(values)]
-    return float(np.mean(part(values))) if values.size else np.nan
+def mean(name: str, part: Callable[[np.ndarray, int], Any]) -> Callable[[History, int], float]:
+    """The mean over all steps of what `part` makes of a column and the number of cells."""
+
+    def measure(history: History, cells: int) -> float:
+        values = np.asarray(history.get(name, NONE), dtype=float)[1:]
+        values = values[np.isfinite(values)]
+        return float(np.mean(part(values, cells))) if values.size else np.nan
+
+    return measure
 
 
 def measure_shrinkage(history: History) -> float:
@@ -268,30 +231,25 @@ def measure_shrinkage(history: History) -> float:
 
 
 RULES = (
-    Rule("cells not convex", lambda history, cells: find_most(history, "cells_not_convex"),
-         0.0, "{value:.0f} cells not convex", "most cells in a step that were not convex"),
-    Rule("untangling events",
-         lambda history, cells: find_mean(history, "regrid_rescues", lambda n: n > 0),
-         0.01, "folded grids untangled in {share} of the steps",
+    Rule("cells not convex", most("cells_not_convex"), 0.0, "{value:.0f} cells not convex",
+         "most cells in a step that were not convex"),
+    Rule("untangling events", mean("regrid_rescues", lambda n, _: n > 0), 0.01,
+         "folded grids untangled in {share} of the steps",
          "steps in which a grid had to be untangled"),
-    Rule("retries", lambda history, cells: find_mean(history, "retries", lambda n: n > 0),
-         0.02, "{share} of the steps retried", "steps that were repeated with a shorter dt"),
-    Rule("first-order faces",
-         lambda history, cells: find_mean(history, "first_order_faces", lambda n: n / (2 * cells)),
-         0.01, "{share} of the faces of first order",
+    Rule("retries", mean("retries", lambda n, _: n > 0), 0.02, "{share} of the steps retried",
+         "steps that were repeated with a shorter dt"),
+    Rule("first-order faces", mean("first_order_faces", lambda n, cells: n / (2 * cells)), 0.01,
+         "{share} of the faces of first order",
          "mean part of the faces that are computed at first order, where second gave no positive "
          "state"),
-    Rule("voids", lambda history, cells: find_most(history, "voided_cells"),
-         0.0, "voids in {value:.0f} cells", "most failed cells with a void in a step"),
-    Rule("shared cells",
-         lambda history, cells: find_mean(history, "shared_cells", lambda n: n / cells),
-         0.03, "{share} of the cells redistribute their states",
+    Rule("voids", most("voided_cells"), 0.0, "voids in {value:.0f} cells",
+         "most failed cells with a void in a step"),
+    Rule("shared cells", mean("shared_cells", lambda n, cells: n / cells), 0.03,
+         "{share} of the cells redistribute their states",
          "mean fraction of cells too small for the step, with state redistribution"),
-    Rule("dt", lambda history, cells: measure_shrinkage(history),
-         100.0, "dt fell {value:.3g} times",
+    Rule("dt", lambda history, _: measure_shrinkage(history), 100.0, "dt fell {value:.3g} times",
          "how many times dt fell below its largest value"),
-    Rule("drift",
-         lambda history, cells: max(measure_drifts(history).values(), default=np.nan),
+    Rule("drift", lambda history, _: max(measure_drifts(history).values(), default=np.nan),
          1e-10, "conservation error {value:.1e}",
          "largest relative conservation error of mass, energy or momentum; round-off is below the "
          "limit"),

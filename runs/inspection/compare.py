@@ -19,7 +19,7 @@ import numpy as np
 from hydro.remap.conserved import check_convex, remap_means
 from hydro.remap.overlay import compute_cell_moments
 from regrid.errors import BadInput
-from runs.inspection.account import count
+from runs.quantities import count
 from runs.store.reader import BlockData, Dump, RunData, Table
 
 SHOWN = 8  # differences, and earlier dumps

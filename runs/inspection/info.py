@@ -18,15 +18,8 @@ from problems.problem_file import read_head
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
 from runs.deck.checking import find_changes
-from runs.inspection.account import (
-    count,
-    describe_cautions,
-    describe_run,
-    describe_seconds,
-    describe_time,
-    describe_verdict,
-    judge,
-)
+from runs.inspection.account import describe_cautions, describe_run, describe_verdict, judge
+from runs.quantities import count, describe_seconds, describe_time
 from runs.store.directory import RunDirectory, read_stored_deck
 from runs.store.files import find_sum
 from runs.store.provenance import describe_provenance

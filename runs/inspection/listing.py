@@ -100,8 +100,9 @@ def describe_deck(path: Path) -> str:
 def describe_plan(deck: ReadDeck) -> str:
     """Blocks, cells, memory, end time and cautions of the run that a deck would make."""
     from problems.problem import plan_blocks
-    from runs.inspection.account import count, describe_cautions
+    from runs.inspection.account import describe_cautions
     from runs.inspection.info import other_name
+    from runs.quantities import count
 
     with deck.numbers_in_reach(), interpreted():
         problem = deck.make_problem()

@@ -216,13 +216,6 @@ def plot(directory: Run, *fields: str, **options: Any) -> Figure:
     return open_run(directory).plot(*fields, **options)
 
 
-def film(
-    directory: Run, field: str | None = None, output: str | Path | None = None, **options: Any
-) -> Path:
-    """Make a film of a run, as `shockgrid film` does; its path.  Options: `OpenRun.film`."""
-    return open_run(directory).film(field, output, **options)
-
-
 def verify(*problems: str, short: bool = False) -> list[dict[str, Any]]:
     """Run the standard problems, or those named, at stated sizes; a record of each statement.
 

@@ -10,7 +10,6 @@ their arrays are live.
 
 from __future__ import annotations
 
-import html
 import math
 import os
 import sys
@@ -35,10 +34,10 @@ from problems.evolution import (
 from problems.problem import Problem, check_memory
 from regrid.errors import BadInput, suggest
 from runs.deck.reading import ReadDeck, read_deck, resolve_deck
-from runs.inspection.account import describe_time
 from runs.march.compiling import compiling
 from runs.march.launching import start_runner
 from runs.march.runner import Ending, Runner
+from runs.quantities import describe_time
 from runs.ranks.started import check_single
 from runs.store.reader import BlockData, Fields, RunData, Snapshot, Table
 from runs.study.definition import flatten, write_settings
@@ -56,17 +55,6 @@ class Drawn:
 
     problem: Problem
     pictures: Sequence[str]  # words for `what` of `plot`
-
-    def list_facts(self) -> list[tuple[str, str]]:
-        """What a notebook shows of it: names and words."""
-        raise NotImplementedError
-
-    def _repr_html_(self) -> str:
-        theory = self.problem.predict().items()
-        rows = [*self.list_facts(), *((f"theory: {name}", f"{v:.6g}") for name, v in theory)]
-        line = "<tr><th style='text-align:left'>{}</th><td style='text-align:left'>{}</td></tr>"
-        lines = (line.format(html.escape(what), html.escape(value)) for what, value in rows)
-        return f"<table>{''.join(lines)}</table>"
 
     def plot(
         self,
@@ -183,10 +171,6 @@ class OpenRun(Drawn, RunData):
 
     def __repr__(self) -> str:
         return f"<run of {self.problem_name} in {self.path}: {self._state}>"
-
-    def list_facts(self) -> list[tuple[str, str]]:
-        rows = [("run", str(self.path)), ("problem", self.problem_name), ("state", self._state)]
-        return [*rows, ("dumps", str(len(self.dumps)))]
 
 
 def open_run(directory: str | os.PathLike) -> OpenRun:
@@ -520,16 +504,6 @@ class Case(Drawn):
             return f"<case {self.name} ({self.read.origin}), not built yet>"
         names = ", ".join(self.blocks)
         return f"<case {self.name}: t = {self.t:.6g} s, step {self.step}, blocks {names}>"
-
-    def list_facts(self) -> list[tuple[str, str]]:
-        rows = [("problem", self.name), ("deck", self.read.origin)]
-        if "simulation" in self.__dict__:
-            rows += [("t", f"{self.t:.6g} s of {self.simulation.t_end:.6g} s")]
-            rows += [("step", str(self.step))]
-            for name, block in self.blocks.items():
-                ni, nj = block.cells
-                rows.append((f"block {name}", f"{block.material}, {ni} x {nj} cells"))
-        return rows
 
 
 def load(deck: str | Path, **settings: Any) -> Case:

@@ -19,7 +19,8 @@ from runs.deck.reading import ReadDeck
 from runs.early_end.causes import name_failure
 from runs.forecast import ShortSteps, TimeLeft, find_past, measure_size, name_flow
 from runs.gauges import NO_BLOCK
-from runs.inspection.account import count, count_cells, describe_seconds, describe_time, judge
+from runs.inspection.account import count_cells, judge
+from runs.quantities import count, describe_seconds, describe_time
 from runs.store.directory import RunDirectory, write_verdict
 from runs.store.history import read_history
 
@@ -138,18 +139,14 @@ class Outlook:
     ):
         self.deck, self.problem, self.evolution = deck, problem, evolution
         self.directory = directory
-        self.began = evolution.step
         self.flow, self.size = name_flow(deck.problem, deck.deck), measure_size(problem, evolution)
         self.trend = ShortSteps(evolution, lambda line: (directory.note(line), say(line)))
         directory.verdict.unlink(missing_ok=True)
-        if self.began:
-            self.trend.resume(read_history(directory.history))
 
     def find_course(self) -> tuple[float, ...]:
         """How the wall time of a past run of the same flow went; () where there was none."""
         past, t_end = find_past(self.flow, self.size.cells), self.evolution.t_end
-        same = past is not None and past.flow == self.flow and math.isclose(past.t_end, t_end)
-        return past.course if past is not None and same else ()
+        return past.course if past is not None and math.isclose(past.t_end, t_end) else ()
 
     def fail(self, error: Exception) -> None:
         """The verdict on a run that has failed; nothing may hide its own sentence."""

@@ -37,8 +37,9 @@ from runs.gauges import Gauges, make_gauges
 from runs.inspection import account
 from runs.march.compiling import compiling
 from runs.march.progress import Outlook, Progress, describe_gauges, describe_threads
+from runs.quantities import count, describe_seconds, describe_time
 from runs.ranks.map import check_cut
-from runs.ranks.world import World, describe_ranks, loss_told
+from runs.ranks.world import World, describe_ranks
 from runs.store.directory import RunDirectory, keep_problem_file, write_noted
 from runs.store.dumps import EMPTY, Names, make_image
 from runs.store.files import write_atomically, write_sealed
@@ -254,7 +255,7 @@ class Runner:
                 )
             moved = self.directory.set_aside_after(step)
             if moved:
-                say(f"{account.count(moved, 'later file')} moved to {self.directory}/superseded")
+                say(f"{count(moved, 'later file')} moved to {self.directory}/superseded")
             self._note_start(f"restart from step {step}")
             write_atomically(self.directory.deck, self.deck_text)
             self.last_point = step
@@ -278,8 +279,7 @@ class Runner:
         )
         self.progress.left.course = self.outlook.find_course()
         try:
-            lost = loss_told(self.world is not None, lambda: self._signal, self._way_on)
-            with self._signals_caught(), lost, self.writing.running(), compiling(self.quiet):
+            with self._signals_caught(), self.writing.running(), compiling(self.quiet):
                 reason = self._march()
             missed = get_missed(self.evolution)
             reason, code = (f"{reason}, {missed}", 3) if missed else (reason, 0)
@@ -306,7 +306,7 @@ class Runner:
         cpu_seconds = time.process_time() - cpu_began  # of all threads
         self.directory.note(
             f"{reason} at step {self.evolution.step}, "
-            f"{account.describe_time(self.evolution.t, self.problem.t_unit)}, {seconds:.1f} s "
+            f"{describe_time(self.evolution.t, self.problem.t_unit)}, {seconds:.1f} s "
             f"of wall time, {cpu_seconds:.1f} s of processor time"
         )
         history = read_history(self.directory.history)
@@ -334,10 +334,10 @@ class Runner:
         evolution, problem, directory = self.evolution, self.problem, self.directory
         t_unit, cells = problem.t_unit, account.count_cells(evolution)
         names = [block.name for block in evolution.blocks]
-        steps = f", {account.count(evolution.step, 'step')}" if t_unit == "s" else ""
+        steps = f", {count(evolution.step, 'step')}" if t_unit == "s" else ""
         lines = [
-            f"{reason}{account.describe_time(evolution.t, t_unit)}{steps}, {cells} cells in "
-            f"{account.count(len(names), 'block')}, {account.describe_seconds(seconds)}",
+            f"{reason}{describe_time(evolution.t, t_unit)}{steps}, {cells} cells in "
+            f"{count(len(names), 'block')}, {describe_seconds(seconds)}",
             account.describe_verdict(verdict),
             *account.describe_run(history, cells, names),
             *describe_gauges(problem.deck, directory),
@@ -352,7 +352,7 @@ class Runner:
             lines += ["", own] if own else []
         cautions = account.describe_cautions(problem, history)
         lines += ["", *cautions] if cautions else []
-        dumps = account.count(len(directory.list_points("dump")), "dump")
+        dumps = count(len(directory.list_points("dump")), "dump")
         lines += [
             "",
             f"in {directory}: {dumps}, history.csv, run.xmf (ParaView)",

@@ -7,15 +7,12 @@ then what was measured; measured columns of one first word, unit and size share 
 
 from __future__ import annotations
 
-import csv
-import io
 import operator
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import h5py
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
@@ -23,14 +20,14 @@ from matplotlib.colors import Normalize
 
 from problems.deck import place_gauges
 from regrid.errors import BadInput
-from runs.inspection.account import compute_drifts, pick_prefix
+from runs.inspection.account import compute_drifts
 from runs.pictures import fields
 from runs.pictures.fields import View
-from runs.store.files import check_free, write_atomically
+from runs.quantities import pick_prefix
+from runs.store.files import check_free, make_csv, write_atomically
 from runs.store.reader import Dump, RunData
 
 CLOSE = 1e-9  # of the interfaces' extent: ends so near are one point
-FORMAT = "shockgrid interfaces"
 
 
 def find_curves(blocks: Sequence) -> dict[str, np.ndarray]:
@@ -67,62 +64,26 @@ def _extend(line: np.ndarray, others: list[np.ndarray], near: float) -> np.ndarr
     return line
 
 
-def export_interfaces(directory: str, output: str | None = None) -> list[Path]:
-    """Write the interfaces at all dumps of a run; returns the files.
+def export_interfaces(directory: str, output: str | None = None) -> Path:
+    """Write the interfaces at all dumps of a run as a CSV file [DIR/interfaces.csv]; its path.
 
-    `output`: a file ending in .csv or .h5, left out: interfaces.csv and interfaces.h5 in the run's
-    directory.  Raises BadInput for another ending, and where there is no dump or no interface.
+    Raises BadInput where there is no dump or no interface.
     """
     run = RunData(directory)
-    paths = [Path(output)] if output else [run.path / f"interfaces.{end}" for end in ("csv", "h5")]
-    for path in paths:
-        if path.suffix not in WRITERS:
-            raise BadInput(f"-o {path}: curves are written to a file ending in .csv or .h5")
-        check_free(path)
+    path = Path(output) if output else run.path / "interfaces.csv"
+    if path.suffix != ".csv":
+        raise BadInput(f"-o {path}: curves are written to a file ending in .csv")
+    check_free(path)
     if not run.dumps:
         raise BadInput(f"{run.path} has no dump that can be read")
-    moments = [(dump, find_curves(dump.blocks)) for dump in run.dumps]
-    if not any(curves for _, curves in moments):
-        raise BadInput(f"{run.path} has no interface: all its blocks are of one material")
-    for path in paths:
-        write_atomically(path, WRITERS[path.suffix](moments))
-    return paths
-
-
-Moments = Sequence[tuple[Dump, dict[str, np.ndarray]]]
-
-
-def make_csv(rows: Iterable[Iterable[Any]]) -> str:
-    """Rows as the text of a CSV file; numbers with all their digits."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
-
-
-def _make_table(moments: Moments) -> bytes:
     rows: list[Iterable[Any]] = [["step", "t", "interface", "x", "y", "s"]]
-    for dump, curves in moments:
-        for name, curve in curves.items():
+    for dump in run.dumps:
+        for name, curve in find_curves(dump.blocks).items():
             rows += [[dump.step, dump.t, name, *point] for point in curve.T.tolist()]
-    return make_csv(rows).encode()
-
-
-def _make_hdf5(moments: Moments) -> bytes:
-    with h5py.File("interfaces", "w", driver="core", backing_store=False) as file:
-        file.attrs.update({"format": FORMAT, "format_version": 1})
-        for dump, curves in moments:
-            moment = file.create_group(f"step_{dump.step:06d}")
-            moment.attrs.update({"step": dump.step, "t": dump.t})
-            for name, curve in curves.items():
-                words = (*dump.axes, "length along the curve")
-                for column, values, long_name in zip("xys", curve, words, strict=True):
-                    data = moment.create_dataset(f"{name}/{column}", data=values)
-                    data.attrs.update({"units": "m", "long_name": long_name})
-        file.flush()
-        return file.id.get_file_image()
-
-
-WRITERS = {".csv": _make_table, ".h5": _make_hdf5}
+    if len(rows) == 1:
+        raise BadInput(f"{run.path} has no interface: all its blocks are of one material")
+    write_atomically(path, make_csv(rows))
+    return path
 
 
 def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
@@ -329,7 +290,7 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
     size = max(HISTORY_WIDTH / max(columns, 3), 6.0 / columns), HISTORY_HEIGHT
     grid = fields.lay_out(figure, number, columns, size, sharex=True)
     for axes, chosen in zip(grid, panels, strict=True):
-        _draw_panel(axes, history["t"] * factor, history, chosen, units)
+        draw_panel(axes, history["t"] * factor, history, chosen, units)
     if constant:
         words = ", ".join(f"{_say(name)} {np.nanmax(history[name]):.4g}" for name in constant)
         letters = int(LETTERS * figure.get_size_inches()[0])
@@ -406,7 +367,8 @@ def make_panel(
     return f"{title} [{unit}]" if unit else title, curves
 
 
-def _draw_panel(axes, t, history, names: Panel, units) -> None:
+def draw_panel(axes, t, history, names: Panel, units) -> None:
+    """The columns `names` of a history over `t` (n,), times or steps."""
     title, curves = make_panel(history, names, units)
     for label, values, points in curves:
         look = {"ls": "", "marker": ".", "ms": 2.5} if points else {"lw": 0.9}

@@ -19,7 +19,7 @@ from problems.evolution import get_material
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 from regrid.sides import SIDE_NAMES, get_side
-from runs.inspection.account import pick_prefix
+from runs.quantities import pick_prefix
 from runs.store.reader import BlockData, Dump
 
 CLOSE = 0.05  # of an edge: beyond the gap that chords of one curve leave between them
@@ -239,7 +239,7 @@ def draw_fields(
         ranges = [find_range(sheets, name, box) for sheets, box in pairs] if name else []
         look = choose_colours(dumps[0], name, ranges, view) if name else None
         for axes, sheets, box, title in zip(panels[k], moments, boxes, titles, strict=True):
-            draw_panel(axes, sheets, name, look, scale, box, view.mesh)
+            draw_blocks(axes, sheets, name, look, scale, box, view.mesh)
             if name and get_style(dumps[0], name).marked:
                 mark_largest(axes, sheets, name, scale, box)
             axes.set_title(title, fontsize=10)
@@ -251,7 +251,7 @@ def draw_fields(
         figure.supxlabel(words, fontsize=8, color="0.4")
 
 
-def draw_panel(
+def draw_blocks(
     axes, sheets: Sequence[Sheet], name: str, look, scale: float, box, mesh=True
 ) -> None:
     """A field (or "": the grids in the blocks' colours) with the lines about it, over the box.

@@ -19,10 +19,10 @@ from matplotlib.cm import ScalarMappable
 from tqdm import tqdm
 
 from regrid.errors import BadInput
-from runs.inspection.account import pick_prefix
 from runs.pictures import command, fields
 from runs.pictures.command import Numbers
 from runs.pictures.fields import View
+from runs.quantities import pick_prefix
 from runs.store.files import check_folder, disk_errors
 from runs.store.provenance import describe_software, hash_deck
 from runs.store.reader import Dump, RunData
@@ -133,7 +133,7 @@ def make_frames(
     def draw(number: int) -> None:
         axes.clear()
         sheets = fields.make_sheets(Dump(paths[number]), [name], view)
-        fields.draw_panel(axes, sheets, name, look, scale, boxes[number], view.mesh)
+        fields.draw_blocks(axes, sheets, name, look, scale, boxes[number], view.mesh)
         axes.set_title(titles[number], fontsize=10)
         axes.set(xlabel=labels[0], ylabel=labels[1])
 

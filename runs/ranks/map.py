@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import functools
-import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from hydro.interior.advance import TILE_ROWS
 from hydro.ranks.cutting import Shares, share_blocks, sum_cells
-from hydro.ranks.messages import CELLS_DEEP, NODES_DEEP
+from hydro.ranks.messages import CELLS_DEEP
 from hydro.simulation import Simulation
 from problems.problem import estimate_memory
 from regrid.errors import BadInput, suggest
@@ -48,41 +45,6 @@ def share_evolution(evolution: Simulation, ranks: int, cut: Mapping[str, int]) -
     return share_named_blocks(blocks, ranks, cut, evolution.flow.source.law is not None)
 
 
-COSTS = Path(__file__).with_name("rank_costs.json")
-FACE_BYTES = 8 * (2 * NODES_DEEP + 5 * CELLS_DEEP)  # that a face of a side stands for in a step
-
-
-@functools.cache
-def read_costs() -> Mapping[str, float]:
-    """Seconds of a cell, a node's iteration, a face, a message, ...: letters in docs/scaling.md.
-
-    `iterations` and `messages` are numbers: of a node and of a step.
-    """
-    return json.loads(COSTS.read_text("utf-8"))
-
-
-def foretell_speed(cells: Sequence[tuple[int, int]], shares: Shares, ranks: int) -> float:
-    """The time of a step on one rank over that on `ranks`, of blocks with these cells (ni, nj).
-
-    Only its owner rank regrids a cut block; messages between its bands are left out.
-    """
-    cost = read_costs()
-    faces = sum(2 * (ni + nj) for ni, nj in cells)
-    alike = cost["face"] * faces + cost["block"] * len(cells) + cost["step"] + cost["record"]
-    own = [0.0] * ranks
-    for (ni, nj), there, bounds in zip(cells, shares.places, shares.bounds, strict=True):
-        nodes = (ni + 1) * (nj + 1)
-        own[there[0]] += cost["iteration"] * cost["iterations"] * nodes
-        for rank, first, last in zip(there, bounds, bounds[1:], strict=False):
-            own[rank] += cost["own_block"] + cost["cell"] * (last - first) * nj
-    whole = len(cells) * cost["own_block"] + sum(
-        cost["iteration"] * cost["iterations"] * (ni + 1) * (nj + 1) + cost["cell"] * ni * nj
-        for ni, nj in cells
-    )
-    messages = cost["message"] * cost["messages"] + cost["byte"] * FACE_BYTES * faces
-    return (whole + alike) / (max(own) + alike + (messages if ranks > 1 else 0.0))
-
-
 MOST_NAMED = 8  # ranks that are told one by one
 
 
@@ -90,10 +52,8 @@ def describe_map(
     blocks: Sequence[tuple[str, Sequence[int]]], ranks: int, cut: Mapping[str, int]
 ) -> list[str]:
     """Lines on how `ranks` ranks share blocks, given as names and cells (ni, nj): who has which,
-    memory of each, how much faster than one.  cut: as in a deck's `run`.
-
-    The greatest speed-up is that of the cells alone, with nothing else to do and nobody to wait
-    for; the likely one is that of `runs.ranks.map`.
+    memory of each, the greatest speed-up: that of the cells alone, with nothing else to do and
+    nobody to wait for.  cut: as in a deck's `run`.
     """
     cells = [(int(ni), int(nj)) for _, (ni, nj) in blocks]
     shares = share_named_blocks(blocks, ranks, cut)
@@ -106,7 +66,6 @@ def describe_map(
         lines.append(f"rank {rank}: {words}; {loads[rank]} cells, about {memory:.0f} MB")
     if ranks > MOST_NAMED:
         lines.append(f"and {ranks - MOST_NAMED} more ranks")
-    likely, most = foretell_speed(cells, shares, ranks), total / max(loads)
     advice, idle = "", loads.count(0)
     if idle:
         advice = (
@@ -115,8 +74,7 @@ def describe_map(
         )
     lines += [
         f"memory of all ranks about {sum(memories) / 1e6:.0f} MB",
-        f"likely {min(likely, most):.2g} times as fast as one rank, on a machine with a core for "
-        f"each; at most {most:.3g} times{advice}",
+        f"at most {total / max(loads):.3g} times as fast as one rank{advice}",
     ]
     return lines
 

@@ -16,10 +16,7 @@ import json
 import os
 import platform
 import signal
-import socket
 import sys
-import threading
-import time
 import tomllib
 from collections.abc import Callable
 from typing import Any, TextIO
@@ -126,47 +123,11 @@ def share_flow(
     return built, ranks
 
 
-PATIENCE = 0.05  # seconds: less than mpiexec has
-
-
-@contextlib.contextmanager
-def loss_told(several: bool, is_heard: Callable, describe: Callable[[], str]):
-    """In the block: SIGTERM that the main thread misses is reported on standard error.
-
-    several: are there other ranks at all?  is_heard: has the main thread's handler been called?
-    describe: gives the end of the sentence.  Only a main thread can watch; others pass.
-    """
-    if not several or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    ours, theirs = socket.socketpair()
-    theirs.setblocking(False)
-    before = signal.set_wakeup_fd(theirs.fileno(), warn_on_full_buffer=False)
-
-    def listen() -> None:
-        while numbers := ours.recv(64):
-            if signal.SIGTERM in numbers:
-                time.sleep(PATIENCE)
-                if not is_heard():
-                    words = "stopping after this step; if a rank has died, this never ends: "
-                    os.write(2, f"\nshockgrid: {words}{describe()}\n".encode())
-
-    watch = threading.Thread(target=listen, daemon=True)
-    watch.start()
-    try:
-        yield
-    finally:
-        signal.set_wakeup_fd(before)
-        theirs.close()
-        watch.join()
-        ours.close()
-
-
 def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str]:
     """The line of the summary, none for a run in one process; all ranks have to be alive.
 
     It has messages and megabytes of a step, and the part of it that the ranks wait for them.
-    note: takes the line of run.log, the message counts of all ranks
+    note: takes the line of run.log, with the counts of all kinds of messages
     (`hydro.ranks.messages.Book.gather`).
     """
     if world is None or world.ranks is None:
@@ -175,10 +136,8 @@ def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str
     note(f"ranks: {json.dumps(books)}")
     steps, words = books["steps"], list[str]()
     if steps:
-        kinds = [kind for kind, calls in books["calls"].items() if calls]
-        calls = sum(books["calls"][kind] for kind in kinds) / steps
-        sizes = [f"{kind} {books['bytes'][kind] / steps / 1e6:.2g}" for kind in kinds]
-        words.append(f"{calls:.1f} a step, MB of {', '.join(sizes)}")
+        calls, size = (sum(books[name].values()) / steps for name in ("calls", "bytes"))
+        words.append(f"{calls:.1f} and {size / 1e6:.2g} MB a step")
         parts = [
             100.0 * waited / seconds
             for waited, seconds in zip(books["waited"], books["seconds"], strict=True)

@@ -13,7 +13,9 @@ hand) changes the sum.
 from __future__ import annotations
 
 import contextlib
+import csv
 import errno
+import io
 import os
 import time
 import zlib
@@ -69,6 +71,13 @@ def write_atomically(
             raise
         if durable:
             sync_folder(path.parent)
+
+
+def make_csv(rows: Iterable[Iterable[Any]]) -> str:
+    """Rows as the text of a CSV file; numbers with all their digits."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
 
 
 def get_part(path: Path) -> Path:

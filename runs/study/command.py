@@ -12,7 +12,7 @@ from typing import Any
 
 from regrid.errors import BadInput
 from runs.deck.reading import parse_value
-from runs.inspection.account import count
+from runs.quantities import count
 from runs.study.computing import Result
 from runs.study.definition import NUMBER, check_same_deck, read_vary
 from runs.study.orders import describe_series

@@ -19,7 +19,6 @@ from matplotlib.ticker import FixedLocator, NullLocator
 from runs.pictures.command import new_figure
 from runs.study.definition import make_column
 from runs.study.orders import Series
-from runs.verify import CASES
 
 FEW_LINES = 5  # in a panel, with colours and a column of the legend for them
 LEAST_MAP = 4  # values of each key from which a map is drawn
@@ -171,7 +170,7 @@ def _name_series(one: Series) -> str:
 
 def _draw_errors(axes: Any, study: Any, name: str, series: list[Series]) -> None:
     """Errors over the cell size, both logarithmic, with slopes of orders 1 and 2 through the
-    largest of the coarsest grids; the bar of `shockgrid verify` where it has one for this deck."""
+    largest of the coarsest grids."""
     for one, colour in zip(series, _make_colours(len(series)), strict=True):
         label = _name_series(one)
         axes.plot(1.0 / one.cells, np.abs(one.values), "o-", color=colour, ms=5, label=label)
@@ -183,11 +182,6 @@ def _draw_errors(axes: Any, study: Any, name: str, series: list[Series]) -> None
     for order, line in ((1, "k-."), (2, "k:")):
         slope = abs(largest.values[0]) * (size / size[0]) ** order
         axes.plot(size, slope, line, lw=0.7, alpha=0.6, label=f"slope {order}")
-    this = study.definition.source, name, set(study.definition.settings)
-    case = next((c for c in CASES if (c.deck, c.quantity, set(c.settings)) == this), None)
-    if case is not None and case.bar is not None and len(series) == 1:
-        label = f"bar of shockgrid verify at {case.sizes[case.judged]} cells"
-        axes.axhline(case.bar, color="C3", lw=1.0, ls=":", label=label)
     _finish(axes, study, f"|{_label(study, name)}|")
 
 

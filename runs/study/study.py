@@ -4,13 +4,10 @@ The folder of a study:
 
     study.toml      what is varied: `shockgrid study DIR` goes on
     runs/           a run directory for each point, called by its values
-    study.csv       the table; study.h5: the same as NetCDF-4
+    study.csv       the table
     orders.csv      orders of accuracy, where cells are varied
     study.png       the picture
     superseded/     runs of another deck at the same values
-
-In study.h5 each quantity of a product of points is an array over the varied keys, which are
-dimension scales; points given one by one lie along `point`.  A number that there is not is NaN.
 
 Note: points that are no longer part of a study keep their runs; they are not in the table.
 """
@@ -18,8 +15,6 @@ Note: points that are no longer part of a study keep their runs; they are not in
 from __future__ import annotations
 
 import contextlib
-import csv
-import io
 import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -30,7 +25,6 @@ from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 
 from problems.evolution import get_start_row
@@ -38,10 +32,9 @@ from problems.problem import Problem
 from regrid.errors import BadInput
 from runs.deck.reading import ReadDeck, read_deck
 from runs.engines import Engine, open_engine
-from runs.inspection.account import count
+from runs.quantities import count
 from runs.store.directory import RunDirectory
-from runs.store.files import disk_errors, write_atomically
-from runs.store.provenance import find_provenance
+from runs.store.files import disk_errors, make_csv, write_atomically
 from runs.store.reader import Table, load_package
 from runs.study.computing import (
     Result,
@@ -72,14 +65,8 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-OWN = {FILE, "runs", "study.csv", "study.h5", "orders.csv", "study.png", "superseded", ".lock"}
-FORMAT, FORMAT_VERSION = "shockgrid study", 1
+OWN = {FILE, "runs", "study.csv", "orders.csv", "study.png", "superseded", ".lock"}
 FUNCTION = re.compile(r"[\w.]+:[\w.<>]+")  # module and name
-LONG_NAMES = {
-    "run": "folder in runs", "state": "how the run ended",
-    "cautions": "why the results may be wrong", "step": "steps made", "t": "time at the end",
-    "seconds": "wall time of the steps",
-}  # fmt: skip
 
 
 class Study:
@@ -176,13 +163,20 @@ class Study:
         return list(self.definition.shown) or first[:2]
 
     def to_xarray(self) -> xarray.Dataset:
-        """The table as a data set, dimensions as in study.h5.
+        """The table as a data set, its dimensions the varied keys; points listed: along `point`.
 
-        Raises BadInput where xarray or h5netcdf is not installed.
+        Raises BadInput where xarray is not installed.
         """
-        load_package("h5netcdf", "to_xarray")
-        xarray = load_package("xarray", "to_xarray")
-        return xarray.load_dataset(self.path / "study.h5", engine="h5netcdf")
+        xarray, vary = load_package("xarray", "to_xarray"), self.definition.vary
+        scales = {key: make_column(list(values)) for key, values in vary.items()}
+        scales = scales or {"point": np.arange(len(self.results))}
+        shape, units = tuple(map(len, scales.values())), self.units
+        data = {
+            name: (list(scales), values.reshape(shape), {"units": units.get(name, "1")})
+            for name, values in self.table.items()
+            if name not in scales
+        }
+        return xarray.Dataset(data, scales)
 
     def to_pandas(self) -> Any:
         """The table as a pandas.DataFrame, a row a point; BadInput where there is no pandas."""
@@ -203,48 +197,20 @@ class Study:
 
         Raises BadInput where the disk does not take them.
         """
-        paths = [self.path / "study.csv", self.path / "study.h5"]
+        paths = [self.path / "study.csv"]
         columns = [
             ["" if v != v else repr(v) if isinstance(v, float) else str(v) for v in column.tolist()]
             for column in self.table.values()
         ]
-        write_csv(paths[0], list(self.table), zip(*columns, strict=True))
-        write_atomically(paths[1], self._make_hdf5())
+        rows = [list(self.table), *zip(*columns, strict=True)]
+        write_atomically(paths[0], make_csv(rows))
         if self.orders:
             paths.append(self.path / "orders.csv")
-            write_csv(paths[-1], HEADS, map(make_row, self.orders))
+            write_atomically(paths[-1], make_csv([HEADS, *map(make_row, self.orders)]))
         if any(result is not None and not result.failure for result in self.results):
             paths.append(self.path / "study.png")
             self.plot(paths[-1])
         return paths
-
-    def _make_hdf5(self) -> bytes:
-        definition, units = self.definition, self.units | {"t": "s", "seconds": "s"}
-
-        def write(name: str, values: np.ndarray) -> h5py.Dataset:
-            kind = h5py.string_dtype() if values.dtype.kind == "U" else values.dtype
-            data = file.create_dataset(name, data=values.astype(kind), dtype=kind)
-            if values.dtype.kind != "U":
-                data.attrs["units"] = units.get(name, "1")
-            data.attrs["long_name"] = LONG_NAMES.get(name, name.replace("_", " "))
-            return data
-
-        with h5py.File("study", "w", driver="core", backing_store=False) as file:
-            file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
-            file.attrs["study"] = text = definition.to_toml()
-            file.create_group("provenance").attrs.update(find_provenance(text))
-            scales = {key: make_column(list(values)) for key, values in definition.vary.items()}
-            scales = scales or {"point": np.arange(len(definition.points))}
-            for name, values in scales.items():
-                write(name, values).make_scale(name)
-            shape = tuple(len(values) for values in scales.values())
-            for name, values in self.table.items():
-                if name not in scales:
-                    data = write(name, values.reshape(shape))
-                    for axis, scale in enumerate(scales):
-                        data.dims[axis].attach_scale(file[scale])
-            file.flush()
-            return file.id.get_file_image()
 
     def check(self) -> None:
         """Raise BadInput where no point can be begun, or a name of `shown` is in none.
@@ -397,13 +363,6 @@ class Study:
             except BadInput as error:
                 states.append(str(error))
         return states
-
-
-def write_csv(path: Path, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Write a table whole or not at all."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([heads, *rows])
-    write_atomically(path, text.getvalue())
 
 
 def _say_state(result: Result | None) -> str:

@@ -80,8 +80,6 @@ def test_own_grid_is_untangled_and_keeps_its_sides(shockgrid, kind):
         assert np.array_equal(better[side], nodes[side])
     code, out, _ = shockgrid("grid", "check", "better.npz")
     assert code == 0 and "every one of the 384 cells is convex" in out
-    bars = [line.split()[3] for line in out.splitlines() if " to " in line and "#" in line]
-    assert sum(map(int, bars)) == 2 * 384
 
 
 def test_compare_on_a_domain(shockgrid):

@@ -52,7 +52,7 @@ ROOMS = (
     ("problems.interface_instability", "problems.plate_on_wedge", "problems.conical_target",
      "problems.shock_bubble", "problems.riemann", "problems.blocks", "problems.standard",
      "problems.convection"),
-    ("runs.deck", "runs.engines"),
+    ("runs.deck", "runs.engines", "runs.quantities"),
     ("runs.store",),
     ("runs.ranks",),
     ("runs.inspection", "runs.gauges"),

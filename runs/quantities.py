@@ -1,0 +1,47 @@
+"""Numbers in words for a person: units with prefixes, times, shares, counts."""
+
+from __future__ import annotations
+
+import math
+
+PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+PREFIXED = ("m", "s", "m/s", "Pa", "J", "J/kg", "N", "B")
+
+
+def pick_prefix(largest: float, unit: str) -> tuple[float, str]:
+    """Factor and unit that bring a quantity of size `largest` near 1 to 1000: (1e-9, "GPa")."""
+    if unit not in PREFIXED or not math.isfinite(largest) or largest == 0:
+        return 1.0, "" if unit == "1" else unit
+    power = 3 * math.floor(math.log10(abs(largest) * 1.0000001) / 3)
+    power = min(max(power, -12), {"m": 3, "s": 0}.get(unit, 12))
+    return 10.0**-power, PREFIXES[power] + unit
+
+
+def describe_time(t: float, unit: str = "s", digits: int = 6) -> str:
+    """`t = 1.5 s`; what counts something else than seconds: `13 iterations`."""
+    return f"t = {t:.{digits}g} s" if unit == "s" else f"{t:.{digits}g} {unit}"
+
+
+def describe_seconds(low: float, high: float | None = None) -> str:
+    """A wall time, or a range, in the unit a person would choose: `34 s`, `6 to 9 min`."""
+    high = low if high is None else high
+    units = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"), (1.0, "s"))
+    size, unit = next((pair for pair in units if high >= 1.5 * pair[0]), units[-1])
+    first, last = (f"{one:.2g}" if one < 100 else f"{one:.0f}" for one in (low / size, high / size))
+    return f"{first} {unit}" if first == last else f"{first} to {last} {unit}"
+
+
+def describe_bytes(number: float) -> str:
+    """A number of bytes in the unit a person would choose."""
+    factor, unit = pick_prefix(number, "B")
+    return f"{number * factor:.3g} {unit}"
+
+
+def describe_share(share: float) -> str:
+    """A share in per cent; a small one is not called nothing."""
+    return "<1%" if 0 < share < 0.01 else f"{share:.0%}"
+
+
+def count(number: int, thing: str) -> str:
+    """`1 block`, `2 blocks`."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"

@@ -511,8 +511,9 @@ class BlockSharing:
 
     def _find_small(self, limit: float, rows: Rows) -> np.ndarray:
         """The cells (n, 2) of these rows whose rate is above `limit`."""
-        # rows one after the other, however many: kernels are compiled for one order only
-        small = np.ascontiguousarray(np.argwhere(self.block.rates[slice(*rows)] > limit))
+        found = np.flatnonzero(self.block.rates[slice(*rows)] > limit)
+        small = np.empty((found.size, 2), dtype=np.int64)
+        np.divmod(found, self.block.nj, out=(small[:, 0], small[:, 1]))
         small[:, 0] += rows[0]
         if len(small) and self.reaches is None:
             block = self.block

@@ -179,7 +179,7 @@ class VoidFill(DeckTable, kw_only=True):
     merges = True
 
     pressure: key(float, "when it is closed off [Pa]; 0: nothing in it", ge=0, le=1e20) = 0.0
-    gamma: key(float, "of the gas", gt=1, le=100) = 1.4
+    gamma: key(float, "of the gas", gt=1, le=10) = 1.4
 
 
 class Regrid(DeckTable, kw_only=True):

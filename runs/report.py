@@ -7,7 +7,6 @@ are theirs.  What cannot be drawn is left out, with the sentence that says why.
 from __future__ import annotations
 
 import base64
-import csv
 import os
 import tempfile
 from collections.abc import Callable
@@ -46,7 +45,7 @@ from runs.pictures.command import (
 )
 from runs.pictures.fields import list_fields
 from runs.pictures.film import make_film
-from runs.store.files import check_folder, disk_errors, write_atomically
+from runs.store.files import check_folder, write_atomically
 from runs.store.reader import Dump, RunData
 
 TEMPLATES = Path(__file__).resolve().with_name("templates")
@@ -61,7 +60,7 @@ PICTURES = (  # heading, words of `shockgrid plot`
 )
 
 
-def make_report(
+def report(
     directory: str | os.PathLike,
     output: str | Path | None = None,
     *,
@@ -69,10 +68,17 @@ def make_report(
     dpi: int = 90,
     say: Callable[[str], None] = lambda text: None,
 ) -> Path:
-    """Write the report of a run; arguments: `report`.  A film needs two dumps or more."""
+    """Write one HTML file about a run, as `shockgrid report` does; its path.
+
+    output: FILE [DIR/report.html]; film: with one, where there are two dumps or more; dpi: of the
+    pictures; say: takes remarks.  Raises BadInput where there is no run, the file cannot be
+    written, or the extra `report` is not installed.
+    """
     run = RunData(directory)
     path = Path(output) if output else run.path / "report.html"
-    check_path(path)
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise BadInput(f"{path}: a report's name has to end in .html")
+    check_folder(path)
     template = load_template("run.html.j2")
     left_out: list[str] = []
     page = template.render(
@@ -87,13 +93,6 @@ def make_report(
         say(f"left out: {sentence}")
     write_atomically(path, page, durable=False)
     return path
-
-
-def check_path(path: Path) -> None:
-    """Raise BadInput where a report cannot go, before anything is drawn."""
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise BadInput(f"{path}: a report's name has to end in .html")
-    check_folder(path)
 
 
 def load_template(name: str) -> Any:
@@ -266,78 +265,3 @@ def read_text(path: Path) -> str:
         return path.read_text(encoding="utf-8", errors="replace")
     except OSError:
         return ""
-
-
-TABLE, RUNS, PAGE = "study.csv", "runs", "report.html"
-
-
-def report(
-    directory: str | os.PathLike,
-    output: str | Path | None = None,
-    *,
-    film: bool | None = None,
-    dpi: int = 90,
-    say: Callable[[str], None] = lambda text: None,
-) -> Path:
-    """Write one HTML file about a run or a study, as `shockgrid report` does; its path.
-
-    output: FILE [DIR/report.html]; film: with films; if not said, of a run yes, of the runs of a
-    study no; dpi: of the pictures; say: takes remarks.  Raises BadInput where the directory is
-    neither, the file cannot be written, or the extra `report` is not installed.
-    """
-    if (Path(directory) / TABLE).is_file():
-        return make_study_report(Path(directory), output, bool(film), dpi, say)
-    return make_report(directory, output, film=film is not False, dpi=dpi, say=say)
-
-
-def make_study_report(
-    home: Path,
-    output: str | Path | None,
-    film: bool,
-    dpi: int,
-    say: Callable[[str], None],
-) -> Path:
-    """Write the reports of a study's runs where they are missing or old, and the page over them.
-
-    A run that cannot be reported is named on the page.
-    """
-    path = Path(output) if output else home / PAGE
-    check_path(path)
-    with disk_errors(home / TABLE), open(home / TABLE, encoding="utf-8", newline="") as file:
-        heads, *rows = list(csv.reader(file)) or [[]]
-    folders = sorted(one.parent for one in (home / RUNS).glob("*/deck.toml"))
-    links, failed = {}, []
-    for folder in folders:
-        page, log = folder / PAGE, folder / "run.log"
-        try:
-            if not (page.exists() and log.exists()) or log.stat().st_mtime > page.stat().st_mtime:
-                make_report(folder, page, film=film, dpi=dpi)
-            links[folder.name] = Path(os.path.relpath(page, path.parent)).as_posix()
-        except BadInput as error:
-            failed.append(f"{folder.name}: {error}")
-    named = [next((cell for cell in row if Path(cell).name in links), "") for row in rows]
-    lonely = [name for name in links if name not in {Path(cell).name for cell in named}]
-    cells = [[(show_number(cell), links.get(Path(cell).name, "")) for cell in row] for row in rows]
-    pictures = [(one.stem, embed(one.read_bytes(), ".png")) for one in sorted(home.glob("*.png"))]
-    page_text = load_template("study.html.j2").render(
-        title=f"study {home.resolve().name}",
-        directory=str(home),
-        heads=heads,
-        rows=cells,
-        pictures=pictures,
-        lonely=[(name, links[name]) for name in lonely],
-        failed=failed,
-        log=read_text(home / "study.toml"),
-    )
-    for sentence in failed:
-        say(f"no report of {sentence}")
-    write_atomically(path, page_text, durable=False)
-    return path
-
-
-def show_number(cell: str) -> str:
-    """A number of the table to six digits; words and whole numbers as they are."""
-    try:
-        return cell if cell.lstrip("+-").isdigit() else f"{float(cell):.6g}"
-    except ValueError:
-        return cell

@@ -328,13 +328,12 @@ def film(directory, field, output, **words) -> None:
 @cli.command()
 @click.argument("directory", metavar="DIR")
 @click.option("-o", "--output", metavar="FILE", help="Page to write [DIR/report.html].")
-@click.option("--film/--no-film", default=None, help="With a film [of a study's runs: no].")
+@click.option("--film/--no-film", default=True, help="With a film [yes].")
 @click.option("--dpi", type=click.IntRange(20, 600), default=90, help="Of pictures [90].")
 def report(directory, output, film, dpi) -> None:
     """Write a report of a run as one HTML file: verdict, pictures, film, history.
 
-    The file is complete and needs no network.  A study's report links those of its
-    runs.  Needs the extra: pip install 'shockgrid[report]'.
+    The file is complete and needs no network.  Needs the extra: pip install 'shockgrid[report]'.
     """
     from runs.report import report as write_report
 

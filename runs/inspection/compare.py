@@ -23,7 +23,6 @@ from runs.quantities import count
 from runs.store.reader import BlockData, Dump, RunData, Table
 
 SHOWN = 8  # differences, and earlier dumps
-SHOWN_COLUMNS = 5  # of histories
 SAME_TIME = 1e-2  # relative: steps of one number nearer than this are the same
 
 
@@ -254,8 +253,7 @@ def compare_by_norms(a: Side, b: Side, rtol: float, atol: float) -> tuple[list[s
     lines = [f"other cells: {b.path} laid on the grid of {a.path}"]
     same_cells = all(one.cells == b.dumps[0].block(one.name).cells for one in a.dumps[0].blocks)
     if same_cells and (parted := find_other_steps(a, b)):
-        nearest = "dumps are compared by the nearest time, histories by time"
-        lines = [f"other steps: {parted}; {nearest}", *compare_histories_by_time(a, b)]
+        lines = [f"other steps: {parted}; dumps are compared by the nearest time"]
     dumps = count(len(pairs), "dump")
     lines[0] += f"; {dumps} of about the same time, {within} within the tolerances"
     for (one, other), rows in zip(pairs[:-1][-SHOWN:], found[:-1][-SHOWN:], strict=True):
@@ -269,38 +267,6 @@ def compare_by_norms(a: Side, b: Side, rtol: float, atol: float) -> tuple[list[s
     for block, field, *norms in found[-1]:
         lines.append(f"  {block:14s} {field:8s} " + " ".join(f"{norm:10.3g}" for norm in norms))
     return lines, within < len(pairs)
-
-
-def compare_histories_by_time(a: Side, b: Side) -> list[str]:
-    """Lines on the columns of numbers that differ most over the times that both histories have.
-
-    That of `b` is interpolated at the times of `a`; a difference counts relative to the column's
-    largest size.
-    """
-    one, other = a.history or {}, b.history or {}
-    begin, end = max(one["t"][0], other["t"][0]), min(one["t"][-1], other["t"][-1])
-    here = (one["t"] >= begin) & (one["t"] <= end)
-    if not here.any():
-        return ["history: no times in common"]
-    t, found = one["t"][here], []
-    for name in one.keys() & other.keys() - {"step", "t", "dt"}:
-        if name.startswith("seconds_") or {one[name].dtype.kind, other[name].dtype.kind} - set(
-            "fi"
-        ):
-            continue
-        ours, theirs = one[name][here], np.interp(t, other["t"], other[name])
-        there = np.isfinite(ours) & np.isfinite(theirs)
-        size = np.abs([ours[there], theirs[there]]).max(initial=0.0)
-        apart = np.where(there, np.abs(ours - theirs), 0.0)
-        if apart.any():
-            found.append((float(apart.max() / size), name, t[apart.argmax()], float(size)))
-    found.sort(reverse=True)
-    lines = [
-        f"history {name}: up to {part:.2g} of its size {size:.3g}, at t = {when:.6g}"
-        for part, name, when, size in found[:SHOWN_COLUMNS]
-    ]
-    more = len(found) - len(lines)
-    return [*lines, f"history: {more} more columns differ by less"] if more > 0 else lines
 
 
 def _compare_blocks(one: BlockData, other: BlockData) -> list[tuple[Any, ...]]:

@@ -15,7 +15,7 @@ from PIL import Image
 
 pytest.importorskip("jinja2")
 
-from runs.report import PICTURES, make_report
+from runs.report import PICTURES, report
 
 
 class Page(HTMLParser):
@@ -89,7 +89,7 @@ def test_a_page_has_all_in_it_and_nothing_from_a_network(run, shockgrid):
 
 
 def test_the_deck_in_the_page_repeats_the_run(run, shockgrid, few_pictures):
-    make_report("run", film=False, dpi=20)
+    report("run", film=False, dpi=20)
     (link,) = (x for x in Page(Path("run/report.html").read_text()).links if x.startswith("data:"))
     Path("deck.toml").write_bytes(base64.b64decode(link.partition(",")[2]))
     assert shockgrid("run", "deck.toml", "-q", "-o", "again")[0] == 0

@@ -14,6 +14,7 @@ A problem's own deck reads:
 
 from __future__ import annotations
 
+import collections
 import hashlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -263,16 +264,9 @@ def place_gauges(tables: Iterable[Gauge]) -> list[Gauge]:
             name = f"{gauge.name}_{k + 1}" if gauge.to else gauge.name
             alone = {"name": name, "at": at, "to": None, "count": 1, "fields": fields}
             points.append(msgspec.structs.replace(gauge, **alone))
-    columns: dict[str, str] = {"step": "the step", "t": "the time", "outside": "a count"}
-    for point in points:
-        own = [*(("x", "y") if point.moves else ()), "block", *point.fields]  # in gauges.csv
-        for column in (f"{point.name}_{word}" for word in own):
-            if column in columns:
-                raise BadInput(
-                    f"deck: gauge {point.name!r} would write the column {column!r}, which is that "
-                    f"of {columns[column]!r} already; give it another name"
-                )
-            columns[column] = point.name
+    for name, count in collections.Counter(point.name for point in points).items():
+        if count > 1:
+            raise BadInput(f"deck: {count} gauges are called {name!r}; give them different names")
     return points
 
 

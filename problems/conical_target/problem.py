@@ -95,10 +95,6 @@ class ConicalTargetDeck(Deck, kw_only=True):
 THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
 AT_REST = 0.01  # of the impactor's speed
 PEAK = ("pressure", "x", "y")  # greatest pressure of a material, and the centre of that cell
-EXTENTS = (  # of parts over the radius inside the shell: no slivers of cells, no endless blocks
-    ("thickness", 0.005, 100.0), ("front", 0.005, 100.0), ("side", 0.005, 100.0),
-    ("length", 0.05, 100.0), ("cone", 0.02, 100.0), ("base", 0.02, 1.0), ("tip", 0.01, 1.0),
-)  # fmt: skip
 BEHIND = 5  # cells behind the front: a shock is three or four wide
 
 
@@ -143,13 +139,6 @@ class ConicalTarget(seen.Results, Problem):
                 f"deck: cover is {deck.cover:g} m, which leaves {deck.radius - deck.cover:g} m of "
                 f"lead beside it; give {deck.radius:g} m to close the shell, or less"
             )
-        for name, low, high in EXTENTS:
-            value = getattr(deck, name)
-            if not low * deck.radius <= value <= high * deck.radius:
-                raise BadInput(
-                    f"deck: {name} is {value:g} m with a radius of {deck.radius:g} m; it must be "
-                    f"between {low * deck.radius:g} and {high * deck.radius:g} m"
-                )
         self.impact = self._match_impact()
         self.ripple = Ripple(deck, self.materials, self.impact)
         self.layout = Layout(deck, self.ripple)

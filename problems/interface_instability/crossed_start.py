@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from problems.initial_states import Front, settle_front
+from problems.interface_instability.spacing import grow_steps
 from problems.references.linear_growth import PerturbedFlow, PerturbedLayer
 from problems.references.riemann import compute_cell_averages
 
@@ -162,10 +163,7 @@ class _Side:
         """Distances (n,) up to `length` of nodes that begin with `size`, grown beyond `even`."""
         stretch = self.start.problem.deck.stretch
         steps = [size] * max(1, round(min(even, length) / size))
-        reach = sum(steps)
-        while reach < length * (1.0 - 1e-9):
-            steps.append(steps[-1] * stretch)
-            reach += steps[-1]
+        steps = grow_steps(steps, stretch, length)
         # the first cells keep their size, those beyond take up what is too much, in proportion
         # to their distance from the first
         positions = np.cumsum(steps)

@@ -196,6 +196,12 @@ class InterfaceInstability(Results, Problem):
         end = max(30.0, self.deck.kct_end)
         return compute_linear_growth(*fluids, self.deck.pressure, self.shock.p, kct_end=end)
 
+    @functools.cached_property
+    def c_first(self) -> float:
+        """Sound speed [m/s] of the first material behind the wave that the interface sends back."""
+        base = self.theory.base
+        return float(self.eos_first.sound_speed(base.rho_left, base.p))
+
     @property
     def t_end(self) -> float:
         """End time: the deck's, or the one its `kct_end` means."""
@@ -275,13 +281,12 @@ class InterfaceInstability(Results, Problem):
         if self.has_open_ends:
             waves = base.u - base.left_wave.head, base.right_wave.head - base.u
             return tuple(1.02 * wave * (t_end - t0) + margin for wave in waves)
-        c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
 
         def late_echo(length):
             return self._find_first_echo(length) - t_end
 
         least = margin + 2.0 * self.deck.gap * self.deck.wavelength
-        longest = 50.0 * c_left * t_end + least
+        longest = 50.0 * self.c_first * t_end + least
         first = least if late_echo(least) >= 0.0 else find_root(late_echo, least, longest)
         front, back = self._find_second_echo()
         second = (t_end - t0) * front * back / (front - base.u + back)
@@ -291,11 +296,10 @@ class InterfaceInstability(Results, Problem):
         """When the wave that the interface sends to the piston is back, at the earliest [s]."""
         base, t0 = self.theory.base, self.arrival
         push, head = self.shock.particle_speed, base.left_wave.head
-        c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
         first = push * self.begun - length  # the piston's first place
         meet = -(first + head * t0) / (push - head)
         position = push * meet + first
-        chase = 1.1 * c_left + max(push, base.u) - base.u
+        chase = 1.1 * self.c_first + max(push, base.u) - base.u
         gap = base.u * (meet - t0) - position
         return meet + gap / chase
 
@@ -313,9 +317,8 @@ class InterfaceInstability(Results, Problem):
         first, second = self.choose_lengths()
         base = self.theory.base
         if self.has_open_ends:
-            c_left = float(self.eos_first.sound_speed(base.rho_left, base.p))
             waves = (
-                ("first", first, base.u - base.left_wave.head, c_left),
+                ("first", first, base.u - base.left_wave.head, self.c_first),
                 ("second", second, base.right_wave.head - base.u, self.theory.sound_speed),
             )
             return {name: self.arrival + way / out + way / c for name, way, out, c in waves}
@@ -342,9 +345,7 @@ class InterfaceInstability(Results, Problem):
             ways.append(np.abs(law * length - self.spacing.make(length)).max())
             laws[name] = law if name == "second" else (1.0 - law)[::-1]
         start = self._find_last_arrival() + ZONE * self.deck.wavelength / find_nearer_speed(base)
-        slowest = min(
-            self.theory.sound_speed, float(self.eos_first.sound_speed(base.rho_left, base.p))
-        )
+        slowest = min(self.theory.sound_speed, self.c_first)
         return Respacing(laws, start, start + 1.5 * max(ways) / (NODE_SPEED * slowest))
 
     def estimate_cells(self) -> int:

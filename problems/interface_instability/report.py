@@ -24,6 +24,7 @@ from regrid.measure.corners import compute_centres
 
 SHOWN = 3  # times drawn beside the growth
 MOST_CURVES = 6  # modes that a screen and a picture of growth show one by one, the strongest
+PASSED = 1.0  # k c t from which on computed rates are drawn
 MOST_NAMED = 3  # curves of rates with names of their own: more have the colours of amplitudes
 NO_WAVE = 1e-6  # of the shock's pressure: a weaker reflected wave is none
 
@@ -214,29 +215,17 @@ def _draw_theory(amplitude, rate, growth, curves: list[_Curve], column, kct: np.
         amplitude.set_ylim(0.0, 1.6 * top)
 
 
-def _draw_rates(problem, axes, kct, t, curves: list[_Curve], theory: bool) -> None:
-    """Computed rates; while the shock passes only what lies in the range of the rest."""
+def _draw_rates(problem, axes, kct, t, curves: list[_Curve]) -> None:
+    """Computed rates after the shock's passage."""
     width = max(1, len(kct) // 200)
     middle = 0.5 * (kct[width:] + kct[:-width])
-    speeds = [
-        (c.values[width:] - c.values[:-width])
-        / ((t[width:] - t[:-width]) * c.number * problem.k * c.first)
-        for c in curves
-    ]
-    settled = np.concatenate([speed[middle > 1.0] for speed in speeds])
-    low, high = -np.inf, np.inf
-    if settled.size:
-        settled = np.concatenate([settled, axes.dataLim.intervaly]) if theory else settled
-        span = np.ptp(settled)
-        low, high = min(0.0, settled.min() - 0.1 * span), settled.max() + 0.1 * span
-        if high > low:
-            axes.set_ylim(low, high)
-    for n, (curve, speed) in enumerate(zip(curves, speeds, strict=True)):
-        shown = middle > 0.0
-        passing = np.flatnonzero((middle <= 1.0) & ((speed < low) | (speed > high)))
-        shown[: passing[-1] + 1 if passing.size else 0] = False
-        label = f"{curve.label} (after shock passage)" if len(curves) <= MOST_NAMED else None
-        axes.plot(middle[shown], speed[shown], color=f"C{n}", label=label)
+    shown = middle > PASSED
+    for n, c in enumerate(curves):
+        speed = (c.values[width:] - c.values[:-width]) / (t[width:] - t[:-width])
+        rate = speed / (c.number * problem.k * c.first)
+        label = f"{c.label} (after shock passage)" if len(curves) <= MOST_NAMED else None
+        axes.plot(middle[shown], rate[shown], color=f"C{n}", label=label)
+    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
 
 
 class Results:
@@ -290,7 +279,7 @@ class Results:
         if growth is not None:
             _draw_theory(amplitude, rate, growth, curves, column, kct)
         if len(kct) > 3:
-            _draw_rates(self, rate, kct, column["t"], curves, growth is not None)
+            _draw_rates(self, rate, kct, column["t"], curves)
         words = "k c t after the shock's arrival" + ", k of mode 1" * several
         amplitude.set(xlabel=words, ylabel="a / a0")
         rate.set(xlabel=words, ylabel="(da/dt) / (k a0)")

@@ -23,6 +23,15 @@ GROWTH = 1.1  # of the finer cells, from one to the next beyond that
 NODE_SPEED = 0.25  # most speed of nodes that are respaced, over that of sound
 
 
+def grow_steps(steps: list[float], stretch: float, length: float) -> list[float]:
+    """The steps and further ones, each `stretch` times the one before, up to `length` or beyond."""
+    reach = sum(steps)
+    while reach < length * (1.0 - 1e-9):
+        steps.append(steps[-1] * stretch)
+        reach += steps[-1]
+    return steps
+
+
 @dataclass(frozen=True)
 class Spacing:
     """The deck's cells across the interface, `finer` times as fine at the interface."""
@@ -38,10 +47,7 @@ class Spacing:
         steps = list(self._make_finer_steps(size, length))
         even = min(length, deck.uniform * deck.wavelength) - sum(steps)
         steps += [size] * max(0 if steps else 1, round(even / size))
-        reach = sum(steps)
-        while reach < length * (1.0 - 1e-9):
-            steps.append(steps[-1] * deck.stretch)
-            reach += steps[-1]
+        steps = grow_steps(steps, deck.stretch, length)
         positions = np.concatenate([[0.0], np.cumsum(steps)])
         return positions * (length / positions[-1])
 

@@ -16,7 +16,6 @@ density ahead no table holds the pressure behind, only states behind need be in 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -312,21 +311,16 @@ def shock_with_mach(eos, rho: float, p: float, mach: float) -> Shock:
 
 
 def _shock_with(eos, rho: float, p: float, name: str, value: float, scale: float) -> Shock:
-    """Shock whose attribute `name` (growing with pressure) is `value`; `scale` ~ pressure rise."""
+    """Shock whose attribute `name` (growing with pressure) is `value`; `scale` ~ pressure rise.
+
+    Rises that no shock reaches (BadInput) are kept clear of as long as there are lower ones.
+    """
     if scale == 0.0:
         return shock_to_pressure(eos, rho, p, p)
 
     def excess(rise):
         return getattr(shock_to_pressure(eos, rho, p, p + rise), name) - value
 
-    return shock_to_pressure(eos, rho, p, p + find_rise(excess, scale))
-
-
-def find_rise(excess: Callable[[float], float], scale: float) -> float:
-    """The rise of pressure > 0 at which `excess`, rising from below 0, is 0; `scale` ~ that rise.
-
-    Rises that no shock reaches (BadInput) are kept clear of as long as there are lower ones.
-    """
     low, high, limit = 0.0, scale, math.inf
     while True:
         try:
@@ -337,7 +331,8 @@ def find_rise(excess: Callable[[float], float], scale: float) -> float:
             limit = high
         else:
             if beyond:
-                return find_root(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
+                rise = find_root(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
+                return shock_to_pressure(eos, rho, p, p + rise)
             low = high
         high = min(2.0 * high, 0.5 * (low + limit))
 

@@ -513,10 +513,6 @@ def compute_linear_growth(
     up to k c t = 30 or so.  Any consistent units.  Raises BadInput for impossible states; the
     curve, when it is asked for, RunFailure if the march in time fails.
     """
-    if not p_behind > p:
-        raise BadInput(
-            f"linear growth: the pressure behind the shock, {p_behind:g}, must be > {p:g}"
-        )
     incident = shock_to_pressure(eos_first, rho_first, p, p_behind)
     rho_ahead, u = incident.rho, incident.particle_speed
     base = solve_riemann(eos_first, (rho_ahead, u, p_behind), eos_second, (rho_second, 0.0, p))

@@ -61,9 +61,8 @@ class FlyerTarget(Problem):
         super().__init__(deck)
         first, second, *more = deck.plates
         if first.gap:
-            raise BadInput(
-                f"deck: plates[0].gap is {first.gap:g}; nothing is before the first plate"
-            )
+            words = "nothing is before the first plate"
+            raise BadInput(f"deck: plates[0].gap is {first.gap:g}; {words}")
         self.materials = [find_material(plate.material) for plate in deck.plates]
         impact = deck.speed, second.gap, first.thickness, second.thickness
         self.theory = compute_plate_impact(*self.materials[:2], *impact)

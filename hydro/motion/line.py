@@ -538,12 +538,12 @@ class JoinedLine(Line):
         if self.carried is not None:
             self.moved[:, 1:-1] = old[:, 1:-1] + self.carried()[:, 1:-1]
             return
-        step = new[:, [0, -1]] - old[:, [0, -1]]
+        step, law = new[:, [0, -1]] - old[:, [0, -1]], self.find_law(span.t)
         self.moved[:, 1:-1] = old[:, 1:-1] + (
-            step[:, :1] * (1.0 - self.law[1:-1]) + step[:, 1:] * self.law[1:-1]
+            step[:, :1] * (1.0 - law[1:-1]) + step[:, 1:] * law[1:-1]
         )
         if self.last_law is not None:
-            change = self.find_law(span.t + span.dt) - self.find_law(span.t)
+            change = self.find_law(span.t + span.dt) - law
             self.moved[:, 1:-1] += (new[:, -1:] - new[:, :1]) * change[1:-1]
 
 

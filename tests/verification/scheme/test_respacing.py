@@ -16,7 +16,7 @@ SPEED = 0.3
 
 def build(sides: str) -> Simulation:
     """A uniform stream on two blocks whose sides go from fine cells at the interface to even ones;
-    j_min and j_max are walls or a periodic pair."""
+    j_min and j_max are walls or a periodic pair, the ends rest, so that both lengths change."""
     even = np.linspace(0.0, 1.0, 13)
     blocks = []
     for name, x in (("first", -1.0 + even**0.5), ("second", even**2)):
@@ -26,7 +26,7 @@ def build(sides: str) -> Simulation:
     first, second = blocks
     links = [join("interface", (first, "i_max"), (second, "i_min"))]
     for block, end in ((first, "i_min"), (second, "i_max")):
-        put(block, end, "piston", velocity=(SPEED, 0.0))
+        put(block, end, "inflow", state=(1.0, SPEED, 0.0, 1.0), velocity=(0.0, 0.0))
         if sides == "periodic":
             links.append(join("periodic", (block, "j_min"), (block, "j_max")))
         else:
@@ -45,7 +45,7 @@ def test_cells_become_even_and_the_stream_stays_uniform(sides):
             assert np.abs(block.state[:, 1:-1, 1:-1] - uniform).max() < 1e-13
     for block in simulation.blocks:
         steps = np.diff(block.nodes[0], axis=0)
-        assert np.abs(steps - 1.0 / 12.0).max() < 1e-3  # the inside follows its sides
+        assert np.abs(steps - steps.mean()).max() < 1e-3  # the inside follows its sides
 
 
 @pytest.mark.parametrize("sides", ["walls", "periodic"])

@@ -128,14 +128,13 @@ def main() -> None:
         line = np.interp(x, scaled, found["growth"])
         rows.append({
             "Mach": one.mach,
-            "growth rate v0 [m/s], measured": f"{one.rate[0]} ± {one.rate[1]:.2f}",
+            "v0 [m/s], measured": f"{one.rate[0]} ± {one.rate[1]:.2f}",
             "computed, sharp": f"{found['rate']:.2f}",
             "psi": f"{found['psi']:.3f}",
             "computed / psi": f"{found['rate'] / found['psi']:.2f}",
-            "k (a - a0+), mean error": f"{100 * np.mean(line / y - 1):+.1f} %",
+            "mean error of k (a - a0+)": f"{100 * np.mean(line / y - 1):+.1f} %",
             "at the last time": f"{100 * (line[-1] / y[-1] - 1):+.1f} %",
-            "interface speed [m/s], measured": one.speed,
-            "computed": f"{found['speed']:.1f}",
+            "interface speed [m/s]": f"{one.speed}, computed {found['speed']:.1f}",
         })  # fmt: skip
         print(rows[-1], flush=True)
         axes.errorbar(

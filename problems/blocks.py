@@ -39,7 +39,6 @@ from problems.deck import (
     key,
     place_file,
 )
-from problems.pictures import draw_field, make_panels
 from problems.problem import Problem, Report
 from regrid.domains import distribute_by_arc_length
 from regrid.equidistribution.weights import Expression
@@ -48,7 +47,7 @@ from regrid.given import find_start, make_boundary, make_polyline, orient_sides,
 from regrid.measure.corners import compute_centres
 from regrid.measure.quality import find_bad_cells
 from regrid.protocol import call_regridder
-from regrid.sides import SIDE_NAMES, compute_area, get_sides
+from regrid.sides import SIDE_NAMES, compute_area
 from regrid.text_files import read_columns
 
 SAMPLES = 1025  # points on a curve given by formulas
@@ -453,17 +452,6 @@ class Blocks(Problem):
                 f"of mass went {x[-1] - x[0]:.4g} m along x; pressure up to {max(p):.4g} Pa"
             )
         return Report(self.deck.title or "blocks of a deck:", notes=notes)
-
-    def draw_blocks(self, figure, run_data) -> None:
-        """Pressure at the end, the outlines of the blocks and every fourth grid line."""
-        dump = run_data.dumps[-1]
-        sides = [line for block in dump.blocks for line in get_sides(block.nodes)]
-        width, height = np.ptp(np.concatenate(sides, axis=1), axis=1)
-        axis = make_panels(figure, 10.0, float(np.clip(8.5 * height / width + 2.0, 3.0, 10.0)))
-        picture = draw_field(axis, dump, "p", every=4, lines=sides)
-        look = {"orientation": "horizontal", "fraction": 0.08, "aspect": 50}
-        figure.colorbar(picture, ax=axis, label="pressure [Pa]", **look)
-        axis.set_title(f"t = {dump.t:.4g} s", fontsize="medium")
 
 
 def measure_means(block: Block) -> list[float]:

@@ -21,7 +21,6 @@ from typing import Literal
 import numpy as np
 
 from problems.deck import Deck, Regrid, RunControl, key
-from problems.pictures import draw_grid, make_panels
 from problems.problem import Problem, Report, Row
 from regrid.domains import DOMAINS, MovingDomain, make_domain
 from regrid.errors import RegridFailure
@@ -142,28 +141,6 @@ class GridMarch(Problem):
             f"{100.0 * made['t'][-1]:.0f} % of the motion; theory is the quasi-1D grid's"
         )
         return Report(head, rows)
-
-    def draw_grids(self, figure, run_data) -> None:
-        """The grid at up to four times of the march."""
-        dumps = list(run_data.dumps)
-        chosen = [dumps[k] for k in np.unique(np.linspace(0, len(dumps) - 1, 4).astype(int))]
-        panels = make_panels(figure, 4.0 * len(chosen), 5.0, 1, len(chosen), squeeze=False)[0]
-        for axes, dump in zip(panels, chosen, strict=True):
-            x, y = nodes = dump.blocks[0].nodes
-            draw_grid(axes, nodes, color="0.25", lw=0.4)
-            if np.ptp(y) > 20.0 * np.ptp(x):
-                axes.set_ylim(y.min(), y.min() + 4.0 * np.ptp(x))
-            axes.set(aspect="equal", title=f"t = {dump.t:.3g}")
-
-    def draw_quality(self, figure, run_data) -> None:
-        """First line gap, aspect ratio, scaled Jacobian and the regridder's work against time."""
-        columns = "first_line_gap", "worst_aspect", "least_scaled_jacobian", "regrid_iterations"
-        words = "first line gap", "worst aspect ratio", "minimum scaled Jacobian", "iterations"
-        panels = make_panels(figure, 8.0, 8.0, len(columns))
-        for axes, name, label in zip(panels, columns, words, strict=True):
-            axes.plot(run_data.history["t"], run_data.history[name], linewidth=1.2)
-            axes.set_ylabel(label)
-        axes.set_xlabel("part of the motion done")
 
 
 class GridMarchEvolution:

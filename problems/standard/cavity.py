@@ -23,7 +23,7 @@ from hydro.boundary import put
 from hydro.eos.materials import find_material
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, VoidFill, key
 from problems.initial_states import put_walls
-from problems.pictures import draw_columns, draw_field, find_dump, make_panels
+from problems.pictures import draw_field, find_dump, make_panels
 from problems.problem import Problem, Report, Row, find_most, find_time
 from problems.references.hugoniot import release, shock_with_particle_speed
 from regrid.errors import BadInput
@@ -147,24 +147,19 @@ class Cavity(Problem):
         return Report(head, rows)
 
     def draw_cavity(self, figure, run_data) -> None:
-        """Pressure and grid at four times, size of the void and speed of the jet over time."""
+        """Pressure and grid at four times, until the jet hits the far side and at the end."""
         history, radius = run_data.history, self.deck.radius
-        axes = make_panels(figure, 12.0, 5.6, 2, 3)
+        axes = make_panels(figure, 9.5, 5.8, 2, 2)
         closing, last = self.find_closing(history), history["t"][-1]
         end = closing if math.isfinite(closing) else last
         times = (self.arrival, 0.5 * (self.arrival + end), end, last)
         dumps = [find_dump(run_data, t) for t in times]
         high = max(1e-9 * float(np.quantile(dump.blocks[0].p, 0.995)) for dump in dumps)
-        for axis, dump in zip(axes[:, :2].ravel(), dumps, strict=True):
+        for axis, dump in zip(axes.flat, dumps, strict=True):
             words = {"title": f"t = {1e6 * dump.t:.3f} µs", "unit": 1e9}
             picture = draw_field(axis, dump, "p", low=0.0, high=high, every=1, **words)
             axis.set(xlim=(-1.6 * radius, 2.4 * radius), ylim=(0.0, 2.0 * radius))
-        figure.colorbar(picture, ax=axes[:, :2], shrink=0.7, label="pressure [GPa]")
-        part = {"t": history["t"], "part": history["void_size"] / history["void_size"][0]}
-        draw_columns(axes[0, 2], part, {"part": ""}, "size of the void, of its first one", "µs")
-        axes[1, 2].axhline(self.near_speed, color="k", lw=0.8, ls="--", label="plane free surface")
-        speeds = {"jet_speed": "near side, jet", "far_speed": "far side"}
-        draw_columns(axes[1, 2], history, speeds, "speed [m/s]", "µs")
+        figure.colorbar(picture, ax=axes, shrink=0.7, label="pressure [GPa]")
 
 
 def measure_void(nodes: np.ndarray, curved: bool) -> float:

@@ -127,18 +127,15 @@ class FlyerTarget(Problem):
         return Report(head, rows, notes)
 
     def draw_flyer_target(self, figure, run_data) -> None:
-        """The free surface's speed beside theory, and the mean speeds of all plates."""
-        (left, right), theory = figure.subplots(1, 2), self.theory
+        """The free surface's speed beside theory."""
+        axis, theory = figure.subplots(), self.theory
         words = {"free_surface_speed": "computed"}
-        draw_columns(left, run_data.history, words, "free surface of the last plate [m/s]", "µs")
+        draw_columns(axis, run_data.history, words, "free surface of the last plate [m/s]", "µs")
         if self.is_pair:
             end = theory.end if math.isfinite(theory.end) else theory.out
-            t = 1e6 * np.array([0.0, theory.out, theory.out, end])
-            trace = 0.0, 0.0, theory.free, theory.free
-            left.plot(t, trace, "k--", lw=0.8, label="theory, until the release")
-        plates = zip(self.names, self.deck.plates, strict=True)
-        words = {f"speed_{name}": f"{name}, {plate.material}" for name, plate in plates}
-        draw_columns(right, run_data.history, words, "mean speed [m/s]", "µs")
+            t, trace = (0.0, theory.out, theory.out, end), (0.0, 0.0, theory.free, theory.free)
+            words = "theory, until the release"
+            axis.plot(1e6 * np.array(t), trace, "k--", lw=0.8, label=words)
 
 
 def median(values: np.ndarray) -> float:

@@ -43,7 +43,7 @@ from runs.pictures.command import (
     new_figure,
     save,
 )
-from runs.pictures.fields import list_fields
+from runs.pictures.fields import get_style, list_fields
 from runs.pictures.film import make_film
 from runs.store.files import check_folder, write_atomically
 from runs.store.reader import Dump, RunData
@@ -199,7 +199,8 @@ def draw_pictures(run: RunData, dpi: int, left_out: list[str]) -> list[tuple[str
     wanted = [(heading, words) for heading, words in PICTURES if applies(run, words)]
     try:
         own = run.problem.figures()
-        field = name_field(run)
+        name = default_fields(run)[0]
+        field = get_style(run.dumps[-1], name).words.capitalize()
     except BadInput as error:
         left_out.append(str(error))
         own, field = {}, "The field"
@@ -229,14 +230,6 @@ def applies(run: RunData, words: dict[str, Any]) -> bool:
     if words.get("what") == "interface":
         return len({get_material(block) for block in last.blocks}) > 1
     return set(words.get("fields", ())) <= set(list_fields(last))
-
-
-def name_field(run: RunData) -> str:
-    """The words for the field that a picture shows if none is named."""
-    name = default_fields(run)[0]
-    block = next(block for block in run.dumps[-1].blocks if name in block.cell_fields)
-    words = block.long_names[name]
-    return words[:1].upper() + words[1:]
 
 
 def embed_film(run: RunData, left_out: list[str]) -> str:

@@ -24,6 +24,7 @@ from runs.inspection.account import compute_drifts
 from runs.pictures import fields
 from runs.pictures.fields import View
 from runs.quantities import pick_prefix
+from runs.store.dumps import LONG_NAMES
 from runs.store.files import check_free, make_csv, write_atomically
 from runs.store.reader import Dump, RunData
 
@@ -392,10 +393,6 @@ def draw_panel(axes, t, history, names: Panel, units) -> None:
 
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg", "c": "m/s"}
-WORDS = {
-    "rho": "density", "u": "velocity u", "v": "velocity v", "p": "pressure",
-    "e": "specific internal energy", "c": "sound speed",
-}  # fmt: skip
 MOST_NAMED = 10  # gauges with a line in the legend; more are told apart by a row of colours
 COLUMNS = 3
 GAUGES_WIDTH, GAUGES_HEIGHT = 4.4, 3.0  # inches of a panel
@@ -437,7 +434,7 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
             lines[k] = axes.plot(
                 factor * table["t"], scale * curve, style, color=colours[k], lw=1, label=words
             )[0]
-        axes.set_title(f"{WORDS[field]} [{field_unit}]", fontsize=9)
+        axes.set_title(f"{LONG_NAMES[field]} [{field_unit}]", fontsize=9)
         axes.tick_params(labelsize=8)
         axes.grid(alpha=0.3)
     moving = "; dashed: moves with the material" * any(point.moves for point in chosen)

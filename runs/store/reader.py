@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from problems.problem import Problem
+from problems.problem import Problem, align
 from regrid.errors import BadInput, suggest
 from regrid.measure.corners import compute_centres
 from runs.deck.reading import ReadDeck, read_toml
@@ -93,11 +93,7 @@ class Table(dict[str, np.ndarray]):
             return str(value)
 
         cells = [[name, *map(say, self[name][:MOST_ROWS])] for name in names]
-        widths = [max(map(len, column)) for column in cells]
-        rows = [
-            "  " + "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
-            for row in zip(*cells, strict=True)
-        ]
+        rows = align(list(zip(*cells, strict=True)))
         more = len(self[names[0]]) - MOST_ROWS if names else 0
         return [*rows, f"  ... and {more} more"] if more > 0 else rows
 

@@ -378,12 +378,11 @@ class LinearGrowth:
         grown = self.get_amplitude(1.0, ends)
         return float((grown[1] - grown[0]) / (ends[1] - ends[0]))
 
-    def get_asymptotic_rate(self, first: float = 6.0, last: float = 30.0) -> float:
-        """The rate about which `rate` oscillates: its mean with weight sin² over the window."""
-        self._check_window(last)
+    def get_asymptotic_rate(self) -> float:
+        """The rate about which `rate` oscillates: its mean with weight sin² over 6 < k c t < 30."""
+        self._check_window(30.0)
         phase = (np.arange(8192) + 0.5) / 8192
-        kct = first + (last - first) * phase
-        rate = self.get_rate(1.0, kct / self.sound_speed)
+        rate = self.get_rate(1.0, (6.0 + 24.0 * phase) / self.sound_speed)
         return float(2.0 * np.mean(np.sin(math.pi * phase) ** 2 * rate))
 
     def _check_window(self, last: float) -> None:

@@ -350,27 +350,6 @@ class Results:
         corner.set(xlim=(x - 1.6, x + 3.2), ylim=(y - 1.9, y + 1.3))
         corner.set_title("where graphite, steel and lead meet", fontsize="medium")
 
-    def draw_gauges(self, figure, run) -> None:
-        """Pressures over time: gauges on the axis, the greatest and its place, the impact face."""
-        axis, places = make_panels(figure, 11.0, 4.2, 1, 2)
-        history, impact = run.history, self.impact[0]
-        t, top = US * history["t"], history["greatest_pressure"]
-        for number, part in enumerate(GAUGES):
-            p = history[f"pressure_gauge_{number}"]
-            axis.plot(t, p * GPA, label=f"axis, {part:g} of the cone")
-        axis.plot(t, top * GPA, "k:", label="greatest in the cone")
-        axis.plot(t, history["pressure_impact"] * GPA, color="0.6", label="impact face")
-        axis.axhline(impact * GPA, color="0.6", lw=0.6)
-        axis.set_ylabel("pressure [GPa]")
-        for column, words in (("x", "x"), ("y", "r")):
-            values = np.where(top > 0.01 * impact, MM * history[f"greatest_{column}"], np.nan)
-            places.plot(t, values, ".", ms=2.0, label=words)
-        places.axvline(t[int(np.nanargmax(top))], color="0.7", lw=0.8, label="at its peak")
-        places.set_ylabel("place of the greatest pressure in the cone [mm]")
-        for panel in (axis, places):
-            panel.set(xlabel="t [us]", xlim=(0.0, t[-1]), ylim=(0.0, None))
-            panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)
-
     def draw_graphite(self, figure, run) -> None:
         """Part in the second phase over time; states beside the Hugoniot; where the phase is."""
         part, states, map_axes = make_panels(figure, 12.0, 4.2, 1, 3, width_ratios=(1.0, 1.0, 1.3))

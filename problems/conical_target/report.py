@@ -401,8 +401,8 @@ class Results:
         path.set(xlabel="t [us]", ylabel="x of the shock [mm]")
 
     def draw_cone_side(self, figure, run) -> None:
-        """The line between graphite and lead, its departure from its own straight line, growth."""
-        shape, away, growth = make_panels(figure, 13.5, 4.0, 1, 3)
+        """The line between graphite and lead, and its departure from its own straight line."""
+        shape, away = make_panels(figure, 9.5, 4.0, 1, 2)
         for dump in spread_dumps(run, SHOWN):
             line, label = dump.block("cone").nodes[:, :, -1], f"{US * dump.t:.2g} us"
             departure, part = measure_departure(line)
@@ -413,7 +413,3 @@ class Results:
         away.set(xlabel="part of the side's length, from the base", ylabel=words)
         for end in MIDDLE:
             away.axvline(end, color="0.7", lw=0.6)
-        t, history = US * run.history["t"], run.history
-        growth.plot(t, MM * history["line_amplitude"], label="amplitude: half of peak to peak")
-        growth.plot(t, MM * history["line_bend"], ls="--", label="greatest distance from the chord")
-        growth.set(xlabel="t [us]", ylabel="[mm]")

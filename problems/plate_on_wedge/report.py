@@ -290,17 +290,6 @@ def _make_panels(figure, run) -> list[tuple]:
     return list(zip(frames.flat, dumps, strict=False))
 
 
-def _draw_pressure(axes, problem, run, dump, **more):
-    """Pressure [GPa] of all blocks with the grid, on one scale for the whole run."""
-    if problem.collision.attached:
-        top = 1.1 * problem.collision.p / 1e9
-    else:
-        last = run.dumps[-1].blocks
-        top = max(float(np.percentile(block.cell_fields["p"], 99.5)) for block in last) / 1e9
-    style = {"colours": "turbo", "low": 0.0, "high": top, "every": 1, "mm": True}
-    return draw_field(axes, dump, lambda block: block.cell_fields["p"] / 1e9, **style, **more)
-
-
 class Results:
     """What the problem says of a run, a part of its class: report, cautions, pictures."""
 
@@ -415,31 +404,21 @@ class Results:
 
     def draw_phases(self, figure, run) -> None:
         """Pressure with the grid at several times, all in one frame."""
-        panels = _make_panels(figure, run)
+        panels, last = _make_panels(figure, run), run.dumps[-1].blocks
+        top = max(float(np.percentile(block.cell_fields["p"], 99.5)) for block in last)
+        top = 1.1 * self.collision.p if self.collision.attached else top
+        style = {"colours": "turbo", "low": 0.0, "high": top / 1e9, "every": 1, "mm": True}
         for axes, dump in panels:
-            image = _draw_pressure(axes, self, run, dump)
+            image = draw_field(axes, dump, "p", unit=1e9, **style)
             axes.label_outer()
         axes = [panel for panel, _ in panels]
         figure.colorbar(image, ax=axes, label="pressure [GPa]", extend="max", pad=0.01)
 
     def draw_contact(self, figure, run) -> None:
-        """Zooms at the collision point and the face's end; A's path and speed against theory."""
+        """Path and speed of the collision point against theory."""
         history, theory = run.history, self.collision.contact_speed
-        zooms, (paths, speeds) = make_panels(figure, 12.0, 8.5, 2, 2)
+        paths, speeds = make_panels(figure, 12.0, 4.5, 1, 2)
         t, path = history["t"], history["contact_path"]
-        rows = choose_rows(self, history, STEADY)
-        times = np.array([dump.t for dump in run.dumps])
-        near = int(np.abs(times - (t[rows].mean() if rows.any() else t[len(t) // 2])).argmin())
-        size = 0.2 * self.deck.face * MM
-        for axes, number, words in (
-            (zooms[0], near, "collision point A"),
-            (zooms[1], -1, "end of the contact, B"),
-        ):
-            dump = run.dumps[number]
-            title = f"{words}, t = {1e6 * dump.t:.2f} us"
-            _draw_pressure(axes, self, run, dump, bar="pressure [GPa]", title=title)
-            x, y = (MM * np.interp(dump.t, t, history[f"contact_{name}"]) for name in "xy")
-            axes.set(xlim=(x - size, x + size), ylim=(y - 0.8 * size, y + 0.8 * size))
         paths.plot(1e6 * t, MM * path, label="computed")
         rows = choose_rows(self, history, (0.02, 1.0))
         if rows.any():

@@ -67,25 +67,15 @@ class Names(NamedTuple):
     t_unit: str = "s"
 
 
-class Source(NamedTuple):
-    """A stored array of `shape`, in a file beside this one or in this one ("."); of it the first
-    entries lie in a larger array from `corner` on, `shown` of them along each axis there."""
-
-    file: str
-    path: str
-    shape: tuple[int, ...]
-    corner: tuple[int, ...]
-    shown: tuple[int, ...]
-
-
 class Virtual(NamedTuple):
-    """An array that is stored elsewhere, in pieces."""
+    """An array that lies elsewhere in the file, whole or each of its `rows` at its own path."""
 
     dtype: np.dtype
     shape: tuple[int, ...]
-    sources: Sequence[Source]
+    paths: Sequence[str]
+    rows: bool
 
-    def create(self, group: h5py.Group, key: str) -> h5py.Dataset:
+    def create(self, group: h5py.Group, key: str) -> None:
         """Make the virtual dataset `key`, which may contain "/".
 
         Made by hand, since h5py's own way notes the time of day, and equal runs make equal files.
@@ -95,23 +85,21 @@ class Virtual(NamedTuple):
         plan.set_obj_track_times(False)
         if self.dtype.kind == "f":
             plan.set_fill_value(np.array(np.nan, self.dtype))
-        for source in self.sources:
-            space.select_hyperslab(source.corner, source.shown)
-            stored = h5py.h5s.create_simple(source.shape)
-            rank = len(source.shape)
-            stored.select_hyperslab((0,) * rank, source.shown[-rank:])
-            path = source.path.replace("%", "%%")  # a percent sign begins a pattern there
-            plan.set_virtual(space, source.file.encode(), path.encode(), stored)
+        stored = h5py.h5s.create_simple(self.shape[1:] if self.rows else self.shape)
+        for row, path in enumerate(self.paths):
+            if self.rows:
+                corner = row, *(0,) * (len(self.shape) - 1)
+                space.select_hyperslab(corner, (1, *self.shape[1:]))
+            path = path.replace("%", "%%")  # a percent sign begins a pattern there
+            plan.set_virtual(space, b".", path.encode(), stored)
         space.select_all()
         parent, _, name = key.rpartition("/")
         group = group.require_group(parent) if parent else group
         kind = h5py.h5t.py_create(self.dtype, logical=True)
         h5py.h5d.create(group.id, name.encode(), kind, space, dcpl=plan)
-        return group[name]
 
 
-Array: TypeAlias = np.ndarray | Virtual
-Arrays: TypeAlias = Mapping[str, Sequence[tuple[str, Array]]]  # of blocks, by the block's name
+Arrays: TypeAlias = Mapping[str, Sequence[tuple[str, np.ndarray]]]  # by the block's name
 
 
 def make_image(
@@ -147,7 +135,10 @@ def make_image(
         if linked is not None:
             group = file.create_group("state")
             for key, value in linked.items():
-                _create(group, key, value)
+                if isinstance(value, Virtual):
+                    value.create(group, key)
+                else:
+                    group.create_dataset(key, data=value)
             made = file.create_group("provenance", track_order=True)
             made.attrs.update(find_provenance(names.deck_text))
         file.flush()
@@ -200,12 +191,6 @@ def _list_numbers(evolution: Evolution) -> dict[str, float]:
     return {"step": step, "t": t, "t_end": t_end}
 
 
-def _create(group: h5py.Group, key: str, value: Any, **filters: Any) -> h5py.Dataset:
-    if isinstance(value, Virtual):
-        return value.create(group, key)
-    return group.create_dataset(key, data=value, **filters)
-
-
 def _link_shown(arrays: Arrays, state: Mapping[str, Any]) -> Mapping[str, Any]:
     """The state, virtual where an array or all its rows lie in the blocks, too, bitwise.
 
@@ -214,9 +199,8 @@ def _link_shown(arrays: Arrays, state: Mapping[str, Any]) -> Mapping[str, Any]:
     shown: dict[tuple, list[tuple[str, np.ndarray]]] = {}
     for block, fields in arrays.items():
         for name, values in fields:
-            if isinstance(values, np.ndarray):
-                entry = f"/blocks/{block}/{name}", values
-                shown.setdefault((values.dtype, values.shape), []).append(entry)
+            entry = f"/blocks/{block}/{name}", values
+            shown.setdefault((values.dtype, values.shape), []).append(entry)
 
     def find(key: str, values: np.ndarray) -> str | None:
         own = f"/blocks/{key.rpartition('/')[0]}/"
@@ -231,15 +215,13 @@ def _link_shown(arrays: Arrays, state: Mapping[str, Any]) -> Mapping[str, Any]:
     for key, value in state.items():
         if not isinstance(value, np.ndarray) or value.ndim < 2 or not value.size:
             continue
-        whole, shape = find(key, value), value.shape
+        whole = find(key, value)
         if whole is None and find(key, value[0]) is None:
             continue
-        paths = [whole] if whole else [find(key, row) for row in value]
-        if all(paths):
-            stored, here = (shape, shape) if whole else (shape[1:], (1, *shape[1:]))
-            rest = (0,) * (value.ndim - 1)
-            sources = [Source(".", str(p), stored, (k, *rest), here) for k, p in enumerate(paths)]
-            linked[key] = Virtual(value.dtype, shape, sources)
+        found = [whole] if whole else [find(key, row) for row in value]
+        paths = [path for path in found if path]
+        if len(paths) == len(found):
+            linked[key] = Virtual(value.dtype, value.shape, paths, rows=whole is None)
     return linked
 
 
@@ -264,7 +246,7 @@ def list_arrays(block: BlockView, output: Output | None = None) -> list[tuple[st
 def write_block(
     group: h5py.Group,
     block: BlockView,
-    arrays: Iterable[tuple[str, Array]],
+    arrays: Iterable[tuple[str, np.ndarray]],
     names: Mapping[str, str] = EMPTY,
     compression: int = 0,
 ) -> None:
@@ -291,7 +273,7 @@ def write_block(
     for name, values in arrays:
         if values.shape not in at:
             raise ValueError(f"block {block.name!r}, {name}: shape {values.shape} in {nodes} nodes")
-        data = _create(group, name, values, **filters)
+        data = group.create_dataset(name, data=values, **filters)
         for axis, scale in enumerate(at[values.shape]):
             data.dims[axis].attach_scale(group[scale])
         data.attrs["units"] = units.get(name, "1")

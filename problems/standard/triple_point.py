@@ -24,7 +24,6 @@ from hydro.links import join
 from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import put_walls
-from problems.pictures import draw_field, draw_grid, make_panels
 from problems.problem import BlockPlan, Problem, Report, Row, average_plateau, get_last
 from problems.references.riemann import solve_riemann
 from regrid.errors import BadInput
@@ -130,17 +129,3 @@ class TriplePoint(Problem):
         x, y = get_last(history, "point_x"), get_last(history, "point_y")
         where = f"t = {get_last(history, 't'):.3g}: the point is at x = {x:.4f}, y = {y:.4f}"
         return Report(head, rows, [where])
-
-    def draw_triple_point(self, figure, run_data) -> None:
-        """Density with the contacts, and the grid around the vortex, at the end."""
-        dump = run_data.dumps[-1]
-        lines = dump["top"].nodes[:, :, 0], dump["left"].nodes[:, -1, :]
-        top, below = make_panels(figure, 9.0, 6.6, 2, 1, sharex=True, sharey=True)
-        density = lambda block: np.log10(block.rho)  # noqa: E731
-        picture = draw_field(top, dump, density, lines=lines, title="t")
-        figure.colorbar(picture, ax=(top, below), shrink=0.6, label="log10 of density in kg/m3")
-        for n, block in enumerate(dump.blocks):
-            draw_grid(below, block.nodes, color=f"C{n}", lw=0.25)
-        below.set_aspect("equal")
-        below.set(xlabel="x [m]", ylabel="y [m]")
-        top.set_xlabel("")

@@ -111,9 +111,7 @@ class Kidder(RadialProblem):
         for h, bar in ((1.0, ""), (0.75, ""), (0.5, "density [kg/m3]")):
             dump = min(dumps, key=lambda dump: abs(shrink(dump.t) - h))
             draw_field(left, dump, "rho", low=0.0, high=high, every=4, bar=bar)
-            words = f"{1e3 * dump.t:.3g} ms"
-            left.text(0.02, 1.01 * RADII[1] * shrink(dump.t), words, size="small")
-        left.set(xlim=(0.0, 1.08), ylim=(0.0, 1.08))
+            left.text(0.02, 1.01 * RADII[1] * shrink(dump.t), f"{1e3 * dump.t:.3g} ms")
         times, h = 1e3 * np.array([(dump.t, 1e-3 * shrink(dump.t)) for dump in dumps]).T
         for edge, words, exact in ((-1, "outer", None), (0, "inner", "exact")):
             radius = [self.compute_radii(d["shell"].nodes[:, edge, :]).mean() for d in dumps]

@@ -34,7 +34,6 @@ PHASES = (
 )  # fmt: skip
 KINDS = {"mean": "mean", "rms": "root mean square", "worst": "worst cell"}  # of errors
 FIRST_STEP = 0.02  # of a cell that the shock crosses in the first step
-SHOWN = (0.6, 0.85, 0.93)  # times of the picture [s]
 MIDDLE = 0.15  # of the length behind the shock that is left out at either end
 
 
@@ -109,8 +108,8 @@ class Saltzmann(Problem):
 
     def draw_saltzmann(self, figure, run_data) -> None:
         """Grid and density at three times, and density against x of all cells."""
-        panels = figure.subplots(len(SHOWN), 2, width_ratios=(2, 1))
-        for (left, right), t in zip(panels, SHOWN, strict=True):
+        panels = figure.subplots(3, 2, width_ratios=(2, 1))
+        for (left, right), t in zip(panels, (0.6, 0.85, 0.93), strict=True):
             dump = find_dump(run_data, t)
             draw_field(left, dump, "rho", every=1, bar="density", title="t")
             left.set_aspect("auto")

@@ -41,7 +41,7 @@ $(BIN)/python:
 
 $(INSTALL): pyproject.toml | $(BIN)/python
 	@echo "installing into $(VENV) ..."
-	@$(PIP) --editable .
+	@$(PIP) --editable '.[report]'
 	@touch $@
 
 $(DEVELOP): pyproject.toml | $(BIN)/python

@@ -271,11 +271,13 @@ def sort_cautions(
     worst = max(found, key=find_error)
     error = find_error(worst)
     of_cells, told = [], []
+    measured = f"with {worst.cells:g} cells per wavelength"
     if worst.cells > cells * (1.0 + EDGE):
         of_cells.append(
-            f"growth was never compared with theory at {cells:.3g} cells per wavelength: "
-            f"take {worst.cells:g} or more"
+            f"{cells:.3g} cells per wavelength are fewer than the table of growth rates has: "
+            f"errors are greater than those {measured}"
         )
+        measured += f", and greater with {cells:.3g}"
     if error > TRUSTED:
         words = f"{100.0 * error:.2g} %"
         if error != abs(worst.rate_error):
@@ -283,14 +285,11 @@ def sort_cautions(
                 f"{100.0 * abs(worst.rate_error):.2g} % of the interface's speed, which is "
                 f"{100.0 * error:.2g} % of the growth here,"
             )
-        told.append(
-            f"growth rates at {where} have errors of up to {words} with {worst.cells:g} cells per "
-            "wavelength"
-        )
+        told.append(f"growth rates at {where} have errors of up to {words} {measured}")
     rough = max(row.roughness for row in found)
     if rough > ROUGH_LINE:
         told.append(
-            f"at {where} the interface became rough with {worst.cells:g} cells per wavelength: "
+            f"at {where} the interface became rough {measured}: "
             f"harmonics above the fourth are {rough:.2g} of the largest mode"
         )
     return of_cells, told
@@ -352,7 +351,6 @@ def sort_deck(problem) -> tuple[list[str], list[str]]:
             f"{which} fewer than {FEW_CELLS} cells per wave, down to {least:.3g}: the scheme damps "
             f"such waves, measured growth with {least:.3g} is about {low:.0f} % low; take cells = "
             f"{FEW_CELLS * short[-1]} or longer waves",
-            *of_cells,
         ]
     return of_cells, others
 

@@ -299,6 +299,7 @@ def remap_runner(
         )
     runner = Runner(deck, directory, deck.make_problem(), target, quiet, gauges=gauges)
     runner.columns, runner.restored = columns, True
+    runner.remapped = f"the history up to step {step} is that of {old}, on its cells"
     return runner
 
 

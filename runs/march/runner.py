@@ -218,6 +218,7 @@ class Runner:
         self.writing = Background()
         self.world: World | None = None  # ranks of MPI that share the run; set like the limit
         self.restored = False
+        self.remapped = ""  # a caution: which part of the history is of other cells
         self._signal = 0
         self._point_wanted = False
 
@@ -351,6 +352,7 @@ class Runner:
             own = account.describe_own(problem, history, evolution)
             lines += ["", own] if own else []
         cautions = account.describe_cautions(problem, history)
+        cautions += [f"caution: {self.remapped}"] if self.remapped else []
         lines += ["", *cautions] if cautions else []
         dumps = count(len(directory.list_points("dump")), "dump")
         lines += [

@@ -99,11 +99,12 @@ def half(shockgrid, toy):
 
 def test_a_run_goes_on_with_more_cells(shockgrid, half):
     before = sum_files(half)
-    code, _, error = shockgrid(
+    code, screen, error = shockgrid(
         "restart", "half", "--cells=20", "--set=run.max_steps=26", "-o", "finer"
     )
     assert code == 0, error
     assert "continues from step 20 of half on other cells: first" in error
+    assert "caution: the history up to step 20 is that of half, on its cells" in screen
     assert sum_files(half) == before, "the old run stays as it is"
     old, new = RunData("half"), RunData("finer")
     assert new.deck.cells == 20 and new.deck.mach == 2.0

@@ -28,7 +28,7 @@ from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.simulation import Simulation
 from hydro.step import take_step
 from problems.deck import DeckTable, key
-from problems.pictures import draw_field, make_panels
+from problems.pictures import draw_field, make_panels, title_time
 from problems.problem import BlockPlan, Problem, find_crossing, say_unreached
 from problems.references.exact_flows import average_points
 from problems.references.hugoniot import Shock, shock_with_mach
@@ -124,7 +124,7 @@ class RadialProblem(Problem):
     codes have with 100 cells, by the deck's `geometry`.
     """
 
-    counted = ("cells", "cells")
+    counted, t_unit = ("cells", "cells"), "1"
     peers: ClassVar[dict[str, str]] = {}
 
     def __init__(self, deck, dimensions: int):
@@ -192,7 +192,7 @@ class RadialProblem(Problem):
     def draw(self, figure, dump, reach: float, **options) -> None:
         """Density out to `reach` [m], and of every cell against its radius beside the exact one."""
         left, right = make_panels(figure, 11.5, 4.8, 1, 2)
-        draw_field(left, dump, "rho", low=0.0, bar="density [kg/m3]", **options)
+        draw_field(left, dump, "rho", low=0.0, bar="density", **options)
         if not self.plane:
             left.set(xlim=(0.0, reach), ylim=(0.0, reach))
         gas = dump["gas"]
@@ -200,8 +200,8 @@ class RadialProblem(Problem):
         right.plot(r.ravel(), gas.rho.ravel(), ".", ms=1.5, color="tab:blue")
         r = np.linspace(1e-3, reach, 2000)
         right.plot(r, self.compute_density(r, max(dump.t, 1e-9)), color="k", lw=0.8)
-        right.set(xlim=(0.0, reach), xlabel="r [m]", ylabel="density [kg/m3], exact in black")
-        figure.suptitle(f"{self.deck.geometry}, t = {dump.t:.3g} s", fontsize="medium")
+        right.set(xlim=(0.0, reach), xlabel="r", ylabel="density, exact in black")
+        figure.suptitle(f"{self.deck.geometry}, {title_time(dump)}", fontsize="medium")
 
 
 def mix_states(eos, fraction: np.ndarray, first, second):

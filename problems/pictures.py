@@ -7,7 +7,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-UNITS = {"s": 1.0, "ms": 1e3, "µs": 1e6}  # of a time axis, in a second
+
+def name_axis(words: str, unit: str) -> str:
+    """`words [unit]`; the words alone where there is no unit."""
+    return words if unit in ("", "1") else f"{words} [{unit}]"
+
+
+UNITS = {"s": 1.0, "1": 1.0, "ms": 1e3, "µs": 1e6}  # of a time axis, in a second
 
 
 def make_panels(figure, width: float, height: float, rows: int = 1, columns: int = 1, **more):
@@ -41,7 +47,7 @@ def draw_field(
     fields = [make(block) / unit for block in dump.blocks]
     low = min(float(np.nanmin(field)) for field in fields) if low is None else low
     high = max(float(np.nanmax(field)) for field in fields) if high is None else high
-    picture, scale, unit = None, 1e3 if mm else 1.0, "mm" if mm else "m"
+    picture, scale, unit = None, 1e3 if mm else 1.0, "mm" if mm else dump.length_unit
     for block, found in zip(dump.blocks, fields, strict=True):
         x, y = nodes = scale * block.nodes
         picture = axis.pcolormesh(x, y, found, cmap=colours, vmin=low, vmax=high, rasterized=True)
@@ -50,14 +56,19 @@ def draw_field(
     for line in lines:
         axis.plot(scale * line[0], scale * line[1], color="w", lw=0.8)
     axis.set_aspect("equal")
-    xlabel, ylabel = (f"{name} [{unit}]" for name in dump.axes)
+    xlabel, ylabel = (name_axis(name, unit) for name in dump.axes)
     axis.set(xlabel=xlabel, ylabel=ylabel)
     if bar:
         axis.figure.colorbar(picture, ax=axis, shrink=0.8, label=bar)
     if title:
-        words = f"t = {dump.t:.3g} s" if title == "t" else title
+        words = title_time(dump) if title == "t" else title
         axis.set_title(words, fontsize="medium")
     return picture
+
+
+def title_time(dump) -> str:
+    """`t = 0.6`, with the unit of the dump's time where it has one."""
+    return f"t = {dump.t:.3g}" + ("" if dump.t_unit == "1" else f" {dump.t_unit}")
 
 
 def draw_grid(axis, nodes: np.ndarray, every: int = 1, color="k", lw=0.2) -> None:
@@ -72,7 +83,7 @@ def draw_columns(axis, history, labels: Mapping[str, str], words: str = "", unit
     t = UNITS[unit] * history["t"]
     for name, label in labels.items():
         axis.plot(t, history[name], label=label)
-    axis.set(xlabel=f"t [{unit}]", ylabel=words)
+    axis.set(xlabel=name_axis("t", unit), ylabel=words)
 
 
 def finish_panels(figure) -> None:

@@ -198,7 +198,7 @@ class Problem:
 
     Deck: ClassVar[type[Deck]] = Deck
     units: ClassVar[Mapping[str, str]] = {}  # of the columns of `measure` that have one
-    t_unit: str = "s"  # of t, in words of the screen: "iterations" where it counts those
+    t_unit: str = "s"  # of t: "1" where the deck's numbers have no units; or "iterations"
     counted: ClassVar[tuple[str, ...]] = ()  # keys of the deck whose product is the cells of all
     measures_sides: ClassVar[bool] = False  # `measure` reads cells along sides alone: `reads_cells`
 
@@ -211,6 +211,13 @@ class Problem:
         """End time [s]: the deck's."""
         assert self.deck.run.t_end is not None
         return self.deck.run.t_end
+
+    def find_units(self) -> dict[str, str]:
+        """Units of t, dt and the columns of `measure`; "1" where the deck's numbers have none."""
+        units = {"t": "s", "dt": "s", **self.units}
+        if self.t_unit != "1":
+            return units
+        return {name: unit if unit.startswith("deg") else "1" for name, unit in units.items()}
 
     def check_end(self, last: float, words: str) -> None:
         """Raise BadInput where the end time is beyond `last` [s], when what `words` say is so."""

@@ -29,6 +29,7 @@ from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import Fluid, make_plane_grid, put_walls
+from problems.pictures import name_axis, title_time
 from problems.problem import Problem, Report, average_plateau, compare, get_last
 from problems.references.riemann import (
     RiemannSolution,
@@ -48,7 +49,8 @@ MOST_RATIO = 1e9  # of the largest cell of a side over its smallest
 SHARE = 0.3  # of a side's cells that are to be in its plateau
 LEAST_GROWTH, MOST_GROWTH = 1.0 + 1e-9, 1.15  # of cells from one to the next
 LARGE = 40.0  # logarithm of a number beside which 1 is nothing
-LABELS = {"rho": "density [kg/m3]", "u": "velocity [m/s]", "p": "pressure [Pa]"}
+UNITLESS = 1e4  # gases at lower pressures than this [Pa] are given without units
+LABELS = {"rho": ("density", "kg/m3"), "u": ("velocity", "m/s"), "p": ("pressure", "Pa")}
 
 
 @dataclass(frozen=True)
@@ -238,6 +240,9 @@ class Riemann(Problem):
         if deck.lengths is not None:
             case = replace(case, lengths=deck.lengths, t_end=None)
         self.case, self.limiter = case, deck.limiter or case.limiter
+        gases = isinstance(case.left_eos, IdealGas) and isinstance(case.right_eos, IdealGas)
+        if gases and max(case.left[2], case.right[2]) < UNITLESS:
+            self.t_unit = "1"
         self.name = "own states" if deck.left is not None else deck.case
         self.on_line = deck.contact == "on-line"
         if not self.on_line and case.left_eos != case.right_eos:
@@ -405,14 +410,14 @@ class Riemann(Problem):
             x = np.unique(np.concatenate([x, speeds, np.nextafter(speeds, np.inf)]))
             for axis, values in zip(axes, self.exact.sample(x / dump.t), strict=True):
                 axis.plot(x, values, color="0.6", lw=1.2, label="exact")
-        for axis, (name, label) in zip(axes, LABELS.items(), strict=True):
+        for axis, (name, (label, unit)) in zip(axes, LABELS.items(), strict=True):
             for block, colour in zip(dump.blocks, ("C0", "C3"), strict=False):
                 x, values = block.centres[0][:, 0], block.cell_fields[name][:, 0]
                 words = block.name if self.on_line else "computed"
                 axis.plot(x, values, ".", ms=3, color=colour, label=words)
-            axis.set_xlabel("x [m]")
-            axis.set_title(label, fontsize="medium")
+            axis.set_xlabel(name_axis("x", dump.length_unit))
+            axis.set_title(name_axis(label, "1" if dump.t_unit == "1" else unit), fontsize="medium")
             values = np.concatenate([block.cell_fields[name][:, 0] for block in dump.blocks])
             if name != "u" and values.min() > 0.0 and values.max() > 300.0 * values.min():
                 axis.set_yscale("log")
-        figure.suptitle(f"{self.name}, t = {dump.t:.4g} s", fontsize="medium")
+        figure.suptitle(f"{self.name}, {title_time(dump)}", fontsize="medium")

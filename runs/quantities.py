@@ -18,8 +18,18 @@ def pick_prefix(largest: float, unit: str) -> tuple[float, str]:
 
 
 def describe_time(t: float, unit: str = "s", digits: int = 6) -> str:
-    """`t = 1.5 s`; what counts something else than seconds: `13 iterations`."""
-    return f"t = {t:.{digits}g} s" if unit == "s" else f"{t:.{digits}g} {unit}"
+    """`t = 1.5 s`; `t = 1.5` without a unit; what counts something else: `13 iterations`."""
+    return f"t = {add_unit(t, unit, digits)}" if is_time(unit) else add_unit(t, unit, digits)
+
+
+def is_time(unit: str) -> bool:
+    """Is this a unit of time, or "1" for a time without unit?  Steady problems count iterations."""
+    return unit in ("s", "1")
+
+
+def add_unit(number: float, unit: str, digits: int = 6) -> str:
+    """`1.5 m`; the number alone where the unit is "1"."""
+    return f"{number:.{digits}g}" if unit == "1" else f"{number:.{digits}g} {unit}"
 
 
 def describe_seconds(low: float, high: float | None = None) -> str:

@@ -161,7 +161,7 @@ def make_noh() -> Case:
         "spherical Noh problem on a rectangular axisymmetric grid",
         "L1 of the density out to twice the shock's radius",
         numbers | {"geometry": "spherical"},
-        {"shockgrid": (50, 100, 200, 400), "pennant": (50, 100, 200)},
+        {"shockgrid": (50, 100, 200, 400, 800), "pennant": (50, 100, 200)},
     )
 
 

@@ -80,6 +80,8 @@ class InterfaceInstability(Results, Problem):
         """
         super().__init__(deck)
         deck.regrid.check_weight()
+        if deck.pressure == 1.0 and not (deck.first.material or deck.second.material):
+            self.t_unit = "1"  # the pressure ahead of the shock is the unit
         self.eos_first, self.rho_first = deck.first.make()
         self.eos_second, self.rho_second = deck.second.make()
         self.k = 2.0 * math.pi / deck.wavelength

@@ -18,7 +18,7 @@ from problems.interface_instability.theories import (
     is_still,
     predict_amplitude,
 )
-from problems.pictures import draw_field, find_dump, spread_dumps
+from problems.pictures import draw_field, find_dump, name_axis, spread_dumps
 from problems.problem import Report, Row
 from regrid.measure.corners import compute_centres
 
@@ -302,7 +302,11 @@ class Results:
             picture = draw_field(axes, dump, "rho", title=title, **style)
             axes.set_xlim(*window)
         if panels:
-            figure.colorbar(picture, ax=panels, label="density [kg/m3]")
+            figure.colorbar(
+                picture,
+                ax=panels,
+                label=name_axis("density", "kg/m3" if self.t_unit == "s" else "1"),
+            )
 
     def draw_spectrum(self, figure, run) -> None:
         """k a of each mode by its number at some times, and the line at these times.
@@ -330,7 +334,8 @@ class Results:
                 lines.plot(x - x.mean(), y, color=colour, lw=1)
         axes.plot([], [], "k--", lw=1, label="linear compressible")
         axes.set(xlabel="number of the mode", ylabel="k |a| of the mode, k of the wavelength")
-        lines.set(xlabel="x minus its mean [m]", ylabel="y [m]")
+        unit = "m" if self.t_unit == "s" else "1"
+        lines.set(xlabel=name_axis("x minus its mean", unit), ylabel=name_axis("y", unit))
         lines.set_title("the interface at these times", fontsize=9)
         lines.xaxis.set_major_locator(MaxNLocator(4))
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -47,6 +47,7 @@ class GreshoDeck(Deck, kw_only=True):
 
 class Gresho(Problem):
     Deck = GreshoDeck
+    t_unit = "1"
     counted = ("cells", "cells")
 
     def make_grids(self, t=0.0):

@@ -108,13 +108,15 @@ class Kidder(RadialProblem):
         left, right = make_panels(figure, 11.5, 5.0, 1, 2)
         dumps, shrink = run_data.dumps, self.shell.compute_shrinking
         high = float(dumps[-1]["shell"].rho.max())
-        for h, bar in ((1.0, ""), (0.75, ""), (0.5, "density [kg/m3]")):
+        for h, bar in ((1.0, ""), (0.75, ""), (0.5, "density")):
             dump = min(dumps, key=lambda dump: abs(shrink(dump.t) - h))
             draw_field(left, dump, "rho", low=0.0, high=high, every=4, bar=bar)
-            left.text(0.02, 1.01 * RADII[1] * shrink(dump.t), f"{1e3 * dump.t:.3g} ms")
-        times, h = 1e3 * np.array([(dump.t, 1e-3 * shrink(dump.t)) for dump in dumps]).T
+            left.text(
+                0.02, 1.01 * RADII[1] * shrink(dump.t), f"t = {dump.t / self.shell.tau:.3g} tau"
+            )
+        times, h = np.array([(dump.t / self.shell.tau, shrink(dump.t)) for dump in dumps]).T
         for edge, words, exact in ((-1, "outer", None), (0, "inner", "exact")):
             radius = [self.compute_radii(d["shell"].nodes[:, edge, :]).mean() for d in dumps]
             right.plot(times, radius, "o", ms=4, label=f"{words} surface")
             right.plot(times, RADII[edge] * h, "k", lw=0.8, label=exact)
-        right.set(xlabel="t [ms]", ylabel="radius [m]")
+        right.set(xlabel="t / tau", ylabel="radius")

@@ -39,6 +39,7 @@ class ObliqueShock(Problem):
     """One block on a grid at rest; density 1 and sound speed 1 in the stream."""
 
     Deck = ObliqueShockDeck
+    t_unit = "1"
     units: ClassVar = {"shock_angle": "degrees"}
 
     def __init__(self, deck: ObliqueShockDeck):
@@ -108,10 +109,10 @@ class ObliqueShock(Problem):
         """Pressure with the grid and the exact shock, and pressure along the wall."""
         left, right = make_panels(figure, 11.5, 4.6, 1, 2, width_ratios=(1.3, 1.0))
         dump, end = run_data.dumps[-1], math.tan(self.beta)
-        draw_field(left, dump, "p", every=5, bar="pressure [Pa]")
+        draw_field(left, dump, "p", every=5, bar="pressure")
         left.plot((0.0, 1.0), (0.0, end), "r--", lw=1.5, zorder=5, label="exact shock")
         x, p = dump["gas"].centres[0][:, 0], dump["gas"].p[:, 0]
         right.plot(x, p, ".-", ms=4, lw=0.8, label="computed")
         exact = (float(p[0]),) * 2 + (self.pressure,) * 2
         right.plot((x[0], 0.0, 0.0, 1.0), exact, "k--", lw=0.9, label="exact")
-        right.set(xlabel="x [m]", ylabel="pressure on the wall [Pa]")
+        right.set(xlabel="x", ylabel="pressure on the wall")

@@ -62,6 +62,7 @@ class RayleighTaylorDeck(Deck, kw_only=True):
 
 class RayleighTaylor(Problem):
     Deck = RayleighTaylorDeck
+    t_unit = "1"
     units: ClassVar = {"amplitude": "m"}
     measures_sides = True
 
@@ -139,14 +140,14 @@ class RayleighTaylor(Problem):
         mean = history["interface_mean"]
         head = f"rayleigh-taylor, {self.deck.above} above, {self.deck.cells} cells per wavelength"
         row = Row("rate", rate, self.exact, what, digits=7, error="rate")
-        rows = [row, compare(history, "amplitude", label="last amplitude [m]", digits=4)]
+        rows = [row, compare(history, "amplitude", label="last amplitude", digits=4)]
         moved = f"the mean has moved by at most {np.abs(mean - mean[0]).max():.1e} m"
         return Report(head, rows, ["theory is without compression", moved])
 
     def draw_growth(self, figure, run_data) -> None:
         """Amplitude against theory."""
         axis, t = figure.subplots(), run_data.history["t"]
-        draw_columns(axis, run_data.history, {"amplitude": "computed"}, "amplitude [m]")
+        draw_columns(axis, run_data.history, {"amplitude": "computed"}, "amplitude", "1")
         theory, name = (np.cosh, "cosh(rate t)") if self.grows else (np.cos, "cos(omega t)")
         axis.plot(t, self.amplitude * theory(self.exact * t), "k--", lw=0.9, label=f"a0 {name}")
         if self.grows:

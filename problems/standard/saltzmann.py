@@ -50,6 +50,7 @@ class SaltzmannDeck(Deck, kw_only=True):
 
 class Saltzmann(Problem):
     Deck = SaltzmannDeck
+    t_unit = "1"
     units: ClassVar = {"transverse_speed": "m/s"}
 
     def __init__(self, deck: SaltzmannDeck):
@@ -101,7 +102,7 @@ class Saltzmann(Problem):
                 for kind, words in KINDS.items():
                     name, label = f"{kind}_error_{n}", f"{when}: {words} [%]"
                     rows.append(Row(name, history[name][last], label=label, unit=0.01, digits=3))
-        most, words = find_most(history, "transverse_speed"), "largest speed across [m/s]"
+        most, words = find_most(history, "transverse_speed"), "largest speed across"
         rows.append(Row("largest_transverse_speed", most, label=words, digits=2))
         head = f"saltzmann, {deck.cells} x {deck.rows} cells, {deck.regrid.name}"
         return Report(f"{head}; errors of the density behind each shock:", rows)

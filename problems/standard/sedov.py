@@ -95,8 +95,8 @@ class Sedov(RadialProblem):
         jump = (deck.gamma + 1.0) / (deck.gamma - 1.0)
         change = float(np.abs(energy / energy[0] - 1.0).max())
         rows = [
-            compare(history, "shock_radius", self.blast.radius(t), "radius of the shock [m]"),
-            compare(history, "most_density", jump, "greatest density [kg/m3]"),
+            compare(history, "shock_radius", self.blast.radius(t), "radius of the shock"),
+            compare(history, "most_density", jump, "greatest density"),
             Row("energy", change, label="relative change of the energy", error="energy", digits=2),
             compare(history, "error_rho", label="relative error of the density", digits=4),
         ]

@@ -47,6 +47,7 @@ class TaylorGreenDeck(Deck, kw_only=True):
 
 class TaylorGreen(Problem):
     Deck = TaylorGreenDeck
+    t_unit = "1"
     counted = ("cells", "cells")
 
     def make_grids(self, t=0.0):
@@ -89,11 +90,11 @@ class TaylorGreen(Problem):
         options = {"every": every, "title": "t"}
         for axis, part in zip(panels, (0.25, 1.0), strict=True):
             dump = find_dump(run_data, part * last.t)
-            draw_field(axis, dump, "p", low=0.5, high=1.5, bar="pressure [Pa]", **options)
+            draw_field(axis, dump, "p", low=0.5, high=1.5, bar="pressure", **options)
 
         def compute_error(block):
             u, v, _ = compute_cell(*block.centres)
             return np.hypot(block.u - u, block.v - v)
 
-        options |= {"bar": "error of the velocity [m/s]", "colours": "magma_r"}
+        options |= {"bar": "error of the velocity", "colours": "magma_r"}
         draw_field(right, last, compute_error, low=0.0, **options)

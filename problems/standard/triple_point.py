@@ -52,6 +52,7 @@ class TriplePoint(Problem):
     """Three blocks; the left one's far side is cut at the triple point."""
 
     Deck = TriplePointDeck
+    t_unit = "1"
     units: ClassVar = {"point_x": "m", "point_y": "m"}
     measures_sides = True
 

@@ -39,6 +39,7 @@ class VortexDeck(Deck, kw_only=True):
 
 class Vortex(Problem):
     Deck = VortexDeck
+    t_unit = "1"
 
     def __init__(self, deck: VortexDeck):
         super().__init__(deck)
@@ -85,7 +86,7 @@ class Vortex(Problem):
         error = square.rho - self.exact.compute_cell_averages(square.nodes, dump.t)[0]
         left, right = figure.subplots(1, 2)
         most, every = np.abs(error).max(), max(1, n // 32)
-        draw_field(left, dump, "rho", every=every, bar="density [kg/m3]")
+        draw_field(left, dump, "rho", every=every, bar="density")
         ends = {"low": -most, "high": most, "colours": "RdBu_r"}
-        draw_field(right, dump, lambda _: error, every=every, bar="density - exact [kg/m3]", **ends)
+        draw_field(right, dump, lambda _: error, every=every, bar="density - exact", **ends)
         figure.suptitle(f"{n} x {n}, t = {dump.t:.4g}")

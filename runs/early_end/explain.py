@@ -21,6 +21,7 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.patches import Polygon, Rectangle
 
+from problems.pictures import name_axis
 from regrid.errors import BadInput, Place, RunFailure
 from regrid.measure.quality import compute_corner_areas
 from regrid.sides import SIDE_NAMES, get_side
@@ -217,7 +218,7 @@ def draw_early_end(run: RunData, title: str, place: Place | None, point: int | N
     name = default_fields(run)[0]
     sheets = fields.make_sheets(dump, [name], fields.View())
     extent = fields.find_extent([sheets])
-    scale, unit = pick_prefix(float(np.abs(extent).max()), "m")
+    scale, unit = pick_prefix(float(np.abs(extent).max()), dump.length_unit)
     part = block.nodes[:, max(i - AROUND, 0) : i + AROUND + 2, max(j - AROUND, 0) : j + AROUND + 2]
     corners = block.nodes[:, [i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
     x, y = corners.mean(axis=1)
@@ -230,7 +231,7 @@ def draw_early_end(run: RunData, title: str, place: Place | None, point: int | N
         fields.draw_blocks(axes, sheets, name, look, scale, box)
         figure.colorbar(ScalarMappable(*look[:2]), ax=axes, label=look[3], shrink=0.9)
         axes.set_title(title, fontsize=10, color=MARK if axes is near else "k")
-        axes.set(xlabel=f"{dump.axes[0]} [{unit}]", ylabel=f"{dump.axes[1]} [{unit}]")
+        axes.set(**{f"{a}label": name_axis(n, unit) for a, n in zip("xy", dump.axes, strict=True)})
         ring = {"markersize": 16, "markeredgewidth": 1.8, "fillstyle": "none", "zorder": 6}
         axes.plot(x * scale, y * scale, "o", color=MARK, **ring)  # seen however flat the cell is
     near.add_patch(Polygon(corners.T * scale, fill=False, edgecolor=MARK, linewidth=2.0, zorder=5))

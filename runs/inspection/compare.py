@@ -19,7 +19,7 @@ import numpy as np
 from hydro.remap.conserved import check_convex, remap_means
 from hydro.remap.overlay import compute_cell_moments
 from regrid.errors import BadInput
-from runs.quantities import count
+from runs.quantities import add_unit, count
 from runs.store.reader import BlockData, Dump, RunData, Table
 
 SHOWN = 8  # differences, and earlier dumps
@@ -309,5 +309,5 @@ def _pair(ours: list[Dump], theirs: list[Dump]) -> list[tuple[Dump, Dump]]:
 
 def _describe_times(one: Dump, other: Dump) -> str:
     same = one.t == other.t
-    apart = "the same time" if same else f"{abs(one.t - other.t):.2g} {one.t_unit} apart"
-    return f"t = {one.t:.6g} {one.t_unit} (steps {one.step} and {other.step}, {apart})"
+    apart = "the same time" if same else f"{add_unit(abs(one.t - other.t), one.t_unit, 2)} apart"
+    return f"t = {add_unit(one.t, one.t_unit)} (steps {one.step} and {other.step}, {apart})"

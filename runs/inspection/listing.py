@@ -13,6 +13,7 @@ from regrid.errors import BadInput
 from regrid.jit import interpreted
 from regrid.plug_ins import GROUPS, find_plug_ins
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
+from runs.quantities import add_unit
 
 
 def describe_all() -> str:
@@ -115,15 +116,18 @@ def describe_plan(deck: ReadDeck) -> str:
         blocks = plan_blocks({b.name + other_name(b): b.nodes for b in evolution.blocks})
     else:
         t_end, blocks = plan
-    march = f"t = 0 to {t_end:g} s"
-    if problem.t_unit != "s":
+    march, length = f"t = 0 to {add_unit(t_end, problem.t_unit)}", "m"
+    if problem.t_unit == "1":
+        length = "1"
+    elif problem.t_unit != "s":
         march = f"at most {t_end:g} {problem.t_unit}"
     lines = [f"{deck.problem} ({deck.described}), {march}"]
     for block in blocks:
         (ni, nj), low, high = block.cells, block.low, block.high
         lines.append(
             f"block {block.name}: {ni} x {nj} cells, "
-            f"x {low[0]:.4g} to {high[0]:.4g} m, y {low[1]:.4g} to {high[1]:.4g} m"
+            f"x {low[0]:.4g} to {add_unit(high[0], length, 4)}, "
+            f"y {low[1]:.4g} to {add_unit(high[1], length, 4)}"
         )
     run, output = deck.deck.run, deck.deck.output
     limit = f", at most {run.max_steps} steps" if run.max_steps is not None else ""

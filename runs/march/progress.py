@@ -92,7 +92,8 @@ class Progress:
         words = [f"step {evolution.step}"]
         if "dt" in row:
             limit = f" ({row['dt_limit']})" if row.get("dt_limit") else ""
-            words.append(f"dt {row['dt']:.2e} s{limit}")
+            unit = "" if self.t_unit == "1" else " s"
+            words.append(f"dt {row['dt']:.2e}{unit}{limit}")
         running = now - self._began
         if self.steps and running > 0:
             rate = self.steps * self.cells / running

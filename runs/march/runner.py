@@ -37,7 +37,7 @@ from runs.gauges import Gauges, make_gauges
 from runs.inspection import account
 from runs.march.compiling import compiling
 from runs.march.progress import Outlook, Progress, describe_gauges, describe_threads
-from runs.quantities import count, describe_seconds, describe_time
+from runs.quantities import count, describe_seconds, describe_time, is_time
 from runs.ranks.map import check_cut
 from runs.ranks.world import World, describe_ranks
 from runs.store.directory import RunDirectory, keep_problem_file, write_noted
@@ -335,7 +335,7 @@ class Runner:
         evolution, problem, directory = self.evolution, self.problem, self.directory
         t_unit, cells = problem.t_unit, account.count_cells(evolution)
         names = [block.name for block in evolution.blocks]
-        steps = f", {count(evolution.step, 'step')}" if t_unit == "s" else ""
+        steps = f", {count(evolution.step, 'step')}" if is_time(t_unit) else ""
         lines = [
             f"{reason}{describe_time(evolution.t, t_unit)}{steps}, {cells} cells in "
             f"{count(len(names), 'block')}, {describe_seconds(seconds)}",

@@ -26,6 +26,7 @@ from regrid.errors import BadInput, suggest
 from regrid.text_files import escape_controls
 from runs.pictures import curves
 from runs.pictures.fields import View, draw_fields, time_titles
+from runs.quantities import add_unit, is_time
 from runs.store.files import check_folder, check_free, disk_errors
 from runs.store.provenance import describe_software, hash_deck
 from runs.store.reader import Dump, RunData
@@ -255,7 +256,7 @@ def choose_dumps(
     if not run.dumps:
         words = f": {run.skipped[0]}" if run.skipped else ""
         raise BadInput(f"{run.path} has no dump that can be read{words}")
-    if at is None and run.dumps[-1].t_unit != "s":
+    if at is None and not is_time(run.dumps[-1].t_unit):
         return run.dumps[-1:]  # what is before are no states, but the way to one
     if at is None:
         numbers = np.unique(np.linspace(0, len(run.dumps) - 1, min(count, len(run.dumps))).round())
@@ -267,9 +268,10 @@ def choose_dumps(
     first, last = words["start"], words["end"]
     slack = 1e-3 * (last - first)
     if say and any(not first - slack <= t <= last + slack for t in times):
-        drawn, unit = ", ".join(f"{dump.t:.6g}" for dump in chosen), chosen[-1].t_unit
-        before = "t = " if unit == "s" else ""
-        words = f"{before}{first:.6g} to {last:.6g} {unit}; drawn: {before}{drawn} {unit}"
+        drawn, unit = ", ".join(f"{dump.t:.6g}" for dump in chosen[:-1]), chosen[-1].t_unit
+        drawn += ", " * bool(drawn) + add_unit(chosen[-1].t, unit)
+        before = "t = " if is_time(unit) else ""
+        words = f"{before}{first:.6g} to {add_unit(last, unit)}; drawn: {before}{drawn}"
         say(f"--at {at}: the dumps are of {words}")
     return chosen
 

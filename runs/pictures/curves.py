@@ -19,11 +19,12 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from problems.deck import place_gauges
+from problems.pictures import name_axis
 from regrid.errors import BadInput
 from runs.inspection.account import compute_drifts
 from runs.pictures import fields
 from runs.pictures.fields import View
-from runs.quantities import pick_prefix
+from runs.quantities import is_time, pick_prefix
 from runs.store.dumps import LONG_NAMES
 from runs.store.files import check_free, make_csv, write_atomically
 from runs.store.reader import Dump, RunData
@@ -104,7 +105,7 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
     travel = np.ptp(middles, axis=0)
     centred = (travel > 0.5 * sizes.max()) & (view.zoom is None)
     largest = float(max(sizes.max(), 0.0 if centred.any() else np.abs(every[0]).max()))
-    scale, length = pick_prefix(largest, "m")
+    scale, length = pick_prefix(largest, dumps[0].length_unit)
     factor, unit = fields.scale_times(dumps)
     norm = Normalize(shapes[0][0] * factor, max(shapes[-1][0] * factor, 1e-300))
     colours = colormaps["viridis_r"]
@@ -116,8 +117,8 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
             x, y = (line - shift[:, None]) * scale
             axes.plot(x, y, color=colours(norm(t * factor)), linewidth=1.2)
     names = [f"{n} - its middle" if c else n for n, c in zip(dumps[0].axes, centred, strict=True)]
-    axes.set_xlabel(f"{names[0]} [{length}]")
-    axes.set_ylabel(f"{names[1]} [{length}]")
+    axes.set_xlabel(name_axis(names[0], length))
+    axes.set_ylabel(name_axis(names[1], length))
     stretched = view.zoom is None and sizes.min() < 0.25 * sizes.max()
     axes.set_aspect("auto" if stretched else "equal", adjustable="box" if view.zoom else "datalim")
     if view.zoom:
@@ -213,7 +214,7 @@ def draw_lineouts(
         if np.ptp(first.columns[other]) == 0.0:  # a line along an axis
             way, label = axis, name
     largest = max(float(np.abs(one.columns[way]).max()) for run in lineouts for one in run)
-    scale, length = pick_prefix(largest, "m")
+    scale, length = pick_prefix(largest, first.dump.length_unit)
     figure.set_size_inches(WIDTH, HEIGHT * len(names) + 0.8)
     panels = figure.subplots(len(names), 1, squeeze=False, sharex=True)[:, 0]
     for axes, name in zip(panels, names, strict=True):
@@ -231,21 +232,22 @@ def draw_lineouts(
                 axes.plot(x, values, dash, color=f"C{k % 10}", linewidth=1.1, label=named)
                 if dash == "-":
                     axes.plot(x, values, ".", color=f"C{k % 10}", markersize=2.5)
-        axes.set_ylabel(f"{style.words} [{unit}]" if unit else style.words, fontsize=9)
+        axes.set_ylabel(name_axis(style.words, unit), fontsize=9)
         axes.grid(alpha=0.3)
         axes.tick_params(labelsize=8)
-    panels[-1].set_xlabel(f"{label} [{length}]")
+    panels[-1].set_xlabel(name_axis(label, length))
     panels[0].legend(fontsize=7, ncols=2 if len(lineouts) > 1 else 1)
 
 
 def write_csv(
     path: Path, lineouts: Sequence[Sequence[Lineout]], names: Sequence[str], runs: Sequence[str]
 ) -> Path:
-    """One row a cell: run, step, t, block, i, j, x, y, way, fields; the head has SI units."""
+    """One row a cell: run, step, t, block, i, j, x, y, way, fields; the head has the units."""
     first = lineouts[0][0].dump
     units = [f"{name} [{fields.get_style(first, name).unit}]" for name in names]
     heads = ["run", "step", f"t [{first.t_unit}]", "block", "i", "j"]
-    rows = [[*heads, f"{first.axes[0]} [m]", f"{first.axes[1]} [m]", "way [m]", *units]]
+    places = [f"{name} [{first.length_unit}]" for name in (*first.axes, "way")]
+    rows = [[*heads, *places, *units]]
     for run, title in zip(lineouts, runs, strict=True):
         for dump, columns in run:
             cells = zip(*(column.tolist() for column in columns.values()), strict=True)
@@ -279,8 +281,8 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
             raise BadInput(f"the column {name!r} of {run.path} holds words, no numbers")
     units = run.find_units()
     factor, unit = fields.scale_times(run.dumps, history["t"][-1])
-    label = f"t [{unit}]"
-    if run.dumps and run.dumps[-1].t_unit != "s":
+    label = name_axis("t", unit)
+    if run.dumps and not is_time(run.dumps[-1].t_unit):
         label = unit
         history = {name: values[1:] for name, values in history.items()}  # the first is no iterate
     panels, constant = [[name] for name in names], []
@@ -358,14 +360,14 @@ def make_panel(
     if names == ["dt"] and words is not None and words.dtype.kind == "U":
         kinds = [word for word in dict.fromkeys(words.tolist()) if word]
         dt = history["dt"] * factor
-        return f"dt [{unit}]", [(k, np.where(words == k, dt, np.nan), True) for k in kinds]
+        return name_axis("dt", unit), [(k, np.where(words == k, dt, np.nan), True) for k in kinds]
     parts = zip(*(name.split("_") for name in names), strict=False)
     title = " ".join(one[0] for one in parts if len(set(one)) == 1)
     curves = [
         (_say(name).removeprefix(title).strip() or _say(name), history[name] * factor, False)
         for name in names
     ]
-    return f"{title} [{unit}]" if unit else title, curves
+    return name_axis(title, unit), curves
 
 
 def draw_panel(axes, t, history, names: Panel, units) -> None:
@@ -418,6 +420,7 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
     shown = [name for name in shown if name in names] or shown
     shown = [name for name in shown if any(name in point.fields for point in chosen)]
     factor, unit = fields.scale_times(run.dumps, table["t"][-1])
+    in_units = not run.dumps or run.dumps[-1].t_unit != "1"
     colours = colormaps["turbo"](np.linspace(0.05, 0.95, len(chosen)))
     columns = min(COLUMNS, len(shown))
     size = max(GAUGES_WIDTH, 7.0 / columns), GAUGES_HEIGHT
@@ -427,18 +430,18 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
         writers = [(k, p) for k, p in enumerate(chosen) if field in p.fields]
         values = [np.asarray(table[f"{p.name}_{field}"], dtype=float) for _, p in writers]
         largest = max(np.abs(v[np.isfinite(v)]).max(initial=0.0) for v in values)
-        scale, field_unit = pick_prefix(float(largest), UNITS[field])
+        scale, field_unit = pick_prefix(float(largest), UNITS[field] if in_units else "1")
         for (k, point), curve in zip(writers, values, strict=True):
             style = "--" if point.moves else "-"
             words = point.name + " (outside of all blocks)" * (not np.isfinite(curve).any())
             lines[k] = axes.plot(
                 factor * table["t"], scale * curve, style, color=colours[k], lw=1, label=words
             )[0]
-        axes.set_title(f"{LONG_NAMES[field]} [{field_unit}]", fontsize=9)
+        axes.set_title(name_axis(LONG_NAMES[field], field_unit), fontsize=9)
         axes.tick_params(labelsize=8)
         axes.grid(alpha=0.3)
     moving = "; dashed: moves with the material" * any(point.moves for point in chosen)
-    figure.supxlabel(f"t [{unit}]{moving}", fontsize=9)
+    figure.supxlabel(name_axis("t", unit) + moving, fontsize=9)
     handles = [lines[k] for k in sorted(lines)]
     named = handles[:: -(-len(handles) // MOST_NAMED)]
     title = f"{len(named)} of {len(handles)}" if len(named) < len(handles) else None

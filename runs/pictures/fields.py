@@ -16,10 +16,11 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize, PowerNorm
 
 from problems.evolution import get_material
+from problems.pictures import name_axis
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 from regrid.sides import SIDE_NAMES, get_side
-from runs.quantities import pick_prefix
+from runs.quantities import is_time, pick_prefix
 from runs.store.reader import BlockData, Dump
 
 CLOSE = 0.05  # of an edge: beyond the gap that chords of one curve leave between them
@@ -141,8 +142,9 @@ def find_field(block: BlockData, name: str) -> Field | None:
 
 
 def get_style(dump: Dump, name: str) -> Field:
-    """The field as the first block has it that has it."""
-    return next(field for block in dump.blocks if (field := find_field(block, name)))
+    """The field as the first block has it that has it; unit "1" where the dump has no units."""
+    style = next(field for block in dump.blocks if (field := find_field(block, name)))
+    return style._replace(unit="1") if dump.t_unit == "1" else style
 
 
 def list_fields(dump: Dump) -> list[str]:
@@ -156,6 +158,7 @@ TALLEST, TALLEST_ALONE = 16.0, 8.0  # at most, at most of one panel
 LONG = 4.0  # in a domain longer than this, in its heights, the panels follow the interface
 AROUND = 0.6  # of the interface's size: what is shown on each side of it
 DECADES = 1.7
+VELOCITIES = "u", "v", "u_node", "v_node"
 FLIPPED = {  # what changes sign in the mirror
     "x": ("u", "u_node", "vorticity"),
     "y": ("v", "v_node", "vorticity"),
@@ -230,8 +233,8 @@ def draw_fields(
     """
     moments = [make_sheets(dump, names, view) for dump in dumps]
     boxes, following = choose_boxes([measure_extent(sheets) for sheets in moments], view)
-    scale, unit = pick_prefix(np.abs(boxes).max(), "m")
-    lengths = [f"{name} [{unit}]" for name in dumps[0].axes]
+    scale, unit = pick_prefix(np.abs(boxes).max(), dumps[0].length_unit)
+    lengths = [name_axis(name, unit) for name in dumps[0].axes]
     panels = make_panels(figure, boxes[0], max(len(names), 1), len(dumps), lengths, following)
     titles = titles or time_titles(dumps)
     for k, name in enumerate(names or ("",)):
@@ -430,10 +433,9 @@ def choose_colours(
         low, high = 0.0, 1.0
     style = get_style(dump, name)
     factor, unit = pick_prefix(max(abs(low), abs(high)), style.unit)
-    label = f"{style.words} [{unit}]" if unit else style.words
     both_signs = low < 0 < high and min(-low, high) > 0.05 * max(-low, high)
     colours = style.colours or ("RdBu_r" if both_signs else "viridis")
-    velocity = style.unit == "m/s"  # zero is its middle, whatever it is in this picture
+    velocity = name in VELOCITIES  # zero is in the middle of its scale
     norm = Normalize(low * factor, high * factor)
     if view.limits:
         pass
@@ -447,15 +449,16 @@ def choose_colours(
     elif low == high:
         margin = 0.5 * factor * (abs(low) or 1.0)
         norm = Normalize(low * factor - margin, high * factor + margin)
-    return norm, view.colours or colours, factor, label
+    return norm, view.colours or colours, factor, name_axis(style.words, unit)
 
 
 def time_titles(dumps: Sequence[Dump]) -> list[str]:
     """`t = 12.5 µs` for each dump, all in one unit; `13 iterations` where t counts those."""
     factor, unit = scale_times(dumps)
-    before = "t = " if dumps[-1].t_unit == "s" else ""
+    before = "t = " if is_time(dumps[-1].t_unit) else ""
     return [
-        f"{before}{dump.t * factor:.4g} {unit}" + " (restart point)" * dump.is_restart_point
+        f"{before}{dump.t * factor:.4g} {unit}".rstrip()
+        + " (restart point)" * dump.is_restart_point
         for dump in dumps
     ]
 

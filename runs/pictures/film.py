@@ -18,6 +18,7 @@ from matplotlib import animation
 from matplotlib.cm import ScalarMappable
 from tqdm import tqdm
 
+from problems.pictures import name_axis
 from regrid.errors import BadInput
 from runs.pictures import command, fields
 from runs.pictures.command import Numbers
@@ -123,8 +124,8 @@ def make_frames(
     paths, titles = [dump.path for dump in dumps], fields.time_titles(dumps)
     first, axes, box = Dump(paths[0]), figure.subplots(), boxes[0]
     look = fields.choose_colours(first, name, ranges, view)
-    scale, unit = pick_prefix(float(np.abs(boxes).max()), "m")
-    labels = [f"{axis} [{unit}]" for axis in first.axes]
+    scale, unit = pick_prefix(float(np.abs(boxes).max()), first.length_unit)
+    labels = [name_axis(axis, unit) for axis in first.axes]
     place = {"shrink": 0.9, "pad": 0.015}
     if box[3] - box[2] < SLENDER * (box[1] - box[0]):  # no room for words at the side
         place = {"location": "bottom", "aspect": 50}

@@ -60,7 +60,8 @@ EMPTY: Mapping[str, Any] = MappingProxyType({})
 
 
 class Names(NamedTuple):
-    """What a dump says of its run: the problem, the resolved deck as TOML, the unit of time."""
+    """What a dump says of its run: the problem, the resolved deck as TOML, the unit of time; with
+    "1" for time, nothing in the dump has a unit."""
 
     problem: str
     deck_text: str
@@ -131,7 +132,7 @@ def make_image(
         for block in evolution.blocks:
             group = blocks.create_group(block.name, track_order=True)
             level = output.compression if output else 0
-            write_block(group, block, arrays[block.name], radial, level)
+            write_block(group, block, arrays[block.name], radial, level, names.t_unit != "1")
         if linked is not None:
             group = file.create_group("state")
             for key, value in linked.items():
@@ -249,11 +250,12 @@ def write_block(
     arrays: Iterable[tuple[str, np.ndarray]],
     names: Mapping[str, str] = EMPTY,
     compression: int = 0,
+    has_units: bool = True,
 ) -> None:
     """Write nodes (2 or 3, ...) and fields of a block, with dimension scales, into its group.
 
     arrays: those to write, x first; names: `long_name`s that go before the block's own; a level
-    of `compression` from 1 is that of gzip.
+    of `compression` from 1 is that of gzip; has_units: False where the deck's numbers have none.
     """
     group.attrs["material"] = get_material(block)
     arrays = list(arrays)
@@ -268,7 +270,7 @@ def write_block(
             scale.attrs["units"] = "1"
             scale.attrs["long_name"] = f"number of the {what} in {name[0]}"
     long_names = {**LONG_NAMES, **get_long_names(block), **names}
-    units = {"x": "m", "y": "m", "z": "m", **block.units}
+    units = {"x": "m", "y": "m", "z": "m", **block.units} if has_units else {}
     filters = {"compression": compression, "shuffle": True} if compression else {}
     for name, values in arrays:
         if values.shape not in at:

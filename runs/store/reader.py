@@ -18,6 +18,7 @@ from problems.problem import Problem, align
 from regrid.errors import BadInput, suggest
 from regrid.measure.corners import compute_centres
 from runs.deck.reading import ReadDeck, read_toml
+from runs.quantities import describe_time
 from runs.store.directory import (
     RunDirectory,
     check_deck,
@@ -258,6 +259,11 @@ class Snapshot:
         return str(self.path)
 
     @property
+    def length_unit(self) -> str:
+        """Unit of the nodes: "m", or "1" where the deck's numbers have no units."""
+        return "1" if self.t_unit == "1" else "m"
+
+    @property
     def axes(self) -> tuple[str, str]:
         """Names of the plane's coordinates: x and y, or x and r in axisymmetric flow."""
         return self.blocks[0].axes if self.blocks else ("x", "y")
@@ -284,7 +290,7 @@ class Snapshot:
 
     def __repr__(self) -> str:
         names = ", ".join(block.name for block in self.blocks)
-        return f"<state of step {self.step}, t = {self.t:.6g} {self.t_unit}, blocks {names}>"
+        return f"<state of step {self.step}, {describe_time(self.t, self.t_unit)}, blocks {names}>"
 
 
 class Dump(Snapshot):
@@ -372,7 +378,7 @@ class RunData:
         seconds = (name for name in self.history if name.startswith("seconds_"))
         units = dict.fromkeys(("t", "dt", *seconds), "s")
         try:
-            return units | dict(self.problem.units)
+            return units | self.problem.find_units()
         except BadInput:  # a deck of another version can still be drawn
             return units
 

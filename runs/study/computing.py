@@ -239,7 +239,7 @@ def _finish(runner: Runner, call: Callable[[], Any], digest: str) -> Result | No
     result.step, result.t = evolution.step, float(evolution.t)
     result.seconds = float(np.nansum(history.get("seconds_step", 0.0)))
     if not result.failure and len(history.get("t", ())):
-        result.units = dict(problem.units)
+        result.units = {n: u for n, u in problem.find_units().items() if n in problem.units}
         told = describe_cautions(problem, history)
         result.cautions = [sentence.removeprefix(HEAD) for sentence in told]
         fill_numbers(result, runner.deck.problem, problem, history, problem.measure(evolution))

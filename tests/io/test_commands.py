@@ -153,6 +153,12 @@ def run_of_pictures(shockgrid):
 
 def test_history_has_units(run_of_pictures):
     data, _ = run_of_pictures
+    assert data.dumps[-1].length_unit == data.dumps[-1].t_unit == "1"
+    figure = new_figure()
+    draw_history(figure, data, [])
+    titles = {axes.get_title() for axes in figure.axes}
+    assert {"dt", "amplitude", "interface"} <= titles  # the deck's numbers have no units
+    data.problem.t_unit = "s"  # as with a pressure in pascals
     figure = new_figure()
     draw_history(figure, data, [])
     titles = {axes.get_title() for axes in figure.axes}

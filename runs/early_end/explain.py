@@ -196,7 +196,7 @@ def describe_event(blocks: Sequence, place: Place | None) -> str:
     x, y = block.nodes[:, i : i + 2, j : j + 2].mean(axis=(1, 2))
     share = float(areas[i, j] / np.median(areas))
     return (
-        f"cell i={i}, j={j} of block '{block.name}' at ({x:.6g}, {y:.6g}) m{where} has {share:.2g} "
+        f"cell i={i}, j={j} of block '{block.name}' at ({x:.6g}, {y:.6g}){where} has {share:.2g} "
         "of the usual area of the block's cells"
     )
 
@@ -242,7 +242,7 @@ def draw_early_end(run: RunData, title: str, place: Place | None, point: int | N
     box = (window[0] * scale, window[2] * scale), 2 * reach * scale, 2 * reach * scale
     whole.add_patch(Rectangle(*box, fill=False, edgecolor=MARK, zorder=5))
     if len(run.history.get("dt", ())):
-        draw_panel(below, run.history["step"], run.history, ["dt"], {"dt": "s"})
+        draw_panel(below, run.history["step"], run.history, ["dt"], {"dt": dump.t_unit})
     below.axvline(dump.step, color=MARK, label=f"end, step {dump.step}")
     if point is not None:
         below.axvline(point, color="tab:blue", ls="--", label=f"restart point, step {point}")

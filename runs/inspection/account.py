@@ -115,7 +115,7 @@ def describe_convexity(history: History) -> str:
     words = "every cell convex in every step"
     for counts in (np.nan_to_num(bad), flat):
         if counts.any():
-            since = f"first at t = {history['t'][np.argmax(counts > 0)]:.6g} s"
+            since = f"first at t = {history['t'][np.argmax(counts > 0)]:.6g}"
             steps = count(int((counts > 0).sum()), "step")
             if counts is not flat:
                 return f"NOT CONVEX: in {steps} of {counts.size}, {since}"

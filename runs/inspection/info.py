@@ -19,7 +19,7 @@ from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
 from runs.deck.checking import find_changes
 from runs.inspection.account import describe_cautions, describe_run, describe_verdict, judge
-from runs.quantities import count, describe_seconds, describe_time
+from runs.quantities import add_unit, count, describe_seconds, describe_time
 from runs.store.directory import RunDirectory, read_stored_deck
 from runs.store.files import find_sum
 from runs.store.provenance import describe_provenance
@@ -60,8 +60,8 @@ def describe_blocks(dump: Dump) -> list[str]:
         low, high = nodes.min(axis=(1, 2)), nodes.max(axis=(1, 2))
         lines.append(
             f"block {block.name}{other_name(block)}: {ni} x {nj} cells, "
-            f"{block.axes[0]} {low[0]:.4g} to {high[0]:.4g} m, "
-            f"{block.axes[1]} {low[1]:.4g} to {high[1]:.4g} m"
+            f"{block.axes[0]} {low[0]:.4g} to {add_unit(high[0], dump.length_unit, 4)}, "
+            f"{block.axes[1]} {low[1]:.4g} to {add_unit(high[1], dump.length_unit, 4)}"
         )
         width = max((len(name) for name in block.cell_fields), default=0)
         for name, values in block.cell_fields.items():
@@ -133,7 +133,8 @@ def describe_directory(path: str) -> str:
     if history:
         names = [block.name for block in last.blocks] if last else []
         cells = last.cells if last else 0
-        lines += ["", *describe_history(history), *describe_run(history, cells, names)]
+        marched = describe_history(history, last.t_unit if last else "s")
+        lines += ["", *marched, *describe_run(history, cells, names)]
     if last:
         first, number = run.dumps[0], len(run.outputs)
         newer = " and a newer restart point" if len(run.dumps) > number else ""
@@ -193,14 +194,14 @@ def describe_settings(run: RunData) -> list[str]:
     return ["deck, where not default:", *lines] if lines else ["deck: all defaults"]
 
 
-def describe_history(history: Mapping[str, np.ndarray]) -> list[str]:
+def describe_history(history: Mapping[str, np.ndarray], t_unit: str = "s") -> list[str]:
     """Steps, range of dt, wall time."""
     if not len(history["step"]):
         return ["no row of the history is known"]
     lines = [f"{int(history['step'][-1])} steps"]
     dt = history.get("dt", np.zeros(0))
     if np.isfinite(dt).any():
-        lines[0] += f", dt {np.nanmin(dt):.3g} to {np.nanmax(dt):.3g} s"
+        lines[0] += f", dt {np.nanmin(dt):.3g} to {add_unit(np.nanmax(dt), t_unit, 3)}"
     if np.isfinite(history.get("seconds_step", np.zeros(0))).any():
         lines[0] += f", {describe_seconds(float(np.nansum(history['seconds_step'])))} in the steps"
     return lines

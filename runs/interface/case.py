@@ -503,7 +503,8 @@ class Case(Drawn):
         if "simulation" not in self.__dict__:
             return f"<case {self.name} ({self.read.origin}), not built yet>"
         names = ", ".join(self.blocks)
-        return f"<case {self.name}: t = {self.t:.6g} s, step {self.step}, blocks {names}>"
+        when = describe_time(self.t, self.problem.t_unit)
+        return f"<case {self.name}: {when}, step {self.step}, blocks {names}>"
 
 
 def load(deck: str | Path, **settings: Any) -> Case:

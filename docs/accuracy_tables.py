@@ -156,7 +156,7 @@ def table_pairs(rows: Rows) -> list[str]:
         ]
         body.append([str(row["seed"]), *states, f"{sides[1].u:.3g}", f"{100.0 * row['error']:.3g}"])
     heads = ["seed", "left: rho, p, gamma", "right: rho, p, gamma", "u right", "error, %"]
-    return [*lines, "", "The worst:", "", *make_table(heads, body)]
+    return [*lines, "", "These pairs have the largest errors:", "", *make_table(heads, body)]
 
 
 def doubt_rates(rows: Iterable[Measured]) -> list[str]:
@@ -168,11 +168,10 @@ def doubt_rates(rows: Iterable[Measured]) -> list[str]:
     for (materials, cells), group in sorted(groups.items(), key=lambda item: item[0][::-1])[::-1]:
         kind = {"gas": "gases", "condensed": "condensed materials"}[materials]
         counts = [sum(abs(r.rate_error) <= most for r in group) for most in LEVELS]
+        within = [f"{n} lie within {100.0 * m:g} %" for n, m in zip(counts, LEVELS, strict=True)]
         told.append(
-            f"- Growth rates of {kind}, {cells:g} cells: of {len(group)}, "
-            + ", ".join(
-                f"{n} within {100.0 * most:g} %" for n, most in zip(counts, LEVELS, strict=True)
-            )
+            f"- With {cells:g} cells per wavelength, of {len(group)} growth rates of {kind} "
+            f"{', '.join(within[:-1])} and {within[-1]} of theory"
             + _list_rates(group, materials)
             + _list_rough(group, materials)
         )
@@ -183,18 +182,19 @@ def _list_rates(group: list[Measured], materials: str) -> str:
     bar = LEVELS[1]
     worst = sorted((r for r in group if abs(r.rate_error) > bar), key=lambda r: -abs(r.rate_error))
     named = [_name_rate(row, materials, f"{100.0 * row.rate_error:+.1f} %") for row in worst]
-    return f". Errors above {100.0 * bar:g} %: {_cut(named)}." if named else "."
+    return f". Errors above {100.0 * bar:g} % occur at {_cut(named)}." if named else "."
 
 
 def _list_rough(group: list[Measured], materials: str) -> str:
     rough = [row for row in group if row.roughness > ROUGH and row.ratio != SAME]
     rough.sort(key=lambda row: -row.roughness)
     named = [_name_rate(row, materials, f"{row.roughness:g}") for row in rough]
-    return f" The interface is rough (more than {ROUGH:g}): {_cut(named)}." if named else ""
+    return f" The interface is rougher than {ROUGH:g} at {_cut(named)}." if named else ""
 
 
 def _name_rate(row: Measured, materials: str, said: str) -> str:
-    return f"Mach {row.mach:g}, {name_ratio(materials, row.ratio)} ({said})"
+    ratio = "ratio " * (materials == "gas") + name_ratio(materials, row.ratio)
+    return f"Mach {row.mach:g}, {ratio} ({said})"
 
 
 def _cut(named: list[str]) -> str:
@@ -206,7 +206,7 @@ def _cut(named: list[str]) -> str:
 def doubt_polars(rows: Rows) -> list[str]:
     """Near the critical angle and away from it: the worst, and what has no value."""
     told = []
-    for near, words in ((False, "farther than"), (True, "up to")):
+    for near, words in ((False, "Farther than"), (True, "Up to")):
         group = [
             row
             for row in rows
@@ -219,10 +219,11 @@ def doubt_polars(rows: Rows) -> list[str]:
         over = [row for row in known if abs(float(row["error in p, %"])) > POLAR_BAR]
         without = len(group) - len(known)
         told.append(
-            f"- Pressure behind the collision point, {words} {NEAR:g} degrees below the critical "
-            f"angle: {len(known) - len(over)} of {len(group)} within {POLAR_BAR:g} %; worst "
-            f"{worst['error in p, %']} % ({_name_polar(worst)})."
-            + (f" Without a value: {without}." if without else "")
+            f"- {words} {NEAR:g} degrees below the critical angle, the pressure behind the "
+            f"collision point is within {POLAR_BAR:g} % of theory in {len(known) - len(over)} of "
+            f"{len(group)} runs; the largest error is {worst['error in p, %']} % "
+            f"({_name_polar(worst)})."
+            + (f" {without} of the runs have no value." if without else "")
         )
     past = [row for row in rows if float(row["below critical"]) < 0.0]
     if past:
@@ -247,18 +248,18 @@ def doubt_lines(rows: Rows) -> list[str]:
     """How the position of a flat interface depends on the sub-cell phase of the shock."""
     told = []
     for key, bar, words, unit in (
-        ("unevenness", LINE_BAR, "final position linear in the start distance s", "cell"),
-        ("speed_scatter", SPEED_BAR, "late speed independent of s", "of the shock's speed"),
+        ("unevenness", LINE_BAR, "final position is linear in the start distance s", "cells"),
+        ("speed_scatter", SPEED_BAR, "late speed does not depend on s", "of the shock's speed"),
     ):
         over = sorted((row for row in rows if row[key] > bar), key=lambda row: -row[key])
         met = f"{len(rows) - len(over)} of {len(rows)}"
-        text = f"- Flat interfaces: {words}, to {bar:g} {unit}, in {met} runs"
+        text = f"- In {met} runs with a flat interface the {words}, to {bar:g} {unit}"
         if over:
-            text += f"; worst {over[0][key]:.2g} {unit} ({_name_line(over[0])})"
+            text += f"; the worst deviation is {over[0][key]:.2g} {unit} ({_name_line(over[0])})"
         told.append(text + ".")
     worst = max(rows, key=lambda row: abs(row["speed_error"]))
     told.append(
-        "- Flat interfaces: error of the mean late speed at most "
+        "- The mean late speed of flat interfaces has an error of at most "
         f"{abs(worst['speed_error']):.1e} of the shock's speed ({_name_line(worst)})."
     )
     return told
@@ -280,11 +281,11 @@ def doubt_null(rows: Rows) -> list[str]:
     }
     count = "All" if len(bad) == len(runs) else f"{len(bad)} of"
     return [
-        f"- One gas on both sides: {count.lower()} {len(runs)} runs, on even cells, miss the "
-        f"tolerance (first mode within {NULL_BAR:g} of its exact value, all others below "
-        f"{OTHERS_BAR:g}). Worst first mode: {first['mode_1']:.4f} instead of "
-        f"{first['exact']:.4f} ({_name_null(first)}); worst other mode: {other['others']:.4f} "
-        f"({_name_null(other)})."
+        f"- With one gas on both sides, {count.lower()} {len(runs)} runs on even cells miss the "
+        f"tolerance, that the first mode is within {NULL_BAR:g} of its exact value and all others "
+        f"are below {OTHERS_BAR:g}. The worst first mode is {first['mode_1']:.4f} instead of "
+        f"{first['exact']:.4f} ({_name_null(first)}), and the largest other mode is "
+        f"{other['others']:.4f} ({_name_null(other)})."
     ]
 
 
@@ -300,12 +301,12 @@ def doubt_pairs(rows: Rows) -> list[str]:
     errors = sorted(row["error"] for row in rows if row["error"] is not None)
     over = sum(error > PAIR_STEPS[-1] for error in errors)
     told = (
-        f"- Riemann problems of random gases: {over} of {len(rows)} with a star-state error "
-        f"above {100.0 * PAIR_STEPS[-1]:g} %; median {100.0 * errors[len(errors) // 2]:.2g} %, "
-        f"worst {100.0 * errors[-1]:.2g} %."
+        f"- Of {len(rows)} Riemann problems of random gases, {over or 'none'} have a star-state "
+        f"error above {100.0 * PAIR_STEPS[-1]:g} %. The median error is "
+        f"{100.0 * errors[len(errors) // 2]:.2g} %, the largest {100.0 * errors[-1]:.2g} %."
     )
     said = [row for row in rows if row["error"] is None]
-    return [told + (f" No value, seed {said[0]['seed']}: {said[0]['said']}." if said else "")]
+    return [told + (f" Seed {said[0]['seed']} has no value: {said[0]['said']}." if said else "")]
 
 
 def read_document(name: str, part: str) -> Rows:

@@ -96,7 +96,7 @@ class BlockSide(DeckTable, kw_only=True):
     kind: key(str, "wall, axis, piston, free-surface, inflow, outflow or an installed one")
     faces: key(
         tuple[Annotated[int, Meta(ge=0, le=10**9)], Annotated[int, Meta(ge=1, le=10**9)]] | None,
-        "from this face up to that, counted from 0; left out: the whole side",
+        "from this face up to that, counted from 0. If left out: the whole side",
     ) = None
     velocity: key(Pair | None, "of a piston or an open side: u, v [m/s] of t") = None
     pressure: key(Formula | None, "on a free surface [Pa], a number or a formula of t") = None
@@ -118,14 +118,14 @@ class BlockTable(DeckTable, kw_only=True):
     curves: key(Curves | None, "its four sides, where there is no file of a grid") = None
     cells: key(
         tuple[Annotated[int, Meta(ge=2, le=4000)], Annotated[int, Meta(ge=2, le=4000)]] | None,
-        "cells along i and j; left out: the nodes of the file, or the points",
+        "cells along i and j. If left out: the nodes of the file, or the points",
     ) = None
     material: key(
         str | dict[str, int | float | str],
         "name of a material, FILE.toml:NAME, or a table with eos and its parameters",
     ) = "air"
     rho: key(
-        Formula | None, "density [kg/m3], of x and y; left out: that of the material at rest"
+        Formula | None, "density [kg/m3], of x and y. If left out: that of the material at rest"
     ) = None
     u: key(Formula, "velocity along x [m/s], of x and y") = 0.0
     v: key(Formula, "velocity along y [m/s], of x and y") = 0.0

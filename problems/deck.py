@@ -84,36 +84,36 @@ class RunControl(DeckTable, kw_only=True):
     merges = True
     runtime = ("t_end", "max_steps", "cfl", "small_cells", "threads", "cut")
 
-    t_end: key(float | None, "end time [s]; left out: the problem's choice", ge=1e-300) = None
+    t_end: key(float | None, "end time [s]. If left out, the problem chooses it", ge=1e-300) = None
     t_set_up: key(
         float | None,
-        "end time [s] that lengths and given motions are made for; left out: "
+        "end time [s] that lengths and given motions are made for. If left out: "
         "that of the run; a restart with another end writes it down",
         gt=0,
     ) = None
     max_steps: key(
-        int | None, "stop after this number of steps; left out: no limit", ge=0, le=2**63 - 1
+        int | None, "stop after this number of steps. If left out: no limit", ge=0, le=2**63 - 1
     ) = None
     cfl: key(float, "fraction of the stable time step", ge=1e-3, le=1) = 0.5
     small_cells: key(
         float | None,
         "fraction of a block's cells that may be too small for a step and then use state "
-        "redistribution; 0: the fastest cell sets the step; left out: 0.05 where the grid is "
-        "rebuilt in every step, else 0",
+        "redistribution; with 0 the fastest cell sets the step. If left out: 0.05 where the grid "
+        "is rebuilt in every step, else 0",
         ge=0,
         le=0.1,
     ) = None
     threads: key(
         int | None,
-        "threads; results are bitwise the same for any number; left out: one per large block, "
+        "number of threads, which does not change the results. If left out: one per large block, "
         "as far as there are processors",
         ge=1,
         le=1024,
     ) = None
     cut: key(
         dict[str, Annotated[int, Meta(ge=1, le=1024)]],
-        "by a block's name, among how many ranks of MPI its update is cut at most; "
-        "1: it stays whole; not named: cut where it is more than 1.2 of a rank's share",
+        "by block name, the largest number of MPI ranks that share the block; 1 keeps it whole. "
+        "Blocks not named are split where they exceed 1.2 of a rank's share",
     ) = {}
 
 

@@ -46,10 +46,10 @@ LEAST_RISE = 1e-3  # of the density over that of the cold gas: less is no shock
 class Fluid(DeckTable, kw_only=True):
     """One material: by name from the library, or as an ideal (stiffened) gas."""
 
-    material: key(str, "name in the material library; left out: a gas") | None = None
+    material: key(str, "name in the material library. If left out: a gas") | None = None
     gamma: key(float, "ratio of specific heats of the gas", ge=1.001, le=1000) = 1.4
     p_inf: key(float, "stiffness of the gas [Pa]; 0: ideal", ge=0, le=1e20) = 0.0
-    rho: key(float, "density [kg/m3]; left out: the library's", ge=1e-20, le=1e20) | None = None
+    rho: key(float, "density [kg/m3]. If left out: the library's", ge=1e-20, le=1e20) | None = None
 
     @classmethod
     def keeps_defaults(cls, table: Mapping[str, Any]) -> bool:

@@ -200,7 +200,7 @@ class RiemannDeck(Deck, kw_only=True):
     right: SideState | None = None
     lengths: key(
         tuple[Length, Length] | None,
-        "lengths of the two sides [m]; left out: the case's, or by the waves, 1 m in all",
+        "lengths of the two sides [m]. If left out: the case's, or by the waves, 1 m in all",
     ) = None
     contact: key(
         Literal["on-line", "captured"],
@@ -213,7 +213,7 @@ class RiemannDeck(Deck, kw_only=True):
     rows: key(int, "cells across", ge=2, le=MOST_CELLS) = 4
     grading: key(
         float | None,
-        "growth of cells off a contact on a line; left out: the case's, or by the waves",
+        "growth of cells off a contact on a line. If left out: the case's, or by the waves",
         ge=1,
         le=1.2,
     ) = None

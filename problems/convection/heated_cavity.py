@@ -68,7 +68,7 @@ class HeatedCavityDeck(Deck, kw_only=True):
     run: RunControl = RunControl()
     method: key(Literal["steady", "time"], "Newton's iteration, or a march from rest") = "steady"
     cells: key(int, "cells across the box", ge=3, le=2000) = 40
-    cells_up: key(int | None, "cells up; left out: cells times aspect", ge=3, le=2000) = None
+    cells_up: key(int | None, "cells up. If left out: cells times aspect", ge=3, le=2000) = None
     aspect: key(float, "height over width", ge=0.01, le=100) = 1.0
     rayleigh: key(float, "Rayleigh number of the width", le=1e12) = 1e5
     prandtl: key(float, "viscosity over diffusivity", le=1e6) = PRANDTL
@@ -81,7 +81,7 @@ class HeatedCavityDeck(Deck, kw_only=True):
     top: Side = Side()
     grid: AxisGrid = AxisGrid(kind="clustered")
     tolerance: key(float, "relative change at which a state is steady", gt=0, le=0.1) = 1e-10
-    longest_step: key(float | None, "of the march [s]; left out: 1/400 of its time", gt=0) = None
+    longest_step: key(float | None, "of the march [s]. If left out: 1/400 of its time", gt=0) = None
 
 
 class HeatedCavity(BoxProblem):

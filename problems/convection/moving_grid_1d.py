@@ -44,9 +44,9 @@ class PlacingPart(DeckTable, kw_only=True):
     merges = True
 
     strength: key(float, "of the gradient: 2 gives two thirds of the nodes to it", ge=0) = 2.0
-    ratio: key(float | None, "largest ratio of neighbouring steps; left out: the default", gt=1) = (
-        None
-    )
+    ratio: key(
+        float | None, "largest ratio of neighbouring steps. If left out: the default", gt=1
+    ) = None
     relaxation: key(float, "fraction of a correction that is applied", gt=0, le=1) = 0.7
     tau: key(float, "relaxation time [s] of the node speed", gt=0) = 0.005
     start: key(

@@ -46,16 +46,16 @@ class RayleighBenardDeck(Deck, kw_only=True):
     walls: key(Literal["no-slip", "free"], "floor and ceiling hold the fluid, or not") = "no-slip"
     cells: key(int, "cells across", ge=3, le=2000) = 40
     cells_up: key(int, "cells up", ge=3, le=2000) = 40
-    width: key(float | None, "over the height; left out: 1, layer: critical", ge=0.01, le=100) = (
-        None
-    )
+    width: key(
+        float | None, "over the height. If left out: 1, layer: critical", ge=0.01, le=100
+    ) = None
     rayleigh: key(float, "Rayleigh number of the height", le=1e12) = 5000.0
     prandtl: key(float, "viscosity over diffusivity", le=1e6) = linear.PRANDTL
     tilt: key(float, "of gravity, anticlockwise from down [degrees]", gt=-90, lt=90) = 0.0
     amplitude: key(float, "of the first disturbance of the temperature [K]", gt=0, le=1) = 1e-3
     onset: key(bool, "search for the onset at the end") = True
     grid: AxisGrid = AxisGrid()
-    longest_step: key(float | None, "of the march [s]; left out: 1/600 of its time", gt=0) = None
+    longest_step: key(float | None, "of the march [s]. If left out: 1/600 of its time", gt=0) = None
 
 
 class RayleighBenard(BoxProblem):

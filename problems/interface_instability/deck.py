@@ -47,7 +47,7 @@ class LineMotion(DeckTable, kw_only=True):
     relax: key(float, "fraction of the way to the target spacing in a step", ge=0, le=1) = 0.02
     thickness: key(
         float | None,
-        "smoothing length [m]: shorter waves of the interface decay; left out: 0.75 of a cell",
+        "smoothing length [m]; shorter waves of the interface decay. If left out: 0.75 of a cell",
         ge=0,
         le=1e12,
     ) = None
@@ -67,12 +67,12 @@ class InterfaceDeck(Deck, kw_only=True):
     pressure: key(float, "pressure ahead of the shock [Pa]", le=1e20) = 1.0
     mach: key(
         float | None,
-        "Mach number of the shock; left out: shock_pressure, or 1.5",
+        "Mach number of the shock. If left out: that of shock_pressure, or 1.5",
         ge=1.001,
         le=1000,
     ) = None
     shock_pressure: key(
-        float | None, "pressure behind the shock [Pa]; left out: by mach", gt=0, le=1e20
+        float | None, "pressure behind the shock [Pa]. If left out: by mach", gt=0, le=1e20
     ) = None
     second_shock: SecondShock | None = None
     wavelength: key(float, "2 pi / k [m]", ge=1e-12, le=1e12) = 1.0
@@ -96,7 +96,7 @@ class InterfaceDeck(Deck, kw_only=True):
     reach: key(float, "distance from the interface, in waves, where grid lines bend", gt=0) = 0.1
     lengths: key(
         tuple[float, float] | None,
-        "lengths of the two materials [m]; left out: too long for a reflection to return",
+        "lengths of the two materials [m]. If left out: so long that no reflection returns",
     ) = None
     start: key(
         Literal["auto", "crossed", "incident"],
@@ -106,7 +106,7 @@ class InterfaceDeck(Deck, kw_only=True):
     layer: key(
         float | None,
         "start crossed: first distance of the nearer wave from the interface, "
-        "in cells; left out: an eighth of the shortest wave, 3 to 8 cells",
+        "in cells. If left out: an eighth of the shortest wave, 3 to 8 cells",
         ge=3,
         le=1000,
     ) = None

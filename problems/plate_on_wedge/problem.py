@@ -93,7 +93,7 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     ) = (80, 24)
     refinement: key(
         float | None,
-        "how many times finer the cells are at the collision point A; left out: "
+        "how many times finer the cells are at the collision point A. If left out: "
         "for a moving plate by the distance from the critical angle, 1 (far) to 3 (near)",
         ge=1,
         le=8,

@@ -50,7 +50,7 @@ class RayleighTaylorDeck(Deck, kw_only=True):
     regrid: Regrid = Regrid()
     above: key(Literal["heavy", "nothing"], "a heavy gas, or a free surface") = "heavy"
     cells: key(int, "cells in a wavelength", ge=8, le=MOST_CELLS) = 64
-    amplitude: key(float | None, "first amplitude [m]; left out: small", ge=1e-8, lt=0.2) = None
+    amplitude: key(float | None, "first amplitude. If left out: small", ge=1e-8, lt=0.2) = None
     sound_speed: key(
         float,
         "of the lower gas at the interface [m/s]; below 1.155 the heavy gas does not reach the lid",

@@ -39,7 +39,7 @@ class SedovDeck(Deck, kw_only=True):
     pressure: key(float, "of the cold gas; exact theory has 0", gt=0, le=0.01) = 1e-8
     mesh: key(
         Literal["follow", "fixed"] | None,
-        "nodes go with the gas, or rest; left out: follow, but fixed if plane",
+        "nodes go with the gas, or rest. If left out: follow, but fixed if plane",
     ) = None
     limiter: Limiter = "van-leer"
 

@@ -345,7 +345,7 @@ def show(value: Any) -> str:
 
 
 WIDTH = 100  # of a line
-HEAD = "# keys without a value, and what that means or what they could be:"
+HEAD = "# These keys have no value; each line gives the meaning and the values that are allowed:"
 
 
 def describe_unset(deck: Deck) -> str:

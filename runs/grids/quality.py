@@ -166,8 +166,8 @@ def write_grid(
         case _:
             write_atomically(path, _make_image(nodes, fields, made_by))
             sidecar = path.with_suffix(".xdmf")
-            with h5py.File(path, "r") as file:
-                block = describe_block(file["blocks/grid"], path.name)
+            arrays = dict(zip("xyz", nodes, strict=False)) | fields
+            block = describe_block("grid", arrays, path.name)
             write_atomically(sidecar, HEAD + block + TAIL)
             return [path, sidecar]
     return [path]

@@ -41,7 +41,7 @@ from runs.quantities import count, describe_seconds, describe_time, is_time
 from runs.ranks.map import check_cut
 from runs.ranks.world import World, describe_ranks
 from runs.store.directory import RunDirectory, keep_problem_file, write_noted
-from runs.store.dumps import EMPTY, Names, make_image
+from runs.store.dumps import EMPTY, Names, list_arrays, make_image
 from runs.store.files import write_atomically, write_sealed
 from runs.store.history import (
     HistoryWriter,
@@ -480,8 +480,11 @@ class Runner:
         began, step = time.monotonic(), self.evolution.step
         self._sync()
         besides = EMPTY if output else self.gauges.get_state()
+        blocks = {block.name: dict(list_arrays(block, output)) for block in self.evolution.blocks}
+        shown = self.sidecar.describe(path, float(self.evolution.t), blocks)
 
         def follow() -> None:
+            self.sidecar.take(path, shown)
             if output is None:
                 self.last_point = step
             if self.limit is not None:

@@ -105,7 +105,7 @@ Arrays: TypeAlias = Mapping[str, Sequence[tuple[str, np.ndarray]]]  # by the blo
 
 def make_image(
     evolution: Evolution, names: Names, besides: State = EMPTY, output: Output | None = None
-) -> bytes:
+) -> bytes | bytearray:
     """The bytes of a dump of the present state, its checksum blank: `write_sealed` fills it in.
 
     besides: what a restart needs beyond the state; output: what is in a light dump, None for a
@@ -117,7 +117,7 @@ def make_image(
     form += repr([_describe(block, arrays) for block in evolution.blocks])
     form += repr({key: _describe_kind(value) for key, value in (linked or {}).items()})
     if linked is not None and form in _KEPT:
-        return _refill(_KEPT[form], evolution, arrays, linked)
+        return _refill(*_KEPT[form], evolution, arrays, linked)
     with h5py.File("dump", "w", driver="core", backing_store=False) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
@@ -147,14 +147,17 @@ def make_image(
     if linked is None:
         return image
     while _KEPT:
-        _KEPT.popitem()[1].close()
-    _KEPT[form] = h5py.File(h5py.h5f.open_file_image(image, WRITABLE))
-    return _refill(_KEPT[form], evolution, arrays, linked)
+        _KEPT.popitem()[1][0].close()
+    file = h5py.File(h5py.h5f.open_file_image(image, WRITABLE))
+    places = {path: file[path].id.get_offset() for path in _list_stored(arrays, linked)}
+    _KEPT[form] = file, places
+    return _refill(*_KEPT[form], evolution, arrays, linked)
 
 
 # HDF5 takes its time over groups, scales and attributes, which are the same in all dumps of a run:
-# the last whole dump stays open in memory, and the numbers of the next are written over its own.
-_KEPT: dict[str, h5py.File] = {}
+# the last whole dump stays open in memory, and the numbers of the next are written over its own,
+# arrays at the places in the file that HDF5 has given them.
+_KEPT: dict[str, tuple[h5py.File, dict[str, int | None]]] = {}
 WRITABLE = 1  # H5LT_FILE_IMAGE_OPEN_RW
 
 
@@ -171,20 +174,32 @@ def _describe_kind(value: Any) -> Any:
     return (value.dtype.str, value.shape) if isinstance(value, np.ndarray) else type(value)
 
 
+def _list_stored(arrays: Arrays, state: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """The numbers of a dump but those of attributes, by their paths in the file."""
+    stored = {f"blocks/{block}/{name}": v for block in arrays for name, v in arrays[block]}
+    for key, value in state.items():
+        if not isinstance(value, str | Virtual):
+            stored[f"state/{key}"] = np.asarray(value)
+    return stored
+
+
 def _refill(
-    file: h5py.File, evolution: Evolution, arrays: Arrays, state: Mapping[str, Any]
-) -> bytes:
-    """The bytes of a dump of the same form as `file`."""
+    file: h5py.File,
+    places: Mapping[str, int | None],
+    evolution: Evolution,
+    arrays: Arrays,
+    state: Mapping[str, Any],
+) -> bytearray:
+    """The bytes of a dump of the same form as `file`, whose arrays lie at `places`."""
     for name, number in _list_numbers(evolution).items():
         file.attrs.modify(name, number)
-    numbers = {f"blocks/{block}/{name}": v for block in arrays for name, v in arrays[block]}
-    numbers |= {f"state/{key}": value for key, value in state.items() if not isinstance(value, str)}
-    for path, value in numbers.items():
-        if not isinstance(value, Virtual):  # by HDF5's own calls: a fifth of the time
-            stored = h5py.h5d.open(file.id, path.encode())
-            stored.write(h5py.h5s.ALL, h5py.h5s.ALL, np.ascontiguousarray(value))
     file.flush()
-    return file.id.get_file_image()
+    image = bytearray(file.id.get_file_image())
+    for path, values in _list_stored(arrays, state).items():
+        if values.size:
+            place = np.frombuffer(image, values.dtype, values.size, places[path])
+            place.reshape(values.shape)[...] = values
+    return image
 
 
 def _list_numbers(evolution: Evolution) -> dict[str, float]:

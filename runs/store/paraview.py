@@ -12,8 +12,8 @@ import os
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
+from typing import Any
 
-import h5py
 import numpy as np
 
 from regrid.errors import BadInput
@@ -62,6 +62,18 @@ class Sidecar:
         self.path = path
         self._known: dict[tuple[Path, str | None], str] = {}  # by path and checksum
 
+    def describe(self, dump: Path, t: float, blocks: Mapping[str, Mapping[str, Any]]) -> str:
+        """The grids of a dump at the time `t` [s], by the blocks' names and arrays, of which the
+        shapes count."""
+        place = os.path.relpath(dump, self.path.parent)
+        grids = "".join(describe_block(name, arrays, place) for name, arrays in blocks.items())
+        grid = '<Grid Name="blocks" GridType="Collection" CollectionType="Spatial">'
+        return f'{grid}\n<Time Value="{t!r}"/>\n{grids}</Grid>\n'
+
+    def take(self, dump: Path, words: str) -> None:
+        """Spare a dump that has just been written the reading: `words` are what `describe` says."""
+        self._known[dump, find_sum(dump)] = words
+
     def write(self, dumps: list[Path]) -> None:
         """Show `dumps`, one after another in time; one that cannot be read is left out."""
         steps = []
@@ -69,32 +81,28 @@ class Sidecar:
             with contextlib.suppress(BadInput):
                 key = dump, find_sum(dump)
                 if key not in self._known:
-                    place = os.path.relpath(dump, self.path.parent)
                     with open_dump(dump) as file, damage_told(dump, "its blocks"):
-                        blocks = "".join(describe_block(g, place) for g in file["blocks"].values())
-                        time = f'<Time Value="{float(file.attrs["t"])!r}"/>'
-                    grid = '<Grid Name="blocks" GridType="Collection" CollectionType="Spatial">'
-                    self._known[key] = f"{grid}\n{time}\n{blocks}</Grid>\n"
+                        blocks = {name: dict(group) for name, group in file["blocks"].items()}
+                        self._known[key] = self.describe(dump, float(file.attrs["t"]), blocks)
                 steps.append(self._known[key])
         grid = '<Grid Name="run" GridType="Collection" CollectionType="Temporal">\n'
         content = "".join([HEAD, grid, *steps, "</Grid>\n", TAIL])
         write_atomically(self.path, content, durable=False)
 
 
-def describe_block(group: h5py.Group, reference: str) -> str:
-    """The grid of one block, plane or in space, whose file lies at `reference`.
+def describe_block(name: str, arrays: Mapping[str, Any], reference: str) -> str:
+    """The grid of one block, plane or in space, whose `arrays` lie in the file at `reference`.
 
-    Only the shapes of its arrays are read.
+    Only their shapes and types are read.
     """
-    arrays = dict(group.items())
 
-    def item(name: str) -> str:
-        data = arrays[name]
+    def item(array: str) -> str:
+        data = arrays[array]
         kind = "Float" if data.dtype.kind == "f" else "Int"
         size = " ".join(str(n) for n in data.shape)
         return (
             f'<DataItem Dimensions="{size}" NumberType="{kind}" Format="HDF" '
-            f'Precision="{data.dtype.itemsize}">{reference}:{group.name}/{name}</DataItem>'
+            f'Precision="{data.dtype.itemsize}">{reference}:/blocks/{name}/{array}</DataItem>'
         )
 
     nodes = arrays["x"].shape
@@ -102,16 +110,16 @@ def describe_block(group: h5py.Group, reference: str) -> str:
     size = " ".join(str(n) for n in nodes)
     geometry = "_".join(components).upper()
     lines = [
-        f'<Grid Name="{escape(group.name.rsplit("/", 1)[-1])}" GridType="Uniform">',
+        f'<Grid Name="{escape(name)}" GridType="Uniform">',
         f'<Topology TopologyType="{len(nodes)}DSMesh" Dimensions="{size}"/>',
         f'<Geometry GeometryType="{geometry}">{"".join(map(item, components))}</Geometry>',
     ]
-    for name, data in arrays.items():
-        if len(data.shape) != len(nodes) or name in components:
+    for array, data in arrays.items():
+        if len(data.shape) != len(nodes) or array in components:
             continue
         center = "Node" if data.shape == nodes else "Cell"
         lines.append(
-            f'<Attribute Name="{escape(name)}" AttributeType="Scalar" Center="{center}">'
-            f"{item(name)}</Attribute>"
+            f'<Attribute Name="{escape(array)}" AttributeType="Scalar" Center="{center}">'
+            f"{item(array)}</Attribute>"
         )
     return "\n".join(lines) + "\n</Grid>\n"

@@ -18,6 +18,7 @@ from pathlib import Path
 HOME = Path(__file__).resolve().parents[2]  # the folder in which the packages lie
 DISTRIBUTION = "shockgrid"
 NOTED = 16  # digits of a digest that screens and logs show
+DIGITS = 12  # of a commit
 PACKAGES = ("numpy", "numba", "scipy", "h5py")
 
 
@@ -79,14 +80,18 @@ def find_commit(home: Path) -> str:
     Of a checkout by git; of an installed package what its installer noted (PEP 610).
     """
     if (home / ".git").exists():
-        command = ["git", "--no-optional-locks", "-C", str(home), "describe", "--always", "--dirty"]
+        command = ["git", "--no-optional-locks", "-C", str(home), "status", "--porcelain=v2"]
+        command += ["--branch", "--no-ahead-behind", "--untracked-files=no"]
         try:
-            done = subprocess.run(
-                [*command, "--abbrev=12", "--exclude=*"], capture_output=True, text=True, timeout=20
-            )
+            done = subprocess.run(command, capture_output=True, text=True, timeout=20)
         except (OSError, subprocess.SubprocessError):
             return ""
-        return done.stdout.strip() if done.returncode == 0 else ""
+        head, *lines = done.stdout.splitlines() or [""]  # "# branch.oid COMMIT", then others
+        commit = head.rpartition(" ")[2]
+        if done.returncode or commit == "(initial)":
+            return ""
+        differs = any(not line.startswith("#") for line in lines)
+        return commit[:DIGITS] + ("-dirty" if differs else "")
     try:
         noted = metadata.distribution(DISTRIBUTION).read_text("direct_url.json")
     except metadata.PackageNotFoundError:

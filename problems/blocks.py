@@ -28,6 +28,7 @@ from hydro.links import join, slide
 from hydro.simulation import Simulation
 from hydro.sources import make_gravity
 from problems.deck import (
+    NONE,
     Deck,
     DeckTable,
     Limiter,
@@ -58,7 +59,14 @@ Formula = float | str
 Pair = tuple[Formula, Formula]
 SideName = Literal["i_min", "i_max", "j_min", "j_max"]
 LINKED = {"interface": "interface", "seam": "seam", "periodic": "periodic", "slide": "sliding"}
+State = tuple[Formula, Formula, Formula, Formula]
 Points = Annotated[tuple[tuple[float, float], ...], Meta(min_length=2)]
+Vector = tuple[float, float]
+Numbers = dict[str, int | float | str]
+Options = dict[str, bool | int | float | str]
+First = Annotated[int, Meta(ge=0, le=10**9)]
+Count = Annotated[int, Meta(ge=1, le=4000)]
+Cells = Annotated[int, Meta(ge=2, le=4000)]
 
 
 class CurveTable(DeckTable, kw_only=True):
@@ -67,10 +75,7 @@ class CurveTable(DeckTable, kw_only=True):
     x: key(Formula | None, "x [m], a number or a formula of s") = None
     y: key(Formula | None, "y [m], a number or a formula of s") = None
     points: key(Points | None, "[[x, y], ...] [m], joined by straight lines") = None
-    cells: key(
-        tuple[Annotated[int, Meta(ge=1, le=4000)], ...] | None,
-        "cells on each of the straight lines; every point is then a node",
-    ) = None
+    cells: key(tuple[Count, ...] | None, "cells on each line; points are nodes then") = None
 
 
 Curve = key(
@@ -94,19 +99,11 @@ class BlockSide(DeckTable, kw_only=True):
 
     side: key(SideName, "which side")
     kind: key(str, "wall, axis, piston, free-surface, inflow, outflow or an installed one")
-    faces: key(
-        tuple[Annotated[int, Meta(ge=0, le=10**9)], Annotated[int, Meta(ge=1, le=10**9)]] | None,
-        "from this face up to that, counted from 0. If left out: the whole side",
-    ) = None
+    faces: key(tuple[First, First] | None, "from this face up to that; left out: all") = None
     velocity: key(Pair | None, "of a piston or an open side: u, v [m/s] of t") = None
     pressure: key(Formula | None, "on a free surface [Pa], a number or a formula of t") = None
-    state: key(
-        tuple[Formula, Formula, Formula, Formula] | None,
-        "beyond an inflow: rho [kg/m3], u, v [m/s], p [Pa], formulas of t",
-    ) = None
-    options: key(
-        dict[str, bool | int | float | str], "further options of the kind, passed on unchanged"
-    ) = msgspec.field(default_factory=dict)
+    state: key(State | None, "beyond an inflow: rho, u, v, p, numbers or formulas of t") = None
+    options: key(Options, "further options of the kind, passed on") = NONE
 
 
 class BlockTable(DeckTable, kw_only=True):
@@ -116,17 +113,9 @@ class BlockTable(DeckTable, kw_only=True):
     grid: key(str, "file of its grid, or of its four curves: .npz, .h5, .vts, .vtk") = ""
     grid_block: key(str, "which of several blocks in that file") = ""
     curves: key(Curves | None, "its four sides, where there is no file of a grid") = None
-    cells: key(
-        tuple[Annotated[int, Meta(ge=2, le=4000)], Annotated[int, Meta(ge=2, le=4000)]] | None,
-        "cells along i and j. If left out: the nodes of the file, or the points",
-    ) = None
-    material: key(
-        str | dict[str, int | float | str],
-        "name of a material, FILE.toml:NAME, or a table with eos and its parameters",
-    ) = "air"
-    rho: key(
-        Formula | None, "density [kg/m3], of x and y. If left out: that of the material at rest"
-    ) = None
+    cells: key(tuple[Cells, Cells] | None, "along i and j; left out: those of its sides") = None
+    material: key(str | Numbers, "a name, FILE.toml:NAME, or a table with eos and so on") = "air"
+    rho: key(Formula | None, "density [kg/m3], of x, y; left out: the material's at rest") = None
     u: key(Formula, "velocity along x [m/s], of x and y") = 0.0
     v: key(Formula, "velocity along y [m/s], of x and y") = 0.0
     p: key(Formula, "pressure [Pa], of x and y") = 1e5
@@ -141,9 +130,7 @@ class LinkTable(DeckTable, kw_only=True):
         "interface: contact of two materials, nodes match; seam: cut inside one "
         "material; periodic: a period apart; slide: nodes need not match, the first side leads",
     )
-    sides: key(
-        tuple[str, str], 'two sides, such as "left.i_max" or "left.i_max[0:8]", faces 0 to 7'
-    )
+    sides: key(tuple[str, str], 'two, such as "left.i_max" or "left.i_max[0:8]", faces 0 to 7')
     tension: key(float, "surface tension of an interface [N/m]", ge=0, le=1e20) = 0.0
 
 
@@ -168,20 +155,13 @@ class BlocksDeck(Deck, kw_only=True):
     regrid: Regrid = Regrid()
     title: key(str, "a line for the summary") = ""
     geometry: key(Literal["plane", "axisymmetric"], "axisymmetric: y is the radius") = "plane"
-    mesh: key(
-        Literal["regrid", "fixed"], "regrid: grids follow moving sides; fixed: no node moves"
-    ) = "regrid"
-    gravity: key(tuple[float, float], "acceleration of all blocks along x and y [m/s2]") = (
-        0.0,
-        0.0,
-    )
+    mesh: key(Literal["regrid", "fixed"], "grids follow moving sides, or rest") = "regrid"
+    gravity: key(Vector, "acceleration of all blocks along x and y [m/s2]") = (0.0, 0.0)
     limiter: Limiter = "van-leer"
     void_fill: VoidFill = VoidFill()
     block: key(tuple[BlockTable, ...], "the blocks, [[block]] each", min_length=1) = (CHANNEL,)
     link: key(tuple[LinkTable, ...], "the links, [[link]] each") = ()
-    digests: key(
-        dict[str, str], "sha256 of the files, as a run stores them; not needed in your own deck"
-    ) = msgspec.field(default_factory=dict)
+    digests: key(dict[str, str], "sha256 of the files, which a run stores by itself") = NONE
 
     def find_files(self, folder: Path) -> BlocksDeck:
         """The same deck, the files that it names taken from `folder` where they are relative."""

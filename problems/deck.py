@@ -15,8 +15,10 @@ A problem's own deck reads:
 from __future__ import annotations
 
 import collections
+import contextlib
 import hashlib
-from collections.abc import Iterable, Mapping
+import operator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union, get_args
 
@@ -44,6 +46,7 @@ def key(kind: Any, description: str, **bounds: Any) -> Any:
     return key(Union[tuple(parts)], description, **bounds) | None  # noqa: UP007
 
 
+NONE: Any = msgspec.field(default_factory=dict)  # of a key that is a table by name: no entry
 Limiter = key(  # the names of hydro.formulas.reconstruction.LIMITERS
     Literal["low-mach", "smooth-shear", "monotonised-central", "van-leer", "minmod"],
     "limiter of slopes, from sharp to smooth; smooth-shear: van-leer but for the velocity where "
@@ -77,6 +80,21 @@ class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
         """Do the keys that this table of a deck leaves out come from the problem's default?"""
         return cls.merges
 
+    def refuse(self, wrong: object, name: str, words: str) -> None:
+        """Raise BadInput about the key `name` (dotted) with its value, where that is `wrong`."""
+        if wrong:
+            value = operator.attrgetter(name)(self)
+            shown = f"{value:g}" if isinstance(value, float) else repr(value)
+            raise BadInput(f"deck: {name} = {shown}; {words}")
+
+    @contextlib.contextmanager
+    def blame(self, name: str, words: str) -> Iterator[None]:
+        """Say of an error of theory within this context that the value of key `name` is why."""
+        try:
+            yield
+        except (BadInput, ValueError) as error:
+            self.refuse(True, name, f"{words} ({error})")
+
 
 class RunControl(DeckTable, kw_only=True):
     """How long and how to march."""
@@ -86,34 +104,23 @@ class RunControl(DeckTable, kw_only=True):
 
     t_end: key(float | None, "end time [s]. If left out, the problem chooses it", ge=1e-300) = None
     t_set_up: key(
-        float | None,
-        "end time [s] that lengths and given motions are made for. If left out: "
-        "that of the run; a restart with another end writes it down",
-        gt=0,
+        float | None, "end time [s] that lengths and motions are made for; left out: t_end", gt=0
     ) = None
-    max_steps: key(
-        int | None, "stop after this number of steps. If left out: no limit", ge=0, le=2**63 - 1
-    ) = None
+    max_steps: key(int | None, "most steps; left out: no limit", ge=0, le=2**63 - 1) = None
     cfl: key(float, "fraction of the stable time step", ge=1e-3, le=1) = 0.5
     small_cells: key(
         float | None,
-        "fraction of a block's cells that may be too small for a step and then use state "
-        "redistribution; with 0 the fastest cell sets the step. If left out: 0.05 where the grid "
-        "is rebuilt in every step, else 0",
+        "fraction of cells that may be too small for a step, by state redistribution; left out: "
+        "0.05 where grids are rebuilt in every step, else 0",
         ge=0,
         le=0.1,
     ) = None
     threads: key(
-        int | None,
-        "number of threads, which does not change the results. If left out: one per large block, "
-        "as far as there are processors",
-        ge=1,
-        le=1024,
+        int | None, "threads, bitwise the same; left out: one per large block", ge=1, le=1024
     ) = None
     cut: key(
         dict[str, Annotated[int, Meta(ge=1, le=1024)]],
-        "by block name, the largest number of MPI ranks that share the block; 1 keeps it whole. "
-        "Blocks not named are split where they exceed 1.2 of a rank's share",
+        "by a block's name, among how many MPI ranks it is cut at most; left out: by its share",
     ) = {}
 
 
@@ -125,27 +132,14 @@ class Output(DeckTable, kw_only=True):
         "dumps", "every", "times", "fields", "precision", "compression", "restart_every", "columns",
     )  # fmt: skip
 
-    dumps: key(
-        int, "dumps evenly over the run besides the first; 0: first and last", ge=0, le=1_000_000
-    ) = 20
-    every: key(float | None, "time [s] from dump to dump; given: `dumps` does not count", gt=0) = (
-        None
-    )
-    times: key(
-        list[Annotated[float, Meta(gt=0)]],
-        "times [s] of further dumps; with dumps = 0 of these and the last alone",
-    ) = []
+    dumps: key(int, "evenly over the run besides the first; 0: the last", ge=0, le=1_000_000) = 20
+    every: key(float | None, "time [s] from dump to dump, in place of `dumps`", gt=0) = None
+    times: key(list[Annotated[float, Meta(gt=0)]], "times [s] of further dumps") = []
     fields: key(list[str], "fields in light dumps, such as rho and p; none: all there are") = []
-    precision: key(
-        Literal["double", "single"], "of the fields in light dumps; their nodes are always double"
-    ) = "double"
+    precision: key(Literal["double", "single"], "of fields in light dumps") = "double"
     compression: key(int, "level of gzip for light dumps; 0: none", ge=0, le=9) = 0
-    restart_every: key(float, "wall seconds between restart points; 0: none but dumps", ge=0) = (
-        300.0
-    )
-    columns: key(
-        tuple[str, ...], "groups of history columns of other installed packages, by name"
-    ) = ()
+    restart_every: key(float, "wall seconds between restart points; 0: none", ge=0) = 300.0
+    columns: key(tuple[str, ...], "groups of history columns of other packages, by name") = ()
 
     @property
     def light(self) -> bool:
@@ -191,12 +185,9 @@ class Regrid(DeckTable, kw_only=True):
 
     name: key(str, "name in the registry of regridders") = "barrier"
     epsilon: key(float, "weight of the orthogonality term of the barrier", gt=0, lt=1) = 1e-3
-    method: key(
-        Literal["newton", "sweeps"], "newton: one Newton step a step; sweeps: the paper's iteration"
-    ) = "newton"
+    method: key(Literal["newton", "sweeps"], "a Newton step, or the paper's iteration") = "newton"
     edge_lengths: key(
-        Literal["conditional", "unit"],
-        "lengths that the weights of a grid line's cells are made from",
+        Literal["conditional", "unit"], "lengths that the weights of a line's cells are made from"
     ) = "conditional"
     weight: key(str, "where cells are to be small: a formula such as 1 + 5*|grad(rho)|/max") = ""
     options: key(
@@ -290,20 +281,16 @@ def check_digests(digests: Mapping[str, str]) -> None:
         if not Path(name).is_file():
             raise BadInput(f"{name}, which the deck names, is gone")
         if compute_digests([name], {})[name] != digest:
-            raise BadInput(
-                f"{name} has changed since this deck was stored (key digests): restore the file, "
-                "or start a new run"
-            )
+            words = "has changed since this deck was stored (key digests)"
+            raise BadInput(f"{name} {words}: restore the file, or start a new run")
 
 
 def check_solid(key: str, label: str, material: Material) -> None:
     """Raise BadInput for a body's material that burns, or has no sound speed at p = 0."""
     eos, rho = material.eos, material.rho0
     if eos.kind == "jwl":
-        raise BadInput(
-            f"deck: {key} is {label!r}, an explosive; nothing burns in this problem and its "
-            "equation of state is that of the burnt products; use an inert material"
-        )
+        why = "an explosive, known by its burnt products; nothing burns here, use an inert material"
+        raise BadInput(f"deck: {key} is {label!r}, {why}")
     if not float(eos.sound_speed(rho, 0.0)) > 0.0:
         why = "which has no sound speed at p = 0; it must be a condensed material"
         if eos.kind == "tabular":

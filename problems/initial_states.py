@@ -87,16 +87,41 @@ def swing_square(cells: int, low: float, period: float, swing: float) -> np.ndar
     return np.array([x + swing * wave, y - swing * wave])
 
 
-def put_walls(*blocks: Block) -> None:
-    """Walls on all faces of these blocks that have nothing else on them."""
+def lay_rays(
+    radius: float, box: tuple[float, float, float], cells: int, rows: int, finest: float = 0.5
+) -> tuple[np.ndarray, list[int]]:
+    """Nodes (2, n + 1, rows + 1) of rays from half a circle about the origin, clockwise, to the
+    walls of a box around it, and numbers of the box's corners in the n + 1.
+
+    box: x of its ends and its height over the radius.  Each wall has its part of the half turn of
+    `cells`, 3 at least; the rows at the circle are `finest` of the mean as high.
+    """
+    low, high, top = box
+    corners = radius * np.array([[low, 0.0], [low, top], [high, top], [high, 0.0]]).T
+    turn = -np.diff(np.unwrap(np.arctan2(*corners[::-1])))
+    places = np.cumsum([0, *np.maximum(3, np.rint(cells * turn / np.pi).astype(int))])
+    along = np.arange(places[-1] + 1)
+    outer = np.array([np.interp(along, places, row) for row in corners])
+    angle = np.pi * (1.0 - np.linspace(0.0, 1.0, along.size))
+    inner = radius * np.array([np.cos(angle), np.sin(angle)])
+    inner[1, [0, -1]] = 0.0
+    part = np.linspace(0.0, 1.0, rows + 1)
+    part = finest * part + (1.0 - finest) * part**2
+    return inner[:, :, None] * (1.0 - part) + outer[:, :, None] * part, places.tolist()
+
+
+def put_walls(*blocks: Block, curved: bool = False) -> None:
+    """Walls on all faces of these blocks that have nothing else on them; where `curved`, the axis
+    on sides that lie on y = 0."""
     for block, side in itertools.product(blocks, SIDE_NAMES):
+        kind = "axis" if curved and not block.side_line(side, block.nodes)[1].any() else "wall"
         free = np.ones(block.side_faces(side)[1], dtype=int)
         for segment in block.segments:
             if segment.side == side:
                 free[segment.start : segment.stop] = 0
         ends = np.flatnonzero(np.diff(np.pad(free, 1))).reshape(-1, 2)
         for start, stop in ends.tolist():
-            put(block, side, "wall", start, stop)
+            put(block, side, kind, start, stop)
 
 
 def follow_gas(block: Block, dt: float) -> np.ndarray:
@@ -143,9 +168,7 @@ class RadialProblem(Problem):
 
     def simulate(self, blocks, links=(), kind=None, **options) -> Simulation:
         """As the base has it; the axis, and walls on sides that nothing is put on, come first."""
-        if self.curved:
-            put(blocks[0], "j_min", "axis")
-        put_walls(*blocks)
+        put_walls(*blocks, curved=self.curved)
         return super().simulate(blocks, links, kind, geometry=self.geometry, **options)
 
     def compute_radii(self, points: np.ndarray) -> np.ndarray:

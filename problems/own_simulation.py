@@ -8,9 +8,7 @@ import shlex
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import msgspec
-
-from problems.deck import Deck, key
+from problems.deck import NONE, Deck, key
 from problems.evolution import Evolution
 from problems.problem import Problem
 from regrid.errors import BadInput
@@ -22,9 +20,7 @@ TAKEN = ("step", "t", "dt", "dt_limit")
 
 class OwnSimulationDeck(Deck, kw_only=True):
     script: key(str, "file of the script that made the blocks") = ""
-    materials: key(dict[str, str], "block and its material, to know the run by") = msgspec.field(
-        default_factory=dict
-    )
+    materials: key(dict[str, str], "block and its material, to know the run by") = NONE
 
 
 class OwnSimulation(Problem):
@@ -48,10 +44,8 @@ class OwnSimulation(Problem):
         """Nothing is known without the blocks; BadInput where none were given."""
         if self.evolution is None:
             script = f" ({self.deck.script})" if self.deck.script else ""
-            raise BadInput(
-                f"the blocks of this run were made in Python{script}, and only there can they be "
-                "made again: continue it with shockgrid.restart(directory, simulation=...)"
-            )
+            words = "continue it there with shockgrid.restart(directory, simulation=...)"
+            raise BadInput(f"the blocks of this run were made in Python{script}: {words}")
 
     def say_repeat(self) -> str:
         """The script makes the blocks, and its deck alone no run."""

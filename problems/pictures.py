@@ -78,6 +78,18 @@ def draw_grid(axis, nodes: np.ndarray, every: int = 1, color="k", lw=0.2) -> Non
     axis.plot(x[:, ::every], y[:, ::every], color=color, lw=lw)
 
 
+def draw_profiles(axis, dumps, name: str, unit: float, exact=None) -> None:
+    """A field over `unit` along the first row of the first block [mm] at the times of some dumps;
+    in black that of an `exact` flow: its `compute_profile(t)` gives places [m] and values (n,)."""
+    for dump in dumps:
+        block = dump.blocks[0]
+        x, values = block.centres[0][:, 0], block.cell_fields[name][:, 0] / unit
+        axis.plot(1e3 * x, values, lw=1.4, label=f"{1e6 * dump.t:.3g} µs")
+        if exact and dump.t > 0.0:
+            x, values = exact.compute_profile(dump.t)
+            axis.plot(1e3 * x, values / unit, "k", lw=0.7)
+
+
 def draw_columns(axis, history, labels: Mapping[str, str], words: str = "", unit="s") -> None:
     """Columns of a history over time [unit], with their labels."""
     t = UNITS[unit] * history["t"]

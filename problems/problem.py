@@ -174,6 +174,54 @@ def average_plateau(edges: np.ndarray, values: np.ndarray, ends: tuple[float, fl
     return np.average(np.asarray(values)[:, inside], axis=1, weights=np.diff(edges)[inside])
 
 
+def reduce_between(
+    reduce: Callable[[np.ndarray], Any],
+    x: np.ndarray,
+    values: np.ndarray,
+    low: float,
+    high: float,
+    least: int = 1,
+) -> float:
+    """What `reduce`, such as np.mean, makes of values (n,) at places x between two; NaN of fewer
+    than `least`."""
+    chosen = values[(x > low) & (x < high)]
+    return float(reduce(chosen)) if chosen.size >= least else math.nan
+
+
+def measure_below(line: np.ndarray, curved: bool) -> float:
+    """Area [m2] between a line (2, n) and y = 0, or where `curved` the volume per radian [m3]."""
+    x, y = line
+    near, far = y[:-1], y[1:]
+    height = far * far + far * near + near * near if curved else far + near
+    return float((np.diff(x) * height).sum()) / (6.0 if curved else 2.0)
+
+
+def find_frequency(t: np.ndarray, values: np.ndarray) -> float:
+    """Angular frequency [1/s] by the times t (n,) at which a wave's values are 0; NaN of fewer than
+    two such times."""
+    change = np.flatnonzero(values[1:] * values[:-1] < 0.0)
+    if change.size < 2:
+        return math.nan
+    part = values[change] / (values[change] - values[change + 1])
+    zeros = t[change] + part * (t[change + 1] - t[change])
+    return math.pi * (change.size - 1) / float(zeros[-1] - zeros[0])
+
+
+def find_growth_rate(t: np.ndarray, values: np.ndarray) -> float:
+    """Rate [1/s] of a growth as cosh(rate t) from values (n,) at three times, a third of the last
+    apart: a1 + a3 = 2 a2 cosh(rate T); NaN where there is none."""
+    first, middle, last = np.interp([t[-1] / 3.0, t[-1] / 1.5, t[-1]], t, values)
+    ratio = (first + last) / (2.0 * middle)
+    return math.acosh(ratio) / (t[-1] / 3.0) if ratio > 1.0 else math.nan
+
+
+def fit_slope(x: np.ndarray, y: np.ndarray, chosen: Any = slice(None), least: int = 3) -> float:
+    """Slope of the straight line nearest to the `chosen` of the points x, y (n,); NaN of fewer than
+    `least`."""
+    x, y = x[chosen], y[chosen]
+    return float(np.polyfit(x, y, 1)[0]) if x.size >= least else math.nan
+
+
 def compare(
     history: History, name: str, theory: float = math.nan, label: str = "", **more: Any
 ) -> Row:
@@ -199,7 +247,7 @@ class Problem:
     Deck: ClassVar[type[Deck]] = Deck
     units: ClassVar[Mapping[str, str]] = {}  # of the columns of `measure` that have one
     t_unit: str = "s"  # of t: "1" where the deck's numbers have no units; or "iterations"
-    counted: ClassVar[tuple[str, ...]] = ()  # keys of the deck whose product is the cells of all
+    counted: ClassVar[tuple[str, ...]] = ()  # own numbers, keys: their product is the cells of all
     measures_sides: ClassVar[bool] = False  # `measure` reads cells along sides alone: `reads_cells`
 
     def __init__(self, deck: AnyDeck):
@@ -221,10 +269,8 @@ class Problem:
 
     def check_end(self, last: float, words: str) -> None:
         """Raise BadInput where the end time is beyond `last` [s], when what `words` say is so."""
-        if self.t_end > last:
-            raise BadInput(
-                f"deck: run.t_end is {self.t_end:g}; at {last:g} s {words}, the run must end before"
-            )
+        wanted = f"at {last:g} s {words}, the run must end before"
+        self.deck.refuse(self.t_end > last, "run.t_end", wanted)
 
     def build(self) -> Evolution:
         """The initial state, ready for its first step."""
@@ -236,7 +282,8 @@ class Problem:
         """The flow of these blocks to the end time, with the deck's run, regrid and void_fill.
 
         mesh: as there; any other word: the nodes are those of `make_grids` at the time.  kind: a
-        class derived from Simulation.
+        class derived from Simulation.  first_dt: bound on the first step
+        [s], of a flow that knows of no wave yet.
         """
         from hydro.simulation import Simulation  # slow to load; a deck is not
 
@@ -251,7 +298,11 @@ class Problem:
             options["mesh"] = lambda name, t: self.make_grids(t)[name]
         if regrid is not None:
             chosen["make_regridder"] = lambda: regrid.make(threads=run.threads)
-        return (kind or Simulation)(list(blocks), list(links), **(chosen | options))
+        chosen |= options
+        first_dt = chosen.pop("first_dt", math.inf)
+        simulation = (kind or Simulation)(list(blocks), list(links), **chosen)
+        simulation.clock.retry_dt = first_dt
+        return simulation
 
     def list_boxes(self) -> list[BlockPlan]:
         """The blocks where they are rectangles of even cells, or may be planned as such."""
@@ -274,7 +325,7 @@ class Problem:
         """Cells of all blocks by arithmetic alone, or somewhat more: asked before `plan` and
         `build`, so that too many are refused before an array of them is made."""
         if self.counted:
-            return math.prod(getattr(self.deck, name) for name in self.counted)
+            return math.prod(getattr(self, n, None) or getattr(self.deck, n) for n in self.counted)
         known = self.list_boxes() or type(self).plan is not Problem.plan
         plan = self.plan() if known else None
         return sum(math.prod(block.cells) for block in plan[1]) if plan else 0

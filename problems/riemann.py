@@ -199,23 +199,14 @@ class RiemannDeck(Deck, kw_only=True):
     left: SideState | None = None
     right: SideState | None = None
     lengths: key(
-        tuple[Length, Length] | None,
-        "lengths of the two sides [m]. If left out: the case's, or by the waves, 1 m in all",
+        tuple[Length, Length] | None, "of the sides [m]; left out: the case's, or by the waves"
     ) = None
-    contact: key(
-        Literal["on-line", "captured"],
-        "on-line: a grid line between two blocks; captured: inside one block",
-    ) = "on-line"
-    mesh: key(
-        Literal["fixed", "wave"], "grid of a captured contact: at rest, or swinging as a wave"
-    ) = "fixed"
+    contact: key(Literal["on-line", "captured"], "between two blocks, or inside one") = "on-line"
+    mesh: key(Literal["fixed", "wave"], "of a captured contact: at rest, swinging") = "fixed"
     cells: key(int, "cells along x", ge=8, le=MOST_CELLS) = 100
     rows: key(int, "cells across", ge=2, le=MOST_CELLS) = 4
     grading: key(
-        float | None,
-        "growth of cells off a contact on a line. If left out: the case's, or by the waves",
-        ge=1,
-        le=1.2,
+        float | None, "growth of cells off the contact; left out: as `lengths`", ge=1, le=1.2
     ) = None
     limiter: Limiter | None = None  # None: the case's
     regrid: Regrid = Regrid()
@@ -245,13 +236,10 @@ class Riemann(Problem):
             self.t_unit = "1"
         self.name = "own states" if deck.left is not None else deck.case
         self.on_line = deck.contact == "on-line"
-        if not self.on_line and case.left_eos != case.right_eos:
-            raise BadInput(
-                "deck: the two sides are of different materials; set contact = 'on-line' "
-                "(a captured contact needs one material)"
-            )
-        if not self.on_line and deck.grading is not None:
-            raise BadInput("deck: grading is for contact = 'on-line'; leave it out")
+        two = not self.on_line and case.left_eos != case.right_eos
+        deck.refuse(two, "contact", "the two sides are of different materials; take 'on-line'")
+        graded = not self.on_line and deck.grading is not None
+        deck.refuse(graded, "grading", "it is for contact = 'on-line'; leave it out")
         self.exact = exact = solve_riemann(case.left_eos, case.left, case.right_eos, case.right)
         if exact.gap:
             parting = case.right[1] - case.left[1]
@@ -263,10 +251,10 @@ class Riemann(Problem):
         self.domain = self.choose_domain()
         growth, count = max(self.domain.growths), deck.cells - deck.cells // 2
         if count * math.log(growth) > math.log(MOST_RATIO):
+            right = 1.0 + 0.9 * math.log(MOST_RATIO) / count
             raise BadInput(
                 f"deck: with grading {growth:.5g} the last of {count} cells would be more than "
-                f"{MOST_RATIO:g} times as long as the first; take grading = "
-                f"{1.0 + 0.9 * math.log(MOST_RATIO) / count:.4g}, or fewer cells"
+                f"{MOST_RATIO:g} times the first; take grading = {right:.4g}, or fewer cells"
             )
         self.t_end = self.domain.t_end
 

@@ -65,11 +65,8 @@ class Ripple:
         self.amplitude, self.wavelength = deck.ripple_amplitude, deck.ripple_wavelength
         self.wavenumber, length = 2.0 * math.pi / self.wavelength, self.frame.length
         self.cells_a_wave = deck.cells * deck.cone / deck.radius * self.wavelength / length
-        if self.amplitude > 0.0 and 3.0 * self.wavelength > length:
-            raise BadInput(
-                f"deck: ripple_wavelength is {self.wavelength:g} m; the cone's side is "
-                f"{length:.4g} m long and must have room for three waves"
-            )
+        words = f"the cone's side, {length:.4g} m long, must have room for three waves"
+        deck.refuse(self and 3.0 * self.wavelength > length, "ripple_wavelength", words)
 
     def __bool__(self) -> bool:
         return self.amplitude > 0.0
@@ -87,17 +84,12 @@ class Ripple:
         if not self:
             return
         number = cells * self.wavelength / self.frame.length
-        if number < LEAST_CELLS:
-            raise BadInput(
-                f"deck: ripple_wavelength is {self.wavelength:g} m, {number:.3g} cells of the "
-                f"cone's side; give at least {LEAST_CELLS * self.frame.length / cells:.3g} m "
-                "or more `cells`"
-            )
-        if any(len(find_bad_cells(nodes)) for nodes in grids.values()):
-            raise BadInput(
-                f"deck: ripple_amplitude is {self.amplitude:g} m on waves of {self.wavelength:g} "
-                "m; cells beside the cone's side would not be convex, give a smaller one"
-            )
+        least = LEAST_CELLS * self.frame.length / cells
+        words = f"that are {number:.3g} cells; give at least {least:.3g} m, or more `cells`"
+        self.deck.refuse(number < LEAST_CELLS, "ripple_wavelength", words)
+        bad = any(len(find_bad_cells(nodes)) for nodes in grids.values())
+        words = "cells beside the cone's side would not be convex; give a smaller one"
+        self.deck.refuse(bad, "ripple_amplitude", words)
 
     @cached_property
     def first_shock(self) -> tuple[float, float]:
@@ -271,10 +263,8 @@ class Layout:
             links += touch(contact.front, under, (front, "i_max", 0, cut))
         links += touch(contact.side, around, (side, "j_min"))
         links += touch(contact.impactor, face, (impactor, "i_max"))
-        for block in (impactor, front, cone, behind):
-            put(block, "j_min", "axis")
         put(impactor, "i_min", "free-surface")
-        put_walls(*blocks.values())
+        put_walls(*blocks.values(), curved=True)
         return links
 
 

@@ -24,7 +24,6 @@ import math
 from pathlib import Path
 from typing import ClassVar, Literal
 
-import msgspec
 import numpy as np
 
 from hydro.block import Block
@@ -32,15 +31,11 @@ from hydro.eos.materials import Material, find_material, make_material
 from hydro.simulation import Simulation
 from problems.conical_target import report as seen
 from problems.conical_target.layout import MATERIALS, Layout, Ripple
-from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, check_solid, key
+from problems.deck import MOST_CELLS, NONE, Deck, DeckTable, Regrid, RunControl, check_solid, key
 from problems.problem import Problem, check_memory, find_crossing
 from problems.references.riemann import solve_riemann
-from regrid.errors import BadInput
 
 Touch = Literal["joined", "sliding"]
-
-
-NUMBERS = msgspec.field(default_factory=dict)  # none
 
 
 class EosNumbers(DeckTable, kw_only=True):
@@ -48,10 +43,10 @@ class EosNumbers(DeckTable, kw_only=True):
 
     merges = True
 
-    impactor: key(dict[str, float], "of the impactor's material") = NUMBERS
-    shell: key(dict[str, float], "of the shell's material") = NUMBERS
-    target: key(dict[str, float], "of the material around the cone") = NUMBERS
-    filling: key(dict[str, float], "of the cone's material") = NUMBERS
+    impactor: key(dict[str, float], "of the impactor's material") = NONE
+    shell: key(dict[str, float], "of the shell's material") = NONE
+    target: key(dict[str, float], "of the material around the cone") = NONE
+    filling: key(dict[str, float], "of the cone's material") = NONE
 
 
 class Contact(DeckTable, kw_only=True):
@@ -76,16 +71,12 @@ class ConicalTargetDeck(Deck, kw_only=True):
     front: key(float, "thickness of the shell's front [m]", gt=0) = 3e-3
     side: key(float, "thickness of the shell's side [m]", gt=0) = 4e-3
     radius: key(float, "inside the shell [m]", gt=0) = 16e-3
-    cover: key(
-        float, "radius of the shell's front [m]; from `radius` on: it closes the shell", gt=0
-    ) = 12.5e-3
+    cover: key(float, "radius of the shell's front [m]; `radius`: it is closed", gt=0) = 12.5e-3
     length: key(float, "inside the shell [m]", gt=0) = 26e-3
     base: key(float, "radius of the cone's base [m]", gt=0) = 9e-3
     tip: key(float, "radius of the cone's blunt tip [m]", gt=0) = 2e-3
     cone: key(float, "length of the cone [m]", gt=0) = 14e-3
-    ripple_amplitude: key(float, "of a ripple on the cone's side [m]; 0: a straight side", ge=0) = (
-        0.0
-    )
+    ripple_amplitude: key(float, "of a ripple on the cone's side [m]; 0: none", ge=0) = 0.0
     ripple_wavelength: key(float, "along the cone's side [m]", gt=0) = 4e-3
     ripple_phase: key(float, "of the sine that begins at the cone's base [rad]") = 0.0
     contact: Contact = Contact()
@@ -129,16 +120,12 @@ class ConicalTarget(seen.Results, Problem):
             ("cone", "length", "there must be lead behind the cone's tip"),
             ("base", "cover", "the shell's front must cover the cone's base and more"),
         ):
-            if getattr(deck, low) > 0.97 * getattr(deck, high):
-                raise BadInput(
-                    f"deck: {low} is {getattr(deck, low):g} and {high} {getattr(deck, high):g} m; "
-                    f"{what}"
-                )
-        if 0.97 * deck.radius < deck.cover < deck.radius:
-            raise BadInput(
-                f"deck: cover is {deck.cover:g} m, which leaves {deck.radius - deck.cover:g} m of "
-                f"lead beside it; give {deck.radius:g} m to close the shell, or less"
-            )
+            most = getattr(deck, high)
+            deck.refuse(getattr(deck, low) > 0.97 * most, low, f"{high} is {most:g} m: {what}")
+        words = (
+            f"the lead beside it is too thin; give {deck.radius:g} m to close the shell, or less"
+        )
+        deck.refuse(0.97 * deck.radius < deck.cover < deck.radius, "cover", words)
         self.impact = self._match_impact()
         self.ripple = Ripple(deck, self.materials, self.impact)
         self.layout = Layout(deck, self.ripple)
@@ -152,20 +139,14 @@ class ConicalTarget(seen.Results, Problem):
         Raises BadInput past the speeds at which the materials' Hugoniots were measured.
         """
         deck, (one, two) = self.deck, (self.materials[name] for name in ("impactor", "shell"))
-        try:
+        with deck.blame("speed", "take a slower impactor"):
             hit = solve_riemann(one.eos, (one.rho0, deck.speed, 0.0), two.eos, (two.rho0, 0.0, 0.0))
-        except BadInput as error:
-            raise BadInput(
-                f"deck: speed is {deck.speed:g} m/s; take a slower impactor: {error}"
-            ) from None
         limits = [float(solid.eos.sound_speed(solid.rho0, 0.0)) for solid in (one, two)]
-        if deck.speed - hit.u > limits[0] or hit.u > limits[1]:
-            raise BadInput(
-                f"deck: speed is {deck.speed:g} m/s; behind its shocks {deck.impactor} or "
-                f"{deck.shell} would move faster than sound does in it at rest "
-                f"({limits[0]:.0f} and {limits[1]:.0f} m/s), for which their equations of state "
-                "are not made; take a slower impactor"
-            )
+        words = (
+            "take a slower impactor: equations of state are not made for material behind a shock "
+            f"that is faster than sound at rest ({limits[0]:.0f} and {limits[1]:.0f} m/s)"
+        )
+        deck.refuse(deck.speed - hit.u > limits[0] or hit.u > limits[1], "speed", words)
         return hit.p, hit.u, deck.front / hit.right_wave.head
 
     def estimate_cells(self) -> int:

@@ -14,7 +14,7 @@ import numpy as np
 
 from hydro.block import Block
 from problems.pictures import draw_field, draw_grid, make_panels, spread_dumps
-from problems.problem import Report, Row
+from problems.problem import Report, Row, fit_slope, reduce_between
 from problems.references.hugoniot import shock_to_pressure
 from problems.references.shock_polars import CrossedLine
 from regrid.curves import compute_arc_lengths
@@ -105,11 +105,7 @@ def measure_growth(history) -> tuple[float, float, float]:
     begin, quarter = (int(np.argmax(amplitude > part * top)) for part in (0.05, 0.25))
     late = t > t[-1] - GROWTH * (t[-1] - t[begin])
     first = slice(begin, max(quarter + 1, begin + 3))
-    slopes = [
-        float(np.polyfit(t[chosen], amplitude[chosen], 1)[0]) if t[chosen].size > 2 else math.nan
-        for chosen in (first, late)
-    ]
-    return float(t[begin]), *slopes
+    return float(t[begin]), fit_slope(t, amplitude, first), fit_slope(t, amplitude, late)
 
 
 AGES = (0.5e-6, 1.2e-6)  # after the passage: between them the rate of growth is told [s]
@@ -233,8 +229,7 @@ class Results:
             return Report(rows=[Row("impact", theory=self.impact[0])])
         deck, t = self.deck, history["t"]
         first, last = (part * self.impact[2] for part in PLATEAU)
-        inside = (t > first) & (t < last)
-        impact = float(history["pressure_impact"][inside].mean()) if inside.any() else math.nan
+        impact = reduce_between(np.mean, t, history["pressure_impact"], first, last)
         words = f"mean from {US * first:.2f} to {US * last:.2f} us; impedances match"
         label = "pressure on the impact face [GPa]"
         rows = [Row("impact", impact, self.impact[0], label, 1e9, 5, "impact", source=words)]
@@ -393,8 +388,7 @@ class Results:
             path.plot(US * t, MM * x, label=words)
             pressure.plot(MM * x, GPA * p, label=words)
             positions = np.linspace(*x[[0, -1]], 40)[1:-1] if x.size > 8 else np.empty(0)
-            chosen = [np.abs(x - position) < reach for position in positions]
-            speeds = [np.polyfit(t[a], x[a], 1)[0] if a.sum() > 3 else math.nan for a in chosen]
+            speeds = [fit_slope(t, x, np.abs(x - place) < reach, 4) for place in positions]
             speed.plot(MM * positions, 1e-3 * np.array(speeds), label=words)
         pressure.set(xlabel="x of the shock [mm]", ylabel="greatest pressure just behind [GPa]")
         speed.set(xlabel="x of the shock [mm]", ylabel="speed [km/s]")

@@ -26,7 +26,6 @@ from problems.convection.boxes import AxisGrid
 from problems.deck import Deck, Output, RunControl, key
 from problems.problem import Problem, Report, compare, get_last, say_unreached
 from problems.references.convection import VerticalPlates
-from regrid.errors import BadInput
 
 NOTHING = 1e-12  # relative: differences below are rounding, no swing
 LASTING = 50.0  # slowest diffusive times that a run may take: steady long before
@@ -54,12 +53,8 @@ class Convection1D(Problem):
 
     def __init__(self, deck: Convection1DDeck):
         super().__init__(deck)
-        if deck.rayleigh == 0.0 and deck.mean_speed == 0.0:
-            raise BadInput(
-                "rayleigh = 0 and mean_speed = 0: nothing would rise or sink; give one of them"
-            )
-        if not (math.isfinite(deck.mean_speed) and math.isfinite(deck.rayleigh)):
-            raise BadInput("rayleigh and mean_speed must be finite numbers")
+        words = "nothing would rise or sink, with mean_speed = 0; give one of them"
+        deck.refuse(deck.rayleigh == deck.mean_speed == 0.0, "rayleigh", words)
         self.exact = VerticalPlates(deck.rayleigh, deck.prandtl, deck.peclet, deck.mean_speed)
 
     def make_column(self, scheme: str | None = None) -> columns.Column:

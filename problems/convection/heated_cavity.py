@@ -45,12 +45,8 @@ class Side(DeckTable, kw_only=True):
     merges = True
 
     flow: key(Literal["no-slip", "free"], "no-slip or free-slip") = "no-slip"
-    heat: key(Literal["isothermal", "adiabatic", "flux"], "thermal condition at the wall") = (
-        "adiabatic"
-    )
-    value: key(
-        float, "temperature [K] of an isothermal wall, or flux in [K m/s]", ge=-1e6, le=1e6
-    ) = 0.0
+    heat: key(Literal["isothermal", "adiabatic", "flux"], "condition at the wall") = "adiabatic"
+    value: key(float, "temperature of the wall [K], or flux [K m/s]", ge=-1e6, le=1e6) = 0.0
 
     def make(self, name: str):
         """The wall for the solver; BadInput where heat and value contradict."""
@@ -72,9 +68,7 @@ class HeatedCavityDeck(Deck, kw_only=True):
     aspect: key(float, "height over width", ge=0.01, le=100) = 1.0
     rayleigh: key(float, "Rayleigh number of the width", le=1e12) = 1e5
     prandtl: key(float, "viscosity over diffusivity", le=1e6) = PRANDTL
-    tilt: key(
-        float, "gravity turned anticlockwise from straight down [degrees]", ge=-360, le=360
-    ) = 0.0
+    tilt: key(float, "of gravity, anticlockwise from down [degrees]", ge=-360, le=360) = 0.0
     left: Side = Side(heat="isothermal", value=0.5)
     right: Side = Side(heat="isothermal", value=-0.5)
     bottom: Side = Side()

@@ -15,7 +15,6 @@ speed hides the lag (nothing accelerates); orders of grids with bounded neighbou
 the bound helps the coarse ones most (`grid.ratio = 1000` shows the second order).
 """
 
-import math
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Literal
@@ -27,7 +26,6 @@ from hydro.convection.columns import FAMILIES, HEIGHT, FrontRace, Placing
 from problems.deck import Deck, DeckTable, RunControl, key
 from problems.problem import BlockPlan, Problem, Report, align
 from problems.references.convection import BurgersFronts
-from regrid.errors import BadInput
 
 WORDS = {
     "fixed": "nodes at rest",
@@ -44,29 +42,18 @@ class PlacingPart(DeckTable, kw_only=True):
     merges = True
 
     strength: key(float, "of the gradient: 2 gives two thirds of the nodes to it", ge=0) = 2.0
-    ratio: key(
-        float | None, "largest ratio of neighbouring steps. If left out: the default", gt=1
-    ) = None
+    ratio: key(float | None, "largest of neighbouring steps; left out: the default", gt=1) = None
     relaxation: key(float, "fraction of a correction that is applied", gt=0, le=1) = 0.7
     tau: key(float, "relaxation time [s] of the node speed", gt=0) = 0.005
-    start: key(
-        Literal["moving", "rest"], "nodes placed after the step: their speed at t = 0 known, or 0"
-    ) = "moving"
+    start: key(Literal["moving", "rest"], "`after`: node speed at t = 0 known, or 0") = "moving"
 
 
 class MovingGrid1DDeck(Deck, kw_only=True):
     run: RunControl = RunControl(t_end=1.0, cfl=0.5)
     cells: key(int, "cells of each column", ge=16, le=10000) = 160
     viscosity: key(float, "viscosity [m2/s]; the column is 1 m", gt=0, le=10) = 5e-3
-    levels: key(tuple[float, ...], "falling values of u [m/s] before and after the fronts") = (
-        1.0,
-        0.5,
-        0.0,
-    )
-    fronts: key(tuple[float, ...], "places [m] of the fronts between the levels at t = 0") = (
-        0.2,
-        0.5,
-    )
+    levels: key(tuple[float, ...], "falling values of u [m/s] between fronts") = (1.0, 0.5, 0.0)
+    fronts: key(tuple[float, ...], "their places [m] at t = 0", min_length=1) = (0.2, 0.5)
     grid: PlacingPart = PlacingPart()
 
 
@@ -76,20 +63,12 @@ class MovingGrid1D(Problem):
 
     def __init__(self, deck: MovingGrid1DDeck):
         super().__init__(deck)
-        if len(deck.levels) != len(deck.fronts) + 1 or len(deck.levels) < 2:
-            raise BadInput(
-                f"{len(deck.levels)} levels need {max(1, len(deck.levels) - 1)} fronts between "
-                f"them, at least one, got {len(deck.fronts)}"
-            )
-        if not all(math.isfinite(u) for u in deck.levels) or any(
-            ahead >= behind for behind, ahead in pairwise(deck.levels)
-        ):
-            raise BadInput(f"levels = {list(deck.levels)}: from front to front u has to fall")
-        positions = [0.0, *deck.fronts, 1.0]
-        if not all(one < other for one, other in pairwise(positions)):
-            raise BadInput(
-                f"fronts = {list(deck.fronts)}: positions must increase and lie between 0 and 1"
-            )
+        words = f"they must be one more than the fronts, of which there are {len(deck.fronts)}"
+        deck.refuse(len(deck.levels) != len(deck.fronts) + 1, "levels", words)
+        rises = any(ahead >= behind for behind, ahead in pairwise(deck.levels))
+        deck.refuse(rises, "levels", "from front to front u has to fall")
+        falls = any(one >= other for one, other in pairwise([0.0, *deck.fronts, 1.0]))
+        deck.refuse(falls, "fronts", "positions must increase and lie between 0 and 1")
         self.exact = BurgersFronts(deck.viscosity, tuple(deck.levels), tuple(deck.fronts))
 
     def make_race(self, cells: int) -> FrontRace:

@@ -46,9 +46,7 @@ class RayleighBenardDeck(Deck, kw_only=True):
     walls: key(Literal["no-slip", "free"], "floor and ceiling hold the fluid, or not") = "no-slip"
     cells: key(int, "cells across", ge=3, le=2000) = 40
     cells_up: key(int, "cells up", ge=3, le=2000) = 40
-    width: key(
-        float | None, "over the height. If left out: 1, layer: critical", ge=0.01, le=100
-    ) = None
+    width: key(float | None, "over the height; left out: 1, or critical", ge=0.01, le=100) = None
     rayleigh: key(float, "Rayleigh number of the height", le=1e12) = 5000.0
     prandtl: key(float, "viscosity over diffusivity", le=1e6) = linear.PRANDTL
     tilt: key(float, "of gravity, anticlockwise from down [degrees]", gt=-90, lt=90) = 0.0
@@ -67,11 +65,8 @@ class RayleighBenard(BoxProblem):
     def __init__(self, deck: RayleighBenardDeck):
         super().__init__(deck)
         self.t_end = deck.run.t_end or TIME
-        if deck.shape == "layer" and deck.sides != "adiabatic":
-            raise BadInput(
-                f"sides = {deck.sides!r} contradicts shape = 'layer', whose sides are periodic; "
-                "leave sides out or take shape = 'box'"
-            )
+        words = "those of a layer are periodic; leave sides out or take shape = 'box'"
+        deck.refuse(deck.shape == "layer" and deck.sides != "adiabatic", "sides", words)
         self.fluid = make_fluid(deck.rayleigh, deck.prandtl, deck.tilt)
         free = deck.walls == "free"
         self.critical = linear.FREE_LAYER_WAVENUMBER if free else linear.LAYER_WAVENUMBER

@@ -19,6 +19,7 @@ import msgspec
 
 from problems.deck import (
     MOST_CELLS,
+    NONE,
     Deck,
     DeckTable,
     Limiter,
@@ -46,10 +47,7 @@ class LineMotion(DeckTable, kw_only=True):
     shape: key(Literal["spline", "chord"], "curve between nodes when re-spaced") = "spline"
     relax: key(float, "fraction of the way to the target spacing in a step", ge=0, le=1) = 0.02
     thickness: key(
-        float | None,
-        "smoothing length [m]; shorter waves of the interface decay. If left out: 0.75 of a cell",
-        ge=0,
-        le=1e12,
+        float | None, "smoothing length [m]; left out: 0.75 of a cell", ge=0, le=1e12
     ) = None
     tension: key(float, "surface tension of the interface [N/m]", ge=0, le=1e20) = 0.0
 
@@ -66,14 +64,9 @@ class InterfaceDeck(Deck, kw_only=True):
     second: Fluid = Fluid(rho=3.0)
     pressure: key(float, "pressure ahead of the shock [Pa]", le=1e20) = 1.0
     mach: key(
-        float | None,
-        "Mach number of the shock. If left out: that of shock_pressure, or 1.5",
-        ge=1.001,
-        le=1000,
+        float | None, "Mach number; left out: by shock_pressure, or 1.5", ge=1.001, le=1000
     ) = None
-    shock_pressure: key(
-        float | None, "pressure behind the shock [Pa]. If left out: by mach", gt=0, le=1e20
-    ) = None
+    shock_pressure: key(float | None, "behind the shock [Pa]", gt=0, le=1e20) = None
     second_shock: SecondShock | None = None
     wavelength: key(float, "2 pi / k [m]", ge=1e-12, le=1e12) = 1.0
     modes: key(list[Mode], "harmonics; [] for a spectrum or a line_file alone") = msgspec.field(
@@ -81,54 +74,34 @@ class InterfaceDeck(Deck, kw_only=True):
     )
     spectrum: Spectrum | None = None
     line_file: key(
-        str | None,
-        "text file of an interface that is added to the modes: x and y, or x [m]",
-        min_length=1,
+        str | None, "text file of a line, added to the modes: x and y, or x [m]", min_length=1
     ) = None
     width: key(float, "width of the domain in wavelengths", gt=0) = 0.5
     sides: key(Literal["wall", "periodic"], "what bounds the domain along the interface") = "wall"
     cells: key(int, "cells per wavelength", ge=4, le=MOST_CELLS) = 64
-    refine: key(bool, "add grid lines during the run where the interface grows long or bends") = (
-        False
-    )
+    refine: key(bool, "add grid lines where the interface grows long or bends") = False
     uniform: key(float, "evenly spaced zone on each side, in wavelengths", ge=0) = 1.0
     stretch: key(float, "growth of cells from one to the next beyond it", ge=1, le=1.5) = 1.01
     reach: key(float, "distance from the interface, in waves, where grid lines bend", gt=0) = 0.1
     lengths: key(
-        tuple[float, float] | None,
-        "lengths of the two materials [m]. If left out: so long that no reflection returns",
+        tuple[float, float] | None, "of both materials [m]; left out: no reflection returns"
     ) = None
     start: key(
         Literal["auto", "crossed", "incident"],
-        "incident: the shock is on its way to the interface; crossed: it has just "
-        "crossed it; auto: crossed where linear theory gives that state",
+        "crossed: the shock is beyond the interface; incident: before it; auto: beyond if it can",
     ) = "auto"
     layer: key(
-        float | None,
-        "start crossed: first distance of the nearer wave from the interface, "
-        "in cells. If left out: an eighth of the shortest wave, 3 to 8 cells",
-        ge=3,
-        le=1000,
+        float | None, "start crossed: cells to the nearer wave; left out: 3 to 8", ge=3, le=1000
     ) = None
-    gap: key(float, "first distance of the shock from the interface, in waves", ge=0.01, le=20) = (
-        0.3
-    )
+    gap: key(float, "of the shock from the interface at first, in waves", ge=0.01, le=20) = 0.3
     passage_refinement: key(
-        float,
-        "start incident: how many times finer cells are across the interface until the shock has "
-        "passed it",
-        ge=1,
-        le=64,
+        float, "start incident: times finer cells at the interface until it is shocked", ge=1, le=64
     ) = 4.0
-    kct_end: key(
-        float, "end: k c t after arrival, c of the shocked second material", gt=0, le=10000
-    ) = 30.0
+    kct_end: key(float, "end: k c t, c of the shocked second material", gt=0, le=10000) = 30.0
     limiter: Limiter = "smooth-shear"
     line: LineMotion = LineMotion()
     regrid: Regrid = Regrid()
-    digests: key(
-        dict[str, str], "sha256 of line_file, as a run stores it; not needed in your own deck"
-    ) = msgspec.field(default_factory=dict)
+    digests: key(dict[str, str], "sha256 of line_file, which a run stores by itself") = NONE
 
     def find_files(self, folder: Path) -> InterfaceDeck:
         """The same deck, its line_file taken from `folder` where it is relative."""

@@ -132,22 +132,18 @@ class Spectrum(DeckTable, kw_only=True):
     seed: key(int, "of the random numbers", ge=0, le=2**63 - 1) = 0
 
 
-def draw_modes(spectrum: Spectrum, even: bool, cells: int) -> list[Mode]:
-    """The modes of a spectrum; phases 0 and pi alone where the line is `even` (between walls).
+def draw_modes(deck, even: bool) -> list[Mode]:
+    """The modes of a deck's spectrum, if any; phases 0 and pi alone where the line is `even`.
 
-    `cells`: in one wavelength.  Raises BadInput for a range that is none, and for waves that the
-    line's nodes cannot show.
+    Raises BadInput for a range that is none, and for waves that the line's nodes cannot show.
     """
-    if spectrum.last < spectrum.first:
-        raise BadInput(
-            f"deck: spectrum.last is {spectrum.last}; it must be at least spectrum.first, "
-            f"{spectrum.first}"
-        )
-    if 2 * spectrum.last > cells:
-        raise BadInput(
-            f"deck: spectrum.last is {spectrum.last}; the nodes resolve waves up to number "
-            f"{cells // 2} with {cells} cells per wavelength"
-        )
+    spectrum, cells = deck.spectrum, deck.cells
+    if spectrum is None:
+        return []
+    words = f"it must be at least spectrum.first, {spectrum.first}"
+    deck.refuse(spectrum.last < spectrum.first, "spectrum.last", words)
+    words = f"nodes resolve waves up to number {cells // 2} with {cells} cells per wavelength"
+    deck.refuse(2 * spectrum.last > cells, "spectrum.last", words)
     numbers = np.arange(spectrum.first, spectrum.last + 1)
     waves = _draw_normal(spectrum.seed, numbers.size)
     waves[1] *= not even
@@ -186,9 +182,8 @@ def read_line(path: str, width: float) -> Perturbation:
         row = int(np.flatnonzero(np.diff(y) <= 0.0)[0]) + 2
         raise BadInput(f"{where}: y must rise from row to row; it does not at row {row}")
     if y[0] > 1e-9 * width or y[-1] < width * (1.0 - 1e-9):
-        raise BadInput(
-            f"{where} covers y = {y[0]:g} to {y[-1]:g} m; the domain has 0 to {width:g} m"
-        )
+        words = f"y = {y[0]:g} to {y[-1]:g} m; the domain has 0 to {width:g} m"
+        raise BadInput(f"{where} covers {words}")
     return CubicSpline(y, x)
 
 
@@ -202,18 +197,13 @@ class FreeLine:
     def __init__(self, perturbation: Perturbation, y: np.ndarray, even: bool, what: str):
         x = np.asarray(perturbation(y), dtype=float)
         if x.shape != y.shape or not np.isfinite(x).all():
-            raise BadInput(
-                f"deck: {what} must give a finite x for each of the {y.size} heights; it gave "
-                f"an array of shape {x.shape}"
-                + (" with numbers that are not" if x.shape == y.shape else "")
-            )
+            words = f"must give a finite x for each of the {y.size} heights; it gave {x}"
+            raise BadInput(f"deck: {what} {words}")
         if not even:
             gap = abs(x[-1] - x[0])
             if gap > CLOSED * float(np.ptp(x)):
-                raise BadInput(
-                    f"deck: {what}: the ends of the interface are {gap:g} m apart in x; between "
-                    "periodic sides they must meet"
-                )
+                words = f"its ends are {gap:g} m apart in x; between periodic sides they must meet"
+                raise BadInput(f"deck: {what}: {words}")
             x = np.append(x[:-1], x[0])
         weights = np.diff(y)
         mean = float((0.5 * (x[1:] + x[:-1]) * weights).sum() / weights.sum())

@@ -88,18 +88,13 @@ class InterfaceInstability(Results, Problem):
         if deck.mach is not None and deck.shock_pressure is not None:
             raise BadInput("deck: give `mach` or `shock_pressure`, not both")
         self.shock = self._make_shock()
-        if deck.second_shock and deck.second_shock.pressure <= self.shock.p:
-            raise BadInput(
-                f"deck: second_shock.pressure is {deck.second_shock.pressure:g}; it must be above "
-                f"the pressure behind the first shock, {self.shock.p:g}"
-            )
-        if deck.second_shock and deck.lengths is None:
-            raise BadInput(
-                "deck: with a second_shock give `lengths` too; shockgrid finds lengths without "
-                "reflections for one shock only"
-            )
+        if late := deck.second_shock:
+            words = f"it must be above the pressure behind the first shock, {self.shock.p:g}"
+            deck.refuse(late.pressure <= self.shock.p, "second_shock.pressure", words)
+            words = "it is found for one shock only; with a second_shock give `lengths` too"
+            deck.refuse(deck.lengths is None, "lengths", words)
         even = deck.sides == "wall"
-        drawn = draw_modes(deck.spectrum, even, deck.cells) if deck.spectrum else []
+        drawn = draw_modes(deck, even)
         check_sense(deck, (self.rho_first, self.rho_second), drawn)
         self.modes = [*deck.modes, *drawn]
         self.free_lines = self._find_free_lines(perturbation, even)
@@ -117,12 +112,10 @@ class InterfaceInstability(Results, Problem):
         self.start = self._choose_start()
         self.begun = arrival + self._choose_since() if self.start == "crossed" else 0.0
         self.arrival = arrival - self.begun
-        if self.start == "crossed" and deck.run.t_end is None and self.t_end <= 0.0:
-            raise BadInput(
-                f"deck: kct_end is {deck.kct_end:g}, and the run begins after the shock has "
-                f"crossed the interface, at k c t = {-self.arrival * self._rate:.3g}; take a "
-                "greater kct_end, or start = 'incident'"
-            )
+        if self.start == "crossed" and deck.run.t_end is None:
+            words = f"the run begins at k c t = {-self.arrival * self._rate:.3g}"
+            wanted = f"{words}; take a greater one, or start = 'incident'"
+            deck.refuse(self.t_end <= 0.0, "kct_end", wanted)
 
     def _choose_start(self) -> str:
         """How the run begins: as the deck says, or after the passage where that can be had.
@@ -178,11 +171,8 @@ class InterfaceInstability(Results, Problem):
         deck = self.deck
         if deck.shock_pressure is None:
             return shock_with_mach(self.eos_first, self.rho_first, deck.pressure, deck.mach or 1.5)
-        if deck.shock_pressure <= deck.pressure:
-            raise BadInput(
-                f"deck: shock_pressure is {deck.shock_pressure:g}; it must be above the pressure "
-                f"ahead, {deck.pressure:g}"
-            )
+        words = f"it must be above the pressure ahead, {deck.pressure:g}"
+        deck.refuse(deck.shock_pressure <= deck.pressure, "shock_pressure", words)
         return shock_to_pressure(self.eos_first, self.rho_first, deck.pressure, deck.shock_pressure)
 
     @property
@@ -247,11 +237,8 @@ class InterfaceInstability(Results, Problem):
     def count_rows(self) -> int:
         """Cells along the interface; BadInput for more than a side may have."""
         rows = max(2, round(self.deck.cells * self.deck.width))
-        if rows > 10 * MOST_CELLS:
-            raise BadInput(
-                f"deck: cells and width make {rows:.3g} cells along the interface; it may have "
-                f"{10 * MOST_CELLS}"
-            )
+        words = f"that makes {rows:.3g} cells along the interface; it may have {10 * MOST_CELLS}"
+        self.deck.refuse(rows > 10 * MOST_CELLS, "width", words)
         return rows
 
     @property
@@ -361,16 +348,10 @@ class InterfaceInstability(Results, Problem):
         y = self.make_heights()
         front = self.shape(y)
         lengths, start = self.choose_lengths(), deck.gap * deck.wavelength + self.amplitude
-        if min(lengths) <= 2.0 * self.amplitude:
-            raise BadInput(
-                f"deck: lengths are {lengths}; each must be greater than twice the amplitude of "
-                f"the interface, {self.amplitude:g}"
-            )
-        if lengths[0] <= start:
-            raise BadInput(
-                f"deck: lengths are {lengths}; the first must be greater than {start:g}, where the "
-                "shock begins (the gap and the amplitude)"
-            )
+        words = f"each must be greater than twice the interface's amplitude, {self.amplitude:g}"
+        deck.refuse(min(lengths) <= 2.0 * self.amplitude, "lengths", words)
+        words = f"the first must be greater than {start:g}, the gap and the amplitude"
+        deck.refuse(lengths[0] <= start, "lengths", words)
         return np.array([front, y])
 
     def plan(self) -> tuple[float, list[BlockPlan]]:
@@ -398,12 +379,8 @@ class InterfaceInstability(Results, Problem):
         front, y = self.make_interface()
         if self.start == "crossed":
             grids = self.crossed.make_grids()
-            if any(len(find_bad_cells(grid)) for grid in grids):
-                raise BadInput(
-                    "deck: start = 'crossed': the interface or a wave is too steep for linear "
-                    f"theory's first grid with {self.deck.cells} cells per wavelength; take start "
-                    "= 'incident'"
-                )
+            words = "the interface is too steep for a first grid by linear theory; take 'incident'"
+            self.deck.refuse(any(len(find_bad_cells(grid)) for grid in grids), "start", words)
             return grids
         reach = max(self.deck.reach * self.deck.wavelength, BENDS * np.abs(front).max())
         grids = []

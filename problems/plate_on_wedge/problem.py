@@ -40,7 +40,8 @@ from problems.references.shock_polars import (
     solve_collision,
 )
 from regrid.curves import arc_law, clustered_law, meeting_laws
-from regrid.errors import BadInput
+
+Cells = Annotated[int, Meta(ge=1, le=MOST_CELLS)]
 
 
 class Drive(DeckTable, kw_only=True):
@@ -48,9 +49,8 @@ class Drive(DeckTable, kw_only=True):
 
     kind: key(
         Literal["piston", "pressure", "flyer", "moving"],
-        "piston: its back is pushed at `speed`; pressure: `pressure` acts on its "
-        "back; flyer: another plate hits its back at `speed`; moving: the whole plate comes "
-        "in at `speed`, the test of shock polars",
+        "on the plate's back: a piston at `speed`, `pressure`, a flyer at `speed`; moving: the "
+        "whole plate comes in at `speed`, the test of shock polars",
     ) = "piston"
     speed: key(float, "speed of piston, flyer or plate [m/s]", gt=0) = 2500.0
     pressure: key(float, "driving pressure [Pa]", gt=0) = 50e9
@@ -73,35 +73,20 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     wedge: key(str, "material of the wedge body") = "SS304"
     angle: key(float, "between plate and wedge face [degrees]", ge=0.5, le=75) = 20.0
     gap: key(
-        float,
-        "of the plate over the wedge's edge at the start [m]; above 0 they are two "
-        "bodies, which collide and separate by themselves, and no node follows A",
-        ge=0,
-        le=1e3,
+        float, "over the wedge's edge at the start [m]; above 0: bodies apart", ge=0, le=1e3
     ) = 0.0
     face: key(float, "length of the wedge's face [m]", gt=0) = 30e-3
     edge: key(float, "length of the flat edge on which the plate lies [m]", gt=0) = 10e-3
     overhang: key(float, "of the plate beyond the end of the face [m]", gt=0) = 10e-3
     depth: key(float, "height of the face's end over the base [m]", gt=0) = 12e-3
-    right: key(
-        Literal["symmetry", "free"], "the plate's far end: a plane of symmetry, or a free end face"
-    ) = "symmetry"
+    right: key(Literal["symmetry", "free"], "the plate's far end") = "symmetry"
     drive: Drive = Drive()
-    cells: key(
-        tuple[Annotated[int, Meta(ge=1, le=MOST_CELLS)], Annotated[int, Meta(ge=1, le=MOST_CELLS)]],
-        "cells of the plate along and across it",
-    ) = (80, 24)
+    cells: key(tuple[Cells, Cells], "cells of the plate along and across it") = (80, 24)
     refinement: key(
-        float | None,
-        "how many times finer the cells are at the collision point A. If left out: "
-        "for a moving plate by the distance from the critical angle, 1 (far) to 3 (near)",
-        ge=1,
-        le=8,
+        float | None, "times finer cells at A; left out: 1, or up to 3 near critical", ge=1, le=8
     ) = None
     until: key(
-        Literal["auto", "arrival", "end"],
-        "end of the run: A's arrival at the end B of the face, or what comes "
-        "later; auto: arrival where cells at A are refined",
+        Literal["auto", "arrival", "end"], "A at the face's end B, or later; auto: B if refined"
     ) = "auto"
 
 
@@ -131,24 +116,19 @@ class PlateOnWedge(Results, Problem):
             check_solid(name, getattr(deck, name), material)
         ni, nj = deck.cells
         self.contact = round(OVER_EDGE * ni)
-        if min(self.contact, ni - self.contact) < 4 or nj < 4:
-            raise BadInput(
-                f"deck: cells is ({ni}, {nj}), which are {self.contact} on the wedge, "
-                f"{ni - self.contact} beyond it and {nj} across; the plate needs at least 4 of each"
-            )
+        parts = self.contact, ni - self.contact, nj  # on the wedge, beyond it, across
+        words = f"the plate needs 4 on the wedge, beyond it and across; these are {parts}"
+        deck.refuse(min(parts) < 4, "cells", words)
         self.angle = math.radians(deck.angle)
         along, down = deck.face * math.cos(self.angle), deck.face * math.sin(self.angle)
         self.end = np.array([deck.edge + along, -down])
         self.length = float(self.end[0]) + deck.overhang
         self.base = float(self.end[1]) - deck.depth
-        if deck.gap and deck.refinement:
-            raise BadInput(
-                f"deck: refinement is {deck.refinement:g} and gap {deck.gap:g} m: cells are finer "
-                "at A only where the plate lies on the wedge from the start; leave one of them out"
-            )
+        words = "cells are finer at A only where the plate lies on the wedge from the start: no gap"
+        deck.refuse(deck.gap and deck.refinement, "refinement", words)
         times = [time for time, _ in deck.drive.history]
-        if any(b <= a for a, b in itertools.pairwise(times)):
-            raise BadInput("deck: drive.history: its times must increase")
+        falls = any(b <= a for a, b in itertools.pairwise(times))
+        deck.refuse(falls, "drive.history", "its times must increase")
         # the plate as it flies, its speed V [m/s], and when the drive's shock is at its lower side
         self.flying, self.plate_speed, arrival = Body(solid.eos, solid.rho0), deck.drive.speed, 0.0
         if deck.drive.kind != "moving":
@@ -177,7 +157,8 @@ class PlateOnWedge(Results, Problem):
         """The drive's first shock in the plate; BadInput without one."""
         drive, solid = self.deck.drive, self.materials["plate"]
         at_rest, speed = (solid.rho0, 0.0), drive.speed
-        try:
+        key = "drive.pressure" if drive.kind == "pressure" else "drive.speed"
+        with self.deck.blame(key, f"{self.deck.plate} has no such shock; take a weaker drive"):
             if drive.kind == "pressure":
                 return shock_to_pressure(solid.eos, *at_rest, drive.pressure)
             if drive.kind == "flyer":
@@ -185,11 +166,6 @@ class PlateOnWedge(Results, Problem):
                 hit = (flyer.rho0, speed, 0.0), solid.eos, (solid.rho0, 0.0, 0.0)
                 speed = solve_riemann(flyer.eos, *hit).u
             return shock_with_particle_speed(solid.eos, *at_rest, speed)
-        except (BadInput, ValueError) as error:
-            raise BadInput(
-                f"deck: drive: the equation of state of {self.deck.plate} allows no such shock "
-                f"({error}); take a slower or weaker drive"
-            ) from None
 
     @functools.cached_property
     def critical(self) -> float:

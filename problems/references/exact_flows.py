@@ -1,4 +1,4 @@
-"""Exact flows: blast wave, wave behind a detonation, vortices, Kidder's shell, plate impact."""
+"""Exact flows: blasts, detonations, vortices, Kidder's shell, waves under gravity, plate impact."""
 
 from __future__ import annotations
 
@@ -37,10 +37,8 @@ class SedovBlast:
         if abs(gamma - 2.0) < 0.02:
             raise BadInput(f"sedov: gamma is {gamma:g}; the closed form has a pole at gamma = 2")
         if 2.0 * (n * (gamma - 1.0) + 2.0) > 0.99 * (n + 2.0) * (gamma + 1.0):
-            raise BadInput(
-                f"sedov: gamma is {gamma:g}; from gamma = 7 on a spherical blast is hollow, and "
-                "near it the closed form is of no use"
-            )
+            words = "from 7 on a spherical blast is hollow, and near that the closed form fails"
+            raise BadInput(f"sedov: gamma is {gamma:g}; {words}")
         self.positions, self.profile = _make_profile(n, gamma)
         # E t²/(rho0 R^(n+2)), from the profile in units of rho0, R and t
         r, (rho, u, p) = self.positions, self.profile
@@ -121,6 +119,16 @@ class TaylorWave:
         p, rho, u = (np.interp(pace, self.pace, q) for q in (self.p, self.rho, self.u))
         return np.where(ahead, 0.0, p), np.where(ahead, self.rho0, rho), np.where(ahead, 0.0, u)
 
+    def compute_profile(self, t: float) -> tuple[np.ndarray, np.ndarray]:
+        """Places x and pressures (n,) at the time t > 0, from the wall to beyond the front."""
+        x = np.linspace(0.0, 1.001 * self.speed * t, 2000)
+        return x, self.compute_state(x / t)[0]
+
+    def measure_error(self, x: np.ndarray, p: np.ndarray, t: float) -> float:
+        """Sum of |p - exact| over that of p exact, at places x (n,); NaN where there is none."""
+        exact = self.compute_state(x / max(t, 1e-300))[0]
+        return float(np.abs(p - exact).sum() / exact.sum()) if exact.any() else math.nan
+
 
 def compute_taylor_wave(eos: JWL) -> TaylorWave:
     """The wave of the explosive `eos` between its front and a wall at x = 0.
@@ -135,6 +143,21 @@ def compute_taylor_wave(eos: JWL) -> TaylorWave:
     p = np.linspace(rest, pressure, POINTS)
     u, rho, c = first - products.velocity_gain(p), products.density(p), products.sound_speed(p)
     return TaylorWave(speed, u + c, p, rho, u, eos.rho0)
+
+
+def follow_burn(speed: float, particle_speed: float, width: float) -> Callable:
+    """Velocity (u, 0) [m/s] over time of a piston that keeps up with a front of burning material.
+
+    It rises to the `particle_speed` in a straight line through a front of that `width` [m], which
+    runs at `speed` through less and less of it: a piston that starts at once sends a shock ahead.
+    """
+    rise = speed / particle_speed
+
+    def velocity(t):
+        part = rise * -math.expm1(-particle_speed / width * t)
+        return particle_speed * min(part, 1.0), 0.0
+
+    return velocity
 
 
 # places in 0..1 and weights of four Gauss points
@@ -289,6 +312,26 @@ def heat_cell(block, x, y, t, dt):
     return 0.0, 0.0, dt * pi / (4.0 * (CELL_GAMMA - 1.0)) * wave
 
 
+def compute_gravity_mode(k: float, gravity: float, above: float, tension: float) -> float:
+    """Square of the growth rate [1/s²] of a wave between layers of height 1, without compression.
+
+    The lower one has density 1, the upper one that `above`, 0 for none; negative where it swings.
+    """
+    pull, across = tension * k**2, k * math.tanh(k)
+    if not above:
+        return -across * (gravity + pull)
+    return across / (1.0 + above) * ((above - 1.0) * gravity - pull)
+
+
+def compute_isentropic_layer(y, rho: float, gravity: float, p: float, gamma: float):
+    """Density and pressure at heights y (any shape) of a layer of an ideal gas in equilibrium, of
+    one entropy, that has `rho` and `p` at y = 0."""
+    power = gamma - 1.0
+    base = 1.0 - power / gamma * rho * gravity / p * y
+    base = np.where(base > 0.0, base, 0.0)
+    return rho * base ** (1.0 / power), p * base ** (gamma / power)
+
+
 class PlateImpact(NamedTuple):
     """A plate hits another: plane waves by the Hugoniots and isentropes of both, first without p.
 
@@ -309,6 +352,22 @@ class PlateImpact(NamedTuple):
     free: float
     out: float
     end: float
+
+    def make_trace(self, unit: float = 1.0) -> np.ndarray:
+        """Corners (2, 4) of the surface's speed over time, times `unit`, until the release."""
+        end = self.end if math.isfinite(self.end) else self.out
+        t = unit * np.array([0.0, self.out, self.out, end])
+        return np.array([t, [0.0, 0.0, self.free, self.free]])
+
+    def read_trace(self, t: np.ndarray, trace: np.ndarray) -> tuple[float, float, float]:
+        """`out`, `free` and `end` as the speeds (n,) of a surface show them; NaN where not yet."""
+        risen = np.maximum.accumulate(trace) > 0.98 * self.free
+        fallen = risen & (t > self.out) & (trace < 0.98 * self.free)
+        out, end = (
+            float(t[a.argmax()]) if a.any() else math.nan for a in (trace > 0.5 * self.free, fallen)
+        )
+        late = trace[(t > max(self.out, 0.5 * (self.out + self.end))) & (t < self.end)]
+        return out, float(np.median(late)) if late.size > 3 else math.nan, end
 
 
 def compute_plate_impact(

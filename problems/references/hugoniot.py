@@ -176,10 +176,8 @@ def release(eos, rho: float, p: float, p_end: float = 0.0) -> tuple[float, float
     """
     isentrope = make_isentrope(eos, rho, p)
     if p_end < isentrope.least_pressure:
-        raise BadInput(
-            f"a release to p = {p_end:g} asks for less than the least pressure of the material, "
-            f"{isentrope.least_pressure:g}"
-        )
+        words = f"it is below the material's least pressure, {isentrope.least_pressure:g}"
+        raise BadInput(f"no release to p = {p_end:g}: {words}")
     return float(isentrope.density(p_end)), float(isentrope.velocity_gain(p_end))
 
 
@@ -229,9 +227,8 @@ def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
     if stiffened is not None:
         gamma, p_inf = stiffened
         if p + p_inf <= 0.0 or p_behind + p_inf <= 0.0:
-            raise BadInput(
-                f"shock from p = {p:g} to {p_behind:g}: both must be above {0.0 - p_inf:g}"
-            )
+            words = f"both must be above {0.0 - p_inf:g}"
+            raise BadInput(f"shock from p = {p:g} to {p_behind:g}: {words}")
         ratio = (p_behind + p_inf) / (p + p_inf)
         return ahead * (gamma + 1.0 + (gamma - 1.0) * ratio) / (gamma - 1.0 + (gamma + 1.0) * ratio)
     if p_behind == p:
@@ -256,9 +253,8 @@ def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
             why = "it lies above the limiting compression of the equation of state"
             if outside:
                 why = eos.failure.replace("its state is", "what is behind it would be")
-            raise BadInput(
-                f"no shock from rho = {rho:g}, p = {p:g} reaches p = {p_behind:g}: {why}"
-            )
+            start = f"no shock from rho = {rho:g}, p = {p:g} reaches p = {p_behind:g}"
+            raise BadInput(f"{start}: {why}")
         there = excess(far)
         if math.isnan(here) and not math.isnan(there):
             near, here = _find_edge(excess, near, far)

@@ -388,10 +388,8 @@ class LinearGrowth:
     def _check_window(self, last: float) -> None:
         reach = self.kt[-1] * self.sound_speed
         if last > reach * (1.0 + 1e-9):
-            raise BadInput(
-                f"linear growth: a mean up to k c t = {last:g} needs a solution beyond {reach:g}; "
-                "ask for a longer one"
-            )
+            words = f"needs a solution beyond {reach:g}; ask for a longer one"
+            raise BadInput(f"linear growth: a mean up to k c t = {last:g} {words}")
 
 
 @functools.cache

@@ -12,7 +12,6 @@ Note: a release is sharp at low speeds, and the scheme spreads it over some cell
 separate a little early.  Use cells of an eightieth of the thinnest plate or less.
 """
 
-import math
 from typing import ClassVar
 
 import numpy as np
@@ -20,15 +19,11 @@ import numpy as np
 from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos.materials import find_material
-from hydro.rows import P, U
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, VoidFill, key
 from problems.initial_states import put_walls
 from problems.pictures import draw_columns
-from problems.problem import BlockPlan, Problem, Report, Row, find_time
+from problems.problem import BlockPlan, Problem, Report, Row, find_time, reduce_between
 from problems.references.exact_flows import compute_plate_impact
-from regrid.errors import BadInput
-
-TALL = 8.0  # heights of cells over their least width: square ones would halve the time step
 
 
 class PlateTable(DeckTable, kw_only=True):
@@ -52,26 +47,22 @@ class FlyerTargetDeck(Deck, kw_only=True):
 
 
 class FlyerTarget(Problem):
-    """Plates in a row, between two walls along it."""
-
     Deck = FlyerTargetDeck
     units: ClassVar = {"free_surface_speed": "m/s", "contact_pressure": "Pa"}
 
     def __init__(self, deck: FlyerTargetDeck):
         super().__init__(deck)
         first, second, *more = deck.plates
-        if first.gap:
-            words = "nothing is before the first plate"
-            raise BadInput(f"deck: plates[0].gap is {first.gap:g}; {words}")
+        first.refuse(first.gap, "gap", "nothing is before the first plate, whose gap must be 0")
         self.materials = [find_material(plate.material) for plate in deck.plates]
         impact = deck.speed, second.gap, first.thickness, second.thickness
         self.theory = compute_plate_impact(*self.materials[:2], *impact)
         self.is_pair = not more
         self.names = [f"plate-{number}" for number in range(1, len(deck.plates) + 1)]
 
-    def list_boxes(self):
+    def list_boxes(self):  # cells 8 times as high as the thinnest: square ones halve the time step
         rows, boxes, x = self.deck.rows, [], 0.0
-        height = TALL * rows * min(one.thickness / one.cells for one in self.deck.plates)
+        height = 8.0 * rows * min(one.thickness / one.cells for one in self.deck.plates)
         for name, plate in zip(self.names, self.deck.plates, strict=True):
             low, x = x + plate.gap, x + plate.gap + plate.thickness
             boxes.append(BlockPlan(name, (plate.cells, rows), (low, 0.0), (x, height)))
@@ -88,56 +79,42 @@ class FlyerTarget(Problem):
         return self.simulate(blocks)
 
     def measure(self, evolution) -> dict[str, float]:
-        """Speeds of the plates and of the last free surface; pressure where the first two meet."""
-        blocks, row = evolution.blocks, {}
-        states = [block.state[:, 1:-1, 1:-1] for block in blocks]
-        for block, state in zip(blocks, states, strict=True):
-            mass = state[0] * block.volume
-            row[f"speed_{block.name}"] = float(np.average(state[U], weights=mass))
-        row["free_surface_speed"] = float(states[-1][U, -1].mean())
-        meeting = 0.5 * (states[0][P, -1].mean() + states[1][P, 0].mean())
-        return {**row, "contact_pressure": float(meeting)}
+        row, states = {}, [block.state[:, 1:-1, 1:-1] for block in evolution.blocks]
+        for block, (rho, u, *_) in zip(evolution.blocks, states, strict=True):
+            row[f"speed_{block.name}"] = float(np.average(u, weights=rho * block.volume))
+        meeting = 0.5 * (states[0][3, -1].mean() + states[1][3, 0].mean())  # of the first two
+        surface = float(states[-1][1, -1].mean())
+        return {**row, "free_surface_speed": surface, "contact_pressure": float(meeting)}
 
     def report(self, history, final=None) -> Report:
         deck, theory, trace = self.deck, self.theory, history["free_surface_speed"]
-        first, t, parted = deck.plates[0], history["t"], history["contacts_opened"] > 0
+        t, p, parted = history["t"], history["contact_pressure"], history["contacts_opened"] > 0
         # a contact that a step has made was there at its start
         impact = find_time(history, np.append(history["contacts_made"][1:] > 0, False))
-        pressure = history["contact_pressure"][(t > impact) & (t < impact + 0.7 * theory.back)]
-        late = (t > max(theory.out, 0.5 * (theory.out + theory.end))) & (t < theory.end)
-        risen = np.maximum.accumulate(trace) > 0.98 * theory.free
-        fallen = risen & (t > theory.out) & (trace < 0.98 * theory.free)
-        out, end = find_time(history, trace > 0.5 * theory.free), find_time(history, fallen)
+        pressure = reduce_between(np.median, t, p, impact, impact + 0.7 * theory.back, 4)
+        out, free, end = theory.read_trace(t, trace)
         rows = [
             Row("impact", impact, theory.impact, "time of impact [s]", digits=5),
-            Row("pressure", median(pressure), theory.pressure, "pressure [GPa]", 1e9, 5),
+            Row("pressure", pressure, theory.pressure, "pressure [GPa]", 1e9, 5),
             Row("out", out, theory.out, "shock at the free surface [s]", digits=5),
-            Row("free", median(trace[late]), theory.free, "free surface [m/s]", digits=5),
+            Row("free", free, theory.free, "free surface [m/s]", digits=5),
             Row("end", end, theory.end, "until the release [s]", digits=5),
         ]
-        rows = [row for row in rows[: 5 if self.is_pair else 2] if not math.isnan(row.theory)]
+        rows = [row for row in rows[: 5 if self.is_pair else 2] if not np.isnan(row.theory)]
+        first, notes = deck.plates[0], []
         plate = f"{first.material} of {1e3 * first.thickness:g} mm at {deck.speed:g} m/s"
-        head, notes = f"flyer-target: {plate}, {len(deck.plates)} plates", []
         if self.is_pair:
             notes.append(f"behind the impact both go at {theory.u:.5g} m/s")
         for name in self.names if history else ():
             notes.append(f"{name} goes at {history[f'speed_{name}'][-1]:.5g} m/s in the end")
         if parted.any():
             notes.append(f"plates parted first at t = {find_time(history, parted):.4g} s")
-        return Report(head, rows, notes)
+        return Report(f"flyer-target: {plate}, {len(deck.plates)} plates", rows, notes)
 
     def draw_flyer_target(self, figure, run_data) -> None:
         """The free surface's speed beside theory."""
         axis, theory = figure.subplots(), self.theory
-        words = {"free_surface_speed": "computed"}
-        draw_columns(axis, run_data.history, words, "free surface of the last plate [m/s]", "µs")
+        labels, words = {"free_surface_speed": "computed"}, "free surface of the last plate [m/s]"
+        draw_columns(axis, run_data.history, labels, words, "µs")
         if self.is_pair:
-            end = theory.end if math.isfinite(theory.end) else theory.out
-            t, trace = (0.0, theory.out, theory.out, end), (0.0, 0.0, theory.free, theory.free)
-            words = "theory, until the release"
-            axis.plot(1e6 * np.array(t), trace, "k--", lw=0.8, label=words)
-
-
-def median(values: np.ndarray) -> float:
-    """The median of a few numbers at least, else NaN."""
-    return float(np.median(values)) if values.size > 3 else math.nan
+            axis.plot(*theory.make_trace(1e6), "k--", lw=0.8, label="theory, until the release")

@@ -24,7 +24,6 @@ from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, RunControl, key
 from problems.initial_states import make_plane_grid
 from problems.problem import Problem, Report, Row, find_most
-from regrid.errors import BadInput
 
 BEND = 0.1  # of the line between the blocks and of its neighbours, over the height of the domain
 PRESSURE = 1e5
@@ -52,8 +51,8 @@ class FreeStream(Problem):
         for block, name in zip(("left", "right"), deck.materials, strict=True):
             found = None if name == "gas" else find_material(name)
             self.fluids[block] = (found.eos, found.rho0) if found else (IdealGas(1.4), 1.0)
-        if deck.contact == "seam" and deck.materials[0] != deck.materials[1]:
-            raise BadInput("deck: a seam joins blocks of one material; give both the same")
+        two = deck.contact == "seam" and deck.materials[0] != deck.materials[1]
+        deck.refuse(two, "materials", "a seam joins blocks of one")
         eos, rho = self.fluids["left"]
         turn, speed = math.radians(deck.angle), deck.mach * float(eos.sound_speed(rho, PRESSURE))
         self.velocity = speed * math.cos(turn), speed * math.sin(turn)

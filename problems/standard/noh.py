@@ -22,7 +22,6 @@ from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import RadialProblem, Symmetry
 from problems.problem import Report, Row, compare, get_last
 from problems.references.exact_flows import DIMENSIONS
-from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
 
@@ -47,11 +46,8 @@ class Noh(RadialProblem):
         super().__init__(deck, DIMENSIONS[deck.geometry])
         self.shock_speed = 0.5 * (deck.gamma - 1.0)
         shock, size = self.shock_speed * deck.run.t_end, 1.0 - deck.shrink * deck.run.t_end
-        if shock > 0.9 * size:
-            raise BadInput(
-                f"deck: at run.t_end = {deck.run.t_end:g} the shock is at r = {shock:.3g} and the "
-                f"grid ends at {size:.3g} (shrink = {deck.shrink:g}); end earlier or shrink less"
-            )
+        words = f"the shock is at {shock:.3g} m then, the grid's end at {size:.3g}; end earlier"
+        deck.refuse(shock > 0.9 * size, "run.t_end", words)
 
     def compute_density(self, r, t):
         n, gamma = self.dimensions, self.deck.gamma

@@ -19,9 +19,8 @@ from hydro.boundary import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.pictures import draw_field, make_panels
-from problems.problem import Problem, Report, compare, find_crossing
+from problems.problem import Problem, Report, compare, find_crossing, fit_slope
 from problems.references.shock_polars import Body, ShockPolar, search_pressure, solve_collision
-from regrid.errors import BadInput
 
 BEFORE = 0.25  # length before the wedge; it is 1 long, and the top is 1 above its start
 
@@ -49,14 +48,11 @@ class ObliqueShock(Problem):
         found = solve_collision(gas, None, fall, self.angle)  # as a plate thrown onto a rigid wedge
         if not found.attached:
             most = math.degrees(search_pressure([ShockPolar(gas, deck.mach)], fall)[2])
-            raise BadInput(
-                f"deck: angle is {deck.angle:g} degrees; at Mach {deck.mach:g} the shock stays "
-                f"attached up to {most:.4g} degrees only"
-            )
+            words = f"at Mach {deck.mach:g} the shock stays attached up to {most:.4g} degrees only"
+            deck.refuse(True, "angle", words)
         self.beta, self.pressure = found.plate.wave_angle, found.p
-        if math.tan(self.beta) >= 1.0:
-            words = f"the shock's angle is {math.degrees(self.beta):.3g} degrees"
-            raise BadInput(f"deck: {words}; above 45 it leaves through the top")
+        words = f"the shock, at {math.degrees(self.beta):.3g} degrees, leaves through the top"
+        deck.refuse(math.tan(self.beta) >= 1.0, "angle", words)
 
     def make_grids(self, t=0.0):
         """Straight upright lines between the wall and the top."""
@@ -87,9 +83,8 @@ class ObliqueShock(Problem):
         x, y = block.centres
         p, x, level = block.state[3, 1:-1, 1:-1], x[:, 0], 0.5 * (self.ahead + self.pressure)
         heights = np.array([find_crossing(*column, level) for column in zip(y, p, strict=True)])
-        chosen, slope = (x > 0.3) & (x < 0.9) & np.isfinite(heights), math.nan
-        if chosen.sum() > 2:
-            slope = math.degrees(math.atan(np.polyfit(x[chosen], heights[chosen], 1)[0]))
+        chosen = (x > 0.3) & (x < 0.9) & np.isfinite(heights)
+        slope = math.degrees(math.atan(fit_slope(x, heights, chosen)))
         off = abs(slope / math.degrees(self.beta) - 1.0)
         ratio = float(p[x > 0.5, 0].mean()) / self.pressure
         return {"wall_pressure_ratio": ratio, "shock_angle": slope, "shock_angle_error": off}

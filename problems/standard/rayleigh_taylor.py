@@ -27,22 +27,13 @@ from hydro.sources import make_gravity
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
 from problems.initial_states import put_walls
 from problems.pictures import draw_columns
-from problems.problem import Problem, Report, Row, compare
-from regrid.errors import BadInput
+from problems.problem import Problem, Report, Row, compare, find_frequency, find_growth_rate
+from problems.references.exact_flows import compute_gravity_mode, compute_isentropic_layer
 from regrid.measure.corners import compute_centres
 
 GAMMA = 5.0 / 3.0
 WAVE_NUMBER = 2.0 * math.pi
 GRAVITY = 1.0
-T_END = {"heavy": 3.0, "nothing": 6.0}
-SWING = 2.5 * math.pi  # of the phase of a wave between gases that surface tension lets swing
-
-
-def compute_square(above: str, tension: float) -> float:
-    """Square of the growth rate [1/s²], negative where the wave swings, without compression."""
-    pull = tension * WAVE_NUMBER**2
-    across = WAVE_NUMBER * math.tanh(WAVE_NUMBER)
-    return across / 3.0 * (GRAVITY - pull) if above == "heavy" else -across * (GRAVITY + pull)
 
 
 class RayleighTaylorDeck(Deck, kw_only=True):
@@ -50,19 +41,15 @@ class RayleighTaylorDeck(Deck, kw_only=True):
     regrid: Regrid = Regrid()
     above: key(Literal["heavy", "nothing"], "a heavy gas, or a free surface") = "heavy"
     cells: key(int, "cells in a wavelength", ge=8, le=MOST_CELLS) = 64
-    amplitude: key(float | None, "first amplitude. If left out: small", ge=1e-8, lt=0.2) = None
-    sound_speed: key(
-        float,
-        "of the lower gas at the interface [m/s]; below 1.155 the heavy gas does not reach the lid",
-        ge=1.2,
-        le=1000,
-    ) = 10.0
+    amplitude: key(float | None, "first amplitude [m]; left out: small", ge=1e-8, lt=0.2) = None
+    sound_speed: key(float, "of the lower gas at the interface [m/s]", ge=1.2, le=1000) = 10.0
     tension: key(float, "of the surface [N/m]", ge=0, le=1000) = 0.0
 
 
 class RayleighTaylor(Problem):
     Deck = RayleighTaylorDeck
     t_unit = "1"
+    counted = ("cells", "columns", "layers")
     units: ClassVar = {"amplitude": "m"}
     measures_sides = True
 
@@ -70,27 +57,19 @@ class RayleighTaylor(Problem):
         super().__init__(deck)
         self.heavy = deck.above == "heavy"
         self.pressure = deck.sound_speed**2 / GAMMA  # of both gases at y = 0
-        square = compute_square(deck.above, deck.tension)
-        if square == 0.0:
-            words = "the wave neither grows nor swings; take more or less"
-            raise BadInput(f"deck: at tension = {deck.tension!r} {words}")
+        wave = WAVE_NUMBER, GRAVITY, 2.0 if self.heavy else 0.0
+        square = compute_gravity_mode(*wave, deck.tension)
+        deck.refuse(square == 0.0, "tension", "there the wave neither grows nor swings")
         self.grows, self.exact = square > 0.0, math.sqrt(abs(square))
+        self.columns, self.layers = max(4, deck.cells // 2), 1 + self.heavy
         self.amplitude = deck.amplitude or (1e-4 if self.heavy else 1e-3)
-        rate = math.sqrt(abs(compute_square(deck.above, 0.0)))
-        swings, usual = self.heavy and not self.grows, T_END[deck.above] * (rate / self.exact)
-        self.t_end = deck.run.t_end or (SWING / self.exact if swings else usual)
-
-    def compute_layer(self, y, density: float):
-        """Density and pressure at height y [m] of the isentropic layer of `density` at y = 0."""
-        base = 1.0 - (GAMMA - 1.0) / GAMMA * density * GRAVITY / self.pressure * y
-        base, power = np.where(base > 0.0, base, 0.0), GAMMA - 1.0
-        return density * base ** (1.0 / power), self.pressure * base ** (GAMMA / power)
-
-    def estimate_cells(self) -> int:
-        return max(4, self.deck.cells // 2) * self.deck.cells * (1 + self.heavy)
+        rate = math.sqrt(abs(compute_gravity_mode(*wave, 0.0)))
+        usual = (3.0 if self.heavy else 6.0) * (rate / self.exact)
+        swings = self.heavy and not self.grows  # by surface tension
+        self.t_end = deck.run.t_end or (2.5 * math.pi / self.exact if swings else usual)
 
     def make_grids(self, t=0.0):
-        x = np.linspace(0.0, 0.5, max(4, self.deck.cells // 2) + 1)[:, None]
+        x = np.linspace(0.0, 0.5, self.columns + 1)[:, None]
         part = np.linspace(0.0, 1.0, self.deck.cells + 1)
         front = self.amplitude * np.cos(WAVE_NUMBER * x)
         heights = {"light": -1.0 + (front + 1.0) * part, "heavy": front + (1.0 - front) * part}
@@ -98,11 +77,11 @@ class RayleighTaylor(Problem):
         return {name: np.array(np.broadcast_arrays(x, heights[name])) for name in shown}
 
     def build(self):
-        tension, blocks = self.deck.tension, []
+        tension, blocks, layer = self.deck.tension, [], (GRAVITY, self.pressure, GAMMA)
         for name, grid in self.make_grids().items():
             density = 2.0 if name == "heavy" else 1.0
             # layers of the same height everywhere: the gas beside the wave is out of balance
-            rho, p = self.compute_layer(compute_centres(grid)[1], density)
+            rho, p = compute_isentropic_layer(compute_centres(grid)[1], density, *layer)
             blocks.append(Block(name, IdealGas(GAMMA), grid, rho, 0.0, 0.0, p))
         top, links = (blocks[0], "j_max"), []
         if self.heavy:
@@ -121,21 +100,9 @@ class RayleighTaylor(Problem):
         amplitude = ((height - mean) * wave * steps).sum() / (wave * wave * steps).sum()
         return {"amplitude": float(amplitude), "interface_mean": mean}
 
-    def find_rate(self, t: np.ndarray, amplitude: np.ndarray) -> float:
-        """Growth rate or angular frequency [1/s] from the history; NaN if it is too short."""
-        if self.grows:
-            first, middle, last = np.interp([t[-1] / 3.0, t[-1] / 1.5, t[-1]], t, amplitude)
-            ratio = (first + last) / (2.0 * middle)
-            return math.acosh(ratio) / (t[-1] / 3.0) if ratio > 1.0 else math.nan
-        change = np.flatnonzero(amplitude[1:] * amplitude[:-1] < 0.0)
-        if change.size < 2:
-            return math.nan
-        part = amplitude[change] / (amplitude[change] - amplitude[change + 1])
-        zeros = t[change] + part * (t[change + 1] - t[change])
-        return math.pi * (change.size - 1) / float(zeros[-1] - zeros[0])
-
     def report(self, history, final=None) -> Report:
-        rate = self.find_rate(history["t"], history["amplitude"])
+        find = find_growth_rate if self.grows else find_frequency
+        rate = find(history["t"], history["amplitude"])
         what = "growth rate [1/s]" if self.grows else "angular frequency [1/s]"
         mean = history["interface_mean"]
         head = f"rayleigh-taylor, {self.deck.above} above, {self.deck.cells} cells per wavelength"

@@ -72,9 +72,7 @@ class Saltzmann(Problem):
         block = Block("gas", gas, self.make_grids()["gas"], *state, **scheme)
         put(block, "i_min", "piston", velocity=(1.0, 0.0))
         put_walls(block)
-        simulation = self.simulate([block])
-        simulation.clock.retry_dt = FIRST_STEP / (deck.cells * PHASES[0][3])
-        return simulation
+        return self.simulate([block], first_dt=FIRST_STEP / (deck.cells * PHASES[0][3]))
 
     def measure(self, evolution) -> dict[str, float]:
         """Relative errors of the density behind each shock (once it is half way), 1D or not."""

@@ -24,7 +24,6 @@ from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import RadialProblem, Symmetry, follow_gas
 from problems.problem import Report, Row, compare, get_last
 from problems.references.exact_flows import DIMENSIONS, SedovBlast
-from regrid.errors import BadInput
 
 # of the whole energy in the part that is computed: half a line, a quarter, a quarter a radian
 SHARES = {"plane": 0.5, "cylindrical": 0.25, "spherical": 0.25 / math.pi}
@@ -38,8 +37,7 @@ class SedovDeck(Deck, kw_only=True):
     gamma: key(float, "ratio of specific heats", ge=1.01) = 1.4
     pressure: key(float, "of the cold gas; exact theory has 0", gt=0, le=0.01) = 1e-8
     mesh: key(
-        Literal["follow", "fixed"] | None,
-        "nodes go with the gas, or rest. If left out: follow, but fixed if plane",
+        Literal["follow", "fixed"] | None, "nodes follow the gas, or rest; left out: plane rests"
     ) = None
     limiter: Limiter = "van-leer"
 
@@ -54,13 +52,10 @@ class Sedov(RadialProblem):
         self.blast = SedovBlast(deck.geometry, deck.gamma, energy=alpha)
         self.mesh = deck.mesh or ("fixed" if deck.geometry == "plane" else "follow")
         end = self.blast.radius(deck.run.t_end)
-        where = f"deck: at run.t_end = {deck.run.t_end:g} the shock is at r = {end:.3g}"
-        if end < deck.size / deck.cells:
-            raise BadInput(f"{where}, inside the first cell; end later, or take smaller cells")
-        if end > 0.95 * deck.size:
-            raise BadInput(
-                f"{where}; the sides are {deck.size:g} long, and its mirror image would come back"
-            )
+        words = "the shock is in the first cell then; end later, or take smaller cells"
+        deck.refuse(end < deck.size / deck.cells, "run.t_end", words)
+        words = f"the shock is at {end:.3g} m then, and sides of {deck.size:g} m send it back"
+        deck.refuse(end > 0.95 * deck.size, "run.t_end", words)
 
     def compute_density(self, r, t):
         return self.blast.sample(r, t)[0]

@@ -38,9 +38,7 @@ PATH_STEPS = 12  # of Runge and Kutta along the paths that nodes follow
 class TaylorGreenDeck(Deck, kw_only=True):
     run: RunControl = RunControl(t_end=0.75, cfl=0.8)
     cells: key(int, "cells along each side of the unit square", ge=4, le=MOST_CELLS) = 32
-    mesh: key(Literal["swing", "follow", "fixed"], "grid swings, follows the flow, or rests") = (
-        "swing"
-    )
+    mesh: key(Literal["swing", "follow", "fixed"], "follow: the flow; fixed: at rest") = "swing"
     amplitude: key(float, "of the swinging nodes; the square is 1 wide", ge=0, le=0.2) = 0.1
     limiter: Limiter = "monotonised-central"
 

@@ -12,7 +12,6 @@ angle, which `hydro.motion.constraints` prevents; finer grids wind further, and 
 point does not converge.
 """
 
-import functools
 import math
 from typing import ClassVar
 
@@ -26,7 +25,6 @@ from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import put_walls
 from problems.problem import BlockPlan, Problem, Report, Row, average_plateau, get_last
 from problems.references.riemann import solve_riemann
-from regrid.errors import BadInput
 
 # equation of state; density, velocity, pressure; lower left and upper right corner
 GASES = {
@@ -41,16 +39,12 @@ class TriplePointDeck(Deck, kw_only=True):
     run: RunControl = RunControl(t_end=5.0, cfl=0.8)
     regrid: Regrid = Regrid(epsilon=0.1, options={"strengthening": 1.0, "curves": False})
     cells: key(int, "cells in a length of 1, an even number", ge=4, le=MOST_CELLS) = 10
-    thickness: key(
-        float | None, "smoothing length of contacts. If left out: 0.75 of a cell", ge=0, le=1
-    ) = None
+    thickness: key(float | None, "smoothing length; left out: 0.75 of a cell", ge=0, le=1) = None
     relax: key(float, "fraction of the way to even node spacing in a step", ge=0, le=1) = 0.05
     limiter: Limiter = "van-leer"
 
 
 class TriplePoint(Problem):
-    """Three blocks; the left one's far side is cut at the triple point."""
-
     Deck = TriplePointDeck
     t_unit = "1"
     units: ClassVar = {"point_x": "m", "point_y": "m"}
@@ -58,10 +52,9 @@ class TriplePoint(Problem):
 
     def __init__(self, deck: TriplePointDeck):
         super().__init__(deck)
-        if deck.cells % 2:
-            raise BadInput(
-                f"deck: cells is {deck.cells}; it must be even, the point is half a length up"
-            )
+        deck.refuse(deck.cells % 2, "cells", "it must be even, the point is half a length up")
+        left = GASES["left"][:2]  # plane Riemann solutions with the other two
+        self.exact = {name: solve_riemann(*left, *GASES[name][:2]) for name in ("bottom", "top")}
 
     def list_boxes(self):
         boxes = []
@@ -85,12 +78,6 @@ class TriplePoint(Problem):
         put_walls(*blocks)
         rule = LineRule(relax=deck.relax, thickness=deck.thickness)
         return self.simulate(blocks, links, line_rule=rule)
-
-    @functools.cached_property
-    def exact(self):
-        """Plane Riemann solutions of the left gas with the other two."""
-        left = GASES["left"][:2]
-        return {name: solve_riemann(*left, *GASES[name][:2]) for name in ("bottom", "top")}
 
     def measure(self, evolution) -> dict[str, float]:
         """Where the point is; early on, star states beside the contacts at the walls."""

@@ -29,9 +29,7 @@ FIXED_GRID_ERRORS = {32: 6.73e-3, 64: 1.60e-3, 128: 3.66e-4, 256: 8.85e-5}
 class VortexDeck(Deck, kw_only=True):
     run: RunControl = RunControl(t_end=10.0, cfl=0.8)
     cells: key(int, "cells along each side", ge=4, le=MOST_CELLS) = 64
-    beta: key(
-        float, "strength of the vortex; above 10.08 its centre would be colder than 0", ge=0, le=10
-    ) = 5.0
+    beta: key(float, "strength; above 10.08 the centre would be colder than 0", ge=0, le=10) = 5.0
     mesh: key(Literal["swing", "fixed"], "grid swinging smoothly, or at rest") = "swing"
     amplitude: key(float, "of the swinging nodes; the square is 10 wide", ge=0, le=1) = 0.5
     limiter: Limiter = "monotonised-central"

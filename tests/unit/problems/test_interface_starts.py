@@ -102,7 +102,7 @@ def test_a_spectrum_has_the_size_that_is_asked_for(even):
 @pytest.mark.parametrize(
     ("deck", "words"),
     [
-        ({"spectrum": Spectrum(first=9, last=3)}, "spectrum.last is 3; it must be at least"),
+        ({"spectrum": Spectrum(first=9, last=3)}, "spectrum.last = 3; it must be at least"),
         ({"spectrum": Spectrum(first=1, last=33)}, "resolve waves up to number 32 with 64 cells"),
         ({"line_file": "nowhere.txt"}, "line_file 'nowhere.txt' cannot be read: No such file"),
     ],
@@ -186,6 +186,6 @@ def test_the_line_has_the_amplitudes_of_linear_theory(name):
 
 
 def test_an_end_before_the_start_is_refused():
-    with pytest.raises(BadInput, match=r"kct_end is 1, .* start = 'incident'"):
+    with pytest.raises(BadInput, match=r"kct_end = 1; .* start = 'incident'"):
         InterfaceInstability(InterfaceDeck(cells=8, kct_end=1.0))
     InterfaceInstability(InterfaceDeck(cells=8, kct_end=1.0, start="incident"))

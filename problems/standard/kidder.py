@@ -87,8 +87,7 @@ class Kidder(RadialProblem):
             row[f"{side}_roundness"] = float(np.ptp(part))
         exact = self.shell.compute_density(self.compute_layers(block.nodes), evolution.t)
         error = np.abs(block.state[0, 1:-1, 1:-1] / exact - 1.0)
-        row["error_rho"] = float(np.average(error, weights=block.volume))
-        return row
+        return {**row, "error_rho": float(np.average(error, weights=block.volume))}
 
     def report(self, history, final=None) -> Report:
         deck = self.deck
@@ -111,9 +110,8 @@ class Kidder(RadialProblem):
         for h, bar in ((1.0, ""), (0.75, ""), (0.5, "density")):
             dump = min(dumps, key=lambda dump: abs(shrink(dump.t) - h))
             draw_field(left, dump, "rho", low=0.0, high=high, every=4, bar=bar)
-            left.text(
-                0.02, 1.01 * RADII[1] * shrink(dump.t), f"t = {dump.t / self.shell.tau:.3g} tau"
-            )
+            words = f"t = {dump.t / self.shell.tau:.3g} tau"
+            left.text(0.02, 1.01 * RADII[1] * shrink(dump.t), words)
         times, h = np.array([(dump.t / self.shell.tau, shrink(dump.t)) for dump in dumps]).T
         for edge, words, exact in ((-1, "outer", None), (0, "inner", "exact")):
             radius = [self.compute_radii(d["shell"].nodes[:, edge, :]).mean() for d in dumps]

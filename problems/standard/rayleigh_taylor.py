@@ -55,8 +55,7 @@ class RayleighTaylor(Problem):
 
     def __init__(self, deck: RayleighTaylorDeck):
         super().__init__(deck)
-        self.heavy = deck.above == "heavy"
-        self.pressure = deck.sound_speed**2 / GAMMA  # of both gases at y = 0
+        self.heavy, self.pressure = deck.above == "heavy", deck.sound_speed**2 / GAMMA  # at y = 0
         wave = WAVE_NUMBER, GRAVITY, 2.0 if self.heavy else 0.0
         square = compute_gravity_mode(*wave, deck.tension)
         deck.refuse(square == 0.0, "tension", "there the wave neither grows nor swings")

@@ -99,7 +99,7 @@ class BlockSide(DeckTable, kw_only=True):
 
     side: key(SideName, "which side")
     kind: key(str, "wall, axis, piston, free-surface, inflow, outflow or an installed one")
-    faces: key(tuple[First, First] | None, "from this face up to that; left out: all") = None
+    faces: key(tuple[First, First] | None, "from this face up to that. If left out: all") = None
     velocity: key(Pair | None, "of a piston or an open side: u, v [m/s] of t") = None
     pressure: key(Formula | None, "on a free surface [Pa], a number or a formula of t") = None
     state: key(State | None, "beyond an inflow: rho, u, v, p, numbers or formulas of t") = None
@@ -113,9 +113,9 @@ class BlockTable(DeckTable, kw_only=True):
     grid: key(str, "file of its grid, or of its four curves: .npz, .h5, .vts, .vtk") = ""
     grid_block: key(str, "which of several blocks in that file") = ""
     curves: key(Curves | None, "its four sides, where there is no file of a grid") = None
-    cells: key(tuple[Cells, Cells] | None, "along i and j; left out: those of its sides") = None
+    cells: key(tuple[Cells, Cells] | None, "along i and j. If left out: those of its sides") = None
     material: key(str | Numbers, "a name, FILE.toml:NAME, or a table with eos and so on") = "air"
-    rho: key(Formula | None, "density [kg/m3], of x, y; left out: the material's at rest") = None
+    rho: key(Formula | None, "density [kg/m3], of x, y. If left out: the material's at rest") = None
     u: key(Formula, "velocity along x [m/s], of x and y") = 0.0
     v: key(Formula, "velocity along y [m/s], of x and y") = 0.0
     p: key(Formula, "pressure [Pa], of x and y") = 1e5

@@ -104,23 +104,23 @@ class RunControl(DeckTable, kw_only=True):
 
     t_end: key(float | None, "end time [s]. If left out, the problem chooses it", ge=1e-300) = None
     t_set_up: key(
-        float | None, "end time [s] that lengths and motions are made for; left out: t_end", gt=0
+        float | None, "end time [s] that lengths and motions are made for. If left out: t_end", gt=0
     ) = None
-    max_steps: key(int | None, "most steps; left out: no limit", ge=0, le=2**63 - 1) = None
+    max_steps: key(int | None, "most steps. If left out: no limit", ge=0, le=2**63 - 1) = None
     cfl: key(float, "fraction of the stable time step", ge=1e-3, le=1) = 0.5
     small_cells: key(
         float | None,
-        "fraction of cells that may be too small for a step, by state redistribution; left out: "
+        "fraction of cells that may be too small for a step, by state redistribution. If left out: "
         "0.05 where grids are rebuilt in every step, else 0",
         ge=0,
         le=0.1,
     ) = None
     threads: key(
-        int | None, "threads, bitwise the same; left out: one per large block", ge=1, le=1024
+        int | None, "number, results do not change. If left out: one per large block", ge=1, le=1024
     ) = None
     cut: key(
         dict[str, Annotated[int, Meta(ge=1, le=1024)]],
-        "by a block's name, among how many MPI ranks it is cut at most; left out: by its share",
+        "by a block's name, among how many MPI ranks it is cut at most. If left out: by its share",
     ) = {}
 
 

@@ -199,14 +199,14 @@ class RiemannDeck(Deck, kw_only=True):
     left: SideState | None = None
     right: SideState | None = None
     lengths: key(
-        tuple[Length, Length] | None, "of the sides [m]; left out: the case's, or by the waves"
+        tuple[Length, Length] | None, "of the sides [m]. If left out: the case's, or by the waves"
     ) = None
     contact: key(Literal["on-line", "captured"], "between two blocks, or inside one") = "on-line"
     mesh: key(Literal["fixed", "wave"], "of a captured contact: at rest, swinging") = "fixed"
     cells: key(int, "cells along x", ge=8, le=MOST_CELLS) = 100
     rows: key(int, "cells across", ge=2, le=MOST_CELLS) = 4
     grading: key(
-        float | None, "growth of cells off the contact; left out: as `lengths`", ge=1, le=1.2
+        float | None, "growth of cells off the contact. If left out: as `lengths`", ge=1, le=1.2
     ) = None
     limiter: Limiter | None = None  # None: the case's
     regrid: Regrid = Regrid()

@@ -122,7 +122,7 @@ class ShockBubbleDeck(Deck, kw_only=True):
     gas: key(Literal["helium", "R22"], "in the bubble") = "helium"
     mach: key(float, "Mach number of the shock in air", ge=1.001, le=5) = 1.22
     cells: key(int, "cells along 45 degrees of the bubble's surface", ge=4, le=MOST_CELLS) = 12
-    thickness: key(float | None, "smoothing length; left out: 0.75 of a cell", ge=0, le=1) = None
+    thickness: key(float | None, "smoothing length. If left out: 0.75 of a cell", ge=0, le=1) = None
     limiter: Limiter = "van-leer"
 
 

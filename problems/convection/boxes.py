@@ -194,7 +194,7 @@ class AxisGrid(DeckTable, kw_only=True):
     ) = "uniform"
     every: key(int, "steps between corrections of the grid", ge=1, le=2**63 - 1) = 1
     relaxation: key(float, "fraction of a correction that is applied", gt=0, le=1) = 0.7
-    ratio: key(float | None, "largest of neighbouring steps; left out: the default", gt=1) = None
+    ratio: key(float | None, "largest of neighbouring steps. If left out: the default", gt=1) = None
     floor: key(float, "least speed, as a fraction of the largest", gt=0, lt=1) = 0.02
     strength: key(float, "of the gradient against the uniform grid in the monitor", ge=0) = 1.0
     share: key(float, "of polevikov's density of nodes in the combined one", ge=0, le=1) = 0.5

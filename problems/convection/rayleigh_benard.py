@@ -46,7 +46,7 @@ class RayleighBenardDeck(Deck, kw_only=True):
     walls: key(Literal["no-slip", "free"], "floor and ceiling hold the fluid, or not") = "no-slip"
     cells: key(int, "cells across", ge=3, le=2000) = 40
     cells_up: key(int, "cells up", ge=3, le=2000) = 40
-    width: key(float | None, "over the height; left out: 1, or critical", ge=0.01, le=100) = None
+    width: key(float | None, "over the height. If left out: 1, or critical", ge=0.01, le=100) = None
     rayleigh: key(float, "Rayleigh number of the height", le=1e12) = 5000.0
     prandtl: key(float, "viscosity over diffusivity", le=1e6) = linear.PRANDTL
     tilt: key(float, "of gravity, anticlockwise from down [degrees]", gt=-90, lt=90) = 0.0

@@ -47,7 +47,7 @@ class LineMotion(DeckTable, kw_only=True):
     shape: key(Literal["spline", "chord"], "curve between nodes when re-spaced") = "spline"
     relax: key(float, "fraction of the way to the target spacing in a step", ge=0, le=1) = 0.02
     thickness: key(
-        float | None, "smoothing length [m]; left out: 0.75 of a cell", ge=0, le=1e12
+        float | None, "smoothing length [m]. If left out: 0.75 of a cell", ge=0, le=1e12
     ) = None
     tension: key(float, "surface tension of the interface [N/m]", ge=0, le=1e20) = 0.0
 
@@ -64,7 +64,7 @@ class InterfaceDeck(Deck, kw_only=True):
     second: Fluid = Fluid(rho=3.0)
     pressure: key(float, "pressure ahead of the shock [Pa]", le=1e20) = 1.0
     mach: key(
-        float | None, "Mach number; left out: by shock_pressure, or 1.5", ge=1.001, le=1000
+        float | None, "Mach number. If left out: by shock_pressure, or 1.5", ge=1.001, le=1000
     ) = None
     shock_pressure: key(float | None, "behind the shock [Pa]", gt=0, le=1e20) = None
     second_shock: SecondShock | None = None
@@ -84,18 +84,18 @@ class InterfaceDeck(Deck, kw_only=True):
     stretch: key(float, "growth of cells from one to the next beyond it", ge=1, le=1.5) = 1.01
     reach: key(float, "distance from the interface, in waves, where grid lines bend", gt=0) = 0.1
     lengths: key(
-        tuple[float, float] | None, "of both materials [m]; left out: no reflection returns"
+        tuple[float, float] | None, "of both [m]. If left out: too long for reflections to return"
     ) = None
     start: key(
         Literal["auto", "crossed", "incident"],
         "crossed: the shock is beyond the interface; incident: before it; auto: beyond if it can",
     ) = "auto"
     layer: key(
-        float | None, "start crossed: cells to the nearer wave; left out: 3 to 8", ge=3, le=1000
+        float | None, "start crossed: cells to the nearer wave. If left out: 3 to 8", ge=3, le=1000
     ) = None
     gap: key(float, "of the shock from the interface at first, in waves", ge=0.01, le=20) = 0.3
     passage_refinement: key(
-        float, "start incident: times finer cells at the interface until it is shocked", ge=1, le=64
+        float, "start incident: how much finer cells at the interface are at first", ge=1, le=64
     ) = 4.0
     kct_end: key(float, "end: k c t, c of the shocked second material", gt=0, le=10000) = 30.0
     limiter: Limiter = "smooth-shear"

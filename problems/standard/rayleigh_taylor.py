@@ -41,7 +41,7 @@ class RayleighTaylorDeck(Deck, kw_only=True):
     regrid: Regrid = Regrid()
     above: key(Literal["heavy", "nothing"], "a heavy gas, or a free surface") = "heavy"
     cells: key(int, "cells in a wavelength", ge=8, le=MOST_CELLS) = 64
-    amplitude: key(float | None, "first amplitude [m]; left out: small", ge=1e-8, lt=0.2) = None
+    amplitude: key(float | None, "first amplitude [m]. If left out: small", ge=1e-8, lt=0.2) = None
     sound_speed: key(float, "of the lower gas at the interface [m/s]", ge=1.2, le=1000) = 10.0
     tension: key(float, "of the surface [N/m]", ge=0, le=1000) = 0.0
 

@@ -37,7 +37,7 @@ class SedovDeck(Deck, kw_only=True):
     gamma: key(float, "ratio of specific heats", ge=1.01) = 1.4
     pressure: key(float, "of the cold gas; exact theory has 0", gt=0, le=0.01) = 1e-8
     mesh: key(
-        Literal["follow", "fixed"] | None, "nodes follow the gas, or rest; left out: plane rests"
+        Literal["follow", "fixed"] | None, "nodes follow the gas, or rest. If left out: plane: rest"
     ) = None
     limiter: Limiter = "van-leer"
 

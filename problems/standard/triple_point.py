@@ -39,7 +39,7 @@ class TriplePointDeck(Deck, kw_only=True):
     run: RunControl = RunControl(t_end=5.0, cfl=0.8)
     regrid: Regrid = Regrid(epsilon=0.1, options={"strengthening": 1.0, "curves": False})
     cells: key(int, "cells in a length of 1, an even number", ge=4, le=MOST_CELLS) = 10
-    thickness: key(float | None, "smoothing length; left out: 0.75 of a cell", ge=0, le=1) = None
+    thickness: key(float | None, "smoothing length. If left out: 0.75 of a cell", ge=0, le=1) = None
     relax: key(float, "fraction of the way to even node spacing in a step", ge=0, le=1) = 0.05
     limiter: Limiter = "van-leer"
 

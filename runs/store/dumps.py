@@ -157,7 +157,7 @@ def make_image(
 # HDF5 takes its time over groups, scales and attributes, which are the same in all dumps of a run:
 # the last whole dump stays open in memory, and the numbers of the next are written over its own,
 # arrays at the places in the file that HDF5 has given them.
-_KEPT: dict[str, tuple[h5py.File, dict[str, int | None]]] = {}
+_KEPT: dict[str, tuple[h5py.File, dict[str, int]]] = {}
 WRITABLE = 1  # H5LT_FILE_IMAGE_OPEN_RW
 
 
@@ -180,12 +180,12 @@ def _list_stored(arrays: Arrays, state: Mapping[str, Any]) -> dict[str, np.ndarr
     for key, value in state.items():
         if not isinstance(value, str | Virtual):
             stored[f"state/{key}"] = np.asarray(value)
-    return stored
+    return {path: values for path, values in stored.items() if values.size}
 
 
 def _refill(
     file: h5py.File,
-    places: Mapping[str, int | None],
+    places: Mapping[str, int],
     evolution: Evolution,
     arrays: Arrays,
     state: Mapping[str, Any],
@@ -196,9 +196,8 @@ def _refill(
     file.flush()
     image = bytearray(file.id.get_file_image())
     for path, values in _list_stored(arrays, state).items():
-        if values.size:
-            place = np.frombuffer(image, values.dtype, values.size, places[path])
-            place.reshape(values.shape)[...] = values
+        place = np.frombuffer(image, values.dtype, values.size, places[path])
+        place.reshape(values.shape)[...] = values
     return image
 
 

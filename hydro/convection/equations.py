@@ -364,7 +364,7 @@ class Factors:
         self.what = what
         self.exchanged = False
         try:
-            self._factors = splu(
+            self._factors = _factorise(
                 self.matrix,
                 permc_spec="MMD_AT_PLUS_A",
                 diag_pivot_thresh=0.0,
@@ -376,7 +376,7 @@ class Factors:
     def _exchange_rows(self) -> None:
         self.exchanged = True
         try:
-            self._factors = splu(self.matrix)
+            self._factors = _factorise(self.matrix)
         except RuntimeError as error:
             words = f"convection: the {self.what} is singular"
             raise RunFailure(words, cause="singular") from error
@@ -395,3 +395,11 @@ class Factors:
     def _is_good(self, solution: np.ndarray, right: np.ndarray) -> bool:
         residual = np.abs(self.matrix @ solution - right).max()
         return bool(residual <= TOLERANCE * np.abs(right).max())
+
+
+def _factorise(matrix: sparse.csc_matrix, **options):
+    """`splu`, with MemoryError where SuperLU's factors outgrow the memory or its own indices."""
+    try:
+        return splu(matrix, **options)
+    except SystemError as error:  # "gstrf was called with invalid arguments"
+        raise MemoryError from error

@@ -33,6 +33,8 @@ from problems.initial_states import Fluid
 from problems.interface_instability.line import Mode, Spectrum
 from regrid.errors import BadInput
 
+LONGEST = 1e4  # wavelengths in a length
+
 
 class SecondShock(DeckTable, kw_only=True):
     """A stronger shock that follows the first."""
@@ -76,7 +78,7 @@ class InterfaceDeck(Deck, kw_only=True):
     line_file: key(
         str | None, "text file of a line, added to the modes: x and y, or x [m]", min_length=1
     ) = None
-    width: key(float, "width of the domain in wavelengths", gt=0) = 0.5
+    width: key(float, "width of the domain in wavelengths", gt=0, le=LONGEST) = 0.5
     sides: key(Literal["wall", "periodic"], "what bounds the domain along the interface") = "wall"
     cells: key(int, "cells per wavelength", ge=4, le=MOST_CELLS) = 64
     refine: key(bool, "add grid lines where the interface grows long or bends") = False
@@ -115,7 +117,6 @@ class InterfaceDeck(Deck, kw_only=True):
 LEAST_CELLS = 3  # in a wave: with fewer it hardly grows
 SQUARE = 2e-3  # most slope of a wave at a wall, over its largest: a phase of 3.14 is one of pi
 FLATTEST = 4.0  # of first cells at the interface: one side over the other
-LONGEST = 1e4  # wavelengths in a length
 DENSEST = 1e6  # most ratio of densities
 
 

@@ -11,7 +11,6 @@ number; the slope of mode n is n times that.
 from __future__ import annotations
 
 import cmath
-import functools
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ import numpy as np
 
 from problems.deck import MOST_CELLS, DeckTable, key
 from regrid.errors import BadInput
+from regrid.jit import inlined, kernel
 from regrid.text_files import read_columns
 
 ROUGH = 5  # harmonics from this one on are none of a gentle wave's own
@@ -67,52 +67,72 @@ def find_harmonics(modes: Iterable[Mode], wavenumber: float) -> list[Harmonic]:
     ]
 
 
-def _weigh_nodes(y: np.ndarray) -> np.ndarray:
-    """Lengths (n,) that nodes stand for in the trapezoidal rule."""
-    steps = y[1:] - y[:-1]
-    weight = np.zeros(len(y))
-    weight[:-1] = steps
-    weight[1:] += steps
-    weight *= 0.5
-    return weight
+@inlined
+def weigh_node(y, node):
+    """Length [m] that a node of a line at heights y (n,) stands for in the trapezoidal rule."""
+    last = y.shape[0] - 1
+    return 0.5 * (y[min(node + 1, last)] - y[max(node - 1, 0)])
 
 
-def measure_mode(line: np.ndarray, wavenumber: float, number: int, phase: float) -> float:
+@kernel(allocates=False)
+def measure_mode(line, wavenumber, number, phase):
     """Amplitude of cos(number k y + phase) in the line x(y), `line` being its nodes (2, n) [m].
 
     Its Fourier coefficient by the trapezoidal rule along y, exact for evenly spaced nodes on whole
     halves of the mode's wavelength.  Where the line has rolled over, x counts backwards there.
     """
     x, y = line
-    weight = _weigh_nodes(y)
-    mean = (x * weight).sum() / weight.sum()
-    wave = np.cos(number * wavenumber * y + phase)
-    return float(((x - mean) * wave * weight).sum() / (wave * wave * weight).sum())
+    mean, part, whole = 0.0, 0.0, 0.0
+    for node in range(x.shape[0]):
+        mean += x[node] * weigh_node(y, node)
+    mean /= y[-1] - y[0]
+    for node in range(x.shape[0]):
+        wave = math.cos(number * wavenumber * y[node] + phase)
+        weighed = wave * weigh_node(y, node)
+        part += (x[node] - mean) * weighed
+        whole += wave * weighed
+    return part / whole
 
 
-@functools.lru_cache(maxsize=8)
-def _list_numbers(highest: int, left_out: tuple[int, ...]) -> np.ndarray:
-    return np.array([number for number in range(ROUGH, highest) if number not in left_out])
+@kernel
+def measure_shape(line, wavenumber, left_out, even):
+    """Mean, greatest and least x of a line's nodes (2, n) [m], its roughness [m], and its largest
+    turn [rad] from segment to segment.
 
-
-def measure_roughness(
-    line: np.ndarray, wavenumber: float, left_out: Iterable[int] = (), even: bool = True
-) -> float:
-    """Root of the sum of squares of the line's harmonics from ROUGH on [m], `left_out` not counted.
-
-    Those that the nodes can show: below half a wave between two.  Of an `even` line (between walls)
-    cosines alone, else harmonics of any phase.
+    Roughness is the root of the sum of squares of the line's harmonics from ROUGH on, those that
+    the nodes can show: below half a wave between two; but for the numbers `left_out` (m,).  Of an
+    `even` line (between walls) cosines alone, else harmonics of any phase.
     """
     x, y = line
-    weight = _weigh_nodes(y) / (y[-1] - y[0])
-    highest = math.ceil((len(y) - 1) * math.pi / (wavenumber * (y[-1] - y[0])) - NOTHING)
-    numbers = _list_numbers(highest, tuple(left_out))
-    phases = wavenumber * (numbers[:, None] * y)
-    away = (x - (x * weight).sum()) * weight
-    parts = np.cos(phases, out=phases if even else None) @ away
-    if not even:
-        parts = np.hypot(parts, np.sin(phases) @ away)
-    return float(2.0 * np.sqrt((parts**2).sum()))
+    count, width = x.shape[0], y[-1] - y[0]
+    highest = math.ceil((count - 1) * math.pi / (wavenumber * width) - NOTHING)
+    cosines, sines = np.zeros(max(highest, ROUGH)), np.zeros(max(highest, ROUGH))
+    mean, most, least, turn = 0.0, x[0], x[0], 0.0
+    for node in range(count):
+        mean += x[node] * weigh_node(y, node) / width
+        most, least = max(most, x[node]), min(least, x[node])
+    for node in range(count):
+        away = (x[node] - mean) * weigh_node(y, node) / width
+        # the waves of all numbers by turning, from one to the next
+        step = complex(math.cos(wavenumber * y[node]), math.sin(wavenumber * y[node]))
+        wave = away * step
+        for number in range(1, highest):
+            cosines[number] += wave.real
+            sines[number] += wave.imag
+            wave *= step
+    for node in range(1, count - 1):
+        ax, ay = x[node] - x[node - 1], y[node] - y[node - 1]
+        bx, by = x[node + 1] - x[node], y[node + 1] - y[node]
+        turn = max(turn, abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by)))
+    for number in left_out:
+        if number < highest:
+            cosines[number] = sines[number] = 0.0
+    roughness = 0.0
+    for number in range(ROUGH, highest):
+        roughness += cosines[number] ** 2
+        if not even:
+            roughness += sines[number] ** 2
+    return mean, most, least, 2.0 * math.sqrt(roughness), turn
 
 
 Perturbation = Callable[[np.ndarray], np.ndarray]  # heights y (n,) [m] -> places x (n,) [m]

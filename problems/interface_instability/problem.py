@@ -37,7 +37,7 @@ from problems.interface_instability.line import (
     draw_modes,
     find_harmonics,
     measure_mode,
-    measure_roughness,
+    measure_shape,
     read_line,
 )
 from problems.interface_instability.report import Results
@@ -52,7 +52,7 @@ from problems.references.hugoniot import (
 )
 from problems.references.linear_growth import LinearGrowth, compute_linear_growth
 from regrid.errors import BadInput
-from regrid.measure.quality import find_bad_cells, measure_turns
+from regrid.measure.quality import find_bad_cells
 from regrid.roots import find_root
 
 BENDS = 6.0  # least reach over the amplitude: cells shrink or grow by no more than a quarter
@@ -106,6 +106,7 @@ class InterfaceInstability(Results, Problem):
         self.harmonics = find_harmonics([*self.modes, *free], self.k)
         self.followed = [h for h in self.harmonics if h.number == 1] or [Harmonic(1, 0.0, 0.0)]
         self.followed += [h for h in self.harmonics if h.number > 1]
+        self._numbers = np.array([h.number for h in self.harmonics], dtype=np.int64)
         self.units = type(self).units | {h.column: "m" for h in self.followed}
         # of the shock at the mean line, on the clock of a run that begins before it
         arrival = (deck.gap * deck.wavelength + self.amplitude) / self.shock.shock_speed
@@ -498,20 +499,17 @@ class InterfaceInstability(Results, Problem):
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Amplitudes and places of the interface, and transverse motion in the far field."""
         line = evolution.blocks[0].nodes[:, -1, :]
-        x, y = line
-        steps = y[1:] - y[:-1]
-        height = 0.5 * (x[1:] + x[:-1])
-        most, least = float(x.max()), float(x.min())
+        mean, most, least, roughness, turn = measure_shape(
+            line, self.k, self._numbers, self.deck.sides == "wall"
+        )
         return {
-            "interface_mean": float((height * steps).sum() / (y[-1] - y[0])),
+            "interface_mean": mean,
             "interface_max": most,
             "interface_min": least,
             "amplitude": 0.5 * (most - least),
             **{h.column: measure_mode(line, self.k, h.number, h.phase) for h in self.followed},
-            "roughness": measure_roughness(
-                line, self.k, [h.number for h in self.harmonics], even=self.deck.sides == "wall"
-            ),
-            "largest_turn": math.degrees(float(np.abs(measure_turns(line)).max())),
+            "roughness": roughness,
+            "largest_turn": math.degrees(turn),
             "far_transverse_speed": max(evolution.measured)[0],
         }
 

@@ -29,7 +29,7 @@ class NohDeck(Deck, kw_only=True):
     run: RunControl = RunControl(t_end=0.6, cfl=0.8)
     geometry: key(Symmetry, "shape of the flow") = "cylindrical"
     cells: key(int, "cells along each side, 1 long", ge=8, le=MOST_CELLS) = 100
-    gamma: key(float, "ratio of specific heats", ge=1.01) = 5.0 / 3.0
+    gamma: key(float, "ratio of specific heats", ge=1.01, le=1000) = 5.0 / 3.0
     pressure: key(float, "of the cold gas; exact theory has 0", ge=1e-8, le=0.01) = 1e-6
     shrink: key(float, "rate at which the grid shrinks to the centre [1/s]; 0: fixed", ge=0) = 0.0
     limiter: Limiter = "monotonised-central"

@@ -29,7 +29,7 @@ class ObliqueShockDeck(Deck, kw_only=True):
     run: RunControl = RunControl(t_end=3.0, cfl=0.8)
     mach: key(float, "Mach number of the stream", ge=1.001, le=100) = 2.5
     angle: key(float, "of the wedge [degrees]", ge=0.1, lt=60) = 15.0
-    gamma: key(float, "ratio of specific heats", ge=1.01) = 1.4
+    gamma: key(float, "ratio of specific heats", ge=1.01, le=1000) = 1.4
     cells: key(int, "cells along the stream", ge=16, le=MOST_CELLS) = 100
     limiter: Limiter = "van-leer"
 

@@ -34,7 +34,7 @@ class SedovDeck(Deck, kw_only=True):
     geometry: key(Symmetry, "shape of the blast") = "cylindrical"
     cells: key(int, "cells along each side", ge=8, le=MOST_CELLS) = 100
     size: key(float, "length of the sides", gt=0) = 1.2
-    gamma: key(float, "ratio of specific heats", ge=1.01) = 1.4
+    gamma: key(float, "ratio of specific heats", ge=1.01, le=1000) = 1.4
     pressure: key(float, "of the cold gas; exact theory has 0", gt=0, le=0.01) = 1e-8
     mesh: key(
         Literal["follow", "fixed"] | None, "nodes follow the gas, or rest. If left out: plane: rest"

@@ -1,6 +1,7 @@
 """history.csv, one row a step, and the restart point up to which it is whole.
 
-A row is appended and flushed, so that a kill leaves the file readable.
+A row is appended, and the file flushed ten times a second and before each dump, so that a kill
+leaves it readable, with all rows that a restart needs.
 
 The first row is step 0, where only some columns have a value; an empty field reads as nan (as ""
 in a column of words).  A last line without its end is an incomplete write; reading drops it.
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import time
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -31,6 +33,7 @@ from runs.store.files import disk_errors, write_atomically
 
 SUM = "crc32"
 STEP_TIME = "seconds_step"  # a column that the runner adds
+FLUSH_EVERY = 0.1  # wall seconds between two flushes
 NUMBERS = (int, float)  # types, exactly, whose repr is what the file holds
 
 
@@ -115,6 +118,7 @@ class HistoryWriter:
         self._waiting: list[dict[str, Any]] = []
         self._start = 0  # checksum of the first line, that of the names
         self._last = -1 if columns is None else read_rows(path).last  # step of the last row
+        self._flush_at = 0.0  # on the monotonic clock
         with disk_errors(path):
             self._file = open(path, "a", encoding="utf-8", newline="")
 
@@ -123,8 +127,8 @@ class HistoryWriter:
         self._waiting.append(dict(row))
 
     def append(self, row: Mapping[str, Any]) -> None:
-        """Write one step and flush; raises BadInput when the columns have changed."""
-        rows, lines = [row], []
+        """Write one step; raises BadInput when the columns have changed."""
+        rows, lines, now = [row], [], time.monotonic()
         if self.columns is None:
             first = [name for one in self._waiting for name in one if name not in row]
             self.columns = [*row, *dict.fromkeys(first)]
@@ -140,7 +144,9 @@ class HistoryWriter:
             self._last = int(one["step"])
         with disk_errors(self.path):
             self._file.write("\n".join(lines) + "\n")
-            self._file.flush()
+            if now >= self._flush_at:
+                self._file.flush()
+                self._flush_at = now + FLUSH_EVERY
 
     def sync(self) -> None:
         """Force the rows to the disk: called before a dump, which must not outlive its rows."""
@@ -150,7 +156,7 @@ class HistoryWriter:
 
     def close(self) -> None:
         """Close the file; more rows cannot follow."""
-        with contextlib.suppress(OSError):  # what could not be flushed `append` has reported
+        with contextlib.suppress(OSError):  # of rows after the last dump
             self._file.close()
 
 

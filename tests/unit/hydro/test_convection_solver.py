@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 from hydro.convection.box import (
     PERIODIC,
@@ -14,7 +15,7 @@ from hydro.convection.box import (
     isothermal,
     make_fluid,
 )
-from hydro.convection.equations import Equations
+from hydro.convection.equations import Equations, Factors
 from hydro.convection.march import March
 from hydro.convection.measure import compute_mean_nusselt
 from hydro.convection.steady import SteadySolver, expand_nodes
@@ -144,3 +145,12 @@ def test_heated_from_below_the_fluid_stays_at_rest_unless_pushed():
     assert np.abs(rolls.psi).max() > 3.0
     state = (rolls.equations, fluid, rolls.temperature)
     assert compute_mean_nusselt(*state, "j_min") > 2.0
+
+
+def test_factors_too_large_for_the_solver_are_out_of_memory(monkeypatch):
+    def fail(*_, **__):
+        raise SystemError("gstrf was called with invalid arguments")
+
+    monkeypatch.setattr("hydro.convection.equations.splu", fail)
+    with pytest.raises(MemoryError):
+        Factors(sparse.identity(3, format="csc"))

@@ -9,11 +9,8 @@ it the exact state stands again.  `settle_shock`: a shock driven by a piston; `s
 that runs outwards from a contact.
 """
 
-import contextlib
-import io
 import itertools
 import math
-import pickle
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar, Literal
@@ -33,7 +30,7 @@ from problems.problem import BlockPlan, Problem, find_crossing, say_unreached
 from problems.references.exact_flows import average_points
 from problems.references.hugoniot import Shock, shock_with_mach
 from regrid.errors import BadInput
-from regrid.jit import PACKAGES, digest_sources, find_kept, keep
+from regrid.jit import PACKAGES, remember
 from regrid.measure.cells import compute_area_fractions
 from regrid.sides import SIDE_NAMES
 
@@ -303,16 +300,8 @@ def settle_front(front: Front, *, cfl: float, limiter: str) -> SettledFront:
     if type(front.eos).__module__.split(".")[0] not in PACKAGES:
         return _settle(front, cfl, limiter)
     eos, rest = front.eos, [getattr(front, one.name) for one in fields(front)[1:]]
-    words = pickle.dumps((type(eos).__qualname__, eos.parameters, rest, cfl, limiter)).hex()
-    path = find_kept("settled", digest_sources(), words)
-    with contextlib.suppress(OSError, ValueError), path.open("rb") as kept:
-        first, *rows = np.lib.format.read_array(kept)
-        return SettledFront(int(first[0]), *rows)
-    found = _settle(front, cfl, limiter)
-    file = io.BytesIO()
-    np.save(file, [np.full(found.rho.size, found.first), found.rho, found.u, found.p])
-    keep(path, file.getvalue())
-    return found
+    words = type(eos).__qualname__, eos.parameters, rest, cfl, limiter
+    return remember("settled", words, lambda: _settle(front, cfl, limiter))
 
 
 def _settle(front: Front, cfl: float, limiter: str) -> SettledFront:

@@ -23,6 +23,7 @@ import uuid
 from collections.abc import Callable
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
+from typing import Any
 
 # threads of a kernel that wait for others sleep after some 50 us, before OpenMP is loaded: spinning
 # on a busy machine they take the time of those that work
@@ -180,6 +181,23 @@ def digest_sources() -> str:
     """Digest of all files of the packages: what is computed with them may differ with it."""
     files = sorted(file for name in PACKAGES for file in ROOT.joinpath(name).rglob("*.py"))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+def remember(name: str, words: Any, compute: Callable[[], Any]) -> Any:
+    """What `compute` gives; it stays in the cache until a file of the packages changes.
+
+    words: all that it depends on beside them, as pickle writes it.
+    """
+    words = hashlib.sha256(pickle.dumps(words)).hexdigest()
+    path = find_kept(name, digest_sources(), words)
+    with contextlib.suppress(OSError):
+        kept = path.read_bytes()
+        if hashlib.sha256(kept[32:]).digest() == kept[:32]:  # else it is damaged
+            return pickle.loads(kept[32:])
+    contents = pickle.dumps(found := compute())
+    if not is_interpreting():  # there the last bits may be others
+        keep(path, hashlib.sha256(contents).digest() + contents)
+    return found
 
 
 class _Loaded(JITCodeLibrary):

@@ -49,7 +49,7 @@ from problems.references.hugoniot import (
 )
 from problems.references.riemann import RiemannSolution, solve_riemann
 from regrid.errors import BadInput, RunFailure
-from regrid.jit import compiled_once, kernel
+from regrid.jit import compiled_once, kernel, remember
 
 P, U, V = range(3)
 CARRY, STRETCH, EXPAND, BULK, PILE, PUSH, LIFT, DRAG, LIGHT, SOURCE = range(10)
@@ -310,6 +310,9 @@ class LinearGrowth:
     @functools.cached_property
     def _curve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`kt`, `rate`, and amplitudes (2, n) of the shocks over a0."""
+        return remember("growth", (self.sides, self.kt_end), self._march)
+
+    def _march(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         times, velocities, ends, _ = march_layers(*self.sides, self.kt_end)
         shapes = zip(self.sides, ends[:, 1], (-1.0, 1.0), strict=True)
         fronts = np.array([sign * v / (side.jump or math.nan) for side, v, sign in shapes])
@@ -339,6 +342,10 @@ class LinearGrowth:
 
         elsewhere no shock changes its entropy.
         """
+        words = self.sides, self.compression, kt
+        return remember("flow", words, lambda: self._find_fields(kt))
+
+    def _find_fields(self, kt: float) -> PerturbedFlow:
         times, velocities, outer, states = march_layers(*self.sides, kt)
         growth = 0.5 * np.sum(np.diff(times) * (velocities[1:] + velocities[:-1]))
         layers = []

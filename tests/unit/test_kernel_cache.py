@@ -251,3 +251,21 @@ def test_a_damaged_file_is_compiled_anew(tmp_path, monkeypatch, damaged):
     file.write_bytes(damaged)
     assert not compile_and_call().stats.cache_hits
     assert len(file.read_bytes()) > 0.9 * len(whole)
+
+
+def test_what_was_computed_is_remembered_until_its_file_is_damaged(tmp_path, monkeypatch):
+    monkeypatch.setenv("SHOCKGRID_CACHE_DIR", str(tmp_path))
+    asked = []
+
+    def remember(words, first=1.0):
+        return jit.remember("sum", words, lambda: asked.append(words) or [first, 2.0])
+
+    with jit.interpreted():
+        assert remember("a", 0.0) == [0.0, 2.0]
+    assert [remember("a"), remember("a"), remember("b")] == [[1.0, 2.0]] * 3
+    assert asked == ["a", "a", "b"]
+    for file in tmp_path.joinpath("kernels").iterdir():
+        contents = bytearray(file.read_bytes())
+        contents[-5] ^= 1
+        file.write_bytes(contents)
+    assert remember("a") == [1.0, 2.0] and asked == ["a", "a", "b", "a"]

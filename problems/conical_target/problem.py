@@ -62,23 +62,27 @@ class ConicalTargetDeck(Deck, kw_only=True):
     run: RunControl = RunControl(t_end=5e-6, cfl=0.8)
     regrid: Regrid = Regrid()
     cells: key(int, "cells from the axis to the shell", ge=16, le=MOST_CELLS) = 48
-    speed: key(float, "of the impactor [m/s]", gt=0) = 2000.0
+    speed: key(float, "of the impactor [m/s]", gt=0, le=1e9) = 2000.0
     impactor: key(str, "material of the impactor") = "Al1100"
     shell: key(str, "material of the shell") = "SS304"
     target: key(str, "material around the cone") = "Pb"
     filling: key(str, "material of the cone") = "graphite-diamond"
-    thickness: key(float, "of the impactor [m]", gt=0) = 8e-3
-    front: key(float, "thickness of the shell's front [m]", gt=0) = 3e-3
-    side: key(float, "thickness of the shell's side [m]", gt=0) = 4e-3
-    radius: key(float, "inside the shell [m]", gt=0) = 16e-3
-    cover: key(float, "radius of the shell's front [m]; `radius`: it is closed", gt=0) = 12.5e-3
-    length: key(float, "inside the shell [m]", gt=0) = 26e-3
-    base: key(float, "radius of the cone's base [m]", gt=0) = 9e-3
-    tip: key(float, "radius of the cone's blunt tip [m]", gt=0) = 2e-3
-    cone: key(float, "length of the cone [m]", gt=0) = 14e-3
-    ripple_amplitude: key(float, "of a ripple on the cone's side [m]; 0: none", ge=0) = 0.0
-    ripple_wavelength: key(float, "along the cone's side [m]", gt=0) = 4e-3
-    ripple_phase: key(float, "of the sine that begins at the cone's base [rad]") = 0.0
+    thickness: key(float, "of the impactor [m]", ge=1e-9, le=1e3) = 8e-3
+    front: key(float, "thickness of the shell's front [m]", ge=1e-9, le=1e3) = 3e-3
+    side: key(float, "thickness of the shell's side [m]", ge=1e-9, le=1e3) = 4e-3
+    radius: key(float, "inside the shell [m]", ge=1e-9, le=1e3) = 16e-3
+    cover: key(
+        float, "radius of the shell's front [m]; `radius`: it is closed", ge=1e-9, le=1e3
+    ) = 12.5e-3
+    length: key(float, "inside the shell [m]", ge=1e-9, le=1e3) = 26e-3
+    base: key(float, "radius of the cone's base [m]", ge=1e-9, le=1e3) = 9e-3
+    tip: key(float, "radius of the cone's blunt tip [m]", ge=1e-9, le=1e3) = 2e-3
+    cone: key(float, "length of the cone [m]", ge=1e-9, le=1e3) = 14e-3
+    ripple_amplitude: key(float, "of a ripple on the cone's side [m]; 0: none", ge=0, le=1e3) = 0.0
+    ripple_wavelength: key(float, "along the cone's side [m]", ge=1e-9, le=1e3) = 4e-3
+    ripple_phase: key(
+        float, "of the sine that begins at the cone's base [rad]", ge=-1e6, le=1e6
+    ) = 0.0
     contact: Contact = Contact()
     eos: EosNumbers = EosNumbers()
 

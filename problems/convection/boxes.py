@@ -196,7 +196,7 @@ class AxisGrid(DeckTable, kw_only=True):
     relaxation: key(float, "fraction of a correction that is applied", gt=0, le=1) = 0.7
     ratio: key(float | None, "largest of neighbouring steps. If left out: the default", gt=1) = None
     floor: key(float, "least speed, as a fraction of the largest", gt=0, lt=1) = 0.02
-    strength: key(float, "of the gradient against the uniform grid in the monitor", ge=0) = 1.0
+    strength: key(float, "of the gradient against the uniform grid", ge=0, le=1e9) = 1.0
     share: key(float, "of polevikov's density of nodes in the combined one", ge=0, le=1) = 0.5
     walls: key(Literal["both", "low", "high"], "where a clustered grid is dense") = "both"
     clustering: key(float, "strength of a clustered grid's tanh spacing", gt=0, le=20) = 2.0

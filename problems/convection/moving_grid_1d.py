@@ -41,10 +41,10 @@ class PlacingPart(DeckTable, kw_only=True):
 
     merges = True
 
-    strength: key(float, "of the gradient: 2 gives two thirds of the nodes to it", ge=0) = 2.0
+    strength: key(float, "of the gradient: 2 gives it two thirds of the nodes", ge=0, le=1e9) = 2.0
     ratio: key(float | None, "largest of neighbouring steps. If left out: the default", gt=1) = None
     relaxation: key(float, "fraction of a correction that is applied", gt=0, le=1) = 0.7
-    tau: key(float, "relaxation time [s] of the node speed", gt=0) = 0.005
+    tau: key(float, "relaxation time [s] of the node speed", ge=1e-12, le=1e9) = 0.005
     start: key(Literal["moving", "rest"], "`after`: node speed at t = 0 known, or 0") = "moving"
 
 

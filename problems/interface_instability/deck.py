@@ -40,7 +40,7 @@ class SecondShock(DeckTable, kw_only=True):
     """A stronger shock that follows the first."""
 
     pressure: key(float, "pressure behind it [Pa]", gt=0, le=1e20)
-    kct: key(float, "when the piston sends it: k c t after the arrival of the first", gt=0) = 6.0
+    kct: key(float, "when the piston sends it: k c t after the first", gt=0, le=1e9) = 6.0
 
 
 class LineMotion(DeckTable, kw_only=True):
@@ -82,9 +82,9 @@ class InterfaceDeck(Deck, kw_only=True):
     sides: key(Literal["wall", "periodic"], "what bounds the domain along the interface") = "wall"
     cells: key(int, "cells per wavelength", ge=4, le=MOST_CELLS) = 64
     refine: key(bool, "add grid lines where the interface grows long or bends") = False
-    uniform: key(float, "evenly spaced zone on each side, in wavelengths", ge=0) = 1.0
+    uniform: key(float, "evenly spaced zone on each side, in wavelengths", ge=0, le=1e4) = 1.0
     stretch: key(float, "growth of cells from one to the next beyond it", ge=1, le=1.5) = 1.01
-    reach: key(float, "distance from the interface, in waves, where grid lines bend", gt=0) = 0.1
+    reach: key(float, "from the interface, in waves, where grid lines bend", gt=0, le=1e4) = 0.1
     lengths: key(
         tuple[float, float] | None, "of both [m]. If left out: too long for reflections to return"
     ) = None

@@ -31,7 +31,7 @@ class Mode(DeckTable, kw_only=True):
 
     number: key(int, "waves per wavelength", ge=1, le=MOST_CELLS) = 1
     ka0: key(float, "amplitude times k = 2 pi / wavelength", ge=-10, le=10) = 0.02
-    phase: key(float, "phase [rad]; 0 or pi between walls") = 0.0
+    phase: key(float, "phase [rad]; 0 or pi between walls", ge=-1e6, le=1e6) = 0.0
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ class Spectrum(DeckTable, kw_only=True):
     first: key(int, "lowest mode: waves per wavelength", ge=1, le=10000)
     last: key(int, "highest mode", ge=1, le=10000)
     slope: key(float, "amplitudes are proportional to number^slope", ge=-10, le=10) = 0.0
-    ka_rms: key(float, "rms displacement of the interface times k = 2 pi / wavelength", gt=0) = 0.01
+    ka_rms: key(float, "rms displacement of the interface times k", gt=0, le=10) = 0.01
     seed: key(int, "of the random numbers", ge=0, le=2**63 - 1) = 0
 
 

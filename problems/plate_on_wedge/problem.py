@@ -52,14 +52,14 @@ class Drive(DeckTable, kw_only=True):
         "on the plate's back: a piston at `speed`, `pressure`, a flyer at `speed`; moving: the "
         "whole plate comes in at `speed`, the test of shock polars",
     ) = "piston"
-    speed: key(float, "speed of piston, flyer or plate [m/s]", gt=0) = 2500.0
-    pressure: key(float, "driving pressure [Pa]", gt=0) = 50e9
+    speed: key(float, "speed of piston, flyer or plate [m/s]", gt=0, le=1e9) = 2500.0
+    pressure: key(float, "driving pressure [Pa]", gt=0, le=1e20) = 50e9
     history: key(
         tuple[tuple[float, Annotated[float, Meta(ge=0)]], ...],
         "pairs of time [s] and part (0..1) of speed or pressure; straight between",
     ) = ()
     material: key(str, "of the flyer") = "SS304"
-    thickness: key(float, "of the flyer [m]", gt=0) = 5e-3
+    thickness: key(float, "of the flyer [m]", ge=1e-9, le=1e3) = 5e-3
 
 
 class PlateOnWedgeDeck(Deck, kw_only=True):
@@ -69,16 +69,16 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     # a stronger barrier than elsewhere: the plate's grid bends by 300 degrees around B
     regrid: Regrid = Regrid(epsilon=3e-2)
     plate: key(str, "material of the plate") = "Al1100"
-    thickness: key(float, "of the plate [m]", gt=0) = 10e-3
+    thickness: key(float, "of the plate [m]", ge=1e-9, le=1e3) = 10e-3
     wedge: key(str, "material of the wedge body") = "SS304"
     angle: key(float, "between plate and wedge face [degrees]", ge=0.5, le=75) = 20.0
     gap: key(
         float, "over the wedge's edge at the start [m]; above 0: bodies apart", ge=0, le=1e3
     ) = 0.0
-    face: key(float, "length of the wedge's face [m]", gt=0) = 30e-3
-    edge: key(float, "length of the flat edge on which the plate lies [m]", gt=0) = 10e-3
-    overhang: key(float, "of the plate beyond the end of the face [m]", gt=0) = 10e-3
-    depth: key(float, "height of the face's end over the base [m]", gt=0) = 12e-3
+    face: key(float, "length of the wedge's face [m]", ge=1e-9, le=1e3) = 30e-3
+    edge: key(float, "length of the flat edge on which the plate lies [m]", ge=1e-9, le=1e3) = 10e-3
+    overhang: key(float, "of the plate beyond the end of the face [m]", ge=1e-9, le=1e3) = 10e-3
+    depth: key(float, "height of the face's end over the base [m]", ge=1e-9, le=1e3) = 12e-3
     right: key(Literal["symmetry", "free"], "the plate's far end") = "symmetry"
     drive: Drive = Drive()
     cells: key(tuple[Cells, Cells], "cells of the plate along and across it") = (80, 24)

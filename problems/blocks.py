@@ -1,8 +1,8 @@
-"""Blocks from a deck: own grids and curves, materials, states, sides and links by name.
+"""Blocks from a deck, with your own grids, curves, materials, states, sides and links.
 
-Each `[[block]]` has a grid from a file or is made on four curves; `[[block.side]]` says what is at
-its sides, `[[link]]` which sides of two blocks lie on one another.  Files are looked for beside the
-deck.  The problem measures mean velocity, centre of mass and greatest pressure of each block.
+Each `[[block]]` has a grid from a file or is made on four curves.  `[[block.side]]` says what is at
+its sides, and `[[link]]` which sides of two blocks lie on one another.  Files lie beside the deck.
+The problem measures mean velocity, centre of mass and greatest pressure of each block.
 
 Note: nothing here knows what the flow should be.  A side that is moved by the flow keeps to the
 walls at its ends, and a wall that ends in a corner does not go on beyond it.

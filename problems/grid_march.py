@@ -1,6 +1,6 @@
-"""A grid marched without flow: a named domain bends step by step, a regridder follows.
+"""A grid marched without flow: a named domain bends step by step, and a regridder follows.
 
-For work on regridders.  The domain's shapes are those of `regrid.domains` (tongues, a
+This problem is for work on regridders.  The shapes are those of `regrid.domains` (tongues, a
 100:1 strip, a pinched jet, a shifted rectangle, ...); `cells_a_step` says how far the fastest
 boundary node goes in one step, `noise` shakes the deforming sides by fresh random normal
 displacements every step.  Time runs from 0 to 1 over the whole motion.

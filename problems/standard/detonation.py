@@ -2,10 +2,10 @@
 
 A bar of explosive burns from a plane at its left end, or a square from its lower left corner.  The
 front moves at the speed D of the material's Chapman–Jouguet state and releases its heat over a few
-cells.  Behind it, "wall": the products come to rest, the pressure peaks at pCJ at the front and
-falls behind it in Taylor's wave, which is known exactly; "piston": the end moves at the CJ
-particle speed and the state behind the front is the CJ state itself.  With `clock` below 1 the
-front is lit on that part of the path only and continues by itself.
+cells.  Behind a "wall" the products come to rest; the pressure peaks at pCJ at the front and falls
+behind it in Taylor's wave, which is known exactly.  With a "piston" the end moves at the CJ
+particle speed, and the state behind the front is the CJ state itself.  With `clock` below 1 the
+programmed burn covers that part of the path only, and the front continues by itself.
 
 The problem measures the position of the front, where the pressure is half of pCJ, its speed over
 the last half of the path, the mean pressure behind it (piston) or its peak (wall, point), and the

@@ -1,4 +1,4 @@
-"""Gresho's vortex: a steady round flow with a kinked profile; how much of it is dissipated.
+"""Gresho's vortex: a steady round flow with a kinked profile, and how much of it is lost.
 
 The speed around the centre rises as 5 r to r = 0.2, falls as 2 - 5 r to r = 0.4 and is zero beyond;
 the pressure balances it.  After one turn (t = 0.4 pi) everything should be as it was.  The

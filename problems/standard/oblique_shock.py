@@ -5,7 +5,8 @@ follows the wall.  The flow becomes steady with a straight shock from the corner
 is the weak solution of tan(angle) = 2 cot(beta) (M² sin² beta - 1)/(M² (g + cos 2 beta) + 2).
 The problem measures the pressure on the wall, and the angle of the line of half the pressure jump.
 
-Note: above the largest angle of attached shocks there is no such solution; the deck is refused.
+Note: above the largest angle of attached shocks there is no such solution, and shockgrid refuses
+the deck.
 Source of the relation: any text on gas dynamics, e.g. NACA report 1135 (1953), equation 148.
 """
 

@@ -8,7 +8,7 @@ middle seven tenths of that length: mean, root mean square and worst cell's diff
 exact state.
 
 Note: gas at rest without pressure allows any time step, and one in which the shock leaves the
-piston through several cells at once leaves entropy there permanently; so the first steps are short.
+piston through several cells at once leaves entropy there permanently, so the first steps are short.
 There is no contact to preserve, so HLL on all faces reduces the error in rows of cells that lines
 oblique to the shock leave.
 """

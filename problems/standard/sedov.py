@@ -1,7 +1,7 @@
-"""Sedov's blast wave: the energy of a point in cold gas; plane, cylinder or sphere.
+"""Sedov's blast wave: energy released in a plane, on a line or at a point of cold gas.
 
-All energy is initially in the cell at the centre (in the cells along the wall of a plane blast), as
-pressure, so that the shock is at radius 1 at t = 1.  The grid is rectangular.  Its nodes move
+All energy is initially in the cell at the centre, or in the cells along the wall of a plane blast,
+as pressure, so that the shock is at radius 1 at t = 1.  The grid is rectangular.  Its nodes move
 with the gas ("follow"), which concentrates cells where the gas is, or rest ("fixed").  The problem
 measures the radius of the shock, the mean position where grid lines from the outside first reach
 half of the density's rise, and at the end the relative error of the density against the exact

@@ -8,7 +8,7 @@ its contacts are grid lines, and the point where all three meet is a node of all
 The problem measures the states beside the left contact far from the point, against the plane
 Riemann problems left|bottom and left|top, and the mass of each gas.  Note: a contact of zero
 thickness rolls up without end, and at the point a block's corner would open beyond a straight
-angle, which `hydro.motion.constraints` prevents; finer grids wind further, and the position of the
+angle, which `hydro.motion.constraints` prevents.  Finer grids wind further, and the position of the
 point does not converge.
 """
 

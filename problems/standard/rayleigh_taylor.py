@@ -1,4 +1,4 @@
-"""Rayleigh–Taylor growth of a heavy gas on a light one, or a standing wave on a free surface.
+"""Rayleigh–Taylor growth of a heavy gas on a light one, or a wave on a free surface.
 
 The box has walls, half a wave of wavelength 1, height 1 on either side of y = 0, and gravity 1
 downwards.  With `above` "heavy", gas of density 2 lies over gas of density 1, and a small wave on
@@ -6,7 +6,7 @@ the interface grows as cosh(rate t); without compression rate² = g k/3 tanh k, 
 With "nothing", the wave oscillates on a free surface under constant pressure with omega² = g k tanh
 k, omega = 2.506620.  Surface `tension` sigma reduces rate² by sigma k³/3 tanh k, so that from sigma
 = g/k² = 0.025330 on the wave oscillates, and adds sigma k³ tanh k to omega².  Both layers are
-isentropic, so that only the interface can become unstable, and start in equilibrium;  `sound_speed`
+isentropic, so that only the interface can become unstable, and start in equilibrium; `sound_speed`
 makes them nearly incompressible.
 
 The rate follows from the amplitude at three times a third of the run apart,

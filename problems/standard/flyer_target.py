@@ -1,4 +1,4 @@
-"""A flyer crosses a gap and hits a target: impact, release, separation, speed of the surface.
+"""A flyer crosses a gap and hits a target: impact, release, separation and surface speed.
 
 Plates of given materials stand in a row with gaps between them; the first one has a speed.  Where
 plates meet a contact closes; it opens again where it would go into tension, so plates separate by

@@ -187,9 +187,7 @@ def make_grid(deck: BlocksDeck, block: BlockTable) -> np.ndarray:
     """Nodes (2, ni+1, nj+1) [m] of a block; BadInput, naming it, where there is no valid grid."""
     where = f"block {block.name!r}"
     if bool(block.grid) == (block.curves is not None):
-        raise BadInput(
-            f"deck: {where}: give a grid, the name of a file, or a table curves, and not both"
-        )
+        raise BadInput(f"deck: {where}: give either a grid, the name of a file, or a table curves")
     if block.curves is not None:
         lines = {side: read_curve(block, side) for side in SIDE_NAMES}
         sides = orient_sides(lines, f"deck: {where}", {side: side for side in SIDE_NAMES})
@@ -205,17 +203,13 @@ def check_grid(nodes: np.ndarray, deck: BlocksDeck, block: BlockTable, where: st
         raise BadInput(f"{where}: a 3D grid; blocks are 2D")
     cells = nodes.shape[1] - 1, nodes.shape[2] - 1
     if block.cells is not None and tuple(block.cells) != cells:
-        raise BadInput(
-            f"{where}: the file has a grid of {cells[0]} x {cells[1]} cells; cells = "
-            f"{list(block.cells)} is for blocks made on curves: leave it out"
-        )
+        words = f"leave out cells = {list(block.cells)}, which is for blocks made on curves"
+        raise BadInput(f"{where}: the file has {cells[0]} x {cells[1]} cells; {words}")
     bad = find_bad_cells(nodes)
     if not len(bad):
         return nodes
     if compute_area(nodes) < 0.0:
-        raise BadInput(
-            f"{where}: i and j turn clockwise; mirror one of them (the sides change their names)"
-        )
+        raise BadInput(f"{where}: i and j turn clockwise; mirror one of them: sides change names")
     i, j = (int(index) for index in bad[0])
     raise BadInput(
         f"{where}: {len(bad)} of {cells[0] * cells[1]} cells are not convex, the first is cell "
@@ -274,15 +268,12 @@ def make_on_sides(
         if given is None:
             sides[side] = distribute_by_arc_length(line, count + 1)
         elif sum(given) != count:
-            raise BadInput(
-                f"{where}: curve {side} has {sum(given)} cells in all; the block has {count} "
-                "along it"
-            )
+            words = f"curve {side} has {sum(given)} cells in all; the block has {count} along it"
+            raise BadInput(f"{where}: {words}")
     boundary = make_boundary(sides, None, where)
     if compute_area(np.nan_to_num(boundary)) <= 0.0:
-        raise BadInput(
-            f"{where}: i and j turn clockwise; exchange i_min and i_max, or j_min and j_max"
-        )
+        words = "i and j turn clockwise; exchange i_min and i_max, or j_min and j_max"
+        raise BadInput(f"{where}: {words}")
     try:
         nodes, _ = find_start(boundary)
         return settle(nodes, boundary, deck) if deck.mesh == "regrid" else nodes
@@ -338,11 +329,8 @@ class Blocks(Problem):
                 raise BadInput(f"deck: {names.count(name)} blocks are called {name!r}")
         self.materials = {block.name: find_block_material(block) for block in deck.block}
         deck.regrid.check_weight()
-        if deck.geometry == "axisymmetric" and deck.gravity[1]:
-            raise BadInput(
-                f"deck: gravity = {list(deck.gravity)}: in axisymmetric flow y is the radius; "
-                "gravity is along x, the axis"
-            )
+        across = deck.geometry == "axisymmetric" and deck.gravity[1]
+        deck.refuse(across, "gravity", "in axisymmetric flow y is the radius; it is along x")
         for link in deck.link:
             if link.tension and link.kind == "slide":
                 raise BadInput(f"deck: link: {link.sides}: a sliding contact has no tension")
@@ -375,9 +363,8 @@ class Blocks(Problem):
             for text in link.sides:
                 where, found = f"deck: link: {text!r}", RUN_OF_FACES.fullmatch(text.strip())
                 if not found:
-                    raise BadInput(
-                        f'{where} is not a side; write "block.i_max" or "block.i_max[0:8]"'
-                    )
+                    words = 'is not a side; write "block.i_max" or "block.i_max[0:8]"'
+                    raise BadInput(f"{where} {words}")
                 if (name := found["block"]) not in blocks:
                     raise BadInput(f"{where}: there is no block {name!r}{suggest(name, blocks)}")
                 faces = (int(found["start"]), int(found["stop"])) if found["start"] else ()
@@ -408,9 +395,8 @@ class Blocks(Problem):
         block = Block(table.name, material.eos, nodes, *state, **options)
         for side in table.side:
             if side.kind in LINKED.values():
-                raise BadInput(
-                    f"{where}, side {side.side}: a side of kind {side.kind!r} is made by [[link]]"
-                )
+                words = f"a side of kind {side.kind!r} is made by [[link]]"
+                raise BadInput(f"{where}, side {side.side}: {words}")
             options = collect_options(side, f"{where}, side {side.side}")
             put(block, side.side, side.kind, *side.faces or (), **options)
         return block

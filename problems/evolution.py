@@ -36,8 +36,6 @@ Note: `get_state` must hold *everything* that the next step depends on, or a res
 ends in other bits than an unbroken one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Protocol, TypeAlias, runtime_checkable
 

@@ -31,11 +31,7 @@ from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import Fluid, make_plane_grid, put_walls
 from problems.pictures import name_axis, title_time
 from problems.problem import Problem, Report, average_plateau, compare, get_last
-from problems.references.riemann import (
-    RiemannSolution,
-    compute_cell_averages,
-    solve_riemann,
-)
+from problems.references.riemann import RiemannSolution, compute_cell_averages, solve_riemann
 from regrid.errors import BadInput, suggest
 from regrid.roots import find_root
 

@@ -94,11 +94,8 @@ class Ripple:
     @cached_property
     def first_shock(self) -> tuple[float, float]:
         """When the plane shock reaches the cone's base [s], and its speed in it [m/s]."""
-        shell, filling, (p, u, arrival) = (
-            self.materials["shell"],
-            self.materials["filling"],
-            self.impact,
-        )
+        shell, filling = self.materials["shell"], self.materials["filling"]
+        p, u, arrival = self.impact
         in_shell = shock_to_pressure(shell.eos, shell.rho0, 0.0, p)
         base = solve_riemann(shell.eos, (in_shell.rho, u, p), filling.eos, (filling.rho0, 0.0, 0.0))
         in_cone = shock_with_particle_speed(filling.eos, filling.rho0, 0.0, base.u)

@@ -89,7 +89,8 @@ class ConicalTargetDeck(Deck, kw_only=True):
 
 THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
 AT_REST = 0.01  # of the impactor's speed
-PEAK = ("pressure", "x", "y")  # greatest pressure of a material, and the centre of that cell
+# greatest pressure of a material, and the centre of that cell
+PEAK = {"pressure": "Pa", "x": "m", "y": "m"}
 BEHIND = 5  # cells behind the front: a shock is three or four wide
 
 
@@ -104,11 +105,7 @@ class ConicalTarget(seen.Results, Problem):
         **dict.fromkeys(("pressure_impact", "greatest_pressure"), "Pa"),
         **dict.fromkeys(("shock_pressure_axis", "shock_pressure_side"), "Pa"),
         **{f"pressure_gauge_{number}": "Pa" for number in range(len(seen.GAUGES))},
-        **{
-            f"peak_{n}_{part}": u
-            for part in seen.PARTS
-            for n, u in zip(PEAK, ("Pa", "m", "m"), strict=True)
-        },
+        **{f"peak_{n}_{part}": unit for part in seen.PARTS for n, unit in PEAK.items()},
     }
 
     def __init__(self, deck: ConicalTargetDeck):

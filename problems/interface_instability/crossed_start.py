@@ -12,8 +12,6 @@ that the nearer of the two waves that it leaves is `layer` cells away.  Everythi
   F15.6).  Head and tail of a rarefaction are grid lines.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import dataclass
@@ -103,23 +101,18 @@ class CrossedStart:
             self.y, [flow.amplitude for flow in self.fields]
         )
 
+    @functools.cached_property
+    def sides(self) -> list:
+        """Both blocks."""
+        return [Side(self, sign) for sign in (-1.0, 1.0)]
+
     def make_states(self) -> list[np.ndarray]:
         """rho, u, v, p (4, ni, nj) of the cells of both blocks at the start."""
-        sides = [_Side(self, sign) for sign in (-1.0, 1.0)]
-        signal = max(side.front.measure_signal() for side in sides)
-        return [side.make_state(signal) for side in sides]
-
-    def count_columns(self) -> tuple[int, int]:
-        """Cells along x of both blocks."""
-        first, second = (_Side(self, sign).away.size - 1 for sign in (-1.0, 1.0))
-        return first, second
-
-    def make_grids(self) -> list[np.ndarray]:
-        """First nodes (2, ni + 1, nj + 1) of both blocks."""
-        return [_Side(self, sign).make_nodes() for sign in (-1.0, 1.0)]
+        signal = max(side.front.measure_signal() for side in self.sides)
+        return [side.make_state(signal) for side in self.sides]
 
 
-class _Side:
+class Side:
     """One block in distances outwards from the interface: sign -1 the first, 1 the second."""
 
     def __init__(self, start: CrossedStart, sign: float):

@@ -139,17 +139,14 @@ def _list_wave_faults(
     for name, mode in waves:
         if LEAST_CELLS * mode.number > deck.cells:
             share = deck.cells / mode.number
+            most, least = deck.cells // LEAST_CELLS, LEAST_CELLS * mode.number
             yield (
-                f"{name}.number is {mode.number}, of which a wave has {share:.3g} cells (cells = "
-                f"{deck.cells} per wavelength); waves of fewer than {LEAST_CELLS} hardly grow: "
-                f"take a number up to {deck.cells // LEAST_CELLS}, or cells = "
-                f"{LEAST_CELLS * mode.number}"
+                f"{name}.number is {mode.number}: waves of {share:.3g} cells (fewer than "
+                f"{LEAST_CELLS}) hardly grow: take a number up to {most}, or cells = {least}"
             )
         if deck.sides == "wall" and abs(math.sin(mode.phase)) > SQUARE:
-            yield (
-                f"{name}.phase is {mode.phase:g}; between walls the interface must meet them at a "
-                "right angle, with phase 0 or 3.141592653589793; or take sides = 'periodic'"
-            )
+            words = "with phase 0 or 3.141592653589793; or take sides = 'periodic'"
+            yield f"{name}.phase is {mode.phase:g}; walls meet a line at a right angle, {words}"
     piece, what = (0.5, "halves of waves") if deck.sides == "wall" else (1.0, "waves")
     for name, mode in [*waves, *(("spectrum", mode) for mode in drawn)]:
         count = mode.number * deck.width / piece
@@ -157,8 +154,7 @@ def _list_wave_faults(
             right = max(1, round(count)) * piece / mode.number
             yield (
                 f"width is {deck.width:g} wavelengths, which holds {count:.4g} {what} of mode "
-                f"{mode.number} ({name}); it must hold a whole number, such as width = "
-                f"{right:.12g}"
+                f"{mode.number} ({name}); it must hold whole ones, such as width = {right:.12g}"
             )
             return
 
@@ -168,21 +164,18 @@ def _list_size_faults(deck: InterfaceDeck, rho: tuple[float, float]) -> Iterator
     rows = max(2, round(deck.cells * deck.width))
     aspect = deck.width / rows * deck.cells
     if not 1.0 / FLATTEST <= aspect <= FLATTEST:
+        least = 2.0 / FLATTEST / deck.cells
         yield (
             f"width is {deck.width:g} wavelengths: its {rows} rows are {aspect:.3g} times as high "
-            f"as cells are long (cells = {deck.cells} per wavelength); take a width from "
-            f"{2.0 / FLATTEST / deck.cells:.3g}, or more cells"
+            f"as cells are long; take a width from {least:.3g}, or more cells"
         )
     for place, length in enumerate(deck.lengths or ()):
         if length > LONGEST * deck.wavelength:
-            yield (
-                f"lengths.{place} is {length:g} m, {length / deck.wavelength:.3g} wavelengths; "
-                f"take at most {LONGEST:g} wavelengths, {LONGEST * deck.wavelength:g} m"
-            )
+            most = f"take at most {LONGEST:g} wavelengths, {LONGEST * deck.wavelength:g} m"
+            yield f"lengths.{place} is {length:g} m, too long: {most}"
     ratio = rho[1] / rho[0]
     if not 1.0 / DENSEST <= ratio <= DENSEST:
         yield (
-            f"the second material's density, {rho[1]:g} kg/m3, is {ratio:.3g} times the first's, "
-            f"{rho[0]:g} kg/m3; the ratio has to lie between {1.0 / DENSEST:g} and {DENSEST:g} "
-            "(first.rho, second.rho)"
+            f"the second material's density, {rho[1]:g} kg/m3, is {ratio:.3g} times the first's; "
+            f"that has to lie between {1.0 / DENSEST:g} and {DENSEST:g} (first.rho, second.rho)"
         )

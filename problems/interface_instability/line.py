@@ -8,8 +8,6 @@ harmonics.  Note: `Mode.ka0` of a deck is the amplitude times k of the *waveleng
 number; the slope of mode n is n times that.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Callable, Iterable

@@ -10,8 +10,6 @@ models.
 Use any consistent units: SI for the materials of the library, or rho = p = 1.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Sequence
@@ -67,10 +65,8 @@ class InterfaceInstability(Results, Problem):
     Deck = InterfaceDeck
     measures_sides = True  # far speeds are found by who has the block
     units: ClassVar[dict[str, str]] = {
-        **dict.fromkeys(("interface_mean", "interface_max", "interface_min"), "m"),
-        **dict.fromkeys(("amplitude", "roughness"), "m"),
-        "largest_turn": "deg",
-        "far_transverse_speed": "m/s",
+        **dict.fromkeys(("interface_mean", "interface_max", "interface_min", "amplitude"), "m"),
+        **{"roughness": "m", "largest_turn": "deg", "far_transverse_speed": "m/s"},
     }
 
     def __init__(self, deck: InterfaceDeck, perturbation: Perturbation | None = None):
@@ -340,8 +336,8 @@ class InterfaceInstability(Results, Problem):
 
     def estimate_cells(self) -> int:
         """Rows of the interface times the columns of `spacing`, without making them."""
-        columns = sum(map(self.spacing.count, self.choose_lengths()))
-        return math.ceil(columns * self.count_rows())
+        columns = sum(self.spacing.make(length).size - 1 for length in self.choose_lengths())
+        return columns * self.count_rows()
 
     def make_interface(self) -> np.ndarray:
         """First nodes (2, n) of the interface, a place for each height; lengths are checked."""
@@ -361,7 +357,7 @@ class InterfaceInstability(Results, Problem):
         low, high = self.find_ends()
         columns = [len(self.spacing.make(length)) - 1 for length in self.choose_lengths()]
         if self.start == "crossed":  # whose cells fit to the fronts
-            columns = self.crossed.count_columns()
+            columns = [side.away.size - 1 for side in self.crossed.sides]
             front = front - self.theory.base.u * self.arrival
         spans = (("first", low, front.max()), ("second", front.min(), high))
         plans = [
@@ -379,7 +375,7 @@ class InterfaceInstability(Results, Problem):
         """
         front, y = self.make_interface()
         if self.start == "crossed":
-            grids = self.crossed.make_grids()
+            grids = [side.make_nodes() for side in self.crossed.sides]
             words = "the interface is too steep for a first grid by linear theory; take 'incident'"
             self.deck.refuse(any(len(find_bad_cells(grid)) for grid in grids), "start", words)
             return grids

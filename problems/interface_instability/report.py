@@ -1,7 +1,5 @@
 """Summary and pictures of `interface-instability`: measured growth compared with theory."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -19,7 +17,7 @@ from problems.interface_instability.theories import (
     predict_amplitude,
 )
 from problems.pictures import draw_field, find_dump, name_axis, spread_dumps
-from problems.problem import Report, Row
+from problems.problem import Report, Row, fit_slope
 from regrid.measure.corners import compute_centres
 
 SHOWN = 3  # times drawn beside the growth
@@ -53,17 +51,6 @@ def _predict(problem) -> list[Row]:
     return rows
 
 
-def _measure_speed(problem, column) -> float:
-    """Speed of the mean interface over the last .7 of the time since the shock's arrival.
-
-    NaN where there are too few steps.
-    """
-    after = column["t"] > problem.arrival + 0.3 * (column["t"][-1] - problem.arrival)
-    if after.sum() <= 2:
-        return float("nan")
-    return float(np.polyfit(column["t"][after], column["interface_mean"][after], 1)[0])
-
-
 def find_strongest(modes: Sequence[Harmonic]) -> list[Harmonic]:
     """The MOST_CURVES steepest of the modes, by number."""
     steepest = sorted(modes, key=lambda mode: -abs(mode.number * mode.amplitude))[:MOST_CURVES]
@@ -85,7 +72,9 @@ def _describe_modes(problem) -> str:
 def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
     """Rows of the modes, the speed and the models, and what else is to be said of the growth."""
     theory, growth, notes = problem.theory, Growth(problem), []
-    speed, exact = _measure_speed(problem, column), float(theory.base.u)
+    t, exact = column["t"], float(theory.base.u)
+    after = t > problem.arrival + 0.3 * (t[-1] - problem.arrival)
+    speed = fit_slope(t, column["interface_mean"], after)
     words = "interface speed" if math.isfinite(speed) else ""
     source = "exact Riemann solution"
     last = Row("interface_speed", speed, exact, words, digits=5, studied=True, source=source)

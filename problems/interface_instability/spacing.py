@@ -7,8 +7,6 @@ that it leaves are beyond the finer cells, these grow to the size of the others,
 the sides.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -20,15 +18,24 @@ from regrid.errors import BadInput
 
 ZONE = 0.05  # wavelengths on each side with the finest cells while the shock passes
 GROWTH = 1.1  # of the finer cells, from one to the next beyond that
+MOST = 10 * MOST_CELLS  # cells along a side
 NODE_SPEED = 0.25  # most speed of nodes that are respaced, over that of sound
 
 
 def grow_steps(steps: list[float], stretch: float, length: float) -> list[float]:
-    """The steps and further ones, each `stretch` times the one before, up to `length` or beyond."""
+    """The steps and further ones, each `stretch` times the one before, up to `length` or beyond.
+
+    Raises BadInput for more than a side may have.
+    """
     reach = sum(steps)
     while reach < length * (1.0 - 1e-9):
         steps.append(steps[-1] * stretch)
         reach += steps[-1]
+        if len(steps) > MOST:
+            words = "take fewer `cells`, shorter `lengths`, more `stretch`"
+            raise BadInput(
+                f"deck: a block {length:g} m long would have {MOST} cells and more: {words}"
+            )
     return steps
 
 
@@ -41,12 +48,11 @@ class Spacing:
 
     def make(self, length: float) -> np.ndarray:
         """Distances (n,) [m] of the nodes from the interface, from 0 to `length`."""
-        self.count(length)
         deck = self.deck
         size = deck.wavelength / deck.cells
         steps = list(self._make_finer_steps(size, length))
         even = min(length, deck.uniform * deck.wavelength) - sum(steps)
-        steps += [size] * max(0 if steps else 1, round(even / size))
+        steps += [size] * max(0 if steps else 1, round(min(even / size, MOST)))
         steps = grow_steps(steps, deck.stretch, length)
         positions = np.concatenate([[0.0], np.cumsum(steps)])
         return positions * (length / positions[-1])
@@ -65,21 +71,3 @@ class Spacing:
         last = Spacing(self.deck).make(length)
         nodes = np.linspace(0.0, last.size - 1.0, self.make(length).size)
         return np.interp(nodes, np.arange(last.size), last) / length
-
-    def count(self, length: float) -> float:
-        """Cells of `make` by arithmetic; BadInput for more than a side may have."""
-        deck = self.deck
-        size = deck.wavelength / deck.cells
-        finer = self._make_finer_steps(size, length)
-        even = max(0.0, min(length, deck.uniform * deck.wavelength) - finer.sum())
-        growing = max(0.0, length - even - finer.sum()) / size
-        if deck.stretch > 1.0:
-            rate = deck.stretch - 1.0
-            growing = math.log1p(growing * rate) / math.log1p(rate)
-        columns = max(1.0, even / size) + growing + finer.size
-        if columns > 10.0 * MOST_CELLS:
-            raise BadInput(
-                f"deck: a block {length:g} m long would have {columns:.3g} cells along it; it may "
-                f"have {10 * MOST_CELLS}: take fewer `cells`, shorter `lengths`, more `stretch`"
-            )
-        return columns

@@ -14,8 +14,6 @@ NEAR times off is left out where the other one is nearer.  Note: between two cor
 larger than at both, and all gases measured have gamma 1.4.
 """
 
-from __future__ import annotations
-
 import bisect
 import functools
 import itertools

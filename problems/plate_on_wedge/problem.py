@@ -83,10 +83,7 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     drive: Drive = Drive()
     cells: key(tuple[Cells, Cells], "cells of the plate along and across it") = (80, 24)
     refinement: key(
-        float | None,
-        "how much finer cells at A are. If left out: up to 3 near critical",
-        ge=1,
-        le=8,
+        float | None, "how much finer cells at A are. If left out: at most 3", ge=1, le=8
     ) = None
     until: key(
         Literal["auto", "arrival", "end"], "A at the face's end B, or later; auto: B if refined"

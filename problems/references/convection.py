@@ -7,8 +7,6 @@ ends there; at 1e7 the spectral benchmark of [LeQuere1991] has Nu = 16.523.)  On
 numbers at which a fluid heated from below begins to move, all walls no-slip.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, localcontext
 
@@ -108,8 +106,8 @@ class VerticalPlates:
     peclet: float = 0.0
     mean_speed: float = 0.0
 
-    def _constants(self) -> dict[str, Decimal]:
-        """The constants of the formula, in the current decimal context."""
+    def _constants(self) -> tuple[Decimal, ...]:
+        """P, Re, A, B, C1, C2 and the factors of x and e^(P x) in v, in the current context."""
         p, prandtl = Decimal(self.peclet), Decimal(self.prandtl)
         ra, mean = Decimal(self.rayleigh), Decimal(self.mean_speed)
         if abs(p) < BESIDE:
@@ -128,37 +126,26 @@ class VerticalPlates:
         m1 = c1 * (fast / re - 1) + 1 / (2 * re)
         k = (mean - m0) / m1
         c2 = c0 + c1 * k
-        return {
-            "p": p,
-            "re": re,
-            "a": a,
-            "b": b,
-            "c1": -c2 - shape,
-            "c2": c2,
-            "slope": k / re,
-            "shape": shape,
-        }
+        return p, re, a, b, -c2 - shape, c2, k / re, shape
 
     def sample(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Temperature and velocity at `x` (any shape, from 0 to 1), as floats."""
         with localcontext(DIGITS):
-            c = self._constants()
+            p, re, a, b, c1, c2, slope, shape = self._constants()
             pairs = []
             for position in np.ravel(x):
                 here = Decimal(float(position))
-                layer = (c["p"] * here).exp()
-                temperature = c["a"] + c["b"] * layer
-                velocity = c["c1"] + c["c2"] * (c["re"] * here).exp()
-                velocity += c["slope"] * here + c["shape"] * layer
-                pairs.append((float(temperature), float(velocity)))
+                layer = (p * here).exp()
+                velocity = c1 + c2 * (re * here).exp() + (slope * here + shape * layer)
+                pairs.append((float(a + b * layer), float(velocity)))
         both = np.array(pairs).T.reshape(2, *np.shape(x))
         return both[0], both[1]
 
     def compute_nusselt(self) -> float:
         """Total flux of heat through the slot over kappa dT/L: conduction and through-flow."""
         with localcontext(DIGITS):
-            c = self._constants()
-            return float(c["p"] * c["a"])
+            p, _, a, *_ = self._constants()
+            return float(p * a)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """Exact flows: blasts, detonations, vortices, Kidder's shell, waves under gravity, plate impact."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable
@@ -23,16 +21,16 @@ SHELLS = 4000  # points of the tabulated profile
 
 class SedovBlast:
     """Blast of energy `energy` [J, per m² or m: that of both sides and the full turn] in gas of
-    density `rho0` and ratio of specific heats `gamma`; geometry: a key of DIMENSIONS.
+    density 1 and ratio of specific heats `gamma`; geometry: a key of DIMENSIONS.
 
-    In n dimensions the shock's radius is `R = (E t²/(alpha rho0))^(1/(n+2))`.  Behind it everything
+    In n dimensions the shock's radius is `R = (E t²/alpha)^(1/(n+2))`.  Behind it everything
     depends on r/R alone, in closed form with the parameter V = (n+2) t u/(2 r), [Sedov1959] in the
     form of [Kamm2000].  Raises BadInput where that has a pole (gamma = 2) or the blast is hollow (a
     sphere from gamma = 7 on).
     """
 
-    def __init__(self, geometry: str, gamma: float = 1.4, rho0: float = 1.0, energy: float = 1.0):
-        self.geometry, self.gamma, self.rho0, self.energy = geometry, gamma, rho0, energy
+    def __init__(self, geometry: str, gamma: float = 1.4, energy: float = 1.0):
+        self.geometry, self.gamma, self.energy = geometry, gamma, energy
         n = self.dimensions = DIMENSIONS[geometry]
         if abs(gamma - 2.0) < 0.02:
             raise BadInput(f"sedov: gamma is {gamma:g}; the closed form has a pole at gamma = 2")
@@ -40,7 +38,7 @@ class SedovBlast:
             words = "from 7 on a spherical blast is hollow, and near that the closed form fails"
             raise BadInput(f"sedov: gamma is {gamma:g}; {words}")
         self.positions, self.profile = _make_profile(n, gamma)
-        # E t²/(rho0 R^(n+2)), from the profile in units of rho0, R and t
+        # E t²/R^(n+2), from the profile in units of R and t
         r, (rho, u, p) = self.positions, self.profile
         density = (0.5 * rho * u * u + p / (gamma - 1.0)) * r ** (n - 1)
         inside = 0.5 * ((density[1:] + density[:-1]) * np.diff(r)).sum()
@@ -48,7 +46,7 @@ class SedovBlast:
 
     def radius(self, t: float) -> float:
         """Radius of the shock at time t [m]."""
-        return (self.energy * t * t / (self.alpha * self.rho0)) ** (1.0 / (self.dimensions + 2.0))
+        return (self.energy * t * t / self.alpha) ** (1.0 / (self.dimensions + 2.0))
 
     def sample(self, r: np.ndarray, t: float) -> np.ndarray:
         """Density, velocity and pressure (3, ...) at radii r >= 0 and time t > 0."""
@@ -57,18 +55,13 @@ class SedovBlast:
         position = r / shock
         inside = position <= 1.0
         rho, u, p = (np.interp(position, self.positions, row) for row in self.profile)
-        return np.array(
-            [
-                np.where(inside, self.rho0 * rho, self.rho0),
-                np.where(inside, u * shock / t, 0.0),
-                np.where(inside, self.rho0 * p * (shock / t) ** 2, 0.0),
-            ]
-        )
+        states = (rho, 1.0), (u * shock / t, 0.0), (p * (shock / t) ** 2, 0.0)
+        return np.array([np.where(inside, behind, ahead) for behind, ahead in states])
 
 
 @functools.cache
 def _make_profile(n: int, gamma: float) -> tuple[np.ndarray, np.ndarray]:
-    """Places r/R from 0 to 1, and rho/rho0, u t/R, p t²/(rho0 R²) there, (3, places)."""
+    """Places r/R from 0 to 1, and rho, u t/R, p t²/R² there, (3, places)."""
     m = n + 2.0
     spread = 2.0 + n * (gamma - 1.0)
     a0 = 2.0 / m

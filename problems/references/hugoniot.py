@@ -13,8 +13,6 @@ condensed material goes on below zero pressure, down to a least pressure where c
 density ahead no table holds the pressure behind, only states behind need be in it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -142,15 +140,12 @@ class GeneralIsentrope:
         return result if result.ndim else float(result)
 
     def density(self, p):
-        """Density at the pressures `p` (any shape)."""
         return self._evaluate(p, 0)
 
     def velocity_gain(self, p):
-        """Integral of dp/(rho c) from `p` (any shape) up to the pressure of the first state."""
         return self._evaluate(p, 1)
 
     def sound_speed(self, p):
-        """Sound speed at the pressures `p` (any shape)."""
         return self.eos.sound_speed(self.density(p), np.asarray(p, dtype=float))
 
     def pressure_in_fan(self, speed, p_low: float):

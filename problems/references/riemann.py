@@ -7,18 +7,15 @@ Note: where the materials pull apart there may be no p*; gases then leave a vacu
 materials go into tension unless a cavitation pressure is given, at which they part.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from problems.references.hugoniot import make_isentrope, shock_to_pressure
+from problems.references.hugoniot import RELATIVE, make_isentrope, shock_to_pressure
 from regrid.errors import BadInput
 from regrid.roots import find_root
 
-RELATIVE = 8.9e-16
 GAUSS_POINTS = 8
 
 

@@ -50,8 +50,6 @@ meets the wedge at less than its first density; `release_driven_plate` gives tha
 Jets of incompressible streams: [Birkhoff1948].  Angles are in radians, units SI (or the caller's).
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Sequence
@@ -60,6 +58,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from problems.references.hugoniot import (
+    RELATIVE,
     Shock,
     release,
     shock_to_pressure,
@@ -69,8 +68,6 @@ from problems.references.hugoniot import (
 from problems.references.linear_growth import compute_atwood_number
 from regrid.errors import BadInput
 from regrid.roots import find_root
-
-RELATIVE = 8.9e-16
 
 
 @dataclass(frozen=True)

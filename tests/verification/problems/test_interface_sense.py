@@ -23,7 +23,7 @@ NONSENSE = [
     ({"width": 1e-3, "modes": []}, "its 2 rows are 0.032 times as high as cells are long"),
     ({"lengths": (1.0, 1e18)}, "lengths.1 is 1e.18 m, .*take at most 10000 wavelengths"),
     ({"second": Fluid(rho=1e-12)}, "second material's density, 1e-12 kg/m3, is 1e-12 times"),
-    ({"first": Fluid(rho=1e12)}, "the ratio has to lie between 1e-06 and 1e.06 .first.rho"),
+    ({"first": Fluid(rho=1e12)}, "that has to lie between 1e-06 and 1e.06 .first.rho"),
 ]
 
 

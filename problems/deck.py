@@ -104,7 +104,9 @@ class RunControl(DeckTable, kw_only=True):
 
     t_end: key(float | None, "end time [s]. If left out, the problem chooses it", ge=1e-300) = None
     t_set_up: key(
-        float | None, "end time [s] that lengths and motions are made for. If left out: t_end", gt=0
+        float | None,
+        "end time [s] that lengths and motions are made for. If left out: t_end",
+        ge=1e-300,
     ) = None
     max_steps: key(int | None, "most steps. If left out: no limit", ge=0, le=2**63 - 1) = None
     cfl: key(float, "fraction of the stable time step", ge=1e-3, le=1) = 0.5
@@ -133,7 +135,7 @@ class Output(DeckTable, kw_only=True):
     )  # fmt: skip
 
     dumps: key(int, "evenly over the run besides the first; 0: the last", ge=0, le=1_000_000) = 20
-    every: key(float | None, "time [s] from dump to dump, in place of `dumps`", gt=0) = None
+    every: key(float | None, "time [s] from dump to dump, in place of `dumps`", ge=1e-300) = None
     times: key(list[Annotated[float, Meta(gt=0)]], "times [s] of further dumps") = []
     fields: key(list[str], "fields in light dumps, such as rho and p; none: all there are") = []
     precision: key(Literal["double", "single"], "of fields in light dumps") = "double"
@@ -184,7 +186,7 @@ class Regrid(DeckTable, kw_only=True):
     runtime = ("name", "epsilon", "method", "edge_lengths", "weight", "options")
 
     name: key(str, "name in the registry of regridders") = "barrier"
-    epsilon: key(float, "weight of the orthogonality term of the barrier", gt=0, lt=1) = 1e-3
+    epsilon: key(float, "weight of the orthogonality term of the barrier", ge=1e-12, lt=1) = 1e-3
     method: key(Literal["newton", "sweeps"], "a Newton step, or the paper's iteration") = "newton"
     edge_lengths: key(
         Literal["conditional", "unit"], "lengths that the weights of a line's cells are made from"

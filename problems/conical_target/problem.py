@@ -62,7 +62,7 @@ class ConicalTargetDeck(Deck, kw_only=True):
     run: RunControl = RunControl(t_end=5e-6, cfl=0.8)
     regrid: Regrid = Regrid()
     cells: key(int, "cells from the axis to the shell", ge=16, le=MOST_CELLS) = 48
-    speed: key(float, "of the impactor [m/s]", gt=0, le=1e9) = 2000.0
+    speed: key(float, "of the impactor [m/s]", ge=1e-12, le=1e9) = 2000.0
     impactor: key(str, "material of the impactor") = "Al1100"
     shell: key(str, "material of the shell") = "SS304"
     target: key(str, "material around the cone") = "Pb"

@@ -193,13 +193,13 @@ class AxisGrid(DeckTable, kw_only=True):
         "clustered at walls; polevikov: by the speed; monitor: by gradients; combined: by both",
     ) = "uniform"
     every: key(int, "steps between corrections of the grid", ge=1, le=2**63 - 1) = 1
-    relaxation: key(float, "fraction of a correction that is applied", gt=0, le=1) = 0.7
+    relaxation: key(float, "fraction of a correction that is applied", ge=1e-12, le=1) = 0.7
     ratio: key(float | None, "largest of neighbouring steps. If left out: the default", gt=1) = None
-    floor: key(float, "least speed, as a fraction of the largest", gt=0, lt=1) = 0.02
+    floor: key(float, "least speed, as a fraction of the largest", ge=1e-12, lt=1) = 0.02
     strength: key(float, "of the gradient against the uniform grid", ge=0, le=1e9) = 1.0
     share: key(float, "of polevikov's density of nodes in the combined one", ge=0, le=1) = 0.5
     walls: key(Literal["both", "low", "high"], "where a clustered grid is dense") = "both"
-    clustering: key(float, "strength of a clustered grid's tanh spacing", gt=0, le=20) = 2.0
+    clustering: key(float, "strength of a clustered grid's tanh spacing", ge=1e-12, le=20) = 2.0
 
     def make(self, n: int, low: float = 0.0, high: float = 1.0) -> np.ndarray:
         """The first axis of n steps, shape (n + 1,)."""

@@ -74,7 +74,7 @@ class HeatedCavityDeck(Deck, kw_only=True):
     bottom: Side = Side()
     top: Side = Side()
     grid: AxisGrid = AxisGrid(kind="clustered")
-    tolerance: key(float, "relative change at which a state is steady", gt=0, le=0.1) = 1e-10
+    tolerance: key(float, "relative change at which a state is steady", ge=1e-12, le=0.1) = 1e-10
     longest_step: key(float | None, "of the march [s]. If left out: 1/400 of its time", gt=0) = None
 
 

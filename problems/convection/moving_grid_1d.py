@@ -43,7 +43,7 @@ class PlacingPart(DeckTable, kw_only=True):
 
     strength: key(float, "of the gradient: 2 gives it two thirds of the nodes", ge=0, le=1e9) = 2.0
     ratio: key(float | None, "largest of neighbouring steps. If left out: the default", gt=1) = None
-    relaxation: key(float, "fraction of a correction that is applied", gt=0, le=1) = 0.7
+    relaxation: key(float, "fraction of a correction that is applied", ge=1e-12, le=1) = 0.7
     tau: key(float, "relaxation time [s] of the node speed", ge=1e-12, le=1e9) = 0.005
     start: key(Literal["moving", "rest"], "`after`: node speed at t = 0 known, or 0") = "moving"
 
@@ -51,7 +51,7 @@ class PlacingPart(DeckTable, kw_only=True):
 class MovingGrid1DDeck(Deck, kw_only=True):
     run: RunControl = RunControl(t_end=1.0, cfl=0.5)
     cells: key(int, "cells of each column", ge=16, le=10000) = 160
-    viscosity: key(float, "viscosity [m2/s]; the column is 1 m", gt=0, le=10) = 5e-3
+    viscosity: key(float, "viscosity [m2/s]; the column is 1 m", ge=1e-12, le=10) = 5e-3
     levels: key(tuple[float, ...], "falling values of u [m/s] between fronts") = (1.0, 0.5, 0.0)
     fronts: key(tuple[float, ...], "their places [m] at t = 0", min_length=1) = (0.2, 0.5)
     grid: PlacingPart = PlacingPart()

@@ -50,7 +50,7 @@ class RayleighBenardDeck(Deck, kw_only=True):
     rayleigh: key(float, "Rayleigh number of the height", le=1e12) = 5000.0
     prandtl: key(float, "viscosity over diffusivity", le=1e6) = linear.PRANDTL
     tilt: key(float, "of gravity, anticlockwise from down [degrees]", gt=-90, lt=90) = 0.0
-    amplitude: key(float, "of the first disturbance of the temperature [K]", gt=0, le=1) = 1e-3
+    amplitude: key(float, "of the first disturbance of the temperature [K]", ge=1e-12, le=1) = 1e-3
     onset: key(bool, "search for the onset at the end") = True
     grid: AxisGrid = AxisGrid()
     longest_step: key(float | None, "of the march [s]. If left out: 1/600 of its time", gt=0) = None

@@ -39,8 +39,8 @@ LONGEST = 1e4  # wavelengths in a length
 class SecondShock(DeckTable, kw_only=True):
     """A stronger shock that follows the first."""
 
-    pressure: key(float, "pressure behind it [Pa]", gt=0, le=1e20)
-    kct: key(float, "when the piston sends it: k c t after the first", gt=0, le=1e9) = 6.0
+    pressure: key(float, "pressure behind it [Pa]", ge=1e-12, le=1e20)
+    kct: key(float, "when the piston sends it: k c t after the first", ge=1e-12, le=1e9) = 6.0
 
 
 class LineMotion(DeckTable, kw_only=True):
@@ -68,7 +68,7 @@ class InterfaceDeck(Deck, kw_only=True):
     mach: key(
         float | None, "Mach number. If left out: by shock_pressure, or 1.5", ge=1.001, le=1000
     ) = None
-    shock_pressure: key(float | None, "behind the shock [Pa]", gt=0, le=1e20) = None
+    shock_pressure: key(float | None, "behind the shock [Pa]", ge=1e-12, le=1e20) = None
     second_shock: SecondShock | None = None
     wavelength: key(float, "2 pi / k [m]", ge=1e-12, le=1e12) = 1.0
     modes: key(list[Mode], "harmonics; [] for a spectrum or a line_file alone") = msgspec.field(
@@ -78,13 +78,13 @@ class InterfaceDeck(Deck, kw_only=True):
     line_file: key(
         str | None, "text file of a line, added to the modes: x and y, or x [m]", min_length=1
     ) = None
-    width: key(float, "width of the domain in wavelengths", gt=0, le=LONGEST) = 0.5
+    width: key(float, "width of the domain in wavelengths", ge=1e-12, le=LONGEST) = 0.5
     sides: key(Literal["wall", "periodic"], "what bounds the domain along the interface") = "wall"
     cells: key(int, "cells per wavelength", ge=4, le=MOST_CELLS) = 64
     refine: key(bool, "add grid lines where the interface grows long or bends") = False
     uniform: key(float, "evenly spaced zone on each side, in wavelengths", ge=0, le=1e4) = 1.0
     stretch: key(float, "growth of cells from one to the next beyond it", ge=1, le=1.5) = 1.01
-    reach: key(float, "from the interface, in waves, where grid lines bend", gt=0, le=1e4) = 0.1
+    reach: key(float, "from the interface, in waves, where grid lines bend", ge=1e-12, le=1e4) = 0.1
     lengths: key(
         tuple[float, float] | None, "of both [m]. If left out: too long for reflections to return"
     ) = None
@@ -99,7 +99,7 @@ class InterfaceDeck(Deck, kw_only=True):
     passage_refinement: key(
         float, "start incident: how much finer cells at the interface are at first", ge=1, le=64
     ) = 4.0
-    kct_end: key(float, "end: k c t, c of the shocked second material", gt=0, le=10000) = 30.0
+    kct_end: key(float, "end: k c t, c of the shocked second material", ge=1e-12, le=10000) = 30.0
     limiter: Limiter = "smooth-shear"
     line: LineMotion = LineMotion()
     regrid: Regrid = Regrid()

@@ -146,7 +146,7 @@ class Spectrum(DeckTable, kw_only=True):
     first: key(int, "lowest mode: waves per wavelength", ge=1, le=10000)
     last: key(int, "highest mode", ge=1, le=10000)
     slope: key(float, "amplitudes are proportional to number^slope", ge=-10, le=10) = 0.0
-    ka_rms: key(float, "rms displacement of the interface times k", gt=0, le=10) = 0.01
+    ka_rms: key(float, "rms displacement of the interface times k", ge=1e-12, le=10) = 0.01
     seed: key(int, "of the random numbers", ge=0, le=2**63 - 1) = 0
 
 

@@ -52,8 +52,8 @@ class Drive(DeckTable, kw_only=True):
         "on the plate's back: a piston at `speed`, `pressure`, a flyer at `speed`; moving: the "
         "whole plate comes in at `speed`, the test of shock polars",
     ) = "piston"
-    speed: key(float, "speed of piston, flyer or plate [m/s]", gt=0, le=1e9) = 2500.0
-    pressure: key(float, "driving pressure [Pa]", gt=0, le=1e20) = 50e9
+    speed: key(float, "speed of piston, flyer or plate [m/s]", ge=1e-12, le=1e9) = 2500.0
+    pressure: key(float, "driving pressure [Pa]", ge=1e-12, le=1e20) = 50e9
     history: key(
         tuple[tuple[float, Annotated[float, Meta(ge=0)]], ...],
         "pairs of time [s] and part (0..1) of speed or pressure; straight between",

@@ -33,8 +33,8 @@ class CavityDeck(Deck, kw_only=True):
     run: RunControl = RunControl(cfl=0.8)
     regrid: Regrid = Regrid(epsilon=3e-2)
     material: key(str, "of the body, name or FILE.toml:NAME") = "Al1100"
-    speed: key(float, "of the piston [m/s]", gt=0, le=1e5) = 1000.0
-    radius: key(float, "of the void [m]", gt=0, le=1e3) = 1e-3
+    speed: key(float, "of the piston [m/s]", ge=1e-12, le=1e5) = 1000.0
+    radius: key(float, "of the void [m]", ge=1e-9, le=1e3) = 1e-3
     before: key(float, "piston from the void's centre, in radii", gt=1, le=100) = 2.5
     behind: key(float, "free surface behind the void, in radii", gt=1, le=100) = 5.0
     width: key(float, "half of the channel's width, in radii", gt=1, le=100) = 3.0

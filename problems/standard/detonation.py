@@ -42,7 +42,7 @@ class DetonationDeck(Deck, kw_only=True):
     length: key(float, "of the bar or square [m]", ge=1e-9, le=1e6) = 0.1
     cells: key(int, "cells along the length", ge=20, le=MOST_CELLS) = 200
     front: key(float, "width of the front in cells", ge=1, le=100) = 4.0
-    clock: key(float, "part of the path that is lit; the front then goes on", gt=0, le=1) = 1.0
+    clock: key(float, "part of the path that is lit; the front then goes on", ge=1e-12, le=1) = 1.0
     limiter: Limiter = "van-leer"
 
 

@@ -28,7 +28,7 @@ from problems.references.exact_flows import compute_plate_impact
 
 class PlateTable(DeckTable, kw_only=True):
     material: key(str, "name of a material, or FILE.toml:NAME") = "Cu"
-    thickness: key(float, "[m]", gt=0, le=1e3) = 2e-3
+    thickness: key(float, "[m]", ge=1e-9, le=1e3) = 2e-3
     cells: key(int, "cells across it", ge=2, le=MOST_CELLS) = 160
     gap: key(float, "to the plate before it [m]; of the first: 0", ge=0, le=1e3) = 0.0
 
@@ -39,7 +39,7 @@ PLATES = PlateTable(material="Al1100", thickness=1e-3, cells=100), PlateTable(ga
 class FlyerTargetDeck(Deck, kw_only=True):
     run: RunControl = RunControl(t_end=1.6e-6, cfl=0.8)
     regrid: Regrid = Regrid()
-    speed: key(float, "of the first plate [m/s]", gt=0, le=1e5) = 1000.0
+    speed: key(float, "of the first plate [m/s]", ge=1e-12, le=1e5) = 1000.0
     plates: key(tuple[PlateTable, ...], "from left to right", min_length=2, max_length=12) = PLATES
     rows: key(int, "cells along the plates", ge=2, le=MOST_CELLS) = 2
     void_fill: VoidFill = VoidFill()

@@ -43,7 +43,7 @@ class SaltzmannDeck(Deck, kw_only=True):
     cells: key(int, "cells along the tube, which is 1 m long", ge=10, le=MOST_CELLS) = 100
     rows: key(int, "cells across; the tube is 0.1 m wide", ge=2, le=MOST_CELLS) = 10
     skew: key(float, "largest displacement of the grid lines [m]", ge=0, le=0.25) = 0.1
-    pressure: key(float, "of the gas at rest; exact is 0 [Pa]", gt=0, le=0.01) = 1e-6
+    pressure: key(float, "of the gas at rest; exact is 0 [Pa]", ge=1e-12, le=0.01) = 1e-6
     limiter: Limiter = DEFAULT_LIMITER
     flux: key(Literal["hllc", "hll"], "hllc: HLL at shocks only; hll: on all faces") = "hll"
 

@@ -35,7 +35,7 @@ class SedovDeck(Deck, kw_only=True):
     cells: key(int, "cells along each side", ge=8, le=MOST_CELLS) = 100
     size: key(float, "length of the sides", ge=1e-9, le=1e9) = 1.2
     gamma: key(float, "ratio of specific heats", ge=1.01, le=1000) = 1.4
-    pressure: key(float, "of the cold gas; exact theory has 0", gt=0, le=0.01) = 1e-8
+    pressure: key(float, "of the cold gas; exact theory has 0", ge=1e-12, le=0.01) = 1e-8
     mesh: key(
         Literal["follow", "fixed"] | None, "nodes follow the gas, or rest. If left out: plane: rest"
     ) = None

@@ -58,7 +58,7 @@ NULL = ("embedded null byte", "embedded null character")  # what Python says of 
 
 def describe_error(error: Exception) -> tuple[int, str]:
     """The exit code for an error that ends a command, and the sentence about it."""
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or "unable to allocate memory" in str(error):  # HDF5's words
         return BAD_INPUT, "not enough memory; fewer cells need less"
     if isinstance(error, BadInput | RunFailure):
         return BAD_INPUT if isinstance(error, BadInput) else FAILED, str(error)

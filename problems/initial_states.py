@@ -174,7 +174,7 @@ class RadialProblem(Problem):
 
     def measure_error(self, evolution, within: float = np.inf) -> float:
         """At the end the relative error of the density against its means over cells, sum |rho -
-        exact| V / sum exact V, in r < within; NaN before."""
+        exact| V / sum exact V, in r < within; NaN before, and where no cell lies within."""
         if evolution.finished is None:
             return math.nan
         (block,) = evolution.blocks
@@ -187,7 +187,8 @@ class RadialProblem(Problem):
         exact = average_points(block.nodes, places, sample)
         weight = block.volume * (self.compute_radii(block.centres) < within)
         error = np.abs(block.state[0, 1:-1, 1:-1] - exact)
-        return float((error * weight).sum() / (exact * weight).sum())
+        whole = float((exact * weight).sum())
+        return float((error * weight).sum()) / whole if whole > 0.0 else math.nan
 
     def list_notes(self, history) -> list[str]:
         """Sentences below the report."""

@@ -178,7 +178,7 @@ Length = Annotated[float, Meta(gt=0)]
 class SideState(Fluid, kw_only=True):
     """One state: a material of the library or an ideal (stiffened) gas, with rho, u, p."""
 
-    u: key(float, "velocity [m/s]", ge=-1e12, le=1e12) = 0.0
+    u: key(float, "velocity [m/s]") = 0.0
     p: key(float, "pressure [Pa]", le=1e20) = 0.0
 
     def get_state(self) -> tuple[EquationOfState, tuple[float, float, float]]:

@@ -234,7 +234,7 @@ class Results:
         jump = abs(theory.base.p - self.shock.p)
         reflected = theory.reflected if jump > NO_WAVE * self.shock.p else "none"
         head = [
-            f"shock to p = {self.shock.p:g} through rho = {self.rho_first:g} onto rho = "
+            f"shock to p = {self.shock.p:g} from rho = {self.rho_first:g} into rho = "
             f"{self.rho_second:g}; {_describe_modes(self)}, "
             f"{deck.cells} cells per wavelength, to k c t = {kct:.3g}",
             f"  reflected wave: {reflected}, Atwood number after the shock {theory.atwood:.3f}",

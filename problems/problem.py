@@ -426,15 +426,19 @@ def estimate_memory(cells: int, blocks: Sequence[int] = ()) -> float:
 
 
 def find_memory() -> float | None:
-    """Bytes of memory of this machine; None where it does not say (Windows)."""
+    """Bytes of memory that this process may have; None where the system does not say (Windows)."""
     try:
-        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (AttributeError, OSError, ValueError):
+        import resource
+
+        memory = float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+        limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    except (ImportError, AttributeError, OSError, ValueError):
         return None
+    return memory if limit == resource.RLIM_INFINITY else min(memory, float(limit))
 
 
 def check_memory(problem: Problem) -> None:
-    """Raise BadInput for a problem whose cells the machine's memory does not hold."""
+    """Raise BadInput for a problem whose cells the memory does not hold."""
     cells, memory = problem.estimate_cells(), find_memory()
     if memory is None or (wanted := estimate_memory(cells)) <= memory:
         return
@@ -442,6 +446,6 @@ def check_memory(problem: Problem) -> None:
     if fit < LARGE:
         fit = max(0, int((memory - PROGRAM) / RUN_BYTES))
     raise BadInput(
-        f"deck: {cells:.4g} cells need about {wanted / 1e9:.3g} GB of memory, this machine has "
-        f"{memory / 1e9:.3g} GB; take fewer cells, at most about {fit:.2g} fit"
+        f"deck: {cells:.4g} cells need about {wanted / 1e9:.3g} GB of memory, where "
+        f"{memory / 1e9:.3g} GB are there; take fewer cells, at most about {fit:.2g} fit"
     )

@@ -95,7 +95,7 @@ def test_what_memory_does_not_hold_is_said_at_once(small_machine, name, settings
     deck = resolve_deck({"problem": name}, "deck", tuple(s.format(most) for s in settings))
     tracemalloc.start()
     try:
-        with pytest.raises(BadInput, match=r"this machine has .*; take fewer cells, at most"):
+        with pytest.raises(BadInput, match=r"where .* GB are there; take fewer cells, at most"):
             describe_plan(deck)  # says the size where a plan is arithmetic; a run refuses it
             size.check_memory(deck.make_problem())
         assert tracemalloc.get_traced_memory()[1] < 100e6

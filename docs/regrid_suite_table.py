@@ -78,7 +78,7 @@ def _compare_common(document: dict, rows: dict) -> list[str]:
         values += [f"{median(r['mean_rate'] / least[r['march']] for r in own):.2f}"]
         values += [f"{median(r['cost'] for r in own):.2g}"]
         table.append([f"`{who}`", *values])
-    words = f"The {len(common)} plane marches to whose end all of these came; medians and worst."
+    words = f"Medians and worst over the {len(common)} plane marches that all of these completed:"
     return [words, "", *make_table(heads, table)]
 
 

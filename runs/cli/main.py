@@ -60,7 +60,9 @@ max_wall = click.option(
     metavar="TIME",
     help="Stop with a restart point before this time (2h, 90m, 1:30:00).",
 )
-limits = click.option("--limits", metavar="LOW,HIGH", help="Limits of the colours, SI units.")
+limits = click.option(
+    "--limits", metavar="LOW,HIGH", help="Limits of the colours, in units of the deck."
+)
 colours = click.option("--colours", metavar="NAME", help="A colour map of matplotlib.")
 
 

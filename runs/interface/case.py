@@ -76,8 +76,8 @@ class Drawn:
         stand in place of a field.  at: times [s] of dumps, "start" or "end"; mesh: draw the grid
         over the fields; zoom: x0, x1, y0, y1 [m]; mirror: "x" or "y" completes a half domain;
         beside: the directory of another run, drawn to the same scale; line: x0, y0, x1, y1 [m], the
-        fields along it are drawn; limits: low, high of the colours in SI units; colours: a colour
-        map.  Raises BadInput for what there is not.
+        fields along it are drawn; limits: low, high of the colours in units of the deck; colours: a
+        colour map.  Raises BadInput for what there is not.
         """
         from runs.pictures.command import Wanted, fill_figure, new_figure
 

@@ -24,7 +24,7 @@ from regrid.errors import BadInput
 from runs.inspection.account import compute_drifts
 from runs.pictures import fields
 from runs.pictures.fields import View
-from runs.quantities import is_time, pick_prefix
+from runs.quantities import add_unit, is_time, pick_prefix
 from runs.store.dumps import LONG_NAMES
 from runs.store.files import check_free, make_csv, write_atomically
 from runs.store.reader import Dump, RunData
@@ -124,10 +124,12 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
     if view.zoom:
         axes.set_xlim(view.zoom[0] * scale, view.zoom[1] * scale)
         axes.set_ylim(view.zoom[2] * scale, view.zoom[3] * scale)
-    figure.colorbar(ScalarMappable(norm, colours), ax=axes, label=f"t [{unit}]")
+    figure.colorbar(ScalarMappable(norm, colours), ax=axes, label=name_axis("t", unit))
     first, last = shapes[0][0] * factor, shapes[-1][0] * factor
     note = ", axes not to one scale" if stretched else ""
-    axes.set_title(f"interface, t = {first:.4g} to {last:.4g} {unit}{note}", fontsize=10)
+    axes.set_title(
+        f"interface, t = {first:.4g} to {add_unit(last, unit or '1', 4)}{note}", fontsize=10
+    )
 
 
 LEAST = 1e-9  # of the line: shorter pieces touch a corner only
@@ -244,9 +246,9 @@ def write_csv(
 ) -> Path:
     """One row a cell: run, step, t, block, i, j, x, y, way, fields; the head has the units."""
     first = lineouts[0][0].dump
-    units = [f"{name} [{fields.get_style(first, name).unit}]" for name in names]
-    heads = ["run", "step", f"t [{first.t_unit}]", "block", "i", "j"]
-    places = [f"{name} [{first.length_unit}]" for name in (*first.axes, "way")]
+    units = [name_axis(name, fields.get_style(first, name).unit) for name in names]
+    heads = ["run", "step", name_axis("t", first.t_unit), "block", "i", "j"]
+    places = [name_axis(name, first.length_unit) for name in (*first.axes, "way")]
     rows = [[*heads, *places, *units]]
     for run, title in zip(lineouts, runs, strict=True):
         for dump, columns in run:

@@ -32,6 +32,8 @@ from problems.deck import (
     Deck,
     DeckTable,
     Limiter,
+    Name,
+    Options,
     Regrid,
     RunControl,
     VoidFill,
@@ -63,7 +65,6 @@ State = tuple[Formula, Formula, Formula, Formula]
 Points = Annotated[tuple[tuple[float, float], ...], Meta(min_length=2)]
 Vector = tuple[float, float]
 Numbers = dict[str, int | float | str]
-Options = dict[str, bool | int | float | str]
 First = Annotated[int, Meta(ge=0, le=10**9)]
 Count = Annotated[int, Meta(ge=1, le=4000)]
 Cells = Annotated[int, Meta(ge=2, le=4000)]
@@ -109,7 +110,7 @@ class BlockSide(DeckTable, kw_only=True):
 class BlockTable(DeckTable, kw_only=True):
     """One block: its grid, its material, its state and its sides."""
 
-    name: key(str, "name, for links and files", pattern="^[A-Za-z][A-Za-z0-9_-]*$")
+    name: key(Name, "name, for links and files")
     grid: key(str, "file of its grid, or of its four curves: .npz, .h5, .vts, .vtk") = ""
     grid_block: key(str, "which of several blocks in that file") = ""
     curves: key(Curves | None, "its four sides, where there is no file of a grid") = None

@@ -46,6 +46,8 @@ def key(kind: Any, description: str, **bounds: Any) -> Any:
     return key(Union[tuple(parts)], description, **bounds) | None  # noqa: UP007
 
 
+Name = Annotated[str, Meta(pattern="^[A-Za-z][A-Za-z0-9_-]*$")]
+Options = dict[str, bool | int | float | str]
 NONE: Any = msgspec.field(default_factory=dict)  # of a key that is a table by name: no entry
 Limiter = key(  # the names of hydro.formulas.reconstruction.LIMITERS
     Literal["low-mach", "smooth-shear", "monotonised-central", "van-leer", "minmod"],
@@ -155,12 +157,7 @@ Field = Literal["rho", "u", "v", "p", "e", "c"]
 class Gauge(DeckTable, kw_only=True):
     """A point, or a line of points, at which the flow is written down after every step."""
 
-    name: key(
-        str,
-        "head of its columns in gauges.csv; points of a line add _1, _2, ...",
-        pattern="^[A-Za-z][A-Za-z0-9_-]*$",
-        max_length=40,
-    )
+    name: key(Name, "head of its columns in gauges.csv; a line's add _1, _2, ...", max_length=40)
     at: key(tuple[float, float], "place [x, y] [m], a line's first one")
     to: key(tuple[float, float] | None, "a line's last place [x, y] [m]") = None
     count: key(int, "points of a line, evenly from `at` to `to`", ge=1, le=10000) = 1
@@ -188,13 +185,9 @@ class Regrid(DeckTable, kw_only=True):
     name: key(str, "name in the registry of regridders") = "barrier"
     epsilon: key(float, "weight of the orthogonality term of the barrier", ge=1e-12, lt=1) = 1e-3
     method: key(Literal["newton", "sweeps"], "a Newton step, or the paper's iteration") = "newton"
-    edge_lengths: key(
-        Literal["conditional", "unit"], "lengths that the weights of a line's cells are made from"
-    ) = "conditional"
+    edge_lengths: key(Literal["conditional", "unit"], "for a line's weights") = "conditional"
     weight: key(str, "where cells are to be small: a formula such as 1 + 5*|grad(rho)|/max") = ""
-    options: key(
-        dict[str, bool | int | float | str], "more options of the regridder, passed on unchanged"
-    ) = {}
+    options: key(Options, "more options of the regridder, passed on unchanged") = {}
 
     def check_weight(self, fields: tuple[str, ...] = FIELDS) -> None:
         """Raise BadInput for a weight that is no formula or has names other than `fields`'."""

@@ -59,9 +59,7 @@ class GridMarchDeck(Deck, kw_only=True):
     ni: key(int, "cells away from the deforming side", ge=2, le=4000) = 60
     nj: key(int, "cells along the deforming side", ge=2, le=4000) = 40
     transposed: key(bool, "exchange i and j, x and y") = False
-    cells_a_step: key(
-        float, "cells that the fastest boundary node goes in a step", gt=0, le=1e9
-    ) = 0.5
+    cells_a_step: key(float, "cells that the fastest node goes in a step", gt=0, le=1e9) = 0.5
     noise: key(float, "normal noise of deforming sides, in node spacings (std)", ge=0, le=0.5) = 0.0
     seed: key(int, "seed of the noise", ge=0, le=2**63 - 1) = 0
     regrid: Regrid = Regrid()

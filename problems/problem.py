@@ -175,12 +175,7 @@ def average_plateau(edges: np.ndarray, values: np.ndarray, ends: tuple[float, fl
 
 
 def reduce_between(
-    reduce: Callable[[np.ndarray], Any],
-    x: np.ndarray,
-    values: np.ndarray,
-    low: float,
-    high: float,
-    least: int = 1,
+    reduce: Callable, x: np.ndarray, values: np.ndarray, low: float, high: float, least: int = 1
 ) -> float:
     """What `reduce`, such as np.mean, makes of values (n,) at places x between two; NaN of fewer
     than `least`."""
@@ -442,9 +437,7 @@ def check_memory(problem: Problem) -> None:
     cells, memory = problem.estimate_cells(), find_memory()
     if memory is None or (wanted := estimate_memory(cells)) <= memory:
         return
-    fit = max(0, int((memory - PROGRAM) / LARGE_BYTES))
-    if fit < LARGE:
-        fit = max(0, int((memory - PROGRAM) / RUN_BYTES))
+    fit = max(0.0, cells * (memory - PROGRAM) / (wanted - PROGRAM))
     raise BadInput(
         f"deck: {cells:.4g} cells need about {wanted / 1e9:.3g} GB of memory, where "
         f"{memory / 1e9:.3g} GB are there; take fewer cells, at most about {fit:.2g} fit"

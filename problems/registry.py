@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import ast
 import importlib
 import importlib.util
 from collections import ChainMap
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from problems.problem_file import is_problem_file, read_head, read_problem_file
@@ -79,7 +77,7 @@ def read_docstring(name: str) -> str:
         return ""
     if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
         return ""
-    return ast.get_docstring(ast.parse(Path(spec.origin).read_text(encoding="utf-8"))) or ""
+    return read_head(spec.origin)
 
 
 def summary_line(name: str) -> str:

@@ -209,8 +209,6 @@ class RiemannDeck(Deck, kw_only=True):
 
 
 class Riemann(Problem):
-    """One or two blocks along x, a few cells across."""
-
     Deck = RiemannDeck
     counted, measures_sides = ("cells", "rows"), True
 

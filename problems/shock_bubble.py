@@ -128,11 +128,8 @@ class ShockBubbleDeck(Deck, kw_only=True):
 
 class ShockBubble(Problem):
     Deck = ShockBubbleDeck
-    units: ClassVar = {
-        **dict.fromkeys(("upwind", "downwind", "rear", "height", "axis_front", "wall_front"), "m"),
-        "volume": "m2",
-        "upwind_speed": "m/s",
-    }
+    places = "upwind", "downwind", "rear", "height", "axis_front", "wall_front"
+    units: ClassVar = {**dict.fromkeys(places, "m"), "volume": "m2"}
     measures_sides = True  # the bubble's outline, the axis and the wall
 
     def __init__(self, deck: ShockBubbleDeck):
@@ -338,8 +335,7 @@ class ShockBubble(Problem):
 
     def draw_space_time(self, figure, run_data) -> None:
         """Places of the bubble's ends and of the shocks over time, and the measured velocities."""
-        history, axis = run_data.history, figure.subplots()
-        figure.set_size_inches(7.5, 6.0)
+        history, axis = run_data.history, make_panels(figure, 7.5, 6.0)
         t = (history["t"] - self.arrival) / MICRO
         inside = history["axis_front"] < self.far_end - 1e-3
         columns = {

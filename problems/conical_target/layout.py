@@ -81,8 +81,6 @@ class Ripple:
 
     def check(self, cells: int, grids: dict[str, np.ndarray]) -> None:
         """Raise BadInput for waves of too few of the side's `cells`, or grids that they fold."""
-        if not self:
-            return
         number = cells * self.wavelength / self.frame.length
         least = LEAST_CELLS * self.frame.length / cells
         words = f"that are {number:.3g} cells; give at least {least:.3g} m, or more `cells`"

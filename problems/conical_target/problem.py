@@ -71,18 +71,14 @@ class ConicalTargetDeck(Deck, kw_only=True):
     front: key(float, "thickness of the shell's front [m]", ge=1e-9, le=1e3) = 3e-3
     side: key(float, "thickness of the shell's side [m]", ge=1e-9, le=1e3) = 4e-3
     radius: key(float, "inside the shell [m]", ge=1e-9, le=1e3) = 16e-3
-    cover: key(
-        float, "radius of the shell's front [m]; `radius`: it is closed", ge=1e-9, le=1e3
-    ) = 12.5e-3
+    cover: key(float, "of the front [m]; `radius`: the shell is closed", ge=1e-9, le=1e3) = 12.5e-3
     length: key(float, "inside the shell [m]", ge=1e-9, le=1e3) = 26e-3
     base: key(float, "radius of the cone's base [m]", ge=1e-9, le=1e3) = 9e-3
     tip: key(float, "radius of the cone's blunt tip [m]", ge=1e-9, le=1e3) = 2e-3
     cone: key(float, "length of the cone [m]", ge=1e-9, le=1e3) = 14e-3
     ripple_amplitude: key(float, "of a ripple on the cone's side [m]; 0: none", ge=0, le=1e3) = 0.0
     ripple_wavelength: key(float, "along the cone's side [m]", ge=1e-9, le=1e3) = 4e-3
-    ripple_phase: key(
-        float, "of the sine that begins at the cone's base [rad]", ge=-1e6, le=1e6
-    ) = 0.0
+    ripple_phase: key(float, "of its sine at the cone's base [rad]", ge=-1e6, le=1e6) = 0.0
     contact: Contact = Contact()
     eos: EosNumbers = EosNumbers()
 
@@ -95,8 +91,6 @@ BEHIND = 5  # cells behind the front: a shock is three or four wide
 
 
 class ConicalTarget(seen.Results, Problem):
-    """Seven blocks: impactor, the shell's front and side, graphite, lead in three parts."""
-
     Deck = ConicalTargetDeck
     measures_sides = True  # peaks are found by who has the block
     units: ClassVar[dict[str, str]] = {

@@ -250,6 +250,12 @@ class BoxProblem(Problem):
         march = March(equations, self.fluid, psi, temperature, cfl=run.cfl, longest=longest)
         return TimeEvolution(march, self.deck.grid.control(), self.t_end, coldest)
 
+    def describe(self) -> str:
+        """The fluid and the grid in words."""
+        deck, (across, up) = self.deck, self.size
+        fluid = f"Ra = {deck.rayleigh:g}, Pr = {deck.prandtl:g}"
+        return f"{fluid}, {across} x {up} cells, grid {deck.grid.kind}"
+
     def say_lost_volume(self, history) -> str:
         """A sentence on the conservation of volume in the last step."""
         lost = get_last(history, "mass_residual")
@@ -270,8 +276,7 @@ class BoxProblem(Problem):
         nodal = compute_nodal_fields(equations, restrict_nodes(equations, psi), heat)[2]
         wide = np.ptp(x) > 1.6 * np.ptp(y)
         high = float(np.clip(3.7 * np.ptp(y) / np.ptp(x) + 0.9, 3.0, 9.0))
-        figure.set_size_inches((7.0, 7.0) if wide else (10.5, high))
-        axes = figure.subplots(2, 1) if wide else figure.subplots(1, 2)
+        axes = make_panels(figure, 7.0, 7.0, 2) if wide else make_panels(figure, 10.5, high, 1, 2)
         largest = float(np.abs(psi).max()) or 1.0
         shades = np.linspace(psi.min(), psi.max(), 41) if np.ptp(psi) else 3
         pale = 1.4 * largest  # so that the lines stay visible on the strongest shade
@@ -293,8 +298,7 @@ class BoxProblem(Problem):
         """Local Nusselt number along two walls in the last dump, and the reference's maximum."""
         _, equations, heat = self.read_dump(run_data.dumps[-1])
         state = equations, self.fluid, heat
-        figure.set_size_inches(7.0, 4.6)
-        axis, (hot, cold) = figure.subplots(), self.hot_and_cold
+        axis, (hot, cold) = make_panels(figure, 7.0, 4.6), self.hot_and_cold
         for side, colour, sign, way in ((hot, "C3", 1.0, "in"), (cold, "C0", -1.0, "out")):
             positions, values = compute_local_nusselt(*state, side, self.scale)
             words = f"{SIDES[side]} wall, {way}"

@@ -55,6 +55,10 @@ class Convection1D(Problem):
         super().__init__(deck)
         words = "nothing would rise or sink, with mean_speed = 0; give one of them"
         deck.refuse(deck.rayleigh == deck.mean_speed == 0.0, "rayleigh", words)
+        self.words = (
+            f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}, {deck.cells} cells, "
+            f"grid {deck.grid.kind}"
+        )
         self.exact = VerticalPlates(deck.rayleigh, deck.prandtl, deck.peclet, deck.mean_speed)
 
     def make_column(self, scheme: str | None = None) -> columns.Column:
@@ -80,10 +84,6 @@ class Convection1D(Problem):
     def report(self, history, final=None) -> Report:
         """Errors of the profiles at the end, and the heat through the slot."""
         deck, change = self.deck, get_last(history, "change")
-        head = (
-            f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}, {deck.cells} cells, "
-            f"grid {deck.grid.kind}, scheme {deck.scheme}"
-        )
         rows = [
             compare(history, "error_T", label="largest error of T [K]", digits=3),
             compare(history, "error_v", label="largest error of v, of its largest", digits=3),
@@ -95,7 +95,7 @@ class Convection1D(Problem):
                 f"NOT STEADY: the state still changes by {change:.1e} in a diffusive time, and the "
                 "exact profiles are the steady ones; a longer time (run.t_end)"
             )
-        return Report(head, rows, notes)
+        return Report(f"{self.words}, scheme {deck.scheme}", rows, notes)
 
     def draw_profiles(self, figure, run_data) -> None:
         """Temperature and velocity in the last dump over the exact profiles, nodes below.
@@ -112,11 +112,7 @@ class Convection1D(Problem):
             width = max(width, 3.0 * np.diff(x)[last])
             windows.append((1.0 - width, 1.0) if last else (0.0, width))
         figure.set_size_inches(9.0, 3.8 * len(windows))
-        figure.suptitle(
-            f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}, {deck.cells} cells, "
-            f"grid {deck.grid.kind}, t = {dump.t:.3g} s",
-            fontsize="medium",
-        )
+        figure.suptitle(f"{self.words}, t = {dump.t:.3g} s", fontsize="medium")
         centres = 0.5 * (x[1:] + x[:-1])
         labels = {"T": "temperature [K]", "v": "velocity along the plates [m/s]"}
         panels = figure.subplots(len(windows), 2, squeeze=False)

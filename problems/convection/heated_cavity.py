@@ -51,10 +51,8 @@ class Side(DeckTable, kw_only=True):
     def make(self, name: str):
         """The wall for the solver; BadInput where heat and value contradict."""
         if self.heat == "adiabatic" and self.value != 0.0:
-            raise BadInput(
-                f"{name}.value = {self.value:g} contradicts {name}.heat = 'adiabatic'; "
-                "take heat = 'flux' or 'isothermal'"
-            )
+            words = f"{name}.heat = 'adiabatic'; take 'flux' or 'isothermal'"
+            raise BadInput(f"{name}.value = {self.value:g} contradicts {words}")
         what = {"flux": "flux", "isothermal": "temperature"}.get(self.heat)
         return Wall(self.flow, **({what: self.value} if what else {}))
 
@@ -127,23 +125,17 @@ class HeatedCavity(BoxProblem):
 
     def find_reference(self) -> CavityState | None:
         """The reference of this deck; None where there is none for it."""
-        deck, usual = self.deck, HeatedCavityDeck()
-        same = all(getattr(deck, name) == getattr(usual, name) for name in ("top", "bottom"))
-        same = same and deck.left.heat == deck.right.heat == "isothermal"
-        same = same and deck.left.flow == deck.right.flow == "no-slip"
-        same = same and math.isclose(deck.left.value - deck.right.value, 1.0)
-        x, y = self.fluid.buoyancy
+        deck, (x, y), ends = self.deck, self.fluid.buoyancy, (self.deck.left, self.deck.right)
+        same = all((side.heat, side.flow) == ("isothermal", "no-slip") for side in ends)
+        same &= math.isclose(ends[0].value - ends[1].value, 1.0)
+        same &= deck.top == deck.bottom == Side()
         if not same or deck.aspect != 1.0 or deck.prandtl != PRANDTL or x != 0.0 or y < 0.0:
             return None
         return STATES.get(deck.rayleigh)
 
     def report(self, history, final=None) -> Report:
         """The quantities of the reference, with its values where there are any."""
-        deck, reference, (across, up) = self.deck, self.find_reference(), self.size
-        head = (
-            f"Ra = {deck.rayleigh:g}, Pr = {deck.prandtl:g}, {across} x {up} cells, "
-            f"grid {deck.grid.kind}"
-        )
+        deck, reference, head = self.deck, self.find_reference(), self.describe()
         rows = [
             compare(history, name, getattr(reference, name, math.nan), words)
             for name, words in ROWS.items()

@@ -26,6 +26,7 @@ from hydro.convection import measure
 from hydro.convection.box import PERIODIC, adiabatic, isothermal, make_fluid
 from problems.convection.boxes import AxisGrid, BoxProblem
 from problems.deck import Deck, Output, RunControl, key
+from problems.pictures import make_panels
 from problems.problem import Report, Row, compare
 from problems.references import convection as linear
 from regrid.errors import BadInput
@@ -146,17 +147,14 @@ class RayleighBenard(BoxProblem):
                 notes.append("growth in time: beside the eigenvalue")
         rows.append(compare(history, "nusselt", label="Nu, floor"))
         rows.append(compare(history, "nusselt_top", label="Nu, ceiling"))
-        head = (
-            f"{deck.shape}, Ra = {deck.rayleigh:g}, Pr = {deck.prandtl:g}, {deck.cells} x "
-            f"{deck.cells_up} cells, grid {deck.grid.kind}"
+        return Report(
+            f"{deck.shape}, {self.describe()}", rows, [*notes, self.say_lost_volume(history)]
         )
-        return Report(head, rows, [*notes, self.say_lost_volume(history)])
 
     def draw_growth(self, figure, run_data) -> None:
         """Kinetic energy and Nusselt number against time, with the growth of the eigenvalue."""
         t, energy = run_data.history["t"], run_data.history["kinetic_energy"]
-        figure.set_size_inches(10.0, 4.4)
-        left, right = figure.subplots(1, 2)
+        left, right = make_panels(figure, 10.0, 4.4, 1, 2)
         left.semilogy(t, energy, lw=1.4, label="kinetic energy")
         if self.deck.tilt == 0.0:
             rate = self.compute_growth(self.make_first_equations())[1]

@@ -24,7 +24,7 @@ from hydro.motion.line import THICK_CELLS, LineRule, Respacing
 from hydro.rows import V
 from hydro.simulation import Simulation
 from problems.deck import MOST_CELLS, check_digests
-from problems.initial_states import settle_shock
+from problems.initial_states import put_walls, settle_shock
 from problems.interface_instability.crossed_start import CLEAR, CrossedStart, find_nearer_speed
 from problems.interface_instability.deck import InterfaceDeck, check_sense
 from problems.interface_instability.line import (
@@ -40,7 +40,7 @@ from problems.interface_instability.line import (
 )
 from problems.interface_instability.report import Results
 from problems.interface_instability.spacing import NODE_SPEED, ZONE, Spacing
-from problems.interface_instability.theories import find_cautions
+from problems.interface_instability.theories import Growth, find_cautions
 from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import (
     Shock,
@@ -60,8 +60,6 @@ FAR = 0.25  # part of each block, counted from its far side, that is called the 
 
 
 class InterfaceInstability(Results, Problem):
-    """Two blocks, one interface, one shock or two."""
-
     Deck = InterfaceDeck
     measures_sides = True  # far speeds are found by who has the block
     units: ClassVar[dict[str, str]] = {
@@ -134,14 +132,9 @@ class InterfaceInstability(Results, Problem):
                     f"{ways[short[0]]:.3g} m"
                 )
         if self.deck.start == "crossed":
-            if fault:
-                raise BadInput(
-                    f"deck: start = 'crossed' begins after the shock has crossed the interface, "
-                    f"and {fault}; take start = 'incident'"
-                )
+            self.deck.refuse(fault, "start", f"{fault}; take 'incident'")
             return "crossed"
-        slope = sum(abs(h.number * self.k * h.amplitude) for h in self.harmonics)
-        return "crossed" if not fault and slope <= MOST_SLOPE else "incident"
+        return "crossed" if not fault and Growth(self).first_slope <= MOST_SLOPE else "incident"
 
     def _choose_since(self) -> float:
         """Time [s] from the shock's arrival at the mean line to a start after the passage."""
@@ -211,11 +204,10 @@ class InterfaceInstability(Results, Problem):
         return places
 
     def _sum_modes(self, modes: list[Mode], y: np.ndarray) -> np.ndarray:
-        if not modes:
-            return np.zeros_like(y)
-        return sum(
+        waves = (
             mode.ka0 / self.k * np.cos(mode.number * self.k * y + mode.phase) for mode in modes
         )
+        return sum(waves, np.zeros_like(y))
 
     def _find_free_lines(self, perturbation: Perturbation | None, even: bool) -> list[FreeLine]:
         """Lines that are no sums of modes: of the deck's file, of a function."""
@@ -444,13 +436,9 @@ class InterfaceInstability(Results, Problem):
             put(second, "i_max", "inflow", state=ahead, velocity=speed)
         else:
             put(first, "i_min", "piston", velocity=self.make_piston())
-            put(second, "i_max", "wall")
-        for block in blocks:
-            if deck.sides == "wall":
-                put(block, "j_min", "wall")
-                put(block, "j_max", "wall")
-            else:
-                links.append(join("periodic", (block, "j_min"), (block, "j_max")))
+        if deck.sides == "periodic":
+            links += [join("periodic", (block, "j_min"), (block, "j_max")) for block in blocks]
+        put_walls(*blocks)
         # The sides that deform are known.  Lines straight from wall to wall, too, would meet the
         # walls at an angle; with their mirror images they make a kink, and the crest gets one.
         # Each line keeps the law that it has at first: a mean of the outer ones' would bend lines.

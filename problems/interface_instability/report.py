@@ -291,11 +291,8 @@ class Results:
             picture = draw_field(axes, dump, "rho", title=title, **style)
             axes.set_xlim(*window)
         if panels:
-            figure.colorbar(
-                picture,
-                ax=panels,
-                label=name_axis("density", "kg/m3" if self.t_unit == "s" else "1"),
-            )
+            label = name_axis("density", "kg/m3" if self.t_unit == "s" else "1")
+            figure.colorbar(picture, ax=panels, label=label)
 
     def draw_spectrum(self, figure, run) -> None:
         """k a of each mode by its number at some times, and the line at these times.

@@ -304,9 +304,8 @@ def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str
     if single:  # waves that are back from the far ends before the run's end
         told += [
             f"waves return to the interface from the far end of the {name} material at t = "
-            f"{t:.4g} s, k c t = {float(get_kct(problem, t)):.3g}, and the run ends at t = "
-            f"{problem.t_end:.4g} s: later growth is not that of an open interface; for that begin "
-            "a new run with longer `lengths`, or without them and run.t_set_up"
+            f"{t:.4g} s, k c t = {float(get_kct(problem, t)):.3g}: later growth is not that of an "
+            "open interface; for that run anew with longer `lengths`, or none and no run.t_set_up"
             for name, t in problem.find_echoes().items()
             if t < problem.t_end
         ]

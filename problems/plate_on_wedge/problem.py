@@ -27,7 +27,7 @@ from hydro.boundary import put
 from hydro.eos.materials import find_material
 from hydro.links import join, slide
 from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, check_solid, key
-from problems.initial_states import make_plane_grid
+from problems.initial_states import make_plane_grid, put_walls
 from problems.plate_on_wedge.report import COLUMNS, WIDE_ZONE, Results
 from problems.plate_on_wedge.run import PlateRun
 from problems.problem import Problem
@@ -72,9 +72,7 @@ class PlateOnWedgeDeck(Deck, kw_only=True):
     thickness: key(float, "of the plate [m]", ge=1e-9, le=1e3) = 10e-3
     wedge: key(str, "material of the wedge body") = "SS304"
     angle: key(float, "between plate and wedge face [degrees]", ge=0.5, le=75) = 20.0
-    gap: key(
-        float, "over the wedge's edge at the start [m]; above 0: bodies apart", ge=0, le=1e3
-    ) = 0.0
+    gap: key(float, "over the wedge's edge at first [m]; above 0: apart", ge=0, le=1e3) = 0.0
     face: key(float, "length of the wedge's face [m]", ge=1e-9, le=1e3) = 30e-3
     edge: key(float, "length of the flat edge on which the plate lies [m]", ge=1e-9, le=1e3) = 10e-3
     overhang: key(float, "of the plate beyond the end of the face [m]", ge=1e-9, le=1e3) = 10e-3
@@ -96,8 +94,6 @@ FINER_ROWS = 0.75  # power of the refinement by which rows are finer: torn cells
 
 
 class PlateOnWedge(Results, Problem):
-    """Plate, wedge, drive: checked, built, run and measured, with their shock polars."""
-
     measures_sides = True  # jet and shocks are found by who has the block
     Deck = PlateOnWedgeDeck
     units: ClassVar = {
@@ -268,12 +264,9 @@ class PlateOnWedge(Results, Problem):
             links.append(join("interface", (plate, "j_max"), (flyer[0], "j_min")))
         if drive.kind in ("moving", "flyer"):
             put(*flyer or [plate], "j_max", "free-surface")
-        for block in blocks:
-            put(block, "i_min", "wall")
-            if block is not wedge:
-                put(block, "i_max", "wall" if deck.right == "symmetry" else "free-surface")
-        put(wedge, "i_max", "free-surface")
-        put(wedge, "j_min", "wall")
+        for block in blocks if deck.right == "free" else [wedge]:
+            put(block, "i_max", "free-surface")
+        put_walls(*blocks)
         return self.simulate(blocks, links, kind=functools.partial(PlateRun, self))
 
     def measure(self, evolution: PlateRun) -> dict[str, float]:

@@ -361,11 +361,8 @@ class Results:
             f"degrees, this one is {abs(critical - deck.angle):.2f} {state}",
         ]
         if theory.attached and zone < WIDE_ZONE:
-            words = "no zone of constant states behind A"
-            if zone > 0.0:
-                words = (
-                    f"the zone of constant states behind A is {100.0 * zone:.1f} % of A's path long"
-                )
+            part = max(100.0 * zone, 0.0)
+            words = f"the zone of constant states behind A is {part:.1f} % of A's path long"
             lines.append(
                 f"  near critical: the flow leaves A at Mach {theory.plate.mach_behind:.2f} in the "
                 f"plate, {theory.wedge.mach_behind:.2f} in the wedge; {words}"
@@ -388,19 +385,13 @@ class Results:
         away = math.degrees(self.critical) - deck.angle
         near = f"{away:.2g} degrees below the critical angle the pressure behind A"
         finer = f"cells=[{FINE_CELLS}, {math.ceil(FINE_CELLS * deck.cells[1] / cells)}]"
+        words = f"was found up to 5 % low with {COARSE_CELLS} cells" * (away < NEAR_CRITICAL)
         if cells < COARSE_CELLS:
-            return [
-                f"{near} was never compared with theory at fewer than {COARSE_CELLS} cells along "
-                f"the plate; take {finer}"
-            ]
-        if self.refinement <= 1.0 and self.zone < SHORT_ZONE:
+            words = f"was never compared with theory at fewer than {COARSE_CELLS} cells along it"
+        elif self.refinement <= 1.0 and self.zone < SHORT_ZONE:
             finer = "refinement=3" if deck.drive.kind == "moving" else "refinement=2, until=arrival"
-            return [
-                f"{near} was found 5 to 8 % low with {COARSE_CELLS} unrefined cells; take {finer}"
-            ]
-        if away < NEAR_CRITICAL:
-            return [f"{near} was found up to 5 % low with {COARSE_CELLS} cells; take {finer}"]
-        return []
+            words = f"was found 5 to 8 % low with {COARSE_CELLS} unrefined cells"
+        return [f"{near} {words}; take {finer}"] if words else []
 
     def draw_phases(self, figure, run) -> None:
         """Pressure with the grid at several times, all in one frame."""

@@ -31,9 +31,7 @@ class NohDeck(Deck, kw_only=True):
     cells: key(int, "cells along each side, 1 long", ge=8, le=MOST_CELLS) = 100
     gamma: key(float, "ratio of specific heats", ge=1.01, le=1000) = 5.0 / 3.0
     pressure: key(float, "of the cold gas; exact theory has 0", ge=1e-8, le=0.01) = 1e-6
-    shrink: key(
-        float, "rate at which the grid shrinks to the centre [1/s]; 0: fixed", ge=0, le=1e9
-    ) = 0.0
+    shrink: key(float, "rate of the grid's shrinking [1/s]; 0: fixed", ge=0, le=1e9) = 0.0
     limiter: Limiter = "monotonised-central"
 
 

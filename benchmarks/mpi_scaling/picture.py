@@ -53,5 +53,5 @@ def _draw_cases(axes: Axes, projection: Mapping[str, Any]) -> None:
                           xytext=(6, 6), textcoords="offset points", fontsize=8)  # fmt: skip
     axes.axhline(assumed["least efficiency"], color="grey", lw=0.8)
     axes.set(xscale="log", ylim=(0.0, 1.1), xlabel="ranks", ylabel="efficiency")
-    axes.set_title("Carried to more ranks: 10⁷ cells (strong), 10⁴ a rank (weak)", fontsize=10)
+    axes.set_title("Model for more ranks: 10⁷ cells (strong), 10⁴ per rank (weak)", fontsize=10)
     axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)

@@ -403,7 +403,7 @@ class Results:
             shape.plot(*(MM * line), lw=1.0, label=label)
             away.plot(part, MM * departure, lw=1.0, label=label)
         shape.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
-        words = "off its own straight line [mm]"
-        away.set(xlabel="part of the side's length, from the base", ylabel=words)
+        words = "deviation from its straight line [mm]"
+        away.set(xlabel="fraction of the side's length from the base", ylabel=words)
         for end in MIDDLE:
             away.axvline(end, color="0.7", lw=0.6)

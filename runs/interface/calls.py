@@ -31,8 +31,13 @@ from runs.interface.case import (
     said_in_python,
     say,
 )
-from runs.march.launching import check_changeable, read_restart_deck
-from runs.march.runner import Runner, check_output
+from runs.march.launching import (
+    check_changeable,
+    check_requests,
+    read_restart_deck,
+    remap_runner,
+)
+from runs.march.runner import Runner
 from runs.ranks.started import check_single
 from runs.store.directory import RunDirectory, open_directory
 
@@ -185,8 +190,6 @@ def restart(
     opened = open_directory(directory)
     words = make_settings(settings)
     if cells is not None:
-        from runs.march.launching import remap_runner
-
         if hooks:
             raise BadInput(
                 "hooks: a restart on other cells has none; restart the result with hooks"
@@ -205,9 +208,10 @@ def restart(
             read = read_restart_deck(opened, words, at)
             case = Case(read, read.make_problem())
         # the simulation says what is missing where the blocks are a script's
-        check_output(case.read.deck.output, case.simulation)
+        gauges = check_requests(case.read, case.simulation)
     after_step = join_hooks(case, hooks)
-    runner = Runner(case.read, opened, case.problem, case.simulation, quiet, after_step=after_step)
+    flow = case.problem, case.simulation
+    runner = Runner(case.read, opened, *flow, gauges, quiet, after_step)
     return case.march(runner, lambda: runner.resume(at), quiet)
 
 

@@ -17,17 +17,17 @@ import msgspec
 from hydro.history import compute_chosen_columns, find_columns
 from hydro.simulation import Simulation
 from problems.deck import Deck, Output, Regrid
-from problems.evolution import Evolution
+from problems.evolution import Evolution, get_node_fields
 from problems.problem import Problem, check_memory
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
 from regrid.jit import interpreted
 from runs.deck.checking import find_differences, is_runtime_key, list_runtime_keys, show
 from runs.deck.reading import ReadDeck, resolve_deck
 from runs.forecast import foretell
-from runs.gauges import make_gauges
+from runs.gauges import Gauges, make_gauges
 from runs.inspection.account import describe_cautions
 from runs.march.compiling import compiling
-from runs.march.runner import Runner, check_output, check_times
+from runs.march.runner import Runner
 from runs.ranks.map import check_cut
 from runs.ranks.world import World
 from runs.store.directory import (
@@ -77,13 +77,29 @@ def check_regridder(problem: Problem) -> None:
             raise BadInput(f"deck: {error}") from error
 
 
-def check_requests(read: ReadDeck, evolution: Evolution) -> None:
-    """Raise BadInput for dumps, gauges and columns that a freshly built evolution cannot give."""
+def check_requests(read: ReadDeck, evolution: Evolution) -> Gauges:
+    """The gauges of a deck in a freshly built evolution; BadInput for what it cannot give: gauges,
+    cut blocks, dumps after its end, fields, columns."""
     output: Output = read.deck.output
-    make_gauges(read.deck, evolution)
+    gauges = make_gauges(read.deck, evolution)
     check_cut(read.deck.run.cut, [block.name for block in evolution.blocks])
-    check_output(output, evolution)
+    check_times(output, evolution.t_end)
+    there = {name for b in evolution.blocks for name in (*b.cell_fields, *get_node_fields(b))}
+    for name in output.fields:
+        if name not in there:
+            hint = suggest(name, sorted(there), cutoff=0.6)
+            raise BadInput(f"deck: output.fields has {name!r}; no block has such a field{hint}")
     compute_chosen_columns(evolution, find_columns(output.columns))
+    return gauges
+
+
+def check_times(output: Output, t_end: float) -> None:
+    """Raise BadInput for a time of a dump past the end of the run."""
+    late = [time for time in output.times if time > t_end]
+    if late:
+        raise BadInput(
+            f"deck: output.times has {late[0]:g}, which is after the end of the run, t = {t_end:g}"
+        )
 
 
 def start_runner(
@@ -107,7 +123,7 @@ def start_runner(
         if world is not None:
             world.build(deck)
         evolution = built[1] if built else problem.build()
-        check_requests(deck, evolution)  # refused before there is a directory
+        gauges = check_requests(deck, evolution)  # refused before there is a directory
         if world is not None:
             world.check(evolution)
         lines, of_disk = foretell(deck, problem, evolution, output)
@@ -115,7 +131,7 @@ def start_runner(
     if not quiet:
         head = f"{deck.problem} ({deck.described}) in {directory}"
         say("\n".join([head, *lines, *cautions, *of_disk]))
-    return Runner(deck, directory, problem, evolution, quiet)
+    return Runner(deck, directory, problem, evolution, gauges, quiet)
 
 
 def continue_runner(
@@ -138,11 +154,11 @@ def continue_runner(
         if world is not None:
             world.build(deck)
         evolution = problem.build()
-        check_output(deck.deck.output, evolution)
+        gauges = check_requests(deck, evolution)
         if deck.deck.run.t_set_up is not None and not quiet:
             for line in describe_cautions(problem):
                 say(line)
-    return Runner(deck, directory, problem, evolution, quiet)
+    return Runner(deck, directory, problem, evolution, gauges, quiet)
 
 
 def read_restart_deck(
@@ -275,7 +291,7 @@ def remap_runner(
             f"--cells: {deck.problem} is not only a flow on blocks, and what else it holds cannot "
             "be laid on other cells; begin a new run with the cells wanted"
         )
-    gauges = make_gauges(deck.deck, target)  # points of the material are those of the first state
+    gauges = check_requests(deck, target)  # points of the material are those of the first state
     state, step, (rows,) = find_restart_point(old, at, say, [old.history])
     restore(source, state, old, step)
     with compiling(quiet):
@@ -297,7 +313,7 @@ def remap_runner(
             f"this run has finished ({target.finished}): its end is remapped to the other cells; "
             f"continue with --set run.t_end=T, T > {target.t:.6g}"
         )
-    runner = Runner(deck, directory, deck.make_problem(), target, quiet, gauges=gauges)
+    runner = Runner(deck, directory, deck.make_problem(), target, gauges, quiet)
     runner.columns, runner.restored = columns, True
     runner.remapped = f"the history up to step {step} is that of {old}, on its cells"
     return runner

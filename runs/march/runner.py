@@ -27,18 +27,17 @@ import numpy as np
 
 from hydro.history import compute_chosen_columns, find_columns
 from problems.deck import Output
-from problems.evolution import Evolution, get_missed, get_node_fields, get_start_row
+from problems.evolution import Evolution, get_missed, get_start_row
 from problems.problem import Problem
-from regrid.errors import BadInput, RunFailure, suggest
+from regrid.errors import BadInput, RunFailure
 from regrid.jit import read_clock
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import ENDS
-from runs.gauges import Gauges, make_gauges
+from runs.gauges import Gauges
 from runs.inspection import account
 from runs.march.compiling import compiling
 from runs.march.progress import Outlook, Progress, describe_gauges, describe_threads
 from runs.quantities import count, describe_seconds, describe_time, is_time
-from runs.ranks.map import check_cut
 from runs.ranks.world import World, describe_ranks
 from runs.store.directory import RunDirectory, keep_problem_file, write_noted
 from runs.store.dumps import EMPTY, Names, list_arrays, make_image
@@ -151,25 +150,6 @@ def is_dump_due(output: Output, t_end: float, t_before: float, t: float) -> bool
     return math.floor(t * output.dumps / t_end) > math.floor(t_before * output.dumps / t_end)
 
 
-def check_output(output: Output, evolution: Evolution) -> None:
-    """Raise BadInput for a time of a dump past the end and for a field that no block has."""
-    check_times(output, evolution.t_end)
-    there = {name for b in evolution.blocks for name in (*b.cell_fields, *get_node_fields(b))}
-    for name in output.fields:
-        if name not in there:
-            hint = suggest(name, sorted(there), cutoff=0.6)
-            raise BadInput(f"deck: output.fields has {name!r}; no block has such a field{hint}")
-
-
-def check_times(output: Output, t_end: float) -> None:
-    """Raise BadInput for a time of a dump past the end of the run."""
-    late = [time for time in output.times if time > t_end]
-    if late:
-        raise BadInput(
-            f"deck: output.times has {late[0]:g}, which is after the end of the run, t = {t_end:g}"
-        )
-
-
 MISSED = "not-steady"  # the cause of an end that is not what the run is for
 
 
@@ -195,11 +175,12 @@ class Runner:
         directory: RunDirectory,
         problem: Problem,
         evolution: Evolution,
+        gauges: Gauges,
         quiet: bool = False,
-        gauges: Gauges | None = None,
         after_step: Callable[[float], str | None] | None = None,
     ):
-        """after_step: called after each step with the time before it; words end the run."""
+        """gauges: what `check_requests` (`runs.march.launching`) has found good; after_step: called
+        after each step with the time before it; words end the run."""
         self.deck = deck
         self.after_step = after_step
         self.deck_text = deck.to_toml()
@@ -209,11 +190,9 @@ class Runner:
         self.evolution = evolution
         self.columns: list[str] | None = None
         self.chosen = find_columns(deck.deck.output.columns)
-        compute_chosen_columns(evolution, self.chosen)  # refused before anything is written
-        check_cut(deck.deck.run.cut, [block.name for block in evolution.blocks])
         self.last_point: int | None = None
         self.sidecar = Sidecar(directory.sidecar)
-        self.gauges = gauges or make_gauges(deck.deck, evolution)
+        self.gauges = gauges
         self.limit: WallLimit | None = None  # of wall time; whoever starts the run may set one
         self.writing = Background()
         self.world: World | None = None  # ranks of MPI that share the run; set like the limit

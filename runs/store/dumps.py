@@ -149,7 +149,8 @@ def make_image(
     while _KEPT:
         _KEPT.popitem()[1][0].close()
     file = h5py.File(h5py.h5f.open_file_image(image, WRITABLE))
-    places = {path: file[path].id.get_offset() for path in _list_stored(arrays, linked)}
+    stored = _list_stored(arrays, linked)
+    places = {path: h5py.h5d.open(file.id, path.encode()).get_offset() for path in stored}
     _KEPT[form] = file, places
     return _refill(*_KEPT[form], evolution, arrays, linked)
 

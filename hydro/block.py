@@ -61,9 +61,9 @@ class PerimeterPlan:
     (n, 3): the others, for kernels, with their kinds and the rows of the states beyond; `pistons`:
     walls that move, by number, whose velocities are in `wall_speeds` (n, 2); `inwards` (faces,): of
     which the next cells inwards are asked; `moving` (n, 2): the spans of faces that go with the
-    flow; `counted`: the spans of segments without a partner, and of those under surface tension,
-    through which totals change; `is_slave`: does a sliding contact lay nodes of these segments on
-    another's line?
+    flow; `counted` (n, 2): the spans of segments without a partner, and of those under surface
+    tension, through which totals change; `is_slave`: does a sliding contact lay nodes of these
+    segments on another's line?
     """
 
     def __init__(self, segments: Sequence[Any], faces: int = 0):
@@ -83,7 +83,8 @@ class PerimeterPlan:
         self.inwards = np.zeros(faces, dtype=np.bool_)
         for segment in segments:
             self.inwards[segment.first : segment.last] = segment.moves
-        self.counted = [(s.first, s.last) for s in segments if not s.linked or s.tension > 0.0]
+        counted = [(s.first, s.last) for s in segments if not s.linked or s.tension > 0.0]
+        self.counted = _collect(counted, 2)
         self.is_slave = any(segment.is_slave for segment in segments)
 
 

@@ -93,12 +93,12 @@ class Cavity(Problem):
         closing = find_time(history, history["void_width"] <= 1e-6 * deck.radius)
         left = max(float(size[-1] / size[0]), 0.0)
         most = find_most(history, "most_pressure") if math.isfinite(closing) else math.nan
-        words = "greatest speed of the jet; plane free surface [m/s]"
+        words = "greatest speed of the jet (theory: plane surface) [m/s]"
         rows = [
-            Row("arrival", arrival, self.arrival, "shock at the void [s]", digits=5),
+            Row("arrival", arrival, self.arrival, "arrival of the shock at the void [s]", digits=5),
             Row("near_speed", find_most(history, "jet_speed"), near, words, digits=5, off=" "),
-            Row("closing", closing, label="it hits the far side [s]", digits=4),
-            Row("shock_pressure", most, p, "greatest pressure then [GPa]", 1e9, 4, off=" "),
+            Row("closing", closing, label="impact of the jet on the far side [s]", digits=4),
+            Row("shock_pressure", most, p, "pressure of the impact [GPa]", 1e9, 4, off=" "),
             Row("left", left, label="void left at the end [%]", unit=0.01, digits=3),
         ]
         head = f"cavity: void of {1e3 * deck.radius:g} mm radius in {deck.material}, piston at"

@@ -96,19 +96,19 @@ class FlyerTarget(Problem):
         rows = [
             Row("impact", impact, theory.impact, "time of impact [s]", digits=5),
             Row("pressure", pressure, theory.pressure, "pressure [GPa]", 1e9, 5),
-            Row("out", out, theory.out, "shock at the free surface [s]", digits=5),
-            Row("free", free, theory.free, "free surface [m/s]", digits=5),
-            Row("end", end, theory.end, "until the release [s]", digits=5),
+            Row("out", out, theory.out, "arrival of the shock at the free surface [s]", digits=5),
+            Row("free", free, theory.free, "speed of the free surface [m/s]", digits=5),
+            Row("end", end, theory.end, "arrival of the release [s]", digits=5),
         ]
         rows = [row for row in rows[: 5 if self.is_pair else 2] if not np.isnan(row.theory)]
         first, notes = deck.plates[0], []
         plate = f"{first.material} of {1e3 * first.thickness:g} mm at {deck.speed:g} m/s"
         if self.is_pair:
-            notes.append(f"behind the impact both go at {theory.u:.5g} m/s")
+            notes.append(f"behind the impact both plates move at {theory.u:.5g} m/s")
         for name in self.names if history else ():
-            notes.append(f"{name} goes at {history[f'speed_{name}'][-1]:.5g} m/s in the end")
+            notes.append(f"{name} moves at {history[f'speed_{name}'][-1]:.5g} m/s at the end")
         if parted.any():
-            notes.append(f"plates parted first at t = {find_time(history, parted):.4g} s")
+            notes.append(f"plates first separated at t = {find_time(history, parted):.4g} s")
         return Report(f"flyer-target: {plate}, {len(deck.plates)} plates", rows, notes)
 
     def draw_flyer_target(self, figure, run_data) -> None:

@@ -110,7 +110,9 @@ class RunControl(DeckTable, kw_only=True):
         "end time [s] that lengths and motions are made for. If left out: t_end",
         ge=1e-300,
     ) = None
-    max_steps: key(int | None, "most steps. If left out: no limit", ge=0, le=2**63 - 1) = None
+    max_steps: key(
+        int | None, "greatest number of steps. If left out: no limit", ge=0, le=2**63 - 1
+    ) = None
     cfl: key(float, "fraction of the stable time step", ge=1e-3, le=1) = 0.5
     small_cells: key(
         float | None,
@@ -120,7 +122,10 @@ class RunControl(DeckTable, kw_only=True):
         le=0.1,
     ) = None
     threads: key(
-        int | None, "number, results do not change. If left out: one per large block", ge=1, le=1024
+        int | None,
+        "threads; results stay the same. If left out: one per large block",
+        ge=1,
+        le=1024,
     ) = None
     cut: key(
         dict[str, Annotated[int, Meta(ge=1, le=1024)]],

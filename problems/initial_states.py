@@ -282,18 +282,9 @@ class Front:
         return max(abs(u - contact) + 2.0 * float(sound(rho, p)) for rho, u, p in states)
 
 
-@dataclass(frozen=True)
-class SettledFront:
-    """Density, velocity outwards and pressure (n,) of the cells from number `first` on."""
-
-    first: int
-    rho: np.ndarray
-    u: np.ndarray
-    p: np.ndarray
-
-
-def settle_front(front: Front, *, cfl: float, limiter: str) -> SettledFront:
-    """The cells about a settled shock; beyond them the uniform states go on.
+def settle_front(front: Front, *, cfl: float, limiter: str) -> tuple[int, np.ndarray]:
+    """The cells about a settled shock: the number of the first, and density, velocity outwards and
+    pressure (3, n) of all; beyond them the uniform states go on.
 
     The shock's place is that of the mass in these cells.  For a material of ours the result is kept
     in the cache of kernels, until a file of the packages changes.
@@ -305,7 +296,7 @@ def settle_front(front: Front, *, cfl: float, limiter: str) -> SettledFront:
     return remember("settled", words, lambda: _settle(front, cfl, limiter))
 
 
-def _settle(front: Front, cfl: float, limiter: str) -> SettledFront:
+def _settle(front: Front, cfl: float, limiter: str) -> tuple[int, np.ndarray]:
     nodes, place, contact = front.nodes, front.place, front.behind[1]
     size, lowest = nodes[1] - nodes[0], place - RUN_IN - MARGIN  # number of the strip's first node
     numbers = np.arange(lowest, min(place + AHEAD + 4, nodes.size - 1) + 1)
@@ -330,8 +321,7 @@ def _settle(front: Front, cfl: float, limiter: str) -> SettledFront:
         excess = ((rho - front.ahead[0]) * np.diff(last))[kept].sum()
         shift -= excess / (front.behind[0] - front.ahead[0]) - (nodes[place] - last[kept][0])
     start = max(0, place - KEPT)
-    part = slice(start - lowest, None)
-    return SettledFront(start, rho[part], u[part], p[part])
+    return start, np.array([rho, u, p])[:, start - lowest :]
 
 
 def run_strip(

@@ -234,10 +234,8 @@ class Side:
             if abs(self.behind[2] - self.ahead[2]) > LEAST_JUMP * abs(self.ahead[2]):
                 deck = self.start.problem.deck
                 cfl = deck.run.cfl * self.front.measure_signal() / signal
-                settled = settle_front(self.front, cfl=cfl, limiter=deck.limiter)
-                here = slice(settled.first, min(count, settled.first + settled.rho.size))
-                taken = slice(0, here.stop - here.start)
-                row[:, here] = settled.rho[taken], settled.u[taken], settled.p[taken]
+                first, settled = settle_front(self.front, cfl=cfl, limiter=deck.limiter)
+                row[:, first : first + settled.shape[1]] = settled[:, : count - first]
             jump = self.behind[1] - self.ahead[1]
             return row, (row[1] - self.ahead[1]) / jump if jump else np.zeros(count)
         edges = self.start.base.u * self.start.since + self.sign * self.away

@@ -85,7 +85,7 @@ class InterfaceInstability(Results, Problem):
         if late := deck.second_shock:
             words = f"it must be above the pressure behind the first shock, {self.shock.p:g}"
             deck.refuse(late.pressure <= self.shock.p, "second_shock.pressure", words)
-            words = "it is found for one shock only; with a second_shock give `lengths` too"
+            words = "with a second_shock it must be given; it is found for one shock only"
             deck.refuse(deck.lengths is None, "lengths", words)
         even = deck.sides == "wall"
         drawn = draw_modes(deck, even)

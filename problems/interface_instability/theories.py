@@ -252,20 +252,20 @@ def sort_cautions(
     where = f"Mach {machs_told}, density ratio {ratios_told}"
     if not near:
         where += f" (none nearer to {ratio:.3g} was measured)"
-    chosen = []
+    found = []
     for corner in itertools.product(near_machs, near or around):
         there = [row for row in known if (row.mach, row.ratio) == corner]
         if not there:
             return [], [f"growth was compared with theory at some of {where} only"]
         there.sort(key=lambda row: row.cells)
-        chosen.append([row for row in there if row.cells <= cells * (1.0 + EDGE)][-1:] or there[:1])
+        enough = [row for row in there if row.cells <= cells * (1.0 + EDGE)]
+        found.append(enough[-1] if enough else there[0])
 
     def find_error(row: Measured) -> float:
         """Of the deck's own rate."""
         still = row.materials == "gas" and abs(row.ratio - 1.0) <= EDGE
         return abs(row.rate_error) / (growth if still else 1.0)
 
-    found = [row for (row,) in chosen]
     worst = max(found, key=find_error)
     error = find_error(worst)
     of_cells, told = [], []
@@ -340,9 +340,8 @@ def sort_deck(problem) -> tuple[list[str], list[str]]:
     of_cells, others = sort_cautions(materials, mach, ratio, least, growth=growth)
     short = [number for number in numbers if cells < FEW_CELLS * number]
     if short:
-        which = (
-            f"mode {short[0]} has" if len(short) == 1 else f"modes {short[0]} to {short[-1]} have"
-        )
+        several = f"modes {short[0]} to {short[-1]} have"
+        which = several if short[1:] else f"mode {short[0]} has"
         low = 100.0 * (1.0 - float(np.interp(least, *zip(*FOUND, strict=True))))
         of_cells = [
             f"{which} fewer than {FEW_CELLS} cells per wave, down to {least:.3g}: the scheme damps "

@@ -14,6 +14,7 @@ SOURCES := regrid hydro problems runs shockgrid tests benchmarks docs
 # where it is set, as in many containers, each start would compile all that it imports, two seconds;
 # setting up writes the bytecode of a run
 unexport PYTHONDONTWRITEBYTECODE
+WRITE_BYTECODE := $(BIN)/python -c 'import runs.march.launching, runs.pictures.command'
 
 .PHONY: help run check test verify soak bench accuracy docs dist sbom requirements lint format \
         setup clean
@@ -45,7 +46,7 @@ $(BIN)/python:
 $(INSTALL): pyproject.toml | $(BIN)/python
 	@echo "installing into $(VENV) ..."
 	@$(PIP) --editable '.[report]'
-	@$(BIN)/python -c 'import runs.march.launching'
+	@$(WRITE_BYTECODE)
 	@touch $@
 
 $(DEVELOP): pyproject.toml | $(BIN)/python
@@ -55,6 +56,7 @@ $(DEVELOP): pyproject.toml | $(BIN)/python
 	  for extra in readers mpi; do \
 	    $(PIP) $(WHEELS) --editable ".[$$extra]" 2>/dev/null || \
 	    echo "extra [$$extra] cannot be had here: its tests will be skipped"; done; }
+	@$(WRITE_BYTECODE)
 	@touch $(INSTALL) $@
 
 $(DOCUMENT): $(INSTALL)

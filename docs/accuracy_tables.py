@@ -168,10 +168,10 @@ def doubt_rates(rows: Iterable[Measured]) -> list[str]:
     for (materials, cells), group in sorted(groups.items(), key=lambda item: item[0][::-1])[::-1]:
         kind = {"gas": "gases", "condensed": "condensed materials"}[materials]
         counts = [sum(abs(r.rate_error) <= most for r in group) for most in LEVELS]
-        within = [f"{n} lie within {100.0 * m:g} %" for n, m in zip(counts, LEVELS, strict=True)]
+        within = [f"{n} within {100.0 * m:g} %" for n, m in zip(counts, LEVELS, strict=True)]
         told.append(
-            f"- With {cells:g} cells per wavelength, of {len(group)} growth rates of {kind} "
-            f"{', '.join(within[:-1])} and {within[-1]} of theory"
+            f"- With {cells:g} cells per wavelength, {counts[0]} of {len(group)} growth rates of "
+            f"{kind} lie within {100.0 * LEVELS[0]:g} % of theory, {' and '.join(within[1:])}"
             + _list_rates(group, materials)
             + _list_rough(group, materials)
         )
@@ -282,8 +282,8 @@ def doubt_null(rows: Rows) -> list[str]:
     count = "All" if len(bad) == len(runs) else f"{len(bad)} of"
     return [
         f"- With one gas on both sides, {count.lower()} {len(runs)} runs on even cells miss the "
-        f"tolerance, that the first mode is within {NULL_BAR:g} of its exact value and all others "
-        f"are below {OTHERS_BAR:g}. The worst first mode is {first['mode_1']:.4f} instead of "
+        f"tolerance: the first mode should be within {NULL_BAR:g} of its exact value and all "
+        f"others below {OTHERS_BAR:g}. The worst first mode is {first['mode_1']:.4f} instead of "
         f"{first['exact']:.4f} ({_name_null(first)}), and the largest other mode is "
         f"{other['others']:.4f} ({_name_null(other)})."
     ]

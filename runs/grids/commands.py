@@ -34,6 +34,7 @@ from runs.deck.reading import packaged_decks, read_deck
 from runs.grids import making
 from runs.grids.making import Grid, choose_family, name_family, parse_options
 from runs.grids.quality import describe, plan_outputs
+from runs.quantities import add_unit
 from runs.store.files import check_free
 
 MOST_CELLS = 4_000_000
@@ -265,7 +266,9 @@ def compare_families(
                 why = march.failure.removeprefix("regrid: ")
                 why = textwrap.shorten(why, REASON, placeholder="...")
                 reasons.append(f"  {label}, step {march.done + 1}: {why}")
-            drawn.append((f"{label}: {done}", march, sides))
+            number, _, part = done.partition(" ")
+            words = f"{label}: {number} steps" + f", {part.strip()}" * bool(part)
+            drawn.append((words, march, sides))
         yield from reasons
         if name in pictures:
             from runs.grids.pictures import draw_comparison
@@ -348,14 +351,18 @@ def _prepare_flow(name: str, settings: tuple[str, ...]) -> tuple[str, Compute]:
     read = read_deck(name, settings)
     if not hasattr(read.deck, "regrid") or read.problem == "grid-march":
         raise BadInput(f"{name}: the problem {read.problem} has no regridder to compare")
-    started = read.make_problem().build()
+    problem = read.make_problem()
+    started = problem.build()
 
     def compute(family: str, options: dict[str, Any]) -> Compared:
         found, part = _run_flow(read, family, options)
         return found, f"{found.done} {100.0 * part:3.0f}%", found.nodes
 
     sizes = ", ".join(f"{b.nodes.shape[1] - 1} x {b.nodes.shape[2] - 1}" for b in started.blocks)
-    return f"flow to t = {started.t_end:.6g} s, blocks of {sizes} cells", compute
+    return (
+        f"flow to t = {add_unit(started.t_end, problem.t_unit)}, blocks of {sizes} cells",
+        compute,
+    )
 
 
 def _run_flow(read, name: str, options: dict[str, Any]) -> tuple[March, float]:

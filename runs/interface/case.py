@@ -295,7 +295,7 @@ def join_hooks(case: Any, given: HooksGiven) -> Callable[[float], str | None]:
     return call
 
 
-def _view(block: BlockView, axes: tuple[str, str]) -> BlockData:
+def _view(block: BlockView, axes: tuple[str, str], has_units: bool) -> BlockData:
     """A block of a flow in memory: each array is a view of now, and cannot be written to."""
 
     def lock(values: np.ndarray) -> np.ndarray:
@@ -315,7 +315,7 @@ def _view(block: BlockView, axes: tuple[str, str]) -> BlockData:
         make_fields(lambda: block.cell_fields),
         make_fields(lambda: get_node_fields(block)),
         make_fields(lambda: {} if rates is None else {"rates": block.rates}),  # type: ignore[attr-defined]
-        block.units,
+        block.units if has_units else dict.fromkeys(block.units, "1"),
         {name: words.get(name, name) for name in (*block.cell_fields, *get_node_fields(block))},
     )
 
@@ -379,7 +379,8 @@ class Case(Drawn):
         The arrays are views of live data, not to be written to: see `runs.interface.case`.
         """
         axes = ("x", "r") if is_axisymmetric(self.simulation) else ("x", "y")
-        return Blocks({block.name: _view(block, axes) for block in self.simulation.blocks})
+        units = self.problem.t_unit != "1"
+        return Blocks({b.name: _view(b, axes, units) for b in self.simulation.blocks})
 
     @property
     def dumps(self) -> list[Snapshot]:

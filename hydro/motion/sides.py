@@ -39,11 +39,14 @@ class StraightSides:
         self.spans = np.array([line.span for line in lines])
         counts = [line.law.size for line in lines]
         self.spans[:, -1] = np.cumsum(counts) - counts
-        self.respaced = any(line.last_law is not None for line in lines)
+        self.respacing = None
+        if any(line.last_law is not None for line in lines):
+            self.respacing, self.share = lines[0].rule.respacing, -1.0
 
     def spread(self, t: float) -> None:
         """Lay their new nodes, by their spacings at t [s], between their new ends."""
-        if self.respaced:
+        if self.respacing is not None and (share := self.respacing.compute_share(t)) != self.share:
+            self.share = share
             self.laws = np.concatenate([line.find_law(t) for line in self.lines])
         spread_straight(self.block.nodes_new, self.spans, self.laws)
 

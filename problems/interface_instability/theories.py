@@ -354,18 +354,13 @@ def sort_deck(problem) -> tuple[list[str], list[str]]:
 def _caution_line(problem, history) -> list[str]:
     """Waves of a few cells on the line, while theory says that it is gentle."""
     modes = [mode.column for mode in problem.harmonics if mode.column in history]
-    if "roughness" not in history or not modes:  # of an earlier version
-        return []
-    growth = Growth(problem)
-    kct = get_kct(problem, history["t"])
+    growth, kct = Growth(problem), get_kct(problem, history["t"])
     gentle = (kct > 1.0) & (kct <= growth.linear_reach)
-    if not gentle.any():
+    if "roughness" not in history or not modes or not gentle.any():  # of an earlier version, short
         return []
-    rough = growth.scale_roughness(history)[gentle]
-    last = float(rough[-1])
-    if last <= ROUGH_LINE:
-        return []
-    return [
+    last = float(growth.scale_roughness(history)[gentle][-1])
+    words = (
         f"the interface is rough: harmonics above the fourth are {last:.2g} of the largest mode at "
         f"k c t = {kct[gentle][-1]:.3g}, and theory predicts almost none; try other or finer cells"
-    ]
+    )
+    return [words] if last > ROUGH_LINE else []

@@ -46,7 +46,7 @@ class Noh(RadialProblem):
         super().__init__(deck, DIMENSIONS[deck.geometry])
         self.shock_speed = 0.5 * (deck.gamma - 1.0)
         shock, size = self.shock_speed * deck.run.t_end, 1.0 - deck.shrink * deck.run.t_end
-        words = f"the shock is at {shock:.3g} m then, the grid's end at {size:.3g}; end earlier"
+        words = f"the shock is at r = {shock:.3g} then, the grid's end at {size:.3g}; end earlier"
         deck.refuse(shock > 0.9 * size, "run.t_end", words)
 
     def compute_density(self, r, t):

@@ -54,7 +54,7 @@ class Sedov(RadialProblem):
         end = self.blast.radius(deck.run.t_end)
         words = "the shock is in the first cell then; end later, or take smaller cells"
         deck.refuse(end < deck.size / deck.cells, "run.t_end", words)
-        words = f"the shock is at {end:.3g} m then, and sides of {deck.size:g} m send it back"
+        words = f"the shock is at r = {end:.3g} then, and sides of {deck.size:g} send it back"
         deck.refuse(end > 0.95 * deck.size, "run.t_end", words)
 
     def compute_density(self, r, t):

@@ -83,8 +83,9 @@ def describe_counts(rows: Rows, keys: Sequence[str], quantity: str) -> list[str]
     failed = sum(str(row["state"]).startswith("failed") for row in rows)
     silent = len(rows) - failed - len(errors)
     return [
-        f"Of {len(rows)} runs {failed} failed and {silent} have no figure; {counts} of theory, "
-        f"and half lie within {100.0 * middle:.1f} %. The largest errors are those at {worst}."
+        f"Of {len(rows)} runs {failed or 'none'} failed and {silent or 'none'} have no figure; "
+        f"{counts} of theory, and half lie within {100.0 * middle:.1f} %. The largest errors are "
+        f"those at {worst}."
     ]
 
 

@@ -29,6 +29,7 @@ from hydro.simulation import Simulation
 from hydro.sources import make_gravity
 from problems.deck import (
     NONE,
+    Coordinate,
     Deck,
     DeckTable,
     Limiter,
@@ -62,8 +63,8 @@ Pair = tuple[Formula, Formula]
 SideName = Literal["i_min", "i_max", "j_min", "j_max"]
 LINKED = {"interface": "interface", "seam": "seam", "periodic": "periodic", "slide": "sliding"}
 State = tuple[Formula, Formula, Formula, Formula]
-Points = Annotated[tuple[tuple[float, float], ...], Meta(min_length=2)]
-Vector = tuple[float, float]
+Points = Annotated[tuple[tuple[Coordinate, Coordinate], ...], Meta(min_length=2)]
+Vector = tuple[Coordinate, Coordinate]
 Numbers = dict[str, int | float | str]
 First = Annotated[int, Meta(ge=0, le=10**9)]
 Count = Annotated[int, Meta(ge=1, le=4000)]

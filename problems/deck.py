@@ -104,11 +104,12 @@ class RunControl(DeckTable, kw_only=True):
     merges = True
     runtime = ("t_end", "max_steps", "cfl", "small_cells", "threads", "cut")
 
-    t_end: key(float | None, "end time [s]. If left out, the problem chooses it", ge=1e-300) = None
+    t_end: key(float | None, "end time [s]. If left out: the problem's", ge=1e-300, le=1e300) = None
     t_set_up: key(
         float | None,
         "end time [s] that lengths and motions are made for. If left out: t_end",
         ge=1e-300,
+        le=1e300,
     ) = None
     max_steps: key(
         int | None, "greatest number of steps. If left out: no limit", ge=0, le=2**63 - 1
@@ -159,12 +160,15 @@ class Output(DeckTable, kw_only=True):
 Field = Literal["rho", "u", "v", "p", "e", "c"]
 
 
+Coordinate = Annotated[float, Meta(ge=-1e12, le=1e12)]  # [m]
+
+
 class Gauge(DeckTable, kw_only=True):
     """A point, or a line of points, at which the flow is written down after every step."""
 
     name: key(Name, "head of its columns in gauges.csv; a line's add _1, _2, ...", max_length=40)
-    at: key(tuple[float, float], "place [x, y] [m], a line's first one")
-    to: key(tuple[float, float] | None, "a line's last place [x, y] [m]") = None
+    at: key(tuple[Coordinate, Coordinate], "place [x, y] [m], a line's first one")
+    to: key(tuple[Coordinate, Coordinate] | None, "a line's last place [x, y] [m]") = None
     count: key(int, "points of a line, evenly from `at` to `to`", ge=1, le=10000) = 1
     moves: key(bool, "true: moves with the material; false: fixed in space") = False
     fields: key(list[Field], "what is recorded; c is the sound speed", min_length=1) = (

@@ -25,6 +25,6 @@ def test_a_cell_is_told_by_its_area_and_the_sides_beside_it(place, cell, beside)
     nodes = np.array(np.meshgrid(np.arange(11.0), np.arange(9.0), indexing="ij"))
     nodes[1, 3:5, -1] -= 0.75
     told = describe_event([SimpleNamespace(name="gas", nodes=nodes)], place)
-    assert told.startswith(f"cell {cell} of block 'gas' at (") and f" m{beside} has " in told
+    assert told.startswith(f"cell {cell} of block 'gas' at (") and f"){beside} has " in told
     share = "0.25" if cell == "i=3, j=7" else "1"
     assert told.endswith(f"has {share} of the usual area of the block's cells")

@@ -14,7 +14,7 @@ from benchmarks.soak.trial import Outcome, find_fault, make_random, tell_last
 
 REFUSALS = (
     "in use", "is not empty", "no restart point", "holds no run", "does not exist",
-    "no run directory", "has no dump", "no deck yet", "no history", "no space", "nothing to",
+    "not a run directory", "has no dump", "no history", "no space", "nothing to",
 )  # fmt: skip
 PAIRS = (
     ("run", "run"), ("restart", "restart"), ("force", "force"), ("force", "restart"),

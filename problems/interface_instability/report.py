@@ -230,13 +230,16 @@ class Results:
         if not history:
             return Report(rows=_predict(self))
         column = _columns(self, history)
-        kct = float(get_kct(self, column["t"][-1]))
+        first, kct = (float(get_kct(self, t)) for t in (0.0, column["t"][-1]))
+        times = f"to k c t = {kct:.3g}"
+        if self.start == "crossed":
+            times = f"from linear theory at k c t = {first:.2g} to {kct:.3g}"
         jump = abs(theory.base.p - self.shock.p)
         reflected = theory.reflected if jump > NO_WAVE * self.shock.p else "none"
         head = [
             f"shock to p = {self.shock.p:g} from rho = {self.rho_first:g} into rho = "
             f"{self.rho_second:g}; {_describe_modes(self)}, "
-            f"{deck.cells} cells per wavelength, to k c t = {kct:.3g}",
+            f"{deck.cells} cells per wavelength, {times}",
             f"  reflected wave: {reflected}, Atwood number after the shock {theory.atwood:.3f}",
             f"  smoothing length of the interface: {self.thickness / deck.wavelength:.3g} "
             f"wavelengths ({self.thickness * deck.cells / deck.wavelength:.2g} of a cell)",

@@ -345,8 +345,8 @@ def sort_deck(problem) -> tuple[list[str], list[str]]:
         low = 100.0 * (1.0 - float(np.interp(least, *zip(*FOUND, strict=True))))
         of_cells = [
             f"{which} fewer than {FEW_CELLS} cells per wave, down to {least:.3g}: the scheme damps "
-            f"such waves, measured growth with {least:.3g} is about {low:.0f} % low; take cells = "
-            f"{FEW_CELLS * short[-1]} or longer waves",
+            f"such waves (with {least:.3g}, growth over 6 < k c t < 12 is about {low:.0f} % low); "
+            f"take cells = {FEW_CELLS * short[-1]} or longer waves",
         ]
     return of_cells, others
 

@@ -172,7 +172,7 @@ def grade(count: int, growth: float) -> np.ndarray:
     return positions / positions[-1]
 
 
-Length = Annotated[float, Meta(gt=0)]
+Length = Annotated[float, Meta(ge=1e-9, le=1e9)]
 
 
 class SideState(Fluid, kw_only=True):

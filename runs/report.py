@@ -187,8 +187,8 @@ def judge_blocks(dump: Dump) -> list[dict[str, str]]:
                 "not convex": str(len(judgement.bad_cells)),
                 "minimum scaled Jacobian": f"{judgement.least_sine:.3f}",
                 "worst aspect ratio": f"{np.nanmax(fields['aspect_ratio']):.3g}",
-                "least cell [m2]": f"{np.nanmin(fields['size']):.3g}",
-                "largest cell [m2]": f"{np.nanmax(fields['size']):.3g}",
+                "smallest cell area": f"{np.nanmin(fields['size']):.3g}",
+                "largest cell area": f"{np.nanmax(fields['size']):.3g}",
             }
         )
     return rows

@@ -114,7 +114,7 @@ REFUSED = [  # what the deck has, what stands there instead, what is said
     ("[[0.0, 0.0], [0.2, 0.0]]", "[[0.0, 0.0], [0.3, 0.0]]", "must have an end in common"),
     ("[[0.0, 0.0], [0.2, 0.0]]", "{ points = [[0.0, 0.0], [0.2, 0.0]], cells = [5] }",
      "curve j_min has 5 cells in all; the block has 6"),
-    ('curves.i_min = "cut.txt"', 'grid = "cut.txt"\ncurves.i_min = "cut.txt"', "give either a grid"),
+    ('curves.i_min = "cut.txt"', 'grid = "cut.txt"\ncurves.i_min = "cut.txt"', "give either"),
     ("mesh = \"fixed\"", "mesh = \"frozen\"", 'it must be "fixed" or "regrid"'),
 ]  # fmt: skip
 

@@ -4,7 +4,8 @@
 
 The interface of the experiment is a layer 5 mm thick, the computed one is sharp: the rates are
 compared after division by the growth-reduction factor psi of the layer [BrouilletteSturtevant1994].
-Note: the tube's slots vent the shocked gas, so the measured interface is slower than computed.
+Note: the measured interface is slower than computed; our guess is that the tube's slots vent the
+shocked gas.
 """
 
 from __future__ import annotations

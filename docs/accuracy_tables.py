@@ -104,10 +104,10 @@ def table_lines(rows: Rows) -> list[str]:
     for row in rows:
         cases.setdefault((row["materials"], row["mach"]), {})[row["cfl"]] = row
     columns = (
-        ("deviation from linear, 1e-3 cell", lambda row: f"{1e3 * row['unevenness']:.2f}"),
+        ("deviation from linear, 1e-3 cells", lambda row: f"{1e3 * row['unevenness']:.2f}"),
         ("error in dx/ds, %", lambda row: f"{100.0 * row['slope_error']:.2f}"),
         ("speed error, 1e-5 D", lambda row: f"{1e5 * row['speed_error']:+.1f}"),
-        ("its scatter", lambda row: f"{1e5 * row['speed_scatter']:.1f}"),
+        ("variation of speed with s, 1e-5 D", lambda row: f"{1e5 * row['speed_scatter']:.1f}"),
     )
     heads = [f"{head}; cfl {cfl:g}" for head, _ in columns for cfl in steps]
     body = []
@@ -143,10 +143,12 @@ def table_pairs(rows: Rows) -> list[str]:
     counts = [
         sum(low < error <= high for error in errors) for low, high in itertools.pairwise(bounds)
     ]
-    heads = [f"to {100.0 * step:g} %" for step in PAIR_STEPS]
-    heads += ["more", "no value"]
+    steps = [f"{100.0 * step:g}" for step in PAIR_STEPS]
+    heads = [f"error up to {steps[0]} %"]
+    heads += [f"error from {low} to {high} %" for low, high in itertools.pairwise(steps)]
+    heads += [f"error above {steps[-1]} %", "no error measured"]
     numbers = [str(count) for count in [*counts, len(rows) - len(errors)]]
-    lines = make_table(["star-state error", *heads], [["pairs", *numbers]])
+    lines = make_table(["", *heads], [["number of pairs", *numbers]])
     worst = sorted((row for row in rows if row["error"] is not None), key=lambda r: -r["error"])
     body = []
     for row in worst[:PAIRS_SHOWN]:
@@ -167,22 +169,23 @@ def doubt_rates(rows: Iterable[Measured]) -> list[str]:
     told = []
     for (materials, cells), group in sorted(groups.items(), key=lambda item: item[0][::-1])[::-1]:
         kind = {"gas": "gases", "condensed": "condensed materials"}[materials]
-        counts = [sum(abs(r.rate_error) <= most for r in group) for most in LEVELS]
-        within = [f"{n} within {100.0 * m:g} %" for n, m in zip(counts, LEVELS, strict=True)]
         told.append(
-            f"- With {cells:g} cells per wavelength, {counts[0]} of {len(group)} growth rates of "
-            f"{kind} lie within {100.0 * LEVELS[0]:g} % of theory, {' and '.join(within[1:])}"
-            + _list_rates(group, materials)
+            f"- With {cells:g} cells per wavelength, {_count_rates(group, kind)}."
             + _list_rough(group, materials)
         )
     return told
 
 
-def _list_rates(group: list[Measured], materials: str) -> str:
-    bar = LEVELS[1]
-    worst = sorted((r for r in group if abs(r.rate_error) > bar), key=lambda r: -abs(r.rate_error))
-    named = [_name_rate(row, materials, f"{100.0 * row.rate_error:+.1f} %") for row in worst]
-    return f". Errors above {100.0 * bar:g} % occur at {_cut(named)}." if named else "."
+def _count_rates(group: list[Measured], kind: str) -> str:
+    """How many errors are within each level, up to the first level that holds them all."""
+    counts = [sum(abs(row.rate_error) <= most for row in group) for most in LEVELS]
+    counts = counts[: counts.index(len(group)) + 1] if len(group) in counts else counts
+    levels = [f"within {100.0 * most:g}%" for most in LEVELS]
+    numbers = ["all" if count == len(group) else str(count) for count in counts]
+    first = f"all {counts[0]}" if numbers[0] == "all" else f"{counts[0]} of {len(group)}"
+    said = [f"{first} growth rates of {kind} lie {levels[0]} of theory"]
+    said += [f"{n} {level}" for n, level in zip(numbers[1:], levels[1:], strict=False)]
+    return f"{', '.join(said[:-1])} and {said[-1]}" if len(said) > 1 else said[0]
 
 
 def _list_rough(group: list[Measured], materials: str) -> str:
@@ -220,10 +223,9 @@ def doubt_polars(rows: Rows) -> list[str]:
         without = len(group) - len(known)
         told.append(
             f"- {words} {NEAR:g} degrees below the critical angle, the pressure behind the "
-            f"collision point is within {POLAR_BAR:g} % of theory in {len(known) - len(over)} of "
-            f"{len(group)} runs; the largest error is {worst['error in p, %']} % "
-            f"({_name_polar(worst)})."
-            + (f" {without} of the runs have no value." if without else "")
+            f"collision point is within {POLAR_BAR:g}% of theory in {_count_within(known, over)} "
+            f"runs; the largest error is {worst['error in p, %']}% ({_name_polar(worst)})."
+            + (f" In {without} further runs no pressure was measured." if without else "")
         )
     past = [row for row in rows if float(row["below critical"]) < 0.0]
     if past:
@@ -237,6 +239,11 @@ def doubt_polars(rows: Rows) -> list[str]:
     return told
 
 
+def _count_within(known: Rows, over: Rows) -> str:
+    inside = len(known) - len(over)
+    return f"all {inside}" if not over else f"{inside} of {len(known)}"
+
+
 def _name_polar(row: dict[str, Any]) -> str:
     return (
         f"{row['plate on wedge']} at {row['V, km/s']} km/s, {row['below critical']} degrees below, "
@@ -246,21 +253,24 @@ def _name_polar(row: dict[str, Any]) -> str:
 
 def doubt_lines(rows: Rows) -> list[str]:
     """How the position of a flat interface depends on the sub-cell phase of the shock."""
-    told = []
+    told = [
+        "- In the tests of a [flat interface](#a-flat-interface-hit-by-a-shock) a shock of speed D "
+        "starts at a distance that we increase by s, from 0 to 1 cell."
+    ]
     for key, bar, words, unit in (
-        ("unevenness", LINE_BAR, "final position is linear in the start distance s", "cells"),
-        ("speed_scatter", SPEED_BAR, "late speed does not depend on s", "of the shock's speed"),
+        ("unevenness", LINE_BAR, "final position deviates from a linear function of s", "cells"),
+        ("speed_scatter", SPEED_BAR, "late speed varies with s", "D"),
     ):
-        over = sorted((row for row in rows if row[key] > bar), key=lambda row: -row[key])
-        met = f"{len(rows) - len(over)} of {len(rows)}"
-        text = f"- In {met} runs with a flat interface the {words}, to {bar:g} {unit}"
-        if over:
-            text += f"; the worst deviation is {over[0][key]:.2g} {unit} ({_name_line(over[0])})"
-        told.append(text + ".")
+        over = sum(row[key] > bar for row in rows)
+        worst = max(rows, key=lambda row: row[key])
+        told.append(
+            f"- The {words} by more than {bar:g} {unit} in {over} of {len(rows)} runs (at most "
+            f"{worst[key]:.2g} {unit}: {_name_line(worst)})."
+        )
     worst = max(rows, key=lambda row: abs(row["speed_error"]))
     told.append(
-        "- The mean late speed of flat interfaces has an error of at most "
-        f"{abs(worst['speed_error']):.1e} of the shock's speed ({_name_line(worst)})."
+        "- The error of the late speed, averaged over s, is at most "
+        f"{abs(worst['speed_error']):.1e} D ({_name_line(worst)})."
     )
     return told
 
@@ -281,8 +291,8 @@ def doubt_null(rows: Rows) -> list[str]:
     }
     count = "All" if len(bad) == len(runs) else f"{len(bad)} of"
     return [
-        f"- With one gas on both sides, {count.lower()} {len(runs)} runs on even cells miss the "
-        f"tolerance: the first mode should be within {NULL_BAR:g} of its exact value and all "
+        f"- With one gas on both sides, {count.lower()} {len(runs)} runs on cells of one size miss "
+        f"our tolerance: the first mode should be within {NULL_BAR:g} of its exact value and all "
         f"others below {OTHERS_BAR:g}. The worst first mode is {first['mode_1']:.4f} instead of "
         f"{first['exact']:.4f} ({_name_null(first)}), and the largest other mode is "
         f"{other['others']:.4f} ({_name_null(other)})."
@@ -302,8 +312,8 @@ def doubt_pairs(rows: Rows) -> list[str]:
     over = sum(error > PAIR_STEPS[-1] for error in errors)
     told = (
         f"- Of {len(rows)} Riemann problems of random gases, {over or 'none'} have a star-state "
-        f"error above {100.0 * PAIR_STEPS[-1]:g} %. The median error is "
-        f"{100.0 * errors[len(errors) // 2]:.2g} %, the largest {100.0 * errors[-1]:.2g} %."
+        f"error above {100.0 * PAIR_STEPS[-1]:g}%. The median error is "
+        f"{100.0 * errors[len(errors) // 2]:.2g}%, the largest {100.0 * errors[-1]:.2g}%."
     )
     said = [row for row in rows if row["error"] is None]
     return [told + (f" Seed {said[0]['seed']} has no value: {said[0]['said']}." if said else "")]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from pathlib import Path
 
 import h5py
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 
 from regrid.errors import BadInput
+from runs.inspection.info import inspect
 from runs.store.dumps import open_dump
 from runs.store.files import find_sum, seal
 from runs.store.reader import RunData
@@ -57,6 +60,17 @@ def test_any_change_is_seen(shockgrid, dump, what):
     assert "checksum NOT AS STORED" in shockgrid("inspect", str(dump))[1]
     with pytest.raises(BadInput, match=r"checksum is wrong.*move it elsewhere"):
         _ = RunData("run").dumps
+
+
+def crash(path):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_damaged_file_that_crashes_hdf5_is_told(dump, monkeypatch):
+    dump.write_bytes(dump.read_bytes()[:-1] + b"x")
+    monkeypatch.setattr("runs.inspection.info.describe_tree", crash)
+    with pytest.raises(BadInput, match=r"is damaged: .* crashes"):
+        inspect(dump)
 
 
 @pytest.mark.parametrize(

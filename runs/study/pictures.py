@@ -16,6 +16,7 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
+from problems.pictures import name_axis
 from runs.pictures.command import new_figure
 from runs.study.definition import make_column
 from runs.study.orders import Series
@@ -130,7 +131,7 @@ def _say(value: Any) -> str:
 
 def _label(study: Any, name: str) -> str:
     units = study.units.get(name, "1")
-    return name.replace("_", " ") + (f" [{units}]" if units != "1" else "")
+    return name_axis(name.replace("_", " "), units)
 
 
 def _is_map(study: Any, name: str) -> bool:

@@ -95,6 +95,8 @@ class NewtonMove:
         The sums are those of `work.base`.  A correction that costs corners is not taken.
         """
         work, tuning = self.work, self.tuning
+        if self.estimate * max(work.ni, work.nj) ** 2 < tuning.smooth_floor:
+            return False  # n cells long, an error of d cells leaves a residual of some d (pi / n)²
         size = work.coarse.find(work.base, work.law, tuning.smooth_floor)
         if not tuning.smooth_floor < size < np.inf:
             return False

@@ -1,11 +1,11 @@
 """Grids as geometry: nodes, boundary polylines, weights; no density, no equation of state.
 
-A library of its own: numpy and numba are all that it loads, and `__all__` has its public names,
-each loaded when it is first asked for.
+This package is an independent library.  It loads only numpy and numba; `__all__` lists its public
+names, each of which is loaded when it is first used.
 
-The folder's own files are the contract: errors, compiling, protocols, sides, names that other
-packages bring, whole marches, the registry of regridders.
-Rooms, each importing only those to its left:
+The files of the folder itself define the interfaces: errors, compilation, protocols, sides, entry
+points of other packages, whole marches, and the registry of regridders.
+Each subpackage imports only those to its left:
 
     errors, jit, protocol, sides <- curves, measure <- algebraic
     <- barrier, domains, node_speeds <- equidistribution, given, marching <- variational <- registry

@@ -1,17 +1,17 @@
-"""Grids written down from the sides: transfinite, quasi-one-dimensional, of curves, displaced.
+"""Algebraic grids: transfinite, quasi-one-dimensional, curved and displaced.
 
-Their regridders are quick and honest: a grid with a bad cell is not returned, the failure names the
-cells.  Note: only the four sides of the values are read.  "displacement" accumulates: its grid
-depends on all boundaries since the first, the others' on the present one alone.
+Their regridders are fast.  They never return a grid with a bad cell; the failure names the cells.
+Only the values on the four sides are read.  The grid of "displacement" depends on all boundaries
+since the first one; the other grids depend only on the present boundary.
 
-Transfinite interpolation blends by the sides' own arc-length spacing, continued into the block so
-that line i is the straight line, in the unit square, between its places on the sides j_min and
-j_max, and line j likewise: lines of one family never cross, whatever the spacings, and nothing
-depends on which family is called i.
+Transfinite interpolation blends by the arc-length spacing of the sides.  In the unit square, line i
+is the straight line between its positions on the sides j_min and j_max, and line j likewise.  Lines
+of one family therefore never cross, whatever the spacings, and the result does not depend on which
+family is called i.
 
-Curved lines are the mean of the two outer lines of their family, each turned and scaled so that it
-ends where the line ends (theory R4.15).  Between straight sides this is the straight line; a side
-that closes on itself has no chord to be turned with.
+A curved line is the mean of the two outer lines of its family, each rotated and scaled to the end
+points of the line (theory R4.15).  Between straight sides it is a straight line.  A closed side has
+no chord and cannot be rotated in this way.
 
 Sources: [CharakhchyanND] (2)-(4), theory R1; [ProkopovND] (6.1), theory R6.
 """

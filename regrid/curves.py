@@ -1,16 +1,16 @@
-"""Boundary lines: spacings, how a line bends, and respacing of its nodes between key nodes.
+"""Boundary lines: spacings, bending, and respacing of nodes between key nodes.
 
-A spacing is an increasing sequence from 0 to 1 that says where the nodes of a line lie.
-Equidistribution (ED1, theory R10.1) makes weight times step equal on all steps.  Note: a weight
-known at the old nodes only must be integrated before it is inverted, with a monotone interpolation
-of the integral; interpolating the weight itself lets nodes cross.  A spacing by turns (theory
-R9.2) puts nodes where a line bends: every segment may turn by TURN, and at least LEAST_EVEN of the
-nodes keep the first spacing.
+A spacing is an increasing sequence from 0 to 1 that gives the positions of a line's nodes.
+Equidistribution (ED1, theory R10.1) makes weight times interval equal on all intervals.  Note: a
+weight that is known only at the old nodes must be integrated first, and the integral interpolated
+monotonically and inverted; if the weight itself is interpolated, nodes can cross.  A spacing by
+turning (theory R9.2) concentrates nodes where a line bends: a segment may turn by TURN, and at
+least LEAST_EVEN of the nodes keep the initial spacing.
 
-Respaced nodes (theory R9) stay on the curve, a straight line stays straight to round-off, no
-node passes another.  Note: a spline through the whole line would round off a corner, so it breaks
-at key nodes; and where the line ends on a wall it must see its own mirror image, between periodic
-sides itself, or half a domain with walls differs from the whole one.
+Respaced nodes (theory R9) stay on the curve, a straight line stays straight to round-off, and no
+node passes another.  Note: a spline through a whole line would round off its corners, so it breaks
+at key nodes.  At a wall it continues as its mirror image, and between periodic sides periodically;
+otherwise half a domain between walls would differ from half of the whole one.
 
 Sources: [KhakimzyanovShokina1998] §1 (ED1), [Polevikov1983] (grids that follow a speed),
 [CharakhchyanND] §1, §5, after [Godunov1976].  Crossings: `regrid.measure.crossings`.

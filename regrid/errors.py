@@ -1,4 +1,4 @@
-"""The three ways in which work ends early, what the command line makes of each, and near names."""
+"""The three ways in which work ends early, how the command line reports each, and similar names."""
 
 from __future__ import annotations
 

@@ -1,16 +1,16 @@
-"""Grids, curves and first grids that people give: npz, HDF5 and VTK files; a start on given sides.
+"""Grids, curves and initial grids from files (npz, HDF5, VTK), and initial grids for given sides.
 
-Boundary curves are four polylines, of any numbers of points, named `i_min`, `i_max`, `j_min`,
+Boundary curves are four polylines with any number of points, named `i_min`, `i_max`, `j_min`,
 `j_max`, or `left`, `right`, `bottom`, `top` in that order: i then runs from left to right.  Each
-is (2, n) or (n, 2); each may run either way, their ends must meet at four corners.  A grid is
-`x`, `y` (and `z`) of shape (n1+1, n2+1[, n3+1]), or `nodes` of shape (2 or 3, ...).
+is (2, n) or (n, 2) and may run in either direction; their ends must meet at four corners.  A grid
+is `x`, `y` (and `z`) of shape (n1+1, n2+1[, n3+1]), or `nodes` of shape (2 or 3, ...).
 
-Note: curves say where a side lies, not where its nodes are; only when opposite sides have
-as many points, and no number of cells was asked for, are the points themselves the nodes.
+Note: curves define a side but not its nodes.  Their points are used as nodes only if opposite sides
+have equal numbers of points and no number of cells is given.
 
-VTK files (.vts and legacy .vtk, extra `vtk`): i runs fastest and points have three coordinates; a
-grid of one plane of points with z = const is a plane grid.  VTK's readers return an empty grid for
-a file that they cannot read, and say why elsewhere.
+In VTK files (.vts and legacy .vtk, extra `vtk`) i runs fastest and points have three coordinates; a
+grid of one plane of points with z = const is a plane grid.  For a file that they cannot read, VTK's
+readers return an empty grid and report the reason elsewhere.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Compiling kernels: one decorator, and a disk cache that never serves stale code.
+"""Compilation of kernels: one decorator, and a disk cache that never returns stale code.
 
-numba's own cache looks at the file of the compiled function only: an edited helper in another
-module gives the old answer.  Here code is found by a digest of all that the kernel is made of.
-A deck is checked by a few calls on small arrays, which do not repay a minute of compiling: inside
-`interpreted` kernels run as the Python functions that they are.  Note: a simulation made there
-(`hydro.simulation.Simulation`) lacks what only a march needs, and cannot march.
+numba's own cache depends only on the file of the compiled function: after a helper in another
+module is edited, it still returns the old code.  The cache here is keyed by a digest of everything
+that a kernel consists of.  Checking a deck takes a few calls on small arrays, for which a minute of
+compilation is not worthwhile: inside `interpreted`, kernels run as plain Python functions.  Note: a
+simulation made there (`hydro.simulation.Simulation`) lacks what a march needs and cannot march.
 """
 
 from __future__ import annotations

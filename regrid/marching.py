@@ -1,9 +1,9 @@
 """Whole marches: a regridder follows a boundary that is a function of time.
 
-`march` calls the regridder once a step and records: the last grid, those on the way,
-the report of every step, the worst cell of all.  Note: `boundary_at` is called once a step, in
-order, so it may hold a random generator; where the times of steps are found by `cells`
-(`choose_times`) it is called beforehand too, and has to be a function of time alone.
+`march` calls the regridder once per step and records the last grid, intermediate grids, the report
+of every step and the worst cell of all.  Note: `boundary_at` is called once per step, in order, so
+it may contain a random generator.  If `cells` determines the times of the steps (`choose_times`),
+it is also called in advance and must be a function of time only.
 """
 
 from __future__ import annotations

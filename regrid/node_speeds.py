@@ -1,8 +1,8 @@
-"""Node speeds of a rebuilt grid: inner nodes should not outrun the boundary (a maximum principle).
+"""Limits on node speeds: no inner node should outrun the boundary (a maximum principle).
 
-A ratio well above 1 says that the regridder throws inner nodes about, which costs time steps and
-smears the flow.  The limited grid is a mixture of two grids node by node, so convexity
-has to be shown again; where the mixture fails, the limit gives way, not convexity.
+A ratio well above 1 means that the regridder moves inner nodes back and forth, which shortens time
+steps and smears the flow.  The limited grid is a mixture of two grids node by node, so its
+convexity must be checked again; where the mixture fails, the limit is relaxed.
 
 Source: [ProkopovND] §6; theory R8.
 """

@@ -1,14 +1,14 @@
-"""What other packages add to shockgrid: problems, equations of state, regridders and so on.
+"""Extensions from other packages: problems, equations of state, regridders and so on.
 
-A distribution names its class in an entry point of one of the GROUPS, as the packaging standard has
-it; in its pyproject.toml:
+A distribution names its class in an entry point of one of the GROUPS, as the packaging standard
+prescribes, in its pyproject.toml:
 
     [project.entry-points."shockgrid.regridders"]
     averaged = "averaged:AveragedRegridder"
 
-Names of shockgrid's own come first, and those of other packages are looked up only where there is
-no such name.  A module is imported when its name is asked for: one that fails to be imported is a
-sentence, and all others go on working.
+The names of shockgrid itself have priority; those of other packages are searched only for names
+that it lacks.  A module is imported when its name is used.  If the import fails, there is an error
+message for this name, and all others continue to work.
 """
 
 from __future__ import annotations

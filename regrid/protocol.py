@@ -1,9 +1,9 @@
-"""What a regridder is and returns: a protocol for all, and two for those that see the flow.
+"""The interface of a regridder: a protocol for all, and two for regridders that use the flow.
 
-A regridder moves a grid from step to step.  Most know geometry alone (`Regridder`).  A
-`CostAwareRegridder` takes the cells' sound speeds as well, and opens cells that shorten the time
-step.  One that follows fields of the flow, or places nodes of sides by itself, is a
-`FlowAwareRegridder`: the flow passes it the fields and the sides that are its own.
+A regridder moves a grid from step to step.  Most use geometry only (`Regridder`).  A
+`CostAwareRegridder` also takes the sound speeds of the cells, and widens cells that limit the time
+step.  A `FlowAwareRegridder` follows fields of the flow or places nodes of sides itself: the flow
+passes it the fields, and the sides whose nodes it may place.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""All regridders by name, one line each; imported when asked for.
+"""All regridders by name, one line each; a regridder is imported when it is used.
 
-A regridder is a class with keyword options that keeps the protocol `regrid.protocol.Regridder`, or
-`FlowAwareRegridder` where it may follow a flow.  `tests/property/test_regridders.py` runs every
-entry through the same tests.
+A regridder is a class with keyword options that follows the protocol `regrid.protocol.Regridder`,
+or `FlowAwareRegridder` if it may follow a flow.  `tests/property/test_regridders.py` runs the same
+tests for every entry.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A root between two places, by Brent's method.
+"""A root in an interval, by Brent's method.
 
-The steps are those of `scipy.optimize.brentq`, to the same bits; scipy takes a third of a second of
-a short run to load.
+The steps are bitwise those of `scipy.optimize.brentq`; loading scipy would take a third of a second
+of a short run.
 """
 
 from __future__ import annotations

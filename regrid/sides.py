@@ -1,4 +1,4 @@
-"""The four sides of a grid: their names and nodes, copies from grid to grid, the area inside.
+"""The four sides of a grid: names, nodes, copies between grids, and the area that they enclose.
 
 Sides are named i_min, i_max, j_min, j_max and always come in this order.  Nodes of a grid have the
 shape (2, ni+1, nj+1).

@@ -1,9 +1,9 @@
-"""Texts and TOML that people give: read so that none stops the program, shown so that none harms.
+"""Text and TOML from users: read so that nothing can stop the program, and printed safely.
 
-A pipe without a writer would be waited for, a device never ends, tables thousands deep overflow
-the stack, and a number of thousands of digits cannot be printed: all of them are refused in words.
-A name in a deck, a folder or an HDF5 file may hold characters that move the cursor, name the
-window, or turn the direction of writing; a terminal obeys them.
+A pipe without a writer would block, a device never ends, tables nested thousands deep overflow the
+stack, and a number with thousands of digits cannot be printed: each of these is rejected with a
+message.  A name in a deck, a folder or an HDF5 file may contain control characters that move the
+cursor, rename the window, or reverse the direction of writing; they are not sent to a terminal.
 """
 
 from __future__ import annotations

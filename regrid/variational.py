@@ -1,37 +1,37 @@
-"""Variational grids: smoothness, volume and orthogonality weighed against each other; node speeds.
+"""Variational grids: a weighted sum of smoothness, volume and orthogonality; node speeds.
 
     J = sigma Σ_cells ¼ Σ_corners [ lam_s (a² + b²)/D + ŵ s (D/c)² + lam_o (a·b)²/c² ]
 
-the integrals of [BrackbillSaltzman1982], `∫(|∇xi|² + |∇eta|²) dV`, `∫ w J dV` and
-`∫ (∇xi·∇eta)² J³ dV` (theory R12.1, R12.2), taken over the four corner triangles of every cell: a,
-b are a corner's edges over their conditional lengths, D = a × b, c the mean of D.  With D in the
-denominator no corner can be turned over.  The Hessian is that of the barrier for the first term,
-Gauss and Newton's for the other two; where w D is constant, what it leaves out adds up to nothing
-at inner nodes.  Note: w belongs to the cell here.  Where it is a function of position it has to be
-recomputed in every step, and J falls from step to step only as long as w stays.
+are the integrals of [BrackbillSaltzman1982], `∫(|∇xi|² + |∇eta|²) dV`, `∫ w J dV` and
+`∫ (∇xi·∇eta)² J³ dV` (theory R12.1, R12.2), summed over the four corner triangles of every cell.
+a, b are the edges at a corner over their conditional lengths, D = a × b, and c is the mean of D.
+With D in the denominator no corner can be inverted.  The Hessian is that of the barrier for the
+first term and the Gauss-Newton approximation for the other two; where w D is constant, the omitted
+terms cancel at inner nodes.  Note: w belongs to the cell here.  If it is a function of position, it
+must be recomputed in every step, and J decreases from step to step only while w is constant.
 
 "brackbill-saltzman" minimises J by Newton's method.  "ivanenko-charakhchyan" is its first term
 alone with equal lengths: the barrier without straight lines and without conditional lengths.  The
-terms are those of the unit square's map divided by the mean cell, so that the three weights are
-plain numbers.  With `edge_lengths` "conditional" the map is that of the rectangle which the sides
-ask for, and a graded rectangle stays as it is; "unit" is the functional of the paper.  Note:
-I_v + I_o alone have no minimum that is a grid; lam_s must be positive.  No step is taken that loses
-more than three quarters of a corner's area.
+terms are those of the map from the unit square divided by the mean cell, so that the three weights
+are plain numbers.  With `edge_lengths` "conditional" the map is from the rectangle implied by the
+sides, and a graded rectangle does not change; "unit" is the functional of the paper.  Note: the
+volume and orthogonality terms alone have no minimum that is a grid; lam_s must be positive.  No
+step removes more than three quarters of the area of a corner.
 
-Every step begins from a valid grid: the old one moved along, or else the barrier's.  "Moved along"
-accumulates; a family whose result must not depend on the way has to iterate far enough.
+Every step starts from a valid grid: the displaced old grid, or otherwise the barrier's.  With the
+displaced grid the result depends on the history unless enough iterations are made.
 
-"node-speed": nodes that follow a speed equation, the residual of equidistribution relaxed in `tau`
-steps,
+"node-speed": nodes that follow an evolution equation, the residual of equidistribution relaxed over
+`tau` steps,
 
     dr/dt = d/tau,   H d = -∇J                                                    theory R13.1
 
-J is the functional with most of its weight on the volume: its gradient is the residual of w times
-area, held in check by smoothness, and H d = -∇J is solved so that waves of all lengths fade in the
-same time.  The grid is moved with its sides and then by the law, for the part `1 - exp(-f/tau)` of
-d; in a flow `f` is the step over the stable step, so that a run cut into short steps has the same
-law.  The residual of ED2 itself does not do as a law: it does not see waves along the cells'
-diagonals (see `regrid.equidistribution.areas`), which a flow feeds.
+J is the functional with most of its weight on the volume.  Its gradient is the residual of w times
+area, regularised by smoothness, and H d = -∇J is solved so that waves of all lengths decay in the
+same time.  The grid first moves with its sides and then by the fraction `1 - exp(-f/tau)` of d.  In
+a flow `f` is the step over the stable step, so that a run divided into short steps has the same
+node motion.  The residual of ED2 itself is not suitable, because it does not contain waves along
+the diagonals of the cells (see `regrid.equidistribution.areas`), which a flow excites.
 
 Sources: [IvanenkoCharakhchyan1988]; [AndersonTannehillPletcher1984] §10.4; [HuangRenRussell1994].
 """

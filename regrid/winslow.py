@@ -3,13 +3,13 @@
     alpha (x_xixi + P x_xi) - 2 beta x_xieta + gamma (x_etaeta + Q x_eta) = 0
     alpha = |x_eta|^2, beta = x_xi . x_eta, gamma = |x_xi|^2                  theory R12.3
 
-P = Q = 0 is Winslow's grid ("none"), whose lines are drawn towards sides that bulge into the block.
-Thompson's control functions are taken from the sides ("sides"): with the steps s of the two sides,
-interpolated linearly across the block, `x_xixi + P x_xi` is `delta(delta x / s)` over the mean of
-1/s, so that a graded rectangle is an exact solution.
+P = Q = 0 is Winslow's grid ("none"), whose lines are attracted to sides that bulge into the block.
+Thompson's control functions are taken from the sides ("sides"): with the spacings s of the two
+sides, interpolated linearly across the block, `x_xixi + P x_xi` is `delta(delta x / s)` over the
+mean of 1/s, so that a graded rectangle is an exact solution.
 
 Note: the maximum principle that keeps such grids from folding holds for the differential
-equations; the discrete ones fold at strongly bent sides, and such grids are not handed back.
+equations.  The discrete grids fold at strongly bent sides, and such grids are not returned.
 
 Lines are solved along i, then along j, with lagged coefficients and a cycle of tau.
 """

@@ -1,6 +1,6 @@
-"""Memory that all regrids of a thread share: its blocks are regridded one after another.
+"""Work arrays that all regrids of a thread share: its blocks are regridded one after another.
 
-Numbers stand there as the last user left them; nobody keeps anything in it from call to call.
+Their contents are undefined at the start of a call, and nothing in them survives a call.
 """
 
 from __future__ import annotations

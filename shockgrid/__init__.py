@@ -1,7 +1,8 @@
-"""The public face: what a person types in a notebook, loaded when it is first asked for.
+"""The public Python interface: `import shockgrid as sg`, then `sg.load`, `sg.run`, `sg.open`, ...
 
-May import: `regrid`, `hydro`, `problems`, `runs`, and only inside functions, so that `import
-shockgrid` loads nothing heavy and another package called `runs` is found out before it is run.
+Each name is imported when it is first used.  May import: `regrid`, `hydro`, `problems`, `runs`,
+and only inside functions, so that `import shockgrid` loads nothing heavy and another package
+called `runs` is detected before it is run.
 """
 
 from __future__ import annotations

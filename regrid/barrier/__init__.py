@@ -1,4 +1,4 @@
 """The barrier regridder: functional, linear solve, Newton move, sweeps, untangling, repair.
 
-May import: the contract of `regrid`, `regrid.measure`, `regrid.curves` and `regrid.algebraic`.
+May import: the interfaces of `regrid`, `regrid.measure`, `regrid.curves` and `regrid.algebraic`.
 """

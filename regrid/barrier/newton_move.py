@@ -1,12 +1,12 @@
 """One move of the barrier regridder: from a valid grid to new sides.
 
-    1 the moved grid (R6.5), as it is or after its smooth errors are taken away (R4.13)
-    2 Newton steps from it, shortened where corners would lose too much (R4.8)
-    3 where it lost too much itself: the sides' motion extended inside by the old grid's Hessian
-    4 where that folds: untangling (R5.1)
-    5 half of the sides' motion at a time, then a map without folds from any start (R5.4)
+    1 the displaced grid (R6.5), if necessary after a correction of its smooth errors (R4.13)
+    2 Newton steps from it, shortened where corners would lose too much area (R4.8)
+    3 if it lost too much itself: the motion of the sides extended by the old grid's Hessian
+    4 if that folds: untangling (R5.1)
+    5 half of the motion of the sides at a time, then a map without folds from any grid (R5.4)
 
-What fails after that is a failure that names side and nodes.
+If all of this fails, the error names side and nodes.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
-"""The barrier regridder: one Newton step a time step, on a functional with a barrier.
+"""The barrier regridder: one Newton step per time step, on a functional with a barrier.
 
 `regrid(previous, boundary)` moves a valid grid to new boundary nodes (theory R4):
 
-    1 laws, lengths, family weights from the new boundary   4 where needed, Hessian and solve
-    2 boundary displacement interpolated to the inside       5 corner areas against the old ones
+    1 spacings, lengths, family weights from the sides       4 if needed, Hessian and solve
+    2 boundary displacement interpolated to the interior     5 corner areas against the old ones
     3 residual check: corner areas, gradient, residual       6 shorten, untangle, or halve the move
 
-The promise: every grid handed back is convex, or RegridFailure names side and nodes.  Note:
-the result may depend on `previous` and `boundary` only, never on earlier calls.
+Every grid that it returns is convex; otherwise RegridFailure names side and nodes.  Note: the
+result must depend only on `previous` and `boundary`, never on earlier calls.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
-"""A given grid made valid: bad cells found, bad nodes projected, the rest untangled.
+"""Repair of a given grid: bad cells are found, bad nodes projected, and the rest untangled.
 
     detection    corner triangles by exact signs (`regrid.measure.corners`)
-    exclusion    triangles that no inner node can turn (`regrid.measure.corners`)
-    projection   an inner node that makes a corner of over 180 degrees is put onto the segment
-                 between its two neighbours in that cell, and a little beyond (theory R7.1)
+    exclusion    triangles that no inner node can make positive (`regrid.measure.corners`)
+    projection   an inner node that makes a corner of more than 180 degrees moves to the segment
+                 between its two neighbours in that cell, and slightly beyond (theory R7.1)
     untangling   the barrier on a smoothed denominator (`regrid.barrier.untangle`)
 
-The nodes of the sides stay.  What was done is counted.  Note: projection repairs a node at a
-time and may only move the fold to the next cell; it is kept where it leaves fewer bad corners
-around the node, and what is still folded after a few rounds is for the untangling, which moves
-every inner node.
+The nodes of the sides do not move.  All repairs are counted.  Note: projection repairs one node at
+a time and may only move the fold to the next cell.  It is accepted if it leaves fewer bad corners
+around the node.  Cells that are still folded after a few rounds are untangled, which moves every
+inner node.
 
 Source: [ProkopovND] §5; theory R5, R7.
 """

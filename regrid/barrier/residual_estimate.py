@@ -1,18 +1,19 @@
-"""The moved grid, and is it good enough as it is?  One pass over the rows of a block.
+"""The displaced grid and its residual estimate, in one pass over the rows of a block.
 
-The old grid moved along with its sides (theory R6.5), its corner areas against the old ones, an
-estimate of the residual, and the grid's quality.  If the gradient is small the Newton step is
-skipped; assembling the Hessian costs several times more.  The residual is g' M^-1 g, M the 2 × 2
-blocks of the Hessian along the lines j = const (`regrid.barrier.line_cg`).  Here M is replaced by a
-scalar tridiagonal matrix: what the straight lines give it, q = k/t an edge, and half the trace of
-the Hessian's blocks that the corners give to an edge a and to an edge b
-(`regrid.barrier.functional`), without the coupling of a and b, which is of either sign at the two
-sides of a line.  The sum Σ y²/p, with the pivots p and the forward eliminated gradient y, goes
-along with the rows.  It is within a third of the residual where cells are not very sharp, and
-nearly it where straight lines rule.
+The pass computes the old grid displaced with its sides (theory R6.5), its corner areas relative to
+the old ones, an estimate of the residual, and the quality of the grid.  If the gradient is small,
+the Newton step is skipped; assembling the Hessian costs several times more.  The residual is
+g' M^-1 g, with M the 2 × 2 blocks of the Hessian along the lines j = const
+(`regrid.barrier.line_cg`).  The estimate replaces M by a scalar tridiagonal matrix.  Its entries
+are the contribution of the straight lines, q = k/t for an edge, and half the trace of the Hessian
+blocks that the corners contribute to an edge a and to an edge b (`regrid.barrier.functional`).  The
+coupling of a and b is omitted, because it has opposite signs on the two sides of a line.  The sum
+Σ y²/p, with the pivots p and the forward-eliminated gradient y, is accumulated row by row.  The
+estimate is within a third of the residual if cells are not very sharp, and close to it where the
+straight lines dominate.
 
-Everything a row of cells yields goes into ONE flat scratch array at constant offsets
-(otherwise nothing here vectorises).
+All results of a row of cells go into ONE flat scratch array at constant offsets (otherwise
+nothing here vectorises).
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""Spacing laws, conditional lengths and family weights, all taken from a boundary's four sides.
+"""Spacings, conditional lengths and family weights, all computed from the four sides of a block.
 
-The functional knows the boundary through these only: for every edge its conditional length, and
-the step of the spacing law it takes, both interpolated linearly between the two opposite sides
-(theory R1.2, R2.3), and the weights of the two families of straight lines (theory R4.5).  The
-paper's sweeps interpolate lengths by the count of lines, the Newton step by the part of the way
-(`fill_blends`, theory R2.4).  Note: a family swapped costs everything, so the sides' bend is
-measured on smoothed, thinned-out nodes, which noise of the node spacing on a flat side does not
-turn.
+The functional depends on the boundary only through these.  Every edge has a conditional length and
+an interval of the spacing, both interpolated linearly between the two opposite sides (theory R1.2,
+R2.3).  The two families of straight lines have weights (theory R4.5).  The sweeps of the paper
+interpolate lengths by line number, the Newton step by relative distance (`fill_blends`, theory
+R2.4).  Note: exchanging the two families changes the whole grid.  The bend of a side is therefore
+measured on smoothed, thinned-out nodes, so that noise in the node spacing on a flat side has no
+effect.
 """
 
 from __future__ import annotations

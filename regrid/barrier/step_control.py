@@ -1,10 +1,10 @@
-"""What a step may do to corners: areas against those of the grid before, steps made shorter.
+"""Limits on a step: corner areas relative to those of the previous grid, and shorter steps.
 
 A corner triangle is a node with its two neighbours in one cell; its doubled area is positive in
-the absolute orientation when the cell is convex there.  Note: "positive" alone lets cells
-shrink a thousandfold until the next step has no convex start, so areas are compared with the old
-ones.  The four triangles at the block's own corners have all their nodes on the boundary: no
-regridder can change them, and they are left out here.
+the absolute orientation if the cell is convex there.  Note: if only positive areas were required,
+cells could shrink a thousandfold until the next step has no convex initial grid, so areas are
+compared with the old ones.  The four triangles at the corners of the block have all their nodes on
+the boundary: no regridder can change them, and they are left out here.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Every number that was chosen in the barrier regridder, in one place.
+"""Every chosen number of the barrier regridder, in one place.
 
-Each field names the formula it belongs to (docs/theory/regridding.md); what it does when it is
-halved or doubled stands in the table that `python benchmarks/ablation.py` makes.  Guards against
-round-off are no choices and stand where they are used.
+Each field names the formula it belongs to (docs/theory/regridding.md).  The table made by
+`python benchmarks/ablation.py` shows the effect of halving or doubling it.  Guards against
+round-off are not tuning parameters and are defined where they are used.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""Untangling: the barrier on a smoothed denominator, pulled tight until every corner is positive.
+"""Untangling: the barrier with a smoothed denominator, sharpened until every corner is positive.
 
     phi_chi = (|a|² + |b|²)/chi(D),   chi(D) = ½ (D + sqrt(D² + e²))
 
-has no pole, so that it may begin from a folded grid; as e shrinks its minimiser unfolds (theory
-R5.1, after [Garanzha1999]).  Steps are Newton steps with backtracking on the energy at fixed e.
-Note: the barrier must outweigh the straight-line terms while cells are folded, so that here it
-carries its greatest weight everywhere.
+has no pole, so the minimisation may start from a folded grid.  As e decreases, the minimiser
+unfolds (theory R5.1, after [Garanzha1999]).  Steps are Newton steps with backtracking on the energy
+at fixed e.  Note: the barrier must outweigh the straight-line terms while cells are folded, so it
+has its greatest weight everywhere.
 """
 
 from __future__ import annotations

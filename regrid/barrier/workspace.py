@@ -1,9 +1,9 @@
 """Arrays and kernel calls of one barrier regrid.
 
-A workspace sees a block in its own frame: lines j = const are the heavier straight-line family,
-and corner areas are positive.  It gets there by exchanging i and j, x and y, so that a block given
-transposed or mirrored runs through the same arithmetic, bit for bit.  Nothing in it survives
-from call to call that a result could depend on.
+A workspace transforms a block to its own frame, in which the lines j = const are the straight-line
+family of larger weight and corner areas are positive.  It exchanges i and j, and x and y, as
+needed, so a transposed or mirrored block goes through bitwise the same arithmetic.  No result
+depends on what a previous call left in it.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Weight times size constant: on curves and surfaces, in areas and volumes.
+"""Grids in which weight times size is constant: curves, surfaces, areas and volumes.
 
-May import: the contract of `regrid`, `regrid.measure`, `regrid.curves`, `regrid.algebraic`,
+May import: the interfaces of `regrid`, `regrid.measure`, `regrid.curves`, `regrid.algebraic`,
 `regrid.barrier` and `regrid.hexahedra`.
 """

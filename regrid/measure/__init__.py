@@ -1,4 +1,4 @@
-"""Judging a given grid: signs, areas, quality, crossings, why a boundary has no grid.
+"""Measures of a given grid: signs, areas, quality, crossings, and why a boundary has no grid.
 
-May import: the contract of `regrid` (errors, jit, report, sides).
+May import: the interfaces of `regrid` (errors, jit, report, sides).
 """

@@ -1,11 +1,11 @@
-"""Flow on moving blocks: one step, from reconstruction to the update, and the run of steps.
+"""Flow on moving blocks: the time step, from reconstruction to update, and the march in time.
 
-The folder's own files tell the story: `block`, `step`, `clock`, `ledger`, `history`, `simulation`,
-`workers`, `sources`, and `rows`, which names what arrays hold.  Rooms and files, each importing
-only those to its left:
+The main files are in the folder itself: `block`, `step`, `clock`, `ledger`, `history`,
+`simulation`, `workers`, `sources`, and `rows`, which names the rows of arrays.  Each subpackage or
+file imports only those to its left:
 
     formulas, eos <- interior, perimeter <- block <- ranks <- boundary, small_cells <- sliding
     <- links <- motion, sources <- step <- history <- simulation
 
-Below all stands `regrid`; `convection` is a house of its own.
+All of them may import `regrid`; `convection` is independent of the others.
 """

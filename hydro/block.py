@@ -1,7 +1,7 @@
 """A block: a structured grid of one material, its state, and its perimeter of segments.
 
-The arrays of the next step stand beside those of this one, so that a step can be rejected at no
-cost until `accept` swaps them.
+The new state of a step has arrays of its own, so a step can be rejected at no cost until `accept`
+swaps them.
 """
 
 from __future__ import annotations

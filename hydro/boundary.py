@@ -1,14 +1,15 @@
-"""Segments: what lies beyond a stretch of a block's side (boundary conditions and contacts).
+"""Segments: boundary conditions and contacts along a part of a block's side.
 
-A kind of segment is one class and one line in SEGMENTS.  It says what ghosts stand beyond its faces
-(for the slopes), how its nodes move (`motion`), and what flows through its faces: rows of its
-`rim`, by the names of `hydro.rim`.
+A kind of segment is one class and one line in SEGMENTS.  It defines the ghost states beyond its
+faces (for the slopes), the motion of its nodes (`motion`), and the fluxes through its faces: rows
+of its `rim`, by the names of `hydro.rim`.
 
-Walls are at rest, on the axis of axisymmetric flow, or move with a given velocity (piston).  A
-block's kernels mirror cells in all its walls and press on them (`hydro.perimeter.strips`); a kind
-of wall is a number.  Note: ghosts may not flatten the slope normal to a wall, which alone halves a
-measured growth rate.  A free surface has a given pressure beyond, which may depend on time.  What
-lies between two linked segments is the link's: `hydro.links`, `hydro.sliding.contact`.
+Walls are at rest, lie on the axis of axisymmetric flow, or move with a given velocity (piston).
+The kernels of a block mirror cells in all its walls and compute the wall pressure
+(`hydro.perimeter.strips`); a kind of wall is a number.  Note: ghosts must not flatten the slope
+normal to a wall, which by itself halves a measured growth rate.  Beyond a free surface the pressure
+is given and may depend on time.  The contact between two linked segments is computed by the link:
+`hydro.links`, `hydro.sliding.contact`.
 """
 
 from __future__ import annotations

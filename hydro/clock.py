@@ -1,4 +1,4 @@
-"""When a flow is, how far its next step may go, and what a step takes of wall time."""
+"""The time of a flow, the limits on its next step, and the wall time of a step."""
 
 from __future__ import annotations
 

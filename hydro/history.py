@@ -1,8 +1,8 @@
-"""The columns of a flow's history, group by group; a new one is one function and one line.
+"""The columns of a flow's history, in groups; a new group is one function and one line.
 
-A group is a function of the flow after a step that returns numbers by column name, the same names
-at every step.  Those of COLUMNS are in every history, those of other packages where a deck names
-them in `output.columns`.
+A group is a function that takes the flow after a step and returns numbers by column name, with the
+same names at every step.  The groups of COLUMNS are in every history; those of other packages are
+included if a deck names them in `output.columns`.
 """
 
 from __future__ import annotations

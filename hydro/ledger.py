@@ -1,10 +1,10 @@
-"""What is conserved and what came in through the boundary, step by step.
+"""Conserved totals and the inflow through the boundary, step by step.
 
-Totals are of each material's mass and of the momentum and energy of all blocks; the boundary's
-part is the time integral of the outward fluxes of all segments that have no partner, with the
-sign turned; what a body source adds, and what surface tension does, counts as come in.
-total - boundary is constant to round-off.
-In axisymmetric flow all are per radian, and radial momentum, which is not conserved, has no column.
+The totals are the mass of each material and the momentum and energy of all blocks.  The boundary
+part is the time integral of the inward fluxes through all segments that are not linked to another
+segment.  Contributions of body sources and of surface tension are counted as inflow.  The
+difference total - boundary is constant to round-off.  In axisymmetric flow all quantities are per
+radian.  Radial momentum is not conserved and has no column.
 """
 
 from __future__ import annotations

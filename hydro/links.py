@@ -1,7 +1,7 @@
-"""All that passes between blocks: links of matching lines, and sliding contacts in their order.
+"""All exchange between blocks: links of matching lines, and sliding contacts in their order.
 
-A link joins two segments face by face.  The contact between them is the link's: it is solved once
-and written into both rims; nothing else of either block is touched.  A sliding contact
+A link joins two segments face by face.  It solves the contact between them once and writes the
+result into both rims; it changes nothing else in either block.  A sliding contact
 (`hydro.sliding.contact`) joins lines whose nodes do not match.
 """
 

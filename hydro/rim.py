@@ -1,10 +1,10 @@
 """The rim of a block: its cells and faces along the four sides, as one array with named rows.
 
-The faces are numbered side by side in the order of SIDES, each side by rising i or j.  Whatever a
-face has, its cell, its ghost, its traces, its contact state, its flux, is one row (2 (ni + nj),) of
-`Rim.rows`.  Python names rows as attributes, `rim.rho`, `rim.p_star`; kernels take `rim.rows` and
-name them by this module's constants (`from hydro import rim as on`, then `rim[on.P_STAR, k]`).
-Note: faces towards -i and -j have outward normals, too.
+The faces are numbered consecutively in the order of SIDES, on each side by increasing i or j.  Each
+quantity of a face (its cell, ghost, traces, contact state, flux) is one row (2 (ni + nj),) of
+`Rim.rows`.  Python code uses rows as attributes, `rim.rho`, `rim.p_star`; kernels take `rim.rows`
+and index it by the constants of this module (`from hydro import rim as on`, then
+`rim[on.P_STAR, k]`).  Note: faces towards -i and -j have outward normals, too.
 """
 
 from __future__ import annotations

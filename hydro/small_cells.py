@@ -1,21 +1,22 @@
-"""Small cells: which cells of a flow set its time step, and what happens to those that may not.
+"""Small cells: which cells limit the time step, and state redistribution for the smallest ones.
 
-The rate of a cell is what waves cross of it per time (theory F7.1).  A run's step hangs on its
-largest; where a few cells are squeezed far more than all others of their block, the step is that
-of cells no flatter than those others, and the squeezed ones share their new states with neighbours
-(state redistribution).  Hot cells are not squeezed ones: they set the step as ever.
+The rate of a cell is the reciprocal of the time in which waves cross it (theory F7.1).  The largest
+rate limits the step.  Where a few cells are squeezed far more than all others of their block, the
+step is that of cells no flatter than those others, and the squeezed cells use state redistribution.
+Hot cells that are not squeezed limit the step as usual.
 
-Every squeezed cell gathers a neighbourhood over its short direction, as many cells on either side
-as make it large enough for the step.  A cell belongs to every neighbourhood that reaches it, its
-own included, with equal parts of its volume; each neighbourhood takes the mean of its parts and
-lays a limited slope through it; each cell is the mean of what its neighbourhoods say there
-[BergerGiuliani2021].  What is shared is what the step has changed, and RELAXED of the state itself:
-sharing all of it in every step would smear what lies along the short direction.  The fluxes are
-those of the scheme, and sums are kept to round-off.  Theory F7.4.
+The neighbourhood of a squeezed cell extends across its short direction and has as many cells on
+either side as make it large enough for the step.  A cell belongs to every neighbourhood that
+contains it, including its own, with equal parts of its volume.  Each neighbourhood takes the mean
+of its parts and a limited slope; the new state of a cell is the mean of the values of its
+neighbourhoods there [BergerGiuliani2021].  The change in the step is redistributed in full, the
+state itself by the fraction RELAXED: redistributing all of it in every step would smear features
+along the short direction.  The fluxes are those of the scheme, and totals are conserved to
+round-off.  Theory F7.4.
 
-Notes: sums run from a cell outwards in pairs, so that a mirrored block keeps its bits; what the
-update has made of a small cell may be no state of the material, and only conserved quantities
-per volume are taken from it.
+Notes: sums run outwards from a cell in pairs, so that a mirrored block gives bitwise mirrored
+results.  The update may leave a small cell in a state that is not admissible, so only conserved
+quantities per volume are used of it.
 """
 
 from __future__ import annotations

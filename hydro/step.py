@@ -1,7 +1,7 @@
 """One time step in seven phases, in the order of the numbers; the arithmetic is elsewhere.
 
-Until phase 7 everything is written beside the state that the step starts from, so that a step can
-be rejected at no cost: body sources write their first half into a copy of it, too.
+Until phase 7 all results go into separate arrays, so that a step can be rejected at no cost.  Body
+sources, too, apply their first half to a copy of the state.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""Blocks side by side on threads, where that gains more than threads inside each block.
+"""Blocks in parallel on threads, where this is faster than threads within each block.
 
-Kernels run without the interpreter lock, and a block's regridding and update touch arrays of that
-block alone, so that any number of threads gives the same bits.  Note: kernels with threads of
-their own may not be called from two threads at once; side by side, blocks have one each.
+Kernels release the interpreter lock, and the regridding and the update of a block use only arrays
+of that block, so results are bitwise the same for any number of threads.  Note: kernels that use
+threads themselves must not be called from two threads at once; blocks in parallel use one thread
+each.
 """
 
 from __future__ import annotations

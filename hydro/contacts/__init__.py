@@ -1,4 +1,4 @@
-"""Bodies that meet, part and meet again: facets between surfaces, each with a line of its own.
+"""Bodies that come into contact, separate and meet again; facets between their surfaces.
 
 May import: `regrid`, `hydro.rows`, `hydro.formulas`, `hydro.perimeter`, `hydro.rim`,
 `hydro.block`, `hydro.boundary`, `hydro.sliding`, `hydro.links`, `hydro.motion`.

@@ -1,8 +1,8 @@
-"""Kernels of the facets' states: a Riemann problem each, what faces get of it, the fluxes.
+"""Kernels for the states of facets: a Riemann problem for each, its result for faces, the fluxes.
 
-One test closes a facet and opens it: is the pressure between both sides' traces, were they in
-contact, above that of the void between them (less the bond)?  That is the Riemann problem with a
-vacuum: below, the two free surfaces part.  Theory F16.2.
+One test decides whether a facet is closed or open: is the pressure between the traces on both
+sides, if they were in contact, above that of the gap between them (less the bond)?  This is the
+Riemann problem with a vacuum: below that pressure the two free surfaces separate.  Theory F16.2.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Kernels that find where two lines lie on each other, and cut this into facets.
+"""Kernels that find where two lines are in contact, and divide the contact into facets.
 
-Lines run so that what is outside lies to the right of their nodes' order; two lines on each other
-run opposite ways.  A *pin* is a node of one line that lies on the other.  The follower's nodes are
-laid on the leader's line; between two pins on one face of the follower the contact is the leader's
-line, whose nodes bound the facets.  So facets add up, as vectors, to the faces of both lines.
-Theory F16.1.
+The outside of a line is to the right of its direction, so two lines in contact run in opposite
+directions.  A *pin* is a node of one line that lies on the other.  The nodes of the follower are
+projected onto the leader's line.  Between two pins on one face of the follower the contact is the
+leader's line, whose nodes bound the facets, so facets add up, as vectors, to the faces of both
+lines.  Theory F16.1.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Kernels that lay nodes on the other line, and those of planes, on which nodes lie at a height."""
+"""Kernels that project nodes onto the other line, or onto a plane."""
 
 from __future__ import annotations
 

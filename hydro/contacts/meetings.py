@@ -1,10 +1,10 @@
-"""All pairs of surfaces that may meet: found, cut to the touch, closed, opened.
+"""All pairs of surfaces that may meet: found, stopped at the touch, closed, opened.
 
-Paired are all surfaces, each also with itself, and all with the planes that bound the whole.  A
-pair costs a comparison of two numbers a step as long as both lines are further apart than their
-nodes can have gone since their distance was measured.  All of it follows from nodes and states at
-the step's start, so a restart within an event is bitwise the same; only what is
-counted is part of a restart point.
+Pairs are formed of all surfaces, of each surface with itself, and of each with the planes that
+bound the whole.  A pair costs a comparison of two numbers per step while its lines are farther
+apart than their nodes can have moved since the distance was last measured.  Everything follows from
+nodes and states at the start of the step, so a restart during a contact is bitwise the same; only
+the counters are part of a restart point.
 """
 
 from __future__ import annotations

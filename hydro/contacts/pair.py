@@ -1,4 +1,4 @@
-"""Two surfaces that may meet, or one that may meet itself: where they lie on each other."""
+"""Two surfaces that may meet, or one that may meet itself: where they are in contact."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rows of the arrays over the facets of two lines, and over the faces that they cover."""
+"""Rows of the arrays for the facets of two lines, and for the faces that they cover."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What may meet: a free surface or a wall, as a line with its outside; planes without ends."""
+"""Surfaces that may meet: a free surface or a wall as a line with its outside; infinite planes."""
 
 from __future__ import annotations
 

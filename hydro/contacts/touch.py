@@ -1,7 +1,7 @@
-"""Kernels on how near two lines are, and when in a step a node of one touches the other.
+"""Kernels for the distance of two lines, and for the first touch of a node during a step.
 
-Nodes go straight from their old to their new place, so the signed area of a node and a face is a
-quadratic of the time: its first root with the node's foot inside the face is a touch.
+Nodes move straight from their old to their new position, so the signed area of a node and a face is
+quadratic in time.  Its first root for which the foot point lies inside the face is a touch.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Voids that surfaces, contacts and planes close off: places, areas, the gas in them.
+"""Voids enclosed by surfaces, contacts and planes: positions, areas, and the gas in them.
 
-Round a void one goes along surfaces, each with its outside on the right: where a contact begins,
-over to the other line; where a line ends, on to the next one there or to the plane that holds the
-end; along a plane to the next line on it.  Ways round that come back to where they began are voids
-if they run clockwise.  Theory F16.7.
+The path around a void follows surfaces, each with its outside on the right.  Where a contact
+begins, it crosses to the other line.  Where a line ends, it continues on the next line or on the
+plane that holds the end, and along a plane to the next line on it.  Closed paths are voids if they
+run clockwise.  Theory F16.7.
 """
 
 from __future__ import annotations

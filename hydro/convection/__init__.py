@@ -1,5 +1,5 @@
-"""Natural convection (Boussinesq); it shares nothing with the shock flow.
+"""Natural convection (Boussinesq), independent of the shock flow.
 
-`tensor_grids` serves all: boxes in two dimensions (`box`, `equations`, `march`, `steady`,
-`measure`), and `columns` of cells in one dimension.  May import: `regrid`.
+All solvers use `tensor_grids`: those for boxes in two dimensions (`box`, `equations`, `march`,
+`steady`, `measure`), and `columns` of cells in one dimension.  May import: `regrid`.
 """

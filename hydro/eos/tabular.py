@@ -1,10 +1,10 @@
 """Tabular p(rho, e): a table from an HDF5 file, bilinear between its points.
 
-The file has datasets `rho` (n,) [kg/m³] and `e` (m,) [J/kg], both rising, and `p` (n, m) [Pa],
-rising along both.  Bilinear interpolation keeps it rising, is inverted exactly for e(rho, p), and
-the sound speed is that of the interpolated surface, so that all three agree to round-off.
-Note: nothing is extrapolated; a state outside is NaN to the kernels, the step fails with a
-sentence.
+The file has datasets `rho` (n,) [kg/m³] and `e` (m,) [J/kg], both increasing, and `p` (n, m) [Pa],
+increasing along both.  Bilinear interpolation keeps it increasing and is inverted exactly for
+e(rho, p).  The sound speed is that of the interpolated surface, so all three agree to round-off.
+Note: nothing is extrapolated.  A state outside the table is NaN in the kernels, and the step fails
+with a message.
 """
 
 from __future__ import annotations

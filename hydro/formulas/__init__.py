@@ -1,4 +1,4 @@
-"""Scalars in, scalars out: geometry, reconstruction, Riemann solvers; no arrays, no rows.
+"""Scalar formulas: geometry, reconstruction, Riemann solvers; no arrays, no rows.
 
 May import: `regrid`.
 """

@@ -1,11 +1,12 @@
 """MUSCL–Hancock reconstruction on moving quadrilaterals: slopes, half step, face values.
 
 Limited variations are taken along the two grid lines, weighted by the distances between opposite
-face midpoints; the gradient is the one vector that has both.  Velocities are limited in their
-components along and across the grid line, so that a turned flow has turned slopes.  The half step
-is in primitive variables at the cell's old centre, and face values are taken at the face's
-mid-time midpoint, which carries the mesh motion without any extra term.  Parts only: the row
-kernels and the kernels of block sides are made of the same text, so that both give the same bits.
+face midpoints; the gradient is the unique vector that reproduces both.  Velocities are limited in
+their components along and across the grid line, so that the slopes of a rotated flow rotate with
+it.  The half step uses primitive variables at the old cell centre.  Face values are evaluated at
+the mid-time midpoint of the face, which includes the mesh motion without any extra term.  These are
+parts only: the row kernels and the kernels of block sides are built from the same source, so both
+give bitwise the same results.
 """
 
 from __future__ import annotations

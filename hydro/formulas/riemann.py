@@ -1,10 +1,10 @@
 """Riemann solvers: HLLC and HLL inside blocks, two-shock contact states on sides.
 
-All are parts of kernels: scalars in, scalars out.  Every formula is written so that exchanging
-the two states and turning the normal gives exactly the negative flux: a mirrored flow stays the
-mirror image bitwise.  HLLC and HLL work with speeds times the length of the face, which
-saves the normalisation.  HLLC is cut into two parts, so that a row of faces can go through one
-after the other: their long chains of dependent operations then overlap between faces.
+All are scalar parts of kernels.  Every formula is written so that exchanging the two states and
+reversing the normal gives exactly the negative flux: a mirrored flow stays the mirror image
+bitwise.  HLLC and HLL use speeds times the length of the face, which avoids the normalisation.
+HLLC is divided into two parts, which a row of faces goes through one after the other: their long
+chains of dependent operations then overlap between faces.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Row kernels of a block's inside and sides, one numerical phase a file; `advance` orders them.
+"""Row kernels for the interior and the sides of a block, one phase per file; `advance` orders them.
 
 May import: `regrid`, `hydro.rows`, `hydro.rim`, `hydro.formulas`, `hydro.eos`.
 """

@@ -1,9 +1,10 @@
-"""One second-order step of a block: rows through all phases while they are in cache.
+"""One second-order step of a block: rows go through all phases while they are in cache.
 
-`make_flow_kernels` binds an equation of state and a limiter to the row phases and gives the
-kernel that advances a whole block.  The block is cut into tiles of fixed size (never by the
-number of threads), each tile reconstructs one row more on either side, and sums are reduced tile
-by tile in order: any number of threads gives the same bits.  The scheme: theory F2, F3, F10.
+`make_flow_kernels` binds an equation of state and a limiter to the row phases and returns the
+kernel that advances a whole block.  The block is divided into tiles whose size does not depend on
+the number of threads.  Each tile reconstructs one more row on either side, and sums are reduced
+tile by tile in order, so results are bitwise the same for any number of threads.  The scheme:
+theory F2, F3, F10.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The phases of one flow step on one row of cells that only axisymmetric flow has.
+"""The phases of one flow step on one row of cells that occur only in axisymmetric flow.
 
-Where the centres of volume lie along the grid lines and how these lean, how smooth the pressure is,
-and the pressure's radial force, per depth and as the tension of rings: see
-`hydro.formulas.geometry`, and `hydro.interior.scratch`, whose rules hold here too.
+They compute the offsets of the centres of volume along the grid lines and the resulting rotation,
+the smoothness of the pressure, and the radial force of the pressure, per depth and as the tension
+of rings.  See `hydro.formulas.geometry`, and `hydro.interior.scratch`, whose rules apply here too.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Fields of a block's cells, of which energy and sound speed are computed when they are asked for.
+"""Fields of a block's cells; energy and sound speed are computed only when they are used.
 
-Who wants to know the names, or a density, at every step pays for no equation of state.
+Reading the names or the density at every step therefore costs no equation of state.
 """
 
 from __future__ import annotations

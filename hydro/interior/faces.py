@@ -1,7 +1,7 @@
-"""Rows of faces: states traced to them, and fluxes: HLLC, or HLL where the switch is on.
+"""Rows of faces: states traced to them, and fluxes: HLLC, or HLL where its switch is on.
 
-The rules of `hydro.interior.scratch` hold here too.  Three traces of a cell are done in one
-loop, so that the predicted state and its gradients are loaded once.  HLLC is in two halves, the
+The rules of `hydro.interior.scratch` apply here too.  Three traces of a cell are computed in one
+loop, so that the predicted state and its gradients are loaded once.  HLLC is divided into the
 upwind side (`make_upwind`) and the flux (`make_flux`), so that the long chains of dependent
 operations overlap between faces.
 """

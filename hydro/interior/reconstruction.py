@@ -1,7 +1,7 @@
-"""How a row of cells is reconstructed: what the cells are, then slopes and half step, in order.
+"""Reconstruction of a row of cells: cell geometry, then slopes and half step, in order.
 
-The inside of a block and the strips along its sides (`hydro.perimeter.strips`) go the same way.
-The rules of `hydro.interior.scratch` hold here too.
+The interior of a block and the strips along its sides (`hydro.perimeter.strips`) use the same code.
+The rules of `hydro.interior.scratch` apply here too.
 """
 
 from __future__ import annotations

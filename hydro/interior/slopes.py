@@ -1,17 +1,18 @@
-"""Rows of limited slopes and the half step in time, for a block's inside.
+"""Rows of limited slopes and the half step in time, for the interior of a block.
 
-The rules of `hydro.interior.scratch` hold here too.
+The rules of `hydro.interior.scratch` apply here too.
 
-A contact or a free surface has no cell beyond it from which a slope could be taken, only its own
-state, from the Riemann problem of both sides.  From the states at the cells' centres that problem
-is of first order where a gradient bends, as every gradient does at an interface: the normal
-velocity of a wave on it decays on both sides, the mean of both cells is the cell's own value, and
-the slope at the interface is gone.  So the cells' states go to the face first, with the limited
-slope of the next cell inwards, which needs nothing from beyond the side (`make_extrapolation`).
-Layers at rest in gravity, whose pressure changes little from cell to cell, stay at rest beside it.
-A shock is no such gradient.  Extrapolation fades out smoothly where the pressure jumps: a switch
-would make what a shock does to the side depend on where in a time step it arrives, and prints
-that on a bent interface.  Theory F4.7; what was tried: docs/notes/decisions.md.
+A contact or a free surface has no cell beyond it that could give a slope.  It has only its own
+state, from the Riemann problem of both sides.  With cell-centred states that problem is first order
+where a gradient has a kink, as every gradient has at an interface: the normal velocity of a wave
+decays on both sides of it, the mean of both cells equals the value of each cell, and the slope at
+the interface vanishes.  The cell states are therefore first extrapolated to the face, with the
+limited slope of the next cell inwards, which needs no data from beyond the side
+(`make_extrapolation`).  Layers at rest under gravity, whose pressure changes little from cell to
+cell, then stay at rest.  A shock must not be extrapolated.  The extrapolation fades out smoothly
+where the pressure jumps: with a switch, the effect of a shock on the side would depend on when in a
+time step it arrives, which would be imprinted on a bent interface.  Theory F4.7; what was tried:
+docs/notes/decisions.md.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The conservative update: old amounts less fluxes, the new state, rates, and totals of tiles.
 
-The rules of `hydro.interior.scratch` hold here too.
+The rules of `hydro.interior.scratch` apply here too.
 """
 
 from __future__ import annotations

@@ -1,30 +1,30 @@
-"""What moves after the lines, because it is bound to them: joints, seams, slaves, corners.
+"""Nodes that move after the lines because they depend on them: joints, seams, slaves, corners.
 
-*Joint*: a key node inside one smooth contact, where the blocks on its sides change.  It has no
-right to its position on the contact; left to the material it goes where that goes, round a corner
-if need be, and takes the blocks' borders with it.  So it slides along the contact and keeps its
-share of both lines' lengths.  Note: it has to stay on the curve, or the cells beside it gain and
-lose area without mass; a cubic through three nodes either way holds it there.
+*Joint*: a key node inside a smooth contact, where the blocks on its sides change.  If it moved with
+the material, it would go wherever the material goes, round a corner if need be, and would take the
+borders of the blocks with it.  It therefore slides along the contact and keeps its relative
+position between the ends of both lines.  Note: it must stay on the curve, or the adjacent cells
+would gain and lose area without mass; a cubic through three nodes on either side ensures this.
 
-*Carried seam*: a block's border inside a material, through which that streams, so that it may stand
-anywhere.  Left alone its ends go with the material, and a contact that runs into the block behind
-it presses the block to nothing.  So it keeps, node by node, its part of the way from one contact to
-another.
+*Carried seam*: a border between blocks inside a material, through which the material flows, so its
+position is free.  If its ends moved with the material, a contact moving into the block behind it
+would squeeze the block to nothing.  Each of its nodes therefore keeps its relative position between
+one contact and another.
 
-*Slave* of a sliding contact: its nodes are laid on the master's moved line, ends included.  An end
-is fixed at an end of the master, or it is a contact point: the place where the free line that goes
-on from there meets the master.
+*Slave* of a sliding contact: its nodes are placed on the moved line of the master, ends included.
+An end is fixed at an end of the master, or it is a contact point, where the free line that
+continues from there meets the master.
 
-*Corner*: a junction that the flow carries may open a block's corner until it is 180 degrees wide,
-and no convex quadrilateral has a wider one, whatever its other nodes do (theory R7).  From there on
-its key node is put on the line between its two neighbours on the sides and the corner cell is a
-triangle (`regrid.measure.corners.find_triangles`), until the flow closes the corner again.
-Notes: both neighbours have to stay, or a corner on the other side of the same line opens instead,
-so the node is moved last; and a node taken further than onto the line would take area from its
-cells, without mass, where nothing is wrong.  Where lines slide on each other the node that carries
-them is moved, and what slides is laid on the moved line again.  If the corner is one of the sliding
-block's, its neighbour on that line goes part of the way with it, so that a straight angle takes a
-few rounds.  Source: [ProkopovND] §5, the projection of a bad node, here of the boundary's own.
+*Corner*: a junction that moves with the flow may open the corner of a block until it is 180 degrees
+wide.  No convex quadrilateral has a wider one, wherever its other nodes are (theory R7).  From then
+on its key node is placed on the line between its two neighbours on the sides, and the corner cell
+is a triangle (`regrid.measure.corners.find_triangles`), until the flow closes the corner again.
+Notes: neither neighbour may move, or a corner on the other side of the same line would open
+instead, so the node is moved last.  A node moved beyond the line would take area from its cells,
+without mass, where nothing is wrong.  Where lines slide on each other, the node that determines
+them is moved, and the sliding line is placed on the moved line again.  If the corner belongs to the
+sliding block, its neighbour on that line moves part of the way with it, so a straight angle takes a
+few rounds.  Source: [ProkopovND] §5, the projection of a bad node, here applied to the boundary.
 """
 
 from __future__ import annotations

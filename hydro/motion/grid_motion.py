@@ -1,7 +1,7 @@
-"""How the grid moves in a step: its sides (`hydro.motion.sides`), then every block's interior.
+"""Motion of the grid in a step: its sides (`hydro.motion.sides`), then the interior of every block.
 
-The inside is rebuilt by the block's regridder, or the nodes follow a prescribed motion.  Nothing is
-written but the new nodes, so that a step can still be rejected.
+The interior is rebuilt by the regridder of the block, or the nodes follow a prescribed motion.
+Only the new nodes are written, so a step can still be rejected.
 """
 
 from __future__ import annotations

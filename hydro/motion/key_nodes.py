@@ -1,15 +1,16 @@
-"""Key nodes: the ends of segments, each moved by one rule from all that meets there.
+"""Key nodes: the ends of segments, each moved by one rule from all segments that meet there.
 
 A key node gathers every segment end at one point, of any number of blocks (and of periodic
-images).  In order: a given motion decides (a moving line that ends on a straight piston goes along
-it as the contact does); else the contact speeds of all moving faces around it, held to the lines of
-walls and open sides; else a seam's end follows the fluid, unless the seam is carried by contacts
-(`hydro.motion.constraints`); else it rests.
+images).  The rules apply in this order.  A prescribed motion decides; a moving line that ends on a
+straight piston moves along it as the contact does.  Otherwise the node moves with the contact
+velocities of all moving faces around it, restricted to the lines of walls and open sides.
+Otherwise the end of a seam follows the fluid, unless the seam is carried by contacts
+(`hydro.motion.constraints`).  Otherwise the node is at rest.
 
-Ends are at one point when they are the same node of a block or are linked, directly or through
-other blocks (so the four blocks around a crossing, or three at a T, share one key node), or when
-the line that others slide on goes on from one to the other.  Points that merely coincide in place
-are not one: two blocks may touch at a corner and part again.
+Ends are at one point if they are the same node of a block, if they are linked directly or through
+other blocks (so the four blocks around a crossing, or three at a T, share one key node), or if the
+line on which others slide continues from one to the other.  Points that merely coincide are
+different: two blocks may touch at a corner and separate again.
 """
 
 from __future__ import annotations

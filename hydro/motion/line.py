@@ -1,14 +1,15 @@
-"""One segment's moving line: its track, its spacing, how its nodes move.
+"""The moving line of a segment: its track, its spacing, and the motion of its nodes.
 
-A track is the polyline of a segment's first nodes, on which nodes of walls and open sides stay
-while they slide along it.  Where two tracks go on smoothly into one another at a key node (the end
-of an interface on a curved wall), both are one, so that the key node can pass from one to the
+A track is the polyline of a segment's initial nodes; nodes of walls and open sides stay on it while
+they slide along it.  Where two tracks continue smoothly into each other at a key node (the end of
+an interface on a curved wall), they form one track, so that the key node can pass from one to the
 other.  Note: a node moved along the tangent leaves a curved track by the square of its step, and
 nothing would ever bring it back.
 
-The kernels read and write the block's nodes themselves.  Where a line is, its `span` says (5,): the
-number of its side in SIDES, its first node and its number of nodes on that side, the perimeter's
-number of its first face, and where its law begins in an array of several lines' laws.
+The kernels read and write the nodes of the block themselves.  The `span` (5,) of a line gives its
+location: the number of its side in SIDES, its first node and its number of nodes on that side, the
+perimeter's number of its first face, and the start of its spacing in an array of the spacings of
+several lines.
 """
 
 from __future__ import annotations

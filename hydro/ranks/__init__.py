@@ -1,4 +1,4 @@
-"""The blocks of a flow, and who computes which where ranks of MPI share them.
+"""The blocks of a flow, and their distribution over MPI ranks.
 
 May import: `regrid`, `hydro.rows`, `hydro.workers`, `hydro.interior`, `hydro.block`.
 """

@@ -1,4 +1,4 @@
-"""From one grid to another: what a block holds laid on other cells, conservatively (theory F12).
+"""Conservative remapping of the state of a block from one grid to another (theory F12).
 
-May import: `regrid` and all other rooms of `hydro`.
+May import: `regrid` and all other subpackages of `hydro`.
 """

@@ -1,4 +1,4 @@
-"""Sliding contacts: two lines whose nodes do not match, cut into common pieces.
+"""Sliding contacts: two lines whose nodes do not match, divided into common pieces.
 
 May import: `regrid`, `hydro.rows`, `hydro.rim`, `hydro.formulas`, `hydro.perimeter`,
 `hydro.boundary`.

@@ -96,10 +96,10 @@ class Block:
     """One material on one structured grid.
 
     nodes (2, ni + 1, nj + 1); rho, u, v, p: numbers or arrays (ni, nj), cell averages, SI.
-    flux: "hllc", with HLL at strong shocks, or "hll" on all faces, which damps what skewed lines
-    print behind a shock, and smears contacts inside the block.
-    Raises BadInput for a grid with a bad cell, a density or sound speed that is not positive, and
-    for an equation of state whose formulas disagree.
+    flux: "hllc", with HLL at strong shocks, or "hll" on all faces, which damps the errors that
+    skewed grid lines leave behind a shock, but smears contacts inside the block.
+    Raises BadInput for a grid with a bad cell, for a density or sound speed that is not positive,
+    and for an equation of state whose formulas disagree.
     """
 
     units = UNITS

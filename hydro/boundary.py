@@ -195,7 +195,7 @@ class Piston(Wall):
 
 
 class Outflow(Segment):
-    """Open side: what comes out is let through, nothing is known beyond."""
+    """Open side: material flows out freely, and no state is prescribed beyond."""
 
     kind = "outflow"
     beyond = on.RHO_TRACE  # as inside
@@ -210,8 +210,8 @@ class Inflow(Segment):
     """Open side with a given state beyond: (rho, u, v, p), or a function of time giving it.
 
     Each of the four is a number, or an array with a value for every face of the segment.  It is
-    the state at the face: slopes take it from there, at half a cell's distance.  The nodes stay
-    on their line, or go with a given constant `velocity` [m/s], through which the fluid passes.
+    the state at the face, so slopes use it at half a cell's distance.  The nodes stay on their
+    line or move with a given constant `velocity` [m/s]; the fluid passes through them.
     """
 
     kind = "inflow"
@@ -253,10 +253,10 @@ class Inflow(Segment):
 class FreeSurface(Segment):
     """Surface under a pressure: a number [Pa], or a function of time (pressure piston).
 
-    tension: surface tension [N/m], `hydro.motion.tension`.  What a contact holds where both of its
-    surfaces have it (`hydro.contacts`): bond, a tension [Pa]; friction, Coulomb's coefficient;
-    weld: both without end.
-    Raises BadInput (at a later time RunFailure) where the block's material has no sound speed at
+    tension: surface tension [N/m], `hydro.motion.tension`.  Properties of a contact if both of
+    its surfaces have them (`hydro.contacts`): bond, a tension [Pa]; friction, Coulomb's
+    coefficient; weld, an unlimited bond and friction.
+    Raises BadInput (at a later time RunFailure) if the block's material has no sound speed at
     that pressure: a gas has no surface to vacuum.
     """
 
@@ -328,9 +328,9 @@ class FreeSurface(Segment):
 
 
 class Linked(Segment):
-    """Segment with another block's (or its own block's) segment on the far side.
+    """Segment linked to a segment of another block (or of its own block).
 
-    Ghosts, contact states and fluxes are the link's.
+    The link computes its ghosts, contact states and fluxes.
     """
 
     linked = True
@@ -351,9 +351,9 @@ class Interface(Linked):
 
 
 class Sliding(Linked):
-    """One side of a sliding contact, or a part of one; its nodes match nobody's.
+    """One side of a sliding contact, or a part of one; its nodes match no other nodes.
 
-    The master's side moves with the contact, the slave's follows.
+    The side of the master moves with the contact, and that of the slave follows.
     """
 
     kind = "sliding"
@@ -364,7 +364,7 @@ class Sliding(Linked):
 
 
 class Seam(Linked):
-    """Cut between blocks of one material: material and grid lines pass through."""
+    """Seam between blocks of one material: material and grid lines pass through."""
 
     kind = "seam"
     motion = NodeMotion.JOIN

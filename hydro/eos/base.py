@@ -35,19 +35,19 @@ from regrid.jit import inlined
 class EquationOfState:
     """Pressure law p(rho, e) of one material; SI units (or any consistent ones).
 
-    Class attributes that a kind of EOS gives (each marked `regrid.jit.inlined`, called by the flow
-    kernels with the parameter tuple last):
+    Class attributes that an equation of state defines (each marked `regrid.jit.inlined` and called
+    by the flow kernels with the parameter tuple last):
 
     - `pressure_part(rho, e, parameters)`
     - `energy_part(rho, p, parameters)`
     - `sound_speed_squared_part(rho, p, parameters)`
-    - `least_pressure_part(parameters)`: minus the tensile strength; material that would be pulled
-      harder gets voids (see `hydro.interior.update.make_update`)
-    - `strength_left_part(rho, parameters)`, optional: the part of that tension which material with
-      gaps between its pieces can bear (`hydro.eos.base`); without it all
-    - `opens_voids`: False where there is no such pressure; the flow kernels then know no voids
+    - `least_pressure_part(parameters)`: minus the tensile strength; under more tension
+      voids open (see `hydro.interior.update.make_update`)
+    - `strength_left_part(rho, parameters)`, optional: the fraction of that tension that fragments
+      with gaps between them can bear (`hydro.eos.base`); by default all of it
+    - `opens_voids`: False if there is no such pressure; the flow kernels then omit voids
 
-    Kernels divide once by what several formulas divide by, if all write it as `1.0 / rho`.
+    Kernels share a division that several formulas contain if all write it as `1.0 / rho`.
     """
 
     kind: ClassVar[str]
@@ -153,12 +153,12 @@ def check_eos(block: str, eos: object) -> None:
 
 @inlined
 def compute_whole_ratio(ratio, p, strength):
-    """rho0/rho that the sound speed sees: of the whole pieces where material is torn.
+    """rho0/rho for the sound speed: that of the solid fragments where material has failed.
 
-    From half the tension at which it tears on it goes from that of a body expanded as a whole to 1,
-    that of pieces with gaps between them: a cell that holds a hundredth of its full mass would else
-    carry waves a hundred times as fast as the solid and stop the time step.  In compression, and at
-    no tension, it is the ratio itself (a strength of 0 too).
+    From half the tensile strength on, it goes from the value of a body expanded as a whole to 1,
+    that of fragments with gaps between them.  Otherwise waves in a cell with a hundredth of its
+    full mass would be a hundred times as fast as in the solid, and the time step would collapse.
+    In compression and without tension it is the ratio itself (also for a strength of 0).
     """
     excess = 0.5 * ((ratio - 1.0) + abs(ratio - 1.0))
     tension = (p - abs(p)) * (1.0 / (strength + 1e-300))  # of the strength at rho0, twice over
@@ -170,13 +170,13 @@ def compute_whole_ratio(ratio, p, strength):
 
 @inlined
 def compute_strength_left(ratio):
-    """Part of its strength that material has at the density rho0/ratio (theory F4.11)."""
+    """Fraction of its strength that a material has at the density rho0/ratio (theory F4.11)."""
     return 1.0 / (1.0 + 0.5 * ((ratio - 1.0) + abs(ratio - 1.0)))
 
 
 @functools.cache
 def make_least_pressure(eos_class):
-    """`least(rho, parameters)` of a class of equations of state: the tension at which it tears.
+    """`least(rho, parameters)` of a class of equations of state: the tension at which it fails.
 
     A class without `strength_left_part` has the same tension at all densities.
     """

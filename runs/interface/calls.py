@@ -1,4 +1,4 @@
-"""The commands as functions: they take and give data, and print nothing unless asked."""
+"""The commands as functions: they take and return data, and by default print nothing."""
 
 from __future__ import annotations
 
@@ -142,12 +142,12 @@ def run(
     quiet: bool = True,
     **settings: Any,
 ) -> OpenRun:
-    """March a problem, a deck, a case or a simulation of one's own into a run directory; its data.
+    """Run a problem, a deck, a case or your own simulation into a run directory; the run as data.
 
-    what: a name or file as for `load`, with `settings` over its deck; a `Case`; a `Simulation`,
-    which has all that packaged problems have, with `run={"max_steps": n}` and `output={...}` as its
-    settings.  measure: for a simulation, a function of it that returns columns of the history, the
-    same names always.  directory, dumps, hooks, force, quiet and what is raised: `Case.run`.
+    what: a name or file as for `load`, whose deck `settings` override; a `Case`; or a `Simulation`,
+    which has everything that packaged problems have.  Its settings are `run={"max_steps": n}` and
+    `output={...}`.  measure: for a simulation, a function of it that returns history columns, with
+    the same names at every step.  directory, dumps, hooks, force, quiet, errors: see `Case.run`.
     """
     check_single("shockgrid.run", "run DECK")
     if measure is not None and isinstance(what, Case | str | Path):
@@ -178,13 +178,13 @@ def restart(
     quiet: bool = True,
     **settings: Any,
 ) -> OpenRun:
-    """Continue a run from its last restart point, or from that of step `at`; its data.
+    """Continue a run from its last restart point, or from that of step `at`; the run as data.
 
-    simulation: for a run of your own blocks, the same blocks rebuilt.  cells: the deck's key
-    of that name, where the state is to be laid on another grid; the run then goes on in `output`
-    [out/<problem>-<n>], without hooks.  measure, hooks: as the run had them.  settings: keys
-    of the deck that say how to march, such as run.t_end and output.*.  Raises BadInput where
-    the run, the problem's file or the settings do not let it go on; else as `Case.run`.
+    simulation: for a run of your own blocks, the same blocks rebuilt.  cells: a new value of the
+    deck's key of that name; the state is remapped, and the run continues in `output`
+    [out/<problem>-<n>], without hooks.  measure, hooks: as in the first part of the run.  settings:
+    keys of the deck that control the computation, such as run.t_end and output.*.  Raises BadInput
+    if the run, the problem's file or the settings do not allow a restart; else see `Case.run`.
     """
     check_single("shockgrid.restart", "restart DIR")
     opened = open_directory(directory)
@@ -216,15 +216,15 @@ def restart(
 
 
 def plot(directory: Run, *fields: str, **options: Any) -> Figure:
-    """The figure that `shockgrid plot` draws of a run; fields and options: `OpenRun.plot`."""
+    """The figure that `shockgrid plot` draws of a run; for options see `OpenRun.plot`."""
     return open_run(directory).plot(*fields, **options)
 
 
 def verify(*problems: str, short: bool = False) -> list[dict[str, Any]]:
-    """Run the standard problems, or those named, at stated sizes; a record of each statement.
+    """Run the standard problems, or those named, at fixed sizes; returns a record of each result.
 
-    A record has "problem", "what", "size", "error", "order", "bar" and "met", None where there is
-    none.  short: one small size of each.  Raises BadInput for a name that is none.
+    A record has "problem", "what", "size", "error", "order", "bar" and "met", with None for a
+    missing value.  short: one small size of each.  Raises BadInput for an unknown name.
     """
     from runs.verify import choose_cases, compute_records
 
@@ -236,11 +236,11 @@ _OWN: dict[tuple[str, str], str] = {}  # what was registered here: kind and name
 
 
 def register(name: str, thing: type) -> None:
-    """Make a class known by name: a problem, an equation of state, a boundary kind, a regridder.
+    """Register a class by name: a problem, an equation of state, a boundary kind, a regridder.
 
-    A regridder is a class with a method `regrid(previous, boundary)`.  The same name may be given
-    again by the same class, rewritten.  Raises BadInput for another class, for a name that is
-    taken, and for one that is not of small letters, digits and hyphens.
+    A regridder is a class with a method `regrid(previous, boundary)`.  A new version of a class
+    may be registered again under its name.  Raises BadInput for any other class, for a name that
+    is taken, and for one with characters other than lower-case letters, digits and hyphens.
     """
     if not isinstance(thing, type):
         raise BadInput(f"{name!r}: a class is registered, not a {type(thing).__name__}")

@@ -1,11 +1,11 @@
-"""A problem with its deck, to inspect, step, run and draw, and a run's directory as data.
+"""A problem with its deck (`Case`), to inspect, step, run and plot, and a run as data (`OpenRun`).
 
 `shockgrid.load` returns the first, `shockgrid.open` and `shockgrid.run` the second.  Keywords are
-settings of the deck, `cells=32, run={"t_end": 1e-3}` or `"run.t_end": 1e-3`: they become the words
-of `--set`, so that the command line and Python have the same checks.
+settings of the deck, `cells=32, run={"t_end": 1e-3}` or `"run.t_end": 1e-3`.  They are passed on
+like `--set`, so the command line and Python make the same checks.
 
-Note: blocks are built when they are first asked for, which may compile kernels for a minute;
-their arrays are live.
+Note: blocks are built at their first use, which may take a minute to compile kernels.  Their
+arrays are live.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ INTERRUPTED = 130
 
 
 class Drawn:
-    """What can be drawn: the dumps of a run, or the present state of a case."""
+    """Common methods for plots: of the dumps of a run, or of the current state of a case."""
 
     problem: Problem
     pictures: Sequence[str]  # words for `what` of `plot`
@@ -69,15 +69,15 @@ class Drawn:
         limits: Sequence[float] | None = None,
         colours: str | None = None,
     ) -> Figure:
-        """The figure that `shockgrid plot` draws: fields (the density where none is named), ...
+        """The figure that `shockgrid plot` draws; the field is the density if none is named.
 
-        what: "fields", "mesh", "interface", "line", of a run also "history" (`fields` then are its
-        columns), "gauges" or a picture of the problem's own; a single word that is one of these may
-        stand in place of a field.  at: times [s] of dumps, "start" or "end"; mesh: draw the grid
-        over the fields; zoom: x0, x1, y0, y1 [m]; mirror: "x" or "y" completes a half domain;
-        beside: the directory of another run, drawn to the same scale; line: x0, y0, x1, y1 [m], the
-        fields along it are drawn; limits: low, high of the colours in units of the deck; colours: a
-        colour map.  Raises BadInput for what there is not.
+        what: "fields", "mesh", "interface" or "line"; for a run also "history" (`fields` are then
+        its columns), "gauges" or a picture specific to the problem.  One of these words may also be
+        given in place of a field.  at: times [s] of dumps, "start" or "end"; mesh: draw the grid
+        over the fields; zoom: x0, x1, y0, y1 [m]; mirror: "x" or "y" adds the mirrored half;
+        beside: the directory of another run, drawn to the same scale; line: x0, y0, x1, y1 [m],
+        plots the fields along it; limits: range of the colours in units of the deck; colours: a
+        colour map.  Raises BadInput for unknown fields, times or pictures.
         """
         from runs.pictures.command import Wanted, fill_figure, new_figure
 
@@ -91,9 +91,9 @@ class Drawn:
 
 
 class Curve(NamedTuple):
-    """Where two materials meet at time t [s]: x and y [m], one array each, along the line.
+    """The curve between two materials at time t [s]: arrays x and y [m] along the line.
 
-    Where there are several lines a nan stands between them.
+    Several lines are separated by nan.
     """
 
     x: np.ndarray
@@ -102,7 +102,7 @@ class Curve(NamedTuple):
 
 
 def find_interface(blocks: Sequence[BlockData], t: float, where: str) -> Curve:
-    """The lines between blocks of different materials; BadInput where there are none."""
+    """The lines between blocks of different materials; BadInput if there are none."""
     from runs.pictures.curves import find_curves
 
     lines = [curve[:2] for curve in find_curves(blocks).values()]
@@ -114,11 +114,11 @@ def find_interface(blocks: Sequence[BlockData], t: float, where: str) -> Curve:
 
 
 class OpenRun(Drawn, RunData):
-    """A run: `.deck`, `.history`, `.dumps[-1]["second"].rho`, `.problem`, and what follows.
+    """A run as data: `.deck`, `.history`, `.dumps[-1]["second"].rho`, `.problem` and more.
 
-    Everything is read at first use; a run that is still marching is opened again to
-    see more of it.  `dumps` are in order of time; `reason` says why the run that was just made
-    ended, and is "" where the directory was opened.
+    Everything is read at first use.  To see more of a run that is still in progress, open it
+    again.  `dumps` are in order of time; `reason` says why a run ended that was just made, and
+    is "" for a directory that was opened.
     """
 
     reason: str = ""
@@ -127,24 +127,24 @@ class OpenRun(Drawn, RunData):
     def interface(self, t: float | None = None) -> Curve:
         """The curve between blocks of different materials in the dump nearest to `t` [s].
 
-        Arrays x and y [m], and the time t of that dump; without `t` the last.  Raises BadInput
-        where there is no dump, or no two materials touch.
+        It has arrays x and y [m] and the time t of that dump; the default is the last dump.  Raises
+        BadInput if there is no dump, or if no two materials touch.
         """
         dump = self.dump_at(t)
         return find_interface(dump.blocks, dump.t, str(dump.path))
 
     @property
     def pictures(self) -> list[str]:  # type: ignore[override]
-        """Words for `what` of `plot`."""
+        """The values that `what` of `plot` may have."""
         gauges = ["gauges"] if self.deck.gauge else []
         return ["mesh", "interface", "history", *gauges, *self.problem.figures()]
 
     def film(
         self, field: str | None = None, output: str | Path | None = None, **options: Any
     ) -> Path:
-        """Make a film of a field over the dumps, mp4 with ffmpeg, else GIF; returns its path.
+        """Make a film of a field, one frame per dump: mp4 with ffmpeg, else GIF; returns its path.
 
-        field: the density where none is named; output: FILE [DIR/film-FIELD.mp4 or .gif];
+        field: the density by default; output: FILE [DIR/film-FIELD.mp4 or .gif];
         options: zoom (x0, x1, y0, y1 [m]), follow, mesh (bool), mirror "x" or "y", fps, dpi.
         Raises BadInput.
         """
@@ -153,9 +153,9 @@ class OpenRun(Drawn, RunData):
         return make_film(self.path, field, output, **options)
 
     def report(self, output: str | Path | None = None, **options: Any) -> Path:
-        """Write one HTML file that tells the run; returns its path [DIR/report.html].
+        """Write a report of the run in one HTML file; returns its path [DIR/report.html].
 
-        options: film (bool), dpi.  Raises BadInput where the extra `report` is not installed.
+        options: film (bool), dpi.  Raises BadInput if the extra `report` is not installed.
         """
         from runs.report import report
 
@@ -174,7 +174,7 @@ class OpenRun(Drawn, RunData):
 
 
 def open_run(directory: str | os.PathLike) -> OpenRun:
-    """The run in a directory, or one that is opened already; BadInput where there is none."""
+    """The run in a directory, or one that is already open; BadInput if there is none."""
     if isinstance(directory, OpenRun):
         return directory
     try:
@@ -241,11 +241,11 @@ def is_count(value: object) -> bool:
 
 
 class Hook:
-    """A function to be called every `steps` steps or every `time` [s], after each step
-    where neither is given.
+    """A function to be called every `steps` steps or every `time` [s]; by default
+    after each step.
 
-    Times are multiples of `time`; a call is made after the first step past one.  Raises BadInput
-    where both are given, or one that is not positive.
+    With `time` it is called after the first step past each multiple of it.  Raises BadInput
+    if both are given, or one that is not positive.
     """
 
     def __init__(
@@ -296,7 +296,7 @@ def join_hooks(case: Any, given: HooksGiven) -> Callable[[float], str | None]:
 
 
 def _view(block: BlockView, axes: tuple[str, str], has_units: bool) -> BlockData:
-    """A block of a flow in memory: each array is a view of now, and cannot be written to."""
+    """A block of a flow in memory: each array is a read-only view of the current state."""
 
     def lock(values: np.ndarray) -> np.ndarray:
         view = values.view()
@@ -321,7 +321,7 @@ def _view(block: BlockView, axes: tuple[str, str], has_units: bool) -> BlockData
 
 
 class Blocks(dict[str, BlockData]):
-    """The blocks of a flow by name, in their order; BadInput for a name that none has."""
+    """The blocks of a flow by name, in their order; BadInput for an unknown name."""
 
     def __missing__(self, name: str) -> BlockData:
         raise BadInput(f"there is no block {name!r}{suggest(str(name), self)}")
@@ -331,9 +331,9 @@ class Blocks(dict[str, BlockData]):
 
 
 class Case(Drawn):
-    """One problem with one deck, at the time that it has been marched to.
+    """One problem with one deck, and its current state.
 
-    `name` is that of the problem, or of the file that it is in; `deck` is checked and cannot be
+    `name` is that of the problem or of its file.  `deck` has been checked and cannot be
     changed: `case.deck.run.t_end`.
     """
 
@@ -354,19 +354,19 @@ class Case(Drawn):
 
     @property
     def theory(self) -> dict[str, float]:
-        """What the problem's references say for this deck, by name, SI units; {} for nothing."""
+        """The problem's reference values for this deck, by name, in SI units; {} if none."""
         return self.problem.predict()
 
     @property
     def cautions(self) -> list[str]:
-        """Sentences on where results of this deck are not to be trusted."""
+        """Sentences that say where results of this deck may be wrong."""
         return self.problem.cautions()
 
     @cached_property
     def simulation(self) -> Evolution:
-        """What marches: a `shockgrid.Simulation` in a flow.  Raises BadInput for a bad deck.
+        """The solver: for a flow a `shockgrid.Simulation`.  Raises BadInput for a bad deck.
 
-        It is made when it is first asked for.  What is changed here changes the run.
+        It is made at its first use.  Changes to it change the run.
         """
         with self.read.numbers_in_reach():
             check_memory(self.problem)
@@ -376,7 +376,7 @@ class Case(Drawn):
     def blocks(self) -> Blocks:
         """The blocks by name: `case.blocks["second"].rho`, (ni, nj) without ghost cells.
 
-        The arrays are views of live data, not to be written to: see `runs.interface.case`.
+        The arrays are read-only views of live data: see `runs.interface.case`.
         """
         axes = ("x", "r") if is_axisymmetric(self.simulation) else ("x", "y")
         units = self.problem.t_unit != "1"
@@ -384,7 +384,7 @@ class Case(Drawn):
 
     @property
     def dumps(self) -> list[Snapshot]:
-        """The present state alone, as pictures take it."""
+        """The current state only, in the form that pictures use."""
         state = Snapshot(self.path, self.t, self.simulation.t_end, self.problem.t_unit, self.step)
         state.blocks = list(self.blocks.values())
         return [state]
@@ -401,15 +401,15 @@ class Case(Drawn):
 
     @property
     def finished(self) -> str | None:
-        """Why the flow is at its end, or None."""
+        """The reason why the flow has ended, or None."""
         return self.simulation.finished
 
     def measure(self) -> dict[str, float]:
-        """The problem's own columns of the history, of the present state."""
+        """The history columns that are specific to the problem, for the current state."""
         return self.problem.measure(self.simulation)
 
     def advance(self, steps: int = 1) -> dict[str, Scalar]:
-        """Make `steps` steps, fewer where the end comes first; the history row of the last.
+        """Make `steps` steps, or fewer if the run ends; returns the history row of the last.
 
         Raises BadInput at the end and from a hook, RunFailure with block, cell and time.
         """
@@ -439,14 +439,14 @@ class Case(Drawn):
         force: bool = False,
         quiet: bool = True,
     ) -> OpenRun:
-        """March to the end, from the state that the case has, into a run directory; its data.
+        """Run from the current state to the end, into a run directory; returns the run as data.
 
-        directory: left out, out/<problem>-<n>.  dumps, max_steps: in place of the deck's.  hooks:
-        functions of the case called after each step, or `Hook`s, or one of them.  force:
-        replace the run that is in the directory.  quiet: no progress and no summary.
+        directory: default out/<problem>-<n>.  dumps, max_steps: override the deck.  hooks: one
+        function or `Hook`, or a list of them; a function is called with the case after each step.
+        force: replace the run that is in the directory.  quiet: no progress and no summary.
         Raises BadInput for a directory that is not empty and on several ranks of MPI, RunFailure
-        where the physics fails, KeyboardInterrupt where it was stopped; then the directory can be
-        restarted from.
+        if the run fails, KeyboardInterrupt if it is stopped; after the last two the directory can
+        be restarted from.
         """
         self._check_ready("a hook cannot start the run that it is called from")
         check_single("Case.run", "run DECK")
@@ -483,13 +483,13 @@ class Case(Drawn):
         return finish(runner, ending, quiet)
 
     def interface(self) -> Curve:
-        """The curve between blocks of different materials now: arrays x, y [m], and t [s]."""
+        """The current curve between blocks of different materials: arrays x, y [m], and t [s]."""
         return find_interface(list(self.blocks.values()), self.t, self.name)
 
     def plot(self, *fields: str, **options: Any) -> Figure:
-        """The figure of the present state; fields and options: `OpenRun.plot`.
+        """A figure of the current state; for fields and options see `OpenRun.plot`.
 
-        what: "fields", "mesh", "interface" or "line".  Raises BadInput for what there is not.
+        what: "fields", "mesh", "interface" or "line".  Raises BadInput for unknown ones.
         """
         what = options.get("what") or (fields[0] if len(fields) == 1 else "")
         if what in ("history", "gauges") or what in self.problem.figures():
@@ -509,10 +509,10 @@ class Case(Drawn):
 
 
 def load(deck: str | Path, **settings: Any) -> Case:
-    """A problem, a packaged deck, a deck's file or a problem's own file, with `settings` over it.
+    """Load a problem, a packaged deck, a deck file or a Python file with a problem, as a `Case`.
 
-    settings: keys of the deck, as `--set` takes them: `cells=32, run={"t_end": 1e-3}` or
-    `**{"run.t_end": 1e-3}`.  Raises BadInput with a sentence about each thing that is wrong.
+    settings: keys of the deck, as for `--set`: `cells=32, run={"t_end": 1e-3}` or
+    `**{"run.t_end": 1e-3}`.  Raises BadInput with a sentence about each mistake.
     """
     with said_in_python():
         read = read_deck(str(deck), make_settings(settings))

@@ -1,6 +1,6 @@
-"""The console command: checks whose packages Python finds, then calls `runs.cli`.
+"""The console command: checks that Python finds the right packages, then calls `runs.cli`.
 
-It stands apart from `runs`, as another package of that name can hide the command line itself.
+It is separate from `runs`, because another package of that name can hide the command line itself.
 """
 
 from __future__ import annotations

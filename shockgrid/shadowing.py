@@ -1,8 +1,8 @@
-"""Whether the packages that Python would import are shockgrid's own, asked before importing them.
+"""Checks, before any import, that the packages Python would import are shockgrid's own.
 
-The import names are short, and `runs` is also that of a distribution on the package index, which
-`inquirer` brings along: where both are in one environment, Python may find the other first.  A
-folder or a file of such a name in the current directory can hide ours too.
+The import names are short, and a distribution on the package index, a dependency of `inquirer`,
+also installs a package `runs`.  If both are in one environment, Python may find the other one
+first.  A folder or a file of such a name in the current directory can hide ours too.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""The promises that parts of shockgrid keep, for those of other packages: `sg.testing`.
+"""Checks for parts of shockgrid that other packages add: `sg.testing`.
 
-`check_regridder`, `check_eos`, `check_boundary` and `check_problem` return nothing where all is
-well and raise AssertionError with a sentence where a promise is broken.  The tests of shockgrid put
-its own parts through the same functions; those of REGRIDDER_PROMISES can be asked one by one.
+`check_regridder`, `check_eos`, `check_boundary` and `check_problem` return nothing if a part is
+correct, and otherwise raise AssertionError with a sentence.  The tests of shockgrid check its own
+parts with the same functions; those of REGRIDDER_PROMISES can be called one by one.
 
-Note: states and motions here are examples.  What passes may still fail elsewhere.
+Note: states and motions here are examples.  A part that passes may still fail for others.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def check_cells_and_sides(make: Make) -> None:
 
 
 def check_inputs(make: Make) -> None:
-    """Inner nodes of the boundary are not read, and no argument is written or handed back."""
+    """Inner nodes of the boundary are not read, and no argument is changed or returned."""
     previous, boundary = carry(make, "valley")
     filled = boundary.copy()
     filled[:, 1:-1, 1:-1] = POISON
@@ -84,7 +84,7 @@ def check_inputs(make: Make) -> None:
 
 
 def check_repeats(make: Make) -> None:
-    """The same call gives the same bits, whatever came before it."""
+    """The same call gives bitwise the same result, whatever came before it."""
     previous, boundary = carry(make, "dome")
     regridder = make()
     first = regridder.regrid(previous, boundary)
@@ -122,7 +122,7 @@ def check_motion(make: Make, motion: str) -> None:
 
 
 def check_threads(make: Make) -> None:
-    """Any number of threads gives the same bits: for a class with an option `threads`."""
+    """Bitwise the same for any number of threads, for a class with an option `threads`."""
     moving = make_domain("dome", 96, 80)
     previous, boundary = transfinite_grid(moving.boundary(0.1)), moving.boundary(0.12)
     grids = [make(threads=threads).regrid(previous, boundary).nodes for threads in (1, 2, 3)]
@@ -131,7 +131,7 @@ def check_threads(make: Make) -> None:
 
 
 def check_hard_motion(make: Make, domain: str) -> None:
-    """A whole motion at once: a valid grid, or a RegridFailure, no third."""
+    """A whole motion at once gives either a valid grid or a RegridFailure."""
     moving = make_domain(domain, 24, 18)
     boundary = moving.boundary(1.0)
     try:
@@ -148,7 +148,7 @@ def check_hard_motion(make: Make, domain: str) -> None:
 
 
 def check_folded_outline(make: Make) -> None:
-    """An outline that crosses itself is a RegridFailure that names a side."""
+    """An outline that crosses itself raises a RegridFailure that names a side."""
     moving = make_domain("dome", 16, 12)
     boundary = moving.boundary(0.0)
     boundary[1, 0, 6] = 1.5  # a spike of side i_min through side i_max
@@ -161,7 +161,7 @@ def check_folded_outline(make: Make) -> None:
 
 
 def check_shapes(make: Make) -> None:
-    """Arrays that do not fit each other are BadInput."""
+    """Arrays with inconsistent shapes raise BadInput."""
     moving = make_domain("dome", 16, 12)
     try:
         make().regrid(moving.start, moving.start[:, 1:])
@@ -182,10 +182,10 @@ REGRIDDER_PROMISES: dict[str, Callable[[Make], None]] = {
 
 
 def check_regridder(regridder: Any) -> None:
-    """Put a regridder through all promises; AssertionError says which one it breaks and how.
+    """Check a regridder in all respects; AssertionError says what is wrong and how.
 
     regridder: an object with `regrid(previous, boundary)`, a class of such, or a function that
-    makes one.  Where that takes `threads`, numbers of threads are compared, too.
+    makes one.  If that takes `threads`, numbers of threads are compared, too.
     """
     if not isinstance(regridder, type) and hasattr(regridder, "regrid"):
         given = regridder
@@ -267,9 +267,9 @@ def check_eos(
     rho: Sequence[float] | np.ndarray | None = None,
     p: Sequence[float] | np.ndarray | None = None,
 ) -> None:
-    """Put an equation of state through all promises at all pairs of densities and pressures.
+    """Check an equation of state in all respects at all pairs of densities and pressures.
 
-    rho [kg/m³], p [Pa]: left out, 0.1 to 30 and 1e3 to 1e8, or, where the equation has a density
+    rho [kg/m³], p [Pa]: by default 0.1 to 30 and 1e3 to 1e8, or, if the equation has a density
     at rest rho0, 1.001 to 1.3 of it and 1e8 to 1e10.  AssertionError names the state.
     """
     rest = getattr(eos, "rho0", None)
@@ -297,11 +297,12 @@ def check_boundary(
     eos: EquationOfState | None = None,
     state: tuple[float, float, float, float] = (1.0, 0.05, 0.02, 1.0),
 ) -> None:
-    """Put a boundary kind through the promises, on every side of a block of skewed cells.
+    """Check a boundary kind in all respects, on every side of a block of skewed cells.
 
-    It writes ghosts of its own faces alone; in five steps the flow stays finite; what the block
-    has more of came through its sides, to 1e-12.  options: those of the kind; eos, state (rho, u,
-    v, p): of the block, an ideal gas left out.  Linked kinds are no matter here (BadInput).
+    It must write ghosts of its own faces only, the flow must stay finite for five steps, and what
+    the block gains must have come through its sides, to 1e-12.  options: those of the kind; eos,
+    state (rho, u, v, p): of the block, by default an ideal gas.  Linked kinds cannot be checked
+    here (BadInput).
     """
     name = kind if isinstance(kind, str) else kind.kind
     segment_class = SEGMENTS[kind] if isinstance(kind, str) else kind
@@ -362,11 +363,11 @@ def _check_flow(kind, side, options, eos, state) -> None:
 
 
 def check_problem(problem: str | type[Problem], deck: Deck | None = None, steps: int = 2) -> None:
-    """Put a problem through the promises, with its default deck or another small one.
+    """Check a problem in all respects, with its default deck or another small one.
 
-    `plan` says what `build` makes; `measure` gives the same names, as numbers, before and after
-    steps, and changes nothing; two builds march to the same bits, and so does one that takes up the
-    state of another half way.  AssertionError says which promise is broken.
+    `plan` must agree with `build`.  `measure` must return numbers under the same names before and
+    after steps, and change nothing.  Two builds must give bitwise the same results, also if one
+    takes over the state of the other half way.  AssertionError says what is wrong.
     """
     kind = load_problem(problem) if isinstance(problem, str) else problem
     name = problem if isinstance(problem, str) else kind.__name__

@@ -262,9 +262,13 @@ class Problem:
             return units
         return {name: unit if unit.startswith("deg") else "1" for name, unit in units.items()}
 
+    def scale_time(self, t: float) -> str:
+        """Time t [s] as pictures name it, such as `k c t = 3`; "" where that is t alone."""
+        return ""
+
     def check_end(self, last: float, words: str) -> None:
         """Raise BadInput where the end time is beyond `last` [s], when what `words` say is so."""
-        wanted = f"at {last:g} s {words}, the run must end before"
+        wanted = f"at t = {last:g} {words}, the run must end before"
         self.deck.refuse(self.t_end > last, "run.t_end", wanted)
 
     def build(self) -> Evolution:

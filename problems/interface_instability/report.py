@@ -254,6 +254,9 @@ class Results:
         )
         return Report("\n".join(head), rows, notes)
 
+    def scale_time(self, t):
+        return f"k c t = {float(get_kct(self, t)):.3g}"
+
     def figures(self):
         found, many = super().figures(), len(self.harmonics) > MOST_CURVES
         return {name: draw for name, draw in found.items() if name != "spectrum" or many}
@@ -289,7 +292,7 @@ class Results:
         rho = np.concatenate(shown) if shown else np.empty(0)
         panels = [figure.add_subplot(grid[1, column]) for column in range(len(dumps))]
         for axes, dump, line, window in zip(panels, dumps, lines, windows, strict=True):
-            title = f"density and grid, k c t = {float(get_kct(self, dump.t)):.1f}"
+            title = f"density and grid, {self.scale_time(dump.t)}"
             style = {"low": rho.min(), "high": rho.max(), "every": 1, "lines": [line]}
             picture = draw_field(axes, dump, "rho", title=title, **style)
             axes.set_xlim(*window)

@@ -386,7 +386,7 @@ class Case(Drawn):
     def dumps(self) -> list[Snapshot]:
         """The current state only, in the form that pictures use."""
         state = Snapshot(self.path, self.t, self.simulation.t_end, self.problem.t_unit, self.step)
-        state.blocks = list(self.blocks.values())
+        state.blocks, state.run = list(self.blocks.values()), self
         return [state]
 
     @property

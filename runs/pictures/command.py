@@ -129,7 +129,7 @@ def fill_figure(
     given = {f"--{name}": getattr(wanted, name) for name in OPTIONS} | {"FIELDS": names or None}
     given = {n: value for n, value in given.items() if value is not None and value is not False}
     what = wanted.what or ("fields" if line is None else "line")
-    shown, write_table = [what], None
+    shown, write_table, part = [what], None, False
     if beside and what not in BESIDE:
         raise BadInput(f"--beside {beside}: for {' and '.join(BESIDE)}, not for {what!r}")
     runs = [run, RunData(beside)] if beside else [run]
@@ -140,7 +140,7 @@ def fill_figure(
         dumps = choose_pairs(runs, at, say) if beside else choose_dumps(run, at, say=say)
         told = zip(name_paths(runs) * len(dumps), time_titles(dumps), strict=False)
         titles = [f"{name}: {when}" for name, when in told] if beside else ()
-        draw_fields(figure, dumps, names, view, titles)
+        part = draw_fields(figure, dumps, names, view, titles)
     elif what == "line":
         if line is None:
             raise BadInput("--what line: --line X0,Y0,X1,Y1 says which line [m]")
@@ -155,7 +155,7 @@ def fill_figure(
         curves.draw_lineouts(figure, lineouts, names, titles)
         write_table = partial(curves.write_csv, lineouts=lineouts, names=names, runs=titles)
     elif what == "mesh":
-        draw_fields(figure, choose_dumps(run, at, say=say), (), view)
+        part = draw_fields(figure, choose_dumps(run, at, say=say), (), view)
     elif what == "interface":
         curves.draw_interfaces(figure, choose_dumps(run, at, 12, say), view)
     elif what == "history":
@@ -176,6 +176,8 @@ def fill_figure(
     idle = [name for name in given if name not in HEEDED.get(what, ())]
     if idle and say:
         say(f"{', '.join(idle)}: not heeded by the picture {what!r}")
+    if part and say:
+        say("the panels show only the region around the interface; --zoom shows any other part")
     if what not in BESIDE:
         shown += names
     for name in OPTIONS:
@@ -185,11 +187,11 @@ def fill_figure(
     return "-".join(re.sub(r"[^\w.+-]+", "_", word) for word in shown), write_table
 
 
-def draw_all(directory: str, dpi: int = 140) -> list[Path]:
+def draw_all(directory: str, say: Callable[[str], None] | None = None) -> list[Path]:
     """The pictures that a finished run gets: its fields and what its problem draws."""
-    paths = draw(directory, dpi=dpi)
+    paths = draw(directory, say=say)
     for name in RunData(directory).problem.figures():
-        paths += draw(directory, Wanted(what=name), dpi=dpi)
+        paths += draw(directory, Wanted(what=name), say=say)
     return paths
 
 

@@ -24,7 +24,7 @@ from regrid.errors import BadInput
 from runs.inspection.account import compute_drifts
 from runs.pictures import fields
 from runs.pictures.fields import View
-from runs.quantities import add_unit, is_time, pick_prefix
+from runs.quantities import is_time, pick_prefix
 from runs.store.dumps import LONG_NAMES
 from runs.store.files import check_free, make_csv, write_atomically
 from runs.store.reader import Dump, RunData
@@ -93,10 +93,9 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
     moments = [fields.make_sheets(dump, (), view) for dump in dumps]
     if view.zoom is not None:
         fields.check_zoom(view.zoom, fields.find_extent(moments))
-    shapes = [
-        (d.t, fields.find_interfaces(sheets)) for d, sheets in zip(dumps, moments, strict=True)
-    ]
-    shapes = [(t, lines) for t, lines in shapes if lines]
+    pairs = zip(dumps, moments, strict=True)
+    shapes = [(dump, fields.find_interfaces(sheets)) for dump, sheets in pairs]
+    shapes = [(dump, lines) for dump, lines in shapes if lines]
     if not shapes:
         raise BadInput(f"{dumps[0].path}: no two materials touch, so there is no interface to draw")
     every = [np.concatenate(lines, axis=1) for _, lines in shapes]
@@ -107,15 +106,15 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
     largest = float(max(sizes.max(), 0.0 if centred.any() else np.abs(every[0]).max()))
     scale, length = pick_prefix(largest, dumps[0].length_unit)
     factor, unit = fields.scale_times(dumps)
-    norm = Normalize(shapes[0][0] * factor, max(shapes[-1][0] * factor, 1e-300))
+    norm = Normalize(shapes[0][0].t * factor, max(shapes[-1][0].t * factor, 1e-300))
     colours = colormaps["viridis_r"]
     figure.set_size_inches(8.0, 6.5)
     axes = figure.subplots()
-    for (t, lines), middle in zip(shapes, middles, strict=True):
+    for (dump, lines), middle in zip(shapes, middles, strict=True):
         shift = np.where(centred, middle, 0.0)
         for line in lines:
             x, y = (line - shift[:, None]) * scale
-            axes.plot(x, y, color=colours(norm(t * factor)), linewidth=1.2)
+            axes.plot(x, y, color=colours(norm(dump.t * factor)), linewidth=1.2)
     names = [f"{n} - its middle" if c else n for n, c in zip(dumps[0].axes, centred, strict=True)]
     axes.set_xlabel(name_axis(names[0], length))
     axes.set_ylabel(name_axis(names[1], length))
@@ -125,11 +124,9 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
         axes.set_xlim(view.zoom[0] * scale, view.zoom[1] * scale)
         axes.set_ylim(view.zoom[2] * scale, view.zoom[3] * scale)
     figure.colorbar(ScalarMappable(norm, colours), ax=axes, label=name_axis("t", unit))
-    first, last = shapes[0][0] * factor, shapes[-1][0] * factor
+    first, last = fields.time_titles([shapes[0][0], shapes[-1][0]])
     note = ", axes not to one scale" if stretched else ""
-    axes.set_title(
-        f"interface, t = {first:.4g} to {add_unit(last, unit or '1', 4)}{note}", fontsize=10
-    )
+    axes.set_title(f"interface, {first} to {last}{note}", fontsize=10)
 
 
 LEAST = 1e-9  # of the line: shorter pieces touch a corner only

@@ -17,7 +17,7 @@ from matplotlib.colors import LogNorm, Normalize, PowerNorm
 
 from problems.evolution import get_material
 from problems.pictures import name_axis
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
 from regrid.measure.corners import compute_centres
 from regrid.sides import SIDE_NAMES, get_side
 from runs.quantities import is_time, pick_prefix
@@ -199,8 +199,11 @@ def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
     """
     for name in names:
         if not any(find_field(block, name) for block in dump.blocks):
-            known = ", ".join(list_fields(dump))
-            raise BadInput(f"{dump.path} has no field {name!r}; there are: {known}")
+            own = dump.field_names()  # density: rho
+            alike = [repr(n) for n in own if name.lower() in get_style(dump, n).words.lower()]
+            hint = f"; did you mean {' or '.join(alike)}?" if alike else ""
+            hint = hint or suggest(name, list_fields(dump))
+            raise BadInput(f"{dump.path} has no field {name!r}{hint}")
     sheets = []
     for block in dump.blocks:
         bad = np.argwhere(~np.isfinite(block.nodes).all(axis=0)).tolist()
@@ -226,10 +229,11 @@ def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
 
 def draw_fields(
     figure, dumps: Sequence[Dump], names: Sequence[str], view: View, titles: Sequence[str] = ()
-) -> None:
+) -> bool:
     """Fill `figure` with a panel for each field and each dump; titles: in place of the times.
 
-    Without names the grids are drawn, a colour for each block.
+    Without names the grids are drawn, a colour for each block.  Returns whether the panels leave
+    out what is far from the interface.
     """
     moments = [make_sheets(dump, names, view) for dump in dumps]
     boxes, following = choose_boxes([measure_extent(sheets) for sheets in moments], view)
@@ -249,9 +253,7 @@ def draw_fields(
         if look:
             bar = ScalarMappable(*look[:2])
             figure.colorbar(bar, ax=panels[k], label=look[3], shrink=0.9, pad=0.015)
-    if following:
-        words = "panels show only the region around the interface; use --zoom for the rest"
-        figure.supxlabel(words, fontsize=8, color="0.4")
+    return following
 
 
 def draw_blocks(
@@ -453,14 +455,16 @@ def choose_colours(
 
 
 def time_titles(dumps: Sequence[Dump]) -> list[str]:
-    """`t = 12.5 µs` for each dump, all in one unit; `13 iterations` where t counts those."""
+    """`t = 12.5 µs` for each dump, all in one unit; `k c t = 3 (t = 12.5 µs)` where the problem has
+    such a time; `13 iterations` where t counts those."""
     factor, unit = scale_times(dumps)
     before = "t = " if is_time(dumps[-1].t_unit) else ""
-    return [
-        f"{before}{dump.t * factor:.4g} {unit}".rstrip()
-        + " (restart point)" * dump.is_restart_point
-        for dump in dumps
-    ]
+    titles = []
+    for dump in dumps:
+        words, scaled = f"{before}{dump.t * factor:.4g} {unit}".rstrip(), dump.scaled_time
+        words = f"{scaled} ({words})" if scaled else words
+        titles.append(words + " (restart point)" * dump.is_restart_point)
+    return titles
 
 
 def scale_times(dumps: Sequence[Dump], last: float = 0.0) -> tuple[float, str]:

@@ -249,6 +249,7 @@ class Snapshot:
     """A state at one time: `t`, `t_unit`, `t_end`, `step`, and its `blocks`; `state["gas"].rho`."""
 
     is_restart_point = False  # by wall time, and no dump of the deck's?
+    run: Any = None  # the `RunData` that it is from
 
     def __init__(self, path: Path, t: float, t_end: float, t_unit: str, step: int):
         self.path, self.t, self.t_end, self.t_unit, self.step = path, t, t_end, t_unit, step
@@ -262,6 +263,14 @@ class Snapshot:
     def length_unit(self) -> str:
         """Unit of the nodes: "m", or "1" where the deck's numbers have no units."""
         return "1" if self.t_unit == "1" else "m"
+
+    @property
+    def scaled_time(self) -> str:
+        """The time as pictures of the problem name it, such as `k c t = 3`; "" where that is t."""
+        try:
+            return "" if self.run is None else self.run.problem.scale_time(self.t)
+        except BadInput:  # a deck of another version can still be drawn
+            return ""
 
     @property
     def axes(self) -> tuple[str, str]:
@@ -296,8 +305,8 @@ class Snapshot:
 class Dump(Snapshot):
     """One dump, besides a `Snapshot`: `problem`, `finished`, `deck_text`, `provenance`."""
 
-    def __init__(self, path: str | os.PathLike):
-        path = Path(path)
+    def __init__(self, path: str | os.PathLike, run: Any = None):
+        path, self.run = Path(path), run
         with open_dump(path) as file, damage_told(path, "its attributes"):
             at = file.attrs
             unit = str(at.get("t_unit", "s"))
@@ -435,7 +444,7 @@ class RunData:
 
     def _try(self, path: Path) -> Dump | None:
         try:
-            return Dump(path)
+            return Dump(path, self)
         except BadInput as error:
             if not path.exists():  # an old restart point of a run that goes on meanwhile
                 return None

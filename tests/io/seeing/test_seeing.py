@@ -113,7 +113,7 @@ def test_a_film_that_fails_leaves_nothing_and_keeps_the_old(run_of_film, monkeyp
         (("-o", "nowhere/film.gif"), "is not a folder"),
         (("--follow", "--zoom", "0,1,0,1"), "use one"),
         (("--zoom", "5,6,0,1"), "is outside the domain"),
-        (("pressure",), "has no field 'pressure'; there are: rho, q"),
+        (("pressure",), "has no field 'pressure'; known are: rho, q"),
         (("--fps", "0"), "fps"),
     ],
 )
@@ -170,7 +170,8 @@ def toys(shockgrid, kept):
         (("--csv", "a.csv"), "--line says which"),
         (("--what", "mesh", "--beside", "one"), "not for 'mesh'"),
         (("--beside", "nowhere"), "nowhere does not exist"),
-        (("vorticity",), "has no field 'vorticity'; there are: rho, q, schlieren"),
+        (("vorticity",), "has no field 'vorticity'; known are: rho, q, schlieren"),
+        (("density",), "has no field 'density'; did you mean 'rho'?"),
         (("rate",), "has no field 'rate'"),
     ],
 )

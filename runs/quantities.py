@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 PREFIXED = ("m", "s", "m/s", "Pa", "J", "J/kg", "N", "B")
@@ -30,6 +31,17 @@ def is_time(unit: str) -> bool:
 def add_unit(number: float, unit: str, digits: int = 6) -> str:
     """`1.5 m`; the number alone where the unit is "1"."""
     return f"{number:.{digits}g}" if unit == "1" else f"{number:.{digits}g} {unit}"
+
+
+UNITS = re.compile(
+    r"(?<=\d) (?:s|m|m/s|Pa|kg/m3)(?![\w/])|"  # behind a number, in brackets
+    r" ?\[(?:1/)?(?:s|m|Pa|kg|N|J|K)\d?(?:/(?:kg|m|s|K)\d?)*\]"
+)
+
+
+def drop_units(words: str, t_unit: str) -> str:
+    """The words without SI units where the unit of time is "1": the deck's numbers have none."""
+    return UNITS.sub("", words) if t_unit == "1" else words
 
 
 def describe_seconds(low: float, high: float | None = None) -> str:

@@ -171,11 +171,11 @@ def _list_size_faults(deck: InterfaceDeck, rho: tuple[float, float]) -> Iterator
         )
     for place, length in enumerate(deck.lengths or ()):
         if length > LONGEST * deck.wavelength:
-            most = f"take at most {LONGEST:g} wavelengths, {LONGEST * deck.wavelength:g} m"
-            yield f"lengths.{place} is {length:g} m, too long: {most}"
+            most = f"take at most {LONGEST:g} wavelengths, {LONGEST * deck.wavelength:g}"
+            yield f"lengths.{place} is {length:g}, too long: {most}"
     ratio = rho[1] / rho[0]
     if not 1.0 / DENSEST <= ratio <= DENSEST:
         yield (
-            f"the second material's density, {rho[1]:g} kg/m3, is {ratio:.3g} times the first's; "
+            f"the second material's density, {rho[1]:g}, is {ratio:.3g} times the first's; "
             f"that has to lie between {1.0 / DENSEST:g} and {DENSEST:g} (first.rho, second.rho)"
         )

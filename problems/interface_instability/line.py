@@ -200,7 +200,7 @@ def read_line(path: str, width: float) -> Perturbation:
         row = int(np.flatnonzero(np.diff(y) <= 0.0)[0]) + 2
         raise BadInput(f"{where}: y must rise from row to row; it does not at row {row}")
     if y[0] > 1e-9 * width or y[-1] < width * (1.0 - 1e-9):
-        words = f"y = {y[0]:g} to {y[-1]:g} m; the domain has 0 to {width:g} m"
+        words = f"y = {y[0]:g} to {y[-1]:g}; the domain has 0 to {width:g}"
         raise BadInput(f"{where} covers {words}")
     return CubicSpline(y, x)
 
@@ -220,7 +220,7 @@ class FreeLine:
         if not even:
             gap = abs(x[-1] - x[0])
             if gap > CLOSED * float(np.ptp(x)):
-                words = f"its ends are {gap:g} m apart in x; between periodic sides they must meet"
+                words = f"its ends are {gap:g} apart in x; between periodic sides they must meet"
                 raise BadInput(f"deck: {what}: {words}")
             x = np.append(x[:-1], x[0])
         weights = np.diff(y)

@@ -128,8 +128,8 @@ class InterfaceInstability(Results, Problem):
             short = [n for n in (0, 1) if lengths[n] < ROOM * ways[n]]
             if short:
                 fault = (
-                    f"lengths.{short[0]} is {lengths[short[0]]:g} m, of which the waves take "
-                    f"{ways[short[0]]:.3g} m"
+                    f"lengths.{short[0]} is {lengths[short[0]]:g}, of which the waves take "
+                    f"{ways[short[0]]:.3g}"
                 )
         if self.deck.start == "crossed":
             self.deck.refuse(fault, "start", f"{fault}; take 'incident'")

@@ -34,7 +34,7 @@ def grow_steps(steps: list[float], stretch: float, length: float) -> list[float]
         if len(steps) > MOST:
             words = "take fewer `cells`, shorter `lengths`, more `stretch`"
             raise BadInput(
-                f"deck: a block {length:g} m long would have {MOST} cells and more: {words}"
+                f"deck: a block of length {length:g} would have {MOST} cells and more: {words}"
             )
     return steps
 

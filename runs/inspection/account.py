@@ -16,7 +16,7 @@ import numpy as np
 from problems.evolution import Evolution
 from problems.problem import Problem
 from regrid.errors import RunFailure
-from runs.quantities import count, describe_share
+from runs.quantities import count, describe_share, drop_units
 
 History = Mapping[str, np.ndarray]
 HEAD = "caution: "
@@ -180,13 +180,13 @@ def describe_cautions(problem: Problem, history: History | None = None) -> list[
         sentences = problem.cautions(told)
     except RunFailure as error:
         sentences = [f"cautions could not be computed: {error}"]
-    return [HEAD + sentence for sentence in dict.fromkeys(sentences)]
+    return [HEAD + drop_units(one, problem.t_unit) for one in dict.fromkeys(sentences)]
 
 
 def describe_own(problem: Problem, history: History, final: Evolution | None = None) -> str:
     """The problem's summary of columns of a history and, where there is one, the final state."""
     try:
-        return problem.summary(history, final).strip("\n")
+        return drop_units(problem.summary(history, final).strip("\n"), problem.t_unit)
     except RunFailure as error:
         return f"there is no comparison with theory: {error}"
 

@@ -20,7 +20,7 @@ from runs.early_end.causes import name_failure
 from runs.forecast import ShortSteps, TimeLeft, find_past, measure_size, name_flow
 from runs.gauges import NO_BLOCK
 from runs.inspection.account import count_cells, judge
-from runs.quantities import count, describe_seconds, describe_time
+from runs.quantities import count, describe_seconds, describe_time, drop_units
 from runs.store.directory import RunDirectory, write_verdict
 from runs.store.history import read_history
 
@@ -141,8 +141,15 @@ class Outlook:
         self.deck, self.problem, self.evolution = deck, problem, evolution
         self.directory = directory
         self.flow, self.size = name_flow(deck.problem, deck.deck), measure_size(problem, evolution)
-        self.trend = ShortSteps(evolution, lambda line: (directory.note(line), say(line)))
+        self.trend = ShortSteps(evolution, self.tell)
+        self.say = say
         directory.verdict.unlink(missing_ok=True)
+
+    def tell(self, line: str) -> None:
+        """Note a line about the run and show it."""
+        line = drop_units(line, self.problem.t_unit)
+        self.directory.note(line)
+        self.say(line)
 
     def find_course(self) -> tuple[float, ...]:
         """How the wall time of a past run of the same flow went; () where there was none."""

@@ -37,7 +37,7 @@ from runs.gauges import Gauges
 from runs.inspection import account
 from runs.march.compiling import compiling
 from runs.march.progress import Outlook, Progress, describe_gauges, describe_threads
-from runs.quantities import count, describe_seconds, describe_time, is_time
+from runs.quantities import count, describe_seconds, describe_time, drop_units, is_time
 from runs.ranks.world import World, describe_ranks
 from runs.store.directory import RunDirectory, keep_problem_file, write_noted
 from runs.store.dumps import EMPTY, Names, list_arrays, make_image
@@ -267,6 +267,8 @@ class Runner:
         except Stopped as stop:
             reason, code = stop.args
         except (RunFailure, BadInput) as error:  # BadInput here: the disk, mostly
+            if isinstance(error, RunFailure):
+                error = error.tell(drop_units(str(error), self.problem.t_unit))
             with contextlib.suppress(BadInput):
                 self.directory.note(f"failed: {error}")
             self.outlook.fail(error)

@@ -60,9 +60,7 @@ max_wall = click.option(
     metavar="TIME",
     help="Stop with a restart point before this time (2h, 90m, 1:30:00).",
 )
-limits = click.option(
-    "--limits", metavar="LOW,HIGH", help="Limits of the colours, in units of the deck."
-)
+limits = click.option("--limits", metavar="LOW,HIGH", help="Least and largest colour.")
 colours = click.option("--colours", metavar="NAME", help="A colour map of matplotlib.")
 
 
@@ -118,9 +116,7 @@ def run(
                 echo("\n".join(describe_map(size.blocks, count, checked.deck.run.cut)))
         return 0
     if ranks is not None:
-        raise BadInput(
-            f"--ranks needs --dry-run; start a run with mpiexec -n {ranks} shockgrid ..."
-        )
+        raise BadInput(f"--ranks needs --dry-run; to run, type mpiexec -n {ranks} shockgrid ...")
     from runs.march.compiling import compiling
     from runs.march.launching import start_runner
 
@@ -164,9 +160,7 @@ def restart(
         runner.limit, runner.world = limit, world
         return _finish(runner.start(), runner.directory, picture)
     if output is not None or force:
-        raise BadInput(
-            "restart: -o and --force need --cells; otherwise a run continues in its directory"
-        )
+        raise BadInput("restart: -o and --force need --cells; a run continues in its directory")
     runner = continue_runner(opened, settings, quiet, at, _say, world)
     runner.limit, runner.world = limit, world
     return _finish(runner.resume(at, _say), opened, picture)
@@ -205,14 +199,14 @@ def study(deck, **words) -> int:
 @click.argument("deck", metavar="PROBLEM_OR_DECK")
 @setting
 def check(deck, settings) -> None:
-    """Check a deck and print it with every key resolved.
+    """Check a deck and print it with every key and its meaning.
 
-    Keys without a value follow as comments, with their meaning.  Cautions about
-    the results go to standard error.
+    Keys without a value are commented out.  Cautions about the results go to
+    standard error.
     """
     from regrid.jit import interpreted
     from runs.deck import reading as deck_reading
-    from runs.deck.checking import describe_unset
+    from runs.deck.checking import describe_deck
     from runs.inspection.account import describe_cautions
     from runs.march.launching import check_deck_fully
 
@@ -220,7 +214,7 @@ def check(deck, settings) -> None:
     with interpreted():
         problem = checked.make_problem()
     check_deck_fully(checked, problem)
-    echo(checked.to_toml() + describe_unset(checked.deck), nl=False)
+    echo(describe_deck(checked.problem, checked.deck, problem.t_unit), nl=False)
     with checked.numbers_in_reach(), interpreted():
         cautions = describe_cautions(problem)
     for line in cautions:
@@ -392,7 +386,7 @@ def _finish(ending, directory, picture: bool) -> int:
     if picture and ending.exit_code < 128:  # not where a signal stopped it
         from runs.pictures.command import draw_all
 
-        paths = draw_all(str(directory))
+        paths = draw_all(str(directory), _say)
     echo(ending.screen)
     if paths:
         echo("pictures:    " + "  ".join(str(path) for path in paths))

@@ -18,10 +18,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import msgspec
+import tomli_w
 
 from problems.deck import Deck, DeckTable
 from problems.registry import load_problem, read_docstring
 from regrid.errors import BadInput, find_nearest
+from runs.quantities import drop_units
 
 DIGESTS = "digests"
 UNIONS = (typing.Union, type(int | str))
@@ -251,7 +253,7 @@ def find_mistakes(value: Any, kind: Any, key: str, deck: type) -> Iterator[tuple
         return
     wanted = describe_type(kind) + ", finite" * (not _is_finite(value))
     if isinstance(value, str) and any("material" in one.__struct_fields__ for one in tables):
-        wanted += f", such as {key} = {{ material = {show(value)} }}"
+        wanted = f"a table, such as {key} = {{ material = {show(value)} }}"
     yield key, f"{key} = {show(value)}; it must be {wanted}"
 
 
@@ -322,11 +324,21 @@ def describe(schema: Part, part: Part) -> str:
         count = f" of at least {low} values" if low else ""
         if high is not None:
             count = f" of {high} values" if low == high else f" of {low} to {high} values"
+        if "properties" in (inner := resolve(schema, items)):
+            return f"a list of tables, such as [{_show_table(schema, inner)}]"
         return f"a list{count}, each {describe(schema, items)}"
+    if "properties" in part:
+        return f"a table, such as {_show_table(schema, part)}"
     bounds = " and ".join(f"{words} {part[k]:g}" for k, words in BOUNDS.items() if k in part)
     bounds = f" of {bounds}" if bounds.startswith("at ") else bounds and f" {bounds}"
     form = f" of the form {part['pattern']}" if "pattern" in part else ""
     return TYPES.get(kind, "something else") + bounds + form
+
+
+def _show_table(schema: Part, part: Part) -> str:
+    """The first keys of a table as TOML, with their defaults."""
+    known = [(name, one.get("default")) for name, one in part["properties"].items()][:3]
+    return "{ " + ", ".join(f"{n} = {'...' if v is None else show(v)}" for n, v in known) + " }"
 
 
 def show(value: Any) -> str:
@@ -344,34 +356,65 @@ def show(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-WIDTH = 100  # of a line
-HEAD = "# These keys have no value; each line gives the meaning and the values that are allowed:"
+WIDTH, COLUMN = 100, 34  # of a line; where its comment begins
 
 
-def describe_unset(deck: Deck) -> str:
-    """Comment lines on the keys of a deck without a value; "" where all have one."""
-    indents = {"initial_indent": "# ", "subsequent_indent": "#     "}
-    lines = [
-        line
-        for key, words in _find_unset(deck, "")
-        for line in textwrap.wrap(f"{key}: {words}", WIDTH, **indents)  # type: ignore[arg-type]
-    ]
-    return "".join(f"{line}\n" for line in (["", HEAD, *lines] if lines else []))
+def describe_deck(name: str, deck: Deck, t_unit: str = "s") -> str:
+    """The deck of problem `name` as TOML, each key with its meaning; those without a value are
+    commented out.  t_unit: that of the problem."""
+    text = f"problem = {show(name)}\n"
+    for line in _write_table(deck, ""):
+        key, mark, words = line.partition("# ")
+        text += f"{key}{mark}{drop_units(words, t_unit)}".rstrip() + "\n"
+    return text
 
 
-def _find_unset(table: Any, prefix: str) -> Iterator[tuple[str, str]]:
-    """Dotted keys of a table with their words; the keys of a table that is left out after it."""
-    for field in msgspec.structs.fields(table) if isinstance(table, DeckTable) else ():
-        key, value = prefix + field.name, getattr(table, field.name)
-        if value is not None:
-            yield from _find_unset(value, f"{key}.")
-            for k, entry in enumerate(value if isinstance(value, list | tuple) else ()):
-                yield from _find_unset(entry, f"{key}.{k}.")
-            continue
-        part = make_parts(field.type)
+def _write_table(table: DeckTable, path: str) -> Iterator[str]:
+    """Lines of the keys of a table with the dotted name `path`, then of the tables in it."""
+    settings, tables = table.__struct_config__, []
+    if settings.tag_field:
+        yield f"{settings.tag_field} = {show(settings.tag)}"
+    for field in msgspec.structs.fields(table):
+        value, part = getattr(table, field.name), make_parts(field.type)
         inner = resolve(part, part)
         words = part.get("description", inner.get("description", "")).strip().partition("\n")[0]
-        is_table = "properties" in inner
-        yield key, f"{words.rstrip('.')} ({'a table' if is_table else describe(part, part)})"
-        for name, inside in inner["properties"].items() if is_table else ():
-            yield f"{key}.{name}", f"{inside.get('description', '')} ({describe(part, inside)})"
+        entries = value if isinstance(value, list | tuple) else [value]
+        head, unset = f"{path}.{field.name}".lstrip("."), value is None
+        if entries and all(isinstance(entry, DeckTable) for entry in entries):
+            tables.append((f"[{head}]" if entries[0] is value else f"[[{head}]]", entries, words))
+        elif unset and "properties" in inner:
+            tables.append((f"# [{head}]", inner["properties"], words))
+        else:
+            form = f" ({describe(part, part)})" if unset or "enum" in inner else ""
+            line = f"# {field.name} =" if unset else f"{field.name} = {_write_value(value)}"
+            yield from _explain(line, words.rstrip(".") + form)
+    for line, entries, words in tables:
+        for entry in entries if isinstance(entries, list | tuple) else ():
+            yield from ("", *_explain(line, words), *_write_table(entry, line.strip("[]")))
+        if isinstance(entries, Mapping):
+            yield from ("", *_explain(line, words))
+            for name, one in entries.items():
+                words = f"{one.get('description', '')} ({describe(part, one)})"
+                yield from _explain(f"# {name} =", words)
+
+
+def _explain(line: str, words: str) -> list[str]:
+    """The line with its comment, which goes on below it, or stands above a long line."""
+    above = len(line) >= COLUMN
+    room = WIDTH - 2 - COLUMN * (not above)
+    lines = [f"# {one}" for one in textwrap.wrap(words, room, break_on_hyphens=False)] or [""]
+    if above:
+        return [*lines, line]
+    return [f"{line:{COLUMN}}{lines[0]}".rstrip(), *(" " * COLUMN + one for one in lines[1:])]
+
+
+def _write_value(value: Any) -> str:
+    """A value as TOML in one line."""
+    value = msgspec.to_builtins(value)
+    if isinstance(value, dict):
+        lines = ((tomli_w.dumps({k: 0})[:-2], v) for k, v in value.items() if v is not None)
+        pairs = [f"{key}{_write_value(one)}" for key, one in lines]
+        return "{ " + ", ".join(pairs) + " }" if pairs else "{}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_write_value, value))}]"
+    return tomli_w.dumps({"value": value}).removeprefix("value = ").rstrip("\n")

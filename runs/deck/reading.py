@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import shlex
 import tomllib
+from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from itertools import pairwise
@@ -111,9 +112,12 @@ def find_deck(source: str) -> tuple[dict[str, Any], str]:
     """The raw table of a deck, and words for where it is from."""
     path = Path(source)
     if path.is_dir() and source not in PROBLEMS:
+        deck, folder = (shlex.quote(str(one)) for one in (path / "deck.toml", path))
+        if not (path / "deck.toml").is_file():
+            raise BadInput(f"{source} is a folder; give a problem, a packaged deck or a deck file")
         raise BadInput(
-            f"{source} is a folder; to go on with the run in it: "
-            f"shockgrid restart {shlex.quote(source)}"
+            f"{source} is the folder of a run; its deck is {deck}, and to continue the run type "
+            f"shockgrid restart {folder}"
         )
     if source in packaged_decks():
         path = packaged_decks()[source]
@@ -122,12 +126,12 @@ def find_deck(source: str) -> tuple[dict[str, Any], str]:
         return {"problem": source}, f"the defaults of {source}"
     if path.suffix == ".toml" or path.exists() or len(path.parts) > 1:
         return read_toml(path), str(path)
-    known = list(dict.fromkeys([*PROBLEMS, *packaged_decks()]))
-    raise BadInput(f"there is no problem or deck {source!r}{suggest_deck(source, known)}")
+    raise BadInput(f"there is no problem or deck {source!r}{suggest_deck(source)}")
 
 
-def suggest_deck(name: str, known: list[str]) -> str:
+def suggest_deck(name: str, known: Sequence[str] = ()) -> str:
     """As `suggest`, but names that contain `name` (such as 'mushroom') come first."""
+    known = known or list(dict.fromkeys([*PROBLEMS, *packaged_decks()]))
     longer = sorted((other for other in known if len(name) > 2 and name in other), key=len)
     if not longer:
         return suggest(name, known)

@@ -359,10 +359,8 @@ def _prepare_flow(name: str, settings: tuple[str, ...]) -> tuple[str, Compute]:
         return found, f"{found.done} {100.0 * part:3.0f}%", found.nodes
 
     sizes = ", ".join(f"{b.nodes.shape[1] - 1} x {b.nodes.shape[2] - 1}" for b in started.blocks)
-    return (
-        f"flow to t = {add_unit(started.t_end, problem.t_unit)}, blocks of {sizes} cells",
-        compute,
-    )
+    t_end = add_unit(started.t_end, problem.t_unit)
+    return f"flow to t = {t_end}, blocks of {sizes} cells", compute
 
 
 def _run_flow(read, name: str, options: dict[str, Any]) -> tuple[March, float]:

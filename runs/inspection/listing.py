@@ -13,28 +13,44 @@ from regrid.errors import BadInput
 from regrid.jit import interpreted
 from regrid.plug_ins import GROUPS, find_plug_ins
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
-from runs.quantities import add_unit
+from runs.quantities import add_unit, is_time
+
+SUBJECTS = {  # of problems, for the list; what is in none of them comes last
+    "interfaces": ("interface-instability", "rayleigh-taylor", "shock-bubble", "triple-point"),
+    "plates, impacts and cones": (
+        "plate-on-wedge", "flyer-target", "cavity", "conical-target", "detonation",
+    ),
+    "verification against exact solutions": (
+        "riemann", "free-stream", "vortex", "gresho", "taylor-green", "noh", "sedov", "kidder",
+        "saltzmann", "oblique-shock",
+    ),
+    "convection and viscous flow": (
+        "heated-cavity", "rayleigh-benard", "convection-1d", "moving-grid-1d",
+    ),
+    "grids without flow": ("grid-march",),
+    "your own blocks": ("blocks",),
+}  # fmt: skip
+
+
+SHORT = r".{1,70}(?=[:;,] |\.?$)|.*"  # the longest beginning that is a clause
 
 
 def describe_all() -> str:
-    """All problems, each with its packaged decks."""
+    """All problems by subject, each with its packaged decks."""
     decks: dict[str, list[tuple[str, str]]] = {}
     for name, path in packaged_decks().items():
         problem = str(read_toml(path).get("problem"))
         if name != problem:
             decks.setdefault(problem, []).append((name, describe_deck(path)))
-    names = [*OWN_PROBLEMS, *(name for entries in decks.values() for name, _ in entries)]
-    width = max(len(name) for name in names) + 2
-    lines = []
-    for name in OWN_PROBLEMS:
-        lines.append(f"{name:{width}}  {summary_line(name)}")
-        lines += [f"  {deck:{width - 2}}  {words}" for deck, words in decks.get(name, ())]
-    lines += describe_installed()
-    lines += [
-        "",
-        "shockgrid run NAME; shockgrid list NAME: description; shockgrid check NAME: its keys",
-    ]
-    return "\n".join(lines)
+    told, lines = {name for names in SUBJECTS.values() for name in names}, []
+    others = tuple(name for name in OWN_PROBLEMS if name not in told)
+    for subject, names in {**SUBJECTS, "others": others}.items():
+        lines += [f"\n{subject.upper()}"] * bool(names)
+        for name in names:
+            rows = [(name, summary_line(name)), *((f"  {n}", w) for n, w in decks.get(name, ()))]
+            lines += [f"{one:40} {re.match(SHORT, words)[0]}" for one, words in rows]  # type: ignore
+    usage = "shockgrid run NAME; shockgrid list NAME: description; shockgrid check NAME: its keys"
+    return "\n".join([*lines, *describe_installed(), "", usage]).strip()
 
 
 def describe_installed() -> list[str]:
@@ -83,8 +99,7 @@ def describe_problem(name: str) -> str:
         return (read_docstring(name) or summary_line(name)) + decks + of
     if name in packaged_decks():
         return packaged_decks()[name].read_text(encoding="utf-8").rstrip()
-    known = [*PROBLEMS, *packaged_decks()]
-    raise BadInput(f"there is no problem or deck {name!r}{suggest_deck(name, known)}")
+    raise BadInput(f"there is no problem or deck {name!r}{suggest_deck(name)}")
 
 
 def describe_deck(path: Path) -> str:
@@ -116,11 +131,9 @@ def describe_plan(deck: ReadDeck) -> str:
         blocks = plan_blocks({b.name + other_name(b): b.nodes for b in evolution.blocks})
     else:
         t_end, blocks = plan
-    march, length = f"t = 0 to {add_unit(t_end, problem.t_unit)}", "m"
-    if problem.t_unit == "1":
-        length = "1"
-    elif problem.t_unit != "s":
-        march = f"at most {t_end:g} {problem.t_unit}"
+    unit = problem.t_unit
+    march = f"t = 0 to {add_unit(t_end, unit)}" if is_time(unit) else f"at most {t_end:g} {unit}"
+    length = "1" if unit == "1" else "m"
     lines = [f"{deck.problem} ({deck.described}), {march}"]
     for block in blocks:
         (ni, nj), low, high = block.cells, block.low, block.high

@@ -30,12 +30,7 @@ from runs.march.compiling import compiling
 from runs.march.runner import Runner
 from runs.ranks.map import check_cut
 from runs.ranks.world import World
-from runs.store.directory import (
-    RunDirectory,
-    create_directory,
-    read_run_deck,
-    read_stored_deck,
-)
+from runs.store.directory import RunDirectory, create_directory, read_run_deck, read_stored_deck
 from runs.store.files import write_atomically
 from runs.store.history import find_restart_point, restore, truncate_history
 

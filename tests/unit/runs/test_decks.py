@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from regrid.errors import BadInput
-from runs.deck.checking import describe_unset
+from runs.deck.checking import describe_deck
 from runs.deck.reading import apply_setting, parse_value, read_deck
 from runs.inspection.account import measure_drifts
+from runs.quantities import drop_units
 from runs.store.history import HistoryWriter, read_history
 
 
@@ -143,32 +144,28 @@ def test_values_without_a_meaning_are_refused(problem, setting):
         read_deck(problem, (setting,))
 
 
-def list_keys(value, prefix=""):
-    """Dotted keys of everything in a nested table, and those of them that have no value."""
-    keys = {}
-    if isinstance(value, list | tuple):
-        value = {str(k): entry for k, entry in enumerate(value)}
-    for name, entry in value.items():
-        keys[prefix + name] = entry
-        if isinstance(entry, dict) or (isinstance(entry, list | tuple) and entry):
-            keys |= list_keys(entry, f"{prefix}{name}.")
-    return keys
-
-
 @pytest.mark.parametrize(
     "name", ["interface-instability-modes", "blocks-gas-gun", "plate-on-wedge", "riemann-captured"]
 )
-def test_every_key_without_a_value_is_told(name):
-    read = read_deck(name)
-    told = describe_unset(read.deck)
-    keys = dict(re.findall(r"^# (\S+): (.+)$", told, re.MULTILINE))
-    missing = {key for key, value in list_keys(msgspec.to_builtins(read.deck)).items()
-               if value is None}  # fmt: skip
-    assert missing and missing <= set(keys)
-    assert all(len(words) > 5 for words in keys.values())
-    assert max(map(len, told.splitlines())) <= 100
-    assert tomllib.loads(read.to_toml() + told) == tomllib.loads(read.to_toml())
-    # a key that is given is told no more
-    assert "run.max_steps" in keys
-    given = read_deck(name, ("run.max_steps=3",))
-    assert "# run.max_steps:" not in describe_unset(given.deck)
+def test_every_key_is_shown_with_its_meaning(name):
+    read = read_deck(name, ("run.max_steps=3",))
+    text = describe_deck(read.problem, read.deck)
+    assert tomllib.loads(text) == tomllib.loads(read.to_toml())
+    lines = text.splitlines()
+    for k, line in enumerate(lines):
+        if re.match(r"[\w[]", line) and line.split(" ")[0] not in ("problem", "kind", "eos"):
+            assert "  # " in line or lines[k - 1].startswith("# "), line
+    for key in (field.name for field in msgspec.structs.fields(read.deck)):
+        assert re.search(rf"^(# )?\[*{key}\b", text, re.MULTILINE), key
+    assert "max_steps = 3  " in text and "# t_set_up =  " in text
+    assert max(len(line) for line in lines if "= [" not in line) <= 100
+
+
+def test_a_deck_without_units_is_shown_without_units():
+    deck = read_deck("interface-instability", ("first.rho=2",)).deck
+    assert "[Pa]" in describe_deck("interface-instability", deck)
+    bare = describe_deck("interface-instability", deck, "1")
+    assert not re.search(r"\[(m|s|Pa|kg/m3|N/m)\]", bare)
+    words = "dt fell to 3e-07 s, x = 1 m, t = 0.2 s (step 3), 2 stages, k c t = 3 [x, y] [m/s]"
+    bare = "dt fell to 3e-07, x = 1, t = 0.2 (step 3), 2 stages, k c t = 3 [x, y]"
+    assert drop_units(words, "s") == words and drop_units(words, "1") == bare

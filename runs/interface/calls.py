@@ -31,12 +31,7 @@ from runs.interface.case import (
     said_in_python,
     say,
 )
-from runs.march.launching import (
-    check_changeable,
-    check_requests,
-    read_restart_deck,
-    remap_runner,
-)
+from runs.march.launching import check_changeable, check_requests, read_restart_deck, remap_runner
 from runs.march.runner import Runner
 from runs.ranks.started import check_single
 from runs.store.directory import RunDirectory, open_directory

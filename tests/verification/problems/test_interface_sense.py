@@ -21,8 +21,8 @@ NONSENSE = [
     ({"width": 1.5, "sides": "periodic"}, "which holds 1.5 waves of mode 1 .* such as width = "),
     ({"width": 0.75, "modes": [], "spectrum": Spectrum(first=2, last=3)}, "of mode 3 .spectrum."),
     ({"width": 1e-3, "modes": []}, "its 2 rows are 0.032 times as high as cells are long"),
-    ({"lengths": (1.0, 1e18)}, "lengths.1 is 1e.18 m, .*take at most 10000 wavelengths"),
-    ({"second": Fluid(rho=1e-12)}, "second material's density, 1e-12 kg/m3, is 1e-12 times"),
+    ({"lengths": (1.0, 1e18)}, "lengths.1 is 1e.18, .*take at most 10000 wavelengths"),
+    ({"second": Fluid(rho=1e-12)}, "second material's density, 1e-12, is 1e-12 times"),
     ({"first": Fluid(rho=1e12)}, "that has to lie between 1e-06 and 1e.06 .first.rho"),
 ]
 

@@ -60,7 +60,7 @@ max_wall = click.option(
     metavar="TIME",
     help="Stop with a restart point before this time (2h, 90m, 1:30:00).",
 )
-limits = click.option("--limits", metavar="LOW,HIGH", help="Least and largest colour.")
+limits = click.option("--limits", metavar="LOW,HIGH", help="Ends of the colour scale.")
 colours = click.option("--colours", metavar="NAME", help="A colour map of matplotlib.")
 
 
@@ -179,7 +179,7 @@ def restart(
 @click.option("--jobs", type=click.IntRange(1), help="Parallel runs [one per processor].")
 @click.option("--engine", default="processes", help="processes or mpi [processes].")
 @click.option("--of", "shown", multiple=True, metavar="NAME", help="Quantity to draw and print.")
-@click.option("--refine", metavar="KEY", help="The key of cells, for orders [cells].")
+@click.option("--refine", metavar="KEY", help="Key that sets the resolution, for orders [cells].")
 @click.option("--retry", is_flag=True, help="Also continue failed runs.")
 @click.option("--dry-run", is_flag=True, help="List the runs and the state of each, and stop.")
 @quiet

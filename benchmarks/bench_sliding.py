@@ -2,7 +2,7 @@
 
 Two gases on a plane contact, one of which slips and is squeezed by a piston, so that every line
 moves and every grid is rebuilt.  The blocks are n × n/2 cells each; sliding is timed with equal
-nodes and with the slave's a sixth fewer.  Each figure is the best and the median of several
+nodes and with the follower's a sixth fewer.  Each figure is the best and the median of several
 timings in one process, after the kernels are compiled, the three cases taking turns.
 
 Then the part of a step that the logic of the running contact point takes in `plate-on-wedge`:
@@ -80,9 +80,9 @@ def measure_contact_point(cells: tuple[int, int]) -> float:
 
         return clocked
 
-    slave = run.motion.slaves[0]
+    follower = run.motion.followers[0]
     for name in ("share_nodes", "_find_contact_point"):
-        setattr(slave, name, clock(getattr(slave, name)))
+        setattr(follower, name, clock(getattr(follower, name)))
     start = time.process_time()
     for _ in range(200):
         run.advance()

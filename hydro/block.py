@@ -62,7 +62,7 @@ class PerimeterPlan:
     walls that move, by number, whose velocities are in `wall_speeds` (n, 2); `inwards` (faces,): of
     which the next cells inwards are asked; `moving` (n, 2): the spans of faces that go with the
     flow; `counted` (n, 2): the spans of segments without a partner, and of those under surface
-    tension, through which totals change; `is_slave`: does a sliding contact lay nodes of these
+    tension, through which totals change; `is_follower`: does a sliding contact lay nodes of these
     segments on another's line?
     """
 
@@ -85,7 +85,7 @@ class PerimeterPlan:
             self.inwards[segment.first : segment.last] = segment.moves
         counted = [(s.first, s.last) for s in segments if not s.linked or s.tension > 0.0]
         self.counted = _collect(counted, 2)
-        self.is_slave = any(segment.is_slave for segment in segments)
+        self.is_follower = any(segment.is_follower for segment in segments)
 
 
 def _collect(rows: list, width: int) -> np.ndarray:
@@ -317,7 +317,7 @@ class Block:
             self._old, self._new, self.rim.rows, dt, self.parameters, self.scratch, self.tiles,
             self.tile_totals[:-1],
         )  # fmt: skip
-        if self.is_slave and not self.is_cut:
+        if self.is_follower and not self.is_cut:
             self.fill_polygons()
 
     def take_rows(self, first: int, last: int) -> None:
@@ -355,9 +355,9 @@ class Block:
         self._start = self.state.copy() if apart else None
 
     @property
-    def is_slave(self) -> bool:
+    def is_follower(self) -> bool:
         """Does a sliding contact lay nodes of this block on another's line?"""
-        return self.plan.is_slave
+        return self.plan.is_follower
 
     def accept(self) -> None:
         """Make the new grid and state the current ones."""
@@ -424,7 +424,7 @@ class Block:
         """Add momentum x, y and energy (3,) that a body source has brought after the update."""
         self._summed = None
         last = self.tile_totals[-1]
-        if not self.is_slave:  # else the polygons' part is there
+        if not self.is_follower:  # else the polygons' part is there
             last[of.CONSERVED] = 0.0
         last[of.MOMENTUM_AND_ENERGY] += gained
 
@@ -479,7 +479,7 @@ class Block:
         Those of polygon cells count what lies beyond their straight faces.
         """
         volume = compute_volumes(self.geometry, self.nodes)
-        if self.is_slave:
+        if self.is_follower:
             for side, edge in (("i_min", 0), ("i_max", -1)):
                 first, count = self.side_faces(side)
                 volume[edge, :] += self.excess_volume_new[first : first + count]

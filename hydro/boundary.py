@@ -47,7 +47,7 @@ class NodeMotion(Enum):
     GIVEN = "they go with a given velocity"
     SLIDE = "they stay on their first line and are spread between its ends"
     JOIN = "they are spread between the ends, which nothing holds to a line"
-    FOLLOW = "they are laid on the master line of a sliding contact"
+    FOLLOW = "they are laid on the leader's line of a sliding contact"
 
 
 class Segment:
@@ -60,7 +60,7 @@ class Segment:
     wall: ClassVar[int | None] = None  # a kind of wall, of `hydro.perimeter.contacts`
     beyond: ClassVar[int | None] = None  # of open sides: first row of the state beyond, in rims
     tension: float = 0.0  # surface tension of its line [N/m]
-    has_own_line: bool = True  # not so for slaves, and where the leader of a link gives the line
+    has_own_line: bool = True  # not so for followers, whose line the leader gives
 
     def __init__(self, block: Block, side: str, start: int, stop: int):
         self.block, self.side, self.start, self.stop = block, side, start, stop
@@ -81,12 +81,12 @@ class Segment:
 
     @property
     def follows_flow(self) -> bool:
-        """Do the nodes go with the material, on a line of their own or on a master's?"""
+        """Do the nodes go with the material, on a line of their own or on a leader's?"""
         return self.motion in (NodeMotion.FLOW, NodeMotion.FOLLOW)
 
     @property
-    def is_slave(self) -> bool:
-        """Are the nodes laid on another's line?"""
+    def is_follower(self) -> bool:
+        """Are the nodes laid on the leader's line of a sliding contact?"""
         return self.motion is NodeMotion.FOLLOW
 
     @property
@@ -353,7 +353,7 @@ class Interface(Linked):
 class Sliding(Linked):
     """One side of a sliding contact, or a part of one; its nodes match no other nodes.
 
-    The side of the master moves with the contact, and that of the slave follows.
+    The side of the leader moves with the contact, and that of the follower follows.
     """
 
     kind = "sliding"

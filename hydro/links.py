@@ -130,14 +130,14 @@ def join(kind: str, leader: Faces, follower: Faces, **options: Any) -> Link:
     return Link(one, two)
 
 
-def slide(master: Faces | list[Faces], slave: Faces | list[Faces]) -> SlidingContact:
+def slide(leader: Faces | list[Faces], follower: Faces | list[Faces]) -> SlidingContact:
     """A sliding contact between two runs of faces (block, side[, start, stop]), or lists.
 
-    The slave's nodes lie on the master's line; the ends of the slave may lie anywhere on it.
+    The follower's nodes lie on the leader's line; the ends of the follower may lie anywhere on it.
     Raises BadInput where they do not.
     """
     chains = []
-    for runs in (master, slave):
+    for runs in (leader, follower):
         runs = runs if isinstance(runs, list) else [runs]
         chain = [put(block, side, "sliding", *faces) for block, side, *faces in runs]
         chains.append(cast("list[Sliding]", chain))

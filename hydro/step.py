@@ -29,14 +29,14 @@ MOST_RETRIES = 12
 # and why it stands there.  They are in `hydro.motion.sides`.
 # Each is left out where the list of this name is empty.
 SIDE_PASSES: tuple[tuple[Callable[[Sides, Span], None], str, str], ...] = (
-    (on_sides.space_contact_points, "slaves", "spacing around contact points, by old lengths"),
+    (on_sides.space_contact_points, "followers", "spacing around contact points, by old lengths"),
     (on_sides.turn_mirrors, "turning", "walls at line ends as they lie, where damping mirrors"),
     (on_sides.damp_short_waves, "damped", "additional velocities of lines and their ends"),
     (on_sides.move_key_nodes, "key_nodes", "ends of lines first, by all faces that meet there"),
     (on_sides.move_lines, "moving", "between their ends; along themselves if nothing cuts them"),
     (on_sides.slide_joints, "joints", "ends inside a contact, along its moved lines"),
     (on_sides.move_carried_seams, "carried_seams", "their ends go with contacts, which have moved"),
-    (on_sides.lay_slaves, "slaves", "on their masters' moved lines; cuts free lines"),
+    (on_sides.lay_followers, "followers", "on their leaders' moved lines; cuts free lines"),
     (on_sides.spread_lines, "lines", "those that were cut, and all that only go with their ends"),
     (on_sides.give_lines, "links", "followers receive the leaders' lines, final but for corners"),
     (on_sides.hold_corners, "guards", "last, because respacing would reopen the held corners"),

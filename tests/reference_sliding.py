@@ -1,15 +1,15 @@
 """Sliding contacts of the plain step in `tests/reference_step.py`: lines whose nodes do not match.
 
-Plane flow, one segment a side, both in the same order.  The master's line is the contact's; the
-slave's nodes lie on it.  Nodes of both cut it into pieces, each with a Riemann problem of its own:
+Plane flow, one segment a side, both in the same order.  The leader's line is the contact's; the
+follower's nodes lie on it.  Nodes of both cut it into pieces, each with its own Riemann problem:
 
-    1 cut       the master's line at its own nodes and at the slave's                  theory F4
+    1 cut       the leader's line at its own nodes and at the follower's                  theory F4
     2 slopes    of velocity and pressure from face to face of each side
-    3 solve     contact states of the pieces; one under tension, or without a slave, is a surface
+    3 solve     contact states of the pieces; one under tension, or without a follower, is a surface
     4 surface   means over each side's faces: what the ghosts are made of
-    5 fluxes    the pieces' pressure; what passes where the slave's nodes slide: closing faces
+    5 fluxes    the pieces' pressure; what passes where the follower's nodes slide: closing faces
 
-A slave's cell is a polygon: nodes of the master between its own two are corners of it.
+A follower's cell is a polygon: nodes of the leader between its own two are corners of it.
 """
 
 from __future__ import annotations
@@ -59,12 +59,12 @@ def find_mean(before, after):
 
 
 class SlidingContact:
-    """A contact in a step; `one` and `two` are the sides of master and slave."""
+    """A contact in a step; `one` and `two` are the sides of leader and follower."""
 
     def __init__(self, contact, one, two, dt):
         self.sides, self.dt = (one, two), dt
         self.sign = 1.0 if one.name in ("i_max", "j_min") else -1.0  # outwards: to the right or not
-        free = [end < 0 for end in contact.fixed]  # ends of the slave that are contact points
+        free = [end < 0 for end in contact.fixed]  # ends of the follower that are contact points
         self.part_at_first = 0.0 if not free[0] else 1.0 if not free[1] else 0.5
         self.lines, self.lines_new = (
             [side.find_line(getattr(side.patch.block, name)) for side in self.sides]
@@ -74,24 +74,27 @@ class SlidingContact:
         two.take(two.patch.extra)[...] = self.extra
         two.take(two.patch.extra_new)[...] = self.extra_new
 
-    def measure_extra(self, line, slave):
-        """What the slave's polygons have beyond their straight faces, towards the master."""
-        positions, found = find_positions(line, slave), []
+    def measure_extra(self, line, follower):
+        """What the follower's polygons have beyond their straight faces, towards the leader."""
+        positions, found = find_positions(line, follower), []
         for k, (start, stop) in enumerate(itertools.pairwise(positions)):
             corners = line[:, int(start) + 1 : int(np.ceil(stop))]
-            x, y = np.column_stack((slave[:, k], corners, slave[:, k + 1])) - slave[:, k, None]
+            x, y = (
+                np.column_stack((follower[:, k], corners, follower[:, k + 1]))
+                - follower[:, k, None]
+            )
             found.append(-0.5 * self.sign * np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
         return np.array(found)
 
     def cut(self, lines, moved):
         """The pieces: their faces on both sides, -1 for none, areas, sweeps, middles, normals."""
-        line, slave = lines
-        positions = find_positions(line, slave)
+        line, follower = lines
+        positions = find_positions(line, follower)
         cuts = np.unique(np.concatenate((np.arange(line.shape[1]), positions)))
         middles = 0.5 * (cuts[1:] + cuts[:-1])
-        self.master = middles.astype(int)
-        self.slave = np.searchsorted(positions, middles) - 1
-        self.slave[self.slave == len(positions) - 1] = -1
+        self.leader = middles.astype(int)
+        self.follower = np.searchsorted(positions, middles) - 1
+        self.follower[self.follower == len(positions) - 1] = -1
         self.area = self.sign * turn_right(np.diff(find_points(line, cuts)))
         self.sweep = dot(find_points(moved, middles), self.area) / self.dt
         self.point = find_points(line, middles)
@@ -102,7 +105,7 @@ class SlidingContact:
         start, end, change = normal.copy(), normal.copy(), bend * np.diff(normal)
         start[:, 1:] -= change
         end[:, :-1] += change
-        turned = start[:, self.master] + (middles - self.master) * (end - start)[:, self.master]
+        turned = start[:, self.leader] + (middles - self.leader) * (end - start)[:, self.leader]
         self.normal = turned / np.hypot(*turned)
         return positions
 
@@ -121,13 +124,13 @@ class SlidingContact:
     def solve(self, find, lines):
         """Pressures of the pieces, and what the contact's speed exceeds either side's own by."""
         found = []
-        for side, line, faces in zip(self.sides, lines, (self.master, self.slave), strict=True):
+        for side, line, faces in zip(self.sides, lines, (self.leader, self.follower), strict=True):
             rho, u, v, p, c2 = self.find_states_at_pieces(find(side), line, faces)
             w = dot((u, v), self.normal)
             found.append((rho, w, p, np.sqrt(c2), side.patch.eos.wave_law))
         one, two = found
         pressure, speed = solve_contact(*one, *two)
-        bare, speed_two = (self.slave < 0) | (pressure < 0.0), speed
+        bare, speed_two = (self.follower < 0) | (pressure < 0.0), speed
         if bare.any():
             rho, w, p, c, law = two
             speed = np.where(bare, find_free_speed(*one, 0.0), speed)
@@ -139,7 +142,7 @@ class SlidingContact:
         self.cut(self.lines, 0.0 * self.lines[0])
         pressure, excess = self.solve(lambda side: side.find_state_at_face(), self.lines)
         number = self.sides.index(asking)
-        faces, own = (self.master, self.slave)[number], asking.find_state_at_face()[1:3]
+        faces, own = (self.leader, self.follower)[number], asking.find_state_at_face()[1:3]
         sign, there = (1.0, -1.0)[number], faces >= 0
         length = np.bincount(faces[there], np.hypot(*self.area)[there])
         pressure, excess = (
@@ -157,7 +160,7 @@ class SlidingContact:
         zero = 0.0 * pressure
         parts = np.stack((zero, *(pressure * self.area), pressure * self.sweep, zero))
         number = self.sides.index(asking)
-        faces, sign = ((self.master, 1.0), (self.slave, -1.0))[number]
+        faces, sign = ((self.leader, 1.0), (self.follower, -1.0))[number]
         flux = np.zeros((5, asking.segment.stop - asking.segment.start))
         np.add.at(flux.T, faces[faces >= 0], sign * parts.T[faces >= 0])
         if number == 1:
@@ -167,14 +170,14 @@ class SlidingContact:
         return flux
 
     def find_closing_flux(self, lines, positions):
-        """What passes from each slave's cell, but the first, to the one before it."""
+        """What passes from each follower's cell, but the first, to the one before it."""
         two = self.sides[1]
         area = -self.sign * turn_right(find_points(lines[0], positions) - lines[1])[:, 1:-1]
         rho, u, v, p, e, *_ = trace = two.find_trace()
         grows = (self.extra_new - self.extra) / self.dt
         grows += two.sign * two.take(two.patch.faces[two.axis][1])
-        under = self.slave >= 0
-        grows += np.bincount(self.slave[under], self.sweep[under])
+        under = self.follower >= 0
+        grows += np.bincount(self.follower[under], self.sweep[under])
         swept = self.part_at_first * np.sum(grows) - np.cumsum(grows)[:-1]
         u, v, p = (0.5 * (q[1:] + q[:-1]) for q in (u, v, p))
         rate = u * area[0] + v * area[1] - swept

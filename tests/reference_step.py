@@ -180,7 +180,7 @@ class Patch:
             {axis: measure_faces(nodes, new, axis, dt, weighted) for axis in "ij"}
             for weighted in (curved, False)
         )
-        self.extra, self.extra_new = np.zeros((2, *self.rho.shape))  # of polygons, along slaves
+        self.extra, self.extra_new = np.zeros((2, *self.rho.shape))  # of polygons, along followers
         self.fluxes = {axis: np.zeros((5, *self.faces[axis][1].shape)) for axis in "ij"}
 
     def compute_c2(self, rho, p):

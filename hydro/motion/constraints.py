@@ -1,4 +1,4 @@
-"""Nodes that move after the lines because they depend on them: joints, seams, slaves, corners.
+"""Nodes that move after the lines because they depend on them: joints, seams, followers, corners.
 
 *Joint*: a key node inside a smooth contact, where the blocks on its sides change.  If it moved with
 the material, it would go wherever the material goes, round a corner if need be, and would take the
@@ -11,9 +11,9 @@ position is free.  If its ends moved with the material, a contact moving into th
 would squeeze the block to nothing.  Each of its nodes therefore keeps its relative position between
 one contact and another.
 
-*Slave* of a sliding contact: its nodes are placed on the moved line of the master, ends included.
-An end is fixed at an end of the master, or it is a contact point, where the free line that
-continues from there meets the master.
+*Follower* of a sliding contact: its nodes, ends included, are placed on the leader's moved line.
+An end is fixed at an end of the leader, or it is a contact point, where the free line that
+continues from there meets the leader.
 
 *Corner*: a junction that moves with the flow may open the corner of a block until it is 180 degrees
 wide.  No convex quadrilateral has a wider one, wherever its other nodes are (theory R7).  From then
@@ -45,7 +45,7 @@ from regrid.errors import BadInput, Place, RegridFailure
 REACH = 3  # nodes of either line that the curve through a joint goes through
 MOST = 4.0  # spacings that a joint wants to slide at most, before `relax`
 OPPOSITE_PART = (0.05, 0.95)  # where the parts of a side opposite to a contact point may meet
-ARRIVAL = 1.5  # steps' motion before the master's end at which a contact point arrives there
+ARRIVAL = 1.5  # steps' motion before the leader's end at which a contact point arrives there
 ROUNDS = 60  # at most, of moving a corner and laying on its lines what slides there
 NARROW = 0.1  # rad: corners at junctions stay as wide, or half as wide as at the start if less
 STRAIGHT_ENOUGH = 1e-13  # what a round moves, as part of the first one's, after which none follows
@@ -131,12 +131,12 @@ class CarriedSeam:
             node.shift(step)
 
 
-class SlaveMotion:
-    """Lays the slave's nodes of one sliding contact on the master's new line.
+class FollowerMotion:
+    """Lays the follower's nodes of one sliding contact on the leader's new line.
 
-    For each of the slave's two ends: `key_nodes`, `free_lines` that go on from there, `starts`
+    For each of the follower's two ends: `key_nodes`, `free_lines` that go on from there, `starts`
     (do those begin there, or end?) and `opposites`, the lines of the sides opposite to those.
-    `law`: the spacing law of the slave's nodes, (n + 1,).
+    `law`: the spacing law of the follower's nodes, (n + 1,).
     """
 
     def __init__(self, contact: SlidingContact):
@@ -148,12 +148,12 @@ class SlaveMotion:
         self.opposites: list[Line | None] = [None, None]
 
     def lay_nodes(self) -> None:
-        """Lay the slave's new nodes on the master's new line; ends first.
+        """Lay the follower's new nodes on the leader's new line; ends first.
 
         Lines that go on from a contact point must have moved; they are cut at the point.  Raises
         RegridFailure where the contact has shrunk to nothing.
         """
-        line = np.ascontiguousarray(self.contact.master.line(new=True))
+        line = np.ascontiguousarray(self.contact.leader.line(new=True))
         old = self.contact.lines[1]
         arc = compute_arc_lengths(line)
         self.contact.fixed_new[:] = self.contact.fixed
@@ -169,16 +169,16 @@ class SlaveMotion:
             raise RegridFailure(
                 f"sliding {self.contact.name}: the contact has shrunk to nothing",
                 cause="contact-lost",
-                place=Place(self.contact.slave.segments[0].block.name),
+                place=Place(self.contact.follower.segments[0].block.name),
             )
         wanted = ends[0] + self.law * (ends[1] - ends[0])
         points = np.array([np.interp(wanted, arc, row) for row in line])
-        shifts = points[:, [0, -1]] - self.contact.slave.new_ends()
+        shifts = points[:, [0, -1]] - self.contact.follower.new_ends()
         one, other = self.key_nodes
         one.shift(shifts[:, 0])
         if other is not one:
             other.shift(shifts[:, 1])
-        self.contact.slave.write_line(points)
+        self.contact.follower.write_line(points)
 
     def share_nodes(self) -> None:
         """Spacing laws around contact points, from the old lines' lengths.
@@ -188,7 +188,7 @@ class SlaveMotion:
         The side opposite to both gets the same parts, divided where the point is projected onto
         it: the grid lines in between do not shear as the contact point runs.
         """
-        line = np.ascontiguousarray(self.contact.slave.line())
+        line = np.ascontiguousarray(self.contact.follower.line())
         length = float(compute_arc_lengths(line)[-1])
         for end, free in enumerate(self.free_lines):
             if free is None:
@@ -202,8 +202,9 @@ class SlaveMotion:
                 self.contact.refinement,
             )
             self.law = law if end == 1 else (1.0 - law)[::-1]
-            own = self.contact.slave.segments[-end]
-            flip = self.contact.slave.reversed[-end] != (end == 0)  # does the contact come after?
+            own = self.contact.follower.segments[-end]
+            # does the contact come after?
+            flip = self.contact.follower.reversed[-end] != (end == 0)
             first, second = (law, other_law) if not flip else (other_law, law)
             if flip:
                 first, second = (1.0 - other_law)[::-1], (1.0 - law)[::-1]
@@ -218,7 +219,7 @@ class SlaveMotion:
                 opposite.law = np.concatenate((part * first, part + (1.0 - part) * second[1:]))
 
     def _find_contact_point(self, end, line, start, arc) -> float:
-        """Arc length on the master's line of the contact point at an end of the slave."""
+        """Arc length on the leader's line of the contact point at an end of the follower."""
         free = self.free_lines[end]
         position = None
         if free is not None:
@@ -230,7 +231,7 @@ class SlaveMotion:
                 point = line[:, face] + part * (line[:, face + 1] - line[:, face])
                 free.cut(at_start, k, point)
         if position is None:
-            moved_end = self.contact.slave.line(new=True)[:, [-end]]
+            moved_end = self.contact.follower.line(new=True)[:, [-end]]
             found = np.empty(1)
             fill_positions(line, moved_end, found)
             face = min(int(found[0]), line.shape[1] - 2)
@@ -250,23 +251,23 @@ class SlaveMotion:
 class CornerGuard:
     """Holds the corners that blocks have at one point, where the flow alone moves them.
 
-    `node` is moved, `slaves` are those of the sliding contacts whose lines it carries, in the order
-    in which they are laid; their ends that are fixed at the node go with it.  None opens beyond a
-    straight angle.  Where three blocks or more are linked none closes below `narrow` [rad] either:
-    there one material would be pinched off between two others.
+    `node` is moved, `followers` are those of the sliding contacts whose lines it carries, in the
+    order in which they are laid; their ends that are fixed at the node go with it.  No corner opens
+    beyond a straight angle.  Where three blocks or more are linked none closes below `narrow` [rad]
+    either: there one material would be pinched off between two others.
     """
 
-    def __init__(self, node: KeyNode, slaves: Sequence[SlaveMotion] = ()):
+    def __init__(self, node: KeyNode, followers: Sequence[FollowerMotion] = ()):
         self.node = node
-        self.slaves: list[SlaveMotion] = []
+        self.followers: list[FollowerMotion] = []
         nodes = [node]
-        for slave in slaves:
-            masters = slave.contact.master.segments
-            if any(segment in masters for n in nodes for segment, _ in n.ends):
-                self.slaves.append(slave)
+        for follower in followers:
+            leaders = follower.contact.leader.segments
+            if any(segment in leaders for n in nodes for segment, _ in n.ends):
+                self.followers.append(follower)
                 for end in (0, 1):
-                    if slave.key_nodes[end] not in nodes and _is_fixed_at(slave, end, nodes):
-                        nodes.append(slave.key_nodes[end])
+                    if follower.key_nodes[end] not in nodes and _is_fixed_at(follower, end, nodes):
+                        nodes.append(follower.key_nodes[end])
         self.corners = [member for n in nodes for member in n.members if _is_corner(*member)]
         self.narrow = 0.0
         if len(node.members) > 2 and all(segment.linked for segment, _ in node.ends):
@@ -274,22 +275,25 @@ class CornerGuard:
             self.narrow = min([NARROW, *(0.5 * abs(angle) for angle in first)])
 
     @classmethod
-    def find(cls, nodes: list[KeyNode], slaves: Sequence[SlaveMotion] = ()) -> list[CornerGuard]:
+    def find(
+        cls, nodes: list[KeyNode], followers: Sequence[FollowerMotion] = ()
+    ) -> list[CornerGuard]:
         """Guards of all key nodes that moving faces alone rule, away from walls.
 
         Sliding contacts have to be whole: those with contact points are placed by what they meet.
         """
-        guards = [cls(node, slaves) for node in nodes if _is_free(node, slaves)]
+        guards = [cls(node, followers) for node in nodes if _is_free(node, followers)]
         return [
             guard
             for guard in guards
-            if guard.corners and all((slave.contact.fixed >= 0).all() for slave in guard.slaves)
+            if guard.corners
+            and all((follower.contact.fixed >= 0).all() for follower in guard.followers)
         ]
 
     def hold(self) -> float:
         """Move the node where a corner has opened or closed too far; returns how far [m]."""
         total = 0.0
-        for _ in range(ROUNDS if self.slaves else 1):
+        for _ in range(ROUNDS if self.followers else 1):
             moved = 0.0
             for member in self.corners:
                 way = compute_way(*find_corner(*member))
@@ -300,8 +304,8 @@ class CornerGuard:
                     moved += float(np.hypot(*way))
             if moved == 0.0:
                 break
-            for slave in self.slaves:
-                slave.lay_nodes()
+            for follower in self.followers:
+                follower.lay_nodes()
             total += moved
             if moved < STRAIGHT_ENOUGH * total:
                 break
@@ -352,16 +356,16 @@ def find_corner(
     return nodes[:, i, j].copy(), *(sides if along * up > 0 else sides[::-1])
 
 
-def _is_free(node: KeyNode, slaves: Sequence[SlaveMotion]) -> bool:
+def _is_free(node: KeyNode, followers: Sequence[FollowerMotion]) -> bool:
     """Do links and free surfaces alone rule the node, and is it laid on no other's line?"""
     if node.given or node.constraining_faces or node.carried or not node.flowing:
         return False
     for segment, face in node.ends:
-        if segment.is_slave:
+        if segment.is_follower:
             if not any(
-                (segment, face) == slave_end and _is_fixed_at(slave, end, [node])
-                for slave in slaves
-                for end, slave_end in enumerate(slave.contact.slave.ends())
+                (segment, face) == follower_end and _is_fixed_at(follower, end, [node])
+                for follower in followers
+                for end, follower_end in enumerate(follower.contact.follower.ends())
             ):
                 return False
         elif segment.kind not in ("sliding", "free-surface") and not segment.linked:
@@ -369,13 +373,13 @@ def _is_free(node: KeyNode, slaves: Sequence[SlaveMotion]) -> bool:
     return True
 
 
-def _is_fixed_at(slave: SlaveMotion, end: int, nodes: list[KeyNode]) -> bool:
-    """Is that end of the slave fixed at an end of the master that is at one of the nodes?"""
-    contact = slave.contact
+def _is_fixed_at(follower: FollowerMotion, end: int, nodes: list[KeyNode]) -> bool:
+    """Is that end of the follower fixed at an end of the leader that is at one of the nodes?"""
+    contact = follower.contact
     if contact.fixed[end] < 0:
         return False
-    master_end = contact.master.ends()[0 if contact.fixed[end] == 0 else 1]
-    return any(master_end == other for node in nodes for other in node.ends)
+    leader_end = contact.leader.ends()[0 if contact.fixed[end] == 0 else 1]
+    return any(leader_end == other for node in nodes for other in node.ends)
 
 
 def _is_corner(block: Block, i: int, j: int) -> bool:

@@ -65,7 +65,7 @@ class GridMotion(Sides):
         self.quality: list | None = None
         self.counts: list = [NO_COUNTS] * len(blocks)
         super().__init__(blocks if mesh == "regrid" else (), exchange, rule)
-        self._has_slaves = mesh == "regrid" and any(block.is_slave for block in blocks)
+        self._has_followers = mesh == "regrid" and any(block.is_follower for block in blocks)
         if mesh == "regrid":
             self._find_free_sides()
         else:
@@ -165,8 +165,8 @@ class GridMotion(Sides):
         try:
             for contact in self.exchange.contacts:
                 contact.measure_new_polygons()
-            for number in own if self._has_slaves else ():
-                if self.blocks[number].is_slave:
+            for number in own if self._has_followers else ():
+                if self.blocks[number].is_follower:
                     self._spare_polygons(number, MOST_EXCESS * min(1.0, fraction))
         except RegridFailure as found:
             return len(self.blocks) + number, found
@@ -212,7 +212,7 @@ class GridMotion(Sides):
         self.reports[number] = result.report
 
     def _spare_polygons(self, number: int, most: float) -> None:
-        """Move less of a slave's interior where its polygon cells would be crushed.
+        """Move less of a follower's interior where its polygon cells would be crushed.
 
         Raises RegridFailure where a cell would be left no volume even so.
         """

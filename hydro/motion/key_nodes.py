@@ -252,7 +252,7 @@ def find_key_nodes(
             b = index[numbers[id(link.follower.block)], i2, j2]
             parent[root(a)] = root(b)
     for contact in contacts:
-        for one, other in contact.master.find_joints():
+        for one, other in contact.leader.find_joints():
             a, b = (
                 index[numbers[id(segment.block)], *_end_nodes(segment)[end][:2]]
                 for segment, end in (one, other)

@@ -5,7 +5,7 @@ Blocks meet along links and sliding contacts, free surfaces of different bodies 
 alone, so the run has to end there.
 
 Looked at are the segments that make the outline of linked blocks: those without a partner, and the
-masters of sliding contacts, whose ends may be bare.  Of two blocks on each other the outline of the
+leaders of sliding contacts, whose ends may be bare.  Of two blocks on each other the outline of the
 one crosses that of the other, or one lies within the other, which only the first grid can show.
 Blocks may touch, and curves be cut by chords, so a crossing counts where one outline has come as
 far into the other block as INSIDE of its first cells.  A block's crossing with itself is found by
@@ -143,7 +143,7 @@ class Overlaps:
             for block in blocks
             for segment in block.segments
             if isinstance(segment, Segment)
-            and (not segment.linked or (segment.kind == "sliding" and not segment.is_slave))
+            and (not segment.linked or (segment.kind == "sliding" and not segment.is_follower))
         ]
         self._outlines: list[Outline] = []  # of the segments that are watched
         self._watched: Pairs = []

@@ -12,7 +12,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.boundary import NodeMotion, Segment
 from hydro.links import Exchange
-from hydro.motion.constraints import CarriedSeam, CornerGuard, Joint, SlaveMotion
+from hydro.motion.constraints import CarriedSeam, CornerGuard, FollowerMotion, Joint
 from hydro.motion.key_nodes import KeyNode, find_key_nodes
 from hydro.motion.line import (
     CORNER,
@@ -70,7 +70,9 @@ class Sides:
         self.exchange, self.stretching = exchange, 0.0
         self.carried_seams: list[CarriedSeam] = []
         self.joints: list[Joint] = []
-        self.slaves = [SlaveMotion(contact) for contact in exchange.contacts] if blocks else []
+        self.followers = (
+            [FollowerMotion(contact) for contact in exchange.contacts] if blocks else []
+        )
         self.key_nodes = find_key_nodes(blocks, exchange.links, exchange.contacts) if blocks else []
         self._by_segment: dict[int, Line] = {
             id(segment): LINES[segment.motion](segment, rule)
@@ -92,10 +94,10 @@ class Sides:
             line = self._find_line(link.leader)
             if line is not None and link.leader.kind == "interface":
                 link.layer = line.damping, line.closed
-        for slave in self.slaves:
+        for follower in self.followers:
             for end in (0, 1):
-                self._end_slave(slave, end)
-        self.guards = CornerGuard.find(self.key_nodes, self.slaves)
+                self._end_follower(follower, end)
+        self.guards = CornerGuard.find(self.key_nodes, self.followers)
         # lines in the order in which the passes take them
         self.moving = [line for line in self.lines if not line.waits]
         self.damped = [line for line in self.moving if line.segment.kind == "sliding"]
@@ -140,7 +142,7 @@ class Sides:
     def _let_slide_on_piston(self, node: KeyNode) -> None:
         """Let moving lines that end on a straight piston slide along it, pistons along pistons.
 
-        Not the lines of sliding contacts: their slaves go with them, and round-off would grow.
+        Not the lines of sliding contacts: their followers go with them, and round-off would grow.
         """
         if any(segment.kind == "sliding" for segment, _ in node.ends):
             return
@@ -197,19 +199,19 @@ class Sides:
         if smooth and line is not other and np.abs(here - there).max() < 1e-9 * np.hypot(*away):
             line.neighbours[end], other.neighbours[other_end] = (other, other_end), (line, end)
 
-    def _end_slave(self, slave: SlaveMotion, end: int) -> None:
+    def _end_follower(self, follower: FollowerMotion, end: int) -> None:
         """Tell a sliding contact an end's key node and the lines that go on from there."""
-        node = slave.key_nodes[end] = self._find_end(*slave.contact.slave.ends()[end])
+        node = follower.key_nodes[end] = self._find_end(*follower.contact.follower.ends()[end])
         for other, face in node.ends:
             line = self._find_line(other)
             if line is None or other.kind != "free-surface":
                 continue
             line.at_contact = True
-            slave.free_lines[end], slave.starts[end] = line, face == other.first
+            follower.free_lines[end], follower.starts[end] = line, face == other.first
             side = OPPOSITE_SIDES[other.side]
             across = [segment for segment in other.block.segments if segment.side == side]
             opposite = self._find_line(across[0]) if len(across) == 1 else None
-            slave.opposites[end] = opposite
+            follower.opposites[end] = opposite
             if opposite is not None:
                 opposite.follows_contact = True
 
@@ -275,8 +277,8 @@ def join_tracks(one: Track, other: Track, point: np.ndarray) -> np.ndarray | Non
 
 
 def space_contact_points(sides: Sides, span: Span) -> None:
-    for slave in sides.slaves:
-        slave.share_nodes()
+    for follower in sides.followers:
+        follower.share_nodes()
 
 
 def turn_mirrors(sides: Sides, span: Span) -> None:
@@ -308,9 +310,9 @@ def move_carried_seams(sides: Sides, span: Span) -> None:
         carried.move_ends()
 
 
-def lay_slaves(sides: Sides, span: Span) -> None:
-    for slave in sides.slaves:
-        slave.lay_nodes()
+def lay_followers(sides: Sides, span: Span) -> None:
+    for follower in sides.followers:
+        follower.lay_nodes()
 
 
 def spread_lines(sides: Sides, span: Span) -> None:

@@ -134,7 +134,7 @@ class Ranks(Blocks):
         self._polygons = {
             number: self._make_polygons(number, cut)
             for number, cut in self.cuts.items()
-            if cut.block.is_slave
+            if cut.block.is_follower
         }
 
     def _make_polygons(self, number: int, cut: CutBlock) -> messages.Message:

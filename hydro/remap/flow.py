@@ -2,7 +2,7 @@
 
 The new simulation comes fresh from its problem.  Its lines are laid on the curves of the old run's,
 its grids made inside them by its own regridders, and the states laid on these, block by block.
-What is not refused holds for as long as blocks, sides and links are the same; slaves of sliding
+What is not refused holds for as long as blocks, sides and links are the same; followers of sliding
 contacts have polygons for cells along their side, which do not fit any other grid.
 
 A side's nodes are respaced along the chords between the old ones.  A new node has, between the
@@ -137,7 +137,7 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
 def _check_same(old: Simulation, new: Simulation) -> None:
     """Raise BadInput where the two simulations are not of one set-up, or where something slides."""
     if old.exchange.contacts or new.exchange.contacts:
-        segment = (old.exchange.contacts or new.exchange.contacts)[0].slave.segments[0]
+        segment = (old.exchange.contacts or new.exchange.contacts)[0].follower.segments[0]
         raise BadInput(
             f"{segment}: it slides on another block, and the cells of such a side are polygons "
             "that do not fit another grid; begin a new run with the cells wanted"

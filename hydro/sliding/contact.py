@@ -1,11 +1,11 @@
 """Sliding contacts: two lines of faces on each other whose nodes do not match.
 
-The master's line carries the geometry and moves with the contact; the slave's nodes are laid on it
-by their own spacing.  Where the slave does not cover the master, the master is a free surface.
+The leader's line defines the geometry and moves with the contact; the follower's nodes are placed
+on it with a spacing of their own.  Where the follower does not cover it, it is a free surface.
 Fluxes pass on the pieces of the common refinement, so that what one side gives the other takes to
-the bit; slave cells are polygons (`hydro.sliding.polygons`).  An end of the slave is fixed at an
-end of the master, or it is a contact point: the place where the free line that goes on from there
-meets the master.  A contact pulls at nothing: pieces under tension get p = 0 and are counted.
+the bit; follower cells are polygons (`hydro.sliding.polygons`).  An end of the follower is fixed at
+an end of the leader, or it is a contact point, where the free line that continues from there meets
+the leader.  A contact pulls at nothing: pieces under tension get p = 0 and are counted.
 """
 
 from __future__ import annotations
@@ -180,31 +180,31 @@ def _find_orders(segments: list[Sliding]) -> list[bool]:
 
 
 class SlidingContact:
-    """A master chain and the slave chain on it; made by `hydro.links.slide`."""
+    """A leader chain and the follower chain on it; made by `hydro.links.slide`."""
 
     kind = "sliding"
 
-    def __init__(self, master: list[Sliding], slave: list[Sliding]):
-        self.segments: list[Sliding] = [*master, *slave]
-        self.master, self.slave = Chain(master), Chain(slave)
-        self.name = f"{master[0].block.name}/{slave[0].block.name}"
-        if self.master.orientation == self.slave.orientation:
-            self.slave.reverse()  # so that both run the same way
-        if len({segment.block.material for segment in slave}) > 1:
+    def __init__(self, leader: list[Sliding], follower: list[Sliding]):
+        self.segments: list[Sliding] = [*leader, *follower]
+        self.leader, self.follower = Chain(leader), Chain(follower)
+        self.name = f"{leader[0].block.name}/{follower[0].block.name}"
+        if self.leader.orientation == self.follower.orientation:
+            self.follower.reverse()  # so that both run the same way
+        if len({segment.block.material for segment in follower}) > 1:
             raise BadInput(
-                f"sliding: {slave[0]} and the slave's segments after it are of several materials; "
-                "lines on which materials meet are the master's"
+                f"sliding: {follower[0]} and the follower's segments after it are of several "
+                "materials; lines on which materials meet are the leader's"
             )
-        for segment in slave:
+        for segment in follower:
             segment.motion, segment.has_own_line = NodeMotion.FOLLOW, False
-        line, other = self.master.line(), self.slave.line()
+        line, other = self.leader.line(), self.follower.line()
         crossing = _find_crossing(line)
         if crossing is not None:
             raise BadInput(
-                f"sliding: the master line of {master[0]} crosses itself at its faces "
+                f"sliding: the leader line of {leader[0]} crosses itself at its faces "
                 f"{crossing[0]} and {crossing[1]}"
             )
-        # an end of the slave: index of the master's node at which it is fixed, or -1
+        # an end of the follower: index of the leader's node at which it is fixed, or -1
         size = np.ptp(line, axis=1).max()
         last = line.shape[1] - 1
         self.fixed = np.full(2, -1)
@@ -221,25 +221,25 @@ class SlidingContact:
         miss = np.abs(points - other).max() / np.ptp(other, axis=1).max()
         if miss > 1e-6:
             raise BadInput(
-                f"sliding: nodes of {slave[0]} lie up to {miss:.1e} of the contact's length off "
-                f"the line of {master[0]}"
+                f"sliding: nodes of {follower[0]} lie up to {miss:.1e} of the contact's length off "
+                f"the line of {leader[0]}"
             )
         if not (np.diff(positions) > 0.0).all():
-            raise BadInput(f"sliding: {slave[0]} and {master[0]} do not lie along each other")
+            raise BadInput(f"sliding: {follower[0]} and {leader[0]} do not lie along each other")
         self.first_law = arc_law(np.ascontiguousarray(other))
         self.refinement = 1.0  # how many times shorter the steps at a contact point are
         self.fixed_new = self.fixed.copy()
-        self.slave.write_line(points, new=False)
+        self.follower.write_line(points, new=False)
         self.pulled = 0  # pieces under tension in the current step
-        pieces = self.master.count + self.slave.count + 2
+        pieces = self.leader.count + self.follower.count + 2
         self.owners = np.zeros((2, pieces), dtype=np.int64)
         self.faces = np.zeros((PIECE_FACE_ROWS, pieces))
         self.parts = np.zeros((2, pieces))
         self.states = np.zeros((PIECE_ROWS, pieces))
         self.count = 0
-        self.positions = np.empty(self.slave.count + 1)
-        self.positions_new = np.empty(self.slave.count + 1)
-        chains = self.master, self.slave
+        self.positions = np.empty(self.follower.count + 1)
+        self.positions_new = np.empty(self.follower.count + 1)
+        chains = self.leader, self.follower
         self.laws = [chain.spread_laws() for chain in chains]
         self.slopes = [np.zeros((SLOPE_ROWS, chain.count)) for chain in chains]
         self.middles = [np.zeros((2, chain.count)) for chain in chains]  # where the pieces are cut
@@ -248,8 +248,8 @@ class SlidingContact:
         self.fluxes = [np.zeros((FLUX_ROWS, chain.count)) for chain in chains]
         self.lines = [chain.line() for chain in chains]  # of the old grid
         self.still = np.zeros_like(self.lines[0])
-        self.excess_volume = np.zeros(self.slave.count)
-        self.excess_volume_new = np.zeros(self.slave.count)
+        self.excess_volume = np.zeros(self.follower.count)
+        self.excess_volume_new = np.zeros(self.follower.count)
         self.set_geometry(PLANE)
 
     def set_geometry(self, geometry: Geometry) -> None:
@@ -265,13 +265,13 @@ class SlidingContact:
 
     def cut(self) -> None:
         """Pieces, positions and polygon areas of the old grid."""
-        line, other = self.lines = self.master.line(), self.slave.line()
+        line, other = self.lines = self.leader.line(), self.follower.line()
         fill_positions(line, other, self.positions)
         self.count = fill_pieces(
             line,
             self.still,
             self.positions,
-            self.master.orientation,
+            self.leader.orientation,
             0.0,
             self.owners,
             self.faces,
@@ -279,19 +279,19 @@ class SlidingContact:
         )
         self._keep_middles(line, other)
         self.fill_excess_volume(
-            line, other, self.positions, self.master.orientation, self.excess_volume
+            line, other, self.positions, self.leader.orientation, self.excess_volume
         )
-        self.slave.scatter_excess("excess_volume", self.excess_volume)
-        self.slave.scatter_excess("excess_volume_new", self.excess_volume)
+        self.follower.scatter_excess("excess_volume", self.excess_volume)
+        self.follower.scatter_excess("excess_volume_new", self.excess_volume)
 
     def measure_new_polygons(self) -> None:
         """With the sides' new nodes known: positions and polygon areas of the new grid."""
-        line, other = self.master.line(new=True), self.slave.line(new=True)
+        line, other = self.leader.line(new=True), self.follower.line(new=True)
         fill_positions(line, other, self.positions_new)
         self.fill_excess_volume(
-            line, other, self.positions_new, self.master.orientation, self.excess_volume_new
+            line, other, self.positions_new, self.leader.orientation, self.excess_volume_new
         )
-        self.slave.scatter_excess("excess_volume_new", self.excess_volume_new)
+        self.follower.scatter_excess("excess_volume_new", self.excess_volume_new)
 
     def _keep_middles(self, line: np.ndarray, other: np.ndarray) -> None:
         for middles, nodes in zip(self.middles, (line, other), strict=True):
@@ -305,12 +305,12 @@ class SlidingContact:
             self.fill_flux(dt)
         else:
             rows = on.AT_FACE if phase == AT_CELLS else on.TRACE
-            self._solve(self.master.gather(rows), self.slave.gather(rows))
+            self._solve(self.leader.gather(rows), self.follower.gather(rows))
 
     def _solve(self, mine: np.ndarray, other: np.ndarray) -> None:
         """States of the pieces, averaged to the faces; writes the contact states of both sides."""
         self._solve_pieces(mine, other)
-        for side, chain, states in ((0, self.master, mine), (1, self.slave, other)):
+        for side, chain, states in ((0, self.leader, mine), (1, self.follower, other)):
             averages, surface = self.averages[side], self.surfaces[side]
             averages[:] = 0.0
             average_pieces(self.states, self.faces, self.owners, side, self.count, averages)
@@ -325,13 +325,13 @@ class SlidingContact:
 
     def fill_flux(self, dt: float) -> None:
         """Fluxes of both sides' faces from the mid-time traces."""
-        master, slave = self.master, self.slave
-        (old, slave_old), (flux, slave_flux) = self.lines, self.fluxes
-        new, slave_new = master.line(new=True), slave.line(new=True)
+        leader, follower = self.leader, self.follower
+        (old, follower_old), (flux, follower_flux) = self.lines, self.fluxes
+        new, follower_new = leader.line(new=True), follower.line(new=True)
         middle, moved = 0.5 * (old + new), new - old
-        slave_middle = 0.5 * (slave_old + slave_new)
-        fill_positions(middle, slave_middle, self.positions)
-        orientation = master.orientation
+        follower_middle = 0.5 * (follower_old + follower_new)
+        fill_positions(middle, follower_middle, self.positions)
+        orientation = leader.orientation
         self.count = fill_pieces(
             middle,
             moved,
@@ -346,54 +346,54 @@ class SlidingContact:
             fill_radius_weighted_pieces(
                 old, new, self.parts, orientation, 1.0 / dt, self.owners, self.count, self.areas
             )
-        self._keep_middles(middle, slave_middle)
-        mine, other = master.gather(on.TRACE), slave.gather(on.TRACE)
+        self._keep_middles(middle, follower_middle)
+        mine, other = leader.gather(on.TRACE), follower.gather(on.TRACE)
         self._solve_pieces(mine, other)
         self.fill_piece_flux(
             self.states[PIECE_P], self.areas, self.faces[AREAS], self.owners, self.count, flux,
-            slave_flux,
+            follower_flux,
         )  # fmt: skip
-        closing = self._measure_closing(middle, moved, slave_middle, slave_new - slave_old)
+        closing = self._measure_closing(middle, moved, follower_middle, follower_new - follower_old)
         growth = (1.0 / dt) * (self.excess_volume_new - self.excess_volume)
-        growth += slave.gather(on.AREAS)[SWEPT_RATE]
+        growth += follower.gather(on.AREAS)[SWEPT_RATE]
         self.add_closing_flux(
             other, closing, growth, self.areas, self.owners, self.count, self._part_at_first(),
-            slave_flux,
+            follower_flux,
         )  # fmt: skip
-        master.scatter(on.FLUX, flux)
-        slave.scatter(on.FLUX, slave_flux)
+        leader.scatter(on.FLUX, flux)
+        follower.scatter(on.FLUX, follower_flux)
 
-    def _measure_closing(self, middle, moved, slave, slave_moved) -> np.ndarray:
-        """Normal times area (2, n + 1) of the closing faces at the slave's nodes.
+    def _measure_closing(self, middle, moved, follower, follower_moved) -> np.ndarray:
+        """Normal times area (2, n + 1) of the closing faces at the follower's nodes.
 
         In axisymmetric flow means over the step, like those of all faces: their axial parts close
         what nodes and positions leave open to round-off.  Then (3, n + 1): with the radial part per
         depth.
         """
-        at_positions = np.empty_like(slave)
+        at_positions = np.empty_like(follower)
         fill_points(middle, self.positions, at_positions)
-        gap = at_positions - slave
+        gap = at_positions - follower
         if not self.geometry.curved:
-            return self.master.orientation * np.stack((-gap[1], gap[0]))
-        position_moved = np.empty_like(slave)
+            return self.leader.orientation * np.stack((-gap[1], gap[0]))
+        position_moved = np.empty_like(follower)
         fill_points(moved, self.positions, position_moved)
         squares = [
             0.5 * y * y + dy * dy / 24.0
-            for y, dy in ((at_positions[1], position_moved[1]), (slave[1], slave_moved[1]))
+            for y, dy in ((at_positions[1], position_moved[1]), (follower[1], follower_moved[1]))
         ]
-        radius = 0.5 * (at_positions[1] + slave[1])
-        return self.master.orientation * np.stack(
+        radius = 0.5 * (at_positions[1] + follower[1])
+        return self.leader.orientation * np.stack(
             (squares[1] - squares[0], radius * gap[0], gap[0])
         )
 
     def _part_at_first(self) -> float:
-        """Part of the budget's rest that belongs to the slave's first end: to a contact point."""
+        """Part of the budget's rest that belongs to a contact point at the follower's first end."""
         if self.fixed[0] >= 0:
             return 0.0
         return 1.0 if self.fixed[1] >= 0 else 0.5
 
     def accept(self) -> None:
-        """Keep what the slave's motion found: which ends are fixed, and where."""
+        """Keep what the follower's motion found: which ends are fixed, and where."""
         self.fixed[:] = self.fixed_new
 
 

@@ -1,11 +1,11 @@
 """The pieces of a sliding contact: where two lines cut each other, and the states between them.
 
-The master line carries the geometry; the slave's nodes lie on it.  Both sets of nodes cut the
-master into pieces, each with one master face and at most one slave face beside it.  A position on
-the master is a number: the index of a face plus the part of it that lies behind.  Each piece has a
-Riemann problem of its own; faces get averages of their pieces.
+The leader's line defines the geometry; the follower's nodes lie on it.  Both sets of nodes cut the
+leader into pieces, each with one leader face and at most one follower face beside it.  A position
+on the leader is a number: the index of a face plus the part of it that lies behind.  Each piece has
+a Riemann problem of its own; faces get averages of their pieces.
 
-`orientation` is 1 where the outward normal of the master lies to the right of its nodes' order,
+`orientation` is 1 where the outward normal of the leader lies to the right of its nodes' order,
 else -1.
 """
 
@@ -16,14 +16,14 @@ from hydro.formulas.riemann import compute_contact, compute_speed_at_pressure
 from hydro.rows import RHO, P, U, V
 from regrid.jit import compiled_once, kernel
 
-SNAP = 1e-9  # parts of a face closer than this to a master node are at the node
+SNAP = 1e-9  # parts of a face closer than this to a leader node are at the node
 NEAR = 1e-2  # squared distance, in squared lengths of a face, of a point that lies on the line
 PARALLEL = 1e-20  # squared sine of the angle below which two lines do not cross
 DEEP = 1e-6  # part of rho c² below which a negative contact pressure is rounding
 
 # Rows of the arrays over the pieces, by name.
-# owners (2, pieces): the master's and the slave's face that a piece belongs to
-MASTER, SLAVE = range(2)
+# owners (2, pieces): the leader's and the follower's face that a piece belongs to
+LEADER, FOLLOWER = range(2)
 
 # states of a side's cells or traces, gathered from rims: rho, u, v, p as in `hydro.rows`, then
 STATE_C, STATE_E = 4, 5
@@ -37,12 +37,12 @@ PIECE_FACE_ROWS = 7
 SURFACE_P, SURFACE_SPEED, SURFACE_U, SURFACE_V, SLIP = range(5)
 SURFACE_ROWS = 5
 
-# parts (2, pieces): where on the master's face a piece begins and ends, 0 to 1
+# parts (2, pieces): where on the leader's face a piece begins and ends, 0 to 1
 PART_START, PART_STOP = range(2)
 
 # states of pieces: contact pressure, speed of the contact beyond either side's own, slip speed,
 # contact velocity
-PIECE_P, PIECE_EXCESS, PIECE_EXCESS_SLAVE, PIECE_SLIP, PIECE_U, PIECE_V = range(6)
+PIECE_P, PIECE_EXCESS, PIECE_EXCESS_FOLLOWER, PIECE_SLIP, PIECE_U, PIECE_V = range(6)
 PIECE_ROWS = 6
 
 # slopes along a chain: unit direction, change of velocity and pressure per length
@@ -70,8 +70,8 @@ def project(line, a, point_x, point_y):
 
 
 @kernel
-def fill_positions(master, points, positions):
-    """Positions (n,) on the master (2, m + 1) nearest to the points (2, n), which follow its order.
+def fill_positions(leader, points, positions):
+    """Positions (n,) on the leader (2, m + 1) nearest to the points (2, n), which follow its order.
 
     A position is looked for from the one before it onwards, so that positions never fall, up to the
     first face behind one that is near.
@@ -80,18 +80,18 @@ def fill_positions(master, points, positions):
     last = 0.0
     for k in range(points.shape[1]):
         best, position = 1e300, last
-        for a in range(start, master.shape[1] - 1):
-            part, away = project(master, a, points[0, k], points[1, k])
+        for a in range(start, leader.shape[1] - 1):
+            part, away = project(leader, a, points[0, k], points[1, k])
             if away < best:
                 best, position = away, a + part
-            elif best < NEAR * measure_square(master, a):
+            elif best < NEAR * measure_square(leader, a):
                 break
         nearest = float(int(position + 0.5))
         if abs(position - nearest) < SNAP:
             position = nearest
         last = position if position > last else last
         positions[k] = last
-        start = min(int(last), master.shape[1] - 2)
+        start = min(int(last), leader.shape[1] - 2)
 
 
 @kernel
@@ -132,7 +132,7 @@ def find_last_crossing(line, other):
 
 @compiled_once
 def compute_normal(line, a, orientation):
-    """Unit normal of face `a`, outwards of the master."""
+    """Unit normal of face `a`, outwards of the leader."""
     dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
     length = orientation * (dx * dx + dy * dy) ** 0.5
     return dy / length, -dx / length
@@ -158,27 +158,27 @@ def compute_normal_at(line, a, end, ring, orientation):
 
 @kernel
 def fill_pieces(line, moved, positions, orientation, inverse_dt, owners, faces, parts):
-    """Cut the master at its own nodes and at the slave's positions; returns the number of pieces.
+    """Cut the leader at its own nodes and the follower's positions; returns the number of pieces.
 
-    line (2, m + 1): master at mid-time; moved (2, m + 1): its displacement in the step. owners (2,
-    pieces): master face, slave face or -1.  faces (7, pieces): rows as of a
-    perimeter's faces, outwards of the master, and the unit normal of the curve.  parts (2,
-    pieces): where on the master's face, 0 to 1, a piece begins and ends.
+    line (2, m + 1): leader at mid-time; moved (2, m + 1): its displacement in the step. owners (2,
+    pieces): leader face, follower face or -1.  faces (7, pieces): rows as of a
+    perimeter's faces, outwards of the leader, and the unit normal of the curve.  parts (2,
+    pieces): where on the leader's face, 0 to 1, a piece begins and ends.
     """
     last = line.shape[1] - 1
     ring = line[0, 0] == line[0, last] and line[1, 0] == line[1, last]
-    slaves = positions.shape[0]
+    followers = positions.shape[0]
     a, k, count = 0, 0, 0
     here = 0.0
-    while k < slaves and positions[k] <= 0.0:
+    while k < followers and positions[k] <= 0.0:
         k += 1
     while a < last:
         there = a + 1.0
-        if k < slaves and positions[k] < there:
+        if k < followers and positions[k] < there:
             there = positions[k]
         if there > here:
-            owners[MASTER, count] = a
-            owners[SLAVE, count] = k - 1 if 0 < k < slaves else -1
+            owners[LEADER, count] = a
+            owners[FOLLOWER, count] = k - 1 if 0 < k < followers else -1
             first, second = here - a, there - a
             parts[PART_START, count] = first
             parts[PART_STOP, count] = second
@@ -202,7 +202,7 @@ def fill_pieces(line, moved, positions, orientation, inverse_dt, owners, faces, 
             faces[NORMAL_X, count] = normal_x / length
             faces[NORMAL_Y, count] = normal_y / length
             count += 1
-        while k < slaves and positions[k] <= there:
+        while k < followers and positions[k] <= there:
             k += 1
         if there >= a + 1.0:
             a += 1
@@ -216,11 +216,11 @@ def fill_radius_weighted_pieces(
 ):
     """Rows AREAS of the pieces in axisymmetric flow, exactly, into radius_weighted_faces (3, n).
 
-    line, line_new (2, m + 1): master, old and new; others as in `fill_pieces`.  A piece keeps its
-    part of the master's face while that moves.
+    line, line_new (2, m + 1): leader, old and new; others as in `fill_pieces`.  A piece keeps its
+    part of the leader's face while that moves.
     """
     for k in range(count):
-        a = owners[MASTER, k]
+        a = owners[LEADER, k]
         first, second = parts[PART_START, k], parts[PART_STOP, k]
         x, y = line[0, a], line[1, a]
         x_new, y_new = line_new[0, a], line_new[1, a]
@@ -242,7 +242,7 @@ def fill_radius_weighted_pieces(
 def average_pieces(values, faces, owners, side, count, averages):
     """Averages by length (rows, faces) of the pieces' values (rows, pieces) over one side's faces.
 
-    side: 0 for the master, 1 for the slave.  Faces without a piece keep what was there.
+    side: 0 for the leader, 1 for the follower.  Faces without a piece keep what was there.
     """
     rows = averages.shape[0]
     done = 0
@@ -322,10 +322,10 @@ def compute_at(states, middles, slopes, k, x, y):
 def solve_pieces(one_side, other_side, owners, faces, count, out):
     """Contact states of the pieces: rows of `out` (6, pieces); returns how many are pulled.
 
-    out: p*; what the contact's normal speed exceeds the master's own by, and the slave's, both
-    outwards of the master; slip; velocity of the line, which is the master's.  A piece without a
-    slave is a free surface; so are both sides of one whose contact pressure is negative: a contact
-    does not pull.
+    out: p*; what the contact's normal speed exceeds the leader's own by, and the follower's, both
+    outwards of the leader; slip; velocity of the line, which is the leader's.  A piece without a
+    follower is a free surface; so are both sides of one whose contact pressure is negative: a
+    contact does not pull.
     Both sides: states (rows, faces), rho, u, v, p and the sound speed first; wave laws
     of the materials (3, faces); middles (2, faces); slopes (5, faces), see `fill_slopes`.  Note:
     with the faces' states and normals instead of the pieces' own, a slip of speed V along a line of
@@ -335,7 +335,7 @@ def solve_pieces(one_side, other_side, owners, faces, count, out):
     other, other_laws, other_middles, other_slopes = other_side
     pulled = 0
     for k in range(count):
-        a, b = owners[MASTER, k], owners[SLAVE, k]
+        a, b = owners[LEADER, k], owners[FOLLOWER, k]
         x, y, nx, ny = faces[FACE_X, k], faces[FACE_Y, k], faces[NORMAL_X, k], faces[NORMAL_Y, k]
         rho, c = mine[RHO, a], mine[STATE_C, a]
         u, v, p = compute_at(mine, middles, slopes, a, x, y)
@@ -366,7 +366,7 @@ def solve_pieces(one_side, other_side, owners, faces, count, out):
                 )
         out[PIECE_P, k] = pressure
         out[PIECE_EXCESS, k] = speed - w
-        out[PIECE_EXCESS_SLAVE, k] = other_speed - w_other
+        out[PIECE_EXCESS_FOLLOWER, k] = other_speed - w_other
         out[PIECE_SLIP, k] = slip
         out[PIECE_U, k] = u + (speed - w) * nx
         out[PIECE_V, k] = v + (speed - w) * ny
@@ -377,8 +377,8 @@ def solve_pieces(one_side, other_side, owners, faces, count, out):
 def fill_surface(states, averages, sign, faces, surface):
     """A side's `surface` (5, n) from the pieces' averages (6, n) over its faces.
 
-    Rows: p*, outward w*, velocity with which the line moves (the master's own along the face, the
-    contact's along the normal), slip.  sign: 1 for the master, -1 for the slave, whose outward
+    Rows: p*, outward w*, velocity with which the line moves (the leader's own along the face, the
+    contact's along the normal), slip.  sign: 1 for the leader, -1 for the follower, whose outward
     normal is opposite.
     """
     row = 1 if sign > 0.0 else 2

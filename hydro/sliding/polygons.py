@@ -1,14 +1,14 @@
-"""Polygon cells: what lies between the slave's straight faces and the master's line.
+"""Polygon cells: what lies between the follower's straight faces and the leader's line.
 
-A slave cell is a polygon: the master's nodes between its own two count as its corners.  What a
-slave node does between old and new time (it slides past master nodes, and at mid-time it is not
-quite on the mid-time line) is a small face between the two slave cells beside it, the closing
-face: with it, areas and swept volumes of every slave cell add up to round-off.
+A follower cell is a polygon: the leader's nodes between its own two count as its corners.  What a
+follower node does between old and new time (it slides past leader nodes, and at mid-time it is not
+quite on the mid-time line) is a small face between the two follower cells beside it, the closing
+face: with it, areas and swept volumes of every follower cell add up to round-off.
 
-A regridder sees the slave's straight faces.  Where a crest of the master's line between two nodes
-takes most of a cell away, a small motion of the cell's far nodes takes all the rest.
+A regridder sees the follower's straight faces.  Where a crest of the leader's line between two
+nodes takes most of a cell away, a small motion of the cell's far nodes takes all the rest.
 
-Method: slave polygons as for classic slide lines; the closing faces are ours (theory F4).
+Method: follower polygons as for classic slide lines; the closing faces are ours (theory F4).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from hydro.formulas.geometry import PLANE, Geometry
 from hydro.perimeter.faces import measure_volume
 from hydro.rim import find_cell, find_excess
 from hydro.rows import RHO, P, U, V
-from hydro.sliding.pieces import AREA_X, AREA_Y, MASTER, SLAVE, STATE_E, SWEPT_RATE
+from hydro.sliding.pieces import AREA_X, AREA_Y, FOLLOWER, LEADER, STATE_E, SWEPT_RATE
 from regrid.jit import kernel
 
 LEAST_LEFT = 0.5  # of a polygon cell's volume after a step
@@ -31,18 +31,18 @@ def make_fill_excess_volume(geometry: Geometry = PLANE):
     weigh = geometry.triangle
 
     @kernel
-    def fill_excess_volume(master, slave, positions, orientation, excess_volume):
-        """Volumes (n,) of the slave's polygon cells beyond their chords, towards the master.
+    def fill_excess_volume(leader, follower, positions, orientation, excess_volume):
+        """Volumes (n,) of the follower's polygon cells beyond their chords, towards the leader.
 
-        slave (2, n + 1): nodes on the master at `positions` (n + 1,).
+        follower (2, n + 1): nodes on the leader at `positions` (n + 1,).
         """
         for k in range(excess_volume.shape[0]):
-            x0, y0 = slave[0, k], slave[1, k]
-            end_x, end_y = slave[0, k + 1] - x0, slave[1, k + 1] - y0
+            x0, y0 = follower[0, k], follower[1, k]
+            end_x, end_y = follower[0, k + 1] - x0, follower[1, k + 1] - y0
             x, y, twice = 0.0, 0.0, 0.0
             a = int(positions[k]) + 1
             while a < positions[k + 1]:
-                next_x, next_y = master[0, a] - x0, master[1, a] - y0
+                next_x, next_y = leader[0, a] - x0, leader[1, a] - y0
                 twice += weigh(x * next_y - next_x * y, y0, y, next_y)
                 x, y = next_x, next_y
                 a += 1
@@ -58,26 +58,26 @@ def make_fill_piece_flux(geometry: Geometry = PLANE):
     split = geometry.split
 
     @kernel
-    def fill_piece_flux(pressure, areas, plane_areas, owners, count, master_flux, slave_flux):
+    def fill_piece_flux(pressure, areas, plane_areas, owners, count, leader_flux, follower_flux):
         """Sum the pressure's momentum and work over both sides' faces, (6, m) and (6, n), outwards.
 
         areas, plane_areas (3, pieces): rows AREAS of a perimeter's faces, per radian and depth.
 
-        What the master's face gets is taken from the slave's to the bit.
+        What the leader's face gets is taken from the follower's to the bit.
         """
-        master_flux[:] = 0.0
-        slave_flux[:] = 0.0
+        leader_flux[:] = 0.0
+        follower_flux[:] = 0.0
         for k in range(count):
-            one, two = owners[MASTER, k], owners[SLAVE, k]
+            one, two = owners[LEADER, k], owners[FOLLOWER, k]
             p = pressure[k]
             momentum_y, push, hoop = split(
                 p * areas[AREA_Y, k], p, areas[AREA_Y, k], plane_areas[AREA_Y, k]
             )
             parts = (0.0, p * areas[AREA_X, k], momentum_y, p * areas[SWEPT_RATE, k], push, hoop)
             for q in range(1, 6):
-                master_flux[q, one] += parts[q]
+                leader_flux[q, one] += parts[q]
                 if two >= 0:
-                    slave_flux[q, two] -= parts[q]
+                    follower_flux[q, two] -= parts[q]
 
     return fill_piece_flux
 
@@ -89,31 +89,31 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
 
     @kernel
     def add_closing_flux(traces, closing, growth, areas, owners, count, first, flux):
-        """Add what passes between neighbouring slave cells through their closing faces.
+        """Add what passes between neighbouring follower cells through their closing faces.
 
-        traces (rows, n): TRACE of the slave's rim; closing (2, n + 1): normal times area of the
-        closing faces, from the nodes at mid-time to their positions' points on the mid-time master,
+        traces (rows, n): TRACE of the follower's rim; closing (2, n + 1): normal times area of the
+        closing faces, from the nodes at mid-time to their positions' points on the mid-time leader,
         outwards of the cell after the node; in axisymmetric flow also the radial one per depth,
-        (3, n + 1); growth (n,) per time: volume swept by the slave's straight faces, outwards, and
-        that of its `excess_volume`; areas (3, pieces): of the pieces.
+        (3, n + 1); growth (n,) per time: volume swept outwards by the follower's straight faces,
+        and that of its `excess_volume`; areas (3, pieces): of the pieces.
         The closing face's own swept volume is what the polygon's budget leaves for it, summed along
         the line.  The budget of the whole line has a rest where an end is a contact point: the part
         `first` of it is left in the first cell, the others in the last one. flux (6, n): outward
-        fluxes of the slave's faces.
+        fluxes of the follower's faces.
         """
         cells = flux.shape[1]
         rest = 0.0
         for piece in range(count):
-            rest -= areas[SWEPT_RATE, piece] if owners[SLAVE, piece] >= 0 else 0.0
+            rest -= areas[SWEPT_RATE, piece] if owners[FOLLOWER, piece] >= 0 else 0.0
         for k in range(cells):
             rest -= growth[k]
         swept = -first * rest
         k = 0
         piece = 0
-        while piece < count and owners[SLAVE, piece] < 0:
+        while piece < count and owners[FOLLOWER, piece] < 0:
             piece += 1
         for k in range(cells - 1):
-            while piece < count and owners[SLAVE, piece] == k:
+            while piece < count and owners[FOLLOWER, piece] == k:
                 swept -= areas[SWEPT_RATE, piece]
                 piece += 1
             swept -= growth[k]

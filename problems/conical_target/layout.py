@@ -1,9 +1,9 @@
 """Blocks of `conical-target`, how they touch, and the ripple on the line between cone and lead.
 
 The shell's front may be a disc that leaves a ring of lead at the impactor (`cover` less than
-`radius`), or close the shell.  Of a sliding pair lead and graphite are masters and steel follows;
+`radius`), or close the shell.  Of a sliding pair lead and graphite are leaders and steel follows;
 on the cone's side lead is, at the impact face the impactor follows.  So where materials meet on a
-line they are all on the master's side.  Note: a corner of a block is an end of two contacts; the
+line they are all on the leader's side.  Note: a corner of a block is an end of two contacts; the
 one that moves it must be placed before the one that is laid on it.
 
 The ripple is a wave along the cone's side that rises from nothing over one wave at either end, so

@@ -64,12 +64,12 @@ class PlateRun(Simulation):
 
     def count_contact(self) -> int:
         """Faces of the plate's lower side from its end over the edge up to A."""
-        return self.contact.slave.count if self.contact else self.find_touching()[0]
+        return self.contact.follower.count if self.contact else self.find_touching()[0]
 
     def find_contact_point(self) -> np.ndarray:
         """Place (2,) of A."""
         if self.contact:
-            return self.get_lower_line()[:, self.contact.slave.count]
+            return self.get_lower_line()[:, self.contact.follower.count]
         return self.find_touching()[1]
 
     def get_free_line(self) -> np.ndarray:

@@ -24,7 +24,7 @@ def make_line(random, faces):
 
 
 def make_places(random, faces, count, whole):
-    """Places of slave nodes on a line of `faces` faces, some of them at its nodes."""
+    """Places of follower nodes on a line of `faces` faces, some of them at its nodes."""
     places = np.sort(random.random(count) * faces)
     places[count // 2] = round(places[count // 2])
     places = np.unique(places)
@@ -52,11 +52,11 @@ def test_pieces_are_the_common_refinement(seed, whole):
     bounds = np.unique(np.concatenate((np.arange(14.0), places)))
     assert owners.shape[1] == bounds.size - 1
     middles = 0.5 * (bounds[1:] + bounds[:-1])
-    slave = np.searchsorted(places, middles) - 1
-    slave[(middles < places[0]) | (middles > places[-1])] = -1
+    follower = np.searchsorted(places, middles) - 1
+    follower[(middles < places[0]) | (middles > places[-1])] = -1
     assert np.array_equal(owners[0], middles.astype(int))
-    assert np.array_equal(owners[1], slave)
-    # the pieces of a master's face add up to it, those of a slave's face to its chord
+    assert np.array_equal(owners[1], follower)
+    # the pieces of a leader's face add up to it, those of a follower's face to its chord
     steps = np.diff(line, axis=1)
     points = np.empty((2, places.size))
     fill_points(line, places, points)
@@ -78,15 +78,15 @@ def test_what_one_side_gives_the_other_takes(seed, geometry):
     places = make_places(random, 13, 29, True)
     owners, faces = cut(line, places, 1.0, 0.1 * random.random((2, 14)), 1.0)
     pressure = random.random(faces.shape[1])
-    master, slave = np.empty((FLUX_ROWS, 13)), np.empty((FLUX_ROWS, places.size - 1))
+    leader, follower = np.empty((FLUX_ROWS, 13)), np.empty((FLUX_ROWS, places.size - 1))
     fill_piece_flux = make_fill_piece_flux(find_geometry(geometry))
     radius_weighted = faces * (2.0 if geometry == "axisymmetric" else 1.0)
-    fill_piece_flux(pressure, radius_weighted, faces, owners, faces.shape[1], master, slave)
-    assert np.abs(master.sum(axis=1) + slave.sum(axis=1)).max() < 1e-15
-    assert not master[0].any() and not slave[0].any()
+    fill_piece_flux(pressure, radius_weighted, faces, owners, faces.shape[1], leader, follower)
+    assert np.abs(leader.sum(axis=1) + follower.sum(axis=1)).max() < 1e-15
+    assert not leader[0].any() and not follower[0].any()
     curved = geometry == "axisymmetric"
     for row in (MOMENTUM_Y, PUSH, HOOP):  # the pressure's part of y is in one or in the others
-        assert (np.abs(master[row]).max() > 1e-3) == (curved != (row == MOMENTUM_Y))
+        assert (np.abs(leader[row]).max() > 1e-3) == (curved != (row == MOMENTUM_Y))
 
 
 def test_contact_does_not_pull():
@@ -114,14 +114,14 @@ STREAM = 0.4, 0.3
 
 
 def make_wavy_contact(ends, stream, cells=((24, 8), (17, 6))):
-    """Two gases of one pressure on a wavy contact, moving with one velocity; master below."""
+    """Two gases of one pressure on a wavy contact, moving with one velocity; leader below."""
     u, v = stream
     blocks = []
     for name, (ni, nj), rho, low in (("low", cells[0], 1.0, True), ("high", cells[1], 3.0, False)):
         s = np.linspace(0.0, 1.0, ni + 1)
         x = 2.0 * (s + 0.05 * np.sin(2.0 * np.pi * s))
         contact = 0.15 * np.sin(np.pi * x)
-        if not low:  # on the master's chords
+        if not low:  # on the leader's chords
             below = blocks[0].nodes[:, :, -1]
             contact = np.interp(x, *below)
         across = np.linspace(0.0, 1.0, nj + 1)
@@ -144,17 +144,17 @@ def make_wavy_contact(ends, stream, cells=((24, 8), (17, 6))):
 
 
 @pytest.mark.parametrize("ends", ["periodic", "walls"])
-def test_free_stream_while_the_slave_slides_on_a_curve(ends):
+def test_free_stream_while_the_follower_slides_on_a_curve(ends):
     simulation, _ = make_wavy_contact(ends, STREAM)
     low, high = simulation.blocks
-    (slave,) = simulation.motion.slaves
-    law = slave.law.copy()
+    (follower,) = simulation.motion.followers
+    law = follower.law.copy()
     moved = 0.0
     for step in range(100):
-        slave.law = law + 0.1 * np.sin(np.pi * law) * np.sin(0.25 * step)
+        follower.law = law + 0.1 * np.sin(np.pi * law) * np.sin(0.25 * step)
         simulation.advance()
-        moved = max(moved, float(np.abs(slave.law - law).max()))
-    assert moved > 2.0 / low.ni, "the nodes have passed two of the master's"
+        moved = max(moved, float(np.abs(follower.law - law).max()))
+    assert moved > 2.0 / low.ni, "the nodes have passed two of the leader's"
     for block, rho in ((low, 1.0), (high, 3.0)):
         for row, value in enumerate((rho, *STREAM, 1.0)):
             assert np.abs(block.state[row, 1:-1, 1:-1] - value).max() < 1e-13, (block.name, row)
@@ -165,11 +165,13 @@ def test_free_stream_with_partial_cover():
     metal = StiffenedGas(4.4, 1.0)
     x, across = np.linspace(0.0, 2.0, 25), np.linspace(0.0, 1.0, 9)
     curve = 0.1 * np.sin(3.0 * x)
-    x_slave = np.linspace(0.53, 1.41, 18)
-    curve_slave = np.interp(x_slave, x, curve)
+    x_follower = np.linspace(0.53, 1.41, 18)
+    curve_follower = np.interp(x_follower, x, curve)
     below = -1.0 + (curve[:, None] + 1.0) * across
-    above = curve_slave[:, None] + (0.6 - curve_slave[:, None]) * across
-    grids = [np.array([np.repeat(a[:, None], 9, 1), b]) for a, b in ((x, below), (x_slave, above))]
+    above = curve_follower[:, None] + (0.6 - curve_follower[:, None]) * across
+    grids = [
+        np.array([np.repeat(a[:, None], 9, 1), b]) for a, b in ((x, below), (x_follower, above))
+    ]
     low = Block("low", metal, grids[0], 1.0, *STREAM, 0.0)
     high = Block("high", metal, grids[1], 2.0, *STREAM, 0.0)
     contact = slide((low, "j_max"), (high, "j_min"))
@@ -184,7 +186,7 @@ def test_free_stream_with_partial_cover():
 
 
 @pytest.mark.parametrize("ends", ["periodic", "walls"])
-def test_sums_are_kept_while_the_slave_slides_on_a_curve(ends):
+def test_sums_are_kept_while_the_follower_slides_on_a_curve(ends):
     simulation, _ = make_wavy_contact(ends, (0.0, 0.0))
     low, high = simulation.blocks
     high.state[1, 1:-1, 1:-1] = 0.5  # slips over the waves of the line
@@ -194,10 +196,10 @@ def test_sums_are_kept_while_the_slave_slides_on_a_curve(ends):
         block.update(0.0)
     simulation.clock.rate = max(block.find_rate() for block in simulation.blocks)
     start = simulation.start_row()
-    (slave,) = simulation.motion.slaves
-    law = slave.law.copy()
+    (follower,) = simulation.motion.followers
+    law = follower.law.copy()
     for step in range(60):
-        slave.law = law + 0.1 * np.sin(np.pi * law) * np.sin(0.25 * step)
+        follower.law = law + 0.1 * np.sin(np.pi * law) * np.sin(0.25 * step)
         row = simulation.advance()
     masses = {block.name: (block.volume * block.cell_fields["rho"]).sum() for block in (low, high)}
     for name, mass in masses.items():

@@ -102,8 +102,8 @@ def make_tube(contact, sizes=(24, 31)):
 
     inner = Block("inner", GAS, make_grid((sizes[0], 8), lambda x: 0.0 * x, line), 1.0, SPEED, 0, 1)
     nodes = make_grid((sizes[1], 6), line, surface)
-    master = inner.nodes[:, :, -1]
-    nodes[1, :, 0] = np.interp(nodes[0, :, 0], *master)
+    leader = inner.nodes[:, :, -1]
+    nodes[1, :, 0] = np.interp(nodes[0, :, 0], *leader)
     outer = Block("outer", GAS, nodes, 3.0, SPEED, 0.0, 1.0)
     pair = (inner, "j_max"), (outer, "j_min")
     link = slide(*pair) if contact == "sliding" else join(contact, *pair)

@@ -24,7 +24,7 @@ GAS, WATER = (IdealGas(1.4), 1.2, 1e5), (StiffenedGas(4.4, 6e8), 1000.0, 3e8)
 METAL = (MieGruneisen(2707.0, 5386.0, 1.339, 1.97), 2800.0, 6e9)
 MATERIALS = {"gas": (GAS, GAS), "metal": (METAL, WATER)}
 STEPS, SHAKE = 6, 0.017  # of nodes [m]: a tenth of a cell, anew in every step
-OTHERS = "upper", "slave"  # blocks of the second material
+OTHERS = "upper", "follower"  # blocks of the second material
 EXACT = 1e-12  # of the largest density, sound speed, rho c squared
 
 
@@ -45,10 +45,10 @@ class Shaken:
                 found[two][there] = found[one][here] + np.reshape(shift, (2, 1))
             for key in self.on_axis:
                 found[key][1, :, 0] = 0.0
-            if "slave" in found:  # its nodes lie on the master's line
-                line, points = found["master"][:, :, -1], found["slave"][:, :, 0]
+            if "follower" in found:  # its nodes lie on the leader's line
+                line, points = found["leader"][:, :, -1], found["follower"][:, :, 0]
                 for end in (0, -1):
-                    if self.grids["slave"][0, end, 0] == self.grids["master"][0, end, 0]:
+                    if self.grids["follower"][0, end, 0] == self.grids["leader"][0, end, 0]:
                         points[:, end] = line[:, end]
                 points[...] = find_points(line, find_positions(line, points))
             self.shaken[t] = found
@@ -130,12 +130,12 @@ def make_flow(materials, geometry, rough, limiter=DEFAULT_LIMITER, flux=DEFAULT_
 def make_sliding_flow(materials, rough):
     """Two blocks that slide on each other.
 
-    The slave covers all of a gas; a condensed master goes on, as a free surface, at one end.
+    The follower covers all of a gas; a condensed leader goes on, as a free surface, at one end.
     """
     random, gas = np.random.default_rng(1), materials is MATERIALS["gas"]
     grids = {
-        "master": box((0.0, 0.0), (1.0, 0.8), (6, 5)),
-        "slave": box((0.0, 0.8), (1.0 if gas else 0.87, 1.8), (8, 6)),
+        "leader": box((0.0, 0.0), (1.0, 0.8), (6, 5)),
+        "follower": box((0.0, 0.8), (1.0 if gas else 0.87, 1.8), (8, 6)),
     }
     nodes = Shaken(grids, [], (), random)
     blocks = [make_block(name, materials, nodes, rough, random) for name in grids]

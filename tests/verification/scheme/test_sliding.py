@@ -39,8 +39,8 @@ def make_planar(
 ):
     """A shock runs upwards through a plane contact on which the two gases slip.
 
-    `speeds` along the contact: a master's grid goes with it.  `cuts`: where the lower and the
-    upper row are cut into blocks joined by seams; a slave's seams should be at rest.
+    `speeds` along the contact: a leader's grid goes with it.  `cuts`: where the lower and the
+    upper row are cut into blocks joined by seams; a follower's seams should be at rest.
     """
     cosine, sine = math.cos(angle), math.sin(angle)
 
@@ -224,7 +224,7 @@ def make_pair(shift=(0.0, 0.0)):
 
 
 @pytest.mark.parametrize("shift", [(0.0, 0.1), (0.3, 0.0)], ids=["above", "beyond the end"])
-def test_slave_off_the_master(shift):
+def test_follower_off_the_leader(shift):
     low, high = make_pair(shift)
     with pytest.raises(BadInput, match=r"nodes of block 'high'.* off the line of block 'low'"):
         slide((low, "j_max"), (high, "j_min"))

@@ -169,7 +169,7 @@ def test_a_mushroom_cut_in_four():
 
 
 @pytest.mark.parametrize("places", [[(1, 0, 2), (0, 1)], [(1, 0), (2,)]])
-def test_a_slave_and_its_master_cut(places):
+def test_a_follower_and_its_leader_cut(places):
     check_cut(read_builder("plate-on-wedge", "cells=[80,6]"), 10, places)
 
 

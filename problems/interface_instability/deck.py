@@ -1,8 +1,8 @@
 """The deck of interface-instability: materials, shocks, the line, what bounds it.
 
 `check_sense` refuses keys that are each allowed and together make no sense.  A wave needs cells to
-grow with: in a run that begins after the shock's passage it has .94 of the growth of linear theory
-with 16, .7 with 8, .2 with 4, and with 2, where its nodes are its crests alone, none.  Between
+grow with: in a run that begins after the shock's passage it has 0.91 of the growth of linear theory
+with 16, 0.66 with 8, 0.25 with 4, and with 2, where its nodes are its crests alone, none.  Between
 walls, which are mirrors, a line meets the wall at a right angle, or its mirror image makes a kink
 there; between periodic sides a whole number of waves fits.  A mode of ka0 = 0 is no wave, and may
 have any number and phase.

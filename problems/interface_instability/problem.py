@@ -1,11 +1,10 @@
 """Richtmyer–Meshkov instability: a shock hits a perturbed interface between two materials.
 
-The shock runs through the first material towards larger x, driven by a piston that moves with the
-material behind it; the second material is at rest beyond the interface.  Each material is a block,
-and the interface is the grid line between them.  A second, stronger shock may follow.  The problem
-measures the amplitude of the interface, its growth rate and the transverse velocity in the far
-field, and compares with linear compressible theory for the deck's materials and with non-linear
-models.
+The shock, driven by a piston or an inflow, runs through the first material towards larger x; the
+second material is at rest beyond the interface.  Each material is a block, and the interface is the
+grid line between them.  A second, stronger shock may follow.  The problem measures the amplitude of
+the interface, its growth rate and the transverse velocity in the far field.  It compares them with
+linear compressible theory for the deck's materials and with non-linear models.
 
 Use any consistent units: SI for the materials of the library, or rho = p = 1.
 """

@@ -325,7 +325,7 @@ class Results:
                 x, y = find_dump(run, float(history["t"][row])).blocks[0].nodes[:, -1, :]
                 lines.plot(x - x.mean(), y, color=colour, lw=1)
         axes.plot([], [], "k--", lw=1, label="linear compressible")
-        axes.set(xlabel="number of the mode", ylabel="k |a| of the mode, k of the wavelength")
+        axes.set(xlabel="number of the mode", ylabel="k $|a_n|$ of mode n, k = 2π / wavelength")
         unit = "m" if self.t_unit == "s" else "1"
         lines.set(xlabel=name_axis("x minus its mean", unit), ylabel=name_axis("y", unit))
         lines.set_title("the interface at these times", fontsize=9)

@@ -170,7 +170,7 @@ def doubt_rates(rows: Iterable[Measured]) -> list[str]:
     for (materials, cells), group in sorted(groups.items(), key=lambda item: item[0][::-1])[::-1]:
         kind = {"gas": "gases", "condensed": "condensed materials"}[materials]
         told.append(
-            f"- With {cells:g} cells per wavelength, {_count_rates(group, kind)}."
+            f"- At {cells:g} cells per wavelength, {_count_rates(group, kind)}."
             + _list_rough(group, materials)
         )
     return told

@@ -71,7 +71,7 @@ def describe_counts(rows: Rows, keys: Sequence[str], quantity: str) -> list[str]
     """Within which bars how many runs are; the worst by name."""
     errors = [abs(row[quantity]) for row in rows if row[quantity] is not None]
     counts = ", ".join(
-        f"{sum(error <= most for error in errors)} lie within {100.0 * most:g} %" for most in LEVELS
+        f"{sum(error <= most for error in errors)} within {100.0 * most:g} %" for most in LEVELS
     )
     middle = sorted(errors)[len(errors) // 2]
     known = [row for row in rows if row[quantity] is not None]
@@ -82,10 +82,10 @@ def describe_counts(rows: Rows, keys: Sequence[str], quantity: str) -> list[str]
     )
     failed = sum(str(row["state"]).startswith("failed") for row in rows)
     silent = len(rows) - failed - len(errors)
+    lost = f"Of {len(rows)} runs {failed} failed and {silent} gave no value."
     return [
-        f"Of {len(rows)} runs {failed or 'none'} failed and {silent or 'none'} have no figure; "
-        f"{counts} of theory, and half lie within {100.0 * middle:.1f} %. The largest errors are "
-        f"those at {worst}."
+        f"{lost if failed + silent else f'All {len(rows)} runs gave a value.'} Errors: {counts}; "
+        f"half are within {100.0 * middle:.1f} %. The largest errors are those at {worst}."
     ]
 
 

@@ -95,7 +95,7 @@ def race(case: Case, options: argparse.Namespace) -> list[dict[str, Any]]:
 
 
 def draw(document: dict[str, Any]) -> None:
-    """Error over CPU seconds, a panel per case; errors below 1e-3 % are drawn there."""
+    """Error versus CPU seconds, a panel per case; errors below 1e-3 % are drawn there."""
     import matplotlib.pyplot as plt
 
     rows = document["rows"]

@@ -353,7 +353,7 @@ class Interface(Linked):
 class Sliding(Linked):
     """One side of a sliding contact, or a part of one; its nodes match no other nodes.
 
-    The side of the leader moves with the contact, and that of the follower follows.
+    The leader's line moves with the contact, and the follower's nodes are placed on it.
     """
 
     kind = "sliding"

@@ -32,7 +32,7 @@ SUBJECTS = {  # of problems, for the list; what is in none of them comes last
 }  # fmt: skip
 
 
-SHORT = r".{1,70}(?=[:;,] |\.?$)|.*"  # the longest beginning that is a clause
+SHORT = r".{1,70}(?=[:;] |\.?$)|.*"  # the longest beginning that is a clause
 
 
 def describe_all() -> str:

@@ -9,7 +9,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     head PROBLEM                docstring of the problem's module
     verify PROBLEM...           rows of results/verify.json ("*": all, with the problem's name)
     runs NAME... | COLUMN; ...  a table, one run a row; see `find_cell` for what a column may be
-    sizes NAME... | SIZE... | COLUMN; ... | ERROR   runs NAME-SIZE a row, ERROR in a column a size
+    sizes NAME... | SIZE... | COLUMN; ... | ERROR   runs NAME-SIZE a row, ERROR [%] in a column a size
     output NAME                 the command and its output, of a run the problem's summary
     bench [FILE: ]TABLE         a table of results/bench.json, or of another file there
     accuracy PART...            a part of the page of `make accuracy`; see docs/accuracy_tables.py
@@ -223,16 +223,17 @@ def fill_runs(arguments: str) -> list[str]:
 
 
 def fill_sizes(arguments: str) -> list[str]:
-    """`NAME... | SIZE... | COLUMN; HEAD=COLUMN | ERROR`: COLUMN of the finest run, ERROR of all."""
+    """`NAME... | SIZE... | HEAD=COLUMN; ... | ERROR`: COLUMNs of the finest run, ERROR of all [%]."""
     names, sizes, columns, error = (part.strip() for part in arguments.split("|"))
-    pairs = [column.strip().split("=", 1) for column in columns.split(";")]
+    pairs = [column.strip().split("=", 1) for column in columns.split(";") if column.strip()]
     rows = []
     for name in names.split():
         results = [read_result(f"{name}-{size}") for size in sizes.split()]
         label = results[-1]["label"].partition(f", {sizes.split()[-1]} cells")[0]
         known = [find_cell(results[-1], column) for _, column in pairs]
-        rows.append([label, *known, *(find_cell(result, error) for result in results)])
-    heads = [f"error with {size} cells" for size in sizes.split()]
+        errors = [float(find_cell(result, error).rstrip(" %")) for result in results]
+        rows.append([label, *known, *(f"{one:+.2f} %" for one in errors)])
+    heads = [f"error at {size} cells" for size in sizes.split()]
     return make_table(["run", *(head for head, _ in pairs), *heads], rows)
 
 

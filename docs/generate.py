@@ -9,7 +9,7 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     head PROBLEM                docstring of the problem's module
     verify PROBLEM...           rows of results/verify.json ("*": all, with the problem's name)
     runs NAME... | COLUMN; ...  a table, one run a row; see `find_cell` for what a column may be
-    sizes NAME... | SIZE... | COLUMN; ... | ERROR   runs NAME-SIZE a row, ERROR [%] in a column a size
+    sizes NAME... | SIZE... | COLUMN; ... | ERROR   runs NAME-SIZE a row, a column a size
     output NAME                 the command and its output, of a run the problem's summary
     bench [FILE: ]TABLE         a table of results/bench.json, or of another file there
     accuracy PART...            a part of the page of `make accuracy`; see docs/accuracy_tables.py
@@ -223,7 +223,7 @@ def fill_runs(arguments: str) -> list[str]:
 
 
 def fill_sizes(arguments: str) -> list[str]:
-    """`NAME... | SIZE... | HEAD=COLUMN; ... | ERROR`: COLUMNs of the finest run, ERROR of all [%]."""
+    """`NAME... | SIZE... | HEAD=COLUMN; ... | ERROR`: COLUMNs of the finest, ERROR of all."""
     names, sizes, columns, error = (part.strip() for part in arguments.split("|"))
     pairs = [column.strip().split("=", 1) for column in columns.split(";") if column.strip()]
     rows = []

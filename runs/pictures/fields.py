@@ -261,7 +261,7 @@ def draw_blocks(
 ) -> None:
     """A field (or "": the grids in the blocks' colours) with the lines about it, over the box.
 
-    look: (norm, colour map, factor, label); mesh: draw the grid over the field.
+    look: (norm, colour map, factor, label); mesh: draw the grid over what was computed.
     """
     for sheet in sheets:
         if name in sheet.fields:
@@ -269,7 +269,9 @@ def draw_blocks(
             nodes, values = sheet.nodes * scale, sheet.fields[name] * factor
             axes.pcolormesh(*nodes, values, norm=norm, cmap=colours, rasterized=True)
     names = list(dict.fromkeys(sheet.name.removesuffix(" mirrored") for sheet in sheets))
-    for sheet in sheets if mesh or not name else ():
+    for sheet in sheets:
+        if name and (not mesh or sheet.name.endswith(" mirrored")):
+            continue
         own = f"C{names.index(sheet.name.removesuffix(' mirrored')) % 10}"
         draw_grid_lines(axes, sheet.nodes * scale, *(("k", 0.35) if name else (own, 1.0)))
     interfaces, outer = trace_outline(sheets)

@@ -11,11 +11,13 @@ import h5py
 import numpy as np
 import pytest
 from matplotlib import animation
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from PIL import Image
 
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
-from runs.pictures import film
+from runs.pictures import fields, film
 from runs.pictures.fields import find_field
 from runs.pictures.film import make_film
 from runs.store.files import seal
@@ -141,6 +143,17 @@ def test_gradients_of_linear_fields_are_exact_on_a_bent_grid(name, exact):
     block = make_block()
     assert find_field(block, name).unit != "1"
     np.testing.assert_allclose(find_field(block, name).compute(block), exact, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("name", "halves"), [("rho", 1), ("", 2)])
+def test_a_grid_over_a_field_leaves_the_mirror_image_free(name, halves, monkeypatch):
+    block, drawn = make_block(), []
+    monkeypatch.setattr(fields, "draw_grid_lines", lambda _, nodes, *words: drawn.append(nodes))
+    sheet = fields.Sheet(block.nodes, "gas", "gas", block.cell_fields)
+    image = fields.Sheet(block.nodes * [[[1]], [[-1]]], "gas", "gas mirrored", sheet.fields)
+    look = Normalize(0, 1), "viridis", 1.0, "density"
+    fields.draw_blocks(Figure().add_subplot(), [sheet, image], name, look, 1.0, (0, 1, 0, 1))
+    assert len(drawn) == halves and (drawn[0][1] > -0.1).all()
 
 
 @pytest.fixture(scope="module")

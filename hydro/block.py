@@ -45,7 +45,7 @@ LONG_NAMES = {
 
 
 def _check_name(name: object, what: str, other: str = "/,") -> None:
-    """Raise BadInput for a name that dumps and histories cannot have; `other`: no such signs."""
+    """Raise BadInput for a name invalid in dumps and histories; `other`: forbidden characters."""
     if not isinstance(name, str):
         raise BadInput(f"{what} is called {name!r}: a name is text")
     if not name.strip() or name == "." or not name.isprintable() or set(name) & set(other):
@@ -54,16 +54,15 @@ def _check_name(name: object, what: str, other: str = "/,") -> None:
 
 
 class PerimeterPlan:
-    """What the phases of a step need to know of a block's segments
-    (`hydro.boundary.Segment`), made once.
+    """Data of a block's segments (`hydro.boundary.Segment`) for the phases of a step, made once.
 
     `ghosts`, `speeds`, `fluxes`: the segments that fill these themselves; `walls` (n, 3), `opened`
     (n, 3): the others, for kernels, with their kinds and the rows of the states beyond; `pistons`:
-    walls that move, by number, whose velocities are in `wall_speeds` (n, 2); `inwards` (faces,): of
-    which the next cells inwards are asked; `moving` (n, 2): the spans of faces that go with the
-    flow; `counted` (n, 2): the spans of segments without a partner, and of those under surface
-    tension, through which totals change; `is_follower`: does a sliding contact lay nodes of these
-    segments on another's line?
+    indices of moving walls, whose velocities are in `wall_speeds` (n, 2); `inwards` (faces,): faces
+    that need the next cells inward; `moving` (n, 2): the spans of faces that move with the flow;
+    `counted` (n, 2): the spans through which totals change, of segments without a partner or with
+    surface tension; `is_follower`: whether a sliding contact places nodes of these segments on
+    another's line.
     """
 
     def __init__(self, segments: Sequence[Any], faces: int = 0):
@@ -160,26 +159,26 @@ class Block:
                 ) from None
         check_first_state(name, eos, self.state[:, 1:-1, 1:-1])
         check_formulas(name, eos, *self.state[[of.RHO, of.P], 1:-1, 1:-1])
-        # how fast waves cross the cells (theory F7.1), and how many cells shared their new state
+        # rates of the cells (theory F7.1), and the number of cells redistributed in the step
         self.rates = np.zeros((self.ni, self.nj))
         self.rates_new = np.zeros((self.ni, self.nj))
-        self.crowding = np.zeros((self.ni, self.nj))  # of the newest grid, theory F7.3
-        # after those: memory that the checks have used is taken by what is written to anyway
+        self.crowding = np.zeros((self.ni, self.nj))  # of the new grid, theory F7.3
+        # after those: memory freed by the checks is reused for arrays that are written anyway
         self.void_energy = np.zeros((self.ni, self.nj))
         self.void_energy_new = np.zeros((self.ni, self.nj))
         self.shared_cells = 0
-        self.is_here = True  # does this process know the block whole? (`hydro.ranks`)
+        self.is_here = True  # whether this process holds the whole block (`hydro.ranks`)
         self.take_rows(0, self.ni)
         self.nodes_new = self.nodes.copy()
         self.state_new = np.zeros(self.state.shape)
-        self._start: np.ndarray | None = None  # of its own where a body source acts
+        self._start: np.ndarray | None = None  # separate if a body source acts
         self.parameters = eos.parameters
         self.wave_law = eos.wave_law
         self.limiter, self.flux_name = limiter, flux
-        # one row a tile, and one for what polygon cells of sliding contacts and sources add
+        # one row per tile, and one for polygon cells of sliding contacts and sources
         self.tile_totals = np.zeros((count_tiles(self.ni, self.nj) + 1, of.TOTALS))
         self.tile_totals[-1, of.LEAST_C2] = of.NO_C2
-        self.sums_array = np.zeros(of.TOTALS)  # of the tiles, and a list of them while it is true
+        self.sums_array = np.zeros(of.TOTALS)  # of the tiles, and their list while valid
         self._summed: list[float] | None = None
         self.scratch = allocate_scratch(1)
         count = 2 * (self.ni + self.nj)
@@ -192,9 +191,9 @@ class Block:
         self.set_geometry(PLANE)
 
     def set_geometry(self, geometry: Geometry) -> None:
-        """Make the flow plane or axisymmetric; done by the simulation.
+        """Make the flow plane or axisymmetric; called by the simulation.
 
-        Raises BadInput where an axisymmetric block reaches beyond the axis y = 0.
+        Raises BadInput if an axisymmetric block extends below the axis y = 0.
         """
         self.geometry = geometry
         self._plan = PerimeterPlan([], self.rim.faces)
@@ -213,7 +212,7 @@ class Block:
     def side_faces(self, side: str) -> tuple[int, int]:
         """First face of a side on the perimeter, and the number of its faces."""
         if side not in SIDES:
-            hint = suggest(side, SIDES, cutoff=0.85)  # of "x_min" nobody knows which it is
+            hint = suggest(side, SIDES, cutoff=0.85)  # "x_min" is ambiguous
             raise BadInput(f"block {self.name!r} has no side {side!r}{hint}")
         code = SIDES.index(side)
         first = (0, self.nj, 2 * self.nj, 2 * self.nj + self.ni)[code]
@@ -229,18 +228,18 @@ class Block:
 
     @property
     def centres(self) -> np.ndarray:
-        """Middles of the cells (2, ni, nj) [m], computed now."""
+        """Centres of the cells (2, ni, nj) [m], computed at every access."""
         return compute_centres(self.nodes)
 
     @property
     def plan(self) -> PerimeterPlan:
-        """What the phases need to know of the segments; rebuilt when there are others."""
+        """Data of the segments for the phases; rebuilt when the segments change."""
         if self._plan.segments != self.segments:
             self._plan = PerimeterPlan(self.segments, self.rim.faces)
         return self._plan
 
     def gather(self, t: float = 0.0) -> None:
-        """Faces at the old time, the states of the cells along the sides, ghosts beyond walls."""
+        """Compute faces at the old time, perimeter cell states, and ghosts beyond walls."""
         plan = self.plan
         for number, wall in plan.pistons:
             plan.wall_speeds[number] = wall.velocity(t)
@@ -252,7 +251,7 @@ class Block:
             self._add_weight(self.body_acceleration)
 
     def _add_weight(self, acceleration: np.ndarray) -> None:
-        """Gas on a wall does not fall: its pressure is mirrored about that of a layer at rest."""
+        """Hydrostatic ghosts: pressure mirrored about that of a layer at rest on the wall."""
         rim = self.rim
         normal, centres = rim.rows[on.NORMAL], self.take_perimeter(compute_centres(self.nodes))
         across = (acceleration * normal).sum(axis=0) / (normal * normal).sum(axis=0)
@@ -262,29 +261,29 @@ class Block:
 
     @staticmethod
     def take_perimeter(field: np.ndarray) -> np.ndarray:
-        """Values (2, faces) that a field (2, ni, nj) has in the cells along the perimeter."""
+        """Values (2, faces) of a field (2, ni, nj) in the cells along the perimeter."""
         sides = field[:, 0, :], field[:, -1, :], field[:, :, 0], field[:, :, -1]
         return np.concatenate(sides, axis=1)
 
     def fill_ghosts(self, t: float) -> None:
-        """What stands beyond the other sides at time t: ghosts, contact states of moving sides."""
+        """Fill the ghosts of the other sides at time t, and contact states of moving sides."""
         for segment in self.plan.ghosts:
             segment.fill_ghosts(t)
 
     def predict(self, dt: float) -> None:
-        """With the ghosts known: mid-time predictions, and traces at old faces that move."""
+        """From the ghosts: mid-time predictions, and traces at moving faces at the old time."""
         self.sides.predict_sides(
             self.start, self.void_energy, self.nodes, 0.5 * dt, self.parameters, self.plan.moving,
             self.scratch, self.rim.rows,
         )  # fmt: skip
 
     def fill_speeds(self, t: float) -> None:
-        """Contact states of the traces, t being the mid-time, on all sides that follow the flow."""
+        """Contact states from the traces at mid-time t on all sides that move with the flow."""
         for segment in self.plan.speeds:
             segment.fill_speeds(t)
 
     def trace(self, dt: float) -> None:
-        """With the new nodes known: mid-time faces, traces at them, fluxes that need no more."""
+        """From the new nodes: mid-time faces, their traces, and fluxes that need nothing else."""
         plan = self.plan
         self.sides.trace_sides(
             self.nodes, self.nodes_new, 1.0 / dt, self.parameters, self.wave_law, plan.walls,
@@ -292,7 +291,7 @@ class Block:
         )  # fmt: skip
 
     def fill_flux(self, t: float) -> None:
-        """Outward fluxes through the other sides from the traces, t being the mid-time."""
+        """Outward fluxes through the other sides from the traces at mid-time t."""
         for segment in self.plan.fluxes:
             segment.fill_flux(t)
 
@@ -302,9 +301,9 @@ class Block:
         fill_open_flux(self.rim.rows, opened, self.geometry.curved)
 
     def update(self, dt: float, threads: int = 1) -> None:
-        """With the fluxes through the perimeter known: the new state and its totals.
+        """From the fluxes through the perimeter: the new state and its totals.
 
-        Of a cut block the rows of this process alone, without what polygon cells add.
+        In a cut block: the rows of this process only, without polygon cells.
         """
         if (self.last_row - self.first_row) * self.nj < LEAST_INSIDE:
             threads = 1
@@ -321,13 +320,13 @@ class Block:
             self.fill_polygons()
 
     def take_rows(self, first: int, last: int) -> None:
-        """From now on update the rows first..last - 1 of cells alone: whole rows of tiles."""
+        """From now on update only the cell rows first..last - 1, which are whole rows of tiles."""
         self.first_row, self.last_row = first, last
         self.tiles = count_tiles(first, self.nj), count_tiles(last, self.nj)
         self.is_cut = last - first < self.ni
 
     def fill_polygons(self) -> None:
-        """Put what polygon cells hold beyond their straight faces into the new state."""
+        """Add the parts of polygon cells beyond their straight faces to the new state."""
         excess = self.excess_volume, self.excess_volume_new
         self.sides.fill_polygons(
             self._old, self._new, excess, self.parameters, self.tile_totals[-1]
@@ -335,12 +334,12 @@ class Block:
 
     @property
     def _old(self) -> tuple[np.ndarray, ...]:
-        """What kernels know of the step's start: state, void energy, nodes."""
+        """Kernel input at the start of the step: state, void energy, nodes."""
         return self.start, self.void_energy, self.nodes
 
     @property
     def _new(self) -> tuple[np.ndarray, ...]:
-        """What they write, the new nodes being known: the same three, rates and crowding."""
+        """Kernel output for known new nodes: the same three, rates and crowding."""
         return (
             self.state_new, self.void_energy_new, self.nodes_new, self.rates_new, self.crowding
         )  # fmt: skip
@@ -351,12 +350,12 @@ class Block:
         return self.state if self._start is None else self._start
 
     def part_start(self, apart: bool) -> None:
-        """Let steps start from a copy of the state, into which a body source may write, or not."""
+        """Set whether steps start from a copy of the state that a body source may modify."""
         self._start = self.state.copy() if apart else None
 
     @property
     def is_follower(self) -> bool:
-        """Does a sliding contact lay nodes of this block on another's line?"""
+        """Whether a sliding contact places nodes of this block on another's line."""
         return self.plan.is_follower
 
     def accept(self) -> None:
@@ -367,14 +366,14 @@ class Block:
         self.rates, self.rates_new = self.rates_new, self.rates
 
     def find_failure(self) -> RunFailure | None:
-        """Why the new state cannot be one of the material, with the cell's indices, or None."""
+        """Why the new state is not admissible, with the cell's indices, or None."""
         totals = self.tile_totals
         rho, _, _, p = self.state_new[:, 1:-1, 1:-1]
         with np.errstate(all="ignore"):
             c = self.eos.sound_speed(rho, p)
         bad = ~((rho > 0.0) & (c > 0.0))
         if self.shared_cells and np.isfinite(totals).all() and not bad.any():
-            return None  # the cells that failed have shared their states since
+            return None  # the failed cells have been redistributed since
         i, j = (int(index) for index in np.argwhere(bad)[0]) if bad.any() else (0, 0)
         rho, p = self.state_new[[of.RHO, of.P], i + 1, j + 1]
         known = f", its pressure {p:.6g} Pa" if np.isfinite(p) else ""
@@ -386,11 +385,12 @@ class Block:
         )
 
     def find_rate(self) -> float:
-        """Largest rate [1/s] of the cells that this process updates: the inverse of their step."""
+        """Largest rate [1/s] of the cells updated by this process, the inverse of their time
+        step."""
         return float(self.rates[self.first_row : self.last_row].max())
 
     def take_shared(self, least_c2: float, voided: int) -> None:
-        """Count in what a redistribution of the new state has changed."""
+        """Update the sums after redistribution of the new state."""
         self._summed = None
         last = self.tile_totals[-1]
         last[of.LEAST_C2] = min(last[of.LEAST_C2], least_c2)
@@ -398,44 +398,44 @@ class Block:
 
     @property
     def sums(self) -> list[float]:
-        """Sums of the tiles (7,), columns as in `hydro.rows`, c² the least; of the last step."""
+        """Sums over the tiles (7,) in the last step, columns as in `hydro.rows` (c²: minimum)."""
         if self._summed is None:
             self.sum_up()
             assert self._summed is not None
         return self._summed
 
     def sum_up(self) -> bool:
-        """Sum the tiles; can the state stand?  See `sum_tiles`."""
+        """Sum the tiles; returns whether the state is valid.  See `sum_tiles`."""
         good = sum_tiles(self.tile_totals, self.sums_array)
         self.take_sums()
         return good
 
     def share_sums(self) -> np.ndarray:
-        """The array that holds `sums`, filled where the block is here; `take_sums` reads it."""
+        """The array of `sums`, filled on the rank that has the block; `take_sums` reads it."""
         if self.is_here and self._summed is None:
             self.sum_up()
         return self.sums_array
 
     def take_sums(self) -> None:
-        """Take up what has been written into `sums_array`."""
+        """Read `sums` from `sums_array`."""
         self._summed = self.sums_array.tolist()
 
     def add_source_totals(self, gained: np.ndarray) -> None:
-        """Add momentum x, y and energy (3,) that a body source has brought after the update."""
+        """Add momentum x, y and energy (3,) of a body source after the update."""
         self._summed = None
         last = self.tile_totals[-1]
-        if not self.is_follower:  # else the polygons' part is there
+        if not self.is_follower:  # otherwise the polygons' part is there
             last[of.CONSERVED] = 0.0
         last[of.MOMENTUM_AND_ENERGY] += gained
 
-    # --- what pictures and dumps see -----------------------------------------------------------
+    # --- fields for pictures and dumps -----------------------------------------------------------
 
     @property
     def cell_fields(self) -> Mapping[str, np.ndarray]:
         """Density, velocity, pressure and specific internal energy, each (ni, nj).
 
-        Views of the state; the energy is computed whenever it is asked for, in the rows that this
-        process has: it is 0 in the others.
+        Views of the state; the energy is computed at every access in the rows of this process, and
+        is 0 in the others.
         """
         rho, u, v, p = self.state[:, 1:-1, 1:-1]
         rows = slice(0, self.ni) if self.is_here else slice(self.first_row, self.last_row)
@@ -455,7 +455,7 @@ class Block:
         return {"rho": rho, "u": u, "v": v, "p": p, "e": e}
 
     def fill_energy(self, rho: np.ndarray, p: np.ndarray, voids: np.ndarray, e: np.ndarray) -> None:
-        """Specific internal energies `e` [J/kg] for density, pressure, voids' energy: (n, nj)."""
+        """Specific internal energies `e` [J/kg] from density, pressure and void energy: (n, nj)."""
         for first in range(0, len(e), SLAB):
             rows = slice(first, first + SLAB)
             e[rows] = self.eos.energy(rho[rows], p[rows]) + voids[rows]
@@ -463,8 +463,8 @@ class Block:
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
         """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2).
 
-        In an array that the next update writes to: `rates_new`.  Of a cut block the rows of this
-        process alone are computed.
+        The result is in `rates_new`, which the next update overwrites.  In a cut block only the
+        rows of this process are computed.
         """
         kind: Any = type(self.eos)
         make_fill_sound_speed(kind)(
@@ -476,7 +476,7 @@ class Block:
     def volume(self) -> np.ndarray:
         """Volumes of the cells, (ni, nj): m² (per depth), in axisymmetric flow m³ per radian.
 
-        Those of polygon cells count what lies beyond their straight faces.
+        Those of polygon cells include the parts beyond their straight faces.
         """
         volume = compute_volumes(self.geometry, self.nodes)
         if self.is_follower:

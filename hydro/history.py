@@ -39,7 +39,7 @@ def compute_grid_quality(flow: Flow) -> dict[str, float | int]:
 
 
 def count_regridding(flow: Flow) -> dict[str, float | int]:
-    """What the regridders did in the step."""
+    """Activity of the regridders in the step."""
     iterations = node_iterations = sub_moves = rescues = limited = told = 0
     ratio = math.inf
     for row in flow.motion.counts:
@@ -61,7 +61,7 @@ def count_regridding(flow: Flow) -> dict[str, float | int]:
 
 
 def count_special_cells(flow: Flow) -> dict[str, float | int]:
-    """Faces of first order, cells with voids, pieces of sliding contacts under tension."""
+    """Numbers of first-order faces, cells with voids, and sliding-contact pieces under tension."""
     first_order = voided = 0
     for block in flow.blocks:
         first_order += int(block.sums[FIRST_ORDER])
@@ -73,12 +73,12 @@ def count_special_cells(flow: Flow) -> dict[str, float | int]:
 
 
 def measure_surfaces(flow: Flow) -> dict[str, float | int]:
-    """Energy of the lines under surface tension, where there are any."""
+    """Energy of the lines with surface tension, if there are any."""
     return {"surface_energy": flow.tension.compute_energy()} if flow.tension.lines else {}
 
 
 def find_step_limit(flow: Flow) -> dict[str, float | int]:
-    """The fastest cell: which block, where, how much shorter it alone would make the next step."""
+    """The fastest cell: its block, its indices, and how much it alone shortens the next step."""
     fastest = flow.small_cells.fastest
     return {
         "shared_cells": flow.small_cells.changed,
@@ -124,7 +124,7 @@ def find_columns(names: Sequence[str]) -> list[ColumnGroup]:
 
 
 def compute_chosen_columns(evolution: Any, groups: Sequence[ColumnGroup]) -> dict[str, Any]:
-    """The columns of chosen groups; BadInput where the evolution is no flow on blocks."""
+    """The columns of chosen groups; BadInput if the evolution is not a flow on blocks."""
     if not groups:
         return {}
     flow = getattr(evolution, "flow", None)

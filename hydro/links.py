@@ -25,7 +25,7 @@ from regrid.errors import BadInput
 class Link:
     """Two linked segments, `leader` and `follower`, and how their nodes correspond.
 
-    The follower's nodes, in reverse order when `reverse`, are the leader's plus `shift`.
+    The follower's nodes, in reverse order if `reverse`, are the leader's plus `shift`.
     """
 
     def __init__(self, leader: Linked, follower: Linked):
@@ -52,19 +52,19 @@ class Link:
         pairs = (leader.first, *order, leader.last - leader.first)
         self._rims = leader.block.rim.rows, follower.block.rim.rows, pairs
         self._laws = leader.block.wave_law, follower.block.wave_law
-        # of a smoothed line, for `add_layer_flux`: its added velocities, does it close?
+        # of a smoothed line, for `add_layer_flux`: its added velocities, whether it is closed
         self.layer = np.empty((2, 0)), False
         self._passes = isinstance(leader, Seam)
-        # make matching nodes the same to the last bit
+        # make matching nodes bitwise equal
         two[...] = self.to_follower(one)
 
     def to_follower(self, line: np.ndarray) -> np.ndarray:
-        """Nodes of the leader's line as the follower has them."""
+        """Nodes of the leader's line in the follower's order and position."""
         return (line + self.shift[:, None])[:, :: -1 if self.reverse else 1]
 
     def solve(self, phase: int, dt: float) -> None:
         """Contact states of both sides in a phase of `hydro.perimeter.contacts`, with ghosts
-        AT_CELLS and fluxes AT_FLUX; of a seam these alone."""
+        AT_CELLS and fluxes AT_FLUX; for a seam only these."""
         curved = self.leader.block.geometry.curved
         if not self._passes:
             speeds, closed = self.layer
@@ -74,7 +74,7 @@ class Link:
             pass_seam(*self._rims, phase, curved)
 
     def swap_line(self) -> None:
-        """The leader's new nodes become the follower's."""
+        """Copy the leader's new nodes to the follower."""
         line = self.leader.line(self.leader.block.nodes_new)
         self.follower.line(self.follower.block.nodes_new)[...] = self.to_follower(line)
 
@@ -95,7 +95,7 @@ class Exchange:
         self.all: list[Any] = [*self.links, *self.contacts]
 
     def cut_contacts(self) -> None:
-        """What sliding contacts must know of the grid of the step's start."""
+        """Prepare sliding contacts on the grid at the start of the step."""
         for contact in self.contacts:
             contact.cut()
 
@@ -106,7 +106,7 @@ class Exchange:
             link.solve(phase, dt)
 
     def accept(self) -> None:
-        """The step stands."""
+        """Accept the step."""
         for contact in self.contacts:
             contact.accept()
 
@@ -117,8 +117,8 @@ Faces = tuple[Block, str] | tuple[Block, str, int, int]
 def join(kind: str, leader: Faces, follower: Faces, **options: Any) -> Link:
     """Link two runs of faces (block, side[, start, stop]) by segments of a linked kind.
 
-    Nodes must match (up to a shift for "periodic"), in either order; raises BadInput otherwise.
-    options: of the kind, such as `tension` [N/m] of an interface.
+    Nodes must match (up to a shift for "periodic") in either order; otherwise raises BadInput.
+    options: options of the kind, such as `tension` [N/m] of an interface.
     """
     one, two = (
         put(block, side, kind, *faces, **options) for block, side, *faces in (leader, follower)
@@ -134,7 +134,7 @@ def slide(leader: Faces | list[Faces], follower: Faces | list[Faces]) -> Sliding
     """A sliding contact between two runs of faces (block, side[, start, stop]), or lists.
 
     The follower's nodes lie on the leader's line; the ends of the follower may lie anywhere on it.
-    Raises BadInput where they do not.
+    Raises BadInput otherwise.
     """
     chains = []
     for runs in (leader, follower):

@@ -41,9 +41,10 @@ from regrid.jit import compiled_once, kernel
 
 MOST_REACH = 6  # cells of a neighbourhood on either side of its own cell
 CONSERVED_ROWS = 4  # per volume: mass, momentum x and y, energy
-RELAXED = 0.1  # of a state is shared in a step, besides all that the step has changed
-# rows of a cell's record: what it shares per volume, the mean and slope of its neighbourhood, where
-# that mean lies along the line, volume, neighbourhoods that it belongs to, what it keeps per volume
+RELAXED = 0.1  # fraction of a state redistributed per step, besides all of the step's change
+# rows of a cell's record: what it redistributes per volume, mean and slope of its neighbourhood,
+# position of that mean along the line, volume, number of its neighbourhoods, what it keeps per
+# volume
 MEAN, SLOPE, LEVER, VOLUME, PARTS = 4, 8, 12, 13, 14
 KEPT = 15
 RECORD_ROWS = 19
@@ -51,7 +52,7 @@ RECORD_ROWS = 19
 
 @compiled_once(allocates=False)
 def find_way(nodes, i, j, far_i, far_j):
-    """Distance between the middles of two cells."""
+    """Distance between the centres of two cells."""
     x = 0.25 * (
         (nodes[0, far_i, far_j] - nodes[0, i, j])
         + (nodes[0, far_i + 1, far_j + 1] - nodes[0, i + 1, j + 1])
@@ -69,7 +70,7 @@ def find_way(nodes, i, j, far_i, far_j):
 
 @functools.cache
 def make_measures(geometry: Geometry):
-    """Two functions of a geometry: a cell's volume in all, and over that in its straight faces."""
+    """Two functions of a geometry: volume of a cell, and its ratio to that in straight faces."""
     weigh = geometry.volume
 
     @compiled_once(allocates=False)
@@ -91,11 +92,11 @@ def make_fill_reaches(geometry: Geometry):
 
     @kernel
     def fill_reaches(small, rates, limit, nodes, excess, reaches):
-        """How far the neighbourhoods of the cells `small` (n, 2) go, into `reaches` (ni, nj).
+        """Fill `reaches` (ni, nj): extents of the neighbourhoods of the cells `small` (n, 2).
 
-        excess (faces,): volume of perimeter cells beyond their straight faces.  `reaches` > 0: so
-        many cells on either side along i; < 0: along j; 0: no neighbourhood.  Returns the largest
-        rate that is left [1/s]; above `limit` where MOST_REACH cells are too few.
+        excess (faces,): volume of perimeter cells beyond their straight faces.  `reaches` > 0:
+        number of cells on either side along i; < 0: along j; 0: no neighbourhood.  Returns the
+        largest remaining rate [1/s], above `limit` if MOST_REACH cells are too few.
         """
         ni, nj = rates.shape
         left = limit
@@ -107,14 +108,14 @@ def make_fill_reaches(geometry: Geometry):
             need = own * rates[i, j] / limit
             held = own
             reach = 0
-            # at least one, though round-off may say that the cell is large enough
+            # at least one, even if by round-off the cell appears large enough
             while (held < need or reach == 0) and reach < MOST_REACH:
                 reach += 1
                 pair = 0.0
                 for way in (-reach, reach):
                     p, q = (i + way, j) if along_i else (i, j + way)
                     if 0 <= p < ni and 0 <= q < nj:
-                        # half of a neighbour's area: it may count for its own neighbourhood as well
+                        # half of a neighbour's area: the rest may belong to its own neighbourhood
                         area = measure_lines(nodes, p, q)[4]
                         pair += 0.5 * area * find_share(nodes, excess, p, q, ni, nj)
                 held += pair
@@ -128,7 +129,7 @@ def make_fill_reaches(geometry: Geometry):
 
 @compiled_once(allocates=False)
 def limit_slope(before, after):
-    """The mean of two slopes of one sign, at most twice the lesser of them; else none."""
+    """The mean of two slopes of equal sign, at most twice the smaller one; otherwise zero."""
     least = before if abs(before) < abs(after) else after
     mean = 0.5 * (before + after)
     slope = mean if abs(mean) < 2.0 * abs(least) else 2.0 * least
@@ -145,7 +146,7 @@ def make_redistribution(eos_class, geometry: Geometry):
 
     @compiled_once
     def fill_conserved(state, void_energy, i, j, part, parameters, first, record):
-        """A part of a cell's state per volume into four rows of its record."""
+        """Store a fraction of a cell's state per volume in four rows of its record."""
         rho, u = state[RHO, i + 1, j + 1], state[U, i + 1, j + 1]
         v, p = state[V, i + 1, j + 1], state[P, i + 1, j + 1]
         e = energy_part(rho, p, parameters) + void_energy[i, j]
@@ -156,7 +157,7 @@ def make_redistribution(eos_class, geometry: Geometry):
 
     @compiled_once
     def mark_neighbourhoods(small, reaches, marks, record, touched):
-        """List the cells that neighbourhoods reach (mark 1), and those beyond their ends (2)."""
+        """List the cells in neighbourhoods (mark 1) and those just beyond their ends (2)."""
         ni, nj = marks.shape
         for n in range(small.shape[0]):
             i, j = small[n]
@@ -170,7 +171,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                         record[PARTS, a, b] = 1.0 if reaches[a, b] == 0 else 0.0
                     record[PARTS, a, b] += 1.0
         for n in range(small.shape[0]):
-            # a cell beyond either end of a neighbourhood tells its slope
+            # a cell beyond either end of a neighbourhood determines its slope
             i, j = small[n]
             beyond, along_i = abs(reaches[i, j]) + 1, reaches[i, j] > 0
             for way in (-beyond, beyond):
@@ -182,7 +183,7 @@ def make_redistribution(eos_class, geometry: Geometry):
 
     @compiled_once
     def fill_means(small, reaches, nodes, record):
-        """Mean of each neighbourhood, and where that lies along its line."""
+        """Mean of each neighbourhood and its position along the line."""
         ni, nj = reaches.shape
         total = np.empty(CONSERVED_ROWS)
         for n in range(small.shape[0]):
@@ -204,7 +205,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                 if row == c and column == d:
                     v2 = record[VOLUME, c, d] / record[PARTS, c, d]
                     d2 = find_way(nodes, i, j, c, d)
-                # where a side has no such cell its part is nothing, of whatever cell
+                # if a side has no such cell its weight is zero
                 volume += v1 + v2
                 lever += v2 * d2 - v1 * d1
                 for q in range(CONSERVED_ROWS):
@@ -217,7 +218,7 @@ def make_redistribution(eos_class, geometry: Geometry):
 
     @compiled_once
     def fill_slopes(small, reaches, nodes, record):
-        """Slope of each neighbourhood, by the means beyond its ends."""
+        """Slope of each neighbourhood, from the means beyond its ends."""
         ni, nj = reaches.shape
         ones, twos = np.zeros(CONSERVED_ROWS), np.zeros(CONSERVED_ROWS)
         for n in range(small.shape[0]):
@@ -232,7 +233,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                 turn = record[LEVER, a, b] if (reaches[a, b] > 0) == along_i else 0.0
                 far = find_way(nodes, i, j, a, b)
                 gap = here + far - turn
-                # neighbourhoods whose means all but meet tell no slope
+                # neighbourhoods whose means nearly coincide determine no slope
                 before = 1.0 / gap if gap > 0.5 * far else 0.0
             if high:
                 turn = record[LEVER, c, d] if (reaches[c, d] > 0) == along_i else 0.0
@@ -245,7 +246,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                 two = (record[MEAN + q, c, d] - mean) * after if high else 0.0
                 ones[q] = one if low else two
                 twos[q] = two if high else one
-            # momentum along the line and across it, so that a turned block keeps its slopes
+            # momentum along the line and across it, so that slopes are rotation invariant
             xi, yi, xj, yj, _ = measure_lines(nodes, i, j)
             x, y = (xi, yi) if along_i else (xj, yj)
             length = (x * x + y * y) ** 0.5
@@ -259,7 +260,7 @@ def make_redistribution(eos_class, geometry: Geometry):
 
     @compiled_once
     def gather_shares(i, j, reaches, nodes, record, pair, line, total):
-        """What the neighbourhoods that a cell belongs to say of it, into `total`."""
+        """Sum into `total` the values that a cell's neighbourhoods give for it."""
         ni, nj = reaches.shape
         total[:] = 0.0
         for along_i in (True, False):
@@ -274,7 +275,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                     if reach < way:
                         continue
                     far = find_way(nodes, i, j, a, b)
-                    # the other cell's neighbourhood lies on that side: this cell is before it
+                    # the other cell's neighbourhood is on that side: this cell precedes it
                     far = (-far if side > 0 else far) - record[LEVER, a, b]
                     for q in range(CONSERVED_ROWS):
                         pair[q] += record[MEAN + q, a, b] + record[SLOPE + q, a, b] * far
@@ -289,14 +290,14 @@ def make_redistribution(eos_class, geometry: Geometry):
 
     @kernel
     def redistribute(squeezed, grids, excess, inverse_dt, parameters, before, after, scratch):
-        """Share the states of cells `small` (n, 2) over their neighbourhoods `reaches` (ni, nj).
+        """State redistribution of cells `small` (n, 2) over neighbourhoods `reaches` (ni, nj).
 
-        squeezed: both; grids: nodes (2, ni + 1, nj + 1) before and after the step; excess
-        (faces,): volume of perimeter cells beyond their straight faces; before: state (4, ni + 2,
-        nj + 2) and void energy (ni, nj); after: these and rates (ni, nj), mended in place; scratch:
-        marks (ni, nj), zeros and left so, and records (RECORD_ROWS, ni, nj).  Returns the cells
-        whose state has changed, the least c² of them, and by how much the number of cells with
-        voids has grown.
+        squeezed: (small, reaches); grids: nodes (2, ni + 1, nj + 1) before and after the step;
+        excess (faces,): volume of perimeter cells beyond their straight faces; before: state (4, ni
+        + 2, nj + 2) and void energy (ni, nj); after: these and rates (ni, nj), updated in place;
+        scratch: marks (ni, nj), zero on entry and exit, and records (RECORD_ROWS, ni, nj).  Returns
+        the number of changed cells, their least c², and the increase in the number of cells with
+        voids.
         """
         (small, reaches), (nodes, nodes_new), (marks, record) = squeezed, grids, scratch
         (start, start_void_energy), (state, void_energy, rates) = before, after
@@ -359,17 +360,17 @@ def make_redistribution(eos_class, geometry: Geometry):
     return redistribute
 
 
-# Bins of the histogram of crowding: the binary exponent of a number and three digits after it, from
-# 2^-128 to 2^128 per square metre.
+# Bins of the histogram of crowding: binary exponent and three mantissa bits, from 2^-128 to 2^128
+# per square metre.
 BINS, CUT = 2048, 52 - 3
 FIRST = (1023 - 128) << 3
-MARGIN = 1.0 + 1e-9  # a rate is above a limit if it is by more than round-off
-FAR_OUT = 1.2  # times the crowding that all but `share` of a block's cells are below
+MARGIN = 1.0 + 1e-9  # a rate must exceed a limit by more than round-off
+FAR_OUT = 1.2  # times the crowding exceeded by the fraction `share` of a block's cells
 TOUCHED_REACH = MOST_REACH + 1  # rows beyond a squeezed cell that its redistribution reads
 
 
 class Fastest(NamedTuple):
-    """The cell of largest rate [1/s] of a flow: which block, and where."""
+    """The cell with the largest rate [1/s] of a flow: its block and indices."""
 
     rate: float
     block: int
@@ -389,10 +390,10 @@ def count_crowding(crowding, counts):
 
 @kernel
 def choose_bin(counts, cells, share, far_out):
-    """The cell that no more than `share` of the `cells` are above, by the histogram `counts`.
+    """The cell exceeded by at most the fraction `share` of `cells`, from the histogram `counts`.
 
-    Returns its bin, -1 where no cell has `far_out` times as much; its place among the sorted cells
-    of that bin, below 0 for before all of them; and the lower edge of the bin.
+    Returns its bin, -1 if no cell has `far_out` times its crowding; its index among the sorted
+    cells of that bin, negative if before all of them; and the lower edge of the bin.
     """
     allowed, above = share * cells, 0
     top = BINS - 1
@@ -413,7 +414,7 @@ def choose_bin(counts, cells, share, far_out):
 
 @kernel
 def keep_bin(crowding, bin, kept):
-    """Put the `crowding` (ni, nj) of the cells of a bin into `kept`; returns how many they are."""
+    """Copy the `crowding` (ni, nj) of the cells of a bin into `kept`; returns their number."""
     size = 0
     for i in range(crowding.shape[0]):
         digits = crowding[i].view(np.int64)
@@ -426,10 +427,10 @@ def keep_bin(crowding, bin, kept):
 
 @kernel
 def find_most_crowded(crowding, share, far_out, counts, kept):
-    """`far_out` times what no more than `share` of the cells are above; inf where none is beyond.
+    """`far_out` times the crowding exceeded by at most `share` of the cells; inf if none is above.
 
-    The very number of the cell that stands there, not the edge of a bin: round-off may not decide.
-    counts (BINS,), kept (cells,): scratch.
+    The exact value of that cell is used, not the edge of a bin: round-off must not decide. counts
+    (BINS,), kept (cells,): scratch.
     """
     count_crowding(crowding, counts)
     bin, rank, low = choose_bin(counts, crowding.size, share, far_out)
@@ -443,7 +444,7 @@ def find_most_crowded(crowding, share, far_out, counts, kept):
 def scan_rates(rates, crowding, most_crowded):
     """The largest of the `rates` (ni, nj), its i and j, and the largest but for squeezed cells.
 
-    Cells of more than `most_crowded` count with the rate that they would have if they were not.
+    Cells of more than `most_crowded` count with the rate that they would have at that crowding.
     """
     most, bulk, at_i, at_j = -1.0, -1.0, 0, 0
     for i in range(rates.shape[0]):
@@ -461,9 +462,9 @@ def scan_rates(rates, crowding, most_crowded):
 
 @kernel
 def scan_state(totals, sums, rates, crowding, part, counts, kept):
-    """`scan_rates` of a new state with `part` of its cells squeezed at most; then: can it stand?
+    """`scan_rates` of a new state with at most `part` of its cells squeezed; then its validity.
 
-    That is `sum_tiles` of its `totals`, whose `sums` are filled.
+    Validity is the result of `sum_tiles` on its `totals`, which fills `sums`.
     """
     edge = np.inf
     if part > 0.0:
@@ -474,7 +475,7 @@ def scan_state(totals, sums, rates, crowding, part, counts, kept):
 def find_most_crowded_of_bands(
     cut: CutBlock, share: float, far_out: float, counts: np.ndarray, kept: np.ndarray
 ) -> float:
-    """`find_most_crowded` of all bands of a block, the same on all of its ranks.
+    """`find_most_crowded` over all bands of a block, with the same result on all of its ranks.
 
     counts (BINS,), kept (cells,): scratch.
     """
@@ -493,18 +494,18 @@ def find_most_crowded_of_bands(
 
 
 def scan_rates_of_bands(cut: CutBlock, most_crowded: float) -> tuple[float, int, int, float]:
-    """`scan_rates` of the new state of all bands of a block, the same on all of its ranks."""
+    """`scan_rates` over all bands of a block's new state, with the same result on all its ranks."""
     block, (first, last) = cut.block, cut.band
     rate, i, j, bulk = scan_rates(
         block.rates_new[first:last], block.crowding[first:last], most_crowded
     )
     found = cut.group.allgather((rate, first + i, j, bulk))
-    most = max(found, key=lambda band: band[0])  # the first of them, as in the whole block
+    most = max(found, key=lambda band: band[0])  # the first maximum, as in the whole block
     return *most[:3], max(band[3] for band in found)
 
 
 class BlockSharing:
-    """Redistribution in one block, with arrays made when it is first needed."""
+    """State redistribution in one block, with arrays allocated when first needed."""
 
     def __init__(self, block: Block):
         self.block = block
@@ -529,9 +530,9 @@ class BlockSharing:
         self.reaches[small[:, 0], small[:, 1]] = 0
 
     def find_rate_left(self, limit: float, rows: Rows) -> float:
-        """The largest rate of these rows if all cells above `limit` share their states.
+        """The largest rate of these rows if all cells above `limit` are redistributed.
 
-        0 for no rows: a block that is cut has none where no cell is above.
+        0 without rows: a part of a cut block has none if no cell is above.
         """
         small, rates = self._find_small(limit, rows), self.block.rates
         if len(small) == 0:
@@ -544,7 +545,7 @@ class BlockSharing:
         return left
 
     def share(self, limit: float, inverse_dt: float, rows: Rows) -> int:
-        """Redistribute the new state where cells of these rows were too small; how many changed."""
+        """Redistribute the new state at too small cells of these rows; returns how many changed."""
         block = self.block
         small = self._find_small(limit, rows)
         if len(small) == 0:
@@ -561,7 +562,7 @@ class BlockSharing:
 
 
 class SmallCells:
-    """All blocks of a flow; `share`: the part of each one's cells that may be too small."""
+    """Small cells of all blocks; `share`: the fraction of a block's cells that may be too small."""
 
     def __init__(self, blocks: Blocks, share: float):
         if not 0.0 <= share <= 0.1:
@@ -576,12 +577,12 @@ class SmallCells:
         self.fastest = Fastest(0.0, 0, 0, 0)
 
     def find_first_rate(self) -> float:
-        """`find_rate` of states that no step has made, all blocks being here and updated."""
+        """`find_rate` of initial states; all blocks must be on this rank and updated."""
         self.scanned = [self.scan(number)[:-1] for number in range(len(self.sharing))]
         return self.find_rate()
 
     def find_rate(self) -> float:
-        """The rate [1/s] that sets the next step, from what `scan` found; theory F7.3."""
+        """The rate [1/s] that sets the next step, from the results of `scan`; theory F7.3."""
         most, limit = Fastest(-1.0, 0, 0, 0), -1.0
         for number, (rate, i, j, bulk) in enumerate(self.scanned):
             limit = max(limit, bulk)
@@ -600,7 +601,7 @@ class SmallCells:
         return max(rate for (rate,) in self.blocks.share_rows(left, 1))
 
     def scan(self, number: int) -> tuple[float, int, int, float, bool]:
-        """`scan_state` of a block; of one that is cut, with its other ranks."""
+        """`scan_state` of a block, collectively with its other ranks if it is cut."""
         block, cut = self.sharing[number].block, self.blocks.cuts.get(number)
         if cut is None:
             found = scan_state(
@@ -616,7 +617,7 @@ class SmallCells:
         return (*scan_rates_of_bands(cut, edge), block.sum_up())
 
     def _find_rows_above(self, limit: float) -> dict[int, Rows]:
-        """The rows of each block here that are to be looked through for rates above `limit`."""
+        """The rows of each block on this rank to be searched for rates above `limit`."""
         cuts = self.blocks.cuts
         return {
             number: cuts[number].find_rows_above(limit, TOUCHED_REACH)
@@ -626,16 +627,16 @@ class SmallCells:
         }
 
     def find_fastest(self) -> None:
-        """Find the fastest cell again, of a state that was taken up."""
+        """Find the fastest cell again, for a restored state."""
         found = [scan_rates(s.block.rates, s.block.crowding, np.inf) for s in self.sharing]
         number = max(range(len(found)), key=lambda n: found[n][0])
         self.fastest = Fastest(found[number][0], number, *found[number][1:3])
 
     def share_states(self, rate: float, dt: float) -> None:
-        """Redistribute the new states of cells above `rate`, that for which `dt` is stable."""
+        """Redistribute the new states of cells above `rate`, for which `dt` is stable."""
         self.changed = 0
         for sharing in self.sharing:
-            sharing.block.shared_cells = 0  # of a step before, or of this one before a retry
+            sharing.block.shared_cells = 0  # from the last step, or from this one before a retry
         if self.fastest.rate <= rate * MARGIN:
             return
         limit = rate * MARGIN

@@ -1,32 +1,33 @@
-"""Body sources: gravity, heating and programmed burn, laid around the flow step by halves.
+"""Body sources: gravity, heating and programmed burn, split symmetrically around the flow step.
 
-Every step is half the source, the flow, half the source [Strang1968]: second order in time, and
-each half is exact by itself, so that what it adds to momentum and energy is known to round-off and
-enters the ledger beside what comes through the boundary.  The first half goes into a copy of the
-state, from which the step starts, so that a rejected step leaves nothing behind.
+Every step consists of half the source, the flow, and half the source [Strang1968]: second order in
+time.  Each half is exact by itself, so its momentum and energy are known to round-off and enter the
+totals like the fluxes through the boundary.  The first half is applied to a copy of the state, from
+which the step starts, so a rejected step leaves no trace.
 
-Programmed burn is a detonation front of given speed that brings the explosive its heat.
-The front starts from a point or a plane at t = 0 and goes on at the speed D.  The part that should
-have burnt is the greater of two [Wilkins1964]: the timed one, which rises over the front's width,
-and that of the compression, (1 - V/V0)/(1 - Vcj/V0).  The timed part is 1 - (1 - s)², s the part of
-the width: with D the Chapman–Jouguet speed the states between rest and CJ then follow each other in
-a straight line.  Half of the width is ahead of D t: with all of it behind, the wave behind the
-front lags by that, an error of first order.  How much a cell has burnt need not be carried along:
-in a front that runs into material at rest, steady or a shock,
+Programmed burn is a detonation front of given speed that releases the heat of the explosive.  The
+front starts from a point or a plane at t = 0 and propagates at the speed D.  The burn fraction is
+the greater of two [Wilkins1964]: the timed one, which rises over the front's width, and that of the
+compression, (1 - V/V0)/(1 - Vcj/V0).  The timed fraction is 1 - (1 - s)², where s is the fraction
+of the width: with D the Chapman–Jouguet speed, the states between rest and CJ then lie on a
+straight line.  Half of the width is ahead of D t; if all of it were behind, the following wave
+would lag by half the width, a first-order error.  The burn fraction is not advected: in a front
+that runs into material at rest, steady or a shock,
 
-    e - e0 = (p/2) (1/rho0 - 1/rho) + part burnt × heat,
+    e - e0 = (p/2) (1/rho0 - 1/rho) + burn fraction × heat,
 
-so it follows from the cell's state, which gets what it lacks.  Heat by the clock alone, whatever
-the state, errs by a little in every front of a few cells; where it is too much, a shock creeps
-ahead and squeezes unburnt explosive to a spike that grows as the cells shrink.  (Ours but for the
-two parts.)
+so it follows from the cell's state, to which the missing heat is added.  Heat by the clock alone,
+independent of the state, has a small error in every front of a few cells; where it is too much, a
+shock runs ahead and compresses unburnt explosive to a spike that grows as the cells shrink.  (Only
+the two fractions are from the source.)
 
-With `clock_stop` the clock stops at a time, and the front goes on by itself, its speed a measure of
-the energy's D.  What burns is then, as long as the explosive is squeezed, the part 1 - (1 - r)², r
-that of the compression, and once it expands the rest, as fast as in the timed part, until it is on
-the isentrope of the CJ state.  Without that rest, what a rarefaction catches in the front never
-burns, and the peak is a third too low; burning the rest earlier makes a weak detonation, some per
-cent too fast.  In a spreading front the relation above holds up to the width over the radius.
+With `clock_stop` the clock stops at that time, and the front propagates by itself at a speed that
+measures D for the given energy.  While the explosive is compressed, the burn fraction is then 1 -
+(1 - r)² with r that of the compression; once it expands, the rest burns as fast as in the timed
+front, until the state is on the isentrope of the CJ state.  Without that rest, explosive reached by
+a rarefaction within the front never burns, and the peak is a third too low; burning the rest
+earlier gives a weak detonation, some per cent too fast.  In a diverging front the relation above
+holds up to terms of width over radius.
 """
 
 from __future__ import annotations
@@ -54,9 +55,9 @@ def make_gravity(acceleration_x: float, acceleration_y: float) -> SourceLaw:
 
 
 class BodySource:
-    """A source term applied to the blocks of a simulation; without one nothing is done.
+    """A source term applied to the blocks of a simulation, if there is one.
 
-    `gained` (3,): momentum x, y [N s/m] and energy [J/m] that this step got from it.
+    `gained` (3,): momentum x, y [N s/m] and energy [J/m] added in this step.
     """
 
     def __init__(self, blocks: Blocks, law: SourceLaw | None):
@@ -66,7 +67,7 @@ class BodySource:
             block.part_start(law is not None)
 
     def start_step(self, t: float, dt: float) -> None:
-        """The first half of a step from t over dt, into the states that the step starts from."""
+        """The first half of the source from t over dt, on the states that the step starts from."""
         if self.law is None:
             return
         self.gained[:] = 0.0
@@ -83,7 +84,7 @@ class BodySource:
             block.body_acceleration = push if pushed else None
 
     def end_step(self, t: float, dt: float) -> None:
-        """The second half, on the accepted state; what it adds goes to the block's totals, too."""
+        """The second half, on the accepted state; also adds it to the block's totals."""
         if self.law is None:
             return
         gains = []
@@ -100,7 +101,7 @@ class BodySource:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Add the source over dt to a state (4, ni + 2, nj + 2) of a block.
 
-        Returns the acceleration (2, ni, nj) and what the block gained, see `gained`.
+        Returns the acceleration (2, ni, nj) and the block's gain (see `gained`).
         """
         x, y = compute_centres(block.nodes)
         push_x, push_y, heat = self.law(block, x, y, t, dt)
@@ -117,14 +118,14 @@ class BodySource:
         return push, gained
 
 
-LEAD = 0.5  # of the front's width that is ahead of where the front is
-STARTED = 0.5  # part burnt from which a front left to itself ends what it has begun
+LEAD = 0.5  # fraction of the front's width that is ahead of the front
+STARTED = 0.5  # burn fraction from which a self-propagating front burns the rest
 
 
 @dataclass(frozen=True)
 class Explosive:
-    """What burning needs of a material: front's speed [m/s], heat and energy at rest [J/kg], and
-    the compression 1 - Vcj/V0."""
+    """Burn parameters of a material: front speed [m/s], heat and energy at rest [J/kg], and the
+    compression 1 - Vcj/V0."""
 
     speed: float
     heat: float
@@ -133,9 +134,9 @@ class Explosive:
 
 
 def find_expanding(block) -> np.ndarray:
-    """In which cells (ni, nj) of a block the velocity diverges, in the plane.
+    """Mask (ni, nj) of the cells of a block in which the plane velocity diverges.
 
-    Beyond the sides it is taken as in the cells beside them: ghosts belong to the step.
+    Beyond the sides the velocity of the adjacent cells is used: ghosts belong to the step.
     """
     _, *velocity, _ = block.state[:, 1:-1, 1:-1]
     u, v = (np.pad(q, 1, mode="edge") for q in velocity)
@@ -163,9 +164,9 @@ def compute_products_energy(eos: JWL, rho) -> np.ndarray:
 class ProgrammedBurn:
     """A source term (`hydro.sources`) that burns all blocks of JWL material.
 
-    origin (2,): a point of the front at t = 0 [m]; direction (2,): where a plane front goes, None
-    for one that spreads from the point; width: of the front [m]; speed [m/s]: None for the CJ
-    speed of each block's material; clock_stop [s]: when the front is left to itself.  Raises
+    origin (2,): a point of the front at t = 0 [m]; direction (2,) of a plane front, None for one
+    that spreads from the point; width: of the front [m]; speed [m/s]: None for the CJ speed of each
+    block's material; clock_stop [s]: time from which the front propagates by itself.  Raises
     BadInput for numbers that are not positive.
     """
 
@@ -201,7 +202,7 @@ class ProgrammedBurn:
         return self._known[eos]
 
     def compute_timed(self, speed: float, x, y, t: float) -> np.ndarray:
-        """Timed part burnt, 0 to 1, at the points x, y [m] at time t [s]."""
+        """Timed burn fraction, 0 to 1, at the points x, y [m] at time t [s]."""
         x, y = x - self.origin[0], y - self.origin[1]
         if self.direction is None:
             way = np.hypot(x, y)
@@ -236,10 +237,10 @@ class ProgrammedBurn:
         return 0.0, 0.0, explosive.heat * np.where(before < 1.0, lacking, 0.0)
 
     def find_rest(self, block, explosive: Explosive, dt: float) -> np.ndarray:
-        """Part (ni, nj) of the heat that burns within dt in cells of a front left to itself.
+        """Fraction (ni, nj) of the heat released within dt in cells of a self-propagating front.
 
-        What is missing to the products' isentrope falls as in the timed part, (1 - s)² with s
-        rising by D dt over the width.
+        The energy missing to the products' isentrope falls as in the timed fraction, as (1 - s)²
+        with s rising by D dt over the width.
         """
         eos = block.eos
         rho, _, _, p = block.state[:, 1:-1, 1:-1]

@@ -1,20 +1,20 @@
-"""A convecting box: its fluid, its walls, and one direction of its tensor grid.
+"""A convecting box: its fluid, its walls, and one axis of its tensor grid.
 
     du/dt + div(u u) = -grad p + nu lap u + b T,      div u = 0
     dT/dt + div(u T) = kappa lap T
 
-with b = -expansion · gravity [m/s2/K], a vector.  In the scales L, kappa/L, dT the numbers are
-nu = Pr, kappa = 1, |b| = Ra Pr.
+with b = -expansion · gravity [m/s2/K], a vector.  Scaled with L, kappa/L and dT, nu = Pr, kappa = 1
+and |b| = Ra Pr.
 
-A side is a wall (no-slip or free) that is isothermal, adiabatic or has a given flux, or it is
-periodic, together with the side opposite.  Temperatures and fluxes may be functions of the
+A side is either a wall (no-slip or free) that is isothermal, adiabatic or has a given flux, or
+periodic together with the opposite side.  Temperatures and fluxes may be functions of the
 coordinate along the wall (conducting walls, a heated strip).
 
-An axis has n cells between `nodes` x[0..n].  Values stand either in the cells (n of them, at the
-midpoints) or on the nodes (n + 1; in a periodic axis n, the last being the first again).  Note: on
-an uneven grid the midpoint of a node's two neighbouring cell centres is not the node.
-Interpolation to a node is therefore linear in distance, while a node's control volume reaches from
-one cell centre to the next.
+An axis has n cells between `nodes` x[0..n].  Values are located either in the cells (n, at the
+midpoints) or on the nodes (n + 1; n on a periodic axis, whose last node is the first).  Note: on an
+uneven grid the midpoint of a node's two neighbouring cell centres is not the node.  Interpolation
+to a node is therefore linear in distance, while a node's control volume reaches from one cell
+centre to the next.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Fluid:
     buoyancy: tuple[float, float]
 
     def __post_init__(self):
-        """Raises BadInput for transport that is not positive, or numbers that are not finite."""
+        """Raises BadInput for nu or kappa that is not positive, or numbers that are not finite."""
         for name in ("viscosity", "diffusivity"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
@@ -61,7 +61,7 @@ class Fluid:
         )
 
     def at_rayleigh(self, rayleigh: float) -> Fluid:
-        """The same fluid with the buoyancy that Ra = `rayleigh` means in the scales L = dT = 1."""
+        """The same fluid with the buoyancy for Ra = `rayleigh` in the scales L = dT = 1."""
         size = math.hypot(*self.buoyancy)
         if size == 0.0:
             raise BadInput(
@@ -84,7 +84,7 @@ def turn_gravity(tilt: float) -> tuple[float, float]:
 
 
 def make_fluid(rayleigh: float, prandtl: float, tilt: float = 0.0) -> Fluid:
-    """The fluid of given numbers in the scales L, kappa/L, dT.
+    """The fluid with the given Ra and Pr in the scales L, kappa/L, dT.
 
     Gravity points down, turned by `tilt` degrees anticlockwise.  Raises BadInput for Ra < 0 and
     Pr <= 0.
@@ -114,8 +114,8 @@ class Wall:
     """One side.
 
     `flow`: "no-slip", "free" (no shear stress) or "periodic".  `temperature` [K] makes it
-    isothermal; `flux` [K m/s] is the heat that enters through it over rho cp; neither: adiabatic.
-    Both are numbers or functions of the coordinate along the wall.
+    isothermal; `flux` [K m/s] is the heat flux into the fluid over rho cp; without either it is
+    adiabatic.  Both are numbers or functions of the coordinate along the wall.
     """
 
     flow: str = "no-slip"
@@ -123,7 +123,7 @@ class Wall:
     flux: Along | None = None
 
     def sample(self, along: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
-        """(temperature or None, flux) at the places `along` (n,)."""
+        """(temperature or None, flux) at the coordinates `along` (n,)."""
 
         def values(given: Along) -> np.ndarray:
             found = given(along) if callable(given) else given
@@ -140,12 +140,12 @@ def isothermal(temperature: Along, flow: str = "no-slip") -> Wall:
 
 
 def adiabatic(flow: str = "no-slip") -> Wall:
-    """A wall that no heat passes."""
+    """A wall without heat flux."""
     return Wall(flow)
 
 
 def heated(flux: Along, flow: str = "no-slip") -> Wall:
-    """A wall through which heat of given flux enters."""
+    """A wall with a given heat flux into the fluid."""
     return Wall(flow, flux=flux)
 
 
@@ -189,10 +189,10 @@ FEWEST_CELLS = 3
 
 
 class Axis:
-    """Nodes (n + 1,) [m] of one direction, rising; `periodic` joins its ends."""
+    """Increasing nodes (n + 1,) [m] of one direction; `periodic` joins its ends."""
 
     def __init__(self, nodes: np.ndarray, periodic: bool = False, name: str = "x"):
-        """Raises BadInput for fewer than three cells, nodes that do not rise or are not finite."""
+        """Raises BadInput for fewer than three cells, or nodes not increasing or not finite."""
         nodes = np.ascontiguousarray(nodes, dtype=np.float64)
         cells = nodes.size - 1
         if cells < FEWEST_CELLS:
@@ -207,7 +207,7 @@ class Axis:
         self.widths = np.diff(nodes)
         self.centres = 0.5 * (nodes[1:] + nodes[:-1])
         self.length = float(nodes[-1] - nodes[0])
-        # of the node's control volume: centre to centre, half a cell at a wall
+        # of a node's control volume: centre to centre, half a cell at a wall
         half = 0.5 * self.widths
         if periodic:
             self.distances = half + np.roll(half, 1)
@@ -232,8 +232,8 @@ class Axis:
     def difference_to_nodes(self, low: float = 1.0, high: float = 1.0) -> sparse.csr_matrix:
         """f[i] - f[i-1] of cell values, on the nodes.
 
-        At a wall the value beyond is 0, times `low` or `high`: 1 where the wall's own value is
-        subtracted (the caller adds what it is), 0 where the difference is to vanish.
+        At a wall the value beyond is 0, scaled by `low` or `high`: 1 if the wall's own value is
+        subtracted (the caller adds it), 0 if the difference vanishes.
         """
         ones = np.ones(self.cells)
         return self._to_nodes(-ones, ones, low, -high)
@@ -251,11 +251,11 @@ class Axis:
         return self._to_nodes(before, after, 0.0, 0.0)
 
     def _inner_distances(self) -> np.ndarray:
-        """Distance (n,) from the centre of the cell before to this cell's, the ends joined."""
+        """Distance (n,) from the previous cell's centre to this one's, across the periodic ends."""
         return 0.5 * (self.widths + np.roll(self.widths, 1))
 
     def _to_nodes(self, before, after, low: float, high: float) -> sparse.csr_matrix:
-        """Weights of each cell for the node behind it (`before`) and ahead of it (`after`)."""
+        """Weights of each cell at the node before it (`before`) and after it (`after`)."""
         here = np.arange(self.cells)
         behind = (here + 1) % self.node_count
         before, after = before.copy(), after.copy()

@@ -1,47 +1,49 @@
 """Columns of cells whose nodes may move: the slot between vertical plates, and a viscous front.
 
-**Slot.**  Across it blows a uniform through-flow U (suction at one wall, injection at the other);
-along it rises v(x), driven by the temperature T(x):
+**Slot.**  A uniform through-flow U crosses it (suction at one wall, injection at the other); the
+flow v(x) along it is driven by the temperature T(x):
 
     dT/dt + U dT/dx = kappa d2T/dx2
     dv/dt + U dv/dx = nu d2v/dx2 + b (T - T0)
 
-with T given at both walls, v = 0 there, and T0 (the pressure gradient along the slot) such that
-the mean of v is the given one.  T and v are means of cells, and
+with T given at both walls, v = 0 there, and T0 (the pressure gradient along the slot) such that the
+mean of v has a given value.  T and v are cell averages, and
 
     F = s (T_l + T_r)/2 - kappa A(Pe) (T_r - T_l)/d,      Pe = s d/kappa,  s = U - node speed
 
-is the flux between two neighbours a distance d apart (centres; at a wall, wall and centre).  A is
-`exponential` Pe/2 coth(Pe/2), exact where no heat is born between the two points; `samarskii`
-R + 1/(1 + R), R = |Pe|/2, which [Polevikov1983] knows; `upwind` 1 + R, of first order only;
-`central` 1, which swings from cell to cell where Pe > 2.  Each but the last has A >= |Pe|/2: its
-matrix is an M-matrix at any Pe and no swing can begin.
+is the flux between two neighbours a distance d apart (centres, or wall and centre).  A is
+`exponential` Pe/2 coth(Pe/2), exact without heat sources between the two points; `samarskii` R +
+1/(1 + R), R = |Pe|/2, as in [Polevikov1983]; `upwind` 1 + R, first order only; `central` 1, which
+oscillates from cell to cell for Pe > 2.  All but the last have A >= |Pe|/2: the matrix is an
+M-matrix at any Pe, so no oscillations arise.
 
 Note: "no oscillation" is not "resolved".  At Pe = 50 the layer lies inside one cell; T is exact
-outside of it, but v of a closed slot is driven by that layer alone and comes out wrong by its own
-size everywhere.  A grid that follows the gradient resolves both.  The speed that a grid follows is
-that of the fluid, through-flow and all (theory R11.3); a strong through-flow makes it uniform.
+outside it, but v in a closed slot is driven by that layer alone and has an error of order one
+everywhere.  A grid that follows the gradient resolves both.  The speed that a grid follows is that
+of the fluid including the through-flow (theory R11.3); a strong through-flow makes the grid
+uniform.
 
-Marched to its steady state, a step places the nodes first, by one correction of the axis, then
-solves on moving cells.  Steps are implicit and grow until nothing changes any more; `settle_column`
-is the same without time: a steady solve, a correction, and so on ([Polevikov1983]).
+On the way to the steady state, each step first moves the nodes by one correction of the axis, then
+solves on the moving cells.  Steps are implicit and grow until the solution is steady;
+`settle_column` instead alternates steady solves and corrections ([Polevikov1983]).
 
-**Front.**  Burgers' equation du/dt + d(u^2/2)/dx = nu d2u/dx2, the flux past a node between l and r
+**Front.**  Burgers' equation du/dt + d(u^2/2)/dx = nu d2u/dx2, with the flux past a node between l
+and r
 
     G = (l^2 + r^2)/4 - s (l + r)/2 - nu A(Pe) (r - l)/d,      Pe = ((l + r)/2 - s) d/nu
 
-with s the speed of the node: nodes that go with a front see no convection there at all.  In time it
-is the L-stable SDIRK method of order 2, (1, gamma = 1 - 1/sqrt 2), its first stage on the grid at
-t + gamma dt; uniform u stays uniform and the sum of u is kept to round-off (GCL).  `FrontRace` runs
-the three families of theory R13, and nodes at rest, side by side:
+with s the speed of the node: nodes that move with a front have no convective flux.  The time
+integrator is the L-stable SDIRK method of order 2 (gamma = 1 - 1/sqrt 2), with its first stage on
+the grid at t + gamma dt; uniform u stays uniform and the sum of u is conserved to round-off (GCL).
+`FrontRace` runs the three families of theory R13 and fixed nodes side by side:
 
-- after: nodes are placed after the step by what came out of it; the speed in its fluxes is the
-  backward difference of the last two placements.  Whenever nodes speed up, start or turn, the
-  equations are wrong by a shift of the whole front, and the sum of u is not kept.
-- law: a speed law, `tau W s_qq + (w x_q)_q = 0` (theory R13.2), W the largest w, integrated
-  together with the flow; the nodes lag behind their best places by about tau.
-- first: nodes are placed first, by what is known, and the fluxes of the same step use where they
-  go: no lag in the equations, and the best places of the step before.
+- after: nodes are placed after the step, from its result; the speed in the fluxes is the backward
+  difference of the last two placements.  Whenever nodes accelerate, the equations have an error
+  that shifts the whole front, and the sum of u is not conserved.
+- law: a moving-mesh equation, `tau W s_qq + (w x_q)_q = 0` (theory R13.2) with W the largest w, is
+  integrated together with the flow; the nodes lag behind their optimum by about tau.
+- first: nodes are placed first, from the known solution, and the fluxes of the same step use their
+  motion: no lag in the equations, and nodes at the optimum of the previous step.
 
 Sources: [Samarskii1977], [Ilin1969], [ScharfetterGummel1969]; [AndersonTannehillPletcher1984]
 §10.4; [HuangRenRussell1994]; SDIRK: [Alexander1977].
@@ -82,7 +84,7 @@ class Column:
     scheme: str = "exponential"
 
     def __post_init__(self):
-        """Raises BadInput for transport that is not positive, unknown schemes, infinite numbers."""
+        """Raises BadInput for nu or kappa not positive, unknown schemes, infinite numbers."""
         for name in ("viscosity", "diffusivity"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
@@ -95,10 +97,10 @@ class Column:
 
 
 def fit_diffusion(scheme: str, peclet: np.ndarray) -> np.ndarray:
-    """The factor A(Pe) of the diffusivity for each of `peclet`, as the module says."""
+    """The factor A(Pe) of the diffusivity for each of `peclet`; see the module."""
     half = 0.5 * np.abs(peclet)
     if scheme == "exponential":
-        safe = np.maximum(half, 1e-4)  # below that two terms of the series are exact
+        safe = np.maximum(half, 1e-4)  # below it two terms of the series are exact
         return np.where(half < 1e-4, 1.0 + half**2 / 3.0, safe / np.tanh(safe))
     if scheme == "samarskii":
         return half + 1.0 / (1.0 + half)
@@ -111,8 +113,8 @@ def assemble_transport(
     """Matrix and wall coefficients of `F[i+1/2] - F[i-1/2]`, net outflow of the cells.
 
     x (n + 1,) [m]; speed (n + 1,) [m/s] of the fluid past the nodes.  Returns the bands (3, n) in
-    the order of scipy's `solve_banded`, and (2,): outflow of the first and the last cell for unit
-    values at their walls [m/s].
+    the order of scipy's `solve_banded`, and the outflow (2,) of the first and the last cell for
+    unit wall values [m/s].
     """
     distance = measure_distances(x)
     spread = diffusivity * fit_diffusion(scheme, speed * distance / diffusivity) / distance
@@ -121,8 +123,8 @@ def assemble_transport(
 
 
 def make_bands(by_left, by_right, sizes=0.0) -> np.ndarray:
-    """Bands (3, n), as `solve_banded` takes them, of sizes + the net outflow of n cells, whose
-    n + 1 fluxes have these derivatives by the values on their left and right."""
+    """Bands (3, n) for `solve_banded` of sizes + the net outflow of n cells, whose n + 1 fluxes
+    have these derivatives with respect to the values on their left and right."""
     bands = np.zeros((3, by_left.size - 1))
     bands[0, 1:], bands[2, :-1] = by_right[1:-1], -by_left[1:-1]
     bands[1] = sizes + by_left[1:] - by_right[:-1]
@@ -130,17 +132,17 @@ def make_bands(by_left, by_right, sizes=0.0) -> np.ndarray:
 
 
 def measure_distances(x: np.ndarray) -> np.ndarray:
-    """Distances (n + 1,) between the neighbours of each node: centres, at the ends the walls."""
+    """Distances (n + 1,) between the cell centres (or walls) on either side of each node."""
     return np.diff(get_places(x))
 
 
 def get_places(x: np.ndarray) -> np.ndarray:
-    """Centres of the cells, between the two walls (n + 2,)."""
+    """Cell centres with both walls as ends (n + 2,)."""
     return enclose(0.5 * (x[1:] + x[:-1]), x[[0, -1]])
 
 
 def enclose(values: np.ndarray, ends) -> np.ndarray:
-    """Values of the cells (n,), between those at the two ends (n + 2,)."""
+    """Cell values (n,) with those at the two ends added (n + 2,)."""
     return np.concatenate([ends[:1], values, ends[1:]])
 
 
@@ -172,9 +174,9 @@ def step_column(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Temperature [K], velocity [m/s] (n,) and T0 [K] after an implicit step of `dt` [s].
 
-    The nodes go from x_old to x (n + 1,) during the step, and the fluxes are those past nodes that
-    move so: a uniform temperature stays uniform to round-off.  `dt` infinite gives the steady state
-    on x at once.  First order in time.
+    The nodes move from x_old to x (n + 1,) during the step, and the fluxes are relative to them, so
+    a uniform temperature stays uniform to round-off.  An infinite `dt` gives the steady state on x.
+    First order in time.
     """
     steady = math.isinf(dt)
     speed = column.through_flow - (0.0 if steady else (x - x_old) / dt)
@@ -188,7 +190,7 @@ def step_column(
     heat[[0, -1]] -= walls * np.array(column.temperatures)
     temperature = solve_banded((1, 1), bands, heat)
 
-    # v is linear in T0: one part without it, one for T0 = -1, mixed to have the mean asked for.
+    # v is linear in T0: one part without it, one for T0 = -1, combined for the given mean.
     bands, _ = assemble_transport(x, speed, column.viscosity, column.scheme)
     bands[1] += now
     steps = np.diff(x)
@@ -212,17 +214,17 @@ def to_nodes(x: np.ndarray, values: np.ndarray, walls: tuple[float, float]) -> n
     return np.interp(x, get_places(x), enclose(values, walls))
 
 
-SETTLED = 1e-12  # relative change in a time L^2/kappa below which nothing changes
-RESTING = 2e-14  # of the axis: nodes that move by less, steady solve after solve, have settled
+SETTLED = 1e-12  # relative change in a time L^2/kappa below which the state is steady
+RESTING = 2e-14  # of the axis: nodes that move by less between steady solves have settled
 GROWTH = 1.25  # of dt from step to step
 FIRST = 1e-4  # first dt over L^2/kappa
-LONGEST = 0.01  # of the whole time: the grid needs steps to settle, however long they are
+LONGEST = 0.01  # of the whole time: the grid needs a number of steps to settle
 
 
 def make_profile(column: Column, kind: str, x: np.ndarray, temperature, velocity):
-    """What `correct_axis` follows in the column: speed, gradient on the steps, or both.
+    """Profile for `correct_axis` in the column: speed, gradient on the steps, or both.
 
-    The gradient is the sum of those of T and v, each over its own range.
+    The gradient is the sum of those of T and v, each divided by its range.
     """
     v = to_nodes(x, velocity, (0.0, 0.0))
     speed = np.hypot(v, column.through_flow)
@@ -239,7 +241,7 @@ def make_profile(column: Column, kind: str, x: np.ndarray, temperature, velocity
 def settle_column(
     column: Column, kind: str, x: np.ndarray, corrections: int = 200, **options
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Axis, T, v at the end of steady solves and corrections in turn, and how many those were.
+    """Axis, T and v after alternating steady solves and corrections, and the number of these.
 
     options: those of `correct_axis`.  Ends when no node moves by more than RESTING of the axis.
     """
@@ -256,7 +258,7 @@ def settle_column(
 
 
 class RowBlock:
-    """A column as pictures and dumps see it: cells one beside the other, one high.
+    """A column as pictures and dumps read it: a row of cells, one cell high.
 
     get_cells: () -> nodes x (n + 1,) [m] and fields by name, (n,) each; described: unit and long
     name of each field; low, high: y of the row [m].
@@ -278,7 +280,7 @@ class RowBlock:
 
 
 class ColumnMarch:
-    """An Evolution: fluid at rest at the mean temperature between plates that are suddenly hot."""
+    """An Evolution: fluid at rest at the mean temperature between plates heated suddenly."""
 
     def __init__(
         self,
@@ -289,7 +291,7 @@ class ColumnMarch:
         every: int = 1,
         **options,
     ):
-        """`x` (n + 1,) [m] the first axis, `kind`, `every`, `options`: how it is corrected."""
+        """x (n + 1,) [m]: the initial axis; `kind`, `every`, `options`: how it is corrected."""
         self.column, self.kind, self.every, self.options = column, kind, every, options
         self.t, self.step, self.t_end = 0.0, 0, t_end
         self.x = np.array(x, dtype=float)
@@ -336,7 +338,7 @@ class ColumnMarch:
         change = max(
             float(np.abs(one).max()) / size for one, size in zip(changes, sizes, strict=True)
         )
-        # in a diffusive time, not in a step: short steps change little, steady or not
+        # per diffusive time, not per step: short steps change little even if unsteady
         change *= (x[-1] - x[0]) ** 2 / column.diffusivity / dt
         self.x, self.temperature, self.velocity = x, temperature, velocity
         inward, outward = compute_wall_fluxes(
@@ -377,15 +379,15 @@ class ColumnMarch:
 
 FAMILIES = ("fixed", "after", "law", "first")
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
-NEWTON = 30  # iterations at most; four are usual
-LEAST = 0.2  # of a step's length: what the lagging speed may leave of it
+NEWTON = 30  # iterations at most; four are typical
+LEAST = 0.2  # of a cell's length: the lagging speed may shrink it to that
 
 Ends = Callable[[float], np.ndarray]
 
 
 @dataclass(frozen=True)
 class Step:
-    """Means u (n,), what came in through the ends (sum of u dx), Newton iterations."""
+    """Cell averages u (n,), inflow through the ends (sum of u dx), Newton iterations."""
 
     u: np.ndarray
     through: float
@@ -400,7 +402,7 @@ def compute_fluxes(
     viscosity: float,
     factor: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """G (n + 1,) past the nodes and its derivatives by the values on their left and right."""
+    """G (n + 1,) past the nodes and its derivatives by the left and right values."""
     values = enclose(u, ends)
     left, right = values[:-1], values[1:]
     spread = viscosity * factor / measure_distances(x)
@@ -417,10 +419,10 @@ def step_front(
     dt: float,
     ends: Ends,
 ) -> Step:
-    """One step of `dt` from `t` while the nodes (n + 1,) go from x_old to x_new; u (n,).
+    """One step of `dt` from `t` while the nodes (n + 1,) move from x_old to x_new; u (n,).
 
-    ends: t -> u at both ends (2,), which stay where they are.  Raises RunFailure where Newton's
-    method does not settle.
+    ends: t -> u at both ends (2,), which are fixed.  Raises RunFailure if Newton's method does not
+    converge.
     """
     speed = (x_new - x_old) / dt
     before, stage_flux, through, iterations = np.diff(x_old) * u, 0.0, 0.0, 0
@@ -448,7 +450,7 @@ def step_front(
                 f"cell {worst}, t = {t:.4g} s: the implicit step did not settle in {NEWTON} "
                 "iterations; a smaller cfl would let it",
                 cause="implicit-step",
-                place=Place("", (worst, 0)),  # who calls knows the column's name
+                place=Place("", (worst, 0)),  # the caller knows the column's name
             )
         stage_flux = np.diff(flux)
         through += (GAMMA if place == 1.0 else 1.0 - GAMMA) * dt * float(flux[0] - flux[-1])
@@ -456,7 +458,7 @@ def step_front(
 
 
 def measure_gradient(x: np.ndarray, u: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Size of du/dx on the cells (n,): the mean of the differences at their two nodes."""
+    """|du/dx| in the cells (n,): the mean of the differences at their two nodes."""
     at_nodes = np.abs(np.diff(enclose(u, ends)) / measure_distances(x))
     return 0.5 * (at_nodes[1:] + at_nodes[:-1])
 
@@ -464,10 +466,10 @@ def measure_gradient(x: np.ndarray, u: np.ndarray, ends: np.ndarray) -> np.ndarr
 def move_by_law(
     x: np.ndarray, steep: np.ndarray, dt: float, tau: float, strength: float
 ) -> np.ndarray:
-    """Nodes after `dt` at the speeds s of `tau W s_qq + (w x_q)_q = 0`, w of the gradient `steep`.
+    """Nodes after `dt` at speeds s: `tau W s_qq + (w x_q)_q = 0`, w from the gradient `steep`.
 
-    Implicit in x, with w as it was: `(w + r) h_new - r h_old` is the same C on all steps h, r =
-    tau W/dt, so that the sum of steps gives C, and positive steps stay positive.
+    Implicit in x, with w lagged: with r = tau W/dt, `(w + r) h_new - r h_old` is the same C for all
+    spacings h.  The sum of the spacings gives C, and positive spacings stay positive.
     """
     weight = weigh_gradient(x, steep, strength)
     inertia = tau / dt * weight.max()
@@ -480,7 +482,7 @@ def move_by_law(
 
 
 def follow_last_move(x: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Nodes that go on as they went from `last` to `x`, all slower if a cell would close."""
+    """Nodes that continue their motion from `last` to `x`, all slower if a cell would collapse."""
     steps, change = np.diff(x), np.diff(x - last)
     closing = float((change / steps).min())
     part = 1.0 if closing >= LEAST - 1.0 else (LEAST - 1.0) / closing
@@ -491,9 +493,9 @@ def follow_last_move(x: np.ndarray, last: np.ndarray) -> np.ndarray:
 class Placing:
     """How the nodes of the moving families are placed.
 
-    strength of the monitor, bound on the ratio of neighbours (None: usual), part of a correction
-    made, tau of the law [s]; start: whether `after` knows the speeds of its nodes at t = 0
-    ("moving") or begins from "rest".
+    Strength of the monitor, bound on the ratio of neighbours (None: default), fraction of a
+    correction applied, tau of the mesh equation [s]; start: whether `after` knows the speeds of its
+    nodes at t = 0 ("moving") or begins from "rest".
     """
 
     strength: float = 2.0
@@ -509,12 +511,12 @@ class Placing:
 
 
 class FrontColumn:
-    """One family's grid and solution: x (n + 1,), u (n,), and what it needs of the past."""
+    """One family's grid and solution: x (n + 1,), u (n,), and the history that it needs."""
 
     def __init__(self, family: str, x: np.ndarray, u: np.ndarray):
         self.family, self.x, self.u = family, x, u
-        self.last = x.copy()  # where the nodes were a step ago
-        self.through = 0.0  # sum of u dx that came in so far
+        self.last = x.copy()  # the nodes a step ago
+        self.through = 0.0  # inflow (sum of u dx) so far
         self.iterations = 0
 
     def get_cells(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -522,7 +524,7 @@ class FrontColumn:
         return self.x, {"u": self.u, "step": np.diff(self.x)}
 
     def advance(self, placing: Placing, viscosity: float, t: float, dt: float, ends: Ends) -> None:
-        """One step of `dt` from `t`, nodes placed as the family does."""
+        """One step of `dt` from `t`, with the family's placement of nodes."""
         x = self.x
         if self.family == "fixed":
             target = x
@@ -542,13 +544,13 @@ class FrontColumn:
             self.x = placing.correct(target, measure_gradient(target, self.u, ends(t + dt)))
 
 
-FIRST_CORRECTIONS = 60  # at most, of the moving grids to the solution at t = 0
+FIRST_CORRECTIONS = 60  # at most, of the moving grids for the solution at t = 0
 PLACED = 1e-10  # of the column: nodes that move by less have settled
 HEIGHT, APART = 0.08, 0.1  # of the blocks in pictures, one above the other
 
 
 class Exact(Protocol):
-    """What the race starts from and takes at its ends."""
+    """The race's initial and boundary values."""
 
     viscosity: float
 
@@ -581,7 +583,7 @@ class FrontRace:
         ]
 
     def _place(self, x: np.ndarray, t: float) -> np.ndarray:
-        """The moving families' axis for the exact solution at t, found from the axis x."""
+        """Axis of the moving families for the exact solution at t, starting from the axis x."""
         for _ in range(FIRST_CORRECTIONS):
             means = self.exact.compute_cell_averages(x, t)
             last, x = x, self.placing.correct(x, measure_gradient(x, means, self.ends(t)))
@@ -622,7 +624,7 @@ class FrontRace:
         return self.t_end * (step / self.steps)
 
     def _totals(self) -> dict[str, float]:
-        """Sums of u dx, and what came in through the ends by the fluxes of the steps."""
+        """Sums of u dx, and the inflow through the ends from the fluxes of the steps."""
         totals = {}
         for column in self.columns:
             totals[f"total_u_{column.family}"] = float(column.u @ np.diff(column.x))

@@ -1,31 +1,32 @@
 """The Boussinesq equations on one tensor grid: conservative staggered finite volumes.
 
 The unknowns are the stream function psi on the free nodes and the temperature T in the cells.  The
-volume flux through a face is the difference of psi along it, so what leaves a cell is zero to
-round-off whatever psi is.  The same differences, transposed, sum the momentum of the faces around
-each node and so eliminate the pressure: what is solved is the marker-and-cell scheme itself
-[HarlowWelch1965], in its divergence-free unknowns.
+volume flux through a face is the difference of psi along it, so the net outflow of a cell is zero
+to round-off for any psi.  The transposed differences sum the momentum of the faces around each node
+and so eliminate the pressure: this is the marker-and-cell scheme [HarlowWelch1965] in
+divergence-free unknowns.
 
     M dpsi/dt + E [(S D psi) (C u)] - nu K psi - (b · B) T = 0,       u = D psi / length
     A dT/dt + W [(D psi) (I T) - kappa G(T)] = 0
 
-D curl, S spread, C carry, E balance, K friction, B buoyancy of `Momentum`; I values, G gradient
-(with the walls), W balance of `Heat`; A areas of the cells.
+D, S, C, E, K and B are `curl`, `spread`, `carry`, `balance`, `friction` and `buoyancy` of
+`Momentum`; I, G (with the walls) and W are `values`, `gradient` and `balance` of `Heat`; A are the
+cell areas.
 
-Cells carry the temperature, faces the volume flux through them, nodes the stream function.  All
+The temperature is located in cells, the volume flux on faces, the stream function on nodes.  All
 faces are numbered in one array: first those across x, shape (nodes in x, cells in y), then those
 across y, shape (cells in x, nodes in y).  A velocity's own control volume reaches from one cell
-centre to the next in its own direction and over one cell in the other; its faces lie in the
-cells' centres and on the grid's nodes.
+centre to the next in its own direction and over one cell in the other; its faces lie in the cells'
+centres and on the grid's nodes.
 
-Note: the stream function of a periodic layer is zero on one wall only.  Its value on the other
-is an unknown of its own, the volume that flows through the layer; the equation for it says that
-no mean pressure gradient drives it.
+Note: the stream function of a periodic layer is zero on one wall only.  Its value on the other is
+an additional unknown, the volume flux through the layer; its equation states that there is no mean
+pressure gradient.
 
-Systems are solved by sparse LU.  The matrices have symmetric patterns and large diagonals; with the
-diagonal as pivots the elimination can follow a minimum-degree ordering of the pattern, which at
-160 x 160 cells is three times as fast as column ordering with row exchanges.  A pivot that is too
-small shows in the residual of the solution; such a matrix is factorised again with exchanges.
+Systems are solved by sparse LU.  The matrices have symmetric patterns and large diagonals; with
+diagonal pivots the elimination can use a minimum-degree ordering of the pattern, which at 160 x 160
+cells is three times as fast as column ordering with row exchanges.  If the residual of the solution
+shows that a pivot was too small, the matrix is factorised again with exchanges.
 """
 
 from __future__ import annotations
@@ -42,14 +43,14 @@ from hydro.convection.box import PAIRS, SIDES, Axis, Fluid, Wall, check_walls
 from regrid.errors import RunFailure
 
 Matrix = sparse.csr_matrix
-Ends = tuple[float, float]  # of an axis: 1 where a wall's own value counts, 0 where slope vanishes
+Ends = tuple[float, float]  # of an axis: 1 if the wall's value is given, 0 if the slope vanishes
 
 
 def kron(component: int, own: Matrix | np.ndarray, cross: Matrix | np.ndarray) -> Matrix:
     """Product of a matrix along the direction `component` (0: x) and one across it.
 
-    A one-dimensional array stands for the diagonal matrix.  (scipy's own is five times slower on
-    matrices as small as these.)
+    A one-dimensional array represents a diagonal matrix.  (scipy's `kron` is five times slower on
+    such small matrices.)
     """
     first, second = (own, cross) if component == 0 else (cross, own)
     (rows, columns, values, shape), (rows2, columns2, values2, shape2) = map(
@@ -71,14 +72,14 @@ def get_entries(matrix: Matrix | np.ndarray):
 
 
 def scale_rows(factors: np.ndarray, matrix: Matrix) -> Matrix:
-    """Every row of a matrix times its factor."""
+    """Multiply every row of a matrix by its factor."""
     data = matrix.data * np.repeat(factors, np.diff(matrix.indptr))
     return sparse.csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 @dataclass(frozen=True)
 class Topology:
-    """The matrices that do not depend on where the nodes are."""
+    """The matrices that do not depend on the node positions."""
 
     free: Matrix  # unknowns of the stream function -> all nodes
     through: int | None  # the unknown that is the volume flux through a periodic layer
@@ -87,14 +88,14 @@ class Topology:
     spread: Matrix  # volume fluxes of faces -> through the faces of control volumes
     averages: tuple[Matrix, Matrix]  # velocities of faces -> cells
     outflows: tuple[tuple[Matrix, Matrix], tuple[Matrix, Matrix]]
-    # of both components: what cells, what nodes carry -> out of control volumes
+    # of both components: fluxes in cells and on nodes -> out of control volumes
     outflow: Matrix  # all of these
-    balance: Matrix  # what faces carry -> out of the cells
+    balance: Matrix  # fluxes through faces -> out of the cells
 
 
 @lru_cache(maxsize=8)
 def make_topology(cells: tuple[int, int], periodic: tuple[bool, bool]) -> Topology:
-    """The topology of a grid of so many cells."""
+    """The topology of a grid with the given numbers of cells."""
     axes = tuple(Axis(np.arange(n + 1.0), p) for n, p in zip(cells, periodic, strict=True))
     free, through = free_nodes(axes)
     curls, averages, halves, outflows, balance = [], [], [], [], []
@@ -123,7 +124,7 @@ def make_topology(cells: tuple[int, int], periodic: tuple[bool, bool]) -> Topolo
 
 
 def free_nodes(axes: tuple[Axis, Axis]) -> tuple[Matrix, int | None]:
-    """Matrix from the unknowns of the stream function to all nodes, and the place of the unknown
+    """Matrix from the unknowns of the stream function to all nodes, and the index of the unknown
     that is the volume flux through a periodic layer (None in a box)."""
     shape = tuple(axis.node_count for axis in axes)
     number = np.full(shape, -1)
@@ -142,7 +143,7 @@ def free_nodes(axes: tuple[Axis, Axis]) -> tuple[Matrix, int | None]:
 class Momentum:
     """Matrices of both velocity components on one grid; "around" is the sum around a free node.
 
-    `ends[k]`, of the component k: 1 where a wall across holds the fluid, 0 where it slips along.
+    `ends[k]` of component k: 1 for a no-slip wall, 0 for a free one.
     """
 
     def __init__(self, axes: tuple[Axis, Axis], ends: tuple[Ends, Ends], topology: Topology):
@@ -170,7 +171,7 @@ class Momentum:
         first, second = topology.averages
         parts = [[first, None], [values[0], None], [None, second], [None, values[1]]]
         self.carry: Matrix = sparse.bmat(parts, "csr")  # velocities -> faces of control volumes
-        # sums around free nodes: of the friction over the viscosity, of the momentum
+        # sums around free nodes: of friction over viscosity, and of momentum
         self.friction: Matrix = (over.T @ (sparse.block_diag(stress, "csr") @ over)).tocsr()
         weighted = scale_rows(self.reaches / self.lengths, topology.curl)
         self.mass: Matrix = topology.curl_transposed @ weighted
@@ -192,12 +193,12 @@ class Momentum:
 
     @cached_property
     def balance(self) -> Matrix:
-        """What the faces of control volumes carry -> sums around free nodes."""
+        """Fluxes through the faces of control volumes -> sums around free nodes."""
         return self.topology.curl_transposed @ scale_rows(1.0 / self.lengths, self.topology.outflow)
 
     @cached_property
     def buoyancy(self) -> tuple[Matrix, Matrix]:
-        """Temperature -> sums around free nodes of a unit pull in x, in y."""
+        """Temperature -> sums around free nodes of a unit force in x and in y."""
         pulls, cut = [], self.axes[0].node_count * self.axes[1].cells
         for k, columns in ((0, slice(0, cut)), (1, slice(cut, None))):
             own, cross = self.axes[k], self.axes[1 - k]
@@ -207,11 +208,11 @@ class Momentum:
         return tuple(pulls)
 
     def sum_around(self, momentum: np.ndarray) -> np.ndarray:
-        """Sums around the free nodes of the control volumes' momentum: no pressure in them."""
+        """Sums of the control volumes' momentum around the free nodes, free of pressure."""
         return self.topology.curl_transposed @ (momentum / self.lengths)
 
     def sum_carried(self, carried: np.ndarray) -> np.ndarray:
-        """Sums around the free nodes of what the faces of control volumes carry."""
+        """Sums around the free nodes of the fluxes through the faces of control volumes."""
         return self.sum_around(self.topology.outflow @ carried)
 
 
@@ -221,12 +222,12 @@ class Heat:
 
     values: Matrix  # temperature -> faces, linear in the distance, 0 on walls
     gradient: Matrix  # temperature -> slope times length on the faces
-    balance: Matrix  # what faces carry -> out of the cells
+    balance: Matrix  # fluxes through faces -> out of the cells
     conduction: Matrix  # temperature -> balance of the gradient
 
 
 def make_heat(axes: tuple[Axis, Axis], ends: tuple[Ends, Ends], topology: Topology) -> Heat:
-    """`ends[k]`: 1 where the wall across direction k is isothermal, 0 where it is not."""
+    """`ends[k]`: 1 if the wall across direction k is isothermal, else 0."""
     values, gradient = [], []
     for k in (0, 1):
         own, cross = axes[k], axes[1 - k]
@@ -272,14 +273,14 @@ class Equations:
         return self.free.shape[1], self.areas.size
 
     def split_faces(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """An array over all faces as its two parts, in their shapes."""
+        """Split an array over all faces into its two parts, in their shapes."""
         first, second = self.face_shapes
         cut = first[0] * first[1]
         return values[:cut].reshape(first), values[cut:].reshape(second)
 
     def _wall_terms(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """On all faces: temperature of isothermal walls [K]; slope times length from it [K];
-        the given heat through the others, in +x or +y [K m2/s].  Zero elsewhere."""
+        """On all faces: temperature of isothermal walls [K]; its part of slope times length [K];
+        the given heat through other walls, in +x or +y [K m2/s].  Zero elsewhere."""
         whole = [np.zeros(self.momentum.lengths.size) for _ in range(3)]
         for k, (low, high) in enumerate(PAIRS):
             own, cross = self.axes[k], self.axes[1 - k]
@@ -310,7 +311,7 @@ class Equations:
         return self.split_faces((self.momentum.curl @ psi) / self.momentum.lengths)
 
     def compute_divergence(self, psi: np.ndarray) -> np.ndarray:
-        """What leaves each cell [m2/s], shape of the cells: zero to round-off."""
+        """Net outflow of each cell [m2/s], shape of the cells: zero to round-off."""
         return (self.heat.balance @ (self.momentum.curl @ psi)).reshape(self.shape)
 
     def compute_conduction(self, fluid: Fluid, temperature: np.ndarray) -> np.ndarray:
@@ -327,7 +328,7 @@ class Equations:
     def compute_residual(
         self, fluid: Fluid, psi: np.ndarray, temperature: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """All but the time derivatives of both equations, zero in the steady state."""
+        """Both equations without their time derivatives; zero in the steady state."""
         momentum = self.momentum.balance @ (
             (self.momentum.volume_flux @ psi) * (self.momentum.velocity @ psi)
         )
@@ -356,7 +357,7 @@ TOLERANCE = 1e-6  # of the residual of a solution, relative to the right-hand si
 
 
 class Factors:
-    """LU of a square sparse matrix; `solve(b)` as often as wanted."""
+    """LU of a square sparse matrix, for any number of calls of `solve`."""
 
     def __init__(self, matrix: sparse.spmatrix, what: str = "matrix"):
         """Factorise; `what` names the matrix in messages.  Raises RunFailure if it is singular."""
@@ -382,7 +383,7 @@ class Factors:
             raise RunFailure(words, cause="singular") from error
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """Solution (n,) for `right` (n,); raises RunFailure where none of use is found."""
+        """Solution (n,) for `right` (n,); raises RunFailure if no accurate one is found."""
         solution = self._factors.solve(right)
         if not self._is_good(solution, right) and not self.exchanged:
             self._exchange_rows()
@@ -398,7 +399,7 @@ class Factors:
 
 
 def _factorise(matrix: sparse.csc_matrix, **options):
-    """`splu`, with MemoryError where SuperLU's factors outgrow the memory or its own indices."""
+    """`splu`, with MemoryError if SuperLU's factors exceed memory or its index range."""
     try:
         return splu(matrix, **options)
     except SystemError as error:  # "gstrf was called with invalid arguments"

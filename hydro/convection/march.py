@@ -1,20 +1,19 @@
-"""Convection in time, on grids that may move: second order, implicit in what diffuses.
+"""Convection in time on grids that may move: second order, implicit in diffusion.
 
-Second-order backward differences of the contents of the control volumes; friction, conduction
-and buoyancy at the new time, what the fluid carries extrapolated to it [AscherRuuthWetton1995]:
+Second-order backward differences of the contents of the control volumes; friction, conduction and
+buoyancy at the new time, convection extrapolated to it [AscherRuuthWetton1995]:
 
     sum_k a_k (A T)^{n+1-k} + dt W [(D psi* - s) (I T*) - kappa G(T^{n+1})] = dt heat
     sum_k a_k O (reach D psi)^{n+1-k}
                       + dt { E [S (D psi* - s) (C u*)] - nu K psi - (b·B) T } = dt O force
 
-a_0, a_1, a_2 for steps of any lengths; starred values are extrapolated; O sums around the free
-nodes, the other letters are those of `equations`, and all matrices are those of the new grid.  s is
-the volume that the faces sweep, per dt, in the same backward difference as the contents: uniform
-temperature and uniform velocity stay what they are to round-off on any moving grid (the geometric
-conservation law).  The fluxes come from a stream function, on any grid, so that mass is conserved
-to round-off in every cell.
+The a_k hold for steps of any length; starred values are extrapolated; O sums around the free nodes,
+the other letters are those of `equations`, and all matrices are those of the new grid.  s is the
+swept volume per dt, in the same backward difference as the contents, so uniform temperature and
+uniform velocity are preserved to round-off on any moving grid (the geometric conservation law).
+The fluxes come from a stream function on any grid, so mass is conserved to round-off in every cell.
 
-Note: the matrices hold a_0/dt.  As long as dt and the grid stay, they are factorised once; a
+Note: the matrices contain a_0/dt.  They are factorised again only when dt or the grid changes; a
 grid that moves in every step costs a factorisation in every step.
 """
 
@@ -34,14 +33,14 @@ from regrid.errors import BadInput, RunFailure
 # (equations of the new grid, time) -> (force on the control volumes of all faces [m4/s2],
 # heat over rho cp into the cells [K m2/s])
 Sources = Callable[[Equations, float], tuple[np.ndarray, np.ndarray]]
-GROWTH = 1.25  # dt grows only when it may grow by this much, so that matrices are kept
+GROWTH = 1.25  # dt grows only if it may grow by this factor, so that matrices are reused
 
 
 @dataclass(frozen=True)
 class Level:
     """The state at one time: its grid's equations, psi (free,), temperature (cells,).
 
-    `entered`: heat over rho cp [K m2] that has come in since the start, from walls and sources.
+    `entered`: heat over rho cp [K m2] added by walls and sources since the start.
     """
 
     equations: Equations
@@ -70,8 +69,8 @@ class Level:
 def compute_swept(old: Equations, new: Equations) -> np.ndarray:
     """Areas swept by all faces between two grids, positive in +x and +y [m2].
 
-    Nodes move uniformly: a face's displacement times its mean length is exact, and what the
-    faces of a cell sweep is exactly what its area grows by.
+    Nodes move uniformly: a face's displacement times its mean length is exact, and the areas that
+    the faces of a cell sweep add up exactly to its growth.
     """
     parts = []
     for k in (0, 1):
@@ -83,7 +82,7 @@ def compute_swept(old: Equations, new: Equations) -> np.ndarray:
 
 
 class March:
-    """A convecting box in time: `level` is the present state, `t` its time [s]."""
+    """A convecting box in time: `level` is the current state, `t` its time [s]."""
 
     def __init__(
         self,
@@ -98,7 +97,7 @@ class March:
     ):
         """Begin from psi (free,) [m2/s] and temperature (cells,) [K]; `longest` bounds dt [s].
 
-        cfl: part of the time in which a cell's content is carried out of it.  Raises BadInput.
+        cfl: fraction of the time in which a cell's content flows out of it.  Raises BadInput.
         """
         if not 0.0 < cfl <= 1.0:
             raise BadInput(f"convection: cfl = {cfl:g} must be above 0 and at most 1")
@@ -116,11 +115,11 @@ class March:
 
     @property
     def equations(self) -> Equations:
-        """Those of the present grid."""
+        """Those of the current grid."""
         return self.level.equations
 
     def compute_longest_step(self) -> tuple[float, str]:
-        """(the longest step [s], what limits it): "flow" through a cell, or "longest" asked for."""
+        """(the longest step [s], its limit): "flow" through a cell, or the given "longest"."""
         equations = self.equations
         flux = np.abs(equations.momentum.curl @ self.level.psi)
         across, up = equations.split_faces(flux)
@@ -139,7 +138,7 @@ class March:
         return self.cfl / fastest, "flow"
 
     def choose_step(self, remaining: float = math.inf) -> float:
-        """dt [s] of the next step: the last one's while that may be, at most `remaining`."""
+        """dt [s] of the next step: the last one if it is still allowed, at most `remaining`."""
         most, limit = self.compute_longest_step()
         if not math.isfinite(most):
             raise BadInput(
@@ -155,9 +154,9 @@ class March:
         return 0.5 * remaining if 2.0 * dt > remaining else dt
 
     def advance(self, dt: float, axes: tuple[np.ndarray, np.ndarray] | None = None) -> None:
-        """One step of length dt [s], to the nodes `axes` (x, y) where the grid moves.
+        """One step of length dt [s], to the nodes `axes` (x, y) if the grid moves.
 
-        Raises RunFailure where the state is no longer finite.
+        Raises RunFailure if the state is no longer finite.
         """
         old, before = self.level, self.before
         new = old.equations if axes is None else Equations(*axes, old.equations.walls)
@@ -174,7 +173,7 @@ class March:
             value = second * getattr(old, name)
             return value if before is None else value + third * getattr(before, name)
 
-        # W (a0 swept - a2 swept before) is what the backward difference makes of the areas
+        # W (a0 swept - a2 swept before) is the backward difference of the areas
         relative = new.momentum.curl @ extrapolate("psi")
         if new is not old.equations:
             relative -= first / dt * compute_swept(old.equations, new)
@@ -206,7 +205,7 @@ class March:
         self.t, self.dt, self.step = t, dt, self.step + 1
 
     def _factorise(self, new: Equations, rate: float) -> tuple[Factors, Factors]:
-        """LU of the heat's and of the momentum's matrix; kept while grid and rate stay."""
+        """LU of the matrices of heat and momentum; reused while grid and rate are unchanged."""
         key = (id(new), rate)
         if self._key != key:
             fluid = self.fluid
@@ -215,7 +214,7 @@ class March:
             flow = rate * new.momentum.mass - fluid.viscosity * new.momentum.friction
             self._factors = Factors(heat, "matrix of the heat"), Factors(flow, "matrix of the flow")
             self._key = key
-            self._held = new  # so that its id is not given away
+            self._held = new  # so that its id is not reused
         return self._factors
 
     def get_state(self) -> dict[str, np.ndarray | float | int | str]:
@@ -231,7 +230,7 @@ class March:
         return state
 
     def set_state(self, state) -> None:
-        """Take up a state of `get_state`."""
+        """Restore a state of `get_state`."""
         walls = self.equations.walls
         now = Equations(state["now/x"], state["now/y"], walls)
         same = bool(state["still"])

@@ -1,16 +1,16 @@
-"""What one reads off a convecting box: Nusselt numbers, greatest speeds, growth of disturbances.
+"""Measurements of a convecting box: Nusselt numbers, greatest speeds, growth of disturbances.
 
-Values between grid points come from cubic splines through the discrete solution and what is known
-on the walls.  Splines are of fourth order, so that the places and values of extremes have the
-error of the solution and hardly any of their own.
+Values between grid points come from cubic splines through the discrete solution and the wall
+values.  Splines are fourth order, so they add little to the error of the solution in the positions
+and values of extrema.
 
 With the Jacobian J of `Equations` and the matrices in front of the time derivatives, growth rates
 are the eigenvalues sigma of -J z = sigma diag(M, A) z.  Those nearest to a given number come from
 shift-and-invert with the sparse LU that Newton's iteration uses.  Note: the disturbance of a growth
-rate is not unique.  A periodic layer has two for each rate, a roll and the same roll a quarter of a
-wavelength on, and any mixture of the two; a simple one has a free sign.  Which of them an
-eigenvalue solver returns depends on the rounding of the machine's linear algebra;
-`filter_disturbance` therefore makes the disturbance from a fixed function.
+rate is not unique.  A periodic layer has two for each rate, a roll and the same roll shifted by a
+quarter of a wavelength, and any linear combination of them; a simple one has an arbitrary sign.
+Which of them an eigenvalue solver returns depends on the round-off of the linear algebra, so
+`filter_disturbance` makes the disturbance from a fixed function.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def compute_local_nusselt(
     side: str,
     scale: float = 1.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(places, Nusselt numbers) (cells,) along a wall: heat that enters the fluid, per length, over
-    kappa times `scale` (temperature difference over distance of the walls)."""
+    """(coordinates, Nusselt numbers) (cells,) along a wall: heat flux into the fluid over kappa
+    times `scale` (temperature difference over distance of the walls)."""
     k = SIDES.index(side) // 2
     cross = equations.axes[1 - k]
     heat = equations.compute_wall_heat(fluid, temperature, side)
@@ -58,9 +58,9 @@ def compute_mean_nusselt(
 
 
 def find_maximum(places: np.ndarray, values: np.ndarray, within=None) -> tuple[float, float]:
-    """(value, place) of the maximum of the cubic spline through points; an end may be it.
+    """(value, position) of the maximum of the cubic spline through points, ends included.
 
-    within: the ends between which a maximum counts, and the two places that may be it too.
+    within: ((low, high), ends), the interval of inner maxima and the two points also compared.
     """
     (low, high), ends = within or ((-np.inf, np.inf), places[[0, -1]])
     spline = CubicSpline(places, values)
@@ -79,10 +79,10 @@ def find_nusselt_maximum(
     side: str,
     scale: float = 1.0,
 ) -> tuple[float, float]:
-    """(value, place) of the greatest local Nusselt number on a wall.
+    """(value, position) of the greatest local Nusselt number on a wall.
 
-    Beside an adiabatic wall the flux has no slope along the wall: it is continued as its own mirror
-    image there, so that a maximum near the corner is not cut.
+    At an adiabatic wall the flux has zero slope along the wall: it is continued by reflection, so
+    that a maximum near the corner is not cut off.
     """
     k = SIDES.index(side) // 2
     places, values = compute_local_nusselt(equations, fluid, temperature, side, scale)
@@ -98,10 +98,9 @@ def find_nusselt_maximum(
 def extract_middle(
     equations: Equations, psi: np.ndarray, component: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(places, velocities) of `component` (0: u, 1: v) along the middle line across it.
+    """(positions, velocities) of `component` (0: u, 1: v) along the middle line across it.
 
-    Of u along x = middle, of v along y = middle; where a wall that holds the fluid ends the line,
-    its zero is among the points.
+    u along x = middle, v along y = middle; at a no-slip wall the zero is among the points.
     """
     values = equations.compute_velocities(psi)[component]
     own, cross = equations.axes[component], equations.axes[1 - component]
@@ -121,7 +120,7 @@ def extract_middle(
 def find_greatest_speed(
     equations: Equations, psi: np.ndarray, component: int
 ) -> tuple[float, float]:
-    """(value, place) of the greatest u on x = middle (0) or v on y = middle (1)."""
+    """(value, position) of the greatest u on x = middle (0) or v on y = middle (1)."""
     return find_maximum(*extract_middle(equations, psi, component))
 
 
@@ -133,7 +132,7 @@ def measure_energy(equations: Equations, psi: np.ndarray) -> float:
 
 
 WANTED = 4  # eigenvalues, of which the fastest is taken
-DETUNING = 1e-3  # distance of the filter's shift from the growth rate, over the rate of free fall
+DETUNING = 1e-3  # distance of the filter's shift from the growth rate, over the free-fall rate
 REPEATS = 20  # of the filter
 
 
@@ -154,11 +153,11 @@ def compute_growth(
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """(growth rate [1/s], psi, temperature) of the fastest disturbance of a steady state.
 
-    Of the eigenvalues nearest to `near` [1/s] the one with the largest real part, and the real
-    part of its disturbance, scaled to a temperature of at most 1; of several such disturbances
-    that of `filter_disturbance`.  Without `near` it is the rate at which a fluid without friction
-    would fall, sqrt(|b| dT / height): nothing grows faster, so the nearest real eigenvalue is the
-    largest.  Raises RunFailure where the iteration finds none.
+    It is the eigenvalue with the largest real part among those nearest to `near` [1/s], with the
+    real part of its disturbance, scaled to a maximum temperature of 1; if the disturbance is not
+    unique, that of `filter_disturbance`.  The default of `near` is the free-fall rate without
+    friction, sqrt(|b| dT / height): nothing grows faster, so the nearest real eigenvalue is the
+    largest.  Raises RunFailure if the iteration finds none.
     """
     height = equations.axes[1].length
     fall = math.hypot(*fluid.buoyancy) * float(np.ptp(temperature)) / height
@@ -196,15 +195,15 @@ def filter_disturbance(
 ) -> np.ndarray:
     """The disturbance (n,) of growth rate `rate` [1/s] in the temperature exp(x/width + y/height).
 
-    From rest with that temperature, REPEATS times over, with B `operator`, N `mass`,
+    From rest with that temperature, repeated REPEATS times, with B `operator` and N `mass`,
 
         z <- (shift - rate) (shift N - B)^-1 N z,      shift = rate + detuning
 
-    leaves as it is what belongs to `rate` and multiplies what belongs to another rate s by
-    (shift - rate)/(shift - s).  The limit is the projection on the space of `rate` along all
-    others.  It depends on no choice of vectors in that space, and rates much nearer to each other
-    than `detuning` [1/s] count as one.  The function has a part of every roll, whatever its
-    symmetry.  Of an oscillating disturbance it is the real part.
+    leaves the component of `rate` unchanged and multiplies that of another rate s by (shift -
+    rate)/(shift - s).  The limit is the projection on the eigenspace of `rate` along all others.
+    It does not depend on a basis of that space, and rates much closer than `detuning` [1/s] count
+    as one.  The function has a component in every roll, whatever its symmetry.  For an oscillating
+    disturbance the result is the real part.
     """
     rate = rate if rate.imag else rate.real
     factors = Factors((operator - (rate + detuning) * mass).tocsc(), "filter of disturbances")
@@ -220,8 +219,8 @@ def find_onset(
 ) -> float:
     """Ra at which the fluid at rest becomes unstable, bracketed between `low` and `high`.
 
-    In the scales in which `fluid` has L = dT = 1; `tolerance` is relative to `low`.
-    Raises BadInput where the growth rate has one sign at both ends.
+    In the scales in which `fluid` has L = dT = 1; `tolerance` is relative to `low`.  Raises
+    BadInput if the growth rate has the same sign at both ends.
     """
     still, conducted = solve_rest(equations, fluid)
 

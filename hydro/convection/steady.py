@@ -1,14 +1,14 @@
-"""Steady convection: Newton's iteration, in stages of growing buoyancy, on a grid that may follow.
+"""Steady convection: Newton's iteration in stages of growing buoyancy, on an adaptive grid.
 
 Every call of `iterate` is one Newton step with a sparse direct solution.  From rest, buoyancy grows
-by factors of ten; a stage that does not converge is taken back and tried with half the factor (in
-the logarithm).  At the full buoyancy the grid is corrected once every so many iterations, as in
-[Polevikov1983], the state goes to the new grid, and the iteration simply goes on.  Note: a fluid
-heated from below that starts at rest stays there, however unstable that is.
+by factors of ten; a stage that does not converge is retried with half the factor (in the
+logarithm).  At full buoyancy the grid is corrected every few iterations, as in [Polevikov1983], the
+state is transferred to the new grid, and the iteration continues.  Note: a fluid heated from below
+that starts at rest stays there, however unstable that is.
 
-From grid to grid the stream function is interpolated as it stands: mass stays conserved on any
-grid.  Of the temperature the double integral from a corner is interpolated, and differenced again,
-so that the heat in the box stays the same to round-off.
+Between grids the stream function itself is interpolated, so mass is conserved on any grid.  For the
+temperature the double integral from a corner is interpolated and differenced again, so the heat in
+the box is conserved to round-off.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def transfer(
 
 
 def interpolate_nodes(old: Equations, new: Equations, values: np.ndarray) -> np.ndarray:
-    """Values at all nodes, both ends of a periodic axis among them, on those of `new`."""
+    """Values at all nodes, with both ends of a periodic axis, interpolated to those of `new`."""
     for k in (0, 1):
         values = CubicSpline(old.axes[k].nodes, values, axis=k)(new.axes[k].nodes)
     return values
@@ -61,7 +61,7 @@ def restrict_nodes(equations: Equations, values: np.ndarray) -> np.ndarray:
 
 
 def close_ends(equations: Equations, values: np.ndarray) -> np.ndarray:
-    """Values on the nodes with the first ones of a periodic axis once more at its end."""
+    """Values on the nodes, with the first ones of a periodic axis repeated at its end."""
     for k, axis in enumerate(equations.axes):
         if axis.periodic:
             values = np.concatenate([values, np.take(values, [0], axis=k)], axis=k)
@@ -71,7 +71,7 @@ def close_ends(equations: Equations, values: np.ndarray) -> np.ndarray:
 def compute_nodal_fields(
     equations: Equations, psi: np.ndarray, temperature: np.ndarray, diffusivity: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """u, v [m/s] and temperature [K] at the nodes, each (nx + 1, ny + 1), the walls' own there."""
+    """u, v [m/s] and temperature [K] at the nodes, each (nx + 1, ny + 1), with the wall values."""
     u, v = equations.compute_velocities(psi)
     across, up = equations.axes
     u = to_nodes(up, u, 1, *(slip(equations, side) for side in PAIRS[1]))
@@ -84,14 +84,14 @@ def compute_nodal_fields(
 
 
 def slip(equations: Equations, side: str) -> float | None:
-    """Velocity along a wall: 0, or None where the fluid is free."""
+    """Velocity along a wall: 0, or None for a free one."""
     return None if equations.walls[side].flow == "free" else 0.0
 
 
 def wall_values(
     equations: Equations, side: str, heat: np.ndarray, diffusivity: float, k: int
 ) -> np.ndarray | float | None:
-    """Temperature of a wall at the places of `heat` along it; None in a periodic axis."""
+    """Temperature of a wall at the points of `heat` along it; None for a periodic axis."""
     own, cross = equations.axes[k], equations.axes[1 - k]
     if own.periodic:
         return 0.0
@@ -106,8 +106,8 @@ def wall_values(
 
 
 def to_nodes(axis: Axis, values: np.ndarray, k: int, low, high) -> np.ndarray:
-    """Cell values along direction k on its nodes, linear between; at walls `low`, `high`, or the
-    nearest value where that is None."""
+    """Cell values along direction k interpolated linearly to its nodes; at walls `low`, `high`, or
+    the nearest value if that is None."""
     cells = np.moveaxis(values, k, 0)
     nodal = axis.interpolate_to_nodes() @ cells
     if not axis.periodic:
@@ -117,22 +117,22 @@ def to_nodes(axis: Axis, values: np.ndarray, k: int, low, high) -> np.ndarray:
 
 
 FIRST_RAYLEIGH = 1e4  # Newton's iteration converges from rest up to here
-ROUGHLY = 1e-3  # change at which a stage before the last is good enough
+ROUGHLY = 1e-3  # change at which a stage before the last counts as converged
 LONGEST_STAGE = 15  # iterations
 LEAST_FACTOR = 1e-3  # of a stage, in the decimal logarithm
-LEAST_CAUTION = 1e-3  # of a correction of the grid, in itself
+LEAST_CAUTION = 1e-3  # least fraction of a grid correction
 SETTLING = 1e-2  # change at which the grid is corrected
 
-# of the solver, in its state
+# of the solver's state
 COUNTERS = ("iterations", "stage_iterations", "corrections")
 NUMBERS = ("change", "stage_best", "grid_shift", "residual", "exponent", "factor", "caution")
 
 
 @dataclass(frozen=True)
 class GridControl:
-    """How the grid follows the flow: kind of `tensor_grids`, every so many iterations or steps.
+    """How the grid adapts: kind of `tensor_grids`, and iterations or steps between corrections.
 
-    `tolerance`: largest shift of a node, in mean steps, at which the grid counts as settled.
+    `tolerance`: largest shift of a node, in mean spacings, at which the grid counts as settled.
     """
 
     kind: str = "uniform"
@@ -154,7 +154,7 @@ class GridControl:
     def correct(
         self, equations: Equations, fluid: Fluid, psi: np.ndarray, temperature: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Both axes after one correction by the present solution."""
+        """Both axes after one correction by the current solution."""
         across, up = (axis.nodes for axis in equations.axes)
         u, v, heat = compute_nodal_fields(equations, psi, temperature, fluid.diffusivity)
         return correct_tensor_grid(self.kind, across, up, u, v, heat, **self.options)
@@ -168,7 +168,7 @@ def sample_walls(equations: Equations):
 
 
 def measure_difference(equations: Equations, fluid: Fluid) -> float:
-    """Range of the walls' temperatures [K], or what the largest given flux would make of it."""
+    """Range of the walls' temperatures [K], or that which the largest given flux would cause."""
     known = []
     for k, temperature, flux in sample_walls(equations):
         if temperature is not None:
@@ -186,7 +186,7 @@ def make_rest(equations: Equations) -> tuple[np.ndarray, np.ndarray]:
 
 
 class SteadySolver:
-    """A steady state in the making: `equations`, `psi`, `temperature` are the present iterate."""
+    """Solver of a steady state: `equations`, `psi`, `temperature` are the current iterate."""
 
     def __init__(
         self,
@@ -198,8 +198,8 @@ class SteadySolver:
     ):
         """Begin from rest, or at full buoyancy from `start` (psi, temperature).
 
-        `tolerance`: relative change of the state at which it is steady.  Raises BadInput where the
-        walls leave the temperature open, so that no steady state is determined.
+        `tolerance`: relative change of the state at which it is steady.  Raises BadInput if the
+        walls do not fix the temperature, so that no steady state is determined.
         """
         check_steady(equations)
         self.equations, self.target, self.tolerance = equations, fluid, tolerance
@@ -210,7 +210,7 @@ class SteadySolver:
         self.residual = math.inf
         height = equations.axes[1].length
         rayleigh = fluid.compute_rayleigh(height, self.difference)
-        self.exponent, self.factor = 0.0, 1.0  # buoyancy is 10**exponent of the wanted one
+        self.exponent, self.factor = 0.0, 1.0  # buoyancy is 10**exponent of the full one
         if start is None:
             self.psi, self.temperature = make_rest(equations)
             if rayleigh > FIRST_RAYLEIGH:
@@ -220,11 +220,11 @@ class SteadySolver:
             self.psi, self.temperature = (np.array(part, dtype=np.float64) for part in start)
         self.good = (self.exponent, self.psi, self.temperature)
         self.before_correction: tuple | None = None  # equations, psi, temperature
-        self.caution = 1.0  # part of each correction of the grid that is made
+        self.caution = 1.0  # fraction of each grid correction that is applied
 
     @property
     def fluid(self) -> Fluid:
-        """The fluid of the present stage."""
+        """The fluid of the current stage."""
         scale = 10.0**self.exponent
         wanted = self.target
         x, y = wanted.buoyancy
@@ -237,9 +237,9 @@ class SteadySolver:
         return self.exponent == 0.0 and self.change <= self.tolerance and settled
 
     def iterate(self) -> None:
-        """One Newton step; before it the grid is corrected when that is due.
+        """One Newton step, preceded by a grid correction if one is due.
 
-        Raises RunFailure where no stage, however short, converges.
+        Raises RunFailure if no stage, however short, converges.
         """
         if self._is_correction_due():
             self._correct_grid()
@@ -257,7 +257,7 @@ class SteadySolver:
             return
         by_psi, by_temperature = np.split(step, self.equations.sizes[:1])
         self.psi, self.temperature = self.psi + by_psi, self.temperature + by_temperature
-        # a flow weaker than the diffusivity is judged by that: at rest psi is all round-off
+        # a flow weaker than the diffusivity is scaled with that: at rest psi is pure round-off
         flow = max(float(np.abs(self.psi).max()), self.target.diffusivity)
         self.change = max(
             float(np.abs(by_psi).max()) / flow,
@@ -305,7 +305,7 @@ class SteadySolver:
         self._begin_stage()
 
     def _take_correction_back(self) -> None:
-        """Return to the grid before the last correction, and go half as far from now on."""
+        """Return to the grid before the last correction, and halve all further ones."""
         self.equations, self.psi, self.temperature = self.before_correction
         self.caution *= 0.5
         if self.caution < LEAST_CAUTION:
@@ -323,7 +323,7 @@ class SteadySolver:
         return self.stage_iterations >= self.grid.every or not self.corrections
 
     def _correct_grid(self) -> None:
-        """One correction of both axes; the state goes over to the new grid."""
+        """One correction of both axes; the state is transferred to the new grid."""
         old = self.equations
         wanted = self.grid.correct(old, self.target, self.psi, self.temperature)
         axes = [
@@ -360,7 +360,7 @@ class SteadySolver:
         return state
 
     def set_state(self, state: Mapping[str, np.ndarray | float | int]) -> None:
-        """Take up a state of `get_state`."""
+        """Restore a state of `get_state`."""
         walls = self.equations.walls
         for name in COUNTERS:
             setattr(self, name, int(state[name]))
@@ -389,7 +389,7 @@ class SteadySolver:
 
 
 def check_steady(equations: Equations) -> None:
-    """Raise BadInput where the walls fix no temperature: no steady state is determined then."""
+    """Raise BadInput if the walls fix no temperature, so that no steady state is determined."""
     if fixes_temperature(equations.walls):
         return
     flows = (flux @ equations.axes[1 - k].widths for k, _, flux in sample_walls(equations))

@@ -1,28 +1,29 @@
-"""Grids of axes that follow a convecting fluid: one dimension, and tensor grids in two.
+"""Adaptive grids for convection: one-dimensional axes, and tensor grids of two of them.
 
-An axis is an increasing array of nodes.  `make_axis` gives a first one, `correct_axis` moves its
-nodes once after what the solver has found on it; repeated, it settles where weight times step is
-equal on all steps.  The kinds differ in the weight:
+An axis is an increasing array of nodes.  `make_axis` returns an initial one; `correct_axis` moves
+its nodes once, from the solution on it, and converges when repeated to equal weight times spacing
+everywhere.  The kinds differ in the weight:
 
-- uniform: none, the axis stays as it is.
-- clustered: a formula, nodes drawn to one wall or to both; stays as it is.
-- polevikov: the mean speed of the step, so that all steps have one grid Reynolds number.  Each
-  correction is exactly theory R11.2; in two dimensions it takes the averages of theory R11.3.
-- monitor: 1 + strength |gradient| / (mean |gradient|), theory R11.4.  Where the field does
-  all its changing in one layer, the part strength / (1 + strength) of the nodes goes there.
-- combined: the mean of polevikov's and monitor's densities of nodes, so that each of the two
-  keeps its part of its own nodes whatever the other wants.
+- uniform: none, the axis stays unchanged.
+- clustered: nodes concentrated at one wall or both by a formula; stays unchanged.
+- polevikov: the mean speed in the cell, so that all cells have the same grid Reynolds number.  Each
+  correction is exactly theory R11.2; in two dimensions it uses the averages of theory R11.3.
+- monitor: 1 + strength |gradient| / (mean |gradient|), theory R11.4.  If the field varies in one
+  layer only, that layer receives the fraction strength / (1 + strength) of the nodes.
+- combined: the mean of the node densities of polevikov and monitor, so that each of the two keeps
+  its share of the nodes.
 
-Polevikov's weight vanishes at a wall without slip, where the boundary layer of the heat is: the
-step there is the longest in the layer, and falls as N^-1/2 only.  That is what the others are for.
+Polevikov's weight vanishes at a no-slip wall, where the thermal boundary layer is: the spacing
+there is the largest in the layer, and falls only as N^-1/2.  The other kinds avoid this.
 
-Stagnant fluid: a speed below the part `floor` of the largest counts as that part, so steps there
-are equal among themselves, finite, and at most about 1/floor times the shortest.
+Stagnant fluid: a speed below the fraction `floor` of the largest counts as that fraction, so
+spacings there are equal, finite, and at most about 1/floor times the shortest.
 
-Note: without a bound on neighbours (`ratio` inf) corrections by a speed that is zero in half
-the box swing for ever, because old long steps say nothing of what lies inside them;
-with it they settle, smooth speeds in 10 to 40 corrections, soonest with a `relaxation` of .7.
-Where the bound begins to act nodes jump by a part of a step, because steps then grow evenly.
+Note: without a bound on neighbours (`ratio` inf), corrections by a speed that is zero in half the
+box oscillate for ever, because long old cells do not resolve what lies inside them.  With the bound
+they converge, for smooth speeds in 10 to 40 corrections, fastest with a `relaxation` of .7.  Where
+the bound starts to act, nodes jump by a fraction of a cell, because spacings then grow at a
+constant ratio.
 
 Sources: [Polevikov1983]; [KhakimzyanovShokina1998] §1; the bound on neighbours after the padding
 of a weight by [KautskyNichols1980].
@@ -41,12 +42,12 @@ from regrid.errors import BadInput, suggest
 
 KINDS = ("uniform", "clustered", "polevikov", "monitor", "combined")
 WALLS = ("both", "low", "high")
-FLOOR = 0.02  # of the largest speed: less counts as so much
-# Most of neighbouring steps' ratio unless told otherwise: Polevikov's grid has 1/(sqrt(2) - 1) =
-# 2.414 beside a wall; layers thinner than the others can grade away from were best with 1.5.
+FLOOR = 0.02  # of the largest speed: lower speeds count as this
+# Default bounds on the ratio of neighbouring spacings: Polevikov's grid has 1/(sqrt(2) - 1) = 2.414
+# beside a wall; for very thin layers 1.5 was best with the other kinds.
 RATIOS = {"polevikov": 2.5, "monitor": 1.5, "combined": 1.5}
-THINNEST = 1e-9  # of the axis: thinner steps at a wall leave the equations no digits
-FINER = 8  # points on a step of the old axis where a bounded spacing is found
+THINNEST = 1e-9  # of the axis: smaller spacings at a wall are lost to round-off
+FINER = 8  # points per old cell in the computation of a bounded spacing
 
 Function = Callable[[np.ndarray], np.ndarray]
 
@@ -62,13 +63,13 @@ def make_axis(
     clustering: float = 2.0,
     floor: float = FLOOR,
 ) -> np.ndarray:
-    """Nodes (n + 1,) [m] of an axis of `n` steps from `low` to `high`.
+    """Nodes (n + 1,) [m] of an axis of `n` cells from `low` to `high`.
 
-    clustered: `x = low + (high - low) tanh(b q) / tanh(b)` and its mirror images, b =
-    `clustering` (2: the step at the wall is a quarter of the uniform one; 3: 3 %), dense at
-    `walls` (both, low, high).  The kinds that follow the solution start uniform, as Polevikov's do,
-    unless `profile` is known everywhere: for polevikov the speed x -> |v| [m/s], for monitor the
-    positive weight x -> w itself; then the axis is the converged one.  Raises BadInput.
+    clustered: `x = low + (high - low) tanh(b q) / tanh(b)` and its mirror images with b =
+    `clustering` (2: the spacing at the wall is a quarter of the uniform one; 3: 3 %), clustered at
+    `walls` (both, low, high).  The adaptive kinds start uniform, as Polevikov's do, unless
+    `profile` is a known function: for polevikov the speed x -> |v| [m/s], for monitor the positive
+    weight x -> w itself; then the axis is the converged one.  Raises BadInput.
     """
     check_kind(kind)
     if n != int(n) or n < 3:
@@ -90,7 +91,7 @@ def make_axis(
 def make_clustered_axis(
     n: int, low: float, high: float, walls: str = "both", clustering: float = 2.0
 ) -> np.ndarray:
-    """Nodes (n + 1,) dense at a wall or both by the hyperbolic tangent; see `make_axis`."""
+    """Nodes (n + 1,) clustered at one or both walls by the hyperbolic tangent; see `make_axis`."""
     if walls not in WALLS:
         raise BadInput(f"walls = {walls!r}: nodes are drawn to 'both', 'low' or 'high'")
     if not 0.0 < clustering <= 20.0:
@@ -100,7 +101,7 @@ def make_clustered_axis(
         law = 0.5 * (1.0 + np.tanh(clustering * q) / np.tanh(clustering))
     else:
         q = np.linspace(0.0, 1.0, n + 1)
-        law = np.tanh(clustering * q) / np.tanh(clustering)  # dense at the high end
+        law = np.tanh(clustering * q) / np.tanh(clustering)  # clustered at the high end
         law = 1.0 - law[::-1] if walls == "low" else law
     if np.diff(law).min() < THINNEST:
         raise BadInput(
@@ -123,16 +124,16 @@ def correct_axis(
     share: float = 0.5,
     relaxation: float = 1.0,
 ) -> np.ndarray:
-    """Nodes (n + 1,) after one correction of the axis `x` (n + 1,) [m]; the ends stay.
+    """Nodes (n + 1,) after one correction of the axis `x` (n + 1,) [m]; the ends are fixed.
 
     profile: for polevikov the speed [m/s] at the nodes (n + 1,); for monitor a field at the nodes
-    (n + 1,) or the size of its gradient on the steps (n,); for combined both, (speed, field).
-    Other kinds do not look at it and return a copy of `x`.
+    (n + 1,) or the size of its gradient in the cells (n,); for combined both, (speed, field).
+    Other kinds ignore it and return a copy of `x`.
 
-    floor: part of the largest speed that any speed counts as, at least.  ratio: no step is longer
-    than so many times its neighbour (left out: RATIOS of the kind; inf: no bound).  strength: of
-    the gradient in the monitor; share: of polevikov's density in the combined one.  relaxation:
-    part of the correction made, in (0, 1].  Raises BadInput.
+    floor: lower bound on speeds, as a fraction of the largest.  ratio: bound on the ratio of
+    neighbouring spacings (default: RATIOS of the kind; inf: no bound).  strength: of the gradient
+    in the monitor; share: of polevikov's density in combined.  relaxation: fraction of the
+    correction applied, in (0, 1].  Raises BadInput.
     """
     check_kind(kind)
     x = np.asarray(x, dtype=float)
@@ -164,7 +165,7 @@ def correct_axis(
             weight += (1.0 - share) * weigh_gradient(x, profile[1], strength)
         placed = place_nodes(x, weight, ratio)
     if relaxation < 1.0:
-        # The mean of two axes that keep a bound on neighbours keeps it too.
+        # The mean of two axes that satisfy the bound on neighbours satisfies it, too.
         placed = x + relaxation * (placed - x)
         placed[0], placed[-1] = x[0], x[-1]
     return placed
@@ -179,7 +180,7 @@ def correct_tensor_grid(
     field: np.ndarray | None = None,
     **options,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Both axes after one correction (theory R11.2, or what `kind` puts in its place).
+    """Both axes after one correction (theory R11.2, or its equivalent for `kind`).
 
     x (ni + 1,), y (nj + 1,) [m]; u, v [m/s] and `field` (for monitor and combined, e.g. the
     temperature) at the nodes, shape (ni + 1, nj + 1).  options: those of `correct_axis`.
@@ -211,7 +212,7 @@ def compute_speed_averages(
 def compute_gradient_averages(
     x: np.ndarray, y: np.ndarray, field: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Root mean squares of ∂f/∂x on the steps of x (ni,) and of ∂f/∂y on those of y (nj,).
+    """Root mean squares of ∂f/∂x in the cells of x (ni,) and of ∂f/∂y in those of y (nj,).
 
     field: (ni + 1, nj + 1) at the nodes; the mean is along the other axis, as in theory R11.3.
     """
@@ -224,20 +225,20 @@ def compute_gradient_averages(
 
 
 def compute_grid_reynolds(x: np.ndarray, speed: np.ndarray, viscosity: float = 1.0) -> np.ndarray:
-    """Grid Reynolds numbers (n,) of the steps, `(x[i] - x[i-1]) (|v[i-1]| + |v[i]|) / (2 nu)`."""
+    """Grid Reynolds numbers (n,) of the cells, `(x[i] - x[i-1]) (|v[i-1]| + |v[i]|) / (2 nu)`."""
     size = np.abs(speed)
     return 0.5 * np.diff(x) * (size[1:] + size[:-1]) / viscosity
 
 
 def compute_neighbour_ratio(x: np.ndarray) -> float:
-    """The largest ratio of a step to its neighbour, at least 1."""
+    """The largest ratio of neighbouring spacings, at least 1."""
     steps = np.abs(np.diff(x))
     quotient = steps[1:] / steps[:-1]
     return float(np.maximum(quotient, 1.0 / quotient).max(initial=1.0))
 
 
 def weigh_speed(x: np.ndarray, speed: np.ndarray, floor: float) -> np.ndarray:
-    """Polevikov's weight on the steps (n,) with mean 1 over the axis; 1 where nothing moves."""
+    """Polevikov's weight in the cells (n,) with mean 1 over the axis; 1 if nothing moves."""
     size = np.abs(check_profile(speed, x))
     sums = size[1:] + size[:-1]
     if not sums.max() > 0.0:
@@ -247,9 +248,9 @@ def weigh_speed(x: np.ndarray, speed: np.ndarray, floor: float) -> np.ndarray:
 
 
 def weigh_gradient(x: np.ndarray, field: np.ndarray, strength: float) -> np.ndarray:
-    """The monitor on the steps (n,) with mean 1 over the axis; 1 where the field is constant.
+    """The monitor in the cells (n,) with mean 1 over the axis; 1 if the field is constant.
 
-    field: at the nodes (n + 1,), or the size of its gradient on the steps (n,).
+    field: at the nodes (n + 1,), or the size of its gradient in the cells (n,).
     """
     given = np.asarray(field, dtype=float)
     if given.shape != (x.size - 1,):
@@ -264,12 +265,12 @@ def weigh_gradient(x: np.ndarray, field: np.ndarray, strength: float) -> np.ndar
 
 
 def place_nodes(x: np.ndarray, weight: np.ndarray, ratio: float) -> np.ndarray:
-    """Nodes (n + 1,) with equal integrals of `weight` (n,), given on the steps of `x` (n + 1,).
+    """Nodes (n + 1,) with equal integrals of `weight` (n,), given in the cells of `x` (n + 1,).
 
-    Where neighbours would differ by more than `ratio`, the steps wanted, h = C / weight, are cut
-    to the least of `h(x') + ln(ratio) |x - x'|` over all x', which is how steps grow whose
-    neighbours differ by that ratio; C is then the one that has room for n of them.  What the steps
-    still lack of the bound, they get by `bound_steps`.
+    Where neighbours would differ by more than `ratio`, the wanted spacings h = C / weight are cut
+    to the minimum of `h(x') + ln(ratio) |x - x'|` over all x', the growth of spacings with that
+    ratio of neighbours; C is chosen so that n of them fit.  `bound_steps` enforces the bound on
+    what remains.
     """
     n = weight.size
     free = invert_integral(x, weight, n)
@@ -281,14 +282,14 @@ def place_nodes(x: np.ndarray, weight: np.ndarray, ratio: float) -> np.ndarray:
     reach = np.log(ratio) * 0.5 * (fine[1:] + fine[:-1])
 
     def cut(constant: float) -> np.ndarray:
-        # lower envelope of cones that stand on every step, from the left and from the right
+        # lower envelope of cones over all cells, from the left and from the right
         steps = np.minimum.accumulate(constant * wanted - reach) + reach
         return np.minimum.accumulate((steps + reach)[::-1])[::-1] - reach
 
     def excess(logarithm: float) -> float:
         return float((widths / cut(np.exp(logarithm))).sum()) - n
 
-    # Without the cut n steps fit exactly; the cut asks for more, so C has to grow.
+    # Without the cut n cells fit exactly; the cut needs more, so C has to grow.
     least = most = float(np.log((widths / wanted).sum() / n))
     while excess(most) > 0.0 and most < least + 60.0:
         most += 1.0
@@ -297,7 +298,7 @@ def place_nodes(x: np.ndarray, weight: np.ndarray, ratio: float) -> np.ndarray:
 
 
 def invert_integral(x: np.ndarray, weight: np.ndarray, n: int) -> np.ndarray:
-    """Nodes (n + 1,) at equal parts of the integral of `weight`, monotone between the old ones."""
+    """Nodes (n + 1,) at equal fractions of the integral of `weight`, monotone between old nodes."""
     integral = np.append(0.0, np.cumsum(weight * np.diff(x)))
     placed = PchipInterpolator(integral, x)(np.linspace(0.0, integral[-1], n + 1))
     placed[0], placed[-1] = x[0], x[-1]
@@ -305,7 +306,7 @@ def invert_integral(x: np.ndarray, weight: np.ndarray, n: int) -> np.ndarray:
 
 
 def bound_steps(x: np.ndarray, ratio: float) -> np.ndarray:
-    """Nodes whose steps are at most `ratio` times their neighbours: longer ones are cut."""
+    """Nodes whose spacings are at most `ratio` times their neighbours; larger ones are cut."""
     steps = np.diff(x)
     for order in (range(1, steps.size), range(steps.size - 2, -1, -1)):
         towards = -1 if order.step > 0 else 1
@@ -324,7 +325,7 @@ def check_kind(kind: str) -> None:
 
 
 def check_floor(floor: float) -> None:
-    """Raise BadInput unless `floor` can be a part of the largest speed."""
+    """Raise BadInput unless `floor` is a valid fraction of the largest speed."""
     if not 0.0 < floor < 1.0:
         raise BadInput(
             f"floor = {floor}: the least speed is a part of the largest, above 0 below 1"
@@ -332,7 +333,7 @@ def check_floor(floor: float) -> None:
 
 
 def check_profile(profile: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """`profile` as floats; BadInput unless it has one finite value a node."""
+    """`profile` as floats; BadInput unless it has one finite value per node."""
     values = np.asarray(profile, dtype=float)
     if values.shape != x.shape or not np.isfinite(values).all():
         raise BadInput(

@@ -1,9 +1,9 @@
 """Jones–Wilkins–Lee products of an explosive, and the explosive itself before it burns.
 
 p = A (1 - w/(R1 V)) exp(-R1 V) + B (1 - w/(R2 V)) exp(-R2 V) + w rho0 e / V with V = rho0/rho.  The
-explosive at rest is the same law at so low an energy that p = 0: burning
-(`hydro.sources`) adds what is missing up to the energy E0 of the products [Lee,
-Hornig & Kury 1968].  Note: `energy0` is an energy per volume of the explosive, e is per mass.
+explosive at rest is the same EOS at the low energy for which p = 0; burning (`hydro.sources`) adds
+the difference to the energy E0 of the products [Lee, Hornig & Kury 1968].  Note: `energy0` is an
+energy per volume of the explosive, whereas e is per mass.
 """
 
 from __future__ import annotations
@@ -68,9 +68,9 @@ def least_pressure(parameters):
 @dataclass(frozen=True)
 class JWL(EquationOfState):
     """Products with `rho0` of the explosive [kg/m³], `a`, `b`, `energy0` [Pa = J/m³], `r1`, `r2`,
-    `omega`, and `strength`, the tension at which the explosive breaks [Pa].
+    `omega`, and `strength`, the tension at which the explosive fails [Pa].
 
-    Raises BadInput when one is not positive (`strength` may be 0).
+    Raises BadInput if one is not positive (`strength` may be 0).
     """
 
     rho0: float = 1630.0
@@ -98,9 +98,9 @@ class JWL(EquationOfState):
 
     @property
     def wave_law(self) -> tuple[float, float, float]:
-        """That of the gas whose waves have the curvature of the products' at the CJ state.
+        """Wave curve of the gas with the same curvature as the products at the CJ state.
 
-        There gamma = rho c²/p = rho0 D²/p - 1, and a = b = (gamma + 1)/4.
+        At that state gamma = rho c²/p = rho0 D²/p - 1, and a = b = (gamma + 1)/4.
         """
         speed, pressure, _ = self.find_detonation()
         slope = 0.25 * self.rho0 * speed**2 / pressure
@@ -108,15 +108,15 @@ class JWL(EquationOfState):
 
     @property
     def heat(self) -> float:
-        """Energy per mass [J/kg] that burning adds to the explosive at rest, p = 0."""
+        """Energy per mass [J/kg] that burning adds to the explosive at rest at p = 0."""
         return self.energy0 / self.rho0 - float(self.energy(self.rho0, 0.0))
 
     @functools.cache  # noqa: B019 - a frozen dataclass of eight numbers
     def find_detonation(self) -> tuple[float, float, float]:
         """Chapman–Jouguet speed [m/s], pressure [Pa] and density [kg/m³] from rest at p = 0.
 
-        On the Hugoniot of the products, e - E0/rho0 = p (1/rho0 - 1/rho)/2, the line from the
-        explosive is steepest where it touches: the least speed D² = p / (rho0² (1/rho0 - 1/rho)).
+        On the Hugoniot of the products, e - E0/rho0 = p (1/rho0 - 1/rho)/2, the Rayleigh line from
+        the explosive is tangent at the CJ state: the least speed D² = p / (rho0² (1/rho0 - 1/rho)).
         """
         from scipy.optimize import minimize_scalar
 

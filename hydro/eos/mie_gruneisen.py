@@ -2,8 +2,8 @@
 
 p = pH(rho) + rho0 G0 (e - eH(rho)) with eta = 1 - rho0/rho; in compression
 pH = rho0 c0² eta / (1 - s eta)² and eH = pH eta / (2 rho0), in expansion pH = rho0 c0² eta and
-eH = 0.  p = e = 0 at rho0.  Note: 1 - s eta = 0 is the limit of compression;
-p(e) divides by the number that e(p) multiplies by, lest rounding add up (`hydro.eos.gases`).
+eH = 0.  p = e = 0 at rho0.  1 - s eta = 0 is the limit of compression.  p(e) divides by the same
+factor that e(p) multiplies by, so that round-off does not accumulate (`hydro.eos.gases`).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ RHO0, C0, S, GRUNEISEN, STRENGTH = range(5)  # positions in the parameter tuple
 
 @inlined
 def reference_pressure(rho, parameters):
-    """pH of both branches."""
+    """pH in compression and expansion."""
     eta = 1.0 - parameters[RHO0] / rho
     compression = 0.5 * (eta + abs(eta))
     narrowing = 1.0 / (1.0 - parameters[S] * compression)
@@ -27,7 +27,7 @@ def reference_pressure(rho, parameters):
 
 @inlined
 def reference_energy(rho, parameters):
-    """eH of both branches."""
+    """eH in compression and expansion."""
     eta = 1.0 - parameters[RHO0] / rho
     compression = 0.5 * (eta + abs(eta))
     speed = parameters[C0] * compression * (1.0 / (1.0 - parameters[S] * compression))
@@ -50,13 +50,13 @@ def energy(rho, p, parameters):
 
 @inlined
 def sound_speed_squared(rho, p, parameters):
-    """c² = dp/drho at constant e + (p/rho²) dp/de, but for what is torn (`tension`)."""
+    """c² = dp/drho at constant e + (p/rho²) dp/de, except in failed material (`tension`)."""
     rho0 = parameters[RHO0]
     ratio = rho0 / rho
     eta = 1.0 - ratio
     compression = 0.5 * (eta + abs(eta))
     narrowing = 1.0 / (1.0 - parameters[S] * compression)
-    # with n = 1/(1 - s eta): dpH/drho is (c0 rho0/rho)² n² (2 n - 1), less what heating takes
+    # with n = 1/(1 - s eta): dpH/drho is (c0 rho0/rho)² n² (2 n - 1), less the thermal part
     gruneisen = parameters[GRUNEISEN]
     stiffness = (parameters[C0] * parameters[C0]) * (narrowing * narrowing)
     slope = stiffness * (narrowing * (2.0 - gruneisen * compression) - 1.0)
@@ -72,7 +72,7 @@ def least_pressure(parameters):
 
 @inlined
 def strength_left(rho, parameters):
-    """Part of the strength at a density below rho0."""
+    """Fraction of the strength left at a density below rho0."""
     return compute_strength_left(parameters[RHO0] / rho)
 
 
@@ -81,7 +81,7 @@ class MieGruneisen(EquationOfState):
     """Mie–Grüneisen EOS: `rho0` in kg/m³, `c0` in m/s, `s`, `gruneisen` (rho G = rho0 G0) and
     `strength`, the tension at which the material spalls, in Pa.
 
-    Raises BadInput when one of them is not positive.
+    Raises BadInput if one of them is not positive.
     """
 
     rho0: float = 2707.0
@@ -103,5 +103,5 @@ class MieGruneisen(EquationOfState):
 
     @property
     def wave_law(self) -> tuple[float, float, float]:
-        """That of the straight Hugoniot, a = s, b = 0, and the impedance at rest."""
+        """Wave curve of the linear Hugoniot: a = s, b = 0, and the impedance at rest."""
         return self.s, 0.0, self.rho0 * self.c0

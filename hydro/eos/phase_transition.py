@@ -1,19 +1,18 @@
-"""Solid with a high-pressure phase: graphite that a shock turns into diamond.
+"""Solid with a high-pressure phase, such as graphite that a shock turns into diamond.
 
-One Hugoniot from the solid at rest, in three pieces over eta = 1 - rho0/rho: the first phase's
-Us = c0 + s up to the pressure `onset`, a mixed region that rises in a straight line to `complete`,
-and the second phase's states that a shock reaches from the first phase at rest,
+The Hugoniot from the solid at rest has three pieces in eta = 1 - rho0/rho: Us = c0 + s up of the
+first phase up to the pressure `onset`, a mixed region that rises linearly to `complete`, and the
+states of the second phase that a shock reaches from the first phase at rest,
 
     pH = pd (1 - Gd etad/2) / (1 - (rhod/rho0) Gd eta/2),   etad = 1 - rhod/rho,
 
-with pd(etad) the second phase's own Hugoniot Us = cd + sd up.  Beside the Hugoniot the law of
-Mie–Grüneisen, p = pH + rho G (e - pH eta/(2 rho0)); in expansion pH = rho0 c0² eta, eH = 0.  The
-part of the second phase goes with eta in a straight line from 0 to 1 through the mixed region, and
-with it rho G from the first phase's rho0 G0 to the second's: beyond it the law is the second
-phase's own.  The energy
-of the transition is taken into the Hugoniots and there is no delay and no memory: released
-material turns back on the same line.  Note: the mixed region's line must rise, else no sound; and
-far below the Hugoniot in it, where no shock or isentrope leads, c² is negative as rho G rises.
+with pd(etad) the second phase's own Hugoniot Us = cd + sd up.  Off the Hugoniot the Mie–Grüneisen
+form holds, p = pH + rho G (e - pH eta/(2 rho0)); in expansion pH = rho0 c0² eta, eH = 0.  Through
+the mixed region the fraction of the second phase rises linearly in eta from 0 to 1, and rho G from
+rho0 G0 of the first phase to the value of the second, whose own EOS holds beyond.  The energy of
+the transition is included in the Hugoniots.  There is no delay and no hysteresis: released material
+transforms back along the same line.  Note: the mixed region's line must rise, or there is no sound
+speed; and far below it, where no shock or isentrope leads, c² is negative because rho G rises.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from regrid.errors import BadInput
 from regrid.jit import inlined
 from regrid.roots import find_root
 
-# positions in the parameter tuple, the first five as of Mie–Grüneisen
+# positions in the parameter tuple, the first five as in Mie–Grüneisen
 RHO0, C0, S, GRUNEISEN, STRENGTH = 0, 1, 2, 3, 4
 SECOND, C_SECOND, S_SECOND, GRUNEISEN_SECOND = 5, 6, 7, 8
 ETA_ONSET, ETA_COMPLETE, RISE, P_COMPLETE = 9, 10, 11, 12
@@ -37,7 +36,7 @@ ETA_ONSET, ETA_COMPLETE, RISE, P_COMPLETE = 9, 10, 11, 12
 
 @inlined
 def second_hugoniot(eta, parameters):
-    """Pressure of the second phase, reached from the first at rest, and its slope in eta."""
+    """Pressure of the second phase behind a shock from the first at rest, and its slope in eta."""
     ratio = parameters[SECOND] / parameters[RHO0]
     own = 1.0 - ratio * (1.0 - eta)
     narrowing = 1.0 / (1.0 - parameters[S_SECOND] * own)
@@ -54,7 +53,7 @@ def second_hugoniot(eta, parameters):
 
 @inlined
 def hugoniot(eta, parameters):
-    """pH and its slope in eta: all pieces, expansion too."""
+    """pH and its slope in eta, for all pieces and expansion."""
     first_end = parameters[ETA_ONSET]
     second_start = parameters[ETA_COMPLETE]
     in_first = 1.0 * (eta <= first_end)
@@ -114,7 +113,7 @@ def energy(rho, p, parameters):
 
 @inlined
 def sound_speed_squared(rho, p, parameters):
-    """c² = dp/drho at constant e + (p/rho²) dp/de, but for what is torn (`tension`)."""
+    """c² = dp/drho at constant e + (p/rho²) dp/de, except in failed material (`tension`)."""
     ratio = parameters[RHO0] / rho
     eta = 1.0 - ratio
     cold, slope = hugoniot(eta, parameters)
@@ -134,8 +133,8 @@ class PhaseTransition(EquationOfState):
     `rho0_second`, `c0_second`, `s_second`, `gruneisen_second` of the other; pressures `onset` and
     `complete` on the Hugoniot between which both are mixed, in Pa.
 
-    Raises BadInput for numbers that are not positive, and where the mixed region would not lead
-    to greater density and pressure.
+    Raises BadInput for numbers that are not positive, and if density or pressure would not rise
+    through the mixed region.
     """
 
     rho0: float = 2200.0
@@ -192,7 +191,7 @@ class PhaseTransition(EquationOfState):
         start = find_root(first, 0.0, (1.0 - 1e-9) / self.s, xtol=1e-15)
         ratio = self.rho0_second / self.rho0
         numbers = tuple(float(value) for value in astuple(self))
-        # limits of the second Hugoniot: its own compression and its energy's
+        # limits of the second Hugoniot: of its compression and of its energy
         most = min(1.0 - (1.0 - 1.0 / self.s_second) / ratio, 2.0 / (ratio * self.gruneisen_second))
         low, high = 1.0 - 1.0 / ratio, 1.0 - 1.0 / ratio
         while second_hugoniot(high, numbers)[0] < self.complete and most - high > 1e-9:
@@ -213,11 +212,11 @@ class PhaseTransition(EquationOfState):
 
     @property
     def wave_law(self) -> tuple[float, float, float]:
-        """The first phase's: all is that phase again when it is released to p = 0."""
+        """Wave curve of the first phase, which all material is again when released to p = 0."""
         return self.s, 0.0, self.rho0 * self.c0
 
     def compute_second_part(self, rho) -> np.ndarray:
-        """Part of the second phase, 0 to 1, at the density `rho` [kg/m³]."""
+        """Fraction of the second phase, 0 to 1, at the density `rho` [kg/m³]."""
         start, end = self.mixed_region
         eta = 1.0 - self.rho0 / np.asarray(rho, float)
         return np.clip((eta - start) / (end - start), 0.0, 1.0)

@@ -53,7 +53,7 @@ def find_pressure(axis_rho, axis_e, table, rho, e):
 
 @compiled_once
 def find_energy(axis_rho, axis_e, table, rho, p):
-    """Energy at which the density has the pressure; NaN where the table has none."""
+    """Energy for the given density and pressure; NaN if the table has none."""
     i = find_interval(axis_rho, rho)
     if i < 0:
         return np.nan
@@ -98,13 +98,13 @@ def sound_speed_squared(rho, p, parameters):
 
 @inlined
 def least_pressure(parameters):
-    """Pressure [Pa] below which the material fails: none, the table decides."""
+    """Pressure [Pa] below which the material fails: none, the table sets the limit."""
     return -1e300
 
 
 def _each(function, *values):
-    """`function` for every entry of the arrays."""
-    with np.errstate(invalid="ignore"):  # NaN is its answer outside the table
+    """Apply `function` to every entry of the arrays."""
+    with np.errstate(invalid="ignore"):  # NaN outside the table
         return np.vectorize(function, otypes=[float])(*values)
 
 
@@ -112,8 +112,8 @@ def _each(function, *values):
 class Tabular(EquationOfState):
     """Table in the HDF5 file `path`.
 
-    Raises BadInput for a file that cannot be read, axes or pressures that do not rise, and for a
-    state outside the table asked for from Python.
+    Raises BadInput for a file that cannot be read, for axes or pressures that do not increase, and
+    for a state outside the table in calls from Python.
     """
 
     path: str = ""
@@ -168,7 +168,7 @@ class Tabular(EquationOfState):
 
     @property
     def failure(self) -> str:
-        """What is said of a cell whose state has no pressure."""
+        """Message for a cell whose state has no pressure."""
         return (
             f"its state is outside the table {self.path} (rho {self.axis_rho[0]:g} to "
             f"{self.axis_rho[-1]:g} kg/m3, e {self.axis_e[0]:g} to {self.axis_e[-1]:g} J/kg)"
@@ -176,7 +176,7 @@ class Tabular(EquationOfState):
 
     @property
     def wave_law(self) -> tuple[float, float, float]:
-        """That of an ideal gas with the stiffness rho c²/p of the middle of the table."""
+        """Wave curve of an ideal gas with the stiffness rho c²/p of the middle of the table."""
         rho = self.axis_rho[self.axis_rho.size // 2]
         e = self.axis_e[self.axis_e.size // 2]
         p, by_rho, by_e = find_pressure(*self.parameters, rho, e)

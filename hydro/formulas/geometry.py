@@ -1,20 +1,19 @@
-"""Plane and axisymmetric geometry: volumes, faces and what curvature adds, as parts of kernels.
+"""Plane and axisymmetric geometry: volumes, faces and geometric terms, as parts of kernels.
 
 In axisymmetric flow x runs along the axis and y is the radius; every integral is per radian (a
-whole ring has 2 pi of it).  The kernels of the flow are written once over the parts of a
-`Geometry`; those of plane geometry hand on what they are given.
+whole ring is 2 pi times as much).  The flow kernels are written once in terms of the parts of a
+`Geometry`; those of plane geometry return their arguments.
 
-Nodes move evenly in a step and edges stay straight, so that a volume is a polynomial of the nodes
-and what a face sweeps is the volume of a quadrilateral in space-time: both exactly.  Normals are
-averages over the step, weighted by the radius, exactly too.  Then over the faces of a cell swept
-volumes add up to its growth, axial parts of the normals to zero, and radial parts to the
-mean plane area.  The pressure pushes outwards by its force per depth at the radius of the centre of
-volume, as it would in plane flow: what a scheme is off in the pressures of all faces alike then
-cancels, where it would stand over the radius.
-Note: faces on the axis have zero area and no normal; averages are values at the centre of
-volume, which in the cell at the axis is a sixth of its height above the middle.  Sums over corners
-take opposite ones together, so that a cell has the same bits whichever way it is turned: along j a
-block's sides go through the kernels turned by a right angle.
+Nodes move at constant velocity in a step and edges stay straight, so a volume is a polynomial of
+the nodes and a swept volume that of a quadrilateral in space-time; both are exact.  So are normals,
+averages over the step weighted by the radius.  Over the faces of a cell the swept volumes add up to
+its growth (GCL), the axial components of the normals to zero, and the radial ones to the mean plane
+area.  The radial pressure force is the force per depth at the radius of the centre of volume, as in
+plane flow: an error common to the pressures of all faces then cancels, instead of appearing divided
+by the radius.  Note: faces on the axis have zero area and no normal; averages are values at the
+centre of volume, which in the cell at the axis is a sixth of its height above the middle.  Sums
+over corners pair opposite ones, so that results are bitwise the same for any orientation of a cell:
+along j a block's sides pass through the kernels rotated by a right angle.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from hydro.formulas.reconstruction import compute_line_geometry
 from regrid.errors import BadInput, suggest
 from regrid.jit import inlined
 
-TINY = 1e-300  # keeps 0/0 at faces on the axis from being a NaN
+TINY = 1e-300  # avoids 0/0 at faces on the axis
 
 
 @inlined
@@ -50,7 +49,7 @@ def weigh_area(area, mid_i, mid_j, twist, y):
 def compute_plane_face(a, b, a_new, b_new, inverse_dt):
     """Normal times length, swept area per time and midpoint of a moving edge at mid-time.
 
-    The normal lies to the right of the way from a to b, points (x, y).
+    The normal points to the right of the direction from a to b, points (x, y).
     """
     (ax, ay), (bx, by), (ax_new, ay_new), (bx_new, by_new) = a, b, a_new, b_new
     area_x = 0.5 * ((by - ay) + (by_new - ay_new))
@@ -68,7 +67,7 @@ def compute_plane_face(a, b, a_new, b_new, inverse_dt):
 
 @inlined
 def compute_radius_weighted_face(a, b, a_new, b_new, inverse_dt):
-    """The same weighted by the radius: means over the step of the integrals along the edge.
+    """The same weighted by the radius: averages over the step of integrals along the edge.
 
     The point is the edge's centre of area at mid-time.  Theory F9.2.
     """
@@ -97,7 +96,7 @@ def compute_radius_weighted_face(a, b, a_new, b_new, inverse_dt):
 
 @inlined
 def compute_centre_offset(mid_i, mid_j, twist, y):
-    """Way from the middle of a cell to its centre of volume, exactly (theory F9.4)."""
+    """Exact vector from the middle of a cell to its centre of volume (theory F9.4)."""
     (mid_i_x, mid_i_y), (mid_j_x, mid_j_y), (twist_x, twist_y) = mid_i, mid_j, twist
     area = mid_i_x * mid_j_y - mid_i_y * mid_j_x
     bend_i = mid_i_x * twist_y - mid_i_y * twist_x
@@ -114,9 +113,9 @@ def compute_centre_offset(mid_i, mid_j, twist, y):
 
 @inlined
 def lean_line(m, n, twist, scale):
-    """The mid-line m as the centres of volume go along it, n being the other one.
+    """The mid-line m through the centres of volume; n is the other mid-line.
 
-    Their ways from the middles along n, n n_y / (12 y), change from cell to cell; scale: 1/(12 y).
+    Their offsets from the middles along n, n n_y / (12 y), vary between cells; scale: 1/(12 y).
     """
     (mx, my), (nx, ny), (twist_x, twist_y) = m, n, twist
     turn = my * ny * (12.0 * scale)
@@ -135,7 +134,7 @@ def lean_lines(mid_i, mid_j, twist, y):
 
 @inlined
 def weigh_differences(before, shift_before, here, shift, after, shift_after):
-    """The same from the distances between centres of volume."""
+    """Weights of two one-sided differences, from the distances between centres of volume."""
     first = (here + 2.0 * shift) + (before - 2.0 * shift_before)
     second = (here - 2.0 * shift) + (after + 2.0 * shift_after)
     scale = 2.0 * here / (first * second)
@@ -144,20 +143,20 @@ def weigh_differences(before, shift_before, here, shift, after, shift_after):
 
 @inlined
 def move_velocity(u, v, u_x, u_y, v_x, v_y, way_x, way_y):
-    """Velocity in the middle of a cell, a way from the centre where it is (u, v)."""
+    """Velocity in the middle of a cell, displaced by `way` from the centre, where it is (u, v)."""
     return u + (u_x * way_x + u_y * way_y), v + (v_x * way_x + v_y * way_y)
 
 
 @inlined
 def spread_half_step(rho_half, p_half, rho, v, c2, y, half_dt):
-    """What the divergence v/y of radial motion adds to the predicted density and pressure."""
+    """Contribution of the divergence v/y of radial motion to predicted density and pressure."""
     thinning = half_dt * (v / y) * rho
     return rho_half - thinning, p_half - thinning * c2
 
 
 @inlined
 def compute_lever(y_centre, y, y_new, smooth):
-    """Radius of a cell's centre of volume at mid-time times `smooth`; the rest of `smooth`.
+    """Radius of a cell's centre of volume at mid-time times `smooth`, and 1 - `smooth`.
 
     y, y_new: radii of its middle, old and new.
     """
@@ -166,16 +165,16 @@ def compute_lever(y_centre, y, y_new, smooth):
 
 @inlined
 def push_outwards(momentum, lever, push, share, hoop):
-    """Radial momentum less the pressure's force, per depth and per radian (theory F9.5)."""
+    """Radial momentum minus the pressure force, per depth and per radian (theory F9.5)."""
     return momentum - (lever * push + share * hoop)
 
 
 @inlined
 def stretch_ring(momentum, push, lines, lines_new):
-    """Radial momentum with a source: `push` (pressure times dt) on the mean plane area.
+    """Radial momentum with the source `push` (pressure times dt) on the mean plane area.
 
-    The mean over the step of the area, whose mid-lines change evenly: to round-off what the radial
-    normals of a cell's faces add up to (theory F9.3).  lines: both mid-lines, old and new.
+    The area is averaged over the step, its mid-lines varying linearly: to round-off the sum of the
+    radial normals of a cell's faces (theory F9.3).  lines: both mid-lines, old and new.
     """
     (mid_i_x, mid_i_y), (mid_j_x, mid_j_y) = lines
     (mid_i_x_new, mid_i_y_new), (mid_j_x_new, mid_j_y_new) = lines_new
@@ -190,13 +189,13 @@ def stretch_ring(momentum, push, lines, lines_new):
 
 @inlined
 def keep_flux(momentum_y, pressure, area_y, plane_area_y):
-    """Plane: the pressure stays in the flux of momentum; no PUSH, no HOOP."""
+    """Plane: the pressure stays in the momentum flux; no PUSH, no HOOP."""
     return momentum_y, 0.0, 0.0
 
 
 @inlined
 def split_flux(momentum_y, pressure, area_y, plane_area_y):
-    """Radial momentum carried through a face; the pressure's force per depth and per radian."""
+    """Convective flux of radial momentum; pressure force per depth and per radian."""
     hoop = pressure * area_y
     return momentum_y - hoop, pressure * plane_area_y, hoop
 
@@ -209,18 +208,18 @@ def keep_triangle(cross, origin, y, next_y):
 
 @inlined
 def weigh_triangle(cross, origin, y, next_y):
-    """Twice the volume per radian of a triangle; radii of the first corner, and less that."""
+    """Twice the volume per radian of a triangle; y, next_y: radii relative to `origin`."""
     return cross * (origin + (y + next_y) / 3.0)
 
 
 class Geometry(NamedTuple):
-    """What makes the flow's kernels plane or axisymmetric: the parts that both have, in their form.
+    """The parts of the flow kernels that differ between plane and axisymmetric geometry.
 
-    What axisymmetric flow has besides, kernels do where it is `curved`.
+    Additional terms of axisymmetric flow are computed if `curved`.
     """
 
     name: str
-    curved: bool  # has the geometric source and centres beside the middle
+    curved: bool  # has the geometric source and centres of volume away from the middle
     volume: object
     face: object
     split: object
@@ -237,7 +236,7 @@ PLANE = GEOMETRIES["plane"]
 
 
 def find_geometry(name: str) -> Geometry:
-    """The geometry called `name`; BadInput with the nearest name where there is none."""
+    """The geometry called `name`; BadInput with the nearest name if there is none."""
     if name not in GEOMETRIES:
         raise BadInput(f"there is no geometry {name!r}{suggest(name, GEOMETRIES)}")
     return GEOMETRIES[name]

@@ -105,7 +105,7 @@ def make_flow_kernels(
         ja = max(0, j0 - 1)  # reconstructed columns ja..jb - 1
         jb = min(nj, j1 + 1)
         m = jb - ja
-        n, w = at.count_padded(m), at.count_whole(m)  # with the neighbour after the cells, without
+        n, w = at.count_padded(m), at.count_whole(m)  # with the next neighbour, without
         # scratch entry k is column ja + k - 1; node columns from node0 on are there
         node0 = max(0, ja - 1)
         shift = node0 - (ja - 1)
@@ -121,7 +121,7 @@ def make_flow_kernels(
             Z[at.SUM_ENERGY + k] = 0.0
             Z[at.SUM_VOIDED + k] = 0.0
         row = max(0, row0 - 1)
-        # the row before the first one, as the current one, then shifted into place
+        # the row before the first one is loaded as the current one, then shifted
         if row > 0:
             copy_rows(nodes, row - 1, node0, node_count, Z, at.X_HIGH + shift)
             copy_rows(nodes, row, node0, node_count, Z, at.X_NEXT + shift)
@@ -140,7 +140,7 @@ def make_flow_kernels(
         fill_steps(Z, w)
         fill_faces_i(Z, w, inverse_dt)
         next_row(Z, n)
-        # cells whose HLL switch is on: of this row, of the row before
+        # cells whose HLL switch is on: this row, the row before
         first_hll, last_hll = m + 1, 0
         first_hll_before, last_hll_before = m + 1, 0
         while row <= row1:
@@ -158,7 +158,7 @@ def make_flow_kernels(
                         clear_shift_after(Z, n)
                 if opens_voids:
                     copy_row(void_energy, row, ja, m, Z, at.VOID_LOADED + 1)
-                # into the cache: what the next row needs, and where this one's results go
+                # prefetch what the next row reads and where this one's results are written
                 prefetch_rows(state, min(row + 3, ni + 1), ja, m + 2)
                 prefetch_rows(nodes, min(row + 3, ni), node0, node_count)
                 prefetch_rows(nodes_new, min(row + 2, ni), node0, node_count)
@@ -179,7 +179,7 @@ def make_flow_kernels(
                     fill_traces_in(Z, w, counted, parameters)
             if row == 0:
                 for q in range(of.FLUX_ROWS):
-                    for k in range(m):  # fluxes of a rim go outwards
+                    for k in range(m):  # fluxes of a rim are outward
                         Z[at.FLUX_I_MASS + q * at.SPAN + 1 + k] = -rim[on.MASS + q, ja + k]
             elif row == ni:
                 for q in range(of.FLUX_ROWS):
@@ -194,7 +194,7 @@ def make_flow_kernels(
                 if curved:
                     fill_push_i(Z, n)
             if row < row1:
-                # the faces towards +i take the place of those towards -i, whose fluxes are known
+                # the faces towards +i replace those towards -i, whose fluxes are known
                 fill_faces_i(Z, w, inverse_dt)
                 fill_faces_j(Z, n, inverse_dt)
                 fill_traces(Z, w, counted, parameters)
@@ -246,19 +246,19 @@ def make_flow_kernels(
     def advance(old, new, rim, dt, parameters, scratch, tiles, tile_totals):
         """Advance the tiles tiles[0]..tiles[1] - 1 of a block by one step.
 
-        old: state (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells; void energy
-        (ni, nj): energy of cells with voids less that of full material at their density and p = 0;
+        old: state (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells; void energy (ni,
+        nj): energy of cells with voids minus that of intact material at the same density and p = 0;
         nodes (2, ni + 1, nj + 1).  new: the same three, of which the first two are written, and the
-        rates and crowding (ni, nj) of the new cells, theory F7.1, F7.3.  rim: rows of `hydro.rim`,
-        of which the fluxes through the sides and the lengths of the ghosts are read; scratch
-        (threads, SIZE); tile_totals (tiles, 7): columns as in `hydro.rows`.
+        rates and crowding (ni, nj) of the new cells, theory F7.1, F7.3.  rim: rows of `hydro.rim`
+        with the fluxes through the sides and the lengths of the ghosts; scratch (threads, SIZE);
+        tile_totals (tiles, 7): columns as in `hydro.rows`.
         """
         for tile in range(tiles[0], tiles[1]):
             advance_tile(old, new, rim, dt, parameters, tile, scratch[0], tile_totals)
 
     @kernel(parallel=True)
     def advance_threaded(old, new, rim, dt, parameters, scratch, tiles, tile_totals):
-        """`advance` with the tiles shared among threads."""
+        """`advance` with the tiles distributed over threads."""
         threads = scratch.shape[0]
         for thread in numba.prange(threads):
             for tile in range(tiles[0] + thread, tiles[1], threads):
@@ -268,7 +268,7 @@ def make_flow_kernels(
 
 
 def count_tiles(ni: int, nj: int) -> int:
-    """Number of tiles into which a block of ni × nj cells is cut, or before row ni of a larger."""
+    """Number of tiles of a block of ni × nj cells, or before row ni of a larger one."""
     return -(-ni // TILE_ROWS) * -(-nj // at.CHUNK)
 
 

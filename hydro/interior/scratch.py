@@ -1,26 +1,24 @@
-"""The scratch in which the row kernels work.
+"""The scratch array of the row kernels.
 
-One array, rows at constant offsets: the vectoriser then needs no run-time check of overlap (it
-silently gives up beyond 128 of them).  SPAN is a multiple of 8 and not a power of two.  In every
-row of cells, entry k is cell k - 1 of the chunk, so that k = 0 and k = m + 1 are the neighbours
-of its m cells; in rows of nodes or faces along j entry k is the one at the low side of cell k.
-Note: entry 1, where most loops start, lies on a cache line (`allocate` sees to the first
-row); loads and stores across two lines take twice the time.  Loops run in whole vectors
-(`count_padded`), so that what lies beyond a row's last neighbour is written but never meant.
-A loop that reads entries k - 1 or k + 1 of a row and writes one of the next two
-rows is not vectorised (it might wait for its own stores); its results stand before what it reads.
+All rows lie in one array at constant offsets, so the vectoriser needs no run-time checks of overlap
+(it silently gives up beyond 128 of them).  SPAN is a multiple of 8 and not a power of two.  In
+every row of cells, entry k is cell k - 1 of the chunk, so that k = 0 and k = m + 1 are the
+neighbours of its m cells; in rows of nodes or faces along j, entry k is on the low side of cell k.
+Note: entry 1, where most loops start, is aligned to a cache line (`allocate` aligns the first row);
+loads and stores across two lines take twice the time.  Loops run in whole vectors (`count_padded`),
+so entries beyond a row's last neighbour are written but never used.  A loop that reads entries k -
+1 or k + 1 of a row and writes one of the next two rows is not vectorised (its loads might wait for
+its stores), so results are placed before what is read.
 
-The phases of a step are loops over the entries 1..n of rows of the flat scratch `Z`, the m cells of
-a chunk in whole vectors, with the neighbour after them only where somebody reads what is found of
-it.  A row's input must be in the scratch before a phase runs, and only
-`copy_*` touch other arrays; a loop with a long chain of dependent operations waits for itself, two
-loops over its halves do not.  Rows are copied by the machine's own `memcpy`, a third of the time of
-a loop that must first see that nothing overlaps, and rows that the next phases copy are brought
-into the second-level cache ahead: a block's arrays are longer than the caches, and a chunk of a row
-is too short for the processor to see what comes next (at 400² cells the flow waited for memory in a
-fifth of its time).  Note: numba knows no such hint, so that it is an instruction of LLVM, bound
-to a plain function that does nothing (the digest of a kernel's contents then sees a plain
-function).
+The phases of a step are loops over the entries 1..n of rows of the flat scratch `Z`: the m cells of
+a chunk in whole vectors, plus the next neighbour only if its result is read.  The input of a phase
+must already be in the scratch, and only `copy_*` access other arrays; a loop with a long chain of
+dependent operations stalls, two loops over its halves do not.  Rows are copied by `memcpy`, in a
+third of the time of a loop that first checks for overlap, and rows that the next phases copy are
+prefetched into the second-level cache: a block's arrays are larger than the caches, and a chunk of
+a row is too short for the hardware prefetcher (at 400² cells the flow spent a fifth of its time
+waiting for memory).  Note: numba has no such hint, so it is an LLVM intrinsic, bound to a plain
+function that does nothing (which the digest of a kernel's contents then sees).
 """
 
 from __future__ import annotations
@@ -36,7 +34,7 @@ LANES = 8  # entries of the widest vector
 LINE = 8  # entries of a cache line
 SPAN = 136
 READ, SECOND_LEVEL, DATA = 0, 2, 1  # arguments of LLVM's prefetch
-CHUNK = SPAN - 3 * LANES  # cells of a chunk that are updated; up to two more are reconstructed
+CHUNK = SPAN - 3 * LANES  # updated cells of a chunk; up to two more are reconstructed
 
 _next = (LINE - 1 + SPAN * row for row in count())
 
@@ -54,14 +52,14 @@ RHO_AFTER, U_AFTER, V_AFTER, P_AFTER = _rows(4)
 RHO_STEP, U_STEP, V_STEP, P_STEP = _rows(4)
 # lengths between opposite face midpoints along i (three rows) and along j
 LENGTH_BEFORE, LENGTH, LENGTH_AFTER, LENGTH_J = _rows(4)
-# axisymmetric: ways from the middles of cells to their centres of volume, and along both lines
+# axisymmetric: vectors from cell middles to centres of volume, and along both lines
 OFFSET_X, OFFSET_Y, OFFSET_X_AFTER, OFFSET_Y_AFTER = _rows(4)
-SHIFT_BEFORE, SHIFT, SHIFT_AFTER, SHIFT_J, SHIFT_J_AFTER = _rows(5)  # as the lengths lie
+SHIFT_BEFORE, SHIFT, SHIFT_AFTER, SHIFT_J, SHIFT_J_AFTER = _rows(5)  # ordered as the lengths
 # the two line vectors, volume, squared sound speed, energy, HLL switch (and the last row's)
 MI_X, MI_Y, MJ_X, MJ_Y, VOLUME, C2, E, HLL, HLL_BEFORE = _rows(9)
-# void energies of this row's cells; energies of torn cells, this row's and those of the row before
+# void energies of this row's cells; energies of failed cells of this row and the row before
 VOID_LOADED, TORN, TORN_BEFORE = _rows(3)
-# how far the motion of the cells is waves: this row, the row before
+# degree to which the motion of the cells is waves: this row, the row before
 ACOUSTIC, ACOUSTIC_BEFORE = _rows(2)
 # gradients, mid-time state
 RHO_X, RHO_Y, U_X, U_Y, V_X, V_Y, P_X, P_Y = _rows(8)
@@ -69,7 +67,7 @@ RHO_HALF, U_HALF, V_HALF, P_HALF, X_CENTRE, Y_CENTRE = _rows(6)
 # faces towards -i and -j at mid-time: normal times length, swept area per time, midpoint
 AREA_X_I, AREA_Y_I, SWEEP_I, X_I, Y_I = _rows(5)
 AREA_X_J, AREA_Y_J, SWEEP_J, X_J, Y_J = _rows(5)
-# between the two halves of HLLC: the upwind side of the contact, its wave, what s* is made of
+# between the two halves of HLLC: the upwind side of the contact, its wave, the terms of s*
 RHO_SIDE, U_SIDE, V_SIDE, P_SIDE, W_SIDE, FLOW_SIDE, S_SIDE, S_CUT = _rows(8)
 PUSH, DRAG, SQUARE, TORN_SIDE = _rows(4)
 # traces at the faces of the row, rho, u, v, p and c²: towards -i, +i, -j, +j
@@ -82,13 +80,13 @@ FLUX_I_MASS, FLUX_I_X, FLUX_I_Y, FLUX_I_ENERGY, PUSH_I, HOOP_I = _rows(6)
 FLUX_J_MASS, FLUX_J_X, FLUX_J_Y, FLUX_J_ENERGY, PUSH_J, HOOP_J = _rows(6)
 PRESSURE_I, PRESSURE_J = _rows(2)  # axisymmetric: in the fluxes
 MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY = _rows(4)
-# axisymmetric: how smooth the pressure is around a cell, pressure in its middle at mid-time;
-# what of both radial forces of the pressure counts, PUSH times a radius and HOOP
+# axisymmetric: smoothness of the pressure around a cell, pressure in its middle at mid-time;
+# weights of both radial pressure forces, PUSH times a radius and HOOP
 SMOOTH, SOURCE_P, LEVER, SHARE = _rows(4)
 # axisymmetric: lines through the centres of volume, 1/area between them
 LEAN_I_X, LEAN_I_Y, LEAN_J_X, LEAN_J_Y, LEAN_INVERSE = _rows(5)
 MI_X_NEW, MI_Y_NEW, MJ_X_NEW, MJ_Y_NEW, VOLUME_NEW, W_X, W_Y = _rows(7)
-# the new state, rate and crowding of the row that is finished
+# the new state, rate and crowding of the finished row
 RHO_NEW, U_NEW, V_NEW, P_NEW, VOID_NEW, RATE_NEW, CROWDING_NEW = _rows(7)
 # running extremes and sums over the rows of a tile
 LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY, SUM_VOIDED = _rows(7)
@@ -104,13 +102,13 @@ LEAN_I, LEAN_J = (LEAN_I_X, LEAN_I_Y), (LEAN_J_X, LEAN_J_Y)
 
 @compiled_once(allocates=False)
 def count_padded(m):
-    """Length of the loops over m cells and the neighbour after them, in whole vectors."""
+    """Loop length for m cells and the next neighbour, in whole vectors."""
     return (m + LANES) // LANES * LANES
 
 
 @compiled_once(allocates=False)
 def count_whole(m):
-    """Length of the loops over m cells alone, in whole vectors."""
+    """Loop length for m cells alone, in whole vectors."""
     return count_padded(m - 1)
 
 
@@ -135,7 +133,7 @@ def copy_back(Z, offset, count, target, row, start):
 
 
 def find_place(context, builder, kind, array, indices):
-    """Pointer to an entry of an array, in a kernel that is compiled."""
+    """Pointer to an entry of an array in compiled code."""
     from numba.core import cgutils
 
     made = context.make_array(kind)(context, builder, array)
@@ -192,8 +190,8 @@ copy_row.compiled_as, copy_back.compiled_as = _copy_row_in_kernels, _copy_back_i
 def load_corners(Z, low, high, k):
     """Corners (x, y) of cell k between two rows of nodes, anticlockwise from its own node.
 
-    `low`, `high`: offsets (of x, of y) of the rows.  Note: not that of x alone, for LLVM adds k and
-    an offset of which it knows a part in an order in which it sees indices that may be negative.
+    `low`, `high`: offsets (of x, of y) of the rows.  Note: both offsets are given, since with that
+    of x alone LLVM orders the additions so that indices may look negative.
     """
     (low_x, low_y), (high_x, high_y) = low, high
     return (
@@ -204,14 +202,14 @@ def load_corners(Z, low, high, k):
 
 @inlined
 def store_vector(Z, rows, k, vector):
-    """Put x and y into two rows, whose offsets are `rows`."""
+    """Store x and y in two rows with the offsets `rows`."""
     x, y = rows
     Z[x + k], Z[y + k] = vector
 
 
 @inlined
 def find_twist(a, b, c, d):
-    """a - b + c - d of a cell's corners, and the mean of their y."""
+    """a - b + c - d of a cell's corners, and their mean y."""
     (xa, ya), (xb, yb), (xc, yc), (xd, yd) = a, b, c, d
     return ((xa - xb) + (xc - xd), (ya - yb) + (yc - yd)), 0.25 * ((ya + yc) + (yb + yd))
 
@@ -225,7 +223,7 @@ def copy_rows(source, row, start, count, Z, offset):
 
 @compiled_once(allocates=False)
 def shift_rows(Z, n):
-    """Make the row after the current one current."""
+    """Make the next row the current one."""
     for k in range(1 - LANES, n + 1 + LANES):
         Z[X_LOW + k] = Z[X_HIGH + k]
         Z[Y_LOW + k] = Z[Y_HIGH + k]
@@ -242,7 +240,7 @@ def shift_rows(Z, n):
 
 
 def prefetch(array, row, column):
-    """Ask for the cache line with the entry (row, column) of a 2-D array."""
+    """Prefetch the cache line with the entry (row, column) of a 2-D array."""
 
 
 @intrinsic
@@ -274,13 +272,13 @@ def _prefetch_in_kernels(array, row, column):
 
 @compiled_once(allocates=False)
 def prefetch_row(source, row, start, count):
-    """Ask for source[row, start : start + count]."""
+    """Prefetch source[row, start : start + count]."""
     for k in range(start, start + count + LINE, LINE):
         prefetch(source, row, k)
 
 
 @compiled_once(allocates=False)
 def prefetch_rows(source, row, start, count):
-    """The given row of every component of `source` (components, rows, columns)."""
+    """Prefetch the given row of every component of `source` (components, rows, columns)."""
     for q in range(source.shape[0]):
         prefetch_row(source[q], row, start, count)

@@ -1,19 +1,18 @@
-"""Do blocks lie on each other?  Asked of the first grid, and before every step of what moves.
+"""Detection of overlapping blocks, in the initial grid and, for moving lines, before every step.
 
-Blocks meet along links and sliding contacts, free surfaces of different bodies by themselves
-(`hydro.contacts`).  Where blocks run into each other otherwise, both would go on as if they were
-alone, so the run has to end there.
+Blocks meet along links and sliding contacts, and free surfaces of different bodies are handled by
+`hydro.contacts`.  Blocks that run into each other otherwise would not interact, so the run has to
+stop.
 
-Looked at are the segments that make the outline of linked blocks: those without a partner, and the
-leaders of sliding contacts, whose ends may be bare.  Of two blocks on each other the outline of the
-one crosses that of the other, or one lies within the other, which only the first grid can show.
-Blocks may touch, and curves be cut by chords, so a crossing counts where one outline has come as
-far into the other block as INSIDE of its first cells.  A block's crossing with itself is found by
-its regridder.
+The check covers the segments that form the outline of linked blocks: those without a partner, and
+the leaders of sliding contacts, whose ends may be uncovered.  If two blocks overlap, their outlines
+cross, or one block lies within the other, which is possible only in the initial grid.  Blocks may
+touch, and chords may cut curves, so a crossing counts if one outline has entered the other block by
+the fraction INSIDE of its first cells.  Self-intersection of a block is detected by its regridder.
 
-Note: blocks with a link between them are looked at in the first grid alone.  Where their contact
-ends the outlines of both go out from one node, and may close on each other like a book: a jet that
-bends round the end of a wedge presses on it there, which no link describes.
+Note: linked blocks are checked in the initial grid only.  Where their contact ends, both outlines
+start from one node and may close on each other: a jet that bends round the end of a wedge presses
+on it there, which no link describes.
 """
 
 from __future__ import annotations
@@ -33,14 +32,14 @@ from regrid.jit import kernel
 from regrid.measure.crossings import GROUP, fill_boxes, find_touching
 from regrid.sides import trace_outline
 
-TIMES = 101  # at which pistons are looked at beforehand
-INSIDE = 0.25  # of the cells along a side: so far in the other block is no longer beside it
+TIMES = 101  # at which pistons are checked beforehand
+INSIDE = 0.25  # fraction of the cells along a side: further in, blocks overlap
 MOST_GROUPS = 64  # boxes of a line
 
 
 @kernel
 def fill_outline(nodes, side, start, line, inset):
-    """The nodes start.. of a side as `line` (2, n), and `inset` (2, n): the line INSIDE cells in.
+    """Fill `line` (2, n) with the nodes start.. of a side, and `inset` (2, n), INSIDE cells inward.
 
     The inset ends INSIDE of a face before the ends of the line.  Returns the least and the largest
     x, then y, of the line.
@@ -68,7 +67,7 @@ def fill_outline(nodes, side, start, line, inset):
 
 
 class Outline:
-    """A segment that other blocks may run into: its line, and its line a little way in."""
+    """A segment that other blocks may run into: its line, and its line shifted slightly inward."""
 
     def __init__(self, segment: Segment, group: int):
         self.segment, self.group = segment, group
@@ -79,21 +78,21 @@ class Outline:
         self.follow()
 
     def follow(self) -> None:
-        """Take up the present nodes."""
+        """Update from the current nodes."""
         segment = self.segment
         side = SIDES.index(segment.side)
         self.bounds = fill_outline(segment.block.nodes, side, segment.start, self.line, self.inset)
         self.is_boxed = False
 
     def fill_boxes(self) -> None:
-        """Boxes of groups of faces, for who is near."""
+        """Fill the bounding boxes of groups of faces, for the proximity test."""
         if not self.is_boxed:
             fill_boxes(self.line, self.group, self.boxes)
             fill_boxes(self.inset, self.group, self.inset_boxes)
             self.is_boxed = True
 
     def find_crossing(self, other: Outline) -> tuple[int, int] | None:
-        """Faces of both, counted along them, at which one is inside the other's block, or None."""
+        """Indices of the faces of both at which one is inside the other's block, or None."""
         self.fill_boxes()
         other.fill_boxes()
         for line, inset, boxes, inset_boxes in (
@@ -106,7 +105,7 @@ class Outline:
         return None
 
 
-Pairs = list[tuple[int, int]]  # of numbers in a list of outlines or segments
+Pairs = list[tuple[int, int]]  # of indices in a list of outlines or segments
 
 
 def search(
@@ -128,7 +127,7 @@ def search(
 
 
 class Overlaps:
-    """Pairs of segments that may come to lie on each other, and the search among them."""
+    """Pairs of segments that may come to overlap, and the search among them."""
 
     def __init__(self, blocks: Sequence[Block], links: Sequence[Link | SlidingContact]):
         self.blocks = blocks
@@ -149,7 +148,7 @@ class Overlaps:
         self._watched: Pairs = []
 
     def check_start(self) -> None:
-        """Raise BadInput where blocks of the first grid lie on each other."""
+        """Raise BadInput if blocks of the initial grid overlap."""
         found = search(self._make_outlines(self.segments), self._pair(self.segments))
         if found is not None:
             one, other, at = found
@@ -166,7 +165,7 @@ class Overlaps:
                     )
 
     def check_pistons(self, t_end: float) -> None:
-        """Raise BadInput where a piston will come into a block of walls alone before `t_end`."""
+        """Raise BadInput if a piston will enter a block bounded by walls only before `t_end`."""
         times = np.linspace(0.0, t_end, TIMES)
         ways = {
             id(segment): integrate_motion(segment, times)
@@ -179,7 +178,7 @@ class Overlaps:
                 continue
             moved = [ways.get(id(segment), np.zeros((2, TIMES))) for segment in own]
             if not all(np.array_equal(way, moved[0]) for way in moved):
-                continue  # it changes its shape: told when it comes to it
+                continue  # it changes its shape: detected when it happens
             for segment in self.segments:
                 linked = any({id(block), id(segment.block)} <= pair for pair in self._linked)
                 if segment.block is block or linked or id(segment) not in ways:
@@ -196,7 +195,7 @@ class Overlaps:
                         )
 
     def watch(self, everything: bool = False) -> None:
-        """From now on check pairs without a link of which one moves by itself, or all of them."""
+        """From now on check unlinked pairs of which one moves independently, or all pairs."""
         pairs = [
             (a, b)
             for a, b in self._pair(self.segments)
@@ -213,7 +212,7 @@ class Overlaps:
         self._watched = [(used.index(a), used.index(b)) for a, b in pairs]
 
     def check(self, t: float, step: int, touching: Collection[frozenset[int]] = ()) -> None:
-        """Raise RunFailure where blocks lie on each other now, but those (by id) that touch."""
+        """Raise RunFailure if blocks overlap now, except those (by id) in `touching`."""
         for outline in self._outlines:
             outline.follow()
         watched = self._watched
@@ -240,7 +239,7 @@ class Overlaps:
         return [Outline(segment, group) for segment in segments]
 
     def _pair(self, segments: Sequence[Segment]) -> Pairs:
-        """All pairs but those within a block and those that a sliding contact rules."""
+        """All pairs except those within a block and those of a sliding contact."""
         return [
             (a, b)
             for (a, one), (b, other) in itertools.combinations(enumerate(segments), 2)
@@ -265,19 +264,19 @@ ADVICE = "blocks may touch, not overlap; where they are in contact, link their s
 
 
 def _leaves(segment: Segment) -> bool:
-    """May the segment leave the line on which it was at the start?"""
+    """Whether the segment may leave its initial line."""
     return segment.moves or segment.motion is NodeMotion.JOIN
 
 
 def integrate_motion(piston: Piston, times: np.ndarray) -> np.ndarray:
-    """Way (2, n) of a piston from t = 0 on."""
+    """Displacement (2, n) of a piston since t = 0."""
     speeds = np.array([piston.velocity(float(t)) for t in times]).T
     steps = 0.5 * (speeds[:, 1:] + speeds[:, :-1]) * np.diff(times)
     return np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
 
 
 def describe_depth(one: Block, other: Block) -> str:
-    """Which of two blocks reaches how far into the other, by the nodes along their sides."""
+    """Describe which block reaches how far into the other, from the nodes along their sides."""
     found = 0.0, ""
     for block, around in ((one, other), (other, one)):
         line = trace_outline(around.nodes)
@@ -297,7 +296,7 @@ def describe_depth(one: Block, other: Block) -> str:
 
 
 def is_inside(point: tuple[float, float], nodes: np.ndarray) -> bool:
-    """Is a point within the outline of `nodes` (2, ni+1, nj+1)?  Even-odd, so rings have holes."""
+    """Whether a point is inside the outline of `nodes` (2, ni+1, nj+1), by the even-odd rule."""
     x, y = trace_outline(nodes) - np.reshape(point, (2, 1))
     if x.min() > 0.0 or x.max() < 0.0 or y.min() > 0.0 or y.max() < 0.0:
         return False

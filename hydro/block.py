@@ -385,8 +385,7 @@ class Block:
         )
 
     def find_rate(self) -> float:
-        """Largest rate [1/s] of the cells updated by this process, the inverse of their time
-        step."""
+        """Largest rate [1/s] of the cells updated by this process: the inverse of their step."""
         return float(self.rates[self.first_row : self.last_row].max())
 
     def take_shared(self, least_c2: float, voided: int) -> None:

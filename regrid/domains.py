@@ -1,21 +1,21 @@
-"""Domains with a moving boundary: what one is, how curves make it, and those with names.
+"""Domains with a moving boundary: their definition, construction from curves, and named examples.
 
 The papers' domains follow the figures of [CharakhchyanND]: 1 and 3 (tongues), 2 (shift), 4
-(strip).  Each is a rectangle whose side i_min (the lower one, where not said otherwise) bends as s
-goes from 0 to 1; lines j = const start there, as the straight-line family must.  i runs upwards
-and j to the left, so that corner areas are positive.
+(strip).  Each is a rectangle whose side i_min (the lower one unless stated otherwise) deforms as s
+goes from 0 to 1; lines j = const start there, as the straight-line family must.  i points up and j
+to the left, so that corner areas are positive.
 
-Note: s is not the amplitude.  It is scaled so that equal steps of s move the fastest boundary
-node by equal distances, and "cells a step" counts the shortest edge of the starting grid at the
+Note: s is not the amplitude.  It is scaled so that equal steps of s move the fastest boundary node
+by equal distances; "cells per step" refers to the shortest edge of the initial grid at the
 deforming sides.
 
-Swan and horseshoe have the boundary curves of [KnuppSteinberg1993]'s gallery, nodes at equal steps
-of the curves' parameters; there and on annulus, airfoil and chicane all sides deform at once, and
-the amplitude is that of a straight way for every node (swan, horseshoe), of a bend (annulus,
-airfoil) or of a turn (chicane).  On nozzle, waves, cushion, pinched, crescent and bulged chevron
-all four sides bend, and neither family of straight lines starts on all sides that deform (theory
-R4.5, R4.16).  All begin as a rectangle and bend as the amplitude grows; nodes are equidistant on
-every side.
+Swan and horseshoe have the boundary curves of [KnuppSteinberg1993]'s gallery, with nodes at equal
+steps of the curves' parameters; in these and in annulus, airfoil and chicane all sides deform at
+once, and the amplitude is that of a straight path of every node (swan, horseshoe), of a bend
+(annulus, airfoil) or of a turn (chicane).  In nozzle, waves, cushion, pinched, crescent and bulged
+chevron all four sides bend, and neither family of straight lines starts on all sides that deform
+(theory R4.5, R4.16).  All start as a rectangle and bend as the amplitude grows; nodes are
+equidistant on every side.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from regrid.curves import arc_law, clustered_law
 from regrid.errors import BadInput, suggest
 from regrid.sides import SIDE_NAMES, copy_sides
 
-SAMPLES = 129  # amplitudes at which the travel of a side is measured,
+SAMPLES = 129  # amplitudes at which the motion of a side is measured,
 SIDES_SAMPLES = 257  # and that of all sides, which may turn corners
 
 
@@ -50,17 +50,17 @@ class MovingDomain:
         return self.move(min(1.0, max(0.0, float(s))))
 
     def steps_for(self, cells_a_step: float) -> int:
-        """Number of equal steps of s in which no boundary node moves further than that."""
+        """Number of equal steps of s in which no boundary node exceeds `cells_a_step`."""
         return max(1, int(np.ceil(self.travel / (cells_a_step * self.cell) - 1e-9)))
 
     @property
     def travel_in_cells(self) -> float:
-        """Way of the fastest boundary node over the whole motion."""
+        """Path length of the fastest boundary node over the whole motion, in cells."""
         return self.travel / self.cell
 
     @property
     def suggested_steps(self) -> int:
-        """Steps at half a cell each."""
+        """Number of steps at half a cell each."""
         return self.steps_for(0.5)
 
     def transposed(self) -> MovingDomain:
@@ -83,7 +83,7 @@ def transpose_nodes(nodes: np.ndarray) -> np.ndarray:
 def distribute_by_arc_length(
     curve: np.ndarray, count: int, law: np.ndarray | None = None
 ) -> np.ndarray:
-    """`count` nodes on the fine polyline `curve` (2, n), equidistant or by `law`, ends included."""
+    """`count` nodes on the fine polyline `curve` (2, n) with its ends, equidistant or by `law`."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=1)))])
     law = np.linspace(0.0, 1.0, count) if law is None else law
     line = np.array([np.interp(law * arc[-1], arc, part) for part in curve])
@@ -92,7 +92,7 @@ def distribute_by_arc_length(
 
 
 def make_box(width: float, heights: np.ndarray, across: np.ndarray) -> np.ndarray:
-    """Rectangle with rows at `heights` and columns at the laws `across`, j from right to left."""
+    """Rectangle with rows at `heights` and columns at fractions `across`, j from right to left."""
     nodes = np.empty((2, heights.size, across.size))
     nodes[0] = width * (1.0 - across)
     nodes[1] = heights[:, None]
@@ -104,7 +104,7 @@ def march_line(
 ) -> MovingDomain:
     """Domain whose side i_min follows the fine curve `curve_at(amplitude)` from j = 0 to j = nj.
 
-    The side's ends may slide along the straight sides j_min and j_max, whose laws are kept.
+    The side's ends may slide along the straight sides j_min and j_max, whose spacing is kept.
     """
     count = start.shape[2]
     law_low, law_high = (arc_law(start[:, :, j]) for j in (0, -1))
@@ -129,8 +129,8 @@ def march_line(
 
 
 def _make_domain(name, start, deforming_sides, cell: float, motion) -> MovingDomain:
-    """The domain of a motion: amplitudes (n,), the longest ways (n - 1,) of a side's node between
-    them, and the sides as a function of the amplitude."""
+    """The domain of a motion: amplitudes (n,), the largest displacements (n - 1,) of a side's node
+    between them, and the sides as a function of the amplitude."""
     amplitudes, steps, sides = motion
     travel = np.concatenate([[0.0], np.cumsum(steps)])
     try:
@@ -145,7 +145,7 @@ def _make_domain(name, start, deforming_sides, cell: float, motion) -> MovingDom
 
 
 def make_unit_box(ni: int, nj: int, width: float = 1.0) -> np.ndarray:
-    """Nodes (2, ni+1, nj+1) of an even grid on the box of `width` by 1."""
+    """Nodes (2, ni+1, nj+1) of a uniform grid on a box of `width` by 1."""
     return make_box(width, np.linspace(0.0, 1.0, ni + 1), np.linspace(0.0, 1.0, nj + 1))
 
 
@@ -185,7 +185,7 @@ def find_shortest_edge(start: np.ndarray, side: str) -> float:
     return float(min(np.hypot(*along).min(), np.hypot(*away).min()))
 
 
-FINE = 2400  # points on the curve from which the nodes are taken
+FINE = 2400  # points on the curve from which nodes are interpolated
 TONGUES = [
     {"centre": 0.22, "width": 0.12, "length": 0.75},
     {"centre": 0.5, "width": 0.10, "length": 1.0},
@@ -228,7 +228,7 @@ def _fingers(name: str, ni: int, nj: int, fingers: list[dict]) -> MovingDomain:
 
 
 def _on_walls(curve_at: Callable[[float], np.ndarray]) -> Callable[[float], np.ndarray]:
-    """Pin the curve's ends, which the smooth profiles just miss, to the walls' feet."""
+    """Pin the curve's ends, which the smooth profiles slightly miss, to the feet of the walls."""
 
     def pinned(amplitude: float) -> np.ndarray:
         curve = curve_at(amplitude)
@@ -249,12 +249,12 @@ def five_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 
 def curled_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """The three tongues, bending by 0.4 to 0.8 radians: as far as they stay between the walls."""
+    """The three tongues bent by 0.4 to 0.8 radians: as far as they stay between the walls."""
     return _bent_fingers("curled_fingers", ni, nj, (-0.4, 0.8, 0.5))
 
 
 def overhung_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """The three tongues, bending by 0.8 to 1.2 radians, the outer ones beyond the walls' feet.
+    """The three tongues bent by 0.8 to 1.2 radians, the outer ones beyond the feet of the walls.
 
     Straight lines from there to the opposite side would leave the domain: the first line gap cannot
     be 1.
@@ -263,7 +263,7 @@ def overhung_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 
 def hooked_fingers(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """The three tongues, bending by up to 2 radians: beyond what straight lines can start from."""
+    """The three tongues bent by up to 2 radians: too far for straight lines to start from them."""
     return _bent_fingers("hooked_fingers", ni, nj, (-2.0, 1.0, 2.0))
 
 
@@ -278,10 +278,10 @@ def single_finger(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 
 def slender_finger(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """One tongue of width 0.05 and length 1, as long as the block is high: the harshest case.
+    """One tongue of width 0.05 and length 1, as long as the block is high: the hardest case.
 
     The straight lines out of a tongue meet its flanks at angles of half its width over its depth:
-    0.025 at the tip, whatever the grid.
+    0.025 at the tip on any grid.
     """
     return _fingers("slender_finger", ni, nj, [{"centre": 0.5, "width": 0.05, "length": 1.0}])
 
@@ -360,7 +360,7 @@ CHICANE_WIDTH = 0.3  # over the length of a leg
 
 
 def _between(first: np.ndarray, last: np.ndarray) -> Callable[[float], np.ndarray]:
-    """Every node on a straight line from its first to its last place."""
+    """Every node moves on a straight line from its first to its last position."""
     return lambda amplitude: (1.0 - amplitude) * first + amplitude * last
 
 
@@ -423,9 +423,9 @@ def airfoil(ni: int = 60, nj: int = 40) -> MovingDomain:
 
     j runs along the profile, equidistant, from the upper to the lower end of its cut trailing edge;
     i outwards, to a half circle of radius 1.5 round the middle of the chord with straight ends.
-    The sides j_min and j_max stand upright on the trailing edge.  On the way both the profile's
-    thickness of log r and the bend grow: `z = (1 - exp(a (u + i theta)))/a`, u from its mean
-    at a = 0 to log r at a = 1; the middle of the chord comes to lie at (1, 0).
+    The sides j_min and j_max are normal to the trailing edge.  During the motion both the profile's
+    thickness in log r and the bend grow: `z = (1 - exp(a (u + i theta)))/a`, u from its mean at
+    a = 0 to log r at a = 1; the middle of the chord ends at (1, 0).
     """
     r, t = _parameters(ni, nj)
     profile = distribute_by_arc_length(_naca_0012(), nj + 1)
@@ -437,7 +437,7 @@ def airfoil(ni: int = 60, nj: int = 40) -> MovingDomain:
     sides[:, :, 0], sides[:, :, -1] = upper, upper * np.array([[1.0], [-1.0]])
     radius = np.hypot(*sides)
     turn = np.arctan2(sides[1], sides[0]) % (2.0 * np.pi) - np.pi
-    # Strip: as wide and as long as the closed shape is on average, in log r and angle.
+    # Strip: as wide and as long as the closed shape on average, in log r and angle.
     level = np.log(np.maximum(radius, 1e-300))
     low, high = level[0].mean(), level[-1].mean()
     flat = np.array(np.meshgrid(low + (high - low) * r, np.pi * (2.0 * t - 1.0), indexing="ij"))
@@ -478,8 +478,8 @@ def chicane(ni: int = 60, nj: int = 40) -> MovingDomain:
     """A straight strip of three legs, 0.3 wide and 3 long, folded to a Z, nodes equidistant.
 
     i along it, j across.  Both turns grow to 135 degrees with mitred corners, 45 degrees between
-    the legs.  The sides' nodes stay equidistant, so that an inner corner comes to lie opposite to
-    the middle of a leg: straight lines across the strip leave it.
+    the legs.  The sides' nodes stay equidistant, so an inner corner ends up opposite the middle of
+    a leg: straight lines across the strip leave it.
     """
     t = np.linspace(0.0, 1.0, nj + 1)
 
@@ -499,7 +499,7 @@ def chicane(ni: int = 60, nj: int = 40) -> MovingDomain:
     return march_sides("chicane", sides_at, SIDE_NAMES)
 
 
-FINE_SIDE = 1200  # points on a side from which its nodes are taken
+FINE_SIDE = 1200  # points on a side from which its nodes are interpolated
 
 Curve = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray]]
 
@@ -521,8 +521,8 @@ def _bend(name: str, ni: int, nj: int, low: Curve, high: Curve, near: Curve, far
 
 
 def _bend_rectangle(name: str, ni: int, nj: int, low, high, near, far) -> MovingDomain:
-    """Rectangle 1.5 x 1 whose sides j_min, j_max, i_min, i_max go up or right by functions of p and
-    the amplitude."""
+    """Rectangle 1.5 x 1 whose sides j_min, j_max, i_min, i_max shift up or right by functions of p
+    and the amplitude."""
     return _bend(
         name, ni, nj,
         lambda p, a: (1.5 * p, low(p, a)), lambda p, a: (1.5 * p, 1.0 + high(p, a)),
@@ -562,7 +562,7 @@ def waves(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 
 def _bulged(name: str, ni: int, nj: int, height: float) -> MovingDomain:
-    """Rectangle 1.5 x 1 whose sides all become parabolas that stand out by `height`."""
+    """Rectangle 1.5 x 1 whose sides all become parabolas of the given `height`."""
 
     def bulge(p: np.ndarray, a: float) -> np.ndarray:
         return 4.0 * height * a * p * (1.0 - p)
@@ -584,9 +584,9 @@ def pinched(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 
 def crescent(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """A rectangle bent to half a ring between the radii 1 and 2, both of its ends bulged by 0.3.
+    """A rectangle bent to half a ring between the radii 1 and 2, with both ends bulged by 0.3.
 
-    i outwards, j round; the inner side has a wave of amplitude 0.1, three of them along the ring.
+    i outwards, j round; the inner side has three waves of amplitude 0.1 along the ring.
     """
     length = 1.5 * np.pi
 
@@ -614,7 +614,7 @@ def crescent(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 
 def bulged_chevron(ni: int = 60, nj: int = 40) -> MovingDomain:
-    """A chevron 1.5 x 1, its kink 0.3 deep on j_min and j_max, between ends that bulge by 0.15."""
+    """A chevron 1.5 x 1 with a kink 0.3 deep on j_min and j_max and ends that bulge by 0.15."""
 
     def kink(p: np.ndarray, a: float) -> np.ndarray:
         return a * 0.3 * (1.0 - np.abs(2.0 * p - 1.0))

@@ -1,9 +1,9 @@
 """Named blocks in space: fixed ones with curved sides, and blocks whose faces move.
 
-A block is a map of the unit cube, so that its faces are exact; what it does inside is not used: a
-regridder finds the inside.  ks_block_1 and ks_block_2 follow a figure whose shapes the paper does
-not write down; what it says of them (two curved blocks, z from -1 to 0, the weights 1 and
-1 + 10 (z + 1)) is kept, the rest is our own definition, as are the moving blocks (in metres).
+A block is a map of the unit cube, so its faces are exact; its interior is not used, because a
+regridder computes it.  ks_block_1 and ks_block_2 follow a figure whose shapes the paper does not
+define; what it states (two curved blocks, z from -1 to 0, the weights 1 and 1 + 10 (z + 1)) is
+kept, the rest is our own definition, as are the moving blocks (in metres).
 
 Source: [KhakimzyanovShokina1998], Figure 3; theory R10.
 """
@@ -41,7 +41,7 @@ def ks_block_2(p: np.ndarray) -> np.ndarray:
 def spherical_shell(p: np.ndarray) -> np.ndarray:
     """Part of a shell from r = 1 to 2, cosine of the polar angle within .5, longitude to 1.2.
 
-    p1 is the radius less 1, so that the grid of equal volumes, r³ = 1 + 7q, has to be found.
+    p1 is the radius less 1, so the grid of equal volumes, r³ = 1 + 7q, has to be computed.
     """
     r, cosine, longitude = 1.0 + p[0], p[1] - 0.5, 1.2 * p[2]
     sine = np.sqrt(1.0 - cosine * cosine)
@@ -63,9 +63,9 @@ def find_block(name: str) -> Mapping:
 
 @dataclass(frozen=True)
 class MovingBlock:
-    """A block on the way: `start` (3, n1+1, n2+1, n3+1) at s = 0, `boundary(s)` of that shape.
+    """A moving block: `start` (3, n1+1, n2+1, n3+1) at s = 0, and `boundary(s)` of that shape.
 
-    Of `boundary(s)` the six faces are meant; inner nodes are zeros.
+    `boundary(s)` has the six faces; inner nodes are zeros.
     """
 
     name: str
@@ -77,7 +77,7 @@ Shape = Callable[[np.ndarray, float], np.ndarray]
 
 
 def piston_with_bump(p: np.ndarray, s: float) -> np.ndarray:
-    """A piston that goes half of the way through a box, while a bump of .3 grows on it."""
+    """A piston that moves halfway through a box while a bump of .3 grows on it."""
     bump = 0.3 * s * (np.sin(np.pi * p[1]) * np.sin(np.pi * p[2])) ** 2
     face = 0.5 * s + bump
     return np.array([face + (1.0 - face) * p[0], p[1], p[2]])
@@ -94,8 +94,8 @@ def twisted_duct(p: np.ndarray, s: float) -> np.ndarray:
 def finger_in_space(p: np.ndarray, s: float) -> np.ndarray:
     """A spike that grows in a column to three wavelengths, from its lower face.
 
-    A quarter of a period: y and z run over half a wave of length 2, from the middle of the spike to
-    that of the gap.  Spike and gap are 6 apart at s = 1; the other end stays at 7.
+    A quarter of a period: y and z cover half a wave of length 2, from the middle of the spike to
+    that of the gap.  Spike and gap are 6 apart at s = 1; the other end is fixed at 7.
     """
     shape = 0.5 * (1.0 + np.cos(np.pi * p[1])) * 0.5 * (1.0 + np.cos(np.pi * p[2]))
     face = 6.0 * s * (shape - 0.25)
@@ -108,7 +108,7 @@ SHAPES: dict[str, Shape] = {
 
 
 def make_moving_block(name: str, cells: tuple[int, int, int]) -> MovingBlock:
-    """A named block with so many cells along i, j, k; BadInput for an unknown name."""
+    """A named block with `cells` along i, j, k; BadInput for an unknown name."""
     key = name.replace("-", "_")
     if key not in SHAPES:
         raise BadInput(f"moving block: none is called '{name}'{suggest(name, SHAPES)}")

@@ -20,20 +20,20 @@ from regrid.measure.quality import find_bad_cells
 from regrid.work_arrays import share_memory
 
 HALVINGS = 8
-ROUNDS = 24  # at most, in which nodes of folded cells go back to the new grid
-BLENDS = 12  # halvings of the way to the new grid that all nodes go where folds would not end
-LOOSE = 2.0  # times as far as others may go nodes of cells that would be sharpened otherwise
+ROUNDS = 24  # at most, in which nodes of folded cells return to the new grid
+BLENDS = 12  # halvings of the distance to the new grid for all nodes if folds persist
+LOOSE = 2.0  # factor of the limit for nodes of cells that would otherwise be sharpened
 ROUND_OFF = 1e-12  # relative, well above that of an area or a comparison
-FLAT = 0.01  # sine of an obtuse corner, below which it is nearly a straight line
-KEPT = 0.98  # of the lesser of a corner's areas, old and new, is left where a node is limited
+FLAT = 0.01  # sine of an obtuse corner below which it is nearly a straight line
+KEPT = 0.98  # fraction of the smaller of a corner's areas, old and new, left by the limit
 
 
 @kernel
 def find_fast_rows(old, new, interpolated, most, first, last):
-    """Rows of nodes with one that `fill_limited` may hold back, whole; returns how many.
+    """Find whole rows of nodes with a node that `fill_limited` may limit; returns their number.
 
-    Into `first`, `last` (ni + 1): the inner nodes of such a row, ni > first > last elsewhere.  The
-    comparison is that of `fill_limited` without its divisions, a shade stricter.
+    `first`, `last` (ni + 1) receive the inner nodes of such a row, ni > first > last elsewhere.
+    The comparison is that of `fill_limited` without divisions, slightly stricter.
     """
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
     part = (1.0 - ROUND_OFF) * most * most
@@ -79,14 +79,14 @@ def measure_spacing(area, along, a, b, wide):
 
 @kernel
 def fill_limited(old, new, interpolated, most, first, last, wide, out):
-    """Nodes of `new`, each at most `most` local spacings from where interpolation puts it.
+    """Nodes of `new`, each at most `most` local spacings from its interpolated position.
 
     old, new, interpolated (displacements), out: (2, ni + 1, nj + 1), in m.  The local spacing is
     the least height of the four old corner triangles at the node over their longer edges: in a
-    sheared sliver its thickness, where the shortest edge would let a node cross many cells.
-    wide: see `measure_spacing`.
-    Only nodes from `first` to `last` (ni + 1) of a row are looked at, and both are brought to the
-    nodes limited.  Returns the number of these.  Theory R8.2.
+    sheared sliver this is the thickness, whereas the shortest edge would allow a node to cross many
+    cells. wide: see `measure_spacing`.  Only nodes from `first` to `last` (ni + 1) of a row are
+    examined, and both are narrowed to the limited nodes.  Returns the number of these.  Theory
+    R8.2.
     """
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
     x, y = old[0], old[1]
@@ -127,7 +127,7 @@ def mark_cell(loose, i, j):
 
 @inlined
 def move_marked(limited, new, first, last, loose, part):
-    """Move marked nodes by a part of the way from `limited` to `new`."""
+    """Move marked nodes by a fraction of the distance from `limited` to `new`."""
     for i in range(1, limited.shape[1] - 1):
         for j in range(first[i], last[i] + 1):
             if loose[i, j] > 0:
@@ -137,12 +137,12 @@ def move_marked(limited, new, first, last, loose, part):
 
 @kernel
 def relax_sharpened(old, new, limited, first, last, loose):
-    """Go half the way from `limited` to `new` with nodes of cells that the limit sharpens.
+    """Move nodes of cells that the limit sharpens halfway from `limited` to `new`.
 
-    That is a cell with a corner triangle of less area in `limited` than KEPT of that in either
-    other grid, all (2, ni + 1, nj + 1); the block's own corners apart, which no inner node changes.
+    These cells have a corner triangle of less area in `limited` than KEPT of that in either other
+    grid, all (2, ni + 1, nj + 1), except the block's own corners, which no inner node changes.
     Only nodes from `first` to `last` of a row may differ from `new`, which is convex: no other
-    cells are looked at.  `loose` (ni + 1, nj + 1) is scratch.  Returns the number of such cells.
+    cells are examined.  `loose` (ni + 1, nj + 1) is scratch.  Returns the number of such cells.
     """
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
     count = 0
@@ -167,12 +167,12 @@ def relax_sharpened(old, new, limited, first, last, loose):
 
 @kernel
 def release_folded(new, limited, first, last, whole, loose):
-    """Bring nodes of cells that the limit folds half the way from `limited` to `new`.
+    """Move nodes of cells that the limit folds halfway from `limited` to `new`.
 
-    A corner counts as folded that is not positive beyond round-off; the block's own corners apart,
-    which no inner node changes.  Only nodes from `first` to `last` (ni + 1) of a row may differ
-    from `new`.  whole: all of the way.  `loose` (ni + 1, nj + 1) is scratch.  Returns the number of
-    such cells.
+    A corner is folded if it is not positive beyond round-off, except the block's own corners, which
+    no inner node changes.  Only nodes from `first` to `last` (ni + 1) of a row may differ from
+    `new`.  whole: all the way.  `loose` (ni + 1, nj + 1) is scratch.  Returns the number of such
+    cells.
     """
     ni, nj = new.shape[1] - 1, new.shape[2] - 1
     x, y = limited[0], limited[1]
@@ -200,22 +200,21 @@ def release_folded(new, limited, first, last, whole, loose):
 class MotionLimiter:
     """Keeps a regridder from moving nodes through the fluid faster than the step allows.
 
-    A regridder aims at its best grid, however far that is from the old one: the part of its
-    motion that the boundary does not ask for does not shrink with dt.  Taken in one step it is
-    a remap of many cells through one face, and the time step, which follows the speed of the
-    faces, collapses.  Limited, the grid gets there in the steps that follow.
+    A regridder aims at its optimal grid, however far that is from the old one: the part of its
+    motion not required by the boundary does not shrink with dt.  In one step it would remap many
+    cells through one face, and the time step, which depends on the face speed, would collapse.
+    With the limit, the grid approaches the optimum over the following steps.
 
-    In a curled block the motion that the boundary asks for, interpolated inside, shears
-    cells thinner step by step, and the thinner they are the less of the regridder's cure they
-    would be left.  So where the limit makes a corner sharper than it is in both grids, the old and
-    the new, nodes may go LOOSE times as far; let go altogether, a regridder that swings at rest
-    would shorten the time step without end.
+    In a curled block the boundary motion, interpolated inward, shears cells thinner step by step,
+    and the thinner they are, the less of the regridder's correction the limit allows.  So where the
+    limit makes a corner sharper than in both grids, old and new, nodes may move LOOSE times as far;
+    without any limit, a regridder that oscillates at rest would shorten the time step indefinitely.
     """
 
     def __init__(self, shape: tuple[int, ...]):
         self.shape = shape
         self.loose = np.empty(shape[1:], dtype=np.int8)
-        # the nodes of each row that are limited; those of `far` are some of them
+        # the limited nodes of each row; those of `far` are a subset
         self.first, self.last = (np.empty(shape[1], dtype=np.int64) for _ in range(2))
         self.far_first, self.far_last = (np.empty(shape[1], dtype=np.int64) for _ in range(2))
 
@@ -223,11 +222,11 @@ class MotionLimiter:
         """`new` with inner nodes within `most` spacings of the interpolated grid, and how many were
         limited.
 
-        `new` must be convex; what is returned holds until the next regrid of this thread.
+        `new` must be convex; the result is valid until the next regrid of this thread.
 
-        Where the limit sharpens corners, nodes go towards LOOSE times as many spacings, by halves;
-        those of folded cells go back to `new`.  Where that folds others without end, all nodes go
-        the same part of the way back to `new`, the least of halvings that leaves no fold.
+        Where the limit sharpens corners, nodes move towards LOOSE times as many spacings, by
+        halves; those of folded cells return to `new`.  If that keeps folding others, all nodes
+        return by the same fraction to `new`, the least of halvings that leaves no fold.
         """
         first, last = self.first, self.last
         whole = share_memory(3 * new.size)[: 3 * new.size]
@@ -265,8 +264,8 @@ class MotionLimiter:
 class NodeSpeeds:
     """Largest speeds of the nodes inside and on the boundary, and their ratio.
 
-    `ratio` is 0 when nothing moves and infinite when only inner nodes do; `fastest` is the inner
-    node (i, j) with the largest speed.
+    `ratio` is 0 if nothing moves and infinite if only inner nodes do; `fastest` is the inner node
+    (i, j) with the largest speed.
     """
 
     inner: float
@@ -288,12 +287,11 @@ def measure_node_speeds(old: np.ndarray, new: np.ndarray, dt: float = 1.0) -> No
 
 
 def limit_node_speeds(old: np.ndarray, new: np.ndarray, factor: float) -> np.ndarray:
-    """The grid `new`, held back where inner nodes outrun `factor` times the fastest boundary node.
+    """The grid `new`, limited where inner nodes exceed `factor` times the fastest boundary node.
 
-    Such a node goes only so far from the place that the interpolated boundary displacement gives
-    it towards its place in `new` that its way is within the limit.  `new` must be convex; the
-    result is: the mixture is moved back to `new` by halves until every cell is convex.
-    Theory R8.1.
+    Such a node moves from its position given by the interpolated boundary displacement towards that
+    in `new` only as far as its displacement is within the limit.  `new` must be convex; the result
+    is, too: the mixture is moved back to `new` by halves until every cell is convex.  Theory R8.1.
     """
     interpolated = np.empty_like(new)
     fill_displacement(np.ascontiguousarray(old), np.ascontiguousarray(new), interpolated)

@@ -1,13 +1,13 @@
 """Gradient and Hessian of the barrier functional, one row of cells at a time.
 
-The formulas of a corner and of a cell are in `regrid.barrier.functional`.  The Hessian drops the
-second derivative of D only and is positive semidefinite; a corner couples one edge of either
+The formulas of a corner and of a cell are in `regrid.barrier.functional`.  The Hessian omits only
+the second derivative of D and is positive semidefinite; a corner couples one edge of either
 direction.  The grid is in the workspace's frame; `low` is the first node column of a chunk, `cells`
 its columns of cells.
 
-Everything a row of cells yields goes into ONE flat scratch array Z at the constant offsets named
-here: rows of separate arrays, at places the compiler cannot know, are not vectorised.  The
-triangles at the block's own corners depend on boundary nodes alone: they only must not enter e_c.
+All results of a row of cells go into ONE flat scratch array Z at the constant offsets named here:
+rows of separate arrays, at offsets unknown to the compiler, are not vectorised.  The triangles at
+the block's own corners depend on boundary nodes alone; they must not enter e_c.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_C
 from regrid.barrier.step_control import SPAN
 from regrid.jit import inlined, kernel
 
-# What a column chunk keeps for every row of nodes: the Hessian's couplings as 2 × 2 blocks (xx,
-# xy, yx, yy) to the nodes (i, j+1), (i+1, j+1), from (i+1, j) to (i, j+1), and to (i+1, j); the
-# node's own block; the inverse pivot of the line solve and the factor P^-1 E.  What is stored lies
-# 2 kB and more behind what is loaded shifted by a column (see regrid.barrier.line_cg).
+# Data of a column chunk for every row of nodes: the Hessian's couplings as 2 × 2 blocks (xx, xy,
+# yx, yy) to the nodes (i, j+1), (i+1, j+1), from (i+1, j) to (i, j+1), and to (i+1, j); the node's
+# own block; the inverse pivot of the line solve and the factor P^-1 E.  Stores are at least 2 kB
+# behind loads shifted by a column (see regrid.barrier.line_cg).
 NORTH, DIAGONAL, CROSS, EAST = 0, 4 * SPAN, 8 * SPAN, 12 * SPAN
 OWN, PIVOT, FACTOR = 16 * SPAN, 19 * SPAN, 22 * SPAN
 NODE_ROWS = 26 * SPAN
@@ -43,9 +43,9 @@ FLUX_X, FLUX_Y = 59 * SPAN, 60 * SPAN
 AREA_1, AREA_2, AREA_3, AREA_4 = (k * SPAN for k in range(61, 65))
 SLOPE_1, SLOPE_2, SLOPE_3, SLOPE_4 = (k * SPAN for k in range(65, 69))
 KEPT = 69 * SPAN - OWN  # own blocks, pivots and factors on their way to the matrix
-W = 79 * SPAN  # where the columns lie, by distance; by count in V
+W = 79 * SPAN  # position of the columns, by distance; by count in V
 FADING = 80 * SPAN
-TERMS = 81 * SPAN  # what the four corners give: gradient in a and b, blocks aa, bb, ab
+TERMS = 81 * SPAN  # terms of the four corners: gradient in a and b, blocks aa, bb, ab
 (
     GRAD_AX, GRAD_AY, GRAD_BX, GRAD_BY, AA_XX, AA_XY, AA_YY, BB_XX, BB_XY, BB_YY,
     AB_XX, AB_XY, AB_YX, AB_YY,
@@ -58,7 +58,7 @@ LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of 
 
 
 class LineLaws(NamedTuple):
-    """What of a `BarrierLaw` edges and straight lines need."""
+    """The parts of a `BarrierLaw` for edges and straight lines."""
 
     along_i: np.ndarray
     along_j: np.ndarray
@@ -73,7 +73,7 @@ class LineLaws(NamedTuple):
 def fill_side_edges(nodes, i, along_j, blend_i, weight, low, cells, Z):
     """Scaled edges along j of node row i, their inverse lengths and straight-line weights.
 
-    Both as they are (rows from RIGHT_X on) and scaled (rows from CX on): the cells' far edges.
+    Both unscaled (rows from RIGHT_X on) and scaled (rows from CX on): the cells' far edges.
     """
     x, y = nodes[0, i, low : low + cells + 1], nodes[1, i, low : low + cells + 1]
     columns = slice(low, low + cells)
@@ -125,7 +125,7 @@ def fill_line_edges(nodes, i, laws, low, count, Z):
 
 @kernel(allocates=False)
 def bend_sides(curve, i, low, cells, Z):
-    """Take from the edges along j of node row i what those of `curve` have (theory R4.17)."""
+    """Subtract the edges of `curve` from the edges along j of node row i (theory R4.17)."""
     x, y = curve[0, i, low : low + cells + 1], curve[1, i, low : low + cells + 1]
     for col in range(cells):
         Z[RIGHT_X + col] -= x[col + 1] - x[col]
@@ -134,7 +134,7 @@ def bend_sides(curve, i, low, cells, Z):
 
 @kernel(allocates=False)
 def bend_lines(curve, i, low, count, Z):
-    """Take from the flux along i between node rows i and i+1 that of `curve` (theory R4.17)."""
+    """Subtract the flux of `curve` from that along i between node rows i, i+1 (theory R4.17)."""
     x0, y0 = curve[0, i, low : low + count], curve[1, i, low : low + count]
     x1, y1 = curve[0, i + 1, low : low + count], curve[1, i + 1, low : low + count]
     for col in range(count):
@@ -145,7 +145,7 @@ def bend_lines(curve, i, low, count, Z):
 
 @kernel(allocates=False)
 def begin_columns(nodes, along_j, blend_i, blend_j, weight, low, cells, Z):
-    """Start a chunk of `cells` columns from node column `low`: where they lie, and node row 0.
+    """Start a chunk of `cells` columns at node column `low`: their positions, and node row 0.
 
     `weight` is that of the straight lines along j.
     """
@@ -158,7 +158,7 @@ def begin_columns(nodes, along_j, blend_i, blend_j, weight, low, cells, Z):
 
 @kernel(allocates=False)
 def begin_row(nodes, i, laws, low, cells, Z):
-    """Edges of cell row i: the far edges of the row before become the near ones (BX, LEFT_X on)."""
+    """Edges of cell row i: the far edges of the last row become the near ones (BX, LEFT_X on)."""
     for col in range(cells):
         Z[BX + col] = Z[CX + col]
         Z[BY + col] = Z[CY + col]
@@ -173,7 +173,7 @@ def begin_row(nodes, i, laws, low, cells, Z):
 
 @kernel(allocates=False)
 def end_row(cells, Z):
-    """Keep what the next row of nodes needs of this one: fluxes, and shares of the far edges."""
+    """Keep the data for the next row of nodes: fluxes, and contributions of the far edges."""
     for col in range(cells):
         Z[OLD_FX + col] = Z[FLUX_X + col]
         Z[OLD_FY + col] = Z[FLUX_Y + col]
@@ -186,10 +186,10 @@ def end_row(cells, Z):
 
 @kernel(allocates=False)
 def fill_fading(growth, cells, Z):
-    """Part of the barrier that a row of cells keeps, into FADING: all of it in ungraded blocks.
+    """Fraction of the barrier applied in a row of cells, into FADING: 1 in ungraded blocks.
 
-    Many cell widths from the side, barrier against bent corners bends the straight lines: with all
-    of it, by .1 of a cell 5 widths from an interface.  The ratio takes all four edges, so that a
+    Many cell widths from the side, the barrier against sheared corners bends the straight lines: in
+    full, by .1 of a cell 5 widths from an interface.  The ratio uses all four edges, so that a
     mirrored block has the mirrored grid.  Theory R4.4.
     """
     for col in range(cells):
@@ -199,9 +199,9 @@ def fill_fading(growth, cells, Z):
 
 @inlined
 def fill_cell_numbers(aa, bb, ab, ba, to, cells, now, Z):
-    """One number, `to`, of every 2 × 2 block of a row of cells: of its edges and across it.
+    """One entry, `to`, of every 2 × 2 block of a row of cells: of its edges and across it.
 
-    `aa`, `bb`, `ab`: the rows of that number in the terms of a corner, `ba` of the transposed one.
+    `aa`, `bb`, `ab`: the rows of that entry in the terms of a corner, `ba` of the transposed one.
     """
     for col in range(cells):
         near_1, far_1 = Z[TERMS + ab + col], Z[TERMS + ba + col]
@@ -221,8 +221,8 @@ def fill_cell_numbers(aa, bb, ab, ba, to, cells, now, Z):
 def fill_cell_blocks(cells, now, Z):
     """Sum the four corners of every cell into its four edges, and couple its four nodes.
 
-    The shares of the edges go into LOW, UP (along i), LEFT and RIGHT (along j), the couplings
-    across the cell into the matrix.
+    The contributions of the edges go into LOW, UP (along i), LEFT and RIGHT (along j), the
+    couplings across the cell into the matrix.
     """
     for col in range(cells):
         Z[LOW_GX + col] = Z[TERMS + GRAD_AX + col] + Z[CORNER_4 + GRAD_AX + col]
@@ -277,7 +277,7 @@ def fill_gradient(row_x, row_y, Z):
 
 @kernel(allocates=False)
 def fill_own_blocks(cells, now, past, Z):
-    """The nodes' own blocks, minus the sum of their couplings, and the pivots of the line solve."""
+    """The diagonal blocks, minus the sum of their couplings, and the pivots of the line solve."""
     for col in range(1, cells):
         e_xx, e_xy = past[EAST + col], past[EAST + SPAN + col]
         e_yx, e_yy = past[EAST + 2 * SPAN + col], past[EAST + 3 * SPAN + col]
@@ -295,7 +295,7 @@ def fill_own_blocks(cells, now, past, Z):
         Z[KEPT + OWN + col] = -xx
         Z[KEPT + OWN + SPAN + col] = -xy
         Z[KEPT + OWN + 2 * SPAN + col] = -yy
-        # E'P^-1 E with the factor T = P^-1 E of the row before, which is zero at the boundary.
+        # E'P^-1 E with the factor T = P^-1 E of the previous row, zero at the boundary.
         t_xx, t_xy = past[FACTOR + col], past[FACTOR + SPAN + col]
         t_yx, t_yy = past[FACTOR + 2 * SPAN + col], past[FACTOR + 3 * SPAN + col]
         p_xx = -xx - (e_xx * t_xx + e_yx * t_yx)
@@ -338,7 +338,7 @@ def add_cost(near, far, sound, scale, weight, cells, now, Z):
             aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy = (
                 functional.cost_blocks(ax, ay, bx, by, slope)
             )
-            # Each of A and B is the mean of the cell's two edges that way.
+            # A and B are the means of the cell's two edges in each direction.
             half = 0.5 * first
             for edge, dx, dy in (
                 (LOW_GX, dax, day), (UP_GX, dax, day), (LEFT_GX, dbx, dby), (RIGHT_GX, dbx, dby),
@@ -375,9 +375,9 @@ def make_corner(corner_terms):
     def fill_corner(A, B, inverse, slope, weight, area, out):
         """Terms of one corner of a row of cells from its edges A along i and B along j.
 
-        A kernel of its own, since its arguments are then different arrays to the compiler: rows
-        of one array at places it cannot know would not be vectorised, and the four corners
-        written out take it four times as long.
+        A separate kernel, so that its arguments are distinct arrays to the compiler: rows of one
+        array at unknown offsets would not be vectorised, and writing out the four corners takes
+        four times as long to compile.
         """
         for col in range(weight.shape[0]):
             (
@@ -480,7 +480,7 @@ def make_assembly(smooth):
             for col in range(cells):
                 Z[WEIGHT + col] *= Z[FADING + col]
             for corner in range(4):
-                # Corners 2 and 3 take the line edge one column on, 3 and 4 the far side edge.
+                # Corners 2 and 3 use the line edge one column on, 3 and 4 the far side edge.
                 shift = 1 if corner == 1 or corner == 2 else 0
                 side = CX if corner >= 2 else BX
                 term = TERMS + corner * 14 * SPAN
@@ -527,8 +527,7 @@ assemble_smoothed = make_assembly(True)
 def assemble_on_threads(nodes, law, columns, H, gradient, scratch):
     """`assemble_barrier` for all chunks; `columns` (chunks + 1) are their first node columns.
 
-    Every chunk writes columns of its own, so that the bits are those of the same chunks one after
-    the other.
+    Every chunk writes its own columns, so results are bitwise those of the same chunks in sequence.
     """
     for k in prange(columns.shape[0] - 1):
         first, last = columns[k], columns[k + 1]

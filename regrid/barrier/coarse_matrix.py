@@ -1,18 +1,18 @@
-"""The Hessian of the functional on coarse nodes, from the fine cell in the middle of a coarse one.
+"""The Hessian of the functional on coarse nodes, from the fine cell at the centre of a coarse one.
 
-The coarse cell of m_i × m_j fine ones gives each of its four corners a quarter of
+A coarse cell of m_i × m_j fine ones contributes to each of its four corners a quarter of
 
     (m_j/m_i) A'T_aa A + 2 A'T_ab B + (m_i/m_j) B'T_bb B
 
 with A, B the differences of the displacements of its corners along i and j (theory R4.13).  T is
 the sum of the blocks of the four corners of that fine cell, of its straight lines and of its
-cost, in differences of nodes.  Where two or four fine cells share the middle it is their mean cell,
-so that a mirrored block has the mirrored matrix.  One cell stands for all: where the displacement
-that is meant bends with the lines inside a coarse cell, sums over all of its cells would resist it.
+cost, in differences of nodes.  If two or four fine cells share the centre, their mean is used, so
+that a mirrored block has the mirrored matrix.  One cell represents all: where the intended
+displacement follows curved lines inside a coarse cell, sums over all of its cells would resist it.
 
-Cells are gathered into rows of scratch before they are worked on, so that the loops run
-over whole vectors.  The system is solved by conjugate gradients, preconditioned by solves along the
-lines of index i, one after the other: it is a sixtieth of the fine one.
+Cells are first gathered into rows of scratch, so that the loops run over whole vectors.  The system
+is solved by conjugate gradients, preconditioned by solves along the lines of index i, in sequence:
+it has a sixtieth of the fine one's size.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ SCRATCH = 26
 
 @inlined
 def take_mean(f, i, i_last, j, j_last):
-    """Mean of an array at (i, j), (i_last, j), (i, j_last), (i_last, j_last): one place or more."""
+    """Mean of an array at (i, j), (i_last, j), (i, j_last), (i_last, j_last), maybe equal."""
     return 0.25 * ((f[i, j] + f[i_last, j_last]) + (f[i, j_last] + f[i_last, j]))
 
 
 @kernel
 def gather_cells(nodes, law, first, last, first_columns, last_columns, Z):
-    """The fine cells in the middle of coarse ones: edges as they are, lengths and weights, in `Z`.
+    """Gather the fine cells at centres of coarse ones in `Z`: unscaled edges, lengths, weights.
 
-    They are (first, first_columns) to (last, last_columns), one or two in a direction, of whose
-    nodes and laws the means are taken.
+    They are (first, first_columns) to (last, last_columns), one or two in a direction, whose nodes
+    and lengths are averaged.
     """
     x, y = nodes
     along_i, along_j = law.along_i, law.along_j
@@ -90,7 +90,7 @@ def gather_cells(nodes, law, first, last, first_columns, last_columns, Z):
 
 @kernel
 def weigh_cells(law, growth, count, Z):
-    """Weight of a corner of the gathered cells (theory R4.3, R4.4); False where one is folded."""
+    """Weight of a corner of the gathered cells (theory R4.3, R4.4); False if one is folded."""
     full, folded = 0.25 * law.sigma * law.epsilon, 0
     for k in range(count):
         ax, ay, ux, uy = Z[LOW_X, k], Z[LOW_Y, k], Z[UP_X, k], Z[UP_Y, k]
@@ -154,8 +154,8 @@ def add_costs(scale, weight, count, Z):
 def couple_nodes(stretch, lines, count, Z, now, then):
     """Add a row of coarse cells to the rows of matrix blocks of the nodes on either side of it.
 
-    `stretch` and `lines` (count) are how many fine cells a coarse one has along i and j; `now` and
-    `then` (ROWS, count + 1) are the blocks at its first and its second row of coarse nodes.
+    `stretch` and `lines` (count) are the numbers of fine cells of a coarse one along i and j; `now`
+    and `then` (ROWS, count + 1) are the blocks at its first and second row of coarse nodes.
     """
     for k in range(count):
         along = 0.5 * lines[k] / stretch
@@ -178,7 +178,7 @@ def couple_nodes(stretch, lines, count, Z, now, then):
         then[NORTH + 3, k] -= bb_yy
         now[ACROSS, k], now[ACROSS + 1, k], now[ACROSS + 2, k] = xx, even, yy
         Z[AA, k], Z[AA + 1, k], Z[AA + 2, k], Z[AB, k] = aa_xx, aa_xy, aa_yy, odd
-        # of a corner itself: both of its edges, and the coupling of the two
+        # at a corner itself: both of its edges, and their coupling
         Z[BB, k], Z[BB + 1, k], Z[BB + 2, k] = aa_xx + bb_xx, aa_xy + bb_xy, aa_yy + bb_yy
         now[OWN, k] += Z[BB, k] + xx
         now[OWN + 1, k] += Z[BB + 1, k] + even
@@ -205,7 +205,7 @@ def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
     """The coarse matrix `matrix` (parts_i + 1, ROWS, parts_j + 1) of the grid `nodes`.
 
     `starts_i`, `starts_j` are the first fine node of each coarse cell, and the last node; `law` a
-    `regrid.barrier.side_laws.BarrierLaw`.  False where a cell that is looked at is folded.
+    `regrid.barrier.side_laws.BarrierLaw`.  False if one of the gathered cells is folded.
     """
     parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
     Z, lines = np.empty((SCRATCH, parts_j)), np.empty(parts_j)
@@ -266,7 +266,7 @@ def factor_lines(matrix):
 
 @kernel(allocates=False)
 def solve_lines(matrix, r, z):
-    """`z` = solution of every line along i for the residual `r`, (2, nodes); returns r·z."""
+    """`z` = solution along every line in i for the residual `r`, (2, nodes); returns r·z."""
     n_i, n_j = r.shape[1] - 1, r.shape[2] - 1
     total = 0.0
     for i in range(1, n_i):
@@ -351,8 +351,8 @@ def fill_product(matrix, p, out):
 def solve(matrix, r, x, z, p, product, tolerance, most):
     """Improve the solution `x` of the factored `matrix` for the right side `r`, overwritten.
 
-    All (2, nodes) with zeros on the boundary.  It stops where the residual's square, in the norm
-    of the lines, is below `tolerance`² of its first value, or after `most` iterations; returns
+    All (2, nodes) with zeros on the boundary.  It stops when the squared residual, in the norm of
+    the line solve, is below `tolerance`² of its first value, or after `most` iterations; returns
     their number, or -1 where the matrix is not positive definite.
     """
     p[:] = 0.0

@@ -1,16 +1,16 @@
 """Smooth errors of large blocks: gradients summed to coarse nodes, displacements interpolated back.
 
-A smooth displacement is given at coarse nodes, every few lines of a block, by how many cells alpha
-a node goes along its line j = const and how many, beta, along its line i = const.  Both are linear
-in the counts i and j between coarse nodes:
+A smooth displacement is given at coarse nodes, every few lines of a block, as alpha cells along the
+line j = const and beta cells along the line i = const.  Both are linear in the indices i and j
+between coarse nodes:
 
     d = alpha e_i + beta e_j,  e_i = ½ (r_{i+1,j} - r_{i-1,j}),  e_j = ½ (r_{i,j+1} - r_{i,j-1})
 
-(theory R4.13).  So nodes slide along lines that bend.  The sums run over stretches of i
-first, one column at a time, so that chunks of columns and threads change no bit; all that follows
-is small and serial.  Levels are solved one after another in the same memory; a call
-begins with nothing that an earlier one has left.  One fine cell speaks for a whole coarse one, and
-weights of sharp cells follow the grid: a part of the solution is taken, which cannot swing.
+(theory R4.13).  Nodes thus slide along curved lines.  The sums run over stretches of i first, one
+column at a time, so results are bitwise independent of chunks of columns and threads; all that
+follows is small and serial.  Levels are solved one after another in the same memory; a call uses no
+values of earlier ones.  One fine cell represents a whole coarse one, and weights of sharp cells
+depend on the grid, so only a fraction of the solution is applied to avoid oscillations.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ import numpy as np
 from regrid.barrier.coarse_matrix import ROWS, factor_lines, fill_coarse_matrix, solve
 from regrid.jit import kernel
 
-# What a look adds up: the gradient along the lines j = const and i = const at coarse lines
-# i = const, summed over the stretches on either side of it by hat functions.
+# Sums of the residual check: the gradient along the lines j = const and i = const at coarse lines
+# i = const, summed over the stretches on either side with hat functions.
 ALPHA, BETA = 0, 1
 
 
 def cut_evenly(count: int, parts: int) -> np.ndarray:
-    """Where about `parts` stretches of `count` edges begin, and the end: indices, int64.
+    """First indices of about `parts` stretches of `count` edges, and the end, int64.
 
-    The same from either end, so that an odd count has an odd number of stretches: one more where
-    `parts` is even.  Lengths differ by two at most.
+    Symmetric about the middle, so an odd count has an odd number of stretches: one more if `parts`
+    is even.  Lengths differ by at most two.
     """
     parts = min(parts + (count % 2 == 1 and parts % 2 == 0), count)
     low = [count * part // parts for part in range(parts // 2 + 1)]
@@ -41,9 +41,9 @@ def cut_evenly(count: int, parts: int) -> np.ndarray:
 
 @kernel(allocates=False)
 def end_stretch(stretch, low, cells, Z, span, sums):
-    """Sums of a stretch of lines into `sums` (2, stretches + 1, nj + 1); the next ones begin.
+    """Store the sums of a stretch of lines in `sums` (2, stretches + 1, nj + 1); reset them.
 
-    `Z` has rows of `span`: along both lines by the near hat functions, by the far ones.  Its
+    `Z` has rows of `span`: along both lines with the near hat functions, then the far ones.  Its
     columns 1..cells-1 are inner columns of nodes from `low` + 1 on.
     """
     for col in range(1, cells):
@@ -80,10 +80,10 @@ def fill_coarse_right(starts_j, sums, right):
 
 @kernel
 def take_frames(nodes, starts_i, starts_j, right, lines, solution):
-    """From alpha and beta to x and y: the `right` side, and the `solution` where a solve begins.
+    """Convert alpha and beta to x and y: the `right` side, and the initial `solution`.
 
-    That is what `lines` (2, parts_i + 1, nj + 1) have at the coarse nodes; `right` and `solution`
-    (2, parts_i + 1, parts_j + 1).  False where lines do not cross at a coarse node.
+    The latter is that of `lines` (2, parts_i + 1, nj + 1) at the coarse nodes; `right` and
+    `solution` (2, parts_i + 1, parts_j + 1).  False if lines do not cross at a coarse node.
     """
     x, y = nodes
     for part_i in range(1, starts_i.shape[0] - 1):
@@ -105,10 +105,10 @@ def take_frames(nodes, starts_i, starts_j, right, lines, solution):
 
 @kernel
 def fill_coarse_lines(nodes, starts_i, starts_j, solution, lines):
-    """The displacement `solution` (2, parts_i + 1, parts_j + 1), in x and y, as alpha and beta.
+    """Convert the displacement `solution` (2, parts_i + 1, parts_j + 1) to alpha and beta.
 
-    It is overwritten.  Into `lines` (2, parts_i + 1, nj + 1), linear between coarse nodes and zero
-    on the sides.  Returns its largest part over the shortest edge at a coarse node, in cells.
+    It is overwritten; the result in `lines` (2, parts_i + 1, nj + 1) is linear between coarse nodes
+    and zero on the sides.  Returns its largest part over the shortest edge there, in cells.
     """
     x, y = nodes
     parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
@@ -141,7 +141,7 @@ def fill_coarse_lines(nodes, starts_i, starts_j, solution, lines):
 def add_coarse(nodes, starts_i, lines, out):
     """`out` = `nodes` + alpha e_i + beta e_j, both linear in i between the coarse `lines`.
 
-    `lines` (2, parts + 1, nj + 1); the sides stay.
+    `lines` (2, parts + 1, nj + 1); the sides are unchanged.
     """
     nj = nodes.shape[2] - 1
     for k in range(2):
@@ -164,13 +164,13 @@ def add_coarse(nodes, starts_i, lines, out):
 
 
 def _cut(whole: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """The beginning of `whole` (n,) as an array of `shape`, and the rest."""
+    """The start of `whole` (n,) as an array of `shape`, and the rest."""
     size = math.prod(shape)
     return whole[:size].reshape(shape), whole[size:]
 
 
 class Level:
-    """Coarse nodes every so many lines of a block, their matrix and the vectors of its solve."""
+    """Coarse nodes at intervals of a block's lines, their matrix and the vectors of its solve."""
 
     matrix: np.ndarray
     vectors: np.ndarray
@@ -181,17 +181,17 @@ class Level:
         self.shapes = (nodes_i, ROWS, nodes_j), (5, 2, nodes_i, nodes_j)
 
     def take_arrays(self, whole: np.ndarray) -> None:
-        """Lay matrix and vectors into the beginning of `whole` (n,)."""
+        """Place matrix and vectors at the start of `whole` (n,)."""
         self.matrix, whole = _cut(whole, self.shapes[0])
         self.vectors, whole = _cut(whole, self.shapes[1])
 
 
 class CoarseCorrection:
-    """The smooth part of the step that a grid of ni × nj cells needs; nothing in small blocks.
+    """The smooth part of the step of a grid of ni × nj cells; none in small blocks.
 
-    A look fills `sums` (2, stretches + 1, nj + 1) for the stretches that begin at `starts_i`;
-    then `find` solves for the correction and `add` adds it.  `take_arrays` has to give it `size`
-    numbers of memory first; `tuning` is a `regrid.barrier.tuning.Tuning`.
+    The residual check fills `sums` (2, stretches + 1, nj + 1) for the stretches that start at
+    `starts_i`; then `find` solves for the correction and `add` adds it.  `take_arrays` must first
+    provide memory for `size` numbers; `tuning` is a `regrid.barrier.tuning.Tuning`.
     """
 
     sums: np.ndarray
@@ -214,17 +214,17 @@ class CoarseCorrection:
         self.iterations = 0
 
     def take_arrays(self, whole: np.ndarray) -> None:
-        """Work in `whole` (`size` or more,), from a look to what is added after it."""
+        """Work in `whole` (`size` or more,), from a residual check to the correction after it."""
         self.sums, whole = _cut(whole, self._shape)
         self.lines, whole = _cut(whole, self._shape)
         for level in self.levels:
             level.take_arrays(whole)
 
     def find(self, nodes: np.ndarray, law, least: float = 0.0) -> float:
-        """Solve for the correction of `nodes` (2, ni+1, nj+1), by their look's sums and `law`.
+        """Solve for the correction of `nodes` (2, ni+1, nj+1), from their check's sums and `law`.
 
-        Returns its largest part over the shortest edge there, in cells; 0 in small blocks, where
-        there is no solution, and where the coarsest nodes go by less than `least`.
+        Returns its largest part over the shortest edge there, in cells; 0 in small blocks, without
+        a solution, and if the coarsest nodes move by less than `least`.
         """
         size, self.iterations = 0.0, 0
         if not self.able:
@@ -255,6 +255,6 @@ class CoarseCorrection:
         return tuning.coarse_part * size
 
     def add(self, nodes: np.ndarray, out: np.ndarray, part: float = 1.0) -> None:
-        """`out` = `nodes` with this part of the correction, both (2, ni+1, nj+1); sides stay."""
+        """`out` = `nodes` plus `part` of the correction, both (2, ni+1, nj+1); sides unchanged."""
         self.lines *= part
         add_coarse(nodes, self.starts_i, self.lines, out)

@@ -1,10 +1,9 @@
 """Conjugate gradients for one Newton step, preconditioned by solves along the straight lines.
 
-The matrix is that of `regrid.barrier.assembly`, kept by column chunks.  Every sum over the block
-is kept as one partial a column, filled over i in order and summed over j in order, so that
-neither chunks nor threads change a bit.  Note: a chunk computes the direction
-in its neighbours' first columns itself, so that a pass needs no waiting inside; both write the
-same number there.
+The matrix is that of `regrid.barrier.assembly`, stored by column chunks.  Every sum over the block
+has one partial sum per column, filled over i in order and summed over j in order, so results are
+bitwise independent of chunks and threads.  Note: a chunk also computes the direction in its
+neighbours' first columns, so a pass needs no synchronisation; both write the same value there.
 """
 
 from __future__ import annotations
@@ -16,8 +15,8 @@ from regrid.barrier.step_control import SPAN
 from regrid.jit import inlined, kernel
 
 # Scratch of the product: the direction in three rows of nodes, and the product in the middle one,
-# far from them: a store less than 2 kB behind a shifted load halves the vectors (LLVM fears for its
-# store-to-load forwarding).
+# far from them: a store less than 2 kB behind a shifted load halves the vector length (LLVM
+# protects store-to-load forwarding).
 BEFORE_X, BEFORE_Y, HERE_X, HERE_Y, AFTER_X, AFTER_Y = (k * SPAN for k in range(6))
 OUT_X, OUT_Y = 10 * SPAN, 11 * SPAN
 
@@ -26,7 +25,7 @@ OUT_X, OUT_Y = 10 * SPAN, 11 * SPAN
 def fill_product_row(now, past, count, Z):
     """Matrix times direction in one row of nodes, from scratch into scratch.
 
-    `now` and `past` are the matrix rows of this row of nodes and of the one before.
+    `now` and `past` are the matrix rows of this row of nodes and the previous one.
     """
     for col in range(1, count + 1):
         x, y = Z[HERE_X + col], Z[HERE_Y + col]
@@ -66,8 +65,8 @@ def fill_product(directions, beta, first, last, H, out, totals, Z):
     """`direction = z + beta old`, `out = H direction` at columns first..last-1, and their product.
 
     `directions` are all three: direction, z, old.
-    All arrays (2, ni+1, nj+1) with zeros on the boundary, `totals` (nj+1).  Where `beta` is
-    negative the direction is taken as it stands, boundary values included.
+    All arrays (2, ni+1, nj+1) with zeros on the boundary, `totals` (nj+1).  If `beta` is negative
+    the direction is used unchanged, including boundary values.
     """
     direction, z, old = directions
     ni = z.shape[1] - 1
@@ -117,8 +116,8 @@ def fill_product(directions, beta, first, last, H, out, totals, Z):
 def fill_line_solution(alpha, step, vectors, first, last, H, totals):
     """Step `x += alpha p, r -= alpha Hp`, then `z` = line solve of r, and the sums of r·z.
 
-    `step` is p and Hp, `vectors` are x, r, z.  Nothing is added where alpha is 0, so that the first
-    call may find rubbish in `step`.
+    `step` is p and Hp, `vectors` are x, r, z.  Nothing is added if alpha is 0, so `step` may be
+    undefined in the first call.
     """
     (direction, product), (x, r, z) = step, vectors
     ni = x.shape[1] - 1
@@ -175,7 +174,7 @@ def fill_line_solution(alpha, step, vectors, first, last, H, totals):
 
 @inlined
 def add_columns(totals, begin, end):
-    """The sum over the columns in order; of `.sum()` a threaded kernel makes partial sums."""
+    """The sum over the columns in order; in a threaded kernel `.sum()` would use partial sums."""
     total = 0.0
     for k in range(begin, end):
         total += totals[k]
@@ -183,16 +182,16 @@ def add_columns(totals, begin, end):
 
 
 def make_solver(parallel):
-    """The conjugate-gradient loop, over column chunks one after the other or on threads."""
+    """The conjugate-gradient loop, over column chunks in sequence or on threads."""
 
     @kernel(parallel=parallel)
     def solve(columns, H, vectors, directions, totals, limits, scratch):
         """Solve `H x = r0` from the x whose residual is `r`; returns (iterations, rz0, rz).
 
         `columns` (chunks + 1) are the first node columns of the chunks, `vectors` x, r, z,
-        `directions` room for p, the one before it and Hp.  `limits`: it stops when the residual's
-        square, in the norm of the preconditioner, is below tolerance² of its first value or
-        below floor, or after so many iterations.
+        `directions` work arrays for p, the previous one and Hp.  `limits`: it stops when the
+        squared residual, in the norm of the preconditioner, is below tolerance² of its first value
+        or below floor, or after the given number of iterations.
         """
         (p, p_old, product), (tolerance, floor, most) = directions, limits
         chunks = columns.shape[0] - 1

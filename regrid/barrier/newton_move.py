@@ -26,16 +26,16 @@ from regrid.measure.faults import find_impossible
 from regrid.protocol import RegridReport
 from regrid.sides import copy_sides, get_sides
 
-ROUND_OFF = 1e-12  # residual, in cells, that nothing can improve
+ROUND_OFF = 1e-12  # residual, in cells, that cannot be improved
 DOUBTFUL = 1e-6  # least ratio up to which the signs of corners are computed exactly
-SLOW = 0.3  # of the speed from which sides are fast: those that rest
+SLOW = 0.3  # of `fast_sides`: slower sides count as at rest
 LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
 
 
 class NewtonMove:
     """One regrid in the workspace's frame: from `work.old` to `work.sides`, into `work.trial`.
 
-    `begin` (ki, kj and what else `Workspace.begin` takes) are the arguments of each part's start.
+    `begin` (ki, kj and other arguments of `Workspace.begin`) are used at the start of each part.
     """
 
     def __init__(self, tuning: Tuning, work: Workspace, **begin):
@@ -47,7 +47,7 @@ class NewtonMove:
         self.start = "displacement"
         self.estimate = self.strayed = np.inf
         self.quality: tuple[float, float, int, int] | None = None
-        self.triangles = -1  # not known
+        self.triangles = -1  # unknown
         self._begin()
         self.exempt = work.block.turned
 
@@ -68,7 +68,7 @@ class NewtonMove:
         )
 
     def is_settled(self) -> bool:
-        """Check the residual of the moved grid: True when it is `work.trial` and needs no more."""
+        """Check the residual of the displaced grid: True if that is `work.trial` and final."""
         work, tuning = self.work, self.tuning
         if work.ni == 1 or work.nj == 1:
             work.load_old()
@@ -89,10 +89,10 @@ class NewtonMove:
         return self._accept(self.moved_ratio)
 
     def _correct_smooth_error(self) -> bool:
-        """Take from the moved grid what its residual check saw of smooth errors; False where that
-        is little.
+        """Remove the smooth errors found by the residual check of the displaced grid; False if they
+        are small.
 
-        The sums are those of `work.base`.  A correction that costs corners is not taken.
+        The sums are those of `work.base`.  A correction that shrinks corners is rejected.
         """
         work, tuning = self.work, self.tuning
         if self.estimate * max(work.ni, work.nj) ** 2 < tuning.smooth_floor:
@@ -111,13 +111,13 @@ class NewtonMove:
         return True
 
     def run(self) -> bool:
-        """Go the whole way where `is_settled` has said no, in halves if need be.
+        """Perform the whole move if `is_settled` returned False, in halves if necessary.
 
         True when `work.trial` is valid.
         """
         work = self.work
         work.load_old()
-        if work.sides is not work.own_sides:  # the moved grid may lie in the same array
+        if work.sides is not work.own_sides:  # the displaced grid may share its array
             copy_sides(work.sides, work.own_sides)
             work.sides = work.own_sides
         if self._advance():
@@ -145,7 +145,7 @@ class NewtonMove:
         return self._unfold()
 
     def _unfold(self) -> bool:
-        """The last resort (theory R5.4), where the boundary alone does not forbid a grid."""
+        """The last resort (theory R5.4), unless the boundary alone rules out a valid grid."""
         work = self.work
         if work.ni == 1 or work.nj == 1 or find_impossible(work.sides) is not None:
             return False
@@ -172,12 +172,12 @@ class NewtonMove:
         return self._accept(work.compare_corners(found, work.old))
 
     def _begin(self) -> None:
-        """Laws of the part's sides, and how they move."""
+        """Spacing of the part's sides, and their motion."""
         self.broken = False
         self.work.begin(**self.arguments)
 
     def _advance(self) -> bool:
-        """One part of the motion, `work.old` to `work.sides`, from the grid moved along.
+        """One part of the motion, `work.old` to `work.sides`, starting from the displaced grid.
 
         True when `work.trial` is valid.
         """
@@ -215,13 +215,13 @@ class NewtonMove:
     def _get_lost(self) -> float:
         """Residual in cells from which the straight-line grid is tried.
 
-        What a left-behind inside leaves is at the sides: judged against their length.
+        An interior that lags behind leaves its residual at the sides: relative to their length.
         """
         inner, around = (self.work.ni - 1) * (self.work.nj - 1), self.work.ni + self.work.nj
         return self.tuning.lost / math.sqrt(inner / around)
 
     def _straighten(self, ratio: float) -> float:
-        """Begin from the straight-line grid instead, where that is valid and much nearer."""
+        """Start from the straight-line grid instead, if that is valid and much closer."""
         work, error, broken = self.work, self.error, self.broken
         kept = work.trial.copy()
         fill_quasi_1d(work.sides, work.base)
@@ -235,10 +235,10 @@ class NewtonMove:
         return ratio
 
     def _polish(self, ratio: float, most: int, afresh: bool = True) -> int:
-        """Newton steps from `work.trial` while the last kept too little, `ratio`, of a corner; how
-        many.
+        """Newton steps from `work.trial` while the last kept too small a fraction `ratio` of a
+        corner; returns their number.
 
-        After untangling (`afresh`) until the residual is below `settled`, too.
+        After untangling (`afresh`) also until the residual is below `settled`.
         """
         work, tuning = self.work, self.tuning
         for step in range(most):
@@ -254,9 +254,9 @@ class NewtonMove:
         return most
 
     def _predict(self) -> float:
-        """Carry the boundary's motion inside by the Hessian of the old grid.
+        """Extend the boundary's motion inward by the Hessian of the old grid.
 
-        Returns the least ratio of the step that led to `work.trial`, 0 where that is not valid.
+        Returns the least corner ratio of the step to `work.trial`, 0 if that is not valid.
         """
         work, least = self.work, self.tuning.step_ratio
         work.assemble(work.old)
@@ -269,10 +269,10 @@ class NewtonMove:
         return self._newton(work.base, work.base) if self.moved_ratio > least else 0.0
 
     def _newton(self, base, old) -> float:
-        """`work.trial` = a Newton step from the valid `base`, shortened node by node if need be.
+        """`work.trial` = a Newton step from the valid `base`, shortened node by node if necessary.
 
-        Returns the least ratio of corner areas to those of `old`; those of `base` must be above
-        `step_ratio` of them.
+        Returns the least ratio of corner areas to those of `old`; those of `base` must exceed
+        `step_ratio` times them.
         """
         work = self.work
         work.assemble(base)
@@ -284,10 +284,10 @@ class NewtonMove:
         return ratio if ratio > self.tuning.step_ratio else self._search(base, old)
 
     def _search(self, base, old) -> float:
-        """The longest part of the step, shortened at its corners too, that makes J less.
+        """The largest fraction of the step, shortened at corners as well, that decreases J.
 
-        Far from the minimum the steps of Newton's method lead uphill, and what is shortened at
-        the corners alone leaves each of them a quarter of its area, step after step.
+        Far from the minimum Newton steps may lead uphill, and shortening at the corners alone
+        leaves each of them a quarter of its area, step after step.
         """
         work = self.work
         barrier = work.compute_barrier(base)
@@ -304,10 +304,10 @@ class NewtonMove:
         return work.compare_corners(base, old)
 
     def _solve(self, guess) -> int:
-        """Fill `work.change`; the iterations done, and `error`, the first residual in cells.
+        """Fill `work.change`; returns the iterations, sets `error`, the initial residual in cells.
 
-        `broken` where the line solve overflows, since corners are too sharp for it: its residual
-        is then not finite, negative or nothing at all, and no sign of a minimum.
+        Sets `broken` if the line solve overflows because corners are too sharp: a residual that is
+        not finite, negative or zero does not indicate a minimum.
         """
         work, tuning = self.work, self.tuning
         scale = work.sigma * (work.ni - 1) * (work.nj - 1)
@@ -336,7 +336,7 @@ class NewtonMove:
         return ratio > DOUBTFUL or not find_folded_cells(self.work.trial).size
 
     def _untangle(self) -> bool:
-        """Untangle the better of the moved grid and the trial into `work.trial`."""
+        """Untangle the better of the displaced grid and the trial into `work.trial`."""
         work = self.work
         self.rescues += 1
         self.start = "untangled"

@@ -26,7 +26,7 @@ from regrid.measure.faults import explain_failure, take_grids, take_numbers
 from regrid.protocol import RegridResult
 from regrid.sides import compute_area, get_sides
 
-EVEN = 1e-6  # families whose weights differ by less are told apart by the block's shape
+EVEN = 1e-6  # families whose weights differ by less are ranked by the block's shape
 SERIAL_NODES = 6400  # smaller blocks stay on one thread
 
 
@@ -35,17 +35,15 @@ class BarrierRegridder:
 
     `epsilon` weighs the barrier (1e-3; 1e-2 for sweeps); `method` is "newton" or "sweeps" (the
     paper's own iteration); `edge_lengths` "conditional" or "unit"; `family` "auto" (by the sides;
-    where all four bend, lines of their shapes unless `curves` is false), "i" (lines j = const
-    straight), "j", or the two weights; `area_weight` is lam of theory R4.1;
-    `strengthening` is how many times epsilon goes up in sharp cells at most (30);
-    `cost_weight` is mu of theory R4.10, the weight of cells that shorten the time step (0: none);
-    it is of use where sound speeds are given;
-    `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is
-    the least number of Newton steps a call; blocks of `coarse_from` cells and more (9000; inf: no
-    block) have their smooth errors taken away on coarse nodes (theory R4.13); these and all other
-    numbers have their defaults from `tuning`.  With family "i"
-    lines keep the spacing that they have in `first_grid` (2, ni+1, nj+1); without it inner
-    ones have means of the outer two's.
+    if all four bend, lines of their shapes unless `curves` is false), "i" (lines j = const
+    straight), "j", or the two weights; `area_weight` is lam of theory R4.1; `strengthening` is the
+    largest factor of epsilon in sharp cells (30); `cost_weight` is mu of theory R4.10, the weight
+    of cells that limit the time step (0: none); it acts only if sound speeds are given;
+    `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is the
+    minimum number of Newton steps per call; in blocks of `coarse_from` cells and more (9000; inf:
+    none) smooth errors are removed on coarse nodes (theory R4.13); these and all other parameters
+    have their defaults in `tuning`.  With family "i" lines keep the spacing of `first_grid` (2,
+    ni+1, nj+1); without it inner lines have the mean spacing of the outer two.
     """
 
     def __init__(
@@ -98,10 +96,10 @@ class BarrierRegridder:
         if first_grid is not None:
             bend = find_bend(np.asarray(first_grid, dtype=float))
             self.first_shape = bend.shape
-            if is_bent(bend):  # evenly spaced lines have no laws that take memory
+            if is_bent(bend):  # evenly spaced lines need no stored spacing
                 self.bend = bend
         self.threads = int(threads)
-        self.meets_itself = False  # may the boundary lie on itself?
+        self.meets_itself = False  # whether the boundary may touch itself
         self._workspaces: dict[tuple[int, int], Workspace] = {}
         self._sweeps = None
         if method == "sweeps":
@@ -112,11 +110,11 @@ class BarrierRegridder:
                 edge_lengths=edge_lengths, family=family, threads=threads,
             )  # fmt: skip
 
-    works_in_place = True  # into `boundary`, whose sides stay bitwise
+    works_in_place = True  # into `boundary`, whose sides are preserved bitwise
 
     @property
     def sees_cost(self) -> bool:
-        """Does it want the sound speeds?  Not the sweeps."""
+        """Whether it uses the sound speeds; the sweeps do not."""
         return self._sweeps is None and self.tuning.cost_weight > 0.0
 
     def regrid(
@@ -129,11 +127,11 @@ class BarrierRegridder:
     ) -> RegridResult:
         """The grid inside `boundary` (2, ni+1, nj+1; only its sides are read), near `previous`.
 
-        With `sound_speed` (ni, nj) [m/s], cells that would set the time step are opened (R4.10):
-        those crossed in less than 1/R, R the greater of this block's (`compute_limiting_rate`) and
-        `least_limiting_rate` [1/s], the greatest of the blocks that share the step.  `in_place`
-        writes the grid into `boundary`, if that is in order, and loses its inside in any case.
-        Raises RegridFailure, naming side and nodes, when there is no valid grid or none is found.
+        With `sound_speed` (ni, nj) [m/s], cells that would limit the time step are widened (R4.10):
+        those crossed in less than 1/R, with R the larger of this block's (`compute_limiting_rate`)
+        and `least_limiting_rate` [1/s], the largest of the blocks that share the step.  `in_place`
+        writes the grid into `boundary` if its layout allows, overwriting its interior anyway.
+        Raises RegridFailure, naming side and nodes, if there is no valid grid or none is found.
         """
         if self._sweeps is not None:
             return self._sweeps.regrid(previous, boundary)
@@ -163,7 +161,7 @@ class BarrierRegridder:
         )  # fmt: skip
         simple = work.block.area > 0.0 and (self.meets_itself or work.is_simple)
         if not (simple and move.is_settled()):
-            if not move.estimate < np.inf:  # else all nodes are numbers
+            if not move.estimate < np.inf:  # otherwise all nodes are finite
                 if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
                     raise explain_failure(boundary)
                 if not np.isfinite(previous).all():
@@ -175,12 +173,12 @@ class BarrierRegridder:
             if not move.run():
                 raise explain_failure(boundary, work.trial, transposed, move.broken)
         report = move.report()
-        if report.quality and mirrored != transposed:  # of a grid that turns clockwise
+        if report.quality and mirrored != transposed:  # of a clockwise grid
             report = replace(report, quality=None)
         return RegridResult(work.give(), report)
 
     def compute_limiting_rate(self, boundary: np.ndarray, sound_speed: np.ndarray) -> float:
-        """R [1/s] of theory R4.11: the rate that these sides ask for, whatever is inside.
+        """R [1/s] of theory R4.11: the rate implied by these sides for any interior.
 
         `boundary` (2, ni+1, nj+1; only its sides are read), `sound_speed` (ni, nj) [m/s].
         """
@@ -208,7 +206,7 @@ class BarrierRegridder:
 
 
 def _check_tuning(tuning: Tuning) -> None:
-    """Raise BadInput for numbers that make no functional."""
+    """Raise BadInput for invalid parameters of the functional."""
     for name, words, good in (
         ("epsilon", "positive", tuning.epsilon > 0.0),
         ("strengthening", "1 or more", tuning.strengthening >= 1.0),
@@ -238,9 +236,9 @@ def _family_weights(family):
 
 
 def _runs_along_j(weights, boundary) -> bool:
-    """Whether the lines i = const are the heavier family; at a tie, whether they are the longer.
+    """Whether the lines i = const are the heavier family; at a tie, whether they are longer.
 
-    A tie must not hang on rounding, nor on which index is called i: more cells, then more length.
+    A tie must not depend on round-off or on the naming of indices: more cells, then more length.
     """
     if abs(weights[1] - weights[0]) > EVEN:
         return bool(weights[1] > weights[0])
@@ -252,10 +250,10 @@ def _runs_along_j(weights, boundary) -> bool:
 
 
 class _FixedFamily(BarrierRegridder):
-    """Base: `BarrierRegridder` with its `family` given (theory R4), not found from the sides.
+    """Base: `BarrierRegridder` with a given `family` (theory R4), not chosen from the sides.
 
-    A family that does not start on the side that deforms leaves the first grid line far from it, as
-    does an even mixture of both.
+    A family that does not start on the deforming side leaves the first grid line far from it, as
+    does an equal mixture of both.
     """
 
     fixed: str | tuple[float, float] = "auto"
@@ -296,6 +294,6 @@ class StraightAlongJ(_FixedFamily):
 
 
 class StraightBothWays(_FixedFamily):
-    """The barrier with both straight families in equal weights."""
+    """The barrier with both straight families at equal weights."""
 
     fixed = (0.5, 0.5)

@@ -32,8 +32,8 @@ from regrid.measure.corners import mark_triangles
 from regrid.measure.quality import find_areas, square
 
 # Scratch: one row each.  The first ones hold node rows i and i + 1 of the old grid and of this one;
-# then what a chunk takes of the tables along j, inverse conditional lengths of edges (G) and their
-# weights as parts of straight lines (Q): along i, along j of the near and of the far row of nodes.
+# then the chunk's part of the tables along j, inverse conditional lengths of edges (G) and their
+# straight-line weights (Q): along i, and along j in the near and the far row of nodes.
 (
     OLD_X, OLD_Y, OLD_NEXT_X, OLD_NEXT_Y, HERE_X, HERE_Y, NEXT_X, NEXT_Y,
     LAW, LAW_CHANGE, VALUE_X, VALUE_Y, CHANGE_X, CHANGE_Y, V, BLEND,
@@ -51,15 +51,15 @@ OLD_ROWS = OLD_X, OLD_Y, OLD_NEXT_X, OLD_NEXT_Y
 ROWS = HERE_X, HERE_Y, NEXT_X, NEXT_Y
 OLD_NEXT, NEXT = OLD_ROWS[2:], ROWS[2:]
 OWN = -NOTHING
-# What a look finds in a chunk of columns, and in the block: the most that a corner has shrunk, the
-# least scaled corner area, how far nodes are from interpolated places, the largest squared inverse
-# sine of a corner and the largest squared aspect ratio.
+# Results of the residual check of a chunk of columns, and of the block: largest shrinkage of a
+# corner, least scaled corner area, distance of nodes from interpolated positions, largest squared
+# inverse sine of a corner and largest squared aspect ratio.
 MOST_SHRUNK, LEAST_SCALED, STRAYED, COSECANT, ASPECT = range(5)
 
 
 @kernel(allocates=False)
 def begin(law, motion, low, cells, Z):
-    """Sums and extremes of nothing, and the tables along j, before the first row of cells."""
+    """Initialise sums, extremes and the tables along j before the first row of cells."""
     nj = law.along_j.shape[1]
     for k in range(0, LOOK_ROWS, SPAN):
         for col in range(round_up(cells + 2)):
@@ -82,7 +82,7 @@ def begin(law, motion, low, cells, Z):
 
 @kernel(allocates=False)
 def shift_rows(count, Z):
-    """The next rows of both grids become those of this row of cells."""
+    """Make the next node rows of both grids those of this row of cells."""
     for col in range(round_up(count)):
         Z[OLD_X + col] = Z[OLD_NEXT_X + col]
         Z[OLD_Y + col] = Z[OLD_NEXT_Y + col]
@@ -92,7 +92,7 @@ def shift_rows(count, Z):
 
 @inlined
 def give_row(nodes, i, frame, low, count, Z):
-    """The next row into row i of a grid in a `frame`, `count` columns from `low` on."""
+    """Store the next row in row i of a grid in a `frame`, `count` columns from `low` on."""
     transposed, mirrored = frame
     x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
     if transposed:
@@ -108,7 +108,7 @@ def give_row(nodes, i, frame, low, count, Z):
 
 @kernel(allocates=False)
 def move_row(here, count, Z):
-    """The old row moved with its sides (R6.5); `here` is what `take_blend` gives of it."""
+    """Displace the old row with its sides (R6.5); `here` is its result of `take_blend`."""
     for col in range(round_up(count)):
         x, y = blend(
             here, Z[LAW + col], Z[LAW_CHANGE + col], Z[VALUE_X + col], Z[VALUE_Y + col],
@@ -120,9 +120,9 @@ def move_row(here, count, Z):
 
 @kernel(allocates=False)
 def bend_row(bend, Z):
-    """The parts `bend` (count) by which lines' own laws depart there, into the moved row.
+    """Add to the moved row the deviations `bend` (count,) of the lines' own spacing there.
 
-    And what the edges that lead there depart by.
+    The edges that lead there are corrected as well.
     """
     for col in range(bend.shape[0]):
         turn, part = bend[col] - Z[BEND + col], bend[col]
@@ -135,7 +135,7 @@ def bend_row(bend, Z):
 
 @inlined
 def make_new_row(i, law, motion, low, count, nodes, Z):
-    """Row i of the moved grid, into `nodes`, too, whose sides may be those of the motion."""
+    """Row i of the displaced grid, also stored in `nodes`, whose sides may be the motion's."""
     ni, nj, sides = nodes.shape[1] - 1, nodes.shape[2] - 1, motion.sides
     if i == 0 or i == ni:
         take_row(sides, i, UPRIGHT, low, count, NEXT, Z)
@@ -151,10 +151,10 @@ def make_new_row(i, law, motion, low, count, nodes, Z):
 
 @kernel(allocates=False)
 def take_laws(line, side, count, Z):
-    """Inverse lengths and weights of the edges along i to the next row and along j in it.
+    """Load inverse lengths and weights of the edges along i to the next row and along j in it.
 
-    `line` and `side` have the numbers of a law, the latter's rows lie in Z; the far edges become
-    near ones.
+    `line` and `side` hold the numbers of a spacing, the latter's rows are in Z; the far edges
+    become near ones.
     """
     (length, length_change, step, step_change, ki), (blend, u, kj) = line, side
     for col in range(round_up(count)):
@@ -173,10 +173,10 @@ def take_laws(line, side, count, Z):
 
 @inlined
 def take_cell(col, numbers, Z):
-    """What the four corners of a cell give to gradient and matrix along its edges; its quality.
+    """Contributions of a cell's four corners to gradient and matrix along its edges; its quality.
 
-    A corner of the block's own has OWN for its old area; it enters neither the areas that are
-    compared nor the weight, and has its area from `given`.
+    A corner of the block itself has OWN as old area; it enters neither the compared areas nor the
+    weight, and its area comes from `given`.
     """
     full, growth, least_sine, most, lam_c, flat, rate, given = numbers
     (ax, ay), (ux, uy), (bx, by), (rx, ry) = take_edges(ROWS, col, Z)
@@ -188,7 +188,7 @@ def take_cell(col, numbers, Z):
     o1, o2, o3, o4 = Z[OLD_1 + col], Z[OLD_2 + col], Z[OLD_3 + col], Z[OLD_4 + col]
     d1, d2 = d1 if o1 > OWN else given, d2 if o2 > OWN else given
     d3, d4 = d3 if o3 > OWN else given, d4 if o4 > OWN else given
-    # One division for the four corners and the fading; where it overflows nothing is a number.
+    # One division for the four corners and the fading; overflow leads to NaN.
     low, up, across = d1 * d2, d3 * d4, gb + gr
     both = 1.0 / ((low * up) * across)
     ratio = (ga + gu) * (both * (low * up))
@@ -203,7 +203,7 @@ def take_cell(col, numbers, Z):
     j1, j2, j3, j4 = i1 * i1, i2 * i2, i3 * i3, i4 * i4
     c1, c2 = (pa * pb) * j1 if o1 > OWN else 0.0, (pu * pb) * j2 if o2 > OWN else 0.0
     c3, c4 = (pu * pr) * j3 if o3 > OWN else 0.0, (pa * pr) * j4 if o4 > OWN else 0.0
-    # What the corners had before, over what they have.
+    # Old over new areas of the corners.
     o1, o2, o3, o4 = o1 * (h1 * i1), o2 * (h2 * i2), o3 * (h3 * i3), o4 * (h4 * i4)
     o1, o3 = o1 if o1 > o2 else o2, o3 if o3 > o4 else o4
     o1, o2 = o1 if o1 > o3 else o3, Z[SHRUNK + col]
@@ -212,7 +212,7 @@ def take_cell(col, numbers, Z):
     c1, c2 = c1 if c1 > c3 else c3, Z[SHARPEST + col]
     Z[SHARPEST + col] = c1 if c1 > c2 else c2
     weight = (full * weigh(c1, least_sine, most)) * fade(ratio, growth)
-    # Mid-lines, twice over: aspect ratio as a fraction, and does the cell limit the step?
+    # Twice the mid-lines: aspect ratio as a fraction, and whether the cell limits the step.
     mx, my, nx, ny = ax + ux, ay + uy, bx + rx, by + ry
     m2, n2 = mx * mx + my * my, nx * nx + ny * ny
     longer, shorter = m2 if m2 > n2 else n2, n2 if m2 > n2 else m2
@@ -250,7 +250,7 @@ def take_cell(col, numbers, Z):
 
 @kernel(allocates=False)
 def take_row_of_cells(numbers, cells, Z):
-    """`take_cell` for so many cells."""
+    """`take_cell` for a number of cells."""
     for col in range(round_up(cells)):
         take_cell(col, numbers, Z)
 
@@ -268,7 +268,7 @@ def fill_old_areas(cells, Z):
 def take_cells(i, law, shape, low, cells, Z):
     """`take_cell` for row i of cells.
 
-    Whole vectors of columns, as in `add_row`: what lies behind the last cell stays by itself.
+    Whole vectors of columns, as in `add_row`; entries behind the last cell affect no other.
     """
     ni, nj = shape
     if law.bent:
@@ -301,8 +301,8 @@ def take_cells(i, law, shape, low, cells, Z):
 
 @kernel(allocates=False)
 def measure_old(cells, Z):
-    """`fill_old_areas`, and for the way nodes stray the least area and the longest edges, squared,
-    by columns."""
+    """`fill_old_areas`, and by columns the least area and the longest squared edges, used to
+    measure deviations of nodes."""
     for col in range(round_up(cells)):
         low, high, near, far = take_edges(OLD_ROWS, col, Z)
         a1, a2, a3, a4 = find_areas(low, high, near, far)
@@ -319,7 +319,7 @@ def measure_old(cells, Z):
 
 @kernel(allocates=False)
 def add_limiting_shares(scale, weight, cells, Z):
-    """What cells that limit the step give along edges: gradient of P, half the trace of its blocks.
+    """Gradient of P and half the trace of its blocks along edges, for cells that limit the step.
 
     `scale` = 2/R², `weight` = mu sigma: see `cost_slope`.
     """
@@ -349,7 +349,7 @@ def add_limiting_shares(scale, weight, cells, Z):
 def add_row(cells, Z):
     """Gradient at a row of nodes, one row of the elimination, and its part of the sum.
 
-    Whole vectors of columns: those behind the last inner node are rubbish and stay by themselves.
+    Whole vectors of columns; entries behind the last inner node are undefined and affect no other.
     """
     for col in range(1, 1 + round_up(cells - 1)):
         q, last_q = Z[LINE_Q + col], Z[PASSED + col]
@@ -376,10 +376,10 @@ def add_row(cells, Z):
 
 @kernel(allocates=False)
 def add_to_stretch(w, cells, Z):
-    """The row added last into sums over its stretch of lines, `w` the part of it that lies behind.
+    """Add the last row to the sums over its stretch of lines; `w`: the fraction already passed.
 
-    The gradient along the lines through a node (theory R4.13).  Whole vectors of columns, as in
-    `add_row`.
+    The sums are of the gradient along the lines through a node (theory R4.13).  Whole vectors of
+    columns, as in `add_row`.
     """
     for col in range(1, 1 + round_up(cells - 1)):
         x, y = 0.5 * Z[WHOLE_X + col], 0.5 * Z[WHOLE_Y + col]
@@ -397,16 +397,16 @@ def add_to_stretch(w, cells, Z):
 
 @kernel(allocates=False)
 def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
-    """Move a grid with its sides into `nodes`; estimate of its residual r·z into `totals` (nj+1).
+    """Displace a grid with its sides into `nodes`; estimate its residual r·z in `totals` (nj+1).
 
-    In a chunk's node columns, which are inner ones.  `given`: the old grid, a grid that gets the
-    new one, and the frame of these two; both may lie as `nodes` does, and then the second is not
-    read.  `chunk`: its first column and the one after its last, found and scratch.  Into found
-    (5,), for all cells that have a corner at these columns, what the names above say; corners are
-    compared with the old ones.  Way strayed: the most that `motion.reach` (nj+1), a distance a
-    column [m], is over the old cells' heights there, taken as the column's least area over its
-    longest edge; 0 where lines are not `law.bent`.  `stretches`: starts, the first node row of
-    each stretch of lines, and the last one, and sums (2, stretches + 1, nj+1), which gets the sums
+    This covers the chunk's inner node columns.  `given`: the old grid, a grid that receives the new
+    one, and the frame of these two; if both have the layout of `nodes`, the second is not read.
+    `chunk`: its first column and the one after its last, found and scratch.  found (5,) receives
+    the quantities named above for all cells with a corner at these columns; corners are compared
+    with the old ones.  The deviation of nodes is the maximum of `motion.reach` (nj+1), a distance
+    per column [m], over the old cells' heights there, taken as the column's least area over its
+    longest edge; 0 if lines are not `law.bent`.  `stretches`: starts, the first node row of each
+    stretch of lines, and the last one, and sums (2, stretches + 1, nj+1), the output of the sums
     over them at these columns (`regrid.barrier.coarse_nodes`).
     """
     (starts, sums), (first, last, found, Z), (old, into, frame) = stretches, chunk, given
@@ -432,7 +432,7 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
             take_curve_sides(law.curve, i, low, cells, NEAR_Q, SIDE_X, SIDE_Y, Z)
         add_row(cells, Z)
         if i == 0:
-            # These were no inner nodes: only the flux and the coupling to the next row are kept.
+            # These were not inner nodes: only the flux and the coupling to the next row are kept.
             for col in range(1, cells):
                 Z[PIVOT + col] = Z[PART_X + col] = Z[PART_Y + col] = Z[SUM + col] = 0.0
                 Z[WHOLE_X + col] = Z[WHOLE_Y + col] = 0.0
@@ -460,7 +460,7 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
 
 @inlined
 def add_own_corners(nodes, cosecant):
-    """The largest squared inverse sine, own corners too; inf where one turns over."""
+    """The largest squared inverse sine with the block's own corners; inf if one is inverted."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     x, y = nodes
     for corner in range(4):
@@ -482,7 +482,7 @@ def make_look(parallel):
         """Estimate of the residual r·z, and marks of triangles at the block's corners.
 
         `chunks`: their first node columns (chunks + 1), found (chunks, 5) and scratch (chunks,
-        LOOK_ROWS or more); found[0] then has what all found.  The sum goes over columns in order.
+        LOOK_ROWS or more); found[0] receives the overall result.  Sums are over columns in order.
         """
         columns, found, scratch = chunks
         count = columns.shape[0] - 1

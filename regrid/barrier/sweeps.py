@@ -1,26 +1,27 @@
-"""The paper's own iteration, sweep by sweep: the reference beside the Newton step.
+"""The paper's own iteration by sweeps, as a reference for the Newton step.
 
     R = u + eps sigma dI/dr                                             theory R3.2
     R[i] + A[i] D[i] - q[i] D[i+1] - q[i-1] D[i-1] = 0                  theory R3.3
 
-    1 laws, lengths, sigma from the new boundary      4 tau halved where corners fall too low
-    2 a convex start, out of a chain of starts         5 the next sweep on what is still active
+    1 spacing, lengths, sigma of the new boundary      4 tau halved where corners get too small
+    2 a convex start, out of a chain of starts         5 the next sweep on all active nodes
     3 direction D along all lines at once
 
 A has the node's own 2 × 2 Hessian of I, whose corners are those of `regrid.barrier.functional`.
-From a convex grid every iterate is convex.  Note: with eps = 1e-2 an iteration leaves the factor of
-theory R3.7 of a shifted grid's error: the start decides, not the sweeps.
+From a convex grid every iterate is convex.  Note: with eps = 1e-2 an iteration reduces the error of
+a shifted grid only by the factor of theory R3.7: the start determines the result, not the sweeps.
 
-The size g of the terms in delta is the root of the squares of the forces that the cells' edges
-exert on a node: rotation-invariant like the paper's (who does not print his), one root a node.
+The size g of the terms in delta is the root of the sum of squares of the forces that the cells'
+edges exert on a node: rotation invariant like the paper's (which is not printed), one root per
+node.
 
-The lines are independent in theory R3.3, so the recurrence runs over i and all lines of a chunk at
-once: assembly and forward elimination are one pass.  All results of a cell go into ONE flat
-scratch array at constant offsets, or nothing here vectorises (theory F10).
+The lines are independent in theory R3.3, so the recurrence over i treats all lines of a chunk
+together: assembly and forward elimination are one pass.  All results of a cell go into ONE flat
+scratch array at constant offsets, otherwise nothing here vectorises (theory F10).
 
-All runs over boxes: the lines with an active node and their neighbours, each between its first and
-last active row.  A corner may already lie below its floor (the start was squeezed); it then must
-not lose more than half of what it has, or no tau would do.
+Everything runs over boxes: the lines with an active node and their neighbours, each between its
+first and last active row.  A corner may already be below its floor (if the start was squeezed); it
+then must not lose more than half of its area, otherwise no tau would be admissible.
 
 Source: [CharakhchyanND] §2-4; theory R1, R2, R3.
 """
@@ -56,7 +57,7 @@ from regrid.sides import compute_area, copy_sides, get_sides
 
 SPAN = 136  # length of a scratch row: a multiple of 8, not a power of two
 WIDEST = 128  # lines in a chunk; a row of nodes has one more on either side
-# Per row of nodes: place across the block, and the edges along i (a) and j (b, then after the
+# Per row of nodes: position across the block, and the edges along i (a) and j (b, then after the
 # row c) over their lengths, with the inverse lengths.
 (
     V, AX, AY, A2, AS, BX, BY, B2, BS, CX, CY, C2, CS,
@@ -67,21 +68,21 @@ WIDEST = 128  # lines in a chunk; a row of nodes has one more on either side
 ONE, TWO, THREE, FOUR = (k * SPAN for k in (21, 27, 33, 39))
 # The sums that the row of cells below leaves for the next row of nodes.
 SAVED = 45 * SPAN
-# Two rows are left free here: a row read at l + 1 less than 256 numbers below one that is written
-# would keep the compiler from vectorising (it fears loads waiting for stores).
-# Elimination: inverse pivot (xx, xy, yy), right-hand side (x, y) and q of this row of nodes.
+# Two rows are unused here: a row read at l + 1 less than 256 numbers below one that is written
+# would prevent vectorisation (loads might wait for stores).  Elimination: inverse pivot (xx, xy,
+# yy), right-hand side (x, y) and q of this row of nodes.
 INVERSE, RIGHT, COUPLING = 53 * SPAN, 56 * SPAN, 58 * SPAN
 # Per line, over all rows: sum of |R|², first and last active row.
 RESIDUAL, ACTIVE_FIRST, ACTIVE_LAST = (k * SPAN for k in range(59, 62))
 ROWS = 62 * SPAN
-KEPT_ROWS = 6  # rows of a node row that the back substitution needs: INVERSE, RIGHT, COUPLING
+KEPT_ROWS = 6  # rows per node row for the back substitution: INVERSE, RIGHT, COUPLING
 KEPT = KEPT_ROWS * SPAN
 NO_ROW = 1e9
-LINE_RESIDUAL, LINE_FIRST, LINE_LAST = range(3)  # rows of what is known of every line
+LINE_RESIDUAL, LINE_FIRST, LINE_LAST = range(3)  # rows of per-line results
 
 FUNCTIONALS = ("regularised", "ivanenko-charakhchyan")
 STARTS = ("displacement", "previous", "quasi-1d")
-MOST_HALVINGS = 10  # of the boundary's motion, one inside the other
+MOST_HALVINGS = 10  # nested, of the boundary's motion
 MOST_TAU_ROUNDS = 400
 LEAST_TAU = 0.5**20
 KEPT_SHARE = 0.5
@@ -91,7 +92,7 @@ PARABOLA_RANGE = (0.05, 2.0)
 
 @inlined
 def take_corner(Z, a, b):
-    """Gradient in both edges, and blocks of the Hessian, of the corner of the edges at `a`, `b`."""
+    """Gradient and Hessian blocks, in both edges, of the corner with the edges at `a`, `b`."""
     ax, ay, a2, ga = Z[a], Z[a + SPAN], Z[a + 2 * SPAN], Z[a + 3 * SPAN]
     bx, by, b2, gb = Z[b], Z[b + SPAN], Z[b + 2 * SPAN], Z[b + 3 * SPAN]
     v, g = ((ax, ay), (bx, by)), ((by, -bx), (-ay, ax))
@@ -103,7 +104,7 @@ def take_corner(Z, a, b):
 def put_node(Z, at, sign_a, sign_b, own, along, across):
     """The six numbers of a cell's node, where edges a and b end (1.0) or begin (-1.0).
 
-    By the corner at the node, and those at the other ends of its edges along i and along j.
+    From the corner at the node and those at the other ends of its edges along i and j.
     """
     ax, ay, bx, by = own[0] + along[0], own[1] + along[1], own[2] + across[2], own[3] + across[3]
     both = sign_a * sign_b
@@ -117,7 +118,7 @@ def put_node(Z, at, sign_a, sign_b, own, along, across):
 
 @inlined
 def fill_cells(cells, Z):
-    """The six numbers of every cell's four nodes, from its edges in AX.., BX.., CX.. ."""
+    """Six numbers for each of a cell's four nodes, from its edges in AX.., BX.., CX.. ."""
     for col in range(cells):
         one, two = take_corner(Z, AX + col, BX + col), take_corner(Z, AX + col + 1, BX + col)
         three, four = take_corner(Z, AX + col + 1, CX + col), take_corner(Z, AX + col, CX + col)
@@ -129,7 +130,7 @@ def fill_cells(cells, Z):
 
 @inlined
 def fill_i_edges(x0, y0, x1, y1, law, pull, nodes, Z):
-    """Edges along i between two rows of nodes: over their lengths, and their pull q (r1 - r0)."""
+    """Edges along i between two rows of nodes over their lengths, and their force q (r1 - r0)."""
     length, length_change, step, step_change = law
     for col in range(nodes):
         dx, dy = x1[col] - x0[col], y1[col] - y0[col]
@@ -150,7 +151,7 @@ def fill_i_edges(x0, y0, x1, y1, law, pull, nodes, Z):
 
 @inlined
 def fill_j_edges(x, y, lengths, changes, u, cells, Z):
-    """Edges along j of a row of nodes at the place u in 0..1, over their lengths, into C."""
+    """Edges along j of a row of nodes at position u in 0..1, over their lengths, stored in C."""
     for col in range(cells):
         inverse = 1.0 / (lengths[col] + u * changes[col])
         dx, dy = (x[col + 1] - x[col]) * inverse, (y[col + 1] - y[col]) * inverse
@@ -209,11 +210,11 @@ def fill_directions(nodes, laws, numbers, boxes, kept, Z, out, per_line):
     """Direction D of (9) for the inner nodes of boxes of lines, into `out` (2, ni+1, nj+1).
 
     `boxes` (n, 4): first line, last line + 1, first row, last row + 1, at most WIDEST lines; nodes
-    outside have D = 0.  `laws` along i and j; `numbers`: pull, which multiplies Q, weight, eps
-    sigma / 4 (or what multiplies I/4), and the tolerance of delta, squared.  `kept` holds KEPT
-    numbers a row of nodes, Z is scratch.
-    `per_line` (3, nj+1) gets sum |R|², first and last active row of each line.  Returns sum |R|²
-    over the boxes and the number of active lines, line by line: no matter how boxes are cut.
+    outside have D = 0.  `laws` along i and j; `numbers`: pull, the factor of Q; weight, eps sigma /
+    4 (or the factor of I/4); and the squared tolerance of delta.  `kept` holds KEPT numbers per row
+    of nodes, Z is scratch.  `per_line` (3, nj+1) receives sum |R|², first and last active row of
+    each line.  Returns sum |R|² over the boxes and the number of active lines, line by line,
+    independent of the division into boxes.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     x, y = nodes[0], nodes[1]
@@ -288,7 +289,7 @@ def substitute_back(kept, j0, i0, i1, lines, Z, out):
 
 @kernel
 def fill_active_boxes(ni, nj, per_line, old_boxes, boxes):
-    """Boxes of the active lines of `old_boxes` and their neighbours; returns their number."""
+    """Find boxes of the active lines of `old_boxes` and their neighbours; returns their number."""
     count = 0
     for b in range(old_boxes.shape[0]):
         for j in range(old_boxes[b, 0], old_boxes[b, 1]):
@@ -310,7 +311,7 @@ def fill_active_boxes(ni, nj, per_line, old_boxes, boxes):
 
 
 def cut_block(ni: int, nj: int) -> np.ndarray:
-    """Boxes (n, 4) of all inner nodes, of even width."""
+    """Boxes (n, 4) of all inner nodes, of equal width."""
     ends = 1 + (nj - 1) * np.arange(-(-(nj - 1) // WIDEST) + 1) // -(-(nj - 1) // WIDEST)
     rows = np.ones_like(ends[1:])
     return np.ascontiguousarray(np.stack([ends[:-1], ends[1:], rows, ni * rows], axis=1))
@@ -323,13 +324,13 @@ def count_nodes(boxes: np.ndarray) -> int:
 class Sweeps:
     """Charakhch'yan's iteration as a regridder.
 
-    `epsilon` weighs the barrier against the straight lines; `functional` "ivanenko-charakhchyan"
-    is I alone with all edge lengths 1, the method it is compared with.  At most `sweeps` sweeps are
-    made, while some node's relative residual exceeds `tolerance` (0: all of them, on all nodes).
-    tau_s is 1 in the first `plain_sweeps` ones, then set by a parabola.  `floor` is the least new
-    corner area relative to the old one (0: the paper's plain convexity).  `start` is the grid that
-    is tried first.  `family` is "i" (lines j = const straight), "j", "auto", or two weights of
-    which the larger counts.
+    `epsilon` weighs the barrier against the straight lines; `functional` "ivanenko-charakhchyan" is
+    I alone with all edge lengths 1, the paper's method for comparison.  At most `sweeps` sweeps are
+    made while some node's relative residual exceeds `tolerance` (0: all of them, on all nodes).
+    tau_s is 1 in the first `plain_sweeps` sweeps, then set by a parabola.  `floor` is the least new
+    corner area relative to the old one (0: the paper's plain convexity).  `start` is the grid tried
+    first.  `family` is "i" (lines j = const straight), "j", "auto", or two weights, the larger of
+    which determines it.
     """
 
     def __init__(
@@ -367,7 +368,7 @@ class Sweeps:
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """The grid inside `boundary` (2, ni+1, nj+1; only its sides are read), near `previous`.
 
-        Raises RegridFailure, naming side and nodes, when no start is convex.
+        Raises RegridFailure, naming side and nodes, if no start is convex.
         """
         previous, boundary = check_grids(previous, boundary)
         transposed = self._family_of(boundary) == "j"
@@ -435,7 +436,7 @@ class _Block:
         )
 
     def move(self, old, wanted, halvings: int) -> bool:
-        """From the grid `old` to the sides of `wanted`, in halves if need be; into `self.nodes`."""
+        """Move `old` to the sides of `wanted`, in halves if necessary, into `self.nodes`."""
         if self._advance(old, wanted):
             return True
         if halvings == 0:
@@ -447,7 +448,7 @@ class _Block:
             return False
         self.sub_moves += 1
         middle = self.nodes.copy()
-        # A failure here means that the boundary itself is at fault: few more halves are tried.
+        # A failure here means that the boundary itself is invalid: few more halves are tried.
         if not self.move(middle, wanted, halvings - 1):
             return False
         self.start = "halved"
@@ -478,7 +479,7 @@ class _Block:
             return float(new.min()), float((new / compute_corner_areas(old)[counted]).min())
 
     def _begin_from_convex(self, old, wanted) -> bool:
-        """The chain of starts: two passes, the first one asks for the floor as well."""
+        """The chain of starts in two passes, of which the first also requires the floor."""
         grids = {}
         order = [self.options.start, *(s for s in STARTS if s != self.options.start)]
         for strict in (True, False):
@@ -534,7 +535,7 @@ class _Block:
             if active == 0:
                 if is_whole:
                     return
-                # the subset has converged: look once at all nodes again
+                # the subset has converged: check all nodes once more
                 self.boxes, is_whole = whole, True
                 continue
             self.sweeps += 1
@@ -553,7 +554,7 @@ class _Block:
                 self.boxes = whole if is_whole else boxes[:count]
 
     def _direct(self, nodes, direction, per_line) -> tuple[float, int]:
-        """Fill `direction` in the boxes; sum |R|², and how many lines are active."""
+        """Fill `direction` in the boxes; returns sum |R|² and the number of active lines."""
         return fill_directions(
             nodes, (self.laws_i, self.laws_j),
             (self.pull, self.weight, self.options.tolerance**2), self.boxes, self.kept,
@@ -577,7 +578,7 @@ class _Block:
         self.trial[:] = self.nodes
 
     def _share_by_parabola(self, at_zero: float) -> float:
-        """tau_s where the parabola through sum |R|² at 0, ½ and 1 is least; `trial` is at 1."""
+        """tau_s at the minimum of the parabola through sum |R|² at 0, ½ and 1; `trial` is at 1."""
         at_one, _ = self._direct(self.trial, self.other_direction, self.other_lines)
         self._try(0.5)
         at_half, _ = self._direct(self.trial, self.other_direction, self.other_lines)
@@ -591,7 +592,7 @@ class _Block:
 
 @kernel
 def try_step(nodes, direction, tau, share, boxes, floors, trial):
-    """Trial nodes `r + share tau D` in boxes; are all corners of their cells above their floors?"""
+    """Trial nodes `r + share tau D` in boxes; True if all corners of their cells exceed floors."""
     failing = 0
     for b in range(boxes.shape[0]):
         j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
@@ -628,9 +629,9 @@ def try_step(nodes, direction, tau, share, boxes, floors, trial):
 
 
 def fill_floors(old: np.ndarray, ratio: float) -> np.ndarray:
-    """Least corner areas (4, ni, nj) a trial grid may have: `ratio` of those of `old`.
+    """Least corner areas (4, ni, nj) allowed in a trial grid: `ratio` times those of `old`.
 
-    The block's own corners have boundary nodes only and get no floor.
+    The block's own corners have boundary nodes only, hence no floor.
     """
     floors = ratio * np.maximum(0.0, compute_corner_areas(old))
     for corner in BLOCK_CORNERS:
@@ -639,9 +640,9 @@ def fill_floors(old: np.ndarray, ratio: float) -> np.ndarray:
 
 
 def halve_taus(areas, has, floors, tau) -> bool:
-    """Halve `tau` at the nodes of corner triangles (4, n, m) that fall too low; are there any?
+    """Halve `tau` at the nodes of corner triangles (4, n, m) that are too small; True if any are.
 
-    Too low is below the floor and below KEPT_SHARE of what it `has`, or not positive.
+    Too small is below the floor and below KEPT_SHARE of the area in `has`, or not positive.
     """
     low = ~(areas > floors) & (floors >= 0.0)
     low &= ~((areas > np.minimum(floors, KEPT_SHARE * has)) & (areas > 0.0))

@@ -17,26 +17,26 @@ class Tuning:
     # the functional
     epsilon: float = 1e-3  # R4.1: weight of the barrier
     area_weight: float = 2.0  # R4.1: lam, weight of the area term
-    least_sine: float = 0.3  # R4.3: cells with a sharper corner have more barrier, in proportion,
+    least_sine: float = 0.3  # R4.3: cells with a sharper corner have a stronger barrier, linearly
     strengthening: float = 30.0  # R4.3: up to this many times
     cost_weight: float = 0.15  # R4.10: mu, weight of cells that limit the time step
-    cost_margin: float = 1.05  # R4.11: of the rate that the sides themselves ask for
+    cost_margin: float = 1.05  # R4.11: of the rate implied by the sides themselves
     open_side: float = 0.5  # R4.16: chord over arc from which a side's shape counts in full,
-    closed_side: float = 0.25  # R4.16: and up to which it does not count
+    closed_side: float = 0.25  # R4.16: and up to which it has no effect
     curved_barrier: float = 0.1  # R4.17: epsilon where both pairs of sides bend alike,
-    half_barrier: float = 0.15  # R4.17: and the ratio of their bends at which it is half of that
+    half_barrier: float = 0.15  # R4.17: and the ratio of their bends at which it is halved
     stiffness: float = 2.0  # R4.18: of sharp cells' corners in the matrix
-    fast_sides: float = 1e-2  # R4.18: cells a step from which sides count as moving
+    fast_sides: float = 1e-2  # R4.18: cells per step from which sides count as moving
     # the linear solve
     tolerance: float = 0.05  # R4.8: of the first residual
-    floor: float = 7e-4  # R4.8: residual in cells that is left
-    idle: float = 2.5  # R4.8, step 1: floors of a moved grid's estimate that are left, too
+    floor: float = 7e-4  # R4.8: residual in cells that is accepted
+    idle: float = 2.5  # R4.8, step 1: accepted estimate of a displaced grid, in floors
     max_iterations: int = 16  # R4.8
-    exact_tolerance: float = 0.02  # R4.8, step 2, R4.14, R5.4: of solves that stand for exact ones
+    exact_tolerance: float = 0.02  # R4.8, step 2, R4.14, R5.4: of solves treated as exact
     predict_iterations: int = 30  # R4.8, step 2
     # the move
-    start_ratio: float = 0.5  # R4.8, step 1: of every corner that a moved grid has to keep
-    step_ratio: float = 0.25  # R4.8, steps 2, 3: of every corner that a step has to keep
+    start_ratio: float = 0.5  # R4.8, step 1: of every corner that a displaced grid must keep
+    step_ratio: float = 0.25  # R4.8, steps 2, 3: of every corner that a step must keep
     lost: float = 0.5  # R4.8, step 1: residual at the sides from which straight lines are tried
     newton_steps: int = 1  # R4.8: at least
     more_steps: int = 6  # R4.8, step 3: at most, after the first
@@ -52,11 +52,11 @@ class Tuning:
     # smooth errors of large blocks
     coarse_from: float = 9000  # R4.13: cells
     coarse_lines: int = 8  # R4.13: lines i = const in a coarse cell at most, half of it at least,
-    coarse_stretches: int = 16  # R4.13: and so many coarse cells along i in between
-    coarse_apart: tuple[int, ...] = (8, 2)  # R4.14: coarse lines j = const, level after level
-    coarse_part: float = 0.6  # R4.14: of the solution that is taken
-    smooth_floor: float = 0.03  # R4.14: cells that are left
-    smooth_part: float = 0.25  # R4.14: of the way of the fastest node that is taken at most
+    coarse_stretches: int = 16  # R4.13: with about this many coarse cells along i
+    coarse_apart: tuple[int, ...] = (8, 2)  # R4.14: coarse lines j = const, level by level
+    coarse_part: float = 0.6  # R4.14: fraction of the solution that is applied
+    smooth_floor: float = 0.03  # R4.14: error in cells that is accepted
+    smooth_part: float = 0.25  # R4.14: largest correction, over the motion of the fastest node
 
 
 DEFAULT = Tuning()

@@ -1,23 +1,22 @@
-"""ED2: grids of a plane block with weight times cell area constant, and their regridder.
+"""ED2: grids of a plane block with constant weight times cell area, and their regridder.
 
     ∂1(w g22 ∂1 x) + ∂2(w g11 ∂2 x) = 0        theory R10.2, nine-point: theory R10.3
 
-w, g11 and g22 at cell centres, from cell-averaged differences.  One iteration computes the exact
-residual and solves `(C + tau L1) C^-1 (C + tau L2) d = tau R` along lines (the stabilising
-correction, three-point operators with the coefficients of the iterate).
+w, g11 and g22 are located at cell centres, from cell-averaged differences.  An iteration computes
+the exact residual and solves `(C + tau L1) C^-1 (C + tau L2) d = tau R` along lines (the
+stabilising correction, three-point operators with the coefficients of the iterate).
 
-Note: lagging the coefficients hides that the whole equation is degenerate.  On a grid of steps
-h1, h2 its symbol has the eigenvalues (h2 k1 ± h1 k2)^2, so waves along the cells' diagonals cost
-nothing.  Where the boundary allows an orthogonal grid with w S constant, the iteration goes to it;
-elsewhere the residual falls, stalls and may grow again.  So the iterate of least residual among the
-convex ones is kept, and what stopped the iteration is said.  Where it stalls,
-`regrid.variational` with much weight on the volume goes on: a square with w = 1 + 10y
-and equal steps on its sides has w S spread by .48 at first, .30 here, .05 there.
+Note: lagging the coefficients hides that the full equation is degenerate.  On a grid of spacings
+h1, h2 its symbol has the eigenvalues (h2 k1 ± h1 k2)^2, so waves along the cells' diagonals are in
+its null space.  If the boundary allows an orthogonal grid with w S constant, the iteration
+converges to it; otherwise the residual falls, stalls and may grow again.  The convex iterate of
+least residual is therefore kept, and the result states why the iteration stopped.  Where it stalls,
+`regrid.variational` with a large weight on the volume gets further: in a square with w = 1 + 10y
+and equal spacing on its sides the spread of w S is .48 initially, .30 here and .05 there.
 
-The regridder's default weight "sides" is the density of nodes that the sides ask for; a weight of
-position knows nothing of how a block is graded, so that it becomes another grid in the first step;
-"own", 1 over the area of the old cells, keeps what there is, and with it every cell that has once
-become too small.
+The regridder's default weight "sides" is the node density implied by the sides.  A weight of
+position ignores the grading of a block, so the grid changes in the first step; "own", 1 over the
+area of the old cells, preserves the grid, including every cell that has become too small.
 
 Source: [KhakimzyanovShokina1998] §2.
 """
@@ -39,18 +38,18 @@ from regrid.protocol import RegridReport, RegridResult
 
 A, B, AX, AY, BX, BY = range(6)  # rows of the fluxes: w g22, w g11, their products with d1, d2
 SCALE, ALONG_I, ALONG_J = range(3)  # rows of the nodes' coefficients
-SMALLEST_TAU = 1.0  # for modes of two cells; the largest, for the block's, is found from its size
-LEAST_SINE = 0.1  # of a corner: where it is reached the iteration has begun to fold
+SMALLEST_TAU = 1.0  # for two-cell modes; the largest, for the block's modes, follows from its size
+LEAST_SINE = 0.1  # of a corner: below this the iteration is starting to fold
 
 
 @dataclass(frozen=True)
 class Equidistributed:
-    """A grid and how it was found; histories hold one value an iterate, the start first.
+    """A grid and its iteration history: one value per iterate, the initial one first.
 
     `stop` is "converged", "stalled" or "iterations".  `residuals` are root mean squares relative to
-    the fluxes, `spreads` standard deviations of w S over its mean, `best` the iterate returned.
-    `faces`: the same for the six faces of a volume, where they were found first, named by the axis
-    across them and its end ("0 low" to "2 high").
+    the fluxes, `spreads` standard deviations of w S over its mean, `best` is the iterate returned.
+    `faces`: the same for the six faces of a volume, if they were computed first, named by their
+    normal axis and its end ("0 low" to "2 high").
     """
 
     nodes: np.ndarray
@@ -83,9 +82,9 @@ def fill_cell_fluxes(nodes, weight, out, products):
 def fill_nodes_equation(flux, residual, coefficients, sums):
     """Residual (2, ni-1, nj-1) of theory R10.3 inside, and three-point coefficients (3, ...).
 
-    Coefficients: the scale C of a node; the edge from node i - 1 to i, in node i's place, along i;
-    likewise along j (both of one edge more than there are inner nodes).  sums (2, ni-1): per row,
-    squares of the residual and of the fluxes that make it up.
+    Coefficients: the scale C of a node; the edge from node i - 1 to i, stored at node i, along i;
+    likewise along j (both with one edge more than inner nodes).  sums (2, ni-1): per row, squares
+    of the residual and of the fluxes that make it up.
     """
     ni, nj = flux.shape[1], flux.shape[2]
     for i in range(ni):
@@ -146,8 +145,8 @@ def solve_lines(scale, edge, tau, values, upper):
 def sweep_both_ways(values, scales, edges, tau: float, nodes: np.ndarray) -> None:
     """Alternating-direction correction of the inner `nodes`: lines along i, then along j.
 
-    values (2, n, m), the residual, is used up; scales (n, m) twice, edges (n+1, m) and (m+1, n):
-    three-point coefficients along i and along j.
+    values (2, n, m), the residual, is overwritten; scales (n, m) twice, edges (n+1, m) and (m+1,
+    n): three-point coefficients along i and along j.
     """
     values *= tau
     solve_lines(scales[0], edges[0], tau, values, np.empty_like(scales[0]))
@@ -160,12 +159,12 @@ def sweep_both_ways(values, scales, edges, tau: float, nodes: np.ndarray) -> Non
 def iterate(
     operator, nodes: np.ndarray, weigh: Callable, iterations: int, tolerance: float
 ) -> Equidistributed:
-    """Correct the inner `nodes`, in place, until the residual is `tolerance` or falls no more.
+    """Correct the inner `nodes` in place until the residual is below `tolerance` or stops falling.
 
-    `operator` evaluates the equations (`products`: w times size of the cells), says which iterates
-    are good, chooses tau and corrects; `Ed2Operator` is one.
+    `operator` evaluates the equations (`products`: w times cell size), accepts or rejects iterates,
+    chooses tau and makes the correction; an example is `Ed2Operator`.
 
-    Returns the good iterate of least residual; `best` is -1 where there was none.
+    Returns the accepted iterate of least residual; `best` is -1 if there was none.
     """
     best, least, stop, kept = -1, np.inf, "iterations", nodes.copy()
     residuals: list[float] = []
@@ -197,9 +196,9 @@ def iterate(
 
 
 class Ed2Operator:
-    """ED2 on one shape of an area.
+    """ED2 on areas of one shape.
 
-    Iterates with a corner sine below `least_sine` are good only if the start was as sharp.
+    Iterates with a corner sine below `least_sine` are accepted only if the start was as sharp.
     """
 
     patience = 100
@@ -230,7 +229,7 @@ class Ed2Operator:
         return sine > 0.0 and sine >= self.least_sine
 
     def choose_tau(self, iteration: int, residuals: list[float]) -> float:
-        """From a cycle; one that made things worse is followed by one of shorter steps."""
+        """The next tau of a cycle; after a cycle that increased the residual, a smaller one."""
         if iteration == 0 or iteration % self.taus.size == 0:
             if iteration > 0:
                 worse, part = residuals[-1] > residuals[-1 - self.taus.size], self.backed_off
@@ -239,7 +238,7 @@ class Ed2Operator:
         return max(self.backed_off * self.taus[iteration % self.taus.size], 0.25)
 
     def measure_sine(self, nodes: np.ndarray) -> float:
-        """Least corner sine; 0 unless every cell is convex and turns like the start."""
+        """Least corner sine; 0 unless every cell is convex and oriented like the start."""
         if self.sign < 0.0:
             nodes = np.ascontiguousarray(nodes[::-1])
         measure_rows(nodes, self.rows, self.worst, self.bad)
@@ -257,8 +256,8 @@ class Ed2Operator:
 def choose_taus(operator: Ed2Operator) -> np.ndarray:
     """A cycle of tau from the bounds of the scaled three-point operators.
 
-    The largest eigenvalue of L/C is about 4, the least of a block's slowest wave about
-    `(pi/n)^2` times the coefficients' share; tau goes from one's inverse to the other's in fours.
+    The largest eigenvalue of L/C is about 4, the smallest about `(pi/n)^2` times the coefficients'
+    share; tau covers the range of their inverses in factors of four.
     """
     n = min(operator.shape)
     share = 0.5 * operator.flux[: B + 1].sum(axis=(1, 2))
@@ -267,7 +266,7 @@ def choose_taus(operator: Ed2Operator) -> np.ndarray:
 
 
 def make_cycle(largest: float) -> np.ndarray:
-    """Values of tau from the largest to SMALLEST_TAU, each a fourth of the one before or more."""
+    """Values of tau from the largest to SMALLEST_TAU, each at least a fourth of the one before."""
     largest = max(4.0 * SMALLEST_TAU, largest)
     count = 1 + int(np.ceil(np.log(largest / SMALLEST_TAU) / np.log(4.0)))
     return np.geomspace(largest, SMALLEST_TAU, count)
@@ -280,10 +279,10 @@ def iterate_ed2(
     tolerance: float = 1e-10,
     least_sine: float = 0.0,
 ) -> Equidistributed:
-    """Iterate theory R10.4 from `nodes` (2, ni+1, nj+1), whose sides stay; `weigh(nodes)` gives w.
+    """Iterate theory R10.4 from `nodes` (2, ni+1, nj+1) with fixed sides; `weigh(nodes)` returns w.
 
     Returns the convex iterate of least residual; one with a corner sine below `least_sine` counts
-    only if the start was as sharp.  Raises RegridFailure naming cells where no iterate is convex.
+    only if the start was as sharp.  Raises RegridFailure, naming cells, if no iterate is convex.
     """
     nodes = np.array(nodes, dtype=np.float64, order="C")
     if not np.isfinite(nodes).all():
@@ -301,11 +300,11 @@ def iterate_ed2(
 
 
 class EquidistributionRegridder(WeightedRegridder):
-    """`weight`: see `equidistribution.weights`; `smoothing`: passes over what depends on fields.
+    """`weight`: see `equidistribution.weights`; `smoothing`: passes over field-dependent weights.
 
     `boundary` "given" leaves the sides' nodes bitwise; "equidistributed" places them along the
-    sides' polylines with the same weight (theory R10.9).  `iterations` and `tolerance` (of the
-    residual over the fluxes) end the iteration.
+    sides' polylines with the same weight (theory R10.9).  `iterations` and `tolerance` (residual
+    over fluxes) end the iteration.
     """
 
     name = "equidistribution"
@@ -324,7 +323,7 @@ class EquidistributionRegridder(WeightedRegridder):
         self.threads = threads
 
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
-        """Grid on the sides of `boundary`; raises RegridFailure where no iterate is convex."""
+        """Grid on the sides of `boundary`; raises RegridFailure if no iterate is convex."""
         previous, boundary = check_grids(previous, boundary)
         boundary = self.distribute_sides(previous, boundary)
         old = compute_corner_areas(previous)
@@ -358,7 +357,7 @@ class EquidistributionRegridder(WeightedRegridder):
 
 
 def accept_sides(nodes: np.ndarray, sign: float) -> Equidistributed:
-    """A block one cell wide, whose grid is its sides; raises RegridFailure where it folds."""
+    """A block one cell wide, whose grid is its sides; raises RegridFailure if it folds."""
     bad = find_bad_cells(nodes if sign > 0.0 else nodes[::-1])
     if len(bad):
         raise RegridFailure(f"cell ({bad[0][0]}, {bad[0][1]}) is not convex")

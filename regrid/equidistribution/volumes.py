@@ -1,34 +1,33 @@
-"""ED3: grids of a volume with weight times cell volume constant, their faces and edges first.
+"""ED3: grids of a volume with constant weight times cell volume, faces and edges first.
 
     ∂1(g22 g33 w ∂1 x) + ∂2(g11 g33 w ∂2 x) + ∂3(g11 g22 w ∂3 x) = 0      theory R10.5
 
-by the stabilising correction (theory R10.6): in increments it is
-`(C + tau L1) C^-1 (C + tau L2) C^-1 (C + tau L3) d = tau R`, R the exact discrete residual, L the
-three-point operators of the iterate's own edge coefficients, C their local size.
+by the stabilising correction (theory R10.6), in increments `(C + tau L1) C^-1 (C + tau L2) C^-1
+(C + tau L3) d = tau R`, with R the exact discrete residual, L the three-point operators with the
+iterate's edge coefficients, and C their local size.
 
 EDC, a curve f(p) in the plane or in space:    ∂(w |f'(p)| ∂p/∂q)/∂q = 0          theory R10.7
 EDS, a surface f(p1, p2):  ∂1(W g~22 ∂1 p) + ∂2(W g~11 ∂2 p) = 0,  W = w J/J~     theory R10.8
 
 g~ and J~ are those of p(q), J is the area of a surface cell.  Both act on the parameters, so the
 nodes stay on the curve or surface.  EDC is solved as w times chord, by Newton's method; EDS is ED2
-in the plane of the parameters, with W in place of w, and inherits its limits.  The print has
-W = w sqrt(g22 g33)/J~, which is J for grids with perpendicular lines only.  With the area itself a
-plane with Cartesian parameters has W = w on every grid: EDS is ED2 there, term by term, as the
-paper says.
+in the plane of the parameters, with W in place of w, and inherits its limits.  The paper prints
+W = w sqrt(g22 g33)/J~, which equals this only for orthogonal grids.  With the area itself, a plane
+with Cartesian parameters has W = w on every grid: EDS is then ED2 term by term, as the paper says.
 
-`equidistribute_block` does the paper's order of work: edges (EDC), faces (EDS), then the volume,
-with one weight for all.  The regridder's default weight "sides" is the density of nodes that the
-faces ask for (theory R10.10, with three lengths).
+`equidistribute_block` follows the paper's order: edges (EDC), faces (EDS), then the volume, all
+with one weight.  The regridder's default weight "sides" is the node density implied by the faces
+(theory R10.10, with three lengths).
 
-Note: as in two dimensions the whole equation is degenerate where the lagged one is not (see
-`regrid.equidistribution.areas`): w times volume becomes constant only where the sides allow a grid
-of perpendicular lines.  What stopped the iteration is said, and the valid iterate of least residual
-is returned.
+Note: as in two dimensions the full equation is degenerate although the lagged one is not (see
+`regrid.equidistribution.areas`): w times volume becomes constant only if the sides allow an
+orthogonal grid.  The result states why the iteration stopped and is the valid iterate of least
+residual.
 
-Rows run along the contiguous third index.  A row of cells is computed into one flat scratch array
-at constant offsets and reduced to what its nodes need; a plane of cells gives its part to the two
-planes of nodes beside it, lower plane first, so that any cut into chunks of planes has the same
-bits.  Rows longer than SPAN do not fit the scratch.
+Rows run along the contiguous third index.  A row of cells is computed in one flat scratch array at
+constant offsets and reduced to the contributions to its nodes; a plane of cells contributes to the
+two adjacent planes of nodes, lower plane first, so results are bitwise independent of the division
+into chunks of planes.  Rows longer than SPAN do not fit the scratch.
 
 Source: [KhakimzyanovShokina1998] §3 to §5.
 """
@@ -75,8 +74,8 @@ def solve_edc(
     """Parameters p (count,) with `w |x[j+1] - x[j]|` equal on all steps (theory R10.7).
 
     curve: p (n,) to points (2, n) or (3, n); weight: a positive number or a function of the
-    coordinates, taken at the curve's points in the middle of the steps of p.  Raises RegridFailure
-    where no such nodes are found.
+    coordinates, evaluated at the curve's points in the middle of the intervals of p.  Raises
+    RegridFailure if no such nodes are found.
     """
     if count < 2:
         raise BadInput(f"equidistribution: a curve needs at least 2 nodes, got {count}")
@@ -107,12 +106,12 @@ def compute_parameter_areas(parameters: np.ndarray) -> np.ndarray:
 def weigh_surface(surface, weight, parameters: np.ndarray) -> np.ndarray:
     """W = w J/J~ at the cells (ni, nj): the weight of ED2 in the plane of the parameters.
 
-    The weight is taken at the mean of a cell's four nodes in space.
+    The weight is evaluated at the mean of a cell's four nodes in space.
     """
     points = surface(parameters)
     flat = np.abs(compute_parameter_areas(parameters))
     ratio = compute_surface_areas(points) / np.maximum(flat, 1e-12 * flat.mean())
-    # A cell that has collapsed on the surface still needs a positive coefficient.
+    # A collapsed cell on the surface still needs a positive coefficient.
     return weigh_points(weight, compute_centres(points)) * np.maximum(ratio, 1e-12 * ratio.mean())
 
 
@@ -125,9 +124,9 @@ def solve_eds(
 ) -> Equidistributed:
     """Parameters of a grid on `surface` with weight times cell area constant.
 
-    surface: p (2, ...) to points (3, ...); parameters (2, ni+1, nj+1): the first grid, whose sides
-    stay; weight: a positive number or a function of x, y, z.  The result's nodes are parameters,
-    its spreads those of w times area on the surface.
+    surface: p (2, ...) to points (3, ...); parameters (2, ni+1, nj+1): the initial grid, whose
+    sides are fixed; weight: a positive number or a function of x, y, z.  The result's nodes are
+    parameters, its spreads those of w times area on the surface.
     """
     return iterate_ed2(
         parameters,
@@ -140,11 +139,11 @@ def solve_eds(
 SPAN = 520  # longest row and its padding
 LONGEST = 512
 # Rows of the scratch: differences of x, y, z along the three directions at cell centres; three
-# coefficients; w J; sums over neighbours along k of this row of cells, of the first two
-# coefficients too; the same of the row before, and the third coefficient there.
+# coefficients; w J; sums over neighbours along k of this row of cells, also of the first two
+# coefficients; the same for the row before, and the third coefficient there.
 D, A, WV, K, KA, L, LA, LC = (k * SPAN for k in (0, 9, 12, 13, 22, 24, 33, 35))
 SCRATCH = 36 * SPAN
-SCALE, EDGE = 3, 4  # rows of a plane's lines along k, transposed; first the right-hand sides
+SCALE, EDGE = 3, 4  # rows of a plane's lines along k, transposed, after the right-hand sides
 
 
 @inlined
@@ -192,9 +191,9 @@ def sum_row(n, Z):
 
 @inlined
 def give_row(to_lower, to_upper, lower, upper, n, Z, c):
-    """A row's part of the residual: added to the nodes below in i, put to those above.
+    """Contribution of a row to the residual: added to the nodes below in i, stored at those above.
 
-    c: of a component, SPAN times its number.
+    c: SPAN times the index of the component.
     """
     for k in range(n - 1):
         across = Z[K + 3 * SPAN + c + k] - Z[L + 3 * SPAN + c + k]
@@ -208,7 +207,7 @@ def give_row(to_lower, to_upper, lower, upper, n, Z, c):
 
 @inlined
 def give_edges(to_lower, to_upper, lower, upper, n, Z, one, other):
-    """A quarter of two rows of coefficients, to the edges of the planes below and above."""
+    """Add a quarter of two rows of coefficients to the edges of the planes below and above."""
     for k in range(n):
         part = 0.25 * (Z[one + k] + Z[other + k])
         if to_lower:
@@ -254,7 +253,7 @@ def assemble_planes(nodes, weight, residual, edges, products, first, last, Z):
                 for c in range(3):
                     lower, upper = residual[c, low, j - 1], residual[c, high, j - 1]
                     give_row(to_lower, to_upper, lower, upper, n, Z, c * SPAN)
-            # this row's sums become those of the row before
+            # this row's sums become those of the previous row
             for at in range(0, L - K, SPAN):
                 for k in range(n):
                     Z[L + at + k] = Z[K + at + k]
@@ -264,11 +263,11 @@ def assemble_planes(nodes, weight, residual, edges, products, first, last, Z):
 
 @inlined
 def eliminate(lines, past, edges, own, factor, tau, link, kept):
-    """One node further along lines side by side: (own + tau L) d = factor times what they hold.
+    """One elimination step along adjacent lines: (own + tau L) d = factor times `lines`.
 
-    `lines` and `past` are x, y, z of this node and of the one before; `edges` its low and high one,
-    `kept` what the elimination keeps of the one before and of it; `link` is 0 at the first node,
-    else tau.  What is kept of it may be `own`.
+    `lines` and `past` are x, y, z of this node and of the previous one; `edges` its low and high
+    edge; `kept` the elimination factors of the previous node and of this one, which may share
+    memory with `own`; `link` is 0 at the first node, otherwise tau.
     """
     (low, high), (before, upper) = edges, kept
     x, y, z = lines
@@ -315,7 +314,7 @@ def sweep_first(residual, edges, tau, work, start, stop):
 def sweep_plane(residual, edges, tau, work, nodes, i, turned):
     """Solve `(C + tau L2) d = C d`, then `(C + tau L3) d = C d` in plane i; add d to the nodes.
 
-    turned (5, n3, n2 + 8): the lines along k, transposed so that all are solved at once.
+    turned (5, n3, n2 + 8): the lines along k, transposed so that all are solved together.
     """
     e2, e3, scale, upper = edges[1][i], edges[2][i], work[0, i], work[1, i]
     x, y, z = residual[0, i], residual[1, i], residual[2, i]
@@ -376,14 +375,14 @@ def sweep_on_threads(residual, edges, tau, work, nodes, lines, bounds, turned):
         sweep_chunk(residual, edges, tau, work, nodes, bounds[t], bounds[t + 1], turned[t])
 
 
-TAU = 1.0  # at first, of the scaled operators, whose largest eigenvalue is about 4
+TAU = 1.0  # initial value, for the scaled operators with largest eigenvalue of about 4
 LEAST_TAU, MOST_TAU = 0.1, 8.0
-GROWTH = 1.1  # of tau while the residual falls; it is halved where the residual grows
+GROWTH = 1.1  # of tau while the residual falls; tau is halved when the residual grows
 CHECK = 10  # iterations between two tests of all corners
 
 
 class Ed3Operator:
-    """ED3 on one shape of a volume, with chunks of planes."""
+    """ED3 on volumes of one shape, with chunks of planes."""
 
     patience = 50
     sign = 1.0
@@ -403,14 +402,14 @@ class Ed3Operator:
             np.empty((n1, n2 - 1, n3 - 1)), np.empty((n1 - 1, n2, n3 - 1)),
             np.empty((n1 - 1, n2 - 1, n3)),
         )  # fmt: skip
-        # zeros: the sweeps begin with scratch times nothing, which a NaN there would spoil
+        # zeros: the sweeps start with scratch times zero, which would keep a NaN
         self.work = np.zeros((2, n1 - 1, n2 - 1, n3 - 1))
         self.products = np.empty(shape)
         self.scratch = np.zeros((threads, SCRATCH))
         self.turned = np.empty((threads, 5, n3, n2 + 7))
 
     def evaluate(self, nodes: np.ndarray, weight: np.ndarray) -> float:
-        """Fill the equations of `nodes`; the residual's root mean square over a typical flux."""
+        """Evaluate the equations at `nodes`; returns the rms residual over a typical flux."""
         arrays = nodes, weight, self.residual, self.edges, self.products
         if self.threads > 1:
             assemble_on_threads(*arrays, self.bounds, self.scratch)
@@ -418,7 +417,7 @@ class Ed3Operator:
             assemble_planes(*arrays, *self.bounds, self.scratch[0])
         count = self.work[0].size
         size = float(np.einsum("cijk,cijk->", self.residual, self.residual))
-        # A flux is about the coefficient times the step, the cube root of the volume.
+        # A flux is about the coefficient times the spacing, the cube root of the volume.
         step = np.cbrt(abs(self.products.mean() / weight.mean()))
         flux = float(self.edges[0][1:].sum()) / count * step
         return float(np.sqrt(size / count) / flux) if flux > 0.0 else np.inf
@@ -451,11 +450,11 @@ def solve_ed3(
     tolerance: float = 1e-10,
     threads: int = 1,
 ) -> Equidistributed:
-    """Equidistribute `weight` over the volume whose six faces and first inside are `nodes`.
+    """Equidistribute `weight` over a volume with the faces and the initial interior of `nodes`.
 
     nodes (3, n1+1, n2+1, n3+1); weight: a positive number, an array of the cells, or a function of
-    the centres' x, y, z.  tau grows while the residual falls and is halved where it grows.  Raises
-    RegridFailure naming cells where no tested iterate has positive corners throughout.
+    the centres' x, y, z.  tau grows while the residual falls and is halved when it grows.  Raises
+    RegridFailure, naming cells, if no tested iterate is valid.
     """
     nodes = np.array(nodes, dtype=np.float64, order="C")
     if nodes.ndim != 4 or nodes.shape[0] != 3 or not np.isfinite(nodes).all():
@@ -482,13 +481,13 @@ def solve_ed3(
 
 
 def is_valid(nodes: np.ndarray, sign: float = 1.0) -> bool:
-    """Whether every cell has eight positive corners, in the orientation `sign`."""
+    """Whether every cell has eight positive corners in the orientation `sign`."""
     turned = nodes if sign > 0.0 else np.ascontiguousarray(nodes[::-1])
     return bool((compute_least_corner_volumes(turned) > 0.0).all())
 
 
 def interpolate_faces(nodes: np.ndarray) -> np.ndarray:
-    """A copy of `nodes` (3, ...) with its inside interpolated from the six faces (boolean sum)."""
+    """A copy of `nodes` (3, ...), its interior interpolated from the six faces (Boolean sum)."""
     found = np.array(nodes, dtype=np.float64, order="C")
     laws = (np.tile(np.linspace(0.0, 1.0, n), (2, 2, 1)) for n in found.shape[1:])
     fill_blended(found, *laws, np.empty((3, found.shape[3])))
@@ -505,10 +504,10 @@ def equidistribute_block(
 ) -> Equidistributed:
     """Grid of a block: edges, then faces, then the volume, with one weight.
 
-    mapping: p in the unit cube (3, ...) to x (3, ...); shape: cells a direction; weight: a positive
-    number or a function of x, y, z.  With `sides` edges (EDC) and faces (EDS) are equidistributed
-    too, in the order of theory R10; otherwise they keep equal steps of p.  Raises RegridFailure
-    naming the face, or the cells, that fold.
+    mapping: p in the unit cube (3, ...) to x (3, ...); shape: cells per direction; weight: a
+    positive number or a function of x, y, z.  With `sides`, edges (EDC) and faces (EDS) are
+    equidistributed first, as in theory R10; otherwise they have equal spacing in p.  Raises
+    RegridFailure, naming the face or the cells that fold.
     """
     p = np.array(np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in shape), indexing="ij"))
     faces: dict[str, Equidistributed] = {}
@@ -528,7 +527,7 @@ def equidistribute_block(
 
 
 def _place_edge(mapping, weight, p, axis, ends) -> None:
-    """EDC along one of the twelve edges: the parameter `axis` of its nodes is written."""
+    """EDC along one of the twelve edges; writes the parameter `axis` of its nodes."""
     index = [-end for end in ends]
     index.insert(axis, slice(None))
     line = p[(slice(None), *index)]
@@ -543,7 +542,7 @@ def _place_edge(mapping, weight, p, axis, ends) -> None:
 
 
 def _place_face(mapping, weight, p, axis, end, iterations) -> Equidistributed:
-    """EDS on one of the six faces, begun from its edges: two of its parameters are written."""
+    """EDS on one of the six faces, starting from its edges; writes two of its parameters."""
     index = [slice(None)] * 3
     index[axis] = end
     face = p[(slice(None), *index)]
@@ -562,7 +561,7 @@ def _place_face(mapping, weight, p, axis, end, iterations) -> Equidistributed:
 
 
 def interpolate_sides(parameters: np.ndarray) -> np.ndarray:
-    """A copy of (2, ni+1, nj+1) with its inside interpolated from the four sides (boolean sum)."""
+    """A copy of (2, ni+1, nj+1), its interior interpolated from the sides (Boolean sum)."""
     found = np.array(parameters, dtype=np.float64, order="C")
     u = np.linspace(0.0, 1.0, found.shape[1])[:, None]
     v = np.linspace(0.0, 1.0, found.shape[2])
@@ -576,7 +575,7 @@ def interpolate_sides(parameters: np.ndarray) -> np.ndarray:
 class EquidistributionRegridder3D:
     """`weight`: "sides", a positive number, cells' values (ni, nj, nk), or a function of x, y, z.
 
-    `iterations` and `tolerance` (of the residual over the fluxes) end the iteration.
+    `iterations` and `tolerance` (residual over fluxes) end the iteration.
     """
 
     def __init__(self, weight="sides", iterations: int = 40, tolerance: float = 1e-8):
@@ -591,8 +590,8 @@ class EquidistributionRegridder3D:
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """Grid inside the six faces of `boundary`; both (3, ni+1, nj+1, nk+1) in m.
 
-        Raises BadInput for arrays that do not fit, RegridFailure, naming cells, where no iterate
-        has positive corners.
+        Raises BadInput for arrays of wrong shape, and RegridFailure, naming cells, if no iterate
+        has only positive corners.
         """
         previous, boundary = check_grids_in_space(previous, boundary)
         sign = 1.0 if compute_volume(previous) >= 0.0 else -1.0

@@ -1,31 +1,32 @@
-"""The weight of a grid's cells: where it is large, cells are to be small; and sides that follow it.
+"""The weight of a grid's cells, large where cells should be small; and sides that follow it.
 
-One design for all families that take a weight.  It is given as a number, an array of the cells, a
+All weighted grid families use this module.  A weight is a number, an array of cell values, a
 function of x and y, or a formula such as "1 + 10*y" or "1 + 5*|grad(rho)|/max" of
 
-    x, y           cell centres of the grid as it is found: follows every iterate
-    rho, u, v, ...  fields of the flow, one value a cell, given before the step (`take_fields`):
+    x, y           cell centres of the current iterate
+    rho, u, v, ...  cell values of the flow, given before the step (`take_fields`):
                    they travel with the cells
     own            1 over the area of the old cells: the density of nodes that the grid has
-    sides          the density of nodes that the block's sides ask for, 1 over the conditional
+    sides          the node density implied by the block's sides, 1 over the conditional
                    lengths interpolated from them: a graded rectangle has constant sides*area
     h              root of the area of the old cells
 
-all over their mean where they are densities, so that `sides*(1 + 5*|grad(rho)|/max)` refines a
-graded block where the density changes.  A formula has arithmetic, bars for absolute values and a
-few functions.  `grad(f)` is the size of the gradient of f; `/max` divides what stands before it by
-its greatest value in the block, numbers in front of it aside: so 5*f/max goes up to 5, whatever f.
-Text from a deck is never given to Python to run; it is parsed, and only the nodes of the tree that
-are known here are evaluated.  Note: a field is known on the old cells only and its gradient is
-rough; what depends on fields is smoothed by (1, 2, 1)/4 along i and j.
+Densities are divided by their mean, so that `sides*(1 + 5*|grad(rho)|/max)` refines a graded block
+where the density changes.  A formula has arithmetic, bars for absolute values and a few functions.
+`grad(f)` is the magnitude of the gradient of f; `/max` divides the preceding expression by its
+maximum in the block, except for numerical factors: 5*f/max reaches 5 for any f.  Text from a deck
+is never executed by Python; it is parsed, and only known nodes of the syntax tree are evaluated.
+Note: a field is known on the old cells only and its gradient is rough, so field-dependent weights
+are smoothed by (1, 2, 1)/4 along i and j.
 
-With `boundary` "given" the sides' nodes are kept bit for bit.  With "equidistributed" a regridder
-owns them: it places the nodes of its `free_sides` along their polylines by the same weight (theory
-R10.9), corners kept.  Inside a block that adapts to a weight, sides that do not bend the lines that
-end on them: shocks on such a grid show it.  Note: in a flow other blocks see the nodes of a contact
-or seam, so that only sides that lie straight on walls may be free; the flow says which.  And a jump
-to the wanted places would drive many cells through one face: told the steps of a flow, nodes go
-SIDE_MOTION of a spacing a full step (at 0.3 their own speed limited dt, and dt collapsed).
+With `boundary` "given" the sides' nodes are preserved bitwise.  With "equidistributed" the
+regridder places the nodes of its `free_sides` along their polylines with the same weight (theory
+R10.9); corners are fixed.  In a block that adapts to a weight, sides that do not adapt bend the
+lines that end on them, which is visible in shocks on such a grid.  Note: in a flow other blocks
+share the nodes of a contact or seam, so only straight sides on walls may be free; the flow
+determines which.  A jump to the target positions would sweep many cells through one face, so in a
+flow nodes move by SIDE_MOTION of a spacing per full step (at 0.3 their own speed limited dt, and dt
+collapsed).
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ FUNCTIONS = {
 }
 TWO_ARGUMENTS = ("min", "max")
 CONSTANTS = {"pi": np.pi}
-FIELDS = ("rho", "u", "v", "p", "e")  # of a flow, one value a cell
+FIELDS = ("rho", "u", "v", "p", "e")  # of a flow, one value per cell
 GEOMETRY = ("x", "y", "own", "sides", "h")  # of the grid: see `regrid.equidistribution.weights`
 MOST_CHARACTERS, MOST_DEPTH = 1000, 60
 MOST_NUMBER = 1e300
@@ -75,8 +76,8 @@ GRADIENT = "grad"
 class Expression:
     """A parsed weight: `names` are those it uses, `evaluate` takes their values.
 
-    Raises BadInput, with `what` the text is for, the text and what is wrong with it, for all but
-    the names.
+    Raises BadInput with the text, its purpose `what` and the fault, for all faults except unknown
+    names.
     """
 
     def __init__(self, text: str, what: str = "weight"):
@@ -137,7 +138,7 @@ class Expression:
         self.has_gradient |= name == GRADIENT
 
     def check_names(self, known) -> None:
-        """Raise BadInput for a name that is not in `known` or a constant."""
+        """Raise BadInput for a name that is neither in `known` nor a constant."""
         for name in sorted(self.names):
             if name not in known and name not in CONSTANTS:
                 raise self._fault(f"there is no '{name}' here{suggest(name, [*known, *CONSTANTS])}")
@@ -149,8 +150,8 @@ class Expression:
     ) -> np.ndarray:
         """The formula's value for arrays of one shape, named in `values`.
 
-        `gradient` maps values of the cells to the size of their gradient.  What is not a number
-        comes out as NaN or infinity.
+        `gradient` maps cell values to the magnitude of their gradient.  Undefined results are NaN
+        or infinity.
         """
         with np.errstate(all="ignore"):
             return np.asarray(self._evaluate(self.tree, values, gradient), dtype=np.float64)
@@ -193,7 +194,7 @@ def make_position_weight(text: str, names: tuple[str, ...] = ("x", "y")) -> Call
 
 
 def _spell_bars(text: str) -> str:
-    """`|f|` as `abs(f)`: a bar opens where a value is due, and closes where one has ended."""
+    """`|f|` as `abs(f)`: a bar opens where an operand is expected and closes after one."""
     out, value_ended, open_bars = [], False, 0
     for character in text:
         if character == "|":
@@ -218,7 +219,7 @@ def _is_over_max(node: ast.expr) -> bool:
 
 
 def _split_number(node: ast.expr) -> tuple[float, ast.expr | None]:
-    """The number that a product or quotient begins with (1 if none), and the rest of it."""
+    """The leading number of a product or quotient (1 if none), and the rest of it."""
     if isinstance(node, ast.Constant):
         return float(node.value), None
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
@@ -241,9 +242,9 @@ NOTHING = 1e-9  # differences of a field below this part of its size are round-o
 
 
 def weigh_points(weight, points: np.ndarray) -> np.ndarray:
-    """The weight of cells at `points` (dimensions, ...), their centres.
+    """The weight of cells with the centres `points` (dimensions, ...).
 
-    weight: a number, an array of the cells or a function of the coordinates; must be positive.
+    weight: a number, an array of cell values or a function of the coordinates; must be positive.
     """
     value = weight(*points) if callable(weight) else weight
     value, cells = np.asarray(value, dtype=np.float64), points.shape[1:]
@@ -259,10 +260,10 @@ def weigh_points(weight, points: np.ndarray) -> np.ndarray:
 
 
 class Weight:
-    """A weight and what it may need: fields of the flow, the old grid, the sides.
+    """A weight and the data it may need: fields of the flow, the old grid, the sides.
 
-    weight: see the module; `smoothing`: passes over what depends on fields.  Raises BadInput for
-    text that is no formula.
+    weight: see the module; `smoothing`: passes over field-dependent weights.  Raises BadInput for
+    an invalid formula.
     """
 
     def __init__(self, weight, smoothing: int = 4):
@@ -279,32 +280,32 @@ class Weight:
 
     @property
     def by_position(self) -> bool:
-        """Is it a number or a function of x and y alone?"""
+        """Whether it is a number or a function of x and y alone."""
         if self.expression is None:
             return callable(self.given) or np.ndim(self.given) == 0
         return self.expression.names <= {"x", "y", "pi"} and not self.expression.has_gradient
 
     @property
     def is_frozen(self) -> bool:
-        """Does it stay with the cells while a grid is found?"""
+        """Whether it stays with the cells during the iteration."""
         if self.expression is None:
             return not callable(self.given)
         return not self.expression.names & {"x", "y"}
 
     def at_points(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Values at points, for weights that are `by_position`."""
+        """Values at points, for weights `by_position`."""
         if self.expression is not None:
             return weigh_points(self.expression.evaluate({"x": x, "y": y}), np.array([x, y]))
         return weigh_points(self.given, np.array([x, y]))
 
     def take_fields(self, fields: Mapping[str, np.ndarray]) -> None:
-        """Take the fields of the cells, (ni, nj) each, that the next grids are to follow."""
+        """Set the cell fields, (ni, nj) each, for the next grids."""
         self.fields = fields
 
     def on(self, previous: np.ndarray, boundary: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """The weight for one regrid: a function of nodes (2, ni+1, nj+1) to cells (ni, nj).
 
-        Raises BadInput for names that are not known and, when called, for values not positive.
+        Raises BadInput for unknown names and, when called, for values that are not positive.
         """
         if self.expression is None:
             return lambda nodes: weigh_points(self.given, compute_centres(nodes))
@@ -354,7 +355,7 @@ class Weight:
 def compute_side_density(boundary: np.ndarray) -> np.ndarray:
     """1 over the product of the two conditional lengths at the cells' centres, over its mean.
 
-    boundary (2, ni+1, nj+1), of which only the sides are read; theory R10.10.
+    Only the sides of boundary (2, ni+1, nj+1) are read; theory R10.10.
     """
     ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
     along_i, along_j = np.zeros((5, ni)), np.zeros((5, nj))
@@ -368,7 +369,7 @@ def compute_side_density(boundary: np.ndarray) -> np.ndarray:
 
 
 def measure_gradient(field: np.ndarray, centres: np.ndarray) -> np.ndarray:
-    """Size of the gradient of cell values (ni, nj) known at `centres` (2, ni, nj).
+    """Magnitude of the gradient of cell values (ni, nj) at `centres` (2, ni, nj).
 
     Central differences along i and j, one-sided at the sides; invariant under rotation.
     """
@@ -389,7 +390,7 @@ def measure_gradient(field: np.ndarray, centres: np.ndarray) -> np.ndarray:
 
 
 def smooth(values: np.ndarray) -> np.ndarray:
-    """One pass of (1, 2, 1)/4 along both directions; the sides are their own images."""
+    """One pass of (1, 2, 1)/4 along both directions, with reflection at the sides."""
     for _ in range(2):
         wide = np.concatenate([values[:1], values, values[-1:]])
         values = (0.5 * values + 0.25 * (wide[:-2] + wide[2:])).T
@@ -397,11 +398,11 @@ def smooth(values: np.ndarray) -> np.ndarray:
 
 
 BESIDE = (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1])  # cells along the four sides
-SIDE_MOTION = 0.1  # way of a side's node along its side in a full step of a flow, in spacings
+SIDE_MOTION = 0.1  # motion of a side's node along its side per full step of a flow, in spacings
 
 
 class WeightedRegridder:
-    """Base: `weight` (see `equidistribution.weights`), `smoothing` of what depends on fields, and
+    """Base: `weight` (see `equidistribution.weights`), `smoothing` of field-dependent weights, and
     `boundary` "given" or "equidistributed".
     """
 
@@ -423,21 +424,21 @@ class WeightedRegridder:
 
     @property
     def owns_sides(self) -> bool:
-        """Does it place nodes of its `free_sides` itself?"""
+        """Whether it places the nodes of its `free_sides` itself."""
         return self.boundary == "equidistributed"
 
     @property
     def sees_flow(self) -> bool:
-        """Does it need the fields of a flow and its steps?"""
+        """Whether it needs the fields and steps of a flow."""
         return self.weight.needs_fields or self.owns_sides
 
     def take_step(self, fields: Mapping[str, np.ndarray], step_fraction: float) -> None:
-        """Take the cells' fields, (ni, nj) each, and the next step over the stable one."""
+        """Set the cell fields, (ni, nj) each, and the next step as a fraction of the stable one."""
         self.weight.take_fields(fields)
         self.step_fraction = float(step_fraction)
 
     def distribute_sides(self, previous: np.ndarray, boundary: np.ndarray) -> np.ndarray:
-        """`boundary`, with the nodes of free sides placed if it owns them."""
+        """`boundary`, with the nodes of free sides redistributed if it places them."""
         if not self.owns_sides:
             return boundary
         most = np.inf if self.step_fraction is None else SIDE_MOTION * self.step_fraction
@@ -453,10 +454,9 @@ def distribute_on_sides(
 ) -> np.ndarray:
     """A copy of `boundary` with w ds constant on some of its sides, by theory R10.9.
 
-    A weight of position is taken on the polylines of `boundary`; any other is that of the cells
-    beside, travels with them, and is known on the grid `previous`.  Nodes go no further than
-    `most` (< 0.5) of the shorter step beside them from the place that they have, in parts of the
-    side, in `previous`.
+    A weight of position is evaluated on the polylines of `boundary`; any other is that of the
+    adjacent cells on the grid `previous` and moves with them.  Nodes move by at most `most` (< 0.5)
+    of the shorter adjacent spacing from their relative position on the side in `previous`.
     """
     distributed = np.array(boundary, dtype=np.float64, order="C")
     cells = None if weight.by_position else weight.on(previous, boundary)(previous)

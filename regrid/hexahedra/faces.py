@@ -1,9 +1,9 @@
-"""The six faces of a block: what is asked of them, what follows from them, what is wrong with them.
+"""The six faces of a block: the spacing and weights that they define, and checks of their validity.
 
-Lengths of edges, weights of the three families and the volume come from nodes of the faces alone.
-Faces are called i_min, i_max, j_min, j_max, k_min, k_max.  Their displacement is interpolated:
-its affine part exactly, the rest by a boolean sum.  Faces that leave no valid grid have turned
-corners at the block's edges or folded quadrilaterals.
+Edge lengths, weights of the three families and the volume follow from the face nodes alone.  Faces
+are called i_min, i_max, j_min, j_max, k_min, k_max.  Their displacement is interpolated: its affine
+part exactly, the rest by a Boolean sum.  Faces that allow no valid grid have inverted corners at
+the block's edges or folded quadrilaterals.
 
 Source: theory R14.
 """
@@ -22,7 +22,7 @@ from regrid.measure.hexahedra import compute_corner_volumes, find_bad_hexahedra
 
 FACES = ("i_min", "i_max", "j_min", "j_max", "k_min", "k_max")
 LEAST_LENGTH = 1e-6  # of a family's mean edge
-BEND = 1e-3  # added to the bend of a pair of faces
+BEND = 1e-3  # added to the curvature measure of a pair of faces
 
 
 def get_face(nodes: np.ndarray, axis: int, end: int) -> np.ndarray:
@@ -37,10 +37,10 @@ def measure_lengths(points: np.ndarray, axis: int) -> np.ndarray:
 
 
 def compute_laws(nodes: np.ndarray) -> list[np.ndarray]:
-    """Arc-length laws (2, 2, n+1) of the twelve block edges: of each direction the four of it.
+    """Arc-length spacings (2, 2, n+1) of the twelve block edges, four for each direction.
 
     The first two indices are the low and high ends of the other two directions, in their order.
-    An edge of no length has equal steps.
+    An edge of zero length has equal spacing.
     """
     laws = []
     for axis in range(3):
@@ -57,9 +57,9 @@ def compute_laws(nodes: np.ndarray) -> list[np.ndarray]:
 
 
 def measure_bend(face: np.ndarray) -> float:
-    """Area of a face (3, n, m) over the size of its vector area, less one; 0 where it is plane.
+    """Area of a face (3, n, m) over the magnitude of its vector area, minus one; 0 if it is plane.
 
-    Of nodes smoothed by (1, 2, 1)/4 both ways, so that noise is no bend.
+    Nodes are smoothed by (1, 2, 1)/4 both ways, so that noise does not count as curvature.
     """
     smooth = face.copy()
     smooth[:, 1:-1] = 0.25 * (face[:, :-2] + 2.0 * face[:, 1:-1] + face[:, 2:])
@@ -80,7 +80,7 @@ def _vector_areas(face: np.ndarray) -> np.ndarray:
 
 
 def compute_family_weights(nodes: np.ndarray) -> np.ndarray:
-    """Weights (3), of sum 1, of the straight lines of each family (R14.7)."""
+    """Weights (3,) of the straight lines of each family, with sum 1 (R14.7)."""
     bends = [
         max(measure_bend(get_face(nodes, axis, end)) for end in (0, -1)) + BEND for axis in range(3)
     ]
@@ -89,7 +89,7 @@ def compute_family_weights(nodes: np.ndarray) -> np.ndarray:
 
 
 def compute_volume(nodes: np.ndarray) -> float:
-    """Volume inside the six faces, signed as i, j, k turn like x, y, z."""
+    """Volume inside the six faces, positive if i, j, k are oriented like x, y, z."""
     middle = nodes[:, [0, -1], :, :][:, :, [0, -1], :][..., [0, -1]].mean(axis=(1, 2, 3))
     total = 0.0
     for axis in range(3):
@@ -98,7 +98,7 @@ def compute_volume(nodes: np.ndarray) -> float:
             centre = 0.25 * (
                 face[:, 1:, 1:] + face[:, :-1, :-1] + face[:, 1:, :-1] + face[:, :-1, 1:]
             )
-            # the diagonals turn so that the area of a low face points inwards for axes 0 and 2
+            # with this order of diagonals the area of a low face points inwards for axes 0 and 2
             part = float((centre * _vector_areas(face)).sum()) / 3.0
             total += part * (1.0 if (end == -1) == (axis != 1) else -1.0)
     return total
@@ -108,8 +108,8 @@ class FaceLaws(NamedTuple):
     """Inverse conditional lengths of all edges, weights of lines, and the scale of the barrier.
 
     `inverse` [1/m]: shapes (n1, n2+1, n3+1), (n1+1, n2, n3+1), (n1+1, n2+1, n3), scaled so that the
-    mean corner is 1.  `ways` [m]: a quarter of the straight lines' weights times their mean
-    length, (n2+1, n3+1), (n1+1, n3+1), (n1+1, n2+1).  `scale` [m2] is sigma of theory R14.
+    mean corner is 1.  `ways` [m]: a quarter of the straight-line weights times their mean length,
+    (n2+1, n3+1), (n1+1, n3+1), (n1+1, n2+1).  `scale` [m2] is sigma of theory R14.
     """
 
     inverse: tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -118,10 +118,10 @@ class FaceLaws(NamedTuple):
 
 
 class Functional(NamedTuple):
-    """What the functional (R14.1) of a block hangs on, but for its nodes.
+    """Parameters of the functional (R14.1) of a block, apart from its nodes.
 
     `strength` (n1, n2, n3): weight e of the barrier in every cell; `area_weight`: lam; `e2`: square
-    of the smoothing of denominators, 0 where corners are positive.
+    of the smoothing of denominators, 0 if all corners are positive.
     """
 
     laws: FaceLaws
@@ -131,7 +131,7 @@ class Functional(NamedTuple):
 
 
 def compute_face_laws(nodes: np.ndarray, weights: np.ndarray, conditional: bool) -> FaceLaws:
-    """The laws of the faces of `nodes` (3, n1+1, n2+1, n3+1), of positive volume (R14.2)."""
+    """`FaceLaws` of the faces of `nodes` (3, n1+1, n2+1, n3+1), of positive volume (R14.2)."""
     shape = tuple(n - 1 for n in nodes.shape[1:])
     mean_volume = compute_volume(nodes) / np.prod(shape)
     if conditional:
@@ -154,9 +154,9 @@ def compute_face_laws(nodes: np.ndarray, weights: np.ndarray, conditional: bool)
 
 
 def compute_face_density(nodes: np.ndarray) -> np.ndarray:
-    """Density of cells (n1, n2, n3) that the faces ask for, over its mean: 1 over three lengths.
+    """Cell density (n1, n2, n3) implied by the faces, over its mean: 1 over three lengths.
 
-    Of `nodes` (3, n1+1, n2+1, n3+1), of positive volume, the faces alone are read.
+    Only the faces of `nodes` (3, n1+1, n2+1, n3+1), of positive volume, are read.
     """
     inverse = compute_face_laws(nodes, np.zeros(3), True).inverse
     density = np.ones([n - 1 for n in nodes.shape[1:]])
@@ -166,14 +166,14 @@ def compute_face_density(nodes: np.ndarray) -> np.ndarray:
 
 
 def _spread_lengths(nodes: np.ndarray, axis: int, laws: list[np.ndarray]) -> np.ndarray:
-    """Conditional lengths of all edges along `axis`, by the four faces that have such edges."""
+    """Conditional lengths of all edges along `axis`, from the four faces with such edges."""
     p, q = (k for k in range(3) if k != axis)
 
     def measure(across: int, end: int) -> np.ndarray:
         along = axis - (axis > across)
         return np.moveaxis(measure_lengths(get_face(nodes, across, end), along), along, 0)
 
-    # arrays (n, across p, across q) while they are made
+    # arrays (n, across p, across q) in this function
     low_p, high_p, low_q, high_q = (measure(k, end) for k in (p, q) for end in (0, -1))
     u, v = laws[p][:, None], laws[q]
     across_p = low_p[:, None, :] + u * (high_p - low_p)[:, None, :]
@@ -197,12 +197,12 @@ def _to_centres(length: np.ndarray, axis: int) -> np.ndarray:
     return length
 
 
-CROSSINGS = 3  # passes for the place where three lines of the unit cube meet
+CROSSINGS = 3  # iterations for the intersection of three lines of the unit cube
 
 
 @kernel(allocates=False)
 def mix(law, i, u, v):
-    """The law between its four edges at the part u, v of the way."""
+    """Spacing interpolated between its four edges at the fractions u, v."""
     low = law[0, 0, i] + v * (law[0, 1, i] - law[0, 0, i])
     high = law[1, 0, i] + v * (law[1, 1, i] - law[1, 0, i])
     return low + u * (high - low)
@@ -210,9 +210,9 @@ def mix(law, i, u, v):
 
 @kernel(allocates=False)
 def fill_blended(values, law_i, law_j, law_k, rows):
-    """Boolean sum of `values` (m, n1+1, n2+1, n3+1) from its six faces to its inside (R14.9).
+    """Boolean sum: fill the interior of `values` (m, n1+1, n2+1, n3+1) from its faces (R14.9).
 
-    The laws (2, 2, n+1) are those of the twelve edges.  `rows` (3, n3+1) is scratch.
+    The spacings (2, 2, n+1) are those of the twelve edges.  `rows` (3, n3+1) is scratch.
     """
     n1, n2, n3 = values.shape[1] - 1, values.shape[2] - 1, values.shape[3] - 1
     for i in range(1, n1):
@@ -253,9 +253,9 @@ def fill_blended(values, law_i, law_j, law_k, rows):
 
 
 def fit_affine(points: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-    """The matrix (3, 3) of an affine displacement of points (3, ...), by least squares.
+    """Matrix (3, 3) of an affine displacement of points (3, ...), by least squares.
 
-    Of a plane block's faces no more than what they show: the solution of least norm.
+    For a plane block it is the solution of least norm.
     """
     there = points.reshape(3, -1)
     moved = displacement.reshape(3, -1)
@@ -266,7 +266,7 @@ def fit_affine(points: np.ndarray, displacement: np.ndarray) -> np.ndarray:
 
 
 def gather_faces(nodes: np.ndarray) -> np.ndarray:
-    """Nodes (3, count) of the six faces; those on the block's edges come twice and more."""
+    """Nodes (3, count) of the six faces; those on the block's edges appear more than once."""
     return np.concatenate(
         [get_face(nodes, axis, end).reshape(3, -1) for axis in range(3) for end in (0, -1)], axis=1
     )
@@ -299,9 +299,9 @@ def carry_faces(previous: np.ndarray, boundary: np.ndarray, out: np.ndarray) -> 
 
 
 def check_grids_in_space(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
-    """Both as contiguous float64 of one shape (3, ni+1, nj+1, nk+1); BadInput where they are not.
+    """Both as contiguous float64 of one shape (3, ni+1, nj+1, nk+1); otherwise BadInput.
 
-    Inner nodes of `boundary` may be anything.
+    Inner nodes of `boundary` are ignored.
     """
     previous, boundary = (
         take_nodes(previous, "previous", "ijk"),
@@ -320,11 +320,11 @@ def check_grids_in_space(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
 
 
 def find_turned_edge(nodes: np.ndarray) -> tuple[str, str, tuple[int, ...]] | None:
-    """A corner at the block's twelve edges that no inner node can make positive: faces and node.
+    """Faces and node of an inverted corner at the block's edges, which no inner node can fix.
 
-    All four nodes of such a corner lie on the boundary.  None where there is no such corner.
+    All four nodes of such a corner lie on the boundary.  None if there is no such corner.
     """
-    with np.errstate(all="ignore"):  # inner nodes may be anything
+    with np.errstate(all="ignore"):  # inner nodes are arbitrary
         volumes = compute_corner_volumes(nodes)
     for axis, end, other_end, c in np.ndindex(3, 2, 2, 2):
         across = [k for k in range(3) if k != axis]
@@ -341,7 +341,7 @@ def find_turned_edge(nodes: np.ndarray) -> tuple[str, str, tuple[int, ...]] | No
 
 
 def find_folded_face(nodes: np.ndarray) -> tuple[str, tuple[int, ...]] | None:
-    """The face node whose four quadrilaterals point most apart, where two of them oppose."""
+    """The face node whose four quadrilaterals' normals differ most, if two of them oppose."""
     worst, found = 0.0, None
     for axis in range(3):
         for end in (0, -1):
@@ -366,8 +366,8 @@ def find_folded_face(nodes: np.ndarray) -> tuple[str, tuple[int, ...]] | None:
 
 
 def explain_failure(faces: np.ndarray, trial: np.ndarray) -> RegridFailure:
-    """The failure of a move to `faces` with the grid `trial`, i, j, k turning like x, y, z; names
-    face and node."""
+    """The failure of a move to `faces` with the grid `trial`, i, j, k oriented like x, y, z; it
+    names face and node."""
     if not compute_volume(faces) > 0.0:
         return RegridFailure(
             "the six faces enclose no positive volume; they have to turn as those of the grid "

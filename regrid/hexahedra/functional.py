@@ -1,23 +1,23 @@
-"""The functional on hexahedra (theory R14): a row of cells at a time, its sums.
+"""The functional on hexahedra (theory R14), evaluated one row of cells at a time.
 
 A row of cells (i, j) has eight rows of edges: two along i at j and j+1, two along j at i and i+1,
-four along k.  Corner (a, b, c) takes one of each; every edge runs along its index, so that the
-triple product of a corner is positive in a good cell at all eight.  The formulas of a corner are
-not those of `regrid.barrier.functional` with a third edge: there the term is (a² + b²)/D, here
-squares of edges and of their cross products over the volume, which a plane corner does not have.
-Only the smoothed denominator is the same.
+four along k.  Corner (a, b, c) uses one of each; every edge points along its index, so the triple
+products of all eight corners are positive in a valid cell.  The corner formulas are not those of
+`regrid.barrier.functional` with a third edge: there the term is (a² + b²)/D; here it contains
+squares of edges and of their cross products over the volume.  Only the smoothed denominator is the
+same.
 
-Everything that a row of cells yields goes into ONE flat scratch array Z at the constant offsets
-named here: rows of separate arrays, at places the compiler cannot know, are not vectorised.  Edges
-lie there over their conditional lengths, three rows a vector.
+All results of a row of cells go into ONE flat scratch array Z at the constant offsets named here:
+rows of separate arrays, at offsets unknown to the compiler, are not vectorised.  Edges are stored
+there divided by their conditional lengths, three rows per vector.
 
-The lines' weights `ways` are those of an edge in ONE of its four cells.  Edges in a face have fewer
-cells, which touches nodes of the boundary alone; their residual is not used.  Note: a row of cells
-adds to four rows of nodes, so that rows are done in one fixed order; and `strength` is frozen in a
-step, so that a search along it compares the same functional.
+The straight-line weights `ways` are those of an edge in ONE of its four cells.  Edges in a face
+have fewer cells, which affects boundary nodes only; their residual is not used.  Note: a row of
+cells adds to four rows of nodes, so rows are processed in one fixed order; and `strength` is frozen
+in a step, so that a line search compares the same functional.
 
-The Hessian is applied corner by corner and never stored; of single edges there are blocks at the
-centres of cells (theory R14.6), for the line solve.
+The Hessian is applied corner by corner and never stored; only the blocks of single edges at cell
+centres (theory R14.6) are, for the line solve.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from regrid.barrier.functional import smooth_area
 from regrid.jit import kernel
 
 SHARP = 0.3  # corner sine below which the barrier is strengthened
-CENTRE_E2 = 1e-6  # the centre of a cell whose corners are positive may be folded
+CENTRE_E2 = 1e-6  # the centre of a cell with positive corners may be folded
 ENERGY, GRADIENT, MATRIX = 0, 1, 2
 
 SPAN = 296  # longest row of nodes and its padding
 LONGEST = 256  # cells along the third index
 VECTOR = 3 * SPAN  # from one edge's rows to the next one's
-# Eight edges: their vectors, inverse lengths, straight-line weights, lengths squared; the vectors
-# of another grid or a direction; eight volumes of corners, twice.
+# Eight edges: vectors, inverse lengths, straight-line weights, squared lengths; the vectors of
+# another grid or a direction; eight corner volumes, twice.
 EDGE, INVERSE, STRAIGHT, SQUARE, TURN = (k * SPAN for k in (0, 24, 32, 40, 48))
 VOLUME, OTHER_VOLUME = 72 * SPAN, 80 * SPAN
 WEIGHT, SUM, LEAST = (k * SPAN for k in (88, 89, 90))  # of cells
 FLUX = 91 * SPAN  # of the eight edges, summed over corners
-HIGH = 115 * SPAN  # of those along i and j, from cells that end there
-BLOCK, BLOCKS = 127 * SPAN, 133 * SPAN  # of cells: of the edge along i; summed over all three
+HIGH = 115 * SPAN  # of those along i and j, from the cells before them
+BLOCK, BLOCKS = 127 * SPAN, 133 * SPAN  # of cells: for the edge along i; summed over all three
 ROWS = 139 * SPAN
-# Direction of the eight edges, and where they begin, beside the node (i, j).
+# Direction of the eight edges, and their first nodes relative to the node (i, j).
 EDGES = (
     (0, 0, 0), (0, 0, 1), (1, 0, 0), (1, 1, 0), (2, 0, 0), (2, 0, 1), (2, 1, 0), (2, 1, 1),
 )  # fmt: skip
@@ -53,7 +53,7 @@ EDGES = (
 (HI0, HI1, HJ0, HJ1) = (HIGH + k * VECTOR for k in range(4))
 (VI0, VI1, VJ0, VJ1, VK0, VK1, VK2, VK3) = (INVERSE + k * SPAN for k in range(8))
 AWAY = TURN - EDGE
-# Edges along i, j, k of the eight corners of a cell, and where the forces on them are summed.
+# Edges along i, j, k of the eight corners of a cell, and offsets of the forces on them.
 CORNERS = (
     (I0, J0, K0), (I0, J1, K2), (I1, J0, K1), (I1, J1, K3), (I0 + 1, J0 + 1, K0),
     (I0 + 1, J1 + 1, K2), (I1 + 1, J0 + 1, K1), (I1 + 1, J1 + 1, K3),
@@ -110,14 +110,14 @@ def take_mean_vector(Z, p, q, r, s):
 
 @formula
 def find_volume(Z, k, edges, away):
-    """Triple product of the edges (of CORNERS) of corner k of a row, `away` from those of EDGE."""
+    """Triple product of the edges (of CORNERS) of corner k of a row, offset by `away` from EDGE."""
     at = away + k
     return dot(take(Z, edges[0] + at), cross(take(Z, edges[1] + at), take(Z, edges[2] + at)))
 
 
 @kernel(allocates=False)
 def fill_volumes(Z, n, away, out):
-    """Triple products of a row's corners into eight rows from `out` on; see `find_volume`."""
+    """Store the triple products of a row's corners in eight rows from `out`; see `find_volume`."""
     for k in range(n):
         Z[out + 0 * SPAN + k] = find_volume(Z, k, CORNERS[0], away)
         Z[out + 1 * SPAN + k] = find_volume(Z, k, CORNERS[1], away)
@@ -131,7 +131,7 @@ def fill_volumes(Z, n, away, out):
 
 @formula
 def add_corner_force(Z, at, edges, shares, steep, p):
-    """Add the gradient (R14.4) in one edge a of a corner, of product p, to its force."""
+    """Add the gradient (R14.4) for edge a of a corner with triple product p to its force."""
     (a, b, c), (own, far, near) = edges, shares
     Z[at] += own * a[0] - (far * b[0] + near * c[0]) + steep * p[0]
     Z[at + SPAN] += own * a[1] - (far * b[1] + near * c[1]) + steep * p[1]
@@ -140,7 +140,7 @@ def add_corner_force(Z, at, edges, shares, steep, p):
 
 @formula
 def add_corner_value(Z, k, edges, forces, area_weight, e2):
-    """Add the bracket of (R14.1) of corner k to SUM, its gradient (R14.4) to the forces, weighed.
+    """Add the weighted bracket (R14.1) of corner k to SUM, its gradient (R14.4) to the forces.
 
     `edges` of CORNERS, `forces` of FORCES.
     """
@@ -164,7 +164,7 @@ def add_corner_value(Z, k, edges, forces, area_weight, e2):
 
 @formula
 def add_corner_turn(Z, at, two, d, hc, bl, back, p):
-    """Add a corner's product (R14.5) in one edge to its force."""
+    """Add a corner's Hessian product (R14.5) for one edge to its force."""
     Z[at] += two * (d[0] + hc[0] + bl[0] + back * p[0])
     Z[at + SPAN] += two * (d[1] + hc[1] + bl[1] + back * p[1])
     Z[at + 2 * SPAN] += two * (d[2] + hc[2] + bl[2] + back * p[2])
@@ -185,12 +185,12 @@ def add_corner_product(Z, k, edges, forces, area_weight, e2):
     t = slope * inverse
     size = dot(a, a) + dot(b, b) + dot(c, c) + dot(p, p)
     size += dot(q, q) + dot(r, r)
-    # changes of the three cross products
+    # variations of the three cross products
     dp = plus(cross(db, c), cross(b, dc))
     dq = plus(cross(dc, a), cross(c, da))
     dr = plus(cross(da, b), cross(a, db))
     change = t * (dot(p, da) + dot(q, db) + dot(r, dc))  # of chi, over chi
-    # v - dv is what is kept of (a, b, c) and of the cross products
+    # v - dv is used for (a, b, c) and for the cross products
     da, db, dc = less(da, change, a), less(db, change, b), less(dc, change, c)
     dp, dq, dr = less(dp, change, p), less(dq, change, q), less(dr, change, r)
     along = dot(a, da) + dot(b, db) + dot(c, dc)
@@ -205,7 +205,7 @@ def add_corner_product(Z, k, edges, forces, area_weight, e2):
 
 @kernel(allocates=False)
 def clear_sums(Z, n):
-    """Nothing in FLUX, HIGH and SUM."""
+    """Set FLUX, HIGH and SUM to zero."""
     for row in range(FLUX, BLOCK, SPAN):
         for k in range(n):
             Z[row + k] = 0.0
@@ -215,9 +215,9 @@ def clear_sums(Z, n):
 
 @kernel(allocates=False)
 def fill_values(Z, n, area_weight, e2):
-    """Values of a row of cells into SUM (R14.1), their forces (R14.4) into FLUX and HIGH.
+    """Store values of a row of cells in SUM (R14.1), and forces (R14.4) in FLUX and HIGH.
 
-    One loop with the eight corners of a cell: nothing is copied, and no corner waits for another.
+    One loop over cells with all eight corners: nothing is copied, and corners are independent.
     """
     clear_sums(Z, n)
     for k in range(n):
@@ -248,7 +248,7 @@ def fill_products(Z, n, area_weight, e2):
 
 @formula
 def turn_about(weight, edges, shares, half, t, p):
-    """Own block (xx, xy, xz, yy, yz, zz) of an edge a beside two others, of product p."""
+    """Diagonal block (xx, xy, xz, yy, yz, zz) of an edge a with two others, triple product p."""
     (a, b, c), (own, ab, ca) = edges, shares
     u = t * (own * a[0] - (ab * b[0] + ca * c[0]) - half * p[0])
     v = t * (own * a[1] - (ab * b[1] + ca * c[1]) - half * p[1])
@@ -265,11 +265,11 @@ def turn_about(weight, edges, shares, half, t, p):
 
 @kernel(allocates=False)
 def fill_centre_blocks(Z, n, area_weight, e2):
-    """The cells' blocks into the scratch: six rows of that along i, six of the sum of all three.
+    """Blocks of the cells: six rows for the edge along i, and six for the sum over all three.
 
-    xx, xy, xz, yy, yz, zz, each over lengths squared, into BLOCK and into BLOCKS.  They are
-    weighed as a quarter of the cell's eight corners, by the cell's own value (SUM) over that of its
-    centre: a cell is as stiff as its corners.
+    xx, xy, xz, yy, yz, zz, each over lengths squared, into BLOCK and into BLOCKS.  Their weight is
+    a quarter of the eight corners, scaled by the cell's value (SUM) over that at its centre, so
+    that a cell is as stiff as its corners.
     """
     for k in range(n):
         a = take_mean_vector(Z, I0 + k, I0 + k + 1, I1 + k, I1 + k + 1)
@@ -302,7 +302,7 @@ def put_six(Z, at, x):
 
 @kernel(allocates=False)
 def fill_edges(nodes, inverse, i, j, at, Z):
-    """The eight rows of edges of the cells (i, j), over their conditional lengths, from `at` on."""
+    """Eight rows of edges of the cells (i, j) over their conditional lengths, from `at` on."""
     for edge in range(8):
         axis, p, q = EDGES[edge][0], i + EDGES[edge][1], j + EDGES[edge][2]
         lengths = inverse[axis][p, q]
@@ -332,7 +332,7 @@ def fill_cell_rows(laws, cells, i, j, n, Z):
 
 @kernel(allocates=False)
 def add_straight(Z, edge, n, row):
-    """The straight lines' weight over length of a row of edges to a row of nodes beside them."""
+    """Add the straight-line weights over length of a row of edges to an adjacent row of nodes."""
     at = INVERSE + edge * SPAN
     inverse, way = Z[at : at + n], Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + n]
     if edge < 4:
@@ -345,7 +345,7 @@ def add_straight(Z, edge, n, row):
 
 @kernel(allocates=False)
 def add_centre_blocks(Z, i, j, n, own, ahead):
-    """The blocks of a row of cells and their straight lines to the line solve's (6, nodes)."""
+    """Add blocks of a row of cells and its straight lines to those of the line solve (6, nodes)."""
     for entry in range(6):
         at = BLOCKS + entry * SPAN
         total = Z[at : at + n]
@@ -370,7 +370,7 @@ def add_centre_blocks(Z, i, j, n, own, ahead):
 
 @kernel(allocates=False)
 def add_to_nodes(Z, edges, i, j, n, out):
-    """The forces along the eight rows of edges, with the straight lines', to four rows of nodes."""
+    """Add the forces of the eight rows of edges and of the straight lines to four rows of nodes."""
     m = n + 1
     for edge in range(8):
         at = INVERSE + edge * SPAN
@@ -402,7 +402,7 @@ def add_to_nodes(Z, edges, i, j, n, out):
 
 @kernel(allocates=False)
 def sum_straight(Z, n):
-    """The straight lines' part of J in a row of cells: half of weight over length times length²."""
+    """Straight-line part of J in a row of cells: half of weight over length times length²."""
     total = 0.0
     for edge in range(8):
         row = EDGE + edge * VECTOR
@@ -415,13 +415,13 @@ def sum_straight(Z, n):
 
 @kernel(allocates=False)
 def round_up(n):
-    """n rounded up to full vectors of eight: loops without remainders."""
+    """n rounded up to full vectors of eight, for loops without remainders."""
     return (n + 7) // 8 * 8
 
 
 @kernel(allocates=False)
 def fill_strength(nodes, inverse, epsilon, most, strength, Z):
-    """Weight e of the barrier in every cell (n1, n2, n3) by its least corner sine (R14.3)."""
+    """Barrier weight e of every cell (n1, n2, n3) from its least corner sine (R14.3)."""
     n1, n2, n = strength.shape
     for i in range(n1):
         for j in range(n2):
@@ -454,10 +454,10 @@ def fill_strength(nodes, inverse, epsilon, most, strength, Z):
 def assemble(nodes, functional, work, gradient, blocks, planes, Z):
     """Value of J, or by `work` its gradient (3, nodes) and the line solve's blocks (2, 6, nodes).
 
-    The value has the straight lines' part only where work is ENERGY.
+    The value includes the straight-line part only if work is ENERGY.
 
-    functional: `Functional`.  `planes` (n1) takes the part of each plane of cells, summed over i by
-    the caller's `sum()`.
+    functional: `Functional`.  `planes` (n1) receives the part of each plane of cells; the caller
+    sums it with `sum()`.
     """
     laws, strength, area_weight, e2 = functional
     n1, n2, n = strength.shape
@@ -482,7 +482,7 @@ def assemble(nodes, functional, work, gradient, blocks, planes, Z):
 
 @kernel(allocates=False)
 def fill_product(nodes, direction, functional, out, Z):
-    """`out` = Hessian on `nodes` times `direction`, both (3, nodes); of the boundary, nothing."""
+    """`out` = Hessian at `nodes` times `direction`, both (3, nodes); zero on the boundary."""
     laws, strength, area_weight, e2 = functional
     n1, n2, n = strength.shape
     padded = round_up(n)
@@ -498,9 +498,9 @@ def fill_product(nodes, direction, functional, out, Z):
 
 @kernel(allocates=False)
 def compare_corners(nodes, old, inverse, shape, Z):
-    """Least ratio of a corner's volume to that in `old`, and the least scaled volume.
+    """Smallest ratio of a corner's volume to that in `old`, and smallest scaled volume.
 
-    A ratio of a corner that is not positive in `old` is that of its scaled volume itself.
+    For a corner that is not positive in `old` the scaled volume replaces the ratio.
     """
     n1, n2, n = shape
     padded = round_up(n)
@@ -517,7 +517,7 @@ def compare_corners(nodes, old, inverse, shape, Z):
                     was = Z[row + OTHER_VOLUME - VOLUME + k]
                     Z[row + OTHER_VOLUME - VOLUME + k] = was if was > 0.0 else 1.0
                 for k in range(padded):
-                    # not min(): a volume that is no number must not be lost
+                    # not min(), which would lose a NaN
                     now, ratio, least = Z[row + k], Z[LEAST + k], Z[SUM + k]
                     part = now / Z[row + OTHER_VOLUME - VOLUME + k]
                     Z[LEAST + k] = ratio if ratio <= part else part
@@ -533,9 +533,9 @@ def compare_corners(nodes, old, inverse, shape, Z):
 
 @kernel(allocates=False)
 def halve_steps(nodes, old, inverse, floor, part, Z):
-    """Halve `part` (nodes) where a corner keeps less than `floor` of its volume; how many corners.
+    """Halve `part` (nodes) at corners that keep less than `floor` of their volume; count them.
 
-    A corner below its floor in `old` already (`floor` of nothing) is not looked at.
+    Corners already below their floor in `old` are skipped.
     """
     n1, n2, n = part.shape[0] - 1, part.shape[1] - 1, part.shape[2] - 1
     short = 0

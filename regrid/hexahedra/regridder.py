@@ -1,12 +1,12 @@
 """The barrier regridder for blocks of hexahedra: straight lines, and a barrier against folding.
 
-`regrid(previous, boundary)` moves a valid grid to six new faces (theory R14), by Newton steps or
-in parts.  The promise: all eight corner tetrahedra of every hexahedron handed back have positive
-volume, or RegridFailure names face and node.  Note: this is less than a positive trilinear Jacobian
-everywhere in a cell; `regrid.measure.hexahedra` measures both.
+`regrid(previous, boundary)` moves a valid grid to six new faces (theory R14) by Newton steps, if
+necessary in parts.  All eight corner tetrahedra of every hexahedron returned have positive volume;
+otherwise RegridFailure names face and node.  Note: this is weaker than a positive trilinear
+Jacobian everywhere in a cell; `regrid.measure.hexahedra` measures both.
 
-The order of trials stands in `HexahedraMove.run` and below; numbers are those of the plane barrier
-regridder where nothing else is said.
+`HexahedraMove.run` and the methods below it define the order of trials; parameters are those of the
+plane barrier regridder unless stated otherwise.
 """
 
 from __future__ import annotations
@@ -42,29 +42,29 @@ from regrid.hexahedra.functional import (
 from regrid.hexahedra.solve import CoarseBlock, factor_lines, solve, solve_lines
 from regrid.protocol import RegridReport, RegridResult
 
-LEAST_RATIO = 0.1  # a predicted corner volume may not be below this part of its old value
-START_RATIO = 0.5  # the moved grid is where the step begins if it keeps this much of every corner
+LEAST_RATIO = 0.1  # least ratio of a predicted corner volume to its old value
+START_RATIO = 0.5  # the step starts from the moved grid if it keeps this much of every corner
 STEP_RATIO = 0.25  # a step on the final faces keeps this much of every corner, node by node,
-SMOOTH_RATIO = 0.5  # and is followed by another one where it kept less than this
+SMOOTH_RATIO = 0.5  # and is followed by another one if it kept less than this
 LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
 MOST_SHORTENINGS = 40
 MOST_STEPS = 6  # Newton steps after the first
-MOST_POLISH = 15  # Newton steps after an untangling, which stop at a residual of SETTLED cells
+MOST_POLISH = 15  # Newton steps after untangling, until the residual is below SETTLED cells
 SETTLED = 0.02
-FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that carries the faces' motion inside
+FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that extends the faces' motion inward
 HOVER, DEEP = 1.3, 0.2  # a residual up to HOVER floors is solved down to DEEP floors
-SMOOTH_FLOOR = 0.3  # floors: a smooth part below this is left
+SMOOTH_FLOOR = 0.3  # floors: a smooth part below this is ignored
 ROUND_OFF = 1e-12
-MOST_HALVINGS = 6  # the motion is cut into no more than 2**6 parts
+MOST_HALVINGS = 6  # the motion is divided into at most 2**6 parts
 MOST_UNTANGLING = 60  # steps
 MOST_RESCUES = 8  # of one regrid, in all parts of its motion
 SMOOTHINGS = (0.2, 0.1, 0.05, 0.02)  # e of the last steps of an untangling
-LEAST_FALL = 0.1  # of the energy, in the law of e
+LEAST_FALL = 0.1  # of the energy, in the formula for e
 
 
 @dataclass(frozen=True)
 class HexahedraOptions:
-    """Numbers of the regridder that a move needs; their meaning: `BarrierRegridder3D`."""
+    """Parameters of a move; see `BarrierRegridder3D`."""
 
     epsilon: float
     area_weight: float
@@ -77,7 +77,7 @@ class HexahedraOptions:
 
 
 class Workspace:
-    """Arrays of the moves of a block of `cells` (3): fresh memory takes time at every call."""
+    """Work arrays for a block of `cells` (3,), kept because allocation takes time at every call."""
 
     def __init__(self, cells: tuple[int, ...]):
         nodes = tuple(n + 1 for n in cells)
@@ -93,8 +93,8 @@ class Workspace:
 class HexahedraMove(Workspace):
     """One regrid from `old` to the faces of `boundary`, (3, n1+1, n2+1, n3+1), into `trial`.
 
-    Both turn i, j, k like x, y, z; lines of index i are the heaviest family of `weights` (3).
-    `trial` and all that is used on the way lie in `space`.
+    In both i, j, k are oriented like x, y, z; lines along i are the heaviest family of `weights`
+    (3).  `trial` and all work arrays are in `space`.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class HexahedraMove(Workspace):
         self.old, self.faces = old, boundary
         self.cells = tuple(n - 1 for n in old.shape[1:])
         vars(self).update(vars(space or Workspace(self.cells)))
-        self.trial[:] = np.nan  # nothing of an earlier call may be left
+        self.trial[:] = np.nan  # no values of an earlier call may remain
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual, self.error, self.ratio = 0.0, 0.0, np.inf
         self.moved = False
@@ -112,22 +112,22 @@ class HexahedraMove(Workspace):
 
     @property
     def inner(self) -> int:
-        """Number of nodes that are free."""
+        """Number of free nodes."""
         return math.prod(n - 1 for n in self.cells)
 
     def report(self) -> RegridReport:
-        """How it went, after `run`."""
+        """The report, after `run`."""
         return RegridReport(
             self.iterations, self.iterations * self.inner, self.sub_moves, self.rescues,
             self.ratio, self.residual, self.start,
         )  # fmt: skip
 
     def run(self) -> bool:
-        """Go the whole way, in halves if need be; True when `trial` is valid."""
+        """Perform the whole motion, in halves if necessary; True if `trial` is valid."""
         if self._advance():
             return True
         if find_turned_edge(self.faces) is not None:
-            return False  # no inside makes that corner positive
+            return False  # no interior makes that corner positive
         begin, end = self.old.copy(), self.faces.copy()
         for halving in range(1, MOST_HALVINGS + 1):
             parts = 2**halving
@@ -145,7 +145,7 @@ class HexahedraMove(Workspace):
         return False
 
     def _advance(self) -> bool:
-        """One part of the motion, `old` to `faces`; True when `trial` is valid."""
+        """One part of the motion, from `old` to `faces`; True if `trial` is valid."""
         options = self.options
         self.laws = compute_face_laws(self.faces, self.weights, options.conditional)
         if not np.isfinite(self.laws.scale) or not self.laws.scale > 0.0:
@@ -176,7 +176,7 @@ class HexahedraMove(Workspace):
         return self._accept()
 
     def _accept(self) -> bool:
-        """Compare the end with the old grid; True when every corner is positive."""
+        """Compare the result with the old grid; True if every corner is positive."""
         ratio, least = self._compare(self.trial)
         self.ratio = min(self.ratio, ratio)
         return least > 0.0 and ratio > 0.0
@@ -186,11 +186,11 @@ class HexahedraMove(Workspace):
         return compare_corners(nodes, old, self.laws.inverse, self.cells, self.scratch)
 
     def functional(self, e2: float) -> Functional:
-        """The present functional, its denominators smoothed by e."""
+        """The current functional, its denominators smoothed by e."""
         return Functional(self.laws, self.strength, self.options.area_weight, e2)
 
     def assemble_at(self, nodes: np.ndarray, work: int, e2: float = 0.0) -> float:
-        """Value of J with the frozen strength; or gradient and factored lines, by `work`."""
+        """Value of J with the frozen strength, or gradient and factored lines, as `work` says."""
         if work > ENERGY:
             self.gradient[:] = 0.0
             self.blocks[:] = 0.0
@@ -209,9 +209,9 @@ class HexahedraMove(Workspace):
         return self.z
 
     def _solve(self, nodes, change, e2: float = 0.0, far: bool = False) -> bool:
-        """Add to `change` the Newton step of `nodes`; False where none is needed; `error` in cells.
+        """Add the Newton step of `nodes` to `change`; False if not needed; sets `error` in cells.
 
-        It begins with the smooth part (theory R14.11); with a residual at the floor this is all.
+        It starts with the smooth part (theory R14.11), enough for a residual at the floor.
         """
 
         options, functional = self.options, self.functional(e2)
@@ -250,9 +250,9 @@ class HexahedraMove(Workspace):
         return corrected or done > 0
 
     def _newton(self, old: np.ndarray) -> float:
-        """`trial` = a Newton step from the valid `trial`, shortened node by node if need be.
+        """`trial` = a Newton step from the valid `trial`, shortened node by node if necessary.
 
-        Returns the least ratio of corners to those of `old`.
+        Returns the smallest ratio of corner volumes to those of `old`.
         """
         base = self.trial.copy()
         self.strengthen(base)
@@ -267,7 +267,7 @@ class HexahedraMove(Workspace):
         return ratio if ratio > STEP_RATIO else self._search(base, change, old)
 
     def _search(self, base, change, old) -> float:
-        """The longest part of the step, shortened at its corners too, that makes J less."""
+        """The largest fraction of the step, shortened at corners as well, that decreases J."""
         before = self.assemble_at(base, ENERGY)
         part = 1.0
         while part >= LEAST_PART:
@@ -285,7 +285,7 @@ class HexahedraMove(Workspace):
         return 1.0
 
     def _predict(self, moved: float) -> float | None:
-        """Carry the faces' motion inside by the Hessian of the old grid, then by what works."""
+        """Extend the faces' motion inward by the old grid's Hessian, or else by other methods."""
         self.strengthen(self.old)
         self.assemble_at(self.old, MATRIX)
         change = self.base - self.old
@@ -321,7 +321,7 @@ class HexahedraMove(Workspace):
             before, after = self._smooth_step(e2)
             least = self._compare(self.trial)[1]
             if not after < before and not least > 0.0:
-                done += 4  # no way down at this e
+                done += 4  # no descent at this e
             root = math.sqrt(least * least + e2)
             chi = 0.5 * (least + root) if least >= 0.0 else 0.5 * e2 / (root - least)
             mu = (1.0 - max(LEAST_FALL, 1.0 - after / before)) * chi
@@ -338,7 +338,7 @@ class HexahedraMove(Workspace):
         return True
 
     def _smooth_step(self, e2: float) -> tuple[float, float]:
-        """A Newton step of the smoothed functional, halved until it falls: J before and after."""
+        """A Newton step of the smoothed functional, halved until J falls: J before and after."""
         base = self.trial.copy()
         before = self.assemble_at(base, ENERGY, e2)
         self.assemble_at(base, MATRIX, e2)
@@ -356,7 +356,7 @@ class HexahedraMove(Workspace):
         return before, before
 
 
-EVEN = 1e-6  # families whose weights differ by less are told apart by the numbers of cells
+EVEN = 1e-6  # families whose weights differ by less are ranked by the numbers of cells
 
 
 class BarrierRegridder3D:
@@ -364,9 +364,9 @@ class BarrierRegridder3D:
 
     `epsilon` weighs the barrier; `edge_lengths` is "conditional" or "unit"; `family` "auto", "i",
     "j", "k" or the three weights of the straight lines; `area_weight` is lam of theory R14.1;
-    `strengthening` is how many times epsilon goes up in sharp cells at most; `tolerance`, `floor`
-    (in cells) and `max_iterations` end the linear solve; `newton_steps` is the least number of
-    Newton steps a call.
+    `strengthening` is the largest factor of epsilon in sharp cells; `tolerance`, `floor` (in cells)
+    and `max_iterations` end the linear solve; `newton_steps` is the minimum number of Newton steps
+    per call.
     """
 
     def __init__(
@@ -406,9 +406,9 @@ class BarrierRegridder3D:
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """The grid inside the six faces of `boundary`, near `previous`; both in m.
 
-        Shapes (3, ni+1, nj+1, nk+1); of `boundary` the faces alone are read.  Raises BadInput for
-        arrays that do not fit, RegridFailure, naming face and node, where there is no valid grid
-        or none is found.
+        Shapes (3, ni+1, nj+1, nk+1); only the faces of `boundary` are read.  Raises BadInput for
+        arrays of wrong shape, and RegridFailure, naming face and node, if there is no valid grid or
+        none is found.
         """
         previous, boundary = check_grids_in_space(previous, boundary)
         weights = compute_family_weights(boundary) if self.family is None else self.family
@@ -437,9 +437,9 @@ class BarrierRegridder3D:
 
 
 def _order_axes(weights, shape: tuple[int, ...]) -> tuple[int, int, int]:
-    """The indices by falling weight of their family; at a tie by rising number of nodes.
+    """The indices by decreasing weight of their family; at a tie by increasing number of nodes.
 
-    A tie must not hang on rounding: long rows run fast, so they come last.
+    A tie must not be decided by round-off; the longest rows come last because they run fastest.
     """
     steps = np.round(np.asarray(weights) / EVEN)
     order = sorted(range(3), key=lambda axis: (-steps[axis], shape[axis], axis))

@@ -1,14 +1,14 @@
 """The linear solve of a Newton step on hexahedra: lines, conjugate gradients, smooth errors.
 
-Conjugate gradients are preconditioned by the blocks of single edges (theory R14.6), of those along
-i the coupling too: a block tridiagonal system a line, factored once a step.  Note: block and
-coupling of an edge along i must have the same factor, or a line's matrix is not positive definite.
-Sums are numpy's, in a fixed order.
+Conjugate gradients are preconditioned by the blocks of single edges (theory R14.6), including the
+coupling for edges along i: a block tridiagonal system per line, factored once per step.  Note:
+block and coupling of an edge along i must have the same factor, or a line's matrix is not positive
+definite.  Sums use numpy in a fixed order.
 
-Smooth errors of a large block are taken away on coarse nodes first (theory R14.11): every few nodes
-make a coarse block of hexahedra, with conditional lengths, lines' weights and strengths of its own;
-the Hessian there is that of the functional on it.  Displacements are trilinear in the indices
-between coarse nodes.  Note: where a coarse cell is folded, though no fine one is, there is no
+Smooth errors of a large block are first removed on coarse nodes (theory R14.11): every few nodes
+form a coarse block of hexahedra with its own conditional lengths, straight-line weights and
+strengths; its Hessian is that of the functional on it.  Displacements are trilinear in the indices
+between coarse nodes.  Note: if a coarse cell is folded although no fine one is, there is no
 correction.
 """
 
@@ -54,8 +54,8 @@ def times(m, v):
 
 @kernel(allocates=False)
 def factor_lines(blocks):
-    """Overwrite own blocks (2, 6, nodes) by the inverse pivots of every line along i, the couplings
-    ahead stay."""
+    """Overwrite the diagonal blocks in (2, 6, nodes) by inverse pivots of the lines along i; the
+    forward couplings are unchanged."""
     own, ahead = blocks[0], blocks[1]
     n1, n2, n3 = own.shape[1] - 1, own.shape[2] - 1, own.shape[3] - 1
     for i in range(1, n1):
@@ -78,7 +78,7 @@ def factor_lines(blocks):
 
 @kernel(allocates=False)
 def solve_lines(blocks, r, z):
-    """`z` = solution along every line of the residual `r`, (3, nodes); zeros on the boundary."""
+    """`z` = solution along every line for the residual `r`, (3, nodes); zeros on the boundary."""
     own, ahead = blocks[0], blocks[1]
     n1, n2, n3 = own.shape[1] - 1, own.shape[2] - 1, own.shape[3] - 1
     for i in range(1, n1):
@@ -102,10 +102,10 @@ def solve_lines(blocks, r, z):
 
 
 def solve(multiply, precondition, r, x, stop: float, most: int):
-    """Add to `x` what takes the residual `r` (3, nodes), which is overwritten, to nothing.
+    """Add to `x` the correction that removes the residual `r` (3, nodes), which is overwritten.
 
     `multiply(p)` and `precondition(r)` return fresh or own arrays with zeros on the boundary.
-    Returns (iterations, first r.z, last r.z).  It stops where r.z is `stop` or less.
+    Returns (iterations, first r.z, last r.z); stops when r.z is `stop` or less.
     """
     z = precondition(r)
     first = rz = float((r * z).sum())
@@ -127,22 +127,22 @@ def solve(multiply, precondition, r, x, stop: float, most: int):
     return done, first, rz
 
 
-LEAST_CELLS = 1000  # of blocks that are corrected: in smaller ones the fine solve sees all errors
-STRETCH = 4  # edges of a coarse one
+LEAST_CELLS = 1000  # of corrected blocks: in smaller ones the fine solve removes all errors
+STRETCH = 4  # fine edges per coarse edge
 LEAST_VOLUME = 0.02  # of a coarse corner, over that of its conditional lengths
 TOLERANCE, ITERATIONS = 0.05, 12  # of the coarse solve
 
 
 def cut_block(cells: int) -> np.ndarray:
-    """Indices of coarse nodes along `cells` edges, both ends among them, int64.
+    """Indices of coarse nodes along `cells` edges, including both ends, int64.
 
-    About every fourth, two coarse edges at least, and the same from either end.
+    About every fourth node, at least two coarse edges, symmetric about the middle.
     """
     return cut_evenly(cells, max(2, cells // STRETCH))
 
 
 def make_hats(starts: np.ndarray) -> np.ndarray:
-    """Parts (coarse, fine) of the piecewise linear hats of coarse nodes; of both ends, nothing."""
+    """Values (coarse, fine) of the linear hat functions of coarse nodes; zero for both ends."""
     fine = np.arange(starts[-1] + 1)
     hats = np.array([np.interp(fine, starts, one) for one in np.eye(starts.size)])
     hats[[0, -1]] = 0.0
@@ -150,14 +150,14 @@ def make_hats(starts: np.ndarray) -> np.ndarray:
 
 
 def contract(hats, values: np.ndarray) -> np.ndarray:
-    """Sums of `values` (3, ...) over every index with a matrix (new, old) each."""
+    """Sums of `values` (3, ...) over every index with one matrix (new, old) per index."""
     for axis, matrix in enumerate(hats, start=1):
         values = np.moveaxis(np.tensordot(matrix, values, (1, axis)), 0, axis)
     return np.ascontiguousarray(values)
 
 
 class CoarseBlock:
-    """The coarse nodes of a block of `cells` (3) and what a solve on them needs.
+    """The coarse nodes of a block of `cells` (3,) and the data for a solve on them.
 
     `able` is False for blocks that are not corrected.
     """
@@ -175,10 +175,10 @@ class CoarseBlock:
         self.planes = np.empty(shape[0] - 1)
 
     def make_laws(self, laws: FaceLaws) -> FaceLaws:
-        """Lengths, lines' weights and scale of the coarse block, by those of the fine one."""
+        """Lengths, straight-line weights and scale of the coarse block, from the fine one."""
         inverse, ways = [], []
         apart = [np.diff(starts) for starts in self.starts]
-        # fine lines that a coarse one stands for, half of those on either side
+        # fine lines that a coarse one represents, half of those on either side
         shares = [0.5 * (np.append(m, m[-1]) + np.append(m[0], m)) for m in apart]
         for axis in range(3):
             across = [k for k in range(3) if k != axis]
@@ -195,10 +195,10 @@ class CoarseBlock:
         return FaceLaws(tuple(inverse), tuple(ways), laws.scale)  # type: ignore[arg-type]
 
     def find(self, nodes, functional: Functional, r, Z) -> float:
-        """Solve for what takes the smooth part of the residual `r` away; both (3, nodes).
+        """Solve for the correction of the smooth part of the residual `r`; both (3, nodes).
 
-        Returns the residual times the solution; 0 where the coarse block is folded, and for blocks
-        that are not corrected.
+        Returns the residual times the solution; 0 if the coarse block is folded or the block is not
+        corrected.
         """
         if not self.able:
             return 0.0

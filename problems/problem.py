@@ -1,10 +1,10 @@
-"""The base of all problems: what a file in `problems/` says, and what is made of it.
+"""The base of all problems: what a file in `problems/` defines, and how it is used.
 
 A problem is one module.  The first line of its docstring is what `shockgrid list` prints, the
-whole docstring is the head of its page in docs/problems.  It has a deck, the blocks that it starts
-from (`build`), columns of the history (`measure`), the numbers that a run found beside theory
-(`report`) and its own pictures (`draw_...`).  Screens, errors for `shockgrid verify`, the results
-that studies draw and what the references say beforehand all follow from the report.
+whole docstring is the head of its page in docs/problems.  It has a deck, the initial blocks
+(`build`), columns of the history (`measure`), the results of a run compared with theory (`report`)
+and its own pictures (`draw_...`).  Summaries, errors for `shockgrid verify`, results for studies
+and predictions of the references all follow from the report.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
     from hydro.simulation import Simulation
 
 # `run_data` is runs.store.reader.RunData; the import would point the wrong way, hence Any.
-AnyDeck: TypeAlias = Deck  # inside Problem the name Deck is that of the problem's own
+AnyDeck: TypeAlias = Deck  # inside Problem the name Deck means the problem's own deck
 History: TypeAlias = Mapping[str, np.ndarray]
 DrawFigure = Callable[["Figure", Any], None]
 
 
 @dataclass(frozen=True)
 class BlockPlan:
-    """Size of a block that a deck asks for: cells each way, and the corners of its extent [m]."""
+    """Size of a block defined by a deck: cells each way, and the corners of its extent [m]."""
 
     name: str
     cells: tuple[int, int]
@@ -44,13 +44,13 @@ class BlockPlan:
     high: tuple[float, float]
 
     def make_nodes(self) -> np.ndarray:
-        """Nodes (2, ni + 1, nj + 1) of even cells in a rectangle of this extent [m]."""
+        """Nodes (2, ni + 1, nj + 1) of uniform cells in a rectangle of this extent [m]."""
         lines = map(np.linspace, self.low, self.high, np.add(self.cells, 1))
         return np.array(np.meshgrid(*lines, indexing="ij"))
 
 
 def plan_blocks(grids: Mapping[str, np.ndarray]) -> list[BlockPlan]:
-    """Sizes of blocks whose first nodes (2, ni + 1, nj + 1) are made, by name."""
+    """Sizes of blocks with the given initial nodes (2, ni + 1, nj + 1), by name."""
     plans = []
     for name, nodes in grids.items():
         low, high = ((float(x), float(y)) for x, y in (nodes.min((1, 2)), nodes.max((1, 2))))
@@ -62,11 +62,11 @@ def plan_blocks(grids: Mapping[str, np.ndarray]) -> list[BlockPlan]:
 class Row:
     """One number of a report: as computed and by theory, NaN where unknown, in SI units.
 
-    A number that belongs to a column of `measure` has its name.  `label`: its words on the screen,
-    which has no line for it without, and shows it over `unit` (1e9 for GPa).  Its error is relative
-    to `size` (left out: the theory), or the number itself where theory is 0 or unknown; `error` is
-    the name that `shockgrid verify` has for it.  Studies draw rows that are `studied`.  Beside the
-    numbers stand the `source` of the theory, and `off`, words in place of the difference.
+    A number with a column of `measure` is named like it.  `label`: its text in the summary, which
+    omits rows without one and shows the number over `unit` (1e9 for GPa).  Its error is relative to
+    `size` (default: the theory), or the number itself if theory is 0 or unknown; `error` is its
+    name in `shockgrid verify`.  Studies draw rows that are `studied`.  `source` is that of the
+    theory; `off` is a text in place of the difference.
     """
 
     name: str
@@ -83,17 +83,17 @@ class Row:
 
     @property
     def difference(self) -> float:
-        """Computed less theory over `size`; NaN where there is nothing to relate it to."""
+        """Computed minus theory, over `size`; NaN if undefined."""
         size = self.size or abs(self.theory)
         return (self.computed - self.theory) / size if size else math.nan
 
     def find_error(self) -> float:
-        """Size of the error."""
+        """Magnitude of the error."""
         bare = math.isnan(self.theory) or not (self.theory or self.size)
         return abs(self.computed) if bare else abs(self.difference)
 
     def format(self, width: int) -> str:
-        """The line on the screen, the label as wide as `width`; "-" for what is not known."""
+        """The line in the summary, the label padded to `width`; "-" for unknown numbers."""
         numbers = [self.computed, self.theory]
         words = [f"{x / self.unit:.{self.digits}g}" if math.isfinite(x) else "-" for x in numbers]
         if math.isnan(self.theory):
@@ -105,9 +105,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Report:
-    """What a run has found: a head, rows in a table, and sentences below them.
+    """The results of a run: a head, rows in a table, and sentences below them.
 
-    A head that takes long to compute is a function, called when the report is shown.
+    A head that takes long to compute is a function, called when the report is printed.
     """
 
     head: str | Callable[[], str] = ""
@@ -125,14 +125,14 @@ class Report:
 
 
 class NoHistory(dict):
-    """The history of a run that has not begun: each of its columns is one NaN."""
+    """The history of a run that has not started: each of its columns is one NaN."""
 
     def __missing__(self, name: str) -> np.ndarray:
         return np.full(1, math.nan)
 
 
 def align(rows: Sequence[Sequence[str]]) -> list[str]:
-    """The lines of a table, its first column to the left, the others to the right."""
+    """The lines of a table, its first column aligned left, the others right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     first = [f"  {row[0]:{widths[0]}}" for row in rows]
     return [
@@ -142,20 +142,20 @@ def align(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def get_last(history: History, name: str) -> float:
-    """The last value of a column; NaN where there is none."""
+    """The last value of a column; NaN if there is none."""
     column = history.get(name)
     return float(column[-1]) if column is not None and len(column) else math.nan
 
 
 def find_most(history: History, name: str) -> float:
-    """The greatest value of a column; NaN where there is none."""
+    """The largest value of a column; NaN if there is none."""
     column = history.get(name, np.empty(0))
     return float(np.nanmax(column)) if np.isfinite(column).any() else math.nan
 
 
 def find_crossing(x: np.ndarray, values: np.ndarray, level: float) -> float:
-    """The last place where `values` (n,) at `x` (n,) fall below a level, linear between two; NaN
-    where none is above it, or the last one still is."""
+    """The last x at which `values` (n,) at `x` (n,) fall below a level, by linear interpolation;
+    NaN if none is above it, or the last one still is."""
     over = np.flatnonzero(values > level)
     if over.size == 0 or over[-1] + 1 == values.size:
         return math.nan
@@ -177,14 +177,14 @@ def average_plateau(edges: np.ndarray, values: np.ndarray, ends: tuple[float, fl
 def reduce_between(
     reduce: Callable, x: np.ndarray, values: np.ndarray, low: float, high: float, least: int = 1
 ) -> float:
-    """What `reduce`, such as np.mean, makes of values (n,) at places x between two; NaN of fewer
-    than `least`."""
+    """`reduce`, such as np.mean, of the values (n,) with x between two bounds; NaN for fewer than
+    `least`."""
     chosen = values[(x > low) & (x < high)]
     return float(reduce(chosen)) if chosen.size >= least else math.nan
 
 
 def measure_below(line: np.ndarray, curved: bool) -> float:
-    """Area [m2] between a line (2, n) and y = 0, or where `curved` the volume per radian [m3]."""
+    """Area [m2] between a line (2, n) and y = 0, or if `curved` the volume per radian [m3]."""
     x, y = line
     near, far = y[:-1], y[1:]
     height = far * far + far * near + near * near if curved else far + near
@@ -192,8 +192,8 @@ def measure_below(line: np.ndarray, curved: bool) -> float:
 
 
 def find_frequency(t: np.ndarray, values: np.ndarray) -> float:
-    """Angular frequency [1/s] by the times t (n,) at which a wave's values are 0; NaN of fewer than
-    two such times."""
+    """Angular frequency [1/s] from the zero crossings of a wave's values at times t (n,); NaN for
+    fewer than two."""
     change = np.flatnonzero(values[1:] * values[:-1] < 0.0)
     if change.size < 2:
         return math.nan
@@ -204,14 +204,14 @@ def find_frequency(t: np.ndarray, values: np.ndarray) -> float:
 
 def find_growth_rate(t: np.ndarray, values: np.ndarray) -> float:
     """Rate [1/s] of a growth as cosh(rate t) from values (n,) at three times, a third of the last
-    apart: a1 + a3 = 2 a2 cosh(rate T); NaN where there is none."""
+    apart: a1 + a3 = 2 a2 cosh(rate T); NaN if there is none."""
     first, middle, last = np.interp([t[-1] / 3.0, t[-1] / 1.5, t[-1]], t, values)
     ratio = (first + last) / (2.0 * middle)
     return math.acosh(ratio) / (t[-1] / 3.0) if ratio > 1.0 else math.nan
 
 
 def fit_slope(x: np.ndarray, y: np.ndarray, chosen: Any = slice(None), least: int = 3) -> float:
-    """Slope of the straight line nearest to the `chosen` of the points x, y (n,); NaN of fewer than
+    """Slope of the least-squares line through the `chosen` points x, y (n,); NaN for fewer than
     `least`."""
     x, y = x[chosen], y[chosen]
     return float(np.polyfit(x, y, 1)[0]) if x.size >= least else math.nan
@@ -225,13 +225,13 @@ def compare(
 
 
 def find_time(history: History, condition: np.ndarray) -> float:
-    """The first time [s] at which a condition (n,) on the rows of a history holds; NaN if never."""
+    """The first time [s] at which a condition (n,) on the rows of a history holds, or NaN."""
     met = np.flatnonzero(condition)
     return float(history["t"][met[0]]) if met.size else math.nan
 
 
 def say_unreached(history: History, name: str) -> list[str]:
-    """A sentence where a column that is measured at the end time has no value."""
+    """A sentence if a column that is measured at the end time has no value."""
     known = not math.isnan(get_last(history, name))
     return [] if known else ["the error is measured at the end time, which was not reached"]
 
@@ -240,13 +240,13 @@ class Problem:
     """One problem with one deck: blocks to run, measurements, references, pictures."""
 
     Deck: ClassVar[type[Deck]] = Deck
-    units: ClassVar[Mapping[str, str]] = {}  # of the columns of `measure` that have one
-    t_unit: str = "s"  # of t: "1" where the deck's numbers have no units; or "iterations"
-    counted: ClassVar[tuple[str, ...]] = ()  # own numbers, keys: their product is the cells of all
+    units: ClassVar[Mapping[str, str]] = {}  # of columns of `measure` with a unit
+    t_unit: str = "s"  # of t: "1" if the deck is dimensionless; or "iterations"
+    counted: ClassVar[tuple[str, ...]] = ()  # keys or attributes: their product is all cells
     measures_sides: ClassVar[bool] = False  # `measure` reads cells along sides alone: `reads_cells`
 
     def __init__(self, deck: AnyDeck):
-        """Keep the deck; a subclass checks here what no single field can (raises BadInput)."""
+        """Keep the deck; a subclass checks combinations of fields here (raises BadInput)."""
         self.deck = deck
 
     @functools.cached_property
@@ -256,23 +256,23 @@ class Problem:
         return self.deck.run.t_end
 
     def find_units(self) -> dict[str, str]:
-        """Units of t, dt and the columns of `measure`; "1" where the deck's numbers have none."""
+        """Units of t, dt and the columns of `measure`; "1" if the deck is dimensionless."""
         units = {"t": "s", "dt": "s", **self.units}
         if self.t_unit != "1":
             return units
         return {name: unit if unit.startswith("deg") else "1" for name, unit in units.items()}
 
     def scale_time(self, t: float) -> str:
-        """Time t [s] as pictures name it, such as `k c t = 3`; "" where that is t alone."""
+        """Time t [s] as pictures name it, such as `k c t = 3`; "" if that is t alone."""
         return ""
 
     def check_end(self, last: float, words: str) -> None:
-        """Raise BadInput where the end time is beyond `last` [s], when what `words` say is so."""
+        """Raise BadInput if the end time is beyond `last` [s], the time of the event in `words`."""
         wanted = f"at t = {last:g} {words}, the run must end before"
         self.deck.refuse(self.t_end > last, "run.t_end", wanted)
 
     def build(self) -> Evolution:
-        """The initial state, ready for its first step."""
+        """The initial state, ready for the first step."""
         raise NotImplementedError
 
     def simulate(
@@ -280,9 +280,9 @@ class Problem:
     ) -> Simulation:
         """The flow of these blocks to the end time, with the deck's run, regrid and void_fill.
 
-        mesh: as there; any other word: the nodes are those of `make_grids` at the time.  kind: a
-        class derived from Simulation.  first_dt: bound on the first step
-        [s], of a flow that knows of no wave yet.
+        mesh: as there; any other word: the nodes are those of `make_grids` at that time.  kind: a
+        class derived from Simulation.  first_dt: bound on the first step [s], for a flow without
+        waves initially.
         """
         from hydro.simulation import Simulation  # slow to load; a deck is not
 
@@ -304,25 +304,25 @@ class Problem:
         return simulation
 
     def list_boxes(self) -> list[BlockPlan]:
-        """The blocks where they are rectangles of even cells, or may be planned as such."""
+        """The blocks if they are rectangles of uniform cells, or may be planned as such."""
         return []
 
     def make_grids(self, t: float = 0.0) -> dict[str, np.ndarray]:
-        """Nodes (2, ni + 1, nj + 1) [m] of the blocks by name at the start, and at time t where
-        their motion is given: those of the boxes; {} where `build` is the only way to know."""
+        """Nodes (2, ni + 1, nj + 1) [m] of the blocks by name, initially or at time t if their
+        motion is given: those of the boxes; {} if only `build` can determine them."""
         return {box.name: box.make_nodes() for box in self.list_boxes()}
 
     def plan(self) -> tuple[float, list[BlockPlan]] | None:
         """End time and blocks of the run without allocating it, after all checks of the deck; None
-        where they are unknown before `build`."""
+        if they are unknown before `build`."""
         if not (boxes := self.list_boxes()):
             check_memory(self)
             boxes = plan_blocks(self.make_grids())
         return (self.t_end, boxes) if boxes else None
 
     def estimate_cells(self) -> int:
-        """Cells of all blocks by arithmetic alone, or somewhat more: asked before `plan` and
-        `build`, so that too many are refused before an array of them is made."""
+        """Cells of all blocks by arithmetic alone, or slightly more: used before `plan` and
+        `build`, so that too many are refused before any array is allocated."""
         if self.counted:
             return math.prod(getattr(self, n, None) or getattr(self.deck, n) for n in self.counted)
         known = self.list_boxes() or type(self).plan is not Problem.plan
@@ -330,34 +330,34 @@ class Problem:
         return sum(math.prod(block.cells) for block in plan[1]) if plan else 0
 
     def measure(self, evolution: Evolution) -> dict[str, float]:
-        """Extra history columns, evaluated before the first and after every step: cheap, same
-        keys always, a function of the evolution's state alone (a restart must give the same)."""
+        """Extra history columns, evaluated before the first and after every step: cheap, with fixed
+        keys, a function of the evolution's state alone (restarts must give the same)."""
         return {}
 
     @property
     def reads_cells(self) -> bool:
-        """Does `measure` read cells' states besides three rows along every side, or nodes inside?
+        """Whether `measure` reads cell states beyond three rows along every side, or inner nodes.
 
-        On several ranks of MPI the first one, which measures, then receives all of all blocks after
-        every step.  What `measure_block` of a `hydro.simulation.Simulation` finds does not count.
+        With several MPI ranks, the first one, which measures, then receives all blocks after every
+        step.  Use of `measure_block` of a `hydro.simulation.Simulation` does not count.
         """
         return not (self.measures_sides or type(self).measure is Problem.measure)
 
     def report(self, history: History, final: Evolution | None = None) -> Report:
-        """What was computed, beside what theory says: the one method for all numbers of a run.
+        """Computed results compared with theory: the one method for all numbers of a run.
 
         `history` maps columns to arrays; before a run it is a `NoHistory`, which is false, and rows
-        have their theory alone; `final` is the state at the end, None when only the run directory
-        is at hand.  The runner prints time, steps and conservation itself.
+        have theory only; `final` is the state at the end, None if only the run directory is
+        available.  The runner prints time, steps and conservation itself.
         """
         return Report()
 
     def cautions(self, history: History | None = None) -> list[str]:
-        """Sentences on where this deck's results are not to be trusted; none where they are.
+        """Sentences on why this deck's results may be unreliable; none if they are reliable.
 
-        Without a `history` from the deck alone: shown by `check`, by `--dry-run` and before the
-        first step.  With that of a run also from what the run shows: in the summary and by `info`.
-        A sentence names the quantity, how far it is off or why nobody knows, and what to change.
+        Without a `history` they follow from the deck alone: shown by `check`, by `--dry-run` and
+        before the first step.  With that of a run they also use its results (summary and `info`).
+        A sentence names the quantity, its error or why that is unknown, and what to change.
         """
         return []
 
@@ -366,12 +366,12 @@ class Problem:
         return f"shockgrid restart {directory}"
 
     def say_repeat(self) -> str:
-        """How its runs are made again where the deck alone does not do it; "" where it does."""
+        """How to repeat its runs if the deck alone is not sufficient; otherwise ""."""
         return ""
 
     def figures(self) -> dict[str, DrawFigure]:
-        """Pictures of this problem by name: its methods `draw_<name>(figure, run_data)`, to which
-        legends and fine lines are added.
+        """Pictures of this problem by name: its methods `draw_<name>(figure, run_data)`, with
+        legends and fine lines added.
 
         `run_data` (runs.store.reader.RunData) has `.deck`, `.history` (dict of arrays), `.dumps`.
         """
@@ -392,18 +392,18 @@ class Problem:
         return str(self.report(history or NoHistory(), final))
 
     def predict(self) -> dict[str, float]:
-        """What the references say for this deck, by name; none where unknown."""
+        """Predictions of the references for this deck, by name; none if unknown."""
         rows = self.report(NoHistory()).rows
         return {row.name: float(row.theory) for row in rows if not math.isnan(row.theory)}
 
     def errors(self, history: History) -> dict[str, float]:
-        """Errors of a whole run against the references by name, for `shockgrid verify`."""
+        """Errors of a complete run against the references by name, for `shockgrid verify`."""
         return {row.error: row.find_error() for row in self.report(history).rows if row.error}
 
     def results(self, history: History) -> dict[str, tuple[float, float]]:
-        """What a whole run was made to find, by name: as computed, and by theory.
+        """The main results of a complete run by name: computed value and theory.
 
-        For studies, which draw the first of them over what is varied.
+        For studies, which plot the first of them over the varied keys.
         """
         rows = self.report(history).rows if history else []
         return {row.name: (row.computed, row.theory) for row in rows if row.studied}
@@ -411,21 +411,21 @@ class Problem:
 
 LARGE = 100_000  # cells
 PROGRAM = 190e6  # bytes of the program with its libraries and kernels, measured
-RUN_BYTES = 640  # a cell at the peak of a run, measured,
-LARGE_BYTES = 350  # of blocks of LARGE cells and more, two even ones, with solves; without 200
+RUN_BYTES = 640  # per cell at the peak of a run, measured,
+LARGE_BYTES = 350  # for blocks of LARGE cells and more, two equal ones, with solves; without: 200
 
 
 def estimate_memory(cells: int, blocks: Sequence[int] = ()) -> float:
-    """Bytes that a run of so many cells takes at its peak; `blocks`: the cells of each, if known.
+    """Peak memory [bytes] of a run with `cells` cells; `blocks`: the cells of each, if known.
 
-    Without them it is taken for a run of large blocks from LARGE cells on.
+    Without `blocks`, LARGE cells and more are assumed to be in large blocks.
     """
     blocks = blocks or [cells]
     return PROGRAM + sum(n * (LARGE_BYTES if n >= LARGE else RUN_BYTES) for n in blocks)
 
 
 def find_memory() -> float | None:
-    """Bytes of memory that this process may have; None where the system does not say (Windows)."""
+    """Memory [bytes] available to this process; None if the system does not tell (Windows)."""
     try:
         import resource
 
@@ -437,7 +437,7 @@ def find_memory() -> float | None:
 
 
 def check_memory(problem: Problem) -> None:
-    """Raise BadInput for a problem whose cells the memory does not hold."""
+    """Raise BadInput for a problem that does not fit into memory."""
     cells, memory = problem.estimate_cells(), find_memory()
     if memory is None or (wanted := estimate_memory(cells)) <= memory:
         return

@@ -1,6 +1,6 @@
-"""From the words of `shockgrid plot` to picture files.
+"""From the arguments of `shockgrid plot` to picture files.
 
-matplotlib is used through its objects, without pyplot: faster to load and no display is asked for.
+matplotlib is used through its objects, without pyplot: faster to load, and no display is needed.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ NAMES = {  # of the fields of metadata: what made it, what of
 
 
 def clean_words(figure: Figure) -> None:
-    """Escape controls in all words of a figure; those that are no formula are drawn as they are."""
+    """Escape control characters in all texts of a figure; only formulas are interpreted."""
     for text in figure.findobj(Text):
         words = text.get_text()
         if (plain := escape_controls(words)) != words:
@@ -188,7 +188,7 @@ def fill_figure(
 
 
 def draw_all(directory: str, say: Callable[[str], None] | None = None) -> list[Path]:
-    """The pictures that a finished run gets: its fields and what its problem draws."""
+    """The pictures of a finished run: its fields and its problem's own pictures."""
     paths = draw(directory, say=say)
     for name in RunData(directory).problem.figures():
         paths += draw(directory, Wanted(what=name), say=say)
@@ -196,7 +196,7 @@ def draw_all(directory: str, say: Callable[[str], None] | None = None) -> list[P
 
 
 class Picture(Figure):
-    """A figure that notebooks show as it stands, and that needs no display."""
+    """A figure that notebooks show directly and that needs no display."""
 
     def _repr_png_(self) -> bytes:
         image = io.BytesIO()
@@ -213,7 +213,7 @@ def new_figure() -> Figure:
 
 
 def save(figure: Figure, path: Path, dpi: int, deck_text: str | None = None) -> Path:
-    """Write the figure; the name's ending says the format.
+    """Write the figure; the file name's suffix sets the format.
 
     deck_text: the resolved deck as TOML of the run that is shown; its digest goes into the file.
     """
@@ -232,12 +232,12 @@ def save(figure: Figure, path: Path, dpi: int, deck_text: str | None = None) -> 
 
 
 def find_deck_text(run: RunData) -> str | None:
-    """The resolved deck of a run as its last dump has it; None where there is no dump."""
+    """The resolved deck of a run from its last dump; None if there is no dump."""
     return run.dumps[-1].deck_text if run.dumps else None
 
 
 def default_fields(run: RunData) -> list[str]:
-    """The density where all dumps have it, else the first field that all have."""
+    """The density if all dumps have it, else the first field that all have."""
     dumps = choose_dumps(run, None)
     names = [dump.field_names() for dump in dumps]
     known = [name for name in names[-1] if all(name in others for others in names)] or names[-1]
@@ -259,7 +259,7 @@ def choose_dumps(
         words = f": {run.skipped[0]}" if run.skipped else ""
         raise BadInput(f"{run.path} has no dump that can be read{words}")
     if at is None and not is_time(run.dumps[-1].t_unit):
-        return run.dumps[-1:]  # what is before are no states, but the way to one
+        return run.dumps[-1:]  # earlier ones are iterates, not states
     if at is None:
         numbers = np.unique(np.linspace(0, len(run.dumps) - 1, min(count, len(run.dumps))).round())
         return [run.dumps[int(k)] for k in numbers]
@@ -283,7 +283,7 @@ def choose_pairs(
 ) -> list[Dump]:
     """Dumps of the first run, after each the one of every other run that is nearest in time.
 
-    Without times: those half way and at the end.
+    Without times: those halfway and at the end.
     """
     first = choose_dumps(runs[0], at, 3, say)
     if at is None and len(first) > 2:
@@ -292,13 +292,13 @@ def choose_pairs(
 
 
 def name_paths(runs: list[RunData]) -> list[str]:
-    """Short names of runs: those of their folders, whole paths where these are the same."""
+    """Short names of runs: those of their folders, or full paths if these are equal."""
     same = len({run.path.name for run in runs}) < len(runs)
     return [str(run.path) if same else run.path.name for run in runs]
 
 
 def make_view(zoom: Numbers, mirror, mesh: bool, limits: Numbers, colours: str | None) -> View:
-    """What a picture or a film shows of a field, and how; BadInput for what there is not."""
+    """What a picture or a film shows of a field, and how; BadInput for invalid values."""
     if limits is not None:
         limits = parse_numbers("--limits", limits, "low,high with low < high", 1)
     if colours is not None and colours not in colormaps:

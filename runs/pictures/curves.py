@@ -1,7 +1,7 @@
 """Curves of a run: its interfaces, values of cells along a line, its history, its gauges.
 
-A history is a grid of panels over time.  The march comes first (dt, conservation), then the grid,
-then what was measured; measured columns of one first word, unit and size share a panel
+A history is a grid of panels over time.  Time stepping comes first (dt, conservation), then the
+grid, then the measurements; measured columns with the same first word, unit and size share a panel
 (`interface_min`, `interface_max`, ...).
 """
 
@@ -29,7 +29,7 @@ from runs.store.dumps import LONG_NAMES
 from runs.store.files import check_free, make_csv, write_atomically
 from runs.store.reader import Dump, RunData
 
-CLOSE = 1e-9  # of the interfaces' extent: ends so near are one point
+CLOSE = 1e-9  # of the interfaces' extent: closer ends are one point
 
 
 def find_curves(blocks: Sequence) -> dict[str, np.ndarray]:
@@ -52,7 +52,7 @@ def find_curves(blocks: Sequence) -> dict[str, np.ndarray]:
 
 
 def _extend(line: np.ndarray, others: list[np.ndarray], near: float) -> np.ndarray:
-    """The line with all of `others` that meet its ends, which are taken from the list."""
+    """The line with all of `others` that meet its ends, which are removed from the list."""
     for number, other in enumerate(others):
         for piece in (other, other[:, ::-1]):
             if np.hypot(*(line[:, -1] - piece[:, 0])) <= near:
@@ -69,7 +69,7 @@ def _extend(line: np.ndarray, others: list[np.ndarray], near: float) -> np.ndarr
 def export_interfaces(directory: str, output: str | None = None) -> Path:
     """Write the interfaces at all dumps of a run as a CSV file [DIR/interfaces.csv]; its path.
 
-    Raises BadInput where there is no dump or no interface.
+    Raises BadInput if there is no dump or no interface.
     """
     run = RunData(directory)
     path = Path(output) if output else run.path / "interfaces.csv"
@@ -130,23 +130,23 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
 
 
 LEAST = 1e-9  # of the line: shorter pieces touch a corner only
-STYLES = ("-", "--")  # of the first run, and of the one beside it
+STYLES = ("-", "--")  # of the first run and the one compared with it
 WIDTH, HEIGHT = 8.0, 2.6  # inches: of the picture, of a panel
 Line = tuple[float, float, float, float]  # x0, y0, x1, y1 [m]
 
 
 class Lineout(NamedTuple):
     """The cells of one dump along a line, in order: block, i, j, x and y of the middle of the piece
-    [m], way to it from the line's start [m], fields (nan in a block without the field)."""
+    [m], distance from the line's start [m], fields (nan in a block without the field)."""
 
     dump: Dump
     columns: dict[str, np.ndarray]  # (n,) each
 
 
 def find_pieces(nodes: np.ndarray, line: Line) -> tuple[np.ndarray, np.ndarray]:
-    """Cells (n, 2) that a line meets and the ends (n, 2) of its piece in each, as parts of it.
+    """Cells (n, 2) that a line meets and the ends (n, 2) of its piece in each, as fractions of it.
 
-    nodes: (2, ni+1, nj+1) [m] of convex cells, turned either way.
+    nodes: (2, ni+1, nj+1) [m] of convex cells of either orientation.
     """
     start = np.array(line[:2])
     along = np.array(line[2:]) - start
@@ -177,7 +177,7 @@ def take_lineouts(
 ) -> list[Lineout]:
     """The cells of the dumps along the line; `say` reports dumps where it meets none.
 
-    Raises BadInput where it meets no cell of any of them, or a field is missing.
+    Raises BadInput if it meets no cell of any of them, or a field is missing.
     """
     (x0, y0, x1, y1), lineouts, missed = line, [], []
     given = ",".join(f"{number:g}" for number in line)
@@ -241,7 +241,7 @@ def draw_lineouts(
 def write_csv(
     path: Path, lineouts: Sequence[Sequence[Lineout]], names: Sequence[str], runs: Sequence[str]
 ) -> Path:
-    """One row a cell: run, step, t, block, i, j, x, y, way, fields; the head has the units."""
+    """One row per cell: run, step, t, block, i, j, x, y, way, fields; the head has the units."""
     first = lineouts[0][0].dump
     units = [name_axis(name, fields.get_style(first, name).unit) for name in names]
     heads = ["run", "step", name_axis("t", first.t_unit), "block", "i", "j"]
@@ -260,7 +260,7 @@ PLAIN = ("step", "t", "dt", "dt_limit", "finished")
 GRID = ("least_scaled_jacobian", "worst_aspect", "cells_not_convex")
 SHARED = 30.0  # columns in one panel are of one size within this factor
 MOST = 4  # of them
-LOGARITHMIC = ("residual", "change", "error")  # words of names of what falls by decades
+LOGARITHMIC = ("residual", "change", "error")  # words in names of quantities that fall by decades
 DECADES = 1e3
 HISTORY_WIDTH, HISTORY_HEIGHT = 13.5, 2.4  # inches: of the picture, of a row
 LETTERS = 12.0  # an inch, of the line below the panels
@@ -269,7 +269,7 @@ Panel = list[str]  # names of columns; "dt" and "drift" are drawn their own way
 
 
 def draw_history(figure, run: RunData, names: list[str]) -> None:
-    """Curves over time: the columns in `names`, or else the march, the grid, the measurements."""
+    """Curves over time: the columns in `names`, or time stepping, grid and measurements."""
     history = run.history
     if len(history.get("t", ())) < 2:
         raise BadInput(f"{run.path} has no history yet: no step was made")
@@ -288,7 +288,7 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
     if not names:
         panels, constant = choose_panels(history, units)
     number = len(panels)
-    columns = min(min((4, 3, 5), key=lambda n: -number % n), number)  # the fewest empty places
+    columns = min(min((4, 3, 5), key=lambda n: -number % n), number)  # the fewest empty panels
     size = max(HISTORY_WIDTH / max(columns, 3), 6.0 / columns), HISTORY_HEIGHT
     grid = fields.lay_out(figure, number, columns, size, sharex=True)
     for axes, chosen in zip(grid, panels, strict=True):
@@ -303,9 +303,9 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
 def choose_panels(
     history: Mapping[str, np.ndarray], units: Mapping[str, str]
 ) -> tuple[list[Panel], list[str]]:
-    """Panels in their order, and the columns that are constant and need none.
+    """Panels in order, and the constant columns, which need none.
 
-    Measured columns of one first word, one unit and one size share a panel.
+    Measured columns with the same first word, unit and size share a panel.
     """
     known = [
         name
@@ -348,7 +348,7 @@ def _say(name: str) -> str:
 def make_panel(
     history: Mapping[str, np.ndarray], names: Panel, units: Mapping[str, str]
 ) -> tuple[str, list[tuple[str, np.ndarray, bool]]]:
-    """Title of a panel; of its curves label, values (n,), and whether they are points."""
+    """Title of a panel; label, values (n,) of its curves, and whether they are points."""
     if names == ["drift"]:
         drifts = compute_drifts(history).items()
         title = "change of conserved totals, relative"
@@ -394,7 +394,7 @@ def draw_panel(axes, t, history, names: Panel, units) -> None:
 
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg", "c": "m/s"}
-MOST_NAMED = 10  # gauges with a line in the legend; more are told apart by a row of colours
+MOST_NAMED = 10  # gauges with a line in the legend; more are distinguished by a row of colours
 COLUMNS = 3
 GAUGES_WIDTH, GAUGES_HEIGHT = 4.4, 3.0  # inches of a panel
 
@@ -402,7 +402,7 @@ GAUGES_WIDTH, GAUGES_HEIGHT = 4.4, 3.0  # inches of a panel
 def draw_gauges(figure, run: RunData, names: list[str]) -> None:
     """Fields over time at all gauges that write them; `names`: these fields or gauges alone.
 
-    Raises BadInput where a run has no gauges, and for a name that is none of them.
+    Raises BadInput if a run has no gauges, and for an unknown name.
     """
     table, points = run.gauges, place_gauges(run.deck.gauge)
     if not points:

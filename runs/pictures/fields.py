@@ -23,7 +23,7 @@ from regrid.sides import SIDE_NAMES, get_side
 from runs.quantities import is_time, pick_prefix
 from runs.store.reader import BlockData, Dump
 
-CLOSE = 0.05  # of an edge: beyond the gap that chords of one curve leave between them
+CLOSE = 0.05  # of an edge: above the gap between different chords of one curve
 
 
 Outline = tuple[list[tuple[tuple[str, str], np.ndarray]], list[np.ndarray]]
@@ -82,21 +82,21 @@ def _distance(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 
 
 def _runs(line: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:
-    """The pieces of `line` made of consecutive chosen edges."""
+    """The pieces of `line` that consist of consecutive chosen edges."""
     bounds = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
     return [line[:, a : b + 1] for a, b in zip(bounds[::2], bounds[1::2], strict=True)]
 
 
 class Field(NamedTuple):
-    """How a field of cells is found in a block, its SI unit and words, and how it is drawn."""
+    """How a cell field is computed from a block, its SI unit and label, and how it is drawn."""
 
     compute: Callable[[BlockData], np.ndarray]
     unit: str
     words: str
     needs: tuple[str, ...] = ()  # fields of the dump; "state/NAME": an array of the restart state
-    colours: str = ""  # a colour map of its own, from 0
+    colours: str = ""  # its own colour map, from 0
     power: float = 1.0  # of the value that the colour follows
-    marked: bool = False  # is the cell of the largest value marked?
+    marked: bool = False  # whether the cell of the largest value is marked
 
 
 def compute_gradient(block: BlockData, name: str) -> np.ndarray:
@@ -131,7 +131,7 @@ DERIVED = {
 
 
 def find_field(block: BlockData, name: str) -> Field | None:
-    """A field that the block has or that can be derived from what it has; None for any other."""
+    """A field of the block, or one that can be derived from its fields; otherwise None."""
     if name in block.cell_fields:
         words = block.units[name], block.long_names[name]
         return Field(lambda block: block.cell_fields[name], *words)
@@ -142,7 +142,7 @@ def find_field(block: BlockData, name: str) -> Field | None:
 
 
 def get_style(dump: Dump, name: str) -> Field:
-    """The field as the first block has it that has it; unit "1" where the dump has no units."""
+    """The field of the first block that has it; unit "1" if the dump has no units."""
     style = next(field for block in dump.blocks if (field := find_field(block, name)))
     return style._replace(unit="1") if dump.t_unit == "1" else style
 
@@ -194,8 +194,8 @@ class Sheet:
 def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
     """The blocks of a dump with the named fields, completed by their mirror images.
 
-    Raises BadInput where no block has a field and none can be derived, and where a node of the dump
-    has no place, so that nothing can be drawn there.
+    Raises BadInput if no block has a field and none can be derived, and if a node of the dump is
+    not finite, so that nothing can be drawn there.
     """
     for name in names:
         if not any(find_field(block, name) for block in dump.blocks):
@@ -230,7 +230,7 @@ def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
 def draw_fields(
     figure, dumps: Sequence[Dump], names: Sequence[str], view: View, titles: Sequence[str] = ()
 ) -> bool:
-    """Fill `figure` with a panel for each field and each dump; titles: in place of the times.
+    """Fill `figure` with a panel for each field and each dump; titles: instead of the times.
 
     Without names the grids are drawn, a colour for each block.  Returns whether the panels leave
     out what is far from the interface.
@@ -283,7 +283,7 @@ def draw_blocks(
 
 
 def mark_largest(axes, sheets: Sequence[Sheet], name: str, scale: float, box) -> None:
-    """A ring about the cell with the largest value of the field, and words on where it is."""
+    """A ring about the cell with the largest value of the field, and text on its position."""
     sheet = max((s for s in sheets if name in s.fields), key=lambda s: np.nanmax(s.fields[name]))
     place = np.unravel_index(np.nanargmax(sheet.fields[name]), sheet.fields[name].shape)
     x, y = compute_centres(sheet.nodes)[:, *place] * scale
@@ -307,8 +307,8 @@ Box = tuple[float, float, float, float]  # x0, x1, y0, y1 [m]
 
 
 def measure_extent(sheets: Sequence[Sheet], follow: bool = True) -> tuple[Box, Box | None]:
-    """What all sheets and what the interfaces in them take up; None: there are none, or they are
-    not wanted (`follow`)."""
+    """Extents of all sheets and of the interfaces in them; None if there are none, or not wanted
+    (`follow`)."""
     every = np.concatenate([sheet.nodes.reshape(2, -1) for sheet in sheets], axis=1)
     lines = find_interfaces(sheets) if follow else []
     return _bound(every), _bound(np.concatenate(lines, axis=1)) if lines else None
@@ -320,7 +320,7 @@ def _bound(points: np.ndarray) -> Box:
 
 
 def find_extent(moments: Sequence[Sequence[Sheet]]) -> Box:
-    """What is drawn at any of the times takes up."""
+    """Extent of what is drawn at any of the times."""
     return _join_boxes([measure_extent(sheets, False)[0] for sheets in moments])
 
 
@@ -335,7 +335,7 @@ def choose_boxes(
     """(What is shown at each time, of one size; does it go with the interface?), from what
     `measure_extent` found at each.
 
-    It does if told to `follow`, and in a long domain; there what lies about the interface is shown.
+    It does with `follow`, and in a long domain, where the surroundings of the interface are shown.
     """
     whole = _join_boxes([box for box, _ in extents])
     if view.zoom is not None:
@@ -357,7 +357,7 @@ def choose_boxes(
 
 
 def check_zoom(zoom, whole) -> None:
-    """Raise BadInput where nothing of the domain `whole` lies in `zoom`."""
+    """Raise BadInput if nothing of the domain `whole` is in `zoom`."""
     x0, x1, y0, y1 = whole
     if zoom[0] >= x1 or zoom[1] <= x0 or zoom[2] >= y1 or zoom[3] <= y0:
         given = ",".join(f"{number:g}" for number in zoom)
@@ -368,7 +368,7 @@ def check_zoom(zoom, whole) -> None:
 
 
 def lay_out(figure, number: int, columns: int, panel: tuple[float, float], **words) -> list:
-    """So many axes in rows of `columns`, each of the size `panel` [inches] with what is about it.
+    """`number` axes in rows of `columns`, each of the size `panel` [inches] with its labels.
 
     words: for `Figure.subplots`; with sharex the lowest of each column has the labels.
     """
@@ -415,7 +415,7 @@ def make_panels(
 
 
 def find_range(sheets: Sequence[Sheet], name: str, box) -> tuple[float, float]:
-    """Least and largest visible value of a field; (inf, -inf) where none is finite."""
+    """Least and largest visible value of a field; (inf, -inf) if none is finite."""
     values = np.empty(0)
     for sheet in sheets:
         if name in sheet.fields:

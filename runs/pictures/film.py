@@ -1,8 +1,8 @@
 """Films: a field and its grid over all dumps of a run, on one colour scale.
 
-An mp4 where ffmpeg is there, else a GIF; written under another name first, so that what is there
-is whole.  Note: a long run does not fit into memory; the dumps are read twice, one at a time,
-first for the scale and the window, then for the frames.
+An mp4 if ffmpeg is available, else a GIF; written under a temporary name first, so that the file is
+always complete.  Note: a long run does not fit into memory; the dumps are read twice, one at a
+time, first for the scale and the window, then for the frames.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from runs.store.files import check_folder, disk_errors
 from runs.store.provenance import describe_software, hash_deck
 from runs.store.reader import Dump, RunData
 
-SECONDS = 8.0  # that a film takes, within the rates of frames below
+SECONDS = 8.0  # length of a film, within the frame rates below
 SLOWEST, FASTEST = 3, 25
 WIDTH, LOWEST, TALLEST = 9.0, 2.4, 8.0  # inches
-SLENDER = 0.3  # height over width of a window below which the colours stand under it
+SLENDER = 0.3  # height over width of a window, below which the colour bar is under it
 KINDS = (".mp4", ".gif")
 
 
@@ -51,12 +51,12 @@ def make_film(
 ) -> Path:
     """Write a film of a run and return its path; [DIR/film-FIELD.mp4, .gif without ffmpeg].
 
-    What is chosen besides stands in the name, too: film-p-mesh.mp4.
+    Other choices are part of the name, too: film-p-mesh.mp4.
 
-    field: of the dumps or derived, the density if not said; follow: the window goes with the
-    interface, else it is `zoom` (x0,x1,y0,y1 [m]) or the domain, in a long one again what is about
-    the interface.  limits: low,high of the colours; colours: a map of matplotlib; fps: frames
-    per second, one each dump.  Raises BadInput.
+    field: of the dumps or derived, by default the density; follow: the window moves with the
+    interface, else it is `zoom` (x0,x1,y0,y1 [m]), the domain or, if that is long, the interface's
+    surroundings.  limits: low,high of the colours; colours: a map of matplotlib; fps: frames per
+    second, one per dump.  Raises BadInput.
     """
     run = RunData(directory)
     view = command.make_view(zoom, mirror, mesh, limits, colours)
@@ -120,14 +120,14 @@ def make_film(
 def make_frames(
     figure, dumps: Sequence[Dump], name: str, view: View, boxes, ranges
 ) -> Callable[[int], None]:
-    """What draws the frame of a dump, by its number from 0, into the same axes of a figure."""
+    """A function that draws the frame of a dump, by its number from 0, into the same axes."""
     paths, titles = [dump.path for dump in dumps], fields.time_titles(dumps)
     first, axes, box = Dump(paths[0]), figure.subplots(), boxes[0]
     look = fields.choose_colours(first, name, ranges, view)
     scale, unit = pick_prefix(float(np.abs(boxes).max()), first.length_unit)
     labels = [name_axis(axis, unit) for axis in first.axes]
     place = {"shrink": 0.9, "pad": 0.015}
-    if box[3] - box[2] < SLENDER * (box[1] - box[0]):  # no room for words at the side
+    if box[3] - box[2] < SLENDER * (box[1] - box[0]):  # no room for labels at the side
         place = {"location": "bottom", "aspect": 50}
     figure.colorbar(ScalarMappable(*look[:2]), ax=axes, label=look[3], **place)
 
@@ -145,7 +145,7 @@ def make_frames(
 
 
 class CommentedGif(animation.PillowWriter):
-    """A GIF whose comment says what made it."""
+    """A GIF whose comment has the provenance."""
 
     def finish(self) -> None:
         for frame in self._frames[:1]:

@@ -1,4 +1,4 @@
 """`shockgrid study`: one deck at many points, each an ordinary run; table, orders, picture.
 
-May import: all other rooms of `runs` but `runs.cli` and `runs.grids`, and all below them.
+May import: all subpackages of `runs` except `runs.cli` and `runs.grids`, and all below them.
 """

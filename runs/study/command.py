@@ -1,4 +1,4 @@
-"""`shockgrid study`: from its words to the summary."""
+"""`shockgrid study`: from its arguments to the summary."""
 
 from __future__ import annotations
 
@@ -38,10 +38,9 @@ def study(
     say: Callable[[str], None],
     note: Callable[[str], None],
 ) -> int:
-    """Compute a study and print what came out (`say`; progress goes to `note`).
+    """Compute a study and print the results (`say`; progress goes to `note`).
 
-    The exit code is 0 where all runs came to their end, 3 where some failed, 130 or 143 after a
-    signal.
+    The exit code is 0 if all runs reached their end, 3 if some failed, 130 or 143 after a signal.
     """
     varied, fixed = read_words(vary, settings)
     names = [name for entry in shown for name in entry.split(",") if name]
@@ -56,7 +55,7 @@ def study(
     with terminate_softly() as caught:
         try:
             if not made.run(engine, jobs, progress.tell, retry):
-                return 0  # a rank of MPI that only computes
+                return 0  # an MPI rank that only computes
         except KeyboardInterrupt as stop:  # by now all workers have stopped
             left = count(made.results.count(None), "run")
             note(f"stopped with {left} to do; repeat the command to continue")
@@ -73,7 +72,7 @@ def study(
 def read_words(
     vary: Sequence[str], settings: Sequence[str]
 ) -> tuple[dict[str, list[Any]], dict[str, Any]]:
-    """Values by key of the words of --vary and --set; BadInput for wrong ones."""
+    """Values by key from the arguments of --vary and --set; BadInput for wrong ones."""
     varied: dict[str, list[Any]] = {}
     for key, values in map(read_vary, vary):
         if key in varied:
@@ -89,7 +88,7 @@ def read_words(
 
 
 def describe_plan(study: Study) -> str:
-    """What would be computed, a line a point."""
+    """What would be computed, one line per point."""
     points, source = study.definition.points, study.definition.source
     lines = [f"{count(len(points), 'run')} of {source} in {study.path}/runs"]
     for point, state in zip(points, study.describe_states(), strict=True):
@@ -99,7 +98,7 @@ def describe_plan(study: Study) -> str:
 
 
 class Progress:
-    """How a study is getting on: a bar in a terminal, a line a run elsewhere, failures always."""
+    """Progress of a study: a bar in a terminal, a line per run elsewhere, failures always."""
 
     def __init__(self, study: Study, quiet: bool, note: Callable[[str], None]):
         self.study, self.quiet, self.note = study, quiet, note
@@ -107,14 +106,14 @@ class Progress:
         self.bar: Any = None
 
     def tell(self, number: int, result: Result, there: bool) -> None:
-        """Take note of a run that has ended, or was there already."""
+        """Record a run that has ended or already existed."""
         points = self.study.definition.points
         if self.bar is None and not self.quiet and sys.stderr.isatty():
             from tqdm import tqdm
 
             self.bar = tqdm(total=len(points), unit="run", dynamic_ncols=True, smoothing=0.0)
         self.there += there
-        self.done += not there and bool(result.digest)  # without one it could not begin
+        self.done += not there and bool(result.digest)  # without one it could not start
         self.ended += 1
         self.failed += bool(result.failure)
         name = points[number].name
@@ -124,7 +123,7 @@ class Progress:
             seconds = f"{result.seconds:.1f} s"
             self._say(f"{self.ended}/{len(points)} {name}: {result.reason}, {seconds}")
         if self.bar is not None:
-            self.bar.initial += there  # no measure of speed
+            self.bar.initial += there  # not counted for the speed
             self.bar.update(1)
             self.bar.set_postfix_str(f"{self.failed} failed" if self.failed else "")
 
@@ -157,7 +156,7 @@ def terminate_softly() -> Iterator[list[int]]:
 
 
 def describe_study(study: Study, progress: Progress, seconds: float) -> str:
-    """The summary: how many runs, what is shown of each, orders, failures."""
+    """The summary: number of runs, their results, orders, failures."""
     runs = len(study.results)
     lines = [
         f"{count(runs, 'run')}: {progress.done} computed now, {progress.there} there already, "
@@ -175,7 +174,7 @@ def describe_study(study: Study, progress: Progress, seconds: float) -> str:
 
 
 def describe_cautions(study: Study) -> list[str]:
-    """How many runs are not to be trusted, and why; sentences alike but for numbers stand once."""
+    """How many runs are unreliable, and why; sentences that differ only in numbers appear once."""
     told = study.cautions
     if not told:
         return []

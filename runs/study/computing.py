@@ -3,8 +3,8 @@
 The folder alone determines what remains to be done.  `result.json` is written when a run has ended;
 it holds the digest of the deck and the values of the table.  Without it a run of the same deck
 continues from its last restart point.  A run of another deck is moved to `superseded` and the point
-starts again.  A run that was stopped, or that the disk failed, has no result; it continues the next
-time.
+starts again.  A run that was stopped, or failed because of the disk, has no result; it continues
+next time.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from runs.verify import CASES
 
 
 def find_error_columns(problem: str, measured: Iterable[str] = ()) -> tuple[str, ...]:
-    """Names of errors that `verify` has statements about for `problem`, columns among them.
+    """Names of errors that `verify` checks for `problem`, including columns.
 
     And those of `measured` that begin with `error`.
     """
@@ -58,12 +58,12 @@ RESULT = "result.json"
 
 
 class Result(msgspec.Struct, kw_only=True):
-    """How a run ended, and its numbers, None for one that there is not.
+    """How a run ended, and its numbers, None if missing.
 
-    failure: a sentence, "" where it ended well; stopped: it is to go on another time; values: by
-    column, in the order of the table: of a result `x` also `x_theory` and `x_error`, then the
-    problem's errors, then its measurements in the last row of the history; computed, errors: which
-    of them are results and errors; cautions: the sentences of the summary on where not to trust it.
+    failure: a sentence, "" if it succeeded; stopped: it is to continue later; values: by column, in
+    the order of the table: for a result `x` also `x_theory` and `x_error`, then the problem's
+    errors, then its measurements in the last row of the history; computed, errors: which of them
+    are results and errors; cautions: the sentences of the summary on its reliability.
     """
 
     digest: str
@@ -80,7 +80,7 @@ class Result(msgspec.Struct, kw_only=True):
     cautions: list[str] = msgspec.field(default_factory=list)
 
     def write(self, folder: Path) -> None:
-        """Write it into the folder of its point."""
+        """Write the result into the folder of its point."""
         with disk_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
         write_atomically(folder / RESULT, msgspec.json.format(msgspec.json.encode(self), indent=1))
@@ -88,10 +88,10 @@ class Result(msgspec.Struct, kw_only=True):
 
 @dataclass(frozen=True)
 class Work:
-    """A point for a worker: the deck, its settings, the folder, and its share of processors.
+    """A point for a worker: the deck, its settings, the folder, and the number of threads.
 
-    retry: compute it again where it has failed; function: computes it from `values`, instead of a
-    run of a deck.
+    retry: recompute it if it failed; function: computes it from `values`, instead of a run of a
+    deck.
     """
 
     source: str
@@ -111,7 +111,7 @@ class Work:
 def compute_digest(deck: ReadDeck) -> str:
     """SHA-256 of the resolved deck and of the file that its problem is in, if it is in one.
 
-    How many threads compute it is no part of it.
+    The number of threads is not part of it.
     """
     run = msgspec.structs.replace(deck.deck.run, threads=None)
     alone = msgspec.structs.replace(deck.deck, run=run)
@@ -141,7 +141,7 @@ def find_names(results: Sequence[Result | None]) -> tuple[list[str], list[str], 
 
 
 def read_result(folder: Path, digest: str) -> Result | None:
-    """The result in a folder if it is of this deck and whole, else None."""
+    """The result in a folder if it is complete and of this deck, else None."""
     try:
         found = msgspec.json.decode((folder / RESULT).read_bytes(), type=Result)
     except (OSError, msgspec.DecodeError, RecursionError):
@@ -150,7 +150,7 @@ def read_result(folder: Path, digest: str) -> Result | None:
 
 
 def find_state(folder: Path, digest: str) -> str:
-    """What a folder holds of a point: "done", "failed", "half", "other" (another deck) or "new"."""
+    """State of a point in a folder: "done", "failed", "half", "other" (another deck) or "new"."""
     result = read_result(folder, digest)
     if result is not None:
         return "failed" if result.failure else "done"
@@ -159,7 +159,7 @@ def find_state(folder: Path, digest: str) -> str:
         return "new"
     try:
         deck = read_run_deck(directory)
-    except BadInput:  # of another version, or torn
+    except BadInput:  # of another version, or damaged
         return "other"
     if compute_digest(deck) != digest:
         return "other"
@@ -167,10 +167,9 @@ def find_state(folder: Path, digest: str) -> str:
 
 
 def compute_point(work: Work) -> Result:
-    """The result of a point, computed as far as it is not there yet.
+    """The result of a point, computed as far as it does not exist yet.
 
-    A physics failure is part of the result; BadInput is raised, also for a mistake in a file of
-    one's own.
+    A physics failure is part of the result; BadInput is raised, also for mistakes in a user's file.
     """
     try:
         return _compute(work) if work.function is None else _call(work)
@@ -181,7 +180,7 @@ def compute_point(work: Work) -> Result:
 
 
 def _call(work: Work) -> Result:
-    """What a function of one's own gives at a point; what it raises is the point's failure."""
+    """The result of a user's function at a point; an exception is the point's failure."""
     assert work.function is not None
     begun = time.monotonic()
     result = Result(digest=compute_digest_of(work), reason="computed")
@@ -222,7 +221,7 @@ def _compute(work: Work) -> Result:
 
 
 def _finish(runner: Runner, call: Callable[[], Any], digest: str) -> Result | None:
-    """Run to the end and write the result; None where no restart point can be continued from."""
+    """Run to the end and write the result; None if no restart point can be used."""
     result = Result(digest=digest)
     try:
         ending = call()
@@ -255,7 +254,7 @@ def fill_numbers(
     history: Mapping[str, np.ndarray],
     measured: Iterable[str],
 ) -> None:
-    """What a history tells of the problem called `name`; `measured`: its own columns."""
+    """Fill in the numbers of the problem called `name` from a history; `measured`: its columns."""
     pairs, values = problem.results(history), result.values
     for key, (computed, theory) in pairs.items():
         error = (computed - theory) / (theory or 1.0)
@@ -276,7 +275,7 @@ def _number(value: Any) -> float | None:
 
 
 def _last(column: np.ndarray) -> float | None:
-    """The last number of a column that is one."""
+    """The last finite number of a column."""
     known = column[np.isfinite(column)] if column.dtype.kind in "fi" else np.zeros(0)
     return float(known[-1]) if known.size else None
 
@@ -293,12 +292,12 @@ def _set_aside(directory: RunDirectory) -> None:
 def warm_up(work: Work) -> None:
     """One step of a point in memory: its kernels are then compiled for all workers."""
     problem = read_deck(work.source, (*work.settings, *work.share)).make_problem()
-    with contextlib.suppress(BadInput, RunFailure):  # it is told where the point is computed
+    with contextlib.suppress(BadInput, RunFailure):  # it is reported when the point is computed
         evolution = problem.build()
         if evolution.finished is None:
             evolution.advance()
 
 
 def share_processors(workers: int) -> int | None:
-    """Threads for each of so many workers; None: as many as a run takes by itself."""
+    """Threads for each of so many workers; None: the default of a run."""
     return None if workers == 1 else max(1, count_processors() // workers)

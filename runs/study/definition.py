@@ -1,4 +1,4 @@
-"""What a study is: a deck, settings over it, what is varied; from the command line or a TOML file.
+"""Definition of a study: a deck, settings and varied keys, from the command line or a TOML file.
 
 deck = "interface-instability"      # a problem, a packaged deck, a file (beside this one)
 shown = ["growth_rate"]             # what pictures are of; left out: the problem's results
@@ -52,9 +52,9 @@ class Point(dict[str, Any]):
 
     @property
     def name(self) -> str:
-        """The name of its folder: `mach=1.2,cells=32`; what is no plain word is cut and numbered.
+        """The name of its folder: `mach=1.2,cells=32`; other than plain words are cut and hashed.
 
-        It depends on this point alone, so that other points can come and go.
+        It depends on this point alone, so other points can be added or removed.
         """
         name = ",".join(f"{key}={_shorten(value)}" for key, value in self.items())
         if len(name) > LONGEST_NAME:
@@ -75,7 +75,7 @@ def _digest(text: str) -> str:
 
 
 def write_value(value: Any, key: str = "vary") -> str:
-    """A value as TOML in one place, tables in braces; BadInput for what TOML has no word for."""
+    """A value as TOML in one place, tables in braces; BadInput for what TOML cannot express."""
     try:
         text = tomli_w.dumps({"list": [0, _make_plain(value)]})  # in a list tables are in braces
     except TypeError as error:
@@ -118,7 +118,7 @@ def read_vary(text: str) -> tuple[str, list[Any]]:
 
 
 def read_values(words: str, where: str) -> list[Any]:
-    """The values that `words` mean: a range, or a list; `where` begins the sentence of BadInput."""
+    """The values given by `words`: a range or a list; `where` starts the message of BadInput."""
     if LIKE_RANGE.fullmatch(words):
         match = RANGE.fullmatch(words)
         values = _spread(*match.groups()) if match else []
@@ -137,7 +137,7 @@ def read_values(words: str, where: str) -> list[Any]:
 
 
 def _spread(first: str, last: str, count: str, log: str | None) -> list[Any]:
-    """The values of a range; [] where it is none."""
+    """The values of a range; [] if it is not one."""
     start, end = float(first), float(last)
     number = int(count) if len(count) < 10 else 0
     good = 2 <= number <= MOST_VALUES and start != end and math.isfinite(start - end)
@@ -174,7 +174,7 @@ def make_product(vary: Mapping[str, Sequence[Any]]) -> list[Point]:
 
 
 def list_points(points: Iterable[Mapping[str, Any]]) -> list[Point]:
-    """Points given one by one; BadInput where one lacks a key of the others, or two are equal."""
+    """Points given one by one; BadInput if one lacks a key of the others, or two are equal."""
     given = list(points)
     if wrong := [point for point in given if not isinstance(point, Mapping)]:
         raise BadInput(f"points: {wrong[0]!r} must be a table of keys with values")
@@ -213,9 +213,9 @@ class StudyFile(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
 class Definition:
     """A study: `source` as `runs.deck.reading.read_deck` takes it, `fixed` keys of all points.
 
-    vary: the values of each key, where the points are their product; {} where they are listed.
-    shown: names of what pictures are of; () where the problem's results are.  function: computes a
-    point from its values and the fixed ones as keywords, in place of a deck.
+    vary: the values of each key if the points are their product; {} if they are listed. shown:
+    names of plotted quantities; () for the problem's results.  function: computes a point from its
+    values and the fixed ones as keywords, in place of a deck.
     """
 
     source: str
@@ -227,7 +227,7 @@ class Definition:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """What is varied."""
+        """The varied keys."""
         return tuple(self.points[0])
 
     @property
@@ -237,12 +237,12 @@ class Definition:
 
     @property
     def deck(self) -> str:
-        """The deck as a study file names it: under its full path where it is a file."""
+        """The deck as a study file names it: by its full path if it is a file."""
         path = Path(self.source)
         return str(path.resolve()) if path.is_file() else self.source
 
     def to_toml(self) -> str:
-        """A study file that means the same, its deck under its full path where it is a file."""
+        """An equivalent study file, with the full path of its deck if that is a file."""
         points = [] if self.vary else self.points
         parts = {"shown": self.shown, "points": points, "set": self.fixed, "vary": self.vary}
         given = {name: _make_plain(part) for name, part in parts.items() if part}
@@ -261,9 +261,9 @@ def make_definition(
     fixed: Mapping[str, Any] | None = None,
     shown: Sequence[str] = (),
 ) -> Definition:
-    """A study from Python values; BadInput where nothing or too much is varied.
+    """A study from Python values; BadInput if nothing or too much is varied.
 
-    vary: by key a sequence of values, the words that `--vary` takes ("1.2:3:7"), or one value.
+    vary: by key a sequence of values, a text as for `--vary` ("1.2:3:7"), or one value.
     """
     vary = {key: _list_values(key, given) for key, given in flatten(vary or {}).items()}
     if bool(vary) == bool(points):
@@ -282,7 +282,7 @@ def make_definition(
 
 
 def _list_values(key: str, given: Any) -> list[Any]:
-    """The values of a key: words are read as those of --vary, what is no sequence is one value."""
+    """The values of a key: text is read as for --vary, anything but a sequence is one value."""
     if isinstance(given, str):
         return read_values(given.strip(), f"vary: {key}")
     if isinstance(given, np.ndarray):
@@ -291,7 +291,7 @@ def _list_values(key: str, given: Any) -> list[Any]:
 
 
 def is_study(source: str) -> Path | None:
-    """The study file that `source` means: itself, or the one of a study's folder; else None.
+    """The study file of `source`: itself, or the one in a study's folder; otherwise None.
 
     BadInput for any other folder.
     """
@@ -310,7 +310,7 @@ def is_study(source: str) -> Path | None:
 
 
 def check_same_deck(folder: Path, definition: Definition) -> None:
-    """Raise BadInput where the study in `folder` is of a deck of another name than `definition`."""
+    """Raise BadInput if the study in `folder` is of a deck of another name than `definition`."""
     file, given = folder / FILE, definition.deck
     there = str(read_toml(file).get("deck")) if file.is_file() else given
     if Path(there).name != Path(given).name:
@@ -321,7 +321,7 @@ def check_same_deck(folder: Path, definition: Definition) -> None:
 
 
 def read_definition(path: Path) -> Definition:
-    """The study in a file; BadInput with key, place and what would be right."""
+    """The study in a file; BadInput with key, place and what is expected."""
     table = read_toml(path)
     check_deck(table, StudyFile, lambda key: str(path))
     file = msgspec.convert(table, StudyFile)

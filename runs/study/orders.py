@@ -1,8 +1,8 @@
-"""Orders of a study that refines: which key is the number of cells, and what each quantity shows.
+"""Orders of a refinement study: which key is the number of cells, and the order of each quantity.
 
-The cells are a whole number, or several, whose geometric mean counts.  Points that differ in
-nothing but these make a series; a key that goes with the cells, one value for each (the rows of a
-tube), does not part them.
+The cells are a whole number, or several, whose geometric mean is used.  Points that differ only in
+these form a series; a key that varies with the cells, one value for each (the rows of a tube), does
+not separate them.
 """
 
 from __future__ import annotations
@@ -23,21 +23,20 @@ from runs.study.definition import Definition, write_value
 
 SAFETY, SAFETY_TWO = 1.25, 3.0  # factors of safety for three grids, and for two
 ASSUMED = 1.0  # order of two grids without an exact value: captured shocks
-MOST_TRUSTED = 2.0  # an order above that of the scheme is luck, and not taken for the uncertainty
+MOST_TRUSTED = 2.0  # a higher order than that of the scheme is not used for the uncertainty
 ROUND_OFF = 1e-12  # of the value: smaller changes are none
-MOST_CREDIBLE = 4.0  # an order above that is none: the grids are not in the asymptotic range
+MOST_CREDIBLE = 4.0  # orders above are not credible: the grids are not in the asymptotic range
 HIGHEST = 20.0  # stands for all orders above it
 
 
 @dataclass(frozen=True)
 class Refined:
-    """What a series of grids shows of one quantity.
+    """Result of a series of grids for one quantity.
 
     kind: "monotone", "not monotone", "not asymptotic", "diverging", "round-off", "two grids" or
-    "one grid"; of errors "error", or why they have no order; order: observed, NaN where there is
-    none; orders: of errors, between neighbouring grids; extrapolated: value for h = 0
-    [theory F13.4]; uncertainty: of the finest value, absolute [theory F13.5, F13.6]; each NaN where
-    nothing is known of it.
+    "one grid"; for errors "error", or why they have no order; order: observed, NaN if there is
+    none; orders: of errors, between neighbouring grids; extrapolated: value for h = 0 [theory
+    F13.4]; uncertainty: of the finest value, absolute [theory F13.5, F13.6]; each NaN if unknown.
     """
 
     kind: str
@@ -50,7 +49,7 @@ class Refined:
 def find_orders(sizes: Sequence[float], errors: Sequence[float]) -> list[float]:
     """Observed order between each grid and the next finer one [theory F13.2].
 
-    sizes: h, falling; errors: computed less exact.  NaN where an error is none or not known.
+    sizes: h, decreasing; errors: computed minus exact.  NaN if an error is zero or unknown.
     """
     orders = []
     for n in range(1, len(sizes)):
@@ -64,9 +63,9 @@ def find_orders(sizes: Sequence[float], errors: Sequence[float]) -> list[float]:
 def judge_errors(sizes: Sequence[float], errors: Sequence[float]) -> Refined:
     """The orders of errors, or why they have none.
 
-    sizes: h, falling; errors: computed less exact, or norms.  "errors change sign": they pass
-    through 0 between two grids, near which any order comes out; "not monotone": a finer grid has a
-    larger error; "not asymptotic": an order is above MOST_CREDIBLE.
+    sizes: h, decreasing; errors: computed minus exact, or norms.  "errors change sign": they cross
+    0 between two grids, which allows any order; "not monotone": a finer grid has a larger error;
+    "not asymptotic": an order is above MOST_CREDIBLE.
     """
     pairs = list(pairwise(errors))
     orders = tuple(find_orders(sizes, errors))
@@ -80,7 +79,7 @@ def judge_errors(sizes: Sequence[float], errors: Sequence[float]) -> Refined:
 
 
 def refine(sizes: Sequence[float], values: Sequence[float]) -> Refined:
-    """What the finest three grids show (two where there are no more); sizes h, falling."""
+    """Result of the finest three grids (two if there are no more); sizes h, decreasing."""
     known = [(h, v) for h, v in zip(sizes, values, strict=True) if math.isfinite(v)]
     if len(known) < 2:
         return Refined("one grid")
@@ -132,7 +131,7 @@ HEADS = ("series", "quantity", "cells", "values", "orders", "kind", "order", "ex
 class Series:
     """A quantity over grids, coarse to fine: `cells` a direction, `values`.
 
-    error: are the values errors?  theory: what the values ought to be, NaN where nobody knows.
+    error: whether the values are errors; theory: the exact value, NaN if unknown.
     """
 
     words: str
@@ -145,7 +144,7 @@ class Series:
 
 
 def count_cells(value: Any) -> float:
-    """Cells a direction: the number itself, or the geometric mean of several; NaN for no cells."""
+    """Cells per direction: the number, or the geometric mean of several; NaN for no cells."""
     sizes = value if isinstance(value, list | tuple) else [value]
     if not sizes or any(isinstance(s, bool) or not isinstance(s, int | float) for s in sizes):
         return math.nan
@@ -168,7 +167,7 @@ def find_refined_key(definition: Definition, wanted: str | None = None) -> str |
 
 
 def find_groups(definition: Definition, key: str) -> dict[str, list[int]]:
-    """Numbers of points by what is not refined, in words, each sorted from coarse to fine."""
+    """Indices of points grouped by the unrefined keys, as text, each sorted from coarse to fine."""
     rows = definition.points
     texts = [{k: write_value(value) for k, value in row.items()} for row in rows]
     parting = [k for k in definition.keys if k != key and not _goes_with(texts, key, k)]
@@ -181,14 +180,14 @@ def find_groups(definition: Definition, key: str) -> dict[str, list[int]]:
 
 
 def _goes_with(texts: Sequence[dict[str, str]], key: str, other: str) -> bool:
-    """Is there one value of `other` for each of `key`, or one in all?"""
+    """Whether there is one value of `other` for each of `key`, or one in total."""
     pairs = {(row[key], row[other]) for row in texts}
     first, second = ({pair[n] for pair in pairs} for n in (0, 1))
     return len(second) == 1 or len(pairs) == len(first) == len(second)
 
 
 def find_series(definition: Definition, results: Sequence[Result | None], key: str) -> list[Series]:
-    """All series of results, errors and measurements; those without two grids are left out."""
+    """All series of results, errors and measurements with at least two grids."""
     computed, errors, rest = find_names(results)
     cells = [count_cells(point[key]) for point in definition.points]
     found = []
@@ -216,7 +215,7 @@ def find_series(definition: Definition, results: Sequence[Result | None], key: s
 
 
 def make_row(one: Series, digits: int = 8) -> list[str]:
-    """A series as a line of orders.csv; HEADS says what stands where."""
+    """A series as a line of orders.csv; HEADS has the column names."""
     refined, last = one.refined, float(one.values[-1])
     relative = refined.uncertainty / abs(last) if last else math.nan
     numbers = refined.order, refined.extrapolated, refined.uncertainty, relative

@@ -1,7 +1,7 @@
-"""Pictures of a study: quantities over what is varied, theory beside; errors over the cells.
+"""Pictures of a study: quantities over the varied keys, with theory; errors over the cells.
 
-What is varied most finely lies along x, lines are for the other keys.  Where two numbers are varied
-over a product of some size and there is theory, a map shows how far from it each run is.
+The most finely varied key is along x, with a line for each value of the others.  If two numbers are
+varied over a product of some size and there is theory, a map shows the error of each run.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from runs.study.orders import Series
 
 FEW_LINES = 5  # in a panel, with colours and a column of the legend for them
 LEAST_MAP = 4  # values of each key from which a map is drawn
-WRITTEN = 240  # runs up to which a map's numbers are written into it
+WRITTEN = 240  # runs up to which numbers are written into a map
 BOUNDS = (-10.0, -5.0, -2.0, -1.0, 1.0, 2.0, 5.0, 10.0)  # per cent, of the map's colours
 
 
@@ -51,13 +51,13 @@ def draw_study(study: Any) -> Figure:
 
 
 def _numbers(study: Any, key: str) -> np.ndarray | None:
-    """Values of a key (n,), None where they are no numbers."""
+    """Values of a key (n,), None if they are not numbers."""
     column = study.table[key]
     return column.astype(float) if column.dtype.kind in "if" else None
 
 
 def _is_even_in_log(values: np.ndarray) -> bool:
-    """Do values spread by ratios rather than by steps?"""
+    """Whether values are spaced by ratios rather than by differences."""
     known = np.unique(values)
     if known.size < 3 or known[0] <= 0.0 or known[-1] < 4.0 * known[0]:
         return False
@@ -66,8 +66,8 @@ def _is_even_in_log(values: np.ndarray) -> bool:
 
 
 def _find_edges(values: np.ndarray) -> np.ndarray:
-    """Edges (n+1,) between rising values (n,), in the middle of their logarithms where they spread
-    by ratios."""
+    """Edges (n+1,) between increasing values (n,), midway in their logarithms if they are spaced by
+    ratios."""
     log = _is_even_in_log(values)
     places = np.log(values) if log else values
     middle = 0.5 * (places[1:] + places[:-1])
@@ -76,7 +76,7 @@ def _find_edges(values: np.ndarray) -> np.ndarray:
 
 
 def _mark(axis: Any, values: np.ndarray, form: Callable[[float], str] = "{:.3g}".format) -> None:
-    """A logarithmic axis with ticks at these values, some of them where many."""
+    """A logarithmic axis with ticks at these values, or at some if there are many."""
     axis.axes.set(**{f"{axis.axis_name}scale": "log"})
     axis.set_major_locator(FixedLocator(values[:: max(1, len(values) // 7)].tolist()))
     axis.set_minor_locator(NullLocator())
@@ -187,10 +187,9 @@ def _draw_errors(axes: Any, study: Any, name: str, series: list[Series]) -> None
 
 
 def _draw_values(axes: Any, study: Any, name: str, series: list[Series]) -> None:
-    """Values with the uncertainty of the finest, theory dashed, a star for cells of no size.
+    """Values with the uncertainty of the finest, theory dashed, a star for zero cell size.
 
-    Several series are drawn as differences from theory, or from their finest value where there is
-    none.
+    Several series are drawn as differences from theory, or else from their finest value.
     """
     known = all(np.isfinite(one.theory) and one.theory for one in series)
     scales = [one.theory if known else one.values[-1] for one in series]

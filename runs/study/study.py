@@ -1,11 +1,11 @@
-"""A study: a deck, or a function of one's own, at many points; each is computed at most once.
+"""A study: a deck, or a user's function, at many points; each is computed at most once.
 
 The folder of a study:
 
-    study.toml      what is varied: `shockgrid study DIR` goes on
-    runs/           a run directory for each point, called by its values
+    study.toml      the varied keys: `shockgrid study DIR` continues
+    runs/           a run directory for each point, named after its values
     study.csv       the table
-    orders.csv      orders of accuracy, where cells are varied
+    orders.csv      orders of accuracy, if cells are varied
     study.png       the picture
     superseded/     runs of another deck at the same values
 
@@ -70,10 +70,10 @@ FUNCTION = re.compile(r"[\w.]+:[\w.<>]+")  # module and name
 
 
 class Study:
-    """A study in its folder with the results that are there, one a point, None where there is none.
+    """A study in its folder with its results, one per point, None if there is none yet.
 
-    It prints as its table.  `table`: arrays by column; `failures`: sentences by run; `orders`: what
-    grids show where cells are varied (`refine` names their key where it is not `cells`).
+    It prints as its table.  `table`: arrays by column; `failures`: sentences by run; `orders`:
+    convergence if cells are varied (`refine` names their key if it is not `cells`).
     """
 
     def __init__(self, definition: Definition, path: Path | str, refine: str | None = None):
@@ -90,7 +90,7 @@ class Study:
         return "\n".join([f"study in {self.path}: {runs}", *self.make_rows()])
 
     def make_rows(self) -> list[str]:
-        """The first rows of the table: what is varied and what is shown."""
+        """The first rows of the table: varied keys and shown quantities."""
         columns = list(self.definition.keys)
         for name in self.shown:
             stem = name.removesuffix("_error")
@@ -99,9 +99,9 @@ class Study:
 
     @cached_property
     def table(self) -> Table:
-        """Columns (n,) of the n points: what is varied, how runs ended, and all that is measured.
+        """Columns (n,) of the n points: varied keys, how runs ended, and all measurements.
 
-        Units are those of the deck.  Of a result `x` there are `x`, `x_theory` and `x_error`.
+        Units are those of the deck.  A result `x` has `x`, `x_theory` and `x_error`.
         """
         points, results = self.definition.points, self.results
         table = {key: make_column([point[key] for point in points]) for key in self.definition.keys}
@@ -117,7 +117,7 @@ class Study:
 
     @property
     def units(self) -> dict[str, str]:
-        """Units of columns, as far as the problem says them."""
+        """Units of columns, as far as the problem defines them."""
         units: dict[str, str] = {}
         for result in self.results:
             units |= result.units if result is not None else {}
@@ -140,17 +140,17 @@ class Study:
 
     @cached_property
     def orders(self) -> list[Series]:
-        """Each quantity over the cells, with its observed order; [] where no cells are varied."""
+        """Each quantity over the cells, with its observed order; [] if no cells are varied."""
         if self.refined_key is None:
             return []
         return find_series(self.definition, self.results, self.refined_key)
 
     @property
     def shown(self) -> list[str]:
-        """What is drawn and printed: the study's choice, or the first that the problem has.
+        """Plotted and printed quantities: the study's choice, or the first of the problem's.
 
-        These are its results, else its errors, else its measurements; where cells are varied, its
-        errors.  BadInput for a name that is in no run.
+        These are its results, else its errors, else its measurements; if cells are varied, its
+        errors.  BadInput for a name in no run.
         """
         computed, errors, values = find_names(self.results)
         known = [*computed, *errors, *values]
@@ -163,9 +163,9 @@ class Study:
         return list(self.definition.shown) or first[:2]
 
     def to_xarray(self) -> xarray.Dataset:
-        """The table as a data set, its dimensions the varied keys; points listed: along `point`.
+        """The table as a data set over the varied keys, or over `point` for listed points.
 
-        Raises BadInput where xarray is not installed.
+        Raises BadInput if xarray is not installed.
         """
         xarray, vary = load_package("xarray", "to_xarray"), self.definition.vary
         scales = {key: make_column(list(values)) for key, values in vary.items()}
@@ -179,11 +179,11 @@ class Study:
         return xarray.Dataset(data, scales)
 
     def to_pandas(self) -> Any:
-        """The table as a pandas.DataFrame, a row a point; BadInput where there is no pandas."""
+        """The table as a pandas.DataFrame, a row per point; BadInput without pandas."""
         return self.table.to_pandas()
 
     def plot(self, path: Path | str | None = None) -> Figure:
-        """The figure of `shown`, written to `path` where there is one."""
+        """The figure of `shown`, written to `path` if given."""
         from runs.pictures.command import save
         from runs.study.pictures import draw_study
 
@@ -193,9 +193,9 @@ class Study:
         return figure
 
     def write(self) -> list[Path]:
-        """Write the table, the orders and the picture; the paths, of the picture if there is one.
+        """Write the table, the orders and the picture, if there is one; returns their paths.
 
-        Raises BadInput where the disk does not take them.
+        Raises BadInput if they cannot be written.
         """
         paths = [self.path / "study.csv"]
         columns = [
@@ -213,9 +213,9 @@ class Study:
         return paths
 
     def check(self) -> None:
-        """Raise BadInput where no point can be begun, or a name of `shown` is in none.
+        """Raise BadInput if no point can be started, or a name of `shown` is in none.
 
-        A value that is wrong at some points fails these alone.
+        A value that is wrong at some points makes only these fail.
         """
         if self.definition.function is not None:
             return
@@ -237,9 +237,9 @@ class Study:
         return read_deck(self.definition.source, write_settings(values))
 
     def _check_shown(self) -> None:
-        """Raise BadInput for a name of `shown` that no kind of point has at its start.
+        """Raise BadInput for a name of `shown` that no kind of point has initially.
 
-        Where a problem cannot say its names before its first step, nothing is refused.
+        If a problem's names are unknown before its first step, nothing is refused.
         """
         missing, known = list(self.definition.shown), []
         for number in self._find_kinds(range(len(self.results)), float):
@@ -258,7 +258,7 @@ class Study:
             raise BadInput(f"--of {missing[0]}: no run has it{words}")
 
     def _find_kinds(self, numbers: Iterable[int], plain: type | UnionType) -> list[int]:
-        """The first point of each kind: those of one kind differ in `plain` values alone."""
+        """The first point of each kind: points of one kind differ only in `plain` values."""
         kinds: dict[tuple, int] = {}
         for number in numbers:
             values = self.definition.points[number].values()
@@ -267,9 +267,9 @@ class Study:
 
     @contextlib.contextmanager
     def claimed(self) -> Iterator[None]:
-        """In the block the folder is made and held for this process, with its study.toml.
+        """In this context the folder exists with its study.toml and is locked for this process.
 
-        BadInput where something else lies in it, or a study of another deck, or another study runs
+        BadInput if it contains something else or a study of another deck, or another study runs
         there.
         """
         folder = self.path
@@ -297,10 +297,10 @@ class Study:
         tell: Callable[[int, Result, bool], None] = lambda number, result, there: None,
         retry: bool = False,
     ) -> bool:
-        """Compute what is not there yet; False on a rank of MPI that only helped.
+        """Compute the missing points; False on an MPI rank that only helped.
 
-        tell: hears the number of a point, its result, and whether it was there already; retry:
-        failed runs go on from where they failed.  Raises KeyboardInterrupt where a signal stopped a
+        tell: called with the number of a point, its result, and whether it existed already; retry:
+        failed runs continue from where they failed.  Raises KeyboardInterrupt if a signal stopped a
         run.
         """
         with open_engine(engine, jobs) as opened:
@@ -335,7 +335,7 @@ class Study:
             # kernels: these are made for materials, limiters and the like, for what is no number
             first = [works[number] for number in self._find_kinds(works, int | float)]
             for _ in engine.compute(warm_up, first):
-                pass  # what is wrong with a point is told where it is computed
+                pass  # faults of a point are reported when it is computed
         numbers = list(works)
         for place, found in engine.compute(compute_point, list(works.values())):
             if isinstance(found, Exception):
@@ -345,7 +345,7 @@ class Study:
             take(numbers[place], found)
 
     def make_work(self, number: int, threads: int | None = None, retry: bool = False) -> Work:
-        """What a worker needs for a point, all paths in full."""
+        """The work of a point for a worker, with absolute paths."""
         definition, point = self.definition, self.definition.points[number]
         folder, values = (self.path / "runs" / point.name).resolve(), {**definition.fixed, **point}
         if definition.function is not None:
@@ -354,7 +354,7 @@ class Study:
         return Work(definition.deck, write_settings(values), folder, threads, retry)
 
     def describe_states(self) -> list[str]:
-        """What is there of each point: "done", "failed", "half", "other", "new", or a sentence."""
+        """State of each point: "done", "failed", "half", "other", "new", or a sentence."""
         states = []
         for number in range(len(self.results)):
             work = self.make_work(number)
@@ -366,7 +366,7 @@ class Study:
 
 
 def _say_state(result: Result | None) -> str:
-    """How a run ended, in its own words; a failure in its sentence."""
+    """How a run ended; a failure by its sentence."""
     if result is None:
         return "not run"
     return f"failed: {result.failure}" if result.failure else result.reason
@@ -383,13 +383,13 @@ def _describe_error(error: Exception) -> str:
 
 
 def _find_start_names(problem_name: str, problem: Problem) -> list[str]:
-    """Names of results, errors and measurements, from a history that has its first row alone."""
+    """Names of results, errors and measurements, from a history with only its first row."""
     evolution = problem.build()
     measured = problem.measure(evolution)
     row = {"step": evolution.step, "t": evolution.t, **get_start_row(evolution), **measured}
     history = {name: np.array([value]) for name, value in row.items()}
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # one row is little to compute with
+        warnings.simplefilter("ignore")  # one row is too little for some formulas
         found = Result(digest="")
         fill_numbers(found, problem_name, problem, history, measured)
     return [*found.values, *measured]
@@ -406,7 +406,7 @@ def make_study(
 ) -> Study:
     """The study of a deck, a study file, a study's folder or a function; arguments: `study`.
 
-    fixed: keys for all points.  Raises BadInput for what cannot be a study.
+    fixed: keys for all points.  Raises BadInput for an invalid study.
     """
     file = None if callable(deck) else is_study(str(deck))
     if file is None:
@@ -444,16 +444,15 @@ def study(
     """Compute a deck at many points, as `shockgrid study` does, and return the study.
 
     deck: problem, packaged deck, deck file, study file, the folder of a study, or a function that
-    takes the varied keys as keywords and returns numbers by name; vary: values by key, or words as
-    `--vary` takes them ("1.2:3:7"), their product is computed; points: instead of it; settings, or
-    keywords as for `run` (cells=32): keys for all points; output: the folder, made if need be;
+    takes the varied keys as keywords and returns numbers by name; vary: values by key, or text as
+    for `--vary` ("1.2:3:7"), whose product is computed; points: instead of it; settings, or
+    keywords as for `run` (cells=32): keys for all points; output: the folder, created if necessary;
     shown: quantities of the picture; jobs, engine: as `open_engine` takes them, an executor of
     `concurrent.futures`, dask or mpi4py among them (with several jobs a script calls this under
     `if __name__ == "__main__":`, and a function is one of a module).
 
-    None on the ranks of MPI that only compute.  Raises BadInput for what cannot be a study; runs
-    that fail are in `Study.failures`.  KeyboardInterrupt where it was stopped; it can be gone on
-    with.
+    None on MPI ranks that only compute.  Raises BadInput for an invalid study; runs that fail are
+    in `Study.failures`.  Raises KeyboardInterrupt if it was stopped; it can be continued.
     """
     fixed = flatten({**(settings or {}), **keywords})
     made = make_study(deck, vary or {}, output, points, fixed, shown, refine)

@@ -177,7 +177,7 @@ class Simulation:
 
     @property
     def blocks(self) -> list[Block]:
-        """The blocks, whole; on several ranks their owners are asked for them."""
+        """The whole blocks; with several ranks they are collected from their owners."""
         self._shared.collect()
         return self._blocks
 

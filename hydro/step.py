@@ -72,7 +72,7 @@ class StepRecord:
 def take_step(flow: Flow) -> StepRecord:
     """Advance all blocks by one step.
 
-    Raises RunFailure where no step down to a few thousandths of the stable one stands; the state is
+    Raises RunFailure if no step down to a few thousandths of the stable one is valid; the state is
     then untouched.
     """
     record = StepRecord()
@@ -197,7 +197,7 @@ def find_failure(flow: Flow) -> RunFailure | None:
 
 
 def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
-    """Phase 7 of a step that stands."""
+    """Phase 7 of an accepted step."""
     # 7 the new grid and state become the current ones; second half of the sources; ledger, clock
     for block in flow.blocks:
         block.accept()

@@ -312,7 +312,8 @@ SMOOTHINGS = 3  # of the turning, over neighbouring segments
 
 @kernel
 def fill_turning(line, closed, wall_first, wall_last, wanted):
-    """How many segments every segment's turning asks for: wanted (n - 1,); line, ends as below."""
+    """Numbers of segments that each segment's turning needs: wanted (n - 1,); line, ends as
+    below."""
     count = line.shape[1]
     edges = count - 1
     turn = np.empty(count)
@@ -524,7 +525,7 @@ def fill_on_spline(line, arc, positions, second, first, last, out):
 
 @kernel
 def fill_redistributed(line, law, keys, spline, relax, closed, wall_first, wall_last, work, out):
-    """Nodes of `line` spread anew between the key nodes `keys`; see `redistribute`.
+    """Nodes of `line` redistributed between the key nodes `keys`; see `redistribute`.
 
     Returns -1, or the first key node of the segment in which nodes would cross; `work` (6, n) is
     scratch.

@@ -309,7 +309,7 @@ def count_compiling() -> tuple[int, int, float]:
 
 
 def read_clock() -> float:
-    """Wall seconds [s] from some moment on; the clock stands while kernels are compiled."""
+    """Wall time [s] from some moment on; the clock is stopped while kernels are compiled."""
     return (_compiling.begun or time.perf_counter()) - _compiling.seconds
 
 

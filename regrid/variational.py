@@ -424,7 +424,7 @@ class VariationalFunctional:
     def set_weight(self, weight: np.ndarray) -> None:
         """Take the weight (ni, nj) of the cells: w times their area is to be constant.
 
-        D is a corner's area over that which the sides ask for, hence `w (s D)²`, s the latter.
+        D is a corner's area over that implied by the sides, hence `w (s D)²`, s the latter.
         """
         wanted = weight * self.areas
         volume = self.volume * (wanted / wanted.mean()) * self.areas
@@ -448,7 +448,7 @@ class VariationalFunctional:
         return energy if np.isfinite(energy) and rows[1].min() > 0.0 else np.inf
 
     def descend(self, fraction: float) -> bool:
-        """Go `fraction` of the step, less where corners or the energy ask for it."""
+        """Take `fraction` of the step, less where corners or the energy require it."""
         work, before = self.work, self.measure(self.work.base)
         for _ in range(HALVINGS):
             np.multiply(work.change, fraction, out=work.trial)

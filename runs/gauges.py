@@ -139,7 +139,7 @@ def place_points(points: Sequence[Gauge], blocks: Sequence[BlockView]) -> Places
 
 
 def _check_fields(points: Sequence[Gauge], blocks: Sequence[BlockView]) -> None:
-    """Raise BadInput where a gauge asks for what a block does not have."""
+    """Raise BadInput if a gauge needs a field that a block does not have."""
     for block in blocks:
         if isinstance(block, Block) or not points:
             continue
@@ -269,7 +269,7 @@ class Gauges:
         self.t = self.evolution.t
 
     def open(self, path: Path) -> None:
-        """Open the file; a new one gets the row of the present state."""
+        """Open the file; a new one starts with the row of the current state."""
         if self.points:
             self._writer = HistoryWriter(path, self.columns)
             if self.columns is None:

@@ -215,16 +215,16 @@ def compute_weights(before, here, after):
 # of material have gaps between them: its sound speed would be that of the body expanded as a whole,
 # hundreds of times that of the pieces, with which the time step was chosen.  Theory F4.10.
 
-WHOLE = 1e300  # stands for the energy of a cell that is not torn
+WHOLE = 1e300  # marks a cell that has not failed
 
 
 @inlined
 def mark_torn(e, void):
-    """The energy of a cell where its void energy says that it is torn; WHOLE elsewhere."""
+    """The energy of a cell that has failed by its void energy; WHOLE elsewhere."""
     return e if void < 0.0 else WHOLE
 
 
 @inlined
 def choose_own(traced, own, torn):
-    """What a trace gives; the cell's own value where `torn`, of `mark_torn`, is not WHOLE."""
+    """The traced value; the cell's own value if `torn`, from `mark_torn`, is not WHOLE."""
     return own if torn < WHOLE else traced

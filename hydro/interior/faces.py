@@ -48,7 +48,7 @@ def make_traces(sound_speed_squared_part, opens_voids):
     def trace(half, gradients, own, torn, dx, dy, parameters):
         """State (rho, u, v, p) and c² at an offset; no state of the material: the cell's own.
 
-        c² is that of the cell where it is torn (`hydro.formulas.reconstruction.mark_torn`).  The
+        c² is that of the cell if it has failed (`hydro.formulas.reconstruction.mark_torn`).  The
         last number is 1 where the cell's own state is taken, else 0.
         """
         rho, u, v, p = compute_face_state(half, gradients, dx, dy)
@@ -237,7 +237,7 @@ def make_hll_flux(energy_part, faces, switch, torn, target, pressure_row, opens_
 
     @compiled_once(allocates=False)
     def use_hll(row, first, last, parameters):
-        """HLL where one of both cells asks for it, at the faces first..last, in whole vectors."""
+        """HLL where one of the two cells needs it, at the faces first..last, in whole vectors."""
         start = (first - 1) // at.LANES * at.LANES
         Z = row[start:]  # loops that begin at a number which they do not know are not vectorised
         for k in range(1, at.count_padded(last - start - 1) + 1):

@@ -29,9 +29,7 @@ from regrid.protocol import (
     sees_cost,
 )
 
-MOST_EXCESS = (
-    0.3  # motion of a node that the boundary does not ask for, in cell heights a full step
-)
+MOST_EXCESS = 0.3  # motion of a node not required by the boundary, in cell heights per full step
 
 SPARING_HALVINGS = 5  # of that motion, where it would crush a polygon cell
 

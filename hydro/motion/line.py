@@ -29,8 +29,8 @@ from regrid.jit import compiled_once, kernel
 CORNER = 0.35  # sine of the angle from which two tracks that meet make a corner
 DAMPING, BEND = 4.0, 0.35  # of sliding lines: strength, and turn [rad]; see `fill_line_damping`
 MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
-THICK_CELLS = 0.75  # thickness of a contact in its first cells where nobody says one
-SHORTEST = 0.25  # segment that turning asks for, in thicknesses of its contact
+THICK_CELLS = 0.75  # default thickness of a contact, in its initial cells
+SHORTEST = 0.25  # segment required by turning, in thicknesses of its contact
 FOLLOWING = 0.2  # part of the way to its law that a line at or opposite a contact point goes
 
 

@@ -216,7 +216,7 @@ class Sides:
                 opposite.follows_contact = True
 
     def find_free_sides(self, block: Block) -> tuple[str, ...]:
-        """The sides of a block that nobody else sees: straight walls."""
+        """The sides of a block that no other block shares: straight walls."""
         free = set(OPPOSITE_SIDES)
         for segment in block.segments:
             line = self._find_line(segment)

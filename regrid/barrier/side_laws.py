@@ -43,7 +43,7 @@ class BarrierLaw(NamedTuple):
     sharp cell goes up;
     `stiffness`, of sharp cells' corners in the matrix (R4.18); what cells cost
     (theory R4.10): `sound` (ni, nj) in m/s, `cost_scale` = 2/R² in s², and
-    `cost_weight`, its weight mu, 0 where nobody asks.
+    `cost_weight`, its weight mu, 0 by default.
     """
 
     along_i: np.ndarray

@@ -213,7 +213,7 @@ class Workspace:
             self.sound = np.ascontiguousarray(sound.T) if transposed else sound
 
     def load_old(self) -> None:
-        """The inside of the grid before into `old`, where only a look has read it so far."""
+        """Copy the interior of the last grid to `old` if only a residual check has read it."""
         if self.given is not None:
             load_grid(self.given, self.old, *self.frame, inside=True)
             self.given = None
@@ -226,7 +226,7 @@ class Workspace:
     def give(self) -> np.ndarray:
         """The grid `trial` in the block's own frame, to keep: the array given for it or a new one.
 
-        A look has written it there already where nothing else was needed.
+        The residual check has already written it there if nothing else was needed.
         """
         if self.given is None and self.trial is not self.into:
             transposed, mirrored = self.frame

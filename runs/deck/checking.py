@@ -342,7 +342,7 @@ def _show_table(schema: Part, part: Part) -> str:
 
 
 def show(value: Any) -> str:
-    """A value as it stands in a deck, cut where it is long; None: the key is left out."""
+    """A value as written in a deck, cut if it is long; None: the key is left out."""
     if value is None:
         text = "left out"
     elif isinstance(value, bool):

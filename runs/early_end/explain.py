@@ -121,7 +121,7 @@ def find_calm_point(directory: RunDirectory) -> int | None:
     """
     points = []
     for step, path in directory.list_points():
-        with contextlib.suppress(BadInput):  # torn
+        with contextlib.suppress(BadInput):  # damaged
             points += [step] if has_state(path) else []
     history = read_history(directory.history)
     steps, dt = history.get("step", ()), history.get("dt")

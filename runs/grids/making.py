@@ -158,7 +158,7 @@ def warm_up(domain: MovingDomain, regridder: Regridder) -> None:
 
 
 def default_cells(name: str) -> tuple[int, int]:
-    """Cells that a named domain has where nothing else is asked for."""
+    """Default cells of a named domain."""
     parameters = inspect.signature(DOMAINS[name.replace("-", "_")]).parameters
     return parameters["ni"].default, parameters["nj"].default
 

@@ -20,7 +20,7 @@ from regrid.jit import count_compiling
 
 LOOK_EVERY = 0.2  # wall seconds until the run is looked at again: how much does it compile?
 MANY = 5  # compiled kernels from which on a second process is worth its start
-PATIENCE = 3.0  # wall seconds of compiling before a person is told what takes so long
+PATIENCE = 3.0  # wall seconds of compiling before a message explains the wait
 USUAL = 30  # kernels that most runs call
 STEPS = 3  # of the small grid: those that need no solve, and those that do
 WORDS = "compiling kernels, once on this machine"

@@ -51,9 +51,9 @@ Options = dict[str, bool | int | float | str]
 NONE: Any = msgspec.field(default_factory=dict)  # of a key that is a table by name: no entry
 Limiter = key(  # the names of hydro.formulas.reconstruction.LIMITERS
     Literal["low-mach", "smooth-shear", "monotonised-central", "van-leer", "minmod"],
-    "limiter of slopes, from sharp to smooth; smooth-shear: van-leer but for the velocity where "
-    "the flow turns or shears without jumps; low-mach: monotonised-central but there, with jumps "
-    "of velocity between cells lessened where the flow is slow",
+    "slope limiter, from sharp to smooth; smooth-shear: van-leer, except for the velocity where "
+    "the flow turns or shears without jumps; low-mach: monotonised-central with that exception, "
+    "and smaller jumps of the velocity at faces where the flow is slow",
 )
 
 
@@ -130,7 +130,7 @@ class RunControl(DeckTable, kw_only=True):
     ) = None
     cut: key(
         dict[str, Annotated[int, Meta(ge=1, le=1024)]],
-        "by a block's name, among how many MPI ranks it is cut at most. If left out: by its share",
+        "largest number of MPI ranks that share a block, by its name. If left out: by its size",
     ) = {}
 
 
@@ -142,11 +142,11 @@ class Output(DeckTable, kw_only=True):
         "dumps", "every", "times", "fields", "precision", "compression", "restart_every", "columns",
     )  # fmt: skip
 
-    dumps: key(int, "evenly over the run besides the first; 0: the last", ge=0, le=1_000_000) = 20
+    dumps: key(int, "number of dumps after the first; 0: one at the end", ge=0, le=1_000_000) = 20
     every: key(float | None, "time [s] from dump to dump, in place of `dumps`", ge=1e-300) = None
     times: key(list[Annotated[float, Meta(gt=0)]], "times [s] of further dumps") = []
     fields: key(list[str], "fields in light dumps, such as rho and p; none: all there are") = []
-    precision: key(Literal["double", "single"], "of fields in light dumps") = "double"
+    precision: key(Literal["double", "single"], "precision of light dumps") = "double"
     compression: key(int, "level of gzip for light dumps; 0: none", ge=0, le=9) = 0
     restart_every: key(float, "wall seconds between restart points; 0: none", ge=0) = 300.0
     columns: key(tuple[str, ...], "groups of history columns of other packages, by name") = ()

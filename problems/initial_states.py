@@ -46,7 +46,7 @@ class Fluid(DeckTable, kw_only=True):
     material: key(str, "name in the material library. If left out: a gas") | None = None
     gamma: key(float, "ratio of specific heats of the gas", ge=1.001, le=1000) = 1.4
     p_inf: key(float, "stiffness of the gas [Pa]; 0: ideal", ge=0, le=1e20) = 0.0
-    rho: key(float, "density [kg/m3]. If left out: the library's", ge=1e-20, le=1e20) | None = None
+    rho: key(float, "density [kg/m3]. If left out: the material's", ge=1e-20, le=1e20) | None = None
 
     @classmethod
     def keeps_defaults(cls, table: Mapping[str, Any]) -> bool:

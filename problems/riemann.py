@@ -2,7 +2,7 @@
 
 `case` names the states (Sod, 123, Toro 3, LeBlanc, two gammas, water against gas, impacts of
 metals); `left` and `right` give others.  With the contact "on-line" each state is a block, the
-contact is the grid line between them, and the grids are rebuilt every step.  If the deck or the
+contact is the grid line between them, and a regridder moves the grids.  If the deck or the
 case gives the lengths of the sides, the ends move with the undisturbed materials; otherwise the
 exact waves determine lengths, grading, end time and motion of the ends, so that each plateau has
 its share of the cells.  "captured" is one block of one material through which the contact runs, on
@@ -377,7 +377,7 @@ class Riemann(Problem):
         ]
         head = (
             f"riemann problem {self.name!r}, {deck.cells} cells, contact {where}: L1(rho) = "
-            f"{get_last(history, 'l1_rho'):.3g} kg/m2; star states beside the contact:"
+            f"{get_last(history, 'l1_rho'):.3g}; star states beside the contact:"
         )
         return Report(head, rows, notes)
 

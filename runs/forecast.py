@@ -163,7 +163,7 @@ def foretell(
     past = find_past(name_flow(read.problem, read.deck), size.cells)
     first_dt = None if clock is None else clock.first_stable_dt
     steps = foretell_steps(size, past, first_dt, read.deck.run.max_steps)
-    words = "steps and time are unknown before the start: no run of this flow yet"
+    words = "steps and time are unknown before the start: no similar run is known"
     if past is not None and steps is not None:
         low, likely, high = (max(round(float(f"{number:.2g}")), 1) for number in steps)
         words = f"about {likely}{f' ({low} to {high})' * (low < high)} steps; "

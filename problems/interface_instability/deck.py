@@ -84,9 +84,10 @@ class InterfaceDeck(Deck, kw_only=True):
     refine: key(bool, "add grid lines where the interface grows long or bends") = False
     uniform: key(float, "evenly spaced zone on each side, in wavelengths", ge=0, le=1e4) = 1.0
     stretch: key(float, "growth of cells from one to the next beyond it", ge=1, le=1.5) = 1.01
-    reach: key(float, "from the interface, in waves, where grid lines bend", ge=1e-12, le=1e4) = 0.1
+    reach: key(float, "grid lines bend within so many wavelengths", ge=1e-12, le=1e4) = 0.1
     lengths: key(
-        tuple[float, float] | None, "of both [m]. If left out: too long for reflections to return"
+        tuple[float, float] | None,
+        "of both sides [m]. If left out: so long that no reflection returns",
     ) = None
     start: key(
         Literal["auto", "crossed", "incident"],
@@ -95,7 +96,7 @@ class InterfaceDeck(Deck, kw_only=True):
     layer: key(
         float | None, "start crossed: cells to the nearer wave. If left out: 3 to 8", ge=3, le=1000
     ) = None
-    gap: key(float, "of the shock from the interface at first, in waves", ge=0.01, le=20) = 0.3
+    gap: key(float, "initial wavelengths from shock to interface", ge=0.01, le=20) = 0.3
     passage_refinement: key(
         float, "start incident: how much finer cells at the interface are at first", ge=1, le=64
     ) = 4.0

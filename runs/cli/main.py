@@ -33,7 +33,7 @@ from runs.ranks.started import is_for_ranks
 @click.version_option(package_name="shockgrid")
 @click.option("--debug", is_flag=True, help="Show the traceback of an error (works anywhere).")
 def cli(debug: bool) -> None:
-    """Shock hydrodynamics on moving blocks whose grids are rebuilt every step.
+    """Shock hydrodynamics on moving blocks whose grids are improved in every step.
 
     \b
     shockgrid run interface-instability      compute, then print the summary

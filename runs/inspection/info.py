@@ -253,7 +253,10 @@ def describe_tree(path: Path) -> str:
 def open_hdf5(path: Path) -> Iterator[h5py.File]:
     """The file, open for reading; BadInput where it is missing, no HDF5, or its tree is damaged."""
     if not path.is_file():
-        raise BadInput(f"{path} is not a file" if path.exists() else f"{path} does not exist")
+        words = (
+            "is no HDF5 file; `shockgrid info` is for runs" if path.is_dir() else "does not exist"
+        )
+        raise BadInput(f"{path} {words}")
     try:
         file = h5py.File(path, "r")
     except OSError as error:

@@ -23,7 +23,7 @@ MANY = 5  # compiled kernels from which on a second process is worth its start
 PATIENCE = 3.0  # wall seconds of compiling before a message explains the wait
 USUAL = 30  # kernels that most runs call
 STEPS = 3  # of the small grid: those that need no solve, and those that do
-WORDS = "compiling kernels, once on this machine"
+WORDS = "compiling kernels, kept for later runs"
 BAR = "{desc}: {n_fmt} of about {total_fmt}|{bar:12}| {elapsed}"
 
 _watched = threading.Lock()  # held by the block that watches
@@ -79,7 +79,7 @@ def _watch(done: threading.Event, stream: Any, quiet: bool, helped: bool) -> Non
                 started.callback(bar.close)
             elif not _told:
                 _told = True
-                print(f"{WORDS}: a minute, several on a busy one ...", file=stream, flush=True)
+                print(f"{WORDS}: a minute, several on a busy machine ...", file=stream, flush=True)
 
 
 if __name__ == "__main__":  # the kernels of the default regridder: some steps of a small grid

@@ -175,7 +175,7 @@ def fill_figure(
             raise BadInput(f"{run.path} has no history yet: no step was made") from error
     idle = [name for name in given if name not in HEEDED.get(what, ())]
     if idle and say:
-        say(f"{', '.join(idle)}: not heeded by the picture {what!r}")
+        say(f"{', '.join(idle)} does not apply to the picture {what!r}")
     if part and say:
         say("the panels show only the region around the interface; --zoom shows any other part")
     if what not in BESIDE:

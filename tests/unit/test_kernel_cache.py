@@ -207,9 +207,9 @@ def test_a_second_process_compiles_where_much_is_compiled(monkeypatch):
 
 
 def test_compiling_is_said_once_and_counted_in_a_terminal(monkeypatch):
-    assert watch(monkeypatch, COUNTS)[0].count("compiling kernels, once on this machine") == 1
+    assert watch(monkeypatch, COUNTS)[0].count("compiling kernels, kept for later runs") == 1
     bar = watch(monkeypatch, COUNTS, terminal=True)[0]
-    assert "compiling kernels, once on this machine: 30 of about 30|" in bar
+    assert "compiling kernels, kept for later runs: 30 of about 30|" in bar
     assert watch(monkeypatch, [(0, 0, 0.0), (9, 0, 9.0)])[0] == ""  # from the disk
 
 

@@ -39,7 +39,7 @@ def test_the_same_steps_are_compared_bit_for_bit(shockgrid, runs):
     assert code == 1 and "rows in a, 6 in short" in out and "other steps" not in out
 
 
-COMPILING = "compiling kernels, once on this machine: a minute, several on a busy one ...\n"
+COMPILING = "compiling kernels, kept for later runs: a minute, several on a busy machine ...\n"
 HEAD = 'problem = "interface-instability"\ncells = 16\nlengths = [2, 2]\n'
 GAUGE = '[[gauge]]\nname = "a"\nat = [99.0, 0.1]\n'
 REFUSED = [

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import numpy as np
 
+MISSPELT = 0.8  # likeness of names that differ by a slip
 LIKE = 0.6  # likeness of names from which one is offered for the other: less misleads
 
 
@@ -115,7 +116,7 @@ class RegridFailure(RunFailure):
 
 
 def find_nearest(name: str, known: Iterable[str], cutoff: float = LIKE) -> str | None:
-    """The name in `known` that is most like `name`, None where none is like enough.
+    """The name in `known` that is most like `name`, or with which it begins, or None.
 
     `cutoff` 0 to 1 is the least likeness; at 0 there is one as soon as there are names.  Capitals,
     "_" and "-" make no difference.
@@ -127,8 +128,13 @@ def find_nearest(name: str, known: Iterable[str], cutoff: float = LIKE) -> str |
     words: dict[str, str] = {}
     for word in known:
         words.setdefault(plain(word), word)
-    close = difflib.get_close_matches(plain(str(name)), words, n=1, cutoff=cutoff)
-    return words[close[0]] if close else None
+    wrong = plain(str(name))
+    for least in (max(cutoff, MISSPELT), cutoff):
+        if close := difflib.get_close_matches(wrong, words, n=1, cutoff=least):
+            return words[close[0]]
+        if begun := [word for word in words if wrong.startswith(f"{word}-")]:
+            return words[max(begun, key=len)]
+    return None
 
 
 def suggest(name: str, known: Iterable[str], cutoff: float = LIKE) -> str:

@@ -46,6 +46,7 @@ def test_keywords_are_settings_of_the_deck():
     [
         ({"cells": -3}, r"^cells = -3; it must be a whole number of at least"),
         ({"run": {"t_nd": 1.0}}, r"^there is no key 'run.t_nd'; did you mean 'run.t_end'\?"),
+        ({"mach_number": 2.0}, r"^there is no key 'mach_number'; did you mean 'mach'\?"),
         ({"cells": None}, "cells = None: a deck cannot hold this"),
         ({"cells": object()}, "cells = <object.*: a deck cannot hold this"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import toy_problem
 
 from problems.registry import PROBLEMS
 from runs.cli.main import main
+from runs.march import compiling
 
 TOY = Path(toy_problem.__file__)
 
@@ -25,8 +27,12 @@ def toy(monkeypatch, tmp_path):
 
 
 @pytest.fixture
-def shockgrid(capfd):
-    """Call the command line in this process; gives exit code, standard output and error."""
+def shockgrid(capfd, monkeypatch):
+    """Call the command line in this process; gives exit code, standard output and error.
+
+    The line that says that kernels are compiled, which a slow machine gets, is not printed.
+    """
+    monkeypatch.setattr(compiling, "PATIENCE", math.inf)
 
     def call(*words: str) -> tuple[int, str, str]:
         code = main(list(words))

@@ -24,8 +24,8 @@ ROWS = 0.6  # height of a row of cells
 NOTES = (  # text, where it stands, what it points at
     ("pin: a follower's node\non a face of the leader", (2.2, 3.95), (2.78, 2.04)),
     ("pin: a leader's node slightly\nbehind a face of the follower", (5.6, 3.95), (3.62, 2.08)),
-    ("face of the follower:\nstraight between its nodes", (2.3, -0.55), (3.9, 1.84)),
-    ("facet: the leader's line\nfrom one pin to the next", (5.6, -0.55), (4.35, 1.9)),
+    ("face of the follower:\nstraight between its nodes", (1.7, -0.55), (3.9, 1.84)),
+    ("facet: the leader's line from a\nnode of either line to the next", (6.0, -0.55), (4.35, 1.9)),
     ("last pin: the contact\nends here", (9.0, 3.75), (5.25, 1.8)),
     ("free surfaces", (10.6, 1.0), (7.8, 1.1)),
 )

@@ -171,13 +171,14 @@ def make_sedov(geometry: str = "spherical") -> Case:
     sphere = geometry == "spherical"
     share = 0.25 / math.pi if sphere else 0.25  # of a quarter, for a sphere a radian
     numbers = {"gamma": GAMMA, "p": 1e-8, "t_end": 1.0, "size": 1.2, "energy": share * blast.energy}
-    peers = ("pennant",) if sphere else ("pyclaw", "pyro")
+    grids = (50, 100, 200)
+    peers = {"pennant": grids} if sphere else {"pyclaw": (*grids, 400), "pyro": grids}
     return Case(
         "sedov" if sphere else "sedov-cylinder",
         f"{'spherical' if sphere else 'cylindrical'} Sedov blast on a rectangular grid",
         "L1 of the density",
         numbers | {"geometry": geometry},
-        {"shockgrid": (50, 100, 200, 400)} | dict.fromkeys(peers, (50, 100, 200)),
+        {"shockgrid": (50, 100, 200, 400)} | peers,
     )
 
 

@@ -8,6 +8,7 @@ steps are compared by norms instead: dumps of about the same time, one laid on t
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,7 +19,10 @@ import numpy as np
 
 from hydro.remap.conserved import check_convex, remap_means
 from hydro.remap.overlay import compute_cell_moments
+from problems.problem import align
 from regrid.errors import BadInput
+from runs.deck.checking import find_differences as find_changed_keys
+from runs.deck.checking import show
 from runs.quantities import add_unit, count
 from runs.store.reader import BlockData, Dump, RunData, Table
 
@@ -48,6 +52,7 @@ class Side:
         self.dumps: list[Dump] = run.outputs if run else [Dump(path)]
         if not self.dumps:
             raise BadInput(f"{path} has no dump yet that could be compared")
+        self.run = run
         self.history: Table | None = run.history if run else None
         self.problem = run.problem_name if run else self.dumps[0].problem
 
@@ -85,7 +90,23 @@ def compare_in_words(a: str, b: str, rtol: float, atol: float) -> tuple[str, boo
     else:
         differences = _find_differences(one, other, rtol, atol)
         lines, differ = report(differences, one, other), bool(differences)
-    return "\n".join([*lines, *_describe_makers(one, other)]), differ
+    table = describe_runs(one.run, other.run) if one.run and other.run else []
+    return "\n".join([*table, *lines, *_describe_makers(one, other)]), differ
+
+
+def describe_runs(a: RunData, b: RunData) -> list[str]:
+    """A table of what differs in the decks of two runs of one problem and in their results."""
+    try:
+        rows = [(x.key, show(x.before), show(x.now)) for x in find_changed_keys(a.deck, b.deck)]
+        results = [run.problem.report(run.history).rows for run in (a, b)]
+    except BadInput:  # a deck of another version
+        return []
+    theirs = {row.name: row for row in results[1]}
+    for row in results[0]:
+        values = row.computed, getattr(theirs.get(row.name), "computed", math.nan)
+        if row.label and values[0] != values[1] and not math.isnan(sum(values)):
+            rows.append((row.label, *(f"{x / row.unit:.{row.digits}g}" for x in values)))
+    return align([("", str(a.path), str(b.path)), *rows]) if rows else []
 
 
 def _find_differences(a: Side, b: Side, rtol: float, atol: float) -> list[Difference]:
@@ -250,20 +271,21 @@ def compare_by_norms(a: Side, b: Side, rtol: float, atol: float) -> tuple[list[s
         for one, other in pairs
     ]
     within = sum(all(l1 <= atol + rtol * size for *_, l1, _, _, size in rows) for rows in found)
-    lines = [f"other cells: {b.path} laid on the grid of {a.path}"]
+    lines = [f"cells differ: the fields of {b.path} are remapped to the grid of {a.path}"]
     same_cells = all(one.cells == b.dumps[0].block(one.name).cells for one in a.dumps[0].blocks)
     if same_cells and (parted := find_other_steps(a, b)):
-        lines = [f"other steps: {parted}; dumps are compared by the nearest time"]
+        lines = [f"steps differ: {parted}"]
     dumps = count(len(pairs), "dump")
-    lines[0] += f"; {dumps} of about the same time, {within} within the tolerances"
+    lines.append(f"{dumps} at about the same times, {within} within the tolerances:")
     for (one, other), rows in zip(pairs[:-1][-SHOWN:], found[:-1][-SHOWN:], strict=True):
         words = "no fields of cells that both have"
         if rows:
             most, block, name = max((l1 / (size or 1.0), *row) for *row, l1, _, _, size in rows)
-            words = f"L1 up to {most:.2g} of {block}, {name}"
+            words = f"largest L1 norm of a difference: {name} in {block}, {most:.2g} of its size"
         lines.append(f"{_describe_times(one, other)}: {words}")
     lines.append(f"{_describe_times(*pairs[-1])}:")
-    lines.append(f"  {'block':14s} {'field':8s} {'L1':>10s} {'L2':>10s} {'Linf':>10s} {'of':>10s}")
+    heads = "".join(f"{head:>11s}" for head in ("L1", "L2", "Linf", "size"))
+    lines.append(f"  {'block':14s} {'field':8s}{heads}")
     for block, field, *norms in found[-1]:
         lines.append(f"  {block:14s} {field:8s} " + " ".join(f"{norm:10.3g}" for norm in norms))
     return lines, within < len(pairs)

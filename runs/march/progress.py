@@ -163,10 +163,19 @@ class Outlook:
             self.close("ended early", str(error), history, name_failure(error))
 
     def close(
-        self, status: str, reason: str, history: Mapping[str, np.ndarray], name: str = ""
+        self,
+        status: str,
+        reason: str,
+        history: Mapping[str, np.ndarray],
+        name: str = "",
+        remapped: str = "",
     ) -> dict[str, Any]:
-        """Write the verdict, which is returned; name: of the cause of an early end."""
+        """Write the verdict, which is returned; name: of the cause of an early end; remapped: which
+        part of the history is of other cells."""
         verdict = judge(status, reason, history, self.size.cells, self.problem, name)
+        if remapped:
+            words = {"rule": "remapped", "value": 1, "limit": 0, "words": remapped}
+            verdict["trust"].append(words)
         write_verdict(self.directory, verdict)
         return verdict
 

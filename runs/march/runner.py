@@ -197,7 +197,7 @@ class Runner:
         self.writing = Background()
         self.world: World | None = None  # ranks of MPI that share the run; set like the limit
         self.restored = False
-        self.remapped = ""  # a caution: which part of the history is of other cells
+        self.remapped = ""  # a warning: which part of the history is of other cells
         self._signal = 0
         self._point_wanted = False
 
@@ -233,6 +233,9 @@ class Runner:
                     f"this run has finished ({self.evolution.finished}); "
                     f"continue with --set run.t_end=T, T > {self.evolution.t:.6g}"
                 )
+            elif not self.quiet:
+                t = describe_time(self.evolution.t, self.problem.t_unit)
+                say(f"{self.directory} continues from step {step}, {t}")
             moved = self.directory.set_aside_after(step)
             if moved:
                 say(f"{count(moved, 'later file')} moved to {self.directory}/superseded")
@@ -293,7 +296,7 @@ class Runner:
         )
         history = read_history(self.directory.history)
         name = ENDS[MISSED].name if code == 3 else ""
-        verdict = self.outlook.close(status, reason, history, name)
+        verdict = self.outlook.close(status, reason, history, name, self.remapped)
         try:
             screen = "\n".join(self._describe_run(f"{reason}: ", seconds, history, verdict))
         except RunFailure as error:  # of what is computed for the screen alone
@@ -333,7 +336,6 @@ class Runner:
             own = account.describe_own(problem, history, evolution)
             lines += ["", own] if own else []
         cautions = account.describe_cautions(problem, history)
-        cautions += [f"caution: {self.remapped}"] if self.remapped else []
         lines += ["", *cautions] if cautions else []
         dumps = count(len(directory.list_points("dump")), "dump")
         lines += [

@@ -256,7 +256,7 @@ def write_csv(
 
 
 FLAT = 1e-9  # relative variation of what is called constant
-PLAIN = ("step", "t", "dt", "dt_limit", "finished")
+PLAIN = ("step", "t", "dt", "dt_limit", "finished", "fastest_block", "fastest_i", "fastest_j")
 GRID = ("least_scaled_jacobian", "worst_aspect", "cells_not_convex")
 SHARED = 30.0  # columns in one panel are of one size within this factor
 MOST = 4  # of them

@@ -23,7 +23,7 @@ import msgspec
 
 from problems.problem_file import ProblemFile, compute_digest, is_problem_file, read_problem_file
 from problems.registry import is_problem, load_problem
-from regrid.errors import BadInput
+from regrid.errors import BadInput, find_nearest
 from regrid.text_files import check_regular, escape_controls
 from runs.deck.checking import find_changes, show
 from runs.deck.reading import ReadDeck, read_toml, resolve_deck
@@ -216,17 +216,27 @@ def _list_inside(directory: RunDirectory) -> list[str]:
     return sorted(path.name for path in directory.path.iterdir() if path not in own)
 
 
+def _list_runs(folder: Path) -> list[str]:
+    """Paths of the run directories in a folder."""
+    return sorted(str(deck.parent) for deck in folder.glob("*/deck.toml"))
+
+
 def open_directory(path: str | os.PathLike) -> RunDirectory:
     """An existing run directory for reading; BadInput where there is none."""
     directory = RunDirectory(path)
     if not directory.path.exists():
-        raise BadInput(f"{path} does not exist")
+        meant = find_nearest(str(directory.path), _list_runs(directory.path.parent))
+        raise BadInput(f"{path} does not exist" + (f"; did you mean {meant}?" if meant else ""))
     if not directory.path.is_dir():
         raise BadInput(f"{path} is a file; a run directory is wanted")
     if not directory.deck.exists():
         words = "it has no deck.toml"
         if (directory.path / STUDY_FILE).exists():
             words = f"its runs lie in {directory.path / 'runs'}; its table: shockgrid study {path}"
+        elif inside := _list_runs(directory.path):
+            words += (
+                "; there are runs in it: " + ", ".join(inside[:5]) + ", ..." * (len(inside) > 5)
+            )
         elif not _list_inside(directory):
             words += (
                 " yet: a run is just starting there, or ended before a step; if it ended, start it "

@@ -73,6 +73,13 @@ def say(seconds: float) -> str:
     return f"{seconds:.2g}" if seconds < 99.5 else f"{float(f'{seconds:.2g}'):.0f}"
 
 
+def typeset(words: str) -> str:
+    """A title with its symbols as pages print them."""
+    for plain, symbol in (("k c t", "*kct*"), ("k a0", "*ka*₀"), ("gamma ", "γ = ")):
+        words = words.replace(plain, symbol)
+    return words
+
+
 def write_summary(document: dict[str, Any]) -> list[str]:
     """One row a case."""
     lines = [f"| CPU seconds to {100 * BAR:.0f} % | {' | '.join(NAMES.values())} |"]
@@ -82,7 +89,7 @@ def write_summary(document: dict[str, Any]) -> list[str]:
             continue
         rows = [r for r in document["rows"] if r["case"] == name]
         cells = " | ".join(describe_time(rows, code) for code in NAMES)
-        lines.append(f"| {case['title']} | {cells} |")
+        lines.append(f"| {typeset(case['title'])} | {cells} |")
     return lines
 
 
@@ -90,8 +97,8 @@ def write_tables(document: dict[str, Any]) -> list[str]:
     """One table a case."""
     lines: list[str] = []
     for name, case in document["cases"].items():
-        title = case["title"]
-        lines += ["", f"## {title[0].upper()}{title[1:]}", "", f"Error: {case['error']}.", ""]
+        title, error = typeset(case["title"]), typeset(case["error"])
+        lines += ["", f"## {title[0].upper()}{title[1:]}", "", f"Error: {error}.", ""]
         lines += ["| code | cells | error | CPU seconds |", "|---|---|---|---|"]
         for row in (r for r in document["rows"] if r["case"] == name):
             error = f"{100.0 * row['error']:.3g} %" if abs(row["error"]) > 1e-9 else "round-off"

@@ -27,6 +27,7 @@ from runs.store.history import read_history
 LINE_EVERY = 15.0  # wall seconds between lines when there is no terminal
 FIRST_WORD = 3.0  # wall seconds after the first step until the whole run is foretold
 WORTH_A_WORD = 30.0  # wall seconds of a run that is foretold in a line of its own
+REMAPPED = "remapped"  # of the verdict: part of the history is of other cells
 BAR = "{desc} {percentage:3.0f}%|{bar:12}| {elapsed}{postfix}"
 
 
@@ -174,7 +175,7 @@ class Outlook:
         part of the history is of other cells."""
         verdict = judge(status, reason, history, self.size.cells, self.problem, name)
         if remapped:
-            words = {"rule": "remapped", "value": 1, "limit": 0, "words": remapped}
+            words = {"rule": REMAPPED, "value": 1, "limit": 0, "words": remapped}
             verdict["trust"].append(words)
         write_verdict(self.directory, verdict)
         return verdict

@@ -36,10 +36,16 @@ from runs.early_end.causes import ENDS
 from runs.gauges import Gauges
 from runs.inspection import account
 from runs.march.compiling import compiling
-from runs.march.progress import Outlook, Progress, describe_gauges, describe_threads
+from runs.march.progress import (
+    REMAPPED,
+    Outlook,
+    Progress,
+    describe_gauges,
+    describe_threads,
+)
 from runs.quantities import count, describe_seconds, describe_time, drop_units, is_time
 from runs.ranks.world import World, describe_ranks
-from runs.store.directory import RunDirectory, keep_problem_file, write_noted
+from runs.store.directory import RunDirectory, keep_problem_file, read_verdict, write_noted
 from runs.store.dumps import EMPTY, Names, list_arrays, make_image
 from runs.store.files import write_atomically, write_sealed
 from runs.store.history import (
@@ -239,6 +245,9 @@ class Runner:
             moved = self.directory.set_aside_after(step)
             if moved:
                 say(f"{count(moved, 'later file')} moved to {self.directory}/superseded")
+            with contextlib.suppress(BadInput):  # of a damaged verdict
+                trust = (read_verdict(self.directory) or {"trust": []})["trust"]
+                self.remapped = "".join(one["words"] for one in trust if one["rule"] == REMAPPED)
             self._note_start(f"restart from step {step}")
             write_atomically(self.directory.deck, self.deck_text)
             self.last_point = step

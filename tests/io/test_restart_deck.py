@@ -107,6 +107,8 @@ def test_a_run_goes_on_with_more_cells(shockgrid, half):
     for told in (screen, shockgrid("info", "finer")[1]):
         verdict = next(line for line in told.splitlines() if line.startswith("verdict"))
         assert "the history up to step 20 is that of half, on its cells" in verdict
+    further = shockgrid("restart", "finer", "--set=run.max_steps=26")[1]
+    assert "the history up to step 20 is that of half, on its cells" in further
     assert sum_files(half) == before, "the old run stays as it is"
     old, new = RunData("half"), RunData("finer")
     assert new.deck.cells == 20 and new.deck.mach == 2.0

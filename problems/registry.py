@@ -14,33 +14,47 @@ from regrid.plug_ins import PlugIns
 if TYPE_CHECKING:
     from problems.problem import Problem
 
-OWN: dict[str, str] = {
-    "interface-instability": "problems.interface_instability.problem:InterfaceInstability",
-    "riemann": "problems.riemann:Riemann",
-    "free-stream": "problems.standard.free_stream:FreeStream",
-    "vortex": "problems.standard.vortex:Vortex",
-    "plate-on-wedge": "problems.plate_on_wedge.problem:PlateOnWedge",
-    "saltzmann": "problems.standard.saltzmann:Saltzmann",
-    "conical-target": "problems.conical_target.problem:ConicalTarget",
-    "noh": "problems.standard.noh:Noh",
-    "sedov": "problems.standard.sedov:Sedov",
-    "kidder": "problems.standard.kidder:Kidder",
-    "gresho": "problems.standard.gresho:Gresho",
-    "taylor-green": "problems.standard.taylor_green:TaylorGreen",
-    "rayleigh-taylor": "problems.standard.rayleigh_taylor:RayleighTaylor",
-    "oblique-shock": "problems.standard.oblique_shock:ObliqueShock",
-    "triple-point": "problems.standard.triple_point:TriplePoint",
-    "shock-bubble": "problems.shock_bubble:ShockBubble",
-    "heated-cavity": "problems.convection.heated_cavity:HeatedCavity",
-    "rayleigh-benard": "problems.convection.rayleigh_benard:RayleighBenard",
-    "convection-1d": "problems.convection.convection_1d:Convection1D",
-    "moving-grid-1d": "problems.convection.moving_grid_1d:MovingGrid1D",
-    "detonation": "problems.standard.detonation:Detonation",
-    "grid-march": "problems.grid_march:GridMarch",
-    "flyer-target": "problems.standard.flyer_target:FlyerTarget",
-    "cavity": "problems.standard.cavity:Cavity",
-    "blocks": "problems.blocks:Blocks",
+# by subject, in the order of `shockgrid list`
+SUBJECTS: dict[str, dict[str, str]] = {
+    "interfaces": {
+        "interface-instability": "problems.interface_instability.problem:InterfaceInstability",
+        "rayleigh-taylor": "problems.standard.rayleigh_taylor:RayleighTaylor",
+        "shock-bubble": "problems.shock_bubble:ShockBubble",
+        "triple-point": "problems.standard.triple_point:TriplePoint",
+    },
+    "plates, impacts and cones": {
+        "plate-on-wedge": "problems.plate_on_wedge.problem:PlateOnWedge",
+        "flyer-target": "problems.standard.flyer_target:FlyerTarget",
+        "cavity": "problems.standard.cavity:Cavity",
+        "conical-target": "problems.conical_target.problem:ConicalTarget",
+        "detonation": "problems.standard.detonation:Detonation",
+    },
+    "verification against exact solutions": {
+        "riemann": "problems.riemann:Riemann",
+        "free-stream": "problems.standard.free_stream:FreeStream",
+        "vortex": "problems.standard.vortex:Vortex",
+        "gresho": "problems.standard.gresho:Gresho",
+        "taylor-green": "problems.standard.taylor_green:TaylorGreen",
+        "noh": "problems.standard.noh:Noh",
+        "sedov": "problems.standard.sedov:Sedov",
+        "kidder": "problems.standard.kidder:Kidder",
+        "saltzmann": "problems.standard.saltzmann:Saltzmann",
+        "oblique-shock": "problems.standard.oblique_shock:ObliqueShock",
+    },
+    "convection and viscous flow": {
+        "heated-cavity": "problems.convection.heated_cavity:HeatedCavity",
+        "rayleigh-benard": "problems.convection.rayleigh_benard:RayleighBenard",
+        "convection-1d": "problems.convection.convection_1d:Convection1D",
+        "moving-grid-1d": "problems.convection.moving_grid_1d:MovingGrid1D",
+    },
+    "grids without flow": {
+        "grid-march": "problems.grid_march:GridMarch",
+    },
+    "your own blocks": {
+        "blocks": "problems.blocks:Blocks",
+    },
 }
+OWN = {name: place for listed in SUBJECTS.values() for name, place in listed.items()}
 INSTALLED = PlugIns("shockgrid.problems")  # of other packages
 # where each is, "module:class"; of an installed package, the class itself
 PROBLEMS: ChainMap[str, Any] = ChainMap(OWN, INSTALLED)  # type: ignore

@@ -7,30 +7,13 @@ from pathlib import Path
 
 from problems.problem import check_memory
 from problems.problem_file import is_problem_file
-from problems.registry import INSTALLED, PROBLEMS, read_docstring, summary_line
+from problems.registry import INSTALLED, PROBLEMS, SUBJECTS, read_docstring, summary_line
 from problems.registry import OWN as OWN_PROBLEMS
 from regrid.errors import BadInput
 from regrid.jit import interpreted
 from regrid.plug_ins import GROUPS, find_plug_ins
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
 from runs.quantities import add_unit, is_time
-
-SUBJECTS = {  # of problems, for the list; what is in none of them comes last
-    "interfaces": ("interface-instability", "rayleigh-taylor", "shock-bubble", "triple-point"),
-    "plates, impacts and cones": (
-        "plate-on-wedge", "flyer-target", "cavity", "conical-target", "detonation",
-    ),
-    "verification against exact solutions": (
-        "riemann", "free-stream", "vortex", "gresho", "taylor-green", "noh", "sedov", "kidder",
-        "saltzmann", "oblique-shock",
-    ),
-    "convection and viscous flow": (
-        "heated-cavity", "rayleigh-benard", "convection-1d", "moving-grid-1d",
-    ),
-    "grids without flow": ("grid-march",),
-    "your own blocks": ("blocks",),
-}  # fmt: skip
-
 
 SHORT = r".{1,70}(?=[:;] |\.?$)|.*"  # the longest beginning that is a clause
 
@@ -42,8 +25,8 @@ def describe_all() -> str:
         problem = str(read_toml(path).get("problem"))
         if name != problem:
             decks.setdefault(problem, []).append((name, describe_deck(path)))
-    told, lines = {name for names in SUBJECTS.values() for name in names}, []
-    others = tuple(name for name in OWN_PROBLEMS if name not in told)
+    lines, told = [], {name for names in SUBJECTS.values() for name in names}
+    others = [name for name in OWN_PROBLEMS if name not in told]  # registered by a script
     for subject, names in {**SUBJECTS, "others": others}.items():
         lines += [f"\n{subject.upper()}"] * bool(names)
         for name in names:

@@ -74,8 +74,8 @@ class Drawn:
         what: "fields", "mesh", "interface" or "line"; for a run also "history" (`fields` are then
         its columns), "gauges" or a picture specific to the problem.  One of these words may also be
         given in place of a field.  at: times [s] of dumps, "start" or "end"; mesh: draw the grid
-        over the fields; zoom: x0, x1, y0, y1 [m]; mirror: "x" or "y" adds the mirrored half;
-        beside: the directory of another run, drawn to the same scale; line: x0, y0, x1, y1 [m],
+        over the fields; zoom: x0, x1, y0, y1 [m]; mirror: "x" or "y" adds the mirrored half,
+        of the field alone; beside: the directory of another run, drawn to the same scale; line: x0, y0, x1, y1 [m],
         plots the fields along it; limits: range of the colours in units of the deck; colours: a
         colour map.  Raises BadInput for unknown fields, times or pictures.
         """

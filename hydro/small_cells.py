@@ -461,15 +461,51 @@ def scan_rates(rates, crowding, most_crowded):
 
 
 @kernel
+def find_fastest_cell(rates, row):
+    """The largest of the `rates` (ni, nj), and the first such cell's i and j; `row` (nj,): scratch.
+
+    By columns first, so that the loop fills the processor's vectors.
+    """
+    row[:] = -1.0
+    for i in range(rates.shape[0]):
+        here = rates[i]
+        for j in range(row.shape[0]):
+            row[j] = here[j] if here[j] > row[j] else row[j]
+    most = -1.0
+    for j in range(row.shape[0]):
+        most = row[j] if row[j] > most else most
+    for i in range(rates.shape[0]):
+        for j in range(row.shape[0]):
+            if row[j] == most and rates[i, j] == most:
+                return most, i, j
+    return most, 0, 0
+
+
+@kernel
+def is_squeezed(crowding, i, j, share, far_out):
+    """Could cell i, j be above `find_most_crowded`?  Not where enough cells are nearly as crowded."""
+    square, allowed, count = crowding[i, j], int(share * crowding.size), 0
+    for p in range(crowding.shape[0]):
+        row = crowding[p]
+        for q in range(row.shape[0]):
+            count += 1 if far_out * row[q] >= square else 0
+        if count > allowed:
+            return False
+    return True
+
+
+@kernel
 def scan_state(totals, sums, rates, crowding, part, counts, kept):
     """`scan_rates` of a new state with at most `part` of its cells squeezed; then its validity.
 
     Validity is the result of `sum_tiles` on its `totals`, which fills `sums`.
     """
-    edge = np.inf
-    if part > 0.0:
+    valid = sum_tiles(totals, sums)
+    most, i, j = find_fastest_cell(rates, kept[: rates.shape[1]])
+    if part > 0.0 and is_squeezed(crowding, i, j, part, FAR_OUT * FAR_OUT):
         edge = find_most_crowded(crowding, part, FAR_OUT * FAR_OUT, counts, kept)
-    return (*scan_rates(rates, crowding, edge), sum_tiles(totals, sums))
+        return (*scan_rates(rates, crowding, edge), valid)
+    return most, i, j, most, valid
 
 
 def find_most_crowded_of_bands(

@@ -97,10 +97,11 @@ class NewtonMove:
         work, tuning = self.work, self.tuning
         if self.estimate * max(work.ni, work.nj) ** 2 < tuning.smooth_floor:
             return False  # n cells long, an error of d cells leaves a residual of some d (pi / n)²
+        if work.coarse.able:
+            work.load_old()
         size = work.coarse.find(work.base, work.law, tuning.smooth_floor)
         if not tuning.smooth_floor < size < np.inf:
             return False
-        work.load_old()
         moved = float(np.abs(work.base - work.old).max()) / math.sqrt(work.sigma)
         work.coarse.add(work.base, work.trial, min(1.0, tuning.smooth_part * moved / size))
         ratio = work.compare_corners(work.trial, work.old)

@@ -46,7 +46,11 @@ from regrid.measure.quality import find_areas, square
     SHRUNK, LEAST_AREA, SHARPEST, LONG, SHORT, OLD_AREA, LONG_LINE, LONG_SIDE, LIMITING,
     WHOLE_X, WHOLE_Y, NEAR_SUM_I, NEAR_SUM_J, FAR_SUM_I, FAR_SUM_J, PAST_X, PAST_Y,
 ) = range(0, 74 * SPAN, SPAN)  # fmt: skip
-LOOK_ROWS = 74 * SPAN
+# TILE rows of x and as many of y: of the old grid and of this one, in a transposed frame, where
+# they are columns in memory.  Eight numbers fill a cache line.
+TILE = 8
+OLD_TILE, TILED = 74 * SPAN, (74 + 2 * TILE) * SPAN
+LOOK_ROWS = (74 + 4 * TILE) * SPAN
 OLD_ROWS = OLD_X, OLD_Y, OLD_NEXT_X, OLD_NEXT_Y
 ROWS = HERE_X, HERE_Y, NEXT_X, NEXT_Y
 OLD_NEXT, NEXT = OLD_ROWS[2:], ROWS[2:]
@@ -90,16 +94,70 @@ def shift_rows(count, Z):
         Z[HERE_Y + col] = Z[NEXT_Y + col]
 
 
+@kernel(allocates=False)
+def take_tile(nodes, i, mirrored, low, count, Z):
+    """Load rows i to i + TILE - 1 of a transposed grid into the old grid's tile."""
+    x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
+    rows = min(TILE, x.shape[1] - i)
+    if rows == TILE:
+        for col in range(count):
+            for k in range(TILE):
+                Z[OLD_TILE + k * SPAN + col] = x[low + col, i + k]
+            for k in range(TILE):
+                Z[OLD_TILE + (TILE + k) * SPAN + col] = y[low + col, i + k]
+        return
+    for col in range(count):
+        for k in range(rows):
+            Z[OLD_TILE + k * SPAN + col] = x[low + col, i + k]
+            Z[OLD_TILE + (TILE + k) * SPAN + col] = y[low + col, i + k]
+
+
+@kernel(allocates=False)
+def give_tile(nodes, i, mirrored, low, count, Z):
+    """Store the tile of this grid in rows i to i + TILE - 1 of a transposed grid."""
+    x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
+    rows = min(TILE, x.shape[1] - i)
+    if rows == TILE:
+        for col in range(count):
+            for k in range(TILE):
+                x[low + col, i + k] = Z[TILED + k * SPAN + col]
+            for k in range(TILE):
+                y[low + col, i + k] = Z[TILED + (TILE + k) * SPAN + col]
+        return
+    for col in range(count):
+        for k in range(rows):
+            x[low + col, i + k] = Z[TILED + k * SPAN + col]
+            y[low + col, i + k] = Z[TILED + (TILE + k) * SPAN + col]
+
+
+@inlined
+def take_old_row(nodes, i, frame, low, count, Z):
+    """Row i of the old grid, which lies in a `frame`, into the scratch: all rows in their order."""
+    transposed, mirrored = frame
+    if not transposed:
+        take_row(nodes, i, frame, low, count, OLD_NEXT, Z)
+        return
+    k = i % TILE
+    if k == 0:
+        take_tile(nodes, i, mirrored, low, count, Z)
+    for col in range(count):
+        Z[OLD_NEXT_X + col] = Z[OLD_TILE + k * SPAN + col]
+        Z[OLD_NEXT_Y + col] = Z[OLD_TILE + (TILE + k) * SPAN + col]
+
+
 @inlined
 def give_row(nodes, i, frame, low, count, Z):
-    """Store the next row in row i of a grid in a `frame`, `count` columns from `low` on."""
+    """Store the next row in row i of a grid in a `frame`: all rows in their order."""
     transposed, mirrored = frame
-    x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
     if transposed:
+        k = i % TILE
         for col in range(count):
-            x[low + col, i] = Z[NEXT_X + col]
-            y[low + col, i] = Z[NEXT_Y + col]
+            Z[TILED + k * SPAN + col] = Z[NEXT_X + col]
+            Z[TILED + (TILE + k) * SPAN + col] = Z[NEXT_Y + col]
+        if k == TILE - 1 or i == nodes.shape[2] - 1:
+            give_tile(nodes, i - k, mirrored, low, count, Z)
     else:
+        x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
         row_x, row_y = x[i, low : low + count], y[i, low : low + count]
         for col in range(count):
             row_x[col] = Z[NEXT_X + col]
@@ -134,9 +192,9 @@ def bend_row(bend, Z):
 
 
 @inlined
-def make_new_row(i, law, motion, low, count, nodes, Z):
-    """Row i of the displaced grid, also stored in `nodes`, whose sides may be the motion's."""
-    ni, nj, sides = nodes.shape[1] - 1, nodes.shape[2] - 1, motion.sides
+def make_new_row(i, law, motion, low, count, ni, nj, Z):
+    """Row i of the displaced grid of ni × nj cells."""
+    sides = motion.sides
     if i == 0 or i == ni:
         take_row(sides, i, UPRIGHT, low, count, NEXT, Z)
     else:
@@ -146,7 +204,6 @@ def make_new_row(i, law, motion, low, count, nodes, Z):
     for j in (0, nj):
         if low <= j < low + count:
             Z[NEXT_X + j - low], Z[NEXT_Y + j - low] = sides[0, i, j], sides[1, i, j]
-    give_row(nodes, i, UPRIGHT, low, count, Z)
 
 
 @kernel(allocates=False)
@@ -400,7 +457,8 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
     """Displace a grid with its sides into `nodes`; estimate its residual r·z in `totals` (nj+1).
 
     This covers the chunk's inner node columns.  `given`: the old grid, a grid that receives the new
-    one, and the frame of these two; if both have the layout of `nodes`, the second is not read.
+    one, and the frame of these two.  If both have the layout of `nodes`, the second is not used;
+    otherwise `nodes` only receives the outer two rows at either end.
     `chunk`: its first column and the one after its last, found and scratch.  found (5,) receives
     the quantities named above for all cells with a corner at these columns; corners are compared
     with the old ones.  The deviation of nodes is the maximum of `motion.reach` (nj+1), a distance
@@ -416,10 +474,13 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
     begin(law, motion, low, cells, Z)
     for i in range(-1, ni):
         shift_rows(cells + 1, Z)
-        take_row(old, i + 1, frame, low, cells + 1, OLD_NEXT, Z)
-        make_new_row(i + 1, law, motion, low, cells + 1, nodes, Z)
-        if frame[0] or frame[1]:
+        take_old_row(old, i + 1, frame, low, cells + 1, Z)
+        make_new_row(i + 1, law, motion, low, cells + 1, ni, nj, Z)
+        framed = frame[0] or frame[1]
+        if framed:
             give_row(into, i + 1, frame, low, cells + 1, Z)
+        if not framed or i < 1 or i > ni - 3:
+            give_row(nodes, i + 1, UPRIGHT, low, cells + 1, Z)
         row = law.along_i[:, max(i, 0)]
         line = row[LENGTH], row[LENGTH_CHANGE], row[STEP], row[STEP_CHANGE], law.ki
         take_laws(line, (law.blend_i[i + 1], (i + 1) / ni, law.kj), cells + 1, Z)

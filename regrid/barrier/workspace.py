@@ -213,9 +213,11 @@ class Workspace:
             self.sound = np.ascontiguousarray(sound.T) if transposed else sound
 
     def load_old(self) -> None:
-        """Copy the interior of the last grid to `old` if only a residual check has read it."""
+        """Copy the grid before to `old`, and the displaced one to `base`, if a residual check has
+        them in another frame."""
         if self.given is not None:
             load_grid(self.given, self.old, *self.frame, inside=True)
+            load_grid(self.into, self.base, *self.frame, inside=True)
             self.given = None
 
     def keep_own(self, old: np.ndarray, sides: np.ndarray) -> None:

@@ -243,7 +243,7 @@ class Block:
         plan = self.plan
         for number, wall in plan.pistons:
             plan.wall_speeds[number] = wall.velocity(t)
-        self.sides.start_sides(
+        self.sides.start_sides.entry(
             self.start, self.nodes, self.parameters, plan.inwards, plan.walls, plan.wall_speeds,
             self.scratch, self.rim.rows,
         )  # fmt: skip
@@ -272,7 +272,7 @@ class Block:
 
     def predict(self, dt: float) -> None:
         """From the ghosts: mid-time predictions, and traces at moving faces at the old time."""
-        self.sides.predict_sides(
+        self.sides.predict_sides.entry(
             self.start, self.void_energy, self.nodes, 0.5 * dt, self.parameters, self.plan.moving,
             self.scratch, self.rim.rows,
         )  # fmt: skip
@@ -285,7 +285,7 @@ class Block:
     def trace(self, dt: float) -> None:
         """From the new nodes: mid-time faces, their traces, and fluxes that need nothing else."""
         plan = self.plan
-        self.sides.trace_sides(
+        self.sides.trace_sides.entry(
             self.nodes, self.nodes_new, 1.0 / dt, self.parameters, self.wave_law, plan.walls,
             plan.opened, self.rim.rows,
         )  # fmt: skip
@@ -312,7 +312,7 @@ class Block:
             self.scratch = allocate_scratch(threads)
         self.tile_totals[-1, of.LEAST_C2], self.tile_totals[-1, of.VOIDED] = of.NO_C2, 0.0
         advance = self.flow.advance_threaded if threads > 1 else self.flow.advance
-        advance(
+        advance.entry(
             self._old, self._new, self.rim.rows, dt, self.parameters, self.scratch, self.tiles,
             self.tile_totals[:-1],
         )  # fmt: skip
@@ -466,7 +466,7 @@ class Block:
         rows of this process are computed.
         """
         kind: Any = type(self.eos)
-        make_fill_sound_speed(kind)(
+        make_fill_sound_speed(kind).entry(
             state, self.parameters, self.first_row, self.last_row, self.rates_new
         )
         return self.rates_new

@@ -69,7 +69,7 @@ class Link:
         if not self._passes:
             speeds, closed = self.layer
             layer = speeds, self.reverse, closed
-            solve_link(*self._rims, *self._laws, layer, phase, curved)
+            solve_link.entry(*self._rims, *self._laws, layer, phase, curved)
         elif phase != AT_TRACES:
             pass_seam(*self._rims, phase, curved)
 

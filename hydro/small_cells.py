@@ -640,7 +640,7 @@ class SmallCells:
         """`scan_state` of a block, collectively with its other ranks if it is cut."""
         block, cut = self.sharing[number].block, self.blocks.cuts.get(number)
         if cut is None:
-            found = scan_state(
+            found = scan_state.entry(
                 block.tile_totals, block.sums_array, block.rates_new, block.crowding, self.part,
                 self.counts, self.kept,
             )  # fmt: skip

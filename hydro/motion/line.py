@@ -460,7 +460,7 @@ class Line:
         block = self.segment.block
         spacing = relax, shape == "spline", self.period is not None, self.closed, self.shortest
         arrays = self.damping, self.moved, self.law, self._law, self._turning, self._work
-        stretching, failed = carry_line(
+        stretching, failed = carry_line.entry(
             block.nodes, block.nodes_new, self.span, block.rim.rows, dt, arrays, spacing,
             tuple(self.walls),
         )  # fmt: skip

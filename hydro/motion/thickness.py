@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from hydro import rim as on
-from hydro.motion.line import SHORTEST, THICK_CELLS, Line
+from hydro.motion.line import SHORTEST, THICK_CELLS, Line, find_node
 from regrid.curves import FREE_END
 from regrid.jit import compiled_once, kernel
 
@@ -231,6 +231,50 @@ def measure_line_speed(nodes, faces, walls):
     return sum_evenly(sizes, lengths)
 
 
+@kernel(allocates=False)
+def take_part(nodes, span, rim, start, backwards, line, faces):
+    """Nodes and faces (contact velocity and slip) of a block's line, from `start` on.
+
+    span: of `hydro.motion.line.Line`; `backwards`: from its last node to its first.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    side, first_node, count, first, _ = span
+    for k in range(count):
+        at = count - 1 - k if backwards else k
+        i, j = find_node(side, first_node + at, ni, nj)
+        line[0, start + k], line[1, start + k] = nodes[0, i, j], nodes[1, i, j]
+    for k in range(count - 1):
+        face = first + (count - 2 - k if backwards else k)
+        for q in range(2):
+            faces[q, start + k] = rim[on.U_STAR + q, face]
+        faces[2, start + k] = rim[on.SLIP, face]
+
+
+@kernel(allocates=False)
+def give_part(speeds, start, backwards, out):
+    """Those of the `speeds` that belong to one line, from `start` on, in its own order."""
+    count = out.shape[1]
+    for k in range(count):
+        at = start + (count - 1 - k if backwards else k)
+        out[0, k], out[1, k] = speeds[0, at], speeds[1, at]
+
+
+@kernel
+def fill_speeds(nodes, faces, closed, walls, cube, dt, out):
+    """Velocities (2, n) that let short waves decay; `cube`: that of the thickness [m3].
+
+    Other arguments as in `measure_line_speed` and `fill_thickness_way`.
+    """
+    strength = measure_line_speed(nodes, faces, walls) * cube * dt
+    if not strength > 0.0:
+        out[...] = 0.0
+        return
+    fill_thickness_way(nodes, closed, walls[0], walls[1], strength, out)
+    for k in range(out.shape[1]):
+        for c in range(2):
+            out[c, k] /= dt
+
+
 class ThickContact:
     """A contact whose shortest waves decay: one line, or lines that go on smoothly into each other.
 
@@ -260,21 +304,16 @@ class ThickContact:
     def damp(self, dt: float) -> None:
         """Fill the velocities of the lines' nodes that let short waves decay."""
         for (line, backwards), start in zip(self.parts, self.counts, strict=False):
-            nodes = line.segment.line(line.segment.block.nodes)
-            end, step = start + nodes.shape[1], -1 if backwards else 1
-            self.nodes[:, start:end] = nodes[:, ::step]
-            rows = line.segment.rim.rows[:, : nodes.shape[1] - 1]
-            for face, row in zip(self.faces, (on.U_STAR, on.V_STAR, on.SLIP), strict=True):
-                face[start : end - 1] = rows[row, ::step]
-        walls = self.find_walls()
-        strength = measure_line_speed(self.nodes, self.faces, walls) * self.thickness**3 * dt
-        if strength > 0.0:
-            fill_thickness_way(self.nodes, self.closed, *walls, strength, self.way)
-        else:
-            self.way[...] = 0.0
+            block = line.segment.block
+            take_part(
+                block.nodes, line.span, block.rim.rows, int(start), backwards, self.nodes,
+                self.faces,
+            )  # fmt: skip
+        fill_speeds.entry(
+            self.nodes, self.faces, self.closed, self.find_walls(), self.thickness**3, dt, self.way
+        )
         for (line, backwards), start in zip(self.parts, self.counts, strict=False):
-            way = self.way[:, start : start + line.damping.shape[1]]
-            line.damping[...] = way[:, :: -1 if backwards else 1] / dt
+            give_part(self.way, int(start), backwards, line.damping)
 
 
 def find_thick_contacts(lines: list[Line]) -> list[ThickContact]:

@@ -270,7 +270,7 @@ class Workspace:
             float(tuning.cost_weight) if cost else 0.0,
         )  # fmt: skip
         self.motion = SideMotion(self.sides, *self.motion_tables)
-        self.block = prepare(
+        self.block = prepare.entry(
             self.old, law, self.motion, conditional,
             (float(tuning.cost_margin), float(self.least_limiting_rate)),
             self.boundary_check.scratch,
@@ -307,7 +307,7 @@ class Workspace:
         given = (self.old, self.base, UPRIGHT)
         if self.given is not None:
             given = (self.given, self.into, self.frame)
-        total, self.marks = look(
+        total, self.marks = look.entry(
             self.base, given, self.law, self.motion, (self.coarse.starts_i, self.coarse.sums),
             self.totals, (self.columns, self.found, self.scratch),
         )  # fmt: skip
@@ -336,7 +336,7 @@ class Workspace:
             self._set_threads()
             assemble_on_threads(nodes, self.law, self.columns, self.H, self.gradient, self.scratch)
         else:
-            self._assemble(assemble_barrier, nodes, 0.0)
+            self._assemble(assemble_barrier.entry, nodes, 0.0)
 
     def assemble_smoothed(self, nodes, spread: float) -> None:
         """The same for the smoothed denominator on any grid."""
@@ -376,7 +376,7 @@ class Workspace:
         if self.threads > 1:
             self._set_threads()
             solver = solve_threaded
-        done, first, last = solver(
+        done, first, last = solver.entry(
             self.whole_columns, self.H, (self.solution, self.r, self.z),
             (self.p, self.p_old, self.product), self.totals, (tolerance, floor, most), self.scratch,
         )  # fmt: skip

@@ -483,7 +483,7 @@ def find_fastest_cell(rates, row):
 
 @kernel
 def is_squeezed(crowding, i, j, share, far_out):
-    """Could cell i, j be above `find_most_crowded`?  Not where enough cells are nearly as crowded."""
+    """Could cell i, j be above `find_most_crowded`?  Not if enough cells are nearly as crowded."""
     square, allowed, count = crowding[i, j], int(share * crowding.size), 0
     for p in range(crowding.shape[0]):
         row = crowding[p]

@@ -10,7 +10,6 @@ theory F2, F3, F10.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numba
@@ -43,8 +42,8 @@ TILE_ROWS = 32
 class FlowKernels(NamedTuple):
     """Kernels of one equation of state; `advance` and `advance_threaded` share one signature."""
 
-    advance: Callable[..., Any]
-    advance_threaded: Callable[..., Any]
+    advance: Any
+    advance_threaded: Any
 
 
 @functools.cache

@@ -62,7 +62,7 @@ class CellFields(Mapping[str, np.ndarray]):
 
 
 @functools.cache
-def make_fill_sound_speed(eos_class) -> Callable[..., Any]:
+def make_fill_sound_speed(eos_class) -> Any:
     """Kernel that fills the sound speeds of a material of an `EquationOfState` class."""
     sound_speed_squared_part = eos_class.sound_speed_squared_part
 

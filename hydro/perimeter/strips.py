@@ -10,7 +10,6 @@ keeps its cells' orientation, one that is mirrored does not).
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from hydro import rim as on
@@ -35,10 +34,10 @@ from regrid.jit import compiled_once, kernel
 class SideKernels(NamedTuple):
     """Kernels of one equation of state on block sides."""
 
-    start_sides: Callable[..., Any]
-    predict_sides: Callable[..., Any]
-    trace_sides: Callable[..., Any]
-    fill_polygons: Callable[..., Any]
+    start_sides: Any
+    predict_sides: Any
+    trace_sides: Any
+    fill_polygons: Any
 
 
 @compiled_once(allocates=False)

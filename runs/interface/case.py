@@ -75,9 +75,9 @@ class Drawn:
         its columns), "gauges" or a picture specific to the problem.  One of these words may also be
         given in place of a field.  at: times [s] of dumps, "start" or "end"; mesh: draw the grid
         over the fields; zoom: x0, x1, y0, y1 [m]; mirror: "x" or "y" adds the mirrored half,
-        of the field alone; beside: the directory of another run, drawn to the same scale; line: x0, y0, x1, y1 [m],
-        plots the fields along it; limits: range of the colours in units of the deck; colours: a
-        colour map.  Raises BadInput for unknown fields, times or pictures.
+        of the field alone; beside: the directory of another run, drawn to the same scale; line:
+        x0, y0, x1, y1 [m], plots the fields along it; limits: range of the colours in units of the
+        deck; colours: a colour map.  Raises BadInput for unknown fields, times or pictures.
         """
         from runs.pictures.command import Wanted, fill_figure, new_figure
 

@@ -31,11 +31,7 @@ class NohDeck(Deck, kw_only=True):
     cells: key(int, "cells along each side, 1 long", ge=8, le=MOST_CELLS) = 100
     gamma: key(float, "ratio of specific heats", ge=1.01, le=1000) = 5.0 / 3.0
     pressure: key(
-        float,
-        "of the cold gas; exact theory has 0. Where the grid shrinks 1e-4 or more: the energy of "
-        "colder gas is below the error of its kinetic energy",
-        ge=1e-8,
-        le=0.01,
+        float, "of the cold gas (0 in theory); 1e-4 or more if the grid shrinks", ge=1e-8, le=0.01
     ) = 1e-6
     shrink: key(float, "rate of the grid's shrinking [1/s]; 0: fixed", ge=0, le=1e9) = 0.0
     limiter: Limiter = "monotonised-central"
@@ -81,8 +77,9 @@ class Noh(RadialProblem):
         start = self.compute_stream(compute_centres(nodes), 0.0)
         block = Block("gas", IdealGas(deck.gamma), nodes, *start, limiter=deck.limiter)
         for side in ("i_max", "j_max")[: self.dimensions]:
+            first = block.side_line(side, nodes)
 
-            def beyond(t, first=block.side_line(side, nodes)):
+            def beyond(t, first=first):
                 line = self.scale(first, t)
                 return self.compute_stream(0.5 * (line[:, 1:] + line[:, :-1]), t)
 

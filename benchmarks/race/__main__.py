@@ -78,6 +78,8 @@ def race(case: Case, options: argparse.Namespace) -> list[dict[str, Any]]:
     rows, found = [], {}
     for code, run in list_codes(options, case).items():
         cells = [n for n in case.cells[code] if n <= options.most_cells]
+        if not cells:
+            continue
         if code in ("shockgrid", "pyro"):  # compiles; our large blocks have kernels of their own
             run(cells[0])
             if code == "shockgrid":

@@ -119,7 +119,7 @@ def make_mushroom() -> Case:
     return Case(
         "mushroom",
         "large-amplitude growth, Mach 1.2, density ratio 5.1, gamma 1.4, k a0 = 0.5, to k c t = 15",
-        "half the width of the interface, against shockgrid on 256 cells",
+        "half the width of the interface, relative to shockgrid at 256 cells per wavelength",
         numbers,
         {
             "shockgrid": (16, 32, 64, 128),

@@ -236,9 +236,10 @@ class Results:
             times = f"from linear theory at k c t = {first:.2g} to {kct:.3g}"
         jump = abs(theory.base.p - self.shock.p)
         reflected = theory.reflected if jump > NO_WAVE * self.shock.p else "none"
+        ahead = float(self.eos_first.sound_speed(self.rho_first, deck.pressure))
         head = [
-            f"shock to p = {self.shock.p:g} from rho = {self.rho_first:g} into rho = "
-            f"{self.rho_second:g}; {_describe_modes(self)}, "
+            f"Mach {self.shock.shock_speed / ahead:.3g} shock (to p = {self.shock.p:.4g}) from "
+            f"density {self.rho_first:g} into density {self.rho_second:g}; {_describe_modes(self)}, "
             f"{deck.cells} cells per wavelength, {times}",
             f"  reflected wave: {reflected}, Atwood number after the shock {theory.atwood:.3f}",
             f"  smoothing length of the interface: {self.thickness / deck.wavelength:.3g} "

@@ -7,9 +7,9 @@ measures the radius of the shock, the mean position where grid lines from the ou
 half of the density's rise, and at the end the relative error of the density against the exact
 solution.
 
-Note: energy conservation is half the test.  The total over all cells drives the shock, and a scheme
-that gains a tenth has a radius error of a fortieth.  In the plane the whole centre is one cell of
-gas when nodes follow; use a grid at rest.  Source: [Sedov1959], [Kamm2000].
+Note: the test is sensitive to energy conservation.  The total over all cells drives the shock, and
+a scheme that gains a tenth has a radius error of a fortieth.  In the plane the whole centre is one
+cell of gas when nodes follow; use a grid at rest.  Source: [Sedov1959], [Kamm2000].
 """
 
 import math

@@ -1,0 +1,113 @@
+"""Draws plate-on-wedge-strip.png and mushroom-strip.png of docs/pictures, the first ones of README.
+
+shockgrid run plate-on-wedge --set cells=[160,48] --set output.dumps=28 -o out/plate
+shockgrid run interface-instability-mushroom --set cells=256 -o out/mushroom
+python docs/lead_pictures.py out/plate out/mushroom
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import ListedColormap
+
+from problems.interface_instability.theories import get_kct
+from runs.store.reader import RunData
+
+PICTURES = Path(__file__).resolve().parent / "pictures"
+INK = "#222222"
+AT_REST = {"plate": "#dbe9f4", "wedge": "#e6e2dc"}
+NOTES = (("piston", 24, 8.2), ("aluminium", 36, -0.9), ("steel", 18, -14))  # and where they stand
+LINES = 8  # of the grid of 256 cells, every so many
+
+
+def find_dump(run: RunData, t: float):
+    """The dump nearest to a time."""
+    return min(run.dumps, key=lambda dump: abs(dump.t - t))
+
+
+def draw_grid(axes, nodes: np.ndarray, step: int, **style) -> None:
+    """Every `step`-th line of a grid (2, ni + 1, nj + 1), and the last ones."""
+    lines = []
+    for grid in (nodes, nodes.transpose(0, 2, 1)):
+        count = grid.shape[1] - 1
+        lines += [grid[:, k].T for k in sorted({*range(0, count, step), count})]
+    axes.add_collection(LineCollection(lines, **style))
+
+
+def fade_in(name: str, part: float) -> ListedColormap:
+    """A colour map whose first `part` is transparent at its lower end."""
+    colours = matplotlib.colormaps[name](np.linspace(0.0, 1.0, 256))
+    colours[:, 3] = np.clip(np.linspace(0.0, 1.0 / part, 256), 0.0, 1.0)
+    return ListedColormap(colours)
+
+
+def draw_plate(run: RunData) -> None:
+    """Pressure in plate and wedge at three times; materials at rest in colours of their own."""
+    figure, panels = plt.subplots(
+        1, 3, figsize=(12, 3.2), dpi=140, sharey=True, layout="constrained"
+    )
+    style = {"cmap": fade_in("inferno_r", 0.08), "vmin": 0.0, "vmax": 120.0}
+    for axes, t in zip(panels, (1.64e-6, 3.2e-6, 4.6e-6), strict=True):
+        dump = find_dump(run, t)
+        for block in dump.blocks:
+            nodes, kind = 1e3 * block.nodes, {"shading": "flat", "rasterized": True}
+            rest = np.zeros(np.array(nodes.shape[1:]) - 1)
+            axes.pcolormesh(*nodes, rest, cmap=ListedColormap([AT_REST[block.name]]), **kind)
+            shown = axes.pcolormesh(*nodes, block.cell_fields["p"] / 1e9, **kind, **style)
+            draw_grid(axes, nodes, 2, colors=INK, lw=0.25, alpha=0.3)
+            side = nodes[:, :, 0] if block.name == "plate" else nodes[:, :, -1]
+            axes.plot(*side, color=INK, lw=0.9)
+        axes.set(
+            title=f"{1e6 * dump.t:.2f} µs", aspect="equal", xlim=(0, 48), ylim=(-22.2, 10.8),
+            xlabel="x [mm]",
+        )  # fmt: skip
+    for text, x, y in NOTES:
+        panels[0].text(x, y, text, ha="center", va="center", color=INK)
+    panels[0].set_ylabel("y [mm]")
+    figure.colorbar(shown, ax=panels, label="pressure [GPa]", pad=0.01)
+    figure.savefig(PICTURES / "plate-on-wedge-strip.png")
+
+
+def draw_mushroom(run: RunData) -> None:
+    """Density at three times; the grid in the lower half."""
+    figure, panels = plt.subplots(
+        1, 3, figsize=(12, 3.1), dpi=140, sharey=True, layout="constrained"
+    )
+    style = {"cmap": "YlGnBu", "vmin": 0.0, "vmax": 11.0, "shading": "flat", "rasterized": True}
+    problem = run.problem
+    for axes, t in zip(panels, (0.64, 5.1, 7.65), strict=True):
+        dump = find_dump(run, t)
+        for block in dump.blocks:
+            lower = block.nodes - np.array([0.0, 0.5])[:, None, None]
+            for nodes in (lower, mirror(lower)):
+                shown = axes.pcolormesh(*nodes, block.cell_fields["rho"], **style)
+            draw_grid(axes, lower, LINES, colors=INK, lw=0.3, alpha=0.3)
+        line = dump.blocks[0].nodes[:, -1] - np.array([0.0, 0.5])[:, None]
+        for part in (line, mirror(line)):
+            axes.plot(*part, color=INK, lw=1.2)
+        middle = 0.5 * (line[0].max() + line[0].min())
+        axes.set(
+            title=f"$kct$ = {float(get_kct(problem, dump.t)):.1f}", aspect="equal",
+            xlabel="x / wavelength", xlim=(middle - 0.9, middle + 0.9), ylim=(-0.5, 0.5),
+        )  # fmt: skip
+    panels[0].set_ylabel("y / wavelength")
+    figure.colorbar(shown, ax=panels, label="density", pad=0.01)
+    figure.savefig(PICTURES / "mushroom-strip.png")
+
+
+def mirror(points: np.ndarray) -> np.ndarray:
+    """Points (2, ...) mirrored in the axis y = 0."""
+    return np.stack([points[0], -points[1]])
+
+
+if __name__ == "__main__":
+    draw_plate(RunData(sys.argv[1]))
+    draw_mushroom(RunData(sys.argv[2]))

@@ -239,8 +239,8 @@ class Results:
         ahead = float(self.eos_first.sound_speed(self.rho_first, deck.pressure))
         head = [
             f"Mach {self.shock.shock_speed / ahead:.3g} shock (to p = {self.shock.p:.4g}) from "
-            f"density {self.rho_first:g} into density {self.rho_second:g}; {_describe_modes(self)}, "
-            f"{deck.cells} cells per wavelength, {times}",
+            f"density {self.rho_first:g} into density {self.rho_second:g}; "
+            f"{_describe_modes(self)}, {deck.cells} cells per wavelength, {times}",
             f"  reflected wave: {reflected}, Atwood number after the shock {theory.atwood:.3f}",
             f"  smoothing length of the interface: {self.thickness / deck.wavelength:.3g} "
             f"wavelengths ({self.thickness * deck.cells / deck.wavelength:.2g} of a cell)",

@@ -1,6 +1,6 @@
 """Calls of kernels and of all else in a step of a small run, CPU time inside and outside kernels.
 
-A profiler sees every call of a kernel as one of the function that was compiled.
+A profiler sees every call of a kernel as one of the function that was compiled, or of its entry.
 """
 
 from __future__ import annotations
@@ -33,11 +33,12 @@ class Calls:
         self.seconds = self._begun = 0.0
 
     def __call__(self, frame, event: str, argument) -> None:
-        is_kernel = id(frame.f_code) in self.codes
-        if event == "call" and is_kernel:
+        called = argument if event.startswith("c_") else frame.f_code
+        is_kernel = id(called) in self.codes
+        if event in ("call", "c_call") and is_kernel:
             self.kernels += 1
             self._begun = time.process_time()
-        elif event == "return" and is_kernel:
+        elif event in ("return", "c_return") and is_kernel:
             self.seconds += time.process_time() - self._begun
         elif event in ("call", "c_call"):
             self.others += 1

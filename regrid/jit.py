@@ -48,7 +48,8 @@ TOOLCHAIN = ("numpy", "numba", "llvmlite", "math", "cmath", "operator", "builtin
 VERSIONS = numba.__version__, llvmlite.__version__, np.__version__, sys.version
 KEPT_FILES = 6000  # of the cache: when there are more, half of them go
 MOST_NUMBERS = 300_000  # in an interpreted call's arrays: beyond, compiling takes no longer
-KERNEL_CODES: set[int] = set()  # identities of all kernels' codes: a profiler tells calls by them
+# identities of all kernels' codes and of their entries: a profiler tells calls by them
+KERNEL_CODES: set[int] = set()
 # the first processors with vectors of 512 bits, which slow down where these are used
 SLOW_AT_512 = ("skylake-avx512", "cascadelake", "cooperlake", "cannonlake")
 
@@ -315,6 +316,7 @@ def _compile_or_interpret(compiled: Dispatcher, *arguments):
         try:
             found = type(compiled)._compile_for_args(compiled, *arguments)
             compiled.entry = found if len(compiled.overloads) == 1 else compiled
+            KERNEL_CODES.add(id(found))
             return found
         finally:
             _compiling.ready += 1

@@ -1,6 +1,6 @@
 """Draws plate-on-wedge-strip.png and mushroom-strip.png of docs/pictures, the first ones of README.
 
-shockgrid run plate-on-wedge --set cells=[160,48] --set output.dumps=28 -o out/plate
+shockgrid run plate-on-wedge-apart --set cells=[160,48] --set output.dumps=28 -o out/plate
 shockgrid run interface-instability-mushroom --set cells=256 -o out/mushroom
 python docs/lead_pictures.py out/plate out/mushroom
 """
@@ -24,7 +24,17 @@ from runs.store.reader import RunData
 PICTURES = Path(__file__).resolve().parent / "pictures"
 INK = "#222222"
 AT_REST = {"plate": "#dbe9f4", "wedge": "#e6e2dc"}
-NOTES = (("piston", 24, 8.2), ("aluminium", 36, -0.9), ("steel", 18, -14))  # and where they stand
+# panel, words, where they stand, what they point at
+NOTES = (
+    (0, "aluminium, 2 km/s", (33, 6.2), (33, -1.4)),
+    (0, "steel", (29, -12), (29, -12)),
+    (0, "collision point", (33, -6.3), (19.2, -1.7)),
+    (1, "shocks", (40, -13), (26.5, -6.6)),
+    (1, "contact", (9, -14.5), (12, -1.7)),
+    (2, "jet", (44.5, -13.5), (41.7, -9.3)),
+    (2, "the bodies part", (11, 3.5), (7, -1.5)),
+)
+ARROW = {"arrowstyle": "->", "color": INK, "lw": 0.8}
 LINES = 8  # of the grid of 256 cells, every so many
 
 
@@ -54,8 +64,8 @@ def draw_plate(run: RunData) -> None:
     figure, panels = plt.subplots(
         1, 3, figsize=(12, 3.2), dpi=140, sharey=True, layout="constrained"
     )
-    style = {"cmap": fade_in("inferno_r", 0.08), "vmin": 0.0, "vmax": 120.0}
-    for axes, t in zip(panels, (1.64e-6, 3.2e-6, 4.6e-6), strict=True):
+    style = {"cmap": fade_in("inferno_r", 0.08), "vmin": 0.0, "vmax": 45.0}
+    for axes, t in zip(panels, (1.29e-6, 2.58e-6, 4.3e-6), strict=True):
         dump = find_dump(run, t)
         for block in dump.blocks:
             nodes, kind = 1e3 * block.nodes, {"shading": "flat", "rasterized": True}
@@ -63,14 +73,15 @@ def draw_plate(run: RunData) -> None:
             axes.pcolormesh(*nodes, rest, cmap=ListedColormap([AT_REST[block.name]]), **kind)
             shown = axes.pcolormesh(*nodes, block.cell_fields["p"] / 1e9, **kind, **style)
             draw_grid(axes, nodes, 2, colors=INK, lw=0.25, alpha=0.3)
-            side = nodes[:, :, 0] if block.name == "plate" else nodes[:, :, -1]
-            axes.plot(*side, color=INK, lw=0.9)
+            axes.plot(*nodes[:, :, 0 if block.name == "plate" else -1], color=INK, lw=0.9)
         axes.set(
-            title=f"{1e6 * dump.t:.2f} µs", aspect="equal", xlim=(0, 48), ylim=(-22.2, 10.8),
+            title=f"{1e6 * dump.t:.2f} µs", aspect="equal", xlim=(0, 48), ylim=(-17.1, 11.5),
             xlabel="x [mm]",
         )  # fmt: skip
-    for text, x, y in NOTES:
-        panels[0].text(x, y, text, ha="center", va="center", color=INK)
+    for panel, text, place, target in NOTES:
+        panels[panel].annotate(
+            text, target, place, ha="center", va="center", color=INK, arrowprops=ARROW
+        )
     panels[0].set_ylabel("y [mm]")
     figure.colorbar(shown, ax=panels, label="pressure [GPa]", pad=0.01)
     figure.savefig(PICTURES / "plate-on-wedge-strip.png")

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.race.athena_peer import run_athena
 from benchmarks.race.cases import CASES, Case
 from benchmarks.race.compiled_peers import (
     build_amrclaw,
@@ -65,6 +66,8 @@ def list_codes(options: argparse.Namespace, case: Case) -> dict[str, Any]:
         python = options.peer_python
         program = build_amrclaw(options.amrclaw, python)
         codes["amrclaw"] = partial(run_amrclaw, python, program, case.name, case.numbers)
+    if options.athena and "athena" in wanted:
+        codes["athena"] = partial(run_athena, options.athena, case.name, case.numbers)
     for code in ("pyclaw", "pyro"):
         if options.peer_python and code in wanted:
             codes[code] = partial(
@@ -138,6 +141,8 @@ def main() -> None:
     parser.add_argument("--pennant", type=Path, help="checkout of lanl/PENNANT")
     claw = "folder with checkouts of clawpack's amrclaw, classic, clawutil and riemann"
     parser.add_argument("--amrclaw", type=Path, help=f"{claw}; needs --peer-python")
+    words = "Athena++ built with the problem generator athena_start.cpp and HLLC"
+    parser.add_argument("--athena", type=Path, metavar="PROGRAM", help=words)
     parser.add_argument("--peer-python", help="interpreter with clawpack and pyro-hydro")
     parser.add_argument("--only", nargs="+", choices=CASES, default=list(CASES))
     parser.add_argument("--codes", nargs="+", choices=NAMES, default=list(NAMES))

@@ -85,7 +85,7 @@ def find_amplitude(name: str, run: Any) -> dict[str, Any]:
     """The interface's amplitude over the time since the shock met the mean interface."""
     t = run.history.t - run.problem.arrival
     if name.startswith("growth"):
-        return {"t": t, "amplitude": run.history.amplitude}
+        return {"t": t, "amplitude": run.history.amplitude_mode_1}
     lines = [run.interface(dump.t) for dump in run.dumps]
     width = [0.5 * np.ptp(line.x) for line in lines]
     return {"t": [line.t - run.problem.arrival for line in lines], "amplitude": width}

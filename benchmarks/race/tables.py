@@ -19,11 +19,13 @@ NAMES = {
     "cloverleaf": "CloverLeaf_ref",
     "pyclaw": "PyClaw",
     "amrclaw": "AMRClaw",
+    "athena": "Athena++",
     "pyro": "pyro",
     "pennant": "PENNANT",
 }
-# no other code starts from linear theory; the grid of shockgrid moves with the slab
-NOT_SUMMED_UP = "growth-behind", "contact"
+# no other code starts from linear theory; the grid of shockgrid moves with the slab; PENNANT gains
+# energy in the spherical blast
+NOT_SUMMED_UP = "growth-behind", "contact", "sedov"
 BAR = 0.01  # the error that times are compared at
 FARTHEST = 10.0  # times the longest run: so far times are extrapolated
 
@@ -37,11 +39,13 @@ def fill_race(arguments: str) -> list[str]:
 def find_time(rows: list[dict[str, Any]], code: str) -> tuple[float, bool]:
     """CPU seconds from which on a code stays within BAR, and whether that was measured.
 
-    Between two grids error and time are interpolated in logarithms; beyond the finest they are
-    continued at the slope of the last two.  NaN where the error does not fall.
+    Between two grids error and time are interpolated in logarithms; where the error changes its
+    sign between them, it is the time of the finer one.  Beyond the finest they are continued at the
+    slope of the last two.  NaN where the error does not fall.
     """
     mine = sorted((r for r in rows if r["code"] == code), key=lambda r: r["cells"])
-    errors, seconds = (np.array([abs(r[key]) for r in mine]) for key in ("error", "cpu"))
+    signed, seconds = (np.array([r[key] for r in mine]) for key in ("error", "cpu"))
+    errors = np.abs(signed)
     above = np.flatnonzero(errors > BAR)
     if above.size == 0:
         return float(seconds[0]), True
@@ -50,6 +54,8 @@ def find_time(rows: list[dict[str, Any]], code: str) -> tuple[float, bool]:
     i = last if measured else last - 1
     if i < 0:
         return math.nan, False
+    if measured and signed[i] * signed[i + 1] < 0.0:
+        return float(seconds[i + 1]), True
     fall = math.log(errors[i] / max(errors[i + 1], 1e-12))
     if fall <= 0.0:
         return math.nan, False

@@ -32,7 +32,7 @@ NOTES = (
     (1, "shocks", (40, -13), (26.5, -6.6)),
     (1, "contact", (9, -14.5), (12, -1.7)),
     (2, "jet", (44.5, -13.5), (41.7, -9.3)),
-    (2, "the bodies part", (11, 3.5), (7, -1.5)),
+    (2, "gap opens", (11, 3.5), (7, -1.5)),
 )
 ARROW = {"arrowstyle": "->", "color": INK, "lw": 0.8}
 LINES = 8  # of the grid of 256 cells, every so many
@@ -94,7 +94,7 @@ def draw_mushroom(run: RunData) -> None:
     )
     style = {"cmap": "YlGnBu", "vmin": 0.0, "vmax": 11.0, "shading": "flat", "rasterized": True}
     problem = run.problem
-    for axes, t in zip(panels, (0.64, 5.1, 7.65), strict=True):
+    for axes, t in zip(panels, (0.64, 5.35, 7.65), strict=True):
         dump = find_dump(run, t)
         for block in dump.blocks:
             lower = block.nodes - np.array([0.0, 0.5])[:, None, None]

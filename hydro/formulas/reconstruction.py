@@ -122,7 +122,7 @@ def compute_acoustic_weight(a, b, c, d, lines, inverse, c2):
 
         min(1, (2 div u)² / |grad u|² + 8 S/c²),   S: sum of the variations²     theory F3.11
 
-    of the plain central gradient.  1 in every plane or round wave, whose gradient has
+    of the plain central gradient.  1 in every plane wave, whose gradient has
     one component in some frame; where velocities jump by a fraction of the sound speed; and where
     nothing moves.  Near 0 in slow flow without divergence.  Made of differences of velocities: the
     same in every frame, moved or turned.  Axisymmetric flow: that of the motion in the plane.

@@ -1,8 +1,10 @@
-"""Draws plate-on-wedge-strip.png and mushroom-strip.png of docs/pictures, the first ones of README.
+"""Draws the pictures of README: plate-on-wedge-strip, mushroom-strip and growth-rate.png.
 
 shockgrid run plate-on-wedge-apart --set cells=[160,48] --set output.dumps=28 -o out/plate
 shockgrid run interface-instability-mushroom --set cells=256 -o out/mushroom
-python docs/lead_pictures.py out/plate out/mushroom
+shockgrid run interface-instability --set start=incident --set modes=[{ka0=0.005}] \\
+    --set cells=N -o out/N     # for N of 32, 64, 128
+python docs/lead_pictures.py out/plate out/mushroom out/32 out/64 out/128
 """
 
 from __future__ import annotations
@@ -35,6 +37,7 @@ NOTES = (
     (2, "gap opens", (11, 3.5), (7, -1.5)),
 )
 ARROW = {"arrowstyle": "->", "color": INK, "lw": 0.8}
+SLOPE = 0.005  # k a0 of the runs of growth
 LINES = 8  # of the grid of 256 cells, every so many
 
 
@@ -114,6 +117,26 @@ def draw_mushroom(run: RunData) -> None:
     figure.savefig(PICTURES / "mushroom-strip.png")
 
 
+def draw_growth(runs: list[RunData]) -> None:
+    """Growth rate of the interface in runs on finer and finer grids, and linear theory."""
+    figure, axes = plt.subplots(figsize=(9, 2.7), dpi=120, layout="constrained")
+    problem = runs[-1].problem
+    theory, t = problem.theory, np.linspace(0.0, runs[-1].history.t[-1] - problem.arrival, 600)[1:]
+    for n, run in enumerate(runs):
+        history, cells = run.history, run.problem.deck.cells
+        kct, width = get_kct(run.problem, history.t), max(1, len(history.t) // 200)
+        gain = history.amplitude_mode_1[width:] - history.amplitude_mode_1[:-width]
+        rate = gain / (history.t[width:] - history.t[:-width]) / SLOPE
+        late = kct[width:] > 5.9
+        axes.plot(kct[width:][late], rate[late], color=f"C{n}", lw=1.4, label=f"{cells} cells")
+    words = {"color": INK, "ls": "--", "lw": 1.0, "label": "linear compressible theory"}
+    axes.plot(problem.k * theory.sound_speed * t, theory.get_rate(problem.k, t), **words)
+    axes.axhline(theory.impulsive, color="0.6", lw=0.8, label="impulsive model (Richtmyer)")
+    axes.set(xlabel="kct", ylabel="(da/dt) / ka₀", xlim=(6, 30), ylim=(0.192, 0.238))
+    axes.legend(ncols=3, loc="lower right", fontsize="small")
+    figure.savefig(PICTURES / "growth-rate.png")
+
+
 def mirror(points: np.ndarray) -> np.ndarray:
     """Points (2, ...) mirrored in the axis y = 0."""
     return np.stack([points[0], -points[1]])
@@ -122,3 +145,4 @@ def mirror(points: np.ndarray) -> np.ndarray:
 if __name__ == "__main__":
     draw_plate(RunData(sys.argv[1]))
     draw_mushroom(RunData(sys.argv[2]))
+    draw_growth([RunData(path) for path in sys.argv[3:]])

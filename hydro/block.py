@@ -172,8 +172,12 @@ class Block:
         self.nodes_new = self.nodes.copy()
         self.state_new = np.zeros(self.state.shape)
         self._start: np.ndarray | None = None  # separate if a body source acts
-        self.parameters = eos.parameters
-        self.wave_law = eos.wave_law
+        # of the types for which kernels are compiled, as those of a user's own need not be
+        self.parameters = tuple(
+            np.ascontiguousarray(value, dtype=float) if np.ndim(value) else float(value)
+            for value in eos.parameters
+        )
+        self.wave_law = tuple(float(value) for value in eos.wave_law)
         self.limiter, self.flux_name = limiter, flux
         # one row per tile, and one for polygon cells of sliding contacts and sources
         self.tile_totals = np.zeros((count_tiles(self.ni, self.nj) + 1, of.TOTALS))

@@ -57,8 +57,8 @@ SLOW_AT_512 = ("skylake-avx512", "cascadelake", "cooperlake", "cannonlake")
 def widen_vectors() -> None:
     """Let LLVM use vectors of 512 bits where the processor has them: by itself it stays at 256.
 
-    Kernels are a tenth to a fifth faster, with the same bits.  NUMBA_CPU_NAME and
-    NUMBA_CPU_FEATURES take precedence.
+    Kernels are a tenth to a fifth faster, with the same bits.  It holds for all that numba compiles
+    in this process.  NUMBA_CPU_NAME and NUMBA_CPU_FEATURES take precedence.
     """
     own = numba.config.CPU_NAME, numba.config.CPU_FEATURES
     if own != (None, None) or llvmlite.binding.get_host_cpu_name() in SLOW_AT_512:
@@ -304,7 +304,9 @@ def interpreted():
 
 
 # wall seconds of compiling and loading until now; when the present one began, 0 where there is none
-_compiling = SimpleNamespace(lock=threading.Lock(), seconds=0.0, begun=0.0, ready=0, compiled=0)
+_compiling = SimpleNamespace(
+    lock=threading.Lock(), seconds=0.0, begun=0.0, ready=0, compiled=0, processor=0.0
+)
 
 
 def _compile_or_interpret(compiled: Dispatcher, *arguments):
@@ -312,7 +314,7 @@ def _compile_or_interpret(compiled: Dispatcher, *arguments):
     if is_interpreting() and numbers <= MOST_NUMBERS:
         return compiled.py_func
     with _compiling.lock:
-        _compiling.begun = time.perf_counter()
+        _compiling.begun, processor = time.perf_counter(), time.thread_time()
         try:
             found = type(compiled)._compile_for_args(compiled, *arguments)
             compiled.entry = found if len(compiled.overloads) == 1 else compiled
@@ -320,6 +322,7 @@ def _compile_or_interpret(compiled: Dispatcher, *arguments):
             return found
         finally:
             _compiling.ready += 1
+            _compiling.processor += time.thread_time() - processor
             _compiling.seconds += time.perf_counter() - _compiling.begun
             _compiling.begun = 0.0
 
@@ -329,6 +332,11 @@ def count_compiling() -> tuple[int, int, float]:
     seconds [s] of compiling and loading them."""
     now = time.perf_counter() - _compiling.begun if _compiling.begun else 0.0
     return _compiling.ready, _compiling.compiled, _compiling.seconds + now
+
+
+def read_processor_time() -> float:
+    """Processor time [s] of this process, without that of compiling and loading kernels."""
+    return time.process_time() - _compiling.processor
 
 
 def read_clock() -> float:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -18,7 +17,7 @@ import msgspec
 import numpy as np
 
 from regrid.errors import BadInput, RunFailure
-from regrid.jit import count_compiling
+from regrid.jit import read_processor_time
 from runs.deck.reading import read_deck, suggest_deck
 from runs.engines import Engine, InTurn, open_engine
 from runs.store.files import check_free, write_atomically
@@ -90,7 +89,7 @@ def choose_cases(names: tuple[str, ...]) -> list[Case]:
 def march(name: RunName) -> tuple[dict[str, np.ndarray], dict, float]:
     """History, errors and CPU seconds of a run in memory, without those of compiling kernels."""
     problem = read_deck(*name).make_problem()
-    start, compiling = time.process_time(), count_compiling()[2]
+    start = read_processor_time()
     evolution = problem.build()
     rows = [{"t": 0.0, **evolution.start_row(), **problem.measure(evolution)}]
     most = problem.deck.run.max_steps or math.inf
@@ -100,8 +99,7 @@ def march(name: RunName) -> tuple[dict[str, np.ndarray], dict, float]:
     history = {
         name: np.array([row.get(name, math.nan) for row in rows], dtype=float) for name in names
     }
-    seconds = time.process_time() - start - (count_compiling()[2] - compiling)
-    return history, problem.errors(history), max(0.0, seconds)
+    return history, problem.errors(history), read_processor_time() - start
 
 
 def compute_records(

@@ -6,7 +6,6 @@ that are stable in two dimensions), on three levels of adaptively refined blocks
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -69,20 +68,20 @@ def run_athena(
         for key in ("left", "right", "heavy")
         for n in range(3)
     )
-    home, amplitude, spent = Path(tempfile.mkdtemp()), [], 0.0
-    for t in find_times(numbers):
-        words = deck.format(
-            t_end=float(t), nx=nx // COARSE, ny=ny // COARSE, x0=x0, x1=x1, levels=LEVELS,
-            block=min(16, ny // COARSE), gamma=numbers["gamma"], a0=numbers["a0"],
-            shock=x_shock(numbers),
-        )  # fmt: skip
-        (home / "athinput").write_text(words)
-        spent = spend([str(program.resolve()), "-i", "athinput"], home)
-        rho, size = np.empty((nx, ny)), y1 / ny
-        for x, y, width, value in np.fromfile(home / "end.bin").reshape(-1, 4):
-            n, i, j = (round(d / size) for d in (width, x - 0.5 * width - x0, y - 0.5 * width))
-            rho[i : i + n, j : j + n] = value
-        places = x0 + (np.arange(nx) + 0.5) * size, (np.arange(ny) + 0.5) * size
-        amplitude.append(find_line(name, numbers, rho, *places))
-    shutil.rmtree(home)
+    amplitude, spent = [], 0.0
+    with tempfile.TemporaryDirectory() as folder:
+        for t in find_times(numbers):
+            words = deck.format(
+                t_end=float(t), nx=nx // COARSE, ny=ny // COARSE, x0=x0, x1=x1, levels=LEVELS,
+                block=min(16, ny // COARSE), gamma=numbers["gamma"], a0=numbers["a0"],
+                shock=x_shock(numbers),
+            )  # fmt: skip
+            Path(folder, "athinput").write_text(words)
+            spent = spend([str(program.resolve()), "-i", "athinput"], Path(folder))
+            rho, size = np.empty((nx, ny)), y1 / ny
+            for x, y, width, value in np.fromfile(Path(folder, "end.bin")).reshape(-1, 4):
+                n, i, j = (round(d / size) for d in (width, x - 0.5 * width - x0, y - 0.5 * width))
+                rho[i : i + n, j : j + n] = value
+            places = x0 + (np.arange(nx) + 0.5) * size, (np.arange(ny) + 0.5) * size
+            amplitude.append(find_line(name, numbers, rho, *places))
     return {"t": numbers["times"], "amplitude": amplitude}, spent

@@ -54,8 +54,8 @@ def find_time(rows: list[dict[str, Any]], code: str) -> tuple[float, bool]:
     i = last if measured else last - 1
     if i < 0:
         return math.nan, False
-    if measured and signed[i] * signed[i + 1] < 0.0:
-        return float(seconds[i + 1]), True
+    if signed[i] * signed[i + 1] < 0.0:
+        return (float(seconds[i + 1]), True) if measured else (math.nan, False)
     fall = math.log(errors[i] / max(errors[i + 1], 1e-12))
     if fall <= 0.0:
         return math.nan, False

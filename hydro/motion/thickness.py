@@ -289,7 +289,8 @@ class ThickContact:
         self.way, self.faces = np.empty_like(self.nodes), np.empty((3, int(self.counts[-1])))
         first = [length for line, _ in parts for length in np.hypot(*np.diff(line.track.nodes))]
         thickness = parts[0][0].rule.thickness
-        self.thickness = THICK_CELLS * float(np.mean(first)) if thickness is None else thickness
+        own = THICK_CELLS * float(np.mean(first))
+        self.thickness = own if thickness is None else float(thickness)
         for line, _ in parts:
             line.closed = closed and len(parts) == 1
             if len(parts) == 1 and (closed or FREE_END not in line.walls):

@@ -85,6 +85,8 @@ class NewtonMove:
         self.strayed = strayed
         if not corrected:
             self.quality, self.triangles = work.get_quality(), work.marks.bit_count()
+        if self.moved_ratio <= DOUBTFUL:  # all of the grid will be read
+            work.load_old()
         work.base, work.trial = work.trial, work.base
         return self._accept(self.moved_ratio)
 

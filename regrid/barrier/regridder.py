@@ -22,7 +22,7 @@ from regrid.barrier.side_laws import fill_family_weights
 from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.workspace import Workspace, find_bend, is_bent
 from regrid.errors import BadInput
-from regrid.measure.faults import explain_failure, take_grids, take_numbers
+from regrid.measure.faults import explain_failure, take_grids, take_nodes, take_numbers
 from regrid.protocol import RegridResult
 from regrid.sides import compute_area, get_sides
 
@@ -147,12 +147,7 @@ class BarrierRegridder:
         mirrored = (compute_area(previous) < 0.0) != transposed
         work = self._workspace(previous.shape, transposed)
         if sound_speed is not None:
-            sound_speed = take_numbers(sound_speed, "sound_speed")
-            if sound_speed.shape != (previous.shape[1] - 1, previous.shape[2] - 1):
-                raise BadInput(
-                    f"regrid: sound_speed has shape {sound_speed.shape}; it must be (ni, nj), "
-                    f"here {(previous.shape[1] - 1, previous.shape[2] - 1)}"
-                )
+            sound_speed = _take_sound(sound_speed, previous)
         work.take(previous, boundary, transposed, mirrored, sound_speed, into)
         work.least_limiting_rate = float(least_limiting_rate)
         move = NewtonMove(
@@ -182,6 +177,8 @@ class BarrierRegridder:
 
         `boundary` (2, ni+1, nj+1; only its sides are read), `sound_speed` (ni, nj) [m/s].
         """
+        boundary = take_nodes(boundary, "boundary")
+        sound_speed = _take_sound(sound_speed, boundary)
         work = self._workspace(boundary.shape, False)
         work.take(None, boundary, False, compute_area(boundary) < 0.0, sound_speed)
         work.least_limiting_rate = 0.0
@@ -203,6 +200,17 @@ class BarrierRegridder:
             if self.bend is not None:
                 self._workspaces[key].take_laws(self.bend)
         return self._workspaces[key]
+
+
+def _take_sound(sound_speed, nodes: np.ndarray) -> np.ndarray:
+    """The sound speeds of a grid's cells as C-contiguous float64; BadInput for another shape."""
+    sound_speed = take_numbers(sound_speed, "sound_speed")
+    cells = nodes.shape[1] - 1, nodes.shape[2] - 1
+    if sound_speed.shape != cells:
+        raise BadInput(
+            f"regrid: sound_speed has shape {sound_speed.shape}; it must be (ni, nj), here {cells}"
+        )
+    return sound_speed
 
 
 def _check_tuning(tuning: Tuning) -> None:

@@ -65,7 +65,7 @@ MOST_SHRUNK, LEAST_SCALED, STRAYED, COSECANT, ASPECT = range(5)
 def begin(law, motion, low, cells, Z):
     """Initialise sums, extremes and the tables along j before the first row of cells."""
     nj = law.along_j.shape[1]
-    for k in range(0, LOOK_ROWS, SPAN):
+    for k in range(0, OLD_TILE, SPAN):
         for col in range(round_up(cells + 2)):
             Z[k + col] = 0.0
     for col in range(cells):
@@ -501,7 +501,7 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
             here, end = starts[stretch], starts[stretch + 1]
             add_to_stretch((i - here) / (end - here), cells, Z)
             if i + 1 == end:
-                end_stretch(stretch, low, cells, Z[NEAR_SUM_I:LOOK_ROWS], SPAN, sums)
+                end_stretch(stretch, low, cells, Z[NEAR_SUM_I:OLD_TILE], SPAN, sums)
                 stretch += 1
     for col in range(1, cells):
         totals[low + col] = Z[SUM + col]

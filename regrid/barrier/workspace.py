@@ -378,7 +378,8 @@ class Workspace:
             solver = solve_threaded
         done, first, last = solver.entry(
             self.whole_columns, self.H, (self.solution, self.r, self.z),
-            (self.p, self.p_old, self.product), self.totals, (tolerance, floor, most), self.scratch,
+            (self.p, self.p_old, self.product), self.totals,
+            (float(tolerance), float(floor), int(most)), self.scratch,
         )  # fmt: skip
         self.iterations += done
         return done, first, last

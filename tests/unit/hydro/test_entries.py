@@ -21,7 +21,7 @@ def check_entries(monkeypatch) -> set[str]:
     seen: set[str] = set()
 
     def check(kernel):
-        (signature,) = kernel.signatures
+        signature = kernel.signatures[0]
         entry = kernel.entry
 
         def checked(*arguments):

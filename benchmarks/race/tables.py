@@ -41,8 +41,8 @@ def find_time(rows: list[dict[str, Any]], code: str) -> tuple[float, bool]:
     """CPU seconds from which on a code stays within BAR, and whether that was measured.
 
     Between two grids error and time are interpolated in logarithms; where the error changes its
-    sign between them, or nearly vanishes on the finer one, it is the time of that one.  Beyond the finest they are continued at the
-    slope of the last two.  NaN where the error does not fall.
+    sign between them, or nearly vanishes on the finer one, it is the time of that one.  Beyond the
+    finest they are continued at the slope of the last two.  NaN where the error does not fall.
     """
     mine = sorted((r for r in rows if r["code"] == code), key=lambda r: r["cells"])
     signed, seconds = (np.array([r[key] for r in mine]) for key in ("error", "cpu"))

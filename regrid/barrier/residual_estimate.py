@@ -99,13 +99,6 @@ def take_tile(nodes, i, mirrored, low, count, Z):
     """Load rows i to i + TILE - 1 of a transposed grid into the old grid's tile."""
     x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
     rows = min(TILE, x.shape[1] - i)
-    if rows == TILE:
-        for col in range(count):
-            for k in range(TILE):
-                Z[OLD_TILE + k * SPAN + col] = x[low + col, i + k]
-            for k in range(TILE):
-                Z[OLD_TILE + (TILE + k) * SPAN + col] = y[low + col, i + k]
-        return
     for col in range(count):
         for k in range(rows):
             Z[OLD_TILE + k * SPAN + col] = x[low + col, i + k]
@@ -117,13 +110,6 @@ def give_tile(nodes, i, mirrored, low, count, Z):
     """Store the tile of this grid in rows i to i + TILE - 1 of a transposed grid."""
     x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
     rows = min(TILE, x.shape[1] - i)
-    if rows == TILE:
-        for col in range(count):
-            for k in range(TILE):
-                x[low + col, i + k] = Z[TILED + k * SPAN + col]
-            for k in range(TILE):
-                y[low + col, i + k] = Z[TILED + (TILE + k) * SPAN + col]
-        return
     for col in range(count):
         for k in range(rows):
             x[low + col, i + k] = Z[TILED + k * SPAN + col]
@@ -135,7 +121,7 @@ def take_old_row(nodes, i, frame, low, count, Z):
     """Row i of the old grid, which lies in a `frame`, into the scratch: all rows in their order."""
     transposed, mirrored = frame
     if not transposed:
-        take_row(nodes, i, frame, low, count, OLD_NEXT, Z)
+        take_row(nodes, i, mirrored, low, count, OLD_NEXT, Z)
         return
     k = i % TILE
     if k == 0:
@@ -196,7 +182,7 @@ def make_new_row(i, law, motion, low, count, ni, nj, Z):
     """Row i of the displaced grid of ni × nj cells."""
     sides = motion.sides
     if i == 0 or i == ni:
-        take_row(sides, i, UPRIGHT, low, count, NEXT, Z)
+        take_row(sides, i, False, low, count, NEXT, Z)
     else:
         move_row(take_blend(i, motion.along_i, motion.corners), count, Z)
     if law.bent:

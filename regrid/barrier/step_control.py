@@ -33,19 +33,15 @@ UPRIGHT = False, False  # a frame: is it transposed, is it mirrored?
 
 
 @inlined
-def take_row(nodes, i, frame, low, count, rows, Z):
-    """x and y of row i of a grid in a `frame` into two rows of Z, `count` columns from `low` on."""
-    (transposed, mirrored), (to_x, to_y) = frame, rows
+def take_row(nodes, i, mirrored, low, count, rows, Z):
+    """x and y of row i of a grid into two rows of Z, `count` columns from `low` on; exchanged if
+    the grid is `mirrored`."""
+    to_x, to_y = rows
     x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
-    if transposed:
-        for col in range(count):
-            Z[to_x + col] = x[low + col, i]
-            Z[to_y + col] = y[low + col, i]
-    else:
-        row_x, row_y = x[i, low : low + count], y[i, low : low + count]
-        for col in range(count):
-            Z[to_x + col] = row_x[col]
-            Z[to_y + col] = row_y[col]
+    row_x, row_y = x[i, low : low + count], y[i, low : low + count]
+    for col in range(count):
+        Z[to_x + col] = row_x[col]
+        Z[to_y + col] = row_y[col]
 
 
 @inlined
@@ -83,8 +79,8 @@ def measure_corners(trial, old, first, last, Z):
         Z[NOT_A_NUMBER + col] = 0.0
     for i in range(ni):
         for grid, rows in ((trial, NEW_ROWS), (old, OLD_ROWS)):
-            take_row(grid, i, UPRIGHT, first, cells + 1, rows[:2], Z)
-            take_row(grid, i + 1, UPRIGHT, first, cells + 1, rows[2:], Z)
+            take_row(grid, i, False, first, cells + 1, rows[:2], Z)
+            take_row(grid, i + 1, False, first, cells + 1, rows[2:], Z)
         for col in range(round_up(cells)):
             Z[AREA_1 + col], Z[AREA_2 + col], Z[AREA_3 + col], Z[AREA_4 + col] = find_areas(
                 *take_edges(NEW_ROWS, col, Z)

@@ -118,8 +118,11 @@ class Simulation:
             self._update_rates()
         if small_cells is None:  # a mesh that is given has the cells that it is to have
             small_cells = SMALL_CELLS if mesh == "regrid" else 0.0
-        self.small_cells = SmallCells(self._shared, small_cells)
-        rate = np.inf if is_interpreting() else self.small_cells.find_first_rate()
+        respacing = self._line_rule.respacing  # the cells that are finer until then are wanted
+        self.small_cells = SmallCells(
+            self._shared, small_cells, respacing.start if respacing else 0.0
+        )
+        rate = np.inf if is_interpreting() else self.small_cells.find_first_rate(0.0)
         self.clock = Clock(t_end=float(t_end), cfl=float(cfl), rate=rate)
         self._make_flow()
 
@@ -299,7 +302,7 @@ class Simulation:
             block.state[:, 1:-1, 1:-1], block.void_energy[...] = state, void_energy
         self.motion.counts = before["motion"].counts  # of the step that is over
         self._update_rates()
-        self.clock.rate = self.small_cells.find_first_rate()
+        self.clock.rate = self.small_cells.find_first_rate(self.t)
 
     def _lay_cells(self, refining: Refining, count: int, states: list) -> None:
         """Rebuild the blocks with so many columns, on grids sampled from the first ones."""
@@ -307,7 +310,8 @@ class Simulation:
         self._connect(blocks, links, make_regridder)
         ledger, self.ledger = self.ledger, Ledger(blocks)
         self.ledger.set_state(ledger.get_state())
-        self.small_cells = SmallCells(self._shared, self.small_cells.part)
+        small = self.small_cells
+        self.small_cells = SmallCells(self._shared, small.allowed, small.start)
         self._make_flow()
 
     def take_cells(self, state) -> None:

@@ -598,22 +598,31 @@ class BlockSharing:
 
 
 class SmallCells:
-    """Small cells of all blocks; `share`: the fraction of a block's cells that may be too small."""
+    """Small cells of all blocks; `share`: the fraction of a block's cells that may be too small.
 
-    def __init__(self, blocks: Blocks, share: float):
+    Before the time `start` [s] no cell is: those that are finer then are meant to be.
+    """
+
+    def __init__(self, blocks: Blocks, share: float, start: float = 0.0):
         if not 0.0 <= share <= 0.1:
             raise BadInput(f"small_cells = {share:g}; it must be between 0 and 0.1")
         self.sharing = [BlockSharing(block) for block in blocks]
         self.blocks = blocks
         self.scanned: Sequence[Sequence[Any]] = []  # of all blocks, by `scan`
-        self.part = float(share)
+        self.allowed, self.start = float(share), start
+        self.part = 0.0  # of `allowed`, by `set_time`
         self.counts = np.zeros(BINS, dtype=np.int64)
         self.kept = np.empty(max(block.ni * block.nj for block in blocks))
         self.changed = 0
         self.fastest = Fastest(0.0, 0, 0, 0)
 
-    def find_first_rate(self) -> float:
-        """`find_rate` of initial states; all blocks must be on this rank and updated."""
+    def set_time(self, t: float) -> None:
+        """May cells be too small at t [s]?"""
+        self.part = self.allowed if t >= self.start else 0.0
+
+    def find_first_rate(self, t: float) -> float:
+        """`find_rate` of states given at t [s]; all blocks must be on this rank and updated."""
+        self.set_time(t)
         self.scanned = [self.scan(number)[:-1] for number in range(len(self.sharing))]
         return self.find_rate()
 

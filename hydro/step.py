@@ -106,6 +106,7 @@ def try_step(flow: Flow, dt: float) -> RunFailure | Touch | None:
     touches, pulls = bool(meetings.pairs), bool(tension.lines)  # is there any of them?
     sides, agreed = watch("sides"), False  # agreed: do all ranks hear of what fails?
     t, middle = flow.clock.t, flow.clock.t + 0.5 * dt
+    flow.small_cells.set_time(t)
     fraction = flow.clock.compute_fraction(dt)  # of the stable step
     try:
         with sides:

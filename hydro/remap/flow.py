@@ -130,7 +130,7 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
             block.start[...] = block.state
         block.update(0.0)  # rates and totals of this state
         block.rates[...] = block.rates_new
-    new.clock.rate = new.small_cells.find_first_rate()
+    new.clock.rate = new.small_cells.find_first_rate(old.t)
     return report
 
 

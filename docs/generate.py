@@ -7,7 +7,8 @@
 A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end generated -->`:
 
     head PROBLEM                docstring of the problem's module
-    verify PROBLEM...           rows of results/verify.json ("*": all, with the problem's name)
+    verify PROBLEM...           rows of results/verify.json ("*": all, with the problem's name;
+                                "first": one of each problem)
     runs NAME... | COLUMN; ...  a table, one run a row; see `find_cell` for what a column may be
     sizes NAME... | SIZE... | COLUMN; ... | ERROR   runs NAME-SIZE a row, a column a size
     output NAME                 the command and its output, of a run the problem's summary
@@ -238,8 +239,16 @@ def fill_sizes(arguments: str) -> list[str]:
 
 
 def fill_verify(arguments: str) -> list[str]:
-    """Rows of the named problems; all, with the sum of bars, for `*`."""
+    """Rows of the named problems; all, with the sum of bars, for `*`; the finest of each problem's
+    first quantity for `first`."""
     document = read_result("verify")
+    if arguments.strip() == "first":
+        leading = {}  # by problem
+        for record in document["rows"]:
+            lead = leading.setdefault(record["problem"], record)
+            if record["what"] == lead["what"]:
+                leading[record["problem"]] = record
+        return make_table(HEADS[:5], [format_record(record)[:5] for record in leading.values()])
     everything = arguments.strip() == "*"
     records = [r for r in document["rows"] if everything or r["problem"] in arguments.split()]
     first = 0 if everything or len(arguments.split()) > 1 else 1

@@ -19,12 +19,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap
+from matplotlib.patches import Rectangle
 
 from problems.interface_instability.theories import get_kct
 from runs.store.reader import RunData
 
 PICTURES = Path(__file__).resolve().parent / "pictures"
 INK = "#222222"
+FRAME = "#d1495b"
 AT_REST = {"plate": "#dbe9f4", "wedge": "#e6e2dc"}
 # panel, words, where they stand, what they point at
 NOTES = (
@@ -91,29 +93,36 @@ def draw_plate(run: RunData) -> None:
 
 
 def draw_mushroom(run: RunData) -> None:
-    """Density at three times; the grid in the lower half."""
-    figure, panels = plt.subplots(
-        1, 3, figsize=(12, 3.1), dpi=140, sharey=True, layout="constrained"
-    )
+    """Density at two times, with the grid in the lower half, and the rolled-up end of the last."""
+    figure, panels = plt.subplot_mosaic(
+        [["early", "close"], ["late", "close"]],
+        figsize=(12, 5.4), dpi=140, layout="constrained", width_ratios=(0.85, 1),
+    )  # fmt: skip
+    early, late, close = (panels[name] for name in ("early", "late", "close"))
     style = {"cmap": "YlGnBu", "vmin": 0.0, "vmax": 11.0, "shading": "flat", "rasterized": True}
-    problem = run.problem
-    for axes, t in zip(panels, (0.64, 5.35, 7.65), strict=True):
+    middle = np.array([0.0, 0.5])[:, None, None]
+    for axes, t, lines in ((early, 0.64, LINES), (late, 7.65, LINES), (close, 7.65, 2)):
         dump = find_dump(run, t)
-        for block in dump.blocks:
-            lower = block.nodes - np.array([0.0, 0.5])[:, None, None]
+        for block, colour in zip(dump.blocks, (INK, "white"), strict=True):
+            lower = block.nodes - middle
             for nodes in (lower, mirror(lower)):
                 shown = axes.pcolormesh(*nodes, block.cell_fields["rho"], **style)
-            draw_grid(axes, lower, LINES, colors=INK, lw=0.3, alpha=0.3)
-        line = dump.blocks[0].nodes[:, -1] - np.array([0.0, 0.5])[:, None]
+            draw_grid(axes, lower, lines, colors=colour, lw=0.4, alpha=0.5)
+        line = (dump.blocks[0].nodes - middle)[:, -1]
         for part in (line, mirror(line)):
             axes.plot(*part, color=INK, lw=1.2)
-        middle = 0.5 * (line[0].max() + line[0].min())
-        axes.set(
-            title=f"$kct$ = {float(get_kct(problem, dump.t)):.1f}", aspect="equal",
-            xlabel="x / wavelength", xlim=(middle - 0.9, middle + 0.9), ylim=(-0.5, 0.5),
-        )  # fmt: skip
-    panels[0].set_ylabel("y / wavelength")
-    figure.colorbar(shown, ax=panels, label="density", pad=0.01)
+        centre = 0.5 * (line[0].max() + line[0].min())
+        axes.set(aspect="equal", xlim=(centre - 0.9, centre + 0.9), ylim=(-0.5, 0.5))
+        kct = float(get_kct(run.problem, dump.t))
+        axes.set_title(f"$kct$ = {kct:.1f}")
+    close.set(xlim=(1.25, 1.61), ylim=(-0.34, 0.0), title="red frame: every second grid line")
+    late.add_patch(Rectangle((1.25, -0.34), 0.36, 0.34, fill=False, ec=FRAME, lw=1.5))
+    for axes in (late, close):
+        axes.set_xlabel("x / wavelength")
+    for axes in (early, late):
+        axes.set_ylabel("y / wavelength")
+    close.spines[:].set(color=FRAME, lw=1.5)
+    figure.colorbar(shown, ax=close, label="density", pad=0.01)
     figure.savefig(PICTURES / "mushroom-strip.png")
 
 
@@ -121,18 +130,19 @@ def draw_growth(runs: list[RunData]) -> None:
     """Growth rate of the interface in runs on finer and finer grids, and linear theory."""
     figure, axes = plt.subplots(figsize=(9, 2.7), dpi=120, layout="constrained")
     problem = runs[-1].problem
-    theory, t = problem.theory, np.linspace(0.0, runs[-1].history.t[-1] - problem.arrival, 600)[1:]
+    theory, speed = problem.theory, problem.theory.base.u  # what the shock gives to the interface
+    t = np.linspace(0.0, runs[-1].history.t[-1] - problem.arrival, 600)[1:]
     for n, run in enumerate(runs):
         history, cells = run.history, run.problem.deck.cells
         kct, width = get_kct(run.problem, history.t), max(1, len(history.t) // 200)
         gain = history.amplitude_mode_1[width:] - history.amplitude_mode_1[:-width]
-        rate = gain / (history.t[width:] - history.t[:-width]) / SLOPE
+        rate = gain / (history.t[width:] - history.t[:-width]) / (SLOPE * speed)
         late = kct[width:] > 5.9
         axes.plot(kct[width:][late], rate[late], color=f"C{n}", lw=1.4, label=f"{cells} cells")
     words = {"color": INK, "ls": "--", "lw": 1.0, "label": "linear compressible theory"}
-    axes.plot(problem.k * theory.sound_speed * t, theory.get_rate(problem.k, t), **words)
-    axes.axhline(theory.impulsive, color="0.6", lw=0.8, label="impulsive model (Richtmyer)")
-    axes.set(xlabel="kct", ylabel="(da/dt) / ka₀", xlim=(6, 30), ylim=(0.192, 0.238))
+    axes.plot(problem.k * theory.sound_speed * t, theory.get_rate(problem.k, t) / speed, **words)
+    axes.axhline(theory.impulsive / speed, color="0.6", lw=0.8, label="impulsive model (Richtmyer)")
+    axes.set(xlabel="kct", ylabel="(da/dt) / (ka₀Δu)", xlim=(6, 30), ylim=(0.317, 0.394))
     axes.legend(ncols=3, loc="lower right", fontsize="small")
     figure.savefig(PICTURES / "growth-rate.png")
 

@@ -3,8 +3,8 @@
 shockgrid run plate-on-wedge-apart --set cells=[160,48] --set output.dumps=28 -o out/plate
 shockgrid run interface-instability-mushroom --set cells=256 -o out/mushroom
 shockgrid run interface-instability --set start=incident --set modes=[{ka0=0.005}] \\
-    --set cells=N -o out/N     # for N of 32, 64, 128
-python docs/lead_pictures.py out/plate out/mushroom out/32 out/64 out/128
+    --set cells=N -o out/N     # for N of 32, 64, 128, 256
+python docs/lead_pictures.py out/plate out/mushroom out/32 out/64 out/128 out/256
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Rectangle
 
-from problems.interface_instability.theories import get_kct
+from problems.interface_instability.theories import get_kct, predict_amplitude
 from runs.store.reader import RunData
 
 PICTURES = Path(__file__).resolve().parent / "pictures"
@@ -40,6 +40,7 @@ NOTES = (
 )
 ARROW = {"arrowstyle": "->", "color": INK, "lw": 0.8}
 SLOPE = 0.005  # k a0 of the runs of growth
+START = 6.0  # k c t from which rates are averaged
 LINES = 8  # of the grid of 256 cells, every so many
 
 
@@ -93,57 +94,74 @@ def draw_plate(run: RunData) -> None:
 
 
 def draw_mushroom(run: RunData) -> None:
-    """Density at two times, with the grid in the lower half, and the rolled-up end of the last."""
+    """Density at three times, the grid in the lower half; the rolled-up end of the last."""
     figure, panels = plt.subplot_mosaic(
-        [["early", "close"], ["late", "close"]],
-        figsize=(12, 5.4), dpi=140, layout="constrained", width_ratios=(0.85, 1),
+        [["early", "close"], ["middle", "close"], ["late", "close"]],
+        figsize=(12, 6.6), dpi=140, layout="constrained", width_ratios=(0.6, 1),
     )  # fmt: skip
-    early, late, close = (panels[name] for name in ("early", "late", "close"))
-    style = {"cmap": "YlGnBu", "vmin": 0.0, "vmax": 11.0, "shading": "flat", "rasterized": True}
-    middle = np.array([0.0, 0.5])[:, None, None]
-    for axes, t, lines in ((early, 0.64, LINES), (late, 7.65, LINES), (close, 7.65, 2)):
-        dump = find_dump(run, t)
+    style = {"cmap": "YlGnBu", "vmin": 0.0, "vmax": 10.0, "shading": "flat", "rasterized": True}
+    half = np.array([0.0, 0.5])[:, None, None]
+    times = {"early": 0.64, "middle": 4.97, "late": 7.65, "close": 7.65}
+    for name, axes in panels.items():
+        dump = find_dump(run, times[name])
         for block, colour in zip(dump.blocks, (INK, "white"), strict=True):
-            lower = block.nodes - middle
+            lower = block.nodes - half
             for nodes in (lower, mirror(lower)):
                 shown = axes.pcolormesh(*nodes, block.cell_fields["rho"], **style)
-            draw_grid(axes, lower, lines, colors=colour, lw=0.4, alpha=0.5)
-        line = (dump.blocks[0].nodes - middle)[:, -1]
+            step = 2 if name == "close" else LINES
+            draw_grid(axes, lower, step, colors=colour, lw=0.4, alpha=0.5)
+        line = (dump.blocks[0].nodes - half)[:, -1]
         for part in (line, mirror(line)):
             axes.plot(*part, color=INK, lw=1.2)
         centre = 0.5 * (line[0].max() + line[0].min())
         axes.set(aspect="equal", xlim=(centre - 0.9, centre + 0.9), ylim=(-0.5, 0.5))
-        kct = float(get_kct(run.problem, dump.t))
-        axes.set_title(f"$kct$ = {kct:.1f}")
-    close.set(xlim=(1.25, 1.61), ylim=(-0.34, 0.0), title="red frame: every second grid line")
-    late.add_patch(Rectangle((1.25, -0.34), 0.36, 0.34, fill=False, ec=FRAME, lw=1.5))
-    for axes in (late, close):
-        axes.set_xlabel("x / wavelength")
-    for axes in (early, late):
+        axes.set_title(f"$kct$ = {float(get_kct(run.problem, dump.t)):.1f}", fontsize="medium")
         axes.set_ylabel("y / wavelength")
+    early, late, close = (panels[name] for name in ("early", "late", "close"))
+    for axes, x, y, words, colour in (
+        (early, -0.4, 0.3, "air", INK), (early, 0.67, 0.3, "heavy gas", "white"),
+        (early, 0.52, 0.1, "shock", "white"), (close, 1.31, -0.27, "air", INK),
+        (close, 1.33, -0.06, "heavy gas", "white"),
+    ):  # fmt: skip
+        axes.text(x, y, words, color=colour, ha="center", va="center")
+    early.annotate("", (0.62, 0.02), (0.4, 0.02), arrowprops=ARROW | {"color": "white"})
+    close.set(xlim=(1.25, 1.61), ylim=(-0.34, 0.0), ylabel="", xlabel="x / wavelength")
+    close.set_title("in the red frame, every second grid line", fontsize="medium")
     close.spines[:].set(color=FRAME, lw=1.5)
-    figure.colorbar(shown, ax=close, label="density", pad=0.01)
+    late.set_xlabel("x / wavelength")
+    late.add_patch(Rectangle((1.25, -0.34), 0.36, 0.34, fill=False, ec=FRAME, lw=1.5))
+    figure.colorbar(shown, ax=close, label="density / that of air", pad=0.01)
     figure.savefig(PICTURES / "mushroom-strip.png")
 
 
 def draw_growth(runs: list[RunData]) -> None:
-    """Growth rate of the interface in runs on finer and finer grids, and linear theory."""
-    figure, axes = plt.subplots(figsize=(9, 2.7), dpi=120, layout="constrained")
+    """Growth rate in runs on finer and finer grids and in linear theory; error of its mean."""
+    figure, (left, right) = plt.subplots(
+        1, 2, figsize=(11, 3.0), dpi=130, layout="constrained", width_ratios=(1.5, 1)
+    )
     problem = runs[-1].problem
     theory, speed = problem.theory, problem.theory.base.u  # what the shock gives to the interface
     t = np.linspace(0.0, runs[-1].history.t[-1] - problem.arrival, 600)[1:]
     for n, run in enumerate(runs):
         history, cells = run.history, run.problem.deck.cells
         kct, width = get_kct(run.problem, history.t), max(1, len(history.t) // 200)
-        gain = history.amplitude_mode_1[width:] - history.amplitude_mode_1[:-width]
-        rate = gain / (history.t[width:] - history.t[:-width]) / (SLOPE * speed)
-        late = kct[width:] > 5.9
-        axes.plot(kct[width:][late], rate[late], color=f"C{n}", lw=1.4, label=f"{cells} cells")
+        slope = history.amplitude_mode_1 / SLOPE
+        rate = (slope[width:] - slope[:-width]) / (history.t[width:] - history.t[:-width]) / speed
+        late = kct[width:] > START - 0.1
+        style = {"color": f"C{n}", "lw": 1.4, "label": f"{cells} cells"}
+        left.plot(kct[width:][late], rate[late], **style)
+        exact = predict_amplitude(theory, kct) / problem.k
+        gain, right_gain = (a - np.interp(START, kct, a) for a in (slope, exact))
+        late = kct > START + 1.0
+        right.plot(kct[late], 100.0 * (gain[late] / right_gain[late] - 1.0), **style)
     words = {"color": INK, "ls": "--", "lw": 1.0, "label": "linear compressible theory"}
-    axes.plot(problem.k * theory.sound_speed * t, theory.get_rate(problem.k, t) / speed, **words)
-    axes.axhline(theory.impulsive / speed, color="0.6", lw=0.8, label="impulsive model (Richtmyer)")
-    axes.set(xlabel="kct", ylabel="(da/dt) / (ka₀Δu)", xlim=(6, 30), ylim=(0.317, 0.394))
-    axes.legend(ncols=3, loc="lower right", fontsize="small")
+    left.plot(problem.k * theory.sound_speed * t, theory.get_rate(problem.k, t) / speed, **words)
+    left.axhline(theory.impulsive / speed, color="0.6", lw=0.8, label="impulsive model (Richtmyer)")
+    left.set(xlabel="kct", ylabel="(da/dt) / (ka₀Δu)", xlim=(START, 30), ylim=(0.317, 0.394))
+    left.legend(ncols=2, loc="lower right", fontsize="small")
+    right.axhline(0.0, color=INK, ls="--", lw=1.0)
+    right.set(xlabel="kct", ylabel="error of the mean rate\nfrom kct = 6 on [%]", xlim=(START, 30))
+    right.set_ylim(-1.0, 3.0)
     figure.savefig(PICTURES / "growth-rate.png")
 
 

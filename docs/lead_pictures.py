@@ -88,8 +88,9 @@ def draw_plate(run: RunData) -> None:
         panels[panel].annotate(
             text, target, place, ha="center", va="center", color=INK, arrowprops=ARROW
         )
+    panels[2].text(10, -15.5, "reflected shock", color="white", ha="center", va="center")
     panels[0].set_ylabel("y [mm]")
-    figure.colorbar(shown, ax=panels, label="pressure [GPa]", pad=0.01)
+    figure.colorbar(shown, ax=panels, label="pressure [GPa]", pad=0.01, extend="max")
     figure.savefig(PICTURES / "plate-on-wedge-strip.png")
 
 

@@ -27,7 +27,7 @@ NAMES = {
 # energy in the spherical blast
 NOT_SUMMED_UP = "growth-behind", "contact", "sedov"
 BAR = 0.01  # the error that times are compared at
-CHANCE = 0.1  # of BAR: below it errors cancel
+CHANCE = 0.1  # of BAR: below it errors cancel, where a finer grid has a greater one
 FARTHEST = 10.0  # times the longest run: so far times are extrapolated
 
 
@@ -40,11 +40,16 @@ def fill_race(arguments: str) -> list[str]:
 def find_time(rows: list[dict[str, Any]], code: str) -> tuple[float, bool]:
     """CPU seconds from which on a code stays within BAR, and whether that was measured.
 
-    Between two grids error and time are interpolated in logarithms; where the error changes its
-    sign between them, or nearly vanishes on the finer one, it is the time of that one.  Beyond the
-    finest they are continued at the slope of the last two.  NaN where the error does not fall.
+    A grid on which the error nearly vanishes, but not on a finer one, does not count.  Between two
+    grids error and time are interpolated in logarithms; where the error changes its sign between
+    them, it is the time of the finer one.  Beyond the finest they are continued at the slope of the
+    last two.  NaN where the error does not fall.
     """
     mine = sorted((r for r in rows if r["code"] == code), key=lambda r: r["cells"])
+    most = [max(abs(r["error"]) for r in mine[n:]) for n in range(len(mine))]
+    mine = [
+        r for r, later in zip(mine, most, strict=True) if not abs(r["error"]) < CHANCE * BAR < later
+    ]
     signed, seconds = (np.array([r[key] for r in mine]) for key in ("error", "cpu"))
     errors = np.abs(signed)
     above = np.flatnonzero(errors > BAR)
@@ -55,7 +60,7 @@ def find_time(rows: list[dict[str, Any]], code: str) -> tuple[float, bool]:
     i = last if measured else last - 1
     if i < 0:
         return math.nan, False
-    if signed[i] * signed[i + 1] < 0.0 or (measured and errors[i + 1] < CHANCE * BAR):
+    if signed[i] * signed[i + 1] < 0.0:
         return (float(seconds[i + 1]), True) if measured else (math.nan, False)
     fall = math.log(errors[i] / max(errors[i + 1], 1e-12))
     if fall <= 0.0:

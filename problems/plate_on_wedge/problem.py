@@ -1,12 +1,12 @@
 """A driven plate strikes a wedge; a collision point runs along the face and may emit a jet.
 
-The plate lies on the flat edge of the wedge body; beside it the wedge's face slopes away at
+The plate lies on the flat top of the wedge body; beyond it the wedge's face slopes away at
 `angle`.  A shock from the drive reaches the plate's free lower side, which flies into the gap
-with about twice the particle speed and closes it from the edge outwards: the collision point A
-runs along the face.  With a `gap` the plate starts above the edge, and the contact of the two
-bodies closes and opens by itself.  Below a critical angle the oblique shocks stay attached to A and
+with about twice the particle speed and closes it progressively: the collision point A runs along
+the face.  With a `gap` the plate starts above the wedge, and the contact of the two bodies closes
+and opens by itself.  Below a critical angle the oblique shocks stay attached to A and
 there is no jet; above it a jet runs ahead of A.  When A reaches the end B of the face the shocks
-detach and a thin jet leaves over B and bends round the end face.  Plate and wedge slide on each
+detach and a thin jet leaves past B and curls round the end face.  Plate and wedge slide on each
 other; both grids follow the contact line, with non-matching nodes.
 
 The history has the phases and their times.  The run ends when the jet meets something (the end

@@ -30,7 +30,7 @@ FRAME = "#d1495b"
 AT_REST = {"plate": "#dbe9f4", "wedge": "#e6e2dc"}
 # panel, words, where they stand, what they point at
 NOTES = (
-    (0, "aluminium, 2 km/s", (33, 6.2), (33, -1.4)),
+    (0, "aluminium, 2 km/s", (33, 6.5), (33, 6.5)),
     (0, "steel", (29, -12), (29, -12)),
     (0, "collision point", (33, -6.3), (19.2, -1.7)),
     (1, "shocks", (40, -13), (26.5, -6.6)),
@@ -88,6 +88,8 @@ def draw_plate(run: RunData) -> None:
         panels[panel].annotate(
             text, target, place, ha="center", va="center", color=INK, arrowprops=ARROW
         )
+    velocity = {"width": 3.0, "headwidth": 9.0, "headlength": 8.0, "color": "#4a6fa5"}
+    panels[0].annotate("", (33, 0.6), (33, 5.2), arrowprops=velocity)
     panels[2].text(10, -15.5, "reflected shock", color="white", ha="center", va="center")
     panels[0].set_ylabel("y [mm]")
     figure.colorbar(shown, ax=panels, label="pressure [GPa]", pad=0.01, extend="max")

@@ -1,7 +1,7 @@
 """Tables of the race from docs/results/race.json, for its page and for README.
 
 race tables     a table a case: code, cells, error, CPU seconds
-race summary    CPU seconds to an error of BAR, a row a case
+race summary [CASE...]    CPU seconds to an error of BAR, a row a case; codes that ran none left out
 """
 
 from __future__ import annotations
@@ -32,9 +32,14 @@ FARTHEST = 10.0  # times the longest run: so far times are extrapolated
 
 
 def fill_race(arguments: str) -> list[str]:
-    """Lines of the part `arguments`: `tables` or `summary`."""
+    """Lines of the part `arguments`: `tables`, or `summary` and the names of its cases."""
     document = json.loads(RESULTS.read_text(encoding="utf-8"))
-    return {"tables": write_tables, "summary": write_summary}[arguments.strip()](document)
+    part, *cases = arguments.split()
+    if part == "tables":
+        return write_tables(document)
+    return write_summary(
+        document, cases or [n for n in document["cases"] if n not in NOT_SUMMED_UP]
+    )
 
 
 def find_time(rows: list[dict[str, Any]], code: str) -> tuple[float, bool]:
@@ -93,16 +98,16 @@ def typeset(words: str) -> str:
     return words
 
 
-def write_summary(document: dict[str, Any]) -> list[str]:
+def write_summary(document: dict[str, Any], cases: list[str]) -> list[str]:
     """One row a case."""
-    lines = [f"| CPU seconds to {100 * BAR:.0f} % | {' | '.join(NAMES.values())} |"]
-    lines.append("|---" * (len(NAMES) + 1) + "|")
-    for name, case in document["cases"].items():
-        if name in NOT_SUMMED_UP:
-            continue
+    ran = {r["code"] for r in document["rows"] if r["case"] in cases}
+    codes = {code: name for code, name in NAMES.items() if code in ran}
+    lines = [f"| CPU seconds to {100 * BAR:.0f} % | {' | '.join(codes.values())} |"]
+    lines.append("|---" * (len(codes) + 1) + "|")
+    for name in cases:
         rows = [r for r in document["rows"] if r["case"] == name]
-        cells = " | ".join(describe_time(rows, code) for code in NAMES)
-        lines.append(f"| {typeset(case['title'])} | {cells} |")
+        cells = " | ".join(describe_time(rows, code) for code in codes)
+        lines.append(f"| {typeset(document['cases'][name]['title'])} | {cells} |")
     return lines
 
 

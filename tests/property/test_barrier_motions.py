@@ -64,7 +64,7 @@ def test_fresh_noise_on_the_boundary_is_survived(noise):
 
 
 KEPT = np.load(Path(__file__).with_name("motions.npz"))
-CHUNKS, CHUNK = 20, 50_000
+CHUNKS, CHUNK = 4, 50_000
 
 
 def add_up(counts):
@@ -95,7 +95,8 @@ def test_random_motions_of_every_other_family(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100, 100 + CHUNKS))
-def test_a_million_motions(seed):
+def test_two_hundred_thousand_motions(seed):
+    """Of a million, with the seeds up to 119, none is wrong; a fifth is enough to see a change."""
     check(count_outcomes(seed, CHUNK))
 
 

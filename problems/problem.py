@@ -329,6 +329,10 @@ class Problem:
         plan = self.plan() if known else None
         return sum(math.prod(block.cells) for block in plan[1]) if plan else 0
 
+    def estimate_solver_memory(self, cells: int) -> float:
+        """Bytes of factorised matrices, where the problem has some, at the peak."""
+        return 0.0
+
     def measure(self, evolution: Evolution) -> dict[str, float]:
         """Extra history columns, evaluated before the first and after every step: cheap, with fixed
         keys, a function of the evolution's state alone (restarts must give the same)."""
@@ -438,10 +442,16 @@ def find_memory() -> float | None:
 
 def check_memory(problem: Problem) -> None:
     """Raise BadInput for a problem that does not fit into memory."""
+
+    def need(count: float) -> float:
+        return estimate_memory(int(count)) + problem.estimate_solver_memory(int(count))
+
     cells, memory = problem.estimate_cells(), find_memory()
-    if memory is None or (wanted := estimate_memory(cells)) <= memory:
+    if memory is None or (wanted := need(cells)) <= memory:
         return
-    fit = max(0.0, cells * (memory - PROGRAM) / (wanted - PROGRAM))
+    fit = float(cells)
+    while fit > 1.0 and need(fit) > memory:
+        fit *= 0.98
     raise BadInput(
         f"deck: {cells:.4g} cells need about {wanted / 1e9:.3g} GB of memory, where "
         f"{memory / 1e9:.3g} GB are there; take fewer cells, at most about {fit:.2g} fit"

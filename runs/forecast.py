@@ -129,7 +129,8 @@ def measure_size(problem: Problem, evolution: Any = None) -> Size:
     finest = float(np.min(widths[widths > 0.0], initial=math.inf))
     named = tuple((block.name, tuple(block.cells)) for block in planned)
     dump = float(DUMP_BYTES * sum(sizes) + BLOCK_BYTES * len(planned))
-    return Size(sum(sizes), named, finest, float(t_end), estimate_memory(sum(sizes), sizes), dump)
+    memory = estimate_memory(sum(sizes), sizes) + problem.estimate_solver_memory(sum(sizes))
+    return Size(sum(sizes), named, finest, float(t_end), memory, dump)
 
 
 def foretell_steps(

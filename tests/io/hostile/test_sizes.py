@@ -101,3 +101,13 @@ def test_what_memory_does_not_hold_is_said_at_once(small_machine, name, settings
         assert tracemalloc.get_traced_memory()[1] < 100e6
     finally:
         tracemalloc.stop()
+
+
+def test_the_matrices_of_a_convecting_box_count(monkeypatch):
+    """Its factors need many times the memory of its cells: 1798 cells up to twice as high."""
+    monkeypatch.setattr(size, "find_memory", lambda: 24e9)
+    deck = resolve_deck({"problem": "heated-cavity"}, "deck", ("cells=1798", "aspect=2"))
+    with pytest.raises(BadInput, match=r"where 24 GB are there; take fewer cells"):
+        size.check_memory(deck.make_problem())
+    deck = resolve_deck({"problem": "heated-cavity"}, "deck", ("cells=400",))
+    size.check_memory(deck.make_problem())

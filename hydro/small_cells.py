@@ -28,12 +28,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hydro.block import Block
+from hydro.crowding import (
+    BINS,
+    FAR_OUT,
+    find_most_crowded_of_bands,
+    scan_rates,
+    scan_rates_of_bands,
+    scan_state,
+)
 from hydro.eos.base import make_least_pressure
 from hydro.formulas.geometry import Geometry
-from hydro.interior.update import compute_rate, sum_tiles
+from hydro.interior.update import compute_rate
 from hydro.perimeter.faces import measure_lines, measure_volume
 from hydro.ranks.blocks import Blocks
-from hydro.ranks.cutting import CutBlock, Rows
+from hydro.ranks.cutting import Rows
 from hydro.rim import find_excess
 from hydro.rows import RHO, P, U, V
 from regrid.errors import BadInput
@@ -360,12 +368,7 @@ def make_redistribution(eos_class, geometry: Geometry):
     return redistribute
 
 
-# Bins of the histogram of crowding: binary exponent and three mantissa bits, from 2^-128 to 2^128
-# per square metre.
-BINS, CUT = 2048, 52 - 3
-FIRST = (1023 - 128) << 3
 MARGIN = 1.0 + 1e-9  # a rate must exceed a limit by more than round-off
-FAR_OUT = 1.2  # times the crowding exceeded by the fraction `share` of a block's cells
 TOUCHED_REACH = MOST_REACH + 1  # rows beyond a squeezed cell that its redistribution reads
 
 
@@ -376,168 +379,6 @@ class Fastest(NamedTuple):
     block: int
     i: int
     j: int
-
-
-@kernel
-def count_crowding(crowding, counts):
-    """Histogram `counts` (BINS,) of the `crowding` (ni, nj) of a block's cells."""
-    counts[:] = 0
-    for i in range(crowding.shape[0]):
-        digits = crowding[i].view(np.int64)
-        for j in range(digits.shape[0]):
-            counts[min(max((digits[j] >> CUT) - FIRST, 0), BINS - 1)] += 1
-
-
-@kernel
-def choose_bin(counts, cells, share, far_out):
-    """The cell exceeded by at most the fraction `share` of `cells`, from the histogram `counts`.
-
-    Returns its bin, -1 if no cell has `far_out` times its crowding; its index among the sorted
-    cells of that bin, negative if before all of them; and the lower edge of the bin.
-    """
-    allowed, above = share * cells, 0
-    top = BINS - 1
-    while top > 0 and counts[top] == 0:
-        top -= 1
-    bin = top
-    while bin > 0 and above + counts[bin] <= allowed:
-        above += counts[bin]
-        bin -= 1
-    edges = np.empty(2, dtype=np.int64)
-    edges[0] = (bin + FIRST) << CUT
-    edges[1] = (top + 1 + FIRST) << CUT
-    low, high = edges.view(np.float64)
-    if high <= far_out * low:
-        return -1, 0, low
-    return bin, counts[bin] - 1 - (int(allowed) - above), low
-
-
-@kernel
-def keep_bin(crowding, bin, kept):
-    """Copy the `crowding` (ni, nj) of the cells of a bin into `kept`; returns their number."""
-    size = 0
-    for i in range(crowding.shape[0]):
-        digits = crowding[i].view(np.int64)
-        for j in range(digits.shape[0]):
-            if (digits[j] >> CUT) - FIRST == bin:
-                kept[size] = crowding[i, j]
-                size += 1
-    return size
-
-
-@kernel
-def find_most_crowded(crowding, share, far_out, counts, kept):
-    """`far_out` times the crowding exceeded by at most `share` of the cells; inf if none is above.
-
-    The exact value of that cell is used, not the edge of a bin: round-off must not decide. counts
-    (BINS,), kept (cells,): scratch.
-    """
-    count_crowding(crowding, counts)
-    bin, rank, low = choose_bin(counts, crowding.size, share, far_out)
-    if bin < 0:
-        return np.inf
-    size = keep_bin(crowding, bin, kept)
-    return far_out * np.sort(kept[:size])[rank] if rank >= 0 else far_out * low
-
-
-@kernel
-def scan_rates(rates, crowding, most_crowded):
-    """The largest of the `rates` (ni, nj), its i and j, and the largest but for squeezed cells.
-
-    Cells of more than `most_crowded` count with the rate that they would have at that crowding.
-    """
-    most, bulk, at_i, at_j = -1.0, -1.0, 0, 0
-    for i in range(rates.shape[0]):
-        for j in range(rates.shape[1]):
-            rate = rates[i, j]
-            if rate > bulk:
-                if rate > most:
-                    most, at_i, at_j = rate, i, j
-                square = crowding[i, j]
-                if square > most_crowded:
-                    rate *= (most_crowded / square) ** 0.5
-                bulk = rate if rate > bulk else bulk
-    return most, at_i, at_j, bulk
-
-
-@kernel
-def find_fastest_cell(rates, row):
-    """The largest of the `rates` (ni, nj), and the first such cell's i and j; `row` (nj,): scratch.
-
-    By columns first, so that the loop fills the processor's vectors.
-    """
-    row[:] = -1.0
-    for i in range(rates.shape[0]):
-        here = rates[i]
-        for j in range(row.shape[0]):
-            row[j] = here[j] if here[j] > row[j] else row[j]
-    most = -1.0
-    for j in range(row.shape[0]):
-        most = row[j] if row[j] > most else most
-    for i in range(rates.shape[0]):
-        for j in range(row.shape[0]):
-            if row[j] == most and rates[i, j] == most:
-                return most, i, j
-    return most, 0, 0
-
-
-@kernel
-def is_squeezed(crowding, i, j, share, far_out):
-    """Could cell i, j be above `find_most_crowded`?  Not if enough cells are nearly as crowded."""
-    square, allowed, count = crowding[i, j], int(share * crowding.size), 0
-    for p in range(crowding.shape[0]):
-        row = crowding[p]
-        for q in range(row.shape[0]):
-            count += 1 if far_out * row[q] >= square else 0
-        if count > allowed:
-            return False
-    return True
-
-
-@kernel
-def scan_state(totals, sums, rates, crowding, part, counts, kept):
-    """`scan_rates` of a new state with at most `part` of its cells squeezed; then its validity.
-
-    Validity is the result of `sum_tiles` on its `totals`, which fills `sums`.
-    """
-    valid = sum_tiles(totals, sums)
-    most, i, j = find_fastest_cell(rates, kept[: rates.shape[1]])
-    if part > 0.0 and is_squeezed(crowding, i, j, part, FAR_OUT * FAR_OUT):
-        edge = find_most_crowded(crowding, part, FAR_OUT * FAR_OUT, counts, kept)
-        return (*scan_rates(rates, crowding, edge), valid)
-    return most, i, j, most, valid
-
-
-def find_most_crowded_of_bands(
-    cut: CutBlock, share: float, far_out: float, counts: np.ndarray, kept: np.ndarray
-) -> float:
-    """`find_most_crowded` over all bands of a block, with the same result on all of its ranks.
-
-    counts (BINS,), kept (cells,): scratch.
-    """
-    block = cut.block
-    crowding = block.crowding[slice(*cut.band)]
-    count_crowding(crowding, counts)
-    every = np.sum(cut.group.allgather(counts), axis=0)
-    bin, rank, low = choose_bin(every, block.ni * block.nj, share, far_out)
-    if bin < 0:
-        return np.inf
-    if rank < 0:
-        return far_out * low
-    size = keep_bin(crowding, bin, kept)
-    found = np.concatenate(cut.group.allgather(kept[:size].copy()))
-    return far_out * float(np.sort(found)[rank])
-
-
-def scan_rates_of_bands(cut: CutBlock, most_crowded: float) -> tuple[float, int, int, float]:
-    """`scan_rates` over all bands of a block's new state, with the same result on all its ranks."""
-    block, (first, last) = cut.block, cut.band
-    rate, i, j, bulk = scan_rates(
-        block.rates_new[first:last], block.crowding[first:last], most_crowded
-    )
-    found = cut.group.allgather((rate, first + i, j, bulk))
-    most = max(found, key=lambda band: band[0])  # the first maximum, as in the whole block
-    return *most[:3], max(band[3] for band in found)
 
 
 class BlockSharing:

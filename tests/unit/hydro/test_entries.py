@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from numba.core.dispatcher import Dispatcher
 
-from hydro.block import Block
+from builders import two_blocks, wall_off
 from hydro.boundary import put
 from hydro.eos import IdealGas, MieGruneisen
-from hydro.links import join
 from hydro.motion.line import LineRule
 from hydro.simulation import Simulation
 from regrid.registry import make_regridder
@@ -44,19 +43,11 @@ def check_entries(monkeypatch) -> set[str]:
 
 def make_flow(eos, rho, p, speed, **options):
     """Two blocks whose interface moves; a grid that has to be rebuilt, lines j = const first."""
-    blocks = []
-    for name, start in (("left", 0.0), ("right", 0.5)):
-        grid = np.meshgrid(np.linspace(start, start + 0.5, 7), np.linspace(0, 1, 13), indexing="ij")
-        nodes = np.array(grid)
-        nodes[0] += 0.05 * np.sin(6.28 * nodes[1]) * np.sin(np.pi * nodes[0]) ** 2
-        blocks.append(Block(name, eos, nodes, rho, 0.0, 0.0, p))
-    left, right = blocks
-    links = [join("interface", (left, "i_max"), (right, "i_min"))]
-    put(left, "i_min", "piston", velocity=(speed, 0.0))
-    put(right, "i_max", "wall")
+    states = 2 * [(rho, 0.0, 0.0, p)]
+    blocks, links = two_blocks(lambda y: 0.1 * np.sin(6.28 * y), (6, 12), (eos, eos), states)
+    put(blocks[0], "i_min", "piston", velocity=(speed, 0.0))
     for block in blocks:
-        put(block, "j_min", "wall")
-        put(block, "j_max", "wall")
+        wall_off(block)
     return Simulation(blocks, links, t_end=1e9, **options)
 
 

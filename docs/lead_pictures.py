@@ -22,6 +22,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Rectangle
 
 from problems.interface_instability.theories import get_kct, predict_amplitude
+from problems.pictures import find_dump
 from runs.store.reader import RunData
 
 PICTURES = Path(__file__).resolve().parent / "pictures"
@@ -42,11 +43,6 @@ ARROW = {"arrowstyle": "->", "color": INK, "lw": 0.8}
 SLOPE = 0.005  # k a0 of the runs of growth
 START = 6.0  # k c t from which rates are averaged
 LINES = 8  # of the grid of 256 cells, every so many
-
-
-def find_dump(run: RunData, t: float):
-    """The dump nearest to a time."""
-    return min(run.dumps, key=lambda dump: abs(dump.t - t))
 
 
 def draw_grid(axes, nodes: np.ndarray, step: int, **style) -> None:
@@ -100,7 +96,7 @@ def draw_mushroom(run: RunData) -> None:
     """Density at three times, the grid in the lower half; the rolled-up end of the last."""
     figure, panels = plt.subplot_mosaic(
         [["early", "close"], ["middle", "close"], ["late", "close"]],
-        figsize=(12, 6.6), dpi=140, layout="constrained", width_ratios=(0.6, 1),
+        figsize=(12, 6.6), dpi=105, layout="constrained", width_ratios=(0.6, 1),
     )  # fmt: skip
     style = {"cmap": "YlGnBu", "vmin": 0.0, "vmax": 10.0, "shading": "flat", "rasterized": True}
     half = np.array([0.0, 0.5])[:, None, None]

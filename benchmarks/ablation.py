@@ -75,7 +75,9 @@ class Counted:
 
 def measure_marches(tuning: Tuning, marches, **options) -> dict:
     """Sums over all marches; `sine`, `gap`, `lag` are arrays, one number a march."""
-    found, sums, seconds = [], np.zeros(3), 0.0
+    found = []
+    sums = np.zeros(3)
+    seconds = 0.0
     for march in marches:
         counted = Counted(tuning, **options)
         outcome = run_march(march, counted, lag=True)
@@ -94,8 +96,10 @@ def measure_marches(tuning: Tuning, marches, **options) -> dict:
 
 def measure_motions(tuning: Tuning, count: int, **options) -> dict:
     """Outcomes of random motions and of the kept ones."""
-    counted, outcomes = Counted(tuning, **options), []
-    kept, begin = np.load(KEPT), time.process_time()
+    counted = Counted(tuning, **options)
+    outcomes = []
+    kept = np.load(KEPT)
+    begin = time.process_time()
     motions = [(nodes, boundary) for _, nodes, boundary in make_motions(SEED, count)]
     number = range(kept["outcome"].size)
     for nodes, boundary in motions + [(kept[f"nodes_{n}"], kept[f"boundary_{n}"]) for n in number]:
@@ -168,7 +172,8 @@ def make_variants(numbers: bool) -> dict[str, tuple[Tuning, dict]]:
 
 def compare(found: dict, base: dict, names: list[str]) -> dict:
     """The columns of ratios: in the mean, and the worst march with its name."""
-    sine, gap = found["sine"] / base["sine"], found["gap"] / base["gap"]
+    sine = found["sine"] / base["sine"]
+    gap = found["gap"] / base["gap"]
     lag = found["lag"] - base["lag"]
     return {
         "sine": f"{np.exp(np.log(sine).mean()):.3f}; {sine.min():.2f} {names[sine.argmin()]}",
@@ -185,7 +190,8 @@ def main() -> None:
     tables = Tables(parser)
     options = tables.options
     marches = [march for march in map(load_march, NAMES) if march.dim == 2]
-    names, base = [march.name for march in marches], None
+    names = [march.name for march in marches]
+    base = None
     measure_marches(DEFAULT, marches[:3])  # compiles
     for name, (tuning, more) in make_variants(options.numbers).items():
         if base is not None and options.names and name not in options.names:

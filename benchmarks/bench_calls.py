@@ -73,7 +73,8 @@ def count_calls(step: Callable[[], None]) -> Calls:
 def measure_steps(tables: Tables, rounds: int) -> None:
     """Table `steps`: medians of a step of STEPS_DECK, with two blocks."""
     step = make_step(())
-    counted, whole = [], []
+    counted = []
+    whole = []
     for _ in range(rounds):
         counted += [count_calls(step) for _ in range(STEPS_STEPS)]
         for _ in range(STEPS_STEPS):

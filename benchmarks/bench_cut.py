@@ -19,7 +19,9 @@ from mpi4py import MPI
 from hydro.ranks.ranks import Ranks
 from runs.deck.reading import read_deck
 
-LAST, MESSAGES = 50, 300  # steps that are measured, messages of a kind
+# steps that are measured, messages of a kind
+LAST = 50
+MESSAGES = 300
 
 
 def measure_seconds(comm, call) -> float:
@@ -50,8 +52,10 @@ def main() -> None:
     places = [(0, 1) if n == largest else (1,) for n in range(len(blocks))]
     ranks = Ranks(comm, blocks, places)
     flow.spread(ranks)
-    cut, block = ranks.cuts[largest], blocks[largest]
-    size, number = block.ni * block.nj, np.zeros(1)
+    cut = ranks.cuts[largest]
+    block = blocks[largest]
+    size = block.ni * block.nj
+    number = np.zeros(1)
     total = np.zeros(1)
     nodes = measure_seconds(comm, cut.send_nodes)
     sound = measure_seconds(comm, lambda: cut.gather_rows(block.sound))
@@ -76,7 +80,8 @@ def main() -> None:
     print(f"ghost rows    {per_cell * ghosts:8.2f}")
     print(f"crowding      {per_cell * scan:8.2f}, with the scan of the rates")
     print(f"a sum of all ranks {1e6 * latency:.1f} us, rows beside lines {1e6 * halo:.1f} us")
-    solve, own = 1e9 * regrid / count, 1e9 * update / count
+    solve = 1e9 * regrid / count
+    own = 1e9 * update / count
     print("ranks  home regrids  all regrid  lines shared   (regridding and update, ns per cell)")
     for n in (2, 4, 8, 16):
         far = 2.0 * (n - 1) / n  # of what travels to half of the block

@@ -27,7 +27,8 @@ from regrid.measure.hexahedra import (
 from runs.grids.making import march_in_space
 
 BLOCKS = ("ks_block_1", "ks_block_2")
-SETTLED, PASSES = 1e-3, 40
+SETTLED = 1e-3
+PASSES = 40
 
 
 def march_blocks(tables: Tables, sizes: list[int], steps: int) -> None:
@@ -64,11 +65,14 @@ def settle_blocks(tables: Tables, sizes: list[int]) -> None:
             p = np.array(np.meshgrid(*[np.linspace(0.0, 1.0, size + 1)] * 3, indexing="ij"))
             boundary = find_block(name)(p)
             nodes = first = interpolate_faces(boundary)
-            cell, passes, moved = np.cbrt(abs(compute_volumes(first)).mean()), 0, np.inf
+            cell = np.cbrt(abs(compute_volumes(first)).mean())
+            passes = 0
+            moved = np.inf
             while moved > SETTLED * cell and passes < PASSES:
                 found = BarrierRegridder3D().regrid(nodes, boundary).nodes
                 moved = float(np.abs(found - nodes).max())
-                nodes, passes = found, passes + 1
+                nodes = found
+                passes = passes + 1
             tables.add(
                 "settled in space",
                 block=name,

@@ -58,7 +58,8 @@ def main() -> None:
             found = repair_grid(nodes)
             least = min(least, time.process_time() - begun)
         sine = compute_scaled_jacobians(found.nodes).min()
-        bad, moved = len(find_bad_cells(nodes)), found.report.projected_nodes
+        bad = len(find_bad_cells(nodes))
+        moved = found.report.projected_nodes
         tables.add(
             "untangling",
             grid=name,

@@ -36,7 +36,9 @@ STEPS = {200: 120, 1000: 10}
 FIT_SIZES = (50, 100)  # smaller squares for the model, on one process and two ranks
 ROW_SIZES = (16, 32)  # of the deck of eight blocks
 MUSHROOM = 32
-LEAST_STEPS, CELL_STEPS = 10, 5_000_000  # of a run, and times its cells
+# of a run, and times its cells
+LEAST_STEPS = 10
+CELL_STEPS = 5_000_000
 
 
 def count_steps(cells: int) -> int:
@@ -72,7 +74,8 @@ def make_strong(timings: dict[Case, Timing], strong: list[Case]) -> list[dict[st
     rows = []
     for case in strong:
         base = timings[Case("square", case.cells, *BASE, case.steps)]
-        timing, parts = timings[case], max(1, case.ranks) * case.threads
+        timing = timings[case]
+        parts = max(1, case.ranks) * case.threads
         gain = base.seconds["loop"] / timing.seconds["loop"]
         rows.append(
             {
@@ -93,7 +96,8 @@ def make_weak(timings: dict[Case, Timing], weak: list[Case], sizes: list[int]) -
     """Rows of weak scaling: two ranks with as many cells per rank as one process has."""
     rows = []
     for half, n in zip(weak, sizes, strict=True):
-        one, two = timings[half], timings[Case("square", n, 2, 1, count_steps(n))]
+        one = timings[half]
+        two = timings[Case("square", n, 2, 1, count_steps(n))]
         for timing, cells in ((one, half.cells), (two, n)):
             rows.append(
                 {
@@ -116,7 +120,8 @@ def make_fit(timings: dict[Case, Timing], costs) -> list[dict[str, Any]]:
         parts = predict(costs, describe_load(timing))
         if case.kind == "blocks":  # what its problem records is not what a person's would
             parts["record"] = timing.seconds["record"]
-        total, measured = sum(parts.values()), timing.seconds["loop"]
+        total = sum(parts.values())
+        measured = timing.seconds["loop"]
         rows.append(
             {
                 "run": f"{case.blocks} blocks of {case.cells}², {case.how}",

@@ -73,8 +73,10 @@ def time_parts(tables: Tables, ni: int, nj: int) -> None:
 
 def time_moves(tables: Tables, ni: int, nj: int, threads: int) -> None:
     """Microseconds an inner node of whole regrids."""
-    moving, regridder = make_domain("three_fingers", ni, nj), BarrierRegridder(threads=threads)
-    nodes, count = moving.start, moving.suggested_steps
+    moving = make_domain("three_fingers", ni, nj)
+    regridder = BarrierRegridder(threads=threads)
+    nodes = moving.start
+    count = moving.suggested_steps
     for step in range(count // 2):
         nodes = regridder.regrid(nodes, moving.boundary(step / count)).nodes
     here = (count // 2 - 1) / count
@@ -111,7 +113,8 @@ def time_left_behind(tables: Tables, ni: int, nj: int) -> None:
         for steps in (2, 4, 7)
     }
     regridders["40 sweeps"] = Sweeps(1e-2, family="i", sweeps=40)
-    kept, newton_move.LOST = newton_move.LOST, np.inf
+    kept = newton_move.LOST
+    newton_move.LOST = np.inf
     for name, regridder in regridders.items():
         result = regridder.regrid(behind, behind)
         error = np.abs(result.nodes - exact).max() / moving.cell
@@ -129,7 +132,8 @@ def time_left_behind(tables: Tables, ni: int, nj: int) -> None:
 
 def time_march(tables: Tables, name: str, ni: int, nj: int) -> None:
     """A whole march at half a cell a step: CPU time and the worst grid on the way."""
-    moving, regridder = make_domain(name, ni, nj), BarrierRegridder()
+    moving = make_domain(name, ni, nj)
+    regridder = BarrierRegridder()
     regridder.regrid(moving.start, moving.start)
     found = march_domain(regridder, moving)
     if found.error:

@@ -24,7 +24,9 @@ from regrid.protocol import RegridReport
 DOMAINS = ("three_fingers", "curled_fingers", "single_finger", "strip", "chicane")
 SIZES = "60x40,120x80,240x160"
 WAYS = {"with": DEFAULT.coarse_from, "without": np.inf}
-MOST_STEPS, SETTLED = 40, 2e-3  # Newton steps of the converged grid; its last step, in cells
+# Newton steps of the converged grid; its last step, in cells
+MOST_STEPS = 40
+SETTLED = 2e-3
 
 
 def measure_lag(nodes: np.ndarray, converged: np.ndarray) -> np.ndarray:
@@ -32,8 +34,10 @@ def measure_lag(nodes: np.ndarray, converged: np.ndarray) -> np.ndarray:
     shortest = np.full(nodes.shape[1:], np.inf)
     for axis in (0, 1):
         edges = np.hypot(*np.diff(converged, axis=axis + 1))
-        near, far = [slice(None)] * 2, [slice(None)] * 2
-        near[axis], far[axis] = slice(None, -1), slice(1, None)
+        near = [slice(None)] * 2
+        far = [slice(None)] * 2
+        near[axis] = slice(None, -1)
+        far[axis] = slice(1, None)
         for side in (tuple(near), tuple(far)):
             shortest[side] = np.minimum(shortest[side], edges)
     return np.hypot(*(nodes - converged)) / shortest
@@ -56,8 +60,10 @@ class Way:
     """One march of a domain, and what it took."""
 
     def __init__(self, moving, coarse_from: float):
-        self.regridder, self.nodes = BarrierRegridder(coarse_from=coarse_from), moving.start
-        self.seconds, self.reports = 0.0, list[RegridReport]()
+        self.regridder = BarrierRegridder(coarse_from=coarse_from)
+        self.nodes = moving.start
+        self.seconds = 0.0
+        self.reports = list[RegridReport]()
         self.lag: list[np.ndarray] = []
 
     def go(self, boundary: np.ndarray) -> None:

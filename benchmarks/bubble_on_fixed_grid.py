@@ -43,14 +43,31 @@ from regrid.jit import inlined, kernel
 @inlined
 def compute_flux(rho_l, u_l, v_l, p_l, g_l, rho_r, u_r, v_r, p_r, g_r):
     """Fluxes of mass, momenta and energy, velocity of the face, G of the side it comes from."""
-    c_l, c_r = np.sqrt((1.0 + 1.0 / g_l) * p_l / rho_l), np.sqrt((1.0 + 1.0 / g_r) * p_r / rho_r)
-    s_l, s_r = min(u_l - c_l, u_r - c_r), max(u_l + c_l, u_r + c_r)
-    m_l, m_r = rho_l * (s_l - u_l), rho_r * (s_r - u_r)
+    c_l = np.sqrt((1.0 + 1.0 / g_l) * p_l / rho_l)
+    c_r = np.sqrt((1.0 + 1.0 / g_r) * p_r / rho_r)
+    s_l = min(u_l - c_l, u_r - c_r)
+    s_r = max(u_l + c_l, u_r + c_r)
+    m_l = rho_l * (s_l - u_l)
+    m_r = rho_r * (s_r - u_r)
     s = (p_r - p_l + m_l * u_l - m_r * u_r) / (m_l - m_r)
     if s >= 0.0:
-        rho, u, v, p, g, m, wave, edge = rho_l, u_l, v_l, p_l, g_l, m_l, s_l, min(s_l, 0.0)
+        rho = rho_l
+        u = u_l
+        v = v_l
+        p = p_l
+        g = g_l
+        m = m_l
+        wave = s_l
+        edge = min(s_l, 0.0)
     else:
-        rho, u, v, p, g, m, wave, edge = rho_r, u_r, v_r, p_r, g_r, m_r, s_r, max(s_r, 0.0)
+        rho = rho_r
+        u = u_r
+        v = v_r
+        p = p_r
+        g = g_r
+        m = m_r
+        wave = s_r
+        edge = max(s_r, 0.0)
     energy = g * p + 0.5 * rho * (u * u + v * v)
     star = m / (wave - s)
     energy_star = star * (energy / rho + (s - u) * (s + p / m))
@@ -71,11 +88,18 @@ def add_rates(state, flux, rates):
     state: density, velocity along and across the rows, pressure, G, two cells more at either end;
     flux: scratch (6, n + 1); rates: of density, both momenta, energy and G, times the cells' size.
     """
-    rows, n = rates.shape[1], rates.shape[2]
+    rows = rates.shape[1]
+    n = rates.shape[2]
     for j in range(rows):
-        rho, u, v, p, g = state[0, j], state[1, j], state[2, j], state[3, j], state[4, j]
+        rho = state[0, j]
+        u = state[1, j]
+        v = state[2, j]
+        p = state[3, j]
+        g = state[4, j]
         for i in range(n + 1):
-            a, b, c = i + 1, i + 2, i + 3
+            a = i + 1
+            b = i + 2
+            c = i + 3
             flux[:, i] = compute_flux(
                 rho[a] + 0.5 * limit(rho[a] - rho[i], rho[b] - rho[a]),
                 u[a] + 0.5 * limit(u[a] - u[i], u[b] - u[a]),
@@ -99,7 +123,8 @@ def add_rates(state, flux, rates):
 
 def compute_state(q: np.ndarray) -> np.ndarray:
     """Density, velocity (u, v), pressure, G of density, momentum, energy, G: both (5, ny, nx)."""
-    rho, g = q[0], q[4]
+    rho = q[0]
+    g = q[4]
     u, v = q[1] / rho, q[2] / rho
     return np.stack([rho, u, v, (q[3] - 0.5 * rho * (u * u + v * v)) / g, g])
 
@@ -115,7 +140,9 @@ class TwoGasFlow:
         rho, u, v, p, g = state
         self.q = np.stack([rho, rho * u, rho * v, g * p + 0.5 * rho * (u * u + v * v), g])
         self.inflow = np.reshape(inflow, (5, 1, 1))
-        self.size, self.cfl, self.t = size, cfl, 0.0
+        self.size = size
+        self.cfl = cfl
+        self.t = 0.0
         self._flux = [np.empty((6, n + 1)) for n in state.shape[:0:-1]]
 
     @property
@@ -149,7 +176,9 @@ class TwoGasFlow:
         self.t += dt
 
 
-LEFT, RIGHT = -4.0, 6.4  # ends of the channel over the radius
+# ends of the channel over the radius
+LEFT = -4.0
+RIGHT = 6.4
 PARTS = 8  # a cell that the circle cuts is counted out by so many points each way
 COLUMNS = ("t", "upwind", "downwind", "rear", "axis_front", "wall_front")
 
@@ -165,7 +194,8 @@ def find_first(values: np.ndarray, level: float, x: np.ndarray) -> float:
 
 def measure(flow: TwoGasFlow, x: np.ndarray, problem: ShockBubble) -> tuple[float, ...]:
     """The history's columns after `t`, see ShockBubble.measure."""
-    air, gas = 1.0 / (AIR.gamma - 1.0), 1.0 / (problem.eos.gamma - 1.0)
+    air = 1.0 / (AIR.gamma - 1.0)
+    gas = 1.0 / (problem.eos.gamma - 1.0)
     share = (flow.q[4] - air) / (gas - air)
     p = flow.state[3]
     fronts = (p[0], 1.05 * PRESSURE), (p[-1], 0.5 * (PRESSURE + problem.shock.p))
@@ -193,7 +223,8 @@ def make_flow(problem: ShockBubble, cells: int) -> tuple[TwoGasFlow, np.ndarray]
     share /= PARTS**2
     behind = np.clip((-(1.0 + GAP) * RADIUS - x) / size + 0.5, 0.0, 1.0)
     shock = problem.shock
-    air, gas = 1.0 / (AIR.gamma - 1.0), 1.0 / (problem.eos.gamma - 1.0)
+    air = 1.0 / (AIR.gamma - 1.0)
+    gas = 1.0 / (problem.eos.gamma - 1.0)
     outside = AIR_DENSITY + behind * (shock.rho - AIR_DENSITY)
     state = np.stack([
         outside + share * (problem.rho - outside),

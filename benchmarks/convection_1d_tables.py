@@ -27,7 +27,9 @@ GRIDS["combined, 1/4"] = ("combined", {"share": 0.25})
 def settle_grid(problem: Convection1D, name: str, cells: int) -> tuple[np.ndarray, dict]:
     """Axis and errors of the grid `name` of GRIDS with so many cells, settled; `reynolds` is
     the largest grid Reynolds number of its steps, through-flow included."""
-    grid, (kind, change), column = problem.deck.grid, GRIDS[name], problem.make_column()
+    grid = problem.deck.grid
+    kind, change = GRIDS[name]
+    column = problem.make_column()
     first = make_axis(kind, cells, walls=grid.walls, clustering=grid.clustering)
     x, *found = columns.settle_column(column, kind, first, **{**grid.options(), **change})[:3]
     speed = np.hypot(columns.to_nodes(x, found[1], (0.0, 0.0)), column.through_flow)
@@ -40,7 +42,8 @@ def add_grids(tables: Tables, deck: str) -> None:
     counts = [size * problem.deck.cells for size in SIZES]
     for name in GRIDS:
         axes, found = zip(*(settle_grid(problem, name, count) for count in counts), strict=True)
-        errors, last = [row["error_v"] for row in found], found[-1]
+        errors = [row["error_v"] for row in found]
+        last = found[-1]
         row = {f"error of v, {n} cells": f"{e:.2e}" for n, e in zip(counts, errors, strict=True)}
         row["order"] = f"{math.log2(errors[-2] / errors[-1]):.2f}"
         row |= {"of T there": f"{last['error_T']:.1e}", "most grid Re": f"{last['reynolds']:.3g}"}
@@ -62,11 +65,14 @@ def add_schemes(tables: Tables, deck: str) -> None:
 def add_families(tables: Tables, deck: str) -> None:
     problem = read_deck(deck, ()).make_problem()
     counts = [problem.deck.cells // part for part in PARTS]
-    errors, seconds = {}, dict.fromkeys(FAMILIES, 0.0)
+    errors = {}
+    seconds = dict.fromkeys(FAMILIES, 0.0)
     for count in counts:
-        race, steps = problem.make_race(count), 0
+        race = problem.make_race(count)
+        steps = 0
         while race.finished is None:
-            row, steps = race.advance(), steps + 1
+            row = race.advance()
+            steps = steps + 1
             if count == counts[-1]:
                 seconds = {name: seconds[name] + row[f"seconds_{name}"] for name in FAMILIES}
         errors[count] = race.measure_errors()
@@ -83,13 +89,15 @@ def draw_grids(path: str) -> None:
     from runs.pictures.command import new_figure
 
     problem = read_deck("convection-1d", ()).make_problem()
-    cells, figure = problem.deck.cells, new_figure()
+    cells = problem.deck.cells
+    figure = new_figure()
     figure.set_size_inches(9.0, 4.2)
     steps, errors = figure.subplots(1, 2)
     counts = np.array([max(3, int(size * cells)) for size in (0.5, *SIZES)])
     for name in GRIDS:
         axes, found = zip(*(settle_grid(problem, name, int(n)) for n in counts), strict=True)
-        x, found = axes[1], [row["error_v"] for row in found]
+        x = axes[1]
+        found = [row["error_v"] for row in found]
         steps.plot(0.5 * (x[1:] + x[:-1]), np.diff(x), ".-", ms=3, lw=0.7, label=name)
         errors.loglog(counts, found, "o-", ms=3, lw=0.9, label=name)
     for order, style in ((1, ":"), (2, "--")):

@@ -33,7 +33,8 @@ from regrid.errors import BadInput
 from regrid.registry import make_regridder
 from runs.store.reader import RunData
 
-CELLS, STEPS = 400, 87
+CELLS = 400
+STEPS = 87
 DECK = """*clover
  state 1 density=0.2 energy=1.0
  state 2 density=1.0 energy=2.5 geometry=rectangle xmin=0.0 xmax=5.0 ymin=0.0 ymax=2.0
@@ -88,7 +89,8 @@ def time_rounds(
 
     With a peer each round has one of its runs beside it, and the ratio is of medians.
     """
-    speeds, others = [], []
+    speeds = []
+    others = []
     for _ in range(rounds):
         start = time.process_time()
         for _ in range(times):
@@ -120,14 +122,19 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
 
 def measure_command(tables: Tables, words: tuple[str, ...], rounds: int, peer: Peer | None) -> None:
     """Table `commands`: `shockgrid run WORDS`, warm; the first of its runs is not counted."""
-    speeds, others, seconds, walls = [], [], [], []
+    speeds = []
+    others = []
+    seconds = []
+    walls = []
     with tempfile.TemporaryDirectory() as folder:
         output = str(Path(folder) / "run")
         program = [sys.executable, "-m", "shockgrid", "run", *words, "-q", "--force", "-o", output]
         for number in range(rounds + 1):
-            before, begin = read_child_time(), time.perf_counter()
+            before = read_child_time()
+            begin = time.perf_counter()
             done = subprocess.run(program, capture_output=True, text=True)
-            after, end = read_child_time(), time.perf_counter()
+            after = read_child_time()
+            end = time.perf_counter()
             if done.returncode:
                 raise BadInput(f"{' '.join(words)}: {done.stderr.strip()}")
             run = RunData(output)
@@ -206,7 +213,8 @@ def measure_flow(tables: Tables, cells: int, rounds: int, peer: Peer | None) -> 
     for name in MATERIALS:
         fixed = make_simulation(name, cells, "fixed", 1)
         fixed.advance()
-        block, dt = fixed.blocks[0], 1e-3 * fixed.dt
+        block = fixed.blocks[0]
+        dt = 1e-3 * fixed.dt
         block.predict(dt)  # the new state's ghosts: cells of zeros would all ask for HLL
         moving = make_simulation(name, cells, "regrid", 1)
         cases: dict[str, tuple[Callable[[], object], int, int]] = {

@@ -95,7 +95,9 @@ def run(deck: str, setting: str, folder: Path) -> tuple[RunData, int]:
 def make_past(deck: str, setting: str, folder: Path) -> PastRun:
     """The entry of past_runs.json."""
     data, _ = run(deck, setting, folder)
-    read, size, row = read_deck(deck, (setting,)), measure_size(data.problem), data.history
+    read = read_deck(deck, (setting,))
+    size = measure_size(data.problem)
+    row = data.history
     first_dt = float(row["dt"][1]) / START_FACTORS[0]
     seconds = drop_events(np.nan_to_num(row["seconds_step"]))
     done = np.interp(PARTS * size.t_end, row["t"], seconds.cumsum() / seconds.sum())
@@ -117,10 +119,12 @@ def judge(deck: str, setting: str, folder: Path) -> dict[str, Any]:
     steps = int(history["step"][-1])
     past = find_past(name_flow(read.problem, read.deck), size.cells)
     foretold = foretell_steps(size, past, first_dt, read.deck.run.max_steps)
-    t, seconds = history["t"][1:], history["seconds_step"][1:].copy()
+    t = history["t"][1:]
+    seconds = history["seconds_step"][1:].copy()
     seconds[0] = np.median(seconds)  # loading kernels
     wall = np.cumsum(drop_events(seconds))
-    left, found = TimeLeft(size.t_end, past.course if past else ()), {}
+    left = TimeLeft(size.t_end, past.course if past else ())
+    found = {}
     waiting = [share * wall[-1] for share in SHARES]
     for number, (now, when) in enumerate(zip(t, wall, strict=True), start=1):
         left.note(number, float(now), float(when))

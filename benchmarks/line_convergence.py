@@ -52,7 +52,8 @@ def main() -> None:
     options = parser.parse_args()
     columns = "run", "half the extent", "length over width", "turn in all [deg]"
     print(" | ".join((*columns, "from the one before [m]", "ratio")))
-    before, last = None, None
+    before = None
+    last = None
     with tempfile.TemporaryDirectory() as place:
         runs: list[tuple[str, Callable[[], Any]]] = [
             (run, partial(sg.open, run)) for run in options.runs

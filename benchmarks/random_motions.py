@@ -38,7 +38,9 @@ OUTCOMES = (
     "wrong: named a crossing that is none",
 )
 MOTIONS_A_GRID = 8
-LEAST_SIZE, MOST_SIZE = 0.01, 20.0  # of a motion, in cells
+# of a motion, in cells
+LEAST_SIZE = 0.01
+MOST_SIZE = 20.0
 
 
 def make_grid(rng: np.random.Generator) -> np.ndarray:
@@ -50,13 +52,15 @@ def make_grid(rng: np.random.Generator) -> np.ndarray:
         x, y = (np.concatenate([[0.0], np.cumsum(step) / step.sum()]) for step in steps)
         x = np.repeat(x[:, None], nj + 1, axis=1) * rng.uniform(0.3, 3.0)
         y = np.repeat(y[None], ni + 1, axis=0)
-        wave, phase = rng.uniform(-0.25, 0.25, 2), rng.uniform(-2.0, 2.0, 2)
+        wave = rng.uniform(-0.25, 0.25, 2)
+        phase = rng.uniform(-2.0, 2.0, 2)
         x, y = (
             x + wave[0] * np.sin(2.0 * np.pi * y + phase[0]),
             y + wave[1] * np.sin(2.0 * np.pi * x + phase[1]),
         )
         angle = rng.uniform(0.0, 2.0 * np.pi)
-        cos, sin = np.cos(angle), np.sin(angle)
+        cos = np.cos(angle)
+        sin = np.sin(angle)
         nodes = np.array((cos * x - sin * y, sin * x + cos * y))
         if rng.random() < 0.3:
             nodes = nodes.transpose(0, 2, 1)
@@ -131,9 +135,14 @@ def is_simple(nodes: np.ndarray) -> bool:
     count = x.shape[1]
     meeting = (q - p == 1) | (q - p == count - 1)
     first, second = p[~meeting], q[~meeting]
-    a, b, c, d = x[:, first], after[:, first], x[:, second], after[:, second]
-    with_c, with_d = compute_turns(a, b, c)[0], compute_turns(a, b, d)[0]
-    with_a, with_b = compute_turns(c, d, a)[0], compute_turns(c, d, b)[0]
+    a = x[:, first]
+    b = after[:, first]
+    c = x[:, second]
+    d = after[:, second]
+    with_c = compute_turns(a, b, c)[0]
+    with_d = compute_turns(a, b, d)[0]
+    with_a = compute_turns(c, d, a)[0]
+    with_b = compute_turns(c, d, b)[0]
     if ((with_c * with_d <= 0) & (with_a * with_b <= 0)).any():
         return False
     # Two edges that share a node touch elsewhere only where the second folds back onto the first.

@@ -20,9 +20,11 @@ ROWS = 2  # of cells: nothing varies across
 def make_random_pair(seed: int) -> tuple[SideState, SideState]:
     """States left and right."""
     random = np.random.default_rng(seed)
-    sides, sounds = [], []
+    sides = []
+    sounds = []
     for _ in range(2):
-        rho, p = 10.0 ** random.uniform(-2.0, 2.0), 10.0 ** random.uniform(-3.0, 3.0)
+        rho = 10.0 ** random.uniform(-2.0, 2.0)
+        p = 10.0 ** random.uniform(-3.0, 3.0)
         gamma = random.uniform(1.1, 3.0)
         sides.append({"rho": float(rho), "p": float(p), "gamma": float(gamma)})
         sounds.append(float(np.sqrt(gamma * p / rho)))

@@ -23,7 +23,9 @@ from scipy.special import erf
 import shockgrid as sg
 
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "pictures" / "shock-tube.png"
-WAVELENGTH, PRESSURE = 0.0593, 92555.0  # m, Pa
+# m, Pa
+WAVELENGTH = 0.0593
+PRESSURE = 92555.0
 AIR = {"gamma": 1.276, "rho": 1.351}  # with a quarter of acetone vapour by volume
 SF6 = {"gamma": 1.093, "rho": 5.494}
 LAYER = 5e-3  # thickness of the layer before the shock [m]: jump of density / largest gradient
@@ -79,7 +81,8 @@ def compute_reduction(atwood: float, thickness: float) -> float:
     bands[1] = rho
     bands[1, 1:] += face
     bands[1, :-1] += face
-    w, largest = np.exp(-np.abs(x)), 1.0
+    w = np.exp(-np.abs(x))
+    largest = 1.0
     for _ in range(60):  # inverse iteration
         w = solveh_banded(bands, slope * w) / largest
         largest *= np.abs(w).max()

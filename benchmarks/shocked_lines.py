@@ -90,7 +90,8 @@ def sweep_flat_line(deck: InterfaceDeck, parts: int = 10) -> FlatLine:
         second_shock=None,
     )
     farthest = InterfaceInstability(deck)
-    base, shock = farthest.theory.base, farthest.shock
+    base = farthest.theory.base
+    shock = farthest.shock
     since = AWAY * deck.wavelength / (base.right_wave.head - base.u)
     t_end = farthest.arrival + since
     run = msgspec.structs.replace(deck.run, t_end=t_end)
@@ -99,7 +100,8 @@ def sweep_flat_line(deck: InterfaceDeck, parts: int = 10) -> FlatLine:
     even = tuple(float(width * np.ceil(length / width)) for length in lengths)
     deck = msgspec.structs.replace(deck, run=run, lengths=even, uniform=max(even) / deck.wavelength)
     s = np.linspace(0.0, 1.0, parts + 1)
-    places, speeds = [], []
+    places = []
+    speeds = []
     for part in s:
         t, x = _follow_line(msgspec.structs.replace(deck, gap=GAP + part * size))
         late = t > t_end - LATE * since
@@ -159,7 +161,8 @@ def measure_null_line(
             second_shock=None,
         )
     )
-    flow, found = problem.build(), []
+    flow = problem.build()
+    found = []
     begun = _measure_modes(problem, flow)[0]
     exact = 1.0 - problem.shock.particle_speed / problem.shock.shock_speed
     for kct in times:

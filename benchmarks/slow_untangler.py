@@ -20,7 +20,8 @@ from scipy.optimize import linprog
 from scipy.sparse import coo_matrix, csr_matrix, hstack
 from scipy.sparse.linalg import spsolve
 
-STEPS, LEAST_TRUST = 60, 1e-6
+STEPS = 60
+LEAST_TRUST = 1e-6
 
 
 class Areas:
@@ -32,8 +33,11 @@ class Areas:
         low, high = slice(None, -1), slice(1, None)
         rows = []
         for p, q in ((low, low), (high, low), (high, high), (low, high)):
-            far_p, far_q = (high if p is low else low), (high if q is low else low)
-            own, along, across = number[p, q], number[far_p, q], number[p, far_q]
+            far_p = high if p is low else low
+            far_q = high if q is low else low
+            own = number[p, q]
+            along = number[far_p, q]
+            across = number[p, far_q]
             turn = (p is low) == (q is low)
             second, third = (along, across) if turn else (across, along)
             rows.append(np.array([own.ravel(), second.ravel(), third.ravel()]))
@@ -54,7 +58,8 @@ class Areas:
 
     def derive(self, points: np.ndarray) -> csr_matrix:
         """Rows: triangles; columns: x of the inner nodes, then y."""
-        count, parts = self.inner.size, []
+        count = self.inner.size
+        parts = []
         for k in range(3):
             own = self.column[self.triangles[k]]
             b, c = (points[:, self.triangles[(k + m) % 3]] for m in (1, 2))
@@ -74,16 +79,20 @@ def make_starts(boundary: np.ndarray, rng: np.random.Generator, count: int):
     corners = (b[:, :1, :1], b[:, -1:, :1], b[:, :1, -1:], b[:, -1:, -1:])
     weights = (1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v
     coons = coons - sum(w * c for w, c in zip(weights, corners, strict=True))
-    coons[:, [0, -1]], coons[:, :, [0, -1]] = b[:, [0, -1]], b[:, :, [0, -1]]
+    coons[:, [0, -1]] = b[:, [0, -1]]
+    coons[:, :, [0, -1]] = b[:, :, [0, -1]]
     yield coons
     number = np.full((ni + 1, nj + 1), -1)
     number[1:-1, 1:-1] = np.arange((ni - 1) * (nj - 1)).reshape(ni - 1, nj - 1)
     for start in range(count + 1):
-        rows, columns, values = [], [], []
+        rows = []
+        columns = []
+        values = []
         right = np.zeros((2, (ni - 1) * (nj - 1)))
         for i in range(1, ni):
             for j in range(1, nj):
-                k, total = number[i, j], 0.0
+                k = number[i, j]
+                total = 0.0
                 for p, q in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
                     weight = 1.0 if start == 0 else float(np.exp(rng.normal()))
                     total += weight
@@ -102,7 +111,8 @@ def make_starts(boundary: np.ndarray, rng: np.random.Generator, count: int):
 def find_grid(boundary: np.ndarray, seed: int = 0, count: int = 3, limit: float = np.inf):
     """A grid on `boundary` (2, ni+1, nj+1; positive area) with all areas positive, or None."""
     ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
-    areas, begin = Areas(ni, nj), time.perf_counter()
+    areas = Areas(ni, nj)
+    begin = time.perf_counter()
     number = areas.inner.size
     plain = np.where(np.isnan(boundary), 0.0, boundary)
     if areas.fixed.size and (areas.compute(plain.reshape(2, -1), areas.fixed) <= 0.0).any():
@@ -136,7 +146,8 @@ def find_grid(boundary: np.ndarray, seed: int = 0, count: int = 3, limit: float 
                     points = trial
                     trust *= 1.5 if np.abs(move).max() > 0.9 * trust else 1.0
                     break
-                trust, move = 0.3 * trust, 0.3 * move
+                trust = 0.3 * trust
+                move = 0.3 * move
             if trust <= least_trust or answer.x[-1] - here.min() < 1e-9 * abs(here.min()):
                 break
     return None
@@ -149,7 +160,10 @@ def main() -> None:
     parser.add_argument("--most-nodes", type=int, default=400)
     parser.add_argument("--outcome", default="named, none found")
     options = parser.parse_args()
-    kept, begin, tried, found = np.load(options.kept), time.perf_counter(), 0, []
+    kept = np.load(options.kept)
+    begin = time.perf_counter()
+    tried = 0
+    found = []
     for n, outcome in enumerate(kept["outcome"]):
         boundary = kept[f"boundary_{n}"]
         if outcome != options.outcome or boundary[0].size > options.most_nodes:

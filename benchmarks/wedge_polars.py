@@ -39,15 +39,19 @@ def measure_polar_point(deck: PlateOnWedgeDeck) -> dict:
     `failure` has the sentence of a run that died; what it had measured till then stands.
     """
     problem = PlateOnWedge(msgspec.structs.replace(deck, until="arrival"))
-    run, rows, failure = problem.build(), [], None
+    run = problem.build()
+    rows = []
+    failure = None
     try:
         while not run.finished:
             rows.append(run.advance() | problem.measure(run))
     except RunFailure as error:
         failure = str(error)
     history = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    theory, behind = problem.collision, measure_behind(problem, history)
-    plateau, lead = measure_plateau(problem, history), measure_lead(problem, history)
+    theory = problem.collision
+    behind = measure_behind(problem, history)
+    plateau = measure_plateau(problem, history)
+    lead = measure_lead(problem, history)
     found = {
         "plate": deck.plate,
         "wedge": deck.wedge,

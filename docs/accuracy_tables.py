@@ -31,10 +31,17 @@ LEVELS = (0.01, 0.02, 0.05)  # errors that are counted; those above the first ar
 ROUGH = 0.05  # roughness of a line that screens caution of
 SAME = 1.0  # ratio of densities where nothing grows, so that roughness has no mode to be over
 NEAR = 0.5  # degrees below the critical angle: nearer is its own sentence
-POLAR_BAR, LINE_BAR, SPEED_BAR = 3.0, 1e-3, 1e-5  # per cent, cells, parts of the shock's speed
-NULL_BAR, OTHERS_BAR = 0.004, 0.005  # first mode; the largest of the others
+# per cent, cells, parts of the shock's speed
+POLAR_BAR = 3.0
+LINE_BAR = 1e-3
+SPEED_BAR = 1e-5
+# first mode; the largest of the others
+NULL_BAR = 0.004
+OTHERS_BAR = 0.005
 PAIR_STEPS = (1e-4, 1e-3, 1e-2)
-PAIRS_SHOWN, NAMED = 5, 6  # the worst pairs in the table; the worst rates in a sentence
+# the worst pairs in the table; the worst rates in a sentence
+PAIRS_SHOWN = 5
+NAMED = 6
 Rows = Sequence[dict[str, Any]]
 
 
@@ -77,7 +84,9 @@ def _say_rate(row: Measured | None) -> str:
 
 def table_polars(rows: Rows) -> list[str]:
     """Error of the pressure by angles below critical, a column for each plate, wedge and speed."""
-    cases, angles, found = [], [], {}
+    cases = []
+    angles = []
+    found = {}
     for row in rows:
         case = (row["plate on wedge"], row["V, km/s"], row["cells"])
         cases += [case] if case not in cases else []

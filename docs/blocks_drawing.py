@@ -14,7 +14,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 FILE = Path(__file__).resolve().parent / "pictures" / "blocks-and-lines.png"
-CONTACT, SLIDING, SIDE, GRID = "#d84315", "#2e7d32", "#223344", "#99aabb"
+CONTACT = "#d84315"
+SLIDING = "#2e7d32"
+SIDE = "#223344"
+GRID = "#99aabb"
 NOTES = (  # text, where it stands, what it points at
     ("segment: a wall,\non side j_max", (1.2, 3.6), (1.4, 3.0)),
     ("contact: an interface, one grid line\nthat both blocks share", (5.2, 3.65), (3.84, 2.45)),

@@ -14,7 +14,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 FILE = Path(__file__).resolve().parent / "pictures" / "contact-facets.png"
-LEADER, FOLLOWER, GRID = "#223344", "#d84315", "#99aabb"
+LEADER = "#223344"
+FOLLOWER = "#d84315"
+GRID = "#99aabb"
 FACETS = "#2e7d32", "#9ccc65"  # alternately
 X_LEADER = np.array([0.0, 1.2, 2.4, 3.6, 4.8, 6.0, 7.2, 8.4, 9.6])
 Y_LEADER = 2.0 - 0.1 * (X_LEADER - 3.6) ** 2 + 0.0012 * (X_LEADER - 3.6) ** 4
@@ -48,7 +50,8 @@ def main() -> None:
     draw_body(axes, X_LEADER, Y_LEADER, -1.0, LEADER, "#e8eef7")
     draw_body(axes, X_FOLLOWER, y_follower, 1.0, FOLLOWER, "#fdf3e1")
     axes.plot(X_FOLLOWER, y_follower, color=FOLLOWER, lw=1.5, zorder=4)
-    first, last = X_FOLLOWER[0], X_FOLLOWER[RAISED == 0.0][-1]
+    first = X_FOLLOWER[0]
+    last = X_FOLLOWER[RAISED == 0.0][-1]
     inside = (X_LEADER > first) & (X_LEADER < last)
     pins = np.sort(np.append(X_LEADER[inside], X_FOLLOWER[RAISED == 0.0]))
     for k in range(pins.size - 1):

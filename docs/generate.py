@@ -45,7 +45,8 @@ from pathlib import Path
 from typing import Any
 
 DOCS = Path(__file__).resolve().parent
-ROOT, RESULTS = DOCS.parent, DOCS / "results"
+ROOT = DOCS.parent
+RESULTS = DOCS / "results"
 sys.path.insert(0, str(ROOT))
 
 from accuracy_tables import fill_accuracy  # noqa: E402
@@ -136,7 +137,8 @@ def read_run(directory: Path, said: str) -> dict[str, Any]:
     screen = directory / "summary.txt"
     if screen.exists():
         first, *rest = screen.read_text(encoding="utf-8").split("\n\n")
-        reason, own = first.split(":")[0], "\n\n".join(rest[:-1]).splitlines()
+        reason = first.split(":")[0]
+        own = "\n\n".join(rest[:-1]).splitlines()
     else:
         reason = said.strip().splitlines()[0].partition("; last restart point")[0]
         own = [reason, *data.problem.summary(history, None).strip("\n").splitlines()]

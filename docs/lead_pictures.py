@@ -70,7 +70,8 @@ def draw_plate(run: RunData) -> None:
     for axes, t in zip(panels, (1.29e-6, 2.58e-6, 4.3e-6), strict=True):
         dump = find_dump(run, t)
         for block in dump.blocks:
-            nodes, kind = 1e3 * block.nodes, {"shading": "flat", "rasterized": True}
+            nodes = 1e3 * block.nodes
+            kind = {"shading": "flat", "rasterized": True}
             rest = np.zeros(np.array(nodes.shape[1:]) - 1)
             axes.pcolormesh(*nodes, rest, cmap=ListedColormap([AT_REST[block.name]]), **kind)
             shown = axes.pcolormesh(*nodes, block.cell_fields["p"] / 1e9, **kind, **style)
@@ -139,11 +140,15 @@ def draw_growth(runs: list[RunData]) -> None:
         1, 2, figsize=(11, 3.0), dpi=130, layout="constrained", width_ratios=(1.5, 1)
     )
     problem = runs[-1].problem
-    theory, speed = problem.theory, problem.theory.base.u  # what the shock gives to the interface
+    # what the shock gives to the interface
+    theory = problem.theory
+    speed = problem.theory.base.u
     t = np.linspace(0.0, runs[-1].history.t[-1] - problem.arrival, 600)[1:]
     for n, run in enumerate(runs):
-        history, cells = run.history, run.problem.deck.cells
-        kct, width = get_kct(run.problem, history.t), max(1, len(history.t) // 200)
+        history = run.history
+        cells = run.problem.deck.cells
+        kct = get_kct(run.problem, history.t)
+        width = max(1, len(history.t) // 200)
         slope = history.amplitude_mode_1 / SLOPE
         rate = (slope[width:] - slope[:-width]) / (history.t[width:] - history.t[:-width]) / speed
         late = kct[width:] > START - 0.1

@@ -178,7 +178,8 @@ class Block:
             for value in eos.parameters
         )
         self.wave_law = tuple(float(value) for value in eos.wave_law)
-        self.limiter, self.flux_name = limiter, flux
+        self.limiter = limiter
+        self.flux_name = flux
         # one row per tile, and one for polygon cells of sliding contacts and sources
         self.tile_totals = np.zeros((count_tiles(self.ni, self.nj) + 1, of.TOTALS))
         self.tile_totals[-1, of.LEAST_C2] = of.NO_C2
@@ -257,7 +258,8 @@ class Block:
     def _add_weight(self, acceleration: np.ndarray) -> None:
         """Hydrostatic ghosts: pressure mirrored about that of a layer at rest on the wall."""
         rim = self.rim
-        normal, centres = rim.rows[on.NORMAL], self.take_perimeter(compute_centres(self.nodes))
+        normal = rim.rows[on.NORMAL]
+        centres = self.take_perimeter(compute_centres(self.nodes))
         across = (acceleration * normal).sum(axis=0) / (normal * normal).sum(axis=0)
         way = ((rim.rows[on.AREA_CENTRE] - centres) * normal).sum(axis=0)
         for first, last, _ in self.plan.walls:
@@ -314,7 +316,8 @@ class Block:
         self._summed = None
         if threads > 1 and self.scratch.shape[0] != threads:
             self.scratch = allocate_scratch(threads)
-        self.tile_totals[-1, of.LEAST_C2], self.tile_totals[-1, of.VOIDED] = of.NO_C2, 0.0
+        self.tile_totals[-1, of.LEAST_C2] = of.NO_C2
+        self.tile_totals[-1, of.VOIDED] = 0.0
         advance = self.flow.advance_threaded if threads > 1 else self.flow.advance
         advance.entry(
             self._old, self._new, self.rim.rows, dt, self.parameters, self.scratch, self.tiles,
@@ -325,7 +328,8 @@ class Block:
 
     def take_rows(self, first: int, last: int) -> None:
         """From now on update only the cell rows first..last - 1, which are whole rows of tiles."""
-        self.first_row, self.last_row = first, last
+        self.first_row = first
+        self.last_row = last
         self.tiles = count_tiles(first, self.nj), count_tiles(last, self.nj)
         self.is_cut = last - first < self.ni
 

@@ -63,7 +63,10 @@ class Segment:
     has_own_line: bool = True  # not so for followers, whose line the leader gives
 
     def __init__(self, block: Block, side: str, start: int, stop: int):
-        self.block, self.side, self.start, self.stop = block, side, start, stop
+        self.block = block
+        self.side = side
+        self.start = start
+        self.stop = stop
         offset, count = block.side_faces(side)
         if not 0 <= start < stop <= count:
             raise BadInput(
@@ -75,7 +78,8 @@ class Segment:
                 f"block {block.name!r}, side {side}: a {self.kind} segment of one face cannot move "
                 "by itself; it needs at least 2"
             )
-        self.first, self.last = offset + start, offset + stop
+        self.first = offset + start
+        self.last = offset + stop
         self.spans = np.array([(self.first, self.last)])
         self.rim = block.rim[self]  # this segment's faces alone
 
@@ -220,7 +224,9 @@ class Inflow(Segment):
     def __init__(self, block, side, start, stop, state, velocity=None):
         super().__init__(block, side, start, stop)
         self.state = state if callable(state) else (lambda t: state)
-        self._is_steady, self._filled = not callable(state), False  # the rows beyond keep it
+        # the rows beyond keep it
+        self._is_steady = not callable(state)
+        self._filled = False
         self.check_numbers(self.state(0.0), ("rho", "u", "v", "p"), "state")
         self._velocity = 0.0, 0.0
         if velocity is not None:
@@ -243,11 +249,17 @@ class Inflow(Segment):
         if self._is_steady and self._filled:
             return
         self._filled = True
-        rim, eos = self.rim, self.block.eos
+        rim = self.rim
+        eos = self.block.eos
         rho, u, v, p = self.state(t)
-        rim.rho_beyond[:], rim.u_beyond[:], rim.v_beyond[:], rim.p_beyond[:] = rho, u, v, p
+        rim.rho_beyond[:] = rho
+        rim.u_beyond[:] = u
+        rim.v_beyond[:] = v
+        rim.p_beyond[:] = p
         c = eos.sound_speed(rho, p)
-        rim.e_beyond[:], rim.c_beyond[:], rim.c2_beyond[:] = eos.energy(rho, p), c, c * c
+        rim.e_beyond[:] = eos.energy(rho, p)
+        rim.c_beyond[:] = c
+        rim.c2_beyond[:] = c * c
 
 
 class FreeSurface(Segment):

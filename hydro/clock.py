@@ -40,20 +40,27 @@ class Clock:
 
     def choose_dt(self) -> tuple[float, str]:
         """The next step and what limits it.  Theory F7.1."""
-        dt, limit = self.cfl / self.rate, "sound"
+        dt = self.cfl / self.rate
+        limit = "sound"
         if self.stretch_rate * dt > MOST_STRETCHING:
-            dt, limit = MOST_STRETCHING / self.stretch_rate, "stretching"
+            dt = MOST_STRETCHING / self.stretch_rate
+            limit = "stretching"
         if dt > self.tension_dt:
-            dt, limit = self.tension_dt, "tension"
+            dt = self.tension_dt
+            limit = "tension"
         if self.step < len(START_FACTORS):
-            dt, limit = dt * START_FACTORS[self.step], "start"
+            dt = dt * START_FACTORS[self.step]
+            limit = "start"
         if dt > self.retry_dt:
-            dt, limit = self.retry_dt, "retry"
+            dt = self.retry_dt
+            limit = "retry"
         left = self.t_end - self.t
         if dt >= left:
-            dt, limit = left, "t_end"
+            dt = left
+            limit = "t_end"
         elif 2.0 * dt > left:
-            dt, limit = 0.5 * left, "t_end"
+            dt = 0.5 * left
+            limit = "t_end"
         return dt, limit
 
     def compute_fraction(self, dt: float) -> float:
@@ -78,7 +85,8 @@ class Phase:
     __slots__ = ("begun", "seconds")
 
     def __init__(self):
-        self.seconds, self.begun = 0.0, 0.0
+        self.seconds = 0.0
+        self.begun = 0.0
 
     def __enter__(self):
         self.begun = read_clock()

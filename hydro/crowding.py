@@ -14,7 +14,8 @@ from regrid.jit import kernel
 
 # Bins of the histogram of crowding: binary exponent and three mantissa bits, from 2^-128 to 2^128
 # per square metre.
-BINS, CUT = 2048, 52 - 3
+BINS = 2048
+CUT = 52 - 3
 FIRST = (1023 - 128) << 3
 FAR_OUT = 1.2  # times the crowding exceeded by the fraction `share` of a block's cells
 
@@ -36,7 +37,8 @@ def choose_bin(counts, cells, share, far_out):
     Returns its bin, -1 if no cell has `far_out` times its crowding; its index among the sorted
     cells of that bin, negative if before all of them; and the lower edge of the bin.
     """
-    allowed, above = share * cells, 0
+    allowed = share * cells
+    above = 0
     top = BINS - 1
     while top > 0 and counts[top] == 0:
         top -= 1
@@ -87,13 +89,18 @@ def scan_rates(rates, crowding, most_crowded):
 
     Cells of more than `most_crowded` count with the rate that they would have at that crowding.
     """
-    most, bulk, at_i, at_j = -1.0, -1.0, 0, 0
+    most = -1.0
+    bulk = -1.0
+    at_i = 0
+    at_j = 0
     for i in range(rates.shape[0]):
         for j in range(rates.shape[1]):
             rate = rates[i, j]
             if rate > bulk:
                 if rate > most:
-                    most, at_i, at_j = rate, i, j
+                    most = rate
+                    at_i = i
+                    at_j = j
                 square = crowding[i, j]
                 if square > most_crowded:
                     rate *= (most_crowded / square) ** 0.5
@@ -125,7 +132,9 @@ def find_fastest_cell(rates, row):
 @kernel
 def is_squeezed(crowding, i, j, share, far_out):
     """Could cell i, j be above `find_most_crowded`?  Not if enough cells are nearly as crowded."""
-    square, allowed, count = crowding[i, j], int(share * crowding.size), 0
+    square = crowding[i, j]
+    allowed = int(share * crowding.size)
+    count = 0
     for p in range(crowding.shape[0]):
         row = crowding[p]
         for q in range(row.shape[0]):
@@ -172,7 +181,8 @@ def find_most_crowded_of_bands(
 
 def scan_rates_of_bands(cut: CutBlock, most_crowded: float) -> tuple[float, int, int, float]:
     """`scan_rates` over all bands of a block's new state, with the same result on all its ranks."""
-    block, (first, last) = cut.block, cut.band
+    block = cut.block
+    first, last = cut.band
     rate, i, j, bulk = scan_rates(
         block.rates_new[first:last], block.crowding[first:last], most_crowded
     )

@@ -29,7 +29,8 @@ def compute_grid_quality(flow: Flow) -> dict[str, float | int]:
     for row in found[1:]:
         sine = row[0] if row[0] < sine else sine
         aspect = row[1] if row[1] > aspect else aspect
-        bad, triangles = bad + row[2], triangles + row[3]
+        bad = bad + row[2]
+        triangles = triangles + row[3]
     return {
         "least_scaled_jacobian": sine,
         "cells_not_convex": int(bad),

@@ -23,7 +23,10 @@ def sum_fluxes(rim, spans):
 
     rim: rows of `hydro.rim`, a column a face.
     """
-    mass, momentum_x, momentum_y, energy = 0.0, 0.0, 0.0, 0.0
+    mass = 0.0
+    momentum_x = 0.0
+    momentum_y = 0.0
+    energy = 0.0
     for span in range(spans.shape[0]):
         for face in range(spans[span, 0], spans[span, 1]):
             mass += rim[on.MASS, face]

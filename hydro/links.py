@@ -31,7 +31,8 @@ class Link:
     def __init__(self, leader: Linked, follower: Linked):
         self.leader, self.follower = leader, follower
         self.segments = [leader, follower]
-        one, two = leader.line(leader.block.nodes), follower.line(follower.block.nodes)
+        one = leader.line(leader.block.nodes)
+        two = follower.line(follower.block.nodes)
         if one.shape != two.shape:
             raise BadInput(
                 f"{leader.kind}: {leader} has {one.shape[1] - 1} faces and {follower} has "

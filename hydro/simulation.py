@@ -103,8 +103,10 @@ class Simulation:
         self._mesh = mesh
         self._line_rule = line_rule or LineRule()
         self._source = source
-        self._void_fill, self._find_end = void_fill, find_end
-        self.refining, self._counts_cells = refining, refining is not None
+        self._void_fill = void_fill
+        self._find_end = find_end
+        self.refining = refining
+        self._counts_cells = refining is not None
         self._connect(blocks, links, make_regridder)
         self._overlaps.check_pistons(float(t_end))
         if refining is not None:  # contacts stay as thick as they are on the first cells
@@ -253,7 +255,8 @@ class Simulation:
         """One step; returns its history row.  Raises RunFailure with block, cell and time."""
         if self.finished:
             raise BadInput(f"the run is at its end already: {self.finished}")
-        ranks, clock = self._shared, self.clock
+        ranks = self._shared
+        clock = self.clock
         ranks.begin_step()
         if self.tension.lines:
             clock.tension_dt = self.tension.find_step()
@@ -289,7 +292,8 @@ class Simulation:
         places = refining.choose(self.step, self.motion.lines)
         if places is None:
             return
-        before, old = dict(self.__dict__), self._blocks
+        before = dict(self.__dict__)
+        old = self._blocks
         inside = [block.state[:, 1:-1, 1:-1][..., places[:-1].astype(int)] for block in old]
         self._lay_cells(refining, places.size - 1, inside)
         try:
@@ -299,7 +303,8 @@ class Simulation:
             return
         for block, (nodes, state, void_energy) in zip(self._blocks, found, strict=True):
             block.nodes[...] = block.nodes_new[...] = nodes
-            block.state[:, 1:-1, 1:-1], block.void_energy[...] = state, void_energy
+            block.state[:, 1:-1, 1:-1] = state
+            block.void_energy[...] = void_energy
         self.motion.counts = before["motion"].counts  # of the step that is over
         self._update_rates()
         self.clock.rate = self.small_cells.find_first_rate(self.t)
@@ -308,7 +313,8 @@ class Simulation:
         """Rebuild the blocks with so many columns, on grids sampled from the first ones."""
         blocks, links, make_regridder = refining.rebuild(refining.make_first_nodes(count), states)
         self._connect(blocks, links, make_regridder)
-        ledger, self.ledger = self.ledger, Ledger(blocks)
+        ledger = self.ledger
+        self.ledger = Ledger(blocks)
         self.ledger.set_state(ledger.get_state())
         small = self.small_cells
         self.small_cells = SmallCells(self._shared, small.allowed, small.start)
@@ -330,7 +336,8 @@ class Simulation:
 
         Its sentence is about the cell that rejects every longer step, or whose rate collapses dt.
         """
-        clock, ranks = self.clock, self._shared
+        clock = self.clock
+        ranks = self._shared
         dt, limit = clock.choose_dt()
         if dt >= LEAST_PART * clock.first_stable_dt or limit == "t_end":
             return
@@ -344,7 +351,8 @@ class Simulation:
         rates = ranks.share_pieces(pieces, 2)
         smallest = ranks.share_rows([_find_smallest(self._blocks[n]) for n in ranks.own], 2)
         number = int(max(rates, key=lambda row: row[1])[0])
-        block, (i, j) = self._blocks[number], (int(index) for index in smallest[number])
+        block = self._blocks[number]
+        i, j = (int(index) for index in smallest[number])
         raise RunFailure(
             f"flow: the time step has collapsed to {dt:.3g} s in block {block.name!r} (smallest "
             f"cell is i={i}, j={j}), {when}",
@@ -398,7 +406,9 @@ class Simulation:
         """Take up a state of `get_state` of the same blocks."""
         self.take_cells(state)
         clock = self.clock
-        clock.t, clock.step, clock.dt = float(state["t"]), int(state["step"]), float(state["dt"])
+        clock.t = float(state["t"])
+        clock.step = int(state["step"])
+        clock.dt = float(state["dt"])
         clock.retry_dt = float(state["ceiling"])
         clock.rate = float(state["rate"])
         clock.stretch_rate = float(state["stretch_rate"])
@@ -485,7 +495,8 @@ def _check_cover(block: Block) -> None:
     """Every face of a side belongs to exactly one segment; raises BadInput otherwise."""
     for side in ("i_min", "i_max", "j_min", "j_max"):
         segments = sorted((s for s in block.segments if s.side == side), key=lambda s: s.start)
-        next_face, count = 0, block.side_faces(side)[1]
+        next_face = 0
+        count = block.side_faces(side)[1]
         for segment in segments:
             if segment.start != next_face:
                 problem = (

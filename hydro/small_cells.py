@@ -53,7 +53,11 @@ RELAXED = 0.1  # fraction of a state redistributed per step, besides all of the 
 # rows of a cell's record: what it redistributes per volume, mean and slope of its neighbourhood,
 # position of that mean along the line, volume, number of its neighbourhoods, what it keeps per
 # volume
-MEAN, SLOPE, LEVER, VOLUME, PARTS = 4, 8, 12, 13, 14
+MEAN = 4
+SLOPE = 8
+LEVER = 12
+VOLUME = 13
+PARTS = 14
 KEPT = 15
 RECORD_ROWS = 19
 
@@ -147,7 +151,8 @@ def limit_slope(before, after):
 @functools.cache
 def make_redistribution(eos_class, geometry: Geometry):
     """The kernel `redistribute` of an equation of state and a geometry."""
-    pressure_part, energy_part = eos_class.pressure_part, eos_class.energy_part
+    pressure_part = eos_class.pressure_part
+    energy_part = eos_class.energy_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     find_least_pressure = make_least_pressure(eos_class)
     find_volume, find_share = make_measures(geometry)
@@ -155,11 +160,14 @@ def make_redistribution(eos_class, geometry: Geometry):
     @compiled_once
     def fill_conserved(state, void_energy, i, j, part, parameters, first, record):
         """Store a fraction of a cell's state per volume in four rows of its record."""
-        rho, u = state[RHO, i + 1, j + 1], state[U, i + 1, j + 1]
-        v, p = state[V, i + 1, j + 1], state[P, i + 1, j + 1]
+        rho = state[RHO, i + 1, j + 1]
+        u = state[U, i + 1, j + 1]
+        v = state[V, i + 1, j + 1]
+        p = state[P, i + 1, j + 1]
         e = energy_part(rho, p, parameters) + void_energy[i, j]
         rho *= part
-        record[first, i, j], record[first + 1, i, j] = rho, rho * u
+        record[first, i, j] = rho
+        record[first + 1, i, j] = rho * u
         record[first + 2, i, j] = rho * v
         record[first + 3, i, j] = rho * (e + 0.5 * (u * u + v * v))
 
@@ -169,7 +177,8 @@ def make_redistribution(eos_class, geometry: Geometry):
         ni, nj = marks.shape
         for n in range(small.shape[0]):
             i, j = small[n]
-            reach, along_i = abs(reaches[i, j]), reaches[i, j] > 0
+            reach = abs(reaches[i, j])
+            along_i = reaches[i, j] > 0
             for way in range(-reach, reach + 1):
                 a, b = (i + way, j) if along_i else (i, j + way)
                 if 0 <= a < ni and 0 <= b < nj:
@@ -181,7 +190,8 @@ def make_redistribution(eos_class, geometry: Geometry):
         for n in range(small.shape[0]):
             # a cell beyond either end of a neighbourhood determines its slope
             i, j = small[n]
-            beyond, along_i = abs(reaches[i, j]) + 1, reaches[i, j] > 0
+            beyond = abs(reaches[i, j]) + 1
+            along_i = reaches[i, j] > 0
             for way in (-beyond, beyond):
                 a, b = (i + way, j) if along_i else (i, j + way)
                 if 0 <= a < ni and 0 <= b < nj and marks[a, b] == 0:
@@ -204,12 +214,14 @@ def make_redistribution(eos_class, geometry: Geometry):
             for way in range(1, abs(reaches[i, j]) + 1):
                 v1 = v2 = d1 = d2 = 0.0
                 row, column = (i - way, j) if along_i else (i, j - way)
-                a, b = max(row, 0), max(column, 0)
+                a = max(row, 0)
+                b = max(column, 0)
                 if row == a and column == b:
                     v1 = record[VOLUME, a, b] / record[PARTS, a, b]
                     d1 = find_way(nodes, i, j, a, b)
                 row, column = (i + way, j) if along_i else (i, j + way)
-                c, d = min(row, ni - 1), min(column, nj - 1)
+                c = min(row, ni - 1)
+                d = min(column, nj - 1)
                 if row == c and column == d:
                     v2 = record[VOLUME, c, d] / record[PARTS, c, d]
                     d2 = find_way(nodes, i, j, c, d)
@@ -228,10 +240,12 @@ def make_redistribution(eos_class, geometry: Geometry):
     def fill_slopes(small, reaches, nodes, record):
         """Slope of each neighbourhood, from the means beyond its ends."""
         ni, nj = reaches.shape
-        ones, twos = np.zeros(CONSERVED_ROWS), np.zeros(CONSERVED_ROWS)
+        ones = np.zeros(CONSERVED_ROWS)
+        twos = np.zeros(CONSERVED_ROWS)
         for n in range(small.shape[0]):
             i, j = small[n]
-            way, along_i = abs(reaches[i, j]) + 1, reaches[i, j] > 0
+            way = abs(reaches[i, j]) + 1
+            along_i = reaches[i, j] > 0
             a, b = (i - way, j) if along_i else (i, j - way)
             c, d = (i + way, j) if along_i else (i, j + way)
             low, high = a >= 0 and b >= 0, c < ni and d < nj
@@ -291,7 +305,8 @@ def make_redistribution(eos_class, geometry: Geometry):
                     line[q] += pair[q]
             for q in range(CONSERVED_ROWS):
                 total[q] += line[q]
-        far, part = -record[LEVER, i, j], 1.0 / record[PARTS, i, j]
+        far = -record[LEVER, i, j]
+        part = 1.0 / record[PARTS, i, j]
         for q in range(CONSERVED_ROWS):
             own = record[MEAN + q, i, j] + record[SLOPE + q, i, j] * far
             total[q] = (total[q] + own) * part + record[KEPT + q, i, j]
@@ -307,8 +322,11 @@ def make_redistribution(eos_class, geometry: Geometry):
         the number of changed cells, their least c², and the increase in the number of cells with
         voids.
         """
-        (small, reaches), (nodes, nodes_new), (marks, record) = squeezed, grids, scratch
-        (start, start_void_energy), (state, void_energy, rates) = before, after
+        small, reaches = squeezed
+        nodes, nodes_new = grids
+        marks, record = scratch
+        start, start_void_energy = before
+        state, void_energy, rates = after
         ni, nj = rates.shape
         touched = [(0, 0)]
         touched.clear()
@@ -326,15 +344,19 @@ def make_redistribution(eos_class, geometry: Geometry):
                 record[SLOPE + q, i, j] = 0.0
         fill_means(small, reaches, nodes_new, record)
         fill_slopes(small, reaches, nodes_new, record)
-        least, changed = 1e300, 0
-        pair, line = np.empty(CONSERVED_ROWS), np.empty(CONSERVED_ROWS)
+        least = 1e300
+        changed = 0
+        pair = np.empty(CONSERVED_ROWS)
+        line = np.empty(CONSERVED_ROWS)
         total = np.empty(CONSERVED_ROWS)
         for i, j in touched:
             if marks[i, j] == 2:
                 continue
             changed += 1
             gather_shares(i, j, reaches, nodes_new, record, pair, line, total)
-            rho, u, v = total[0], total[1] / total[0], total[2] / total[0]
+            rho = total[0]
+            u = total[1] / total[0]
+            v = total[2] / total[0]
             e = total[3] / total[0] - 0.5 * (u * u + v * v)
             p = pressure_part(rho, e, parameters)
             void_energy[i, j] = 0.0
@@ -345,8 +367,10 @@ def make_redistribution(eos_class, geometry: Geometry):
                 voided += 1
             c2 = sound_speed_squared_part(rho, p, parameters)
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
-            state[RHO, i + 1, j + 1], state[U, i + 1, j + 1] = rho, u
-            state[V, i + 1, j + 1], state[P, i + 1, j + 1] = v, p
+            state[RHO, i + 1, j + 1] = rho
+            state[U, i + 1, j + 1] = u
+            state[V, i + 1, j + 1] = v
+            state[P, i + 1, j + 1] = p
             least = min(least, c2)
             xi, yi, xj, yj, area = measure_lines(nodes_new, i, j)
             w_x = w_y = 0.0
@@ -411,7 +435,8 @@ class BlockSharing:
 
         0 without rows: a part of a cut block has none if no cell is above.
         """
-        small, rates = self._find_small(limit, rows), self.block.rates
+        small = self._find_small(limit, rows)
+        rates = self.block.rates
         if len(small) == 0:
             return float(rates[slice(*rows)].max(initial=0.0))
         block = self.block
@@ -450,7 +475,8 @@ class SmallCells:
         self.sharing = [BlockSharing(block) for block in blocks]
         self.blocks = blocks
         self.scanned: Sequence[Sequence[Any]] = []  # of all blocks, by `scan`
-        self.allowed, self.start = float(share), start
+        self.allowed = float(share)
+        self.start = start
         self.part = 0.0  # of `allowed`, by `set_time`
         self.counts = np.zeros(BINS, dtype=np.int64)
         self.kept = np.empty(max(block.ni * block.nj for block in blocks))
@@ -469,7 +495,8 @@ class SmallCells:
 
     def find_rate(self) -> float:
         """The rate [1/s] that sets the next step, from the results of `scan`; theory F7.3."""
-        most, limit = Fastest(-1.0, 0, 0, 0), -1.0
+        most = Fastest(-1.0, 0, 0, 0)
+        limit = -1.0
         for number, (rate, i, j, bulk) in enumerate(self.scanned):
             limit = max(limit, bulk)
             if rate > most.rate:
@@ -488,7 +515,8 @@ class SmallCells:
 
     def scan(self, number: int) -> tuple[float, int, int, float, bool]:
         """`scan_state` of a block, collectively with its other ranks if it is cut."""
-        block, cut = self.sharing[number].block, self.blocks.cuts.get(number)
+        block = self.sharing[number].block
+        cut = self.blocks.cuts.get(number)
         if cut is None:
             found = scan_state.entry(
                 block.tile_totals, block.sums_array, block.rates_new, block.crowding, self.part,

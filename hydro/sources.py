@@ -61,7 +61,8 @@ class BodySource:
     """
 
     def __init__(self, blocks: Blocks, law: SourceLaw | None):
-        self.blocks, self.law = blocks, law
+        self.blocks = blocks
+        self.law = law
         self.gained = np.zeros(3)
         for block in blocks:
             block.part_start(law is not None)
@@ -71,7 +72,8 @@ class BodySource:
         if self.law is None:
             return
         self.gained[:] = 0.0
-        pushes, gains = [], []
+        pushes = []
+        gains = []
         for block in (self.blocks[number] for number in self.blocks.own):
             block.start[...] = block.state
             push, gained = self._apply(block, block.start, t, 0.5 * dt)
@@ -156,7 +158,8 @@ def compute_products_energy(eos: JWL, rho) -> np.ndarray:
     def solid(volume):
         return eos.a * np.exp(-eos.r1 * volume) + eos.b * np.exp(-eos.r2 * volume)
 
-    volume, start = eos.rho0 / rho, eos.rho0 / density
+    volume = eos.rho0 / rho
+    start = eos.rho0 / density
     gas = (pressure - solid(start)) * start**power
     return eos.energy(rho, solid(volume) + gas * volume**-power)
 
@@ -184,7 +187,9 @@ class ProgrammedBurn:
             )
         if not clock_stop > 0.0:
             raise BadInput(f"burn: clock_stop is {clock_stop:g} s; it must be positive")
-        self.origin, self.width, self.speed = np.asarray(origin, float), width, speed
+        self.origin = np.asarray(origin, float)
+        self.width = width
+        self.speed = speed
         self.clock_stop = clock_stop
         self.direction = None
         if direction is not None:

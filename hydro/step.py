@@ -80,7 +80,8 @@ def take_step(flow: Flow) -> StepRecord:
     dt, record.limit = flow.clock.choose_dt()
     while reason := try_step(flow, dt):
         if isinstance(reason, Touch):
-            dt, record.limit = float(reason), "touch"
+            dt = float(reason)
+            record.limit = "touch"
             continue
         record.reason = reason
         record.retries += 1
@@ -90,7 +91,8 @@ def take_step(flow: Flow) -> StepRecord:
                 f"{MOST_RETRIES} times to {dt:.3g} s without success",
                 RunFailure,
             )
-        dt, record.limit = 0.5 * dt, "retry"
+        dt = 0.5 * dt
+        record.limit = "retry"
     accept_step(flow, dt, record)
     return record
 
@@ -101,11 +103,20 @@ class Touch(float):
 
 def try_step(flow: Flow, dt: float) -> RunFailure | Touch | None:
     """Phases 2 to 6, into the new nodes and states; why the step does not stand, or None."""
-    blocks, exchange, motion, watch = flow.blocks, flow.exchange, flow.motion, flow.watch
-    meetings, tension = flow.meetings, flow.tension
-    touches, pulls = bool(meetings.pairs), bool(tension.lines)  # is there any of them?
-    sides, agreed = watch("sides"), False  # agreed: do all ranks hear of what fails?
-    t, middle = flow.clock.t, flow.clock.t + 0.5 * dt
+    blocks = flow.blocks
+    exchange = flow.exchange
+    motion = flow.motion
+    watch = flow.watch
+    meetings = flow.meetings
+    tension = flow.tension
+    # is there any of them?
+    touches = bool(meetings.pairs)
+    pulls = bool(tension.lines)
+    # agreed: do all ranks hear of what fails?
+    sides = watch("sides")
+    agreed = False
+    t = flow.clock.t
+    middle = flow.clock.t + 0.5 * dt
     flow.small_cells.set_time(t)
     fraction = flow.clock.compute_fraction(dt)  # of the stable step
     try:

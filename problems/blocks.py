@@ -55,7 +55,9 @@ from regrid.sides import SIDE_NAMES, compute_area
 from regrid.text_files import read_columns
 
 SAMPLES = 1025  # points on a curve given by formulas
-PASSES, SETTLED = 20, 1e-3  # of the regridder; the last moves no node by more cells than that
+# of the regridder; the last moves no node by more cells than that
+PASSES = 20
+SETTLED = 1e-3
 # Text such as "1e5*(1 + 0.1*sin(pi*x))": of x and y [m] in a state, of the time t [s] at a side, of
 # the part s of the way from 0 to 1 along a curve; parsed (`Expression`), never run.
 Formula = float | str
@@ -167,7 +169,8 @@ class BlocksDeck(Deck, kw_only=True):
 
     def find_files(self, folder: Path) -> BlocksDeck:
         """The same deck, the files that it names taken from `folder` where they are relative."""
-        blocks, names = [], []
+        blocks = []
+        names = []
         for block in self.block:
             changed: dict[str, Any] = {"grid": block.grid and place_file(block.grid, folder)}
             names.append(changed["grid"])
@@ -194,7 +197,8 @@ def make_grid(deck: BlocksDeck, block: BlockTable) -> np.ndarray:
         lines = {side: read_curve(block, side) for side in SIDE_NAMES}
         sides = orient_sides(lines, f"deck: {where}", {side: side for side in SIDE_NAMES})
         return make_on_sides(sides, deck, block, f"deck: {where}")
-    found, where = read_source(block.grid, block.grid_block or None), f"{where}, {block.grid}"
+    found = read_source(block.grid, block.grid_block or None)
+    where = f"{where}, {block.grid}"
     make = make_on_sides if isinstance(found, dict) else check_grid
     return make(found, deck, block, where)
 
@@ -221,7 +225,8 @@ def check_grid(nodes: np.ndarray, deck: BlocksDeck, block: BlockTable, where: st
 
 def read_curve(block: BlockTable, side: str) -> np.ndarray:
     """Polyline (2, n) [m] of a side, from a file, points or formulas of s."""
-    curve, where = getattr(block.curves, side), f"deck: block {block.name!r}"
+    curve = getattr(block.curves, side)
+    where = f"deck: block {block.name!r}"
     if isinstance(curve, str):
         return make_polyline(read_columns(curve), side, curve)
     if not isinstance(curve, CurveTable):
@@ -265,7 +270,8 @@ def make_on_sides(
 ) -> np.ndarray:
     """The grid on four polylines; BadInput says why there is none."""
     for side, line in sides.items() if block.cells else ():
-        count, curve = block.cells[1 if side[0] == "i" else 0], getattr(block.curves, side, None)
+        count = block.cells[1 if side[0] == "i" else 0]
+        curve = getattr(block.curves, side, None)
         given = getattr(curve, "cells", None)
         if given is None:
             sides[side] = distribute_by_arc_length(line, count + 1)
@@ -358,12 +364,14 @@ class Blocks(Problem):
         return []
 
     def build(self) -> Simulation:
-        deck, links = self.deck, []
+        deck = self.deck
+        links = []
         blocks = {table.name: self.make_block(table) for table in deck.block}
         for link in deck.link:
             pair = []
             for text in link.sides:
-                where, found = f"deck: link: {text!r}", RUN_OF_FACES.fullmatch(text.strip())
+                where = f"deck: link: {text!r}"
+                found = RUN_OF_FACES.fullmatch(text.strip())
                 if not found:
                     words = 'is not a side; write "block.i_max" or "block.i_max[0:8]"'
                     raise BadInput(f"{where} {words}")
@@ -386,7 +394,8 @@ class Blocks(Problem):
 
     def make_block(self, table: BlockTable) -> Block:
         """A block with its state and the segments of its sides that are not linked."""
-        nodes, material = self.grids[table.name], self.materials[table.name]
+        nodes = self.grids[table.name]
+        material = self.materials[table.name]
         where = f"deck: block {table.name!r}"
         places = dict(zip("xy", compute_centres(nodes), strict=True))
         rho = material.rho0 if table.rho is None else table.rho
@@ -446,7 +455,8 @@ def find_block_material(block: BlockTable) -> Material:
 
 def collect_options(side: BlockSide, where: str) -> dict[str, Any]:
     """The options of a side's segment; formulas of t are functions of time."""
-    options, where = dict(side.options), f"{where}, {side.kind}"
+    options = dict(side.options)
+    where = f"{where}, {side.kind}"
     if side.velocity is not None:  # that of an open side is constant
         fixed = side.kind == "inflow"
         options["velocity"] = side.velocity if fixed else follow_time(side.velocity, where)

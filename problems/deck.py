@@ -291,7 +291,8 @@ def check_digests(digests: Mapping[str, str]) -> None:
 
 def check_solid(key: str, label: str, material: Material) -> None:
     """Raise BadInput for a body's material that burns, or has no sound speed at p = 0."""
-    eos, rho = material.eos, material.rho0
+    eos = material.eos
+    rho = material.rho0
     if eos.kind == "jwl":
         why = "an explosive, known by its burnt products; nothing burns here, use an inert material"
         raise BadInput(f"deck: {key} is {label!r}, {why}")

@@ -112,7 +112,8 @@ class GridMarch(Problem):
         return GridMarchEvolution(self.deck, self.make_domain())
 
     def measure(self, evolution: GridMarchEvolution) -> dict[str, float]:
-        nodes, domain = evolution.nodes, evolution.domain
+        nodes = evolution.nodes
+        domain = evolution.domain
         if self.deck.domain == "strip":
             return {"far_line_bend": measure_far_bend(nodes, domain)}
         if self.deck.domain == "rectangle_shift" and self.deck.noise == 0.0:
@@ -121,7 +122,9 @@ class GridMarch(Problem):
         return {}
 
     def report(self, history, final=None) -> Report:
-        deck, rows, steps = self.deck, [], np.isfinite(history["dt"])
+        deck = self.deck
+        rows = []
+        steps = np.isfinite(history["dt"])
         made = {name: values[steps] for name, values in history.items()}
         if not steps.any():
             return Report("no step was made" if history else "")
@@ -145,8 +148,11 @@ class GridMarchEvolution:
     """One block whose boundary follows the domain; time is the part of the motion done."""
 
     def __init__(self, deck: GridMarchDeck, domain: MovingDomain):
-        self.deck, self.domain = deck, domain
-        self.t, self.step, self.t_end = 0.0, 0, deck.run.t_end or 1.0
+        self.deck = deck
+        self.domain = domain
+        self.t = 0.0
+        self.step = 0
+        self.t_end = deck.run.t_end or 1.0
         self.steps = domain.steps_for(deck.cells_a_step)
         self.nodes = domain.start.copy()
         self.regridder = deck.regrid.make(threads=deck.run.threads)
@@ -212,7 +218,8 @@ class GridMarchEvolution:
         return {"t": self.t, "step": self.step, "nodes": self.nodes}
 
     def set_state(self, state) -> None:
-        self.t, self.step = float(state["t"]), int(state["step"])
+        self.t = float(state["t"])
+        self.step = int(state["step"])
         self.nodes = self.blocks[0].nodes = np.array(state["nodes"], dtype=np.float64)
 
 

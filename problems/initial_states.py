@@ -146,12 +146,15 @@ class RadialProblem(Problem):
     codes have with 100 cells, by the deck's `geometry`.
     """
 
-    counted, t_unit = ("cells", "cells"), "1"
+    counted = ("cells", "cells")
+    t_unit = "1"
     peers: ClassVar[dict[str, str]] = {}
 
     def __init__(self, deck, dimensions: int):
         super().__init__(deck)
-        self.dimensions, self.plane, self.curved = dimensions, dimensions == 1, dimensions == 3
+        self.dimensions = dimensions
+        self.plane = dimensions == 1
+        self.curved = dimensions == 3
         self.geometry = "axisymmetric" if self.curved else "plane"  # that of the `Simulation`
 
     def compute_density(self, r: np.ndarray, t: float) -> np.ndarray:
@@ -192,7 +195,8 @@ class RadialProblem(Problem):
 
     def list_notes(self, history) -> list[str]:
         """Sentences below the report."""
-        deck, notes = self.deck, say_unreached(history, "error_rho")
+        deck = self.deck
+        notes = say_unreached(history, "error_rho")
         known = deck.cells == 100 and deck.geometry in self.peers
         return notes + ([f"other codes: {self.peers[deck.geometry]}"] if known else [])
 
@@ -203,7 +207,8 @@ class RadialProblem(Problem):
         half way from 1 to the greatest of all; in a straight line between centres.  0 where nothing
         is denser than the cold gas.
         """
-        r, rho = self.compute_radii(block.centres), block.state[0, 1:-1, 1:-1]
+        r = self.compute_radii(block.centres)
+        rho = block.state[0, 1:-1, 1:-1]
         level = 0.5 * (1.0 + float(rho.max()))
         lines = [*zip(r.T, rho.T, strict=True), *zip(r, rho, strict=True)]
         found = np.array([find_crossing(*line, level) for line in lines])
@@ -277,7 +282,8 @@ class Front:
 
     def measure_signal(self) -> float:
         """Greatest speed [m/s] of waves through the cells, summed over both directions."""
-        contact, sound = self.behind[1], self.eos.sound_speed
+        contact = self.behind[1]
+        sound = self.eos.sound_speed
         states = self.behind, self.ahead
         return max(abs(u - contact) + 2.0 * float(sound(rho, p)) for rho, u, p in states)
 
@@ -291,17 +297,23 @@ def settle_front(front: Front, *, cfl: float, limiter: str) -> tuple[int, np.nda
     """
     if type(front.eos).__module__.split(".")[0] not in PACKAGES:
         return _settle(front, cfl, limiter)
-    eos, rest = front.eos, [getattr(front, one.name) for one in fields(front)[1:]]
+    eos = front.eos
+    rest = [getattr(front, one.name) for one in fields(front)[1:]]
     words = type(eos).__qualname__, eos.parameters, rest, cfl, limiter
     return remember("settled", words, lambda: _settle(front, cfl, limiter))
 
 
 def _settle(front: Front, cfl: float, limiter: str) -> tuple[int, np.ndarray]:
-    nodes, place, contact = front.nodes, front.place, front.behind[1]
-    size, lowest = nodes[1] - nodes[0], place - RUN_IN - MARGIN  # number of the strip's first node
+    nodes = front.nodes
+    place = front.place
+    contact = front.behind[1]
+    # number of the strip's first node
+    size = nodes[1] - nodes[0]
+    lowest = place - RUN_IN - MARGIN
     numbers = np.arange(lowest, min(place + AHEAD + 4, nodes.size - 1) + 1)
     first = np.where(numbers < 0, numbers * size, nodes[np.clip(numbers, 0, nodes.size - 1)])
-    begin, relative = first[MARGIN], front.speed - contact
+    begin = first[MARGIN]
+    relative = front.speed - contact
     rate = beyond = (front.end_speed - contact) / nodes[-1]
     if begin < 0.0:  # cells beyond the contact go on as those before it, but let a shock pass
         beyond = max(rate, SLOWEST * relative / begin)
@@ -314,7 +326,9 @@ def _settle(front: Front, cfl: float, limiter: str) -> tuple[int, np.ndarray]:
 
     states = [(rho, 0.0, u, p) for rho, u, p in (front.behind, front.ahead)]
     ends = [{"kind": "inflow", "state": state} for state in states]
-    kept, last, shift = slice(place - KEPT - lowest, None), place_nodes(duration), 0.0
+    kept = slice(place - KEPT - lowest, None)
+    last = place_nodes(duration)
+    shift = 0.0
     for _ in range(2):  # what the shock's start leaves behind moves its place
         strip = nodes[place] - front.speed * duration + shift, states, ends, duration
         rho, u, p = run_strip(front.eos, place_nodes, size, *strip, cfl=cfl, limiter=limiter)
@@ -337,7 +351,8 @@ def run_strip(
 
     def lay_nodes(_, t):
         nodes = np.empty((2, *x.shape))
-        nodes[0], nodes[1] = x, place_nodes(t)
+        nodes[0] = x
+        nodes[1] = place_nodes(t)
         return nodes
 
     nodes = lay_nodes("", 0.0)
@@ -382,7 +397,9 @@ class SettledShock:
         momentum = self.rho * self.u
         energy = self.rho * self.eos.energy(self.rho, self.p) + 0.5 * momentum * self.u
         ends = 0.5 * (nodes[0, :, 1:] + nodes[0, :, :-1])
-        x, width, means = self.x.copy(), np.diff(ends, axis=0), []
+        x = self.x.copy()
+        width = np.diff(ends, axis=0)
+        means = []
         x[0], x[-1] = min(x[0], ends.min()), max(x[-1], ends.max())
         for density in (self.rho, momentum, energy):
             # of what is over the state ahead, which comes out as it is, to the last bit
@@ -423,7 +440,9 @@ def settle_shock(
     rho, u, p = run_strip(eos, place_nodes, size, *strip, cfl=cfl, limiter=limiter)
     spot = way / size * (1.0 - shock.particle_speed / shock.shock_speed)  # cells behind the shock
     front = max(0, cell - min(MOST_KEPT, int(CLEAN * spot)))
-    rho[:front], u[:front], p[:front] = shock.rho, shock.particle_speed, shock.p
+    rho[:front] = shock.rho
+    u[:front] = shock.particle_speed
+    p[:front] = shock.p
     return SettledShock(eos, line, rho, u, p)
 
 

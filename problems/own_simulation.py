@@ -33,7 +33,8 @@ class OwnSimulation(Problem):
         super().__init__(deck)
         if measure is not None and not callable(measure):
             raise BadInput(f"measure = {measure!r}: a function of the simulation is wanted")
-        self.evolution, self.own_measure = evolution, measure
+        self.evolution = evolution
+        self.own_measure = measure
 
     def build(self) -> Evolution:
         """The simulation that was given; BadInput where none was."""

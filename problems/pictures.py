@@ -47,7 +47,9 @@ def draw_field(
     fields = [make(block) / unit for block in dump.blocks]
     low = min(float(np.nanmin(field)) for field in fields) if low is None else low
     high = max(float(np.nanmax(field)) for field in fields) if high is None else high
-    picture, scale, unit = None, 1e3 if mm else 1.0, "mm" if mm else dump.length_unit
+    picture = None
+    scale = 1e3 if mm else 1.0
+    unit = "mm" if mm else dump.length_unit
     for block, found in zip(dump.blocks, fields, strict=True):
         x, y = nodes = scale * block.nodes
         picture = axis.pcolormesh(x, y, found, cmap=colours, vmin=low, vmax=high, rasterized=True)
@@ -83,7 +85,8 @@ def draw_profiles(axis, dumps, name: str, unit: float, exact=None) -> None:
     in black that of an `exact` flow: its `compute_profile(t)` gives places [m] and values (n,)."""
     for dump in dumps:
         block = dump.blocks[0]
-        x, values = block.centres[0][:, 0], block.cell_fields[name][:, 0] / unit
+        x = block.centres[0][:, 0]
+        values = block.cell_fields[name][:, 0] / unit
         axis.plot(1e3 * x, values, lw=1.4, label=f"{1e6 * dump.t:.3g} µs")
         if exact and dump.t > 0.0:
             x, values = exact.compute_profile(dump.t)

@@ -167,7 +167,8 @@ def find_crossing(x: np.ndarray, values: np.ndarray, level: float) -> float:
 def average_plateau(edges: np.ndarray, values: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
     """Means (k,) of `values` (k, n) over the cells between `edges` (n + 1) with their centres in
     the middle half of a plateau that reaches from one of `ends` to the other; NaN without any."""
-    middle, length = 0.5 * (ends[0] + ends[1]), abs(ends[1] - ends[0])
+    middle = 0.5 * (ends[0] + ends[1])
+    length = abs(ends[1] - ends[0])
     inside = np.abs(0.5 * (edges[1:] + edges[:-1]) - middle) < 0.25 * length
     if not inside.any():
         return np.full(len(values), math.nan)
@@ -186,7 +187,8 @@ def reduce_between(
 def measure_below(line: np.ndarray, curved: bool) -> float:
     """Area [m2] between a line (2, n) and y = 0, or if `curved` the volume per radian [m3]."""
     x, y = line
-    near, far = y[:-1], y[1:]
+    near = y[:-1]
+    far = y[1:]
     height = far * far + far * near + near * near if curved else far + near
     return float((np.diff(x) * height).sum()) / (6.0 if curved else 2.0)
 
@@ -286,13 +288,15 @@ class Problem:
         """
         from hydro.simulation import Simulation  # slow to load; a deck is not
 
-        run, regrid = self.deck.run, getattr(self.deck, "regrid", None)
+        run = self.deck.run
+        regrid = getattr(self.deck, "regrid", None)
         fill = getattr(self.deck, "void_fill", None)
         chosen: dict[str, Any] = {"t_end": self.t_end, "cfl": run.cfl, "threads": run.threads}
         chosen["small_cells"] = run.small_cells
         if fill is not None:
             chosen["void_fill"] = (fill.pressure, fill.gamma)
-        mesh, own = options.get("mesh", "regrid"), type(self).make_grids is not Problem.make_grids
+        mesh = options.get("mesh", "regrid")
+        own = type(self).make_grids is not Problem.make_grids
         if own and isinstance(mesh, str) and mesh not in ("regrid", "fixed"):
             options["mesh"] = lambda name, t: self.make_grids(t)[name]
         if regrid is not None:
@@ -446,7 +450,8 @@ def check_memory(problem: Problem) -> None:
     def need(count: float) -> float:
         return estimate_memory(int(count)) + problem.estimate_solver_memory(int(count))
 
-    cells, memory = problem.estimate_cells(), find_memory()
+    cells = problem.estimate_cells()
+    memory = find_memory()
     if memory is None or (wanted := need(cells)) <= memory:
         return
     fit = float(cells)

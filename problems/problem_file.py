@@ -136,7 +136,8 @@ def _describe_failure(path: Path, error: BaseException) -> str:
     lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
     what = f"the file cannot be run ({type(error).__name__}: {error})"
     if isinstance(error, SyntaxError) and error.filename == str(path):
-        lines, what = [error.lineno], f"this is not valid Python ({error.msg})"
+        lines = [error.lineno]
+        what = f"this is not valid Python ({error.msg})"
     place = f", line {lines[-1]}" if lines and lines[-1] else ""
     return f"{path}{place}: {what}"
 

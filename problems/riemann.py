@@ -43,7 +43,9 @@ FIRST = 0.2  # of its last length that a side with a rarefaction has at first
 GRADED_CELLS = 200  # for which the cases' gradings are chosen
 MOST_RATIO = 1e9  # of the largest cell of a side over its smallest
 SHARE = 0.3  # of a side's cells that are to be in its plateau
-LEAST_GROWTH, MOST_GROWTH = 1.0 + 1e-9, 1.15  # of cells from one to the next
+# of cells from one to the next
+LEAST_GROWTH = 1.0 + 1e-9
+MOST_GROWTH = 1.15
 LARGE = 40.0  # logarithm of a number beside which 1 is nothing
 UNITLESS = 1e4  # gases at lower pressures than this [Pa] are given without units
 LABELS = {"rho": ("density", "kg/m3"), "u": ("velocity", "m/s"), "p": ("pressure", "Pa")}
@@ -76,7 +78,8 @@ def _gas(left, right, gamma=1.4, second=None, **more) -> Case:
 
 def _impact(flyer: str, target: str, speed: float) -> Case:
     """A flyer plate at `speed` [m/s] hits a target at rest, both without pressure."""
-    one, two = find_material(flyer), find_material(target)
+    one = find_material(flyer)
+    two = find_material(target)
     states = one.eos, (one.rho0, speed, 0.0), two.eos, (two.rho0, 0.0, 0.0)
     return Case(*states, lengths=(0.01, 0.01))
 
@@ -134,7 +137,10 @@ def choose_domain(exact: RiemannSolution, cells: tuple[int, int], t_end: float |
 
     cells: of the two sides; `t_end` None: when both sides together are 1 m long at the end.
     """
-    last, first, growths, ends = [], [], [], []
+    last = []
+    first = []
+    growths = []
+    ends = []
     waves = exact.left_wave, exact.right_wave
     for sign, wave, count in zip((-1, 1), waves, cells, strict=True):
         pace = sign * (wave.head - exact.u) / (1.0 - BEYOND)  # length at the end, over t
@@ -210,7 +216,8 @@ class RiemannDeck(Deck, kw_only=True):
 
 class Riemann(Problem):
     Deck = RiemannDeck
-    counted, measures_sides = ("cells", "rows"), True
+    counted = ("cells", "rows")
+    measures_sides = True
 
     def __init__(self, deck: RiemannDeck):
         super().__init__(deck)
@@ -224,7 +231,8 @@ class Riemann(Problem):
             raise BadInput(f"deck: there is no case {deck.case!r}{suggest(deck.case, CASES)}")
         if deck.lengths is not None:
             case = replace(case, lengths=deck.lengths, t_end=None)
-        self.case, self.limiter = case, deck.limiter or case.limiter
+        self.case = case
+        self.limiter = deck.limiter or case.limiter
         gases = isinstance(case.left_eos, IdealGas) and isinstance(case.right_eos, IdealGas)
         if gases and max(case.left[2], case.right[2]) < UNITLESS:
             self.t_unit = "1"
@@ -243,7 +251,8 @@ class Riemann(Problem):
                 f"m/s, make that less than {parting - (exact.u_right - exact.u_left):.6g} m/s"
             )
         self.domain = self.choose_domain()
-        growth, count = max(self.domain.growths), deck.cells - deck.cells // 2
+        growth = max(self.domain.growths)
+        count = deck.cells - deck.cells // 2
         if count * math.log(growth) > math.log(MOST_RATIO):
             right = 1.0 + 0.9 * math.log(MOST_RATIO) / count
             raise BadInput(
@@ -255,14 +264,17 @@ class Riemann(Problem):
     def choose_domain(self) -> Domain:
         """Lengths, growths and end time: the deck's, the case's, or by the waves, of which one is
         WAY of the way to its end where nothing else gives the end time."""
-        deck, case, exact = self.deck, self.case, self.exact
+        deck = self.deck
+        case = self.case
+        exact = self.exact
         if case.lengths is not None:
             ends = (case.left[1], case.right[1]) if self.on_line else (0.0, 0.0)
             speeds = ends[0] - exact.left_wave.head, exact.right_wave.head - ends[1]
             ways = zip(case.lengths, speeds, strict=True)
             t = WAY * min(length / speed for length, speed in ways if speed > 0.0)
             own = case.grading ** min(1.0, GRADED_CELLS / deck.cells)
-            t_end, growths = deck.run.t_end or case.t_end or t, (deck.grading or own,) * 2
+            t_end = deck.run.t_end or case.t_end or t
+            growths = (deck.grading or own,) * 2
             return Domain(case.lengths, growths, ends, t_end, sum(case.lengths))
         made_for = deck.run.t_set_up or deck.run.t_end
         if self.on_line:
@@ -282,7 +294,9 @@ class Riemann(Problem):
         """Straight lines, cells about as wide as long.  A captured contact is on a grid at rest,
         or one that swings as a standing wave of one period, which stretches cells by a fifth at
         most and is back at its start at the end."""
-        deck, domain, half = self.deck, self.domain, self.deck.cells // 2
+        deck = self.deck
+        domain = self.domain
+        half = self.deck.cells // 2
         across = np.linspace(0.0, domain.span / deck.cells * deck.rows, deck.rows + 1)
         left, right = domain.lengths
         if self.on_line:
@@ -293,14 +307,18 @@ class Riemann(Problem):
         else:
             x = np.linspace(-left, right, deck.cells + 1)
             if deck.mesh == "wave":
-                turn, length, period = 2.0 * math.pi, x[-1] - x[0], deck.run.t_set_up or self.t_end
+                turn = 2.0 * math.pi
+                length = x[-1] - x[0]
+                period = deck.run.t_set_up or self.t_end
                 wave = 0.2 * length / turn * np.sin(turn * (x - x[0]) / length)
                 x = x + wave * math.sin(turn * t / period)
             lines = {"all": x}
         return {name: make_plane_grid(x, across) for name, x in lines.items()}
 
     def build(self):
-        case, grids, blocks = self.case, self.make_grids(), []
+        case = self.case
+        grids = self.make_grids()
+        blocks = []
         if not self.on_line:
             x = grids["all"][0]
             first = np.clip(-x[:-1, 1:] / np.diff(x[:, 1:], axis=0), 0.0, 1.0)  # of a cell in x < 0
@@ -327,7 +345,8 @@ class Riemann(Problem):
 
     def measure(self, evolution) -> dict[str, float]:
         """Error of the density and the star states (NaN while a plateau is too narrow)."""
-        t, exact = evolution.t, self.exact
+        t = evolution.t
+        exact = self.exact
         row = {"l1_rho": 0.0} | {f"star_{name}": math.nan for name in STARS}
         if t == 0.0:
             return row
@@ -349,7 +368,8 @@ class Riemann(Problem):
         Of the velocity that is the largest of |u*| and the changes of velocity over the waves;
         where nothing moves, a speed of sound.
         """
-        exact, case = self.exact, self.case
+        exact = self.exact
+        case = self.case
         speed = max(abs(exact.u), abs(exact.u - case.left[1]), abs(exact.u - case.right[1]))
         c = float(case.left_eos.sound_speed(case.left[0], case.left[2]))
         speed = speed if speed > REST * c else c
@@ -360,7 +380,9 @@ class Riemann(Problem):
         }
 
     def report(self, history, final=None) -> Report:
-        deck, exact, t = self.deck, self.exact, get_last(history, "t")
+        deck = self.deck
+        exact = self.exact
+        t = get_last(history, "t")
         where = "on a grid line" if self.on_line else f"captured, grid {deck.mesh}"
         rows = [
             compare(
@@ -383,7 +405,8 @@ class Riemann(Problem):
 
     def draw_profiles(self, figure, run_data) -> None:
         """Density, velocity and pressure along x in the last dump over the exact solution."""
-        dump, axes = run_data.dumps[-1], figure.subplots(1, 3)
+        dump = run_data.dumps[-1]
+        axes = figure.subplots(1, 3)
         ends = [block.nodes[0, [0, -1], 0] for block in dump.blocks]
         x = np.linspace(np.min(ends), np.max(ends), 2000)
         if dump.t > 0.0:
@@ -394,7 +417,8 @@ class Riemann(Problem):
                 axis.plot(x, values, color="0.6", lw=1.2, label="exact")
         for axis, (name, (label, unit)) in zip(axes, LABELS.items(), strict=True):
             for block, colour in zip(dump.blocks, ("C0", "C3"), strict=False):
-                x, values = block.centres[0][:, 0], block.cell_fields[name][:, 0]
+                x = block.centres[0][:, 0]
+                values = block.cell_fields[name][:, 0]
                 words = block.name if self.on_line else "computed"
                 axis.plot(x, values, ".", ms=3, color=colour, label=words)
             axis.set_xlabel(name_axis("x", dump.length_unit))

@@ -37,16 +37,23 @@ from regrid.algebraic import fill_from_sides
 from regrid.measure.cells import compute_area_fractions
 
 MICRO = 1e-6
-PRESSURE, AIR_DENSITY, AIR = 101325.0, 1.225, IdealGas(1.4)
+PRESSURE = 101325.0
+AIR_DENSITY = 1.225
+AIR = IdealGas(1.4)
 GASES = {"helium": (0.2228, IdealGas(1.648)), "R22": (3.863, IdealGas(1.249))}
-RADIUS, HALF_HEIGHT = 0.025, 0.0445
+RADIUS = 0.025
+HALF_HEIGHT = 0.0445
 # The barrel over the radius: its half width on the axis, its corners', its top's distance.
-CORE, CORNER, CROWN = 0.5, 0.68, 0.7
+CORE = 0.5
+CORNER = 0.68
+CROWN = 0.7
 # Degrees from the axis where the three blocks around the bubble meet: the seam that leads from
 # there to the box's corner has to stay clear of the lobe that curls over it.
 JOINT = {"helium": 70.0, "R22": 38.0}
 PICTURE = {"helium": 427e-6, "R22": 417e-6}  # a photograph after the shock's arrival [s]
-UPWIND, DOWNWIND = 0.1, 0.16  # lengths of the tube before and behind the box [m]
+# lengths of the tube before and behind the box [m]
+UPWIND = 0.1
+DOWNWIND = 0.16
 GAP = 0.1  # first distance of shock and bubble over the radius
 BUBBLE = ("core", "west", "north", "east")
 DECADES = 1.3  # of gradients that are drawn, from those that 1 % of a picture's nodes exceed
@@ -146,7 +153,9 @@ class ShockBubble(Problem):
         self.contact = solve_riemann(AIR, air, self.eos, (self.rho, 0.0, PRESSURE))
 
     def make_grids(self, t=0.0):
-        n, high, joint = self.deck.cells, HALF_HEIGHT, math.radians(JOINT[self.deck.gas])
+        n = self.deck.cells
+        high = HALF_HEIGHT
+        joint = math.radians(JOINT[self.deck.gas])
         core = CORE * RADIUS
         size = core / n
         columns = max(4, round(1.2 * RADIUS * (math.pi - 2.0 * joint) / size))
@@ -164,10 +173,12 @@ class ShockBubble(Problem):
         side = np.array([np.full(up.size, high), high * up])
         lid = np.array([high * across, np.full(across.size, high)])
         box = {"west": mirror * side, "north": lid, "east": side}
-        inner, outer = round((RADIUS - core) / size) + 1, round(1.2 * (high - RADIUS) / size) + 1
+        inner = round((RADIUS - core) / size) + 1
+        outer = round(1.2 * (high - RADIUS) / size) + 1
         middle = np.zeros((2, across.size, up.size))
         middle[0, :, 0] = core * across
-        middle[:, 0], middle[:, -1] = barrel["west"], barrel["east"]
+        middle[:, 0] = barrel["west"]
+        middle[:, -1] = barrel["east"]
         middle[:, :, -1] = barrel["north"]
         fill_from_sides(middle.copy(), middle)
         grids = {"core": middle}
@@ -189,13 +200,18 @@ class ShockBubble(Problem):
         return 34 * (self.deck.cells + 2) ** 2
 
     def build(self):
-        deck, blocks = self.deck, {}
+        deck = self.deck
+        blocks = {}
         ahead = AIR_DENSITY, 0.0, 0.0, PRESSURE
         for name, nodes in self.make_grids().items():
-            eos, state, material = self.eos, (self.rho, 0.0, 0.0, PRESSURE), deck.gas
+            eos = self.eos
+            state = (self.rho, 0.0, 0.0, PRESSURE)
+            material = deck.gas
             if name not in BUBBLE:
                 part = compute_area_fractions(nodes, -RADIUS - GAP * RADIUS)
-                eos, state, material = AIR, mix_states(AIR, part, self.behind, ahead), "air"
+                eos = AIR
+                state = mix_states(AIR, part, self.behind, ahead)
+                material = "air"
             blocks[name] = Block(name, eos, nodes, *state, material=material, limiter=deck.limiter)
         put(blocks["upwind"], "i_min", "inflow", state=self.behind)
         links = [
@@ -280,7 +296,10 @@ class ShockBubble(Problem):
         none; of the upwind end's first speed against the plane contact's; of the focus' time."""
         if not history:
             return Report()
-        deck, t, volume, first = self.deck, history["t"], history["volume"], math.nan
+        deck = self.deck
+        t = history["t"]
+        volume = history["volume"]
+        first = math.nan
         # the upwind end while the shock goes a quarter of a radius on
         start, end = (self.arrival + part * RADIUS / self.shock.shock_speed for part in (0.05, 0.3))
         if t[-1] >= end:
@@ -288,7 +307,8 @@ class ShockBubble(Problem):
         rows = [Row("first_upwind_speed", first, self.contact.u, error="upwind_speed")]
         table = [["velocities [m/s]", "here", "fixed grid", "measured", "computed", "window [us]"]]
         for feature in FEATURES[deck.gas]:
-            (name, *_, measured, computed, fixed), alone = feature, math.isnan(feature.measured)
+            name, *_, measured, computed, fixed = feature
+            alone = math.isnan(feature.measured)
             window, speed = self.fit_velocity(history, feature)
             rows.append(Row(name, speed, fixed if alone else measured, error=name))
             if window and self.features:
@@ -317,7 +337,8 @@ class ShockBubble(Problem):
     def draw_shock_bubble(self, figure, run_data) -> None:
         """Density gradients as a shadowgraph shows them, the grid mirrored below, at the times of
         the experiment's photographs and at the end."""
-        last, chosen = run_data.dumps[-1], {}
+        last = run_data.dumps[-1]
+        chosen = {}
         for time in PHOTOGRAPHS[self.deck.gas]:
             wanted = self.arrival + time * MICRO
             dump = find_dump(run_data, wanted)
@@ -335,7 +356,8 @@ class ShockBubble(Problem):
 
     def draw_space_time(self, figure, run_data) -> None:
         """Places of the bubble's ends and of the shocks over time, and the measured velocities."""
-        history, axis = run_data.history, make_panels(figure, 7.5, 6.0)
+        history = run_data.history
+        axis = make_panels(figure, 7.5, 6.0)
         t = (history["t"] - self.arrival) / MICRO
         inside = history["axis_front"] < self.far_end - 1e-3
         columns = {

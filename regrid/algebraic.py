@@ -87,7 +87,9 @@ def blend(row, law, bend, value_x, value_y, change_x, change_y):
 def fill_blend(along_i, along_j, corners, out):
     """Boolean sum (theory R6.4) of the sides' values into the inner nodes; rows as named above."""
     for i in range(1, out.shape[1] - 1):
-        here, row_x, row_y = take_blend(i, along_i, corners), out[0, i], out[1, i]
+        here = take_blend(i, along_i, corners)
+        row_x = out[0, i]
+        row_y = out[1, i]
         for j in range(1, out.shape[2] - 1):
             row_x[j], row_y[j] = blend(
                 here, along_j[LAW, j], along_j[LAW_CHANGE, j], along_j[VALUE_X, j],
@@ -108,15 +110,19 @@ def fill_tables(laws_of, values, moved, along_i, along_j, corners):
     # The value rows first hold the sides of the grid, for the laws.
     for j, law in ((0, LAW), (nj, LAW_CHANGE)):
         for i in range(ni + 1):
-            along_i[VALUE_X, i], along_i[VALUE_Y, i] = laws_of[0, i, j], laws_of[1, i, j]
+            along_i[VALUE_X, i] = laws_of[0, i, j]
+            along_i[VALUE_Y, i] = laws_of[1, i, j]
         fill_arc_law(along_i[VALUE_X], along_i[VALUE_Y], along_i[law])
     for i, law in ((0, LAW), (ni, LAW_CHANGE)):
         fill_arc_law(laws_of[0, i], laws_of[1, i], along_j[law])
     for k in range(2):
-        own, laws = values[k], laws_of[k]
-        value, change = VALUE_X + k, CHANGE_X + k
+        own = values[k]
+        laws = laws_of[k]
+        value = VALUE_X + k
+        change = CHANGE_X + k
         first, second = own[0, 0] - part * laws[0, 0], own[0, nj] - part * laws[0, nj]
-        third, fourth = own[ni, 0] - part * laws[ni, 0], own[ni, nj] - part * laws[ni, nj]
+        third = own[ni, 0] - part * laws[ni, 0]
+        fourth = own[ni, nj] - part * laws[ni, nj]
         # The mean is symmetric in the corners, so that a mirrored or transposed block gets the
         # same bits, and is the value itself where all agree: a block moved bodily keeps its shape.
         mean = 0.25 * ((first + fourth) + (second + third))
@@ -128,7 +134,8 @@ def fill_tables(laws_of, values, moved, along_i, along_j, corners):
             low = own[0, j] - part * laws[0, j]
             along_j[value, j] = low - mean
             along_j[change, j] = (own[ni, j] - part * laws[ni, j]) - low
-        corners[k, 0], corners[k, 1] = along_j[value, 0], along_j[value, nj]
+        corners[k, 0] = along_j[value, 0]
+        corners[k, 1] = along_j[value, nj]
         corners[k, 2] = along_j[value, 0] + along_j[change, 0]
         corners[k, 3] = along_j[value, nj] + along_j[change, nj]
         corners[k, 4] = mean
@@ -194,7 +201,8 @@ def prepare_motion(old, motion, most_bend, bent):
 
     Where lines are `bent`, `most_bend` (nj+1) is how far their laws depart at most.
     """
-    sides, turn = motion.sides, motion.turn
+    sides = motion.sides
+    turn = motion.turn
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
     fill_tables(old, sides, True, motion.along_i, motion.along_j, motion.corners)
     if bent:
@@ -245,12 +253,15 @@ def fill_quasi_1d(boundary: np.ndarray, out: np.ndarray) -> None:
     Sides are copied from `boundary` (2, ni+1, nj+1), inner nodes of it are not read.
     """
     copy_sides(boundary, out)
-    laws, nj = np.empty((2, out.shape[1])), out.shape[2] - 1
+    laws = np.empty((2, out.shape[1]))
+    nj = out.shape[2] - 1
     for law, j in zip(laws, (0, -1), strict=True):
         fill_arc_law(*np.ascontiguousarray(boundary[:, :, j]), law)
-    low, change = laws[0, 1:-1, None], (laws[1] - laws[0])[1:-1, None]
+    low = laws[0, 1:-1, None]
+    change = (laws[1] - laws[0])[1:-1, None]
     part = low + change * (np.arange(1, nj) / nj)
-    first, last = out[:, :1, 1:-1], out[:, -1:, 1:-1]
+    first = out[:, :1, 1:-1]
+    last = out[:, -1:, 1:-1]
     out[:, 1:-1, 1:-1] = first + part * (last - first)
 
 
@@ -289,10 +300,13 @@ def fill_curves(sides, share_i, share_j, curve):
     x, y = sides
     curve[:] = 0.0
     if share_i > 0.0:
-        line, low, high = np.empty((2, ni + 1)), np.empty((2, ni + 1)), np.empty((2, ni + 1))
+        line = np.empty((2, ni + 1))
+        low = np.empty((2, ni + 1))
+        high = np.empty((2, ni + 1))
         for j, shape in ((0, low), (nj, high)):
             for i in range(ni + 1):
-                line[0, i], line[1, i] = x[i, j], y[i, j]
+                line[0, i] = x[i, j]
+                line[1, i] = y[i, j]
             fill_shape(line[0], line[1], shape)
         for i in range(ni + 1):
             for j in range(nj + 1):
@@ -361,7 +375,8 @@ class AlgebraicRegridder:
         """
         previous, boundary = check_grids(previous, boundary)
         nodes = self.make_nodes(previous, boundary)
-        old, new = compute_corner_areas(previous), compute_corner_areas(nodes)
+        old = compute_corner_areas(previous)
+        new = compute_corner_areas(nodes)
         sign = 1.0 if old.sum() >= 0.0 else -1.0
         forced = [corner for corner in BLOCK_CORNERS if not sign * new[corner] > 0.0]
         for corner in forced:

@@ -116,7 +116,10 @@ def fill_refined_law(least, length, at_end, law):
     Falls back on `fill_grown_law` where even steps would be shorter, or growing ones too few.
     """
     number = law.shape[0] - 1
-    total, last, even = 0.0, least, 0.0  # of the growing steps; the step that comes next
+    # of the growing steps; the step that comes next
+    total = 0.0
+    last = least
+    even = 0.0
     for k in range(number):
         even = (length - total) / (number - k)
         if even <= last:
@@ -126,7 +129,8 @@ def fill_refined_law(least, length, at_end, law):
     if even > last or even < least:
         fill_grown_law(least, length, at_end, law)
         return
-    position, step = 0.0, least
+    position = 0.0
+    step = least
     law[number if at_end else 0] = 1.0 if at_end else 0.0
     for k in range(1, number):
         position += min(step, even)
@@ -165,7 +169,8 @@ def equidistribute(nodes: np.ndarray, weight: np.ndarray, count: int | None = No
     `weight` is positive and given at the n nodes, or on the n - 1 steps between them (then the
     integral is inverted exactly).  The integral is interpolated monotonically.
     """
-    nodes, weight = np.asarray(nodes, dtype=float), np.asarray(weight, dtype=float)
+    nodes = np.asarray(nodes, dtype=float)
+    weight = np.asarray(weight, dtype=float)
     if weight.size not in (nodes.size, nodes.size - 1) or not (weight > 0.0).all():
         raise BadInput("spacing: a weight must be positive, one value a node or one a step")
     on_steps = weight if weight.size < nodes.size else 0.5 * (weight[1:] + weight[:-1])
@@ -177,7 +182,8 @@ def equidistribute(nodes: np.ndarray, weight: np.ndarray, count: int | None = No
         from scipy.interpolate import PchipInterpolator  # slow to load
 
         found = PchipInterpolator(integral, nodes)(levels)
-    found[0], found[-1] = nodes[0], nodes[-1]
+    found[0] = nodes[0]
+    found[-1] = nodes[-1]
     return found
 
 
@@ -259,7 +265,8 @@ def equalise_products(
     x = np.array(nodes, dtype=float)
     if x.size < 3:
         return x
-    count, width = x.size, x[-1] - x[0]
+    count = x.size
+    width = x[-1] - x[0]
     # Unknown are the inner nodes and the common product: the last column of the matrix.
     matrix = np.zeros((count - 1, count - 1))
     rows = np.arange(count - 2)
@@ -294,7 +301,8 @@ def equalise_products(
             break
         if np.abs(change).max() < 1e-16 * abs(width):
             break
-        x, product = trial, trial_product
+        x = trial
+        product = trial_product
     spread = np.abs(product - product.mean()).max() / abs(product.mean())
     if not spread <= SETTLED:
         worst = int(np.abs(product - product.mean()).argmax())
@@ -318,14 +326,17 @@ def fill_turning(line, closed, wall_first, wall_last, wanted):
     edges = count - 1
     turn = np.empty(count)
     for k in range(count):
-        before, after = max(k - 1, 0), min(k, edges - 1)
+        before = max(k - 1, 0)
+        after = min(k, edges - 1)
         if closed and (k == 0 or k == edges):
-            before, after = edges - 1, 0
+            before = edges - 1
+            after = 0
         ax, ay = line[0, before + 1] - line[0, before], line[1, before + 1] - line[1, before]
         bx, by = line[0, after + 1] - line[0, after], line[1, after + 1] - line[1, after]
         if before == after:  # an end: its mirror image's segment, along and across the normal
             nx, ny = wall_first if k == 0 else wall_last
-            along, across = abs(nx * ax + ny * ay), abs(nx * ay - ny * ax)
+            along = abs(nx * ax + ny * ay)
+            across = abs(nx * ay - ny * ax)
             turn[k] = 2.0 * np.arctan2(across, along)
             if nx == 0.0 and ny == 0.0:
                 turn[k] = 0.0
@@ -334,7 +345,8 @@ def fill_turning(line, closed, wall_first, wall_last, wanted):
     for k in range(edges):
         wanted[k] = 0.5 * (turn[k] + turn[k + 1]) / TURN
     for _ in range(SMOOTHINGS):
-        start, last = wanted[0], wanted[edges - 1]
+        start = wanted[0]
+        last = wanted[edges - 1]
         before = last if closed else start
         for k in range(edges):
             after = wanted[k + 1] if k + 1 < edges else (start if closed else last)
@@ -355,7 +367,8 @@ def fill_turning_law(line, first, turning, closed, wall_first, wall_last, shorte
     """
     count = line.shape[1]
     edges = count - 1
-    arc, wanted = np.empty(count), np.empty(edges)
+    arc = np.empty(count)
+    wanted = np.empty(edges)
     fill_arc_lengths(line, arc)
     fill_turning(line, closed, wall_first, wall_last, wanted)
     for k in range(edges):
@@ -367,8 +380,11 @@ def fill_turning_law(line, first, turning, closed, wall_first, wall_last, shorte
     even = max(1.0 - total / edges, LEAST_EVEN)
     scale = edges / (even * edges + total)
     # the number of segments up to node k, and the places where it is whole
-    law[0], law[edges] = 0.0, 1.0
-    done, following, place = 0.0, 1, 0
+    law[0] = 0.0
+    law[edges] = 1.0
+    done = 0.0
+    following = 1
+    place = 0
     before = 0.0
     for k in range(edges):
         reached = arc[k + 1] / arc[edges]
@@ -407,8 +423,10 @@ def fill_positions(arc, law, first, last, relax, positions):
     Between the two key nodes the wanted place follows `law`; a node goes there by the part `relax`
     (theory R9.1).
     """
-    length, span = arc[last] - arc[first], law[last] - law[first]
-    positions[first], positions[last] = arc[first], arc[last]
+    length = arc[last] - arc[first]
+    span = law[last] - law[first]
+    positions[first] = arc[first]
+    positions[last] = arc[last]
     for k in range(first + 1, last):
         wanted = arc[first] + length * ((law[k] - law[first]) / span)
         positions[k] = arc[k] + relax * (wanted - arc[k])
@@ -435,9 +453,11 @@ def fill_curvatures(line, arc, first, last, wall_first, wall_last, eliminated, s
     h = arc[first + 1] - arc[first]
     step_x = line[0, first + 1] - line[0, first]
     step_y = line[1, first + 1] - line[1, first]
-    eliminated[0, first], second[0, first] = 0.0, 0.0
+    eliminated[0, first] = 0.0
+    second[0, first] = 0.0
     if free_first:
-        eliminated[1, first], second[1, first] = 0.0, 0.0
+        eliminated[1, first] = 0.0
+        second[1, first] = 0.0
     else:
         eliminated[1, first] = 0.5
         second[1, first] = 3.0 * (-normal_y * step_x + normal_x * step_y) / (h * h)
@@ -452,10 +472,13 @@ def fill_curvatures(line, arc, first, last, wall_first, wall_last, eliminated, s
             pivot = 1.0 / (2.0 * (h + ahead) - h * eliminated[c, k - 1])
             eliminated[c, k] = ahead * pivot
             second[c, k] = (right[c] - h * second[c, k - 1]) * pivot
-        h, rise_x, rise_y = ahead, ahead_x, ahead_y
+        h = ahead
+        rise_x = ahead_x
+        rise_y = ahead_y
     # Last node: n . M = 0 and t . (2 M + M_before) = 6 t . rise / h, in the first wall's frame.
     last_x, last_y = wall_last
-    second[0, last], second[1, last] = 0.0, 0.0
+    second[0, last] = 0.0
+    second[1, last] = 0.0
     if last_x != 0.0 or last_y != 0.0:
         along_0 = normal_x * -last_y + normal_y * last_x
         along_1 = normal_y * last_y + normal_x * last_x
@@ -463,12 +486,14 @@ def fill_curvatures(line, arc, first, last, wall_first, wall_last, eliminated, s
         slope -= along_0 * second[0, last - 1] + along_1 * second[1, last - 1]
         stiff = along_0 * along_0 * (2.0 - eliminated[0, last - 1])
         stiff += along_1 * along_1 * (2.0 - eliminated[1, last - 1])
-        second[0, last], second[1, last] = along_0 * slope / stiff, along_1 * slope / stiff
+        second[0, last] = along_0 * slope / stiff
+        second[1, last] = along_1 * slope / stiff
     for k in range(last - 1, first - 1, -1):
         for c in range(2):
             second[c, k] -= eliminated[c, k] * second[c, k + 1]
     for k in range(first, last + 1):
-        part_0, part_1 = second[0, k], second[1, k]
+        part_0 = second[0, k]
+        part_1 = second[1, k]
         second[0, k] = normal_x * part_0 - normal_y * part_1
         second[1, k] = normal_y * part_0 + normal_x * part_1
 
@@ -483,13 +508,18 @@ def fill_closed_curvatures(line, arc, eliminated, second):
     """
     last = arc.shape[0] - 1
     fill_curvatures(line, arc, 0, last, FREE_END, FREE_END, eliminated, second)
-    first_h, end_h = arc[1] - arc[0], arc[last] - arc[last - 1]
+    first_h = arc[1] - arc[0]
+    end_h = arc[last] - arc[last - 1]
     slopes = np.empty(2)
     for c in range(2):
         slope = (line[c, 1] - line[c, 0]) / first_h - (line[c, last] - line[c, last - 1]) / end_h
         slopes[c] = 6.0 * slope - first_h * second[c, 1] - end_h * second[c, last - 1]
-    factor, unit = eliminated[0], eliminated[1]  # of the elimination; the solution for X = 1
-    factor[0], unit[0], unit[last] = 0.0, 1.0, 1.0
+    # of the elimination; the solution for X = 1
+    factor = eliminated[0]
+    unit = eliminated[1]
+    factor[0] = 0.0
+    unit[0] = 1.0
+    unit[last] = 1.0
     h = first_h
     for k in range(1, last):
         ahead = arc[k + 1] - arc[k]
@@ -531,13 +561,17 @@ def fill_redistributed(line, law, keys, spline, relax, closed, wall_first, wall_
     scratch.
     """
     count = line.shape[1]
-    arc, positions, eliminated, second = work[0], work[1], work[2:4], work[4:6]
+    arc = work[0]
+    positions = work[1]
+    eliminated = work[2:4]
+    second = work[4:6]
     fill_arc_lengths(line, arc)
     for c in range(2):
         for k in range(count):
             out[c, k] = line[c, k]
     for segment in range(keys.shape[0] - 1):
-        first, last = keys[segment], keys[segment + 1]
+        first = keys[segment]
+        last = keys[segment + 1]
         if not fill_positions(arc, law, first, last, relax, positions):
             return first
         if spline and closed and keys.shape[0] == 2 and last > 1:
@@ -595,7 +629,8 @@ def redistribute(
     ends = np.array(sorted({0, count - 1, *keys}), dtype=np.int64)
     if ends[0] < 0 or ends[-1] >= count:
         raise BadInput(f"line: key nodes must lie between 0 and {count - 1}, got {list(keys)}")
-    out, work = np.empty_like(line), np.empty((6, count))
+    out = np.empty_like(line)
+    work = np.empty((6, count))
     wall_first, wall_last = ((float(wall[0]), float(wall[1])) for wall in walls)
     failed = fill_redistributed(
         line, law, ends, shape == "spline", float(relax), closed, wall_first, wall_last, work, out

@@ -87,7 +87,8 @@ def distribute_by_arc_length(
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=1)))])
     law = np.linspace(0.0, 1.0, count) if law is None else law
     line = np.array([np.interp(law * arc[-1], arc, part) for part in curve])
-    line[:, 0], line[:, -1] = curve[:, 0], curve[:, -1]
+    line[:, 0] = curve[:, 0]
+    line[:, -1] = curve[:, -1]
     return line
 
 
@@ -114,9 +115,11 @@ def march_line(
         nodes[:, -1] = start[:, -1]
         nodes[:, 0] = distribute_by_arc_length(curve_at(amplitude), count)
         for j, law in ((0, law_low), (-1, law_high)):
-            foot, top = nodes[:, 0, j], nodes[:, -1, j]
+            foot = nodes[:, 0, j]
+            top = nodes[:, -1, j]
             nodes[:, :, j] = foot[:, None] + law * (top - foot)[:, None]
-            nodes[:, 0, j], nodes[:, -1, j] = foot, top
+            nodes[:, 0, j] = foot
+            nodes[:, -1, j] = top
         return nodes
 
     amplitudes = np.linspace(0.0, 1.0, SAMPLES)
@@ -181,7 +184,8 @@ def find_shortest_edge(start: np.ndarray, side: str) -> float:
     """Shortest edge along a side of a grid and from there to the first line [m]."""
     turned = start if side[0] == "i" else start.transpose(0, 2, 1)
     turned = turned[:, ::-1] if side.endswith("max") else turned
-    along, away = np.diff(turned[:, 0], axis=1), turned[:, 1] - turned[:, 0]
+    along = np.diff(turned[:, 0], axis=1)
+    away = turned[:, 1] - turned[:, 0]
     return float(min(np.hypot(*along).min(), np.hypot(*away).min()))
 
 
@@ -232,7 +236,8 @@ def _on_walls(curve_at: Callable[[float], np.ndarray]) -> Callable[[float], np.n
 
     def pinned(amplitude: float) -> np.ndarray:
         curve = curve_at(amplitude)
-        curve[:, 0], curve[:, -1] = (1.0, 0.0), (0.0, 0.0)
+        curve[:, 0] = (1.0, 0.0)
+        curve[:, -1] = (0.0, 0.0)
         return curve
 
     return pinned
@@ -433,8 +438,10 @@ def airfoil(ni: int = 60, nj: int = 40) -> MovingDomain:
     upper = np.array([np.full_like(r, tail), profile[1, 0] + (AIRFOIL_RADIUS - profile[1, 0]) * r])
     outer = distribute_by_arc_length(_c_shape(tail), nj + 1)
     sides = np.zeros((2, ni + 1, nj + 1))
-    sides[:, 0], sides[:, -1] = profile, outer
-    sides[:, :, 0], sides[:, :, -1] = upper, upper * np.array([[1.0], [-1.0]])
+    sides[:, 0] = profile
+    sides[:, -1] = outer
+    sides[:, :, 0] = upper
+    sides[:, :, -1] = upper * np.array([[1.0], [-1.0]])
     radius = np.hypot(*sides)
     turn = np.arctan2(sides[1], sides[0]) % (2.0 * np.pi) - np.pi
     # Strip: as wide and as long as the closed shape on average, in log r and angle.

@@ -43,7 +43,9 @@ def spherical_shell(p: np.ndarray) -> np.ndarray:
 
     p1 is the radius less 1, so the grid of equal volumes, r³ = 1 + 7q, has to be computed.
     """
-    r, cosine, longitude = 1.0 + p[0], p[1] - 0.5, 1.2 * p[2]
+    r = 1.0 + p[0]
+    cosine = p[1] - 0.5
+    longitude = 1.2 * p[2]
     sine = np.sqrt(1.0 - cosine * cosine)
     return r * np.array([sine * np.cos(longitude), sine * np.sin(longitude), -cosine])
 
@@ -86,8 +88,10 @@ def piston_with_bump(p: np.ndarray, s: float) -> np.ndarray:
 def twisted_duct(p: np.ndarray, s: float) -> np.ndarray:
     """A square duct of length 2 whose far end turns by 120 degrees."""
     angle = 2.0 * np.pi / 3.0 * s * p[0]
-    y, z = p[1] - 0.5, p[2] - 0.5
-    cosine, sine = np.cos(angle), np.sin(angle)
+    y = p[1] - 0.5
+    z = p[2] - 0.5
+    cosine = np.cos(angle)
+    sine = np.sin(angle)
     return np.array([2.0 * p[0], cosine * y - sine * z, sine * y + cosine * z])
 
 

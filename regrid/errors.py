@@ -44,7 +44,8 @@ class RunFailure(Exception):
 
     def __init__(self, what: str = "", *, cause: str = "", place: Place | None = None):
         super().__init__(what)
-        self.cause, self._place = cause, place
+        self.cause = cause
+        self._place = place
 
     @property
     def place(self) -> Place | None:
@@ -54,7 +55,8 @@ class RunFailure(Exception):
     def tell(self, words: str, kind: type[RunFailure] | None = None) -> RunFailure:
         """A failure with other words, of the same cause, at the same place; of `kind`, if given."""
         told = (kind or type(self))(words)
-        told.cause, told._place = self.cause, self.place
+        told.cause = self.cause
+        told._place = self.place
         return told
 
 
@@ -82,7 +84,10 @@ class RegridFailure(RunFailure):
     ):
         super().__init__(what, cause=cause, place=place)
         self.cell = cell
-        self.block, self.side, self.nodes, self.grid = block, side, tuple(nodes), grid
+        self.block = block
+        self.side = side
+        self.nodes = tuple(nodes)
+        self.grid = grid
 
     @property
     def place(self) -> Place | None:

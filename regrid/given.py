@@ -29,7 +29,9 @@ from regrid.measure.quality import find_bad_cells
 from regrid.sides import SIDE_NAMES, get_side, get_sides
 
 ALIASES = dict(zip(("left", "right", "bottom", "top"), SIDE_NAMES, strict=True))
-LEAST, MOST = 1e-100, 1e100  # extents whose areas can be computed with
+# extents whose areas can be computed with
+LEAST = 1e-100
+MOST = 1e100
 GAP = 1e-6  # ends of sides that are to meet may lie so far apart, over the size of the whole
 CORNERS = (  # a side and its end that meets the end of another
     ("i_min", 0, "j_min", 0), ("i_min", -1, "j_max", 0),

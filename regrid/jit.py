@@ -88,7 +88,8 @@ class _Contents(pickle.Pickler):
 
     def __init__(self, stream: io.BytesIO):
         super().__init__(stream, 4)
-        self.fast, self.seen = True, {}
+        self.fast = True
+        self.seen = {}
 
     def reducer_override(self, value):
         for name in ("py_func", "_pyfunc", "_defn"):  # of what numba has compiled
@@ -118,7 +119,8 @@ class _Contents(pickle.Pickler):
             return where, self.seen[key]
         self.seen[key] = len(self.seen)
         if is_function:
-            names, space = _list_names(value.__code__), dict(value.__globals__)
+            names = _list_names(value.__code__)
+            space = dict(value.__globals__)
             for name, cell in zip(value.__code__.co_freevars, value.__closure__ or (), strict=True):
                 with contextlib.suppress(ValueError):  # empty
                     space[name] = cell.cell_contents
@@ -314,7 +316,8 @@ def _compile_or_interpret(compiled: Dispatcher, *arguments):
     if is_interpreting() and numbers <= MOST_NUMBERS:
         return compiled.py_func
     with _compiling.lock:
-        _compiling.begun, processor = time.perf_counter(), time.thread_time()
+        _compiling.begun = time.perf_counter()
+        processor = time.thread_time()
         try:
             found = type(compiled)._compile_for_args(compiled, *arguments)
             compiled.entry = found if len(compiled.overloads) == 1 else compiled

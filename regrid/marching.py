@@ -114,7 +114,9 @@ def march(
         try:
             result = call_regridder(regridder, found.nodes, boundary, *more)
         except RegridFailure as failure:
-            found.failure, found.folded, found.error = str(failure), failure.grid, failure
+            found.failure = str(failure)
+            found.folded = failure.grid
+            found.error = failure
             break
         seconds = time.process_time() - begun
         upright = result.nodes[::-1] if turned else result.nodes
@@ -124,7 +126,8 @@ def march(
             found.failure = f"{say_not_convex(quality.bad_cells)}: {named}"
             found.folded = result.nodes
             break
-        found.nodes, found.done = result.nodes, step
+        found.nodes = result.nodes
+        found.done = step
         found.times.append(t)
         found.seconds.append(seconds)
         found.reports.append(result.report)
@@ -184,7 +187,8 @@ def choose_times(
     if not begin < end:
         raise BadInput(f"march: span {span} must begin before it ends")
     fine = np.linspace(begin, end, SAMPLES)
-    last, travel = None, np.zeros(SAMPLES)
+    last = None
+    travel = np.zeros(SAMPLES)
     for k, t in enumerate(fine):
         boundary = np.asarray(boundary_at(float(t)), dtype=np.float64)
         if boundary.shape != start.shape:

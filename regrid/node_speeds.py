@@ -39,28 +39,46 @@ def find_fast_rows(old, new, interpolated, most, first, last):
     part = (1.0 - ROUND_OFF) * most * most
     rows = 0
     for i in range(ni + 1):
-        first[i], last[i] = nj, 0
+        first[i] = nj
+        last[i] = 0
     for i in range(1, ni):
-        x0, y0, x, y = old[0, i - 1], old[1, i - 1], old[0, i], old[1, i]
+        x0 = old[0, i - 1]
+        y0 = old[1, i - 1]
+        x = old[0, i]
+        y = old[1, i]
         x1, y1 = old[0, i + 1], old[1, i + 1]
-        new_x, new_y, way_x, way_y = new[0, i], new[1, i], interpolated[0, i], interpolated[1, i]
+        new_x = new[0, i]
+        new_y = new[1, i]
+        way_x = interpolated[0, i]
+        way_y = interpolated[1, i]
         fast = 0
         for j in range(1, nj):
             excess_x, excess_y = (new_x[j] - x[j]) - way_x[j], (new_y[j] - y[j]) - way_y[j]
             square = excess_x * excess_x + excess_y * excess_y
-            ax, ay, bx, by = x1[j] - x[j], y1[j] - y[j], x[j + 1] - x[j], y[j + 1] - y[j]
-            cx, cy, dx, dy = x0[j] - x[j], y0[j] - y[j], x[j - 1] - x[j], y[j - 1] - y[j]
-            a, b = ax * ax + ay * ay, bx * bx + by * by
-            c, d = cx * cx + cy * cy, dx * dx + dy * dy
-            p, q = ax * by - ay * bx, bx * cy - by * cx
-            r, s = cx * dy - cy * dx, dx * ay - dy * ax
+            ax = x1[j] - x[j]
+            ay = y1[j] - y[j]
+            bx = x[j + 1] - x[j]
+            by = y[j + 1] - y[j]
+            cx = x0[j] - x[j]
+            cy = y0[j] - y[j]
+            dx = x[j - 1] - x[j]
+            dy = y[j - 1] - y[j]
+            a = ax * ax + ay * ay
+            b = bx * bx + by * by
+            c = cx * cx + cy * cy
+            d = dx * dx + dy * dy
+            p = ax * by - ay * bx
+            q = bx * cy - by * cx
+            r = cx * dy - cy * dx
+            s = dx * ay - dy * ax
             beyond = square * (a if a > b else b) > part * (p * p)
             beyond |= square * (b if b > c else c) > part * (q * q)
             beyond |= square * (c if c > d else d) > part * (r * r)
             beyond |= square * (d if d > a else a) > part * (s * s)
             fast += 1 if beyond else 0
         if fast > 0:
-            first[i], last[i] = 1, nj - 1
+            first[i] = 1
+            last[i] = nj - 1
             rows += 1
     return rows
 
@@ -93,8 +111,10 @@ def fill_limited(old, new, interpolated, most, first, last, wide, out):
     limited = 0
     out[:] = new
     for i in range(1, ni):
-        begin, end = first[i], last[i]
-        first[i], last[i] = nj, 0
+        begin = first[i]
+        end = last[i]
+        first[i] = nj
+        last[i] = 0
         for j in range(begin, end + 1):
             excess_x = (new[0, i, j] - x[i, j]) - interpolated[0, i, j]
             excess_y = (new[1, i, j] - y[i, j]) - interpolated[1, i, j]
@@ -103,8 +123,10 @@ def fill_limited(old, new, interpolated, most, first, last, wide, out):
             bx, by = x[i, j + 1] - x[i, j], y[i, j + 1] - y[i, j]
             cx, cy = x[i - 1, j] - x[i, j], y[i - 1, j] - y[i, j]
             dx, dy = x[i, j - 1] - x[i, j], y[i, j - 1] - y[i, j]
-            a, b = ax * ax + ay * ay, bx * bx + by * by
-            c, d = cx * cx + cy * cy, dx * dx + dy * dy
+            a = ax * ax + ay * ay
+            b = bx * bx + by * by
+            c = cx * cx + cy * cy
+            d = dx * dx + dy * dy
             limit = measure_spacing(ax * by - ay * bx, ax * bx + ay * by, a, b, wide)
             limit = min(limit, measure_spacing(bx * cy - by * cx, bx * cx + by * cy, b, c, wide))
             limit = min(limit, measure_spacing(cx * dy - cy * dx, cx * dx + cy * dy, c, d, wide))
@@ -115,7 +137,8 @@ def fill_limited(old, new, interpolated, most, first, last, wide, out):
                 out[0, i, j] = x[i, j] + interpolated[0, i, j] + keep * excess_x
                 out[1, i, j] = y[i, j] + interpolated[1, i, j] + keep * excess_y
                 limited += 1
-                first[i], last[i] = min(first[i], j), j
+                first[i] = min(first[i], j)
+                last[i] = j
     return limited
 
 
@@ -228,7 +251,8 @@ class MotionLimiter:
         halves; those of folded cells return to `new`.  If that keeps folding others, all nodes
         return by the same fraction to `new`, the least of halvings that leaves no fold.
         """
-        first, last = self.first, self.last
+        first = self.first
+        last = self.last
         whole = share_memory(3 * new.size)[: 3 * new.size]
         interpolated, held, far = whole.reshape(3, *self.shape)
         fill_displacement(old, new, interpolated)
@@ -237,8 +261,10 @@ class MotionLimiter:
         count = fill_limited(old, new, interpolated, most, first, last, False, held)
         if count == 0:
             return new, 0
-        self.far_first[:], self.far_last[:] = first, last
-        far_first, far_last = self.far_first, self.far_last
+        self.far_first[:] = first
+        self.far_last[:] = last
+        far_first = self.far_first
+        far_last = self.far_last
         fill_limited(old, new, interpolated, LOOSE * most, far_first, far_last, True, far)
         for _ in range(HALVINGS):
             if relax_sharpened(old, far, held, first, last, self.loose) == 0:

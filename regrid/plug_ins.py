@@ -71,7 +71,8 @@ def find_plug_ins(group: str) -> tuple[PlugIn, ...]:
     """
     from importlib.metadata import distributions
 
-    found, seen = [], set()
+    found = []
+    seen = set()
     for distribution in distributions():
         name = str(distribution.metadata["Name"])
         if name in seen:

@@ -31,8 +31,12 @@ def find_root(
             raise ValueError(f"find_root: the function is NaN at {place:g}")
         return value
 
-    last, here, far = float(low), float(high), 0.0
-    f_last, f_here, f_far = evaluate(last), evaluate(here), 0.0
+    last = float(low)
+    here = float(high)
+    far = 0.0
+    f_last = evaluate(last)
+    f_here = evaluate(here)
+    f_far = 0.0
     before = step = 0.0
     if f_last == 0.0:
         return last
@@ -42,7 +46,8 @@ def find_root(
         raise ValueError(f"find_root: the function has the same sign at {low:g} and {high:g}")
     for _ in range(MOST_STEPS):
         if f_last != 0.0 and f_here != 0.0 and (f_last < 0.0) != (f_here < 0.0):
-            far, f_far = last, f_last
+            far = last
+            f_far = f_last
             before = step = here - last
         if abs(f_far) < abs(f_here):
             last, here, far = here, far, here
@@ -62,10 +67,12 @@ def find_root(
                 if ratio != 0.0:
                     trial = -f_here * (f_far * slope_far - f_last * slope) / ratio
         if 2.0 * abs(trial) < min(abs(before), 3.0 * abs(half) - delta):
-            before, step = step, trial
+            before = step
+            step = trial
         else:
             before = step = half
-        last, f_last = here, f_here
+        last = here
+        f_last = f_here
         if abs(step) > delta:
             here += step
         else:

@@ -72,26 +72,36 @@ def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonalit
     not `active` has none.
     """
     for col in range(volume.shape[0]):
-        ax, ay, ga = A[col], A[SPAN + col], A[3 * SPAN + col]
-        bx, by, gb = B[col], B[SPAN + col], B[3 * SPAN + col]
+        ax = A[col]
+        ay = A[SPAN + col]
+        ga = A[3 * SPAN + col]
+        bx = B[col]
+        by = B[SPAN + col]
+        gb = B[3 * SPAN + col]
         keep = active[col]
         d = keep * area[col] + (1.0 - keep)
         wx, wy = ax - by, ay + bx
-        v, g = ((wx, wy), (wy, -wx)), ((by, -bx), (-ay, ax))
+        v = ((wx, wy), (wy, -wx))
+        g = ((by, -bx), (-ay, ax))
         scale = keep * smoothness, ga, gb
         terms = corner_blocks(wx * wx + wy * wy, v, g, 1.0, 1.0 / d, 1.0, scale, (0.0, 0.0))
         gax, gay, gbx, gby, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy = terms[:10]
         ab_xx, ab_xy, ab_yx, ab_yy = terms[10:]
-        kappa, mu = 2.0 * keep * volume[col], 2.0 * keep * orthogonality
+        kappa = 2.0 * keep * volume[col]
+        mu = 2.0 * keep * orthogonality
         dot = ax * bx + ay * by
-        kd, md = kappa * d, mu * dot
+        kd = kappa * d
+        md = mu * dot
         out[at.GRAD_AX + col] = gax + ga * (kd * by + md * bx)
         out[at.GRAD_AY + col] = gay + ga * (md * by - kd * bx)
         out[at.GRAD_BX + col] = gbx + gb * (md * ax - kd * ay)
         out[at.GRAD_BY + col] = gby + gb * (kd * ax + md * ay)
-        kaa, maa = kappa * ga * ga, mu * ga * ga
-        kab, mab = kappa * ga * gb, mu * ga * gb
-        kbb, mbb = kappa * gb * gb, mu * gb * gb
+        kaa = kappa * ga * ga
+        maa = mu * ga * ga
+        kab = kappa * ga * gb
+        mab = mu * ga * gb
+        kbb = kappa * gb * gb
+        mbb = mu * gb * gb
         out[at.AA_XX + col] = aa_xx + (kaa * by * by + maa * bx * bx)
         out[at.AA_XY + col] = aa_xy + (maa - kaa) * bx * by
         out[at.AA_YY + col] = aa_yy + (kaa * bx * bx + maa * by * by)
@@ -114,9 +124,11 @@ def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
     """
     along_i, along_j, blend_i, blend_j = sides
     volume, active, smoothness, orthogonality = cells
-    ni, low = nodes.shape[1] - 1, first - 1
+    ni = nodes.shape[1] - 1
+    low = first - 1
     count = last - first + 1
-    bend, way = np.zeros((ni + 1, nodes.shape[2])), np.zeros((2, nodes.shape[2]))
+    bend = np.zeros((ni + 1, nodes.shape[2]))
+    way = np.zeros((2, nodes.shape[2]))
     laws = at.LineLaws(along_i, along_j, blend_i, bend, way, 0.0, 0.0)
     at.begin_columns(nodes, along_j, blend_i, blend_j, 0.0, low, count, Z)
     for i in range(ni):
@@ -126,7 +138,10 @@ def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
         for col in range(count):
             ax, ay = Z[at.AX + col], Z[at.AY + col]
             ux, uy = Z[at.AX + col + 1], Z[at.AY + col + 1]
-            bx, by, rx, ry = Z[at.BX + col], Z[at.BY + col], Z[at.CX + col], Z[at.CY + col]
+            bx = Z[at.BX + col]
+            by = Z[at.BY + col]
+            rx = Z[at.CX + col]
+            ry = Z[at.CY + col]
             Z[at.AREA_1 + col] = ax * by - ay * bx
             Z[at.AREA_2 + col] = ux * by - uy * bx
             Z[at.AREA_3 + col] = ux * ry - uy * rx
@@ -137,7 +152,8 @@ def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
             # Corners 2 and 3 take the line edge one column on, 3 and 4 the far side edge.
             shift = 1 if corner == 1 or corner == 2 else 0
             side = at.CX if corner >= 2 else at.BX
-            term, area = at.TERMS + corner * 14 * SPAN, at.AREA_1 + corner * SPAN
+            term = at.TERMS + corner * 14 * SPAN
+            area = at.AREA_1 + corner * SPAN
             fill_variational_corner(
                 Z[at.AX + shift : at.AX + shift + 4 * SPAN],
                 Z[side : side + 4 * SPAN],
@@ -169,7 +185,8 @@ def fill_variational_energy(nodes, sides, cells, energy, least, Z):
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     x, y = nodes[0], nodes[1]
     for i in range(ni):
-        length, change = along_i[LENGTH, i], along_i[LENGTH_CHANGE, i]
+        length = along_i[LENGTH, i]
+        change = along_i[LENGTH_CHANGE, i]
         for j in range(nj + 1):
             g = 1.0 / (length + blend_j[j] * change)
             Z[EDGE_I_X, j] = g * (x[i + 1, j] - x[i, j])
@@ -180,7 +197,8 @@ def fill_variational_energy(nodes, sides, cells, energy, least, Z):
                 g = 1.0 / (along_j[LENGTH, j] + way * along_j[LENGTH_CHANGE, j])
                 Z[NEAR_X + 2 * row, j] = g * (x[i + row, j + 1] - x[i + row, j])
                 Z[NEAR_Y + 2 * row, j] = g * (y[i + row, j + 1] - y[i + row, j])
-        total, smallest = 0.0, 1e300
+        total = 0.0
+        smallest = 1e300
         for corner in range(4):
             shift = 1 if corner == 1 or corner == 2 else 0
             side = FAR_X if corner >= 2 else NEAR_X
@@ -194,7 +212,8 @@ def fill_variational_energy(nodes, sides, cells, energy, least, Z):
                 total += keep * (term + volume[i, j] * d * d + orthogonality * dot * dot)
                 bound = d if keep > 0.0 else 1e300
                 smallest = smallest if smallest < bound else bound
-        energy[i], least[i] = total, smallest
+        energy[i] = total
+        least[i] = smallest
 
 
 START_RATIO = 0.25  # the moved grid is begun from where it keeps this much of every corner
@@ -232,7 +251,8 @@ def find_valid_start(
     excluded = np.zeros(new.shape, dtype=bool)
     if not ((sign * old > 0.0).all() and (sign * new > 0.0).all()):
         excluded = find_excluded_corners(boundary)
-    collapsed, count = is_collapsed(excluded), int(excluded.sum())
+    collapsed = is_collapsed(excluded)
+    count = int(excluded.sum())
     for corner in BLOCK_CORNERS:
         excluded[corner] = True
     old[excluded] = new[excluded] = sign
@@ -259,7 +279,8 @@ def measure_least_ratio(old: np.ndarray, new: np.ndarray, excluded: np.ndarray) 
 
     Where all are excluded, as in a block of one cell, all count.
     """
-    before, after = compute_corner_areas(old), compute_corner_areas(new)
+    before = compute_corner_areas(old)
+    after = compute_corner_areas(new)
     counted = ~excluded if not excluded.all() else excluded
     return float((after[counted] / before[counted]).min())
 
@@ -305,10 +326,12 @@ class VariationalRegridder(WeightedRegridder):
             raise BadInput(
                 f"{self.name}: edge_lengths '{edge_lengths}' is neither 'conditional' nor 'unit'"
             )
-        self.smoothness, self.volume = float(smoothness), float(volume)
+        self.smoothness = float(smoothness)
+        self.volume = float(volume)
         self.orthogonality = float(orthogonality)
         self.conditional = edge_lengths == "conditional"
-        self.steps, self.tolerance = int(steps), float(tolerance)
+        self.steps = int(steps)
+        self.tolerance = float(tolerance)
         self.barrier = BarrierRegridder(threads=threads)
         self._workspaces: dict[tuple[int, int], Workspace] = {}
 
@@ -327,15 +350,19 @@ class VariationalRegridder(WeightedRegridder):
         Raises RegridFailure, naming side and nodes, when no valid grid is found.
         """
         previous, boundary = check_grids(previous, boundary)
-        given, boundary = boundary, self.distribute_sides(previous, boundary)
+        given = boundary
+        boundary = self.distribute_sides(previous, boundary)
         start = find_valid_start(previous, boundary, self.barrier)
         ni, nj = previous.shape[1] - 1, previous.shape[2] - 1
-        work, mirrored = self._workspace(ni, nj), compute_area(boundary) < 0.0
+        work = self._workspace(ni, nj)
+        mirrored = compute_area(boundary) < 0.0
         flip = slice(None, None, -1) if mirrored else slice(None)
         work.base[:] = start.nodes[flip]
         copy_sides(boundary[flip], work.sides)
         weigh = self.weight.on(previous, given)
-        done, residual, limited = 0, 0.0, 0
+        done = 0
+        residual = 0.0
+        limited = 0
         if min(ni, nj) > 1:
             done, residual, limited = self._minimise(work, weigh, start)
         nodes = np.array(work.base[flip])
@@ -365,13 +392,17 @@ class VariationalRegridder(WeightedRegridder):
         flip = slice(None, None, -1) if compute_area(start.nodes) < 0.0 else slice(None)
         work.begin(self.conditional, 0.0, 0.0, Tuning(epsilon=1.0, area_weight=0.0))
         functional = VariationalFunctional(self, work, start)
-        done, step, damping, fixed = 0, np.inf, 1.0, None
+        done = 0
+        step = np.inf
+        damping = 1.0
+        fixed = None
         for _ in range(self.steps):
             if fixed is None or not self.weight.is_frozen:
                 fixed = weigh(np.ascontiguousarray(work.base[flip]))
             functional.set_weight(fixed)
             done += functional.solve()
-            last, step = step, _measure_steps(work.base, work.change)
+            last = step
+            step = _measure_steps(work.base, work.change)
             if step <= self.tolerance:
                 functional.descend(self.fraction)
                 break
@@ -402,9 +433,11 @@ class VariationalFunctional:
     """The functional on a workspace's grids, for one weight at a time."""
 
     def __init__(self, options: VariationalRegridder, work: Workspace, start: ValidStart):
-        self.work, self.collapsed = work, start.collapsed
+        self.work = work
+        self.collapsed = start.collapsed
         self.active = np.where(start.excluded, 0.0, 1.0)
-        quarter, mean = 0.25 * work.sigma, work.area_target
+        quarter = 0.25 * work.sigma
+        mean = work.area_target
         self.numbers = quarter * options.smoothness, quarter * options.orthogonality / mean**2
         self.volume = quarter * options.volume / mean**2
         self.areas = np.ones((work.ni, work.nj))
@@ -449,7 +482,8 @@ class VariationalFunctional:
 
     def descend(self, fraction: float) -> bool:
         """Take `fraction` of the step, less where corners or the energy require it."""
-        work, before = self.work, self.measure(self.work.base)
+        work = self.work
+        before = self.measure(self.work.base)
         for _ in range(HALVINGS):
             np.multiply(work.change, fraction, out=work.trial)
             work.trial += work.base

@@ -37,15 +37,20 @@ def fill_equation(nodes, steps_i, steps_j, residual, scale_i, scale_j, sums):
     """
     x, y = nodes[0], nodes[1]
     for i in range(residual.shape[1]):
-        size, whole = 0.0, 0.0
+        size = 0.0
+        whole = 0.0
         for j in range(residual.shape[2]):
-            p, q = i + 1, j + 1
+            p = i + 1
+            q = j + 1
             x1, y1 = 0.5 * (x[p + 1, q] - x[p - 1, q]), 0.5 * (y[p + 1, q] - y[p - 1, q])
             x2, y2 = 0.5 * (x[p, q + 1] - x[p, q - 1]), 0.5 * (y[p, q + 1] - y[p, q - 1])
-            alpha, gamma, beta = x2 * x2 + y2 * y2, x1 * x1 + y1 * y1, x1 * x2 + y1 * y2
+            alpha = x2 * x2 + y2 * y2
+            gamma = x1 * x1 + y1 * y1
+            beta = x1 * x2 + y1 * y2
             low, high = steps_i[i, j], steps_i[i + 1, j]
             left, right = steps_j[i, j], steps_j[i, j + 1]
-            a, c = 2.0 * alpha / (low + high), 2.0 * gamma / (left + right)
+            a = 2.0 * alpha / (low + high)
+            c = 2.0 * gamma / (left + right)
             cross_x = (x[p + 1, q + 1] + x[p - 1, q - 1]) - (x[p + 1, q - 1] + x[p - 1, q + 1])
             cross_y = (y[p + 1, q + 1] + y[p - 1, q - 1]) - (y[p + 1, q - 1] + y[p - 1, q + 1])
             along_x = high * (x[p + 1, q] - x[p, q]) - low * (x[p, q] - x[p - 1, q])
@@ -55,18 +60,21 @@ def fill_equation(nodes, steps_i, steps_j, residual, scale_i, scale_j, sums):
             rx = (a * along_x + c * across_x) - 0.5 * beta * cross_x
             ry = (a * along_y + c * across_y) - 0.5 * beta * cross_y
             scale = 0.5 * (alpha + gamma)
-            residual[0, i, j], residual[1, i, j] = rx / a, ry / a
+            residual[0, i, j] = rx / a
+            residual[1, i, j] = ry / a
             scale_i[i, j], scale_j[i, j] = scale / a, scale / c
             size += rx * rx + ry * ry
             whole += alpha * gamma * (alpha + gamma)
-        sums[0, i], sums[1, i] = size, whole
+        sums[0, i] = size
+        sums[1, i] = whole
 
 
 def compute_inverse_steps(sides: np.ndarray, control: str) -> tuple[np.ndarray, np.ndarray]:
     """Inverse wanted steps of the inner lines' edges, along i (ni, nj-1) and along j (nj, ni-1)."""
     inverse = []
     for grid in (sides, sides.transpose(0, 2, 1)):
-        n, m = grid.shape[1] - 1, grid.shape[2] - 1
+        n = grid.shape[1] - 1
+        m = grid.shape[2] - 1
         if control == "none":
             inverse.append(np.ones((n, m - 1)))
             continue
@@ -93,7 +101,8 @@ class WinslowRegridder:
         if control not in ("sides", "none"):
             raise BadInput(f"winslow: control '{control}' is neither 'sides' nor 'none'")
         self.control = control
-        self.iterations, self.tolerance = int(iterations), float(tolerance)
+        self.iterations = int(iterations)
+        self.tolerance = float(tolerance)
         self.threads = threads
 
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
@@ -102,7 +111,8 @@ class WinslowRegridder:
         old = compute_corner_areas(previous)
         sign = 1.0 if old.sum() >= 0.0 else -1.0
         nodes, start = begin_grid(previous, boundary, sign)
-        done, residual = 0, 0.0
+        done = 0
+        residual = 0.0
         if min(nodes.shape[1:]) > 2:
             unit = find_unit(nodes)
             nodes /= unit
@@ -122,10 +132,12 @@ def iterate_winslow(
     nodes: np.ndarray, control: str = "sides", iterations: int = 100, tolerance: float = 1e-8
 ) -> tuple[int, float]:
     """Move the inner `nodes` (2, ni+1, nj+1) to the solution; iterations done, last residual."""
-    n, m = nodes.shape[1] - 2, nodes.shape[2] - 2
+    n = nodes.shape[1] - 2
+    m = nodes.shape[2] - 2
     steps_i, steps_j = compute_inverse_steps(nodes, control)
     across = np.ascontiguousarray(steps_j.T)
-    residual, sums = np.empty((2, n, m)), np.empty((2, n))
+    residual = np.empty((2, n, m))
+    sums = np.empty((2, n))
     scale_i, scale_j = np.empty((2, n, m))
     taus = make_cycle((min(n, m) / np.pi) ** 2)
     for iteration in range(iterations + 1):

@@ -106,7 +106,8 @@ class Processes:
                 future, pool = self._submit(task, arguments[waiting[0]])
                 running[future] = waiting.popleft(), pool
             for future in wait(running, return_when=FIRST_COMPLETED).done:
-                (number, pool), error = running.pop(future), future.exception()
+                number, pool = running.pop(future)
+                error = future.exception()
                 if not isinstance(error, BrokenProcessPool):
                     self._idle.append(pool)
                 elif not self._started.is_set():
@@ -137,7 +138,8 @@ class Cluster:
     """An executor as an `Engine`: all tasks are handed over at once."""
 
     def __init__(self, executor: Executor, workers: int):
-        self.executor, self.workers = executor, workers
+        self.executor = executor
+        self.workers = workers
 
     def compute(self, task: Task, arguments: Sequence[Any]) -> Iterator[tuple[int, Any]]:
         """As `Engine.compute`; a task whose workers died gives the executor's exception."""

@@ -30,7 +30,8 @@ DUMP_BYTES = 64  # a cell in a dump: nodes, five fields and a rate
 BLOCK_BYTES = 30_000  # of a block in a dump, for the form of the file; measured
 ROW_BYTES = 600  # of a step in history.csv; measured
 # steps over those foretold, at the least and most: from a run to this time, or to another
-SAME, LIKE = (0.75, 1.5), (0.5, 5.0)
+SAME = (0.75, 1.5)
+LIKE = (0.5, 5.0)
 TIGHT = 0.9  # part of the free disk that a run may be foretold to fill without a word
 
 PAST_RUNS = Path(__file__).with_name("past_runs.json")
@@ -46,7 +47,8 @@ STEEPEST = 4.0  # change of a logarithm, at most, that is foretold from a fit al
 UNUSUAL = 4.0  # times the usual wall time of a step: no speed, but an event
 PARTS = np.linspace(0.0, 1.0, 21)  # of the end time of a past run
 # what was left over what was foretold, at its least and most, at the very start of runs
-FITTED, REMEMBERED = (0.8, 3.0), (0.65, 1.8)
+FITTED = (0.8, 3.0)
+REMEMBERED = (0.65, 1.8)
 
 FALLEN = 100.0  # times below its largest value: dt is worth a word
 
@@ -160,7 +162,8 @@ def foretell(
     """
     with read.numbers_in_reach():
         size = measure_size(problem, evolution)
-    clock, wanted = getattr(evolution, "clock", None), read.deck.output
+    clock = getattr(evolution, "clock", None)
+    wanted = read.deck.output
     past = find_past(name_flow(read.problem, read.deck), size.cells)
     first_dt = None if clock is None else clock.first_stable_dt
     steps = foretell_steps(size, past, first_dt, read.deck.run.max_steps)
@@ -215,7 +218,8 @@ class TimeLeft:
     """Marks of a run, and what they foretell; course: of a past run of this deck, if any."""
 
     def __init__(self, t_end: float, course: Sequence[float] = ()):
-        self.t_end, self.course = t_end, course
+        self.t_end = t_end
+        self.course = course
         self.marks: list[tuple[float, float, float]] = []  # step, t, wall time
         self._next = 0.0
 
@@ -234,16 +238,21 @@ class TimeLeft:
         steps, times, walls = np.array([*self.marks, *fresh], dtype=float).T
         if not (math.isfinite(self.t_end) and t > times[0]):
             return None
-        counts, flow = np.diff(steps), np.maximum(np.diff(times), 1e-300)  # dt may collapse
+        # dt may collapse
+        counts = np.diff(steps)
+        flow = np.maximum(np.diff(times), 1e-300)
         each = drop_events(np.diff(walls) / counts)
         half = slice(max(int(np.searchsorted(steps, steps.mean())) - 1, 0), None)
         a_step = np.average(each[half], weights=counts[half])
-        end, limits = self.t_end, FITTED
+        end = self.t_end
+        limits = FITTED
         if self.course:  # a run may end before its end time
             end *= PARTS[np.searchsorted(self.course, 1.0)]
         # the trend of steps a second of the flow, believed in for about as long as it was seen
-        middles, memory = 0.5 * (times[1:] + times[:-1])[half] - t, t - times[half][0]
-        rates, weights = np.log(counts / flow)[half], np.sqrt(counts[half])
+        middles = 0.5 * (times[1:] + times[:-1])[half] - t
+        memory = t - times[half][0]
+        rates = np.log(counts / flow)[half]
+        weights = np.sqrt(counts[half])
         slope, level = np.polyfit(middles, rates, 1, w=weights)
         ahead = np.linspace(0.0, max(end - t, 0.0), 200)
         trend = np.clip(slope * memory * (1.0 - np.exp(-ahead / memory)), -STEEPEST, STEEPEST)
@@ -252,7 +261,8 @@ class TimeLeft:
             first, now = np.interp([times[0] / self.t_end, t / self.t_end], PARTS, self.course)
             spent = each @ counts
             known = spent * (1.0 - now) / max(now - first, 1e-9)
-            share, limits = spent / (spent + known), REMEMBERED
+            share = spent / (spent + known)
+            limits = REMEMBERED
             left = left**share * known ** (1.0 - share)
         unknown = math.sqrt(max(1.0 - t / self.t_end, 0.0))
         return tuple(float(left * x**unknown) for x in (limits[0], 1.0, limits[1]))
@@ -266,22 +276,27 @@ class ShortSteps:
     """
 
     def __init__(self, evolution: Any, say: Callable[[str], None]):
-        self.evolution, self.say = evolution, say
-        self.largest, self.told = 0.0, False
+        self.evolution = evolution
+        self.say = say
+        self.largest = 0.0
+        self.told = False
 
     def follow(self, row: Mapping[str, Any]) -> None:
         """Take note of a step's history row."""
-        dt, limit = row.get("dt"), row.get("dt_limit")
+        dt = row.get("dt")
+        limit = row.get("dt_limit")
         if self.told or dt is None or limit in OWN_REASONS or not dt > 0.0:
             return
         self.largest = max(self.largest, dt)
         if self.largest < FALLEN * dt:
             return
-        self.told, where = True, ""
+        self.told = True
+        where = ""
         if limit not in SHORT_STEPS and math.isfinite(row.get("fastest_i", math.nan)):
             block = self.evolution.blocks[int(row["fastest_block"])].name
             where = f"; fastest cell: {block}, i={row['fastest_i']}, j={row['fastest_j']}"
-        step, t = self.evolution.step, self.evolution.t
+        step = self.evolution.step
+        t = self.evolution.t
         self.say(
             f"dt is {self.largest / dt:.3g} times below its largest: {dt:.3g} s at step {step}, "
             f"t = {t:.6g} s, limited by {limit or 'step'}{where}; what can be changed: "

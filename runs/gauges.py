@@ -39,7 +39,8 @@ class Places:
     def __init__(self, position: np.ndarray, allowed: np.ndarray, reach: np.ndarray):
         count = position.shape[1]
         self.position = position
-        self.allowed, self.reach = allowed, reach
+        self.allowed = allowed
+        self.reach = reach
         self.block = np.full(count, NOWHERE, dtype=np.int64)
         self.cell = np.zeros((2, count), dtype=np.int64)
         self.quad = np.zeros((2, count), dtype=np.int64)
@@ -68,13 +69,16 @@ class Places:
         self, number: int, block: BlockView, tried: np.ndarray, reach: float = 0.0
     ) -> np.ndarray:
         """Look for the points of a mask in one block; the mask of those that are found."""
-        found, chosen = np.zeros_like(tried), np.flatnonzero(tried)
+        found = np.zeros_like(tried)
+        chosen = np.flatnonzero(tried)
         if not chosen.size:
             return found
-        sizes, here = np.array(block.nodes.shape[1:])[:, None], self.block[chosen] == number
+        sizes = np.array(block.nodes.shape[1:])[:, None]
+        here = self.block[chosen] == number
         # from the last cell, which may be gone, or else from the middle
         cells = np.minimum(np.where(here, self.cell[:, chosen], sizes // 2), sizes - 2)
-        quads, parts = np.zeros_like(cells), np.zeros(cells.shape)
+        quads = np.zeros_like(cells)
+        parts = np.zeros(cells.shape)
         where = np.zeros(chosen.size, dtype=np.int64)
         nodes, points = map(np.ascontiguousarray, (block.nodes, self.position[:, chosen]))
         find_places(nodes, points, float(reach), cells, quads, parts, where)
@@ -94,7 +98,8 @@ class Places:
             chosen = np.flatnonzero(self.block == number)
             if not chosen.size:
                 continue
-            (a, b), (s, t) = self.quad[:, chosen], self.part[:, chosen]
+            a, b = self.quad[:, chosen]
+            s, t = self.part[:, chosen]
             ni, nj = block.nodes.shape[1] - 1, block.nodes.shape[2] - 1
             i = np.array([a, np.minimum(a + 1, ni - 1)])[[0, 1, 0, 1]]
             j = np.array([b, np.minimum(b + 1, nj - 1)])[[0, 0, 1, 1]]
@@ -203,10 +208,13 @@ class Gauges:
 
     def follow(self) -> None:
         """Move and sample all gauges after a step."""
-        blocks, places, moving = self.evolution.blocks, self.places, self.moving
+        blocks = self.evolution.blocks
+        places = self.places
+        moving = self.moving
         dt = self.evolution.t - self.t
         if moving.size:
-            start, velocity = places.position[:, moving].copy(), self.velocity[:, moving]
+            start = places.position[:, moving].copy()
+            velocity = self.velocity[:, moving]
             places.position[:, moving] = start + dt * velocity
             places.locate(blocks)
             there = places.sample(blocks, ("u", "v"))

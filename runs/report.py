@@ -115,15 +115,20 @@ def load_template(name: str) -> Any:
 
 def describe_run_in_words(run: RunData, left_out: list[str]) -> dict[str, Any]:
     """What the page says besides pictures: state, verdict, cautions, tables, provenance, deck."""
-    history, last = run.history, run.dumps[-1] if run.dumps else None
+    history = run.history
+    last = run.dumps[-1] if run.dumps else None
     marched = len(history.get("t", ())) > 1
     try:
         cautions = describe_cautions(run.problem, history)
         errors = run.problem.errors(history) if marched else {}
-        theory, script = find_own_words(run), run.problem.say_repeat()
+        theory = find_own_words(run)
+        script = run.problem.say_repeat()
     except (BadInput, RunFailure, KeyError, ValueError, IndexError) as error:  # of another version
         left_out.append(f"what the problem says ({error})")
-        cautions, errors, theory, script = [], {}, "", ""
+        cautions = []
+        errors = {}
+        theory = ""
+        script = ""
     try:
         verdict = find_verdict(run)
     except BadInput as error:
@@ -203,9 +208,11 @@ def draw_pictures(run: RunData, dpi: int, left_out: list[str]) -> list[tuple[str
         field = get_style(run.dumps[-1], name).words.capitalize()
     except BadInput as error:
         left_out.append(str(error))
-        own, field = {}, "The field"
+        own = {}
+        field = "The field"
     wanted[1:1] = [(f"{name}, drawn by the problem", {"what": name}) for name in own]
-    drawn, deck_text = [], find_deck_text(run)
+    drawn = []
+    deck_text = find_deck_text(run)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.png")
         for heading, words in wanted:

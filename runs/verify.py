@@ -62,7 +62,9 @@ HEADS = ("problem", "what", "size", "error", "order", "threshold", "met", "CPU s
 
 def format_record(record: Mapping[str, Any]) -> tuple[str, ...]:
     """A record in words, in the order of HEADS."""
-    error, order, bar = record["error"], record["order"], record["bar"]
+    error = record["error"]
+    order = record["order"]
+    bar = record["bar"]
     words = record["failure"] or ("" if error is None else f"{error:.3g}")
     return (
         record["problem"],

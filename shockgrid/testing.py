@@ -48,7 +48,8 @@ def _demand(kept: Any, words: str) -> None:
 def carry(make: Make, domain: str, steps: int = 3) -> tuple[np.ndarray, np.ndarray]:
     """The grid (2, 17, 13) of a gently moved domain after some steps, and the next boundary."""
     moving = make_domain(domain, 16, 12)
-    regridder, nodes = make(), moving.start
+    regridder = make()
+    nodes = moving.start
     total = 2 * moving.suggested_steps
     for step in range(1, steps + 1):
         nodes = regridder.regrid(nodes, moving.boundary(step / total)).nodes
@@ -74,7 +75,8 @@ def check_inputs(make: Make) -> None:
     previous, boundary = carry(make, "valley")
     filled = boundary.copy()
     filled[:, 1:-1, 1:-1] = POISON
-    before, sides = previous.copy(), boundary.copy()
+    before = previous.copy()
+    sides = boundary.copy()
     first = make().regrid(previous, boundary).nodes
     second = make().regrid(previous, filled).nodes
     _demand(np.array_equal(first, second), "inner nodes of the boundary array are read")
@@ -124,7 +126,8 @@ def check_motion(make: Make, motion: str) -> None:
 def check_threads(make: Make) -> None:
     """Bitwise the same for any number of threads, for a class with an option `threads`."""
     moving = make_domain("dome", 96, 80)
-    previous, boundary = transfinite_grid(moving.boundary(0.1)), moving.boundary(0.12)
+    previous = transfinite_grid(moving.boundary(0.1))
+    boundary = moving.boundary(0.12)
     grids = [make(threads=threads).regrid(previous, boundary).nodes for threads in (1, 2, 3)]
     same = np.array_equal(grids[0], grids[1]) and np.array_equal(grids[0], grids[2])
     _demand(same, "another number of threads gives other bits")
@@ -379,7 +382,8 @@ def check_problem(problem: str | type[Problem], deck: Deck | None = None, steps:
 
 
 def _check_problem(kind: type[Problem], deck: Deck, steps: int) -> None:
-    one, plan = kind(deck), kind(deck).plan()
+    one = kind(deck)
+    plan = kind(deck).plan()
     flow = one.build()
     if plan is not None:
         t_end, blocks = plan
@@ -399,7 +403,8 @@ def _check_problem(kind: type[Problem], deck: Deck, steps: int) -> None:
     _demand(numbers, "measure gives values that are not numbers")
     extra = set(one.units) - set(last)
     _demand(not extra, f"units names columns that measure does not give: {sorted(extra)}")
-    again, third = kind(deck).build(), kind(deck).build()
+    again = kind(deck).build()
+    third = kind(deck).build()
     for _ in range(steps):
         again.advance()
     _demand(_same(half, _copy_state(again)), "two builds of one deck march to different bits")

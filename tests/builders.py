@@ -38,7 +38,8 @@ def box(low, high, cells, angle=0.0) -> np.ndarray:
     if not angle:
         return nodes
     x, y = nodes
-    cosine, sine = math.cos(angle), math.sin(angle)
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
     return np.array([cosine * x - sine * y, sine * x + cosine * y])
 
 
@@ -111,7 +112,9 @@ def check_restarts(make, places, columns=("t", "total_energy"), steps=3) -> None
 
     places: numbers of steps, or a function that finds them from rows and states of a whole march.
     """
-    whole, rows, states = make(), [], []
+    whole = make()
+    rows = []
+    states = []
     last = None if callable(places) else max(places) + steps
     while not whole.finished and len(rows) != last:
         rows.append(whole.advance())
@@ -152,7 +155,8 @@ def measure_growth(problem, history, first=6.0, last=30.0) -> float:
 def find_unexplained(history, name) -> float:
     """By how much a total left what came through the boundary, largest of all rows, absolute."""
     columns = history if isinstance(history, dict) else collect_columns(history)
-    total, came = columns[f"total_{name}"], columns[f"boundary_{name}"].copy()
+    total = columns[f"total_{name}"]
+    came = columns[f"boundary_{name}"].copy()
     came[:1] = np.nan_to_num(came[:1])
     return float(np.abs(total - came - total[0]).max())
 

@@ -37,7 +37,8 @@ def turn_right(a):
 
 def find_positions(line, points):
     """Where on a line the points lie: the number of a face plus the part of it behind the point."""
-    start, way = line[:, None, :-1], np.diff(line)[:, None]
+    start = line[:, None, :-1]
+    way = np.diff(line)[:, None]
     part = np.clip(dot(points[:, :, None] - start, way) / dot(way, way), 0.0, 1.0)
     miss = points[:, :, None] - start - part * way
     face = np.argmin(dot(miss, miss), axis=1)
@@ -62,7 +63,8 @@ class SlidingContact:
     """A contact in a step; `one` and `two` are the sides of leader and follower."""
 
     def __init__(self, contact, one, two, dt):
-        self.sides, self.dt = (one, two), dt
+        self.sides = (one, two)
+        self.dt = dt
         self.sign = 1.0 if one.name in ("i_max", "j_min") else -1.0  # outwards: to the right or not
         free = [end < 0 for end in contact.fixed]  # ends of the follower that are contact points
         self.part_at_first = 0.0 if not free[0] else 1.0 if not free[1] else 0.5
@@ -76,7 +78,8 @@ class SlidingContact:
 
     def measure_extra(self, line, follower):
         """What the follower's polygons have beyond their straight faces, towards the leader."""
-        positions, found = find_positions(line, follower), []
+        positions = find_positions(line, follower)
+        found = []
         for k, (start, stop) in enumerate(itertools.pairwise(positions)):
             corners = line[:, int(start) + 1 : int(np.ceil(stop))]
             x, y = (
@@ -102,7 +105,9 @@ class SlidingContact:
         normal = self.sign * turn_right(np.diff(line))
         normal = normal / np.hypot(*normal)
         bend = 0.5 * np.clip(10.0 * (dot(normal[:, 1:], normal[:, :-1]) - 0.8), 0.0, 1.0)
-        start, end, change = normal.copy(), normal.copy(), bend * np.diff(normal)
+        start = normal.copy()
+        end = normal.copy()
+        change = bend * np.diff(normal)
         start[:, 1:] -= change
         end[:, :-1] += change
         turned = start[:, self.leader] + (middles - self.leader) * (end - start)[:, self.leader]
@@ -111,7 +116,8 @@ class SlidingContact:
 
     def find_states_at_pieces(self, states, line, faces):
         """States (rho, u, v, p, c²) of a side's faces, with slopes, at the pieces' middles."""
-        middles, slopes = 0.5 * (line[:, 1:] + line[:, :-1]), np.zeros_like(states)
+        middles = 0.5 * (line[:, 1:] + line[:, :-1])
+        slopes = np.zeros_like(states)
         steps = np.diff(states) / np.hypot(*np.diff(middles))
         for rows in (slice(1, 3), slice(3, 4)):  # the velocity as a vector
             slopes[rows, 1:-1] = find_mean(steps[rows, :-1], steps[rows, 1:])
@@ -130,7 +136,8 @@ class SlidingContact:
             found.append((rho, w, p, np.sqrt(c2), side.patch.eos.wave_law))
         one, two = found
         pressure, speed = solve_contact(*one, *two)
-        bare, speed_two = (self.follower < 0) | (pressure < 0.0), speed
+        bare = (self.follower < 0) | (pressure < 0.0)
+        speed_two = speed
         if bare.any():
             rho, w, p, c, law = two
             speed = np.where(bare, find_free_speed(*one, 0.0), speed)
@@ -142,8 +149,10 @@ class SlidingContact:
         self.cut(self.lines, 0.0 * self.lines[0])
         pressure, excess = self.solve(lambda side: side.find_state_at_face(), self.lines)
         number = self.sides.index(asking)
-        faces, own = (self.leader, self.follower)[number], asking.find_state_at_face()[1:3]
-        sign, there = (1.0, -1.0)[number], faces >= 0
+        faces = (self.leader, self.follower)[number]
+        own = asking.find_state_at_face()[1:3]
+        sign = (1.0, -1.0)[number]
+        there = faces >= 0
         length = np.bincount(faces[there], np.hypot(*self.area)[there])
         pressure, excess = (
             np.bincount(faces[there], (q * np.hypot(*self.area))[there]) / length
@@ -182,7 +191,8 @@ class SlidingContact:
         u, v, p = (0.5 * (q[1:] + q[:-1]) for q in (u, v, p))
         rate = u * area[0] + v * area[1] - swept
         rho, u_up, v_up, _, e, *_ = np.where(rate > 0.0, trace[:, 1:], trace[:, :-1])
-        mass, work = rho * rate, p * (u * area[0] + v * area[1])
+        mass = rho * rate
+        work = p * (u * area[0] + v * area[1])
         total = e + 0.5 * (u_up**2 + v_up**2)
         momentum = mass * u_up + p * area[0], mass * v_up + p * area[1]
         return np.stack((mass, *momentum, mass * total + work, 0.0 * p))

@@ -45,8 +45,12 @@ def take_step(blocks, links, t, dt, curved=False, contacts=()):
     patches = [Patch(block, dt, curved) for block in blocks]
     sides = {id(s): Side(patch, s) for patch in patches for s in patch.block.segments}
     for link in links:
-        one, two = sides[id(link.leader)], sides[id(link.follower)]
-        one.partner, two.partner, one.reverse, two.reverse = two, one, link.reverse, link.reverse
+        one = sides[id(link.leader)]
+        two = sides[id(link.follower)]
+        one.partner = two
+        two.partner = one
+        one.reverse = link.reverse
+        two.reverse = link.reverse
     for contact in contacts:
         one, two = (sides[id(segment)] for segment in contact.segments)
         one.contact = two.contact = SlidingContact(contact, one, two, dt)
@@ -93,13 +97,15 @@ def find_edges(nodes, axis):
 def measure_cells(nodes, curved):
     """Volumes, and the places where averages belong: in plane flow the middles."""
     a, b, c, d = find_corners(nodes)
-    volume, moment = 0.0, 0.0
+    volume = 0.0
+    moment = 0.0
     for s in GAUSS:
         for r in GAUSS:
             point = (1 - s) * ((1 - r) * a + r * d) + s * ((1 - r) * b + r * c)
             area = 0.25 * cross((1 - r) * (b - a) + r * (c - d), (1 - s) * (d - a) + s * (c - b))
             weight = area * point[1] if curved else area
-            volume, moment = volume + weight, moment + weight * point
+            volume = volume + weight
+            moment = moment + weight * point
     return volume, moment / volume if curved else 0.25 * (a + b + c + d)
 
 
@@ -108,8 +114,10 @@ def measure_faces(nodes, nodes_new, axis, dt, curved):
 
     Swept volumes so add up to what cells grow, whatever the motion (theory F3.1, F9.2).
     """
-    (a, b), (a_new, b_new) = find_edges(nodes, axis), find_edges(nodes_new, axis)
-    normal, sweep = 0.0, 0.0
+    a, b = find_edges(nodes, axis)
+    a_new, b_new = find_edges(nodes_new, axis)
+    normal = 0.0
+    sweep = 0.0
     for r in GAUSS:  # times
         start, end = a + r * (a_new - a), b + r * (b_new - b)
         right = np.stack((end[1] - start[1], start[0] - end[0]))
@@ -117,7 +125,8 @@ def measure_faces(nodes, nodes_new, axis, dt, curved):
             weight = 0.25 * ((1 - s) * start + s * end)[1] if curved else 0.25
             normal = normal + weight * right
             sweep = sweep + weight * dot(right, (1 - s) * (a_new - a) + s * (b_new - b)) / dt
-    edge, middle = 0.5 * (b - a + b_new - a_new), 0.25 * (a + b + a_new + b_new)
+    edge = 0.5 * (b - a + b_new - a_new)
+    middle = 0.25 * (a + b + a_new + b_new)
     return normal, sweep, middle + edge * edge[1] / (12.0 * middle[1] + TINY) if curved else middle
 
 
@@ -130,27 +139,36 @@ def fade(jump, calm, strong):
 def compute_flux(left, right, normal, sweep):
     """Mass, momentum x and y, energy per time between traces (8, ...), and the pressure in it."""
     left, right = Trace(*left), Trace(*right)
-    square, rough = dot(normal, normal), left.hll + right.hll > 0.0
+    square = dot(normal, normal)
+    rough = left.hll + right.hll > 0.0
     w_l, w_r = (dot((k.u, k.v), normal) - sweep for k in (left, right))  # times the length
     kept = np.where(rough, 1.0, np.maximum(left.acoustic, right.acoustic))  # theory F3.12
     w_l, w_r = w_l + 0.5 * (1.0 - kept) * (w_r - w_l), w_r - 0.5 * (1.0 - kept) * (w_r - w_l)
-    c_l, c_r = np.sqrt(left.c2 * square), np.sqrt(right.c2 * square)
-    s_l, s_r = np.minimum(w_l - c_l, w_r - c_r), np.maximum(w_l + c_l, w_r + c_r)
-    flow_l, flow_r = left.rho * (s_l - w_l), right.rho * (s_r - w_r)
+    c_l = np.sqrt(left.c2 * square)
+    c_r = np.sqrt(right.c2 * square)
+    s_l = np.minimum(w_l - c_l, w_r - c_r)
+    s_r = np.maximum(w_l + c_l, w_r + c_r)
+    flow_l = left.rho * (s_l - w_l)
+    flow_r = right.rho * (s_r - w_r)
     contact = (square * (right.p - left.p) + flow_l * w_l - flow_r * w_r) / (flow_l - flow_r)
-    cut_l, cut_r = np.minimum(s_l, 0.0), np.maximum(s_r, 0.0)
+    cut_l = np.minimum(s_l, 0.0)
+    cut_r = np.maximum(s_r, 0.0)
 
     def press(w):
         return np.stack((0.0 * w, *normal, w + sweep, 0.0 * w + 1.0))
 
-    amounts, simple, hllc = [], [], []
+    amounts = []
+    simple = []
+    hllc = []
     for k, w, s, cut in ((left, w_l, s_l, cut_l), (right, w_r, s_r, cut_r)):
         total = k.e + 0.5 * (k.u**2 + k.v**2)
         q = k.rho * np.stack((1.0 + 0.0 * w, k.u, k.v, total, 0.0 * w))
         f = w * q + k.p * press(w)
         p_star = k.p + k.rho * (s - w) * (contact - w) / square
         star = ((s - w) * q + p_star * press(contact) - k.p * press(w)) / (s - contact)
-        amounts, simple, hllc = [*amounts, q], [*simple, f], [*hllc, f + cut * (star - q)]
+        amounts = [*amounts, q]
+        simple = [*simple, f]
+        hllc = [*hllc, f + cut * (star - q)]
     amounts[1][4] = 0.5 * (left.rho + right.rho) * (w_r - w_l) / square
     hll = cut_r * simple[0] - cut_l * simple[1] + cut_l * cut_r * (amounts[1] - amounts[0])
     return np.where(rough, hll / (cut_r - cut_l), np.where(contact >= 0.0, *hllc))
@@ -160,17 +178,25 @@ class Patch:
     """A block in a step."""
 
     def __init__(self, block, dt, curved):
-        self.block, self.eos, self.dt, self.curved = block, block.eos, dt, curved
+        self.block = block
+        self.eos = block.eos
+        self.dt = dt
+        self.curved = curved
         self.state = block.state[:, 1:-1, 1:-1].copy()
-        self.rho, self.velocity, self.p = self.state[0], self.state[1:3], self.state[3]
+        self.rho = self.state[0]
+        self.velocity = self.state[1:3]
+        self.p = self.state[3]
         self.c2 = self.compute_c2(self.rho, self.p)
         self.e = self.eos.energy(self.rho, self.p) + block.void_energy
-        nodes, new = block.nodes, block.nodes_new
+        nodes = block.nodes
+        new = block.nodes_new
         self.volume, self.centre = measure_cells(nodes, curved)
         self.middle, self.middle_new = (measure_cells(q, False)[1] for q in (nodes, new))
         self.mid_lines = dict(zip("ij", find_mid_lines(nodes), strict=True))
         self.lengths = {axis: np.sqrt(dot(line, line)) for axis, line in self.mid_lines.items()}
-        self.reaches, self.ghosts = {}, {}  # reach: twice the way from a cell's centre to a face
+        # reach: twice the way from a cell's centre to a face
+        self.reaches = {}
+        self.ghosts = {}
         for side in SIDES:
             way = 2.0 * dot(self.centre - self.middle, self.mid_lines[side[0]])
             way *= -1.0 if side.endswith("max") else 1.0
@@ -188,7 +214,8 @@ class Patch:
 
     def find_steps(self, axis):
         """Differences of the state to the cells before and after, and twice the ways there."""
-        at, ends = "ij".index(axis) + 1, (f"{axis}_min", f"{axis}_max")
+        at = "ij".index(axis) + 1
+        ends = (f"{axis}_min", f"{axis}_max")
         before, after = (np.expand_dims(self.ghosts[side], at) for side in ends)
         cells = np.stack((*self.state, *(self.reaches[side] for side in ends)))
         cells = np.concatenate((before, cells, after), axis=at)
@@ -203,8 +230,10 @@ class Patch:
     @np.errstate(invalid="ignore")  # before the ghosts are known only the inner cells count
     def limit_variations(self, axis):
         """Limited variations along an axis; of the velocity's parts along and across the line."""
-        (a, b), limit = self.find_variations(axis), np.vectorize(LIMITERS[self.block.limiter])
-        line, found = self.mid_lines[axis], limit(a, b)
+        a, b = self.find_variations(axis)
+        limit = np.vectorize(LIMITERS[self.block.limiter])
+        line = self.mid_lines[axis]
+        found = limit(a, b)
         along = limit(dot(line, a[1:3]), dot(line, b[1:3]))
         across = limit(cross(line, a[1:3]), cross(line, b[1:3]))
         turned = np.stack((-line[1], line[0]))
@@ -220,7 +249,8 @@ class Patch:
     def lean(self, line, other):
         """A mid-line as the centres of volume go along it (theory F9.6)."""
         a, b, c, d = find_corners(self.block.nodes)
-        twist, y = (a - b) + (c - d), self.middle[1]
+        twist = (a - b) + (c - d)
+        y = self.middle[1]
         lean = (twist * other[1] + other * twist[1] - other * (other[1] * line[1] / y)) / (12.0 * y)
         return line + lean - line * dot(lean, line) / dot(line, line)
 
@@ -248,7 +278,9 @@ class Patch:
         self.hll = 1.0 * (jump > riemann.FLUXES[self.block.flux_name])
         # the half step: theory F3.6
         rho_slope, u_slope, v_slope, p_slope = np.moveaxis(self.slopes, 1, 0)
-        rho, velocity, way = self.rho, self.velocity, self.middle - self.centre
+        rho = self.rho
+        velocity = self.velocity
+        way = self.middle - self.centre
         carried = velocity + np.stack((dot(u_slope, way), dot(v_slope, way)))
         divergence = u_slope[0] + v_slope[1] + (velocity[1] / self.centre[1] if self.curved else 0)
         rates = np.stack((
@@ -295,7 +327,9 @@ class Patch:
         if self.curved:
             amounts[2] += self.dt * self.push_outwards()
         volume = measure_cells(self.block.nodes_new, self.curved)[0] + self.extra_new
-        rho, velocity, e = amounts[0] / volume, amounts[1:3] / amounts[0], amounts[3] / amounts[0]
+        rho = amounts[0] / volume
+        velocity = amounts[1:3] / amounts[0]
+        e = amounts[3] / amounts[0]
         e = e - 0.5 * dot(velocity, velocity)
         p = self.eos.pressure(rho, e)
         least = make_least_pressure(type(self.eos))(rho, self.eos.parameters)
@@ -311,7 +345,8 @@ class Patch:
         )
         radius = 0.5 * self.centre[1] * (1.0 + self.middle_new[1] / self.middle[1])
         pressure = self.trace(0.5 * (self.middle + self.middle_new))[3]
-        old, new = self.block.nodes, self.block.nodes_new
+        old = self.block.nodes
+        new = self.block.nodes_new
         area = sum(0.5 * cross(*find_mid_lines(old + r * (new - old))) for r in GAUSS)
         return self.smooth * (hoop - radius * push) + (1.0 - self.smooth) * pressure * area
 
@@ -331,8 +366,12 @@ class Side:
     """The faces of one segment, in its order; normals point outwards."""
 
     def __init__(self, patch, segment):
-        self.patch, self.segment, self.name = patch, segment, segment.side
-        self.axis, self.partner, self.reverse = self.name[0], None, False
+        self.patch = patch
+        self.segment = segment
+        self.name = segment.side
+        self.axis = self.name[0]
+        self.partner = None
+        self.reverse = False
         self.sign = 1.0 if self.name.endswith("max") else -1.0
 
     def take(self, field, depth=0):
@@ -353,8 +392,11 @@ class Side:
 
     def fill_ghosts(self, t):
         """State beyond the side, and twice the way from there to the faces (theory F4.6)."""
-        kind, patch, segment = self.segment.kind, self.patch, self.segment
-        state, reach = self.find_cells()[:4].copy(), self.find_cells()[4]
+        kind = self.segment.kind
+        patch = self.patch
+        segment = self.segment
+        state = self.find_cells()[:4].copy()
+        reach = self.find_cells()[4]
         normal = self.find_normal(patch.block.nodes)
         if kind in ("wall", "axis", "piston"):
             excess = dot(state[1:3] - np.reshape(segment.velocity(t), (2, 1)), normal)
@@ -362,13 +404,15 @@ class Side:
             state[1:3] -= 2.0 * part * excess * normal
         elif kind in ("interface", "free-surface", "sliding"):
             pressure, speed = self.solve(Side.find_state_at_face, normal, t)
-            c2, rise = self.take(patch.c2), 2.0 * (pressure - state[3])
+            c2 = self.take(patch.c2)
+            rise = 2.0 * (pressure - state[3])
             jump = np.minimum(2.0 * (speed - dot(state[1:3], normal)), 1.5 * np.sqrt(c2))
             state += np.stack((rise / c2, *(jump * normal), rise))
         elif kind in ("seam", "periodic"):
             *state, reach = self.ask(Side.find_cells)
         elif kind == "inflow":
-            state, reach = self.find_inflow(t)[:4], 0.0 * reach
+            state = self.find_inflow(t)[:4]
+            reach = 0.0 * reach
         else:
             assert kind == "outflow", f"there is no reference for {kind}"
         patch.ghosts[self.name][:, segment.start : segment.stop] = np.stack((*state, reach, reach))
@@ -381,7 +425,8 @@ class Side:
     def shorten(self, excess, normal):
         """Part of the jump beyond a piston that does not carry the gas past it (theory F4.9)."""
         inwards = self.axis + ("_max" if self.name.endswith("min") else "_min")
-        reaches, velocity = self.patch.reaches, self.patch.velocity
+        reaches = self.patch.reaches
+        velocity = self.patch.velocity
         way = self.take(reaches[inwards]) + self.take(reaches[self.name], 1)
         further = dot(self.take(velocity, 1) - self.take(velocity), normal)
         ratio = further * self.take(reaches[self.name]) / (excess * way)
@@ -406,24 +451,30 @@ class Side:
         """Pressure and normal speed of a contact or a free surface between the states found."""
         if self.segment.kind == "sliding":
             return self.contact.find_surface(self, normal)
-        (rho, u, v, p, c2), law = find(self), self.patch.eos.wave_law
+        rho, u, v, p, c2 = find(self)
+        law = self.patch.eos.wave_law
         mine = rho, dot((u, v), normal), p, np.sqrt(c2), law
         if self.partner is None:
             pressure = self.segment.pressure(t) + 0.0 * rho
             return pressure, find_free_speed(*mine, pressure)
-        (rho, u, v, p, c2), law = self.ask(find), self.partner.patch.eos.wave_law
+        rho, u, v, p, c2 = self.ask(find)
+        law = self.partner.patch.eos.wave_law
         return solve_contact(*mine, rho, dot((u, v), normal), p, np.sqrt(c2), law)
 
     def find_inflow(self, t):
         """What stands beyond an inflow side."""
-        ones, eos = np.ones(self.segment.stop - self.segment.start), self.patch.eos
+        ones = np.ones(self.segment.stop - self.segment.start)
+        eos = self.patch.eos
         rho, u, v, p = (value * ones for value in self.segment.state(t))
-        e, c2 = eos.energy(rho, p), self.patch.compute_c2(rho, p)
+        e = eos.energy(rho, p)
+        c2 = self.patch.compute_c2(rho, p)
         return np.stack((rho, u, v, p, e, c2, 0.0 * p, 0.0 * p))
 
     def fill_flux(self, t):
         """Fluxes through the side; t is the mid-time (theory F4.5)."""
-        kind, patch, trace = self.segment.kind, self.patch, self.find_trace()
+        kind = self.segment.kind
+        patch = self.patch
+        trace = self.find_trace()
         normal, sweep, _ = (self.sign * self.take(q) for q in patch.faces[self.axis])
         if kind in ("seam", "periodic", "inflow", "outflow"):
             other = self.find_inflow(t) if kind == "inflow" else trace
@@ -442,8 +493,10 @@ class Side:
         patch = self.patch
         if self.segment.kind != "axis":
             return self.take(patch.trace_to(self.name))
-        nodes, points = 0.5 * (patch.block.nodes + patch.block.nodes_new), patch.centre.copy()
-        line, radius = at_side(nodes, self.name), at_side(nodes, self.name, 1)[1]
+        nodes = 0.5 * (patch.block.nodes + patch.block.nodes_new)
+        points = patch.centre.copy()
+        line = at_side(nodes, self.name)
+        radius = at_side(nodes, self.name, 1)[1]
         part = np.diff(radius) / (6.0 * (radius[1:] + radius[:-1]))
         at_side(points, self.name)[...] = 0.5 * (line[:, 1:] + line[:, :-1]) + part * np.diff(line)
         return self.take(patch.trace(points))
@@ -451,7 +504,8 @@ class Side:
     def find_pressure(self, trace, t):
         """What presses on faces that nothing passes."""
         area, sweep, _ = (self.sign * self.take(q) for q in self.patch.plane_faces[self.axis])
-        normal, law = area / np.hypot(*area), self.patch.eos.wave_law
+        normal = area / np.hypot(*area)
+        law = self.patch.eos.wave_law
         if self.segment.kind in ("interface", "free-surface"):
             return self.solve(lambda side: side.find_trace()[[0, 1, 2, 3, 5]], normal, t)[0]
         change = dot((trace.u, trace.v), normal) - sweep / np.hypot(*area)

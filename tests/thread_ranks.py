@@ -50,7 +50,9 @@ class ThreadComm:
     """The communicator of one thread."""
 
     def __init__(self, board: Board, rank: int, size: int):
-        self.board, self.rank, self.size = board, rank, size
+        self.board = board
+        self.rank = rank
+        self.size = size
 
     def _swap(self, message):
         board = self.board

@@ -50,7 +50,8 @@ class Passage:
         if self.stopped is not None:
             return np.nan
         areas = compute_areas(self.grids[0])
-        first, last = self.pulses[0], self.pulses[-1]
+        first = self.pulses[0]
+        last = self.pulses[-1]
         return float((np.abs(last - first) * areas).sum() / (first * areas).sum())
 
 
@@ -80,7 +81,8 @@ def make_boundary(line: np.ndarray, ni: int) -> np.ndarray:
     """Sides of the domain between the line (2, nj+1), from right to left, and y = 1."""
     count = line.shape[1]
     boundary = np.full((2, ni + 1, count), np.nan)
-    boundary[0, -1], boundary[1, -1] = np.linspace(1.0, 0.0, count), 1.0
+    boundary[0, -1] = np.linspace(1.0, 0.0, count)
+    boundary[1, -1] = 1.0
     up = np.linspace(0.0, 1.0, ni + 1)
     for j in (0, -1):
         boundary[0, :, j] = line[0, j]
@@ -145,7 +147,8 @@ def make_mapping(nodes: np.ndarray) -> Callable:
     def place(xi, eta):
         i = np.clip(np.floor(xi * ni).astype(int), 0, ni - 1)
         j = np.clip(np.floor(eta * nj).astype(int), 0, nj - 1)
-        a, b = xi * ni - i, eta * nj - j
+        a = xi * ni - i
+        b = eta * nj - j
         low = (1.0 - b) * nodes[:, i, j] + b * nodes[:, i, j + 1]
         high = (1.0 - b) * nodes[:, i + 1, j] + b * nodes[:, i + 1, j + 1]
         return list((1.0 - a) * low + a * high)
@@ -168,7 +171,9 @@ def run(cells: int = 48, family: str = "barrier", steps_a_cell: float = 2.0) -> 
     nodes = regrid.transfinite_grid(make_boundary(line, cells))
 
     solver = pyclaw.ClawSolver2D(riemann.vc_advection_2D)
-    solver.dimensional_split, solver.transverse_waves, solver.order = False, 2, 2
+    solver.dimensional_split = False
+    solver.transverse_waves = 2
+    solver.order = 2
     solver.limiters = pyclaw.limiters.tvd.MC
     aux = np.empty((3, cells + 2 * GHOSTS, cells + 2 * GHOSTS))
 
@@ -188,7 +193,9 @@ def run(cells: int = 48, family: str = "barrier", steps_a_cell: float = 2.0) -> 
 
     steps = int(np.ceil(PERIOD * steps_a_cell * cells / 2.0)) * 2
     dt = PERIOD / steps
-    solver.dt_variable, solver.dt, solver.cfl_max = False, dt, 1.0
+    solver.dt_variable = False
+    solver.dt = dt
+    solver.cfl_max = 1.0
     found = Passage([nodes], [state.q[0].copy()], steps)
     for step in range(steps):
         t = step * dt
@@ -237,7 +244,8 @@ def main() -> None:
     parser.add_argument("--families", default="barrier")
     parser.add_argument("--plot", metavar="FILE", help="the last run that came through")
     tables = Tables(parser)
-    options, drawn = tables.options, None
+    options = tables.options
+    drawn = None
     for family in options.families.split(","):
         for cells in map(int, options.cells.split(",")):
             passage = run(cells, family)

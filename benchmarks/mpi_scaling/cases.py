@@ -57,13 +57,15 @@ class Case:
 
     def list_words(self, folder: Path) -> list[str]:
         """The command after `shockgrid`; a deck that is no packaged one goes into `folder`."""
-        n, square = self.cells, ["width=1.0", "lengths=[1.0,1.0]", "gap=0.01"]
+        n = self.cells
+        square = ["width=1.0", "lengths=[1.0,1.0]", "gap=0.01"]
         settings = [f"run.max_steps={self.steps}", "output.dumps=0"]
         deck = "interface-instability"
         if self.kind == "square":
             settings += [f"cells={n}", *square]
         elif self.kind == "mushroom":
-            deck, settings = f"{deck}-mushroom", [*settings, f"cells={n}"]
+            deck = f"{deck}-mushroom"
+            settings = [*settings, f"cells={n}"]
         else:
             deck = str(folder / "blocks.toml")
             Path(deck).write_text(write_row_of_blocks(n), encoding="utf-8")

@@ -68,9 +68,11 @@ class Record:
         self.clocks = Clocks()
 
     def _begin(self, simulation: Simulation) -> None:
-        self.simulation, self.ended = simulation, time.perf_counter()
+        self.simulation = simulation
+        self.ended = time.perf_counter()
         self.columns: dict[str, list[float]] = {name: [] for name in COLUMNS}
-        self.counts, self.in_shares = (0, 0, 0.0), 0.0
+        self.counts = (0, 0, 0.0)
+        self.in_shares = 0.0
 
     def watch(self) -> None:
         """Clock the calls of the packages from now on."""
@@ -124,7 +126,8 @@ class Record:
 
 
 if __name__ == "__main__":
-    folder, sys.argv = Path(sys.argv[1]), ["shockgrid", *sys.argv[2:]]
+    folder = Path(sys.argv[1])
+    sys.argv = ["shockgrid", *sys.argv[2:]]
     record = Record()
     record.watch()
     try:

@@ -28,7 +28,9 @@ from benchmarks.mpi_scaling.cases import Timing
 from hydro.ranks.messages import CELLS_DEEP, NODES_DEEP
 
 RING_BYTES = 8 * (2 * NODES_DEEP + 5 * CELLS_DEEP)  # that a face of a side stands for in a step
-GHOST_ROWS, GHOST_NUMBERS = 2, 6  # of a block that is cut: rows at each cut, numbers per cell
+# of a block that is cut: rows at each cut, numbers per cell
+GHOST_ROWS = 2
+GHOST_NUMBERS = 6
 LEAST_GAIN = 0.5  # efficiency at which another rank is said to gain nothing
 
 
@@ -95,7 +97,8 @@ def predict(costs: Costs, load: Load, network: Network = SAME_MACHINE) -> dict[s
     own = costs.cell * load.cells + costs.own_block * load.own_blocks
     messages = 0.0
     if load.ranks > 1:
-        calls, size = load.calls + load.cuts, load.size + load.cut_size
+        calls = load.calls + load.cuts
+        size = load.size + load.cut_size
         messages = costs.message * calls + costs.byte * size + network.take(load.ranks, calls, size)
     return {
         "own work": own + costs.iteration * load.node_iterations,
@@ -173,7 +176,8 @@ def _fit_iteration(timings: Sequence[Timing]) -> float:
     """Seconds of an iteration at a node: the slope of a step's regridding over its iterations."""
     seconds = np.concatenate([t.steps["regrid"] for t in timings])
     counts = np.concatenate([t.steps["node_iterations"] for t in timings])
-    scale, size = float(np.median(seconds)), float(counts.max())
+    scale = float(np.median(seconds))
+    size = float(counts.max())
     if size == 0.0:
         raise ValueError("the regridder made no iteration in any step")
 
@@ -199,7 +203,8 @@ def load_strong(ranks: int, cells: float, blocks: int, iterations: float, calls:
     side = math.sqrt(cells / blocks)
     strips = max(1.0, ranks / blocks)
     own = math.ceil(blocks / min(ranks, blocks))
-    cuts, cut_size = 0.0, 0.0
+    cuts = 0.0
+    cut_size = 0.0
     if strips > 1.0:
         cuts = 2.0 + 3.0 * iterations
         cut_size = 8.0 * side * 2.0 * (GHOST_ROWS * GHOST_NUMBERS + 2.0 * iterations)

@@ -25,7 +25,8 @@ from benchmarks.mpi_scaling.model import (
     predict,
 )
 
-STRONG_CELLS, STRONG_BLOCKS = 10_000_000, 8
+STRONG_CELLS = 10_000_000
+STRONG_BLOCKS = 8
 WEAK_CELLS = 10_000
 MOST_RANKS = 1000
 SHOWN = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1000)

@@ -78,7 +78,8 @@ def list_codes(options: argparse.Namespace, case: Case) -> dict[str, Any]:
 
 def race(case: Case, options: argparse.Namespace) -> list[dict[str, Any]]:
     """Rows of one case: code, cells, error, CPU seconds."""
-    rows, found = [], {}
+    rows = []
+    found = {}
     for code, run in list_codes(options, case).items():
         cells = [n for n in case.cells[code] if n <= options.most_cells]
         if not cells:

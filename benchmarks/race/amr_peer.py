@@ -37,23 +37,39 @@ def write_input(name: str, numbers: dict, cells: int, ratios: list[int]) -> tupl
     own.add_param("a0", numbers["a0"])
     for key in ("left", "right", "heavy"):
         own.add_param(key, list(numbers[key]))
-    claw, amr = data.clawdata, data.amrdata
+    claw = data.clawdata
+    amr = data.amrdata
     claw.lower, claw.upper = [x0, y0], [x0 + nx * whole / cells, y1]
     claw.num_cells = [nx, ny // whole]
-    claw.num_eqn, claw.num_aux, claw.num_waves, claw.num_ghost = 4, 0, 4, 2
-    claw.output_style, claw.output_times = 2, find_times(numbers).tolist()
-    claw.output_format, claw.output_q_components = "ascii", "all"
-    claw.output_aux_components, claw.verbosity = "none", 0
-    claw.dt_variable, claw.dt_initial, claw.steps_max = True, 0.01 * whole / cells, 10**7
-    claw.cfl_desired, claw.cfl_max = 0.9, 1.0
-    claw.order, claw.dimensional_split, claw.transverse_waves = 2, "unsplit", 2
+    claw.num_eqn = 4
+    claw.num_aux = 0
+    claw.num_waves = 4
+    claw.num_ghost = 2
+    claw.output_style = 2
+    claw.output_times = find_times(numbers).tolist()
+    claw.output_format = "ascii"
+    claw.output_q_components = "all"
+    claw.output_aux_components = "none"
+    claw.verbosity = 0
+    claw.dt_variable = True
+    claw.dt_initial = 0.01 * whole / cells
+    claw.steps_max = 10**7
+    claw.cfl_desired = 0.9
+    claw.cfl_max = 1.0
+    claw.order = 2
+    claw.dimensional_split = "unsplit"
+    claw.transverse_waves = 2
     claw.limiter = ["mc"] * 4
     claw.bc_lower, claw.bc_upper = ["extrap", "wall"], ["extrap", "wall"]
     amr.amr_levels_max = len(ratios) + 1
     amr.refinement_ratios_x = amr.refinement_ratios_y = amr.refinement_ratios_t = ratios
     amr.aux_type = []
-    amr.flag_richardson, amr.flag2refine, amr.flag2refine_tol = False, True, 0.05
-    amr.regrid_interval, amr.regrid_buffer_width, amr.clustering_cutoff = 2, 3, 0.7
+    amr.flag_richardson = False
+    amr.flag2refine = True
+    amr.flag2refine_tol = 0.05
+    amr.regrid_interval = 2
+    amr.regrid_buffer_width = 3
+    amr.clustering_cutoff = 0.7
     amr.verbosity_regrid = 0
     data.write()
     return x0, nx * whole, ny
@@ -61,7 +77,8 @@ def write_input(name: str, numbers: dict, cells: int, ratios: list[int]) -> tupl
 
 def read_density(path: Path, x0: float, cells: int, shape: tuple[int, int]) -> np.ndarray:
     """Density of all levels on the cells of the finest, finer ones over coarser ones."""
-    rho, grids = np.full(shape, np.nan), []
+    rho = np.full(shape, np.nan)
+    grids = []
     lines = iter(path.read_text().splitlines())
     for first in lines:
         if "grid_number" not in first:
@@ -73,7 +90,9 @@ def read_density(path: Path, x0: float, cells: int, shape: tuple[int, int]) -> n
             values += [float(words[0])] if words else []
         grids.append((level, x, y, dx, np.reshape(values, (int(my), int(mx))).T))
     for _, x, y, dx, values in sorted(grids, key=lambda grid: grid[0]):
-        times, i, j = round(dx * cells), round((x - x0) * cells), round(y * cells)
+        times = round(dx * cells)
+        i = round((x - x0) * cells)
+        j = round(y * cells)
         fine = values.repeat(times, axis=0).repeat(times, axis=1)
         rho[i : i + fine.shape[0], j : j + fine.shape[1]] = fine
     return rho
@@ -81,7 +100,9 @@ def read_density(path: Path, x0: float, cells: int, shape: tuple[int, int]) -> n
 
 def main() -> None:
     """Write, run, read, print."""
-    program, name, cells = Path(sys.argv[1]).resolve(), sys.argv[2], int(sys.argv[3])
+    program = Path(sys.argv[1]).resolve()
+    name = sys.argv[2]
+    cells = int(sys.argv[3])
     numbers = json.load(sys.stdin)
     ratios = [max(2, min(4, cells // (4 * COARSEST))), 4] if cells > 2 * COARSEST else [2]
     os.environ.setdefault("CLAW", str(program.parent))

@@ -68,7 +68,8 @@ def run_athena(
         for key in ("left", "right", "heavy")
         for n in range(3)
     )
-    amplitude, spent = [], 0.0
+    amplitude = []
+    spent = 0.0
     with tempfile.TemporaryDirectory() as folder:
         for t in find_times(numbers):
             words = deck.format(
@@ -78,7 +79,8 @@ def run_athena(
             )  # fmt: skip
             Path(folder, "athinput").write_text(words)
             spent = spend([str(program.resolve()), "-i", "athinput"], Path(folder))
-            rho, size = np.empty((nx, ny)), y1 / ny
+            rho = np.empty((nx, ny))
+            size = y1 / ny
             for x, y, width, value in np.fromfile(Path(folder, "end.bin")).reshape(-1, 4):
                 n, i, j = (round(d / size) for d in (width, x - 0.5 * width - x0, y - 0.5 * width))
                 rho[i : i + n, j : j + n] = value

@@ -33,14 +33,17 @@ class Case:
         numbers = self.numbers
         if "rate" in numbers:
             first, last = numbers["times"]
-            t, a = np.array(found["t"]), np.array(found["amplitude"])
+            t = np.array(found["t"])
+            a = np.array(found["amplitude"])
             rate = np.diff(np.interp((first, last), t, a))[0] / (last - first)
             return float(rate / numbers["rate"] - 1.0)
         if "amplitude" in numbers:
-            t, a = np.array(found["t"]), np.array(found["amplitude"])
+            t = np.array(found["t"])
+            a = np.array(found["amplitude"])
             return float(np.interp(numbers["times"][-1], t, a) / numbers["amplitude"] - 1.0)
         x, y = np.array(found["x"]), np.array(found["y"])
-        rho, volume = np.array(found["rho"]), np.array(found["volume"])
+        rho = np.array(found["rho"])
+        volume = np.array(found["volume"])
         exact = compute_exact_density(self, x, y)
         near = np.hypot(x, y) < numbers["radius"] if "radius" in numbers else np.full(x.shape, True)
         off = np.abs(rho - exact) * volume
@@ -54,7 +57,8 @@ def compute_exact_density(case: Case, x: np.ndarray, y: np.ndarray) -> np.ndarra
         inside = np.abs(x - numbers["centre"]) < 0.5 * numbers["width"]
         return np.where(inside, numbers["rho"][1], numbers["rho"][0])
     problem = sg.load(case.name.split("-")[0], geometry=numbers["geometry"]).problem
-    radii, t = np.hypot(x, y), numbers["t_end"]
+    radii = np.hypot(x, y)
+    t = numbers["t_end"]
     if case.name == "noh":
         return problem.compute_density(radii, t)
     return problem.blast.sample(radii, t)[0]
@@ -67,7 +71,8 @@ def make_shocked_interface(deck: str, **settings: Any) -> dict[str, Any]:
     (rho, u, p) behind the shock, before it and beyond the interface.
     """
     problem = sg.load(deck, cells=16, **settings).problem
-    base, shock = problem.theory.base, problem.shock
+    base = problem.theory.base
+    shock = problem.shock
     sound = problem.theory.sound_speed
     ka0 = problem.deck.modes[0].ka0
     return {

@@ -130,7 +130,8 @@ def run_cloverleaf(
     rho, _, p = numbers["left"]
     sound = (numbers["gamma"] * p / rho) ** 0.5
     # the wall's echo, and the fan of the gas that leaves the right wall
-    x0, x1 = -0.75 * sound * t_end - push * wait, (1.19 + push) * t_end
+    x0 = -0.75 * sound * t_end - push * wait
+    x1 = (1.19 + push) * t_end
     nx, ny = round((x1 - x0) * cells), cells // 2
     deck = CLOVERLEAF_DECK.format(
         left=(rho,), energy=p / ((numbers["gamma"] - 1.0) * rho),

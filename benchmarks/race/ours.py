@@ -61,7 +61,8 @@ def run_ours(name: str, numbers: dict[str, Any], cells: int) -> tuple[dict, floa
         settings = {"cells": cells}
         if name == "contact":
             (home / "slab.toml").write_text(write_slab(numbers, cells))
-            deck, settings = "slab.toml", {}
+            deck = "slab.toml"
+            settings = {}
         elif name.startswith("growth"):
             deck = "interface-instability"
             if name == "growth":

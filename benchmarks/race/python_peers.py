@@ -115,21 +115,26 @@ def run_pyclaw(name: str, numbers: dict, cells: int) -> dict:
     solver = pyclaw.ClawSolver2D(riemann.euler_hlle_2D if strong else riemann.euler_4wave_2D)
     limiters = pyclaw.limiters.tvd
     solver.limiters = limiters.minmod if strong and cells > 200 else limiters.MC
-    solver.order, solver.transverse_waves, solver.dimensional_split = 2, 2, False
-    solver.cfl_desired, solver.cfl_max, solver.max_steps = 0.9, 1.0, 10**7
+    solver.order = 2
+    solver.transverse_waves = 2
+    solver.dimensional_split = False
+    solver.cfl_desired = 0.9
+    solver.cfl_max = 1.0
+    solver.max_steps = 10**7
     if strong:  # this solver has no transverse part
-        solver.transverse_waves, solver.dimensional_split = 0, True
-    wall, open_, periodic = pyclaw.BC.wall, pyclaw.BC.extrap, pyclaw.BC.periodic
+        solver.transverse_waves = 0
+        solver.dimensional_split = True
+    wall = pyclaw.BC.wall
+    open_ = pyclaw.BC.extrap
+    periodic = pyclaw.BC.periodic
     lower, upper = {
         "growth": ((open_, wall), (open_, wall)),
         "mushroom": ((open_, wall), (open_, wall)),
         "contact": ((periodic, periodic), (periodic, periodic)),
         "sedov-cylinder": ((wall, wall), (open_, open_)),
     }[name]
-    (solver.bc_lower[0], solver.bc_lower[1]), (solver.bc_upper[0], solver.bc_upper[1]) = (
-        lower,
-        upper,
-    )
+    solver.bc_lower[0], solver.bc_lower[1] = lower
+    solver.bc_upper[0], solver.bc_upper[1] = upper
     domain = pyclaw.Domain(
         [pyclaw.Dimension(x0, x1, nx, name="x"), pyclaw.Dimension(y0, y1, ny, name="y")]
     )
@@ -190,7 +195,8 @@ def run_pyro(name: str, numbers: dict, cells: int) -> dict:
     x, y = (0.5 * (f[1:] + f[:-1]) for f in (x_face, y_face))
     ghosts = code.sim.cc_data.grid.ng
     inside = np.s_[ghosts : ghosts + nx, ghosts : ghosts + ny]
-    seen, amplitude = [], []
+    seen = []
+    amplitude = []
     while not code.sim.finished():
         code.single_step()
         if "times" in numbers and len(seen) < len(times):
@@ -218,6 +224,8 @@ def finish(numbers: dict, amplitude: list, rho, x, y) -> dict:
 
 
 if __name__ == "__main__":
-    code, name, cells = sys.argv[1], sys.argv[2], int(sys.argv[3])
+    code = sys.argv[1]
+    name = sys.argv[2]
+    cells = int(sys.argv[3])
     run = {"pyclaw": run_pyclaw, "pyro": run_pyro}[code]
     print(json.dumps(run(name, json.load(sys.stdin), cells)))

@@ -115,7 +115,8 @@ def write_tables(document: dict[str, Any]) -> list[str]:
     """One table a case."""
     lines: list[str] = []
     for name, case in document["cases"].items():
-        title, error = typeset(case["title"]), typeset(case["error"])
+        title = typeset(case["title"])
+        error = typeset(case["error"])
         lines += ["", f"## {title[0].upper()}{title[1:]}", "", f"Error: {error}.", ""]
         lines += ["| code | cells | error | CPU seconds |", "|---|---|---|---|"]
         for row in (r for r in document["rows"] if r["case"] == name):

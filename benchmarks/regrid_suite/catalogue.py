@@ -20,7 +20,9 @@ from regrid.errors import BadInput, suggest
 
 DATA = Path(__file__).with_name("data")
 ROLL_PARTS = 4  # steps from one dump of the roll to the next
-LOW, BOTH, ALL = ("j_min",), ("j_min", "j_max"), PLANE_SIDES
+LOW = ("j_min",)
+BOTH = ("j_min", "j_max")
+ALL = PLANE_SIDES
 
 # name: the formula, cells, cells per step, the sides that deform
 FORMULAS = {
@@ -123,8 +125,10 @@ def load_roll(name: str) -> March:
     """
     gas = ROLLS[name]
     with np.load(DATA / "mushroom_roll.npz") as kept:
-        times, dumped = kept["t"], kept[f"{gas}_sides"].astype(float)
-        sound, (ni, nj) = kept[f"{gas}_sound"].astype(float), kept[f"{gas}_cells"]
+        times = kept["t"]
+        dumped = kept[f"{gas}_sides"].astype(float)
+        sound = kept[f"{gas}_sound"].astype(float)
+        ni, nj = kept[f"{gas}_cells"]
     part = np.linspace(0.0, len(times) - 1.0, (len(times) - 1) * ROLL_PARTS + 1)
     before = np.minimum(part.astype(int), len(times) - 2)
     way = (part - before)[:, None, None]

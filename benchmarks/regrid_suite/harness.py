@@ -83,9 +83,12 @@ def run_march(march: March, regrid: Regrid, lag: bool = False) -> Outcome:
     A regridder that compiles at its first calls has to be warmed up by another march.
     """
     found = Outcome(march.name, march.steps, nodes=march.start.copy())
-    seconds, rates = 0.0, []
+    seconds = 0.0
+    rates = []
     for step in range(1, march.steps + 1):
-        before, old_sides, parts = found.nodes, march.boundary(step - 1), 1
+        before = found.nodes
+        old_sides = march.boundary(step - 1)
+        parts = 1
         begun = time.process_time()
         while True:
             nodes, failure = march_parts(march, regrid, before, old_sides, step, parts)
@@ -99,11 +102,13 @@ def run_march(march: March, regrid: Regrid, lag: bool = False) -> Outcome:
                 found.overlap = measures.measure_overlap(nodes)
             break
         seconds += time.process_time() - begun
-        found.nodes, found.done = nodes, step
+        found.nodes = nodes
+        found.done = step
         found.sub_moves += parts - 1
         rates.append(measure_step(found, march, before, step))
     if rates:
-        found.rate, found.mean_rate = max(rates), float(np.mean(rates))
+        found.rate = max(rates)
+        found.mean_rate = float(np.mean(rates))
     found.sub_moves += getattr(regrid, "sub_moves", 0)
     found.cost = 1e6 * seconds / (march.inner_nodes * max(found.done, 1))
     if lag and found.whole and found.nodes is not None:
@@ -166,7 +171,9 @@ def measure_lag(march: March, regrid: Regrid, last: np.ndarray) -> float | None:
 
     None where one fails.  At most `LAG_CALLS` calls on the last sides, fewer where none is needed.
     """
-    edge, nodes, sides = measures.measure_mean_edge(last), last, march.boundary(march.steps)
+    edge = measures.measure_mean_edge(last)
+    nodes = last
+    sides = march.boundary(march.steps)
     for _ in range(LAG_CALLS):
         following, failure = try_step(march, regrid, nodes, sides, march.steps, 1)
         if failure is not None or following is None:

@@ -129,7 +129,8 @@ def make_march(
         get_side(start, side)[...] = first[side]
     start = transfinite_grid(start) if len(cells) == 2 else interpolate_faces(start)
     samples = np.linspace(0.0, 1.0, SAMPLES)
-    travel, last = np.zeros(SAMPLES), first
+    travel = np.zeros(SAMPLES)
+    last = first
     for k, a in enumerate(samples[1:], start=1):
         following = take(a)
         ways = (np.sqrt(((following[s] - last[s]) ** 2).sum(axis=0)).max() for s in names)

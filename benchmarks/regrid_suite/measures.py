@@ -124,12 +124,14 @@ def find_boundary_crossing(nodes: np.ndarray) -> tuple[int, int] | None:
     """
     line, _ = walk_boundary(nodes)
     count = line.shape[1]
-    a, b = line, np.roll(line, -1, axis=1)
+    a = line
+    b = np.roll(line, -1, axis=1)
     low, high = np.minimum(a, b), np.maximum(a, b)
     apart = (low[:, :, None] > high[:, None]) | (high[:, :, None] < low[:, None])
     first, second = np.nonzero(np.triu(~apart.any(axis=0), k=1))
     beside = (second == first + 1) | ((first == 0) & (second == count - 1))
-    p, q = first[~beside], second[~beside]
+    p = first[~beside]
+    q = second[~beside]
     turns = [
         compute_turns(*points)[0]
         for points in (

@@ -64,7 +64,9 @@ class OwnInSpace:
     """The barrier for hexahedra as a plain callable."""
 
     def __init__(self, march: March):
-        self.regridder, self.sees_cost, self.sub_moves = BarrierRegridder3D(), False, 0
+        self.regridder = BarrierRegridder3D()
+        self.sees_cost = False
+        self.sub_moves = 0
 
     def __call__(self, previous, boundary):
         result = self.regridder.regrid(previous, boundary)

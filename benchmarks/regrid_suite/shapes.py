@@ -191,7 +191,9 @@ def turn(xi, eta, a):
 
     angle = pi a; (x, y) = the point (1.5 xi, eta) turned by angle.
     """
-    x, y, angle = 1.5 * xi, eta, np.pi * a
+    x = 1.5 * xi
+    y = eta
+    angle = np.pi * a
     return x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)
 
 
@@ -229,7 +231,8 @@ def omega(xi, eta, a):
     h = exp(-ln 2 (2 (xi - .5)/.26)^4), d = xi - .5; x = .5 + d (1 + a (.9 h^3 - 2 h (1 - h))
     (1 - eta)); low = .55 a h; y = low + eta (1 - low).
     """
-    h, d = hump(xi - 0.5, 0.26), xi - 0.5
+    h = hump(xi - 0.5, 0.26)
+    d = xi - 0.5
     x = 0.5 + d * (1.0 + a * (0.9 * h**3 - 2.0 * h * (1.0 - h)) * (1.0 - eta))
     return x, between(0.55 * a * h, 1.0, eta)
 

@@ -24,7 +24,9 @@ def twisted_duct_3d(xi, eta, zeta, a):
 
     angle = (2 pi/3) a xi; x = 2 xi; (y, z) = (eta - 1/2, zeta - 1/2) turned by angle.
     """
-    y, z, angle = eta - 0.5, zeta - 0.5, 2.0 * np.pi / 3.0 * a * xi
+    y = eta - 0.5
+    z = zeta - 0.5
+    angle = 2.0 * np.pi / 3.0 * a * xi
     return (
         2.0 * xi,
         y * np.cos(angle) - z * np.sin(angle),

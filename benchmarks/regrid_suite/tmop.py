@@ -20,8 +20,10 @@ from benchmarks.regrid_suite.harness import Refused
 from benchmarks.regrid_suite.marches import March, get_side, interpolate_faces, name_sides
 from regrid.algebraic import fill_displacement
 
-NEWTON, NEWTON_TOLERANCE = 8, 1e-3
-LINEAR, LINEAR_TOLERANCE = 100, 1e-3
+NEWTON = 8
+NEWTON_TOLERANCE = 1e-3
+LINEAR = 100
+LINEAR_TOLERANCE = 1e-3
 ORDER = 3  # of the rule: the corners of a cell
 
 
@@ -29,7 +31,8 @@ class Tmop:
     """A mesh of the march's shape and its optimiser, used again in every step."""
 
     def __init__(self, march: March, target: str = "shape"):
-        self.dim, cells = march.dim, [n - 1 for n in march.start.shape[1:]]
+        self.dim = march.dim
+        cells = [n - 1 for n in march.start.shape[1:]]
         if self.dim == 2:
             self.mesh = mfem.Mesh.MakeCartesian2D(
                 *cells, mfem.Element.QUADRILATERAL, True, 1.0, 1.0, False

@@ -93,7 +93,8 @@ def march(kinds, folder: Path, kept: Path, seed: int, minutes: float, most: int 
             kind.prepare()
             prepared.add(kind.name)
             began = time.monotonic()
-        trial, number = folder / "trial", record.find_next(kind.name)
+        trial = folder / "trial"
+        number = record.find_next(kind.name)
         trial.mkdir()
         outcome = kind.attempt(number, trial)
         shutil.rmtree(trial, ignore_errors=True)

@@ -65,7 +65,8 @@ class Call:
         it at which to end (from 1); before: called in the copy first, to spoil its clocks or disk;
         memory: bound of its addresses [GiB].
         """
-        self.cpu, self.memory = cpu, memory
+        self.cpu = cpu
+        self.memory = memory
         self._files = tempfile.TemporaryFile(), tempfile.TemporaryFile()
         self._end, theirs = os.pipe()
         sys.stdout.flush()
@@ -142,7 +143,8 @@ def import_commands() -> None:
 
 def _kill_self_at(folder: Path, number: int) -> None:
     """Be killed just before change `number` of files below `folder`."""
-    below, count = str(folder), 0
+    below = str(folder)
+    count = 0
 
     def watch(event: str, details: tuple) -> None:
         nonlocal count

@@ -109,7 +109,8 @@ def swap_tables(text: str, chance: random.Random) -> str:
     found = TABLE.findall(text)
     if not found:
         return nest(text, chance)
-    one, other = chance.choice(found), chance.choice(found)
+    one = chance.choice(found)
+    other = chance.choice(found)
     if one == other:
         return text.replace(one, f"[{one}]")
     return text.replace(one, "\0").replace(other, one).replace("\0", other)
@@ -157,7 +158,9 @@ def make_deck(chance: random.Random) -> bytes:
 class Decks:
     """`check` of a changed deck."""
 
-    name, wanted, weight = "decks", 10_000, 3.0
+    name = "decks"
+    wanted = 10_000
+    weight = 3.0
     about = "a packaged deck changed at random, `check`ed"
     cpu = 20  # [s] for one check
 
@@ -185,12 +188,15 @@ class Decks:
 class DeckRuns(Decks):
     """A short run of a changed deck that `check` accepts: twenty steps or an end with a name."""
 
-    name, wanted, weight = "deck-runs", 500, 2.0
+    name = "deck-runs"
+    wanted = 500
+    weight = 2.0
     about = "a changed deck that `check` accepts, run for 20 steps"
 
     def attempt(self, number: int, folder: Path) -> Outcome:
         chance = make_random(self.name, self.seed, number)
-        deck, path = folder / "deck.toml", folder / "run"
+        deck = folder / "deck.toml"
+        path = folder / "run"
         for _ in range(200):
             deck.write_bytes(make_deck(chance))
             done = call(["check", str(deck)], folder, cpu=self.cpu, memory=4)

@@ -27,7 +27,9 @@ FULL = "no space left", "too large", "the run will need about"  # what a run say
 class Disks(TrialsOfRuns):
     """A run on a disk with room for a part of it, then with room enough."""
 
-    name, wanted, weight = "disks", 50, 0.7
+    name = "disks"
+    wanted = 50
+    weight = 0.7
     about = "a disk that fills during a run; then space is made and the run goes on"
 
     def attempt(self, number: int, folder: Path) -> Outcome:
@@ -36,7 +38,8 @@ class Disks(TrialsOfRuns):
         whole = self.undisturbed.find(problem)
         with small_disk(folder / "disk") as mounted:
             path = folder / "disk" / "run"
-            words, before = list_words(problem, path), None
+            words = list_words(problem, path)
+            before = None
             if mounted:
                 free = chance.randint(0, measure_pages(whole) + 2) * PAGE
                 fill_up(folder / "disk" / "filler", free)

@@ -10,7 +10,8 @@ from benchmarks.soak.small_runs import OFTEN, SMALL, load_kernels
 from benchmarks.soak.trial import Outcome, find_fault, make_random, tell_last
 
 FLIPPED = ("interface-instability", "riemann")
-HALF, END = {"interface-instability": 10, "riemann": 20}, 1000
+HALF = {"interface-instability": 10, "riemann": 20}
+END = 1000
 USES = ("restart",) * 10 + ("info",) * 3 + ("inspect",) * 2 + ("compare",) * 4 + ("plot",)
 SAID = (
     "damaged",
@@ -28,17 +29,21 @@ TIMED = ("seconds_", "crc32")  # columns: wall times, and sums over them
 class Flips:
     """A run stopped half-way, one bit turned in one file, then restarted or looked at."""
 
-    name, wanted, weight = "flips", 2000, 3.0
+    name = "flips"
+    wanted = 2000
+    weight = 3.0
     about = "one bit turned in a dump, the history, the gauges or the deck of half a run"
 
     def __init__(self, seed: int, folder: Path):
-        self.seed, self.folder = seed, folder
+        self.seed = seed
+        self.folder = folder
 
     def prepare(self) -> None:
         self.folder.mkdir(exist_ok=True)
         for problem in FLIPPED:
             load_kernels(problem)
-            half, whole = self.folder / f"{problem}-half", self.folder / f"{problem}-whole"
+            half = self.folder / f"{problem}-half"
+            whole = self.folder / f"{problem}-whole"
             settings = (*SMALL[problem], *OFTEN, f"run.max_steps={HALF[problem]}")
             words = [word for text in settings for word in ("--set", text)]
             done = call(["run", problem, "-q", "-o", str(half), *words], self.folder)
@@ -50,15 +55,18 @@ class Flips:
 
     def attempt(self, number: int, folder: Path) -> Outcome:
         chance = make_random(self.name, self.seed, number)
-        problem, use = chance.choice(FLIPPED), chance.choice(USES)
-        half, run = self.folder / f"{problem}-half", folder / "run"
+        problem = chance.choice(FLIPPED)
+        use = chance.choice(USES)
+        half = self.folder / f"{problem}-half"
+        run = folder / "run"
         shutil.copytree(half, run)
         dumps = sorted(run.glob("dumps/*.h5"))
         target = chance.choice(
             (*dumps, dumps[-1], dumps[-1], run / "history.csv", run / "deck.toml")
         )
         content = bytearray(target.read_bytes())
-        place, bit = chance.randrange(len(content)), chance.randrange(8)
+        place = chance.randrange(len(content))
+        bit = chance.randrange(8)
         content[place] ^= 1 << bit
         if target.suffix != ".h5" and use == "inspect":
             use = "info"  # that shows dumps alone

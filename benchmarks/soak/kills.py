@@ -20,14 +20,18 @@ from benchmarks.soak.trial import Outcome, find_fault, make_random, tell_last
 class Kills(TrialsOfRuns):
     """Killed once to four times; half at a moment of time, half at a change of files."""
 
-    name, wanted, weight = "kills", 1000, 3.0
+    name = "kills"
+    wanted = 1000
+    weight = 3.0
     about = "a run killed (its restarts too, up to three times), then restarted to its end"
 
     def attempt(self, number: int, folder: Path) -> Outcome:
         chance = make_random(self.name, self.seed, number)
         problem = list(SMALL)[number % len(SMALL)]
-        whole, path = self.undisturbed.find(problem), folder / "run"
-        words, kills = list_words(problem, path), chance.choice((1, 1, 2, 3, 4))
+        whole = self.undisturbed.find(problem)
+        path = folder / "run"
+        words = list_words(problem, path)
+        kills = chance.choice((1, 1, 2, 3, 4))
         killed = 0
         for _ in range(kills):
             done = self._kill(words, problem, path, folder, chance)
@@ -68,10 +72,8 @@ def finish(problem: str, path: Path, whole: Path, folder: Path) -> Outcome:
     """
     label = "restarted, bitwise equal"
     if not path.exists():
-        label, done = (
-            "killed before the first file, run again, bitwise equal",
-            call(list_words(problem, path), folder),
-        )
+        label = "killed before the first file, run again, bitwise equal"
+        done = call(list_words(problem, path), folder)
     else:
         done = call(["restart", str(path), "-q"], folder)
         if done.code == 2:

@@ -21,7 +21,8 @@ class Record:
     """Outcomes of all trials so far, in a file that a later call goes on with."""
 
     def __init__(self, path: Path, seed: int):
-        self.path, self.seed = path, seed
+        self.path = path
+        self.seed = seed
         self.rows: list[dict[str, Any]] = []
         if path.exists():
             text, _, torn = path.read_text(encoding="utf-8").rpartition("\n")

@@ -25,13 +25,17 @@ PAIRS = (
 class Rivals(TrialsOfRuns):
     """Two commands begun within a moment of one another."""
 
-    name, wanted, weight = "rivals", 200, 1.0
+    name = "rivals"
+    wanted = 200
+    weight = 1.0
     about = "two commands at once in one directory"
 
     def attempt(self, number: int, folder: Path) -> Outcome:
         chance = make_random(self.name, self.seed, number)
-        problem, path = list(SMALL)[number % len(SMALL)], folder / "run"
-        whole, pair = self.undisturbed.find(problem), PAIRS[number // len(SMALL) % len(PAIRS)]
+        problem = list(SMALL)[number % len(SMALL)]
+        path = folder / "run"
+        whole = self.undisturbed.find(problem)
+        pair = PAIRS[number // len(SMALL) % len(PAIRS)]
         seconds = self.undisturbed.seconds[problem]
         if "restart" in pair or "force" in pair:
             Call(list_words(problem, path), folder).wait(
@@ -70,12 +74,15 @@ class Rivals(TrialsOfRuns):
 class Clocks(TrialsOfRuns):
     """All clocks of a run, and of its restart, jump back and on by up to a day."""
 
-    name, wanted, weight = "clocks", 100, 0.7
+    name = "clocks"
+    wanted = 100
+    weight = 0.7
     about = "clocks that jump back and on by up to a day during a run"
 
     def attempt(self, number: int, folder: Path) -> Outcome:
         chance = make_random(self.name, self.seed, number)
-        problem, path = list(SMALL)[number % len(SMALL)], folder / "run"
+        problem = list(SMALL)[number % len(SMALL)]
+        path = folder / "run"
         whole = self.undisturbed.find(problem)
         spoil = lambda: make_clocks_jump(chance.getrandbits(32))  # noqa: E731
         more = ("--max-wall", "1h") if chance.random() < 0.5 else ()
@@ -98,7 +105,8 @@ class Clocks(TrialsOfRuns):
 
 def make_clocks_jump(seed: int) -> None:
     """Let the clocks of this process jump, now and then, at most a day from the true time."""
-    chance, day = random.Random(seed), 86400.0
+    chance = random.Random(seed)
+    day = 86400.0
     offset = 0.0
 
     def spoil(clock):

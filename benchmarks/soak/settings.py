@@ -24,7 +24,8 @@ SPREAD = 4.0  # a number without bounds is drawn up to so many times the default
 class Settings:
     """A packaged deck changed within its bounds, run for some seconds."""
 
-    name, weight = "settings", 2.0
+    name = "settings"
+    weight = 2.0
     about = "a packaged deck at half and double cells and at random settings in bounds"
     seconds = 5
 
@@ -89,7 +90,9 @@ def change_cells(part: Any, factor: float, key: str = "") -> list[str]:
 def draw_setting(schema: dict[str, Any], table: dict[str, Any], chance: random.Random) -> str:
     """A key of a deck, in its tables too, and a value within its bounds, as for `--set`."""
     keys = sorted(set(schema["properties"]) - LEFT_ALONE)
-    path, part, given = [], schema, table
+    path = []
+    part = schema
+    given = table
     while True:
         key = chance.choice(keys)
         path.append(key)

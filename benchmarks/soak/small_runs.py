@@ -85,7 +85,8 @@ class TrialsOfRuns:
     """What kinds of trials share that end in the bits of undisturbed runs."""
 
     def __init__(self, seed: int, undisturbed: Undisturbed):
-        self.seed, self.undisturbed = seed, undisturbed
+        self.seed = seed
+        self.undisturbed = undisturbed
 
     def prepare(self) -> None:
         """Make the runs to compare with."""

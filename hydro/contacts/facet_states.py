@@ -71,12 +71,18 @@ def solve_facets(
     """
     closed = 0
     for k in range(count):
-        a, b = owners[LEADER, k], owners[FOLLOWER, k]
-        x, y, nx, ny = faces[FACE_X, k], faces[FACE_Y, k], faces[NORMAL_X, k], faces[NORMAL_Y, k]
+        a = owners[LEADER, k]
+        b = owners[FOLLOWER, k]
+        x = faces[FACE_X, k]
+        y = faces[FACE_Y, k]
+        nx = faces[NORMAL_X, k]
+        ny = faces[NORMAL_Y, k]
         u_other, v_other, p_other = compute_at(follower, other_middles, other_slopes, b, x, y)
         w_other = u_other * nx + v_other * ny
-        rho_other, c_other = follower[RHO, b], follower[SOUND, b]
-        void, stiffness = other_open_p[b], rho_other * c_other * c_other
+        rho_other = follower[RHO, b]
+        c_other = follower[SOUND, b]
+        void = other_open_p[b]
+        stiffness = rho_other * c_other * c_other
         if rigid:
             u, v = velocity[0], velocity[1]
             w = u * nx + v * ny
@@ -85,7 +91,8 @@ def solve_facets(
         else:
             u, v, p = compute_at(leader, middles, slopes, a, x, y)
             w = u * nx + v * ny
-            rho, c = leader[RHO, a], leader[SOUND, a]
+            rho = leader[RHO, a]
+            c = leader[SOUND, a]
             void = max(void, open_p[a])
             stiffness = max(stiffness, rho * c * c)
             pressure, speed = compute_contact(
@@ -185,9 +192,14 @@ def add_friction(
         inverse = 1.0 / (other_rim[on.RHO, other] * other_rim[on.LENGTH, other])
         u_other, v_other = other_rim[on.U, other], other_rim[on.V, other]
         if rigid:
-            u, v, part, own_inverse = velocity[0], velocity[1], 0.0, 0.0
+            u = velocity[0]
+            v = velocity[1]
+            part = 0.0
+            own_inverse = 0.0
         else:
-            u, v, z = rim[on.U, own], rim[on.V, own], rim[on.RHO, own] * rim[on.C, own]
+            u = rim[on.U, own]
+            v = rim[on.V, own]
+            z = rim[on.RHO, own] * rim[on.C, own]
             part = z / (z + z_other)
             own_inverse = 1.0 / (rim[on.RHO, own] * rim[on.LENGTH, own])
         slip = (u_other - u) * x + (v_other - v) * y
@@ -199,7 +211,8 @@ def add_friction(
         # velocities along the facet in the middle of the step
         w = u * x + v * y + 0.5 * dt * push * own_inverse
         w_other = u_other * x + v_other * y - 0.5 * dt * push * inverse
-        force, speed = push * area, w + part * (w_other - w)
+        force = push * area
+        speed = w + part * (w_other - w)
         other_rim[on.MOMENTUM_X, other] += force * x
         other_rim[on.MOMENTUM_Y, other] += force * y
         other_rim[on.ENERGY, other] += force * speed
@@ -215,7 +228,9 @@ def measure_closed(states, faces, owners, ends_of, count):
 
     Facets are in the order of the leader; a stretch ends where one is open or does not go on.
     """
-    stretches, length, before = 0, 0.0, -1.0
+    stretches = 0
+    length = 0.0
+    before = -1.0
     for k in range(count):
         if states[CLOSED, k] == 0.0:
             continue

@@ -87,7 +87,8 @@ def may_lie_on(part, k, a):
 @compiled_once
 def find_direction(points, k):
     """Vector from the point before to the one after point `k` of points (2, n)."""
-    before, after = max(0, k - 1), min(points.shape[1] - 1, k + 1)
+    before = max(0, k - 1)
+    after = min(points.shape[1] - 1, k + 1)
     return points[0, after] - points[0, before], points[1, after] - points[1, before]
 
 
@@ -128,8 +129,11 @@ def find_pins(
     (4, groups): of `group` faces each; reach: BULGE of the longest [m]; part: see `may_lie_on`.
     Returns how many do.
     """
-    count, last = line.shape[1] - 1, points.shape[1] - 1
-    groups, near, found = np.empty(boxes.shape[1], np.int64), 0, 0
+    count = line.shape[1] - 1
+    last = points.shape[1] - 1
+    groups = np.empty(boxes.shape[1], np.int64)
+    near = 0
+    found = 0
     for k in range(last + 1):
         if k % group == 0:
             near = find_groups(points, points, k, min(last + 1, k + group), boxes, reach, groups)
@@ -138,7 +142,8 @@ def find_pins(
             continue
         x, y = points[0, k], points[1, k]
         along_x, along_y = find_direction(points, k)
-        least, position = 1e300, -1.0
+        least = 1e300
+        position = -1.0
         for n in range(near):
             g = groups[n]
             if lies_away(x, y, boxes, g, reach):
@@ -159,7 +164,8 @@ def find_pins(
                     if a == count - 1 and (1.0 - at) * square**0.5 < deep:
                         is_on = False
                 if is_on and not (asked[k] and one_body and is_film(inner, k, line, a, x, y)):
-                    least, position = away, snap_position(a + at)
+                    least = away
+                    position = snap_position(a + at)
         positions[k] = position
         if position >= 0.0:
             found += 1
@@ -174,9 +180,12 @@ def find_deepest(points, pinned, line, boxes, group, reach):
     further from the line than `reach` [m], nor its end faces: round a
     body's corner what is behind one side is in front of the next.
     """
-    count, last = line.shape[1] - 1, points.shape[1] - 1
-    groups, near = np.empty(boxes.shape[1], np.int64), 0
-    deepest, which = 0.0, -1
+    count = line.shape[1] - 1
+    last = points.shape[1] - 1
+    groups = np.empty(boxes.shape[1], np.int64)
+    near = 0
+    deepest = 0.0
+    which = -1
     for k in range(last + 1):
         if k % group == 0:
             near = find_groups(points, points, k, min(last + 1, k + group), boxes, reach, groups)
@@ -184,7 +193,8 @@ def find_deepest(points, pinned, line, boxes, group, reach):
             continue
         x, y = points[0, k], points[1, k]
         along_x, along_y = find_direction(points, k)
-        least, depth = 1e300, 0.0
+        least = 1e300
+        depth = 0.0
         for n in range(near):
             g = groups[n]
             if lies_away(x, y, boxes, g, reach):
@@ -193,12 +203,14 @@ def find_deepest(points, pinned, line, boxes, group, reach):
                 part, away = project(line, a, x, y)
                 if away >= least:
                     continue
-                least, depth = away, 0.0
+                least = away
+                depth = 0.0
                 inner = 0 < a < count - 1 and 0.0 < part < 1.0
                 if inner and faces_each_other(line, a, along_x, along_y):
                     depth = max(0.0, find_depth(line, a, x, y) / measure_square(line, a) ** 0.5)
         if depth > deepest and least <= reach * reach:
-            deepest, which = depth, k
+            deepest = depth
+            which = k
     return deepest, which
 
 
@@ -234,7 +246,8 @@ def put_pin(pins, row, count, one, other):
     while at > 0 and goes_before(one, other, pins[row, at - 1], pins[row + 1, at - 1]):
         pins[row, at], pins[row + 1, at] = pins[row, at - 1], pins[row + 1, at - 1]
         at -= 1
-    pins[row, at], pins[row + 1, at] = one, other
+    pins[row, at] = one
+    pins[row + 1, at] = other
 
 
 @compiled_once
@@ -244,7 +257,8 @@ def merge_pins(leader_positions, follower_positions, pins):
     leader_positions (m + 1,): of the leader's nodes on the follower; follower_positions (n + 1,):
     of the follower's nodes on the leader; negative where a node lies on nothing.  Returns how many.
     """
-    own, others = 0, 0
+    own = 0
+    others = 0
     for k in range(follower_positions.shape[0] - 1, -1, -1):
         if follower_positions[k] >= 0.0:
             put_pin(pins, 2, own, follower_positions[k], float(k))
@@ -253,19 +267,25 @@ def merge_pins(leader_positions, follower_positions, pins):
         if leader_positions[k] >= 0.0:
             put_pin(pins, 4, others, float(k), leader_positions[k])
             others += 1
-    kept, one, two = 0, 0, 0
+    kept = 0
+    one = 0
+    two = 0
     while one < own or two < others:
-        row, at = 2, one
+        row = 2
+        at = one
         if one == own or (
             two < others and goes_before(pins[4, two], pins[5, two], pins[2, one], pins[3, one])
         ):
-            row, at = 4, two
+            row = 4
+            at = two
             two += 1
         else:
             one += 1
-        start, other = pins[row, at], pins[row + 1, at]
+        start = pins[row, at]
+        other = pins[row + 1, at]
         if kept == 0 or pins[0, kept - 1] != start or pins[1, kept - 1] != other:
-            pins[0, kept], pins[1, kept] = start, other
+            pins[0, kept] = start
+            pins[1, kept] = other
             kept += 1
     return kept
 
@@ -287,25 +307,35 @@ def fill_facets(leader, follower, positions, back_positions, straight, pins, cov
     Fills `owners` (2, n) and `ends` (4, n).  straight: the leader is a plane, whose face goes on.
     covered (m + 1,): set for the leader's nodes that lie between pins on one face of the follower.
     """
-    facets, count = 0, merge_pins(back_positions, positions, pins)
-    last, last_follower = leader.shape[1] - 2, follower.shape[1] - 2
+    facets = 0
+    count = merge_pins(back_positions, positions, pins)
+    last = leader.shape[1] - 2
+    last_follower = follower.shape[1] - 2
     for k in range(count - 1):
-        start, stop = pins[0, k], pins[0, k + 1]
-        high, low = pins[1, k], pins[1, k + 1]  # the follower runs the other way
+        start = pins[0, k]
+        stop = pins[0, k + 1]
+        # the follower runs the other way
+        high = pins[1, k]
+        low = pins[1, k + 1]
         if stop <= start or low >= high:
             continue
-        a, b = min(int(start), last), min(int(low), last_follower)
+        a = min(int(start), last)
+        b = min(int(low), last_follower)
         along_x = follower[0, b + 1] - follower[0, b]
         along_y = follower[1, b + 1] - follower[1, b]
         if high > b + 1.0 or not faces_each_other(leader, a, along_x, along_y):
             continue
         if straight or stop <= a + 1.0:
-            owners[LEADER, facets], owners[FOLLOWER, facets] = a, b
-            ends[LEADER_START, facets], ends[LEADER_STOP, facets] = start, stop
-            ends[FOLLOWER_START, facets], ends[FOLLOWER_STOP, facets] = high, low
+            owners[LEADER, facets] = a
+            owners[FOLLOWER, facets] = b
+            ends[LEADER_START, facets] = start
+            ends[LEADER_STOP, facets] = stop
+            ends[FOLLOWER_START, facets] = high
+            ends[FOLLOWER_STOP, facets] = low
             facets += 1
         elif lie_near(leader, a + 1, int(stop - SNAP) + 1, follower, b):
-            here, other = start, high
+            here = start
+            other = high
             while here < stop:
                 there = min(float(int(here) + 1), stop)
                 next_other = low
@@ -314,11 +344,15 @@ def fill_facets(leader, follower, positions, back_positions, straight, pins, cov
                     covered[node] = True
                     part, _ = project(follower, b, leader[0, node], leader[1, node])
                     next_other = max(low, min(other, b + part))
-                owners[LEADER, facets], owners[FOLLOWER, facets] = int(here), b
-                ends[LEADER_START, facets], ends[LEADER_STOP, facets] = here, there
-                ends[FOLLOWER_START, facets], ends[FOLLOWER_STOP, facets] = other, next_other
+                owners[LEADER, facets] = int(here)
+                owners[FOLLOWER, facets] = b
+                ends[LEADER_START, facets] = here
+                ends[LEADER_STOP, facets] = there
+                ends[FOLLOWER_START, facets] = other
+                ends[FOLLOWER_STOP, facets] = next_other
                 facets += 1
-                here, other = there, next_other
+                here = there
+                other = next_other
     return facets
 
 
@@ -349,15 +383,18 @@ def measure_facets(line, other, rigid, moved, inverse_dt, owners, ends, count, f
     """
     for k in range(count):
         a = owners[LEADER, k]
-        start, stop = ends[LEADER_START, k], ends[LEADER_STOP, k]
+        start = ends[LEADER_START, k]
+        stop = ends[LEADER_STOP, k]
         x, y = find_point(line, a, start)
         x_end, y_end = find_point(line, a, stop)
         middle = 0.5 * (start + stop)
         speed_x, speed_y = find_point(moved, a, middle)
         area_x, area_y = y_end - y, x - x_end
-        faces[AREA_X, k], faces[AREA_Y, k] = area_x, area_y
+        faces[AREA_X, k] = area_x
+        faces[AREA_Y, k] = area_y
         faces[SWEPT_RATE, k] = inverse_dt * (speed_x * area_x + speed_y * area_y)
-        faces[FACE_X, k], faces[FACE_Y, k] = 0.5 * (x + x_end), 0.5 * (y + y_end)
+        faces[FACE_X, k] = 0.5 * (x + x_end)
+        faces[FACE_Y, k] = 0.5 * (y + y_end)
         normal_x, normal_y = find_curve_normal(line, a, middle - a)
         if not rigid:
             b = owners[FOLLOWER, k]
@@ -365,7 +402,8 @@ def measure_facets(line, other, rigid, moved, inverse_dt, owners, ends, count, f
             other_x, other_y = find_curve_normal(other, b, part)
             normal_x, normal_y = normal_x - other_x, normal_y - other_y
         length = (normal_x * normal_x + normal_y * normal_y) ** 0.5
-        faces[NORMAL_X, k], faces[NORMAL_Y, k] = normal_x / length, normal_y / length
+        faces[NORMAL_X, k] = normal_x / length
+        faces[NORMAL_Y, k] = normal_y / length
 
 
 @kernel
@@ -373,9 +411,12 @@ def measure_radius_weighted_facets(old, new, inverse_dt, owners, ends, count, ar
     """Rows AREAS (3, facets) in axisymmetric flow; the leader's old and new line."""
     for k in range(count):
         a = owners[LEADER, k]
-        start, stop = ends[LEADER_START, k], ends[LEADER_STOP, k]
+        start = ends[LEADER_START, k]
+        stop = ends[LEADER_STOP, k]
         area_x, area_y, sweep, _, _ = compute_radius_weighted_face(
             find_point(old, a, start), find_point(old, a, stop),
             find_point(new, a, start), find_point(new, a, stop), inverse_dt,
         )  # fmt: skip
-        areas[AREA_X, k], areas[AREA_Y, k], areas[SWEPT_RATE, k] = area_x, area_y, sweep
+        areas[AREA_X, k] = area_x
+        areas[AREA_Y, k] = area_y
+        areas[SWEPT_RATE, k] = sweep

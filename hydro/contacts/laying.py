@@ -79,11 +79,13 @@ def lay(
     `part_back` of that alone: a finite way in a short step would crush its cells.
     Returns how many inner nodes are moved, -1 where one has gone far into the other body.
     """
-    last, most = points.shape[1] - 1, line.shape[1] - 1
+    last = points.shape[1] - 1
+    most = line.shape[1] - 1
     ends[:] = 0.0
     moved = 0
     for k in range(last + 1):
-        ways[0, k], ways[1, k] = 0.0, 0.0
+        ways[0, k] = 0.0
+        ways[1, k] = 0.0
         if found[k] < 0.0:
             continue
         a = min(int(found[k]), most - 1)
@@ -122,11 +124,14 @@ def lay(
                 scale = max(0.0, 1.0 - (1.0 - part_back) * was / way)
                 x, y = scale * x, scale * y
         if 0 < k < last:
-            ways[0, k], ways[1, k] = x, y
+            ways[0, k] = x
+            ways[1, k] = y
             moved += 1
         else:
             end = 0 if k == 0 else 1
-            ends[end, 0], ends[end, 1], ends[end, 2] = 1.0, x, y
+            ends[end, 0] = 1.0
+            ends[end, 1] = x
+            ends[end, 2] = y
     for k in range(1, last):
         points[0, k] += ways[0, k]
         points[1, k] += ways[1, k]
@@ -141,7 +146,9 @@ def match(points, line, places, hits, held, ends):
     the points were on it, or come through it; ends (4, 3): as in `lay`, of the points' line, then
     of the other one.  Returns how many have met.
     """
-    last, most, met = points.shape[1] - 1, line.shape[1] - 1, 0
+    last = points.shape[1] - 1
+    most = line.shape[1] - 1
+    met = 0
     ends[:] = 0.0
     for k in range(last + 1):
         m = int(places[k] + 0.5)
@@ -168,13 +175,17 @@ def match(points, line, places, hits, held, ends):
             points[1, k] += 0.5 * y
         else:
             end = 0 if k == 0 else 1
-            ends[end, 0], ends[end, 1], ends[end, 2] = 1.0, 0.5 * x, 0.5 * y
+            ends[end, 0] = 1.0
+            ends[end, 1] = 0.5 * x
+            ends[end, 2] = 0.5 * y
         if 0 < m < most:
             line[0, m] -= 0.5 * x
             line[1, m] -= 0.5 * y
         else:
             end = 2 if m == 0 else 3
-            ends[end, 0], ends[end, 1], ends[end, 2] = 1.0, -0.5 * x, -0.5 * y
+            ends[end, 0] = 1.0
+            ends[end, 1] = -0.5 * x
+            ends[end, 2] = -0.5 * y
     return met
 
 

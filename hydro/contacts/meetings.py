@@ -238,7 +238,8 @@ class Meetings:
         """The step stands: count what closed and opened, and how far lines may have come."""
         if not self.pairs:
             return
-        self._found, self.length = False, 0.0
+        self._found = False
+        self.length = 0.0
         if MOST_LONGER * self._most < self._room:
             self._room -= self._most
             self._gone += self._most
@@ -291,7 +292,8 @@ class Meetings:
 
         middle: at mid-time, for the fluxes; the covers are left as they are.
         """
-        states, pressures = {}, {}
+        states = {}
+        pressures = {}
         for surface in self._sides:
             states[id(surface)] = surface.gather(rows)
             pressures[id(surface)] = surface.gather_pressure()
@@ -326,14 +328,18 @@ class Meetings:
 
     def set_state(self, state: Any) -> None:
         """Take up a state of `get_state`; a restart point without one had met nothing."""
-        self._found, self._room, self._gone = False, 0.0, 0.0
+        self._found = False
+        self._room = 0.0
+        self._gone = 0.0
         for pair in self.pairs:
-            pair.clearance, pair.is_near = 0.0, False
+            pair.clearance = 0.0
+            pair.is_near = False
         self.voids.set_state(state)
         counts = state.get("contacts/counts")
         if counts is None or len(counts) != len(self.pairs) + 2:
             return
-        self.made, self.opened = int(counts[0]), int(counts[1])
+        self.made = int(counts[0])
+        self.opened = int(counts[1])
         for pair, stretches in zip(self.pairs, counts[2:].tolist(), strict=True):
             pair.stretches = stretches
         self.length = float(state["contacts/length"])
@@ -359,7 +365,8 @@ def _find_pairs(
     """Surfaces, and all pairs of them and of planes with them that may meet; walls lead."""
     if motion.mesh != "regrid":
         return [], []
-    bodies, planes = _find_bodies(blocks, links), find_planes(blocks, geometry.curved)
+    bodies = _find_bodies(blocks, links)
+    planes = find_planes(blocks, geometry.curved)
     bounds = {id(segment) for plane in planes for segment in plane.segments}
     surfaces = [
         Surface(segment, motion)

@@ -62,16 +62,21 @@ class Pair:
         self.stretches = 0  # that are closed
         self.touched = False  # does a node of one come through the other in this step?
         self.count = self.closed = self.pinned = self.common = 0  # common: pins at shared ends
-        nodes, back = self.follower.count + 1, self.leader.count + 1
+        nodes = self.follower.count + 1
+        back = self.leader.count + 1
         facets = nodes + back
-        self.positions, self.back_positions = np.full(nodes, -1.0), np.full(back, -1.0)
-        self._found, self._back_found = self.positions.copy(), self.back_positions.copy()
-        self.hits, self.back_hits = self.positions.copy(), self.back_positions.copy()
+        self.positions = np.full(nodes, -1.0)
+        self.back_positions = np.full(back, -1.0)
+        self._found = self.positions.copy()
+        self._back_found = self.back_positions.copy()
+        self.hits = self.positions.copy()
+        self.back_hits = self.back_positions.copy()
         self._pins = np.empty((6, facets))
         self.covered = np.zeros(back, dtype=np.bool_)
         self._covered = np.zeros(back, dtype=np.bool_)
         self.held = np.zeros(nodes, dtype=np.bool_)  # of `find_held`
-        self.back_held, self.inner = self.covered.copy(), self.covered.copy()
+        self.back_held = self.covered.copy()
+        self.inner = self.covered.copy()
         self.closed_before = self.covered.copy()  # leader's nodes at which a closed facet stops
         self.owners = np.zeros((2, facets), dtype=np.int64)
         self.ends = np.zeros((END_ROWS, facets))
@@ -79,7 +84,8 @@ class Pair:
         self.weighted = np.zeros((3, facets))
         self.states = np.zeros((FACET_ROWS, facets))
         self._still = np.zeros((2, back))
-        self._ways, self.shifts = np.empty((2, facets)), np.zeros((4, 3))
+        self._ways = np.empty((2, facets))
+        self.shifts = np.zeros((4, 3))
         self.asked = self._find_asked(self.follower, self.leader)
         self.back_asked = self._find_asked(self.leader, self.follower)
         if one_body:
@@ -114,7 +120,8 @@ class Pair:
             self.covered.fill(False)
             return
         if self.pinned > 1:
-            line, other = self.leader.line, self.follower.line
+            line = self.leader.line
+            other = self.follower.line
             self._cut(line, other, self.positions, self.back_positions, self.covered)
             self._measure(line, other, self._still, 0.0)
         else:
@@ -124,7 +131,9 @@ class Pair:
             self.back_held.fill(False)
 
     def _find_pins(self) -> int:
-        one, other, parts = self.leader, self.follower, self.parts
+        one = self.leader
+        other = self.follower
+        parts = self.parts
         pinned = find_pins(
             other.line, other.inner, one.line, one.boxes, one.group, ON, BULGE * one.longest,
             self.asked, self.one_body, parts[0], self.positions,
@@ -152,9 +161,11 @@ class Pair:
         return None
 
     def _measure_clearance(self) -> float:
-        one, other = self.leader, self.follower
+        one = self.leader
+        other = self.follower
         longest = max(one.longest, other.longest)
-        width, most = BULGE * longest, FAR * longest if self.one_body else np.inf
+        width = BULGE * longest
+        most = FAR * longest if self.one_body else np.inf
         near = measure_distance(
             other.line, other.inner, one.line, one.boxes, one.group, self.asked, self.parts[0],
             self.one_body, most,
@@ -185,7 +196,8 @@ class Pair:
 
         cover: add what closed facets cover to both surfaces' `cover`.
         """
-        one, other = self.leader, self.follower
+        one = self.leader
+        other = self.follower
         lead = other if one.rigid else one  # a wall has no states: these are not looked at
         self.closed = solve_facets(
             states[id(lead)], states[id(other)], lead.block.wave_law, other.block.wave_law,
@@ -196,7 +208,8 @@ class Pair:
 
     def rub(self, dt: float) -> None:
         """Add friction to the fluxes of both sides."""
-        one, other = self.leader, self.follower
+        one = self.leader
+        other = self.follower
         lead = other if one.rigid else one
         add_friction(
             lead.block.rim.rows, other.block.rim.rows, one.rigid, one.velocity, self.friction, dt,
@@ -259,7 +272,9 @@ class Pair:
         return self.is_near and self.pinned > self.common
 
     def _find_touch(self, stretch: float, cuts: bool) -> float:
-        one, other, parts = self.leader, self.follower, self.parts
+        one = self.leader
+        other = self.follower
+        parts = self.parts
         for surface in (one, other):
             surface.stretch(stretch)
             fill_swept_boxes(surface.line, surface.further, surface.group, surface.swept)
@@ -286,7 +301,8 @@ class Pair:
         The ends' ways are in `shifts`, the follower's first.
         """
         places = np.maximum(self.positions, self.hits)
-        one, other = self.follower.new, self.leader.new
+        one = self.follower.new
+        other = self.leader.new
         return match(one, other, places, self.hits, self.held, self.shifts)
 
     def lay(self, back: bool, part_back: float) -> int:

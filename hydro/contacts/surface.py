@@ -28,7 +28,8 @@ class Surface:
     """A segment's faces in the order in which what is outside lies to the right."""
 
     def __init__(self, segment: Segment, motion: GridMotion):
-        self.segment, self.block = segment, segment.block
+        self.segment = segment
+        self.block = segment.block
         self.rigid = isinstance(segment, Wall)
         self.count = segment.last - segment.first
         self.side = SIDES.index(segment.side)
@@ -37,10 +38,15 @@ class Surface:
         self.start = segment.last - 1 if self.back else segment.first
         self.group = max(GROUP, -(-self.count // MOST_GROUPS))
         boxes = 4, -(-self.count // self.group)
-        self.boxes, self.swept = np.empty(boxes), np.empty(boxes)
+        self.boxes = np.empty(boxes)
+        self.swept = np.empty(boxes)
         nodes = 2, self.count + 1
-        self.line, self.new, self.further = np.empty(nodes), np.empty(nodes), np.empty(nodes)
-        self.middle, self.moved = np.empty(nodes), np.empty(nodes)  # at mid-time, in the step
+        self.line = np.empty(nodes)
+        self.new = np.empty(nodes)
+        self.further = np.empty(nodes)
+        # at mid-time, in the step
+        self.middle = np.empty(nodes)
+        self.moved = np.empty(nodes)
         self.inner = np.empty(nodes)  # the next nodes inwards
         self.middles = np.empty((2, self.count))
         self.slopes = np.zeros((SLOPE_ROWS, self.count))
@@ -97,7 +103,8 @@ class Surface:
 
     def measure_way(self) -> None:
         """How far the node goes in this step that goes furthest, into `way`."""
-        segment, block = self.segment, self.block
+        segment = self.segment
+        block = self.block
         self.way = measure_way(block.nodes, block.nodes_new, self.side, segment.start, segment.stop)
 
     def write_new(self) -> None:
@@ -133,7 +140,8 @@ class Surface:
 
     def find_stiffness(self, face: int) -> float:
         """rho c² [Pa] of the cell along a face of the line."""
-        rim, at = self.block.rim, self.start + self.step * face
+        rim = self.block.rim
+        at = self.start + self.step * face
         return float(rim.rho[at] * rim.c[at] ** 2)
 
     def __str__(self) -> str:
@@ -147,8 +155,10 @@ class Plane:
     beyond this face.
     """
 
-    rigid, back = True, False
-    count, way = 1, 0.0
+    rigid = True
+    back = False
+    count = 1
+    way = 0.0
     bond = friction = length = np.inf
     block = None
     ends = (None, None)
@@ -160,10 +170,13 @@ class Plane:
         segments: Sequence[Segment],
         under: Surface | None = None,
     ):
-        self.origin, self.along, self.segments = origin, along, list(segments)
+        self.origin = origin
+        self.along = along
+        self.segments = list(segments)
         self.under = under
         self.velocity = np.zeros(2)
-        self.line, self.moved = np.zeros((2, 2)), np.zeros((2, 2))
+        self.line = np.zeros((2, 2))
+        self.moved = np.zeros((2, 2))
         self.new = self.middle = self.line  # at rest
 
     def put_under(self, surface: Surface) -> Plane:

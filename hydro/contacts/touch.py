@@ -34,7 +34,8 @@ def fill_swept_boxes(old, new, group, boxes):
             for k in range(g * group, min(last, (g + 1) * group) + 1):
                 low = min(low, min(old[c, k], new[c, k]))
                 high = max(high, max(old[c, k], new[c, k]))
-            boxes[2 * c, g], boxes[2 * c + 1, g] = low, high
+            boxes[2 * c, g] = low
+            boxes[2 * c + 1, g] = high
 
 
 @kernel
@@ -45,8 +46,10 @@ def measure_distance(points, inner, line, boxes, group, asked, part, one_body, m
     where there is no film between (`is_film`).
     """
     least = most * most
-    count, last = line.shape[1] - 1, points.shape[1]
-    groups, near = np.empty(boxes.shape[1], np.int64), 0
+    count = line.shape[1] - 1
+    last = points.shape[1]
+    groups = np.empty(boxes.shape[1], np.int64)
+    near = 0
     for k in range(last):
         if k % group == 0:
             near = find_groups(
@@ -109,7 +112,8 @@ def fill_inner(nodes, side, start, back, inner):
         i, j = (1, k) if side == 0 else (ni - 1, k)
         if side > 1:
             i, j = (k, 1) if side == 2 else (k, nj - 1)
-        inner[0, n], inner[1, n] = nodes[0, i, j], nodes[1, i, j]
+        inner[0, n] = nodes[0, i, j]
+        inner[1, n] = nodes[1, i, j]
 
 
 @compiled_once
@@ -157,8 +161,10 @@ def find_touches(
     so, else -1.0.  part: see `may_lie_on`.
     """
     first = 2.0
-    count, last = old.shape[1] - 1, old_points.shape[1]
-    groups, near = np.empty(boxes.shape[1], np.int64), 0
+    count = old.shape[1] - 1
+    last = old_points.shape[1]
+    groups = np.empty(boxes.shape[1], np.int64)
+    near = 0
     beside = np.zeros(last, np.bool_)
     for k in range(others.shape[0] if cuts else 0):
         node = int(others[k] + 0.5)

@@ -77,7 +77,8 @@ class Voids:
                 raise BadInput(
                     f"{surface}: void_fill: gas in voids is not beside lines under surface tension"
                 )
-        self.curved, self.pairs = curved, list(pairs)
+        self.curved = curved
+        self.pairs = list(pairs)
         self.surfaces = list(surfaces)
         self.planes: list[Plane] = []
         self.numbers = {id(surface): number for number, surface in enumerate(self.surfaces)}
@@ -106,7 +107,8 @@ class Voids:
     def find(self) -> None:
         """The voids of the present lines, with what those before held; their faces' pressures."""
         self._asked = False
-        before, self.found = self.found, [self._measure(loop) for loop in self._find_loops()]
+        before = self.found
+        self.found = [self._measure(loop) for loop in self._find_loops()]
         self.found = [void for void in self.found if void.area > (LEAST * void.depth) ** 2]
         self._hand_on(before)
         self._press()
@@ -115,9 +117,13 @@ class Voids:
 
     def _find_loops(self) -> list[list[tuple[int, float, float]]]:
         """Ways round that close, as stretches of curves; none that are points."""
-        steps, loops, seen = self._find_steps(), [], set()
+        steps = self._find_steps()
+        loops = []
+        seen = set()
         for start in [target for own in steps.values() for _, target in own]:
-            here, stretches, length = start, [], 0.0
+            here = start
+            stretches = []
+            length = 0.0
             while here not in seen:
                 seen.add(here)
                 curve, position = here
@@ -133,7 +139,8 @@ class Voids:
 
     def _find_lasting_steps(self) -> list[tuple[int, float, int, float]]:
         """Steps from curve to curve, at positions on both, that stay: at ends, planes' corners."""
-        steps, first = [], len(self.surfaces)
+        steps = []
+        first = len(self.surfaces)
         for number, surface in enumerate(self.surfaces):
             for following, other in enumerate(self.surfaces):
                 same = surface.ends[1] is not None and surface.ends[1] is other.ends[0]
@@ -141,7 +148,8 @@ class Voids:
                     steps.append((number, float(surface.count), following, 0.0))
         for k, one_plane in enumerate(self.planes, first):
             for m, two_plane in enumerate(self.planes, first):
-                a, b = one_plane.along, two_plane.along
+                a = one_plane.along
+                b = two_plane.along
                 out = float(a[0] * b[1] - a[1] * b[0])  # how fast the height over b rises along a
                 if out < -1e-9:
                     way = two_plane.origin - one_plane.origin
@@ -161,7 +169,8 @@ class Voids:
         """On each curve the positions where one goes over to another, and to where."""
         found = list(self._steps)
         for number, end, side in self._held:
-            surface, plane = self.surfaces[number], self.planes[side - len(self.surfaces)]
+            surface = self.surfaces[number]
+            plane = self.planes[side - len(self.surfaces)]
             place = float((surface.line[:, -end] - plane.origin) @ plane.along)
             if end == 0:
                 found.append((side, place, number, 0.0))
@@ -170,7 +179,8 @@ class Voids:
         for pair in self.pairs:
             if not (pair.is_near and pair.count):
                 continue
-            one, other = self.numbers[id(pair.leader)], self.numbers[id(pair.follower)]
+            one = self.numbers[id(pair.leader)]
+            other = self.numbers[id(pair.follower)]
             ends = pair.ends[:, : pair.count]
             breaks = np.flatnonzero(ends[LEADER_START, 1:] != ends[LEADER_STOP, :-1])
             for k in (0, *(breaks + 1)):
@@ -199,7 +209,8 @@ class Voids:
             plane = self.planes[curve - len(self.surfaces)]
             return plane.origin[:, None] + plane.along[:, None] * np.array([start, stop])
         line = self.surfaces[curve].line
-        a, b = math.floor(start), min(math.floor(stop), line.shape[1] - 2)
+        a = math.floor(start)
+        b = min(math.floor(stop), line.shape[1] - 2)
         first, last = (
             line[:, k : k + 1] + (at - k) * (line[:, k + 1 : k + 2] - line[:, k : k + 1])
             for k, at in ((min(a, line.shape[1] - 2), start), (b, stop))
@@ -215,12 +226,14 @@ class Voids:
         volume = area
         if self.curved:
             volume = float(((x_next - x) * (y * y + y * y_next + y_next * y_next)).sum()) / 6.0
-        faces, depth = [], []
+        faces = []
+        depth = []
         for curve, start, stop in stretches:
             if curve >= len(self.surfaces) or self.surfaces[curve].rigid:
                 continue
             surface = self.surfaces[curve]
-            first, last = int(start), min(math.ceil(stop), surface.count)
+            first = int(start)
+            last = min(math.ceil(stop), surface.count)
             if first < last:
                 faces.append((curve, first, last))
                 ways = surface.inner[:, first : last + 1] - surface.line[:, first : last + 1]

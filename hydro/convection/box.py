@@ -201,7 +201,9 @@ class Axis:
             )
         if not np.isfinite(nodes).all() or not (np.diff(nodes) > 0.0).all():
             raise BadInput(f"the nodes of a convection grid do not rise in {name}")
-        self.nodes, self.periodic, self.name = nodes, periodic, name
+        self.nodes = nodes
+        self.periodic = periodic
+        self.name = name
         self.cells = cells
         self.node_count = cells if periodic else cells + 1
         self.widths = np.diff(nodes)
@@ -258,9 +260,12 @@ class Axis:
         """Weights of each cell at the node before it (`before`) and after it (`after`)."""
         here = np.arange(self.cells)
         behind = (here + 1) % self.node_count
-        before, after = before.copy(), after.copy()
+        before = before.copy()
+        after = after.copy()
         if not self.periodic:
-            before[-1], after[0] = high, low
-        rows, columns = np.concatenate([behind, here]), np.tile(here, 2)
+            before[-1] = high
+            after[0] = low
+        rows = np.concatenate([behind, here])
+        columns = np.tile(here, 2)
         values = np.concatenate([before, after])
         return sparse.csr_matrix((values, (rows, columns)), shape=(self.node_count, self.cells))

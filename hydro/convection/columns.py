@@ -126,7 +126,8 @@ def make_bands(by_left, by_right, sizes=0.0) -> np.ndarray:
     """Bands (3, n) for `solve_banded` of sizes + the net outflow of n cells, whose n + 1 fluxes
     have these derivatives with respect to the values on their left and right."""
     bands = np.zeros((3, by_left.size - 1))
-    bands[0, 1:], bands[2, :-1] = by_right[1:-1], -by_left[1:-1]
+    bands[0, 1:] = by_right[1:-1]
+    bands[2, :-1] = -by_left[1:-1]
     bands[1] = sizes + by_left[1:] - by_right[:-1]
     return bands
 
@@ -250,7 +251,8 @@ def settle_column(
         count += 1
         temperature, velocity, _ = solve_column(column, x)
         profile = make_profile(column, kind, x, temperature, velocity)
-        old, x = x, correct_axis(kind, x, profile, **options)
+        old = x
+        x = correct_axis(kind, x, profile, **options)
         if np.abs(x - old).max() <= RESTING * (x[-1] - x[0]):
             break
     temperature, velocity, _ = solve_column(column, x)
@@ -265,7 +267,9 @@ class RowBlock:
     """
 
     def __init__(self, name: str, get_cells: Callable, described: Mapping, low, high):
-        self.name, self._get_cells, self._ends = name, get_cells, np.array([low, high])
+        self.name = name
+        self._get_cells = get_cells
+        self._ends = np.array([low, high])
         self.units = {field: unit for field, (unit, _) in described.items()}
         self.long_names = {field: words for field, (_, words) in described.items()}
 
@@ -292,8 +296,13 @@ class ColumnMarch:
         **options,
     ):
         """x (n + 1,) [m]: the initial axis; `kind`, `every`, `options`: how it is corrected."""
-        self.column, self.kind, self.every, self.options = column, kind, every, options
-        self.t, self.step, self.t_end = 0.0, 0, t_end
+        self.column = column
+        self.kind = kind
+        self.every = every
+        self.options = options
+        self.t = 0.0
+        self.step = 0
+        self.t_end = t_end
         self.x = np.array(x, dtype=float)
         self.temperature = np.full(x.size - 1, 0.5 * sum(column.temperatures))
         self.velocity = np.zeros(x.size - 1)
@@ -322,11 +331,14 @@ class ColumnMarch:
         return self._totals()
 
     def advance(self) -> dict[str, float | str]:
-        column, dt = self.column, self.dt
+        column = self.column
+        dt = self.dt
         limit = "growth" if dt < LONGEST * self.t_end else "longest"
         if self.t + dt >= self.t_end * (1.0 - 1e-12):
-            dt, limit = self.t_end - self.t, "end"
-        x, corrected = self.x, self.step % self.every == 0
+            dt = self.t_end - self.t
+            limit = "end"
+        x = self.x
+        corrected = self.step % self.every == 0
         if corrected:
             profile = make_profile(column, self.kind, x, self.temperature, self.velocity)
             x = correct_axis(self.kind, x, profile, **self.options)
@@ -340,7 +352,9 @@ class ColumnMarch:
         )
         # per diffusive time, not per step: short steps change little even if unsteady
         change *= (x[-1] - x[0]) ** 2 / column.diffusivity / dt
-        self.x, self.temperature, self.velocity = x, temperature, velocity
+        self.x = x
+        self.temperature = temperature
+        self.velocity = velocity
         inward, outward = compute_wall_fluxes(
             x, temperature, column.temperatures, column, column.diffusivity
         )
@@ -369,11 +383,14 @@ class ColumnMarch:
         return state | {"heat_in": self.heat_in, "still": int(self.still)}
 
     def set_state(self, state) -> None:
-        self.t, self.step, self.dt = float(state["t"]), int(state["step"]), float(state["dt"])
+        self.t = float(state["t"])
+        self.step = int(state["step"])
+        self.dt = float(state["dt"])
         self.x, self.temperature, self.velocity = (
             np.array(state[name], dtype=float) for name in ("x", "T", "v")
         )
-        self.reference, self.heat_in = float(state["reference"]), float(state["heat_in"])
+        self.reference = float(state["reference"])
+        self.heat_in = float(state["heat_in"])
         self.still = bool(state["still"])
 
 
@@ -425,11 +442,15 @@ def step_front(
     converge.
     """
     speed = (x_new - x_old) / dt
-    before, stage_flux, through, iterations = np.diff(x_old) * u, 0.0, 0.0, 0
+    before = np.diff(x_old) * u
+    stage_flux = 0.0
+    through = 0.0
+    iterations = 0
     tolerance = 1e-14 * float(np.abs(before).max()) + 1e-300
     for place, earlier in ((GAMMA, 0.0), (1.0, 1.0 - GAMMA)):
         x = x_new if place == 1.0 else x_old + place * (x_new - x_old)
-        sizes, outside = np.diff(x), ends(t + place * dt)
+        sizes = np.diff(x)
+        outside = ends(t + place * dt)
         values = enclose(u, outside)
         past = 0.5 * (values[:-1] + values[1:]) - speed
         factor = fit_diffusion("exponential", past * measure_distances(x) / viscosity)
@@ -483,7 +504,8 @@ def move_by_law(
 
 def follow_last_move(x: np.ndarray, last: np.ndarray) -> np.ndarray:
     """Nodes that continue their motion from `last` to `x`, all slower if a cell would collapse."""
-    steps, change = np.diff(x), np.diff(x - last)
+    steps = np.diff(x)
+    change = np.diff(x - last)
     closing = float((change / steps).min())
     part = 1.0 if closing >= LEAST - 1.0 else (LEAST - 1.0) / closing
     return x + part * (x - last)
@@ -514,7 +536,9 @@ class FrontColumn:
     """One family's grid and solution: x (n + 1,), u (n,), and the history that it needs."""
 
     def __init__(self, family: str, x: np.ndarray, u: np.ndarray):
-        self.family, self.x, self.u = family, x, u
+        self.family = family
+        self.x = x
+        self.u = u
         self.last = x.copy()  # the nodes a step ago
         self.through = 0.0  # inflow (sum of u dx) so far
         self.iterations = 0
@@ -537,16 +561,20 @@ class FrontColumn:
             else:
                 target = placing.correct(x, steep)
         step = step_front(x, target, self.u, viscosity, t, dt, ends)
-        self.u, self.iterations = step.u, step.iterations
+        self.u = step.u
+        self.iterations = step.iterations
         self.through += step.through
-        self.last, self.x = x, target
+        self.last = x
+        self.x = target
         if self.family == "after":
             self.x = placing.correct(target, measure_gradient(target, self.u, ends(t + dt)))
 
 
 FIRST_CORRECTIONS = 60  # at most, of the moving grids for the solution at t = 0
 PLACED = 1e-10  # of the column: nodes that move by less have settled
-HEIGHT, APART = 0.08, 0.1  # of the blocks in pictures, one above the other
+# of the blocks in pictures, one above the other
+HEIGHT = 0.08
+APART = 0.1
 
 
 class Exact(Protocol):
@@ -565,8 +593,11 @@ class FrontRace:
     def __init__(
         self, exact: Exact, cells: int, dt: float, t_end: float, placing: Placing | None = None
     ):
-        self.exact, self.placing = exact, placing or Placing()
-        self.t, self.step, self.t_end = 0.0, 0, t_end
+        self.exact = exact
+        self.placing = placing or Placing()
+        self.t = 0.0
+        self.step = 0
+        self.t_end = t_end
         self.steps = max(1, int(np.ceil(t_end / dt * (1.0 - 1e-12))))
         resting = np.linspace(0.0, 1.0, cells + 1)
         moving = self._place(resting, 0.0)
@@ -586,7 +617,8 @@ class FrontRace:
         """Axis of the moving families for the exact solution at t, starting from the axis x."""
         for _ in range(FIRST_CORRECTIONS):
             means = self.exact.compute_cell_averages(x, t)
-            last, x = x, self.placing.correct(x, measure_gradient(x, means, self.ends(t)))
+            last = x
+            x = self.placing.correct(x, measure_gradient(x, means, self.ends(t)))
             if np.abs(x - last).max() < PLACED:
                 break
         return x
@@ -604,7 +636,8 @@ class FrontRace:
 
     def advance(self) -> dict[str, float | int | str]:
         after = self.t_end if self.step + 1 == self.steps else self._time(self.step + 1)
-        dt, row = after - self.t, {}
+        dt = after - self.t
+        row = {}
         for column in self.columns:
             begun = time.thread_time()
             try:
@@ -616,7 +649,8 @@ class FrontRace:
                     place=Place(column.family, failure.place.cell) if failure.place else None,
                 ) from failure
             row[f"seconds_{column.family}"] = time.thread_time() - begun
-        self.t, self.step = after, self.step + 1
+        self.t = after
+        self.step = self.step + 1
         iterations = {f"iterations_{one.family}": one.iterations for one in self.columns}
         return {"t": self.t, "dt": dt, "dt_limit": "cfl", **self._totals(), **iterations, **row}
 
@@ -647,7 +681,8 @@ class FrontRace:
         return state
 
     def set_state(self, state) -> None:
-        self.t, self.step = float(state["t"]), int(state["step"])
+        self.t = float(state["t"])
+        self.step = int(state["step"])
         for column in self.columns:
             for name in ("x", "last", "u"):
                 setattr(column, name, np.array(state[f"{column.family}/{name}"], dtype=float))

@@ -98,10 +98,16 @@ def make_topology(cells: tuple[int, int], periodic: tuple[bool, bool]) -> Topolo
     """The topology of a grid with the given numbers of cells."""
     axes = tuple(Axis(np.arange(n + 1.0), p) for n, p in zip(cells, periodic, strict=True))
     free, through = free_nodes(axes)
-    curls, averages, halves, outflows, balance = [], [], [], [], []
+    curls = []
+    averages = []
+    halves = []
+    outflows = []
+    balance = []
     for k in (0, 1):
-        own, cross = axes[k], axes[1 - k]
-        nodes, inside = np.ones(own.node_count), np.ones(cross.cells)
+        own = axes[k]
+        cross = axes[1 - k]
+        nodes = np.ones(own.node_count)
+        inside = np.ones(cross.cells)
         out_of_nodes = kron(k, nodes, cross.difference_to_cells())
         curls.append((1.0 - 2.0 * k) * out_of_nodes)
         averages.append(kron(k, own.average_to_cells(), inside))
@@ -130,7 +136,8 @@ def free_nodes(axes: tuple[Axis, Axis]) -> tuple[Matrix, int | None]:
     number = np.full(shape, -1)
     inner = tuple(slice(None) if axis.periodic else slice(1, -1) for axis in axes)
     number[inner] = np.arange(number[inner].size).reshape(number[inner].shape)
-    count, through = number[inner].size, None
+    count = number[inner].size
+    through = None
     for axis, far_wall in zip(axes, (number[:, -1], number[-1]), strict=True):
         if axis.periodic:
             far_wall[:] = through = count
@@ -147,15 +154,18 @@ class Momentum:
     """
 
     def __init__(self, axes: tuple[Axis, Axis], ends: tuple[Ends, Ends], topology: Topology):
-        self.axes, self.topology = axes, topology
-        lengths, reaches, stress, values = [], [], [], []
+        self.axes = axes
+        self.topology = topology
+        lengths = []
+        reaches = []
+        stress = []
+        values = []
         for k in (0, 1):
-            own, cross = axes[k], axes[1 - k]
+            own = axes[k]
+            cross = axes[1 - k]
             nodes = np.ones(own.node_count)
-            length, reach = (
-                np.outer(nodes, cross.widths),
-                np.outer(own.distances, np.ones(cross.cells)),
-            )
+            length = np.outer(nodes, cross.widths)
+            reach = np.outer(own.distances, np.ones(cross.cells))
             lengths.append((length if k == 0 else length.T).ravel())
             reaches.append((reach if k == 0 else reach.T).ravel())
             values.append(kron(k, nodes, cross.interpolate_to_nodes()))
@@ -166,7 +176,8 @@ class Momentum:
                 out_of_cells @ kron(k, along, cross.widths)
                 + out_of_nodes @ kron(k, own.distances, across)
             )
-        self.lengths, self.reaches = np.concatenate(lengths), np.concatenate(reaches)
+        self.lengths = np.concatenate(lengths)
+        self.reaches = np.concatenate(reaches)
         over = scale_rows(1.0 / self.lengths, topology.curl)
         first, second = topology.averages
         parts = [[first, None], [values[0], None], [None, second], [None, values[1]]]
@@ -199,9 +210,11 @@ class Momentum:
     @cached_property
     def buoyancy(self) -> tuple[Matrix, Matrix]:
         """Temperature -> sums around free nodes of a unit force in x and in y."""
-        pulls, cut = [], self.axes[0].node_count * self.axes[1].cells
+        pulls = []
+        cut = self.axes[0].node_count * self.axes[1].cells
         for k, columns in ((0, slice(0, cut)), (1, slice(cut, None))):
-            own, cross = self.axes[k], self.axes[1 - k]
+            own = self.axes[k]
+            cross = self.axes[1 - k]
             reach = scale_rows(own.distances, own.interpolate_to_nodes())
             pull = kron(k, reach, np.ones(cross.cells))
             pulls.append(self.topology.curl_transposed[:, columns] @ pull)
@@ -228,9 +241,11 @@ class Heat:
 
 def make_heat(axes: tuple[Axis, Axis], ends: tuple[Ends, Ends], topology: Topology) -> Heat:
     """`ends[k]`: 1 if the wall across direction k is isothermal, else 0."""
-    values, gradient = [], []
+    values = []
+    gradient = []
     for k in (0, 1):
-        own, cross = axes[k], axes[1 - k]
+        own = axes[k]
+        cross = axes[1 - k]
         slope = scale_rows(1.0 / own.distances, own.difference_to_nodes(*ends[k]))
         values.append(kron(k, own.interpolate_to_nodes(), np.ones(cross.cells)))
         gradient.append(kron(k, slope, cross.widths))
@@ -251,7 +266,8 @@ class Equations:
         self.shape = tuple(axis.cells for axis in self.axes)
         self.areas = np.outer(*(axis.widths for axis in self.axes)).ravel()
         self.topology = make_topology(self.shape, tuple(periodic))
-        self.free, self.through = self.topology.free, self.topology.through
+        self.free = self.topology.free
+        self.through = self.topology.through
         slip = [tuple(float(walls[s].flow != "free") for s in pair) for pair in PAIRS]
         self.momentum = Momentum(self.axes, (slip[1], slip[0]), self.topology)
         held = [
@@ -283,7 +299,8 @@ class Equations:
         the given heat through other walls, in +x or +y [K m2/s].  Zero elsewhere."""
         whole = [np.zeros(self.momentum.lengths.size) for _ in range(3)]
         for k, (low, high) in enumerate(PAIRS):
-            own, cross = self.axes[k], self.axes[1 - k]
+            own = self.axes[k]
+            cross = self.axes[1 - k]
             if own.periodic:
                 continue
             parts = [self.split_faces(values)[k] for values in whole]
@@ -342,11 +359,13 @@ class Equations:
         self, fluid: Fluid, psi: np.ndarray, temperature: np.ndarray
     ) -> sparse.csc_matrix:
         """Derivative of `compute_residual` by (psi, temperature)."""
-        flux, velocity = self.momentum.volume_flux @ psi, self.momentum.velocity @ psi
+        flux = self.momentum.volume_flux @ psi
+        velocity = self.momentum.velocity @ psi
         carried = scale_rows(flux, self.momentum.velocity)
         carried += scale_rows(velocity, self.momentum.volume_flux)
         momentum = self.momentum.balance @ carried - fluid.viscosity * self.momentum.friction
-        curl, values = self.momentum.curl, self.heat.values
+        curl = self.momentum.curl
+        values = self.heat.values
         heat_by_psi = self.heat.balance @ (scale_rows(values @ temperature, curl))
         heat = self.heat.balance @ (scale_rows(curl @ psi, values))
         heat -= fluid.diffusivity * self.heat.conduction

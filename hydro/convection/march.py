@@ -103,12 +103,17 @@ class March:
             raise BadInput(f"convection: cfl = {cfl:g} must be above 0 and at most 1")
         if not longest > 0.0:
             raise BadInput(f"convection: the longest step, {longest:g} s, must be positive")
-        self.fluid, self.cfl, self.longest, self.sources = fluid, cfl, longest, sources
+        self.fluid = fluid
+        self.cfl = cfl
+        self.longest = longest
+        self.sources = sources
         self.level = Level(
             equations, np.array(psi, dtype=np.float64), np.array(temperature, dtype=np.float64)
         )
         self.before: Level | None = None
-        self.t, self.dt, self.step = t, 0.0, 0
+        self.t = t
+        self.dt = 0.0
+        self.step = 0
         self.limit = "longest"
         self._key: tuple | None = None
         self._factors: tuple[Factors, Factors] | None = None
@@ -158,7 +163,8 @@ class March:
 
         Raises RunFailure if the state is no longer finite.
         """
-        old, before = self.level, self.before
+        old = self.level
+        before = self.before
         new = old.equations if axes is None else Equations(*axes, old.equations.walls)
         ratio = dt / self.dt if before is not None else 0.0
         first = (1.0 + 2.0 * ratio) / (1.0 + ratio)
@@ -201,8 +207,11 @@ class March:
             )
         entering = heat + new.heat.balance @ new.compute_conduction(self.fluid, temperature)
         entered = (dt * float(entering.sum()) - past("entered")) / first
-        self.before, self.level = old, Level(new, psi, temperature, entered)
-        self.t, self.dt, self.step = t, dt, self.step + 1
+        self.before = old
+        self.level = Level(new, psi, temperature, entered)
+        self.t = t
+        self.dt = dt
+        self.step = self.step + 1
 
     def _factorise(self, new: Equations, rate: float) -> tuple[Factors, Factors]:
         """LU of the matrices of heat and momentum; reused while grid and rate are unchanged."""
@@ -244,7 +253,10 @@ class March:
             )
             for name, grid in (("now", now), ("before", other))
         ]
-        self.level, self.before = levels[0], levels[1] if int(state["levels"]) == 2 else None
-        self.t, self.dt, self.step = float(state["t"]), float(state["dt"]), int(state["step"])
+        self.level = levels[0]
+        self.before = levels[1] if int(state["levels"]) == 2 else None
+        self.t = float(state["t"])
+        self.dt = float(state["dt"])
+        self.step = int(state["step"])
         self.limit = str(state["limit"])
         self._key = None

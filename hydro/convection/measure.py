@@ -103,7 +103,8 @@ def extract_middle(
     u along x = middle, v along y = middle; at a no-slip wall the zero is among the points.
     """
     values = equations.compute_velocities(psi)[component]
-    own, cross = equations.axes[component], equations.axes[1 - component]
+    own = equations.axes[component]
+    cross = equations.axes[1 - component]
     values = values if component == 0 else values.T
     middle = 0.5 * (own.nodes[0] + own.nodes[-1])
     nodes = own.nodes[: own.node_count]

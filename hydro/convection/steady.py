@@ -92,7 +92,8 @@ def wall_values(
     equations: Equations, side: str, heat: np.ndarray, diffusivity: float, k: int
 ) -> np.ndarray | float | None:
     """Temperature of a wall at the points of `heat` along it; None for a periodic axis."""
-    own, cross = equations.axes[k], equations.axes[1 - k]
+    own = equations.axes[k]
+    cross = equations.axes[1 - k]
     if own.periodic:
         return 0.0
     along = cross.centres
@@ -202,7 +203,9 @@ class SteadySolver:
         walls do not fix the temperature, so that no steady state is determined.
         """
         check_steady(equations)
-        self.equations, self.target, self.tolerance = equations, fluid, tolerance
+        self.equations = equations
+        self.target = fluid
+        self.tolerance = tolerance
         self.grid = grid or GridControl()
         self.difference = measure_difference(equations, fluid) or 1.0
         self.iterations = self.stage_iterations = self.corrections = 0
@@ -210,7 +213,9 @@ class SteadySolver:
         self.residual = math.inf
         height = equations.axes[1].length
         rayleigh = fluid.compute_rayleigh(height, self.difference)
-        self.exponent, self.factor = 0.0, 1.0  # buoyancy is 10**exponent of the full one
+        # buoyancy is 10**exponent of the full one
+        self.exponent = 0.0
+        self.factor = 1.0
         if start is None:
             self.psi, self.temperature = make_rest(equations)
             if rayleigh > FIRST_RAYLEIGH:
@@ -256,7 +261,8 @@ class SteadySolver:
             self._take_back()
             return
         by_psi, by_temperature = np.split(step, self.equations.sizes[:1])
-        self.psi, self.temperature = self.psi + by_psi, self.temperature + by_temperature
+        self.psi = self.psi + by_psi
+        self.temperature = self.temperature + by_temperature
         # a flow weaker than the diffusivity is scaled with that: at rest psi is pure round-off
         flow = max(float(np.abs(self.psi).max()), self.target.diffusivity)
         self.change = max(
@@ -282,7 +288,8 @@ class SteadySolver:
             self._take_back()
 
     def _begin_stage(self) -> None:
-        self.stage_iterations, self.stage_best = 0, math.inf
+        self.stage_iterations = 0
+        self.stage_best = math.inf
 
     def _take_back(self) -> None:
         """Return to the last state that converged and take a shorter step from it."""

@@ -109,7 +109,8 @@ def make_clustered_axis(
             f"the wall with {n} cells, lost in round-off; take a smaller one (2 is usual)"
         )
     x = low + (high - low) * law
-    x[0], x[-1] = low, high
+    x[0] = low
+    x[-1] = high
     return x
 
 
@@ -167,7 +168,8 @@ def correct_axis(
     if relaxation < 1.0:
         # The mean of two axes that satisfy the bound on neighbours satisfies it, too.
         placed = x + relaxation * (placed - x)
-        placed[0], placed[-1] = x[0], x[-1]
+        placed[0] = x[0]
+        placed[-1] = x[-1]
     return placed
 
 
@@ -278,7 +280,8 @@ def place_nodes(x: np.ndarray, weight: np.ndarray, ratio: float) -> np.ndarray:
         return free
     parts = np.arange(1, FINER + 1) / FINER
     fine = np.append(x[0], (x[:-1, None] + np.diff(x)[:, None] * parts).ravel())
-    widths, wanted = np.diff(fine), 1.0 / np.repeat(weight, FINER)
+    widths = np.diff(fine)
+    wanted = 1.0 / np.repeat(weight, FINER)
     reach = np.log(ratio) * 0.5 * (fine[1:] + fine[:-1])
 
     def cut(constant: float) -> np.ndarray:
@@ -301,7 +304,8 @@ def invert_integral(x: np.ndarray, weight: np.ndarray, n: int) -> np.ndarray:
     """Nodes (n + 1,) at equal fractions of the integral of `weight`, monotone between old nodes."""
     integral = np.append(0.0, np.cumsum(weight * np.diff(x)))
     placed = PchipInterpolator(integral, x)(np.linspace(0.0, integral[-1], n + 1))
-    placed[0], placed[-1] = x[0], x[-1]
+    placed[0] = x[0]
+    placed[-1] = x[-1]
     return placed
 
 

@@ -115,7 +115,8 @@ class EquationOfState:
 
     def sound_speed(self, rho, p):
         """Sound speed from density and pressure (arrays of one shape), NaN where c² < 0."""
-        rho, p = np.asarray(rho, float), np.asarray(p, float)
+        rho = np.asarray(rho, float)
+        p = np.asarray(p, float)
         with np.errstate(invalid="ignore"):
             return np.sqrt(self.sound_speed_squared_part(rho, p, self.parameters))
 

@@ -45,7 +45,8 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
     if mistakes:
         raise BadInput("\n".join(f"{where}: {mistake}" for mistake in mistakes))
     numbers = dict(table)
-    eos_class, source = EQUATIONS_OF_STATE[numbers.pop("eos")], numbers.pop("source")
+    eos_class = EQUATIONS_OF_STATE[numbers.pop("eos")]
+    source = numbers.pop("source")
     rho0 = numbers["rho0"]
     if "rho0" not in _list_parameters(eos_class):
         del numbers["rho0"]
@@ -69,7 +70,8 @@ def _list_parameters(eos_class: type[EquationOfState]) -> dict[str, str]:
 
 def _find_mistakes(table: dict) -> Iterator[str]:
     """What is wrong with a material's table, as far as each number tells by itself."""
-    kind, source = table.get("eos"), table.get("source")
+    kind = table.get("eos")
+    source = table.get("source")
     if not isinstance(source, str) or not source.strip():
         yield "`source` is missing; say where its numbers come from"
     if not isinstance(kind, str) or kind not in EQUATIONS_OF_STATE:

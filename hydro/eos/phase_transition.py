@@ -29,9 +29,19 @@ from regrid.jit import inlined
 from regrid.roots import find_root
 
 # positions in the parameter tuple, the first five as in Mie–Grüneisen
-RHO0, C0, S, GRUNEISEN, STRENGTH = 0, 1, 2, 3, 4
-SECOND, C_SECOND, S_SECOND, GRUNEISEN_SECOND = 5, 6, 7, 8
-ETA_ONSET, ETA_COMPLETE, RISE, P_COMPLETE = 9, 10, 11, 12
+RHO0 = 0
+C0 = 1
+S = 2
+GRUNEISEN = 3
+STRENGTH = 4
+SECOND = 5
+C_SECOND = 6
+S_SECOND = 7
+GRUNEISEN_SECOND = 8
+ETA_ONSET = 9
+ETA_COMPLETE = 10
+RISE = 11
+P_COMPLETE = 12
 
 
 @inlined

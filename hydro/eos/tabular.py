@@ -67,9 +67,11 @@ def find_energy(axis_rho, axis_e, table, rho, p):
         middle = (low + high) // 2
         p_middle = table[i, middle] + a * (table[i + 1, middle] - table[i, middle])
         if p_middle <= p:
-            low, p_low = middle, p_middle
+            low = middle
+            p_low = p_middle
         else:
-            high, p_high = middle, p_middle
+            high = middle
+            p_high = p_middle
     return axis_e[low] + (axis_e[high] - axis_e[low]) * ((p - p_low) / (p_high - p_low))
 
 

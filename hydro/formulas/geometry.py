@@ -51,7 +51,10 @@ def compute_plane_face(a, b, a_new, b_new, inverse_dt):
 
     The normal points to the right of the direction from a to b, points (x, y).
     """
-    (ax, ay), (bx, by), (ax_new, ay_new), (bx_new, by_new) = a, b, a_new, b_new
+    ax, ay = a
+    bx, by = b
+    ax_new, ay_new = a_new
+    bx_new, by_new = b_new
     area_x = 0.5 * ((by - ay) + (by_new - ay_new))
     area_y = 0.5 * ((ax - bx) + (ax_new - bx_new))
     motion_x = (ax_new - ax) + (bx_new - bx)
@@ -71,7 +74,10 @@ def compute_radius_weighted_face(a, b, a_new, b_new, inverse_dt):
 
     The point is the edge's centre of area at mid-time.  Theory F9.2.
     """
-    (ax, ay), (bx, by), (ax_new, ay_new), (bx_new, by_new) = a, b, a_new, b_new
+    ax, ay = a
+    bx, by = b
+    ax_new, ay_new = a_new
+    bx_new, by_new = b_new
     radius = 0.5 * (ay + by)
     radius_new = 0.5 * (ay_new + by_new)
     weight = (2.0 * radius + radius_new) / 6.0
@@ -97,7 +103,9 @@ def compute_radius_weighted_face(a, b, a_new, b_new, inverse_dt):
 @inlined
 def compute_centre_offset(mid_i, mid_j, twist, y):
     """Exact vector from the middle of a cell to its centre of volume (theory F9.4)."""
-    (mid_i_x, mid_i_y), (mid_j_x, mid_j_y), (twist_x, twist_y) = mid_i, mid_j, twist
+    mid_i_x, mid_i_y = mid_i
+    mid_j_x, mid_j_y = mid_j
+    twist_x, twist_y = twist
     area = mid_i_x * mid_j_y - mid_i_y * mid_j_x
     bend_i = mid_i_x * twist_y - mid_i_y * twist_x
     bend_j = twist_x * mid_j_y - twist_y * mid_j_x
@@ -117,7 +125,9 @@ def lean_line(m, n, twist, scale):
 
     Their offsets from the middles along n, n n_y / (12 y), vary between cells; scale: 1/(12 y).
     """
-    (mx, my), (nx, ny), (twist_x, twist_y) = m, n, twist
+    mx, my = m
+    nx, ny = n
+    twist_x, twist_y = twist
     turn = my * ny * (12.0 * scale)
     lean_x = scale * ((twist_x * ny + nx * twist_y) - nx * turn)
     lean_y = scale * (2.0 * (twist_y * ny) - ny * turn)
@@ -244,7 +254,10 @@ def find_geometry(name: str) -> Geometry:
 
 def compute_volumes(geometry: Geometry, nodes):
     """Volumes (ni, nj) of the cells between nodes (2, ni + 1, nj + 1): m² or m³ per radian."""
-    a, b, c, d = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
+    a = nodes[:, :-1, :-1]
+    b = nodes[:, 1:, :-1]
+    c = nodes[:, 1:, 1:]
+    d = nodes[:, :-1, 1:]
     area = 0.5 * ((c[0] - a[0]) * (d[1] - b[1]) - (d[0] - b[0]) * (c[1] - a[1]))
     mid_i, mid_j, _ = compute_line_geometry(a, b, c, d)
     middle = 0.25 * ((a[1] + c[1]) + (b[1] + d[1]))

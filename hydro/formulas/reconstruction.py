@@ -71,7 +71,10 @@ def compute_line_geometry(a, b, c, d):
     Nodes a = (i, j), b = (i+1, j), c = (i+1, j+1), d = (i, j+1).  The cross product of the two
     vectors is the quadrilateral's area exactly.
     """
-    (xa, ya), (xb, yb), (xc, yc), (xd, yd) = a, b, c, d
+    xa, ya = a
+    xb, yb = b
+    xc, yc = c
+    xd, yd = d
     mid_i = 0.5 * ((xb + xc) - (xa + xd)), 0.5 * ((yb + yc) - (ya + yd))
     mid_j = 0.5 * ((xd + xc) - (xa + xb)), 0.5 * ((yd + yc) - (ya + yb))
     return mid_i, mid_j, mid_i[0] * mid_j[1] - mid_i[1] * mid_j[0]
@@ -129,7 +132,10 @@ def compute_acoustic_weight(a, b, c, d, lines, inverse, c2):
     Variations (u, v) of the velocity over the cell: along i towards the cell before (a), after (b),
     along j below (c), above (d); lines: both line vectors.
     """
-    (u_a, v_a), (u_b, v_b), (u_c, v_c), (u_d, v_d) = a, b, c, d
+    u_a, v_a = a
+    u_b, v_b = b
+    u_c, v_c = c
+    u_d, v_d = d
     u_i = 0.5 * (u_a + u_b)
     v_i = 0.5 * (v_a + v_b)
     u_j = 0.5 * (u_c + u_d)
@@ -185,7 +191,10 @@ def make_limit_velocity(limit):
 @inlined
 def compute_hll_switch(fall, rise, fall_j, rise_j, rho, c2, least_jump):
     """1 where a pressure difference to one of four neighbours is over least_jump rho c², else 0."""
-    a, b, c, d = abs(fall), abs(rise), abs(fall_j), abs(rise_j)
+    a = abs(fall)
+    b = abs(rise)
+    c = abs(fall_j)
+    d = abs(rise_j)
     a = a if a > b else b
     c = c if c > d else d
     a = a if a > c else c

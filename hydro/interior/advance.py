@@ -58,7 +58,8 @@ def make_flow_kernels(
     energy = eos_class.energy_part
     sound = eos_class.sound_speed_squared_part
     low_mach = limiter == LOW_MACH
-    opens_voids, curved = eos_class.opens_voids, geometry.curved
+    opens_voids = eos_class.opens_voids
+    curved = geometry.curved
     measure_after, next_row, reconstruct, _ = make_row_phases(eos_class, limiter, geometry, flux)
     fill_faces_i = make_faces(geometry.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I)
     fill_faces_j = make_faces(geometry.face, at.X_HIGH, at.X_LOW, at.AREA_X_J)
@@ -104,7 +105,9 @@ def make_flow_kernels(
         ja = max(0, j0 - 1)  # reconstructed columns ja..jb - 1
         jb = min(nj, j1 + 1)
         m = jb - ja
-        n, w = at.count_padded(m), at.count_whole(m)  # with the next neighbour, without
+        # with the next neighbour, without
+        n = at.count_padded(m)
+        w = at.count_whole(m)
         # scratch entry k is column ja + k - 1; node columns from node0 on are there
         node0 = max(0, ja - 1)
         shift = node0 - (ja - 1)
@@ -140,8 +143,10 @@ def make_flow_kernels(
         fill_faces_i(Z, w, inverse_dt)
         next_row(Z, n)
         # cells whose HLL switch is on: this row, the row before
-        first_hll, last_hll = m + 1, 0
-        first_hll_before, last_hll_before = m + 1, 0
+        first_hll = m + 1
+        last_hll = 0
+        first_hll_before = m + 1
+        last_hll_before = 0
         while row <= row1:
             inside = row0 <= row < row1
             counted = 1.0 if inside else 0.0
@@ -170,7 +175,8 @@ def make_flow_kernels(
                 length_below = rim[on.LENGTH_GHOST, 2 * nj + row] if ja == 0 else -1.0
                 length_above = rim[on.LENGTH_GHOST, 2 * nj + ni + row] if jb == nj else -1.0
                 reconstruct(Z, m, n, length_below, length_above, 0.5 * dt, parameters)
-                first_hll_before, last_hll_before = first_hll, last_hll
+                first_hll_before = first_hll
+                last_hll_before = last_hll
                 first_hll, last_hll = find_hll(Z, m)
                 if curved:
                     fill_source_pressure(Z, n, parameters)

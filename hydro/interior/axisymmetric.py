@@ -14,7 +14,8 @@ from regrid.jit import compiled_once, inlined
 
 # jumps of the pressure over rho c² between neighbours, up to which flow is smooth, and from which
 # on it is not at all
-SMOOTH_JUMP, STRONG_JUMP = 0.5, 1.5
+SMOOTH_JUMP = 0.5
+STRONG_JUMP = 1.5
 
 
 @compiled_once(allocates=False)
@@ -27,7 +28,10 @@ def clear_shift_after(Z, n):
 @inlined
 def find_even_twist(a, b, c, d):
     """a - b + c - d of a cell's corners, opposite ones together, and the mean of their y."""
-    (xa, ya), (xb, yb), (xc, yc), (xd, yd) = a, b, c, d
+    xa, ya = a
+    xb, yb = b
+    xc, yc = c
+    xd, yd = d
     return ((xa + xc) - (xb + xd), (ya + yc) - (yb + yd)), 0.25 * ((ya + yc) + (yb + yd))
 
 
@@ -40,7 +44,8 @@ def fill_shift_after(Z, n):
     for k in range(n + 1):
         a, b, c, d = at.load_corners(Z, at.HIGH, at.NEXT, k)
         mid_i, mid_j, _ = compute_line_geometry(a, b, c, d)
-        (mid_i_x, mid_i_y), (mid_j_x, mid_j_y) = mid_i, mid_j
+        mid_i_x, mid_i_y = mid_i
+        mid_j_x, mid_j_y = mid_j
         twist, middle = find_even_twist(a, b, c, d)
         x, y = compute_centre_offset(mid_i, mid_j, twist, middle)
         length_i = (mid_i_x * mid_i_x + mid_i_y * mid_i_y) ** 0.5

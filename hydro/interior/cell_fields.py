@@ -45,7 +45,8 @@ class CellFields(Mapping[str, np.ndarray]):
     """
 
     def __init__(self, stored: Mapping[str, np.ndarray], compute_energy: Callable[[], np.ndarray]):
-        self._stored, self._compute_energy = stored, compute_energy
+        self._stored = stored
+        self._compute_energy = compute_energy
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self._compute_energy() if name == ENERGY else self._stored[name]
@@ -73,7 +74,9 @@ def make_fill_sound_speed(eos_class) -> Any:
         Into `out` (ni, nj); NaN for none.
         """
         for i in range(first, last):
-            rho, p, row = state[RHO, i + 1], state[P, i + 1], out[i]
+            rho = state[RHO, i + 1]
+            p = state[P, i + 1]
+            row = out[i]
             for j in range(row.shape[0]):
                 row[j] = sound_speed_squared_part(rho[j + 1], p[j + 1], parameters) ** 0.5
 

@@ -180,9 +180,11 @@ def find_hll(Z, m):
     switched = 0
     for k in range(1, m + 1):
         switched += 1 if Z[at.HLL + k] > 0.0 else 0
-    first, last = m + 1, 0
+    first = m + 1
+    last = 0
     if switched > 0:
-        first, last = 1, m
+        first = 1
+        last = m
         while Z[at.HLL + first] <= 0.0:
             first += 1
         while Z[at.HLL + last] <= 0.0:
@@ -252,7 +254,8 @@ def make_hll_flux(energy_part, faces, switch, torn, target, pressure_row, opens_
                 e_r = choose_own(e_r, Z[at.TORN + k], Z[at.TORN + k])
             u_l, v_l = Z[left + at.SPAN + k], Z[left + 2 * at.SPAN + k]
             u_r, v_r = Z[right + at.SPAN + k], Z[right + 2 * at.SPAN + k]
-            c2_l, c2_r = Z[left + 4 * at.SPAN + k], Z[right + 4 * at.SPAN + k]
+            c2_l = Z[left + 4 * at.SPAN + k]
+            c2_r = Z[right + 4 * at.SPAN + k]
             mass, momentum_x, momentum_y, energy, pressure = riemann.compute_hll_flux(
                 (rho_l, u_l, v_l, p_l, e_l, c2_l),
                 (rho_r, u_r, v_r, p_r, e_r, c2_r),

@@ -125,11 +125,13 @@ class RowPhases(NamedTuple):
 @functools.cache
 def make_row_phases(eos_class, limiter: str, geometry: Geometry, flux: str) -> RowPhases:
     """Phases of an equation of state, a limiter, a geometry and a flux."""
-    sound, curved = eos_class.sound_speed_squared_part, geometry.curved
+    sound = eos_class.sound_speed_squared_part
+    curved = geometry.curved
     switch = sound, eos_class.energy_part, FLUXES[flux], eos_class.opens_voids
     limit = LIMITERS[limiter]
     fill_slopes = make_slopes(limit, limiter in RELAXED, geometry, switch)
-    fill_geometry, fill_switch = make_geometry(geometry.volume), make_switch(*switch)
+    fill_geometry = make_geometry(geometry.volume)
+    fill_switch = make_switch(*switch)
 
     @compiled_once(allocates=False)
     def measure_after(Z, n):

@@ -33,7 +33,10 @@ from regrid.jit import compiled_once, inlined
 LANES = 8  # entries of the widest vector
 LINE = 8  # entries of a cache line
 SPAN = 136
-READ, SECOND_LEVEL, DATA = 0, 2, 1  # arguments of LLVM's prefetch
+# arguments of LLVM's prefetch
+READ = 0
+SECOND_LEVEL = 2
+DATA = 1
 CHUNK = SPAN - 3 * LANES  # updated cells of a chunk; up to two more are reconstructed
 
 _next = (LINE - 1 + SPAN * row for row in count())
@@ -94,10 +97,17 @@ LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY, SUM_VOIDED = _rows(7)
 SIZE = next(_next) + 1
 
 # rows that hold a vector: offsets of x and y
-LOW, HIGH, NEXT = (X_LOW, Y_LOW), (X_HIGH, Y_HIGH), (X_NEXT, Y_NEXT)
-LOW_NEW, HIGH_NEW = (X_LOW_NEW, Y_LOW_NEW), (X_HIGH_NEW, Y_HIGH_NEW)
-MI, MJ, MI_NEW, MJ_NEW = (MI_X, MI_Y), (MJ_X, MJ_Y), (MI_X_NEW, MI_Y_NEW), (MJ_X_NEW, MJ_Y_NEW)
-LEAN_I, LEAN_J = (LEAN_I_X, LEAN_I_Y), (LEAN_J_X, LEAN_J_Y)
+LOW = (X_LOW, Y_LOW)
+HIGH = (X_HIGH, Y_HIGH)
+NEXT = (X_NEXT, Y_NEXT)
+LOW_NEW = (X_LOW_NEW, Y_LOW_NEW)
+HIGH_NEW = (X_HIGH_NEW, Y_HIGH_NEW)
+MI = (MI_X, MI_Y)
+MJ = (MJ_X, MJ_Y)
+MI_NEW = (MI_X_NEW, MI_Y_NEW)
+MJ_NEW = (MJ_X_NEW, MJ_Y_NEW)
+LEAN_I = (LEAN_I_X, LEAN_I_Y)
+LEAN_J = (LEAN_J_X, LEAN_J_Y)
 
 
 @compiled_once(allocates=False)
@@ -183,7 +193,8 @@ def _copy_back_in_kernels(Z, offset, count, target, row, start):
 
 
 # for the kernels' digests
-copy_row.compiled_as, copy_back.compiled_as = _copy_row_in_kernels, _copy_back_in_kernels
+copy_row.compiled_as = _copy_row_in_kernels
+copy_back.compiled_as = _copy_back_in_kernels
 
 
 @inlined
@@ -193,7 +204,8 @@ def load_corners(Z, low, high, k):
     `low`, `high`: offsets (of x, of y) of the rows.  Note: both offsets are given, since with that
     of x alone LLVM orders the additions so that indices may look negative.
     """
-    (low_x, low_y), (high_x, high_y) = low, high
+    low_x, low_y = low
+    high_x, high_y = high
     return (
         (Z[low_x + k], Z[low_y + k]), (Z[high_x + k], Z[high_y + k]),
         (Z[high_x + k + 1], Z[high_y + k + 1]), (Z[low_x + k + 1], Z[low_y + k + 1]),
@@ -210,7 +222,10 @@ def store_vector(Z, rows, k, vector):
 @inlined
 def find_twist(a, b, c, d):
     """a - b + c - d of a cell's corners, and their mean y."""
-    (xa, ya), (xb, yb), (xc, yc), (xd, yd) = a, b, c, d
+    xa, ya = a
+    xb, yb = b
+    xc, yc = c
+    xd, yd = d
     return ((xa - xb) + (xc - xd), (ya - yb) + (yc - yd)), 0.25 * ((ya + yc) + (yb + yd))
 
 
@@ -252,7 +267,8 @@ def _prefetch(typing_context, array, row, column):
         kind = signature.args[0]
         made = context.make_array(kind)(context, builder, values[0])
         place = cgutils.get_item_pointer(context, builder, kind, made, values[1:], wraparound=False)
-        pointer, number = ir.IntType(8).as_pointer(), ir.IntType(32)
+        pointer = ir.IntType(8).as_pointer()
+        number = ir.IntType(32)
         function = cgutils.get_or_insert_function(
             builder.module,
             ir.FunctionType(ir.VoidType(), [pointer, number, number, number]),

@@ -77,7 +77,8 @@ def make_slopes(limit, relaxed, geometry, switch):
     crest of the speed for a shock.
     """
     limit_velocity = make_limit_velocity(limit)
-    curved, weigh = geometry.curved, make_weigh(geometry)
+    curved = geometry.curved
+    weigh = make_weigh(geometry)
     sound, energy, least_jump, opens_voids = switch
 
     @compiled_once(allocates=False)
@@ -90,8 +91,12 @@ def make_slopes(limit, relaxed, geometry, switch):
         for k in range(1, n + 1):
             a, b, c, d = at.load_corners(Z, at.LOW, at.HIGH, k)
             mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
-            (xa, ya), (xb, yb), (xc, yc), (xd, yd) = a, b, c, d
-            (mid_i_x, mid_i_y), (mid_j_x, mid_j_y) = mid_i, mid_j
+            xa, ya = a
+            xb, yb = b
+            xc, yc = c
+            xd, yd = d
+            mid_i_x, mid_i_y = mid_i
+            mid_j_x, mid_j_y = mid_j
             rho = Z[at.RHO + k]
             p = Z[at.P + k]
             if curved:
@@ -232,8 +237,11 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
             )
             a, b, c, d = at.load_corners(Z, at.LOW, at.HIGH, k)
             (line_x, line_y), _, _ = compute_line_geometry(a, b, c, d)
-            rho, p, c = rim[on.RHO, face], rim[on.P, face], rim[on.C, face]
-            jump, jump_beyond = abs(p - Z[at.P + k]), abs(Z[at.P + k] - Z[at.P_AFTER + k])
+            rho = rim[on.RHO, face]
+            p = rim[on.P, face]
+            c = rim[on.C, face]
+            jump = abs(p - Z[at.P + k])
+            jump_beyond = abs(Z[at.P + k] - Z[at.P_AFTER + k])
             jump = jump if jump > jump_beyond else jump_beyond
             rough = (jump / (rho * c * c) - CALM) / (SHOCK - CALM)
             rough = rough if rough > 0.0 else 0.0

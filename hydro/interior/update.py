@@ -35,10 +35,13 @@ def make_update(eos_class, geometry, finishes, gathers):
     `gathers`: it closes the row's own account but for the fluxes through the faces towards +i.
     Both in one loop: the one adds and multiplies where the other waits for divisions and roots.
     """
-    pressure_part, energy_part = eos_class.pressure_part, eos_class.energy_part
+    pressure_part = eos_class.pressure_part
+    energy_part = eos_class.energy_part
     sound_speed_squared_part = eos_class.sound_speed_squared_part
-    find_least_pressure, opens_voids = make_least_pressure(eos_class), eos_class.opens_voids
-    weigh, curved = geometry.volume, geometry.curved
+    find_least_pressure = make_least_pressure(eos_class)
+    opens_voids = eos_class.opens_voids
+    weigh = geometry.volume
+    curved = geometry.curved
 
     @compiled_once(allocates=False)
     def update_rows(Z, n, dt, inverse_dt, parameters):
@@ -68,7 +71,8 @@ def make_update(eos_class, geometry, finishes, gathers):
                 total = Z[at.ENERGY + k] - dt * Z[at.FLUX_I_ENERGY + k]
                 volume = Z[at.VOLUME_NEW + k]
                 # two divisions: of one for both, the rounding would add up in cells at rest
-                inverse_volume, inverse_mass = 1.0 / volume, 1.0 / mass
+                inverse_volume = 1.0 / volume
+                inverse_mass = 1.0 / mass
                 rho = mass * inverse_volume
                 u = momentum_x * inverse_mass
                 v = momentum_y * inverse_mass
@@ -164,7 +168,10 @@ def make_update(eos_class, geometry, finishes, gathers):
                 at.store_vector(Z, at.MI_NEW, k, mid_i)
                 at.store_vector(Z, at.MJ_NEW, k, mid_j)
                 Z[at.VOLUME_NEW + k] = weigh(area, mid_i, mid_j, twist, y_new)
-                (xa, ya), (xb, yb), (xc, yc), (xd, yd) = a, b, c, d
+                xa, ya = a
+                xb, yb = b
+                xc, yc = c
+                xd, yd = d
                 Z[at.W_X + k] = 0.25 * (
                     ((xa - Z[at.X_LOW + k]) + (xd - Z[at.X_LOW + k + 1]))
                     + ((xb - Z[at.X_HIGH + k]) + (xc - Z[at.X_HIGH + k + 1]))

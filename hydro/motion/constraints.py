@@ -55,7 +55,9 @@ class Joint:
     """A key node between two lines; `ends`: which end of each it is, 0 the first, 1 the last."""
 
     def __init__(self, node: KeyNode, lines: tuple[Line, Line], ends: tuple[int, int]):
-        self.node, self.lines, self.ends = node, lines, ends
+        self.node = node
+        self.lines = lines
+        self.ends = ends
         lengths = [self._measure(line.segment.line(line.segment.block.nodes)) for line in lines]
         self.share = lengths[0] / sum(lengths)
 
@@ -73,7 +75,8 @@ class Joint:
         way = relax * (self.share * sum(lengths) - lengths[0])
         near = min(float(np.hypot(*(nodes[:, 1] - nodes[:, 0]))) for nodes in moved)
         way = min(max(way, -MOST * relax * near), MOST * relax * near)
-        before, after = moved[0][:, REACH:0:-1], moved[1][:, 1 : REACH + 1]
+        before = moved[0][:, REACH:0:-1]
+        after = moved[1][:, 1 : REACH + 1]
         position = moved[0][:, 0].copy()
         curve = np.concatenate([before, position[:, None], after], axis=1)
         arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=1)))])
@@ -92,11 +95,13 @@ class CarriedSeam:
     """
 
     def __init__(self, seam: Segment, one: Segment, other: Segment):
-        self.seam, self.contacts = seam, (one, other)
+        self.seam = seam
+        self.contacts = (one, other)
         here, a, b = (segment.line(segment.block.nodes) for segment in (seam, one, other))
         way = b.mean(axis=1) - a.mean(axis=1)
         heights = [way[0] * line[1] - way[1] * line[0] for line in (here, a, b)]
-        self.positions, points = [], []
+        self.positions = []
+        points = []
         for line, height in zip((a, b), heights[1:], strict=True):
             order = 1 if height[-1] > height[0] else -1
             least, most = sorted((height[0], height[-1]))
@@ -334,7 +339,8 @@ def compute_way_in(
     angle = measure_angle(position, before, after)
     if not abs(angle) < narrow:
         return np.zeros(2)
-    a, b = before - position, after - position
+    a = before - position
+    b = after - position
     lengths = float(np.hypot(*a)), float(np.hypot(*b))
     middle = a / lengths[0] + b / lengths[1]
     return middle * (0.5 * min(lengths) * min(0.5, 1.0 - angle / narrow))
@@ -342,7 +348,8 @@ def compute_way_in(
 
 def measure_angle(position: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
     """Angle at a corner [rad], -pi to pi: below 0 or far open where it has turned over."""
-    a, b = before - position, after - position
+    a = before - position
+    b = after - position
     return float(np.arctan2(b[0] * a[1] - b[1] * a[0], a @ b))
 
 
@@ -350,7 +357,8 @@ def find_corner(
     block: Block, i: int, j: int, old: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """New positions (2,) of a block's corner node, of the nodes before and after on the sides."""
-    along, up = 1 if i == 0 else -1, 1 if j == 0 else -1
+    along = 1 if i == 0 else -1
+    up = 1 if j == 0 else -1
     nodes = block.nodes if old else block.nodes_new
     sides = nodes[:, i, j + up], nodes[:, i + along, j]
     return nodes[:, i, j].copy(), *(sides if along * up > 0 else sides[::-1])

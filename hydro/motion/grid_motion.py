@@ -137,7 +137,8 @@ class GridMotion(Sides):
         number = -1 if failure is None or not callable(self.mesh) else self._find_number(failure)
         if failure is None:
             number, failure = self._regrid_own(fraction)
-        rows, before = [], self.quality
+        rows = []
+        before = self.quality
         for own in self.blocks.own if failure is None else ():
             report = self.reports[own] if self.mesh == "regrid" else None
             known = report.quality if report is not None and not self._limited[own] else None
@@ -145,7 +146,8 @@ class GridMotion(Sides):
                 known = before[own]
             known = known or measure_worst(self.blocks[own].nodes_new)
             rows += [(*known, *self._count(own))]
-        self.quality, self.counts = [], []
+        self.quality = []
+        self.counts = []
         for row in self.blocks.share_nodes(rows, number, failure):
             self.quality += [row[:4]]
             self.counts += [row[4:]]
@@ -154,7 +156,8 @@ class GridMotion(Sides):
 
     def _regrid_own(self, fraction: float) -> tuple[int, RunFailure | None]:
         """Regrid the blocks that are here; the first failure, and its place in the order of all."""
-        own, number = self.blocks.own, 0
+        own = self.blocks.own
+        number = 0
         if self.mesh == "regrid":
             try:
                 self.blocks.workers.run(lambda n: self._regrid_block(own[n], fraction), len(own))
@@ -173,7 +176,8 @@ class GridMotion(Sides):
     def _count(self, number: int) -> tuple[float, ...]:
         """What regridding a block took in the step: iterations, of nodes, sub-moves, rescues, nodes
         held back, reports; and the least corner ratio."""
-        report, limited = self.reports[number], self._limited[number]
+        report = self.reports[number]
+        limited = self._limited[number]
         if report is None:
             return (*NO_COUNTS[:4], limited, *NO_COUNTS[5:])
         return (
@@ -188,7 +192,8 @@ class GridMotion(Sides):
         return names.index(place.block) if place is not None and place.block in names else -1
 
     def _regrid_block(self, number: int, fraction: float) -> None:
-        block, regridder = self.blocks[number], self.regridders[number]
+        block = self.blocks[number]
+        regridder = self.regridders[number]
         self._limited[number] = 0
         aware = self.flow_aware[number]
         if aware is not None and aware.sees_flow:
@@ -202,7 +207,8 @@ class GridMotion(Sides):
         except RegridFailure as failure:
             failure.block = block.name
             raise
-        nodes, most = result.nodes, MOST_EXCESS * min(1.0, fraction)
+        nodes = result.nodes
+        most = MOST_EXCESS * min(1.0, fraction)
         if result.report.strayed > most:
             nodes, self._limited[number] = self.limiters[number].limit(block.nodes, nodes, most)
         if nodes is not block.nodes_new:

@@ -68,13 +68,17 @@ class KeyNode:
 
     def find_wall(self) -> tuple[int, float, float]:
         """Number of different lines that hold the node (0, 1 or 2), and the first one's normal."""
-        count, first_x, first_y = 0, 0.0, 0.0
+        count = 0
+        first_x = 0.0
+        first_y = 0.0
         for block, face in self.constraining_faces:
             x, y = float(block.rim.nx[face]), float(block.rim.ny[face])
             length = math.hypot(x, y)
             x, y = x / length, y / length
             if count == 0:
-                count, first_x, first_y = 1, x, y
+                count = 1
+                first_x = x
+                first_y = y
             elif abs(x * first_y - y * first_x) > self.corner:
                 return 2, first_x, first_y
             elif self.corner > STRAIGHT:  # a smooth wall in chords: the normal between both
@@ -199,7 +203,9 @@ class KeyNode:
 
 def _mean_contact_velocity(faces: list[tuple[Block, int]]) -> tuple[float, float]:
     """Contact velocity at the node, interpolated by distance from the faces around it."""
-    total, x, y = 0.0, 0.0, 0.0
+    total = 0.0
+    x = 0.0
+    y = 0.0
     for block, face in faces:
         weight = 1.0 / math.hypot(block.rim.nx[face], block.rim.ny[face])
         total += weight

@@ -27,7 +27,9 @@ from regrid import curves
 from regrid.jit import compiled_once, kernel
 
 CORNER = 0.35  # sine of the angle from which two tracks that meet make a corner
-DAMPING, BEND = 4.0, 0.35  # of sliding lines: strength, and turn [rad]; see `fill_line_damping`
+# of sliding lines: strength, and turn [rad]; see `fill_line_damping`
+DAMPING = 4.0
+BEND = 0.35
 MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
 THICK_CELLS = 0.75  # default thickness of a contact, in its initial cells
 SHORTEST = 0.25  # segment required by turning, in thicknesses of its contact
@@ -92,7 +94,8 @@ class Track:
 
         On a closed track that is the full turn from the first point.
         """
-        first, last = self.locate(start), self.locate(end)
+        first = self.locate(start)
+        last = self.locate(end)
         if self.closed:
             return self.at((first + law * self.arc[-1]) % self.arc[-1])
         return self.at(first + law * (last - first))
@@ -199,7 +202,8 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, spacing, walls):
         i, j = find_node(side, start + k, ni, nj)
         moved[0, k] = nodes_new[0, i, j]
         moved[1, k] = nodes_new[1, i, j]
-    failed, out = -1, moved
+    failed = -1
+    out = moved
     if relax > 0.0:
         out = work[6:]
         failed = curves.fill_redistributed(
@@ -353,12 +357,14 @@ class Line:
         self.damping = np.zeros_like(line)
         self.extended = np.empty((2, line.shape[1] + 4))
         self.moved = np.empty_like(line)
-        side, count = SIDES.index(segment.side), line.shape[1]
+        side = SIDES.index(segment.side)
+        count = line.shape[1]
         self.span = np.array([side, segment.start, count, segment.first, 0])
         self._work = np.empty((8, count))
         self.closed = False  # does it end where it begins, or at its periodic image?
         self.shortest = 0.0  # segment that turning asks for [m]; 0: spaced by length alone
-        self._law, self._turning = self.law.copy(), np.zeros(line.shape[1] - 1)
+        self._law = self.law.copy()
+        self._turning = np.zeros(line.shape[1] - 1)
         self.carried: Callable[[], np.ndarray] | None = None  # displacement of a carried seam
         self.shortened = False
         self.slides = False  # a straight piston, an end of which goes along it
@@ -398,7 +404,8 @@ class Line:
 
     def extend(self, new: bool = False) -> np.ndarray:
         """The old nodes, or the new ones, with two images (2, n + 5) beyond each end; one array."""
-        block, extended = self.segment.block, self.extended
+        block = self.segment.block
+        extended = self.extended
         nodes = block.nodes_new if new else block.nodes
         fill_extended(nodes, self.span, tuple(self.walls), extended)
         if self.period is not None:
@@ -419,7 +426,8 @@ class Line:
         old = np.ascontiguousarray(segment.line(segment.block.nodes))
         new = segment.line(segment.block.nodes_new)
         self.shortened = False
-        self.moved[:, 0], self.moved[:, -1] = new[:, 0], new[:, -1]
+        self.moved[:, 0] = new[:, 0]
+        self.moved[:, -1] = new[:, -1]
         self.fill_moved(old, new, span)
         return 0.0 if self.at_contact else self.settle(span.fraction)
 
@@ -441,12 +449,14 @@ class Line:
         `fraction`: dt over the stable step.  With a dt they are moved before; returns the
         stretching.
         """
-        relax, shape = 0.0, self.rule.shape
+        relax = 0.0
+        shape = self.rule.shape
         if self.respaced or self.follows_contact:
             relax = float(self.rule.relax * min(1.0, fraction))
         if self.at_contact or self.follows_contact:
             # a spline would loop in the fold above the tip of a jet
-            relax, shape = FOLLOWING * min(1.0, fraction), "chord"
+            relax = FOLLOWING * min(1.0, fraction)
+            shape = "chord"
         if self.is_kinked:  # a spline would swing about the end of the contact
             shape = "chord"
         if self.shortened:
@@ -539,7 +549,8 @@ class JoinedLine(Line):
         if self.carried is not None:
             self.moved[:, 1:-1] = old[:, 1:-1] + self.carried()[:, 1:-1]
             return
-        step, law = new[:, [0, -1]] - old[:, [0, -1]], self.find_law(span.t)
+        step = new[:, [0, -1]] - old[:, [0, -1]]
+        law = self.find_law(span.t)
         self.moved[:, 1:-1] = old[:, 1:-1] + (
             step[:, :1] * (1.0 - law[1:-1]) + step[:, 1:] * law[1:-1]
         )

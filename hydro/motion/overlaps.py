@@ -50,16 +50,21 @@ def fill_outline(nodes, side, start, line, inset):
         for k in range(last + 1):
             at = start + k
             if side == 0:
-                here, there = nodes[c, 0, at], nodes[c, 1, at]
+                here = nodes[c, 0, at]
+                there = nodes[c, 1, at]
             elif side == 1:
-                here, there = nodes[c, ni, at], nodes[c, ni - 1, at]
+                here = nodes[c, ni, at]
+                there = nodes[c, ni - 1, at]
             elif side == 2:
-                here, there = nodes[c, at, 0], nodes[c, at, 1]
+                here = nodes[c, at, 0]
+                there = nodes[c, at, 1]
             else:
-                here, there = nodes[c, at, nj], nodes[c, at, nj - 1]
+                here = nodes[c, at, nj]
+                there = nodes[c, at, nj - 1]
             line[c, k] = here
             inset[c, k] = here + INSIDE * (there - here)
-        first_step, last_step = inset[c, 1] - inset[c, 0], inset[c, last - 1] - inset[c, last]
+        first_step = inset[c, 1] - inset[c, 0]
+        last_step = inset[c, last - 1] - inset[c, last]
         inset[c, 0] += INSIDE * first_step
         inset[c, last] += INSIDE * last_step
     x, y = line[0], line[1]
@@ -70,11 +75,14 @@ class Outline:
     """A segment that other blocks may run into: its line, and its line shifted slightly inward."""
 
     def __init__(self, segment: Segment, group: int):
-        self.segment, self.group = segment, group
+        self.segment = segment
+        self.group = group
         nodes = segment.stop - segment.start + 1
-        self.line, self.inset = np.empty((2, nodes)), np.empty((2, nodes))
+        self.line = np.empty((2, nodes))
+        self.inset = np.empty((2, nodes))
         boxes = 4, -(-(nodes - 1) // group)
-        self.boxes, self.inset_boxes = np.empty(boxes), np.empty(boxes)
+        self.boxes = np.empty(boxes)
+        self.inset_boxes = np.empty(boxes)
         self.follow()
 
     def follow(self) -> None:
@@ -252,7 +260,8 @@ class Overlaps:
 
     @staticmethod
     def _describe(one: Outline, other: Outline, at: tuple[int, int]) -> str:
-        a, b = one.segment, other.segment
+        a = one.segment
+        b = other.segment
         x, y = 0.5 * (one.line[:, at[0]] + one.line[:, at[0] + 1])
         return (
             f"block {a.block.name!r}, side {a.side}, and block {b.block.name!r}, side {b.side}, "
@@ -280,9 +289,12 @@ def describe_depth(one: Block, other: Block) -> str:
     found = 0.0, ""
     for block, around in ((one, other), (other, one)):
         line = trace_outline(around.nodes)
-        start, way = line, np.roll(line, -1, axis=1) - line
+        start = line
+        way = np.roll(line, -1, axis=1) - line
         square = (way * way).sum(axis=0)
-        start, way, square = start[:, square > 0.0], way[:, square > 0.0], square[square > 0.0]
+        start = start[:, square > 0.0]
+        way = way[:, square > 0.0]
+        square = square[square > 0.0]
         nodes = trace_outline(block.nodes)
         middles = 0.5 * (nodes + np.roll(nodes, -1, axis=1))
         for x, y in np.concatenate([nodes, middles], axis=1).T:
@@ -300,7 +312,8 @@ def is_inside(point: tuple[float, float], nodes: np.ndarray) -> bool:
     x, y = trace_outline(nodes) - np.reshape(point, (2, 1))
     if x.min() > 0.0 or x.max() < 0.0 or y.min() > 0.0 or y.max() < 0.0:
         return False
-    rises, following = y > 0.0, np.roll(y > 0.0, -1)
+    rises = y > 0.0
+    following = np.roll(y > 0.0, -1)
     at = np.flatnonzero(rises != following)
     x_next, y_next = np.roll(x, -1)[at], np.roll(y, -1)[at]
     crossing = x[at] - y[at] * (x_next - x[at]) / (y_next - y[at])

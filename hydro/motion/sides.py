@@ -34,14 +34,16 @@ class StraightSides:
     """The waiting lines of a block that lie straight for good, to be spread all at once."""
 
     def __init__(self, lines: list[StraightLine]):
-        self.lines, self.block = lines, lines[0].segment.block
+        self.lines = lines
+        self.block = lines[0].segment.block
         self.laws = np.concatenate([line.law for line in lines])
         self.spans = np.array([line.span for line in lines])
         counts = [line.law.size for line in lines]
         self.spans[:, -1] = np.cumsum(counts) - counts
         self.respacing = None
         if any(line.last_law is not None for line in lines):
-            self.respacing, self.share = lines[0].rule.respacing, -1.0
+            self.respacing = lines[0].rule.respacing
+            self.share = -1.0
 
     def spread(self, t: float) -> None:
         """Lay their new nodes, by their spacings at t [s], between their new ends."""
@@ -67,7 +69,8 @@ class Sides:
     """
 
     def __init__(self, blocks, exchange: Exchange, rule: LineRule):
-        self.exchange, self.stretching = exchange, 0.0
+        self.exchange = exchange
+        self.stretching = 0.0
         self.carried_seams: list[CarriedSeam] = []
         self.joints: list[Joint] = []
         self.followers = (
@@ -193,11 +196,14 @@ class Sides:
         if len(found) != 2 or found[0][0].segment.kind != found[1][0].segment.kind:
             return
         (line, end), (other, other_end) = found
-        here, there = line.track.nodes[:, -end], other.track.nodes[:, -other_end]
-        away, further = line.beside(end)[:, 0] - here, other.beside(other_end)[:, 0] - there
+        here = line.track.nodes[:, -end]
+        there = other.track.nodes[:, -other_end]
+        away = line.beside(end)[:, 0] - here
+        further = other.beside(other_end)[:, 0] - there
         smooth = -(away @ further) > 0.8 * np.hypot(*away) * np.hypot(*further)
         if smooth and line is not other and np.abs(here - there).max() < 1e-9 * np.hypot(*away):
-            line.neighbours[end], other.neighbours[other_end] = (other, other_end), (line, end)
+            line.neighbours[end] = (other, other_end)
+            other.neighbours[other_end] = (line, end)
 
     def _end_follower(self, follower: FollowerMotion, end: int) -> None:
         """Tell a sliding contact an end's key node and the lines that go on from there."""
@@ -207,7 +213,8 @@ class Sides:
             if line is None or other.kind != "free-surface":
                 continue
             line.at_contact = True
-            follower.free_lines[end], follower.starts[end] = line, face == other.first
+            follower.free_lines[end] = line
+            follower.starts[end] = face == other.first
             side = OPPOSITE_SIDES[other.side]
             across = [segment for segment in other.block.segments if segment.side == side]
             opposite = self._find_line(across[0]) if len(across) == 1 else None

@@ -45,7 +45,8 @@ def compute_tangents(line: np.ndarray) -> np.ndarray:
 def _find_tangents(before: np.ndarray, here: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Unit tangents in the points `here` of the circles through three points each, (2, n) all."""
     first, second = here - before, after - here
-    a, b = _square(first), _square(second)
+    a = _square(first)
+    b = _square(second)
     return _normalise(b * first + a * second)
 
 
@@ -93,9 +94,11 @@ class SurfaceTension:
         for line in motion.lines:
             if line.segment.tension == 0.0:
                 continue
-            sides, orders = [line.segment], [1]
+            sides = [line.segment]
+            orders = [1]
             if link := partners.get(id(line.segment)):
-                sides, orders = [link.leader, link.follower], [1, -1 if link.reverse else 1]
+                sides = [link.leader, link.follower]
+                orders = [1, -1 if link.reverse else 1]
             rest = np.zeros((2, line.segment.stop - line.segment.start))
             self.lines.append(TenseLine(line, sides, orders, rest))
 
@@ -119,12 +122,14 @@ class SurfaceTension:
 
     def _compute_force(self, line: np.ndarray) -> np.ndarray:
         """Forces (2, n) on a line's faces at tension 1; (2, n + 5) nodes.  Theory F14.1, F14.4."""
-        tangents, nodes = compute_tangents(line), line[:, 2:-2]
+        tangents = compute_tangents(line)
+        nodes = line[:, 2:-2]
         if not self.curved:
             return tangents[:, 1:] - tangents[:, :-1]
         pull = nodes[1] * tangents
         force = pull[:, 1:] - pull[:, :-1]
-        steps, mean = nodes[:, 1:] - nodes[:, :-1], 0.5 * (tangents[:, 1:] + tangents[:, :-1])
+        steps = nodes[:, 1:] - nodes[:, :-1]
+        mean = 0.5 * (tangents[:, 1:] + tangents[:, :-1])
         force[1] -= (steps * mean).sum(axis=0)  # the tension around the axis
         return force
 
@@ -137,7 +142,8 @@ class SurfaceTension:
             ]
             total = sum(parts)
             for side, order, part in zip(tense.sides, tense.orders, parts, strict=True):
-                force, rim = (part / total * tense.rest)[:, ::order], side.rim
+                force = (part / total * tense.rest)[:, ::order]
+                rim = side.rim
                 rim.momentum_x[:] -= force[0]
                 rim.momentum_y[:] -= force[1]
                 rim.energy[:] -= (force * rim.rows[on.CONTACT_VELOCITY]).sum(axis=0)

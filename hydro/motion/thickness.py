@@ -62,7 +62,8 @@ def solve_along(main, next_one, next_two, right, closed, backwards, band, out):
             if backwards:
                 a = (count - k) % count if closed else count - 1 - k
                 other = (count - other) % count if closed else count - 1 - other
-            row, column = find_band_place(a, count, closed), find_band_place(other, count, closed)
+            row = find_band_place(a, count, closed)
+            column = find_band_place(other, count, closed)
             band[max(row, column), abs(row - column)] += value
     for row in range(count):
         low = max(0, row - HALF_BAND)
@@ -104,12 +105,15 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
     total = nodes.shape[1]
     edges = total - 1
     count = edges if closed else total
-    stiff, length = np.empty(edges), np.empty(edges)
+    stiff = np.empty(edges)
+    length = np.empty(edges)
     for k in range(edges):
         step_x, step_y = nodes[0, k + 1] - nodes[0, k], nodes[1, k + 1] - nodes[1, k]
         length[k] = (step_x * step_x + step_y * step_y) ** 0.5
         stiff[k] = 1.0 / length[k]
-    mass, inverse, bend = np.empty(count), np.empty(count), np.empty(count)
+    mass = np.empty(count)
+    inverse = np.empty(count)
+    bend = np.empty(count)
     normal = np.empty((2, count))
     for k in range(count):
         end = not closed and (k == 0 or k == edges)
@@ -130,18 +134,23 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
         tx, ty = 0.5 * (ax + bx), 0.5 * (ay + by)
         width = (tx * tx + ty * ty) ** 0.5
         width = max(width, FLAT * (length[before] + length[after]))
-        normal[0, k], normal[1, k] = -ty / width, tx / width
+        normal[0, k] = -ty / width
+        normal[1, k] = tx / width
         mass[k] = part * width
         inverse[k] = 1.0 / mass[k] if part > 0.0 else 0.0
         bend[k] = 0.0
         if part > 0.0:
             bend[k] = (ax * by - ay * bx) / (length[before] * length[after] * width)
-    main, next_one, next_two = np.zeros(count), np.zeros(count), np.zeros(count)
-    right, middle = np.empty(count), np.empty(count)
+    main = np.zeros(count)
+    next_one = np.zeros(count)
+    next_two = np.zeros(count)
+    right = np.empty(count)
+    middle = np.empty(count)
     for k in range(count):
         left_stiff = stiff[k - 1] if k > 0 else (stiff[edges - 1] if closed else 0.0)
         right_stiff = stiff[k] if k < edges else 0.0
-        left, ahead = (k - 1) % count, (k + 1) % count
+        left = (k - 1) % count
+        ahead = (k + 1) % count
         middle[k] = -(left_stiff + right_stiff)
         main[k] = mass[k] + strength * (
             (left_stiff * left_stiff * inverse[left] + right_stiff * right_stiff * inverse[ahead])
@@ -151,11 +160,13 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
             left_stiff * (bend[left] - bend[k]) + right_stiff * (bend[ahead] - bend[k])
         )
         if inverse[k] == 0.0:
-            main[k], right[k] = 1.0, 0.0
+            main[k] = 1.0
+            right[k] = 0.0
     for k in range(count):
         if not closed and k == count - 1:
             break
-        one, two = (k + 1) % count, (k + 2) % count
+        one = (k + 1) % count
+        two = (k + 2) % count
         far_stiff = stiff[one] if one < edges else 0.0
         if inverse[k] > 0.0 and inverse[one] > 0.0:
             next_one[k] = (
@@ -167,7 +178,8 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
     band = np.empty((count, HALF_BAND + 2))
     solve_along(main, next_one, next_two, right, closed, False, band, first)
     solve_along(main, next_one, next_two, right, closed, True, band, second)
-    way, base = np.empty(count), np.empty(count)
+    way = np.empty(count)
+    base = np.empty(count)
     most = 0.0
     for k in range(count):
         base[k] = 0.5 * (first[k] + second[k])
@@ -176,7 +188,8 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
     for _ in range(MOST_PASSES):
         change = 0.0
         for k in range(edges):  # what the segments sweep beyond the sum of m phi
-            a, b = k, (k + 1) % count
+            a = k
+            b = (k + 1) % count
             first[k] = normal[0, a] * normal[1, b] - normal[1, a] * normal[0, b]
             first[k] *= 0.25 * way[a] * way[b]
         for k in range(count):
@@ -209,13 +222,16 @@ def measure_line_speed(nodes, faces, walls):
     `fill_thickness_way`: across them the line and its images have their own speed for a mean.
     """
     count = faces.shape[1]
-    lengths, sizes = np.empty(count), np.ones(count)
+    lengths = np.empty(count)
+    sizes = np.ones(count)
     for k in range(count):
         step_x, step_y = nodes[0, k + 1] - nodes[0, k], nodes[1, k + 1] - nodes[1, k]
         lengths[k] = (step_x * step_x + step_y * step_y) ** 0.5
     lengths /= sum_evenly(sizes, lengths)
     mean_x, mean_y = sum_evenly(faces[0], lengths), sum_evenly(faces[1], lengths)
-    end_x, end_y, ends = 0.0, 0.0, 0
+    end_x = 0.0
+    end_y = 0.0
+    ends = 0
     for (nx, ny), at, beside in ((walls[0], 0, 1), (walls[1], -1, -2)):
         if nx != 0.0 or ny != 0.0:
             end_x += 1.5 * faces[0, at] - 0.5 * faces[0, beside]
@@ -242,7 +258,8 @@ def take_part(nodes, span, rim, start, backwards, line, faces):
     for k in range(count):
         at = count - 1 - k if backwards else k
         i, j = find_node(side, first_node + at, ni, nj)
-        line[0, start + k], line[1, start + k] = nodes[0, i, j], nodes[1, i, j]
+        line[0, start + k] = nodes[0, i, j]
+        line[1, start + k] = nodes[1, i, j]
     for k in range(count - 1):
         face = first + (count - 2 - k if backwards else k)
         for q in range(2):
@@ -256,7 +273,8 @@ def give_part(speeds, start, backwards, out):
     count = out.shape[1]
     for k in range(count):
         at = start + (count - 1 - k if backwards else k)
-        out[0, k], out[1, k] = speeds[0, at], speeds[1, at]
+        out[0, k] = speeds[0, at]
+        out[1, k] = speeds[1, at]
 
 
 @kernel
@@ -283,10 +301,12 @@ class ThickContact:
     """
 
     def __init__(self, parts: list[tuple[Line, bool]], closed: bool):
-        self.parts, self.closed = parts, closed
+        self.parts = parts
+        self.closed = closed
         self.counts = np.cumsum([0] + [line.damping.shape[1] - 1 for line, _ in parts])
         self.nodes = np.empty((2, int(self.counts[-1]) + 1))
-        self.way, self.faces = np.empty_like(self.nodes), np.empty((3, int(self.counts[-1])))
+        self.way = np.empty_like(self.nodes)
+        self.faces = np.empty((3, int(self.counts[-1])))
         first = [length for line, _ in parts for length in np.hypot(*np.diff(line.track.nodes))]
         thickness = parts[0][0].rule.thickness
         own = THICK_CELLS * float(np.mean(first))
@@ -299,7 +319,8 @@ class ThickContact:
 
     def find_walls(self) -> tuple:
         """Unit normals of the walls at both ends, (0, 0) where there is none."""
-        (first, first_backwards), (last, last_backwards) = self.parts[0], self.parts[-1]
+        first, first_backwards = self.parts[0]
+        last, last_backwards = self.parts[-1]
         return first.walls[1 if first_backwards else 0], last.walls[0 if last_backwards else 1]
 
     def damp(self, dt: float) -> None:
@@ -319,12 +340,14 @@ class ThickContact:
 
 def find_thick_contacts(lines: list[Line]) -> list[ThickContact]:
     """The contacts of all lines, each from one end to the other."""
-    found, left = [], {id(line): line for line in lines}
+    found = []
+    left = {id(line): line for line in lines}
     for line in lines:
         if id(line) not in left:
             continue
         # back to where the contact begins, or once around
-        here, end = line, 0
+        here = line
+        end = 0
         while here.neighbours[end] is not None:
             here, end = here.neighbours[end][0], 1 - here.neighbours[end][1]
             if here is line:

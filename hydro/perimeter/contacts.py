@@ -38,22 +38,31 @@ def solve_contact(rim, k, other, m, state, law, other_law):
     law, other_law: `EquationOfState.wave_law`.  By JUMP the pressure is higher on this side.
     """
     nx, ny = find_normal(rim, k)
-    rho, u, v = rim[state + on.RHO, k], rim[state + on.U, k], rim[state + on.V, k]
-    rho_other, u_other = other[state + on.RHO, m], other[state + on.U, m]
-    v_other, c, c_other = other[state + on.V, m], rim[state + on.C, k], other[state + on.C, m]
+    rho = rim[state + on.RHO, k]
+    u = rim[state + on.U, k]
+    v = rim[state + on.V, k]
+    rho_other = other[state + on.RHO, m]
+    u_other = other[state + on.U, m]
+    v_other = other[state + on.V, m]
+    c = rim[state + on.C, k]
+    c_other = other[state + on.C, m]
     jump = rim[on.JUMP, k]
-    w, w_other = u * nx + v * ny, u_other * nx + v_other * ny
+    w = u * nx + v * ny
+    w_other = u_other * nx + v_other * ny
     p, w = riemann.compute_contact(
         (rho, w, rim[state + on.P, k], c, law),
         (rho_other, w_other, other[state + on.P, m], c_other, other_law),
         jump,
     )
-    z, z_other = rho * c, rho_other * c_other
+    z = rho * c
+    z_other = rho_other * c_other
     mean_x = (z * u + z_other * u_other) / (z + z_other)
     mean_y = (z * v + z_other * v_other) / (z + z_other)
     excess = w - (mean_x * nx + mean_y * ny)
-    rim[on.P_STAR, k], other[on.P_STAR, m] = p + 0.5 * jump, p - 0.5 * jump
-    rim[on.W_STAR, k], other[on.W_STAR, m] = w, -w
+    rim[on.P_STAR, k] = p + 0.5 * jump
+    other[on.P_STAR, m] = p - 0.5 * jump
+    rim[on.W_STAR, k] = w
+    other[on.W_STAR, m] = -w
     rim[on.U_STAR, k] = other[on.U_STAR, m] = mean_x + excess * nx
     rim[on.V_STAR, k] = other[on.V_STAR, m] = mean_y + excess * ny
     rim[on.SLIP, k] = other[on.SLIP, m] = abs((u - u_other) * ny - (v - v_other) * nx)
@@ -83,7 +92,8 @@ def fill_ghost_from_face(rim, k):
 @compiled_once(allocates=False)
 def press(rim, k, curved):
     """Flux through an impermeable face: the pressure P_STAR on the moving face."""
-    pressure, push = rim[on.P_STAR, k], rim[on.P_STAR, k] * rim[on.AREA_Y, k]
+    pressure = rim[on.P_STAR, k]
+    push = rim[on.P_STAR, k] * rim[on.AREA_Y, k]
     rim[on.MASS, k] = 0.0
     rim[on.MOMENTUM_X, k] = pressure * rim[on.AREA_X, k]
     rim[on.ENERGY, k] = pressure * rim[on.SWEPT, k]
@@ -137,7 +147,9 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
     What the n faces gain together is spread over them.
     """
     count = speeds.shape[1] - 1
-    gain, size, along = np.empty(count), np.empty(count), np.empty(count + 1)
+    gain = np.empty(count)
+    size = np.empty(count)
+    along = np.empty(count + 1)
     for k in range(count):
         at = count - k if backwards else k
         other = at - 1 if backwards else at + 1
@@ -147,12 +159,14 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
             + (speeds[1, at] + speeds[1, other]) * area_y
         )
         size[k] = (area_x * area_x + area_y * area_y) ** 0.5
-    left, whole = 0.0, 0.0
+    left = 0.0
+    whole = 0.0
     for k in range(count):
         left += 0.5 * (gain[k] + gain[count - 1 - k])
         whole += 0.5 * (size[k] + size[count - 1 - k])
     # the sums from both ends: the same for the mirror image
-    before, after = 0.0, 0.0
+    before = 0.0
+    after = 0.0
     for k in range(count + 1):
         along[k] = 0.0
     for k in range(count):
@@ -172,7 +186,8 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
             continue
         giver = (k - 1) % count if rate > 0.0 else k % count
         m = first + giver
-        rho, p = rim[on.RHO_TRACE, m], rim[on.P_TRACE, m]
+        rho = rim[on.RHO_TRACE, m]
+        p = rim[on.P_TRACE, m]
         u, v = rim[on.U_TRACE, m], rim[on.V_TRACE, m]
         energy = rho * (rim[on.E_TRACE, m] + 0.5 * (u * u + v * v)) + p
         for side in range(2):  # out of the cell before node k, into the one after
@@ -196,7 +211,8 @@ def solve_link(rim, other, pairs, law, other_law, layer, phase, curved):
     first, other_first, step, count = pairs
     state = on.RHO_FACE if phase == AT_CELLS else on.RHO_TRACE
     for n in range(count):
-        k, m = first + n, other_first + step * n
+        k = first + n
+        m = other_first + step * n
         solve_contact(rim, k, other, m, state, law, other_law)
         if phase == AT_CELLS:
             fill_ghost_from_face(rim, k)
@@ -217,7 +233,8 @@ def pass_seam(rim, other, pairs, phase, curved):
     through the common faces, what one loses the other gets."""
     first, other_first, step, count = pairs
     for n in range(count):
-        k, m = first + n, other_first + step * n
+        k = first + n
+        m = other_first + step * n
         if phase == AT_CELLS:
             for q in range(on.P + 1):
                 rim[on.RHO_GHOST + q, k] = other[q, m]

@@ -42,7 +42,8 @@ def measure_volume(nodes, i, j, weigh):
 
 def make_fill_faces(geometry: Geometry):
     """Phase that fills the faces of a rim; `Geometry.face`."""
-    compute_face, curved = geometry.face, geometry.curved
+    compute_face = geometry.face
+    curved = geometry.curved
 
     @compiled_once(allocates=False)
     def fill_faces(nodes, nodes_new, inverse_dt, rim):
@@ -103,7 +104,8 @@ def place_traces_on_axis(nodes, nodes_new, start, stop, rim):
 
 def make_fill_polygons(eos_class, geometry: Geometry):
     """Kernel that adds to a new state what cells hold beyond their straight faces."""
-    pressure_part, energy_part = eos_class.pressure_part, eos_class.energy_part
+    pressure_part = eos_class.pressure_part
+    energy_part = eos_class.energy_part
     find_least_pressure = make_least_pressure(eos_class)
     sound_speed_squared_part = eos_class.sound_speed_squared_part
     weigh = geometry.volume
@@ -138,10 +140,14 @@ def make_fill_polygons(eos_class, geometry: Geometry):
             if old == 0.0 and new == 0.0:
                 continue
             volume = measure_volume(nodes_new, i, j, weigh)
-            rho, u = state_new[of.RHO, i + 1, j + 1], state_new[of.U, i + 1, j + 1]
-            v, p = state_new[of.V, i + 1, j + 1], state_new[of.P, i + 1, j + 1]
-            rho_old, u_old = state[of.RHO, i + 1, j + 1], state[of.U, i + 1, j + 1]
-            v_old, p_old = state[of.V, i + 1, j + 1], state[of.P, i + 1, j + 1]
+            rho = state_new[of.RHO, i + 1, j + 1]
+            u = state_new[of.U, i + 1, j + 1]
+            v = state_new[of.V, i + 1, j + 1]
+            p = state_new[of.P, i + 1, j + 1]
+            rho_old = state[of.RHO, i + 1, j + 1]
+            u_old = state[of.U, i + 1, j + 1]
+            v_old = state[of.V, i + 1, j + 1]
+            p_old = state[of.P, i + 1, j + 1]
             energy = energy_part(rho, p, parameters) + void_energy_new[i, j]
             energy += 0.5 * (u * u + v * v)
             energy_old = energy_part(rho_old, p_old, parameters) + void_energy[i, j]

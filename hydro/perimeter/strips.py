@@ -103,11 +103,14 @@ def make_side_kernels(
     """Side kernels for an `EquationOfState` class, a limiter, a geometry and a flux."""
     energy = eos_class.energy_part
     sound = eos_class.sound_speed_squared_part
-    opens_voids, curved = eos_class.opens_voids, geometry.curved
+    opens_voids = eos_class.opens_voids
+    curved = geometry.curved
     low_mach = limiter == LOW_MACH
     rows = make_row_phases(eos_class, limiter, geometry, flux)
-    measure_after, next_row = rows.measure_after, rows.next_row
-    reconstruct, extrapolate = rows.reconstruct, rows.extrapolate
+    measure_after = rows.measure_after
+    next_row = rows.next_row
+    reconstruct = rows.reconstruct
+    extrapolate = rows.extrapolate
     fill_faces = make_fill_faces(geometry)
 
     @compiled_once(allocates=False)
@@ -139,7 +142,8 @@ def make_side_kernels(
                         rim[q, face] = state[q, i + 1, j + 1]
                     c = sound(rim[on.RHO, face], rim[on.P, face], parameters) ** 0.5
                     rim[on.C, face] = c
-                    length, shift = Z[at.LENGTH_AFTER + k + 1], Z[at.SHIFT_AFTER + k + 1]
+                    length = Z[at.LENGTH_AFTER + k + 1]
+                    shift = Z[at.SHIFT_AFTER + k + 1]
                     rim[on.LENGTH, face] = length + 2.0 * shift
                     for q in range(on.C + 1):
                         rim[on.RHO_FACE + q, face] = rim[q, face]

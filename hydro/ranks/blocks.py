@@ -32,7 +32,8 @@ class Blocks(list[Block]):
     ranks; rank, size: which of how many; workers: threads that do it.
     """
 
-    rank, size = 0, 1
+    rank = 0
+    size = 1
 
     def __init__(self, blocks: Sequence[Block], workers: Workers | None = None):
         super().__init__(blocks)
@@ -45,7 +46,8 @@ class Blocks(list[Block]):
 
     def update(self, dt: float) -> None:
         """New states of all blocks."""
-        pieces, workers = self.pieces, self.workers
+        pieces = self.pieces
+        workers = self.workers
         workers.run(lambda n: self[pieces[n].number].update(dt, workers.inside), len(pieces))
 
     def check_new_states(self, scan: Callable[[int], Row]) -> Table:
@@ -53,7 +55,9 @@ class Blocks(list[Block]):
 
         Raises the RunFailure of the first block whose new state cannot stand.
         """
-        rows, number, reason = [], 0, None
+        rows = []
+        number = 0
+        reason = None
         for number in self.own:
             *row, good = scan(number)
             rows.append(row)

@@ -82,12 +82,15 @@ def share_blocks(
     if ranks < 1:
         raise ValueError(f"{ranks} ranks; one at least is needed")
     sizes = [ni * nj for ni, nj in cells]
-    fair, wanted = sum(sizes) / ranks, wanted or {}
-    loads, homes = [0.0] * ranks, [0.0] * ranks
+    fair = sum(sizes) / ranks
+    wanted = wanted or {}
+    loads = [0.0] * ranks
+    homes = [0.0] * ranks
     places: list[tuple[int, ...]] = [(0,)] * len(cells)
     bounds: list[tuple[int, ...]] = [(0, ni) for ni, _ in cells]
     for number in sorted(range(len(cells)), key=lambda n: (-sizes[n], n)):
-        size, rows = sizes[number], count_tile_rows(cells[number][0])
+        size = sizes[number]
+        rows = count_tile_rows(cells[number][0])
         order = sorted(range(ranks), key=lambda r: (loads[r], r))
         bands = 1 if number in whole else min(wanted.get(number, rows), rows, ranks)
         if number in wanted or bands == 1:
@@ -149,7 +152,8 @@ class CutBlock:
     """
 
     def __init__(self, group: Any, block: Block, bounds: Sequence[int]):
-        self.group, self.block = group, block
+        self.group = group
+        self.block = block
         self.bands: list[Rows] = list(pairwise(bounds))
         self.is_home = group.rank == 0
         self.band = self.bands[group.rank]
@@ -161,7 +165,8 @@ class CutBlock:
 
         array: (..., rows, columns), the same rows on all ranks; have, need: rows of each rank.
         """
-        me, requests = self.group.rank, []
+        me = self.group.rank
+        requests = []
         for tag, plane in enumerate(array.reshape(-1, *array.shape[-2:])):
             for other in range(len(self.bands)):
                 if other == me:
@@ -218,7 +223,8 @@ class CutBlock:
 
     def share_ghost_rows(self) -> None:
         """Give every rank the new states of its ghost rows."""
-        ni, block = self.block.ni, self.block
+        ni = self.block.ni
+        block = self.block
         need = [(max(a - GHOST_ROWS, 0), min(b + GHOST_ROWS, ni)) for a, b in self.bands]
         for array in (block.state_new, block.void_energy_new):
             shift = _count_ghosts(array, block)
@@ -226,7 +232,8 @@ class CutBlock:
 
     def bring_totals(self) -> None:
         """Send the owner the totals of all tiles."""
-        totals, nj = self.block.tile_totals, self.block.nj
+        totals = self.block.tile_totals
+        nj = self.block.nj
         tiles = [(count_tiles(a, nj), count_tiles(b, nj)) for a, b in self.bands]
         self.send_rows(totals, tiles, self._for_home((0, len(totals) - 1)))
 

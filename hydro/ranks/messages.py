@@ -95,11 +95,13 @@ class Message:
     """
 
     def __init__(self, comm: Any, blocks: Sequence[Block], items: Sequence[Item]):
-        self.comm, self.blocks = comm, blocks
+        self.comm = comm
+        self.blocks = blocks
         ranks = range(comm.size)
         self.counts = [1 + sum(i.size for i in items if i.rank == k) for k in ranks]
         self.starts = [sum(self.counts[:k]) for k in ranks]
-        filled, placed = [start + 1 for start in self.starts], []
+        filled = [start + 1 for start in self.starts]
+        placed = []
         for item in items:
             placed.append((item, filled[item.rank]))
             filled[item.rank] += item.size
@@ -164,8 +166,10 @@ class Counted:
     """
 
     def __init__(self, comm: Any, traffic: Traffic):
-        self._comm, self._traffic = comm, traffic
-        self.rank, self.size = int(comm.rank), int(comm.size)
+        self._comm = comm
+        self._traffic = traffic
+        self.rank = int(comm.rank)
+        self.size = int(comm.size)
         for name in COUNTED:
             setattr(self, name, self._count(getattr(comm, name)))
 
@@ -190,8 +194,11 @@ class Book:
     """The traffic of one rank by kind, and the steps and their wall seconds that it went with."""
 
     def __init__(self, comm: Any):
-        self.comm, self.kinds = comm, {name: Traffic() for name in KINDS}
-        self.steps, self.seconds, self._began = 0, 0.0, 0.0
+        self.comm = comm
+        self.kinds = {name: Traffic() for name in KINDS}
+        self.steps = 0
+        self.seconds = 0.0
+        self._began = 0.0
 
     def count(self, kind: str) -> Counted:
         """The communicator for messages of that kind."""

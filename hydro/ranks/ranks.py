@@ -43,7 +43,9 @@ from hydro.rows import TOTALS
 from regrid.errors import RunFailure
 
 STEP, COLLECT, COUNT, END = range(4)  # what the first rank tells the others to do
-AWAKE, NAP = 5e-3, 2e-4  # seconds that a rank waits wide awake, and that it sleeps then
+# seconds that a rank waits wide awake, and that it sleeps then
+AWAKE = 5e-3
+NAP = 2e-4
 KEPT = ("nodes", "state", "void_energy", "rates")  # what pictures, dumps and measurements read
 
 
@@ -65,8 +67,10 @@ class Ranks(Blocks):
     ):
         super().__init__(blocks)
         self.book = messages.Book(comm)
-        self.comm, self.places = self.book.count("rows"), list(places)
-        self.rank, self.size = int(comm.rank), int(comm.size)
+        self.comm = self.book.count("rows")
+        self.places = list(places)
+        self.rank = int(comm.rank)
+        self.size = int(comm.size)
         self.owners = [there[0] for there in places]
         self.own = [n for n, r in enumerate(self.owners) if r == self.rank]
         by_rank = [[n for n, r in enumerate(self.owners) if r == k] for k in range(self.size)]
@@ -107,13 +111,16 @@ class Ranks(Blocks):
             self[number].take_rows(first, last)
 
     def _make_messages(self) -> None:
-        blocks, new, now = self, [], []
+        blocks = self
+        new = []
+        now = []
         rings = [
             [(attrgetter("nodes_new"), messages.find_ring_of_nodes(block))] for block in blocks
         ]
         self._nodes = self._make("nodes", rings, NODE_ROW)
         for number, block in enumerate(blocks):
-            there, bounds = self.places[number], self.bounds[number]
+            there = self.places[number]
+            bounds = self.bounds[number]
             for rank, rows in zip(there, pairwise(bounds), strict=True):
                 at = messages.find_ring_of_cells(block, rows)
                 ring = messages.find_part_of_ring(block, messages.CELLS_DEEP, rows)
@@ -270,7 +277,8 @@ class Ranks(Blocks):
         """As `Blocks.collect`; within a step, or in a `glance`, nothing is done."""
         if self.busy or self._glancing or (self.rank == 0 and self.whole):
             return
-        self.busy, comm = True, self.book.count("whole blocks")
+        self.busy = True
+        comm = self.book.count("whole blocks")
         if self.rank == 0:
             tell(self.comm, COLLECT)
         for number in range(len(self)):
@@ -283,7 +291,8 @@ class Ranks(Blocks):
                         comm.Recv(plane, source=rank, tag=tag)
                     elif self.rank == rank:
                         comm.Send(plane, dest=0, tag=tag)
-        self.busy, self.whole = False, True
+        self.busy = False
+        self.whole = True
 
     def count(self) -> dict[str, Any]:
         """What all ranks have said and heard; see `hydro.ranks.messages.Book.gather`."""
@@ -296,7 +305,8 @@ class Ranks(Blocks):
 
     def _list_kept(self, number: int) -> list[tuple[int, int, str, tuple[int, int]]]:
         """Who has what of a block, as rank, tag, name of an array and its rows; nodes at home."""
-        block, found = self[number], []
+        block = self[number]
+        found = []
         for tag, name in enumerate(KEPT, len(KEPT) * number):
             if name == "nodes":
                 found.append((self.owners[number], tag, name, (0, block.ni + 1)))
@@ -313,7 +323,8 @@ class Ranks(Blocks):
         if first == 0 and last == block.ni:
             return
         if last > 0:
-            first, last = max(first - GHOST_ROWS, 0), min(last + GHOST_ROWS, block.ni)
+            first = max(first - GHOST_ROWS, 0)
+            last = min(last + GHOST_ROWS, block.ni)
         parted = block.start is not block.state
         rings = {
             "nodes": messages.find_ring_of_nodes(block),
@@ -350,7 +361,8 @@ def tell(comm: Any, word: int, code: int = 0) -> None:
 def hear(comm: Any) -> tuple[int, int]:
     """What the first rank tells: a word, and an exit code; who waits long lets others compute."""
     word = np.zeros(2, dtype=np.int64)
-    request, began = comm.Ibcast(word, root=0), time.monotonic()
+    request = comm.Ibcast(word, root=0)
+    began = time.monotonic()
     while not request.Test():
         time.sleep(NAP if time.monotonic() - began > AWAKE else 0.0)
     return int(word[0]), int(word[1])

@@ -54,7 +54,8 @@ def find_side_faces(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     nodes (2, ni+1, nj+1) [m].
     """
-    middles, owners = [], []
+    middles = []
+    owners = []
     for axis, end in SIDES.values():
         line = np.take(nodes, end, axis=1 + axis)
         middles.append(0.5 * (line[:, 1:] + line[:, :-1]))
@@ -149,7 +150,8 @@ def find_state(eos: EquationOfState, conserved: np.ndarray) -> tuple[np.ndarray,
     with np.errstate(all="ignore"):
         u, v = momentum_x / rho, momentum_y / rho
         e = total / rho - 0.5 * (u * u + v * v)
-        p, void_energy = eos.pressure(rho, e), np.zeros_like(rho)
+        p = eos.pressure(rho, e)
+        void_energy = np.zeros_like(rho)
         if eos.opens_voids:
             least = make_least_pressure(type(eos))(rho, eos.parameters) + np.zeros_like(rho)
             voided = p < least
@@ -212,10 +214,14 @@ def lessen_slopes(eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, c
 
 def _find_parts(eos: EquationOfState, cells: np.ndarray) -> np.ndarray:
     """The largest of PARTS (n,) with which all corners of the cells (rows, n) are states."""
-    factor, waiting = np.zeros(cells.shape[1]), np.arange(cells.shape[1])
+    factor = np.zeros(cells.shape[1])
+    waiting = np.arange(cells.shape[1])
     for part in PARTS:
-        means, slope_x, slope_y = cells[0:4], cells[4:8], cells[8:12]
-        (least_rho, least_p), (most_rho, most_p) = cells[12:14], cells[14:16]
+        means = cells[0:4]
+        slope_x = cells[4:8]
+        slope_y = cells[8:12]
+        least_rho, least_p = cells[12:14]
+        most_rho, most_p = cells[14:16]
         left_rho, left_c2 = cells[16:18]
         good = np.ones(waiting.size, dtype=bool)
         with np.errstate(all="ignore"):
@@ -229,7 +235,8 @@ def _find_parts(eos: EquationOfState, cells: np.ndarray) -> np.ndarray:
                 good &= (rho > left_rho) & (c2 > left_c2) & (rho >= least_rho) & (rho <= most_rho)
                 good &= (p >= least_p) & (p <= most_p)
         factor[waiting[good]] = part
-        waiting, cells = waiting[~good], cells[:, ~good]
+        waiting = waiting[~good]
+        cells = cells[:, ~good]
         if waiting.size == 0:
             break
     return factor

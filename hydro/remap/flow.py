@@ -50,13 +50,15 @@ def spread_anew(line: np.ndarray, law: np.ndarray, new_law: np.ndarray) -> np.nd
     arc = compute_arc_lengths(line)
     positions = PchipInterpolator(law, arc)(new_law) if line.shape[1] > 2 else new_law * arc[-1]
     nodes = np.array([np.interp(positions, arc, row) for row in line])
-    nodes[:, 0], nodes[:, -1] = line[:, 0], line[:, -1]
+    nodes[:, 0] = line[:, 0]
+    nodes[:, -1] = line[:, -1]
     return nodes
 
 
 def find_fractional_indices(line: np.ndarray, old_line: np.ndarray) -> np.ndarray:
     """Where the nodes (2, m) of a line lie among those (2, n) of an old one: 0 to n - 1."""
-    arc, old_arc = compute_arc_lengths(line), compute_arc_lengths(old_line)
+    arc = compute_arc_lengths(line)
+    old_arc = compute_arc_lengths(old_line)
     return np.interp(arc / arc[-1], old_arc / old_arc[-1], np.arange(float(old_arc.size)))
 
 
@@ -113,7 +115,8 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
             one.void_energy, other.nodes,
         )  # fmt: skip
         state[f"{one.name}/nodes"] = other.nodes.copy()
-        state[f"{one.name}/state"], state[f"{one.name}/void_energy"] = found, void_energy
+        state[f"{one.name}/state"] = found
+        state[f"{one.name}/void_energy"] = void_energy
         report.append(RemappedBlock(one.name, (one.ni, one.nj), (other.ni, other.nj), slivers))
     new.set_state(
         state
@@ -177,7 +180,8 @@ def _lay_line(before: Line, line: Line, t: float) -> None:
     target = line.segment.line(line.segment.block.nodes_new)
     if line.segment.motion is NodeMotion.SLIDE:
         if line.track.straight:
-            first, last = target[:, :1].copy(), target[:, -1:].copy()
+            first = target[:, :1].copy()
+            last = target[:, -1:].copy()
             target[:, 1:-1] = (first + (last - first) * law)[:, 1:-1]
         else:
             target[:, 1:-1] = line.track.spread(target[:, 0], target[:, -1], law)[:, 1:-1]
@@ -288,7 +292,8 @@ class Refinement:
             return None
         lines = [line for line in lines if line.segment.kind == "interface"]
         count = lines[0].segment.block.nj
-        split, kept = np.zeros(count), np.zeros(count - 1)
+        split = np.zeros(count)
+        kept = np.zeros(count - 1)
         for line in lines:
             edges, turns = measure_line(line)
             first = line.segment.line(self.first[line.segment.block.name])
@@ -329,7 +334,8 @@ class Refinement:
         parents = places[:-1].astype(int)
         for number, (one, other) in enumerate(zip(blocks, motion.blocks, strict=True)):
             cells = np.array(np.meshgrid(np.arange(one.ni), parents, indexing="ij"))
-            first, sides = sample_lines(one.nodes, places), other.nodes_new
+            first = sample_lines(one.nodes, places)
+            sides = other.nodes_new
             nodes = settle_grid(motion, number, one, cells, first, sides, PASSES).copy()
             held = one.nodes, one.state[:, 1:-1, 1:-1], one.void_energy
             state, void_energy, _ = remap_state(
@@ -355,7 +361,8 @@ def measure_line(line: Line) -> tuple[np.ndarray, np.ndarray]:
         if line.period is not None:
             images.append(nodes[:, -2] - line.period if end == 0 else nodes[:, 1] + line.period)
             continue
-        away, normal = nodes[:, inside] - nodes[:, here], np.asarray(line.walls[end], dtype=float)
+        away = nodes[:, inside] - nodes[:, here]
+        normal = np.asarray(line.walls[end], dtype=float)
         image = away - 2.0 * normal * (normal @ away) if normal.any() else -away
         images.append(nodes[:, here] + image)
     longer = np.concatenate([images[0][:, None], nodes, images[1][:, None]], axis=1)

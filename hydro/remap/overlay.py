@@ -35,7 +35,8 @@ def cut_polygon(x, y, n, out_x, out_y, line):
     line: a point on it and its direction.
     """
     from_x, from_y, way_x, way_y = line
-    count, outside = 0, False
+    count = 0
+    outside = False
     before_x, before_y = x[n - 1], y[n - 1]
     before = way_x * (before_y - from_y) - way_y * (before_x - from_x)
     for k in range(n):
@@ -51,7 +52,9 @@ def cut_polygon(x, y, n, out_x, out_y, line):
             count += 1
         else:
             outside = True
-        before_x, before_y, before = here_x, here_y, here
+        before_x = here_x
+        before_y = here_y
+        before = here
     return count, outside
 
 
@@ -61,7 +64,9 @@ def measure_polygon(x, y, n, curved, about_x, about_y):
 
     The sums run over triangles with the polygon's first corner: theory F12.2.
     """
-    volume, moment_x, moment_y = 0.0, 0.0, 0.0
+    volume = 0.0
+    moment_x = 0.0
+    moment_y = 0.0
     first_x, first_y = x[0], y[0]
     for k in range(1, n - 1):
         ax, ay = x[k] - first_x, y[k] - first_y
@@ -71,7 +76,8 @@ def measure_polygon(x, y, n, curved, about_x, about_y):
             third = area * (first_y + (ay + by) / 3.0)  # the mean radius
             volume += third
             radii = 3.0 * first_y + ay + by
-            a_y, b_y = first_y + ay, first_y + by
+            a_y = first_y + ay
+            b_y = first_y + by
             twelfth = area / 12.0
             moment_x += twelfth * ((ax + bx) * radii + ax * a_y + bx * b_y)
             moment_y += twelfth * ((ay + by) * radii + ay * a_y + by * b_y)
@@ -112,7 +118,8 @@ def compute_cell_moments(nodes: np.ndarray, curved: bool) -> tuple[np.ndarray, n
     nodes (2, ni+1, nj+1) [m]; curved: y is the distance from an axis.
     """
     ni, nj = (size - 1 for size in nodes.shape[1:])
-    volumes, centres = np.empty((ni, nj)), np.empty((2, ni, nj))
+    volumes = np.empty((ni, nj))
+    centres = np.empty((2, ni, nj))
     fill_cell_moments(np.ascontiguousarray(nodes, dtype=np.float64), curved, volumes, centres)
     return volumes, centres
 
@@ -155,9 +162,12 @@ def fill_linear_fields(means, nodes, centres, least, greatest, fields):
     for i in range(ni):
         for j in range(nj):
             x, y = centres[0, i, j], centres[1, i, j]
-            xx, xy, yy = 0.0, 0.0, 0.0
+            xx = 0.0
+            xy = 0.0
+            yy = 0.0
             for q in range(count):
-                fields[i, j, q, SLOPE_X], fields[i, j, q, SLOPE_Y] = 0.0, 0.0
+                fields[i, j, q, SLOPE_X] = 0.0
+                fields[i, j, q, SLOPE_Y] = 0.0
             for k in range(max(i - 1, 0), min(i + 2, ni)):
                 for m in range(max(j - 1, 0), min(j + 2, nj)):
                     if k == i and m == j:
@@ -180,7 +190,8 @@ def fill_linear_fields(means, nodes, centres, least, greatest, fields):
                 limit = 1.0
                 for a in range(2):
                     for b in range(2):
-                        k, m = i + a, j + b
+                        k = i + a
+                        m = j + b
                         change = slope_x * (nodes[0, k, m] - x) + slope_y * (nodes[1, k, m] - y)
                         if change > 0.0:
                             limit = min(limit, (greatest[q, k, m] - mean) / change)
@@ -200,7 +211,8 @@ def make_linear_fields(means: np.ndarray, nodes: np.ndarray, centres: np.ndarray
     count, ni, nj = means.shape
     wide = continue_beyond_sides(means)
     around = wide[:, :-1, :-1], wide[:, 1:, :-1], wide[:, 1:, 1:], wide[:, :-1, 1:]
-    least, greatest = np.minimum.reduce(around), np.maximum.reduce(around)
+    least = np.minimum.reduce(around)
+    greatest = np.maximum.reduce(around)
     fields = np.empty((ni, nj, count, 3))
     fill_linear_fields(means, np.ascontiguousarray(nodes), centres, least, greatest, fields)
     return fields
@@ -218,7 +230,8 @@ def cut_by_cell(work, nodes, i, j, x, y):
     """
     n = 4
     for k in range(4):
-        work[0, k], work[1, k] = x[k], y[k]
+        work[0, k] = x[k]
+        work[1, k] = y[k]
     ax, ay = nodes[0, i, j], nodes[1, i, j]
     bx, by = nodes[0, i + 1, j], nodes[1, i + 1, j]
     cx, cy = nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1]
@@ -323,12 +336,16 @@ def queue_missed(nodes, x, y, every, mark, marks, queue):
         for j in range(0, nj, step):
             if marks[i, j] == mark:
                 continue
-            ax, bx = nodes[0, i, j], nodes[0, i + 1, j]
-            cx, dx = nodes[0, i + 1, j + 1], nodes[0, i, j + 1]
+            ax = nodes[0, i, j]
+            bx = nodes[0, i + 1, j]
+            cx = nodes[0, i + 1, j + 1]
+            dx = nodes[0, i, j + 1]
             if min(ax, bx, cx, dx) > high_x or max(ax, bx, cx, dx) < low_x:
                 continue
-            ay, by = nodes[1, i, j], nodes[1, i + 1, j]
-            cy, dy = nodes[1, i + 1, j + 1], nodes[1, i, j + 1]
+            ay = nodes[1, i, j]
+            by = nodes[1, i + 1, j]
+            cy = nodes[1, i + 1, j + 1]
+            dy = nodes[1, i, j + 1]
             if min(ay, by, cy, dy) > high_y or max(ay, by, cy, dy) < low_y:
                 continue
             marks[i, j] = mark
@@ -352,20 +369,28 @@ def fill_overlaps(old, new, curved, least_gap, scratch, out):
     taken, covered, used = out
     ni, nj = centres.shape[1], centres.shape[2]
     most = 4 * (ni + nj)
-    x, y, here = np.empty(4), np.empty(4), np.empty(2)
-    marks[:, :], taken[:, :, :], covered[:, :, :], used[:, :, :] = -1, 0.0, 0.0, 0.0
+    x = np.empty(4)
+    y = np.empty(4)
+    here = np.empty(2)
+    marks[:, :] = -1
+    taken[:, :, :] = 0.0
+    covered[:, :, :] = 0.0
+    used[:, :, :] = 0.0
     row_i, row_j = 0, 0
     for i in range(taken.shape[0]):
         at_i, at_j = row_i, row_j
         for j in range(taken.shape[1]):
             mark = i * taken.shape[1] + j
             read_cell(new_nodes, i, j, x, y)
-            here[0], here[1] = new_centres[0, i, j], new_centres[1, i, j]
+            here[0] = new_centres[0, i, j]
+            here[1] = new_centres[1, i, j]
             at_i, at_j = find_cell(nodes, at_i, at_j, here[0], here[1], most)
             if j == 0:
                 row_i, row_j = at_i, at_j
-            queue[0], marks[at_i, at_j] = at_i * nj + at_j, mark
-            cell, own = (x, y, here), (taken[i, j], covered[i, j], used)
+            queue[0] = at_i * nj + at_j
+            marks[at_i, at_j] = mark
+            cell = (x, y, here)
+            own = (taken[i, j], covered[i, j], used)
             take_overlaps(1, cell, old, curved, mark, scratch, own)
             if covered[i, j, 0] < (1.0 - least_gap) * new_volumes[i, j]:
                 every = covered[i, j, 0] == 0.0
@@ -405,10 +430,13 @@ def lay_over(
     ni, nj, count, _ = fields.shape
     new_nodes = np.ascontiguousarray(new_nodes, dtype=np.float64)
     volumes, new_centres = compute_cell_moments(new_nodes, curved)
-    taken, covered = np.empty((*volumes.shape, count)), np.empty((*volumes.shape, 3))
+    taken = np.empty((*volumes.shape, count))
+    covered = np.empty((*volumes.shape, 3))
     used = np.empty((ni, nj, 3))
     old = np.ascontiguousarray(nodes, dtype=np.float64), centres, fields
-    marks, queue = np.empty((ni, nj), dtype=np.int64), np.empty(ni * nj, dtype=np.int64)
-    scratch, out = (marks, queue, np.empty((4, MOST_CORNERS))), (taken, covered, used)
+    marks = np.empty((ni, nj), dtype=np.int64)
+    queue = np.empty(ni * nj, dtype=np.int64)
+    scratch = (marks, queue, np.empty((4, MOST_CORNERS)))
+    out = (taken, covered, used)
     fill_overlaps(old, (new_nodes, volumes, new_centres), curved, LEAST_GAP, scratch, out)
     return Overlay(taken, covered, used, volumes, new_centres)

@@ -120,7 +120,8 @@ class Chain:
 
     def ends(self) -> list[tuple[Sliding, int]]:
         """Segment and perimeter face at the chain's first and last node."""
-        first, last = self.segments[0], self.segments[-1]
+        first = self.segments[0]
+        last = self.segments[-1]
         return [
             (first, first.last - 1 if self.reversed[0] else first.first),
             (last, last.first if self.reversed[-1] else last.last - 1),
@@ -196,8 +197,10 @@ class SlidingContact:
                 "materials; lines on which materials meet are the leader's"
             )
         for segment in follower:
-            segment.motion, segment.has_own_line = NodeMotion.FOLLOW, False
-        line, other = self.leader.line(), self.follower.line()
+            segment.motion = NodeMotion.FOLLOW
+            segment.has_own_line = False
+        line = self.leader.line()
+        other = self.follower.line()
         crossing = _find_crossing(line)
         if crossing is not None:
             raise BadInput(
@@ -286,7 +289,8 @@ class SlidingContact:
 
     def measure_new_polygons(self) -> None:
         """With the sides' new nodes known: positions and polygon areas of the new grid."""
-        line, other = self.leader.line(new=True), self.follower.line(new=True)
+        line = self.leader.line(new=True)
+        other = self.follower.line(new=True)
         fill_positions(line, other, self.positions_new)
         self.fill_excess_volume(
             line, other, self.positions_new, self.leader.orientation, self.excess_volume_new
@@ -311,7 +315,8 @@ class SlidingContact:
         """States of the pieces, averaged to the faces; writes the contact states of both sides."""
         self._solve_pieces(mine, other)
         for side, chain, states in ((0, self.leader, mine), (1, self.follower, other)):
-            averages, surface = self.averages[side], self.surfaces[side]
+            averages = self.averages[side]
+            surface = self.surfaces[side]
             averages[:] = 0.0
             average_pieces(self.states, self.faces, self.owners, side, self.count, averages)
             fill_surface(states, averages, 1.0 - 2.0 * side, chain.gather(on.NORMAL), surface)
@@ -326,9 +331,12 @@ class SlidingContact:
     def fill_flux(self, dt: float) -> None:
         """Fluxes of both sides' faces from the mid-time traces."""
         leader, follower = self.leader, self.follower
-        (old, follower_old), (flux, follower_flux) = self.lines, self.fluxes
-        new, follower_new = leader.line(new=True), follower.line(new=True)
-        middle, moved = 0.5 * (old + new), new - old
+        old, follower_old = self.lines
+        flux, follower_flux = self.fluxes
+        new = leader.line(new=True)
+        follower_new = follower.line(new=True)
+        middle = 0.5 * (old + new)
+        moved = new - old
         follower_middle = 0.5 * (follower_old + follower_new)
         fill_positions(middle, follower_middle, self.positions)
         orientation = leader.orientation
@@ -347,7 +355,8 @@ class SlidingContact:
                 old, new, self.parts, orientation, 1.0 / dt, self.owners, self.count, self.areas
             )
         self._keep_middles(middle, follower_middle)
-        mine, other = leader.gather(on.TRACE), follower.gather(on.TRACE)
+        mine = leader.gather(on.TRACE)
+        other = follower.gather(on.TRACE)
         self._solve_pieces(mine, other)
         self.fill_piece_flux(
             self.states[PIECE_P], self.areas, self.faces[AREAS], self.owners, self.count, flux,

@@ -26,7 +26,8 @@ DEEP = 1e-6  # part of rho c² below which a negative contact pressure is roundi
 LEADER, FOLLOWER = range(2)
 
 # states of a side's cells or traces, gathered from rims: rho, u, v, p as in `hydro.rows`, then
-STATE_C, STATE_E = 4, 5
+STATE_C = 4
+STATE_E = 5
 
 # faces of pieces: normal times length, swept area per time, middle, unit normal
 AREA_X, AREA_Y, SWEPT_RATE, FACE_X, FACE_Y, NORMAL_X, NORMAL_Y = range(7)
@@ -79,11 +80,13 @@ def fill_positions(leader, points, positions):
     start = 0
     last = 0.0
     for k in range(points.shape[1]):
-        best, position = 1e300, last
+        best = 1e300
+        position = last
         for a in range(start, leader.shape[1] - 1):
             part, away = project(leader, a, points[0, k], points[1, k])
             if away < best:
-                best, position = away, a + part
+                best = away
+                position = a + part
             elif best < NEAR * measure_square(leader, a):
                 break
         nearest = float(int(position + 0.5))
@@ -113,7 +116,9 @@ def find_last_crossing(line, other):
     for k in range(line.shape[1] - 2, -1, -1):
         x, y = line[0, k], line[1, k]
         dx, dy = line[0, k + 1] - x, line[1, k + 1] - y
-        found, found_part, most = -1, 0.0, -1.0
+        found = -1
+        found_part = 0.0
+        most = -1.0
         for a in range(other.shape[1] - 1):
             ex = other[0, a + 1] - other[0, a]
             ey = other[1, a + 1] - other[1, a]
@@ -124,7 +129,9 @@ def find_last_crossing(line, other):
             along = (away_x * ey - away_y * ex) / cross
             part = (away_x * dy - away_y * dx) / cross
             if 0.0 <= along <= 1.0 and 0.0 <= part <= 1.0 and along > most:
-                found, found_part, most = a, part, along
+                found = a
+                found_part = part
+                most = along
         if found >= 0:
             return k, most, found, found_part
     return -1, 0.0, -1, 0.0
@@ -168,7 +175,9 @@ def fill_pieces(line, moved, positions, orientation, inverse_dt, owners, faces, 
     last = line.shape[1] - 1
     ring = line[0, 0] == line[0, last] and line[1, 0] == line[1, last]
     followers = positions.shape[0]
-    a, k, count = 0, 0, 0
+    a = 0
+    k = 0
+    count = 0
     here = 0.0
     while k < followers and positions[k] <= 0.0:
         k += 1
@@ -225,7 +234,8 @@ def fill_radius_weighted_pieces(
         x, y = line[0, a], line[1, a]
         x_new, y_new = line_new[0, a], line_new[1, a]
         dx, dy = line[0, a + 1] - x, line[1, a + 1] - y
-        dx_new, dy_new = line_new[0, a + 1] - x_new, line_new[1, a + 1] - y_new
+        dx_new = line_new[0, a + 1] - x_new
+        dy_new = line_new[1, a + 1] - y_new
         area_x, area_y, sweep, _, _ = compute_radius_weighted_face(
             (x + first * dx, y + first * dy),
             (x + second * dx, y + second * dy),
@@ -266,7 +276,8 @@ def average_pieces(values, faces, owners, side, count, averages):
 @compiled_once
 def compute_share(before, after):
     """Weights of two differences in van Leer's mean, from their squares."""
-    before, after = before**0.5, after**0.5
+    before = before**0.5
+    after = after**0.5
     total = before + after
     return (after / total, before / total) if total > 0.0 else (0.0, 0.0)
 
@@ -288,19 +299,14 @@ def fill_slopes(states, middles, slopes):
         slopes[ALONG_Y, k] = dy / length
         before = (middles[0, k] - middles[0, k - 1]) ** 2 + (middles[1, k] - middles[1, k - 1]) ** 2
         after = (middles[0, k + 1] - middles[0, k]) ** 2 + (middles[1, k + 1] - middles[1, k]) ** 2
-        before, after = 1.0 / before**0.5, 1.0 / after**0.5
-        u, u_next = (
-            (states[U, k] - states[U, k - 1]) * before,
-            (states[U, k + 1] - states[U, k]) * after,
-        )
-        v, v_next = (
-            (states[V, k] - states[V, k - 1]) * before,
-            (states[V, k + 1] - states[V, k]) * after,
-        )
-        p, p_next = (
-            (states[P, k] - states[P, k - 1]) * before,
-            (states[P, k + 1] - states[P, k]) * after,
-        )
+        before = 1.0 / before**0.5
+        after = 1.0 / after**0.5
+        u = (states[U, k] - states[U, k - 1]) * before
+        u_next = (states[U, k + 1] - states[U, k]) * after
+        v = (states[V, k] - states[V, k - 1]) * before
+        v_next = (states[V, k + 1] - states[V, k]) * after
+        p = (states[P, k] - states[P, k - 1]) * before
+        p_next = (states[P, k + 1] - states[P, k]) * after
         if u * u_next + v * v_next > 0.0:
             one, two = compute_share(u * u + v * v, u_next * u_next + v_next * v_next)
             slopes[U_SLOPE, k] = one * u + two * u_next
@@ -335,14 +341,22 @@ def solve_pieces(one_side, other_side, owners, faces, count, out):
     other, other_laws, other_middles, other_slopes = other_side
     pulled = 0
     for k in range(count):
-        a, b = owners[LEADER, k], owners[FOLLOWER, k]
-        x, y, nx, ny = faces[FACE_X, k], faces[FACE_Y, k], faces[NORMAL_X, k], faces[NORMAL_Y, k]
-        rho, c = mine[RHO, a], mine[STATE_C, a]
+        a = owners[LEADER, k]
+        b = owners[FOLLOWER, k]
+        x = faces[FACE_X, k]
+        y = faces[FACE_Y, k]
+        nx = faces[NORMAL_X, k]
+        ny = faces[NORMAL_Y, k]
+        rho = mine[RHO, a]
+        c = mine[STATE_C, a]
         u, v, p = compute_at(mine, middles, slopes, a, x, y)
         w = u * nx + v * ny
         w_other = 0.0
         law = laws[0, a], laws[1, a], laws[2, a]
-        pressure, speed, other_speed, slip = -1.0, 0.0, 0.0, 0.0
+        pressure = -1.0
+        speed = 0.0
+        other_speed = 0.0
+        slip = 0.0
         if b >= 0:
             u_other, v_other, p_other = compute_at(other, other_middles, other_slopes, b, x, y)
             w_other = u_other * nx + v_other * ny

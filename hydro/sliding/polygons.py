@@ -39,7 +39,9 @@ def make_fill_excess_volume(geometry: Geometry = PLANE):
         for k in range(excess_volume.shape[0]):
             x0, y0 = follower[0, k], follower[1, k]
             end_x, end_y = follower[0, k + 1] - x0, follower[1, k + 1] - y0
-            x, y, twice = 0.0, 0.0, 0.0
+            x = 0.0
+            y = 0.0
+            twice = 0.0
             a = int(positions[k]) + 1
             while a < positions[k + 1]:
                 next_x, next_y = leader[0, a] - x0, leader[1, a] - y0
@@ -68,7 +70,8 @@ def make_fill_piece_flux(geometry: Geometry = PLANE):
         leader_flux[:] = 0.0
         follower_flux[:] = 0.0
         for k in range(count):
-            one, two = owners[LEADER, k], owners[FOLLOWER, k]
+            one = owners[LEADER, k]
+            two = owners[FOLLOWER, k]
             p = pressure[k]
             momentum_y, push, hoop = split(
                 p * areas[AREA_Y, k], p, areas[AREA_Y, k], plane_areas[AREA_Y, k]
@@ -158,7 +161,9 @@ def make_find_crushed(geometry: Geometry = PLANE):
         something from; without any: 1.0, -1, -1.  At most 0 for a cell without volume.
         """
         ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-        least, at_i, at_j = 1.0, -1, -1
+        least = 1.0
+        at_i = -1
+        at_j = -1
         for face in range(excess.shape[0]):
             if excess_new[face] < 0.0:
                 _, i, j = find_cell(face, ni, nj)
@@ -168,7 +173,9 @@ def make_find_crushed(geometry: Geometry = PLANE):
                 volume_new = measure_volume(nodes_new, i, j, weigh) + beyond
                 part = volume_new / volume if volume > 0.0 else min(volume_new, 0.0)
                 if part < least:
-                    least, at_i, at_j = part, i, j
+                    least = part
+                    at_i = i
+                    at_j = j
         return least, at_i, at_j
 
     return find_crushed

@@ -60,10 +60,14 @@ class Ripple:
     """The ripple of a deck of `conical-target`; `materials`, `impact` as its problem has them."""
 
     def __init__(self, deck, materials: dict, impact: tuple[float, float, float]):
-        self.deck, self.materials, self.impact = deck, materials, impact
+        self.deck = deck
+        self.materials = materials
+        self.impact = impact
         self.frame = SideFrame(deck)
-        self.amplitude, self.wavelength = deck.ripple_amplitude, deck.ripple_wavelength
-        self.wavenumber, length = 2.0 * math.pi / self.wavelength, self.frame.length
+        self.amplitude = deck.ripple_amplitude
+        self.wavelength = deck.ripple_wavelength
+        self.wavenumber = 2.0 * math.pi / self.wavelength
+        length = self.frame.length
         self.cells_a_wave = deck.cells * deck.cone / deck.radius * self.wavelength / length
         words = f"the cone's side, {length:.4g} m long, must have room for three waves"
         deck.refuse(self and 3.0 * self.wavelength > length, "ripple_wavelength", words)
@@ -92,7 +96,8 @@ class Ripple:
     @cached_property
     def first_shock(self) -> tuple[float, float]:
         """When the plane shock reaches the cone's base [s], and its speed in it [m/s]."""
-        shell, filling = self.materials["shell"], self.materials["filling"]
+        shell = self.materials["shell"]
+        filling = self.materials["filling"]
         p, u, arrival = self.impact
         in_shell = shock_to_pressure(shell.eos, shell.rho0, 0.0, p)
         base = solve_riemann(shell.eos, (in_shell.rho, u, p), filling.eos, (filling.rho0, 0.0, 0.0))
@@ -104,7 +109,8 @@ class Ripple:
 
         None where there is none: the shock does not lead in the cone.
         """
-        filling, target = self.materials["filling"], self.materials["target"]
+        filling = self.materials["filling"]
+        target = self.materials["target"]
         speed = self.first_shock[1] / self.frame.along[0] if speed is None else speed
         try:
             return cross_line(Body(filling.eos, filling.rho0), Body(target.eos, target.rho0), speed)
@@ -179,15 +185,19 @@ class Layout:
     """Sizes, nodes and contacts of the blocks."""
 
     def __init__(self, deck, ripple: Ripple | None = None):
-        self.deck, self.ripple = deck, ripple
+        self.deck = deck
+        self.ripple = ripple
         self.open = deck.cover < deck.radius
         count = self.count_cells  # from the axis to the cone, to the front's rim, to the side
-        self.within, self.shell = count(deck.base), count(deck.side)
+        self.within = count(deck.base)
+        self.shell = count(deck.side)
         self.ring = count(deck.radius - deck.cover) if self.open else 0
         self.covered = max(THINNEST, deck.cells - self.within - self.ring)
         self.inside = self.within + self.covered + self.ring
-        self.impactor, self.front = count(deck.thickness), count(deck.front)
-        self.along, self.behind = count(deck.cone), count(deck.length - deck.cone)
+        self.impactor = count(deck.thickness)
+        self.front = count(deck.front)
+        self.along = count(deck.cone)
+        self.behind = count(deck.length - deck.cone)
 
     def count_cells(self, length: float) -> int:
         """Cells along a part of that length [m], square ones where it is not very short."""
@@ -195,7 +205,8 @@ class Layout:
 
     def estimate_cells(self) -> int:
         """Cells of all blocks, by arithmetic alone."""
-        wide, deep = self.inside + self.shell, self.along + self.behind
+        wide = self.inside + self.shell
+        deep = self.along + self.behind
         # the front as far as the shell's outside, or beside it the ring and the shell's side
         return (self.impactor + self.front + deep) * wide
 
@@ -236,9 +247,15 @@ class Layout:
 
     def connect(self, blocks: dict[str, Block]) -> list:
         """Links and contacts of all blocks, the walls, the axis and the free surface."""
-        impactor, front, side = blocks["impactor"], blocks["front"], blocks["side"]
-        cone, beside, behind = blocks["cone"], blocks["beside"], blocks["behind"]
-        contact, inner, covered = self.deck.contact, self.within, self.covered
+        impactor = blocks["impactor"]
+        front = blocks["front"]
+        side = blocks["side"]
+        cone = blocks["cone"]
+        beside = blocks["beside"]
+        behind = blocks["behind"]
+        contact = self.deck.contact
+        inner = self.within
+        covered = self.covered
         links = [join("seam", (beside, "i_max"), (behind, "i_min", inner, self.inside))]
         links += touch(contact.cone, [(beside, "j_min")], (cone, "j_max"))
         links += touch("joined", [(cone, "i_max")], (behind, "i_min", 0, inner))

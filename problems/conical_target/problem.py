@@ -133,7 +133,8 @@ class ConicalTarget(seen.Results, Problem):
 
         Raises BadInput past the speeds at which the materials' Hugoniots were measured.
         """
-        deck, (one, two) = self.deck, (self.materials[name] for name in ("impactor", "shell"))
+        deck = self.deck
+        one, two = (self.materials[name] for name in ("impactor", "shell"))
         with deck.blame("speed", "take a slower impactor"):
             hit = solve_riemann(one.eos, (one.rho0, deck.speed, 0.0), two.eos, (two.rho0, 0.0, 0.0))
         limits = [float(solid.eos.sound_speed(solid.rho0, 0.0)) for solid in (one, two)]
@@ -169,7 +170,8 @@ class ConicalTarget(seen.Results, Problem):
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Pressures, the part of the cone's mass in its second phase, the bend of its side."""
         blocks = {block.name: block for block in evolution.blocks}
-        front, cone = blocks["front"], blocks["cone"]
+        front = blocks["front"]
+        cone = blocks["cone"]
         measured = dict(zip(blocks, evolution.measured, strict=True))
         greatest, x, y, transformed = measured["cone"]
         row = {"pressure_impact": float(front.state[3, 2, 1]), "greatest_pressure": greatest}
@@ -189,7 +191,8 @@ class ConicalTarget(seen.Results, Problem):
         middle = departure[(part >= seen.MIDDLE[0]) & (part <= seen.MIDDLE[1])]
         row["line_amplitude"] = 0.5 * float(np.ptp(middle))
         row["line_length"] = float(np.hypot(*np.diff(line, axis=1)).sum())
-        threshold, speed = THRESHOLD * self.impact[0], AT_REST * self.deck.speed
+        threshold = THRESHOLD * self.impact[0]
+        speed = AT_REST * self.deck.speed
         for name, number in (("axis", 0), ("side", -1)):
             front = measure_front(cone, number, threshold, speed)
             row[f"shock_x_{name}"], row[f"shock_pressure_{name}"] = front
@@ -202,7 +205,8 @@ class ConicalTarget(seen.Results, Problem):
 
 def _find_material(deck: ConicalTargetDeck, name: str) -> Material:
     """The material of a part, with the deck's own numbers; raises BadInput."""
-    found, own = find_material(getattr(deck, name)), getattr(deck.eos, name)
+    found = find_material(getattr(deck, name))
+    own = getattr(deck.eos, name)
     if own:
         table = dataclasses.asdict(found.eos) | {"eos": found.eos.kind, "source": found.source}
         found = make_material(f"deck: eos.{name}", table | own, Path())

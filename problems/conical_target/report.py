@@ -22,7 +22,9 @@ from regrid.errors import BadInput
 from regrid.sides import trace_outline
 
 PARTS = ("impactor", "shell", "target", "filling")
-MM, GPA, US = 1e3, 1e-9, 1e6
+MM = 1e3
+GPA = 1e-9
+US = 1e6
 MEASURED_NUMBERS = 4  # that `measure_block` gives
 
 
@@ -56,7 +58,8 @@ GROWTH = 0.5  # of the time from the first bend to the end: the latest stage
 
 def get_shock_path(history, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times [s], places x [m] and pressures [Pa] of the shock on the cone's "axis" or "side"."""
-    x, p = history[f"shock_x_{name}"], history[f"shock_pressure_{name}"]
+    x = history[f"shock_x_{name}"]
+    p = history[f"shock_pressure_{name}"]
     known = np.isfinite(x)
     return history["t"][known], x[known], p[known]
 
@@ -66,7 +69,8 @@ def measure_passage(problem, history, name: str) -> list[tuple[float, float, flo
 
     Speed: slope of the straight line through the path within WIDTH of the station.
     """
-    deck, (t, x, p) = problem.deck, get_shock_path(history, name)
+    deck = problem.deck
+    t, x, p = get_shock_path(history, name)
     found = []
     for station in STATIONS:
         position = deck.front + station * deck.cone
@@ -98,7 +102,8 @@ def measure_growth(history) -> tuple[float, float, float]:
 
     It begins when the amplitude is a twentieth of its last; at first: to a quarter of it.
     """
-    t, amplitude = history["t"], history["line_amplitude"]
+    t = history["t"]
+    amplitude = history["line_amplitude"]
     top = float(np.nanmax(amplitude))
     if not top > 0.0 or t.size < 10:
         return (math.nan,) * 3
@@ -139,7 +144,9 @@ def measure_waves(problem, history) -> tuple[CrossedLine | None, list[WaveGrowth
 
     That shock's path along the side is the straight line of least squares through its places.
     """
-    t, frame, middles = history["t"], problem.ripple.frame, problem.ripple.waves
+    t = history["t"]
+    frame = problem.ripple.frame
+    middles = problem.ripple.waves
     position = (history["shock_x_side"] - problem.deck.front) / frame.along[0]
     known = np.isfinite(position) & (position > middles[0]) & (position < middles[-1] + 1e-3)
     if known.sum() < 4:
@@ -155,7 +162,8 @@ def measure_waves(problem, history) -> tuple[CrossedLine | None, list[WaveGrowth
 
 def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
     """The growth of every wave of the ripple beside theory, and what it rests on."""
-    ripple, rows = problem.ripple, []
+    ripple = problem.ripple
+    rows = []
     k, crossed, waves = ripple.wavenumber, *measure_waves(problem, history)
     notes = [
         f"ripple of {ripple.amplitude * MM:.3g} mm on waves of {ripple.wavelength * MM:.3g} mm on "
@@ -183,8 +191,10 @@ def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
     for number, wave in enumerate(waves):
         if not np.isfinite(wave.amplitude).any():
             continue
-        words, top = [], int(np.nanargmax(wave.amplitude))
-        rate, grown = wave.measure_rate(), wave.get_amplitude(AGES[1]) / wave.amplitude[0]
+        words = []
+        top = int(np.nanargmax(wave.amplitude))
+        rate = wave.measure_rate()
+        grown = wave.get_amplitude(AGES[1]) / wave.amplitude[0]
         if math.isfinite(rate):
             words = ["theory of small slopes", f"a/a0 = {grown:.3g} at {AGES[1] * US:.2g} us"]
         most = wave.amplitude[top]
@@ -227,7 +237,8 @@ class Results:
         """What was computed, beside theory where there is one."""
         if not history:
             return Report(rows=[Row("impact", theory=self.impact[0])])
-        deck, t = self.deck, history["t"]
+        deck = self.deck
+        t = history["t"]
         first, last = (part * self.impact[2] for part in PLATEAU)
         impact = reduce_between(np.mean, t, history["pressure_impact"], first, last)
         words = f"mean from {US * first:.2f} to {US * last:.2f} us; impedances match"
@@ -269,7 +280,8 @@ class Results:
         words = f"half of peak to peak at the end; at most {top * MM:.2g} mm at {when * US:.2f} us"
         label = "side: deviation from its own line [mm]"
         tell("line_amplitude", history["line_amplitude"][-1], label, 1e-3, words)
-        bend, length = history["line_bend"][-1], history["line_length"]
+        bend = history["line_bend"][-1]
+        length = history["line_length"]
         words = f"{length[-1] / length[0]:.3f} times its initial length"
         label = "side: deviation from its chord [mm]"
         tell("line_bend", bend, label, 1e-3, words)
@@ -289,17 +301,22 @@ class Results:
         grid = figure.add_gridspec(2, 2, height_ratios=(1.25, 1.0))
         shape = figure.add_subplot(grid[0, :])
         amplitude, growth = (figure.add_subplot(grid[1, column]) for column in (0, 1))
-        dumps, k = spread_dumps(run, SHOWN), self.ripple.wavenumber
+        dumps = spread_dumps(run, SHOWN)
+        k = self.ripple.wavenumber
         for shade, dump in zip(np.linspace(0.0, 0.9, len(dumps)), dumps, strict=True):
-            line, colour = MM * dump.block("cone").nodes[:, :, -1], colormaps["viridis"](shade)
+            line = MM * dump.block("cone").nodes[:, :, -1]
+            colour = colormaps["viridis"](shade)
             shape.plot(*line, lw=1.4, label=f"{US * dump.t:.2g} us", color=colour)
         shape.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
         shape.set_title("line between graphite and lead", fontsize="medium")
-        (crossed, waves), t = measure_waves(self, run.history), run.history["t"]
+        crossed, waves = measure_waves(self, run.history)
+        t = run.history["t"]
         top = max((np.nanmax(wave.amplitude) for wave in waves), default=math.nan)
         for number, wave in enumerate(waves):
-            style, grown = {"color": f"C{number}"}, wave.age > 0.0
-            label, first = f"wave {number + 1}", wave.amplitude[0]
+            style = {"color": f"C{number}"}
+            grown = wave.age > 0.0
+            label = f"wave {number + 1}"
+            first = wave.amplitude[0]
             amplitude.plot(US * t, MM * wave.amplitude, label=label, **style)
             growth.plot(US * wave.age[grown], wave.amplitude[grown] / first, label=label, **style)
             theory = first * crossed.compute_growth(k, wave.age) if crossed else np.zeros(0)
@@ -308,7 +325,8 @@ class Results:
         amplitude.axhline(MM / k, color="0.6", lw=0.7, label="k a = 1")
         if crossed is not None:
             age = np.linspace(0.0, max(wave.age[-1] for wave in waves), 200)
-            (impulse, shear), plus = crossed.compute_rates(k), crossed.compression
+            impulse, shear = crossed.compute_rates(k)
+            plus = crossed.compression
             for values, style, words in (
                 (crossed.compute_growth(k, age), "k--", "theory"),
                 (plus * (1.0 + impulse * age), "k-.", "impulse alone"),
@@ -325,8 +343,10 @@ class Results:
         figure.set_size_inches(12.0, 7.4)
         grid = figure.add_gridspec(2, 6, height_ratios=(1.0, 1.25))
         top = [figure.add_subplot(grid[0, 2 * n : 2 * n + 2]) for n in range(3)]
-        near, corner = figure.add_subplot(grid[1, :3]), figure.add_subplot(grid[1, 3:])
-        first, last = run.dumps[0], run.dumps[-1]
+        near = figure.add_subplot(grid[1, :3])
+        corner = figure.add_subplot(grid[1, 3:])
+        first = run.dumps[0]
+        last = run.dumps[-1]
         names = {block: getattr(self.deck, part).split("-")[0] for block, part in LABELS.items()}
         for axis, dump in zip(top, (first, last), strict=False):
             _draw_materials(axis, dump, names, grid=False)
@@ -338,7 +358,8 @@ class Results:
             axis.set_facecolor(FACES["shell"])  # what shows between chords and the line
             _draw_materials(axis, last, {}, grid=True)
         cone = MM * last.block("cone").nodes
-        (left, _), (right, high) = cone.min(axis=(1, 2)), cone.max(axis=(1, 2))
+        left, _ = cone.min(axis=(1, 2))
+        right, high = cone.max(axis=(1, 2))
         near.set(xlim=(left - 1.5, right + 1.5), ylim=(0.0, high + 1.5))
         near.set_title(f"the graphite at {last.t * US:.3g} us", fontsize="medium")
         x, y = cone[:, 0, -1]
@@ -349,7 +370,9 @@ class Results:
         """Part in the second phase over time; states beside the Hugoniot; where the phase is."""
         part, states, map_axes = make_panels(figure, 12.0, 4.2, 1, 3, width_ratios=(1.0, 1.0, 1.3))
         material = self.materials["filling"]
-        eos, t, share = material.eos, run.history["t"], run.history["transformed"]
+        eos = material.eos
+        t = run.history["t"]
+        share = run.history["transformed"]
         part.plot(US * t, 100.0 * share, color="k")
         part.set(xlim=(0.0, US * t[-1]), ylim=(0.0, None))
         part.set(xlabel="t [us]", ylabel="in the second phase [% of the cone's mass]")
@@ -357,7 +380,8 @@ class Results:
         shares = [float(np.interp(dump.t, t, share)) for dump in run.dumps]
         most = run.dumps[int(np.argmax(shares if max(shares) > 0.0 else tops))]
         for dump in spread_dumps(run, SHOWN)[1:]:
-            rho, p = dump["cone"].rho.ravel(), GPA * dump["cone"].p.ravel()
+            rho = dump["cone"].rho.ravel()
+            p = GPA * dump["cone"].p.ravel()
             states.plot(rho, p, ".", ms=1.5, zorder=2, label=f"{US * dump.t:.3g} us")
         shocks = [(material.rho0, 0.0)]
         with contextlib.suppress(BadInput):  # beyond its table
@@ -371,7 +395,8 @@ class Results:
             states.axvspan(*edges, color="0.9", zorder=0, label="both phases")
         states.set(xlabel="density [kg/m3]", ylabel="pressure [GPa]")
         states.legend(fontsize="x-small", markerscale=4.0, loc="upper left")
-        cone, style = most["cone"], {"cmap": "magma_r", "vmin": 0.0, "rasterized": True}
+        cone = most["cone"]
+        style = {"cmap": "magma_r", "vmin": 0.0, "rasterized": True}
         values = 100.0 * eos.compute_second_part(cone.rho)
         picture = map_axes.pcolormesh(*(MM * cone.nodes), values, **style)
         map_axes.plot(*(MM * trace_outline(cone.nodes)), "k", lw=0.8)
@@ -398,7 +423,8 @@ class Results:
         """The line between graphite and lead, and its departure from its own straight line."""
         shape, away = make_panels(figure, 9.5, 4.0, 1, 2)
         for dump in spread_dumps(run, SHOWN):
-            line, label = dump.block("cone").nodes[:, :, -1], f"{US * dump.t:.2g} us"
+            line = dump.block("cone").nodes[:, :, -1]
+            label = f"{US * dump.t:.2g} us"
             departure, part = measure_departure(line)
             shape.plot(*(MM * line), lw=1.0, label=label)
             away.plot(part, MM * departure, lw=1.0, label=label)

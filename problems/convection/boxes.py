@@ -46,7 +46,9 @@ class ConvectionBlock:
     name = "box"
 
     def __init__(self, equations: Equations, psi: np.ndarray, temperature: np.ndarray):
-        self.equations, self.psi, self.temperature = equations, psi, temperature
+        self.equations = equations
+        self.psi = psi
+        self.temperature = temperature
         self.nodes = make_plane_grid(*(axis.nodes for axis in equations.axes))
 
     @property
@@ -74,7 +76,8 @@ class _Box:
     """A box that marches: `solver` has its fluid, its `level` equations, psi and temperature."""
 
     def __init__(self, solver: SteadySolver | March, t_end: float):
-        self.solver, self.t_end = solver, t_end
+        self.solver = solver
+        self.t_end = t_end
 
     level = property(attrgetter("solver.level"))
     fluid = property(attrgetter("solver.fluid"))  # in a steady run that of the present stage
@@ -144,7 +147,8 @@ class TimeEvolution(_Box):
 
     def __init__(self, march: March, grid: GridControl, t_end: float, coldest: float):
         super().__init__(march, t_end)
-        self.grid, self.coldest = grid, coldest
+        self.grid = grid
+        self.coldest = coldest
 
     @property
     def finished(self) -> str | None:
@@ -156,9 +160,11 @@ class TimeEvolution(_Box):
 
     def advance(self) -> dict[str, float | int | str]:
         """One step in time; RunFailure where it fails."""
-        march, shift = self.solver, 0.0
+        march = self.solver
+        shift = 0.0
         remaining = self.t_end - march.t
-        dt, axes = march.choose_step(remaining), self._move_grid()
+        dt = march.choose_step(remaining)
+        axes = self._move_grid()
         if axes is not None:
             shift = max(
                 float(np.abs(new - axis.nodes).max()) * axis.cells / axis.length
@@ -234,7 +240,8 @@ class BoxProblem(Problem):
     @property
     def size(self) -> tuple[int, int]:
         """Cells across and up."""
-        cells, up = self.deck.cells, self.deck.cells_up
+        cells = self.deck.cells
+        up = self.deck.cells_up
         return cells, up or max(3, round(cells * self.extent[1] / self.extent[0]))
 
     def plan(self) -> tuple[float, list[BlockPlan]]:
@@ -259,7 +266,8 @@ class BoxProblem(Problem):
 
     def describe(self) -> str:
         """The fluid and the grid in words."""
-        deck, (across, up) = self.deck, self.size
+        deck = self.deck
+        across, up = self.size
         fluid = f"Ra = {deck.rayleigh:g}, Pr = {deck.prandtl:g}"
         return f"{fluid}, {across} x {up} cells, grid {deck.grid.kind}"
 
@@ -279,7 +287,8 @@ class BoxProblem(Problem):
         from matplotlib.ticker import MaxNLocator
 
         block, equations, heat = self.read_dump(run_data.dumps[-1])
-        psi, (x, y) = block.node_fields["psi"], block.nodes
+        psi = block.node_fields["psi"]
+        x, y = block.nodes
         nodal = compute_nodal_fields(equations, restrict_nodes(equations, psi), heat)[2]
         wide = np.ptp(x) > 1.6 * np.ptp(y)
         high = float(np.clip(3.7 * np.ptp(y) / np.ptp(x) + 0.9, 3.0, 9.0))
@@ -305,7 +314,8 @@ class BoxProblem(Problem):
         """Local Nusselt number along two walls in the last dump, and the reference's maximum."""
         _, equations, heat = self.read_dump(run_data.dumps[-1])
         state = equations, self.fluid, heat
-        axis, (hot, cold) = make_panels(figure, 7.0, 4.6), self.hot_and_cold
+        axis = make_panels(figure, 7.0, 4.6)
+        hot, cold = self.hot_and_cold
         for side, colour, sign, way in ((hot, "C3", 1.0, "in"), (cold, "C0", -1.0, "out")):
             positions, values = compute_local_nusselt(*state, side, self.scale)
             words = f"{SIDES[side]} wall, {way}"
@@ -314,7 +324,8 @@ class BoxProblem(Problem):
             peak, position = find_nusselt_maximum(*state, hot, self.scale)
             axis.plot(position, peak, "k+", ms=10, label=f"maximum {peak:.4g} at {position:.4f}")
             if (reference := self.find_reference()) is not None:
-                peak, position = reference.nusselt_max, reference.nusselt_max_y
+                peak = reference.nusselt_max
+                position = reference.nusselt_max_y
                 words = f"reference {peak:.4g} at {position:.4f}"
                 axis.plot(position, peak, "o", label=words, mfc="none", color="0.3", ms=9)
         axis.set(xlabel="y [m]" if hot == "i_min" else "x [m]", ylabel="local Nusselt number")

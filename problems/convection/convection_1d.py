@@ -69,10 +69,12 @@ class Convection1D(Problem):
         return columns.Column(viscosity=deck.prandtl, diffusivity=1.0, **forces)
 
     def build(self) -> columns.ColumnMarch:
-        deck, grid = self.deck, self.deck.grid
+        deck = self.deck
+        grid = self.deck.grid
         t_end = deck.run.t_end or LASTING * max(1.0, 1.0 / deck.prandtl)
         kind = t_end, grid.kind, grid.every
-        column, first = self.make_column(), grid.make(deck.cells)
+        column = self.make_column()
+        first = grid.make(deck.cells)
         return columns.ColumnMarch(column, first, *kind, **grid.options())
 
     def measure(self, evolution: columns.ColumnMarch) -> dict[str, float]:
@@ -83,7 +85,8 @@ class Convection1D(Problem):
 
     def report(self, history, final=None) -> Report:
         """Errors of the profiles at the end, and the heat through the slot."""
-        deck, change = self.deck, get_last(history, "change")
+        deck = self.deck
+        change = get_last(history, "change")
         rows = [
             compare(history, "error_T", label="largest error of T [K]", digits=3),
             compare(history, "error_v", label="largest error of v, of its largest", digits=3),
@@ -102,7 +105,8 @@ class Convection1D(Problem):
 
         A thin layer at a wall has a second row of panels to itself.
         """
-        deck, dump = self.deck, run_data.dumps[-1]
+        deck = self.deck
+        dump = run_data.dumps[-1]
         (block,) = dump.blocks
         x = block.nodes[0, :, 0]
         windows = [(0.0, 1.0)]
@@ -117,7 +121,8 @@ class Convection1D(Problem):
         labels = {"T": "temperature [K]", "v": "velocity along the plates [m/s]"}
         panels = figure.subplots(len(windows), 2, squeeze=False)
         for row, (low, high) in zip(panels, windows, strict=True):
-            shown, fine = (centres >= low) & (centres <= high), np.linspace(low, high, 501)
+            shown = (centres >= low) & (centres <= high)
+            fine = np.linspace(low, high, 501)
             nodes = x[(x >= low) & (x <= high)]
             for axes, exact, name in zip(row, self.exact.sample(fine), labels, strict=True):
                 found = block.cell_fields[name][shown, 0]

@@ -97,7 +97,8 @@ class HeatedCavity(BoxProblem):
         self.t_end = deck.run.t_end or float(STEADY_ITERATIONS if steady else TIME)
 
     def build(self):
-        deck, equations = self.deck, self.make_first_equations()
+        deck = self.deck
+        equations = self.make_first_equations()
         if deck.method == "steady":
             solver = SteadySolver(equations, self.fluid, deck.grid.control(), deck.tolerance)
             return SteadyEvolution(solver, self.t_end)
@@ -107,7 +108,8 @@ class HeatedCavity(BoxProblem):
 
     def measure(self, evolution) -> dict[str, float]:
         """Nusselt numbers and greatest speeds, with their places."""
-        equations, fluid = evolution.equations, evolution.fluid
+        equations = evolution.equations
+        fluid = evolution.fluid
         state = (equations, fluid, evolution.temperature)
         peak, position = measure.find_nusselt_maximum(*state, "i_min", self.scale)
         u, y = measure.find_greatest_speed(equations, evolution.psi, 0)
@@ -125,7 +127,9 @@ class HeatedCavity(BoxProblem):
 
     def find_reference(self) -> CavityState | None:
         """The reference of this deck; None where there is none for it."""
-        deck, (x, y), ends = self.deck, self.fluid.buoyancy, (self.deck.left, self.deck.right)
+        deck = self.deck
+        x, y = self.fluid.buoyancy
+        ends = (self.deck.left, self.deck.right)
         same = all((side.heat, side.flow) == ("isothermal", "no-slip") for side in ends)
         same &= math.isclose(ends[0].value - ends[1].value, 1.0)
         same &= deck.top == deck.bottom == Side()
@@ -135,7 +139,9 @@ class HeatedCavity(BoxProblem):
 
     def report(self, history, final=None) -> Report:
         """The quantities of the reference, with its values where there are any."""
-        deck, reference, head = self.deck, self.find_reference(), self.describe()
+        deck = self.deck
+        reference = self.find_reference()
+        head = self.describe()
         rows = [
             compare(history, name, getattr(reference, name, math.nan), words)
             for name, words in ROWS.items()
@@ -149,7 +155,8 @@ class HeatedCavity(BoxProblem):
             notes.append(f"heat out at the right over heat in at the left, less 1: {balance:.1e}")
         notes.append(self.say_lost_volume(history))
         if deck.method == "steady":
-            part, change = get_last(history, "buoyancy"), get_last(history, "change")
+            part = get_last(history, "buoyancy")
+            change = get_last(history, "change")
             if part < 1.0 or change > deck.tolerance:
                 head += (
                     f"\nNOT STEADY: these are iterates at Ra = {part * deck.rayleigh:.3g} that "

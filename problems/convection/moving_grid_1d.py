@@ -91,7 +91,8 @@ class MovingGrid1D(Problem):
 
     def report(self, history, final=None) -> Report:
         """The table of the four families at the end time."""
-        deck, steps = self.deck, max(1, len(history["t"]) - 1)
+        deck = self.deck
+        steps = max(1, len(history["t"]) - 1)
         if not history or history["t"][-1] < 0.999999 * self.t_end:
             words = "the families are compared at the end time, which is not reached"
             return Report(f"moving-grid-1d: {words}" if history else "")
@@ -101,7 +102,8 @@ class MovingGrid1D(Problem):
         )
         table = [["", "mean |u - exact|", "worst in time", "sum lost", "CPU ms/step"]]
         for family in FAMILIES:
-            errors, total = history[f"error_{family}"], history[f"total_u_{family}"]
+            errors = history[f"error_{family}"]
+            total = history[f"total_u_{family}"]
             through = history[f"boundary_u_{family}"]
             lost = abs(total[-1] - total[0] - (through[-1] - through[0]))
             lost /= max(abs(total[-1]), abs(total[0]))  # of u dx beyond what came in
@@ -115,7 +117,8 @@ class MovingGrid1D(Problem):
         dump = run_data.dumps[-1]
         figure.set_size_inches(10.0, 7.0)
         grid = figure.add_gridspec(2, 6)
-        profile, wrong = figure.add_subplot(grid[0, :3]), figure.add_subplot(grid[0, 3:])
+        profile = figure.add_subplot(grid[0, :3])
+        wrong = figure.add_subplot(grid[0, 3:])
         fine = np.linspace(0.0, 1.0, 4001)
         exact = self.exact.compute_values(fine, dump.t)
         middle = fine[np.abs(np.diff(exact)).argmax()]
@@ -123,7 +126,8 @@ class MovingGrid1D(Problem):
         shown = np.abs(fine - middle) < half
         profile.plot(fine[shown], exact[shown], color="0.5", lw=1.5, label="exact")
         for block in dump.blocks:
-            x, u = block.nodes[0, :, 0], block.cell_fields["u"][:, 0]
+            x = block.nodes[0, :, 0]
+            u = block.cell_fields["u"][:, 0]
             centres = 0.5 * (x[1:] + x[:-1])
             near = np.abs(centres - middle) < half
             style = {"color": COLOURS[block.name], "label": WORDS[block.name]}

@@ -73,7 +73,8 @@ class RayleighBenard(BoxProblem):
         self.critical = linear.FREE_LAYER_WAVENUMBER if free else linear.LAYER_WAVENUMBER
         usual = 1.0 if deck.shape == "box" else 2.0 * math.pi / self.critical
         self.width = deck.width or usual
-        self.extent, side = (self.width, 1.0), PERIODIC
+        self.extent = (self.width, 1.0)
+        side = PERIODIC
         self.onset = math.nan  # by linear theory, where it has one for this deck
         if deck.tilt == 0.0 and deck.shape == "layer":
             if math.isclose(self.width * self.critical, 2.0 * math.pi, rel_tol=1e-3):
@@ -87,7 +88,8 @@ class RayleighBenard(BoxProblem):
         self.walls = {"i_min": side, "i_max": side, "j_min": floor, "j_max": ceiling}
 
     def build(self):
-        equations, size = self.make_first_equations(), self.deck.amplitude
+        equations = self.make_first_equations()
+        size = self.deck.amplitude
         (psi, temperature), _, flow, heat = self.compute_growth(equations)
         return self.make_march(equations, psi + size * flow, temperature + size * heat, -0.5)
 
@@ -104,7 +106,8 @@ class RayleighBenard(BoxProblem):
 
     def find_onset(self) -> float | None:
         """Ra at which growth of the discrete equations begins; None where none is found."""
-        deck, equations = self.deck, self.make_first_equations()
+        deck = self.deck
+        equations = self.make_first_equations()
         about = self.onset if math.isfinite(self.onset) else max(deck.rayleigh, 1.0)
         fluid = make_fluid(1.0, deck.prandtl, deck.tilt)
         low, high = (part * about for part in ONSET_BRACKET)
@@ -126,7 +129,9 @@ class RayleighBenard(BoxProblem):
 
     def compute_report(self, history) -> Report:
         """Onset and growth rate beside linear theory, heat transported at the end."""
-        deck, rows, notes = self.deck, [], []
+        deck = self.deck
+        rows = []
+        notes = []
         if deck.onset and deck.tilt == 0.0:
             found = self.find_onset()
             if found is None:
@@ -134,7 +139,8 @@ class RayleighBenard(BoxProblem):
             else:
                 rows.append(Row("onset", found, self.onset, "onset, Ra"))
         if deck.tilt == 0.0:
-            rate, theory = self.compute_growth(self.make_first_equations())[1], math.nan
+            rate = self.compute_growth(self.make_first_equations())[1]
+            theory = math.nan
             if deck.shape == "layer":
                 numbers = deck.rayleigh, deck.prandtl, 2.0 * math.pi / self.width
                 theory = linear.compute_layer_growth(*numbers, deck.walls == "free")
@@ -153,7 +159,8 @@ class RayleighBenard(BoxProblem):
 
     def draw_growth(self, figure, run_data) -> None:
         """Kinetic energy and Nusselt number against time, with the growth of the eigenvalue."""
-        t, energy = run_data.history["t"], run_data.history["kinetic_energy"]
+        t = run_data.history["t"]
+        energy = run_data.history["kinetic_energy"]
         left, right = make_panels(figure, 10.0, 4.4, 1, 2)
         left.semilogy(t, energy, lw=1.4, label="kinetic energy")
         if self.deck.tilt == 0.0:
@@ -174,7 +181,8 @@ def measure_growth(t: np.ndarray, energy: np.ndarray) -> float:
     where too few steps are small.
     """
     known = np.isfinite(energy) & (energy > 0.0)
-    t, energy = t[known], energy[known]
+    t = t[known]
+    energy = energy[known]
     if energy.size < LEAST_ROWS:
         return math.nan
     decays = energy[-1] < energy[0]

@@ -72,7 +72,8 @@ class CrossedStart:
     """The state of an `InterfaceInstability` `since` [s] after the shock met the mean line."""
 
     def __init__(self, problem, since: float):
-        self.problem, self.since = problem, since
+        self.problem = problem
+        self.since = since
         self.base = problem.theory.base
         self.shock = problem.shock
         self.y = problem.make_heights()
@@ -116,14 +117,21 @@ class Side:
     """One block in distances outwards from the interface: sign -1 the first, 1 the second."""
 
     def __init__(self, start: CrossedStart, sign: float):
-        self.start, self.sign = start, sign
-        problem, base = start.problem, start.base
-        shock, deck = problem.shock, problem.deck
+        self.start = start
+        self.sign = sign
+        problem = start.problem
+        base = start.base
+        shock = problem.shock
+        deck = problem.deck
         if sign < 0.0:
-            self.eos, self.wave, rho = problem.eos_first, base.left_wave, base.rho_left
+            self.eos = problem.eos_first
+            self.wave = base.left_wave
+            rho = base.rho_left
             self.ahead = shock.rho, sign * shock.particle_speed, shock.p
         else:
-            self.eos, self.wave, rho = problem.eos_second, base.right_wave, base.rho_right
+            self.eos = problem.eos_second
+            self.wave = base.right_wave
+            rho = base.rho_right
             self.ahead = problem.rho_second, 0.0, deck.pressure
         self.behind = rho, sign * base.u, base.p
         self.end_speed = (self.behind if problem.has_open_ends else self.ahead)[1]
@@ -136,7 +144,9 @@ class Side:
 
     def _make_spacing(self, size: float) -> tuple[np.ndarray, list[int]]:
         """Distances (n,) of the mean nodes from the interface, and the fronts' numbers in them."""
-        edges, places, sizes = [0.0], [0], size
+        edges = [0.0]
+        places = [0]
+        sizes = size
         positions = [np.zeros(1)]
         for speed in self.speeds:
             width = speed * self.start.since - edges[-1]
@@ -170,7 +180,8 @@ class Side:
     @functools.cached_property
     def front(self) -> Front:
         """The shock on the mean nodes."""
-        speed, place = self.sign * self.wave.head, self.places[0]
+        speed = self.sign * self.wave.head
+        place = self.places[0]
         return Front(self.eos, self.behind, self.ahead, speed, self.away, place, self.end_speed)
 
     def get_layer(self, flow: PerturbedFlow) -> PerturbedLayer:
@@ -196,7 +207,8 @@ class Side:
         that it has the same place in the cells of all rows.  What the line moves with the interface
         until then is part of it (theory F15.6).  Lines beyond the reach are straight.
         """
-        start, theory = self.start, self.start.problem.theory
+        start = self.start
+        theory = self.start.problem.theory
         front = self.away[self.places[-1]]
         amplitudes = [flow.amplitude]
         for speed in self.speeds:
@@ -210,7 +222,8 @@ class Side:
         rate = (self.end_speed - self.behind[1]) / self.length  # of the cells' growth
         passage = (self.away - front) / (self.speeds[0] - self.away * rate)
         passage = np.maximum(passage, 0.0)
-        t, rest = start.since + passage, 1.0 - self.away / self.length
+        t = start.since + passage
+        rest = 1.0 - self.away / self.length
         shape = theory.get_front(0 if self.sign < 0.0 else 1, wave.wavenumber, t)
         if math.isnan(self.get_layer(flow).front):
             shape = np.full(t.size, amplitudes[1])

@@ -140,7 +140,8 @@ def _list_wave_faults(
     for name, mode in waves:
         if LEAST_CELLS * mode.number > deck.cells:
             share = deck.cells / mode.number
-            most, least = deck.cells // LEAST_CELLS, LEAST_CELLS * mode.number
+            most = deck.cells // LEAST_CELLS
+            least = LEAST_CELLS * mode.number
             yield (
                 f"{name}.number is {mode.number}: waves of {share:.3g} cells (fewer than "
                 f"{LEAST_CELLS}) hardly grow: take a number up to {most}, or cells = {least}"

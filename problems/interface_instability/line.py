@@ -80,7 +80,9 @@ def measure_mode(line, wavenumber, number, phase):
     halves of the mode's wavelength.  Where the line has rolled over, x counts backwards there.
     """
     x, y = line
-    mean, part, whole = 0.0, 0.0, 0.0
+    mean = 0.0
+    part = 0.0
+    whole = 0.0
     for node in range(x.shape[0]):
         mean += x[node] * weigh_node(y, node)
     mean /= y[-1] - y[0]
@@ -102,13 +104,19 @@ def measure_shape(line, wavenumber, left_out, even):
     `even` line (between walls) cosines alone, else harmonics of any phase.
     """
     x, y = line
-    count, width = x.shape[0], y[-1] - y[0]
+    count = x.shape[0]
+    width = y[-1] - y[0]
     highest = math.ceil((count - 1) * math.pi / (wavenumber * width) - NOTHING)
-    cosines, sines = np.zeros(max(highest, ROUGH)), np.zeros(max(highest, ROUGH))
-    mean, most, least, turn = 0.0, x[0], x[0], 0.0
+    cosines = np.zeros(max(highest, ROUGH))
+    sines = np.zeros(max(highest, ROUGH))
+    mean = 0.0
+    most = x[0]
+    least = x[0]
+    turn = 0.0
     for node in range(count):
         mean += x[node] * weigh_node(y, node) / width
-        most, least = max(most, x[node]), min(least, x[node])
+        most = max(most, x[node])
+        least = min(least, x[node])
     for node in range(count):
         away = (x[node] - mean) * weigh_node(y, node) / width
         # the waves of all numbers by turning, from one to the next
@@ -155,7 +163,8 @@ def draw_modes(deck, even: bool) -> list[Mode]:
 
     Raises BadInput for a range that is none, and for waves that the line's nodes cannot show.
     """
-    spectrum, cells = deck.spectrum, deck.cells
+    spectrum = deck.spectrum
+    cells = deck.cells
     if spectrum is None:
         return []
     words = f"it must be at least spectrum.first, {spectrum.first}"
@@ -225,7 +234,9 @@ class FreeLine:
             x = np.append(x[:-1], x[0])
         weights = np.diff(y)
         mean = float((0.5 * (x[1:] + x[:-1]) * weights).sum() / weights.sum())
-        self.y, self.x, self.even = y, x - mean, even
+        self.y = y
+        self.x = x - mean
+        self.even = even
 
     def get_places(self, y: np.ndarray) -> np.ndarray:
         """Places x (m,) [m] at heights y (m,) [m], straight between those that are known."""
@@ -237,7 +248,8 @@ class FreeLine:
         per_wave = (self.y.size - 1) * 2.0 * math.pi / (wavenumber * (self.y[-1] - self.y[0]))
         found = []
         for number in range(1, max(1, int(per_wave / LEAST_CELLS)) + 1):
-            size, phase = wavenumber * measure_mode(line, wavenumber, number, 0.0), 0.0
+            size = wavenumber * measure_mode(line, wavenumber, number, 0.0)
+            phase = 0.0
             if not self.even:
                 other = wavenumber * measure_mode(line, wavenumber, number, -0.5 * math.pi)
                 size, phase = math.hypot(size, other), math.atan2(-other, size)

@@ -118,7 +118,8 @@ class InterfaceInstability(Results, Problem):
         """
         if self.deck.start == "incident":
             return "incident"
-        base, lengths = self.theory.base, self.deck.lengths
+        base = self.theory.base
+        lengths = self.deck.lengths
         fault = ""
         if base.gap:
             fault = "the materials part behind it"
@@ -146,7 +147,8 @@ class InterfaceInstability(Results, Problem):
     def _find_ways(self, since: float) -> tuple[float, float]:
         """What of both lengths [m] waves take up to `since` [s] after the shock's arrival: how far
         the piston is behind it then and the reflected wave on its way back, and the other's way."""
-        base, shock = self.theory.base, self.shock
+        base = self.theory.base
+        shock = self.shock
         begun = (self.deck.gap * self.deck.wavelength + self.amplitude) / shock.shock_speed + since
         back = shock.particle_speed * begun - base.left_wave.head * since
         return max(0.0, back), base.right_wave.head * since
@@ -210,7 +212,8 @@ class InterfaceInstability(Results, Problem):
 
     def _find_free_lines(self, perturbation: Perturbation | None, even: bool) -> list[FreeLine]:
         """Lines that are no sums of modes: of the deck's file, of a function."""
-        deck, y = self.deck, self.make_heights()
+        deck = self.deck
+        y = self.make_heights()
         sources = [("the perturbation", perturbation)] if perturbation is not None else []
         if deck.line_file is not None:
             check_digests(deck.digests)
@@ -252,7 +255,8 @@ class InterfaceInstability(Results, Problem):
         """
         if self.deck.lengths is not None:
             return self.deck.lengths
-        base, t0 = self.theory.base, self.arrival
+        base = self.theory.base
+        t0 = self.arrival
         t_end = self.deck.run.t_set_up or self.t_end
         margin = self.amplitude + 0.5 * self.deck.wavelength
         if self.has_open_ends:
@@ -271,8 +275,10 @@ class InterfaceInstability(Results, Problem):
 
     def _find_first_echo(self, length: float) -> float:
         """When the wave that the interface sends to the piston is back, at the earliest [s]."""
-        base, t0 = self.theory.base, self.arrival
-        push, head = self.shock.particle_speed, base.left_wave.head
+        base = self.theory.base
+        t0 = self.arrival
+        push = self.shock.particle_speed
+        head = base.left_wave.head
         first = push * self.begun - length  # the piston's first place
         meet = -(first + head * t0) / (push - head)
         position = push * meet + first
@@ -316,7 +322,9 @@ class InterfaceInstability(Results, Problem):
         """How cells that are finer for the passage grow when its waves have left them."""
         if self.spacing.finer == 1.0:
             return None
-        base, laws, ways = self.theory.base, {}, []
+        base = self.theory.base
+        laws = {}
+        ways = []
         for name, length in zip(("first", "second"), self.choose_lengths(), strict=True):
             law = self.spacing.make_last_law(length)
             ways.append(np.abs(law * length - self.spacing.make(length)).max())
@@ -335,7 +343,8 @@ class InterfaceInstability(Results, Problem):
         deck = self.deck
         y = self.make_heights()
         front = self.shape(y)
-        lengths, start = self.choose_lengths(), deck.gap * deck.wavelength + self.amplitude
+        lengths = self.choose_lengths()
+        start = deck.gap * deck.wavelength + self.amplitude
         words = f"each must be greater than twice the interface's amplitude, {self.amplitude:g}"
         deck.refuse(min(lengths) <= 2.0 * self.amplitude, "lengths", words)
         words = f"the first must be greater than {start:g}, the gap and the amplitude"
@@ -428,7 +437,8 @@ class InterfaceInstability(Results, Problem):
         tension = deck.line.tension
         links = [join("interface", (first, "i_max"), (second, "i_min"), tension=tension)]
         if self.has_open_ends:
-            speed, shock = (self.theory.base.u, 0.0), self.shock
+            speed = (self.theory.base.u, 0.0)
+            shock = self.shock
             behind = shock.rho, shock.particle_speed, 0.0, shock.p
             ahead = self.rho_second, 0.0, 0.0, deck.pressure
             put(first, "i_min", "inflow", state=behind, velocity=speed)
@@ -463,7 +473,8 @@ class InterfaceInstability(Results, Problem):
         if self.deck.second_shock is None:
             return self.arrival
         start, later = self._make_second_shock()
-        piston, interface = self.shock.particle_speed, self.theory.base.u
+        piston = self.shock.particle_speed
+        interface = self.theory.base.u
         between = interface * (start - self.arrival) + self.choose_lengths()[0] - piston * start
         return start + max(0.0, between / (piston + later.shock_speed - interface))
 

@@ -71,18 +71,23 @@ def _describe_modes(problem) -> str:
 
 def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
     """Rows of the modes, the speed and the models, and what else is to be said of the growth."""
-    theory, growth, notes = problem.theory, Growth(problem), []
-    t, exact = column["t"], float(theory.base.u)
+    theory = problem.theory
+    growth = Growth(problem)
+    notes = []
+    t = column["t"]
+    exact = float(theory.base.u)
     after = t > problem.arrival + 0.3 * (t[-1] - problem.arrival)
     speed = fit_slope(t, column["interface_mean"], after)
     words = "interface speed" if math.isfinite(speed) else ""
     source = "exact Riemann solution"
     last = Row("interface_speed", speed, exact, words, digits=5, studied=True, source=source)
-    modes, several = problem.harmonics, len(problem.harmonics) > 1
+    modes = problem.harmonics
+    several = len(problem.harmonics) > 1
     if not modes:
         return [last], ["growth: the interface is flat"]
     shown = several or growth.linear_reach > 0.0 or bool(growth.model_fails)
-    strongest, rows = find_strongest(modes), []
+    strongest = find_strongest(modes)
+    rows = []
     for mode in modes:
         words = shown and mode in strongest
         rows += _compare_mode(growth, mode, column, kct, several, words)
@@ -94,11 +99,13 @@ def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
     known = [row for row in rows if row.label and row.source.startswith("linear")]
     rows.append(last)
     if any(not is_still(theory, row.theory) for row in known):
-        words, source = f"impulsive model ({theory.impulse})", "for comparison"
+        words = f"impulsive model ({theory.impulse})"
+        source = "for comparison"
         rows.append(Row("impulsive", math.nan, theory.impulsive, words, digits=5, source=source))
     if growth.linear_reach < kct:
         if several:
-            start, reach = growth.first_slope, growth.linear_reach
+            start = growth.first_slope
+            reach = growth.linear_reach
             since = f"from k c t = {reach:.3g} on" if reach else "from the start"
             notes.append(
                 f"the modes couple {since}: the sum of their k a, initially {start:.3g}, exceeds "
@@ -113,7 +120,8 @@ def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
 
 def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, shown) -> list[Row]:
     """Rows for one mode: its rate, and its size where theory has next to no growth."""
-    theory, window = growth.theory, growth.find_window(mode, kct)
+    theory = growth.theory
+    window = growth.find_window(mode, kct)
     name = f"growth_rate_mode_{mode.number}" if several else "growth_rate"
     if window is None or mode.column not in column:
         return [Row(name, studied=True)]
@@ -148,7 +156,8 @@ def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, sho
 
 def _compare_model(growth, column, kct: float) -> Row:
     """The row of the Padé model, at the end or where its range ends."""
-    problem, last = growth.problem, min(kct, growth.model_reach)
+    problem = growth.problem
+    last = min(kct, growth.model_reach)
     t = problem.arrival + last / (problem.k * problem.theory.sound_speed)
     computed = float(np.interp(t, column["t"], column["amplitude"]))
     model = float(growth.compute_model(np.array([t]))[-1])
@@ -181,14 +190,18 @@ def _choose_curves(problem, growth, column) -> list[_Curve]:
 
 def _draw_theory(amplitude, rate, growth, curves: list[_Curve], column, kct: np.ndarray) -> None:
     """Theories of the curves, and the time up to which they hold, where it ends."""
-    problem, theory = growth.problem, growth.theory
+    problem = growth.problem
+    theory = growth.theory
     known = (kct > 0.0) & (kct <= theory.kt[-1] * theory.sound_speed)
-    t, reach, several = column["t"][known] - problem.arrival, growth.linear_reach, len(curves) > 1
+    t = column["t"][known] - problem.arrival
+    reach = growth.linear_reach
+    several = len(curves) > 1
     for n, curve in enumerate(curves):
         dashes = {"color": f"C{n}" if several else "k", "ls": "--"}
         amplitude.plot(kct[known], predict_amplitude(theory, curve.number * kct[known]), **dashes)
         rate.plot(kct[known], theory.get_rate(curve.number * problem.k, t), **dashes)
-    words, modes = "linear compressible", len(problem.harmonics) > 1
+    words = "linear compressible"
+    modes = len(problem.harmonics) > 1
     words += ", waves couple" if modes and reach == 0.0 else ""
     for axes in (amplitude, rate)[modes:]:  # the first is too narrow for this and names of modes
         axes.plot([], [], "k--", label=words)
@@ -226,7 +239,8 @@ class Results:
 
         No numbers for two shocks, for which there is no theory.
         """
-        theory, deck = self.theory, self.deck
+        theory = self.theory
+        deck = self.deck
         if not history:
             return Report(rows=_predict(self))
         column = _columns(self, history)
@@ -245,7 +259,8 @@ class Results:
             f"  smoothing length of the interface: {self.thickness / deck.wavelength:.3g} "
             f"wavelengths ({self.thickness * deck.cells / deck.wavelength:.2g} of a cell)",
         ]
-        rows, notes = [], ["growth: there is no theory for two shocks"]
+        rows = []
+        notes = ["growth: there is no theory for two shocks"]
         if deck.second_shock is None:
             rows, notes = _compare(self, column, kct)
         far = column["far_transverse_speed"].max() / theory.sound_speed
@@ -259,15 +274,18 @@ class Results:
         return f"k c t = {float(get_kct(self, t)):.3g}"
 
     def figures(self):
-        found, many = super().figures(), len(self.harmonics) > MOST_CURVES
+        found = super().figures()
+        many = len(self.harmonics) > MOST_CURVES
         return {name: draw for name, draw in found.items() if name != "spectrum" or many}
 
     def draw_growth(self, figure, run) -> None:
         """Amplitude and growth rate against theory, and the interface with its grid at the end."""
         grid = figure.add_gridspec(2, SHOWN, height_ratios=(1.0, 1.1))
-        amplitude, rate = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1:])
+        amplitude = figure.add_subplot(grid[0, 0])
+        rate = figure.add_subplot(grid[0, 1:])
         column = _columns(self, run.history)
-        kct, several = get_kct(self, column["t"]), len(self.harmonics) > 1
+        kct = get_kct(self, column["t"])
+        several = len(self.harmonics) > 1
         growth = Growth(self) if self.deck.second_shock is None and self.harmonics else None
         curves = _choose_curves(self, growth, column)
         for n, curve in enumerate(curves):
@@ -279,8 +297,10 @@ class Results:
         words = "k c t after the shock's arrival" + ", k of mode 1" * several
         amplitude.set(xlabel=words, ylabel="a / a0")
         rate.set(xlabel=words, ylabel="(da/dt) / (k a0)")
-        windows, shown = [], []
-        dumps, margin = spread_dumps(run, SHOWN), 0.05 * self.deck.wavelength
+        windows = []
+        shown = []
+        dumps = spread_dumps(run, SHOWN)
+        margin = 0.05 * self.deck.wavelength
         lines = [dump.blocks[0].nodes[:, -1, :] for dump in dumps]
         # all panels are as wide as the widest needs
         reach = max((max(0.6 * np.ptp(x) + margin, 0.5 * np.ptp(y)) for x, y in lines), default=0.0)
@@ -308,7 +328,8 @@ class Results:
         """
         from matplotlib.ticker import MaxNLocator
 
-        history, modes = run.history, self.harmonics
+        history = run.history
+        modes = self.harmonics
         known = np.flatnonzero(np.isfinite(history["amplitude"]))
         numbers, first = np.array([(mode.number, mode.amplitude) for mode in modes]).T
         kct = np.asarray(get_kct(self, history["t"]), dtype=float)
@@ -317,7 +338,8 @@ class Results:
         for n in range(SHOWN):
             row = known[np.argmin(np.abs(kct[known] - kct[known[-1]] * (n + 1) / SHOWN))]
             size = np.array([history[mode.column][row] for mode in modes])
-            colour, words = f"C{n}", f"k c t = {kct[row]:.3g}"
+            colour = f"C{n}"
+            words = f"k c t = {kct[row]:.3g}"
             axes.semilogy(numbers, np.abs(size) * self.k, "o", color=colour, ms=4, label=words)
             if self.deck.second_shock is None and kct[row] > 0.0:
                 theory = first * predict_amplitude(self.theory, numbers * kct[row])

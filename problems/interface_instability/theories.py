@@ -81,7 +81,8 @@ class Growth:
     @property
     def first_slope(self) -> float:
         """Sum of the k a of all modes of the first line, each with its own k."""
-        modes, wavenumber = self.problem.harmonics, self.problem.k
+        modes = self.problem.harmonics
+        wavenumber = self.problem.k
         return sum(abs(mode.number * wavenumber * mode.amplitude) for mode in modes)
 
     @property
@@ -94,7 +95,9 @@ class Growth:
     @functools.cached_property
     def linear_reach(self) -> float:
         """k c t (k of the wavelength) up to which linear theory applies; 0 where nowhere."""
-        modes, theory, limit = self.problem.harmonics, self.theory, self.limit
+        modes = self.problem.harmonics
+        theory = self.theory
+        limit = self.limit
         end = float(max(WINDOW[1], get_kct(self.problem, self.problem.t_end)))
         kct = np.linspace(0.0, end, 1201)
         slopes = np.zeros_like(kct)
@@ -142,7 +145,8 @@ class Growth:
     @property
     def model_fails(self) -> str:
         """Why the Padé model does not apply at all; "" where it does."""
-        theory, modes = self.theory, self.problem.harmonics
+        theory = self.theory
+        modes = self.problem.harmonics
         if len(modes) != 1:
             return "the Padé model is one of a single mode"
         if is_still(theory, theory.get_asymptotic_rate()):
@@ -160,8 +164,10 @@ class Growth:
     @functools.cached_property
     def model(self) -> PadeModel:
         """The Padé model of the one mode, from the linear asymptotic rate."""
-        (mode,), theory = self.problem.harmonics, self.theory
-        wavenumber, start = mode.number * self.problem.k, abs(mode.amplitude)
+        (mode,) = self.problem.harmonics
+        theory = self.theory
+        wavenumber = mode.number * self.problem.k
+        start = abs(mode.amplitude)
         rate = abs(theory.get_asymptotic_rate()) * wavenumber * start
         return PadeModel(wavenumber, start * theory.compression, rate, theory.atwood)
 
@@ -237,7 +243,8 @@ def sort_cautions(
         pair = MATERIALS.get(materials, "a gas and a condensed material")
         return [], [f"growth was never compared with theory for {pair}"]
     machs, ratios = (sorted({getattr(row, key) for row in known}) for key in ("mach", "ratio"))
-    near_machs, around = find_bracket(machs, mach), find_bracket(ratios, ratio)
+    near_machs = find_bracket(machs, mach)
+    around = find_bracket(ratios, ratio)
     if near_machs is None or around is None:
         return [], [
             f"growth at Mach {mach:.3g} and density ratio {ratio:.3g} was never compared with "
@@ -268,7 +275,8 @@ def sort_cautions(
 
     worst = max(found, key=find_error)
     error = find_error(worst)
-    of_cells, told = [], []
+    of_cells = []
+    told = []
     measured = f"with {worst.cells:g} cells per wavelength"
     if worst.cells > cells * (1.0 + EDGE):
         of_cells.append(
@@ -299,8 +307,10 @@ FREE = 0.25  # phase of a capillary wave up to which its growth is within 1 % of
 def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str]:
     """Sentences for the deck of an `InterfaceInstability`; with a history, for the run as well."""
     told = [words for some in sort_deck(problem) for words in some] if problem.harmonics else []
-    deck, base = problem.deck, problem.theory.base
-    single, tension = deck.second_shock is None, deck.line.tension
+    deck = problem.deck
+    base = problem.theory.base
+    single = deck.second_shock is None
+    tension = deck.line.tension
     if single:  # waves that are back from the far ends before the run's end
         told += [
             f"waves return to the interface from the far end of the {name} material at t = "
@@ -334,8 +344,10 @@ def sort_deck(problem) -> tuple[list[str], list[str]]:
     theory = problem.theory
     rate = theory.impulsive  # the scale alone: a check does not wait for the linear theory
     growth = 1.0 if is_still(theory, rate) else abs(rate / theory.base.u)
-    cells, numbers = problem.deck.cells, [mode.number for mode in problem.harmonics]
-    least, mach = cells / numbers[-1], problem.shock.shock_speed / float(ahead)
+    cells = problem.deck.cells
+    numbers = [mode.number for mode in problem.harmonics]
+    least = cells / numbers[-1]
+    mach = problem.shock.shock_speed / float(ahead)
     ratio = problem.rho_second / problem.rho_first
     of_cells, others = sort_cautions(materials, mach, ratio, least, growth=growth)
     short = [number for number in numbers if cells < FEW_CELLS * number]
@@ -354,7 +366,8 @@ def sort_deck(problem) -> tuple[list[str], list[str]]:
 def _caution_line(problem, history) -> list[str]:
     """Waves of a few cells on the line, while theory says that it is gentle."""
     modes = [mode.column for mode in problem.harmonics if mode.column in history]
-    growth, kct = Growth(problem), get_kct(problem, history["t"])
+    growth = Growth(problem)
+    kct = get_kct(problem, history["t"])
     gentle = (kct > 1.0) & (kct <= growth.linear_reach)
     if "roughness" not in history or not modes or not gentle.any():  # of an earlier version, short
         return []

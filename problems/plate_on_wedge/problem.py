@@ -106,7 +106,8 @@ class PlateOnWedge(Results, Problem):
 
     def __init__(self, deck: PlateOnWedgeDeck):
         super().__init__(deck)
-        solid, wedge = find_material(deck.plate), find_material(deck.wedge)
+        solid = find_material(deck.plate)
+        wedge = find_material(deck.wedge)
         self.materials = {"plate": solid, "wedge": wedge}
         for name, material in self.materials.items():
             check_solid(name, getattr(deck, name), material)
@@ -116,7 +117,8 @@ class PlateOnWedge(Results, Problem):
         words = f"the plate needs 4 on the wedge, beyond it and across; these are {parts}"
         deck.refuse(min(parts) < 4, "cells", words)
         self.angle = math.radians(deck.angle)
-        along, down = deck.face * math.cos(self.angle), deck.face * math.sin(self.angle)
+        along = deck.face * math.cos(self.angle)
+        down = deck.face * math.sin(self.angle)
         self.end = np.array([deck.edge + along, -down])
         self.length = float(self.end[0]) + deck.overhang
         self.base = float(self.end[1]) - deck.depth
@@ -126,7 +128,9 @@ class PlateOnWedge(Results, Problem):
         falls = any(b <= a for a, b in itertools.pairwise(times))
         deck.refuse(falls, "drive.history", "its times must increase")
         # the plate as it flies, its speed V [m/s], and when the drive's shock is at its lower side
-        self.flying, self.plate_speed, arrival = Body(solid.eos, solid.rho0), deck.drive.speed, 0.0
+        self.flying = Body(solid.eos, solid.rho0)
+        self.plate_speed = deck.drive.speed
+        arrival = 0.0
         if deck.drive.kind != "moving":
             shock = self.find_drive_shock()
             arrival = deck.thickness / shock.shock_speed
@@ -145,14 +149,17 @@ class PlateOnWedge(Results, Problem):
         self.wedge_spacing = self.coarse_spacing / math.sqrt(self.refinement)
         parts = deck.edge / self.wedge_spacing, deck.face / self.wedge_spacing
         self.on_edge, self.on_face = (max(3, round(part)) for part in parts)  # faces of the wedge
-        drive, self.flyer_rows = deck.drive, 0
+        drive = deck.drive
+        self.flyer_rows = 0
         if drive.kind == "flyer":
             self.flyer_rows = max(4, round(drive.thickness / deck.thickness * nj))
 
     def find_drive_shock(self) -> Shock:
         """The drive's first shock in the plate; BadInput without one."""
-        drive, solid = self.deck.drive, self.materials["plate"]
-        at_rest, speed = (solid.rho0, 0.0), drive.speed
+        drive = self.deck.drive
+        solid = self.materials["plate"]
+        at_rest = (solid.rho0, 0.0)
+        speed = drive.speed
         key = "drive.pressure" if drive.kind == "pressure" else "drive.speed"
         with self.deck.blame(key, f"{self.deck.plate} has no such shock; take a weaker drive"):
             if drive.kind == "pressure":
@@ -198,7 +205,9 @@ class PlateOnWedge(Results, Problem):
 
     def make_grids(self, t=0.0):
         """Those of plate and wedge, and of a flyer."""
-        deck, (ni, nj), drive = self.deck, self.deck.cells, self.deck.drive
+        deck = self.deck
+        ni, nj = self.deck.cells
+        drive = self.deck.drive
         lengths = (deck.edge, self.length - deck.edge)
         counts = (self.contact + 1, ni - self.contact + 1)
         law, free_law = meeting_laws(counts, lengths, self.refinement)
@@ -228,14 +237,18 @@ class PlateOnWedge(Results, Problem):
 
     def estimate_cells(self) -> int:
         """Cells of all blocks, counted from the sizes that the deck asks for."""
-        (ni, nj), deck = self.deck.cells, self.deck
+        ni, nj = self.deck.cells
+        deck = self.deck
         along = 6.0 + (deck.edge + deck.face) / self.wedge_spacing
         return ni * (nj + self.flyer_rows) + math.ceil(
             along * max(6.0, 1.0 + deck.depth / self.coarse_spacing)
         )
 
     def build(self) -> PlateRun:
-        deck, drive, grids, blocks = self.deck, self.deck.drive, self.make_grids(), []
+        deck = self.deck
+        drive = self.deck.drive
+        grids = self.make_grids()
+        blocks = []
         strength = lambda t: 1.0  # noqa: E731
         if drive.history:
             times, parts = (np.array(column) for column in zip(*drive.history, strict=True))
@@ -246,7 +259,8 @@ class PlateOnWedge(Results, Problem):
             state = solids[name].rho0, 0.0, speeds.get(name, 0.0), 0.0
             blocks.append(Block(name, solids[name].eos, nodes, *state))
         plate, wedge, *flyer = blocks
-        edge, face = (wedge, "j_max", 0, self.on_edge), (wedge, "j_max", self.on_edge, None)
+        edge = (wedge, "j_max", 0, self.on_edge)
+        face = (wedge, "j_max", self.on_edge, None)
         links = []
         if deck.gap:
             for side in (edge, face):

@@ -105,7 +105,8 @@ def find_plateau(profiles: np.ndarray, mach: float = 1.0) -> Plateau:
     p = np.nanmean(profiles, axis=0)
     fallen = np.flatnonzero((p < FALLEN * p.max()) & (np.arange(p.size) > p.argmax()))
     count = max(int(fallen[0]) if fallen.size else p.size, LEAST_PARTS)
-    x, width = 0.5 * (low + high)[:count], (high - low)[:count]
+    x = 0.5 * (low + high)[:count]
+    width = (high - low)[:count]
     broken, bend = _fit_broken_line(x, p[:count], width)
     curved = _fit_parabola(x, p[:count], width)
     flat = int(np.searchsorted(x, bend))
@@ -119,7 +120,8 @@ def find_plateau(profiles: np.ndarray, mach: float = 1.0) -> Plateau:
     level = (1.0 - share) * broken.level + share * curved.level
     fit = (1.0 - share) * broken.values + share * curved.values
     miss = (profiles[:, :count] - fit) / level
-    end, fall = float(high[count - 1]), 1.0 - float(fit[-1]) / level
+    end = float(high[count - 1])
+    fall = 1.0 - float(fit[-1]) / level
     return Plateau(level, float(np.sqrt(np.nanmean(miss**2))), float(low[0]), end, False, fall)
 
 
@@ -133,7 +135,8 @@ class _Fit(NamedTuple):
 
 def _fit(p: np.ndarray, width: np.ndarray, *basis: np.ndarray) -> _Fit | None:
     """The nearest sum of a constant and the rows of `basis`; None where it rises from A on."""
-    columns, root = np.vstack((np.ones_like(p), *basis)), np.sqrt(width / width.sum())
+    columns = np.vstack((np.ones_like(p), *basis))
+    root = np.sqrt(width / width.sum())
     factors, *_ = np.linalg.lstsq((columns * root).T, p * root)
     if (factors[1:2] > 0.0).any():
         return None
@@ -144,11 +147,13 @@ def _fit(p: np.ndarray, width: np.ndarray, *basis: np.ndarray) -> _Fit | None:
 
 def _fit_broken_line(x, p, width) -> tuple[_Fit, float]:
     """Flat as far as a bend, straight from there; also the bend, of all that are tried the best."""
-    best, place = _fit(p, width), math.inf
+    best = _fit(p, width)
+    place = math.inf
     for bend in np.linspace(x[1], x[-1], BENDS + 1)[:-1]:  # nearer to A none can be seen
         found = _fit(p, width, np.maximum(0.0, x - bend))
         if found is not None and found.misfit < best.misfit:
-            best, place = found, float(bend)
+            best = found
+            place = float(bend)
     return best, place
 
 
@@ -162,7 +167,8 @@ def _fit_parabola(x, p, width) -> _Fit:
         found.values[0] + found.values[-1]
     ):
         return found
-    steep, level = _fit(p, width, x), _fit(p, width, x * x)
+    steep = _fit(p, width, x)
+    level = _fit(p, width, x * x)
     if steep is None or level is None:
         return _fit(p, width)
     return min(steep, level, key=lambda fit: fit.misfit)
@@ -181,7 +187,8 @@ MM = 1e3
 
 def choose_rows(problem, history, parts) -> np.ndarray:
     """Rows of the history in which A is on the given part of the face and has not arrived."""
-    path, face = np.nan_to_num(history["contact_path"], nan=-1.0), problem.deck.face
+    path = np.nan_to_num(history["contact_path"], nan=-1.0)
+    face = problem.deck.face
     return (path > parts[0] * face) & (path < parts[1] * face)
 
 
@@ -193,7 +200,8 @@ def measure_contact_speed(problem, history) -> tuple[float, float]:
     rows = choose_rows(problem, history, FITTED)
     if rows.sum() < 3 * PARTS:
         return math.nan, math.nan
-    t, path = history["t"][rows], history["contact_path"][rows]
+    t = history["t"][rows]
+    path = history["contact_path"][rows]
     speed = float(np.polyfit(t, path, 1)[0])
     edges = np.linspace(path[0], path[-1], PARTS + 1)
     times = np.interp(edges, path, t)
@@ -259,7 +267,8 @@ def describe_plateau(plateau: Plateau) -> str:
 def describe_jet(problem, history) -> str:
     """One sentence: is there a jet ahead of A, and does theory have one?"""
     lead = measure_lead(problem, history)
-    attached, spacing = problem.collision.attached, problem.length / problem.deck.cells[0]
+    attached = problem.collision.attached
+    spacing = problem.length / problem.deck.cells[0]
     if not math.isfinite(lead):
         return "jet: A has not run far enough to tell whether one runs ahead of it"
     if lead > LEAST_LEAD * spacing:
@@ -297,15 +306,18 @@ class Results:
         """What was computed and how far it is from theory."""
         if not history:
             return Report()
-        deck, theory = self.deck, self.collision
-        rows, notes = [], [describe_jet(self, history)]
+        deck = self.deck
+        theory = self.collision
+        rows = []
+        notes = [describe_jet(self, history)]
         chosen = choose_rows(self, history, (0.2, 0.8))
         if deck.drive.kind != "moving" and chosen.any():
             speed = float(np.median(history["surface_speed"][chosen]))
             words = "speed of the free surface [km/s]"
             rows.append(Row("plate_speed", speed, self.plate_speed, words, 1e3, 5))
         speed, spread = measure_contact_speed(self, history)
-        words, source = "speed of A on the face [km/s]", ""
+        words = "speed of A on the face [km/s]"
+        source = ""
         if math.isfinite(spread):
             source = f"constant within {100.0 * spread:.2f} % over fifths of its path"
         if not theory.attached:
@@ -313,8 +325,10 @@ class Results:
             source = "where the plate would meet the face"
         rows.append(Row("contact_speed", speed, theory.contact_speed, words, 1e3, 5, source=source))
         if theory.attached:
-            found, degree = measure_behind(self, history), math.pi / 180.0
-            plateau, words = measure_plateau(self, history), "pressure behind A [GPa]"
+            found = measure_behind(self, history)
+            degree = math.pi / 180.0
+            plateau = measure_plateau(self, history)
+            words = "pressure behind A [GPa]"
             source = describe_plateau(plateau)
             rows.append(Row("pressure", plateau.p, theory.p, words, 1e9, 5, source=source))
             for name, wave in (("plate", theory.plate), ("wedge", theory.wedge)):
@@ -325,7 +339,8 @@ class Results:
                     what = f"{kind}_{name}"
                     rows.append(Row(what, found[what], exact, words, degree, 5))
         # fastest material; single cells that are nearly empty are faster for a few steps
-        speed, t = history["jet_speed"], history["t"]
+        speed = history["jet_speed"]
+        t = history["t"]
         if (there := speed > 0.0).any():
             order = np.argsort(speed[there])
             weight = np.cumsum(np.gradient(t)[there][order]) if t.size > 1 else np.ones(1)
@@ -351,7 +366,10 @@ class Results:
 
     def describe(self) -> str:
         """What collides, how far it is from the critical angle, and what it costs to be near."""
-        deck, theory, zone, finer = self.deck, self.collision, self.zone, self.refinement
+        deck = self.deck
+        theory = self.collision
+        zone = self.zone
+        finer = self.refinement
         critical = math.degrees(self.critical)
         state = "below it: the shocks are attached" if theory.attached else "above it: a jet"
         lines = [
@@ -379,7 +397,8 @@ class Results:
 
     def cautions(self, history=None) -> list[str]:
         """Where the pressure behind A is low: too few cells close to the critical angle."""
-        deck, cells = self.deck, self.deck.cells[0]
+        deck = self.deck
+        cells = self.deck.cells[0]
         if not self.collision.attached or self.zone >= WIDE_ZONE or cells >= FINE_CELLS:
             return []
         away = math.degrees(self.critical) - deck.angle
@@ -395,7 +414,8 @@ class Results:
 
     def draw_phases(self, figure, run) -> None:
         """Pressure with the grid at several times, all in one frame."""
-        panels, last = _make_panels(figure, run), run.dumps[-1].blocks
+        panels = _make_panels(figure, run)
+        last = run.dumps[-1].blocks
         top = max(float(np.percentile(block.cell_fields["p"], 99.5)) for block in last)
         top = 1.1 * self.collision.p if self.collision.attached else top
         style = {"colours": "turbo", "low": 0.0, "high": top / 1e9, "every": 1, "mm": True}
@@ -407,9 +427,11 @@ class Results:
 
     def draw_contact(self, figure, run) -> None:
         """Path and speed of the collision point against theory."""
-        history, theory = run.history, self.collision.contact_speed
+        history = run.history
+        theory = self.collision.contact_speed
         paths, speeds = make_panels(figure, 12.0, 4.5, 1, 2)
-        t, path = history["t"], history["contact_path"]
+        t = history["t"]
+        path = history["contact_path"]
         paths.plot(1e6 * t, MM * path, label="computed")
         rows = choose_rows(self, history, (0.02, 1.0))
         if rows.any():
@@ -429,7 +451,8 @@ class Results:
 
     def draw_configuration(self, figure, run) -> None:
         """Outlines of all bodies at several times, as the paper draws them (its Fig 6)."""
-        deck, fills = self.deck, {}
+        deck = self.deck
+        fills = {}
         materials = {"plate": deck.plate, "wedge": deck.wedge, "flyer": deck.drive.material}
         for axes, dump in _make_panels(figure, run):
             for block, shade in zip(dump.blocks, SHADES, strict=False):

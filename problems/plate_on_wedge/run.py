@@ -29,7 +29,8 @@ class PlateRun(Simulation):
         options |= {"measure_block": self.measure_block, "measured_numbers": 4}
         super().__init__(blocks, links, **options)
         self.problem = problem
-        self.plate, self.wedge = blocks[0], blocks[1]
+        self.plate = blocks[0]
+        self.wedge = blocks[1]
         self.times = dict.fromkeys(report.PHASES, math.nan)
         self.start = np.array([problem.deck.edge, 0.0])
         self.contact: SlidingContact | None = None  # where plate and wedge are bodies of their own
@@ -48,7 +49,8 @@ class PlateRun(Simulation):
         A is the last node of plate or wedge that lies on the other; the edge's end at first.
         """
         self.meetings.find(self.t, self.step)
-        nodes, points = [0], [self.start]
+        nodes = [0]
+        points = [self.start]
         for pair in self.meetings.near:
             parts = ((pair.follower, pair.positions), (pair.leader, pair.back_positions))
             segments = [getattr(surface, "segment", None) for surface, _ in parts]
@@ -104,7 +106,8 @@ class PlateRun(Simulation):
         shock [degrees]; of others zeros."""
         if block is not self.plate and block is not self.wedge:
             return 0.0, 0.0, 0.0, 0.0
-        point, in_wedge = self.find_contact_point(), block is self.wedge
+        point = self.find_contact_point()
+        in_wedge = block is self.wedge
         angle = self.measure_shock_angle(block, point, in_wedge)
         if in_wedge:
             return 0.0, 0.0, 0.0, angle
@@ -115,18 +118,23 @@ class PlateRun(Simulation):
 
     def measure(self) -> dict[str, float]:
         """Columns of the history: A, the states behind it, the jet, the phase."""
-        point, count, (first, last) = self.find_contact_point(), self.count_contact(), BEHIND
+        point = self.find_contact_point()
+        count = self.count_contact()
+        first, last = BEHIND
         line = self.get_lower_line()[:, count::-1]  # of the contact, from A backwards
         _, u, v, pressure = self.plate.state[:, 1:-1, 1]
-        surface, arrived = np.hypot(u, v), math.isfinite(self.times["arrived"])
-        behind, direction = math.nan, np.full(2, math.nan)
+        surface = np.hypot(u, v)
+        arrived = math.isfinite(self.times["arrived"])
+        behind = math.nan
+        direction = np.full(2, math.nan)
         if count >= last:
             behind = float(pressure[count - last : count - first].mean())
             direction = line[:, first] - line[:, last]
         (fastest, cells, mass, angle), (*_, angle_in_wedge) = self.measured[:2]
         means = np.full(len(report.COLUMNS), math.nan)  # at fixed parts of A's path, while it runs
         if not arrived:
-            arc, behind_a = compute_arc_lengths(line), pressure[:count][::-1]
+            arc = compute_arc_lengths(line)
+            behind_a = pressure[:count][::-1]
             ringing = report.REFINED_RINGING if self.problem.refinement > 1.0 else report.RINGING
             pressures = behind_a[: arc.size - 1]
             means = report.measure_profile(arc, pressures, self.measure_path(), ringing)
@@ -160,7 +168,8 @@ class PlateRun(Simulation):
         height = float(np.median(free[1, free.shape[1] // 2 :]))
         spacing = float(np.hypot(*np.diff(free)).mean())
         hangs = free[:, free[1] < height - HANGING * spacing]
-        sine, cosine = math.sin(self.problem.angle), math.cos(self.problem.angle)
+        sine = math.sin(self.problem.angle)
+        cosine = math.cos(self.problem.angle)
         ahead = cosine * (hangs[0] - self.start[0]) - sine * (hangs[1] - self.start[1])
         return float(np.append(ahead, self.measure_path()).max() - (self.start[1] - height) / sine)
 
@@ -171,12 +180,15 @@ class PlateRun(Simulation):
         pressure falls through half of theory's (or of its own largest value); the angle is that of
         the straight line from A through these places.
         """
-        nodes, p = block.nodes, block.state[3, 1:-1, 1:-1]
+        nodes = block.nodes
+        p = block.state[3, 1:-1, 1:-1]
         rows = np.arange(*SHOCK_ROWS)
         rows = -1 - rows[rows < block.nj] if in_wedge else rows[rows < block.nj]
         low, high = np.sort((rows[0], rows[-1])) + (block.nj if in_wedge else 0)
-        centres, p = compute_centres(nodes[:, :, low : high + 2]), p[:, low : high + 1]
-        collision, cells = self.problem.collision, np.arange(float(p.shape[0]))
+        centres = compute_centres(nodes[:, :, low : high + 2])
+        p = p[:, low : high + 1]
+        collision = self.problem.collision
+        cells = np.arange(float(p.shape[0]))
         level = 0.5 * (collision.p if collision.attached else float(p.max()))
         fronts = [find_crossing(cells, column, level) for column in p.T]
         positions = [

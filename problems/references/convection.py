@@ -62,7 +62,8 @@ def compute_layer_growth(
 
     n = POINTS
     _, d, _ = make_chebyshev(n + 1)
-    unit, k2 = np.eye(n + 1), wavenumber**2
+    unit = np.eye(n + 1)
+    k2 = wavenumber**2
     laplacian = d @ d - k2 * unit
     none = np.zeros_like(unit)
     left = np.block(
@@ -108,8 +109,10 @@ class VerticalPlates:
 
     def _constants(self) -> tuple[Decimal, ...]:
         """P, Re, A, B, C1, C2 and the factors of x and e^(P x) in v, in the current context."""
-        p, prandtl = Decimal(self.peclet), Decimal(self.prandtl)
-        ra, mean = Decimal(self.rayleigh), Decimal(self.mean_speed)
+        p = Decimal(self.peclet)
+        prandtl = Decimal(self.prandtl)
+        ra = Decimal(self.rayleigh)
+        mean = Decimal(self.mean_speed)
         if abs(p) < BESIDE:
             p = BESIDE
         if abs(prandtl - 1) < BESIDE:
@@ -118,9 +121,11 @@ class VerticalPlates:
         b = -1 / (p.exp() - 1)
         a = Decimal("0.5") - b
         shape = -ra * b / (p * p - re * p)
-        grown, fast = p.exp() - 1, re.exp() - 1
+        grown = p.exp() - 1
+        fast = re.exp() - 1
         # C1 = -C2 - shape; C2 from v(1) = 0, linear in k = Ra (A - T0): C2 = c0 + c1 k
-        c0, c1 = -shape * grown / fast, -1 / (re * fast)
+        c0 = -shape * grown / fast
+        c1 = -1 / (re * fast)
         # the mean of v is m0 + m1 k
         m0 = c0 * (fast / re - 1) + shape * (grown / p - 1)
         m1 = c1 * (fast / re - 1) + 1 / (2 * re)

@@ -30,7 +30,9 @@ class SedovBlast:
     """
 
     def __init__(self, geometry: str, gamma: float = 1.4, energy: float = 1.0):
-        self.geometry, self.gamma, self.energy = geometry, gamma, energy
+        self.geometry = geometry
+        self.gamma = gamma
+        self.energy = energy
         n = self.dimensions = DIMENSIONS[geometry]
         if abs(gamma - 2.0) < 0.02:
             raise BadInput(f"sedov: gamma is {gamma:g}; the closed form has a pole at gamma = 2")
@@ -39,7 +41,8 @@ class SedovBlast:
             raise BadInput(f"sedov: gamma is {gamma:g}; {words}")
         self.positions, self.profile = _make_profile(n, gamma)
         # E t²/R^(n+2), from the profile in units of R and t
-        r, (rho, u, p) = self.positions, self.profile
+        r = self.positions
+        rho, u, p = self.profile
         density = (0.5 * rho * u * u + p / (gamma - 1.0)) * r ** (n - 1)
         inside = 0.5 * ((density[1:] + density[:-1]) * np.diff(r)).sum()
         self.alpha = float({1: 2.0, 2: 2.0 * np.pi, 3: 4.0 * np.pi}[n] * inside)
@@ -134,7 +137,9 @@ def compute_taylor_wave(eos: JWL) -> TaylorWave:
     first = speed * (1.0 - eos.rho0 / density)
     rest = find_root(lambda p: first - products.velocity_gain(p), 0.05 * pressure, pressure)
     p = np.linspace(rest, pressure, POINTS)
-    u, rho, c = first - products.velocity_gain(p), products.density(p), products.sound_speed(p)
+    u = first - products.velocity_gain(p)
+    rho = products.density(p)
+    c = products.sound_speed(p)
     return TaylorWave(speed, u + c, p, rho, u, eos.rho0)
 
 
@@ -162,15 +167,21 @@ GAUSS = [
 def average_points(nodes: np.ndarray, places, function: Callable) -> np.ndarray:
     """Means over the cells of `function(points) -> (values, weights)`, at `places` in 0..1 each
     way with their weights; points (2, ni, nj) lie on the bilinear cells of `nodes`."""
-    a, b, c, d = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
-    total, volume = 0.0, 0.0
+    a = nodes[:, :-1, :-1]
+    b = nodes[:, 1:, :-1]
+    c = nodes[:, 1:, 1:]
+    d = nodes[:, :-1, 1:]
+    total = 0.0
+    volume = 0.0
     for s, weight_s in places:
         for q, weight_q in places:
             point = (1 - s) * (1 - q) * a + s * (1 - q) * b + s * q * c + (1 - s) * q * d
-            along, across = (1 - q) * (b - a) + q * (c - d), (1 - s) * (d - a) + s * (c - b)
+            along = (1 - q) * (b - a) + q * (c - d)
+            across = (1 - s) * (d - a) + s * (c - b)
             values, weight = function(point, along[0] * across[1] - along[1] * across[0])
             weight = weight_s * weight_q * weight
-            total, volume = total + weight * values, volume + weight
+            total = total + weight * values
+            volume = volume + weight
     return total / volume
 
 
@@ -181,7 +192,7 @@ class Vortex:
     With d = (dx, dy) from the centre and r = |d|, in units where density and pressure far away are
     1, an exact solution of the Euler equations for all time:
 
-        (u, v) = stream + beta/(2 pi) exp((1 - r²)/2) (-dy, dx),
+        u, v = stream + beta/(2 pi) exp((1 - r²)/2) (-dy, dx),
         T = 1 - (gamma - 1) beta²/(8 gamma pi²) exp(1 - r²),   rho = T^(1/(gamma - 1)),   p = rho T.
 
     The square cuts it off at r = 5, where its speed is down to 2e-5 of the stream.
@@ -239,7 +250,8 @@ class Shell:
     """
 
     def __init__(self, n: int):
-        self.n, self.gamma = n, 1.0 + 2.0 / n
+        self.n = n
+        self.gamma = 1.0 + 2.0 / n
         self.entropy = PRESSURES[1] / OUTER_DENSITY**self.gamma
         inner, outer = ((p / self.entropy) ** (1.0 / self.gamma) for p in PRESSURES)
         self.densities = inner, outer
@@ -259,7 +271,8 @@ class Shell:
 
     def compute_density(self, r: np.ndarray, t: float) -> np.ndarray:
         """Density at time t [kg/m³] at the radii r [m]."""
-        h, power = self.compute_shrinking(t), self.gamma - 1.0
+        h = self.compute_shrinking(t)
+        power = self.gamma - 1.0
         part = ((r / h) ** 2 - RADII[0] ** 2) / (RADII[1] ** 2 - RADII[0] ** 2)
         inner, outer = (rho**power for rho in self.densities)
         return ((1.0 - part) * inner + part * outer) ** (1.0 / power) / h**self.n
@@ -274,7 +287,8 @@ def compute_cell(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
     u = sin(pi x) cos(pi y), v = -cos(pi x) sin(pi y), p = 1 + (cos 2 pi x + cos 2 pi y)/4, rho = 1,
     with rho de/dt = pi/(4 (g - 1)) (cos 3 pi x cos pi y - cos pi x cos 3 pi y), g = CELL_GAMMA.
     """
-    a, b = math.pi * x, math.pi * y
+    a = math.pi * x
+    b = math.pi * y
     p = 1.0 + 0.25 * (np.cos(2.0 * a) + np.cos(2.0 * b))
     return np.sin(a) * np.cos(b), -np.cos(a) * np.sin(b), p
 
@@ -282,7 +296,9 @@ def compute_cell(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
 def compute_cell_velocity(nodes: np.ndarray) -> np.ndarray:
     """Velocity [m/s] of the flow at nodes (2, ni + 1, nj + 1) of a grid between the walls."""
     velocity = np.array(compute_cell(*nodes)[:2])
-    velocity[0, [0, -1]], velocity[1, :, [0, -1]] = 0.0, 0.0  # sin(pi) is not zero
+    # sin(pi) is not zero
+    velocity[0, [0, -1]] = 0.0
+    velocity[1, :, [0, -1]] = 0.0
     return velocity
 
 
@@ -310,7 +326,8 @@ def compute_gravity_mode(k: float, gravity: float, above: float, tension: float)
 
     The lower one has density 1, the upper one that `above`, 0 for none; negative where it swings.
     """
-    pull, across = tension * k**2, k * math.tanh(k)
+    pull = tension * k**2
+    across = k * math.tanh(k)
     if not above:
         return -across * (gravity + pull)
     return across / (1.0 + above) * ((above - 1.0) * gravity - pull)

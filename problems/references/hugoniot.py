@@ -47,7 +47,8 @@ class StiffenedIsentrope:
 
     def __init__(self, eos, rho: float, p: float):
         self.gamma, self.p_inf = get_stiffened_parameters(eos)
-        self.rho, self.p = float(rho), float(p)
+        self.rho = float(rho)
+        self.p = float(p)
         stiffness = self.gamma * (self.p + self.p_inf)
         self.c = math.sqrt(stiffness / self.rho) if stiffness > 0.0 else math.nan
         self.least_pressure = 0.0 - self.p_inf
@@ -84,7 +85,8 @@ class GeneralIsentrope:
 
     def __init__(self, eos, rho: float, p: float):
         self.eos = eos
-        self.rho, self.p = float(rho), float(p)
+        self.rho = float(rho)
+        self.p = float(p)
         with np.errstate(invalid="ignore"):
             self.c = float(eos.sound_speed(self.rho, self.p))
         self.least_pressure = -math.inf
@@ -101,7 +103,9 @@ class GeneralIsentrope:
 
     def _integrate(self, p_end: float):
         """The same, between the first state and `p_end` as it is."""
-        eos, rho, p = self.eos, self.rho, self.p
+        eos = self.eos
+        rho = self.rho
+        p = self.p
         refusal = BadInput(
             f"the isentrope from rho = {rho:g}, p = {p:g} does not reach p = {p_end:g}: the "
             "equation of state has no sound speed there; ask for a higher pressure"
@@ -207,7 +211,8 @@ def shock_to_pressure(eos, rho: float, p: float, p_behind: float) -> Shock:
     ahead = 1.0 / rho
     jump = p_behind - p
     if jump == 0.0:
-        speed, shock_speed = 0.0, float(eos.sound_speed(rho, p))
+        speed = 0.0
+        shock_speed = float(eos.sound_speed(rho, p))
     else:
         speed = math.copysign(math.sqrt(jump * (ahead - volume)), jump)
         shock_speed = ahead * jump / speed
@@ -241,7 +246,10 @@ def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
     acoustic = (p_behind - p) / (rho * float(eos.sound_speed(rho, p))) ** 2
     step = -min(max(abs(acoustic) / 16.0, 1e-12 * ahead), ahead / VOLUME_STEPS)
     step = math.copysign(step, -(p_behind - p))
-    near, here, outside, left = ahead, excess(ahead), False, False
+    near = ahead
+    here = excess(ahead)
+    outside = False
+    left = False
     while True:
         far = near + step
         if left or not 0.0 < far < 3.0 * ahead:
@@ -257,7 +265,8 @@ def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
             return find_root(excess, near, far, xtol=1e-17 * ahead, rtol=RELATIVE)
         outside |= math.isnan(there)
         left = math.isnan(there) and not math.isnan(here)  # the table: nothing lies further on
-        near, here = far, there
+        near = far
+        here = there
 
 
 def _find_edge(excess, outside: float, inside: float) -> tuple[float, float]:
@@ -312,7 +321,9 @@ def _shock_with(eos, rho: float, p: float, name: str, value: float, scale: float
     def excess(rise):
         return getattr(shock_to_pressure(eos, rho, p, p + rise), name) - value
 
-    low, high, limit = 0.0, scale, math.inf
+    low = 0.0
+    high = scale
+    limit = math.inf
     while True:
         try:
             beyond = excess(high) >= 0.0
@@ -335,8 +346,10 @@ def compute_hugoniot_slopes(eos, shock: Shock) -> tuple[float, float]:
     `F_p = e_p - (v0 - v)/2` and `F_v = rho^2 c^2 e_p - (p - p0)/2` (the latter by
     `c^2 = (p/rho^2 - e_rho)/e_p`); `e_p` by a central difference.
     """
-    rho, p = shock.rho, shock.p
-    ahead, volume = 1.0 / shock.rho_ahead, 1.0 / rho
+    rho = shock.rho
+    p = shock.p
+    ahead = 1.0 / shock.rho_ahead
+    volume = 1.0 / rho
     jump = p - shock.p_ahead
     c2 = float(eos.sound_speed(rho, p)) ** 2
     difference = 1e-4 * rho * c2

@@ -91,7 +91,9 @@ def fill_rates(t, state, zones, slope, rates):
                 slope[q, j] = 0.0
         for i in range(size):
             row = slopes[zone, i]
-            p, u, v = state[P, first + i], state[U, first + i], state[V, first + i]
+            p = state[P, first + i]
+            u = state[U, first + i]
+            v = state[V, first + i]
             for j in range(size):
                 slope[P, j] += p * row[j]
                 slope[U, j] += u * row[j]
@@ -99,7 +101,9 @@ def fill_rates(t, state, zones, slope, rates):
         c = coefficients[zone]
         for j in range(size):
             k = first + j
-            p, u, v = state[P, k], state[U, k], state[V, k]
+            p = state[P, k]
+            u = state[U, k]
+            v = state[V, k]
             rates[P, k] = (
                 c[CARRY, j] * slope[P, j]
                 - c[STRETCH, j] * (slope[U, j] * c[EXPAND, j] + t * v)
@@ -130,7 +134,8 @@ def fill_rates(t, state, zones, slope, rates):
     cut = 0
     for zone in range(inner):
         cut += sizes[zone]
-    z, other = impedances[0], impedances[inner]
+    z = impedances[0]
+    other = impedances[inner]
     from_first = rates[P, 0] - z * rates[U, 0]
     from_second = rates[P, cut] - other * rates[U, cut]
     rates[P, 0] = (other * from_first + z * from_second) / (z + other)
@@ -148,12 +153,16 @@ def fill_velocities(times, step, middle, state, zones, work, velocities, ends):
     work (4, 3, points): scratch; velocities (n,): of the interface, at `times`; ends (2, 2, n): p
     and v at the outer ends of both sides.
     """
-    sizes, inner = zones[2], zones[5]
+    sizes = zones[2]
+    inner = zones[5]
     cut = 0
     for zone in range(inner):
         cut += sizes[zone]
     count = state.shape[1]
-    slope, rates, total, trial = work[0], work[1], work[2], work[3]
+    slope = work[0]
+    rates = work[1]
+    total = work[2]
+    trial = work[3]
     for n in range(times.size - 1):
         for stage in range(4):
             time = times[n] if stage == 0 else times[n] * middle if stage < 3 else times[n + 1]
@@ -172,8 +181,10 @@ def fill_velocities(times, step, middle, state, zones, work, velocities, ends):
             for k in range(count):
                 state[q, k] += step / 6.0 * total[q, k]
         velocities[n + 1] = state[U, cut]
-        ends[0, 0, n + 1], ends[0, 1, n + 1] = state[P, cut - 1], state[V, cut - 1]
-        ends[1, 0, n + 1], ends[1, 1, n + 1] = state[P, count - 1], state[V, count - 1]
+        ends[0, 0, n + 1] = state[P, cut - 1]
+        ends[0, 1, n + 1] = state[V, cut - 1]
+        ends[1, 0, n + 1] = state[P, count - 1]
+        ends[1, 1, n + 1] = state[V, count - 1]
 
 
 def compute_atwood_number(rho_first: float, rho_second: float) -> float:
@@ -250,7 +261,8 @@ class PerturbedLayer:
 
         Each run of points up to one that stands twice is a zone with its own polynomial.
         """
-        points, values = self.speed, np.array([self.rho, self.u, self.v, self.p])
+        points = self.speed
+        values = np.array([self.rho, self.u, self.v, self.p])
         ends = [0, *(np.flatnonzero(np.diff(points) == 0.0) + 1), points.size]
         inside = np.clip(speed, points[0], points[-1])
         found = np.empty((4, inside.size))
@@ -355,7 +367,8 @@ class LinearGrowth:
             del states[:count]
             speed = np.concatenate([zone.speed for zone in side.zones])
             slope = np.concatenate([zone.slope for zone in side.zones])
-            rho, front = slope * p, math.nan
+            rho = slope * p
+            front = math.nan
             if side.jump:
                 passed = np.interp(kt * speed / speed[-1], times, ends[0])
                 rho += (side.hugoniot - slope) * passed
@@ -438,7 +451,8 @@ def _make_layer(points: int, rho: float, c: float, width: float, edge, v: float)
     coefficients[LIGHT] = 1.0 / rho
     start = np.zeros((3, points))
     start[V] = v
-    slope, stiffness = np.full(points, c**-2), radius * (1.0 + c / width)
+    slope = np.full(points, c**-2)
+    stiffness = radius * (1.0 + c / width)
     return Zone(matrix, coefficients, rho * c, edge, start, width * xi, slope, stiffness)
 
 
@@ -468,7 +482,8 @@ def _make_fan_side(eos, base: RiemannSolution, ahead, incident_speed: float, poi
     nodes, matrix, radius = make_chebyshev(fan_points)
     position = tail + width * nodes
     pressure = isentrope.pressure_in_fan(position - (base.u - u), base.p)
-    pressure[0], pressure[-1] = base.p, p
+    pressure[0] = base.p
+    pressure[-1] = p
     matrix = matrix / width
     rho = isentrope.density(pressure)
     c = isentrope.sound_speed(pressure)
@@ -493,7 +508,8 @@ def _make_fan_side(eos, base: RiemannSolution, ahead, incident_speed: float, poi
     coefficients[SOURCE] = tilt
     start = np.zeros((3, fan_points))
     start[V] = transverse
-    at_rest, stiffness = (0.0, 0.0, 0.0), radius * (2.0 * float(c.max()) / width)
+    at_rest = (0.0, 0.0, 0.0)
+    stiffness = radius * (2.0 * float(c.max()) / width)
     fan = Zone(
         matrix, coefficients, float(rho[-1] * c[-1]), at_rest, start, position, c**-2, stiffness
     )
@@ -518,15 +534,18 @@ def compute_linear_growth(
     curve, when it is asked for, RunFailure if the march in time fails.
     """
     incident = shock_to_pressure(eos_first, rho_first, p, p_behind)
-    rho_ahead, u = incident.rho, incident.particle_speed
+    rho_ahead = incident.rho
+    u = incident.particle_speed
     base = solve_riemann(eos_first, (rho_ahead, u, p_behind), eos_second, (rho_second, 0.0, p))
     forward = shock_to_pressure(eos_second, rho_second, p, base.p)
     tilt = 1.0 - forward.shock_speed / incident.shock_speed
     transmitted = _make_shock_side(eos_second, forward, tilt, points)
-    wave, change = base.left_wave, base.u - u
+    wave = base.left_wave
+    change = base.u - u
     tilt = -(1.0 - wave.head / incident.shock_speed)
     if abs(change) < WEAK_WAVE * (u - wave.head):  # so weak that sound passes it unreflected
-        rho, c = base.rho_left, float(eos_first.sound_speed(base.rho_left, base.p))
+        rho = base.rho_left
+        c = float(eos_first.sound_speed(base.rho_left, base.p))
         open_edge = 0.5, 1.0 / (rho * c), 0.0
         side = _Side([_make_layer(points, rho, c, c, open_edge, -change * tilt)])
     elif wave.kind == "rarefaction":
@@ -537,9 +556,11 @@ def compute_linear_growth(
         side = _make_shock_side(eos_first, shock, tilt, points)
     c = float(eos_second.sound_speed(base.rho_right, base.p))
     compression = 1.0 - base.u / incident.shock_speed
-    amplitude, impulse = compression, "Richtmyer"
+    amplitude = compression
+    impulse = "Richtmyer"
     if wave.kind == "rarefaction":
-        amplitude, impulse = 0.5 * (1.0 + compression), "Meyer, Blewett"
+        amplitude = 0.5 * (1.0 + compression)
+        impulse = "Meyer, Blewett"
     impulsive = amplitude * base.u * compute_atwood_number(base.rho_left, base.rho_right)
     sides = side, transmitted
     return LinearGrowth(
@@ -555,7 +576,8 @@ def march_layers(first: _Side, second: _Side, kt_end: float):
     """
     zones = [*first.zones, *second.zones]
     steps = math.ceil(-math.log(START) * max(zone.stiffness for zone in zones) / STABLE)
-    times, step = kt_end * START ** np.linspace(1.0, 0.0, steps + 1), -math.log(START) / steps
+    times = kt_end * START ** np.linspace(1.0, 0.0, steps + 1)
+    step = -math.log(START) / steps
     sizes = np.array([zone.start.shape[1] for zone in zones])
     slopes = np.zeros((len(zones), sizes.max(), sizes.max()))
     coefficients = np.zeros((len(zones), COEFFICIENTS, sizes.max()))
@@ -565,7 +587,8 @@ def march_layers(first: _Side, second: _Side, kt_end: float):
     edges = np.array([zone.edge or (0.0, 0.0, 0.0) for zone in zones])
     impedances = np.array([zone.z for zone in zones])
     state = np.concatenate([zone.start for zone in zones], axis=1)
-    velocities, ends = np.zeros(len(times)), np.zeros((2, 2, len(times)))
+    velocities = np.zeros(len(times))
+    ends = np.zeros((2, 2, len(times)))
     ends[:, 1, 0] = first.zones[-1].start[V, -1], second.zones[-1].start[V, -1]
     fill_velocities(
         times, step, math.exp(0.5 * step), state,

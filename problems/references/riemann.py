@@ -32,7 +32,8 @@ class _Side:
     """One given state and the curves through it; `sign` is -1 on the left, +1 on the right."""
 
     def __init__(self, eos, state, sign: int):
-        self.eos, self.sign = eos, sign
+        self.eos = eos
+        self.sign = sign
         self.rho, self.u, self.p = (float(value) for value in state)
         where = "left" if sign < 0 else "right"
         if not self.rho > 0.0:
@@ -98,7 +99,9 @@ class RiemannSolution:
         position = np.asarray(x_over_t, dtype=float)
         rho, u, p = (np.empty(position.shape) for _ in range(3))
         gap = (position >= self.u_left) & (position <= self.u_right)
-        rho[gap], u[gap], p[gap] = 0.0, position[gap], self.p
+        rho[gap] = 0.0
+        u[gap] = position[gap]
+        p[gap] = self.p
         stars = ((self.rho_left, self.u_left), (self.rho_right, self.u_right))
         waves = (self.left_wave, self.right_wave)
         for side, wave, (rho_star, u_star) in zip(self._sides, waves, stars, strict=True):
@@ -110,12 +113,17 @@ class RiemannSolution:
             given = inside & (outward >= sign * wave.head)
             star = inside & (outward <= sign * wave.tail) & ~given
             fan = inside & ~given & ~star
-            rho[given], u[given], p[given] = side.rho, side.u, side.p
-            rho[star], u[star], p[star] = rho_star, u_star, self.p
+            rho[given] = side.rho
+            u[given] = side.u
+            p[given] = side.p
+            rho[star] = rho_star
+            u[star] = u_star
+            p[star] = self.p
             if fan.any():
                 isentrope = side.isentrope
                 p_fan = isentrope.pressure_in_fan(outward[fan] - sign * side.u, self.p)
-                rho[fan], p[fan] = isentrope.density(p_fan), p_fan
+                rho[fan] = isentrope.density(p_fan)
+                p[fan] = p_fan
                 u[fan] = side.u - sign * isentrope.velocity_gain(p_fan)
         return rho, u, p
 
@@ -145,7 +153,8 @@ def solve_riemann(eos_left, left, eos_right, right, cavitation_pressure: float |
     rise = max(abs(side.p - low) + side.rho * side.isentrope.c**2 * 1e-3 for side in sides)
     high = low + rise
     while closing(high) > 0.0:
-        low, rise = high, 2.0 * rise
+        low = high
+        rise = 2.0 * rise
         high = low + rise
     p = low if closing(low) == 0.0 else find_root(closing, low, high, xtol=1e-300, rtol=RELATIVE)
     return _join(sides, p, False)

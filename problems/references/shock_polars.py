@@ -115,7 +115,8 @@ class ShockPolar:
     """
 
     def __init__(self, body: Body, flow_speed: float):
-        self.body, self.flow_speed = body, float(flow_speed)
+        self.body = body
+        self.flow_speed = float(flow_speed)
 
     @functools.cached_property
     def normal_shock(self) -> ObliqueWave:
@@ -165,7 +166,9 @@ def search_pressure(
     """
     low = min(polar.body.p for polar in polars)
     rise = speed / sum(1.0 / (polar.body.rho * polar.body.sound_speed) for polar in polars)
-    before, last, value = low, low, -math.inf
+    before = low
+    last = low
+    value = -math.inf
     while True:
         p = low + rise
         total = sum_deflections(polars, p)
@@ -173,7 +176,10 @@ def search_pressure(
             return last, p, total
         if not total > value:
             break
-        before, last, value, rise = last, p, total, 1.4 * rise
+        before = last
+        last = p
+        value = total
+        rise = 1.4 * rise
     if math.isnan(total):
         p = min(p, *(polar.normal_shock.p for polar in polars))
     from scipy.optimize import minimize_scalar  # slow to load
@@ -229,7 +235,8 @@ class CrossedLine:
     @property
     def drift(self) -> float:
         """Speed at which waves go along the line after the point, weighted by the densities."""
-        one, two = self.first, self.second
+        one = self.first
+        two = self.second
         mean = one.rho * one.speed_behind + two.rho * two.speed_behind
         return self.speed * math.cos(self.deflection) - mean / (one.rho + two.rho)
 
@@ -268,7 +275,8 @@ def cross_line(first: Body, second: Body, speed: float) -> CrossedLine:
     The body in which the shock leads must come first.  Raises BadInput when the point is
     slower than sound in one of them, or when the polars do not cross.
     """
-    one, two = ShockPolar(first, speed), ShockPolar(second, speed)
+    one = ShockPolar(first, speed)
+    two = ShockPolar(second, speed)
     top = min(one.normal_shock.p, two.normal_shock.p)
     low = max(first.p, second.p)
 
@@ -323,7 +331,8 @@ def solve_collision(plate: Body, wedge: Body | None, speed: float, angle: float)
 
     `wedge` None is a rigid one; angles [rad] are between 0 and pi/2.
     """
-    polars, contact_speed = _make_polars(plate, wedge, speed, angle), speed / math.sin(angle)
+    polars = _make_polars(plate, wedge, speed, angle)
+    contact_speed = speed / math.sin(angle)
     if not polars:
         return Collision(contact_speed)
     low, high, total = search_pressure(polars, speed, angle)

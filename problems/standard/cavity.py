@@ -52,8 +52,10 @@ class Cavity(Problem):
 
     def __init__(self, deck: CavityDeck):
         super().__init__(deck)
-        self.material, self.curved = find_material(deck.material), deck.geometry == "axisymmetric"
-        eos, rho = self.material.eos, self.material.rho0
+        self.material = find_material(deck.material)
+        self.curved = deck.geometry == "axisymmetric"
+        eos = self.material.eos
+        rho = self.material.rho0
         with deck.blame("speed", f"{deck.material} has no such shock"):
             self.shock = shock = shock_with_particle_speed(eos, rho, 0.0, deck.speed)
             self.near_speed = deck.speed + release(eos, shock.rho, shock.p)[1]
@@ -68,8 +70,10 @@ class Cavity(Problem):
         return {"metal": self.lay()[0]}
 
     def build(self):
-        deck, (nodes, (_, first, second, last)) = self.deck, self.lay()
-        state, material = (self.material.rho0, 0.0, 0.0, 0.0), deck.material.rpartition(":")[2]
+        deck = self.deck
+        (nodes, (_, first, second, last)) = self.lay()
+        state = (self.material.rho0, 0.0, 0.0, 0.0)
+        material = deck.material.rpartition(":")[2]
         block = Block("metal", self.material.eos, nodes, *state, material=material)
         put(block, "j_min", "free-surface")
         put(block, "j_max", "piston", 0, first, velocity=(deck.speed, 0.0))
@@ -82,13 +86,18 @@ class Cavity(Problem):
 
     def measure(self, evolution) -> dict[str, float]:
         (block,) = evolution.blocks
-        x, (_, u, _, p) = block.nodes[0, :, 0], block.state[:, 1:-1, 1:-1]
-        size, width = measure_below(block.nodes[:, :, 0], self.curved), float(x[-1] - x[0])
+        x = block.nodes[0, :, 0]
+        _, u, _, p = block.state[:, 1:-1, 1:-1]
+        size = measure_below(block.nodes[:, :, 0], self.curved)
+        width = float(x[-1] - x[0])
         row = {"void_size": size, "void_width": width, "jet_speed": float(u[0, 0])}
         return {**row, "far_speed": float(u[-1, 0]), "most_pressure": float(p.max())}
 
     def report(self, history, final=None) -> Report:
-        deck, near, p, size = self.deck, self.near_speed, self.shock.p, history["void_size"]
+        deck = self.deck
+        near = self.near_speed
+        p = self.shock.p
+        size = history["void_size"]
         arrival = find_time(history, history["jet_speed"] > 0.5 * near)
         closing = find_time(history, history["void_width"] <= 1e-6 * deck.radius)
         left = max(float(size[-1] / size[0]), 0.0)
@@ -106,9 +115,11 @@ class Cavity(Problem):
 
     def draw_cavity(self, figure, run_data) -> None:
         """Pressure and grid at four times, until the jet hits the far side and at the end."""
-        history, radius = run_data.history, self.deck.radius
+        history = run_data.history
+        radius = self.deck.radius
         axes = make_panels(figure, 9.5, 5.8, 2, 2)
-        start, last = self.arrival, history["t"][-1]
+        start = self.arrival
+        last = history["t"][-1]
         end = np.nanmin((find_time(history, history["void_width"] <= 1e-6 * radius), last))
         dumps = [find_dump(run_data, t) for t in (start, 0.5 * (start + end), end, last)]
         high = max(1e-9 * float(np.quantile(dump.blocks[0].p, 0.995)) for dump in dumps)

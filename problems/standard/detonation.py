@@ -67,8 +67,11 @@ class Detonation(Problem):
         return [BlockPlan("explosive", (self.deck.cells, rows), (0.0, 0.0), high)]
 
     def build(self):
-        deck, eos, nodes = self.deck, self.eos, self.make_grids()["explosive"]
-        width, named = deck.front * self.size, {"material": deck.explosive, "limiter": deck.limiter}
+        deck = self.deck
+        eos = self.eos
+        nodes = self.make_grids()["explosive"]
+        width = deck.front * self.size
+        named = {"material": deck.explosive, "limiter": deck.limiter}
         block = Block("explosive", eos, nodes, eos.rho0, 0.0, 0.0, 1e5, **named)
         if deck.behind == "piston":
             velocity = follow_burn(self.speed, self.particle_speed, width)
@@ -82,8 +85,10 @@ class Detonation(Problem):
     def measure(self, evolution) -> dict[str, float]:
         """Place of the front on the lower side, pressure behind it or at its peak, mean error."""
         (block,) = evolution.blocks
-        x, p = block.centres[0][:, 0], block.state[3, 1:-1, 1]
-        front, pressure = find_crossing(x, p, 0.5 * self.pressure), float(p.max())
+        x = block.centres[0][:, 0]
+        p = block.state[3, 1:-1, 1]
+        front = find_crossing(x, p, 0.5 * self.pressure)
+        pressure = float(p.max())
         if self.deck.behind == "piston" and math.isfinite(front):
             back = float(block.nodes[0, 0, 0])
             inside = (x > back + 0.3 * (front - back)) & (x < back + 0.8 * (front - back))
@@ -94,7 +99,9 @@ class Detonation(Problem):
         return row
 
     def report(self, history, final=None) -> Report:
-        deck, t, front = self.deck, history["t"], history["front"]
+        deck = self.deck
+        t = history["t"]
+        front = history["front"]
         speed = fit_slope(t, front, (t > 0.5 * t[-1]) & np.isfinite(front))
         words = "pressure behind it [GPa]" if deck.behind == "piston" else "peak pressure [GPa]"
         rows = [
@@ -114,7 +121,8 @@ class Detonation(Problem):
         left.axhline(1e-9 * self.pressure, color="k", ls="--", lw=0.8, label="pCJ")
         left.set(xlabel="x [mm]", ylabel="pressure [GPa]")
         left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)
-        t, front = run_data.history["t"], run_data.history["front"]
+        t = run_data.history["t"]
+        front = run_data.history["front"]
         right.plot(1e6 * t, 1e3 * (self.speed * t - front), lw=1.2, label="D t - front")
         right.axhline(1e3 * self.size, color="k", ls=":", lw=0.8, label="size of a cell")
         right.set(xlabel="t [µs]", ylabel="front, where p = pCJ/2, behind D t [mm]")

@@ -61,10 +61,13 @@ class FlyerTarget(Problem):
         self.names = [f"plate-{number}" for number in range(1, len(deck.plates) + 1)]
 
     def list_boxes(self):  # cells 8 times as high as the thinnest: square ones halve the time step
-        rows, boxes, x = self.deck.rows, [], 0.0
+        rows = self.deck.rows
+        boxes = []
+        x = 0.0
         height = 8.0 * rows * min(one.thickness / one.cells for one in self.deck.plates)
         for name, plate in zip(self.names, self.deck.plates, strict=True):
-            low, x = x + plate.gap, x + plate.gap + plate.thickness
+            low = x + plate.gap
+            x = x + plate.gap + plate.thickness
             boxes.append(BlockPlan(name, (plate.cells, rows), (low, 0.0), (x, height)))
         return boxes
 
@@ -79,7 +82,8 @@ class FlyerTarget(Problem):
         return self.simulate(blocks)
 
     def measure(self, evolution) -> dict[str, float]:
-        row, states = {}, [block.state[:, 1:-1, 1:-1] for block in evolution.blocks]
+        row = {}
+        states = [block.state[:, 1:-1, 1:-1] for block in evolution.blocks]
         for block, (rho, u, *_) in zip(evolution.blocks, states, strict=True):
             row[f"speed_{block.name}"] = float(np.average(u, weights=rho * block.volume))
         meeting = 0.5 * (states[0][3, -1].mean() + states[1][3, 0].mean())  # of the first two
@@ -87,8 +91,12 @@ class FlyerTarget(Problem):
         return {**row, "free_surface_speed": surface, "contact_pressure": float(meeting)}
 
     def report(self, history, final=None) -> Report:
-        deck, theory, trace = self.deck, self.theory, history["free_surface_speed"]
-        t, p, parted = history["t"], history["contact_pressure"], history["contacts_opened"] > 0
+        deck = self.deck
+        theory = self.theory
+        trace = history["free_surface_speed"]
+        t = history["t"]
+        p = history["contact_pressure"]
+        parted = history["contacts_opened"] > 0
         # a contact that a step has made was there at its start
         impact = find_time(history, np.append(history["contacts_made"][1:] > 0, False))
         pressure = reduce_between(np.median, t, p, impact, impact + 0.7 * theory.back, 4)
@@ -101,7 +109,8 @@ class FlyerTarget(Problem):
             Row("end", end, theory.end, "arrival of the release [s]", digits=5),
         ]
         rows = [row for row in rows[: 5 if self.is_pair else 2] if not np.isnan(row.theory)]
-        first, notes = deck.plates[0], []
+        first = deck.plates[0]
+        notes = []
         plate = f"{first.material} of {1e3 * first.thickness:g} mm at {deck.speed:g} m/s"
         if self.is_pair:
             notes.append(f"behind the impact both plates move at {theory.u:.5g} m/s")
@@ -113,8 +122,10 @@ class FlyerTarget(Problem):
 
     def draw_flyer_target(self, figure, run_data) -> None:
         """The free surface's speed beside theory."""
-        axis, theory = figure.subplots(), self.theory
-        labels, words = {"free_surface_speed": "computed"}, "free surface of the last plate [m/s]"
+        axis = figure.subplots()
+        theory = self.theory
+        labels = {"free_surface_speed": "computed"}
+        words = "free surface of the last plate [m/s]"
         draw_columns(axis, run_data.history, labels, words, "µs")
         if self.is_pair:
             axis.plot(*theory.make_trace(1e6), "k--", lw=0.8, label="theory, until the release")

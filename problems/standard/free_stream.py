@@ -54,12 +54,14 @@ class FreeStream(Problem):
         two = deck.contact == "seam" and deck.materials[0] != deck.materials[1]
         deck.refuse(two, "materials", "a seam joins blocks of one")
         eos, rho = self.fluids["left"]
-        turn, speed = math.radians(deck.angle), deck.mach * float(eos.sound_speed(rho, PRESSURE))
+        turn = math.radians(deck.angle)
+        speed = deck.mach * float(eos.sound_speed(rho, PRESSURE))
         self.velocity = speed * math.cos(turn), speed * math.sin(turn)
 
     def make_grids(self, t=0.0):
         """Cut from the nodes of both; a function of t, deck and seed."""
-        deck, n = self.deck, self.deck.cells
+        deck = self.deck
+        n = self.deck.cells
         x, y = make_plane_grid(np.linspace(-1.0, 1.0, 2 * n + 1), np.linspace(0.0, 1.0, n + 1))
         nodes = np.array([x + BEND * (1.0 - x * x) * np.sin(2.0 * math.pi * y), y])
         (bits,) = struct.unpack("<Q", struct.pack("<d", t))
@@ -76,7 +78,10 @@ class FreeStream(Problem):
         return 2 * self.deck.cells**2
 
     def build(self):
-        deck, grids, blocks, links = self.deck, self.make_grids(), [], []
+        deck = self.deck
+        grids = self.make_grids()
+        blocks = []
+        links = []
         for name, (eos, rho) in self.fluids.items():
             stream = rho, *self.velocity, PRESSURE
             material = "all" if deck.contact == "seam" else name
@@ -104,7 +109,8 @@ class FreeStream(Problem):
         return (float((off / (density, c, c, stiffness)).max()),)
 
     def report(self, history, final=None) -> Report:
-        deck, words = self.deck, f"largest deviation, {history['deviation'].size - 1} steps"
+        deck = self.deck
+        words = f"largest deviation, {history['deviation'].size - 1} steps"
         most = find_most(history, "deviation")
         row = Row("largest_deviation", most, label=words, digits=3)
         head = (

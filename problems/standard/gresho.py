@@ -29,7 +29,8 @@ KINETIC_ENERGY = 8.0 * math.pi / 300.0
 def compute_flow(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """u, v, p (3, ...) of the steady flow of density 1 around the origin."""
     r = np.hypot(x, y)
-    inner, ring = r < 0.2, (r >= 0.2) & (r < 0.4)
+    inner = r < 0.2
+    ring = (r >= 0.2) & (r < 0.4)
     r_ring = np.where(ring, r, 0.3)
     turn = np.where(inner, 5.0, np.where(ring, 2.0 / r_ring - 5.0, 0.0))  # speed over r
     p_ring = 9.0 - 4.0 * math.log(0.2) + 12.5 * r_ring**2 - 20.0 * r_ring + 4.0 * np.log(r_ring)
@@ -56,7 +57,8 @@ class Gresho(Problem):
         return {"square": swing_square(self.deck.cells, -0.5, 1.0, swing)}
 
     def build(self):
-        deck, nodes = self.deck, self.make_grids()["square"]
+        deck = self.deck
+        nodes = self.make_grids()["square"]
         flow = average_points(nodes, GAUSS, lambda point, area: (compute_flow(*point), area))
         block = Block("square", IdealGas(1.4), nodes, 1.0, *flow, limiter=deck.limiter)
         links = [join("periodic", (block, f"{d}_min"), (block, f"{d}_max")) for d in "ij"]
@@ -72,7 +74,8 @@ class Gresho(Problem):
         return {"kinetic_energy": float(energy), "error_velocity": float(error)}
 
     def report(self, history, final=None) -> Report:
-        deck, energy = self.deck, history["kinetic_energy"]
+        deck = self.deck
+        energy = history["kinetic_energy"]
         lost = 1.0 - float(energy[-1] / energy[0])
         turns = f", {history['t'][-1] / TURN:.3g} turns" if history else ""
         rows = [

@@ -64,11 +64,13 @@ class Kidder(RadialProblem):
             return {"shell": np.array(np.broadcast_arrays(radius, part))}
         angle = np.linspace(0.0, 0.5 * math.pi, self.deck.rays + 1)
         nodes = np.array([radius * np.cos(angle), radius * np.sin(angle)])
-        nodes[0, :, -1], nodes[1, :, 0] = 0.0, 0.0
+        nodes[0, :, -1] = 0.0
+        nodes[1, :, 0] = 0.0
         return {"shell": nodes}
 
     def build(self):
-        shell, nodes = self.shell, self.make_grids()["shell"]
+        shell = self.shell
+        nodes = self.make_grids()["shell"]
         rho = shell.compute_density(self.compute_layers(nodes), 0.0)
         p = shell.entropy * rho**shell.gamma
         block = Block("shell", IdealGas(shell.gamma), nodes, rho, 0.0, 0.0, p)
@@ -79,7 +81,8 @@ class Kidder(RadialProblem):
     def measure(self, evolution) -> dict[str, float]:
         """Relative errors of both radii, how round they are, and of the density."""
         (block,) = evolution.blocks
-        h, row = self.shell.compute_shrinking(evolution.t), {}
+        h = self.shell.compute_shrinking(evolution.t)
+        row = {}
         for side, edge, first in (("inner", 0, RADII[0]), ("outer", -1, RADII[1])):
             part = self.compute_radii(block.nodes[:, edge, :]) / (h * first)
             row[f"{side}_error"] = abs(float(part.mean()) - 1.0)
@@ -105,7 +108,8 @@ class Kidder(RadialProblem):
     def draw_kidder(self, figure, run_data) -> None:
         """Shell at the start, on the way and at the end; radii over time; how far they are off."""
         left, right = make_panels(figure, 11.5, 5.0, 1, 2)
-        dumps, shrink = run_data.dumps, self.shell.compute_shrinking
+        dumps = run_data.dumps
+        shrink = self.shell.compute_shrinking
         high = float(dumps[-1]["shell"].rho.max())
         for h, bar in ((1.0, ""), (0.75, ""), (0.5, "density")):
             dump = min(dumps, key=lambda dump: abs(shrink(dump.t) - h))

@@ -47,12 +47,14 @@ class Noh(RadialProblem):
     def __init__(self, deck: NohDeck):
         super().__init__(deck, DIMENSIONS[deck.geometry])
         self.shock_speed = 0.5 * (deck.gamma - 1.0)
-        shock, size = self.shock_speed * deck.run.t_end, 1.0 - deck.shrink * deck.run.t_end
+        shock = self.shock_speed * deck.run.t_end
+        size = 1.0 - deck.shrink * deck.run.t_end
         words = f"the shock is at r = {shock:.3g} then, the grid's end at {size:.3g}; end earlier"
         deck.refuse(shock > 0.9 * size, "run.t_end", words)
 
     def compute_density(self, r, t):
-        n, gamma = self.dimensions, self.deck.gamma
+        n = self.dimensions
+        gamma = self.deck.gamma
         before = (1.0 + t / np.maximum(r, 1e-12)) ** (n - 1)
         behind = ((gamma + 1.0) / (gamma - 1.0)) ** n
         return np.where(r < self.shock_speed * t, behind, before)
@@ -73,7 +75,8 @@ class Noh(RadialProblem):
         return {"gas": self.scale(self.lay_nodes(1.0), t)}
 
     def build(self):
-        deck, nodes = self.deck, self.make_grids()["gas"]
+        deck = self.deck
+        nodes = self.make_grids()["gas"]
         start = self.compute_stream(compute_centres(nodes), 0.0)
         block = Block("gas", IdealGas(deck.gamma), nodes, *start, limiter=deck.limiter)
         for side in ("i_max", "j_max")[: self.dimensions]:
@@ -99,9 +102,11 @@ class Noh(RadialProblem):
         return {**row, "error_rho": self.measure_error(evolution, 2.0 * shock)}
 
     def report(self, history, final=None) -> Report:
-        deck, t = self.deck, get_last(history, "t") if history else self.t_end
+        deck = self.deck
+        t = get_last(history, "t") if history else self.t_end
         behind = float(self.compute_density(np.zeros(1), max(t, 1e-9))[0])
-        reach, p = self.shock_speed * t, self.shock_speed * behind
+        reach = self.shock_speed * t
+        p = self.shock_speed * behind
         words = f"relative error of the density, r < {2 * reach:.3g}"
         grid = f"grid shrinking at {deck.shrink:g} a second" if deck.shrink else "fixed grid"
         rows = [

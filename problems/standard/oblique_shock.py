@@ -44,14 +44,17 @@ class ObliqueShock(Problem):
 
     def __init__(self, deck: ObliqueShockDeck):
         super().__init__(deck)
-        self.angle, self.ahead = math.radians(deck.angle), 1.0 / deck.gamma
-        gas, fall = Body(IdealGas(deck.gamma), 1.0, self.ahead), deck.mach * math.tan(self.angle)
+        self.angle = math.radians(deck.angle)
+        self.ahead = 1.0 / deck.gamma
+        gas = Body(IdealGas(deck.gamma), 1.0, self.ahead)
+        fall = deck.mach * math.tan(self.angle)
         found = solve_collision(gas, None, fall, self.angle)  # as a plate thrown onto a rigid wedge
         if not found.attached:
             most = math.degrees(search_pressure([ShockPolar(gas, deck.mach)], fall)[2])
             words = f"at Mach {deck.mach:g} the shock stays attached up to {most:.4g} degrees only"
             deck.refuse(True, "angle", words)
-        self.beta, self.pressure = found.plate.wave_angle, found.p
+        self.beta = found.plate.wave_angle
+        self.pressure = found.p
         words = f"the shock, at {math.degrees(self.beta):.3g} degrees, leaves through the top"
         deck.refuse(math.tan(self.beta) >= 1.0, "angle", words)
 
@@ -69,8 +72,10 @@ class ObliqueShock(Problem):
         return self.deck.cells * round(0.8 * self.deck.cells)
 
     def build(self):
-        deck, state = self.deck, (1.0, self.deck.mach, 0.0, self.ahead)
-        gas, nodes = IdealGas(deck.gamma), self.make_grids()["gas"]
+        deck = self.deck
+        state = (1.0, self.deck.mach, 0.0, self.ahead)
+        gas = IdealGas(deck.gamma)
+        nodes = self.make_grids()["gas"]
         block = Block("gas", gas, nodes, *state, limiter=deck.limiter)
         for side in ("i_min", "j_max"):
             put(block, side, "inflow", state=state)
@@ -82,7 +87,9 @@ class ObliqueShock(Problem):
         """Pressure on the last half of the wedge over the exact one, and the shock's angle."""
         (block,) = evolution.blocks
         x, y = block.centres
-        p, x, level = block.state[3, 1:-1, 1:-1], x[:, 0], 0.5 * (self.ahead + self.pressure)
+        p = block.state[3, 1:-1, 1:-1]
+        x = x[:, 0]
+        level = 0.5 * (self.ahead + self.pressure)
         heights = np.array([find_crossing(*column, level) for column in zip(y, p, strict=True)])
         chosen = (x > 0.3) & (x < 0.9) & np.isfinite(heights)
         slope = math.degrees(math.atan(fit_slope(x, heights, chosen)))
@@ -91,7 +98,8 @@ class ObliqueShock(Problem):
         return {"wall_pressure_ratio": ratio, "shock_angle": slope, "shock_angle_error": off}
 
     def report(self, history, final=None) -> Report:
-        deck, beta = self.deck, math.degrees(self.beta)
+        deck = self.deck
+        beta = math.degrees(self.beta)
         words = "angle of the shock [degrees]", "pressure on the wall over exact"
         rows = [
             compare(history, "shock_angle", beta, words[0], error="angle"),
@@ -104,10 +112,12 @@ class ObliqueShock(Problem):
     def draw_oblique_shock(self, figure, run_data) -> None:
         """Pressure with the grid and the exact shock, and pressure along the wall."""
         left, right = make_panels(figure, 11.5, 4.6, 1, 2, width_ratios=(1.3, 1.0))
-        dump, end = run_data.dumps[-1], math.tan(self.beta)
+        dump = run_data.dumps[-1]
+        end = math.tan(self.beta)
         draw_field(left, dump, "p", every=5, bar="pressure")
         left.plot((0.0, 1.0), (0.0, end), "r--", lw=1.5, zorder=5, label="exact shock")
-        x, p = dump["gas"].centres[0][:, 0], dump["gas"].p[:, 0]
+        x = dump["gas"].centres[0][:, 0]
+        p = dump["gas"].p[:, 0]
         right.plot(x, p, ".-", ms=4, lw=0.8, label="computed")
         exact = (float(p[0]),) * 2 + (self.pressure,) * 2
         right.plot((x[0], 0.0, 0.0, 1.0), exact, "k--", lw=0.9, label="exact")

@@ -55,12 +55,16 @@ class RayleighTaylor(Problem):
 
     def __init__(self, deck: RayleighTaylorDeck):
         super().__init__(deck)
-        self.heavy, self.pressure = deck.above == "heavy", deck.sound_speed**2 / GAMMA  # at y = 0
+        # at y = 0
+        self.heavy = deck.above == "heavy"
+        self.pressure = deck.sound_speed**2 / GAMMA
         wave = WAVE_NUMBER, GRAVITY, 2.0 if self.heavy else 0.0
         square = compute_gravity_mode(*wave, deck.tension)
         deck.refuse(square == 0.0, "tension", "there the wave neither grows nor swings")
-        self.grows, self.exact = square > 0.0, math.sqrt(abs(square))
-        self.columns, self.layers = max(4, deck.cells // 2), 1 + self.heavy
+        self.grows = square > 0.0
+        self.exact = math.sqrt(abs(square))
+        self.columns = max(4, deck.cells // 2)
+        self.layers = 1 + self.heavy
         self.amplitude = deck.amplitude or (1e-4 if self.heavy else 1e-3)
         rate = math.sqrt(abs(compute_gravity_mode(*wave, 0.0)))
         usual = (3.0 if self.heavy else 6.0) * (rate / self.exact)
@@ -76,13 +80,16 @@ class RayleighTaylor(Problem):
         return {name: np.array(np.broadcast_arrays(x, heights[name])) for name in shown}
 
     def build(self):
-        tension, blocks, layer = self.deck.tension, [], (GRAVITY, self.pressure, GAMMA)
+        tension = self.deck.tension
+        blocks = []
+        layer = (GRAVITY, self.pressure, GAMMA)
         for name, grid in self.make_grids().items():
             density = 2.0 if name == "heavy" else 1.0
             # layers of the same height everywhere: the gas beside the wave is out of balance
             rho, p = compute_isentropic_layer(compute_centres(grid)[1], density, *layer)
             blocks.append(Block(name, IdealGas(GAMMA), grid, rho, 0.0, 0.0, p))
-        top, links = (blocks[0], "j_max"), []
+        top = (blocks[0], "j_max")
+        links = []
         if self.heavy:
             links = [join("interface", top, (blocks[1], "j_min"), tension=tension)]
         else:
@@ -93,7 +100,8 @@ class RayleighTaylor(Problem):
     def measure(self, evolution) -> dict[str, float]:
         """Amplitude of the wave (its first Fourier coefficient) and height of the mean."""
         x, y = evolution.blocks[0].nodes[:, :, -1]
-        steps, height = np.diff(x), 0.5 * (y[1:] + y[:-1])
+        steps = np.diff(x)
+        height = 0.5 * (y[1:] + y[:-1])
         mean = float(np.average(height, weights=steps))
         wave = np.cos(WAVE_NUMBER * (0.5 * (x[1:] + x[:-1])))
         amplitude = ((height - mean) * wave * steps).sum() / (wave * wave * steps).sum()
@@ -112,7 +120,8 @@ class RayleighTaylor(Problem):
 
     def draw_growth(self, figure, run_data) -> None:
         """Amplitude against theory."""
-        axis, t = figure.subplots(), run_data.history["t"]
+        axis = figure.subplots()
+        t = run_data.history["t"]
         draw_columns(axis, run_data.history, {"amplitude": "computed"}, "amplitude", "1")
         theory, name = (np.cosh, "cosh(rate t)") if self.grows else (np.cos, "cos(omega t)")
         axis.plot(t, self.amplitude * theory(self.exact * t), "k--", lw=0.9, label=f"a0 {name}")

@@ -67,7 +67,9 @@ class Saltzmann(Problem):
         return {"gas": np.array([x + self.deck.skew * (1.0 - 10.0 * y) * bend, y])}
 
     def build(self):
-        deck, gas, state = self.deck, IdealGas(5.0 / 3.0), (1.0, 0.0, 0.0, self.deck.pressure)
+        deck = self.deck
+        gas = IdealGas(5.0 / 3.0)
+        state = (1.0, 0.0, 0.0, self.deck.pressure)
         scheme = {"limiter": deck.limiter, "flux": deck.flux}
         block = Block("gas", gas, self.make_grids()["gas"], *state, **scheme)
         put(block, "i_min", "piston", velocity=(1.0, 0.0))
@@ -79,10 +81,12 @@ class Saltzmann(Problem):
         (block,) = evolution.blocks
         row = {f"{kind}_error_{n}": math.nan for n in (1, 2, 3) for kind in KINDS}
         row["transverse_speed"] = float(np.abs(block.state[2, 1:-1, 1:-1]).max())
-        t, x = evolution.t, block.centres[0]
+        t = evolution.t
+        x = block.centres[0]
         phase = sum(t > start for start, *_ in PHASES[1:])  # reflections before
         start, end, place, speed, exact = PHASES[phase]
-        front, back = place + speed * (t - start), t if phase != 1 else 1.0
+        front = place + speed * (t - start)
+        back = t if phase != 1 else 1.0
         inside = np.abs(x - 0.5 * (front + back)) < (0.5 - MIDDLE) * abs(front - back)
         if t < 0.5 * (start + end) or not inside.any():
             return row
@@ -93,14 +97,17 @@ class Saltzmann(Problem):
         return row
 
     def report(self, history, final=None) -> Report:
-        deck, rows = self.deck, []
+        deck = self.deck
+        rows = []
         for n, (*_, exact) in enumerate(PHASES, 1):
             for last in np.flatnonzero(np.isfinite(history[f"mean_error_{n}"]))[-1:]:
                 when = f"density {exact:g}, t = {history['t'][last]:.3f}"
                 for kind, words in KINDS.items():
-                    name, label = f"{kind}_error_{n}", f"{when}: {words} [%]"
+                    name = f"{kind}_error_{n}"
+                    label = f"{when}: {words} [%]"
                     rows.append(Row(name, history[name][last], label=label, unit=0.01, digits=3))
-        most, words = find_most(history, "transverse_speed"), "largest speed across"
+        most = find_most(history, "transverse_speed")
+        words = "largest speed across"
         rows.append(Row("largest_transverse_speed", most, label=words, digits=2))
         head = f"saltzmann, {deck.cells} x {deck.rows} cells, {deck.regrid.name}"
         return Report(f"{head}; errors of the density behind each shock:", rows)

@@ -64,12 +64,15 @@ class Sedov(RadialProblem):
         return {"gas": self.lay_nodes(self.deck.size)}
 
     def build(self):
-        deck, nodes = self.deck, self.make_grids()["gas"]
+        deck = self.deck
+        nodes = self.make_grids()["gas"]
         volume = compute_volumes(find_geometry(self.geometry), nodes)
         pressure = np.full(volume.shape, deck.pressure)
-        first, energy = np.index_exp[:1, :1], SHARES[deck.geometry] * self.blast.energy
+        first = np.index_exp[:1, :1]
+        energy = SHARES[deck.geometry] * self.blast.energy
         if deck.geometry == "plane":
-            first, energy = np.index_exp[:1, :], energy * nodes[1, 0, -1]
+            first = np.index_exp[:1, :]
+            energy = energy * nodes[1, 0, -1]
         pressure[first] += (deck.gamma - 1.0) * energy / volume[first].sum()
         block = Block("gas", IdealGas(deck.gamma), nodes, 1, 0, 0, pressure, limiter=deck.limiter)
         follow = lambda name, t: follow_gas(block, t - simulation.t)  # noqa: E731
@@ -85,7 +88,8 @@ class Sedov(RadialProblem):
         return {**found, "error_rho": self.measure_error(evolution)}
 
     def report(self, history, final=None) -> Report:
-        deck, energy = self.deck, history["total_energy"]
+        deck = self.deck
+        energy = history["total_energy"]
         t = get_last(history, "t") if history else self.t_end
         jump = (deck.gamma + 1.0) / (deck.gamma - 1.0)
         change = float(np.abs(energy / energy[0] - 1.0).max())

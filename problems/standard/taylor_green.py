@@ -58,7 +58,8 @@ class TaylorGreen(Problem):
         return {"square": nodes + swing * compute_cell_velocity(nodes)}
 
     def build(self):
-        gas, nodes = IdealGas(CELL_GAMMA), self.make_grids()["square"]
+        gas = IdealGas(CELL_GAMMA)
+        nodes = self.make_grids()["square"]
         flow = compute_cell(*compute_centres(nodes))
         block = Block("square", gas, nodes, 1.0, *flow, limiter=self.deck.limiter)
         put_walls(block)
@@ -73,7 +74,8 @@ class TaylorGreen(Problem):
         return {name: float((e * block.volume).sum()) for name, e in errors.items()}
 
     def report(self, history, final=None) -> Report:
-        n, t = self.deck.cells, f", t = {history['t'][-1]:.3g}" if history else ""
+        n = self.deck.cells
+        t = f", t = {history['t'][-1]:.3g}" if history else ""
         what = {"error_velocity": "the velocity", "error_p": "the pressure"}
         rows = [
             compare(history, name, label=f"mean error of {words}", digits=3)
@@ -84,7 +86,8 @@ class TaylorGreen(Problem):
     def draw_taylor_green(self, figure, run_data) -> None:
         """Pressure with the grid at two times and the velocity's error in the last dump."""
         *panels, right = make_panels(figure, 13.0, 4.2, 1, 3)
-        last, every = run_data.dumps[-1], max(1, self.deck.cells // 16)
+        last = run_data.dumps[-1]
+        every = max(1, self.deck.cells // 16)
         options = {"every": every, "title": "t"}
         for axis, part in zip(panels, (0.25, 1.0), strict=True):
             dump = find_dump(run_data, part * last.t)

@@ -64,7 +64,8 @@ class TriplePoint(Problem):
         return boxes
 
     def build(self):
-        deck, blocks = self.deck, []
+        deck = self.deck
+        blocks = []
         for name, nodes in self.make_grids().items():
             eos, (rho, u, p), *_ = GASES[name]
             blocks.append(Block(name, eos, nodes, rho, u, 0.0, p, limiter=deck.limiter))
@@ -84,10 +85,12 @@ class TriplePoint(Problem):
         left, bottom, top = evolution.blocks
         row = {"point_x": float(top.nodes[0, 0, 0]), "point_y": float(top.nodes[1, 0, 0])}
         for name, block, j in (("bottom", bottom, 0), ("top", top, -1)):
-            exact, t = self.exact[name], evolution.t
+            exact = self.exact[name]
+            t = evolution.t
             far = max(abs(exact.left_wave.head), exact.right_wave.head) * t
             for side, gas, wave in (("l", left, exact.left_wave), ("r", block, exact.right_wave)):
-                edges, cells = gas.nodes[0, :, j] - 1.0, gas.state[[0, 1, 3], 1:-1, 1:-1][..., j]
+                edges = gas.nodes[0, :, j] - 1.0
+                cells = gas.state[[0, 1, 3], 1:-1, 1:-1][..., j]
                 means = average_plateau(edges, cells, (exact.u * t, wave.tail * t))
                 known = 0.1 < t < EARLY and far < 0.9
                 for q, mean in zip(("rho", "u", "p"), means, strict=True):
@@ -95,7 +98,9 @@ class TriplePoint(Problem):
         return row
 
     def report(self, history, final=None) -> Report:
-        stars, rows = {}, []  # exact states beside the left contact at the walls, by columns
+        # exact states beside the left contact at the walls, by columns
+        stars = {}
+        rows = []
         for name, exact in self.exact.items():
             for side, rho in (("l", exact.rho_left), ("r", exact.rho_right)):
                 values = {"rho": rho, "u": exact.u, "p": exact.p}

@@ -44,17 +44,21 @@ class Vortex(Problem):
         self.exact = ExactVortex(beta=deck.beta)
 
     def list_boxes(self):
-        n, period = self.deck.cells, float(self.exact.period)
+        n = self.deck.cells
+        period = float(self.exact.period)
         return [BlockPlan("square", (n, n), (0.0, 0.0), (period, period))]
 
     def make_grids(self, t=0.0):
         """Every node swings about its position, twice during the run."""
-        deck, period = self.deck, self.exact.period
+        deck = self.deck
+        period = self.exact.period
         swing = deck.amplitude * math.sin(2.0 * (2.0 * math.pi / period) * t)
         return {"square": swing_square(deck.cells, 0.0, period, swing)}
 
     def build(self):
-        deck, gas, nodes = self.deck, IdealGas(self.exact.gamma), self.make_grids()["square"]
+        deck = self.deck
+        gas = IdealGas(self.exact.gamma)
+        nodes = self.make_grids()["square"]
         state = self.exact.compute_cell_averages(nodes)
         block = Block("square", gas, nodes, *state, limiter=deck.limiter)
         links = [join("periodic", (block, f"{d}_min"), (block, f"{d}_max")) for d in "ij"]
@@ -70,20 +74,24 @@ class Vortex(Problem):
         return {"error_rho": float(np.average(error, weights=block.volume))}
 
     def report(self, history, final=None) -> Report:
-        deck, error = self.deck, get_last(history, "error_rho")
+        deck = self.deck
+        error = get_last(history, "error_rho")
         rows = [compare(history, "error_rho", label="mean error of the density", digits=3)]
-        notes, known = say_unreached(history, "error_rho"), FIXED_GRID_ERRORS.get(deck.cells)
+        notes = say_unreached(history, "error_rho")
+        known = FIXED_GRID_ERRORS.get(deck.cells)
         if known and not notes and deck.beta == 5.0 and deck.run.t_end == 10.0:
             notes = [f"{error / known:.2f} of the reference on a fixed grid, {known:.3g}"]
         return Report(f"vortex, {deck.cells} x {deck.cells}, grid {deck.mesh}", rows, notes)
 
     def draw_vortex(self, figure, run_data) -> None:
         """Density in the last dump with the grid, and its error."""
-        dump, n = run_data.dumps[-1], self.deck.cells
+        dump = run_data.dumps[-1]
+        n = self.deck.cells
         square = dump["square"]
         error = square.rho - self.exact.compute_cell_averages(square.nodes, dump.t)[0]
         left, right = figure.subplots(1, 2)
-        most, every = np.abs(error).max(), max(1, n // 32)
+        most = np.abs(error).max()
+        every = max(1, n // 32)
         draw_field(left, dump, "rho", every=every, bar="density")
         ends = {"low": -most, "high": most, "colours": "RdBu_r"}
         draw_field(right, dump, lambda _: error, every=every, bar="density - exact", **ends)

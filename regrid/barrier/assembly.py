@@ -26,8 +26,13 @@ from regrid.jit import inlined, kernel
 # yx, yy) to the nodes (i, j+1), (i+1, j+1), from (i+1, j) to (i, j+1), and to (i+1, j); the node's
 # own block; the inverse pivot of the line solve and the factor P^-1 E.  Stores are at least 2 kB
 # behind loads shifted by a column (see regrid.barrier.line_cg).
-NORTH, DIAGONAL, CROSS, EAST = 0, 4 * SPAN, 8 * SPAN, 12 * SPAN
-OWN, PIVOT, FACTOR = 16 * SPAN, 19 * SPAN, 22 * SPAN
+NORTH = 0
+DIAGONAL = 4 * SPAN
+CROSS = 8 * SPAN
+EAST = 12 * SPAN
+OWN = 16 * SPAN
+PIVOT = 19 * SPAN
+FACTOR = 22 * SPAN
 NODE_ROWS = 26 * SPAN
 
 # Scratch of the assembly: one row each.
@@ -39,7 +44,8 @@ NODE_ROWS = 26 * SPAN
 ) = (k * SPAN for k in range(35))  # fmt: skip
 LOW, UP, LEFT, RIGHT = (k * SPAN for k in (35, 39, 43, 47))
 OLD_RIGHT, OLD_RIGHT_GX, OLD_RIGHT_GY, OLD_FX, OLD_FY = (k * SPAN for k in (51, 55, 56, 57, 58))
-FLUX_X, FLUX_Y = 59 * SPAN, 60 * SPAN
+FLUX_X = 59 * SPAN
+FLUX_Y = 60 * SPAN
 AREA_1, AREA_2, AREA_3, AREA_4 = (k * SPAN for k in range(61, 65))
 SLOPE_1, SLOPE_2, SLOPE_3, SLOPE_4 = (k * SPAN for k in range(65, 69))
 KEPT = 69 * SPAN - OWN  # own blocks, pivots and factors on their way to the matrix
@@ -77,9 +83,12 @@ def fill_side_edges(nodes, i, along_j, blend_i, weight, low, cells, Z):
     """
     x, y = nodes[0, i, low : low + cells + 1], nodes[1, i, low : low + cells + 1]
     columns = slice(low, low + cells)
-    length, length_change = along_j[LENGTH, columns], along_j[LENGTH_CHANGE, columns]
-    step, step_change = along_j[STEP, columns], along_j[STEP_CHANGE, columns]
-    u, way = i / (nodes.shape[1] - 1), blend_i[i]
+    length = along_j[LENGTH, columns]
+    length_change = along_j[LENGTH_CHANGE, columns]
+    step = along_j[STEP, columns]
+    step_change = along_j[STEP_CHANGE, columns]
+    u = i / (nodes.shape[1] - 1)
+    way = blend_i[i]
     for col in range(cells):
         s = length[col] + way * length_change[col]
         t = step[col] + u * step_change[col]
@@ -99,18 +108,26 @@ def fill_side_edges(nodes, i, along_j, blend_i, weight, low, cells, Z):
 @kernel(allocates=False)
 def fill_line_edges(nodes, i, laws, low, count, Z):
     """Scaled edges along i between node rows i and i+1, and the straight-line flux along them."""
-    along_i, bend, way, weight = laws.along_i, laws.bend, laws.way, laws.ki
+    along_i = laws.along_i
+    bend = laws.bend
+    way = laws.way
+    weight = laws.ki
     x0, y0 = nodes[0, i, low : low + count], nodes[1, i, low : low + count]
     x1, y1 = nodes[0, i + 1, low : low + count], nodes[1, i + 1, low : low + count]
-    length, length_change = along_i[LENGTH, i], along_i[LENGTH_CHANGE, i]
-    step, step_change = along_i[STEP, i], along_i[STEP_CHANGE, i]
-    bend0, bend1 = bend[i, low : low + count], bend[i + 1, low : low + count]
+    length = along_i[LENGTH, i]
+    length_change = along_i[LENGTH_CHANGE, i]
+    step = along_i[STEP, i]
+    step_change = along_i[STEP_CHANGE, i]
+    bend0 = bend[i, low : low + count]
+    bend1 = bend[i + 1, low : low + count]
     way_x, way_y = way[0, low : low + count], way[1, low : low + count]
     for col in range(count):
         v = Z[V + col]
-        s, t = length + Z[W + col] * length_change, step + v * step_change
+        s = length + Z[W + col] * length_change
+        t = step + v * step_change
         inverse = 1.0 / (s * t)
-        g, q = t * inverse, weight * (s * inverse)
+        g = t * inverse
+        q = weight * (s * inverse)
         dx, dy = x1[col] - x0[col], y1[col] - y0[col]
         ax, ay = dx * g, dy * g
         Z[AX + col] = ax
@@ -204,10 +221,14 @@ def fill_cell_numbers(aa, bb, ab, ba, to, cells, now, Z):
     `aa`, `bb`, `ab`: the rows of that entry in the terms of a corner, `ba` of the transposed one.
     """
     for col in range(cells):
-        near_1, far_1 = Z[TERMS + ab + col], Z[TERMS + ba + col]
-        near_3, far_3 = Z[CORNER_3 + ab + col], Z[CORNER_3 + ba + col]
-        far_2, near_4 = Z[CORNER_2 + ba + col], Z[CORNER_4 + ab + col]
-        low, up = Z[TERMS + aa + col] + Z[CORNER_4 + aa + col], Z[CORNER_2 + aa + col]
+        near_1 = Z[TERMS + ab + col]
+        far_1 = Z[TERMS + ba + col]
+        near_3 = Z[CORNER_3 + ab + col]
+        far_3 = Z[CORNER_3 + ba + col]
+        far_2 = Z[CORNER_2 + ba + col]
+        near_4 = Z[CORNER_4 + ab + col]
+        low = Z[TERMS + aa + col] + Z[CORNER_4 + aa + col]
+        up = Z[CORNER_2 + aa + col]
         left, right = Z[TERMS + bb + col] + Z[CORNER_2 + bb + col], Z[CORNER_3 + bb + col]
         Z[LOW + to + col] = (near_4 - far_1) - low
         Z[UP + to + col] = (far_2 - near_3) - (up + Z[CORNER_3 + aa + col])
@@ -305,7 +326,9 @@ def fill_own_blocks(cells, now, past, Z):
         least = LEAST_PIVOT * square
         determinant = square - p_xy * p_xy
         scale = 1.0 / (determinant if determinant > least else least)
-        v_xx, v_xy, v_yy = p_yy * scale, -(p_xy * scale), p_xx * scale
+        v_xx = p_yy * scale
+        v_xy = -(p_xy * scale)
+        v_yy = p_xx * scale
         Z[KEPT + PIVOT + col] = v_xx
         Z[KEPT + PIVOT + SPAN + col] = v_xy
         Z[KEPT + PIVOT + 2 * SPAN + col] = v_yy
@@ -325,7 +348,8 @@ def add_cost(near, far, sound, scale, weight, cells, now, Z):
     x and y of the rows of nodes `near` and `far`, `sound` of its cells, `scale` = 2/R², `weight` =
     mu sigma.
     """
-    (x0, y0), (x1, y1) = near, far
+    x0, y0 = near
+    x1, y1 = far
     for col in range(cells):
         ax = 0.5 * ((x1[col] - x0[col]) + (x1[col + 1] - x0[col + 1]))
         ay = 0.5 * ((y1[col] - y0[col]) + (y1[col + 1] - y0[col + 1]))
@@ -346,7 +370,8 @@ def add_cost(near, far, sound, scale, weight, cells, now, Z):
                 Z[edge + col] += half * dx
                 Z[edge + SPAN + col] += half * dy
             less_xx, less_xy = 0.25 * (aa_xx - bb_xx), 0.25 * (aa_xy - bb_xy)
-            less_yy, odd = 0.25 * (aa_yy - bb_yy), 0.25 * (ab_xy - ab_yx)
+            less_yy = 0.25 * (aa_yy - bb_yy)
+            odd = 0.25 * (ab_xy - ab_yx)
             for edge, sign, turn in (
                 (LOW, -1.0, odd),
                 (UP, -1.0, -odd),
@@ -357,10 +382,12 @@ def add_cost(near, far, sound, scale, weight, cells, now, Z):
                 Z[edge + SPAN + col] += sign * less_xy + turn
                 Z[edge + 2 * SPAN + col] += sign * less_xy - turn
                 Z[edge + 3 * SPAN + col] += sign * less_yy
-            sum_xx, sum_xy, sum_yy = (
-                0.25 * (aa_xx + bb_xx), 0.25 * (aa_xy + bb_xy), 0.25 * (aa_yy + bb_yy),
-            )  # fmt: skip
-            even_xx, even_xy, even_yy = 0.5 * ab_xx, 0.25 * (ab_xy + ab_yx), 0.5 * ab_yy
+            sum_xx = 0.25 * (aa_xx + bb_xx)
+            sum_xy = 0.25 * (aa_xy + bb_xy)
+            sum_yy = 0.25 * (aa_yy + bb_yy)
+            even_xx = 0.5 * ab_xx
+            even_xy = 0.25 * (ab_xy + ab_yx)
+            even_yy = 0.5 * ab_yy
             for block, sign in ((DIAGONAL, 1.0), (CROSS, -1.0)):
                 now[block + col] -= sum_xx + sign * even_xx
                 now[block + SPAN + col] -= sum_xy + sign * even_xy
@@ -426,7 +453,8 @@ def make_assembly(smooth):
         cells = last - first + 1
         laws = LineLaws(law.along_i, law.along_j, law.blend_i, law.bend, law.way, law.ki, law.kj)
         area = law.area_weight * law.area_target, law.area_weight / law.area_target
-        full, most = 0.25 * law.sigma * law.epsilon, law.strengthening
+        full = 0.25 * law.sigma * law.epsilon
+        most = law.strengthening
         begin_columns(nodes, law.along_j, law.blend_i, law.blend_j, law.kj, low, cells, Z)
         for i in range(ni):
             now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
@@ -436,12 +464,22 @@ def make_assembly(smooth):
                 bend_sides(law.curve, i + 1, low, cells, Z)
                 bend_lines(law.curve, i, low, cells + 1, Z)
             for col in range(cells):
-                ax, ay, a2 = Z[AX + col], Z[AY + col], Z[A2 + col]
-                ux, uy, u2 = Z[AX + col + 1], Z[AY + col + 1], Z[A2 + col + 1]
-                bx, by, b2 = Z[BX + col], Z[BY + col], Z[B2 + col]
-                rx, ry, r2 = Z[CX + col], Z[CY + col], Z[C2 + col]
-                d1, d2 = ax * by - ay * bx, ux * by - uy * bx
-                d3, d4 = ux * ry - uy * rx, ax * ry - ay * rx
+                ax = Z[AX + col]
+                ay = Z[AY + col]
+                a2 = Z[A2 + col]
+                ux = Z[AX + col + 1]
+                uy = Z[AY + col + 1]
+                u2 = Z[A2 + col + 1]
+                bx = Z[BX + col]
+                by = Z[BY + col]
+                b2 = Z[B2 + col]
+                rx = Z[CX + col]
+                ry = Z[CY + col]
+                r2 = Z[C2 + col]
+                d1 = ax * by - ay * bx
+                d2 = ux * by - uy * bx
+                d3 = ux * ry - uy * rx
+                d4 = ax * ry - ay * rx
                 if smooth:
                     d1, s1 = functional.smooth_area(d1, spread * spread)
                     d2, s2 = functional.smooth_area(d2, spread * spread)
@@ -451,13 +489,18 @@ def make_assembly(smooth):
                     Z[SLOPE_2 + col] = s2
                     Z[SLOPE_3 + col] = s3
                     Z[SLOPE_4 + col] = s4
-                i1, i2, i3, i4 = 1.0 / d1, 1.0 / d2, 1.0 / d3, 1.0 / d4
+                i1 = 1.0 / d1
+                i2 = 1.0 / d2
+                i3 = 1.0 / d3
+                i4 = 1.0 / d4
                 Z[INV_1 + col] = i1
                 Z[INV_2 + col] = i2
                 Z[INV_3 + col] = i3
                 Z[INV_4 + col] = i4
-                m1, m2 = (a2 * b2) * (i1 * i1), (u2 * b2) * (i2 * i2)
-                m3, m4 = (u2 * r2) * (i3 * i3), (a2 * r2) * (i4 * i4)
+                m1 = (a2 * b2) * (i1 * i1)
+                m2 = (u2 * b2) * (i2 * i2)
+                m3 = (u2 * r2) * (i3 * i3)
+                m4 = (a2 * r2) * (i4 * i4)
                 Z[AREA_1 + col] = m1
                 Z[AREA_2 + col] = m2
                 Z[AREA_3 + col] = m3
@@ -469,7 +512,10 @@ def make_assembly(smooth):
                 if last == nj:
                     Z[(AREA_2 if i == 0 else AREA_3) + cells - 1] = 0.0
             for col in range(cells):
-                m1, m2, m3, m4 = Z[AREA_1 + col], Z[AREA_2 + col], Z[AREA_3 + col], Z[AREA_4 + col]
+                m1 = Z[AREA_1 + col]
+                m2 = Z[AREA_2 + col]
+                m3 = Z[AREA_3 + col]
+                m4 = Z[AREA_4 + col]
                 m1 = m1 if m1 > m2 else m2
                 m3 = m3 if m3 > m4 else m4
                 m1 = functional.weigh(m1 if m1 > m3 else m3, law.least_sine, most)
@@ -489,7 +535,8 @@ def make_assembly(smooth):
                 inverse = Z[INV_1 + corner * SPAN : INV_1 + corner * SPAN + cells]
                 stiff_row = SLOPE_1 + corner * SPAN if smooth else SLOPE_1
                 slope = Z[stiff_row : stiff_row + cells]
-                weight, out = Z[WEIGHT : WEIGHT + cells], Z[term : term + 14 * SPAN]
+                weight = Z[WEIGHT : WEIGHT + cells]
+                out = Z[term : term + 14 * SPAN]
                 if smooth:
                     fill_smoothed_corner(A, B, inverse, slope, weight, area, out)
                 else:
@@ -530,5 +577,6 @@ def assemble_on_threads(nodes, law, columns, H, gradient, scratch):
     Every chunk writes its own columns, so results are bitwise those of the same chunks in sequence.
     """
     for k in prange(columns.shape[0] - 1):
-        first, last = columns[k], columns[k + 1]
+        first = columns[k]
+        last = columns[k + 1]
         assemble_barrier(nodes, law, 0.0, first, last, H[k], gradient, scratch[k])

@@ -28,13 +28,20 @@ LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of 
 # (NORTH), xx, xy, yy across the cell that begins there (ACROSS: between its nodes (i+1, j) and
 # (i, j+1), with the other sign between (i, j) and (i+1, j+1)), of the node itself (OWN); the
 # inverse pivot of the line solve (PIVOT) and its factor (FACTOR).
-EAST, NORTH, ACROSS, OWN, PIVOT, FACTOR = 0, 4, 8, 11, 14, 17
+EAST = 0
+NORTH = 4
+ACROSS = 8
+OWN = 11
+PIVOT = 14
+FACTOR = 17
 ROWS = 21
 # Scratch: the lower and upper edge along i, the near and far one along j, inverse conditional
 # lengths of the four, straight-line weights, sound speed, weight of the barrier, and T: aa, ab, bb.
 LOW_X, LOW_Y, UP_X, UP_Y, NEAR_X, NEAR_Y, FAR_X, FAR_Y = range(8)
 LOW_G, UP_G, NEAR_G, FAR_G, LINE_Q, SIDE_Q, SOUND, WEIGHT = range(8, 16)
-AA, AB, BB = 16, 19, 23
+AA = 16
+AB = 19
+BB = 23
 SCRATCH = 26
 
 
@@ -62,7 +69,8 @@ def gather_cells(nodes, law, first, last, first_columns, last_columns, Z):
     far_blend = 0.5 * (law.blend_i[first + 1] + law.blend_i[last + 1])
     u = 0.5 * (first + last + 1) / ni
     for k in range(first_columns.shape[0]):
-        j, j_last = first_columns[k], last_columns[k]
+        j = first_columns[k]
+        j_last = last_columns[k]
         x1, y1 = take_mean(x, first, last, j, j_last), take_mean(y, first, last, j, j_last)
         x2 = take_mean(x, first, last, j + 1, j_last + 1)
         y2 = take_mean(y, first, last, j + 1, j_last + 1)
@@ -70,8 +78,14 @@ def gather_cells(nodes, law, first, last, first_columns, last_columns, Z):
         y3 = take_mean(y, first + 1, last + 1, j + 1, j_last + 1)
         x4 = take_mean(x, first + 1, last + 1, j, j_last)
         y4 = take_mean(y, first + 1, last + 1, j, j_last)
-        Z[LOW_X, k], Z[LOW_Y, k], Z[UP_X, k], Z[UP_Y, k] = x4 - x1, y4 - y1, x3 - x2, y3 - y2
-        Z[NEAR_X, k], Z[NEAR_Y, k], Z[FAR_X, k], Z[FAR_Y, k] = x2 - x1, y2 - y1, x3 - x4, y3 - y4
+        Z[LOW_X, k] = x4 - x1
+        Z[LOW_Y, k] = y4 - y1
+        Z[UP_X, k] = x3 - x2
+        Z[UP_Y, k] = y3 - y2
+        Z[NEAR_X, k] = x2 - x1
+        Z[NEAR_Y, k] = y2 - y1
+        Z[FAR_X, k] = x3 - x4
+        Z[FAR_Y, k] = y3 - y4
         low_blend = 0.5 * (law.blend_j[j] + law.blend_j[j_last])
         up_blend = 0.5 * (law.blend_j[j + 1] + law.blend_j[j_last + 1])
         Z[LOW_G, k] = 1.0 / (low + low_blend * low_change)
@@ -91,12 +105,25 @@ def gather_cells(nodes, law, first, last, first_columns, last_columns, Z):
 @kernel
 def weigh_cells(law, growth, count, Z):
     """Weight of a corner of the gathered cells (theory R4.3, R4.4); False if one is folded."""
-    full, folded = 0.25 * law.sigma * law.epsilon, 0
+    full = 0.25 * law.sigma * law.epsilon
+    folded = 0
     for k in range(count):
-        ax, ay, ux, uy = Z[LOW_X, k], Z[LOW_Y, k], Z[UP_X, k], Z[UP_Y, k]
-        bx, by, rx, ry = Z[NEAR_X, k], Z[NEAR_Y, k], Z[FAR_X, k], Z[FAR_Y, k]
-        a2, u2, b2, r2 = ax * ax + ay * ay, ux * ux + uy * uy, bx * bx + by * by, rx * rx + ry * ry
-        d1, d2, d3, d4 = ax * by - ay * bx, ux * by - uy * bx, ux * ry - uy * rx, ax * ry - ay * rx
+        ax = Z[LOW_X, k]
+        ay = Z[LOW_Y, k]
+        ux = Z[UP_X, k]
+        uy = Z[UP_Y, k]
+        bx = Z[NEAR_X, k]
+        by = Z[NEAR_Y, k]
+        rx = Z[FAR_X, k]
+        ry = Z[FAR_Y, k]
+        a2 = ax * ax + ay * ay
+        u2 = ux * ux + uy * uy
+        b2 = bx * bx + by * by
+        r2 = rx * rx + ry * ry
+        d1 = ax * by - ay * bx
+        d2 = ux * by - uy * bx
+        d3 = ux * ry - uy * rx
+        d4 = ax * ry - ay * rx
         folded += 0 if min(min(d1, d2), min(d3, d4)) > 0.0 else 1
         square = max(
             max(a2 * b2 / (d1 * d1), u2 * b2 / (d2 * d2)),
@@ -117,8 +144,12 @@ def add_corners(near, far, a_g, b_g, law, count, Z):
     """
     lam_c = law.area_weight * law.area_target
     for k in range(count):
-        ga, gb = Z[a_g, k], Z[b_g, k]
-        ax, ay, bx, by = ga * Z[near, k], ga * Z[near + 1, k], gb * Z[far, k], gb * Z[far + 1, k]
+        ga = Z[a_g, k]
+        gb = Z[b_g, k]
+        ax = ga * Z[near, k]
+        ay = ga * Z[near + 1, k]
+        bx = gb * Z[far, k]
+        by = gb * Z[far + 1, k]
         inverse = 1.0 / (ax * by - ay * bx)
         _, _, _, _, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy = (
             functional.barrier_corner(
@@ -159,11 +190,17 @@ def couple_nodes(stretch, lines, count, Z, now, then):
     """
     for k in range(count):
         along = 0.5 * lines[k] / stretch
-        aa_xx, aa_xy, aa_yy = along * Z[AA, k], along * Z[AA + 1, k], along * Z[AA + 2, k]
+        aa_xx = along * Z[AA, k]
+        aa_xy = along * Z[AA + 1, k]
+        aa_yy = along * Z[AA + 2, k]
         along = 0.5 * stretch / lines[k]
-        bb_xx, bb_xy, bb_yy = along * Z[BB, k], along * Z[BB + 1, k], along * Z[BB + 2, k]
-        odd, even = 0.25 * (Z[AB + 1, k] - Z[AB + 2, k]), 0.25 * (Z[AB + 1, k] + Z[AB + 2, k])
-        xx, yy = 0.5 * Z[AB, k], 0.5 * Z[AB + 3, k]
+        bb_xx = along * Z[BB, k]
+        bb_xy = along * Z[BB + 1, k]
+        bb_yy = along * Z[BB + 2, k]
+        odd = 0.25 * (Z[AB + 1, k] - Z[AB + 2, k])
+        even = 0.25 * (Z[AB + 1, k] + Z[AB + 2, k])
+        xx = 0.5 * Z[AB, k]
+        yy = 0.5 * Z[AB + 3, k]
         now[EAST, k] -= aa_xx
         now[EAST + 1, k] += odd - aa_xy
         now[EAST + 2, k] -= odd + aa_xy
@@ -176,10 +213,17 @@ def couple_nodes(stretch, lines, count, Z, now, then):
         then[NORTH + 1, k] += odd - bb_xy
         then[NORTH + 2, k] -= odd + bb_xy
         then[NORTH + 3, k] -= bb_yy
-        now[ACROSS, k], now[ACROSS + 1, k], now[ACROSS + 2, k] = xx, even, yy
-        Z[AA, k], Z[AA + 1, k], Z[AA + 2, k], Z[AB, k] = aa_xx, aa_xy, aa_yy, odd
+        now[ACROSS, k] = xx
+        now[ACROSS + 1, k] = even
+        now[ACROSS + 2, k] = yy
+        Z[AA, k] = aa_xx
+        Z[AA + 1, k] = aa_xy
+        Z[AA + 2, k] = aa_yy
+        Z[AB, k] = odd
         # at a corner itself: both of its edges, and their coupling
-        Z[BB, k], Z[BB + 1, k], Z[BB + 2, k] = aa_xx + bb_xx, aa_xy + bb_xy, aa_yy + bb_yy
+        Z[BB, k] = aa_xx + bb_xx
+        Z[BB + 1, k] = aa_xy + bb_xy
+        Z[BB + 2, k] = aa_yy + bb_yy
         now[OWN, k] += Z[BB, k] + xx
         now[OWN + 1, k] += Z[BB + 1, k] + even
         now[OWN + 2, k] += Z[BB + 2, k] + yy
@@ -191,7 +235,9 @@ def couple_nodes(stretch, lines, count, Z, now, then):
         now[EAST + 1, k + 1] -= Z[AB, k] + Z[AA + 1, k]
         now[EAST + 2, k + 1] += Z[AB, k] - Z[AA + 1, k]
         now[EAST + 3, k + 1] -= Z[AA + 2, k]
-        xx, even, yy = now[ACROSS, k], now[ACROSS + 1, k], now[ACROSS + 2, k]
+        xx = now[ACROSS, k]
+        even = now[ACROSS + 1, k]
+        yy = now[ACROSS + 2, k]
         now[OWN, k + 1] += Z[BB, k] - xx
         now[OWN + 1, k + 1] += Z[BB + 1, k] - even
         now[OWN + 2, k + 1] += Z[BB + 2, k] - yy
@@ -208,7 +254,8 @@ def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
     `regrid.barrier.side_laws.BarrierLaw`.  False if one of the gathered cells is folded.
     """
     parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
-    Z, lines = np.empty((SCRATCH, parts_j)), np.empty(parts_j)
+    Z = np.empty((SCRATCH, parts_j))
+    lines = np.empty(parts_j)
     first_columns, last_columns = np.empty((2, parts_j), dtype=np.int64)
     for k in range(parts_j):
         first_columns[k] = (starts_j[k] + starts_j[k + 1] - 1) // 2
@@ -244,24 +291,40 @@ def factor_lines(matrix):
     """Inverse pivots and factors of every line along i into `matrix` (n_i + 1, ROWS, n_j + 1)."""
     n_i, n_j = matrix.shape[0] - 1, matrix.shape[2] - 1
     for i in range(1, n_i):
-        past, now = matrix[i - 1], matrix[i]
+        past = matrix[i - 1]
+        now = matrix[i]
         for j in range(1, n_j):
-            xx, xy, yy = now[OWN, j], now[OWN + 1, j], now[OWN + 2, j]
+            xx = now[OWN, j]
+            xy = now[OWN + 1, j]
+            yy = now[OWN + 2, j]
             if i > 1:
-                a, b, c, d = past[EAST, j], past[EAST + 1, j], past[EAST + 2, j], past[EAST + 3, j]
-                p, q = past[FACTOR, j], past[FACTOR + 1, j]
-                r, s = past[FACTOR + 2, j], past[FACTOR + 3, j]
+                a = past[EAST, j]
+                b = past[EAST + 1, j]
+                c = past[EAST + 2, j]
+                d = past[EAST + 3, j]
+                p = past[FACTOR, j]
+                q = past[FACTOR + 1, j]
+                r = past[FACTOR + 2, j]
+                s = past[FACTOR + 3, j]
                 xx -= a * p + c * r
                 xy -= a * q + c * s
                 yy -= b * q + d * s
             square = xx * yy
-            least, determinant = LEAST_PIVOT * square, square - xy * xy
+            least = LEAST_PIVOT * square
+            determinant = square - xy * xy
             scale = 1.0 / (determinant if determinant > least else least)
             xx, xy, yy = yy * scale, -(xy * scale), xx * scale
-            now[PIVOT, j], now[PIVOT + 1, j], now[PIVOT + 2, j] = xx, xy, yy
-            a, b, c, d = now[EAST, j], now[EAST + 1, j], now[EAST + 2, j], now[EAST + 3, j]
-            now[FACTOR, j], now[FACTOR + 1, j] = xx * a + xy * c, xx * b + xy * d
-            now[FACTOR + 2, j], now[FACTOR + 3, j] = xy * a + yy * c, xy * b + yy * d
+            now[PIVOT, j] = xx
+            now[PIVOT + 1, j] = xy
+            now[PIVOT + 2, j] = yy
+            a = now[EAST, j]
+            b = now[EAST + 1, j]
+            c = now[EAST + 2, j]
+            d = now[EAST + 3, j]
+            now[FACTOR, j] = xx * a + xy * c
+            now[FACTOR + 1, j] = xx * b + xy * d
+            now[FACTOR + 2, j] = xy * a + yy * c
+            now[FACTOR + 3, j] = xy * b + yy * d
 
 
 @kernel(allocates=False)
@@ -270,8 +333,13 @@ def solve_lines(matrix, r, z):
     n_i, n_j = r.shape[1] - 1, r.shape[2] - 1
     total = 0.0
     for i in range(1, n_i):
-        past, z_x, z_y = matrix[i - 1], z[0, i], z[1, i]
-        r_x, r_y, b_x, b_y = r[0, i], r[1, i], z[0, i - 1], z[1, i - 1]
+        past = matrix[i - 1]
+        z_x = z[0, i]
+        z_y = z[1, i]
+        r_x = r[0, i]
+        r_y = r[1, i]
+        b_x = z[0, i - 1]
+        b_y = z[1, i - 1]
         if i == 1:
             for j in range(1, n_j):
                 z_x[j], z_y[j] = r_x[j], r_y[j]
@@ -281,8 +349,13 @@ def solve_lines(matrix, r, z):
                 z_x[j] = r_x[j] - (past[FACTOR, j] * u + past[FACTOR + 2, j] * v)
                 z_y[j] = r_y[j] - (past[FACTOR + 1, j] * u + past[FACTOR + 3, j] * v)
     for i in range(n_i - 1, 0, -1):
-        now, z_x, z_y = matrix[i], z[0, i], z[1, i]
-        r_x, r_y, a_x, a_y = r[0, i], r[1, i], z[0, i + 1], z[1, i + 1]
+        now = matrix[i]
+        z_x = z[0, i]
+        z_y = z[1, i]
+        r_x = r[0, i]
+        r_y = r[1, i]
+        a_x = z[0, i + 1]
+        a_y = z[1, i + 1]
         for j in range(1, n_j):
             u, v = z_x[j], z_y[j]
             x = now[PIVOT, j] * u + now[PIVOT + 1, j] * v
@@ -300,15 +373,14 @@ def fill_product(matrix, p, out):
     n_i, n_j = p.shape[1] - 1, p.shape[2] - 1
     total = 0.0
     for i in range(1, n_i):
-        past, now = matrix[i - 1], matrix[i]
-        b_x, b_y, h_x, h_y, a_x, a_y = (
-            p[0, i - 1],
-            p[1, i - 1],
-            p[0, i],
-            p[1, i],
-            p[0, i + 1],
-            p[1, i + 1],
-        )
+        past = matrix[i - 1]
+        now = matrix[i]
+        b_x = p[0, i - 1]
+        b_y = p[1, i - 1]
+        h_x = p[0, i]
+        h_y = p[1, i]
+        a_x = p[0, i + 1]
+        a_y = p[1, i + 1]
         out_x, out_y = out[0, i], out[1, i]
         for j in range(1, n_j):
             u, v = h_x[j], h_y[j]
@@ -359,13 +431,16 @@ def solve(matrix, r, x, z, p, product, tolerance, most):
     fill_product(matrix, x, product)
     r -= product
     rz = solve_lines(matrix, r, z)
-    stop, beta, done = tolerance * tolerance * rz, 0.0, 0
+    stop = tolerance * tolerance * rz
+    beta = 0.0
+    done = 0
     if not rz >= 0.0:
         return -1
     while done < most and rz > stop:
         for k in range(2):
             for i in range(1, r.shape[1] - 1):
-                direction, step = p[k, i], z[k, i]
+                direction = p[k, i]
+                step = z[k, i]
                 for j in range(r.shape[2]):
                     direction[j] = step[j] + beta * direction[j]
         curvature = fill_product(matrix, p, product)
@@ -374,7 +449,10 @@ def solve(matrix, r, x, z, p, product, tolerance, most):
         alpha = rz / curvature
         for k in range(2):
             for i in range(1, r.shape[1] - 1):
-                x_row, r_row, p_row, h_row = x[k, i], r[k, i], p[k, i], product[k, i]
+                x_row = x[k, i]
+                r_row = r[k, i]
+                p_row = p[k, i]
+                h_row = product[k, i]
                 for j in range(r.shape[2]):
                     x_row[j] += alpha * p_row[j]
                     r_row[j] -= alpha * h_row[j]

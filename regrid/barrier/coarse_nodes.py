@@ -24,7 +24,8 @@ from regrid.jit import kernel
 
 # Sums of the residual check: the gradient along the lines j = const and i = const at coarse lines
 # i = const, summed over the stretches on either side with hat functions.
-ALPHA, BETA = 0, 1
+ALPHA = 0
+BETA = 1
 
 
 def cut_evenly(count: int, parts: int) -> np.ndarray:
@@ -65,10 +66,13 @@ def fill_coarse_right(starts_j, sums, right):
     right[:] = 0.0
     for k in range(2):
         for part_i in range(1, parts_i):
-            row, out = sums[k, part_i], right[k, part_i]
+            row = sums[k, part_i]
+            out = right[k, part_i]
             for part_j in range(parts_j):
-                begin, end = starts_j[part_j], starts_j[part_j + 1]
-                near, far = 0.0, 0.0
+                begin = starts_j[part_j]
+                end = starts_j[part_j + 1]
+                near = 0.0
+                far = 0.0
                 for j in range(max(begin, 1), end):
                     v = (j - begin) / (end - begin)
                     near += (1.0 - v) * row[j]
@@ -94,10 +98,12 @@ def take_frames(nodes, starts_i, starts_j, right, lines, solution):
             area = ix * jy - iy * jx
             if not area > 0.0:
                 return False
-            alpha, beta = right[0, part_i, part_j] / area, right[1, part_i, part_j] / area
+            alpha = right[0, part_i, part_j] / area
+            beta = right[1, part_i, part_j] / area
             right[0, part_i, part_j] = alpha * jy - beta * iy
             right[1, part_i, part_j] = beta * ix - alpha * jx
-            alpha, beta = lines[0, part_i, j], lines[1, part_i, j]
+            alpha = lines[0, part_i, j]
+            beta = lines[1, part_i, j]
             solution[0, part_i, part_j] = alpha * ix + beta * jx
             solution[1, part_i, part_j] = alpha * iy + beta * jy
     return True
@@ -130,8 +136,10 @@ def fill_coarse_lines(nodes, starts_i, starts_j, solution, lines):
             solution[1, part_i, part_j] = (ix * dy - iy * dx) / area
         for k in range(2):
             for part_j in range(parts_j):
-                begin, end = starts_j[part_j], starts_j[part_j + 1]
-                near, far = solution[k, part_i, part_j], solution[k, part_i, part_j + 1]
+                begin = starts_j[part_j]
+                end = starts_j[part_j + 1]
+                near = solution[k, part_i, part_j]
+                far = solution[k, part_i, part_j + 1]
                 for j in range(begin, end):
                     lines[k, part_i, j] = near + (far - near) * ((j - begin) / (end - begin))
     return np.sqrt(most)
@@ -147,14 +155,20 @@ def add_coarse(nodes, starts_i, lines, out):
     for k in range(2):
         out[k, 0] = nodes[k, 0]
         for part in range(starts_i.shape[0] - 1):
-            begin, end = starts_i[part], starts_i[part + 1]
-            near, far, near_j, far_j = (
-                lines[0, part], lines[0, part + 1], lines[1, part], lines[1, part + 1],
-            )  # fmt: skip
+            begin = starts_i[part]
+            end = starts_i[part + 1]
+            near = lines[0, part]
+            far = lines[0, part + 1]
+            near_j = lines[1, part]
+            far_j = lines[1, part + 1]
             for i in range(max(begin, 1), end):
                 w = (i - begin) / (end - begin)
-                past, here, then, row = nodes[k, i - 1], nodes[k, i], nodes[k, i + 1], out[k, i]
-                row[0], row[nj] = here[0], here[nj]
+                past = nodes[k, i - 1]
+                here = nodes[k, i]
+                then = nodes[k, i + 1]
+                row = out[k, i]
+                row[0] = here[0]
+                row[nj] = here[nj]
                 for j in range(1, nj):
                     alpha = near[j] + w * (far[j] - near[j])
                     beta = near_j[j] + w * (far_j[j] - near_j[j])
@@ -205,7 +219,9 @@ class CoarseCorrection:
         counts = [nj // apart for apart in tuning.coarse_apart if nj // apart >= 2]
         self.able = ni * nj >= tuning.coarse_from and parts_i >= 2 and bool(counts)
         if not self.able:
-            parts_i, counts, nj = 0, [], 0
+            parts_i = 0
+            counts = []
+            nj = 0
         self.starts_i = cut_evenly(ni, parts_i) if parts_i else np.zeros(1, dtype=np.int64)
         self.levels = [Level(self.starts_i.size, count, nj) for count in counts]
         self._shape = 2, self.starts_i.size, nj + 1
@@ -226,7 +242,8 @@ class CoarseCorrection:
         Returns its largest part over the shortest edge there, in cells; 0 in small blocks, without
         a solution, and if the coarsest nodes move by less than `least`.
         """
-        size, self.iterations = 0.0, 0
+        size = 0.0
+        self.iterations = 0
         if not self.able:
             return 0.0
         self.lines[:] = 0.0

@@ -91,14 +91,20 @@ def corner_blocks(size, v, g, off, inverse, stiff, scale, area):
     With respect to edges as they are: `scale` has the weight and the inverse conditional lengths of
     both edges, `area` lam c and lam/c.
     """
-    (va, vb), (g_a, g_b), (weight, ga, gb), (lam_c, flat) = v, g, scale, area
+    va, vb = v
+    g_a, g_b = g
+    weight, ga, gb = scale
+    lam_c, flat = area
     m, _ = corner_slope(size, inverse, lam_c, flat)
     aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy = corner_hessian(
         size, v, g, off, inverse, stiff, lam_c
     )
     twice = 2.0 * inverse
-    wa, wb = weight * ga, weight * gb
-    waa, wab, wbb = twice * wa * ga, twice * wa * gb, twice * wb * gb
+    wa = weight * ga
+    wb = weight * gb
+    waa = twice * wa * ga
+    wab = twice * wa * gb
+    wbb = twice * wb * gb
     return (
         wa * (twice * va[0] + m * g_a[0]), wa * (twice * va[1] + m * g_a[1]),
         wb * (twice * vb[0] + m * g_b[0]), wb * (twice * vb[1] + m * g_b[1]),
@@ -113,17 +119,21 @@ def barrier_corner(a, b, inverse, stiff, weight, area):
 
     Of the edges a and b: x, y, length squared, inverse conditional length.
     """
-    (ax, ay, _, ga), (bx, by, _, gb) = a, b
+    ax, ay, _, ga = a
+    bx, by, _, gb = b
     wx, wy = ax - by, ay + bx
-    v, g = ((wx, wy), (wy, -wx)), ((by, -bx), (-ay, ax))
+    v = ((wx, wy), (wy, -wx))
+    g = ((by, -bx), (-ay, ax))
     return corner_blocks(wx * wx + wy * wy, v, g, 1.0, inverse, stiff, (weight, ga, gb), area)
 
 
 @inlined
 def smoothed_corner(a, b, inverse, slope, weight, area):
     """`corner_blocks` with D replaced by chi(D); `inverse` is 1/chi, `slope` is chi'(D)."""
-    (ax, ay, a2, ga), (bx, by, b2, gb) = a, b
-    v, g = ((ax, ay), (bx, by)), ((slope * by, -slope * bx), (-slope * ay, slope * ax))
+    ax, ay, a2, ga = a
+    bx, by, b2, gb = b
+    v = ((ax, ay), (bx, by))
+    g = ((slope * by, -slope * bx), (-slope * ay, slope * ax))
     return corner_blocks(a2 + b2, v, g, 0.0, inverse, 1.0, (weight, ga, gb), area)
 
 
@@ -168,7 +178,9 @@ def cost_number(shares, one, other):
 
     Of two components of A and B: each with the slopes of V and of rho in it.
     """
-    (stiffness, cross, both, curve), (p, g_p, d_p), (q, g_q, d_q) = shares, one, other
+    stiffness, cross, both, curve = shares
+    p, g_p, d_p = one
+    q, g_q, d_q = other
     return stiffness * (both * (g_p * g_q) - cross * (p * g_q + g_p * q)) + curve * (d_p * d_q)
 
 
@@ -182,7 +194,10 @@ def cost_blocks(ax, ay, bx, by, slope):
     first, curve, dax, day, dbx, dby, twice, share, inverse = slope
     h = first * twice
     shares = h, 2.0 * inverse, (4.0 * share) * inverse, curve
-    a_x, a_y, b_x, b_y = (ax, by, dax), (ay, -bx, day), (bx, -ay, dbx), (by, ax, dby)
+    a_x = (ax, by, dax)
+    a_y = (ay, -bx, day)
+    b_x = (bx, -ay, dbx)
+    b_y = (by, ax, dby)
     return (
         h + cost_number(shares, a_x, a_x), cost_number(shares, a_x, a_y),
         h + cost_number(shares, a_y, a_y),

@@ -18,7 +18,8 @@ from regrid.jit import inlined, kernel
 # far from them: a store less than 2 kB behind a shifted load halves the vector length (LLVM
 # protects store-to-load forwarding).
 BEFORE_X, BEFORE_Y, HERE_X, HERE_Y, AFTER_X, AFTER_Y = (k * SPAN for k in range(6))
-OUT_X, OUT_Y = 10 * SPAN, 11 * SPAN
+OUT_X = 10 * SPAN
+OUT_Y = 11 * SPAN
 
 
 @inlined
@@ -70,7 +71,9 @@ def fill_product(directions, beta, first, last, H, out, totals, Z):
     """
     direction, z, old = directions
     ni = z.shape[1] - 1
-    count, low, high = last - first, first - 1, last + 1
+    count = last - first
+    low = first - 1
+    high = last + 1
     total = totals[first:last]
     for k in range(count):
         total[k] = 0.0
@@ -119,12 +122,14 @@ def fill_line_solution(alpha, step, vectors, first, last, H, totals):
     `step` is p and Hp, `vectors` are x, r, z.  Nothing is added if alpha is 0, so `step` may be
     undefined in the first call.
     """
-    (direction, product), (x, r, z) = step, vectors
+    direction, product = step
+    x, r, z = vectors
     ni = x.shape[1] - 1
     count = last - first
     total = totals[first:last]
     for i in range(1, ni):
-        x_x, x_y = x[0, i, first:last], x[1, i, first:last]
+        x_x = x[0, i, first:last]
+        x_y = x[1, i, first:last]
         r_x, r_y = r[0, i, first:last], r[1, i, first:last]
         if alpha != 0.0:
             p_x, p_y = direction[0, i, first:last], direction[1, i, first:last]
@@ -159,7 +164,8 @@ def fill_line_solution(alpha, step, vectors, first, last, H, totals):
         for k in range(count):
             col = k + 1
             u, v = z_x[k], z_y[k]
-            p, q = a_x[k], a_y[k]
+            p = a_x[k]
+            q = a_y[k]
             off = now[at.PIVOT + SPAN + col]
             s_x = (now[at.PIVOT + col] * u + off * v) - (
                 now[at.FACTOR + col] * p + now[at.FACTOR + SPAN + col] * q
@@ -193,14 +199,18 @@ def make_solver(parallel):
         squared residual, in the norm of the preconditioner, is below tolerance² of its first value
         or below floor, or after the given number of iterations.
         """
-        (p, p_old, product), (tolerance, floor, most) = directions, limits
+        p, p_old, product = directions
+        tolerance, floor, most = limits
         chunks = columns.shape[0] - 1
-        begin, end = columns[0], columns[chunks]
+        begin = columns[0]
+        end = columns[chunks]
         for c in prange(chunks):
             fill_line_solution(0.0, (p, product), vectors, columns[c], columns[c + 1], H[c], totals)
         first = add_columns(totals, begin, end)
-        rz, stop = first, max(floor, tolerance * tolerance * first)
-        beta, done = 0.0, 0
+        rz = first
+        stop = max(floor, tolerance * tolerance * first)
+        beta = 0.0
+        done = 0
         while done < most and rz > stop:
             for c in prange(chunks):
                 fill_product(
@@ -216,7 +226,8 @@ def make_solver(parallel):
                     alpha, (p, product), vectors, columns[c], columns[c + 1], H[c], totals
                 )
             done += 1
-            previous, rz = rz, add_columns(totals, begin, end)
+            previous = rz
+            rz = add_columns(totals, begin, end)
             beta = rz / previous
             p, p_old = p_old, p
         return done, first, rz

@@ -39,7 +39,9 @@ class NewtonMove:
     """
 
     def __init__(self, tuning: Tuning, work: Workspace, **begin):
-        self.tuning, self.work, self.arguments = tuning, work, begin
+        self.tuning = tuning
+        self.work = work
+        self.arguments = begin
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual = 0.0
         self.broken = False
@@ -69,7 +71,8 @@ class NewtonMove:
 
     def is_settled(self) -> bool:
         """Check the residual of the displaced grid: True if that is `work.trial` and final."""
-        work, tuning = self.work, self.tuning
+        work = self.work
+        tuning = self.tuning
         if work.ni == 1 or work.nj == 1:
             work.load_old()
             copy_sides(work.sides, work.base)
@@ -77,14 +80,16 @@ class NewtonMove:
         self.moved_ratio, self.estimate, strayed = work.look()
         corrected = False
         if self.moved_ratio > tuning.start_ratio and self._correct_smooth_error():
-            strayed, corrected = np.inf, True
+            strayed = np.inf
+            corrected = True
         good = self.estimate <= min(max(tuning.idle * tuning.floor, ROUND_OFF), self._get_lost())
         if not (self.moved_ratio > tuning.start_ratio and good):
             return False
         self.residual = max(self.residual, self.estimate)
         self.strayed = strayed
         if not corrected:
-            self.quality, self.triangles = work.get_quality(), work.marks.bit_count()
+            self.quality = work.get_quality()
+            self.triangles = work.marks.bit_count()
         if self.moved_ratio <= DOUBTFUL:  # all of the grid will be read
             work.load_old()
         work.base, work.trial = work.trial, work.base
@@ -96,7 +101,8 @@ class NewtonMove:
 
         The sums are those of `work.base`.  A correction that shrinks corners is rejected.
         """
-        work, tuning = self.work, self.tuning
+        work = self.work
+        tuning = self.tuning
         if self.estimate * max(work.ni, work.nj) ** 2 < tuning.smooth_floor:
             return False  # n cells long, an error of d cells leaves a residual of some d (pi / n)²
         if work.coarse.able:
@@ -125,7 +131,8 @@ class NewtonMove:
             work.sides = work.own_sides
         if self._advance():
             return True
-        begin, end = work.old.copy(), work.sides.copy()
+        begin = work.old.copy()
+        end = work.sides.copy()
         for halving in range(1, self.tuning.most_halvings + 1):
             parts = 2**halving
             work.keep_own(begin, end)
@@ -142,7 +149,8 @@ class NewtonMove:
                 work.old[:] = work.trial
             else:
                 self.sub_moves = parts - 1
-                self.start, self.strayed = "halved", np.inf
+                self.start = "halved"
+                self.strayed = np.inf
                 return True
         work.keep_own(begin, end)
         return self._unfold()
@@ -152,7 +160,9 @@ class NewtonMove:
         work = self.work
         if work.ni == 1 or work.nj == 1 or find_impossible(work.sides) is not None:
             return False
-        broken, self.quality, self.triangles = self.broken, None, -1
+        broken = self.broken
+        self.quality = None
+        self.triangles = -1
         self._begin()
         work.look()
         straight = transfinite_grid(work.sides)
@@ -163,9 +173,11 @@ class NewtonMove:
         else:
             self.broken = broken
             return False
-        self.ratio, self.sub_moves = np.inf, 0
+        self.ratio = np.inf
+        self.sub_moves = 0
         self.rescues += 1
-        self.start, self.strayed = "untangled", np.inf
+        self.start = "untangled"
+        self.strayed = np.inf
         work.trial[:] = found
         self._polish(0.0, self.tuning.most_polish)
         if not self.broken and self._accept(work.compare_corners(work.trial, work.old)):
@@ -184,15 +196,19 @@ class NewtonMove:
 
         True when `work.trial` is valid.
         """
-        work, tuning = self.work, self.tuning
-        self.quality, self.triangles = None, -1
+        work = self.work
+        tuning = self.tuning
+        self.quality = None
+        self.triangles = -1
         if work.ni == 1 or work.nj == 1:
             work.trial[:] = work.base
             return self._accept(work.compare_corners(work.trial, work.old))
-        slow, fast = SLOW * tuning.fast_sides, tuning.fast_sides
+        slow = SLOW * tuning.fast_sides
+        fast = tuning.fast_sides
         stiffness = compute_stiffness(work.old, work.sides, tuning.stiffness, slow, fast)
         work.law = work.law._replace(stiffness=stiffness)
-        moved, untangled = self.moved_ratio > tuning.start_ratio, False
+        moved = self.moved_ratio > tuning.start_ratio
+        untangled = False
         if moved:
             done = self.iterations
             ratio = self._newton(work.base, work.old)
@@ -220,12 +236,15 @@ class NewtonMove:
 
         An interior that lags behind leaves its residual at the sides: relative to their length.
         """
-        inner, around = (self.work.ni - 1) * (self.work.nj - 1), self.work.ni + self.work.nj
+        inner = (self.work.ni - 1) * (self.work.nj - 1)
+        around = self.work.ni + self.work.nj
         return self.tuning.lost / math.sqrt(inner / around)
 
     def _straighten(self, ratio: float) -> float:
         """Start from the straight-line grid instead, if that is valid and much closer."""
-        work, error, broken = self.work, self.error, self.broken
+        work = self.work
+        error = self.error
+        broken = self.broken
         kept = work.trial.copy()
         fill_quasi_1d(work.sides, work.base)
         if work.compare_corners(work.base, work.old) > 0.0:
@@ -243,7 +262,8 @@ class NewtonMove:
 
         After untangling (`afresh`) also until the residual is below `settled`.
         """
-        work, tuning = self.work, self.tuning
+        work = self.work
+        tuning = self.tuning
         for step in range(most):
             good = ratio > tuning.start_ratio
             if afresh:
@@ -261,7 +281,8 @@ class NewtonMove:
 
         Returns the least corner ratio of the step to `work.trial`, 0 if that is not valid.
         """
-        work, least = self.work, self.tuning.step_ratio
+        work = self.work
+        least = self.tuning.step_ratio
         work.assemble(work.old)
         self._solve(work.base - work.old)
         np.add(work.old, work.change, out=work.trial)
@@ -312,7 +333,8 @@ class NewtonMove:
         Sets `broken` if the line solve overflows because corners are too sharp: a residual that is
         not finite, negative or zero does not indicate a minimum.
         """
-        work, tuning = self.work, self.tuning
+        work = self.work
+        tuning = self.tuning
         scale = work.sigma * (work.ni - 1) * (work.nj - 1)
         floor = max(tuning.floor, ROUND_OFF) ** 2 * scale
         if guess is None:

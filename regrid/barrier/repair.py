@@ -77,7 +77,9 @@ def repair_grid(nodes: np.ndarray, project: bool = True) -> Repaired:
     nodes = np.ascontiguousarray(nodes[flip])
     excluded = find_excluded_corners(nodes)
     bad = find_folded_cells(nodes, excluded)
-    before, projected, untangled = len(bad), 0, False
+    before = len(bad)
+    projected = 0
+    untangled = False
     if len(bad) and project and len(bad) <= max(4, FEW * excluded[0].size):
         projected = project_nodes(nodes, excluded)
         bad = find_folded_cells(nodes, excluded)
@@ -116,7 +118,8 @@ def project_nodes(nodes: np.ndarray, excluded: np.ndarray) -> int:
         progress = False
         for corner, i, j in np.argwhere(wrong):
             (a, b), before, after = TRIANGLES[corner][0], *TRIANGLES[corner][1:]
-            p, q = i + a, j + b
+            p = i + a
+            q = j + b
             if not (0 < p < ni and 0 < q < nj):
                 continue
             here = nodes[:, p, q].copy()

@@ -49,11 +49,13 @@ from regrid.measure.quality import find_areas, square
 # TILE rows of x and as many of y: of the old grid and of this one, in a transposed frame, where
 # they are columns in memory.  Eight numbers fill a cache line.
 TILE = 8
-OLD_TILE, TILED = 74 * SPAN, (74 + 2 * TILE) * SPAN
+OLD_TILE = 74 * SPAN
+TILED = (74 + 2 * TILE) * SPAN
 LOOK_ROWS = (74 + 4 * TILE) * SPAN
 OLD_ROWS = OLD_X, OLD_Y, OLD_NEXT_X, OLD_NEXT_Y
 ROWS = HERE_X, HERE_Y, NEXT_X, NEXT_Y
-OLD_NEXT, NEXT = OLD_ROWS[2:], ROWS[2:]
+OLD_NEXT = OLD_ROWS[2:]
+NEXT = ROWS[2:]
 OWN = -NOTHING
 # Results of the residual check of a chunk of columns, and of the block: largest shrinkage of a
 # corner, least scaled corner area, distance of nodes from interpolated positions, largest squared
@@ -79,7 +81,8 @@ def begin(law, motion, low, cells, Z):
         for k in range(6):
             Z[LAW + k * SPAN + col] = motion.along_j[k, low + col]
         if law.bent:
-            Z[WAY_X + col], Z[WAY_Y + col] = law.way[0, low + col], law.way[1, low + col]
+            Z[WAY_X + col] = law.way[0, low + col]
+            Z[WAY_Y + col] = law.way[1, low + col]
             Z[CHANGED_X + col] = motion.turn[0, low + col]
             Z[CHANGED_Y + col] = motion.turn[1, low + col]
 
@@ -169,7 +172,8 @@ def bend_row(bend, Z):
     The edges that lead there are corrected as well.
     """
     for col in range(bend.shape[0]):
-        turn, part = bend[col] - Z[BEND + col], bend[col]
+        turn = bend[col] - Z[BEND + col]
+        part = bend[col]
         Z[NEXT_X + col] += part * Z[CHANGED_X + col]
         Z[NEXT_Y + col] += part * Z[CHANGED_Y + col]
         Z[TURN_X + col] = turn * Z[WAY_X + col]
@@ -189,7 +193,8 @@ def make_new_row(i, law, motion, low, count, ni, nj, Z):
         bend_row(law.bend[i, low : low + count], Z)
     for j in (0, nj):
         if low <= j < low + count:
-            Z[NEXT_X + j - low], Z[NEXT_Y + j - low] = sides[0, i, j], sides[1, i, j]
+            Z[NEXT_X + j - low] = sides[0, i, j]
+            Z[NEXT_Y + j - low] = sides[1, i, j]
 
 
 @kernel(allocates=False)
@@ -199,9 +204,11 @@ def take_laws(line, side, count, Z):
     `line` and `side` hold the numbers of a spacing, the latter's rows are in Z; the far edges
     become near ones.
     """
-    (length, length_change, step, step_change, ki), (blend, u, kj) = line, side
+    length, length_change, step, step_change, ki = line
+    blend, u, kj = side
     for col in range(round_up(count)):
-        s, t = length + Z[BLEND + col] * length_change, step + Z[V + col] * step_change
+        s = length + Z[BLEND + col] * length_change
+        t = step + Z[V + col] * step_change
         inverse = 1.0 / (s * t)
         Z[LINE_G + col] = t * inverse
         Z[LINE_Q + col] = ki * (s * inverse)
@@ -223,52 +230,103 @@ def take_cell(col, numbers, Z):
     """
     full, growth, least_sine, most, lam_c, flat, rate, given = numbers
     (ax, ay), (ux, uy), (bx, by), (rx, ry) = take_edges(ROWS, col, Z)
-    ga, gu, gb, gr = Z[LINE_G + col], Z[LINE_G + col + 1], Z[NEAR_G + col], Z[FAR_G + col]
-    a1, a2 = ax * by - ay * bx, ux * by - uy * bx
-    a3, a4 = ux * ry - uy * rx, ax * ry - ay * rx
-    h1, h2, h3, h4 = ga * gb, gu * gb, gu * gr, ga * gr
-    d1, d2, d3, d4 = h1 * a1, h2 * a2, h3 * a3, h4 * a4
-    o1, o2, o3, o4 = Z[OLD_1 + col], Z[OLD_2 + col], Z[OLD_3 + col], Z[OLD_4 + col]
-    d1, d2 = d1 if o1 > OWN else given, d2 if o2 > OWN else given
-    d3, d4 = d3 if o3 > OWN else given, d4 if o4 > OWN else given
+    ga = Z[LINE_G + col]
+    gu = Z[LINE_G + col + 1]
+    gb = Z[NEAR_G + col]
+    gr = Z[FAR_G + col]
+    a1 = ax * by - ay * bx
+    a2 = ux * by - uy * bx
+    a3 = ux * ry - uy * rx
+    a4 = ax * ry - ay * rx
+    h1 = ga * gb
+    h2 = gu * gb
+    h3 = gu * gr
+    h4 = ga * gr
+    d1 = h1 * a1
+    d2 = h2 * a2
+    d3 = h3 * a3
+    d4 = h4 * a4
+    o1 = Z[OLD_1 + col]
+    o2 = Z[OLD_2 + col]
+    o3 = Z[OLD_3 + col]
+    o4 = Z[OLD_4 + col]
+    d1 = d1 if o1 > OWN else given
+    d2 = d2 if o2 > OWN else given
+    d3 = d3 if o3 > OWN else given
+    d4 = d4 if o4 > OWN else given
     # One division for the four corners and the fading; overflow leads to NaN.
-    low, up, across = d1 * d2, d3 * d4, gb + gr
+    low = d1 * d2
+    up = d3 * d4
+    across = gb + gr
     both = 1.0 / ((low * up) * across)
     ratio = (ga + gu) * (both * (low * up))
     both *= across
     low, up = both * up, both * low
-    i1, i2, i3, i4 = low * d2, low * d1, up * d4, up * d3
-    d1, d3 = d1 if d1 < d2 else d2, d3 if d3 < d4 else d4
-    d1, d2 = d1 if d1 < d3 else d3, Z[LEAST_AREA + col]
+    i1 = low * d2
+    i2 = low * d1
+    i3 = up * d4
+    i4 = up * d3
+    d1 = d1 if d1 < d2 else d2
+    d3 = d3 if d3 < d4 else d4
+    d1 = d1 if d1 < d3 else d3
+    d2 = Z[LEAST_AREA + col]
     Z[LEAST_AREA + col] = d1 if d1 < d2 else d2
-    pa, pu, pb, pr = ax * ax + ay * ay, ux * ux + uy * uy, bx * bx + by * by, rx * rx + ry * ry
-    pa, pu, pb, pr = (ga * ga) * pa, (gu * gu) * pu, (gb * gb) * pb, (gr * gr) * pr
-    j1, j2, j3, j4 = i1 * i1, i2 * i2, i3 * i3, i4 * i4
-    c1, c2 = (pa * pb) * j1 if o1 > OWN else 0.0, (pu * pb) * j2 if o2 > OWN else 0.0
-    c3, c4 = (pu * pr) * j3 if o3 > OWN else 0.0, (pa * pr) * j4 if o4 > OWN else 0.0
+    pa = ax * ax + ay * ay
+    pu = ux * ux + uy * uy
+    pb = bx * bx + by * by
+    pr = rx * rx + ry * ry
+    pa = (ga * ga) * pa
+    pu = (gu * gu) * pu
+    pb = (gb * gb) * pb
+    pr = (gr * gr) * pr
+    j1 = i1 * i1
+    j2 = i2 * i2
+    j3 = i3 * i3
+    j4 = i4 * i4
+    c1 = (pa * pb) * j1 if o1 > OWN else 0.0
+    c2 = (pu * pb) * j2 if o2 > OWN else 0.0
+    c3 = (pu * pr) * j3 if o3 > OWN else 0.0
+    c4 = (pa * pr) * j4 if o4 > OWN else 0.0
     # Old over new areas of the corners.
-    o1, o2, o3, o4 = o1 * (h1 * i1), o2 * (h2 * i2), o3 * (h3 * i3), o4 * (h4 * i4)
-    o1, o3 = o1 if o1 > o2 else o2, o3 if o3 > o4 else o4
-    o1, o2 = o1 if o1 > o3 else o3, Z[SHRUNK + col]
+    o1 = o1 * (h1 * i1)
+    o2 = o2 * (h2 * i2)
+    o3 = o3 * (h3 * i3)
+    o4 = o4 * (h4 * i4)
+    o1 = o1 if o1 > o2 else o2
+    o3 = o3 if o3 > o4 else o4
+    o1 = o1 if o1 > o3 else o3
+    o2 = Z[SHRUNK + col]
     Z[SHRUNK + col] = o1 if o1 > o2 else o2
-    c1, c3 = c1 if c1 > c2 else c2, c3 if c3 > c4 else c4
-    c1, c2 = c1 if c1 > c3 else c3, Z[SHARPEST + col]
+    c1 = c1 if c1 > c2 else c2
+    c3 = c3 if c3 > c4 else c4
+    c1 = c1 if c1 > c3 else c3
+    c2 = Z[SHARPEST + col]
     Z[SHARPEST + col] = c1 if c1 > c2 else c2
     weight = (full * weigh(c1, least_sine, most)) * fade(ratio, growth)
     # Twice the mid-lines: aspect ratio as a fraction, and whether the cell limits the step.
-    mx, my, nx, ny = ax + ux, ay + uy, bx + rx, by + ry
-    m2, n2 = mx * mx + my * my, nx * nx + ny * ny
-    longer, shorter = m2 if m2 > n2 else n2, n2 if m2 > n2 else m2
-    long, short = Z[LONG + col], Z[SHORT + col]
+    mx = ax + ux
+    my = ay + uy
+    nx = bx + rx
+    ny = by + ry
+    m2 = mx * mx + my * my
+    n2 = nx * nx + ny * ny
+    longer = m2 if m2 > n2 else n2
+    shorter = n2 if m2 > n2 else m2
+    long = Z[LONG + col]
+    short = Z[SHORT + col]
     more = longer * short > long * shorter
-    Z[LONG + col], Z[SHORT + col] = longer if more else long, shorter if more else short
+    Z[LONG + col] = longer if more else long
+    Z[SHORT + col] = shorter if more else short
     area = (a1 + a3) + (a2 + a4)
     Z[LIMITING + col] = (rate * (m2 + n2)) * (Z[SOUND + col] * Z[SOUND + col]) - area * area
     k1, s1 = corner_slope(pa + pb, i1, lam_c, flat)
     k2, s2 = corner_slope(pu + pb, i2, lam_c, flat)
     k3, s3 = corner_slope(pu + pr, i3, lam_c, flat)
     k4, s4 = corner_slope(pa + pr, i4, lam_c, flat)
-    k1, k2, k3, k4 = k1 * (weight * h1), k2 * (weight * h2), k3 * (weight * h3), k4 * (weight * h4)
+    k1 = k1 * (weight * h1)
+    k2 = k2 * (weight * h2)
+    k3 = k3 * (weight * h3)
+    k4 = k4 * (weight * h4)
     w = weight * (ga * ga)
     t = (w + w) * (i1 + i4)
     Z[LOW_Q + col] = w * (s1 * pb + s4 * pr)
@@ -279,7 +337,8 @@ def take_cell(col, numbers, Z):
     Z[UP_Q + col] = w * (s2 * pb + s3 * pr)
     Z[UP_X + col] = t * ux + (k2 * by + k3 * ry)
     Z[UP_Y + col] = t * uy - (k2 * bx + k3 * rx)
-    w, q = weight * (gb * gb), Z[NEAR_Q + col]
+    w = weight * (gb * gb)
+    q = Z[NEAR_Q + col]
     t = (w + w) * (i1 + i2)
     Z[SIDE_Q + col] = (q + Z[RIGHT_Q + col]) + w * (s1 * pa + s2 * pu)
     Z[SIDE_X + col] = (q * bx + Z[RIGHT_X + col]) + (t * bx - (k1 * ay + k2 * uy))
@@ -349,13 +408,21 @@ def measure_old(cells, Z):
     for col in range(round_up(cells)):
         low, high, near, far = take_edges(OLD_ROWS, col, Z)
         a1, a2, a3, a4 = find_areas(low, high, near, far)
-        Z[OLD_1 + col], Z[OLD_2 + col], Z[OLD_3 + col], Z[OLD_4 + col] = a1, a2, a3, a4
-        a1, a3 = a1 if a1 < a2 else a2, a3 if a3 < a4 else a4
-        a1, a2 = a1 if a1 < a3 else a3, Z[OLD_AREA + col]
+        Z[OLD_1 + col] = a1
+        Z[OLD_2 + col] = a2
+        Z[OLD_3 + col] = a3
+        Z[OLD_4 + col] = a4
+        a1 = a1 if a1 < a2 else a2
+        a3 = a3 if a3 < a4 else a4
+        a1 = a1 if a1 < a3 else a3
+        a2 = Z[OLD_AREA + col]
         Z[OLD_AREA + col] = a1 if a1 < a2 else a2
-        line, longest = square(low), Z[LONG_LINE + col]
+        line = square(low)
+        longest = Z[LONG_LINE + col]
         Z[LONG_LINE + col] = line if line > longest else longest
-        side, other, longest = square(near), square(far), Z[LONG_SIDE + col]
+        side = square(near)
+        other = square(far)
+        longest = Z[LONG_SIDE + col]
         side = side if side > other else other
         Z[LONG_SIDE + col] = side if side > longest else longest
 
@@ -369,16 +436,22 @@ def add_limiting_shares(scale, weight, cells, Z):
     for col in range(cells):
         if Z[LIMITING + col] > 0.0:
             (ax, ay), (ux, uy), (bx, by), (rx, ry) = take_edges(ROWS, col, Z)
-            ax, ay, bx, by = 0.5 * (ax + ux), 0.5 * (ay + uy), 0.5 * (bx + rx), 0.5 * (by + ry)
+            ax = 0.5 * (ax + ux)
+            ay = 0.5 * (ay + uy)
+            bx = 0.5 * (bx + rx)
+            by = 0.5 * (by + ry)
             rho = cell_rate(ax, ay, bx, by, Z[SOUND + col], scale)
             first, curve, dax, day, dbx, dby, twice, share, inverse = cost_slope(
                 ax, ay, bx, by, rho, Z[SOUND + col], scale, weight
             )
-            half, h, both = 0.5 * first, first * twice, (4.0 * share) * inverse
+            half = 0.5 * first
+            h = first * twice
+            both = (4.0 * share) * inverse
             # half the traces of the blocks AA and BB, a quarter of them for each edge
             stiff_a = h * (both * (bx * bx + by * by) - 2.0) + curve * (dax * dax + day * day)
             stiff_b = h * (both * (ax * ax + ay * ay) - 2.0) + curve * (dbx * dbx + dby * dby)
-            stiff_a, stiff_b = 0.125 * stiff_a, 0.125 * stiff_b
+            stiff_a = 0.125 * stiff_a
+            stiff_b = 0.125 * stiff_b
             for edge, stiff, dx, dy in (
                 (LOW_X, stiff_a, dax, day), (UP_X, stiff_a, dax, day),
                 (SIDE_X, stiff_b, dbx, dby), (RIGHT_X, stiff_b, dbx, dby),
@@ -395,7 +468,8 @@ def add_row(cells, Z):
     Whole vectors of columns; entries behind the last inner node are undefined and affect no other.
     """
     for col in range(1, 1 + round_up(cells - 1)):
-        q, last_q = Z[LINE_Q + col], Z[PASSED + col]
+        q = Z[LINE_Q + col]
+        last_q = Z[PASSED + col]
         line_x, line_y = Z[NEXT_X + col] - Z[HERE_X + col], Z[NEXT_Y + col] - Z[HERE_Y + col]
         flux_x = q * (line_x - Z[TURN_X + col]) + (Z[LOW_X + col] + Z[UP_X + col - 1])
         flux_y = q * (line_y - Z[TURN_Y + col]) + (Z[LOW_Y + col] + Z[UP_Y + col - 1])
@@ -453,10 +527,14 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
     stretch of lines, and the last one, and sums (2, stretches + 1, nj+1), the output of the sums
     over them at these columns (`regrid.barrier.coarse_nodes`).
     """
-    (starts, sums), (first, last, found, Z), (old, into, frame) = stretches, chunk, given
+    starts, sums = stretches
+    first, last, found, Z = chunk
+    old, into, frame = given
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    low, cells = first - 1, last - first + 1
-    count, stretch = starts.shape[0] - 1, 0
+    low = first - 1
+    cells = last - first + 1
+    count = starts.shape[0] - 1
+    stretch = 0
     begin(law, motion, low, cells, Z)
     for i in range(-1, ni):
         shift_rows(cells + 1, Z)
@@ -484,15 +562,19 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
                 Z[PIVOT + col] = Z[PART_X + col] = Z[PART_Y + col] = Z[SUM + col] = 0.0
                 Z[WHOLE_X + col] = Z[WHOLE_Y + col] = 0.0
         if count > 1:
-            here, end = starts[stretch], starts[stretch + 1]
+            here = starts[stretch]
+            end = starts[stretch + 1]
             add_to_stretch((i - here) / (end - here), cells, Z)
             if i + 1 == end:
                 end_stretch(stretch, low, cells, Z[NEAR_SUM_I:OLD_TILE], SPAN, sums)
                 stretch += 1
     for col in range(1, cells):
         totals[low + col] = Z[SUM + col]
-    found[MOST_SHRUNK], found[LEAST_SCALED], found[STRAYED] = 0.0, NOTHING, 0.0
-    found[COSECANT], found[ASPECT] = 0.0, 0.0
+    found[MOST_SHRUNK] = 0.0
+    found[LEAST_SCALED] = NOTHING
+    found[STRAYED] = 0.0
+    found[COSECANT] = 0.0
+    found[ASPECT] = 0.0
     for col in range(cells):
         found[MOST_SHRUNK] = max(found[MOST_SHRUNK], Z[SHRUNK + col])
         found[LEAST_SCALED] = min(found[LEAST_SCALED], Z[LEAST_AREA + col])
@@ -512,8 +594,12 @@ def add_own_corners(nodes, cosecant):
     x, y = nodes
     for corner in range(4):
         i, j = ni if corner >= 2 else 0, nj if corner == 1 or corner == 2 else 0
-        k, m = ni - 1 if corner >= 2 else 1, nj - 1 if corner == 1 or corner == 2 else 1
-        ax, ay, bx, by = x[k, j] - x[i, j], y[k, j] - y[i, j], x[i, m] - x[i, j], y[i, m] - y[i, j]
+        k = ni - 1 if corner >= 2 else 1
+        m = nj - 1 if corner == 1 or corner == 2 else 1
+        ax = x[k, j] - x[i, j]
+        ay = y[k, j] - y[i, j]
+        bx = x[i, m] - x[i, j]
+        by = y[i, m] - y[i, j]
         area = ax * by - ay * bx if corner == 0 or corner == 2 else bx * ay - by * ax
         squares = (ax * ax + ay * ay) * (bx * bx + by * by)
         here = squares / (area * area) if area > 0.0 else np.inf

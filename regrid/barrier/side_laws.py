@@ -95,7 +95,9 @@ def compute_bend(x, y):
     edges = (last + stride - 1) // stride
     if last % 2 == 1 and edges % 2 == 0:
         edges += 1  # no node lies in the middle of an odd number of edges
-    arc, old_x, old_y = 0.0, x[0], y[0]
+    arc = 0.0
+    old_x = x[0]
+    old_y = y[0]
     for edge in range(1, edges + 1):
         k = edge * last // edges if 2 * edge <= edges else last - (edges - edge) * last // edges
         new_x, new_y = x[k], y[k]
@@ -122,15 +124,19 @@ def compute_stiffness(old, sides, stiffest, slow, fast):
     ni, nj = sides.shape[1] - 1, sides.shape[2] - 1
     mean = np.empty(2)
     for k in range(2):
-        now, then = sides[k], old[k]
+        now = sides[k]
+        then = old[k]
         mean[k] = 0.25 * (
             ((now[0, 0] - then[0, 0]) + (now[ni, nj] - then[ni, nj]))
             + ((now[0, nj] - then[0, nj]) + (now[ni, 0] - then[ni, 0]))
         )
-    farthest, shortest = 0.0, np.inf
+    farthest = 0.0
+    shortest = np.inf
     for side in range(4):
         count = nj if side < 2 else ni
-        length, i, j = 0.0, 0, 0
+        length = 0.0
+        i = 0
+        j = 0
         last_x, last_y = 0.0, 0.0
         for k in range(count + 1):
             if side < 2:
@@ -172,7 +178,8 @@ def weigh_curves(sides, open_side, closed_side, barrier, half_barrier):
     has no share.  Theory R4.16, R4.17; the numbers are those of `Tuning`.
     """
     bend_i, bend_j = measure_bends(sides)
-    less, more = min(bend_i, bend_j), max(bend_i, bend_j)
+    less = min(bend_i, bend_j)
+    more = max(bend_i, bend_j)
     if not less > FLAT:
         return 0.0, 0.0, 0.0
     range_of = open_side - closed_side
@@ -300,7 +307,10 @@ def fill_mean_law(low, high, law):
 def compute_mean_area(along_i, along_j, blend_i, blend_j):
     """Mean over the cells of the product of the two conditional lengths at the cell's centre."""
     ni, nj = along_i.shape[1], along_j.shape[1]
-    i_flat, i_slope, i_moment, i_both = 0.0, 0.0, 0.0, 0.0
+    i_flat = 0.0
+    i_slope = 0.0
+    i_moment = 0.0
+    i_both = 0.0
     for i in range(ni):
         u = 0.5 * (blend_i[i] + blend_i[i + 1])
         i_flat += along_i[LENGTH, i]
@@ -323,12 +333,15 @@ def compute_limiting_rate(sound, along_i, along_j, blend_i, blend_j, area_target
     `BarrierLaw`.
     """
     ni, nj = sound.shape
-    columns, rates = np.zeros(nj), np.zeros(nj)
+    columns = np.zeros(nj)
+    rates = np.zeros(nj)
     for j in range(nj):
         columns[j] = 0.5 * (blend_j[j] + blend_j[j + 1])
     for i in range(ni):
         u = 0.5 * (blend_i[i] + blend_i[i + 1])
-        length, change, row = along_i[LENGTH, i], along_i[LENGTH_CHANGE, i], sound[i]
+        length = along_i[LENGTH, i]
+        change = along_i[LENGTH_CHANGE, i]
+        row = sound[i]
         # the largest of each column: a single one would keep the loop from the vectoriser
         for j in range(nj):
             s_i = length + columns[j] * change
@@ -364,7 +377,10 @@ def prepare(old, law, motion, conditional, limits, check):
     """
     sides = motion.sides
     prepare_motion(old, motion, law.most_bend, law.bent)
-    along_i, along_j, blend_i, blend_j = law.along_i, law.along_j, law.blend_i, law.blend_j
+    along_i = law.along_i
+    along_j = law.along_j
+    blend_i = law.blend_i
+    blend_j = law.blend_j
     sigma = fill_laws(sides, conditional, along_i, along_j, blend_i, blend_j)
     fill_growth(along_i, law.ki - law.kj)
     if law.bent:

@@ -98,24 +98,35 @@ def measure_corners(trial, old, first, last, Z):
                     Z[row + col] = Z[other + col]
                     Z[row + OLD_1 - AREA_1 + col] = Z[other + OLD_1 - AREA_1 + col]
         for col in range(cells):
-            a1, a2, a3, a4 = Z[AREA_1 + col], Z[AREA_2 + col], Z[AREA_3 + col], Z[AREA_4 + col]
-            b1, b2, b3, b4 = Z[OLD_1 + col], Z[OLD_2 + col], Z[OLD_3 + col], Z[OLD_4 + col]
+            a1 = Z[AREA_1 + col]
+            a2 = Z[AREA_2 + col]
+            a3 = Z[AREA_3 + col]
+            a4 = Z[AREA_4 + col]
+            b1 = Z[OLD_1 + col]
+            b2 = Z[OLD_2 + col]
+            b3 = Z[OLD_3 + col]
+            b4 = Z[OLD_4 + col]
             bad = (((a1 + a2) + (a3 + a4)) + ((b1 + b2) + (b3 + b4))) * 0.0
-            least, area = Z[LEAST_RATIO + col], Z[LEAST_AREA + col]
+            least = Z[LEAST_RATIO + col]
+            area = Z[LEAST_AREA + col]
             area = a1 if a1 < area else area
             area = a2 if a2 < area else area
             area = a3 if a3 < area else area
             area = a4 if a4 < area else area
             # The least of four ratios with one division (old areas are positive).
             first_less, second_less = a1 * b2 < a2 * b1, a3 * b4 < a4 * b3
-            a1, b1 = a1 if first_less else a2, b1 if first_less else b2
-            a3, b3 = a3 if second_less else a4, b3 if second_less else b4
+            a1 = a1 if first_less else a2
+            b1 = b1 if first_less else b2
+            a3 = a3 if second_less else a4
+            b3 = b3 if second_less else b4
             less = a1 * b3 < a3 * b1
             ratio = (a1 if less else a3) / (b1 if less else b3)
             Z[LEAST_RATIO + col] = ratio if ratio < least else least
             Z[LEAST_AREA + col] = area
             Z[NOT_A_NUMBER + col] += bad
-    ratio, area, bad = NOTHING, NOTHING, 0.0
+    ratio = NOTHING
+    area = NOTHING
+    bad = 0.0
     for col in range(cells):
         ratio = min(ratio, Z[LEAST_RATIO + col])
         area = min(area, Z[LEAST_AREA + col])

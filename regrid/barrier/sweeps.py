@@ -71,7 +71,9 @@ SAVED = 45 * SPAN
 # Two rows are unused here: a row read at l + 1 less than 256 numbers below one that is written
 # would prevent vectorisation (loads might wait for stores).  Elimination: inverse pivot (xx, xy,
 # yy), right-hand side (x, y) and q of this row of nodes.
-INVERSE, RIGHT, COUPLING = 53 * SPAN, 56 * SPAN, 58 * SPAN
+INVERSE = 53 * SPAN
+RIGHT = 56 * SPAN
+COUPLING = 58 * SPAN
 # Per line, over all rows: sum of |R|², first and last active row.
 RESIDUAL, ACTIVE_FIRST, ACTIVE_LAST = (k * SPAN for k in range(59, 62))
 ROWS = 62 * SPAN
@@ -93,9 +95,16 @@ PARABOLA_RANGE = (0.05, 2.0)
 @inlined
 def take_corner(Z, a, b):
     """Gradient and Hessian blocks, in both edges, of the corner with the edges at `a`, `b`."""
-    ax, ay, a2, ga = Z[a], Z[a + SPAN], Z[a + 2 * SPAN], Z[a + 3 * SPAN]
-    bx, by, b2, gb = Z[b], Z[b + SPAN], Z[b + 2 * SPAN], Z[b + 3 * SPAN]
-    v, g = ((ax, ay), (bx, by)), ((by, -bx), (-ay, ax))
+    ax = Z[a]
+    ay = Z[a + SPAN]
+    a2 = Z[a + 2 * SPAN]
+    ga = Z[a + 3 * SPAN]
+    bx = Z[b]
+    by = Z[b + SPAN]
+    b2 = Z[b + 2 * SPAN]
+    gb = Z[b + 3 * SPAN]
+    v = ((ax, ay), (bx, by))
+    g = ((by, -bx), (-ay, ax))
     inverse = 1.0 / (ax * by - ay * bx)
     return corner_blocks(a2 + b2, v, g, 0.0, inverse, 1.0, (1.0, ga, gb), (0.0, 0.0))
 
@@ -106,7 +115,10 @@ def put_node(Z, at, sign_a, sign_b, own, along, across):
 
     From the corner at the node and those at the other ends of its edges along i and j.
     """
-    ax, ay, bx, by = own[0] + along[0], own[1] + along[1], own[2] + across[2], own[3] + across[3]
+    ax = own[0] + along[0]
+    ay = own[1] + along[1]
+    bx = own[2] + across[2]
+    by = own[3] + across[3]
     both = sign_a * sign_b
     Z[at] = sign_a * ax + sign_b * bx
     Z[at + SPAN] = sign_a * ay + sign_b * by
@@ -120,8 +132,10 @@ def put_node(Z, at, sign_a, sign_b, own, along, across):
 def fill_cells(cells, Z):
     """Six numbers for each of a cell's four nodes, from its edges in AX.., BX.., CX.. ."""
     for col in range(cells):
-        one, two = take_corner(Z, AX + col, BX + col), take_corner(Z, AX + col + 1, BX + col)
-        three, four = take_corner(Z, AX + col + 1, CX + col), take_corner(Z, AX + col, CX + col)
+        one = take_corner(Z, AX + col, BX + col)
+        two = take_corner(Z, AX + col + 1, BX + col)
+        three = take_corner(Z, AX + col + 1, CX + col)
+        four = take_corner(Z, AX + col, CX + col)
         put_node(Z, ONE + col, -1.0, -1.0, one, four, two)
         put_node(Z, TWO + col, -1.0, 1.0, two, three, one)
         put_node(Z, THREE + col, 1.0, 1.0, three, two, four)
@@ -135,9 +149,11 @@ def fill_i_edges(x0, y0, x1, y1, law, pull, nodes, Z):
     for col in range(nodes):
         dx, dy = x1[col] - x0[col], y1[col] - y0[col]
         # One division for the two inverses.
-        edge, law_step = length + Z[V + col] * length_change, step + Z[V + col] * step_change
+        edge = length + Z[V + col] * length_change
+        law_step = step + Z[V + col] * step_change
         both = 1.0 / (edge * law_step)
-        inverse, q = law_step * both, pull * (edge * both)
+        inverse = law_step * both
+        q = pull * (edge * both)
         square = dx * dx + dy * dy
         Z[AX + col] = dx * inverse
         Z[AY + col] = dy * inverse
@@ -177,8 +193,10 @@ def eliminate_row(i, weight, tolerance, lines, Z):
         n = col + 1
         total_x, total_y = sum_node(Z, 0, col), sum_node(Z, SPAN, col)
         total_xx, total_xy = sum_node(Z, 2 * SPAN, col), sum_node(Z, 3 * SPAN, col)
-        total_yy, terms = sum_node(Z, 4 * SPAN, col), sum_node(Z, 5 * SPAN, col)
-        q, q_last = Z[FQ + n], Z[LAST_FQ + n]
+        total_yy = sum_node(Z, 4 * SPAN, col)
+        terms = sum_node(Z, 5 * SPAN, col)
+        q = Z[FQ + n]
+        q_last = Z[LAST_FQ + n]
         residual_x = Z[LAST_FX + n] - Z[FX + n] + weight * total_x
         residual_y = Z[LAST_FY + n] - Z[FY + n] + weight * total_y
         square = residual_x * residual_x + residual_y * residual_y
@@ -200,7 +218,8 @@ def eliminate_row(i, weight, tolerance, lines, Z):
         Z[COUPLING + col] = q
         Z[RESIDUAL + col] += square
         excess = square - tolerance * (size * size)
-        here, first = (i if excess > 0.0 else NO_ROW), Z[ACTIVE_FIRST + col]
+        here = i if excess > 0.0 else NO_ROW
+        first = Z[ACTIVE_FIRST + col]
         Z[ACTIVE_FIRST + col] = here if here < first else first
         Z[ACTIVE_LAST + col] = i if excess > 0.0 else Z[ACTIVE_LAST + col]
 
@@ -218,13 +237,22 @@ def fill_directions(nodes, laws, numbers, boxes, kept, Z, out, per_line):
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     x, y = nodes[0], nodes[1]
-    (laws_i, laws_j), (pull, weight, tolerance) = laws, numbers
-    total, active = 0.0, 0
+    laws_i, laws_j = laws
+    pull, weight, tolerance = numbers
+    total = 0.0
+    active = 0
     for b in range(boxes.shape[0]):
-        j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
-        lines, left, stop = j1 - j0, j0 - 1, j1 + 1
-        cells, count = lines + 1, lines + 2
-        lengths, changes = laws_j[LENGTH, left:j1], laws_j[LENGTH_CHANGE, left:j1]
+        j0 = boxes[b, 0]
+        j1 = boxes[b, 1]
+        i0 = boxes[b, 2]
+        i1 = boxes[b, 3]
+        lines = j1 - j0
+        left = j0 - 1
+        stop = j1 + 1
+        cells = lines + 1
+        count = lines + 2
+        lengths = laws_j[LENGTH, left:j1]
+        changes = laws_j[LENGTH_CHANGE, left:j1]
         for col in range(count):
             Z[V + col] = (left + col) / nj
         for col in range(lines):
@@ -242,7 +270,8 @@ def fill_directions(nodes, laws, numbers, boxes, kept, Z, out, per_line):
                     Z[LAST_FX + row + col] = Z[FX + row + col]
             x0, y0 = x[i, left:stop], y[i, left:stop]
             x1, y1 = x[i + 1, left:stop], y[i + 1, left:stop]
-            step, step_change = laws_i[STEP, i], laws_i[STEP_CHANGE, i]
+            step = laws_i[STEP, i]
+            step_change = laws_i[STEP_CHANGE, i]
             law = (laws_i[LENGTH, i], laws_i[LENGTH_CHANGE, i], step, step_change)
             fill_i_edges(x0, y0, x1, y1, law, pull, count, Z)
             fill_j_edges(x1, y1, lengths, changes, (i + 1) / ni, cells, Z)
@@ -296,8 +325,11 @@ def fill_active_boxes(ni, nj, per_line, old_boxes, boxes):
             if per_line[LINE_LAST, j] < 0.0:
                 continue
             low, high = max(1, j - 1), min(nj, j + 2)
-            top, end = int(per_line[LINE_FIRST, j]) - 1, int(per_line[LINE_LAST, j]) + 2
-            top, end, last = max(1, top), min(ni, end), boxes[count - 1]
+            top = int(per_line[LINE_FIRST, j]) - 1
+            end = int(per_line[LINE_LAST, j]) + 2
+            top = max(1, top)
+            end = min(ni, end)
+            last = boxes[count - 1]
             if count > 0 and low - last[1] < JOINED and high - last[0] <= WIDEST:
                 last[1], last[2], last[3] = max(high, last[1]), min(top, last[2]), max(end, last[3])
                 continue
@@ -305,7 +337,10 @@ def fill_active_boxes(ni, nj, per_line, old_boxes, boxes):
                 low = max(low, last[1])
             if low < high:
                 new = boxes[count]
-                new[0], new[1], new[2], new[3] = low, high, top, end
+                new[0] = low
+                new[1] = high
+                new[2] = top
+                new[3] = end
                 count += 1
     return count
 
@@ -358,9 +393,12 @@ class Sweeps:
             raise BadInput(f"sweeps: epsilon {epsilon} must not be negative")
         if not 0.0 <= floor < 1.0:
             raise BadInput(f"sweeps: floor {floor} must lie in 0..1, below 1")
-        self.epsilon, self.floor, self.start = float(epsilon), float(floor), start
+        self.epsilon = float(epsilon)
+        self.floor = float(floor)
+        self.start = start
         self.conditional = edge_lengths == "conditional" and not self.alone
-        self.sweeps, self.plain_sweeps = int(sweeps), int(plain_sweeps)
+        self.sweeps = int(sweeps)
+        self.plain_sweeps = int(plain_sweeps)
         self.tolerance = float(tolerance)
         self.family = family
         self._blocks: dict[tuple[int, int], _Block] = {}
@@ -414,14 +452,17 @@ class _Block:
         self.tau = np.ones(shape[1:])
         self.laws_i, self.laws_j = np.zeros((4, ni)), np.zeros((4, nj))
         self.blends = np.zeros(ni + 1), np.zeros(nj + 1)
-        self.kept, self.scratch = np.zeros((ni + 1) * KEPT), np.zeros(ROWS)
+        self.kept = np.zeros((ni + 1) * KEPT)
+        self.scratch = np.zeros(ROWS)
         self.per_line, self.other_lines = np.zeros((2, 3, nj + 1))
         self.workspace: Workspace | None = None
 
     def begin(self, options: Sweeps) -> None:
         self.options = options
         self.sweeps = self.node_sweeps = self.sub_moves = self.rescues = 0
-        self.ratio, self.residual, self.start = np.inf, 0.0, options.start
+        self.ratio = np.inf
+        self.residual = 0.0
+        self.start = options.start
 
     def report(self) -> RegridReport:
         return RegridReport(
@@ -515,15 +556,18 @@ class _Block:
         if self.workspace is None:
             self.workspace = Workspace(self.ni, self.nj, 1)
         work = self.workspace
-        work.old[:], work.sides[:] = old, grid
+        work.old[:] = old
+        work.sides[:] = grid
         work.begin(
             self.options.conditional, 1.0, 0.0, Tuning(epsilon=max(self.options.epsilon, 1e-4))
         )
         return bool(untangle(work, grid)) and bool(np.isfinite(grid).all())
 
     def _iterate(self, sigma: float) -> None:
-        options, whole = self.options, cut_block(self.ni, self.nj)
-        self.boxes, is_whole = whole, True
+        options = self.options
+        whole = cut_block(self.ni, self.nj)
+        self.boxes = whole
+        is_whole = True
         # Outside the boxes the trial grid is the grid, before and after every sweep.
         self.trial[:] = self.nodes
         self.halved = True
@@ -536,7 +580,8 @@ class _Block:
                 if is_whole:
                     return
                 # the subset has converged: check all nodes once more
-                self.boxes, is_whole = whole, True
+                self.boxes = whole
+                is_whole = True
                 continue
             self.sweeps += 1
             self.node_sweeps += count_nodes(self.boxes)
@@ -565,7 +610,8 @@ class _Block:
         """Trial grid with tau_s = `share`; tau0 halved node by node until it is convex."""
         if self.halved:
             self.tau[:] = 1.0
-        self.halved, has = False, None
+        self.halved = False
+        has = None
         for _ in range(MOST_TAU_ROUNDS):
             if try_step(
                 self.nodes, self.direction, self.tau, share, self.boxes, self.floors, self.trial
@@ -595,29 +641,35 @@ def try_step(nodes, direction, tau, share, boxes, floors, trial):
     """Trial nodes `r + share tau D` in boxes; True if all corners of their cells exceed floors."""
     failing = 0
     for b in range(boxes.shape[0]):
-        j0, j1, i0, i1 = boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3]
+        j0 = boxes[b, 0]
+        j1 = boxes[b, 1]
+        i0 = boxes[b, 2]
+        i1 = boxes[b, 3]
         for k in range(2):
             for i in range(i0, i1):
                 # slices, because an index of unknown sign keeps the loop from vectorising
-                here, step, new = nodes[k, i, j0:j1], direction[k, i, j0:j1], trial[k, i, j0:j1]
+                here = nodes[k, i, j0:j1]
+                step = direction[k, i, j0:j1]
+                new = trial[k, i, j0:j1]
                 part = tau[i, j0:j1]
                 for col in range(j1 - j0):
                     new[col] = here[col] + share * part[col] * step[col]
     for b in range(boxes.shape[0]):
-        near, end = boxes[b, 0] - 1, boxes[b, 1]
+        near = boxes[b, 0] - 1
+        end = boxes[b, 1]
         for i in range(boxes[b, 2] - 1, boxes[b, 3]):
             x0, y0 = trial[0, i, near : end + 1], trial[1, i, near : end + 1]
             x1, y1 = trial[0, i + 1, near : end + 1], trial[1, i + 1, near : end + 1]
             least = floors[:, i, near:end]
             for col in range(end - near):
-                lx, ly, ux, uy = (
-                    x1[col] - x0[col], y1[col] - y0[col],
-                    x1[col + 1] - x0[col + 1], y1[col + 1] - y0[col + 1],
-                )  # fmt: skip
-                ax, ay, bx, by = (
-                    x0[col + 1] - x0[col], y0[col + 1] - y0[col],
-                    x1[col + 1] - x1[col], y1[col + 1] - y1[col],
-                )  # fmt: skip
+                lx = x1[col] - x0[col]
+                ly = y1[col] - y0[col]
+                ux = x1[col + 1] - x0[col + 1]
+                uy = y1[col + 1] - y0[col + 1]
+                ax = x0[col + 1] - x0[col]
+                ay = y0[col + 1] - y0[col]
+                bx = x1[col + 1] - x1[col]
+                by = y1[col + 1] - y1[col]
                 good = (0.5 * (lx * ay - ly * ax) > least[0, col]) & (
                     0.5 * (ux * ay - uy * ax) > least[1, col]
                 )

@@ -22,7 +22,8 @@ from regrid.sides import copy_sides
 
 TERM_1, TERM_2, TERM_3, TERM_4 = (at.ROWS + k * SPAN for k in range(4))
 LEAST_1, LEAST_2, LEAST_3, LEAST_4 = (at.ROWS + k * SPAN for k in range(4, 8))
-ENERGY, LEAST = at.ROWS + 8 * SPAN, at.ROWS + 9 * SPAN
+ENERGY = at.ROWS + 8 * SPAN
+LEAST = at.ROWS + 9 * SPAN
 ENERGY_ROWS = at.ROWS + 10 * SPAN
 
 
@@ -36,7 +37,9 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     cells = last - first
     laws = at.LineLaws(law.along_i, law.along_j, law.blend_i, law.bend, law.way, law.ki, law.kj)
-    c, lam, quarter = law.area_target, law.area_weight, 0.25 * law.sigma * law.epsilon
+    c = law.area_target
+    lam = law.area_weight
+    quarter = 0.25 * law.sigma * law.epsilon
     for col in range(cells):
         Z[ENERGY + col] = 0.0
         Z[LEAST + col] = 1e300
@@ -47,19 +50,31 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
             at.bend_sides(law.curve, i + 1, first, cells, Z)
             at.bend_lines(law.curve, i, first, cells + 1, Z)
         for col in range(cells):
-            ax, ay, a2 = Z[at.AX + col], Z[at.AY + col], Z[at.A2 + col]
-            ux, uy, u2 = Z[at.AX + col + 1], Z[at.AY + col + 1], Z[at.A2 + col + 1]
-            bx, by, b2 = Z[at.BX + col], Z[at.BY + col], Z[at.B2 + col]
-            rx, ry, r2 = Z[at.CX + col], Z[at.CY + col], Z[at.C2 + col]
-            d1, d2 = ax * by - ay * bx, ux * by - uy * bx
-            d3, d4 = ux * ry - uy * rx, ax * ry - ay * rx
+            ax = Z[at.AX + col]
+            ay = Z[at.AY + col]
+            a2 = Z[at.A2 + col]
+            ux = Z[at.AX + col + 1]
+            uy = Z[at.AY + col + 1]
+            u2 = Z[at.A2 + col + 1]
+            bx = Z[at.BX + col]
+            by = Z[at.BY + col]
+            b2 = Z[at.B2 + col]
+            rx = Z[at.CX + col]
+            ry = Z[at.CY + col]
+            r2 = Z[at.C2 + col]
+            d1 = ax * by - ay * bx
+            d2 = ux * by - uy * bx
+            d3 = ux * ry - uy * rx
+            d4 = ax * ry - ay * rx
             Z[LEAST_1 + col] = d1
             Z[LEAST_2 + col] = d2
             Z[LEAST_3 + col] = d3
             Z[LEAST_4 + col] = d4
             e2 = spread * spread
-            d1, d2 = smooth_area(d1, e2)[0], smooth_area(d2, e2)[0]
-            d3, d4 = smooth_area(d3, e2)[0], smooth_area(d4, e2)[0]
+            d1 = smooth_area(d1, e2)[0]
+            d2 = smooth_area(d2, e2)[0]
+            d3 = smooth_area(d3, e2)[0]
+            d4 = smooth_area(d4, e2)[0]
             Z[TERM_1 + col] = corner_value(a2 + b2, d1, c, lam)
             Z[TERM_2 + col] = corner_value(u2 + b2, d2, c, lam)
             Z[TERM_3 + col] = corner_value(u2 + r2, d3, c, lam)
@@ -83,7 +98,10 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
                 + Z[at.RIGHT_Y + col] * Z[at.RIGHT_Y + col]
             )
             terms = (Z[TERM_1 + col] + Z[TERM_2 + col]) + (Z[TERM_3 + col] + Z[TERM_4 + col])
-            m1, m2, m3, m4 = Z[LEAST_1 + col], Z[LEAST_2 + col], Z[LEAST_3 + col], Z[LEAST_4 + col]
+            m1 = Z[LEAST_1 + col]
+            m2 = Z[LEAST_2 + col]
+            m3 = Z[LEAST_3 + col]
+            m4 = Z[LEAST_4 + col]
             m1 = m1 if m1 < m2 else m2
             m3 = m3 if m3 < m4 else m4
             m1 = m1 if m1 < m3 else m3
@@ -95,7 +113,10 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
             )
             Z[LEAST + col] = m1 if m1 < least else least
         if spread == 0.0 and law.cost_weight > 0.0:
-            x0, y0, x1, y1 = nodes[0, i], nodes[1, i], nodes[0, i + 1], nodes[1, i + 1]
+            x0 = nodes[0, i]
+            y0 = nodes[1, i]
+            x1 = nodes[0, i + 1]
+            y1 = nodes[1, i + 1]
             weight = law.cost_weight * law.sigma
             for col in range(cells):
                 j = first + col
@@ -111,14 +132,17 @@ FIRST_PART = 0.2  # e of the first step, over the worst D
 LEAST_SPREAD = 1e-6  # of a grid that need not unfold from anywhere
 LEAST_GAIN = 0.1  # of the energy in a step, in the law of e (R5.2)
 LEAST_FREE_SPREAD = 1e-10
-ROUND_STEPS, ROUND_GAIN = 8, 0.02  # of (R5.4) at one e; it ends when a step gains less
+# of (R5.4) at one e; it ends when a step gains less
+ROUND_STEPS = 8
+ROUND_GAIN = 0.02
 FREE_SOLVE = 200  # iterations of one step of (R5.4)
 WIDE = 10.0  # e over the worst D of a nearly harmonic map
 
 
 def untangle(work, nodes, tuning: Tuning = DEFAULT) -> bool:
     """Unfold `nodes`, an array of the workspace, in place; True when all corners are positive."""
-    law, solve = work.law, (tuning.untangle_tolerance, 16)
+    law = work.law
+    solve = (tuning.untangle_tolerance, 16)
     work.law = law._replace(epsilon=tuning.untangle_barrier * law.epsilon)
     found = _lower(work, nodes, 1, LEAST_SPREAD, tuning.untangle_steps, solve)
     for factor in tuning.last_spreads if found is not None else ():
@@ -136,8 +160,10 @@ def unfold(work, nodes, tuning: Tuning, spread_out: bool) -> bool:
     Their sides are set first; with `spread_out` a nearly harmonic map is where it begins.
     """
     copy_sides(work.sides, nodes)
-    law, area_target = work.law, work.area_target
-    work.law, work.area_target = make_free_law(work), 1.0
+    law = work.law
+    area_target = work.area_target
+    work.law = make_free_law(work)
+    work.area_target = 1.0
     solve = tuning.exact_tolerance, FREE_SOLVE
     if spread_out:
         spread = WIDE * max(1.0, -work.compute_energy(nodes, 1.0)[1])
@@ -145,7 +171,8 @@ def unfold(work, nodes, tuning: Tuning, spread_out: bool) -> bool:
         for _ in range(ROUND_STEPS):
             energy = _step(work, nodes, spread, energy, solve)[1]
     found = _lower(work, nodes, ROUND_STEPS, LEAST_FREE_SPREAD, tuning.free_steps, solve)
-    work.law, work.area_target = law, area_target
+    work.law = law
+    work.area_target = area_target
     return found is not None
 
 
@@ -207,7 +234,8 @@ def _step(work, nodes, spread, before, solve, least=-np.inf):
     """
     work.assemble_smoothed(nodes, spread)
     work.solve(tolerance=solve[0], floor=0.0, most=solve[1])
-    fraction, trial = 1.0, work.trial
+    fraction = 1.0
+    trial = work.trial
     for _ in range(12):
         np.multiply(work.change, fraction, out=trial)
         trial += nodes

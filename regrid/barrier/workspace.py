@@ -109,7 +109,10 @@ class Workspace:
         tuning: Tuning = DEFAULT,
         shared: bool = False,
     ):
-        self.ni, self.nj, self.threads, self.tuning = ni, nj, threads, tuning
+        self.ni = ni
+        self.nj = nj
+        self.threads = threads
+        self.tuning = tuning
         self.shape = shape = (2, ni + 1, nj + 1)
         self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
         self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
@@ -127,7 +130,8 @@ class Workspace:
         self.whole_columns = self.columns.copy()
         self.whole_columns[-1] += -(nj - self.columns[-2]) % 8
         vector = (2, ni + 1, -(-(int(self.whole_columns[-1]) + 1) // 8) * 8)
-        self.totals, self.found = np.zeros(vector[2]), np.zeros((chunks, 5))
+        self.totals = np.zeros(vector[2])
+        self.found = np.zeros((chunks, 5))
         self.motion_tables = (
             np.zeros((6, ni + 1)), np.zeros((6, nj + 1)), np.zeros((2, 5)), np.zeros((2, nj + 1)),
             np.zeros(nj + 1),
@@ -147,7 +151,8 @@ class Workspace:
         self.size = sum(count_numbers(*form) for form, _ in self.arrays.values())
         form = chunks, max(ENERGY_ROWS, LOOK_ROWS)
         self.scratch = Carver(np.zeros(count_numbers(*form))).cut(*form)
-        self.shared, self.clean = shared, not shared
+        self.shared = shared
+        self.clean = not shared
         self._whole = np.zeros(0)
         if not shared:
             self._lay(np.zeros(self.size))
@@ -158,7 +163,8 @@ class Workspace:
         """Lay the large arrays into `whole` (`size` or more,)."""
         if whole is self._whole:
             return
-        self._whole, carver = whole, Carver(whole)
+        self._whole = whole
+        carver = Carver(whole)
         for name, (shape, column) in self.arrays.items():
             setattr(self, name, carver.cut(*shape, column=column))
         self.coarse.take_arrays(self.coarse_memory)
@@ -173,7 +179,8 @@ class Workspace:
             side[:] = 0.0
         rows = self.H.reshape(self.columns.size - 1, self.ni + 1, -1, SPAN)
         rows[:, 0] = 0.0
-        last, whole = self.columns[-1], self.whole_columns[-1]
+        last = self.columns[-1]
+        whole = self.whole_columns[-1]
         rows[-1, :, :, last - self.columns[-2] + 1 : whole - self.columns[-2] + 1] = 0.0
         self.clean = True
 
@@ -184,9 +191,13 @@ class Workspace:
 
     def use_own(self) -> None:
         """Let all grids be arrays of the workspace, whose contents may be anything."""
-        self.old, self.sides, self.sound = self.own_old, self.own_sides, self.own_sound
-        self.base, self.trial = self.own_base, self.own_trial
-        self.frame, self.given = UPRIGHT, None
+        self.old = self.own_old
+        self.sides = self.own_sides
+        self.sound = self.own_sound
+        self.base = self.own_base
+        self.trial = self.own_trial
+        self.frame = UPRIGHT
+        self.given = None
 
     def take(self, previous, boundary, transposed, mirrored, sound=None, into=None) -> None:
         """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides.
@@ -201,7 +212,8 @@ class Workspace:
         self.use_own()
         self.into = np.empty(boundary.shape) if into is None else into
         if not (transposed or mirrored):
-            self.base, self.sides = self.into, boundary
+            self.base = self.into
+            self.sides = boundary
             self.old = boundary if previous is None else previous
         else:
             self.frame = transposed, mirrored
@@ -222,8 +234,10 @@ class Workspace:
 
     def keep_own(self, old: np.ndarray, sides: np.ndarray) -> None:
         """Copies of `old` and `sides` that may be written to, in their places."""
-        self.old, self.sides = self.own_old, self.own_sides
-        self.old[:], self.sides[:] = old, sides
+        self.old = self.own_old
+        self.sides = self.own_sides
+        self.old[:] = old
+        self.sides[:] = sides
 
     def give(self) -> np.ndarray:
         """The grid `trial` in the block's own frame, to keep: the array given for it or a new one.
@@ -253,7 +267,9 @@ class Workspace:
         it.
         """
         tuning = tuning or self.tuning
-        epsilon, share_i, share_j = float(tuning.epsilon), 0.0, 0.0
+        epsilon = float(tuning.epsilon)
+        share_i = 0.0
+        share_j = 0.0
         if curved:
             share_i, share_j, least = weigh_curves(
                 self.sides, tuning.open_side, tuning.closed_side, tuning.curved_barrier,
@@ -312,7 +328,8 @@ class Workspace:
             self.totals, (self.columns, self.found, self.scratch),
         )  # fmt: skip
         found = self.found[0]
-        good, shrunk = found[LEAST_SCALED] > 0.0, found[MOST_SHRUNK]
+        good = found[LEAST_SCALED] > 0.0
+        shrunk = found[MOST_SHRUNK]
         if not (good and shrunk > 0.0 and total >= 0.0):
             self.load_old()
             ratio = self.compare_corners(self.base, self.old) if good else 0.0
@@ -323,7 +340,8 @@ class Workspace:
 
     def get_quality(self) -> tuple[float, float, int, int] | None:
         """What `measure_worst` says of the grid looked at last, if all its corners are positive."""
-        cosecant, aspect = self.found[0, COSECANT], self.found[0, ASPECT]
+        cosecant = self.found[0, COSECANT]
+        aspect = self.found[0, ASPECT]
         if self.marks or not cosecant < math.inf:
             return None
         return math.sqrt(1.0 / cosecant), math.sqrt(aspect), 0, 0
@@ -346,7 +364,8 @@ class Workspace:
 
     def _assemble(self, kernel, nodes, spread) -> None:
         for c in range(self.columns.size - 1):
-            first, last = self.columns[c], self.columns[c + 1]
+            first = self.columns[c]
+            last = self.columns[c + 1]
             kernel(nodes, self.law, spread, first, last, self.H[c], self.gradient, self.scratch[c])
 
     def _set_threads(self) -> None:
@@ -409,10 +428,13 @@ class Workspace:
         J itself, and not finite where a cell is not convex.
         """
         barrier = self.full_barrier if barrier is None else barrier
-        energy, least = 0.0, np.inf
+        energy = 0.0
+        least = np.inf
         for c in range(self.cell_columns.size - 1):
-            first, last = self.cell_columns[c], self.cell_columns[c + 1]
-            rows, count = self.scratch[c], last - first
+            first = self.cell_columns[c]
+            last = self.cell_columns[c + 1]
+            rows = self.scratch[c]
+            count = last - first
             fill_energy(nodes, self.law, spread, barrier, first, last, rows)
             energy += float(rows[ENERGY : ENERGY + count].sum())
             least = min(least, float(rows[LEAST : LEAST + count].min()))

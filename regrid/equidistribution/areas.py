@@ -72,9 +72,12 @@ def fill_cell_fluxes(nodes, weight, out, products):
             d2x, d2y = 0.5 * (up_x - down_x), 0.5 * (up_y - down_y)
             a = weight[i, j] * (d2x * d2x + d2y * d2y)
             b = weight[i, j] * (d1x * d1x + d1y * d1y)
-            out[A, i, j], out[B, i, j] = a, b
-            out[AX, i, j], out[AY, i, j] = a * d1x, a * d1y
-            out[BX, i, j], out[BY, i, j] = b * d2x, b * d2y
+            out[A, i, j] = a
+            out[B, i, j] = b
+            out[AX, i, j] = a * d1x
+            out[AY, i, j] = a * d1y
+            out[BX, i, j] = b * d2x
+            out[BY, i, j] = b * d2y
             products[i, j] = weight[i, j] * (d1x * d2y - d1y * d2x)
 
 
@@ -109,12 +112,14 @@ def fill_nodes_equation(flux, residual, coefficients, sums):
                     flux[BX + k, i, j] + flux[BX + k, i + 1, j]
                 )
                 residual[k, i, j] = 0.5 * (along + across)
-        size, whole = 0.0, 0.0
+        size = 0.0
+        whole = 0.0
         for j in range(nj - 1):
             size += residual[0, i, j] ** 2 + residual[1, i, j] ** 2
             whole += flux[AX, i, j] ** 2 + flux[AY, i, j] ** 2
             whole += flux[BX, i, j] ** 2 + flux[BY, i, j] ** 2
-        sums[0, i], sums[1, i] = size, whole
+        sums[0, i] = size
+        sums[1, i] = whole
 
 
 @kernel
@@ -166,7 +171,10 @@ def iterate(
 
     Returns the accepted iterate of least residual; `best` is -1 if there was none.
     """
-    best, least, stop, kept = -1, np.inf, "iterations", nodes.copy()
+    best = -1
+    least = np.inf
+    stop = "iterations"
+    kept = nodes.copy()
     residuals: list[float] = []
     spreads: list[float] = []
     for iteration in range(iterations + 1):
@@ -182,7 +190,8 @@ def iterate(
         spreads.append(float(products.std() / abs(mean)) if mean != 0.0 else np.inf)
         ended = iteration == iterations or residual <= tolerance
         if residual < least and operator.is_good(nodes, iteration, ended):
-            best, least = iteration, residual
+            best = iteration
+            least = residual
             kept[:] = nodes
         if best == iteration and residual <= tolerance:
             stop = "converged"
@@ -212,9 +221,12 @@ class Ed2Operator:
         self.residual = np.empty((2, ni - 1, nj - 1))
         self.coefficients = np.empty((3, ni, nj))
         self.sums = np.empty((2, ni - 1))
-        self.worst, self.bad = np.empty((4, ni)), np.empty(ni, dtype=np.int64)
+        self.worst = np.empty((4, ni))
+        self.bad = np.empty(ni, dtype=np.int64)
         self.rows = np.empty((4, nj))
-        self.sign, self.least_sine, self.backed_off = 1.0, least_sine, 1.0
+        self.sign = 1.0
+        self.least_sine = least_sine
+        self.backed_off = 1.0
 
     def evaluate(self, nodes: np.ndarray, weight: np.ndarray) -> float:
         fill_cell_fluxes(nodes, weight, self.flux, self.products)
@@ -232,7 +244,8 @@ class Ed2Operator:
         """The next tau of a cycle; after a cycle that increased the residual, a smaller one."""
         if iteration == 0 or iteration % self.taus.size == 0:
             if iteration > 0:
-                worse, part = residuals[-1] > residuals[-1 - self.taus.size], self.backed_off
+                worse = residuals[-1] > residuals[-1 - self.taus.size]
+                part = self.backed_off
                 self.backed_off = max(0.25 * part, 0.01) if worse else min(2.0 * part, 1.0)
             self.taus = choose_taus(self)
         return max(self.backed_off * self.taus[iteration % self.taus.size], 0.25)
@@ -248,7 +261,8 @@ class Ed2Operator:
         """One alternating-direction correction of the inner nodes, after `evaluate`."""
         n, m = self.residual.shape[1:]
         scale, along_i, along_j = self.coefficients
-        scale, along_i = np.ascontiguousarray(scale[:n, :m]), np.ascontiguousarray(along_i[:, :m])
+        scale = np.ascontiguousarray(scale[:n, :m])
+        along_i = np.ascontiguousarray(along_i[:, :m])
         edges = along_i, np.ascontiguousarray(along_j[:n].T)
         sweep_both_ways(self.residual, (scale, scale), edges, tau, nodes)
 
@@ -319,7 +333,8 @@ class EquidistributionRegridder(WeightedRegridder):
         threads: int = 1,
     ):
         super().__init__(weight, boundary, smoothing)
-        self.iterations, self.tolerance = int(iterations), float(tolerance)
+        self.iterations = int(iterations)
+        self.tolerance = float(tolerance)
         self.threads = threads
 
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:

@@ -90,8 +90,10 @@ def solve_edc(
 
 def compute_surface_areas(points: np.ndarray) -> np.ndarray:
     """Areas (ni, nj) of surface cells by their mid-lines; points (3, ni+1, nj+1)."""
-    up, down = points[:, 1:, 1:] - points[:, :-1, :-1], points[:, 1:, :-1] - points[:, :-1, 1:]
-    along, across = 0.5 * (up + down), 0.5 * (up - down)
+    up = points[:, 1:, 1:] - points[:, :-1, :-1]
+    down = points[:, 1:, :-1] - points[:, :-1, 1:]
+    along = 0.5 * (up + down)
+    across = 0.5 * (up - down)
     normal = np.cross(along, across, axis=0)
     return np.sqrt((normal**2).sum(axis=0))
 
@@ -143,16 +145,23 @@ LONGEST = 512
 # coefficients; the same for the row before, and the third coefficient there.
 D, A, WV, K, KA, L, LA, LC = (k * SPAN for k in (0, 9, 12, 13, 22, 24, 33, 35))
 SCRATCH = 36 * SPAN
-SCALE, EDGE = 3, 4  # rows of a plane's lines along k, transposed, after the right-hand sides
+# rows of a plane's lines along k, transposed, after the right-hand sides
+SCALE = 3
+EDGE = 4
 
 
 @inlined
 def difference_row(x, i, j, n, Z, at):
     """Cell-centred differences of one coordinate along a row of cells (theory R10.5)."""
-    r00, r01, r10, r11 = x[i, j], x[i, j + 1], x[i + 1, j], x[i + 1, j + 1]
+    r00 = x[i, j]
+    r01 = x[i, j + 1]
+    r10 = x[i + 1, j]
+    r11 = x[i + 1, j + 1]
     for k in range(n):
-        low, left = r00[k] + r00[k + 1], r01[k] + r01[k + 1]
-        right, high = r10[k] + r10[k + 1], r11[k] + r11[k + 1]
+        low = r00[k] + r00[k + 1]
+        left = r01[k] + r01[k + 1]
+        right = r10[k] + r10[k + 1]
+        high = r11[k] + r11[k + 1]
         Z[at + k] = 0.25 * ((high + right) - (left + low))
         Z[at + 3 * SPAN + k] = 0.25 * ((high + left) - (right + low))
         upper = (r00[k + 1] + r11[k + 1]) + (r01[k + 1] + r10[k + 1])
@@ -166,7 +175,10 @@ def weigh_row(weight, n, Z):
         a = (Z[D + k], Z[D + SPAN + k], Z[D + 2 * SPAN + k])
         b = (Z[D + 3 * SPAN + k], Z[D + 4 * SPAN + k], Z[D + 5 * SPAN + k])
         c = (Z[D + 6 * SPAN + k], Z[D + 7 * SPAN + k], Z[D + 8 * SPAN + k])
-        g11, g22, g33, w = dot(a, a), dot(b, b), dot(c, c), weight[k]
+        g11 = dot(a, a)
+        g22 = dot(b, b)
+        g33 = dot(c, c)
+        w = weight[k]
         Z[A + k] = w * (g22 * g33)
         Z[A + SPAN + k] = w * (g11 * g33)
         Z[A + 2 * SPAN + k] = w * (g11 * g22)
@@ -177,10 +189,12 @@ def weigh_row(weight, n, Z):
 def sum_row(n, Z):
     """Sums (along k, differences) over neighbours along k, at inner nodes 1..n-1 in 0..n-2."""
     for direction in range(3):
-        factor, sign = A + direction * SPAN, -1.0 if direction == 2 else 1.0
+        factor = A + direction * SPAN
+        sign = -1.0 if direction == 2 else 1.0
         a = Z[factor : factor + n]
         for row in range(3 * direction * SPAN, 3 * (direction + 1) * SPAN, SPAN):
-            d, total = Z[D + row : D + row + n], Z[K + row : K + row + n]
+            d = Z[D + row : D + row + n]
+            total = Z[K + row : K + row + n]
             for k in range(n - 1):
                 total[k] = a[k + 1] * d[k + 1] + sign * (a[k] * d[k])
         if direction < 2:
@@ -269,11 +283,13 @@ def eliminate(lines, past, edges, own, factor, tau, link, kept):
     edge; `kept` the elimination factors of the previous node and of this one, which may share
     memory with `own`; `link` is 0 at the first node, otherwise tau.
     """
-    (low, high), (before, upper) = edges, kept
+    low, high = edges
+    before, upper = kept
     x, y, z = lines
     px, py, pz = past
     for k in range(own.shape[0]):
-        scale, back = own[k], link * low[k]
+        scale = own[k]
+        back = link * low[k]
         inverse = 1.0 / (scale + tau * (low[k] + high[k]) - back * before[k])
         weight = factor if factor > 0.0 else scale
         upper[k] = tau * high[k] * inverse
@@ -290,12 +306,19 @@ def sweep_first(residual, edges, tau, work, start, stop):
     scratch.
     """
     e1, e2, e3 = edges
-    scale, upper = work[0], work[1]
-    n, m = residual.shape[1], residual.shape[3]
+    scale = work[0]
+    upper = work[1]
+    n = residual.shape[1]
+    m = residual.shape[3]
     for i in range(n):
-        before, link = max(i - 1, 0), tau if i > 0 else 0.0
+        before = max(i - 1, 0)
+        link = tau if i > 0 else 0.0
         for j in range(start, stop):
-            a, b, c, d, e = e1[i, j], e1[i + 1, j], e2[i, j], e2[i, j + 1], e3[i, j]
+            a = e1[i, j]
+            b = e1[i + 1, j]
+            c = e2[i, j]
+            d = e2[i, j + 1]
+            e = e3[i, j]
             own = scale[i, j]
             for k in range(m):
                 own[k] = ((a[k] + b[k]) + (c[k] + d[k]) + (e[k] + e[k + 1])) * (1.0 / 6.0)
@@ -305,7 +328,9 @@ def sweep_first(residual, edges, tau, work, start, stop):
     for i in range(n - 2, -1, -1):
         for j in range(start, stop):
             for c in range(3):
-                row, after, here = residual[c, i, j], residual[c, i + 1, j], upper[i, j]
+                row = residual[c, i, j]
+                after = residual[c, i + 1, j]
+                here = upper[i, j]
                 for k in range(m):
                     row[k] += here[k] * after[k]
 
@@ -316,33 +341,52 @@ def sweep_plane(residual, edges, tau, work, nodes, i, turned):
 
     turned (5, n3, n2 + 8): the lines along k, transposed so that all are solved together.
     """
-    e2, e3, scale, upper = edges[1][i], edges[2][i], work[0, i], work[1, i]
+    e2 = edges[1][i]
+    e3 = edges[2][i]
+    scale = work[0, i]
+    upper = work[1, i]
     x, y, z = residual[0, i], residual[1, i], residual[2, i]
-    n, m = residual.shape[2], residual.shape[3]
+    n = residual.shape[2]
+    m = residual.shape[3]
     for j in range(n):
-        p, link = max(j - 1, 0), tau if j > 0 else 0.0
-        lines, past = (x[j], y[j], z[j]), (x[p], y[p], z[p])
+        p = max(j - 1, 0)
+        link = tau if j > 0 else 0.0
+        lines = (x[j], y[j], z[j])
+        past = (x[p], y[p], z[p])
         eliminate(lines, past, (e2[j], e2[j + 1]), scale[j], 0.0, tau, link, (upper[p], upper[j]))
     for j in range(n - 2, -1, -1):
         for c in range(3):
-            row, after, here = residual[c, i, j], residual[c, i, j + 1], upper[j]
+            row = residual[c, i, j]
+            after = residual[c, i, j + 1]
+            here = upper[j]
             for k in range(m):
                 row[k] += here[k] * after[k]
     for j in range(n):
-        px, py, pz, own, edge = x[j], y[j], z[j], scale[j], e3[j]
+        px = x[j]
+        py = y[j]
+        pz = z[j]
+        own = scale[j]
+        edge = e3[j]
         for k in range(m):
-            turned[0, k, j], turned[1, k, j], turned[2, k, j] = px[k], py[k], pz[k]
-            turned[SCALE, k, j], turned[EDGE, k, j] = own[k], edge[k]
+            turned[0, k, j] = px[k]
+            turned[1, k, j] = py[k]
+            turned[2, k, j] = pz[k]
+            turned[SCALE, k, j] = own[k]
+            turned[EDGE, k, j] = edge[k]
         turned[EDGE, m, j] = edge[m]
     for k in range(m):
-        p, link = max(k - 1, 0), tau if k > 0 else 0.0
+        p = max(k - 1, 0)
+        link = tau if k > 0 else 0.0
         lines = turned[0, k, :n], turned[1, k, :n], turned[2, k, :n]
-        past, own = (turned[0, p, :n], turned[1, p, :n], turned[2, p, :n]), turned[SCALE, k, :n]
+        past = (turned[0, p, :n], turned[1, p, :n], turned[2, p, :n])
+        own = turned[SCALE, k, :n]
         low, high = turned[EDGE, k, :n], turned[EDGE, k + 1, :n]
         eliminate(lines, past, (low, high), own, 0.0, tau, link, (turned[SCALE, p, :n], own))
     for k in range(m - 2, -1, -1):
         for c in range(3):
-            row, after, here = turned[c, k], turned[c, k + 1], turned[SCALE, k]
+            row = turned[c, k]
+            after = turned[c, k + 1]
+            here = turned[SCALE, k]
             for j in range(n):
                 row[j] += here[j] * after[j]
     for c in range(3):
@@ -376,7 +420,8 @@ def sweep_on_threads(residual, edges, tau, work, nodes, lines, bounds, turned):
 
 
 TAU = 1.0  # initial value, for the scaled operators with largest eigenvalue of about 4
-LEAST_TAU, MOST_TAU = 0.1, 8.0
+LEAST_TAU = 0.1
+MOST_TAU = 8.0
 GROWTH = 1.1  # of tau while the residual falls; tau is halved when the residual grows
 CHECK = 10  # iterations between two tests of all corners
 
@@ -551,7 +596,9 @@ def _place_face(mapping, weight, p, axis, end, iterations) -> Equidistributed:
 
     def surface(pair):
         points = np.empty((3, *pair.shape[1:]))
-        points[axis], points[free[0]], points[free[1]] = level, pair[0], pair[1]
+        points[axis] = level
+        points[free[0]] = pair[0]
+        points[free[1]] = pair[1]
         return mapping(points)
 
     start = interpolate_sides(face[free])
@@ -565,8 +612,12 @@ def interpolate_sides(parameters: np.ndarray) -> np.ndarray:
     found = np.array(parameters, dtype=np.float64, order="C")
     u = np.linspace(0.0, 1.0, found.shape[1])[:, None]
     v = np.linspace(0.0, 1.0, found.shape[2])
-    low, high, left, right = found[:, :1], found[:, -1:], found[:, :, :1], found[:, :, -1:]
-    along, across = (1.0 - u) * low + u * high, (1.0 - v) * left + v * right
+    low = found[:, :1]
+    high = found[:, -1:]
+    left = found[:, :, :1]
+    right = found[:, :, -1:]
+    along = (1.0 - u) * low + u * high
+    across = (1.0 - v) * left + v * right
     ends = (1.0 - v) * along[:, :, :1] + v * along[:, :, -1:]
     found[:, 1:-1, 1:-1] = (along + across - ends)[:, 1:-1, 1:-1]
     return found
@@ -585,7 +636,8 @@ class EquidistributionRegridder3D:
                 "array of the cells or a function of x, y, z"
             )
         self.weight = weight
-        self.iterations, self.tolerance = int(iterations), float(tolerance)
+        self.iterations = int(iterations)
+        self.tolerance = float(tolerance)
 
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """Grid inside the six faces of `boundary`; both (3, ni+1, nj+1, nk+1) in m.
@@ -595,11 +647,13 @@ class EquidistributionRegridder3D:
         """
         previous, boundary = check_grids_in_space(previous, boundary)
         sign = 1.0 if compute_volume(previous) >= 0.0 else -1.0
-        nodes, start = np.empty_like(previous), "displacement"
+        nodes = np.empty_like(previous)
+        start = "displacement"
         carry_faces(previous, boundary, nodes)
         if not is_valid(nodes, sign):
             copy_faces(boundary, nodes)
-            nodes, start = interpolate_faces(nodes), "transfinite"
+            nodes = interpolate_faces(nodes)
+            start = "transfinite"
         if min(nodes.shape[1:]) < 3:
             if not is_valid(nodes, sign):
                 raise RegridFailure("the faces of a block one cell wide fold it")

@@ -68,7 +68,8 @@ TWO_ARGUMENTS = ("min", "max")
 CONSTANTS = {"pi": np.pi}
 FIELDS = ("rho", "u", "v", "p", "e")  # of a flow, one value per cell
 GEOMETRY = ("x", "y", "own", "sides", "h")  # of the grid: see `regrid.equidistribution.weights`
-MOST_CHARACTERS, MOST_DEPTH = 1000, 60
+MOST_CHARACTERS = 1000
+MOST_DEPTH = 60
 MOST_NUMBER = 1e300
 GRADIENT = "grad"
 
@@ -81,7 +82,8 @@ class Expression:
     """
 
     def __init__(self, text: str, what: str = "weight"):
-        self.text, self.what = text, what
+        self.text = text
+        self.what = what
         if len(text) > MOST_CHARACTERS:
             raise BadInput(f"{what}: the expression is longer than {MOST_CHARACTERS} characters")
         try:
@@ -195,7 +197,9 @@ def make_position_weight(text: str, names: tuple[str, ...] = ("x", "y")) -> Call
 
 def _spell_bars(text: str) -> str:
     """`|f|` as `abs(f)`: a bar opens where an operand is expected and closes after one."""
-    out, value_ended, open_bars = [], False, 0
+    out = []
+    value_ended = False
+    open_bars = 0
     for character in text:
         if character == "|":
             out.append(")" if value_ended else "abs(")
@@ -247,7 +251,8 @@ def weigh_points(weight, points: np.ndarray) -> np.ndarray:
     weight: a number, an array of cell values or a function of the coordinates; must be positive.
     """
     value = weight(*points) if callable(weight) else weight
-    value, cells = np.asarray(value, dtype=np.float64), points.shape[1:]
+    value = np.asarray(value, dtype=np.float64)
+    cells = points.shape[1:]
     if value.shape not in ((), cells):
         raise BadInput(
             f"equidistribution: a weight of shape {value.shape} does not fit cells {cells}"
@@ -267,7 +272,8 @@ class Weight:
     """
 
     def __init__(self, weight, smoothing: int = 4):
-        self.given, self.smoothing = weight, int(smoothing)
+        self.given = weight
+        self.smoothing = int(smoothing)
         if self.smoothing < 0:
             raise BadInput(f"weight: smoothing {smoothing} must not be negative")
         self.expression = Expression(weight) if isinstance(weight, str) else None
@@ -275,7 +281,8 @@ class Weight:
             self.expression.check_names((*GEOMETRY, *FIELDS))
         names = self.expression.names if self.expression else set()
         self.needs_fields = bool(names - {*GEOMETRY, "pi"})
-        self.needs_sides, self.needs_own = "sides" in names, bool(names & {"own", "h"})
+        self.needs_sides = "sides" in names
+        self.needs_own = bool(names & {"own", "h"})
         self.fields: Mapping[str, np.ndarray] = {}
 
     @property
@@ -384,7 +391,9 @@ def measure_gradient(field: np.ndarray, centres: np.ndarray) -> np.ndarray:
     least = NOTHING * np.abs(field).max()
     f1, f2 = (np.where(np.abs(f) > least, f, 0.0) for f in differences)
     area = along[0] * across[1] - along[1] * across[0]
-    g11, g22, g12 = (along**2).sum(axis=0), (across**2).sum(axis=0), (along * across).sum(axis=0)
+    g11 = (along**2).sum(axis=0)
+    g22 = (across**2).sum(axis=0)
+    g12 = (along * across).sum(axis=0)
     square = f1 * f1 * g22 - 2.0 * f1 * f2 * g12 + f2 * f2 * g11
     return np.sqrt(np.maximum(square, 0.0)) / np.maximum(np.abs(area), 1e-300)
 
@@ -413,7 +422,8 @@ class WeightedRegridder:
             raise BadInput(
                 f"{self.name}: boundary '{boundary}' is neither 'given' nor 'equidistributed'"
             )
-        self.weight, self.boundary = Weight(weight, smoothing), boundary
+        self.weight = Weight(weight, smoothing)
+        self.boundary = boundary
         if self.owns_sides and self.weight.needs_own:
             raise BadInput(
                 f"{self.name}: equidistributed sides cannot follow 'own' or 'h', which come from "

@@ -214,7 +214,9 @@ def fill_blended(values, law_i, law_j, law_k, rows):
 
     The spacings (2, 2, n+1) are those of the twelve edges.  `rows` (3, n3+1) is scratch.
     """
-    n1, n2, n3 = values.shape[1] - 1, values.shape[2] - 1, values.shape[3] - 1
+    n1 = values.shape[1] - 1
+    n2 = values.shape[2] - 1
+    n3 = values.shape[3] - 1
     for i in range(1, n1):
         for j in range(1, n2):
             for k in range(1, n3):
@@ -223,12 +225,18 @@ def fill_blended(values, law_i, law_j, law_k, rows):
                 r = 0.25 * (law_k[0, 0, k] + law_k[0, 1, k] + law_k[1, 0, k] + law_k[1, 1, k])
                 for _ in range(CROSSINGS):
                     p, q, r = mix(law_i, i, q, r), mix(law_j, j, p, r), mix(law_k, k, p, q)
-                rows[0, k], rows[1, k], rows[2, k] = p, q, r
+                rows[0, k] = p
+                rows[1, k] = q
+                rows[2, k] = r
             for m in range(values.shape[0]):
                 f = values[m]
                 for k in range(1, n3):
-                    p, q, r = rows[0, k], rows[1, k], rows[2, k]
-                    a, b, c = 1.0 - p, 1.0 - q, 1.0 - r
+                    p = rows[0, k]
+                    q = rows[1, k]
+                    r = rows[2, k]
+                    a = 1.0 - p
+                    b = 1.0 - q
+                    c = 1.0 - r
                     faces = (
                         (a * f[0, j, k] + p * f[n1, j, k])
                         + (b * f[i, 0, k] + q * f[i, n2, k])
@@ -303,10 +311,8 @@ def check_grids_in_space(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
 
     Inner nodes of `boundary` are ignored.
     """
-    previous, boundary = (
-        take_nodes(previous, "previous", "ijk"),
-        take_nodes(boundary, "boundary", "ijk"),
-    )
+    previous = take_nodes(previous, "previous", "ijk")
+    boundary = take_nodes(boundary, "boundary", "ijk")
     if previous.shape != boundary.shape:
         raise BadInput(
             f"regrid: previous has shape {previous.shape}, boundary {boundary.shape}; "
@@ -328,7 +334,8 @@ def find_turned_edge(nodes: np.ndarray) -> tuple[str, str, tuple[int, ...]] | No
         volumes = compute_corner_volumes(nodes)
     for axis, end, other_end, c in np.ndindex(3, 2, 2, 2):
         across = [k for k in range(3) if k != axis]
-        corner, cells = [end, other_end], [-end, -other_end]
+        corner = [end, other_end]
+        cells = [-end, -other_end]
         node = [(nodes.shape[k + 1] - 1) * e for k, e in zip(across, corner, strict=True)]
         faces = [FACES[2 * k + e] for k, e in zip(across, corner, strict=True)]
         corner.insert(axis, c)
@@ -342,7 +349,8 @@ def find_turned_edge(nodes: np.ndarray) -> tuple[str, str, tuple[int, ...]] | No
 
 def find_folded_face(nodes: np.ndarray) -> tuple[str, tuple[int, ...]] | None:
     """The face node whose four quadrilaterals' normals differ most, if two of them oppose."""
-    worst, found = 0.0, None
+    worst = 0.0
+    found = None
     for axis in range(3):
         for end in (0, -1):
             face = get_face(nodes, axis, end)

@@ -29,7 +29,9 @@ from regrid.jit import kernel
 
 SHARP = 0.3  # corner sine below which the barrier is strengthened
 CENTRE_E2 = 1e-6  # the centre of a cell with positive corners may be folded
-ENERGY, GRADIENT, MATRIX = 0, 1, 2
+ENERGY = 0
+GRADIENT = 1
+MATRIX = 2
 
 SPAN = 296  # longest row of nodes and its padding
 LONGEST = 256  # cells along the third index
@@ -37,21 +39,24 @@ VECTOR = 3 * SPAN  # from one edge's rows to the next one's
 # Eight edges: vectors, inverse lengths, straight-line weights, squared lengths; the vectors of
 # another grid or a direction; eight corner volumes, twice.
 EDGE, INVERSE, STRAIGHT, SQUARE, TURN = (k * SPAN for k in (0, 24, 32, 40, 48))
-VOLUME, OTHER_VOLUME = 72 * SPAN, 80 * SPAN
+VOLUME = 72 * SPAN
+OTHER_VOLUME = 80 * SPAN
 WEIGHT, SUM, LEAST = (k * SPAN for k in (88, 89, 90))  # of cells
 FLUX = 91 * SPAN  # of the eight edges, summed over corners
 HIGH = 115 * SPAN  # of those along i and j, from the cells before them
-BLOCK, BLOCKS = 127 * SPAN, 133 * SPAN  # of cells: for the edge along i; summed over all three
+# of cells: for the edge along i; summed over all three
+BLOCK = 127 * SPAN
+BLOCKS = 133 * SPAN
 ROWS = 139 * SPAN
 # Direction of the eight edges, and their first nodes relative to the node (i, j).
 EDGES = (
     (0, 0, 0), (0, 0, 1), (1, 0, 0), (1, 1, 0), (2, 0, 0), (2, 0, 1), (2, 1, 0), (2, 1, 1),
 )  # fmt: skip
 # Edges and forces by name: two along i, two along j, four along k; forces of the corners c = 1.
-(I0, I1, J0, J1, K0, K1, K2, K3) = (EDGE + k * VECTOR for k in range(8))
-(FI0, FI1, FJ0, FJ1, FK0, FK1, FK2, FK3) = (FLUX + k * VECTOR for k in range(8))
-(HI0, HI1, HJ0, HJ1) = (HIGH + k * VECTOR for k in range(4))
-(VI0, VI1, VJ0, VJ1, VK0, VK1, VK2, VK3) = (INVERSE + k * SPAN for k in range(8))
+I0, I1, J0, J1, K0, K1, K2, K3 = (EDGE + k * VECTOR for k in range(8))
+FI0, FI1, FJ0, FJ1, FK0, FK1, FK2, FK3 = (FLUX + k * VECTOR for k in range(8))
+HI0, HI1, HJ0, HJ1 = (HIGH + k * VECTOR for k in range(4))
+VI0, VI1, VJ0, VJ1, VK0, VK1, VK2, VK3 = (INVERSE + k * SPAN for k in range(8))
 AWAY = TURN - EDGE
 # Edges along i, j, k of the eight corners of a cell, and offsets of the forces on them.
 CORNERS = (
@@ -132,7 +137,8 @@ def fill_volumes(Z, n, away, out):
 @formula
 def add_corner_force(Z, at, edges, shares, steep, p):
     """Add the gradient (R14.4) for edge a of a corner with triple product p to its force."""
-    (a, b, c), (own, far, near) = edges, shares
+    a, b, c = edges
+    own, far, near = shares
     Z[at] += own * a[0] - (far * b[0] + near * c[0]) + steep * p[0]
     Z[at + SPAN] += own * a[1] - (far * b[1] + near * c[1]) + steep * p[1]
     Z[at + 2 * SPAN] += own * a[2] - (far * b[2] + near * c[2]) + steep * p[2]
@@ -144,19 +150,35 @@ def add_corner_value(Z, k, edges, forces, area_weight, e2):
 
     `edges` of CORNERS, `forces` of FORCES.
     """
-    a, b, c = take(Z, edges[0] + k), take(Z, edges[1] + k), take(Z, edges[2] + k)
-    p, q, r = cross(b, c), cross(c, a), cross(a, b)
+    a = take(Z, edges[0] + k)
+    b = take(Z, edges[1] + k)
+    c = take(Z, edges[2] + k)
+    p = cross(b, c)
+    q = cross(c, a)
+    r = cross(a, b)
     chi, slope = smooth_area(dot(a, p), e2)
-    aa, bb, cc, ab, bc, ca = dot(a, a), dot(b, b), dot(c, c), dot(a, b), dot(b, c), dot(c, a)
+    aa = dot(a, a)
+    bb = dot(b, b)
+    cc = dot(c, c)
+    ab = dot(a, b)
+    bc = dot(b, c)
+    ca = dot(c, a)
     size = aa + bb + cc + dot(p, p)
     size += dot(q, q) + dot(r, r)
-    inverse, weight = 1.0 / chi, Z[WEIGHT + k]
+    inverse = 1.0 / chi
+    weight = Z[WEIGHT + k]
     Z[SUM + k] += weight * ((size * inverse - 6.0) + area_weight * (chi + inverse - 2.0))
     steep = weight * slope * (area_weight * (1.0 - inverse * inverse) - size * inverse * inverse)
     two = 2.0 * weight * inverse
-    i, j, e = forces[0] + k, forces[1] + k, forces[2] + k
-    of_a, of_b, of_c = two * (1.0 + bb + cc), two * (1.0 + cc + aa), two * (1.0 + aa + bb)
-    ab, bc, ca = two * ab, two * bc, two * ca
+    i = forces[0] + k
+    j = forces[1] + k
+    e = forces[2] + k
+    of_a = two * (1.0 + bb + cc)
+    of_b = two * (1.0 + cc + aa)
+    of_c = two * (1.0 + aa + bb)
+    ab = two * ab
+    bc = two * bc
+    ca = two * ca
     add_corner_force(Z, i, (a, b, c), (of_a, ab, ca), steep, p)
     add_corner_force(Z, j, (b, c, a), (of_b, bc, ab), steep, q)
     add_corner_force(Z, e, (c, a, b), (of_c, ca, bc), steep, r)
@@ -176,10 +198,18 @@ def add_corner_product(Z, k, edges, forces, area_weight, e2):
 
     `edges` of CORNERS, `forces` of FORCES.
     """
-    i, j, e = edges[0] + k, edges[1] + k, edges[2] + k
-    a, b, c = take(Z, i), take(Z, j), take(Z, e)
-    da, db, dc = take(Z, i + AWAY), take(Z, j + AWAY), take(Z, e + AWAY)
-    p, q, r = cross(b, c), cross(c, a), cross(a, b)
+    i = edges[0] + k
+    j = edges[1] + k
+    e = edges[2] + k
+    a = take(Z, i)
+    b = take(Z, j)
+    c = take(Z, e)
+    da = take(Z, i + AWAY)
+    db = take(Z, j + AWAY)
+    dc = take(Z, e + AWAY)
+    p = cross(b, c)
+    q = cross(c, a)
+    r = cross(a, b)
     chi, slope = smooth_area(dot(a, p), e2)
     inverse = 1.0 / chi
     t = slope * inverse
@@ -191,13 +221,19 @@ def add_corner_product(Z, k, edges, forces, area_weight, e2):
     dr = plus(cross(da, b), cross(a, db))
     change = t * (dot(p, da) + dot(q, db) + dot(r, dc))  # of chi, over chi
     # v - dv is used for (a, b, c) and for the cross products
-    da, db, dc = less(da, change, a), less(db, change, b), less(dc, change, c)
-    dp, dq, dr = less(dp, change, p), less(dq, change, q), less(dr, change, r)
+    da = less(da, change, a)
+    db = less(db, change, b)
+    dc = less(dc, change, c)
+    dp = less(dp, change, p)
+    dq = less(dq, change, q)
+    dr = less(dr, change, r)
     along = dot(a, da) + dot(b, db) + dot(c, dc)
     along += dot(p, dp) + dot(q, dq) + dot(r, dr)
     back = t * (area_weight * change - along)
     two = 2.0 * Z[WEIGHT + k] * inverse
-    i, j, e = forces[0] + k, forces[1] + k, forces[2] + k
+    i = forces[0] + k
+    j = forces[1] + k
+    e = forces[2] + k
     add_corner_turn(Z, i, two, da, cross(dq, c), cross(b, dr), back, p)
     add_corner_turn(Z, j, two, db, cross(dr, a), cross(c, dp), back, q)
     add_corner_turn(Z, e, two, dc, cross(dp, b), cross(a, dq), back, r)
@@ -249,7 +285,8 @@ def fill_products(Z, n, area_weight, e2):
 @formula
 def turn_about(weight, edges, shares, half, t, p):
     """Diagonal block (xx, xy, xz, yy, yz, zz) of an edge a with two others, triple product p."""
-    (a, b, c), (own, ab, ca) = edges, shares
+    a, b, c = edges
+    own, ab, ca = shares
     u = t * (own * a[0] - (ab * b[0] + ca * c[0]) - half * p[0])
     v = t * (own * a[1] - (ab * b[1] + ca * c[1]) - half * p[1])
     w = t * (own * a[2] - (ab * b[2] + ca * c[2]) - half * p[2])
@@ -275,10 +312,17 @@ def fill_centre_blocks(Z, n, area_weight, e2):
         a = take_mean_vector(Z, I0 + k, I0 + k + 1, I1 + k, I1 + k + 1)
         b = take_mean_vector(Z, J0 + k, J0 + k + 1, J1 + k, J1 + k + 1)
         c = take_mean_vector(Z, K0 + k, K1 + k, K2 + k, K3 + k)
-        p, q, r = cross(b, c), cross(c, a), cross(a, b)
+        p = cross(b, c)
+        q = cross(c, a)
+        r = cross(a, b)
         chi, slope = smooth_area(dot(a, p), e2)
         t = slope / chi
-        aa, bb, cc, ab, bc, ca = dot(a, a), dot(b, b), dot(c, c), dot(a, b), dot(b, c), dot(c, a)
+        aa = dot(a, a)
+        bb = dot(b, b)
+        cc = dot(c, c)
+        ab = dot(a, b)
+        bc = dot(b, c)
+        ca = dot(c, a)
         size = aa + bb + cc + (aa * bb - ab * ab) + (bb * cc - bc * bc) + (cc * aa - ca * ca)
         # z = n_a - (N + lam) p / (2 chi) g_a takes both of the terms with g_a
         half = 0.5 * (size + area_weight) * t
@@ -296,15 +340,21 @@ def fill_centre_blocks(Z, n, area_weight, e2):
 
 @formula
 def put_six(Z, at, x):
-    Z[at], Z[at + SPAN], Z[at + 2 * SPAN] = x[0], x[1], x[2]
-    Z[at + 3 * SPAN], Z[at + 4 * SPAN], Z[at + 5 * SPAN] = x[3], x[4], x[5]
+    Z[at] = x[0]
+    Z[at + SPAN] = x[1]
+    Z[at + 2 * SPAN] = x[2]
+    Z[at + 3 * SPAN] = x[3]
+    Z[at + 4 * SPAN] = x[4]
+    Z[at + 5 * SPAN] = x[5]
 
 
 @kernel(allocates=False)
 def fill_edges(nodes, inverse, i, j, at, Z):
     """Eight rows of edges of the cells (i, j) over their conditional lengths, from `at` on."""
     for edge in range(8):
-        axis, p, q = EDGES[edge][0], i + EDGES[edge][1], j + EDGES[edge][2]
+        axis = EDGES[edge][0]
+        p = i + EDGES[edge][1]
+        q = j + EDGES[edge][2]
         lengths = inverse[axis][p, q]
         for component in range(3):
             low, high = nodes[component, p, q], nodes[component, p, q, 1:]
@@ -320,8 +370,11 @@ def fill_edges(nodes, inverse, i, j, at, Z):
 def fill_cell_rows(laws, cells, i, j, n, Z):
     """Inverse lengths and straight-line weights of the eight rows of edges, weights of `cells`."""
     for edge in range(8):
-        axis, p, q = EDGES[edge][0], i + EDGES[edge][1], j + EDGES[edge][2]
-        inverse, way = laws.inverse[axis][p, q], laws.ways[axis][q if axis == 0 else p]
+        axis = EDGES[edge][0]
+        p = i + EDGES[edge][1]
+        q = j + EDGES[edge][2]
+        inverse = laws.inverse[axis][p, q]
+        way = laws.ways[axis][q if axis == 0 else p]
         row = INVERSE + edge * SPAN
         for k in range(inverse.shape[0]):
             Z[row + k] = inverse[k]
@@ -334,7 +387,8 @@ def fill_cell_rows(laws, cells, i, j, n, Z):
 def add_straight(Z, edge, n, row):
     """Add the straight-line weights over length of a row of edges to an adjacent row of nodes."""
     at = INVERSE + edge * SPAN
-    inverse, way = Z[at : at + n], Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + n]
+    inverse = Z[at : at + n]
+    way = Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + n]
     if edge < 4:
         for k in range(1, n):
             row[k] += inverse[k] * way[k]
@@ -374,10 +428,12 @@ def add_to_nodes(Z, edges, i, j, n, out):
     m = n + 1
     for edge in range(8):
         at = INVERSE + edge * SPAN
-        inverse, straight = Z[at : at + m], Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + m]
+        inverse = Z[at : at + m]
+        straight = Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + m]
         for component in range(0, VECTOR, SPAN):
             at = edge * VECTOR + component
-            flux, vector = Z[FLUX + at : FLUX + at + m], Z[edges + at : edges + at + m]
+            flux = Z[FLUX + at : FLUX + at + m]
+            vector = Z[edges + at : edges + at + m]
             if edge < 4:
                 high = Z[HIGH + at : HIGH + at + m]
                 for k in range(1, n):
@@ -406,7 +462,8 @@ def sum_straight(Z, n):
     total = 0.0
     for edge in range(8):
         row = EDGE + edge * VECTOR
-        inverse, straight = INVERSE + edge * SPAN, STRAIGHT + edge * SPAN
+        inverse = INVERSE + edge * SPAN
+        straight = STRAIGHT + edge * SPAN
         for k in range(n + 1 if edge < 4 else n):
             x, y, z = Z[row + k], Z[row + SPAN + k], Z[row + 2 * SPAN + k]
             total += 0.5 * Z[straight + k] / Z[inverse + k] * (x * x + y * y + z * z)
@@ -435,11 +492,16 @@ def fill_strength(nodes, inverse, epsilon, most, strength, Z):
                 Z[LEAST + k] = 1.0
             for corner in range(8):
                 # rows of the squares of the corner's edges along i, j and k, and of its volume
-                a, b, c = corner & 1, (corner >> 1) & 1, corner >> 2
-                p, q = SQUARE + b * SPAN + c, SQUARE + (2 + a) * SPAN + c
-                r, volume = SQUARE + (4 + 2 * a + b) * SPAN, VOLUME + corner * SPAN
+                a = corner & 1
+                b = (corner >> 1) & 1
+                c = corner >> 2
+                p = SQUARE + b * SPAN + c
+                q = SQUARE + (2 + a) * SPAN + c
+                r = SQUARE + (4 + 2 * a + b) * SPAN
+                volume = VOLUME + corner * SPAN
                 for k in range(n):
-                    det, least = Z[volume + k], Z[LEAST + k]
+                    det = Z[volume + k]
+                    least = Z[LEAST + k]
                     sine = det * abs(det) / (Z[p + k] * Z[q + k] * Z[r + k])
                     Z[LEAST + k] = sine if sine < least else least
             out = strength[i, j]
@@ -518,11 +580,14 @@ def compare_corners(nodes, old, inverse, shape, Z):
                     Z[row + OTHER_VOLUME - VOLUME + k] = was if was > 0.0 else 1.0
                 for k in range(padded):
                     # not min(), which would lose a NaN
-                    now, ratio, least = Z[row + k], Z[LEAST + k], Z[SUM + k]
+                    now = Z[row + k]
+                    ratio = Z[LEAST + k]
+                    least = Z[SUM + k]
                     part = now / Z[row + OTHER_VOLUME - VOLUME + k]
                     Z[LEAST + k] = ratio if ratio <= part else part
                     Z[SUM + k] = least if least <= now else now
-    ratio, least = math.inf, math.inf
+    ratio = math.inf
+    least = math.inf
     for k in range(n):
         if not Z[LEAST + k] >= ratio:
             ratio = Z[LEAST + k]
@@ -537,7 +602,9 @@ def halve_steps(nodes, old, inverse, floor, part, Z):
 
     Corners already below their floor in `old` are skipped.
     """
-    n1, n2, n = part.shape[0] - 1, part.shape[1] - 1, part.shape[2] - 1
+    n1 = part.shape[0] - 1
+    n2 = part.shape[1] - 1
+    n = part.shape[2] - 1
     short = 0
     for i in range(n1):
         for j in range(n2):
@@ -546,8 +613,11 @@ def halve_steps(nodes, old, inverse, floor, part, Z):
             fill_volumes(Z, round_up(n), 0, VOLUME)
             fill_volumes(Z, round_up(n), AWAY, OTHER_VOLUME)
             for corner in range(8):
-                a, b, c = corner & 1, (corner >> 1) & 1, corner >> 2
-                now, was = VOLUME + corner * SPAN, OTHER_VOLUME + corner * SPAN
+                a = corner & 1
+                b = (corner >> 1) & 1
+                c = corner >> 2
+                now = VOLUME + corner * SPAN
+                was = OTHER_VOLUME + corner * SPAN
                 for k in range(n):
                     if not Z[now + k] >= floor * Z[was + k]:
                         short += 1

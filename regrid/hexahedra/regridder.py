@@ -51,8 +51,12 @@ MOST_SHORTENINGS = 40
 MOST_STEPS = 6  # Newton steps after the first
 MOST_POLISH = 15  # Newton steps after untangling, until the residual is below SETTLED cells
 SETTLED = 0.02
-FAR_TOLERANCE, FAR_ITERATIONS = 0.01, 30  # the solve that extends the faces' motion inward
-HOVER, DEEP = 1.3, 0.2  # a residual up to HOVER floors is solved down to DEEP floors
+# the solve that extends the faces' motion inward
+FAR_TOLERANCE = 0.01
+FAR_ITERATIONS = 30
+# a residual up to HOVER floors is solved down to DEEP floors
+HOVER = 1.3
+DEEP = 0.2
 SMOOTH_FLOOR = 0.3  # floors: a smooth part below this is ignored
 ROUND_OFF = 1e-12
 MOST_HALVINGS = 6  # the motion is divided into at most 2**6 parts
@@ -85,7 +89,8 @@ class Workspace:
             np.zeros((3, *nodes)) for _ in range(7)
         )
         self.blocks = np.zeros((2, 6, *nodes))
-        self.strength, self.planes = np.empty(cells), np.empty(cells[0])
+        self.strength = np.empty(cells)
+        self.planes = np.empty(cells[0])
         self.scratch = np.zeros(ROWS)
         self.coarse = CoarseBlock(cells)
 
@@ -100,13 +105,17 @@ class HexahedraMove(Workspace):
     def __init__(
         self, options: HexahedraOptions, old, boundary, weights, space: Workspace | None = None
     ):
-        self.options, self.weights = options, weights
-        self.old, self.faces = old, boundary
+        self.options = options
+        self.weights = weights
+        self.old = old
+        self.faces = boundary
         self.cells = tuple(n - 1 for n in old.shape[1:])
         vars(self).update(vars(space or Workspace(self.cells)))
         self.trial[:] = np.nan  # no values of an earlier call may remain
         self.iterations = self.rescues = self.sub_moves = 0
-        self.residual, self.error, self.ratio = 0.0, 0.0, np.inf
+        self.residual = 0.0
+        self.error = 0.0
+        self.ratio = np.inf
         self.moved = False
         self.start = "displacement"
 
@@ -128,7 +137,8 @@ class HexahedraMove(Workspace):
             return True
         if find_turned_edge(self.faces) is not None:
             return False  # no interior makes that corner positive
-        begin, end = self.old.copy(), self.faces.copy()
+        begin = self.old.copy()
+        end = self.faces.copy()
         for halving in range(1, MOST_HALVINGS + 1):
             parts = 2**halving
             self.old = begin.copy()
@@ -140,7 +150,8 @@ class HexahedraMove(Workspace):
                     break
                 self.old = self.trial.copy()
             else:
-                self.sub_moves, self.start = parts - 1, "halved"
+                self.sub_moves = parts - 1
+                self.start = "halved"
                 return True
         return False
 
@@ -194,14 +205,16 @@ class HexahedraMove(Workspace):
         if work > ENERGY:
             self.gradient[:] = 0.0
             self.blocks[:] = 0.0
-        functional, planes = self.functional(e2), self.planes
+        functional = self.functional(e2)
+        planes = self.planes
         assemble(nodes, functional, work, self.gradient, self.blocks, planes, self.scratch)
         if work == MATRIX:
             factor_lines(self.blocks)
         return float(self.planes.sum())
 
     def strengthen(self, nodes: np.ndarray) -> None:
-        epsilon, most = self.options.epsilon, self.options.strengthening
+        epsilon = self.options.epsilon
+        most = self.options.strengthening
         fill_strength(nodes, self.laws.inverse, epsilon, most, self.strength, self.scratch)
 
     def precondition(self, r: np.ndarray) -> np.ndarray:
@@ -214,7 +227,8 @@ class HexahedraMove(Workspace):
         It starts with the smooth part (theory R14.11), enough for a residual at the floor.
         """
 
-        options, functional = self.options, self.functional(e2)
+        options = self.options
+        functional = self.functional(e2)
 
         def multiply(p):
             fill_product(nodes, p, functional, self.product, self.scratch)
@@ -275,7 +289,8 @@ class HexahedraMove(Workspace):
             for _ in range(MOST_SHORTENINGS):
                 np.multiply(change, steps, out=self.trial)
                 self.trial += base
-                inverse, Z = self.laws.inverse, self.scratch
+                inverse = self.laws.inverse
+                Z = self.scratch
                 if not halve_steps(self.trial, base, inverse, STEP_RATIO, steps, Z):
                     if self.assemble_at(self.trial, ENERGY) < before:
                         return self._compare(self.trial, old)[0]
@@ -308,7 +323,8 @@ class HexahedraMove(Workspace):
         if self.rescues == MOST_RESCUES:
             return False
         self.rescues += 1
-        self.rescued, self.start = True, "untangled"
+        self.rescued = True
+        self.start = "untangled"
         self.strength[:] = options.epsilon * options.strengthening
         least = self._compare(self.trial)[1]
         if not np.isfinite(self.trial).all():

@@ -56,31 +56,45 @@ def times(m, v):
 def factor_lines(blocks):
     """Overwrite the diagonal blocks in (2, 6, nodes) by inverse pivots of the lines along i; the
     forward couplings are unchanged."""
-    own, ahead = blocks[0], blocks[1]
-    n1, n2, n3 = own.shape[1] - 1, own.shape[2] - 1, own.shape[3] - 1
+    own = blocks[0]
+    ahead = blocks[1]
+    n1 = own.shape[1] - 1
+    n2 = own.shape[2] - 1
+    n3 = own.shape[3] - 1
     for i in range(1, n1):
         for j in range(1, n2):
             for k in range(1, n3):
                 xx, xy, xz, yy, yz, zz = get_six(own, i, j, k)
                 if i > 1:
-                    pivot, c = get_six(own, i - 1, j, k), get_six(ahead, i - 1, j, k)
+                    pivot = get_six(own, i - 1, j, k)
+                    c = get_six(ahead, i - 1, j, k)
                     u = times(c, times(pivot, (c[0], c[1], c[2])))
                     v = times(c, times(pivot, (c[1], c[3], c[4])))
                     w = times(c, times(pivot, (c[2], c[4], c[5])))
                     xx, xy, xz = xx - u[0], xy - v[0], xz - w[0]
-                    yy, yz, zz = yy - v[1], yz - w[1], zz - w[2]
-                p, q, r = cross((xy, yy, yz), (xz, yz, zz)), xx * zz - xz * xz, xy * xz - xx * yz
+                    yy = yy - v[1]
+                    yz = yz - w[1]
+                    zz = zz - w[2]
+                p = cross((xy, yy, yz), (xz, yz, zz))
+                q = xx * zz - xz * xz
+                r = xy * xz - xx * yz
                 inverse = 1.0 / (xx * p[0] + xy * p[1] + xz * p[2])
-                own[0, i, j, k], own[1, i, j, k] = p[0] * inverse, p[1] * inverse
-                own[2, i, j, k], own[3, i, j, k] = p[2] * inverse, q * inverse
-                own[4, i, j, k], own[5, i, j, k] = r * inverse, (xx * yy - xy * xy) * inverse
+                own[0, i, j, k] = p[0] * inverse
+                own[1, i, j, k] = p[1] * inverse
+                own[2, i, j, k] = p[2] * inverse
+                own[3, i, j, k] = q * inverse
+                own[4, i, j, k] = r * inverse
+                own[5, i, j, k] = (xx * yy - xy * xy) * inverse
 
 
 @kernel(allocates=False)
 def solve_lines(blocks, r, z):
     """`z` = solution along every line for the residual `r`, (3, nodes); zeros on the boundary."""
-    own, ahead = blocks[0], blocks[1]
-    n1, n2, n3 = own.shape[1] - 1, own.shape[2] - 1, own.shape[3] - 1
+    own = blocks[0]
+    ahead = blocks[1]
+    n1 = own.shape[1] - 1
+    n2 = own.shape[2] - 1
+    n3 = own.shape[3] - 1
     for i in range(1, n1):
         for j in range(1, n2):
             for k in range(1, n3):
@@ -120,7 +134,8 @@ def solve(multiply, precondition, r, x, stop: float, most: int):
         x += alpha * p
         r -= alpha * product
         z = precondition(r)
-        before, rz = rz, float((r * z).sum())
+        before = rz
+        rz = float((r * z).sum())
         p *= rz / before
         p += z
         done += 1
@@ -130,7 +145,9 @@ def solve(multiply, precondition, r, x, stop: float, most: int):
 LEAST_CELLS = 1000  # of corrected blocks: in smaller ones the fine solve removes all errors
 STRETCH = 4  # fine edges per coarse edge
 LEAST_VOLUME = 0.02  # of a coarse corner, over that of its conditional lengths
-TOLERANCE, ITERATIONS = 0.05, 12  # of the coarse solve
+# of the coarse solve
+TOLERANCE = 0.05
+ITERATIONS = 12
 
 
 def cut_block(cells: int) -> np.ndarray:
@@ -176,7 +193,8 @@ class CoarseBlock:
 
     def make_laws(self, laws: FaceLaws) -> FaceLaws:
         """Lengths, straight-line weights and scale of the coarse block, from the fine one."""
-        inverse, ways = [], []
+        inverse = []
+        ways = []
         apart = [np.diff(starts) for starts in self.starts]
         # fine lines that a coarse one represents, half of those on either side
         shares = [0.5 * (np.append(m, m[-1]) + np.append(m[0], m)) for m in apart]
@@ -204,7 +222,8 @@ class CoarseBlock:
             return 0.0
         coarse = np.ascontiguousarray(nodes[np.ix_(range(3), *self.starts)])
         cells = tuple(len(starts) - 1 for starts in self.starts)
-        laws, strength = self.make_laws(functional.laws), functional.strength
+        laws = self.make_laws(functional.laws)
+        strength = functional.strength
         _, least = compare_corners(coarse, coarse, laws.inverse, cells, Z)
         if not least > LEAST_VOLUME:
             return 0.0

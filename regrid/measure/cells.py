@@ -24,7 +24,10 @@ from regrid.errors import BadInput
 from regrid.jit import compiled_once, inlined, kernel
 from regrid.sides import compute_area
 
-OUTSIDE, INSIDE, BESIDE = 0, 1, 2  # of the block: what `find_places` says of a point
+# of the block: what `find_places` says of a point
+OUTSIDE = 0
+INSIDE = 1
+BESIDE = 2
 ON_EDGE = 1e-12  # of a cell: so far beyond a side counts as inside
 MOST_ITERATIONS = 30
 MOST_QUADS = 12  # that are tried around the cell
@@ -39,13 +42,25 @@ def _compute_excess(nodes, i, j, side, x, y):
     Sides: 0 i_min, 1 i_max, 2 j_min, 3 j_max, of a grid whose cells go anticlockwise.
     """
     if side == 0:
-        ai, aj, bi, bj = i, j + 1, i, j
+        ai = i
+        aj = j + 1
+        bi = i
+        bj = j
     elif side == 1:
-        ai, aj, bi, bj = i + 1, j, i + 1, j + 1
+        ai = i + 1
+        aj = j
+        bi = i + 1
+        bj = j + 1
     elif side == 2:
-        ai, aj, bi, bj = i, j, i + 1, j
+        ai = i
+        aj = j
+        bi = i + 1
+        bj = j
     else:
-        ai, aj, bi, bj = i + 1, j + 1, i, j + 1
+        ai = i + 1
+        aj = j + 1
+        bi = i
+        bj = j + 1
     ax, ay = nodes[0, ai, aj], nodes[1, ai, aj]
     dx, dy = nodes[0, bi, bj] - ax, nodes[1, bi, bj] - ay
     length2 = dx * dx + dy * dy
@@ -93,14 +108,17 @@ def _walk(nodes, i, j, sign, x, y):
     """Cell in which a walk from cell (i, j) ends, and whether the point is in it."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     for _ in range(4 * (ni + nj) + 16):
-        worst, chosen, beyond = 0.0, -1, False
+        worst = 0.0
+        chosen = -1
+        beyond = False
         for side in range(4):
             excess = sign * _compute_excess(nodes, i, j, side, x, y)
             if excess > ON_EDGE:
                 beyond = True
                 ends = (i == 0, i == ni - 1, j == 0, j == nj - 1)
                 if not ends[side] and excess > worst:
-                    worst, chosen = excess, side
+                    worst = excess
+                    chosen = side
         if not beyond:
             return i, j, True
         if chosen < 0:
@@ -150,7 +168,10 @@ def _solve_quad(nodes, a, b, x, y):
     x10, y10 = _compute_centre(nodes, a + 1, b)
     x01, y01 = _compute_centre(nodes, a, b + 1)
     x11, y11 = _compute_centre(nodes, a + 1, b + 1)
-    xs, ys, xt, yt = x10 - x00, y10 - y00, x01 - x00, y01 - y00
+    xs = x10 - x00
+    ys = y10 - y00
+    xt = x01 - x00
+    yt = y01 - y00
     xst, yst = (x11 - x01) - xs, (y11 - y01) - ys
     scale = abs(xs) + abs(ys) + abs(xt) + abs(yt)
     s = t = 0.5
@@ -161,7 +182,9 @@ def _solve_quad(nodes, a, b, x, y):
         ry = y - y00 - s * ys - t * yt - s * t * yst
         size = abs(rx) + abs(ry)
         if best < 0.0 or size < best:
-            best, best_s, best_t = size, s, t
+            best = size
+            best_s = s
+            best_t = t
         elif size <= 1e3 * CONVERGED * scale:
             break  # round-off
         ds_x, ds_y = xs + t * xst, ys + t * yst
@@ -180,14 +203,17 @@ def _solve_quad(nodes, a, b, x, y):
 def _place(nodes, i, j, x, y):
     """Quad (a, b) of centres around a point near cell (i, j), parts s, t in it, and success."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    most_a, most_b = max(ni - 2, 0), max(nj - 2, 0)
-    a, b = min(i, most_a), min(j, most_b)
+    most_a = max(ni - 2, 0)
+    most_b = max(nj - 2, 0)
+    a = min(i, most_a)
+    b = min(j, most_b)
     s = t = 0.0
     for _ in range(MOST_QUADS):
         s, t, found = _solve_quad(nodes, a, b, x, y)
         if not found:
             break
-        next_a, next_b = a, b
+        next_a = a
+        next_b = b
         if s < -UNIT_PARTS:
             next_a = max(a - 1, 0)
         elif s > 1.0 + UNIT_PARTS:
@@ -200,8 +226,10 @@ def _place(nodes, i, j, x, y):
             if abs(a + s - i) <= 2.0 and abs(b + t - j) <= 2.0:
                 return a, b, s, t, True
             break
-        a, b = next_a, next_b
-    a, b = min(i, most_a), min(j, most_b)
+        a = next_a
+        b = next_b
+    a = min(i, most_a)
+    b = min(j, most_b)
     return a, b, float(i - a), float(j - b), False
 
 
@@ -227,19 +255,26 @@ def find_places(nodes, points, reach, cells, quads, parts, where):
         if not inside and _is_in_outline(nodes, x, y):
             for m in range(ni * nj):
                 if _is_in_cell(nodes, m // nj, m % nj, sign, x, y):
-                    i, j, inside = m // nj, m % nj, True
+                    i = m // nj
+                    j = m % nj
+                    inside = True
                     break
         if not inside and reach <= 0.0:
             continue
         a, b, s, t, placed = _place(nodes, i, j, x, y)
         if not inside:
-            low, far_i, far_j = -0.5 - reach, ni - 0.5 + reach, nj - 0.5 + reach
+            low = -0.5 - reach
+            far_i = ni - 0.5 + reach
+            far_j = nj - 0.5 + reach
             if not (placed and low <= a + s <= far_i and low <= b + t <= far_j):
                 continue
         where[k] = INSIDE if inside else BESIDE
-        cells[0, k], cells[1, k] = i, j
-        quads[0, k], quads[1, k] = a, b
-        parts[0, k], parts[1, k] = s, t
+        cells[0, k] = i
+        cells[1, k] = j
+        quads[0, k] = a
+        quads[1, k] = b
+        parts[0, k] = s
+        parts[1, k] = t
 
 
 @compiled_once
@@ -284,7 +319,8 @@ def _integrate_edge(xa, ya, xb, yb, curve_x, curve_y):
     count = curve_y.size
     piece = _count_below(curve_y, ya, True)
     total = 0.0
-    y0, x0 = ya, xa
+    y0 = ya
+    x0 = xa
     while y0 < yb:
         y1 = yb
         if piece < count and curve_y[piece] < yb:
@@ -300,7 +336,8 @@ def _integrate_edge(xa, ya, xb, yb, curve_x, curve_y):
             f0 = curve_x[piece - 1] + rise * ((y0 - curve_y[piece - 1]) / run)
             f1 = curve_x[piece - 1] + rise * ((y1 - curve_y[piece - 1]) / run)
         total += _integrate_smaller(x0, x1, f0, f1, y1 - y0)
-        y0, x0 = y1, x1
+        y0 = y1
+        x0 = x1
         piece += 1
     return sign * total
 

@@ -214,7 +214,8 @@ def find_excluded_corners(nodes: np.ndarray) -> np.ndarray:
     sign = 1 if compute_area(nodes) >= 0.0 else -1
     excluded = np.zeros((4, ni, nj), dtype=bool)
     for corner, i, j in BLOCK_CORNERS:
-        row, column = i % ni, j % nj
+        row = i % ni
+        column = j % nj
         cell = nodes[:, row : row + 2, column : column + 2]
         turn = compute_corner_signs(cell)[corner, 0, 0]
         excluded[corner, i, j] = sign * turn <= 0

@@ -22,8 +22,12 @@ from regrid.measure.corners import BOUND, UNDERFLOW, compute_turns
 
 LEAF = 4  # edges of the smallest pieces
 LOW_X, HIGH_X, LOW_Y, HIGH_Y = range(4)  # rows of the boxes
-NONE, COINCIDENT = -1, -2
-RIGHTWARD, LEFTWARD, UPWARD, DOWNWARD = 1, 2, 4, 8
+NONE = -1
+COINCIDENT = -2
+RIGHTWARD = 1
+LEFTWARD = 2
+UPWARD = 4
+DOWNWARD = 8
 
 
 @kernel
@@ -56,7 +60,10 @@ def find_turn(a_x, a_y, b_x, b_y, c_x, c_y):
 def may_meet(line, a, b, count, closed):
     """May the edges a < b of the polygon have a point in common that is not a node of both?"""
     x, y = line[0], line[1]
-    p, q, r, s = a, a + 1, b, b + 1
+    p = a
+    q = a + 1
+    r = b
+    s = b + 1
     if max(x[p], x[q]) < min(x[r], x[s]) or max(x[r], x[s]) < min(x[p], x[q]):
         return False
     if max(y[p], y[q]) < min(y[r], y[s]) or max(y[r], y[s]) < min(y[p], y[q]):
@@ -83,10 +90,16 @@ def fill_tree(line, leaves, boxes, ways, ends):
     length, or -1.
     """
     x, y = line[0], line[1]
-    count, short = line.shape[1] - 1, -1
+    count = line.shape[1] - 1
+    short = -1
     for leaf in range(leaves):
-        first, last = min(count, leaf * LEAF), min(count, (leaf + 1) * LEAF)
-        low_x, low_y, high_x, high_y, way = np.inf, np.inf, -np.inf, -np.inf, 15
+        first = min(count, leaf * LEAF)
+        last = min(count, (leaf + 1) * LEAF)
+        low_x = np.inf
+        low_y = np.inf
+        high_x = -np.inf
+        high_y = -np.inf
+        way = 15
         for k in range(first, last):
             low_x, high_x = min(low_x, x[k], x[k + 1]), max(high_x, x[k], x[k + 1])
             low_y, high_y = min(low_y, y[k], y[k + 1]), max(high_y, y[k], y[k + 1])
@@ -96,11 +109,16 @@ def fill_tree(line, leaves, boxes, ways, ends):
             if here == 0 and short < 0:
                 short = k
         at = leaves + leaf
-        boxes[LOW_X, at], boxes[HIGH_X, at] = low_x, high_x
-        boxes[LOW_Y, at], boxes[HIGH_Y, at] = low_y, high_y
-        ways[at], ends[0, at], ends[1, at] = way, first, last
+        boxes[LOW_X, at] = low_x
+        boxes[HIGH_X, at] = high_x
+        boxes[LOW_Y, at] = low_y
+        boxes[HIGH_Y, at] = high_y
+        ways[at] = way
+        ends[0, at] = first
+        ends[1, at] = last
     for at in range(leaves - 1, 0, -1):
-        one, two = 2 * at, 2 * at + 1
+        one = 2 * at
+        two = 2 * at + 1
         boxes[LOW_X, at] = min(boxes[LOW_X, one], boxes[LOW_X, two])
         boxes[HIGH_X, at] = max(boxes[HIGH_X, one], boxes[HIGH_X, two])
         boxes[LOW_Y, at] = min(boxes[LOW_Y, one], boxes[LOW_Y, two])
@@ -141,7 +159,8 @@ def search_meeting(nodes, line, boxes, ways, ends, stack):
     fill_boundary(nodes, line)
     seam_i, seam_j = are_one(nodes, True), are_one(nodes, False)
     closed = seam_i or seam_j
-    count, leaves = line.shape[1] - 1, boxes.shape[1] // 2
+    count = line.shape[1] - 1
+    leaves = boxes.shape[1] // 2
     short = fill_tree(line, leaves, boxes, ways, ends)
     if short >= 0:
         return COINCIDENT, short
@@ -149,14 +168,18 @@ def search_meeting(nodes, line, boxes, ways, ends, stack):
     stack[0, 0] = stack[1, 0] = 1
     while depth > 0:
         depth -= 1
-        one, two = stack[0, depth], stack[1, depth]
+        one = stack[0, depth]
+        two = stack[1, depth]
         if one == two:
             if ways[one] != 0:
                 continue
             if one < leaves:
-                stack[0, depth], stack[1, depth] = 2 * one, 2 * one
-                stack[0, depth + 1], stack[1, depth + 1] = 2 * one + 1, 2 * one + 1
-                stack[0, depth + 2], stack[1, depth + 2] = 2 * one, 2 * one + 1
+                stack[0, depth] = 2 * one
+                stack[1, depth] = 2 * one
+                stack[0, depth + 1] = 2 * one + 1
+                stack[1, depth + 1] = 2 * one + 1
+                stack[0, depth + 2] = 2 * one
+                stack[1, depth + 2] = 2 * one + 1
                 depth += 3
                 continue
         else:
@@ -235,7 +258,10 @@ def find_crossing(nodes: np.ndarray) -> tuple[tuple[str, int], tuple[str, int]] 
     for k in range(2):
         near &= (low[k][:, None] <= high[k]) & (low[k] <= high[k][:, None])
     first, second = np.nonzero(near)
-    a, b, c, d = start[:, first], end[:, first], start[:, second], end[:, second]
+    a = start[:, first]
+    b = end[:, first]
+    c = start[:, second]
+    d = end[:, second]
     if all_seam:
         leads, follows = (a == d).all(axis=0), (b == c).all(axis=0)
     else:
@@ -248,7 +274,10 @@ def find_crossing(nodes: np.ndarray) -> tuple[tuple[str, int], tuple[str, int]] 
             node, k, n = (a, b, c) if other is leads else (b, a, d)
             meets[at] |= compute_turns(k[:, at], n[:, at], node[:, at])[0] == 0
     at = np.flatnonzero(apart)
-    a, b, c, d = a[:, at], b[:, at], c[:, at], d[:, at]
+    a = a[:, at]
+    b = b[:, at]
+    c = c[:, at]
+    d = d[:, at]
     across = compute_turns(a, b, c)[0] * compute_turns(a, b, d)[0] <= 0
     across &= compute_turns(c, d, a)[0] * compute_turns(c, d, b)[0] <= 0
     meets[at] |= across
@@ -304,7 +333,8 @@ def fill_boxes(line, group, boxes):
             low, high = line[c, g * group], line[c, g * group]
             for k in range(g * group + 1, min(last, (g + 1) * group) + 1):
                 low, high = min(low, line[c, k]), max(high, line[c, k])
-            boxes[2 * c, g], boxes[2 * c + 1, g] = low, high
+            boxes[2 * c, g] = low
+            boxes[2 * c + 1, g] = high
 
 
 @kernel
@@ -313,9 +343,14 @@ def find_touching(line, other, same, group, boxes, other_boxes):
 
     With `same` the two lines are one: neighbouring segments are only tested for folding back.
     """
-    x, y, u, v = line[0], line[1], other[0], other[1]
-    count, other_count = line.shape[1] - 1, other.shape[1] - 1
-    found_a, found_b = -1, -1
+    x = line[0]
+    y = line[1]
+    u = other[0]
+    v = other[1]
+    count = line.shape[1] - 1
+    other_count = other.shape[1] - 1
+    found_a = -1
+    found_b = -1
     for g in range(boxes.shape[1]):
         for f in range(g if same else 0, other_boxes.shape[1]):
             apart = boxes[LEAST_X, g] > other_boxes[MOST_X, f]
@@ -340,7 +375,8 @@ def find_touching(line, other, same, group, boxes, other_boxes):
                         )
                     earlier = found_a < 0 or a < found_a or (a == found_a and b < found_b)
                     if touch and earlier:
-                        found_a, found_b = a, b
+                        found_a = a
+                        found_b = b
     return found_a, found_b
 
 

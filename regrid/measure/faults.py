@@ -28,7 +28,9 @@ from regrid.measure.quality import compute_corner_areas
 from regrid.sides import compute_area, get_sides
 
 FLOAT64 = np.dtype(np.float64)
-LEAST_SIZE, MOST_SIZE = 1e-150, 1e150  # of a block, in m: squares of its areas are still numbers
+# of a block, in m: squares of its areas are still numbers
+LEAST_SIZE = 1e-150
+MOST_SIZE = 1e150
 NEAR = 1e9  # sizes of the block from the origin up to which nothing has to be looked at
 COARSE = 0.01  # of a mean cell: the most that coordinates may be rounded to
 EVERYDAY = 1e-40, 1e40  # sizes whose tenth powers need no unit of their own
@@ -62,7 +64,8 @@ def take_grids(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
 def take_nodes(nodes, name: str, axes: str = "ij") -> np.ndarray:
     """A grid as C-contiguous float64; BadInput, with its `name`, for what is none of these axes."""
     nodes = take_numbers(nodes, name)
-    shape, dimensions = nodes.shape, len(axes)
+    shape = nodes.shape
+    dimensions = len(axes)
     if len(shape) != dimensions + 1 or shape[0] != dimensions or min(shape) < 2:
         wanted = ", ".join([str(dimensions), *(f"n{axis}+1" for axis in axes)])
         cells = ", ".join(f"n{axis}" for axis in axes)
@@ -215,7 +218,9 @@ def _double_area(a: Point, b: Point, c: Point) -> float:
 def _cut(regions, triangle, free: int) -> bool:
     """Cut one node's region by what those of the others allow; False where nothing is left."""
     p, q, r = (triangle[(free + k) % 3] for k in range(3))
-    here, second, third = regions[p], regions[q], regions[r]
+    here = regions[p]
+    second = regions[q]
+    third = regions[r]
     if len(here) > MOST_VERTICES or len(second) * len(third) > MOST_VERTICES:
         return True
     # All of it is allowed as soon as one place of the others allows all of its vertices.
@@ -240,7 +245,8 @@ def _clip(polygon: list[Point], b: Point, c: Point) -> list[Point]:
         return polygon
     part = []
     for k, (point, area) in enumerate(zip(polygon, areas, strict=True)):
-        before, last = areas[k - 1], polygon[k - 1]
+        before = areas[k - 1]
+        last = polygon[k - 1]
         if (before < 0.0) != (area < 0.0):
             t = before / (before - area)
             part.append((last[0] + t * (point[0] - last[0]), last[1] + t * (point[1] - last[1])))

@@ -20,10 +20,13 @@ def fill_least_corner_volumes(nodes, out):
         for j in range(out.shape[1]):
             row = out[i, j]
             for corner in range(8):
-                a, b, c = corner & 1, (corner >> 1) & 1, corner >> 2
+                a = corner & 1
+                b = (corner >> 1) & 1
+                c = corner >> 2
                 x, y, z = nodes[0, i + a, j + b], nodes[1, i + a, j + b], nodes[2, i + a, j + b]
                 # Neighbours of the corner's row along i and along j.
-                p, q = i + 1 - a, j + 1 - b
+                p = i + 1 - a
+                q = j + 1 - b
                 xi, yi, zi = nodes[0, p, j + b], nodes[1, p, j + b], nodes[2, p, j + b]
                 xj, yj, zj = nodes[0, i + a, q], nodes[1, i + a, q], nodes[2, i + a, q]
                 sign = float((1 - 2 * a) * (1 - 2 * b) * (1 - 2 * c))
@@ -85,7 +88,8 @@ def compute_least_jacobian(nodes: np.ndarray, points: int = 5) -> np.ndarray:
             edge = np.diff(nodes, axis=axis + 1)
             for other in range(3):
                 if other != axis:
-                    way, before = ways[place[other]], (slice(None),) * (other + 1)
+                    way = ways[place[other]]
+                    before = (slice(None),) * (other + 1)
                     low, high = edge[(*before, slice(None, -1))], edge[(*before, slice(1, None))]
                     edge = (1.0 - way) * low + way * high
             edges.append(edge)

@@ -81,14 +81,18 @@ def measure_cell(low, high, near, far):
     """Least sine of a cell's corners, squared with its sign, so that one root serves a whole grid;
     squares and product of the doubled mid-lines along i and along j."""
     area_1, area_2, area_3, area_4 = find_areas(low, high, near, far)
-    low_2, high_2, near_2, far_2 = square(low), square(high), square(near), square(far)
+    low_2 = square(low)
+    high_2 = square(high)
+    near_2 = square(near)
+    far_2 = square(far)
     sine_1 = area_1 * abs(area_1) / (low_2 * near_2)
     sine_2 = area_2 * abs(area_2) / (high_2 * near_2)
     sine_3 = area_3 * abs(area_3) / (high_2 * far_2)
     sine_4 = area_4 * abs(area_4) / (low_2 * far_2)
     low_sine = sine_1 if sine_1 < sine_2 else sine_2
     high_sine = sine_3 if sine_3 < sine_4 else sine_4
-    mid, across = (low[0] + high[0], low[1] + high[1]), (near[0] + far[0], near[1] + far[1])
+    mid = (low[0] + high[0], low[1] + high[1])
+    across = (near[0] + far[0], near[1] + far[1])
     dot = mid[0] * across[0] + mid[1] * across[1]
     sine = low_sine if low_sine < high_sine else high_sine
     return sine, square(mid), square(across), dot
@@ -99,7 +103,10 @@ def fill_corner_areas(nodes, out):
     """Signed areas of the four corner triangles of every cell into `out` (4, ni, nj)."""
     x, y = nodes[0], nodes[1]
     for i in range(out.shape[1]):
-        x0, y0, x1, y1 = x[i], y[i], x[i + 1], y[i + 1]
+        x0 = x[i]
+        y0 = y[i]
+        x1 = x[i + 1]
+        y1 = y[i + 1]
         for j in range(out.shape[2]):
             area_1, area_2, area_3, area_4 = find_areas(*take_edges(x0, y0, x1, y1, j))
             out[0, i, j] = 0.5 * area_1
@@ -113,11 +120,17 @@ def fill_scaled_jacobians(nodes, out):
     """Sines of the four corner angles of every cell into `out` (4, ni, nj); NaN at a zero edge."""
     x, y = nodes[0], nodes[1]
     for i in range(out.shape[1]):
-        x0, y0, x1, y1 = x[i], y[i], x[i + 1], y[i + 1]
+        x0 = x[i]
+        y0 = y[i]
+        x1 = x[i + 1]
+        y1 = y[i + 1]
         for j in range(out.shape[2]):
             low, high, near, far = take_edges(x0, y0, x1, y1, j)
             area_1, area_2, area_3, area_4 = find_areas(low, high, near, far)
-            low_2, high_2, near_2, far_2 = square(low), square(high), square(near), square(far)
+            low_2 = square(low)
+            high_2 = square(high)
+            near_2 = square(near)
+            far_2 = square(far)
             out[0, i, j] = area_1 / np.sqrt(low_2 * near_2)
             out[1, i, j] = area_2 / np.sqrt(high_2 * near_2)
             out[2, i, j] = area_3 / np.sqrt(high_2 * far_2)
@@ -138,7 +151,10 @@ def measure_rows(nodes, rows, worst, bad_cells):
     x, y = nodes[0], nodes[1]
     ni, nj = worst.shape[1], x.shape[1] - 1
     for i in range(ni):
-        x0, y0, x1, y1 = x[i], y[i], x[i + 1], y[i + 1]
+        x0 = x[i]
+        y0 = y[i]
+        x1 = x[i + 1]
+        y1 = y[i + 1]
         for j in range(nj):
             edges = take_edges(x0, y0, x1, y1, j)
             area_1, area_2, area_3, area_4 = find_areas(*edges)
@@ -151,15 +167,21 @@ def measure_rows(nodes, rows, worst, bad_cells):
             rows[SINE, j] = sine
             rows[ASPECT, j] = along / across if along > across else across / along
             rows[SKEW, j] = dot * dot / (along * across)
-        area, sine, aspect, skew, bad = rows[AREA, 0], rows[SINE, 0], 0.0, 0.0, 0
+        area = rows[AREA, 0]
+        sine = rows[SINE, 0]
+        aspect = 0.0
+        skew = 0.0
+        bad = 0
         for j in range(nj):
             area = min(area, rows[AREA, j])
             sine = min(sine, rows[SINE, j])
             aspect = max(aspect, rows[ASPECT, j])
             skew = max(skew, rows[SKEW, j])
             bad += 0 if rows[AREA, j] > 0.0 else 1
-        worst[AREA, i], worst[SINE, i] = 0.5 * area, sine
-        worst[ASPECT, i], worst[SKEW, i] = aspect, skew
+        worst[AREA, i] = 0.5 * area
+        worst[SINE, i] = sine
+        worst[ASPECT, i] = aspect
+        worst[SKEW, i] = skew
         bad_cells[i] = bad
 
 
@@ -212,7 +234,8 @@ def find_bad_cells(nodes: np.ndarray) -> np.ndarray:
     """
     if _are_surely_convex(nodes):
         return np.empty((0, 2), dtype=np.int64)
-    areas, triangles = compute_corner_areas(nodes), find_triangles(nodes)
+    areas = compute_corner_areas(nodes)
+    triangles = find_triangles(nodes)
     for flat in triangles:
         areas[flat] = np.inf
     least = areas.min(axis=0)
@@ -251,15 +274,20 @@ def measure_quality(nodes: np.ndarray) -> Quality:
     measure_rows(nodes, rows, worst, bad_cells)
     triangles = find_triangles(nodes)
     if triangles:
-        areas, sines = compute_corner_areas(nodes), compute_scaled_jacobians(nodes)
+        areas = compute_corner_areas(nodes)
+        sines = compute_scaled_jacobians(nodes)
         for flat in triangles:
             areas[flat] = sines[flat] = np.inf
-        areas, sines = areas.min(axis=0), sines.min(axis=0)
-        worst[AREA], bad_cells[:] = areas.min(axis=1), (~(areas > 0.0)).sum(axis=1)
+        areas = areas.min(axis=0)
+        sines = sines.min(axis=0)
+        worst[AREA] = areas.min(axis=1)
+        bad_cells[:] = (~(areas > 0.0)).sum(axis=1)
         worst[SINE] = (sines * np.abs(sines)).min(axis=1)
-    area_row, sine_row = int(worst[AREA].argmin()), int(worst[SINE].argmin())
+    area_row = int(worst[AREA].argmin())
+    sine_row = int(worst[SINE].argmin())
     if triangles:
-        areas, sines = areas[area_row], sines[sine_row]
+        areas = areas[area_row]
+        sines = sines[sine_row]
     else:
         areas, sines = (
             compute(nodes[:, row : row + 2]).min(axis=0)[0]
@@ -288,11 +316,18 @@ def reduce_worst(nodes, rows):
     As of `measure_rows`, in fewer operations, and without places; rows (3, nj): scratch.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    sines, aspects, bad = rows[0], rows[1], rows[2]
+    sines = rows[0]
+    aspects = rows[1]
+    bad = rows[2]
     for j in range(nj):
-        sines[j], aspects[j], bad[j] = np.inf, 0.0, 0.0
+        sines[j] = np.inf
+        aspects[j] = 0.0
+        bad[j] = 0.0
     for i in range(ni):
-        x0, y0, x1, y1 = nodes[0, i], nodes[1, i], nodes[0, i + 1], nodes[1, i + 1]
+        x0 = nodes[0, i]
+        y0 = nodes[1, i]
+        x1 = nodes[0, i + 1]
+        y1 = nodes[1, i + 1]
         for j in range(nj):
             edges = take_edges(x0, y0, x1, y1, j)
             area_1, area_2, area_3, area_4 = find_areas(*edges)
@@ -304,7 +339,9 @@ def reduce_worst(nodes, rows):
             sines[j] = sine if sine < sines[j] else sines[j]
             aspects[j] = aspect if aspect > aspects[j] else aspects[j]
             bad[j] += 0.0 if good else 1.0
-    sine, aspect, count = sines[0], aspects[0], 0.0
+    sine = sines[0]
+    aspect = aspects[0]
+    count = 0.0
     for j in range(nj):
         sine = sines[j] if sines[j] < sine else sine
         aspect = aspects[j] if aspects[j] > aspect else aspect
@@ -377,7 +414,8 @@ def compute_best_sines(boundary: np.ndarray) -> tuple[np.ndarray, list[tuple[str
     boundary itself turns a block's corner over.
     """
     line, positions = walk_boundary(boundary)
-    to_next, to_last = np.roll(line, -1, axis=1) - line, np.roll(line, 1, axis=1) - line
+    to_next = np.roll(line, -1, axis=1) - line
+    to_last = np.roll(line, 1, axis=1) - line
     area = 0.5 * (line[0] * np.roll(line[1], -1) - line[1] * np.roll(line[0], -1)).sum()
     first, second = (to_next, to_last) if area > 0.0 else (to_last, to_next)
     cross = first[0] * second[1] - first[1] * second[0]
@@ -398,5 +436,6 @@ def find_best_sine(boundary: np.ndarray) -> tuple[float, str, int]:
 def measure_turns(line: np.ndarray) -> np.ndarray:
     """Turns (n - 2,) [rad] from segment to segment of a polyline (2, n), positive to the left."""
     steps = line[:, 1:] - line[:, :-1]
-    (ax, ay), (bx, by) = steps[:, :-1], steps[:, 1:]
+    ax, ay = steps[:, :-1]
+    bx, by = steps[:, 1:]
     return np.arctan2(ax * by - ay * bx, ax * bx + ay * by)

@@ -122,7 +122,8 @@ def run(
 
     with compiling(quiet, helped=world is None):
         runner = start_runner(checked, output, force, quiet, _say, world)
-        runner.limit, runner.world = limit, world
+        runner.limit = limit
+        runner.world = world
         end = runner.start()
     return _finish(end, runner.directory, picture)
 
@@ -157,12 +158,14 @@ def restart(
     settings = _with_threads(settings, threads)
     if cells is not None:
         runner = remap_runner(opened, cells, settings, at, output, force, quiet, _say)
-        runner.limit, runner.world = limit, world
+        runner.limit = limit
+        runner.world = world
         return _finish(runner.start(), runner.directory, picture)
     if output is not None or force:
         raise BadInput("restart: -o and --force need --cells; a run continues in its directory")
     runner = continue_runner(opened, settings, quiet, at, _say, world)
-    runner.limit, runner.world = limit, world
+    runner.limit = limit
+    runner.world = world
     return _finish(runner.resume(at, _say), opened, picture)
 
 

@@ -52,7 +52,10 @@ def echo_usage(error: click.ClickException) -> None:
         echo(cut(line, MOST_IN_LINE), err=True)
 
 
-BAD_INPUT, FAILED, INTERNAL = 2, 3, 70  # exit codes
+# exit codes
+BAD_INPUT = 2
+FAILED = 3
+INTERNAL = 70
 NULL = ("embedded null byte", "embedded null character")  # what Python says of a name
 
 

@@ -74,7 +74,8 @@ def is_runtime_key(key: str, kind: type[Deck]) -> bool:
 def find_differences(before: Deck, now: Deck) -> list[Difference]:
     """Where two decks of one problem differ, by the order of the keys of `before`; files that they
     name are the same where their digests are."""
-    one, two = msgspec.to_builtins(before), msgspec.to_builtins(now)
+    one = msgspec.to_builtins(before)
+    two = msgspec.to_builtins(now)
     known, known_now = (table.pop(DIGESTS, None) or {} for table in (one, two))
 
     def find_digest(digests: dict, name: Any) -> Any:
@@ -104,7 +105,9 @@ def find_changes(before: Any, now: Any, key: str = "") -> Iterator[Difference]:
         yield Difference(key, before, now)
 
 
-RUNTIME, MAY_CHANGE = "x-restart", "may change"  # marks keys in a schema; editors pass it over
+# marks keys in a schema; editors pass it over
+RUNTIME = "x-restart"
+MAY_CHANGE = "may change"
 
 
 def make_schema(problem: str) -> dict[str, Any]:
@@ -129,7 +132,8 @@ def make_schema(problem: str) -> dict[str, Any]:
 def make_parts(kind: Any) -> dict[str, Any]:
     """The schema of a type: of a deck's own fields, without the key problem."""
     (root,), parts = msgspec.json.schema_components([kind], ref_template="#/$defs/{name}")
-    root, parts = _without_null(root), _without_null(parts)
+    root = _without_null(root)
+    parts = _without_null(parts)
     if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
         root = parts.pop(kind.__name__)
         needed = any(field.required for field in msgspec.structs.fields(kind))
@@ -315,7 +319,8 @@ def describe(schema: Part, part: Part) -> str:
         return f"{', '.join(others)} or {last}" if others else last
     if "anyOf" in part:
         return " or ".join(dict.fromkeys(describe(schema, one) for one in part["anyOf"]))
-    kind, items = part.get("type", "object"), part.get("items", {})
+    kind = part.get("type", "object")
+    items = part.get("items", {})
     if kind == "array" and isinstance(items, list):
         words = ", ".join(describe(schema, one) for one in items)
         return f"a list of {len(items)} values: {words}"
@@ -356,7 +361,9 @@ def show(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-WIDTH, COLUMN = 100, 34  # of a line; where its comment begins
+# of a line; where its comment begins
+WIDTH = 100
+COLUMN = 34
 
 
 def describe_deck(name: str, deck: Deck, t_unit: str = "s") -> str:
@@ -371,15 +378,18 @@ def describe_deck(name: str, deck: Deck, t_unit: str = "s") -> str:
 
 def _write_table(table: DeckTable, path: str) -> Iterator[str]:
     """Lines of the keys of a table with the dotted name `path`, then of the tables in it."""
-    settings, tables = table.__struct_config__, []
+    settings = table.__struct_config__
+    tables = []
     if settings.tag_field:
         yield f"{settings.tag_field} = {show(settings.tag)}"
     for field in msgspec.structs.fields(table):
-        value, part = getattr(table, field.name), make_parts(field.type)
+        value = getattr(table, field.name)
+        part = make_parts(field.type)
         inner = resolve(part, part)
         words = part.get("description", inner.get("description", "")).strip().partition("\n")[0]
         entries = value if isinstance(value, list | tuple) else [value]
-        head, unset = f"{path}.{field.name}".lstrip("."), value is None
+        head = f"{path}.{field.name}".lstrip(".")
+        unset = value is None
         if entries and all(isinstance(entry, DeckTable) for entry in entries):
             tables.append((f"[{head}]" if entries[0] is value else f"[[{head}]]", entries, words))
         elif unset and "properties" in inner:

@@ -222,7 +222,8 @@ def apply_setting(table: dict[str, Any], setting: str, kind: type[Deck] | None =
     default: Any = _drop_none(msgspec.to_builtins(kind())) if kind and listed else {}
     for depth, (name, following) in enumerate(pairwise(names), start=1):
         if isinstance(branch, list):
-            branch, default = _list_entry(branch, name, key), None
+            branch = _list_entry(branch, name, key)
+            default = None
         else:
             default = default.get(name) if isinstance(default, dict) else None
             is_list = following.isdigit() and isinstance(default, list)

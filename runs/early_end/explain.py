@@ -67,7 +67,8 @@ def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restar
     restart: the command that continues the run.  The failure gets what was made as its
     `early_end`, and the words as its notes.  Raises nothing that is an Exception.
     """
-    cause, place = ENDS.get(failure.cause, Cause("", "")), failure.place
+    cause = ENDS.get(failure.cause, Cause("", ""))
+    place = failure.place
     end = failure.early_end = EarlyEnd()
 
     def say(head: str, words: str) -> None:
@@ -124,7 +125,8 @@ def find_calm_point(directory: RunDirectory) -> int | None:
         with contextlib.suppress(BadInput):  # damaged
             points += [step] if has_state(path) else []
     history = read_history(directory.history)
-    steps, dt = history.get("step", ()), history.get("dt")
+    steps = history.get("step", ())
+    dt = history.get("dt")
     if not points or dt is None or len(steps) < 2:
         return points[-1] if points else None
     retried = history.get("retries", np.zeros(len(steps))) > 0
@@ -167,7 +169,8 @@ def find_marked(blocks: Sequence, place: Place | None) -> tuple[Any, tuple[int, 
     named = [block for block in blocks if place is not None and block.name == place.block]
     areas = [measure_areas(block.nodes) for block in named or blocks]
     number = int(np.argmin([area.min() / np.median(area) for area in areas]))
-    block, last = (named or blocks)[number], np.array(areas[number].shape) - 1
+    block = (named or blocks)[number]
+    last = np.array(areas[number].shape) - 1
     cell = np.array(np.unravel_index(areas[number].argmin(), areas[number].shape))
     known = bool(named and place is not None and (place.cell or (place.side and place.nodes)))
     if known and place is not None:
@@ -208,7 +211,8 @@ def draw_early_end(run: RunData, title: str, place: Place | None, point: int | N
     point of step `point`.  A failure without a cell is marked at the smallest.  Raises BadInput
     where the disk is full.
     """
-    figure, dump = new_figure(), run.outputs[-1]
+    figure = new_figure()
+    dump = run.outputs[-1]
     figure.set_size_inches(13.0, 6.8)
     figure.suptitle(textwrap.fill(title, 190), fontsize=9, x=0.01, ha="left")
     left, right = figure.subfigures(1, 2, width_ratios=(1.35, 1.0))

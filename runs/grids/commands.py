@@ -109,10 +109,12 @@ def make_grid(
     **words,
 ) -> list[str]:
     """`grid make`; words: of `making.make`."""
-    name, given = source.replace("-", "_"), parse_options(options)
+    name = source.replace("-", "_")
+    given = parse_options(options)
     size = parse_cells(cells, 3 if name in (*BLOCKS, *SHAPES) else 2)
     used = name_family(family, source, name in BLOCKS)
-    label, stem = f"{source}, {used}", f"{Path(source).stem}-{used}"
+    label = f"{source}, {used}"
+    stem = f"{Path(source).stem}-{used}"
     if name in BLOCKS:
         label = stem = source
     return _write(
@@ -130,8 +132,10 @@ def regrid_file(
     **words,
 ) -> list[str]:
     """`grid regrid`; words: of `making.regrid`."""
-    given, grid = parse_options(options), Grid(read_grid(file, block), made_by={"source": file})
-    used, before = name_family(family, file, grid.nodes.shape[0] == 3), grid.quality
+    given = parse_options(options)
+    grid = Grid(read_grid(file, block), made_by={"source": file})
+    used = name_family(family, file, grid.nodes.shape[0] == 3)
+    before = grid.quality
 
     def compute() -> Grid:
         made = making.regrid(grid, family, **words, **given)
@@ -257,7 +261,8 @@ def compare_families(
             title, compute = _prepare_domain(name, cells, steps)
         yield f"{name}: {title}"
         yield HEAD
-        drawn, reasons = [], []
+        drawn = []
+        reasons = []
         for label, (family, options) in known.items():
             weighted = {} if weight is None or not takes_weight(family) else {"weight": weight}
             march, done, sides = compute(family, weighted | options)
@@ -328,7 +333,8 @@ def _prepare_file(name: str, block: str | None, cells, passes: int) -> tuple[str
         else:
             made = making.make_on_curves(sides, regridder, passes, name)
         found = made.march or March(made.nodes, passes)
-        found.nodes, found.failure = made.nodes, made.failure
+        found.nodes = made.nodes
+        found.failure = made.failure
         if found.done:
             found.gap = max(measure_first_line_gap(found.nodes, side) for side in SIDE_NAMES)
         return found, f"{found.done}/{passes}", sides

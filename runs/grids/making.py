@@ -309,7 +309,8 @@ def regrid_plane(nodes: np.ndarray, regridder: Regridder, passes: int) -> Grid:
         repaired = repair_grid(turned)
     except RegridFailure as failure:
         return Grid(nodes, [], str(failure))
-    start, words = repaired.nodes, f"the given grid{describe_repair(repaired.report)}"
+    start = repaired.nodes
+    words = f"the given grid{describe_repair(repaired.report)}"
     made = settle(start, turned, regridder, passes, words)
     if turned is not nodes:
         made.nodes = np.ascontiguousarray(made.nodes[:, :, ::-1])
@@ -327,28 +328,34 @@ def settle(nodes, boundary, regridder, passes: int, words: str) -> Grid:
     A pass that would more than halve the minimum scaled Jacobian is gone only part of the way.
     """
     cell = np.sqrt(abs(compute_area(nodes)) / ((nodes.shape[1] - 1) * (nodes.shape[2] - 1)))
-    shortened, moved, sine = 0, np.inf, _least_sine(nodes)
+    shortened = 0
+    moved = np.inf
+    sine = _least_sine(nodes)
     count = March(nodes, passes)
     while count.done < passes and moved >= SETTLED:
         begun = time.process_time()
         try:
             result = call_regridder(regridder, nodes, boundary)
         except RegridFailure as failure:
-            count.failure, count.folded = str(failure), failure.grid
+            count.failure = str(failure)
+            count.folded = failure.grid
             break
         count.seconds.append(time.process_time() - begun)
         count.sub_moves += result.report.sub_moves
         count.rescues += result.report.rescues
-        taken, part = result.nodes, 1.0
+        taken = result.nodes
+        part = 1.0
         while _least_sine(taken) < MOST_LOSS * sine and part > LEAST_PART:
             part *= 0.5
             taken = nodes + part * (result.nodes - nodes)
         shortened += part < 1.0
         moved = float(np.hypot(*(taken - nodes)).max() / cell)
-        nodes, sine = taken, _least_sine(taken)
+        nodes = taken
+        sine = _least_sine(taken)
         count.done += 1
     quality = measure_quality(nodes)
-    count.nodes, count.sine = nodes, quality.least_scaled_jacobian
+    count.nodes = nodes
+    count.sine = quality.least_scaled_jacobian
     count.aspect = quality.worst_aspect_ratio
     note = f"started from {words}; {count.done} pass{'es' * (count.done > 1)}"
     note += f", {shortened} of them shortened" * (shortened > 0)
@@ -384,10 +391,12 @@ def make_spatial_law(options: Mapping[str, Any], weight: str | None) -> Any:
 
 
 def _describe_ed3(found: volumes.Equidistributed, law) -> Grid:
-    bad, failure = hexahedra.find_bad_hexahedra(found.nodes), None
+    bad = hexahedra.find_bad_hexahedra(found.nodes)
+    failure = None
     if len(bad) and len(hexahedra.find_bad_hexahedra(found.nodes[::-1])):
         failure = f"cells {name_cells(bad, 8)} have corners that are not positive"
-    first, last = found.spreads[0], found.spreads[found.best]
+    first = found.spreads[0]
+    last = found.spreads[found.best]
     note = (
         f"{found.residuals.size - 1} iterations ({found.stop}): spread of weight times volume "
         f"{first:.4f} to {last:.4f}, residual {found.residuals[0]:.2e} to "
@@ -415,7 +424,8 @@ def march_in_space(block: MovingBlock, regridder, steps: int, end: float = 1.0) 
             named = name_cells(np.argwhere(bad), 8)
             found.failure = f"cells {named} have corners that are not positive"
             break
-        found.nodes, found.done = result.nodes, step
+        found.nodes = result.nodes
+        found.done = step
         found.reports.append(result.report)
         found.sub_moves += result.report.sub_moves
         found.rescues += result.report.rescues

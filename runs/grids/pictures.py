@@ -23,7 +23,8 @@ from runs.pictures.fields import draw_grid_lines, lay_out
 
 LONG = 6.0  # a domain longer than this, in its widths, is shown in part
 DPI = 120
-LINE, BAD = "0.2", "tab:red"
+LINE = "0.2"
+BAD = "tab:red"
 COLOURS = "viridis"
 
 
@@ -84,7 +85,8 @@ def draw_comparison(
     ratio = float(np.clip(height / width, 0.25, 2.0))
     wished = 7 if ratio > 1.2 else 5 if ratio > 0.7 else 4
     columns = min((wished, wished + 1), key=lambda number: -len(marches) % number)
-    figure, columns = new_figure(), min(columns, len(marches))
+    figure = new_figure()
+    columns = min(columns, len(marches))
     panels = lay_out(figure, len(marches), columns, (3.2, 2.7 * ratio + 0.6))
     for axes, (name, march, sides) in zip(panels, marches, strict=True):
         draw_grid_lines(axes, march.nodes, LINE)
@@ -130,7 +132,8 @@ def frame(axes, nodes: np.ndarray, everything: np.ndarray | None = None) -> None
     long = int(np.argmax(size))
     if size[long] > LONG * size[1 - long]:
         line = max((nodes[long, :, 0], nodes[long, 0]), key=np.ptp)  # the side along it
-        finest, reach = line[np.nanargmin(np.abs(np.diff(line)))], 2.0 * size[1 - long]
+        finest = line[np.nanargmin(np.abs(np.diff(line)))]
+        reach = 2.0 * size[1 - long]
         if finest < 0.5 * (low[long] + high[long]):
             high[long] = low[long] + reach
         else:

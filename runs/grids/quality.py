@@ -91,7 +91,8 @@ def judge(nodes: np.ndarray, weight: np.ndarray | None = None) -> Judgement:
 
 def describe(judgement: Judgement) -> list[str]:
     """Lines: convex or not and where, and the worst figures with their cells."""
-    fields, plane = judgement.fields, judgement.nodes.shape[0] == 2
+    fields = judgement.fields
+    plane = judgement.nodes.shape[0] == 2
     cells = fields["size"].size
     lines = []
     if judgement.valid:
@@ -130,7 +131,8 @@ def describe(judgement: Judgement) -> list[str]:
     return lines
 
 
-FORMAT, FORMAT_VERSION = "shockgrid grid", 1
+FORMAT = "shockgrid grid"
+FORMAT_VERSION = 1
 ENDINGS = (".h5", ".vts", ".npz")
 
 

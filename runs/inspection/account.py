@@ -223,7 +223,8 @@ def mean(name: str, part: Callable[[np.ndarray, int], Any]) -> Callable[[History
 
 def measure_shrinkage(history: History) -> float:
     """How many times dt fell below its largest value before, steps cut on purpose left out."""
-    dts, limits = history.get("dt"), history.get("dt_limit")
+    dts = history.get("dt")
+    limits = history.get("dt_limit")
     if dts is None or limits is None or dts.dtype.kind != "f":
         return np.nan
     counts = dts[np.isfinite(dts) & (dts > 0.0) & ~np.isin(limits, OWN_REASONS)]
@@ -283,7 +284,8 @@ def judge(
 
 def describe_verdict(verdict: Mapping[str, Any]) -> str:
     """The verdict in one line."""
-    head, reason = str(verdict["status"]), str(verdict["reason"]).partition("\n")[0]
+    head = str(verdict["status"])
+    reason = str(verdict["reason"]).partition("\n")[0]
     if head == "ended early":
         head = f"{head}, {verdict['name']}"
     elif head != "finished" and reason:  # which may begin so: "stopped by SIGTERM"

@@ -63,7 +63,8 @@ def open_both(
     """Two runs or two dumps; BadInput where they are not of one kind, and for bad tolerances."""
     if not (0.0 <= rtol < np.inf and 0.0 <= atol < np.inf):
         raise BadInput("--rtol and --atol have to be finite numbers, at least 0")
-    one, other = Path(a), Path(b)
+    one = Path(a)
+    other = Path(b)
     if missing := [path for path in (one, other) if not path.exists()]:
         raise BadInput("; ".join(f"{path} does not exist" for path in dict.fromkeys(missing)))
     if one.is_dir() != other.is_dir():
@@ -89,7 +90,8 @@ def compare_in_words(a: str, b: str, rtol: float, atol: float) -> tuple[str, boo
         lines, differ = compare_by_norms(one, other, rtol, atol)
     else:
         differences = _find_differences(one, other, rtol, atol)
-        lines, differ = report(differences, one, other), bool(differences)
+        lines = report(differences, one, other)
+        differ = bool(differences)
     table = describe_runs(one.run, other.run) if one.run and other.run else []
     return "\n".join([*table, *lines, *_describe_makers(one, other)]), differ
 
@@ -139,7 +141,9 @@ def compare_histories(a: Side, b: Side, rtol: float, atol: float) -> Iterator[Di
     common = min(lengths)
     for name in (name for name in one if name in other):
         x, y = one[name][:common], other[name][:common]
-        bad, relative, much = x != y, 0.0, ""
+        bad = x != y
+        relative = 0.0
+        much = ""
         if "U" not in (x.dtype.kind, y.dtype.kind):
             bad, relative = find_differences(x, y, rtol, atol)
             much = f", up to {relative:.2g} of its size"
@@ -243,7 +247,8 @@ def find_other_steps(a: Side, b: Side) -> str:
 
     Runs whose times part later, and those of no step yet, are none: their rows belong together.
     """
-    one, other = a.history or {}, b.history or {}
+    one = a.history or {}
+    other = b.history or {}
     if min(len(history.get("t", ())) for history in (one, other)) < 2:
         return ""
     common, i, j = np.intersect1d(one["step"], other["step"], return_indices=True)
@@ -305,8 +310,11 @@ def _compare_blocks(one: BlockData, other: BlockData) -> list[tuple[Any, ...]]:
         theirs = remap_means(theirs, other.nodes, one.nodes, curved)
     ours = np.array([one.cell_fields[name] for name in names], dtype=float)
     volumes, _ = compute_cell_moments(one.nodes, curved)
-    away, weight, cells = np.abs(ours - theirs), volumes / volumes.sum(), (1, 2)
-    l1, l2 = (away * weight).sum(cells), np.sqrt((away**2 * weight).sum(cells))
+    away = np.abs(ours - theirs)
+    weight = volumes / volumes.sum()
+    cells = (1, 2)
+    l1 = (away * weight).sum(cells)
+    l2 = np.sqrt((away**2 * weight).sum(cells))
     size = np.abs([ours, theirs]).max(axis=(0, 2, 3))
     return list(zip([one.name] * len(names), names, l1, l2, away.max(cells), size, strict=True))
 

@@ -58,7 +58,8 @@ def describe_blocks(dump: Dump) -> list[str]:
     """Blocks with their cells and extent, then the range of every field in every block."""
     lines = []
     for block in dump.blocks:
-        (ni, nj), nodes = block.cells, block.nodes
+        ni, nj = block.cells
+        nodes = block.nodes
         low, high = nodes.min(axis=(1, 2)), nodes.max(axis=(1, 2))
         lines.append(
             f"block {block.name}{other_name(block)}: {ni} x {nj} cells, "
@@ -105,7 +106,8 @@ def describe_state(last: Dump, history: Mapping[str, np.ndarray]) -> str:
     """How far a run came, by its history where it has one, else by its last dump."""
     told = len(history.get("t", ()))
     t, step = (history["t"][-1], int(history["step"][-1])) if told else (last.t, last.step)
-    ending, t_end = last.finished or "not finished", last.t_end
+    ending = last.finished or "not finished"
+    t_end = last.t_end
     words = f"{describe_time(t, last.t_unit)} of {t_end:.6g} ({t / t_end:.0%})"
     return f"{ending}: step {step}, {words}"
 
@@ -138,7 +140,8 @@ def describe_directory(path: str) -> str:
         marched = describe_history(history, last.t_unit if last else "s")
         lines += ["", *marched, *describe_run(history, cells, names)]
     if last:
-        first, number = run.dumps[0], len(run.outputs)
+        first = run.dumps[0]
+        number = len(run.outputs)
         newer = " and a newer restart point" if len(run.dumps) > number else ""
         words = f"t = {first.t:.6g} to {describe_time(last.t, last.t_unit).removeprefix('t = ')}"
         lines += ["", f"{count(number, 'dump')}{newer}, {words}; in the last:"]
@@ -178,7 +181,8 @@ def find_verdict(run: RunData) -> dict[str, Any] | None:
         run.skipped.append(str(error))
         raise BadInput("its file is damaged") from error
     if verdict is None and len(run.history.get("step", ())) > 1 and run.dumps:
-        reason, cells = "it is still running, or was killed", run.dumps[-1].cells
+        reason = "it is still running, or was killed"
+        cells = run.dumps[-1].cells
         return judge("unfinished", reason, run.history, cells, run.problem)
     return verdict
 
@@ -237,7 +241,8 @@ def describe_tree(path: Path) -> str:
         head = f"{path}: {path.stat().st_size} bytes"
         if (found := find_sum(path)) is not None:
             head += f", checksum {'as stored' if found else 'NOT AS STORED'}"
-        lines, items = [head], list_items(tree)
+        lines = [head]
+        items = list_items(tree)
         for folder in (name for name, item in items.items() if isinstance(item, h5py.Group)):
             arrays = {n: i for n, i in items[folder].items() if isinstance(i, h5py.Dataset)}
             width = max(map(len, arrays), default=0)
@@ -296,9 +301,11 @@ def describe_array(data: h5py.Dataset) -> str:
     unit = "" if unit == "1" else unit
     if not isinstance(values, np.ndarray):
         return " ".join(word for word in (_say_value(values), unit, name) if word)
-    extent, told = "" if values.size else "empty", []
+    extent = "" if values.size else "empty"
+    told = []
     if values.dtype.kind in "fiub":
-        finite, nans = values[np.isfinite(values)], int(np.isnan(values).sum())
+        finite = values[np.isfinite(values)]
+        nans = int(np.isnan(values).sum())
         if values.size:
             extent = (
                 f"{finite.min():.7g} to {finite.max():.7g}" if finite.size else "nothing finite"

@@ -25,7 +25,8 @@ def describe_all() -> str:
         problem = str(read_toml(path).get("problem"))
         if name != problem:
             decks.setdefault(problem, []).append((name, describe_deck(path)))
-    lines, told = [], {name for names in SUBJECTS.values() for name in names}
+    lines = []
+    told = {name for names in SUBJECTS.values() for name in names}
     others = [name for name in OWN_PROBLEMS if name not in told]  # registered by a script
     for subject, names in {**SUBJECTS, "others": others}.items():
         lines += [f"\n{subject.upper()}"] * bool(names)
@@ -119,13 +120,16 @@ def describe_plan(deck: ReadDeck) -> str:
     length = "1" if unit == "1" else "m"
     lines = [f"{deck.problem} ({deck.described}), {march}"]
     for block in blocks:
-        (ni, nj), low, high = block.cells, block.low, block.high
+        ni, nj = block.cells
+        low = block.low
+        high = block.high
         lines.append(
             f"block {block.name}: {ni} x {nj} cells, "
             f"x {low[0]:.4g} to {add_unit(high[0], length, 4)}, "
             f"y {low[1]:.4g} to {add_unit(high[1], length, 4)}"
         )
-    run, output = deck.deck.run, deck.deck.output
+    run = deck.deck.run
+    output = deck.deck.output
     limit = f", at most {run.max_steps} steps" if run.max_steps is not None else ""
     dumps = count(output.dumps + 1, "dump")
     threads = count(run.threads, "thread") if run.threads else "one thread per large block"

@@ -62,7 +62,8 @@ def make_case(
     if begun is not None:
         origin = str(begun.deck)
         check_changeable(settings, OwnSimulationDeck)
-        before, now = read_toml(begun.deck), table["materials"]
+        before = read_toml(begun.deck)
+        now = table["materials"]
         if before.get("problem") != NAME:
             raise BadInput(
                 f"{begun} is a run of {before.get('problem')}, which makes its blocks itself: "
@@ -255,7 +256,8 @@ def register(name: str, thing: type) -> None:
             raise BadInput(f"{thing.__qualname__}: a class inside a function cannot be registered")
         if name in registry and _OWN.get((kind, name)) != place:
             raise BadInput(f"there is a {kind} {name!r} already; choose another name")
-        registry[name], _OWN[kind, name] = value, place
+        registry[name] = value
+        _OWN[kind, name] = place
         return
     raise BadInput(
         f"{thing.__name__} is not a problem, equation of state, boundary kind or regridder: it "

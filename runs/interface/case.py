@@ -82,7 +82,8 @@ class Drawn:
         from runs.pictures.command import Wanted, fill_figure, new_figure
 
         if what is None and len(fields) == 1 and fields[0] in self.pictures:
-            what, fields = fields[0], ()
+            what = fields[0]
+            fields = ()
         if mirror not in (None, "x", "y"):
             raise BadInput(f"mirror = {mirror!r}: 'x' or 'y' is wanted")
         wanted = Wanted(fields, what, at, mesh, zoom, mirror, beside, line, limits, colours)
@@ -194,7 +195,8 @@ def finish(runner: Runner, ending: Ending, quiet: bool) -> OpenRun:
     if not quiet:
         print(ending.screen)
     run = OpenRun(runner.directory.path)
-    run.reason, run.final = ending.reason, runner.evolution
+    run.reason = ending.reason
+    run.final = runner.evolution
     return run
 
 
@@ -259,7 +261,9 @@ class Hook:
             raise BadInput(f"steps = {steps!r} of a hook: a whole number of at least 1 is wanted")
         if time is not None and not 0.0 < time < math.inf:
             raise BadInput(f"time = {time!r} s of a hook: a positive number is wanted")
-        self.function, self.steps, self.time = function, steps or 1, time
+        self.function = function
+        self.steps = steps or 1
+        self.time = time
 
     def is_due(self, case: Any, t_before: float) -> bool:
         """Is it to be called after the step from `t_before` to the time of the case?"""
@@ -306,7 +310,8 @@ def _view(block: BlockView, axes: tuple[str, str], has_units: bool) -> BlockData
     def make_fields(get: Callable[[], Mapping[str, np.ndarray]]) -> Fields:
         return Fields(f"block {block.name!r}", get(), lambda name: lock(get()[name]))
 
-    words, rates = get_long_names(block), getattr(block, "rates", None)
+    words = get_long_names(block)
+    rates = getattr(block, "rates", None)
     return BlockData(
         block.name,
         get_material(block),
@@ -342,7 +347,9 @@ class Case(Drawn):
     pictures = ("mesh", "interface", "line")
 
     def __init__(self, read: ReadDeck, problem: Problem):
-        self.read, self.problem, self.deck = read, problem, read.deck
+        self.read = read
+        self.problem = problem
+        self.deck = read.deck
         self.name = self.problem_name = read.label
         self.path = Path(read.label)  # as it is named in messages
         self._runs = False
@@ -386,7 +393,8 @@ class Case(Drawn):
     def dumps(self) -> list[Snapshot]:
         """The current state only, in the form that pictures use."""
         state = Snapshot(self.path, self.t, self.simulation.t_end, self.problem.t_unit, self.step)
-        state.blocks, state.run = list(self.blocks.values()), self
+        state.blocks = list(self.blocks.values())
+        state.run = self
         return [state]
 
     @property

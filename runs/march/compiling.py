@@ -55,7 +55,8 @@ def compiling(quiet: bool, helped: bool = True) -> Iterator[None]:
 
 def _watch(done: threading.Event, stream: Any, quiet: bool, helped: bool) -> None:
     global _told
-    (_, before, since), bar = count_compiling(), None
+    _, before, since = count_compiling()
+    bar = None
     with contextlib.ExitStack() as started:
         while not done.wait(LOOK_EVERY):
             ready, compiled, seconds = count_compiling()

@@ -190,7 +190,8 @@ def settle_deck(
             f"{directory.deck}: problem = {show(deck.problem)}, and {kept.path.name} holds a run "
             f"of {before.problem}; another problem is another run (shockgrid run)"
         )
-    run, made_for = deck.deck.run, before.deck.run.t_set_up or kept.t_end
+    run = deck.deck.run
+    made_for = before.deck.run.t_set_up or kept.t_end
     found = find_differences(before.deck, deck.deck)
     refused = [one for one in found if not is_runtime_key(one.key, type(deck.deck))]
     may_differ = {CELLS} if cells else set()
@@ -274,13 +275,15 @@ def remap_runner(
     check_effect(settings, deck.deck)
     deck = settle_deck(old, deck, at, cells=True)
     if output:
-        new, kept = RunDirectory(output).path.resolve(), old.path.resolve()
+        new = RunDirectory(output).path.resolve()
+        kept = old.path.resolve()
         if new == kept or kept in new.parents:
             raise BadInput(
                 f"-o {output} is the run that is gone on with, which stays as it is; name another "
                 "directory"
             )
-    source, target = _build(before, quiet), _build(deck, quiet)
+    source = _build(before, quiet)
+    target = _build(deck, quiet)
     if type(source) is not Simulation or type(target) is not Simulation:  # it holds more
         raise BadInput(
             f"--cells: {deck.problem} is not only a flow on blocks, and what else it holds cannot "
@@ -309,7 +312,8 @@ def remap_runner(
             f"continue with --set run.t_end=T, T > {target.t:.6g}"
         )
     runner = Runner(deck, directory, deck.make_problem(), target, gauges, quiet)
-    runner.columns, runner.restored = columns, True
+    runner.columns = columns
+    runner.restored = True
     runner.remapped = f"the history up to step {step} is that of {old}, on its cells"
     return runner
 

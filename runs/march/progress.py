@@ -69,14 +69,13 @@ class Progress:
             found = self.left.foretell(self.steps, evolution.t, now)
             self._foretold = found is not None
             if found is not None and found[1] >= WORTH_A_WORD:
-                a_step, ends = (
-                    (now - self._began) / self.steps,
-                    describe_seconds(found[0], found[2]),
-                )
+                a_step = (now - self._began) / self.steps
+                ends = describe_seconds(found[0], found[2])
                 self.say(f"measured: {a_step * 1e3:.3g} ms per step; {ends} to the end")
         if self.bar is None and now - self._said < LINE_EVERY:
             return
-        t, t_end = evolution.t, evolution.t_end
+        t = evolution.t
+        t_end = evolution.t_end
         when = describe_time(t, self.t_unit, 4)
         words = f"{self.remaining(evolution, now)} left, {self.describe(evolution, row, now)}"
         if self.bar is not None:
@@ -139,9 +138,12 @@ class Outlook:
         directory: RunDirectory,
         say: Callable[[str], None],
     ):
-        self.deck, self.problem, self.evolution = deck, problem, evolution
+        self.deck = deck
+        self.problem = problem
+        self.evolution = evolution
         self.directory = directory
-        self.flow, self.size = name_flow(deck.problem, deck.deck), measure_size(problem, evolution)
+        self.flow = name_flow(deck.problem, deck.deck)
+        self.size = measure_size(problem, evolution)
         self.trend = ShortSteps(evolution, self.tell)
         self.say = say
         directory.verdict.unlink(missing_ok=True)
@@ -154,7 +156,8 @@ class Outlook:
 
     def find_course(self) -> tuple[float, ...]:
         """How the wall time of a past run of the same flow went; () where there was none."""
-        past, t_end = find_past(self.flow, self.size.cells), self.evolution.t_end
+        past = find_past(self.flow, self.size.cells)
+        t_end = self.evolution.t_end
         return past.course if past is not None and math.isclose(past.t_end, t_end) else ()
 
     def fail(self, error: Exception) -> None:
@@ -199,7 +202,8 @@ def describe_gauges(deck: Deck, directory: RunDirectory) -> list[str]:
 
 def describe_threads(wanted: int | None, evolution: Evolution) -> str:
     """Threads that the blocks asked for, those there are, and how they are started."""
-    workers, numba = getattr(evolution, "workers", None), sys.modules.get("numba")
+    workers = getattr(evolution, "workers", None)
+    numba = sys.modules.get("numba")
     if workers and workers.side_by_side:
         return f"{workers.threads}, blocks side by side"
     wanted = workers.threads if workers else wanted or 1

@@ -76,7 +76,8 @@ class Background:
         """Wait for the file, or only look; raises what its writing has raised, once."""
         if self._writing is not None and (wait or self._writing.done()):
             self._writing.exception()  # waits; interrupted, it can be waited for again
-            writing, self._writing = self._writing, None
+            writing = self._writing
+            self._writing = None
             writing.result()
 
     @contextlib.contextmanager
@@ -233,7 +234,8 @@ class Runner:
                     if one.path.exists():
                         self.directory.set_aside(one.path)
             columns = [truncate_history(one.path, step, one) for one in rows]
-            self.columns, self.gauges.columns = columns[0], columns[-1]
+            self.columns = columns[0]
+            self.gauges.columns = columns[-1]
             if self.evolution.finished:
                 say(
                     f"this run has finished ({self.evolution.finished}); "
@@ -262,7 +264,9 @@ class Runner:
         )
 
     def _run(self) -> Ending:
-        began, cpu_began, status = time.monotonic(), time.process_time(), "stopped"
+        began = time.monotonic()
+        cpu_began = time.process_time()
+        status = "stopped"
         self.history = HistoryWriter(self.directory.history, self.columns)
         self.gauges.open(self.directory.gauges)
         self.progress = Progress(self.evolution, self.quiet, t_unit=self.problem.t_unit)
@@ -325,8 +329,11 @@ class Runner:
         verdict: Mapping[str, Any],
     ) -> list[str]:
         """The lines of the screen at the end."""
-        evolution, problem, directory = self.evolution, self.problem, self.directory
-        t_unit, cells = problem.t_unit, account.count_cells(evolution)
+        evolution = self.evolution
+        problem = self.problem
+        directory = self.directory
+        t_unit = problem.t_unit
+        cells = account.count_cells(evolution)
         names = [block.name for block in evolution.blocks]
         steps = f", {count(evolution.step, 'step')}" if is_time(t_unit) else ""
         lines = [
@@ -358,7 +365,8 @@ class Runner:
 
     def _march(self) -> str:
         """Step until there is a reason to stop; the state then is in a dump."""
-        evolution, run = self.evolution, self.deck.deck.run
+        evolution = self.evolution
+        run = self.deck.deck.run
         if self.columns is None:
             first = {"step": evolution.step, "t": evolution.t}
             first |= get_start_row(evolution)
@@ -387,7 +395,8 @@ class Runner:
             if self.limit is not None and self.limit.reached:
                 self._write_restart_point()
                 raise Stopped(f"{self.limit} reached", 0)
-            t_before, clock = evolution.t, read_clock()
+            t_before = evolution.t
+            clock = read_clock()
             row = evolution.advance()
             seconds = read_clock() - clock
             self._record(row, seconds)
@@ -469,7 +478,8 @@ class Runner:
 
         output: what is in a light one; a whole one is written while the run goes on.
         """
-        began, step = time.monotonic(), self.evolution.step
+        began = time.monotonic()
+        step = self.evolution.step
         self._sync()
         besides = EMPTY if output else self.gauges.get_state()
         blocks = {block.name: dict(list_arrays(block, output)) for block in self.evolution.blocks}

@@ -105,7 +105,8 @@ def draw(
     table: a CSV file for the values along a line; `say` takes remarks.  Raises BadInput for what is
     not there.
     """
-    run, figure = RunData(directory), new_figure()
+    run = RunData(directory)
+    figure = new_figure()
     stem, write_table = fill_figure(figure, run, wanted, say)
     if table:
         if not write_table:
@@ -123,13 +124,17 @@ def fill_figure(
 
     Returns the stem of a name for it, and what writes the table of a line's values, if it is one.
     """
-    at, beside, line = wanted.at, wanted.beside, wanted.line
+    at = wanted.at
+    beside = wanted.beside
+    line = wanted.line
     view = make_view(wanted.zoom, wanted.mirror, wanted.mesh, wanted.limits, wanted.colours)
     names = [name for entry in wanted.fields for name in entry.split(",") if name]
     given = {f"--{name}": getattr(wanted, name) for name in OPTIONS} | {"FIELDS": names or None}
     given = {n: value for n, value in given.items() if value is not None and value is not False}
     what = wanted.what or ("fields" if line is None else "line")
-    shown, write_table, part = [what], None, False
+    shown = [what]
+    write_table = None
+    part = False
     if beside and what not in BESIDE:
         raise BadInput(f"--beside {beside}: for {' and '.join(BESIDE)}, not for {what!r}")
     runs = [run, RunData(beside)] if beside else [run]
@@ -147,7 +152,8 @@ def fill_figure(
         way = parse_numbers("--line", line, "x0,y0,x1,y1, two points in metres")
         if way[:2] == way[2:]:
             raise BadInput(f"--line {line}: two points in metres are wanted, these are the same")
-        dumps, titles = choose_pairs(runs, at, say), name_paths(runs)
+        dumps = choose_pairs(runs, at, say)
+        titles = name_paths(runs)
         lineouts = [
             curves.take_lineouts(dumps[k :: len(runs)], names, way, view, say)
             for k in range(len(runs))
@@ -267,10 +273,12 @@ def choose_dumps(
     at = at if isinstance(at, str) else ",".join(map(str, np.atleast_1d(at)))
     times = [words[w] if w in words else parse_number("--at", at, w) for w in at.split(",")]
     chosen = list(dict.fromkeys(run.dump_at(t) for t in times))
-    first, last = words["start"], words["end"]
+    first = words["start"]
+    last = words["end"]
     slack = 1e-3 * (last - first)
     if say and any(not first - slack <= t <= last + slack for t in times):
-        drawn, unit = ", ".join(f"{dump.t:.6g}" for dump in chosen[:-1]), chosen[-1].t_unit
+        drawn = ", ".join(f"{dump.t:.6g}" for dump in chosen[:-1])
+        unit = chosen[-1].t_unit
         drawn += ", " * bool(drawn) + add_unit(chosen[-1].t, unit)
         before = "t = " if is_time(unit) else ""
         words = f"{before}{first:.6g} to {add_unit(last, unit)}; drawn: {before}{drawn}"

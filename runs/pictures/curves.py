@@ -41,7 +41,8 @@ def find_curves(blocks: Sequence) -> dict[str, np.ndarray]:
         found.setdefault(pair, []).append(line)
     curves = {}
     for pair, lines in found.items():
-        near, joined = CLOSE * max(float(np.ptp(line, axis=1).max()) for line in lines), []
+        near = CLOSE * max(float(np.ptp(line, axis=1).max()) for line in lines)
+        joined = []
         while lines:
             joined.append(_extend(lines.pop(0), lines, near))
         name = "interface_" + "_".join(word.replace("/", "-") for word in pair)
@@ -131,7 +132,9 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
 
 LEAST = 1e-9  # of the line: shorter pieces touch a corner only
 STYLES = ("-", "--")  # of the first run and the one compared with it
-WIDTH, HEIGHT = 8.0, 2.6  # inches: of the picture, of a panel
+# inches: of the picture, of a panel
+WIDTH = 8.0
+HEIGHT = 2.6
 Line = tuple[float, float, float, float]  # x0, y0, x1, y1 [m]
 
 
@@ -151,9 +154,11 @@ def find_pieces(nodes: np.ndarray, line: Line) -> tuple[np.ndarray, np.ndarray]:
     start = np.array(line[:2])
     along = np.array(line[2:]) - start
     corners = [nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]]
-    (ax, ay), (bx, by) = corners[2] - corners[0], corners[3] - corners[1]
+    ax, ay = corners[2] - corners[0]
+    bx, by = corners[3] - corners[1]
     turned = np.sign(ax * by - ay * bx)
-    enter, leave = np.zeros(turned.shape), np.ones(turned.shape)
+    enter = np.zeros(turned.shape)
+    leave = np.ones(turned.shape)
     for first, second in zip(corners, [*corners[1:], corners[0]], strict=True):
         edge = (second - first) * turned  # the inside is on its left
         to_start = start[:, None, None] - first
@@ -179,7 +184,9 @@ def take_lineouts(
 
     Raises BadInput if it meets no cell of any of them, or a field is missing.
     """
-    (x0, y0, x1, y1), lineouts, missed = line, [], []
+    x0, y0, x1, y1 = line
+    lineouts = []
+    missed = []
     given = ",".join(f"{number:g}" for number in line)
     heads = ("block", "i", "j", "x", "y", "way", *names)
     for dump in dumps:
@@ -208,10 +215,13 @@ def draw_lineouts(
     figure, lineouts: Sequence[Sequence[Lineout]], names: Sequence[str], runs: Sequence[str]
 ) -> None:
     """A panel for each field: a curve for each dump, colour by time, style by run."""
-    first, way, label = lineouts[0][0], "way", "distance along the line"
+    first = lineouts[0][0]
+    way = "way"
+    label = "distance along the line"
     for axis, other, name in zip("xy", "yx", first.dump.axes, strict=True):
         if np.ptp(first.columns[other]) == 0.0:  # a line along an axis
-            way, label = axis, name
+            way = axis
+            label = name
     largest = max(float(np.abs(one.columns[way]).max()) for run in lineouts for one in run)
     scale, length = pick_prefix(largest, first.dump.length_unit)
     figure.set_size_inches(WIDTH, HEIGHT * len(names) + 0.8)
@@ -223,10 +233,12 @@ def draw_lineouts(
         for run, dash, title in zip(lineouts, STYLES, runs, strict=False):
             titles = fields.time_titles([one.dump for one in run])
             for k, (one, when) in enumerate(zip(run, titles, strict=True)):
-                x, values = one.columns[way] * scale, one.columns[name] * factor
+                x = one.columns[way] * scale
+                values = one.columns[name] * factor
                 blocks = one.columns["block"]
                 gaps = np.flatnonzero(blocks[1:] != blocks[:-1]) + 1  # another block begins
-                x, values = np.insert(x, gaps, np.nan), np.insert(values, gaps, np.nan)
+                x = np.insert(x, gaps, np.nan)
+                values = np.insert(values, gaps, np.nan)
                 named = f"{title}, {when}" if len(lineouts) > 1 else when
                 axes.plot(x, values, dash, color=f"C{k % 10}", linewidth=1.1, label=named)
                 if dash == "-":
@@ -262,7 +274,9 @@ SHARED = 30.0  # columns in one panel are of one size within this factor
 MOST = 4  # of them
 LOGARITHMIC = ("residual", "change", "error")  # words in names of quantities that fall by decades
 DECADES = 1e3
-HISTORY_WIDTH, HISTORY_HEIGHT = 13.5, 2.4  # inches: of the picture, of a row
+# inches: of the picture, of a row
+HISTORY_WIDTH = 13.5
+HISTORY_HEIGHT = 2.4
 LETTERS = 12.0  # an inch, of the line below the panels
 HEADROOM = 0.8  # of the range of the conserved totals, above them: for the legend
 Panel = list[str]  # names of columns; "dt" and "drift" are drawn their own way
@@ -284,7 +298,8 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
     if run.dumps and not is_time(run.dumps[-1].t_unit):
         label = unit
         history = {name: values[1:] for name, values in history.items()}  # the first is no iterate
-    panels, constant = [[name] for name in names], []
+    panels = [[name] for name in names]
+    constant = []
     if not names:
         panels, constant = choose_panels(history, units)
     number = len(panels)
@@ -321,7 +336,8 @@ def choose_panels(
     panels = [] if moving and _is_flat(history["dt"]) else [["dt"]]
     panels += [["drift"]] if compute_drifts(history) else []
     panels += [[name] for name in grid]
-    alone, measured = len(panels), [name for name in moving if name not in grid]
+    alone = len(panels)
+    measured = [name for name in moving if name not in grid]
     for name in measured:
         size = np.nanmax(np.abs(history[name]))
         for together in panels[alone:]:
@@ -396,7 +412,9 @@ def draw_panel(axes, t, history, names: Panel, units) -> None:
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg", "c": "m/s"}
 MOST_NAMED = 10  # gauges with a line in the legend; more are distinguished by a row of colours
 COLUMNS = 3
-GAUGES_WIDTH, GAUGES_HEIGHT = 4.4, 3.0  # inches of a panel
+# inches of a panel
+GAUGES_WIDTH = 4.4
+GAUGES_HEIGHT = 3.0
 
 
 def draw_gauges(figure, run: RunData, names: list[str]) -> None:
@@ -404,7 +422,8 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
 
     Raises BadInput if a run has no gauges, and for an unknown name.
     """
-    table, points = run.gauges, place_gauges(run.deck.gauge)
+    table = run.gauges
+    points = place_gauges(run.deck.gauge)
     if not points:
         raise BadInput(f"{run.path} has no gauges; a deck has them as [[gauge]] tables")
     if len(table.get("t", ())) < 2:

@@ -34,7 +34,8 @@ def trace_outline(blocks: Sequence) -> Outline:
 
     An interface is listed once, from the first of its two blocks.
     """
-    interfaces, outer = [], []
+    interfaces = []
+    outer = []
     for k, block in enumerate(blocks):
         material = get_material(block)
         for side in SIDE_NAMES:
@@ -74,7 +75,8 @@ def _edges_on(line: np.ndarray, nodes: np.ndarray, reach: float) -> np.ndarray:
 
 def _distance(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     """Distance of each of `points` (2, n) to the polyline `line` (2, m)."""
-    start, along = line[:, None, :-1], np.diff(line, axis=1)[:, None, :]
+    start = line[:, None, :-1]
+    along = np.diff(line, axis=1)[:, None, :]
     offset = points[:, :, None] - start
     length = np.maximum((along**2).sum(axis=0), 1e-300)
     share = np.clip((offset * along).sum(axis=0) / length, 0.0, 1.0)
@@ -153,8 +155,12 @@ def list_fields(dump: Dump) -> list[str]:
     return list(dict.fromkeys([*dump.field_names(), *derived]))
 
 
-WIDTH, PAGE = 12.0, 6.5  # inches: of every picture, wished for
-TALLEST, TALLEST_ALONE = 16.0, 8.0  # at most, at most of one panel
+# inches: of every picture, wished for
+WIDTH = 12.0
+PAGE = 6.5
+# at most, at most of one panel
+TALLEST = 16.0
+TALLEST_ALONE = 8.0
 LONG = 4.0  # in a domain longer than this, in its heights, the panels follow the interface
 AROUND = 0.6  # of the interface's size: what is shown on each side of it
 DECADES = 1.7
@@ -266,7 +272,8 @@ def draw_blocks(
     for sheet in sheets:
         if name in sheet.fields:
             norm, colours, factor, _ = look
-            nodes, values = sheet.nodes * scale, sheet.fields[name] * factor
+            nodes = sheet.nodes * scale
+            values = sheet.fields[name] * factor
             axes.pcolormesh(*nodes, values, norm=norm, cmap=colours, rasterized=True)
     names = list(dict.fromkeys(sheet.name.removesuffix(" mirrored") for sheet in sheets))
     for sheet in sheets:
@@ -315,7 +322,8 @@ def measure_extent(sheets: Sequence[Sheet], follow: bool = True) -> tuple[Box, B
 
 
 def _bound(points: np.ndarray) -> Box:
-    (x0, y0), (x1, y1) = points.min(axis=1).tolist(), points.max(axis=1).tolist()
+    x0, y0 = points.min(axis=1).tolist()
+    x1, y1 = points.max(axis=1).tolist()
     return x0, x1, y0, y1
 
 
@@ -325,7 +333,8 @@ def find_extent(moments: Sequence[Sequence[Sheet]]) -> Box:
 
 
 def _join_boxes(boxes: Sequence[Box]) -> Box:
-    (x0, _, y0, _), (_, x1, _, y1) = np.min(boxes, axis=0).tolist(), np.max(boxes, axis=0).tolist()
+    x0, _, y0, _ = np.min(boxes, axis=0).tolist()
+    _, x1, _, y1 = np.max(boxes, axis=0).tolist()
     return x0, x1, y0, y1
 
 
@@ -342,7 +351,8 @@ def choose_boxes(
         check_zoom(view.zoom, whole)
         return [view.zoom] * len(extents), False
     low, high = np.array(whole[::2]), np.array(whole[1::2])
-    size, spans = high - low, [np.reshape(span, (2, 2)) for _, span in extents if span]
+    size = high - low
+    spans = [np.reshape(span, (2, 2)) for _, span in extents if span]
     long = size.max() > LONG * size.min()
     if len(spans) < len(extents) or not (follow or long):
         return [whole] * len(extents), False
@@ -463,7 +473,8 @@ def time_titles(dumps: Sequence[Dump]) -> list[str]:
     before = "t = " if is_time(dumps[-1].t_unit) else ""
     titles = []
     for dump in dumps:
-        words, scaled = f"{before}{dump.t * factor:.4g} {unit}".rstrip(), dump.scaled_time
+        words = f"{before}{dump.t * factor:.4g} {unit}".rstrip()
+        scaled = dump.scaled_time
         words = f"{scaled} ({words})" if scaled else words
         titles.append(words + " (restart point)" * dump.is_restart_point)
     return titles

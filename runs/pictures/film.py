@@ -29,8 +29,12 @@ from runs.store.provenance import describe_software, hash_deck
 from runs.store.reader import Dump, RunData
 
 SECONDS = 8.0  # length of a film, within the frame rates below
-SLOWEST, FASTEST = 3, 25
-WIDTH, LOWEST, TALLEST = 9.0, 2.4, 8.0  # inches
+SLOWEST = 3
+FASTEST = 25
+# inches
+WIDTH = 9.0
+LOWEST = 2.4
+TALLEST = 8.0
 SLENDER = 0.3  # height over width of a window, below which the colour bar is under it
 KINDS = (".mp4", ".gif")
 
@@ -121,8 +125,11 @@ def make_frames(
     figure, dumps: Sequence[Dump], name: str, view: View, boxes, ranges
 ) -> Callable[[int], None]:
     """A function that draws the frame of a dump, by its number from 0, into the same axes."""
-    paths, titles = [dump.path for dump in dumps], fields.time_titles(dumps)
-    first, axes, box = Dump(paths[0]), figure.subplots(), boxes[0]
+    paths = [dump.path for dump in dumps]
+    titles = fields.time_titles(dumps)
+    first = Dump(paths[0])
+    axes = figure.subplots()
+    box = boxes[0]
     look = fields.choose_colours(first, name, ranges, view)
     scale, unit = pick_prefix(float(np.abs(boxes).max()), first.length_unit)
     labels = [name_axis(axis, unit) for axis in first.axes]

@@ -58,15 +58,18 @@ def describe_map(
     cells = [(int(ni), int(nj)) for _, (ni, nj) in blocks]
     shares = share_named_blocks(blocks, ranks, cut)
     loads = sum_cells(cells, shares, ranks)
-    total, pieces = sum(loads), name_pieces([name for name, _ in blocks], shares, ranks)
-    lines, memories = [], estimate_memories(cells, shares, ranks)
+    total = sum(loads)
+    pieces = name_pieces([name for name, _ in blocks], shares, ranks)
+    lines = []
+    memories = estimate_memories(cells, shares, ranks)
     for rank in range(min(ranks, MOST_NAMED)):
         memory = memories[rank] / 1e6
         words = ", ".join(pieces[rank]) or "nothing"
         lines.append(f"rank {rank}: {words}; {loads[rank]} cells, about {memory:.0f} MB")
     if ranks > MOST_NAMED:
         lines.append(f"and {ranks - MOST_NAMED} more ranks")
-    advice, idle = "", loads.count(0)
+    advice = ""
+    idle = loads.count(0)
     if idle:
         advice = (
             f"; {idle} of {ranks} ranks would have nothing to do: blocks are cut between rows of "

@@ -42,7 +42,8 @@ class World:
     """The ranks of an mpi4py communicator `comm`, led by this one, the first."""
 
     def __init__(self, comm: Any):
-        self.comm, self.size = comm, int(comm.size)
+        self.comm = comm
+        self.size = int(comm.size)
         self.ranks: Ranks | None = None
         self._reads_cells = True  # does the problem measure inside blocks?
         self._beginning = False
@@ -59,7 +60,8 @@ class World:
         tell(self.comm, BUILD)
         file = str(deck.file.path) if deck.file else None
         self.comm.bcast((text, deck.origin, file), root=0)
-        self._sent, self._beginning = text, False
+        self._sent = text
+        self._beginning = False
 
     def check(self, evolution: Any) -> None:
         """Raise BadInput for an evolution that cannot be computed on ranks."""
@@ -134,7 +136,8 @@ def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str
         return []
     books = world.ranks.count()
     note(f"ranks: {json.dumps(books)}")
-    steps, words = books["steps"], list[str]()
+    steps = books["steps"]
+    words = list[str]()
     if steps:
         calls, size = (sum(books[name].values()) / steps for name in ("calls", "bytes"))
         words.append(f"{calls:.1f} and {size / 1e6:.2g} MB a step")
@@ -148,7 +151,9 @@ def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str
     return [f"messages of ranks: {'; '.join(words) or 'none'}"]
 
 
-BAD_INPUT, INTERNAL = 2, 70  # exit codes, as in `runs.cli.main`
+# exit codes, as in `runs.cli.main`
+BAD_INPUT = 2
+INTERNAL = 70
 
 
 def run_on_ranks(command: Callable[[World | None], int], say: Callable[[str], None]) -> int:
@@ -169,7 +174,8 @@ def run_on_ranks(command: Callable[[World | None], int], say: Callable[[str], No
     if comm.size == 1:
         return command(None)
     if comm.rank == 0:
-        world, code = World(comm), INTERNAL
+        world = World(comm)
+        code = INTERNAL
         try:
             code = command(world)
         finally:

@@ -169,7 +169,8 @@ def create_directory(wanted: str | None, problem: str, force: bool = False) -> R
 
 
 def _next_free(problem: str) -> RunDirectory:
-    parent, form = Path("out"), re.compile(rf"{re.escape(problem)}-(\d+)")
+    parent = Path("out")
+    form = re.compile(rf"{re.escape(problem)}-(\d+)")
     with disk_errors(parent):
         parent.mkdir(exist_ok=True)
         taken = [int(m[1]) for path in parent.iterdir() if (m := form.fullmatch(path.name))]
@@ -278,7 +279,9 @@ def check_deck(directory: RunDirectory) -> str:
     """
     if is_noted(directory, directory.deck):
         return ""
-    found, told, way = read_stored_deck(directory), "", "no dump that can be read has it"
+    found = read_stored_deck(directory)
+    told = ""
+    way = "no dump that can be read has it"
     if found is not None:
         text = directory.deck.read_text(encoding="utf-8", errors="replace")
         with contextlib.suppress(tomllib.TOMLDecodeError):
@@ -356,7 +359,8 @@ def _read_kept(directory: RunDirectory, strict: bool) -> ProblemFile:
     """The file of the problem of a run: where it was, if it is as it was, else the copy."""
     try:
         note = json.loads(directory.problem_note.read_text(encoding="utf-8"))
-        place, digest = Path(note["file"]), str(note["sha256"])
+        place = Path(note["file"])
+        digest = str(note["sha256"])
         copy = compute_digest(directory.problem_copy.read_bytes())
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise BadInput(

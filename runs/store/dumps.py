@@ -203,7 +203,9 @@ def _refill(
 
 
 def _list_numbers(evolution: Evolution) -> dict[str, float]:
-    step, t, t_end = int(evolution.step), float(evolution.t), float(evolution.t_end)
+    step = int(evolution.step)
+    t = float(evolution.t)
+    t_end = float(evolution.t_end)
     return {"step": step, "t": t, "t_end": t_end}
 
 
@@ -326,7 +328,8 @@ def open_dump(path: Path) -> h5py.File:
         ) from error
     try:
         with damage_told(path, "its format"):
-            kind, version = file.attrs.get("format"), file.attrs.get("format_version")
+            kind = file.attrs.get("format")
+            version = file.attrs.get("format_version")
             if kind != FORMAT:
                 words = f"{path} is HDF5 but not a shockgrid dump (its 'format' is {kind!r})"
                 raise BadInput(words)

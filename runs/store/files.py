@@ -33,7 +33,9 @@ with contextlib.suppress(ImportError):
 with contextlib.suppress(ImportError):
     import msvcrt
 
-TRIES, PAUSE = 20, 0.05  # s
+# s
+TRIES = 20
+PAUSE = 0.05
 SYSTEM = ("dev", "proc", "sys")  # folders at the root that hold no files of people
 DUMPS = "dumps"  # folder of a run
 LOCK = ".lock"
@@ -211,7 +213,8 @@ def seal(image: bytes) -> list[memoryview | bytes]:
     if place < 0:
         raise ValueError("a file without the attribute for its checksum")
     start = place + len(SUM_HEAD)
-    head, tail = view[:start], view[start + DIGITS :]
+    head = view[:start]
+    tail = view[start + DIGITS :]
     return [head, b"%08x" % zlib.crc32(tail, zlib.crc32(head)), tail]
 
 

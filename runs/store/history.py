@@ -67,7 +67,8 @@ class Rows:
         text = dict(self.rows).get(step)
         if text is not None and self.columns is not None and "t" in self.columns:
             if float(text.split(",")[self.columns.index("t")]) != t:
-                self.rows, self.columns = [], None
+                self.rows = []
+                self.columns = None
                 self.fault = f"has a row of step {step} that is not of t = {t:.6g} s"
 
 
@@ -85,7 +86,8 @@ def read_rows(path: Path, newest: int = 0) -> Rows:
             found.fault = "is damaged in its first line, that of the names"
             return found
         found.columns = names[:-1]
-        start, where = zlib.crc32(lines[0]), names.index("step")
+        start = zlib.crc32(lines[0])
+        where = names.index("step")
     for number, line in enumerate(lines[1:], start=2):
         text, _, digits = line.rpartition(b",")
         try:
@@ -131,12 +133,15 @@ class HistoryWriter:
 
     def append(self, row: Mapping[str, Any]) -> None:
         """Write one step; raises BadInput when the columns have changed."""
-        rows, lines, now = [row], [], time.monotonic()
+        rows = [row]
+        lines = []
+        now = time.monotonic()
         if self.columns is None:
             first = [name for one in self._waiting for name in one if name not in row]
             self.columns = [*row, *dict.fromkeys(first)]
             self._names = set(self.columns)
-            rows, self._waiting = [*self._waiting, row], []
+            rows = [*self._waiting, row]
+            self._waiting = []
             lines = [",".join([*self.columns, SUM])]
         elif row.keys() != self._names:
             raise BadInput(f"{self.path}: {describe_change(self.columns, row)}")
@@ -183,7 +188,8 @@ def _format_value(value: Any) -> str:
 
 def describe_change(before: Iterable[str], now: Iterable[str]) -> str:
     """A sentence on the columns that are missing `now` or new; both are names of columns."""
-    before, now = list(before), list(now)
+    before = list(before)
+    now = list(now)
     missing = [name for name in before if name not in now]
     new = [name for name in now if name not in before]
     kinds = (("without", missing), ("with", new))
@@ -319,7 +325,8 @@ def restore(
             f"it lacks {', '.join(missing[:4])}"
         )
     for name, value in expected.items():
-        shape, stored = np.shape(value), np.shape(state[name])
+        shape = np.shape(value)
+        stored = np.shape(state[name])
         if shape != stored:
             raise BadInput(
                 f"the restart point of step {step} in {directory} has {name} of shape {stored}, "

@@ -29,7 +29,9 @@ def write_vts(path: Path, nodes: np.ndarray, cell_fields: Mapping[str, np.ndarra
     points = np.zeros((nodes[0].size, 3))
     for k, component in enumerate(nodes):
         points[:, k] = component.ravel(order="F")
-    data, offset, fields = [], 0, []
+    data = []
+    offset = 0
+    fields = []
     arrays = [("points", points, 3), *((n, v.ravel(order="F"), 1) for n, v in cell_fields.items())]
     for name, values, components in arrays:
         image = np.ascontiguousarray(values, dtype="<f8").tobytes()

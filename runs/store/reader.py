@@ -55,7 +55,9 @@ class Table(dict[str, np.ndarray]):
         find_units: Callable[[], Mapping[str, str]] = dict,
     ):
         super().__init__(columns)
-        self.name, self._index, self._find_units = name, index, find_units
+        self.name = name
+        self._index = index
+        self._find_units = find_units
 
     @property
     def units(self) -> dict[str, str]:
@@ -103,7 +105,8 @@ class Table(dict[str, np.ndarray]):
 
         Raises BadInput where xarray is not installed.
         """
-        units, index = self.units, self._index
+        units = self.units
+        index = self._index
         data = {
             name: (index or "row", values, {"units": units[name]} if name in units else {})
             for name, values in self.items()
@@ -138,7 +141,10 @@ class Fields(Mapping[str, np.ndarray]):
     def __init__(
         self, where: str, names: Iterable[str], read: Callable[[str], np.ndarray], keep=False
     ):
-        self._where, self._names, self._read, self._keep = where, tuple(names), read, keep
+        self._where = where
+        self._names = tuple(names)
+        self._read = read
+        self._keep = keep
         self._known: dict[str, np.ndarray] = {}
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -252,7 +258,11 @@ class Snapshot:
     run: Any = None  # the `RunData` that it is from
 
     def __init__(self, path: Path, t: float, t_end: float, t_unit: str, step: int):
-        self.path, self.t, self.t_end, self.t_unit, self.step = path, t, t_end, t_unit, step
+        self.path = path
+        self.t = t
+        self.t_end = t_end
+        self.t_unit = t_unit
+        self.step = step
 
     blocks: list[BlockData]
 
@@ -306,7 +316,8 @@ class Dump(Snapshot):
     """One dump, besides a `Snapshot`: `problem`, `finished`, `deck_text`, `provenance`."""
 
     def __init__(self, path: str | os.PathLike, run: Any = None):
-        path, self.run = Path(path), run
+        path = Path(path)
+        self.run = run
         with open_dump(path) as file, damage_told(path, "its attributes"):
             at = file.attrs
             unit = str(at.get("t_unit", "s"))

@@ -89,7 +89,8 @@ def read_words(
 
 def describe_plan(study: Study) -> str:
     """What would be computed, one line per point."""
-    points, source = study.definition.points, study.definition.source
+    points = study.definition.points
+    source = study.definition.source
     lines = [f"{count(len(points), 'run')} of {source} in {study.path}/runs"]
     for point, state in zip(points, study.describe_states(), strict=True):
         words = "to do" if state == "new" else STATES.get(state, state)
@@ -101,7 +102,9 @@ class Progress:
     """Progress of a study: a bar in a terminal, a line per run elsewhere, failures always."""
 
     def __init__(self, study: Study, quiet: bool, note: Callable[[str], None]):
-        self.study, self.quiet, self.note = study, quiet, note
+        self.study = study
+        self.quiet = quiet
+        self.note = note
         self.there = self.done = self.failed = self.ended = 0
         self.bar: Any = None
 

@@ -199,7 +199,8 @@ def _call(work: Work) -> Result:
 
 def _compute(work: Work) -> Result:
     deck = read_deck(work.source, work.settings)
-    digest, directory = compute_digest(deck), RunDirectory(work.folder)
+    digest = compute_digest(deck)
+    directory = RunDirectory(work.folder)
     known = read_result(work.folder, digest)
     if known is not None and not (known.failure and work.retry):
         return known
@@ -225,7 +226,8 @@ def _finish(runner: Runner, call: Callable[[], Any], digest: str) -> Result | No
     result = Result(digest=digest)
     try:
         ending = call()
-        result.reason, result.stopped = ending.reason, ending.exit_code >= 128
+        result.reason = ending.reason
+        result.stopped = ending.exit_code >= 128
     except RunFailure as failure:
         words = re.split("; last restart point is|; there is no restart point yet", str(failure))
         result.failure = result.reason = words[0]
@@ -233,9 +235,11 @@ def _finish(runner: Runner, call: Callable[[], Any], digest: str) -> Result | No
         if call == runner.resume and runner.last_point is None and "is in use" not in str(error):
             return None
         raise
-    problem, evolution = runner.problem, runner.evolution
+    problem = runner.problem
+    evolution = runner.evolution
     history = read_history(runner.directory.history)
-    result.step, result.t = evolution.step, float(evolution.t)
+    result.step = evolution.step
+    result.t = float(evolution.t)
     result.seconds = float(np.nansum(history.get("seconds_step", 0.0)))
     if not result.failure and len(history.get("t", ())):
         result.units = {n: u for n, u in problem.find_units().items() if n in problem.units}
@@ -255,7 +259,8 @@ def fill_numbers(
     measured: Iterable[str],
 ) -> None:
     """Fill in the numbers of the problem called `name` from a history; `measured`: its columns."""
-    pairs, values = problem.results(history), result.values
+    pairs = problem.results(history)
+    values = result.values
     for key, (computed, theory) in pairs.items():
         error = (computed - theory) / (theory or 1.0)
         numbers = {"": computed, "_theory": theory, "_error": error}
@@ -267,7 +272,8 @@ def fill_numbers(
             errors[key] = _last(history[key])
     for key, last in (*errors.items(), *columns.items()):
         values.setdefault(key, last)
-    result.computed, result.errors = list(pairs), [*errors, *(f"{key}_error" for key in pairs)]
+    result.computed = list(pairs)
+    result.errors = [*errors, *(f"{key}_error" for key in pairs)]
 
 
 def _number(value: Any) -> float | None:

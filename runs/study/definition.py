@@ -271,7 +271,8 @@ def make_definition(
             "a study varies something: give either `vary` (--vary KEY=VALUES), whose product it "
             "computes, or `points`"
         )
-    made, fixed = tuple(list_points(points) if points else make_product(vary)), dict(fixed or {})
+    made = tuple(list_points(points) if points else make_product(vary))
+    fixed = dict(fixed or {})
     if both := [key for key in made[0] if key in fixed]:
         raise BadInput(f"vary: {both[0]} is set, too; leave one of them out")
     if isinstance(source, str):
@@ -311,7 +312,8 @@ def is_study(source: str) -> Path | None:
 
 def check_same_deck(folder: Path, definition: Definition) -> None:
     """Raise BadInput if the study in `folder` is of a deck of another name than `definition`."""
-    file, given = folder / FILE, definition.deck
+    file = folder / FILE
+    given = definition.deck
     there = str(read_toml(file).get("deck")) if file.is_file() else given
     if Path(there).name != Path(given).name:
         raise BadInput(

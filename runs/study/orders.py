@@ -21,7 +21,9 @@ from regrid.roots import find_root
 from runs.study.computing import Result, find_names
 from runs.study.definition import Definition, write_value
 
-SAFETY, SAFETY_TWO = 1.25, 3.0  # factors of safety for three grids, and for two
+# factors of safety for three grids, and for two
+SAFETY = 1.25
+SAFETY_TWO = 3.0
 ASSUMED = 1.0  # order of two grids without an exact value: captured shocks
 MOST_TRUSTED = 2.0  # a higher order than that of the scheme is not used for the uncertainty
 ROUND_OFF = 1e-12  # of the value: smaller changes are none
@@ -53,7 +55,8 @@ def find_orders(sizes: Sequence[float], errors: Sequence[float]) -> list[float]:
     """
     orders = []
     for n in range(1, len(sizes)):
-        coarse, fine = abs(errors[n - 1]), abs(errors[n])
+        coarse = abs(errors[n - 1])
+        fine = abs(errors[n])
         known = coarse > 0.0 and fine > 0.0 and math.isfinite(coarse * fine)
         ratio = sizes[n - 1] / sizes[n]
         orders.append(math.log(coarse / fine) / math.log(ratio) if known else math.nan)
@@ -88,7 +91,8 @@ def refine(sizes: Sequence[float], values: Sequence[float]) -> Refined:
         gain = (h2 / h1) ** ASSUMED - 1.0
         return Refined("two grids", uncertainty=SAFETY_TWO * abs(v2 - v1) / gain)
     (h3, v3), (h2, v2), (h1, v1) = known[-3:]
-    change_32, change_21 = v3 - v2, v2 - v1
+    change_32 = v3 - v2
+    change_21 = v2 - v1
     largest = max(abs(change_32), abs(change_21))
     if largest <= ROUND_OFF * max(abs(v1), abs(v2), abs(v3)):
         return Refined("round-off", extrapolated=v1, uncertainty=largest)
@@ -111,7 +115,8 @@ def find_order(h1: float, h2: float, h3: float, ratio: float) -> float:
     """
 
     def mismatch(p: float) -> float:
-        fine, coarse = (h2 / h1) ** p, (h3 / h2) ** p
+        fine = (h2 / h1) ** p
+        coarse = (h3 / h2) ** p
         return math.log(fine * (coarse - 1.0) / (fine - 1.0)) - math.log(ratio)
 
     least = 1e-6
@@ -202,7 +207,8 @@ def find_series(definition: Definition, results: Sequence[Result | None], key: s
             ]
             if len(pairs) > 1:
                 grids, values = np.array(pairs).T
-                sizes, theory = (1.0 / grids).tolist(), f"{name}_theory"
+                sizes = (1.0 / grids).tolist()
+                theory = f"{name}_theory"
                 look = judge_errors if name in errors else refine
                 known = finest.values.get(theory) if finest else None
                 found.append(
@@ -216,7 +222,8 @@ def find_series(definition: Definition, results: Sequence[Result | None], key: s
 
 def make_row(one: Series, digits: int = 8) -> list[str]:
     """A series as a line of orders.csv; HEADS has the column names."""
-    refined, last = one.refined, float(one.values[-1])
+    refined = one.refined
+    last = float(one.values[-1])
     relative = refined.uncertainty / abs(last) if last else math.nan
     numbers = refined.order, refined.extrapolated, refined.uncertainty, relative
     lists = (

@@ -61,7 +61,8 @@ def _is_even_in_log(values: np.ndarray) -> bool:
     known = np.unique(values)
     if known.size < 3 or known[0] <= 0.0 or known[-1] < 4.0 * known[0]:
         return False
-    steps, ratios = np.diff(known), np.diff(np.log(known))
+    steps = np.diff(known)
+    ratios = np.diff(np.log(known))
     return bool(ratios.max() / ratios.min() < steps.max() / steps.min())
 
 
@@ -85,7 +86,8 @@ def _mark(axis: Any, values: np.ndarray, form: Callable[[float], str] = "{:.3g}"
 
 def _draw_lines(axes: Any, study: Any, name: str) -> None:
     """A quantity over the key along x, a line for each value of the others; theory dashed."""
-    table, keys = study.table, study.definition.keys
+    table = study.table
+    keys = study.definition.keys
     numbers = [key for key in keys if _numbers(study, key) is not None]
     key = max(numbers, key=lambda key: len(np.unique(table[key])), default=keys[0])
     x = _numbers(study, key)
@@ -147,12 +149,16 @@ def _draw_map(axes: Any, study: Any, name: str) -> None:
     x, y = (make_column(list(values)).astype(float) for values in vary.values())
     errors = 100.0 * study.table[f"{name}_error"].reshape(x.size, y.size)
     orders = np.argsort(x), np.argsort(y)
-    x, y, errors = x[orders[0]], y[orders[1]], errors[np.ix_(*orders)]
+    x = x[orders[0]]
+    y = y[orders[1]]
+    errors = errors[np.ix_(*orders)]
     norm = BoundaryNorm(BOUNDS, 256, extend="both")
-    edges, look = (_find_edges(x), _find_edges(y)), {"cmap": "RdBu_r", "edgecolors": "w", "lw": 0.5}
+    edges = (_find_edges(x), _find_edges(y))
+    look = {"cmap": "RdBu_r", "edgecolors": "w", "lw": 0.5}
     mesh = axes.pcolormesh(*edges, errors.T, norm=norm, **look)
     for (i, j), error in np.ndenumerate(errors) if errors.size <= WRITTEN else ():
-        text, colour = f"{error:+.1f}", "w" if abs(error) > BOUNDS[-2] else "k"
+        text = f"{error:+.1f}"
+        colour = "w" if abs(error) > BOUNDS[-2] else "k"
         words = {"ha": "center", "va": "center", "fontsize": 6, "color": colour}
         axes.text(x[i], y[j], "-" if np.isnan(error) else text, **words)
     for axis, values in ((axes.xaxis, x), (axes.yaxis, y)):
@@ -164,7 +170,8 @@ def _draw_map(axes: Any, study: Any, name: str) -> None:
 
 
 def _name_series(one: Series) -> str:
-    order, kind = one.refined.order, one.refined.kind.removeprefix("error")
+    order = one.refined.order
+    kind = one.refined.kind.removeprefix("error")
     told = f"order {order:.2f}" if np.isfinite(order) else kind
     return ", ".join(words for words in (one.words, told) if words)
 

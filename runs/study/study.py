@@ -77,7 +77,8 @@ class Study:
     """
 
     def __init__(self, definition: Definition, path: Path | str, refine: str | None = None):
-        self.definition, self.path = definition, Path(path)
+        self.definition = definition
+        self.path = Path(path)
         self.results: list[Result | None] = [None] * len(definition.points)
         self.refined_key = find_refined_key(definition, refine)
 
@@ -103,7 +104,8 @@ class Study:
 
         Units are those of the deck.  A result `x` has `x`, `x_theory` and `x_error`.
         """
-        points, results = self.definition.points, self.results
+        points = self.definition.points
+        results = self.results
         table = {key: make_column([point[key] for point in points]) for key in self.definition.keys}
         words = {"run": [point.name for point in points], "state": list(map(_say_state, results))}
         words["cautions"] = [" | ".join(result.cautions) if result else "" for result in results]
@@ -167,10 +169,12 @@ class Study:
 
         Raises BadInput if xarray is not installed.
         """
-        xarray, vary = load_package("xarray", "to_xarray"), self.definition.vary
+        xarray = load_package("xarray", "to_xarray")
+        vary = self.definition.vary
         scales = {key: make_column(list(values)) for key, values in vary.items()}
         scales = scales or {"point": np.arange(len(self.results))}
-        shape, units = tuple(map(len, scales.values())), self.units
+        shape = tuple(map(len, scales.values()))
+        units = self.units
         data = {
             name: (list(scales), values.reshape(shape), {"units": units.get(name, "1")})
             for name, values in self.table.items()
@@ -241,7 +245,8 @@ class Study:
 
         If a problem's names are unknown before its first step, nothing is refused.
         """
-        missing, known = list(self.definition.shown), []
+        missing = list(self.definition.shown)
+        known = []
         for number in self._find_kinds(range(len(self.results)), float):
             if not missing:
                 return
@@ -346,8 +351,10 @@ class Study:
 
     def make_work(self, number: int, threads: int | None = None, retry: bool = False) -> Work:
         """The work of a point for a worker, with absolute paths."""
-        definition, point = self.definition, self.definition.points[number]
-        folder, values = (self.path / "runs" / point.name).resolve(), {**definition.fixed, **point}
+        definition = self.definition
+        point = self.definition.points[number]
+        folder = (self.path / "runs" / point.name).resolve()
+        values = {**definition.fixed, **point}
         if definition.function is not None:
             own = definition.function, values
             return Work(definition.source, write_settings(point), folder, None, retry, *own)

@@ -96,7 +96,8 @@ def run(name, folder, *settings):
 def test_problem_standing_sound_has_its_period(add, tmp_path, capsys):
     add("standing_sound.py")
     history = run("standing-sound", tmp_path / "out")
-    t, amplitude = history["t"], history["amplitude"]
+    t = history["t"]
+    amplitude = history["amplitude"]
     assert np.abs(amplitude - 1e-3 * np.cos(np.pi * t)).max() < 2e-5
     assert "amplitude" in capsys.readouterr().out
     assert main(["list", "standing-sound"]) == 0
@@ -107,7 +108,8 @@ def test_problem_standing_sound_has_its_period(add, tmp_path, capsys):
 def test_equation_of_state_shock_obeys_hugoniot(add):
     gas = add("noble_abel.py").NobleAbel(gamma=1.4, b=0.2)
     assert gas.pressure(1.5, gas.energy(1.5, 2.0)) == pytest.approx(2.0, rel=1e-14)
-    push, t = 2.0, 0.15
+    push = 2.0
+    t = 0.15
     tube = make_tube(gas, 1.0, 200, 1.0, 1.0, i_min=("piston", {"velocity": (push, 0.0)}))
 
     def follow(name, time):
@@ -138,7 +140,8 @@ def test_equation_of_state_is_known_to_material_files(add, tmp_path):
 def test_regridder_keeps_sides_and_convexity(add):
     add("averaged.py")
     moving = make_domain("valley", 24, 18)
-    nodes, boundary = moving.start, moving.boundary(0.1)
+    nodes = moving.start
+    boundary = moving.boundary(0.1)
     found = make_regridder("averaged", sweeps=40).regrid(nodes, boundary)
     assert len(find_bad_cells(found.nodes)) == 0
     for side in (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1]):

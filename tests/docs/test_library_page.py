@@ -25,7 +25,8 @@ def test_the_page_runs(capsys):
     assert "without failure" in out and names["found"].gap < 1.2
 
     # a host's memory, through the function pointer alone
-    start, boundary = names["start"], names["boundary_at"](0.1)
+    start = names["start"]
+    boundary = names["boundary_at"](0.1)
     memory = (ctypes.c_double * start.size)(*start.ravel())
     sides = (ctypes.c_double * start.size)(*boundary.ravel())
     pointer = ctypes.cast(names["regrid_nodes"], ctypes.c_void_p).value

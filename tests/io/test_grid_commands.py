@@ -21,7 +21,8 @@ T9 = np.linspace(0.0, 1.0, 9)
 
 def save_curves(name, **changes):
     """Four curves round a bent duct, with different numbers of points, some running backwards."""
-    t, few = np.linspace(0.0, 1.0, 31), np.linspace(0.0, 1.0, 8)
+    t = np.linspace(0.0, 1.0, 31)
+    few = np.linspace(0.0, 1.0, 8)
     curves = {
         "left": np.c_[0.0 * few, few],
         "right": np.c_[2.0 + 0.0 * t, 1.0 - t],

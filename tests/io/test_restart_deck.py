@@ -44,7 +44,8 @@ def test_the_end_moves_and_the_domain_stays(shockgrid, again, setting):
     assert np.ptp(last.blocks[1].nodes[0]) < 4.0
     words = (*SHORT, f"--set=run.t_set_up={made_for!r}", f"--set={setting}")
     assert shockgrid("run", "interface-instability", *words, "-o", "whole")[0] == 0
-    one, two = RunData("run"), RunData("whole")
+    one = RunData("run")
+    two = RunData("whole")
     assert np.array_equal(one.history["t"], two.history["t"])
     assert np.array_equal(one.dumps[-1].blocks[0].nodes, two.dumps[-1].blocks[0].nodes)
 
@@ -110,11 +111,13 @@ def test_a_run_goes_on_with_more_cells(shockgrid, half):
     further = shockgrid("restart", "finer", "--set=run.max_steps=26")[1]
     assert "the history up to step 20 is that of half, on its cells" in further
     assert sum_files(half) == before, "the old run stays as it is"
-    old, new = RunData("half"), RunData("finer")
+    old = RunData("half")
+    new = RunData("finer")
     assert new.deck.cells == 20 and new.deck.mach == 2.0
     assert list(new.history["step"]) == list(range(27)), "the history goes on"
     assert (new.history["t"][:21] == old.history["t"]).all()
-    ends, starts = old.outputs[-1], new.outputs[0]
+    ends = old.outputs[-1]
+    starts = new.outputs[0]
     assert (starts.step, starts.t) == (20, ends.t)
     for one, other in zip(ends.blocks, starts.blocks, strict=True):
         assert np.prod(other.nodes.shape) > 2 * np.prod(one.nodes.shape)

@@ -56,7 +56,10 @@ def hold(step: int) -> None:
 
 class ToyBlock:
     def __init__(self, name: str, nodes: np.ndarray, heat: np.ndarray):
-        self.name, self.material, self.nodes, self.heat = name, f"stuff {name}", nodes, heat
+        self.name = name
+        self.material = f"stuff {name}"
+        self.nodes = nodes
+        self.heat = heat
         self.units = {"rho": "kg/m3", "u_node": "m/s", "q": "1"}
 
     @property
@@ -70,8 +73,11 @@ class ToyBlock:
 
 class ToyEvolution:
     def __init__(self, deck: ToyDeck):
-        n, self.deck = deck.cells, deck
-        self.t, self.step, self.t_end = 0.0, 0, deck.run.t_end or 0.5
+        n = deck.cells
+        self.deck = deck
+        self.t = 0.0
+        self.step = 0
+        self.t_end = deck.run.t_end or 0.5
         self.blocks = []
         self.random = np.random.default_rng(3)
         for k, name in enumerate(("left", "right")):
@@ -101,7 +107,8 @@ class ToyEvolution:
         dt = 0.01 * (1 + 0.1 * self.random.random()) / float(left.max()) ** 0.5
         limit = "diffusion"
         if self.t + dt >= self.t_end:
-            dt, limit = self.t_end - self.t, "end"
+            dt = self.t_end - self.t
+            limit = "end"
         whole = np.concatenate([left, right])
         flow = 10 * dt * np.diff(whole, axis=0)
         whole[:-1] += flow
@@ -134,11 +141,10 @@ class ToyEvolution:
 
     def set_state(self, state):
         for block in self.blocks:
-            block.nodes[:], block.heat[:] = (
-                state[f"{block.name}/nodes"],
-                state[f"{block.name}/heat"],
-            )
-        self.t, self.step = state["t"], state["step"]
+            block.nodes[:] = state[f"{block.name}/nodes"]
+            block.heat[:] = state[f"{block.name}/heat"]
+        self.t = state["t"]
+        self.step = state["step"]
         whole = self.random.bit_generator.state
         value, increment = state["random"].split()
         whole["state"] = {"state": int(value), "inc": int(increment)}

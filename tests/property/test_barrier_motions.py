@@ -25,7 +25,8 @@ CONVEX = ("brackbill-saltzman", "ivanenko-charakhchyan", "node-speed")
 
 def march_domain(name, ni, nj, cells=0.5, noise=0.0, stop=1.0):
     """Worst figures of a march with the boundary moved by `cells` a step."""
-    moving, rng = make_domain(name, ni, nj), np.random.default_rng(0)
+    moving = make_domain(name, ni, nj)
+    rng = np.random.default_rng(0)
     count = moving.steps_for(cells)
 
     def boundary_at(s):
@@ -64,7 +65,8 @@ def test_fresh_noise_on_the_boundary_is_survived(noise):
 
 
 KEPT = np.load(Path(__file__).with_name("motions.npz"))
-CHUNKS, CHUNK = 4, 50_000
+CHUNKS = 4
+CHUNK = 50_000
 
 
 def add_up(counts):
@@ -103,7 +105,8 @@ def test_two_hundred_thousand_motions(seed):
 @pytest.mark.parametrize("number", range(KEPT["outcome"].size))
 def test_motions_that_were_wrong_once(number):
     """No grid was found where there is one, or cells lay on each other on a crossing boundary."""
-    nodes, boundary = KEPT[f"nodes_{number}"], KEPT[f"boundary_{number}"]
+    nodes = KEPT[f"nodes_{number}"]
+    boundary = KEPT[f"boundary_{number}"]
     try:
         answer = BarrierRegridder().regrid(nodes, boundary).nodes
     except RegridFailure as failure:

@@ -17,7 +17,8 @@ def make_flow(seed, inner="interface", piston=None):
     """Two blocks full of random states behind a bent line, in a closed box or under a piston."""
     random = np.random.default_rng(seed)
     ni, nj = 10, 8
-    waves, height = random.integers(1, 4), random.uniform(-1.0, 1.0)
+    waves = random.integers(1, 4)
+    height = random.uniform(-1.0, 1.0)
     gases = IdealGas(1.4), IdealGas(1.4 if inner == "seam" else 1.67)
     states = []
     for _ in range(2):
@@ -42,7 +43,8 @@ def make_flow(seed, inner="interface", piston=None):
 def test_closed_box(seed, inner):
     """Mass of each material and energy; momentum less what the walls gave."""
     simulation = make_flow(seed, inner)
-    start, row = simulation.start_row(), march(simulation, 25)[-1]
+    start = simulation.start_row()
+    row = march(simulation, 25)[-1]
     energy = start["total_energy"]
     for name in start:
         if name.startswith("total_mass") and inner == "interface":
@@ -60,7 +62,8 @@ def test_closed_box(seed, inner):
 def test_work_of_a_piston(seed, speed):
     """All energy that comes in is the piston's work, all momentum the pressure on the sides."""
     simulation = make_flow(seed, piston=lambda t: (speed * np.sin(6.0 * t), 0.0))
-    start, row = simulation.start_row(), march(simulation, 25)[-1]
+    start = simulation.start_row()
+    row = march(simulation, 25)[-1]
     for name in ("energy", "momentum_x", "momentum_y"):
         change = row["total_" + name] - start["total_" + name]
         assert abs(change - row["boundary_" + name]) <= 1e-12 * start["total_energy"]

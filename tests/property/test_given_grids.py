@@ -9,7 +9,8 @@ from regrid.sides import SIDES
 
 FAMILIES = {name: {} for name in sorted(REGRIDDERS)} | {"sweeps": {"method": "sweeps"}}
 DOME = make_domain("dome", 8, 6)
-OLD, NEW = DOME.start, np.nan_to_num(DOME.boundary(0.05))
+OLD = DOME.start
+NEW = np.nan_to_num(DOME.boundary(0.05))
 
 
 def make(name):
@@ -44,7 +45,8 @@ def test_numbers_count_not_how_they_are_held(name):
     regridder = make(name)
     wanted = regridder.regrid(OLD, NEW).nodes
     for what, hold in SAME_NUMBERS.items():
-        old, new = hold(OLD), hold(NEW)
+        old = hold(OLD)
+        new = hold(NEW)
         found = regridder.regrid(old, new).nodes
         assert np.array_equal(found, wanted), what
         assert found.dtype == np.float64 and found.flags.c_contiguous and found.flags.writeable

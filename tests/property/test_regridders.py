@@ -54,9 +54,11 @@ def test_sides_owned_stay_on_their_polylines_and_keep_the_corners(name):
     assert regridder.owns_sides and len(find_bad_cells(nodes)) == 0
     moved = 0.0
     for side in SIDES:
-        line, placed = boundary[side], nodes[side]
+        line = boundary[side]
+        placed = nodes[side]
         assert np.array_equal(line[:, [0, -1]], placed[:, [0, -1]])
-        starts, steps = line[:, None, :-1], np.diff(line)[:, None, :]
+        starts = line[:, None, :-1]
+        steps = np.diff(line)[:, None, :]
         away = placed[:, :, None] - starts
         part = np.clip((away * steps).sum(axis=0) / (steps**2).sum(axis=0), 0.0, 1.0)
         distance = np.hypot(*(away - part * steps)).min(axis=1)
@@ -73,7 +75,8 @@ def test_weights_are_followed_and_not_remembered(name):
     boundary = start.copy()
     areas = []
     for text in ("1 + 20*exp(-40*((x - 0.5)**2 + (y - 0.5)**2))", 1.0):
-        regridder, nodes = make_regridder(name, weight=text), start
+        regridder = make_regridder(name, weight=text)
+        nodes = start
         for _ in range(10):
             nodes = regridder.regrid(nodes, boundary).nodes
         areas.append(compute_corner_areas(nodes).sum(axis=0)[11:13, 8:10].mean())

@@ -81,7 +81,8 @@ def slugs(text: str) -> tuple[set[str], set[str]]:
 
 
 def _first_free(slug: str, taken: set[str], joint: str) -> str:
-    number, free = 0, slug
+    number = 0
+    free = slug
     while free in taken:
         number += 1
         free = f"{slug}{joint}{number}"
@@ -152,7 +153,8 @@ def test_every_number_is_defined_once_and_in_order():
 
 
 def test_every_theory_number_cited_is_defined():
-    labels, count = set(theory_labels()), 0
+    labels = set(theory_labels())
+    count = 0
     for path in [*SOURCES, *PAGES]:
         if path == HERE:
             continue
@@ -205,7 +207,8 @@ def test_names_on_pages_about_code_are_those_of_the_code(page):
 
 
 def test_passes_stand_in_the_page_in_their_order():
-    names, text = [move.__name__ for move, _, _ in SIDE_PASSES], read(DOCS / "architecture.md")
+    names = [move.__name__ for move, _, _ in SIDE_PASSES]
+    text = read(DOCS / "architecture.md")
     told = CODE_NAMED.findall(text[text.index("| pass |") :])
     assert [name for name in told if name in names] == names
     assert all(reason for _, _, reason in SIDE_PASSES)

@@ -76,7 +76,8 @@ def run(folder: Path, cache: str = "cache", script: str | None = None) -> tuple[
 
 
 def test_an_edited_equation_of_state_is_compiled_anew(tmp_path):
-    laws, exponents = tmp_path / "laws.py", tmp_path / "exponents.py"
+    laws = tmp_path / "laws.py"
+    exponents = tmp_path / "exponents.py"
     laws.write_text(LAW)
     exponents.write_text(EXPONENTS)
     assert run(tmp_path) == (pytest.approx(3.0), 0)
@@ -181,7 +182,9 @@ COUNTS = [(0, 0, 0.0), (4, 9, 1.0), (9, 20, 4.0), (30, 60, 40.0)]  # ready, comp
 
 def watch(monkeypatch, counts, terminal=False, helped=True) -> tuple[str, list]:
     """What is said where the kernels are counted so, and the programs that are started."""
-    programs, stream, numbers = [], io.StringIO(), iter(counts)
+    programs = []
+    stream = io.StringIO()
+    numbers = iter(counts)
     looks = iter([*[False] * (len(counts) - 1), True])
 
     def start_process(program, **options):

@@ -75,7 +75,8 @@ class Changed(TransfiniteRegridder):
 
     def __init__(self, change):
         super().__init__()
-        self.change, self.calls = change, 0
+        self.change = change
+        self.calls = 0
 
     def regrid(self, previous, boundary):
         result = super().regrid(previous, boundary)

@@ -21,7 +21,8 @@ CASES = [
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("xtol", [2e-12, 1e-300, 1e-3])
 def test_steps_are_those_of_scipy(case, xtol):
-    places, others = [], []
+    places = []
+    others = []
 
     def note(x, list_):
         list_.append(x)

@@ -54,7 +54,8 @@ def compare_ends(whole, part, step):
 
 
 def test_a_run_on_ranks_and_its_restart_on_others_are_those_of_one_process(tmp_path):
-    whole, part = tmp_path / "whole", tmp_path / "part"
+    whole = tmp_path / "whole"
+    part = tmp_path / "part"
     out, err, code = finish(start(2, "run", *DECK, "--set", "run.max_steps=6", "-o", part, "-q"))
     assert code == 0, err
     assert out.count("verdict:") == 1 and "rank" not in err  # one rank has a voice
@@ -134,7 +135,8 @@ def run_on_ranks(size, *words):
 
 @pytest.mark.slow
 def test_a_run_with_a_cut_block_and_its_restart_on_another_cut(tmp_path):
-    whole, part = tmp_path / "whole", tmp_path / "part"
+    whole = tmp_path / "whole"
+    part = tmp_path / "part"
     cut = ("--set", "run.cut.first=3", "--set", "run.max_steps=60")
     run_on_ranks(3, "run", *RANKS_DECK, *cut, "-o", part, "-q")
     assert "rows 64-95 of 'first'" in (part / "run.log").read_text()

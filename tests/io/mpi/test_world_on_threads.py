@@ -25,7 +25,8 @@ def run_with_followers(size, folder, settings=SETTINGS, deck="triple-point", scr
     def rank(comm):
         if comm.rank:
             return follow(comm, screens[comm.rank])
-        world, code = World(comm), 70
+        world = World(comm)
+        code = 70
         try:
             read = read_deck(deck, settings)
             runner = start_runner(read, str(folder), False, True, lambda text: None, world)

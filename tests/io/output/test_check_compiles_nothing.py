@@ -63,7 +63,8 @@ def make_divide():
 
 
 def test_a_kernel_that_is_looked_at_is_no_compiled_one():
-    divide, values = make_divide(), np.arange(3.0)
+    divide = make_divide()
+    values = np.arange(3.0)
     with interpreted():
         assert divide(values, 2.0).tolist() == [0.0, 0.5, 1.0]
         assert np.isnan(divide(np.zeros(1), values[0])).all()  # no warning, no error

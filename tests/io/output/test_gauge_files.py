@@ -72,7 +72,8 @@ def test_gauges_leave_the_flow_as_it_is_and_feel_its_shock(shockgrid, deck, toy)
     code, text, _ = shockgrid("compare", "with", "without")
     assert code == 0, text
     assert not Path("without/gauges.csv").exists()
-    table, problem = RunData("with").gauges, RunData("with").problem
+    table = RunData("with").gauges
+    problem = RunData("with").problem
     # the shock passes line_1 with its own pressure, and carries it at the speed of the material
     behind = (table["line_1_p"] > 0.99 * problem.shock.p) & (table["t"] < problem.arrival)
     assert behind.sum() > 5 and table["line_1_p"][0] == pytest.approx(1.0, rel=1e-3)

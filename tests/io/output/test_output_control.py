@@ -39,7 +39,8 @@ def test_light_dumps_hold_what_was_asked_for_and_the_last_one_all(shockgrid):
     assert shockgrid("run", *GAS, "-o", "full")[0] == 0
     light = set_all("output.fields=['p','rho']", "output.precision=single", "output.compression=4")
     assert shockgrid("run", *GAS, "-o", "light", *light)[0] == 0
-    full, small = RunData("full").outputs, RunData("light").outputs
+    full = RunData("full").outputs
+    small = RunData("light").outputs
     assert [dump.step for dump in small] == [dump.step for dump in full]
     for one, other in zip(full[:-1], small[:-1], strict=True):
         assert one.has_state and not other.has_state
@@ -50,7 +51,8 @@ def test_light_dumps_hold_what_was_asked_for_and_the_last_one_all(shockgrid):
         assert (values == one.blocks[1].cell_fields["rho"].astype(np.float32)).all()
         assert other.path.stat().st_size < 0.7 * one.path.stat().st_size
     assert small[-1].path.read_bytes()[:8] == full[-1].path.read_bytes()[:8]
-    state, other = read_state(full[-1].path), read_state(small[-1].path)
+    state = read_state(full[-1].path)
+    other = read_state(small[-1].path)
     assert all(np.array_equal(state[key], other[key]) for key in state)
     assert shockgrid("plot", "light")[0] == 0
     code, _, error = shockgrid("plot", "light", "u")

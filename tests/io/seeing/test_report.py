@@ -25,7 +25,10 @@ class Page(HTMLParser):
 
     def __init__(self, text: str):
         super().__init__()
-        self.sources, self.links, self.words, self.open = [], [], [], []
+        self.sources = []
+        self.links = []
+        self.words = []
+        self.open = []
         self.feed(text)
         assert self.open == []
 

@@ -32,7 +32,8 @@ def run(shockgrid, name: str, *words: str) -> RunData:
 
 
 def test_equal_runs_make_equal_bytes_and_say_what_made_them(shockgrid):
-    one, other = run(shockgrid, "one"), run(shockgrid, "other")
+    one = run(shockgrid, "one")
+    other = run(shockgrid, "other")
     for a, b in zip(one.dumps, other.dumps, strict=True):
         assert a.path.read_bytes() == b.path.read_bytes()
     made = one.dumps[-1].provenance
@@ -147,7 +148,8 @@ def test_gradients_of_linear_fields_are_exact_on_a_bent_grid(name, exact):
 
 @pytest.mark.parametrize(("name", "halves"), [("rho", 1), ("", 2)])
 def test_a_grid_over_a_field_leaves_the_mirror_image_free(name, halves, monkeypatch):
-    block, drawn = make_block(), []
+    block = make_block()
+    drawn = []
     monkeypatch.setattr(fields, "draw_grid_lines", lambda _, nodes, *words: drawn.append(nodes))
     sheet = fields.Sheet(block.nodes, "gas", "gas", block.cell_fields)
     image = fields.Sheet(block.nodes * [[[1]], [[-1]]], "gas", "gas mirrored", sheet.fields)

@@ -16,10 +16,12 @@ from runs.inspection.account import RULES, describe_verdict, judge
 def follow(dts, limit="sound"):
     """The lines on steps of these lengths."""
     blocks = [SimpleNamespace(name="a"), SimpleNamespace(name="b")]
-    run, said = SimpleNamespace(blocks=blocks, step=0, t=0.0), []
+    run = SimpleNamespace(blocks=blocks, step=0, t=0.0)
+    said = []
     short = ShortSteps(run, said.append)
     for dt in dts:
-        run.step, run.t = run.step + 1, run.t + dt
+        run.step = run.step + 1
+        run.t = run.t + dt
         cell = {"fastest_block": 1, "fastest_i": 3, "fastest_j": 4}
         short.follow({"dt": dt, "dt_limit": limit, **cell})
     return said
@@ -36,7 +38,9 @@ def test_a_hundredth_of_the_largest_dt_is_told_once_with_cell_and_settings():
 
 def march(step_of, t_end=1.0, seconds=lambda t: 0.01):
     """Steps, times and wall times of a run with dt = step_of(t)."""
-    t, wall, rows = 0.0, 0.0, []
+    t = 0.0
+    wall = 0.0
+    rows = []
     while t < t_end:
         t = min(t + step_of(t), t_end)
         wall += seconds(t)
@@ -81,7 +85,8 @@ def test_a_run_that_ends_before_its_end_time_is_expected_to_do_so_again():
     assert likely == pytest.approx(real, rel=0.02)
 
 
-STEPS, CELLS = 200, 1000
+STEPS = 200
+CELLS = 1000
 
 
 def make_history(**columns):

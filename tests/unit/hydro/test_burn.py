@@ -60,7 +60,8 @@ def test_a_cell_gets_what_its_state_lacks():
     def find_part(density, burnt, t):
         """Part that burns of a cell behind a steady front that has burnt `burnt` of it."""
         volume = 1.0 / TNT.rho0 - 1.0 / density
-        p, e = 1e10, 0.0
+        p = 1e10
+        e = 0.0
         for _ in range(60):  # p and e agree with the jump and the law
             e = rest + 0.5 * p * volume + burnt * TNT.heat
             p = float(TNT.pressure(density, e))

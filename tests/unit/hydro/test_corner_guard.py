@@ -14,7 +14,8 @@ from regrid.measure.quality import find_bad_cells
 
 def measure_angle(place, before, after):
     """Angle at a corner, from `after` round the cell's inside to `before`; up to 360 degrees."""
-    a, b = after - place, before - place
+    a = after - place
+    b = before - place
     return math.atan2(a[0] * b[1] - a[1] * b[0], a @ b) % (2.0 * math.pi)
 
 
@@ -22,7 +23,8 @@ def measure_angle(place, before, after):
 @pytest.mark.parametrize(("part", "height"), [(0.5, -1.0), (0.3, -0.2), (0.8, -0.004)])
 def test_a_corner_too_wide_is_taken_to_a_straight_angle(turn, part, height):
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-    before, after = rotation @ [0.1, 2.0], rotation @ [0.1, 0.0]
+    before = rotation @ [0.1, 2.0]
+    after = rotation @ [0.1, 0.0]
     place = rotation @ [0.1 - height, 2.0 - 2.0 * part]
     assert measure_angle(place, before, after) > math.pi + 1e-3
     moved = place + compute_way(place, before, after)
@@ -36,7 +38,8 @@ def test_a_corner_too_wide_is_taken_to_a_straight_angle(turn, part, height):
 @pytest.mark.parametrize("angle", [0.05, 0.01, 0.0, -0.01])
 def test_a_corner_that_closes_keeps_an_angle(angle):
     """By half of its shorter side at most in a step."""
-    place, after = np.array([1.0, 2.0]), np.array([1.1, 2.0])
+    place = np.array([1.0, 2.0])
+    after = np.array([1.1, 2.0])
     before = place + 0.2 * np.array([math.cos(angle), math.sin(angle)])
     moved = place.copy()
     for _ in range(40):

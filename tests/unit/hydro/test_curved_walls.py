@@ -68,7 +68,8 @@ def test_an_interface_slides_along_curved_walls():
 
 
 def test_the_mirrored_ring_is_the_mirror():
-    one, two = make_pair(), make_pair(mirrored=True)
+    one = make_pair()
+    two = make_pair(mirrored=True)
     march(one, 30)
     march(two, 30)
     for block, other in zip(one.blocks, two.blocks[::-1], strict=True):

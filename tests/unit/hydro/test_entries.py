@@ -75,7 +75,8 @@ def test_entries_get_the_types_they_were_compiled_for(monkeypatch):
 def test_a_limiting_rate_is_that_of_any_layout():
     regridder = make_regridder("barrier")
     x, y = np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 2, 6), indexing="ij")
-    boundary, sound = np.array([x, y]), 1.0 + np.add.outer(np.arange(8.0), np.arange(5.0))
+    boundary = np.array([x, y])
+    sound = 1.0 + np.add.outer(np.arange(8.0), np.arange(5.0))
     rate = regridder.compute_limiting_rate(boundary, sound)
     strided = np.repeat(boundary, 2, axis=2)[:, :, ::2]
     assert regridder.compute_limiting_rate(strided, np.asfortranarray(sound)) == rate

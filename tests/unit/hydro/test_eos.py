@@ -163,7 +163,8 @@ def test_the_sound_speed_is_real_wherever_shocks_and_isentropes_lead(graphite):
     for first in (0.15, graphite.mixed_region[0], mixed, 0.47):
         p = float(hugoniot(first, graphite.parameters)[0])
         for target in np.linspace(0.02, 0.48, 24):
-            rho, e = 2200.0 / (1.0 - first), 0.5 * p * first / 2200.0
+            rho = 2200.0 / (1.0 - first)
+            e = 0.5 * p * first / 2200.0
             for part in np.diff(np.linspace(rho, 2200.0 / (1.0 - target), 201)):
                 # e = e + p/rho² drho by the midpoint: an isentrope, up and down
                 start = float(graphite.pressure(rho, e))
@@ -173,7 +174,8 @@ def test_the_sound_speed_is_real_wherever_shocks_and_isentropes_lead(graphite):
                 rho += part
             assert graphite.sound_speed(rho, graphite.pressure(rho, e)) > 0.2 * graphite.c0
             if target > first:  # the second shock: from (first, p) to the density `target`
-                rho0, rho = 2200.0 / (1.0 - first), 2200.0 / (1.0 - target)
+                rho0 = 2200.0 / (1.0 - first)
+                rho = 2200.0 / (1.0 - target)
                 p2 = p
                 for _ in range(200):
                     e = 0.5 * p * first / 2200.0 + 0.5 * (p + p2) * (1.0 / rho0 - 1.0 / rho)

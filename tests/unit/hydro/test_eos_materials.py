@@ -79,7 +79,8 @@ def write_of_tabular(tmp_path):
         e = np.geomspace(0.2, 20.0, 50) if e is None else np.asarray(e, float)
         path = tmp_path / "table.h5"
         with h5py.File(path, "w") as file:
-            file["rho"], file["e"] = rho, e
+            file["rho"] = rho
+            file["e"] = e
             file["p"] = 0.4 * rho[:, None] * e if p is None else p
         return str(path)
 
@@ -87,7 +88,8 @@ def write_of_tabular(tmp_path):
 
 
 def test_a_table_of_an_ideal_gas_is_that_gas(write_of_tabular):
-    table, gas = Tabular(write_of_tabular()), IdealGas(1.4)
+    table = Tabular(write_of_tabular())
+    gas = IdealGas(1.4)
     rho, e = np.meshgrid([0.06, 0.9, 5.1], [0.3, 2.5, 11.0])
     p = gas.pressure(rho, e)
     assert table.pressure(rho, e) == pytest.approx(p, rel=1e-13)

@@ -44,7 +44,9 @@ class Stubborn:
     def __init__(self, failures):
         from regrid.registry import make_regridder
 
-        self.inner, self.failures, self.calls = make_regridder("barrier"), failures, 0
+        self.inner = make_regridder("barrier")
+        self.failures = failures
+        self.calls = 0
 
     def regrid(self, previous, boundary):
         self.calls += 1
@@ -97,7 +99,8 @@ def test_one_signature_a_kernel(eos_class):
 
 
 def test_threads_give_the_same_bits():
-    one, two = make_pair(40, 140), make_pair(40, 140, threads=2)
+    one = make_pair(40, 140)
+    two = make_pair(40, 140, threads=2)
     march(one, 6)
     march(two, 6)
     assert get_bits(one) == get_bits(two)

@@ -29,13 +29,15 @@ def make_places(random, faces, count, whole):
     places[count // 2] = round(places[count // 2])
     places = np.unique(places)
     if whole:
-        places[0], places[-1] = 0.0, faces
+        places[0] = 0.0
+        places[-1] = faces
     return places
 
 
 def cut(line, places, turn=1.0, moved=None, inverse_dt=0.0):
     most = line.shape[1] + places.size + 2
-    owners, faces = np.zeros((2, most), dtype=np.int64), np.zeros((7, most))
+    owners = np.zeros((2, most), dtype=np.int64)
+    faces = np.zeros((7, most))
     moved = np.zeros_like(line) if moved is None else moved
     parts = np.zeros((2, most))
     count = fill_pieces(line, moved, places, turn, inverse_dt, owners, faces, parts)
@@ -92,7 +94,8 @@ def test_what_one_side_gives_the_other_takes(seed, geometry):
 def test_contact_does_not_pull():
     line = np.array([[0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 0.0]])
     owners, faces = cut(line, np.array([0.0, 1.0, 2.0]), turn=-1.0)  # outwards: +y
-    rho, c = 2.0, 3.0
+    rho = 2.0
+    c = 3.0
     mine = np.tile(np.array([[rho], [0.0], [0.0], [0.0], [c]]), (1, 3))
     other = np.tile(np.array([[rho], [5.0], [0.0], [0.0], [c]]), (1, 2))
     other[2] = 0.1, -0.1  # the first flies off, the second comes
@@ -163,7 +166,8 @@ def test_free_stream_while_the_follower_slides_on_a_curve(ends):
 @pytest.mark.kernels
 def test_free_stream_with_partial_cover():
     metal = StiffenedGas(4.4, 1.0)
-    x, across = np.linspace(0.0, 2.0, 25), np.linspace(0.0, 1.0, 9)
+    x = np.linspace(0.0, 2.0, 25)
+    across = np.linspace(0.0, 1.0, 9)
     curve = 0.1 * np.sin(3.0 * x)
     x_follower = np.linspace(0.53, 1.41, 18)
     curve_follower = np.interp(x_follower, x, curve)

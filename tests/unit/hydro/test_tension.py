@@ -86,7 +86,8 @@ def test_a_wave_falls_and_energy_is_kept():
 
 
 def test_the_same_bits_after_a_restart_on_threads_and_ranks():
-    one, other = make_wave(), make_wave(threads=2)
+    one = make_wave()
+    other = make_wave(threads=2)
     rows = march(one, 12)
     march(other, 12)
     found, there = march_on_ranks(2, make_wave, 12, places=[(0,), (1,)])
@@ -105,7 +106,8 @@ def test_what_is_no_tension_is_refused(tension):
         put(blocks[0], "i_max", "free-surface", pressure=1.0, tension=tension)
 
 
-WALL, FREE = (0.0, 1.0), (0.0, 0.0)
+WALL = (0.0, 1.0)
+FREE = (0.0, 0.0)
 
 
 def smooth(line, closed, wall, strength, steps=1):
@@ -151,7 +153,8 @@ def measure_decay(line, closed, strength, steps):
 @pytest.mark.parametrize("closed", [False, True])
 @pytest.mark.parametrize("uneven", [0.0, 0.5])
 def test_a_wave_decays_as_k_to_the_fourth_of_second_order_in_the_spacing(closed, uneven):
-    strength, steps = 1e-5 / (2.0 * np.pi) ** 4, 10
+    strength = 1e-5 / (2.0 * np.pi) ** 4
+    steps = 10
     errors = []
     for count in (8, 16, 32, 64):
         cells = 2 * count if closed else count
@@ -167,7 +170,8 @@ def test_an_ellipse_becomes_a_circle_of_its_area(ratio):
     line = make_ellipse(ratio, 1.0, 64)
     after = smooth(line, True, FREE, 1e-3, steps=400)
     assert compute_area(after) == pytest.approx(compute_area(line), rel=1e-13)
-    before, reached = np.hypot(*line), np.hypot(*after)
+    before = np.hypot(*line)
+    reached = np.hypot(*after)
     assert np.ptp(reached) <= max(0.9 * np.ptp(before), 1e-12)
 
 

@@ -82,7 +82,9 @@ def test_a_run_ends_in_the_bits_of_the_command(tmp_path, case):
 
 
 def test_hooks_see_each_step_and_stop_a_run(tmp_path):
-    seen, every, late = [], [], []
+    seen = []
+    every = []
+    late = []
 
     def look(case):
         seen.append((case.step, float(case.blocks["first"].p.max())))
@@ -165,7 +167,8 @@ def test_data_of_a_run(run):
 def test_data_of_a_run_go_to_other_processes(run):
     one = sg.open(run.path)
     block = one.dumps[-1]["right"]
-    history, rho = one.history, block.rho
+    history = one.history
+    rho = block.rho
     for other in (pickle.loads(pickle.dumps(one)), copy.deepcopy(one)):
         assert other.history.t.tolist() == history.t.tolist()
         assert other.history.units == history.units

@@ -130,7 +130,8 @@ def test_each_mode_of_a_small_spectrum_grows_as_theory_says():
         assert row[mode.column] == pytest.approx(float(expected), rel=TRUSTED)
 
 
-HEAVY, LIGHT = Fluid(rho=3.0), Fluid(rho=1.0)
+HEAVY = Fluid(rho=3.0)
+LIGHT = Fluid(rho=1.0)
 METALS = {"pressure": 0.0, "shock_pressure": 10e9, "wavelength": 1e-3}
 STARTS = {
     "reflected shock": {},

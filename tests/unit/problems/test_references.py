@@ -82,11 +82,13 @@ def test_profile_conserves_mass_and_momentum(name):
     _, (rho_l, u_l, p_l), _, (rho_r, u_r, p_r) = problem
     solution = solve_riemann(*problem)
     assert solution.gap == (name == "vacuum")
-    speeds, t = solution.get_speeds(), 0.7
+    speeds = solution.get_speeds()
+    t = 0.7
     reach = speeds[-1] - speeds[0]
     x = t * np.linspace(speeds[0] - 0.1 * reach, speeds[-1] + 0.2 * reach, 38)
     rho, momentum, _ = compute_cell_averages(solution, x, t)
-    x_l, x_r = x[0], x[-1]
+    x_l = x[0]
+    x_r = x[-1]
     mass = rho_r * (x_r - u_r * t) - rho_l * (x_l - u_l * t)
     push = t * (rho_r * u_r**2 + p_r - rho_l * u_l**2 - p_l)
     impulse = rho_r * u_r * x_r - rho_l * u_l * x_l - push
@@ -119,7 +121,9 @@ METALS = {"Al1100": AL, "SS304": SS, "Pb": PB}
 @pytest.mark.parametrize("particle_speed", [1e-3, 0.5, 2.0])
 def test_metal_shock_lies_on_its_linear_hugoniot(name, particle_speed):
     eos = METALS[name]
-    rho0, c0, s = eos.rho0, eos.c0, eos.s
+    rho0 = eos.rho0
+    c0 = eos.c0
+    s = eos.s
     shock = shock_with_particle_speed(eos, rho0, 0.0, particle_speed)
     assert shock.shock_speed == pytest.approx(c0 + s * particle_speed, rel=1e-11)
     assert shock.p == pytest.approx(rho0 * shock.shock_speed * particle_speed, rel=1e-11)
@@ -138,7 +142,8 @@ def test_every_way_of_asking_gives_the_same_shock(eos, rho, p):
 
 def test_integrated_isentrope_is_the_closed_form():
     eos = StiffenedGas(4.4, 0.6)
-    closed, general = make_isentrope(eos, 1.4, 5.0), GeneralIsentrope(eos, 1.4, 5.0)
+    closed = make_isentrope(eos, 1.4, 5.0)
+    general = GeneralIsentrope(eos, 1.4, 5.0)
     p = np.array([8.0, 5.0, 2.0, 0.0, -0.5])
     np.testing.assert_allclose(general.density(p), closed.density(p), rtol=1e-10)
     np.testing.assert_allclose(general.velocity_gain(p), closed.velocity_gain(p), atol=1e-10)
@@ -176,15 +181,18 @@ def test_a_gas_at_the_wall_keeps_what_theory_says():
 
 
 def test_it_is_steady_in_its_own_frame_and_isentropic():
-    vortex, h = Vortex(stream=(0.0, 0.0)), 1e-4
+    vortex = Vortex(stream=(0.0, 0.0))
+    h = 1e-4
     rng = np.random.default_rng(7)
     x, y = rng.uniform(3.0, 7.0, (2, 40))
     rho, u, v, p = vortex.sample(x, y)
     np.testing.assert_allclose(p / rho**1.4, 1.0, rtol=1e-13)
 
     def slopes(k):
-        east, west = vortex.sample(x + h, y)[k], vortex.sample(x - h, y)[k]
-        north, south = vortex.sample(x, y + h)[k], vortex.sample(x, y - h)[k]
+        east = vortex.sample(x + h, y)[k]
+        west = vortex.sample(x - h, y)[k]
+        north = vortex.sample(x, y + h)[k]
+        south = vortex.sample(x, y - h)[k]
         return (east - west) / (2 * h), (north - south) / (2 * h)
 
     (u_x, u_y), (v_x, v_y), (p_x, p_y), (rho_x, rho_y) = (slopes(k) for k in (1, 2, 3, 0))

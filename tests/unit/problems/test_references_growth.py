@@ -123,7 +123,8 @@ def test_the_impulse_is_meyer_and_blewett_s_where_a_rarefaction_is_reflected(mac
 
 
 GRAPHITE, LEAD = (find_material(name) for name in ("graphite", "Pb"))
-FIRST, SECOND = Body(GRAPHITE.eos, GRAPHITE.rho0), Body(LEAD.eos, LEAD.rho0)
+FIRST = Body(GRAPHITE.eos, GRAPHITE.rho0)
+SECOND = Body(LEAD.eos, LEAD.rho0)
 SPEED = 6600.0
 
 
@@ -133,7 +134,8 @@ def crossed():
 
 
 def test_a_ripple_is_flattened_as_the_shock_runs_over_it(crossed):
-    angle, height = crossed.first.wave_angle, 1e-6
+    angle = crossed.first.wave_angle
+    height = 1e-6
     normal = np.array([math.sin(angle), math.cos(angle)])
     front = SPEED * math.sin(angle)
     late = [normal @ (0.0, y) / front for y in (height, -height)]

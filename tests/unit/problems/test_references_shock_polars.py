@@ -151,8 +151,11 @@ def test_critical_angle_of_aluminium_plate(pair, speed):
 @pytest.mark.parametrize("degrees", [5.0, 30.0, 60.0])
 def test_birkhoff_jet(degrees):
     """In the frame of the wall the plate has no momentum along itself, and keeps its energy."""
-    angle, speed = math.radians(degrees), 2000.0
-    jet, part = compute_jet_speed(speed, angle), math.sin(0.5 * angle) ** 2  # of the plate's mass
+    angle = math.radians(degrees)
+    speed = 2000.0
+    # of the plate's mass
+    jet = compute_jet_speed(speed, angle)
+    part = math.sin(0.5 * angle) ** 2
     slug = 2.0 * speed / math.sin(angle) - jet  # as fast the other way in the frame of A
     assert part * jet + (1.0 - part) * slug == pytest.approx(speed * math.sin(angle))
     assert part * jet**2 + (1.0 - part) * slug**2 == pytest.approx(speed**2)

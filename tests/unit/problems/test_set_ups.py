@@ -27,7 +27,8 @@ def make(left, right, **options) -> Riemann:
 @pytest.mark.parametrize("seed", range(12))
 def test_every_plateau_has_its_cells_and_every_wave_its_place(seed):
     problem = make(*make_random_pair(seed), cells=200)
-    exact, domain = problem.exact, problem.domain
+    exact = problem.exact
+    domain = problem.domain
     assert sum(domain.lengths) <= 1.0 + 1e-12 and domain.lengths[0] > 0.0
     sides = zip(
         (-1, 1), (exact.left_wave, exact.right_wave), domain.lengths, domain.ends, domain.growths,

@@ -22,7 +22,8 @@ from problems.initial_states import (
 from problems.references.hugoniot import Shock, shock_to_pressure, shock_with_mach
 from regrid import jit
 
-CFL, LIMITER = 0.8, "monotonised-central"
+CFL = 0.8
+LIMITER = "monotonised-central"
 X = np.linspace(0.0, 2.0, 129)
 CELL = X[1] - X[0]
 POSITION = 1.003  # in the first half of a cell
@@ -89,10 +90,8 @@ def test_exact_states_far_from_it(name):
 def test_a_profile_of_few_cells_at_its_place(name, part):
     position = 1.0 + part * CELL
     line, shock = settle(name, position)
-    masses, momenta = (
-        (find_by(line.rho, shock.rho, shock.rho_ahead) - position) / CELL,
-        (find_by(line.rho * line.u, shock.rho * shock.particle_speed, 0.0) - position) / CELL,
-    )
+    masses = (find_by(line.rho, shock.rho, shock.rho_ahead) - position) / CELL
+    momenta = (find_by(line.rho * line.u, shock.rho * shock.particle_speed, 0.0) - position) / CELL
     assert 0.0 < masses < AHEAD[name][0] and 0.0 < momenta < AHEAD[name][1]
     other, _ = settle(name)
     assert masses == pytest.approx(
@@ -133,7 +132,8 @@ def test_a_shock_that_starts_settled_leaves_no_spot_behind():
 def test_a_settled_front_from_the_cache_is_the_one_that_was_computed(tmp_path, monkeypatch):
     monkeypatch.setattr(jit, "find_kept", lambda *words: tmp_path / "settled")
     speed = 2.0 * 1.4**0.5  # Mach 2
-    ahead, behind = (1.0, 0.0, 1.0), (8.0 / 3.0, 0.625 * speed, 4.5)
+    ahead = (1.0, 0.0, 1.0)
+    behind = (8.0 / 3.0, 0.625 * speed, 4.5)
     front = Front(IdealGas(1.4), behind, ahead, speed, 0.02 * np.arange(101.0), 80, behind[1])
     found = [settle_front(front, cfl=CFL, limiter=LIMITER) for _ in range(2)]
     assert (tmp_path / "settled").exists() and found[0][0] == found[1][0]

@@ -74,9 +74,12 @@ def long_graded_march(turn, ni, nj, size, family):
     """Grids of six regrids in a row: cells up to 30 times as long as wide, all sides bending."""
     start = graded_box(ni, nj, 1.15, 1.05, width=12.0)
     way = start[0] / 12.0
-    regridder, nodes, grids = BarrierRegridder(family=family), turn(start), []
+    regridder = BarrierRegridder(family=family)
+    nodes = turn(start)
+    grids = []
     for step in range(1, 7):
-        boundary, part = start.copy(), size * step / 6.0
+        boundary = start.copy()
+        part = size * step / 6.0
         boundary[0] += part * (np.cos(2.3 * start[1] + 0.4) + 0.3 * start[1]) * (1.0 - way) ** 2
         boundary[1] += 0.4 * part * np.sin(np.pi * way) * (start[1] - 0.3)
         boundary[:, 1:-1, 1:-1] = np.nan
@@ -127,7 +130,8 @@ def test_threads_do_not_change_a_bit():
     moving = three_fingers(120, 80)
     grids = []
     for threads in (1, 2, 3):
-        regridder, nodes = BarrierRegridder(threads=threads), moving.start
+        regridder = BarrierRegridder(threads=threads)
+        nodes = moving.start
         for step in range(1, 5):
             nodes = regridder.regrid(nodes, moving.boundary(0.01 * step)).nodes
         grids.append(nodes)

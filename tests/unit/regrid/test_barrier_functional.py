@@ -12,10 +12,14 @@ from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.workspace import Workspace
 
-NI, NJ = 7, 9
+NI = 7
+NJ = 9
 INNER = np.s_[:, 1:-1, 1:-1]
 FASTER = 3.5  # than R was made for: about half of all cells limit the step
-KI, KJ, EPSILON, LAM = 0.7, 0.3, DEFAULT.epsilon, DEFAULT.area_weight
+KI = 0.7
+KJ = 0.3
+EPSILON = DEFAULT.epsilon
+LAM = DEFAULT.area_weight
 
 
 def shaken_grid(amplitude=0.25, seed=3):
@@ -32,16 +36,20 @@ def prepared(nodes):
 
 def corner_terms(work, nodes, spread=0.0):
     """Terms of the four corners of every cell (4, ni, nj), and their squared inverse sines."""
-    v, u = work.blend_j, work.blend_i[:, None]
+    v = work.blend_j
+    u = work.blend_i[:, None]
     a = np.diff(nodes, axis=1) / (work.along_i[0][:, None] + v * work.along_i[1][:, None])
     b = np.diff(nodes, axis=2) / (work.along_j[0] + u * work.along_j[1])
-    terms, sines = [], []
+    terms = []
+    sines = []
     for low, near in ((0, 0), (1, 0), (1, 1), (0, 1)):
-        p, q = a[:, :, low : low + NJ], b[:, near : near + NI]
+        p = a[:, :, low : low + NJ]
+        q = b[:, near : near + NI]
         area = p[0] * q[1] - p[1] * q[0]
         if spread:
             area = 0.5 * (area + np.sqrt(area**2 + spread**2))
-        p2, q2 = (p**2).sum(axis=0), (q**2).sum(axis=0)
+        p2 = (p**2).sum(axis=0)
+        q2 = (q**2).sum(axis=0)
         terms.append((p2 + q2) / area + LAM * (area / work.area_target + work.area_target / area))
         sines.append(p2 * q2 / area**2)
     return np.array(terms), np.array(sines)
@@ -68,8 +76,10 @@ def barrier_weights(work, nodes, spread=0.0):
 
 def energy(work, nodes, weights, spread=0.0):
     """The functional as theory R4.1 has it, with frozen cell weights."""
-    v, u = np.arange(NJ + 1) / NJ, np.arange(NI + 1)[:, None] / NI
-    along, across = np.diff(nodes, axis=1), np.diff(nodes, axis=2)
+    v = np.arange(NJ + 1) / NJ
+    u = np.arange(NI + 1)[:, None] / NI
+    along = np.diff(nodes, axis=1)
+    across = np.diff(nodes, axis=2)
     qi = 1.0 / (work.along_i[2][:, None] + v * work.along_i[3][:, None])
     qj = 1.0 / (work.along_j[2] + u * work.along_j[3])
     straight_i = (qi[:, 1:-1] * (along[:, :, 1:-1] ** 2).sum(axis=0)).sum()
@@ -91,7 +101,8 @@ def assembled(nodes, spread=0.0):
 def make_dense(work):
     size = 2 * (NI - 1) * (NJ - 1)
     matrix = np.zeros((size, size))
-    zero, out = np.zeros((2, NI + 1, NJ + 1)), np.zeros((2, NI + 1, NJ + 1))
+    zero = np.zeros((2, NI + 1, NJ + 1))
+    out = np.zeros((2, NI + 1, NJ + 1))
     for column in range(size):
         unit = np.zeros(size)
         unit[column] = 1.0
@@ -112,7 +123,8 @@ def dense_matrix(spread):
 
 def find_slopes(nodes, compute):
     """Central differences of a function of the nodes, at the inner ones."""
-    step, slopes = 1e-6, np.zeros_like(nodes)
+    step = 1e-6
+    slopes = np.zeros_like(nodes)
     for k, i, j in np.ndindex(2, NI - 1, NJ - 1):
         for sign in (1.0, -1.0):
             moved = nodes.copy()
@@ -141,7 +153,8 @@ def test_line_solve_inverts_the_blocks_of_each_line():
     work, matrix = dense_matrix(0.0)
     rest = np.zeros((2, NI + 1, NJ + 1))
     rest[:, 1:-1, 1:-1] = np.random.default_rng(5).normal(size=(2, NI - 1, NJ - 1))
-    found, zero = np.zeros_like(rest), np.zeros_like(rest)
+    found = np.zeros_like(rest)
+    zero = np.zeros_like(rest)
     newton.fill_line_solution(
         0.0, (zero, zero), (zero.copy(), rest, found), 1, NJ, work.H[0], work.totals
     )
@@ -239,7 +252,8 @@ def priced(nodes, weight):
 
 def test_gradient_is_the_slope_of_the_cost():
     nodes = shaken_grid(0.3)
-    work, without = priced(nodes, 1.0), priced(nodes, 0.0)
+    work = priced(nodes, 1.0)
+    without = priced(nodes, 0.0)
     barrier = np.zeros((NI, NJ))  # leaves straight lines and the cost
 
     def measure_cost(moved):

@@ -86,7 +86,8 @@ def test_lemma_2_2_quasi_orthogonal_grid_with_w_times_area_constant():
     r = 1.0 + np.concatenate([[0.0], np.cumsum(rng.uniform(0.02, 0.2, 12))])
     theta = np.concatenate([[0.0], np.cumsum(rng.uniform(0.02, 0.1, 15))])
     nodes = polar(r, theta)
-    p, q = nodes[:, 1:, 1:] - nodes[:, :-1, :-1], nodes[:, :-1, 1:] - nodes[:, 1:, :-1]
+    p = nodes[:, 1:, 1:] - nodes[:, :-1, :-1]
+    q = nodes[:, :-1, 1:] - nodes[:, 1:, :-1]
     areas = 0.5 * (p[0] * q[1] - p[1] * q[0])
     residual = compute_residual(nodes, areas.mean() / areas)
     assert np.abs(residual).max() < 1e-15
@@ -109,7 +110,8 @@ def test_turned_moved_and_scaled_blocks_have_the_same_grid():
 
     start = bent(annulus(12), 0.05)
     expected = solve_ed2(start, weight, 25).nodes
-    angle, shift = 0.7, np.array([2.0, -1.0])[:, None, None]
+    angle = 0.7
+    shift = np.array([2.0, -1.0])[:, None, None]
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     for scale in (1.0, 1e-10, 1e10):
 

@@ -115,7 +115,8 @@ def shaken(nodes, size, seed=1):
 def make_functional(nodes, weight, **options):
     regridder = VariationalRegridder(**options)
     work = Workspace(nodes.shape[1] - 1, nodes.shape[2] - 1, regridder.threads)
-    work.sides[:], work.base[:] = nodes, nodes
+    work.sides[:] = nodes
+    work.base[:] = nodes
     work.begin(True, 0.0, 0.0, Tuning(epsilon=1.0, area_weight=0.0))
     excluded = np.zeros((4, work.ni, work.nj), dtype=bool)
     for corner in BLOCK_CORNERS:
@@ -138,7 +139,8 @@ def test_gradient_is_that_of_the_functional(lambdas):
     functional.solve()
     numerical = np.zeros_like(nodes)
     for k, i, j in np.ndindex(2, 5, 4):
-        place, values = (k, i + 1, j + 1), []
+        place = (k, i + 1, j + 1)
+        values = []
         for step in (1e-6, -1e-6):
             moved = nodes.copy()
             moved[place] += step

@@ -44,7 +44,8 @@ def test_gradient_is_that_of_the_value(size, e2):
     nodes = throw(graded(), size)
     move = begin(nodes)
     move.assemble_at(nodes, MATRIX, e2)
-    gradient, way = move.gradient.copy(), throw(np.zeros_like(nodes), 1.0, 2)
+    gradient = move.gradient.copy()
+    way = throw(np.zeros_like(nodes), 1.0, 2)
     h = 1e-5
     ahead, behind = (move.assemble_at(nodes + s * h * way, ENERGY, e2) for s in (1.0, -1.0))
     slope = (gradient * way)[INNER].sum()
@@ -58,7 +59,8 @@ def test_matrix_and_line_solve_are_symmetric_and_positive(size, e2):
     move = begin(nodes)
     move.assemble_at(nodes, MATRIX, e2)
     places = np.argwhere(np.ones_like(nodes[INNER], dtype=bool)) + (0, 1, 1, 1)
-    matrix, inverse = [], []
+    matrix = []
+    inverse = []
     for place in places:
         unit = np.zeros_like(nodes)
         unit[tuple(place)] = 1.0
@@ -108,7 +110,8 @@ def test_a_smooth_error_is_mostly_taken_away_at_once():
     move.strengthen(thrown)
     move.assemble_at(thrown, MATRIX)
     inner = np.s_[:, 1:-1, 1:-1, 1:-1]
-    residual, change = -move.gradient, np.zeros_like(thrown)
+    residual = -move.gradient
+    change = np.zeros_like(thrown)
     gain = move.coarse.find(thrown, move.functional(0.0), residual, move.scratch)
     move.coarse.add(change)
     product = np.zeros_like(thrown)
@@ -132,7 +135,8 @@ def bent_of_regridder(cells=(3, 4, 5)):
 @pytest.mark.parametrize("name", SHAPES)
 def test_every_step_of_a_march_is_valid(name):
     block = make_moving_block(name, (10, 5, 5))
-    regridder, nodes = BarrierRegridder3D(), block.start
+    regridder = BarrierRegridder3D()
+    nodes = block.start
     for step in range(1, 13):
         boundary = block.boundary(step / 12)
         found = regridder.regrid(nodes, boundary)
@@ -147,7 +151,8 @@ def test_every_step_of_a_march_is_valid(name):
 
 def test_the_march_keeps_to_the_converged_grid():
     block = make_moving_block("piston-with-bump", (6, 6, 6))
-    nodes, regridder = block.start, BarrierRegridder3D()
+    nodes = block.start
+    regridder = BarrierRegridder3D()
     for step in range(1, 25):
         nodes = regridder.regrid(nodes, block.boundary(step / 24)).nodes
     settled = nodes

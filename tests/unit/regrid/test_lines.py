@@ -93,7 +93,8 @@ def test_ed1_products_are_equal_to_round_off():
     assert np.diff(x).min() > 0.0
 
 
-FREE, WALL = (0.0, 0.0), (0.0, 1.0)
+FREE = (0.0, 0.0)
+WALL = (0.0, 1.0)
 
 
 def find_law(line, first=None, closed=False, walls=(FREE, FREE), shortest=1e-9):
@@ -112,7 +113,8 @@ def make_hook(count, radius=0.05):
     half = np.pi * radius
     s = np.linspace(0.0, 2.0 + half, count)
     angle = np.clip((s - 1.0) / radius, 0.0, np.pi)
-    before, after = np.minimum(s, 1.0), np.maximum(s - 1.0 - half, 0.0)
+    before = np.minimum(s, 1.0)
+    after = np.maximum(s - 1.0 - half, 0.0)
     return np.array([before - after + radius * np.sin(angle), radius * (1.0 - np.cos(angle))])
 
 

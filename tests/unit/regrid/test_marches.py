@@ -70,7 +70,10 @@ def valley():
 
 
 def test_a_march_is_the_loop_that_one_would_write(valley):
-    nodes, regridder, gap, sine = valley.start, BarrierRegridder(), 0.0, 1.0
+    nodes = valley.start
+    regridder = BarrierRegridder()
+    gap = 0.0
+    sine = 1.0
     for step in range(1, 11):
         nodes = regridder.regrid(nodes, valley.boundary(step / 10)).nodes
         gap = max(gap, measure_first_line_gap(nodes, "i_min"))
@@ -91,13 +94,17 @@ def march_both(cost_weight, joint):
     """Largest rate of both blocks at every step, each block's worst first line gap, sub-moves."""
     marches = [load_march(name) for name in ROLLS]
     regridders = [BarrierRegridder(family="i", cost_weight=cost_weight) for _ in marches]
-    grids, gaps, top, moves = [march.start for march in marches], [0.0, 0.0], [], 0
+    grids = [march.start for march in marches]
+    gaps = [0.0, 0.0]
+    top = []
+    moves = 0
     for step in range(1, marches[0].steps + 1):
         pairs = list(zip(regridders, marches, strict=True))
         asked = [r.compute_limiting_rate(m.boundary(step), m.sound[step]) for r, m in pairs]
         rates = []
         for k, (regridder, motion) in enumerate(pairs):
-            sound, least = motion.sound[step], max(asked) if joint else 0.0
+            sound = motion.sound[step]
+            least = max(asked) if joint else 0.0
             result = regridder.regrid(grids[k], motion.boundary(step), sound, least)
             grids[k] = result.nodes
             moves += result.report.sub_moves + result.report.rescues

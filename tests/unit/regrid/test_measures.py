@@ -78,7 +78,8 @@ def test_gap_is_one_on_the_quasi_1d_grid_and_follows_the_first_line():
 def test_signs_of_nearly_straight_corners_are_exact():
     random = np.random.default_rng(0)
     a, step = random.normal(size=(2, 2, 500))
-    b, c = a + step, a + random.uniform(size=500) * step
+    b = a + step
+    c = a + random.uniform(size=500) * step
     signs, doubtful = compute_turns(a, b, c)
     expected = []
     for k in range(500):
@@ -149,9 +150,11 @@ def test_least_sine_has_the_sign_of_the_least_corner_volume():
 def test_a_sheared_rectangle(width, height, slope):
     nodes = box((0.0, 0.0), (width, height), (6, 4))
     nodes[0] += slope * nodes[1]
-    a, b = np.array([width / 6, 0.0]), np.array([slope * height / 4, height / 4])
+    a = np.array([width / 6, 0.0])
+    b = np.array([slope * height / 4, height / 4])
     area = width * height / 24
-    long, short = np.hypot(*a), np.hypot(*b)
+    long = np.hypot(*a)
+    short = np.hypot(*b)
     assert measures.count_bad_cells(nodes) == 0
     np.testing.assert_allclose(measures.compute_sizes(nodes), area)
     np.testing.assert_allclose(measures.compute_sines(nodes), area / (long * short), rtol=1e-9)
@@ -189,7 +192,8 @@ def test_crossing_is_exact():
 def test_all_measures_stay_when_the_grid_is_turned_moved_and_scaled(seed):
     generator = np.random.default_rng(seed)
     nodes = unit_steps(6, 5) + generator.uniform(-0.3, 0.3, (2, 7, 6))
-    angle, scale = generator.uniform(0.0, 6.0), generator.uniform(0.1, 9.0)
+    angle = generator.uniform(0.0, 6.0)
+    scale = generator.uniform(0.1, 9.0)
     turn = scale * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     turned = np.einsum("ab,bij->aij", turn, nodes) + generator.uniform(-5, 5, (2, 1, 1))
     for measure in (measures.measure_aspect, measures.measure_smoothness):

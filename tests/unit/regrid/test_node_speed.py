@@ -44,7 +44,8 @@ def test_convexity_goes_before_the_limit():
 @pytest.mark.parametrize("most", [0.3, 0.1])
 def test_folds_without_end_do_not_let_a_block_jump(most):
     found = np.load(Path(__file__).with_name("folds_without_end.npz"))
-    old, new = found["old"], found["new"]
+    old = found["old"]
+    new = found["new"]
     held, count = MotionLimiter(old.shape).limit(old, new, most)
     assert count > 0 and len(find_bad_cells(held)) == 0
     assert np.abs(held - old).max() < 0.1 * np.abs(new - old).max()
@@ -71,8 +72,10 @@ def test_the_law_is_at_rest_on_the_exact_grid():
 
 
 def test_a_bent_grid_relaxes_to_the_tensor_grid_in_tau_steps():
-    exact, errors = make_tensor_grid(12), []
-    nodes, q = exact.copy(), np.sin(np.pi * np.linspace(0.0, 1.0, 13))
+    exact = make_tensor_grid(12)
+    errors = []
+    nodes = exact.copy()
+    q = np.sin(np.pi * np.linspace(0.0, 1.0, 13))
     nodes[:, 1:-1, 1:-1] += 0.01 * np.outer(q, q)[1:-1, 1:-1]
     regridder = NodeSpeedRegridder(weight=WEIGHT, tau=2.0)
     for step in range(40):

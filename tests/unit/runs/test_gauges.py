@@ -61,7 +61,9 @@ class Carried:
     """Two blocks in a flow u = -rate y + u0, v = rate x, whose grids wave in time."""
 
     def __init__(self, rate=1.0, u0=0.0, v0=0.0, materials=("gas", "gas")):
-        self.t, self.step, self.materials = 0.0, 0, materials
+        self.t = 0.0
+        self.step = 0
+        self.materials = materials
         self.fields = {
             "u": lambda x, y: u0 - rate * y,
             "v": lambda x, y: v0 + rate * x,
@@ -77,7 +79,8 @@ class Carried:
             self.blocks.append(make_block(nodes, self.fields, f"{material}{k}", material))
 
     def go(self, dt):
-        self.t, self.step = self.t + dt, self.step + 1
+        self.t = self.t + dt
+        self.step = self.step + 1
         self.make()
 
 
@@ -89,7 +92,8 @@ def test_a_tracer_in_solid_rotation_is_of_second_order():
         for _ in range(steps):
             flow.go(4.0 / steps)
             gauges.follow()
-        c, s = np.cos(4.0), np.sin(4.0)
+        c = np.cos(4.0)
+        s = np.sin(4.0)
         exact = np.array([c * 1.1 - s * 0.3, s * 1.1 + c * 0.3])
         errors.append(np.hypot(*(gauges.places.position[:, 0] - exact)))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])

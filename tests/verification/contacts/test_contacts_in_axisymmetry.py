@@ -24,12 +24,14 @@ def test_an_impact_of_rings_is_that_of_plates():
     """Along the axis all is as in plane flow, to 1e-9; mass and energy are kept to 1e-12."""
     plates, plane = make_rings("plane", (1000.0, 0.0), 5e-5)
     rings, curved = make_rings("axisymmetric", (1000.0, 0.0), 5e-5)
-    rows, rows_of_rings = march_whole(plane), march_whole(curved)
+    rows = march_whole(plane)
+    rows_of_rings = march_whole(curved)
     assert rows_of_rings[-1]["contacts_made"] == 1
     assert rows_of_rings[-1]["contact_length"] == pytest.approx(1e-3, rel=1e-9)
     for plate, ring in zip(plates, rings, strict=True):
         assert np.abs(plate.nodes[0] - ring.nodes[0]).max() < 1e-9 * 1e-3
-        there, here = plate.state[:, 1:-1, 1:-1], ring.state[:, 1:-1, 1:-1]
+        there = plate.state[:, 1:-1, 1:-1]
+        here = ring.state[:, 1:-1, 1:-1]
         assert np.abs(there[1:3] - here[1:3]).max() < 1e-9 * 1000.0
         assert np.abs(there[3] - here[3]).max() < 1e-9 * np.abs(there[3]).max()
     check_budget(rows)

@@ -21,7 +21,9 @@ from hydro.simulation import Simulation
 from regrid.measure.corners import compute_centres
 
 CELL = 1e-4  # of the U's arms
-ARM, HALF_GAP, THICK = 4e-3, 2e-4, 1e-3
+ARM = 4e-3
+HALF_GAP = 2e-4
+THICK = 1e-3
 
 
 def make_half(cells, bend, layers, sign=1.0):
@@ -45,13 +47,15 @@ def make_u(kind="whole", speed=400.0, cells=40, bend=6, layers=8, t_end=1.5e-6):
 
     The arms turn towards each other about the bend.
     """
-    upper, lower = make_half(cells, bend, layers), make_half(cells, bend, layers, -1.0)
+    upper = make_half(cells, bend, layers)
+    lower = make_half(cells, bend, layers, -1.0)
     grids = {
         "whole": {"u": np.concatenate([upper, lower[:, -2::-1]], axis=1)},
         "linked": {"upper": upper, "lower": lower[:, ::-1]},
         "half": {"upper": upper},
     }
-    blocks, links = [], []
+    blocks = []
+    links = []
     for name, nodes in grids[kind].items():
         x, y = compute_centres(nodes)
         turning = -speed * np.sign(y) * np.clip(1.0 - x / ARM, 0.0, 1.0)
@@ -121,7 +125,8 @@ def test_a_wall_goes_on_beyond_its_end(geometry):
 
     In plane flow with the pressure of its mirror image, to .2 %; the axis takes no momentum.
     """
-    speed, gap = 500.0, 1e-4
+    speed = 500.0
+    gap = 1e-4
     base = make_body("base", "Al1100", box((-3e-3, 0.0), (-1e-3, 1e-3), (4, 4)))
     put(base, "j_min", "axis" if geometry == "axisymmetric" else "wall")
     block = make_body("block", "Cu", box((0.0, gap), (4e-3, gap + 2e-3), (20, 40)), 0.0, -speed)

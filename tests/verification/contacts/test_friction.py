@@ -19,8 +19,10 @@ from hydro.rows import CONSERVED, RHO, P, U, V
 from hydro.simulation import Simulation
 from hydro.sources import make_gravity
 
-CU, AL = find_material("Cu"), find_material("Al1100")
-LENGTH, HEIGHT = 2e-3, 1e-3
+CU = find_material("Cu")
+AL = find_material("Al1100")
+LENGTH = 2e-3
+HEIGHT = 1e-3
 
 
 def make_layer(name, material, low, cells, speed, pressure=(0.0, 0.0), p=0.0, **options):
@@ -40,7 +42,10 @@ def make_floor():
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_layer_on_an_incline(friction):
     """It is held back by mu g cos, to .5 %; all the work that it does is heat of the layer."""
-    g, tilt, speed, t_end = 1e7, 0.5, 100.0, 1.2e-6
+    g = 1e7
+    tilt = 0.5
+    speed = 100.0
+    t_end = 1.2e-6
     layer, link = make_layer("layer", "Cu", 0.0, (10, 8), speed, friction=friction)
     y = 0.5 * (layer.nodes[1, 1:, 1:] + layer.nodes[1, :-1, :-1])
     layer.state[P, 1:-1, 1:-1] = CU.rho0 * g * np.cos(tilt) * (HEIGHT - y)
@@ -63,7 +68,8 @@ def make_layers(friction=0.0, weld=False, p=2e8, speed=100.0):
     low, one = make_layer("low", "Al1100", 0.0, (8, 8), -speed, (p, 0.0), p, **options)
     high, other = make_layer("high", "Cu", HEIGHT, (10, 6), speed, (0.0, p), p, **options)
     for block in (low, high):
-        rho, c = block.state[RHO, 1, 1], float(block.eos.sound_speed(block.state[RHO, 1, 1], 0.0))
+        rho = block.state[RHO, 1, 1]
+        c = float(block.eos.sound_speed(block.state[RHO, 1, 1], 0.0))
         block.state[RHO, 1:-1, 1:-1] = rho + p / c**2
     return (low, high), Simulation([low, high], [one, other], t_end=4e-7)
 
@@ -107,7 +113,8 @@ def test_welded_layers_do_not_slip():
 
 def test_a_layer_at_rest_sticks():
     """Below the angle of friction the cells on the floor stay where they are."""
-    g, tilt = 1e7, 0.2
+    g = 1e7
+    tilt = 0.2
     layer, link = make_layer("layer", "Cu", 0.0, (6, 2), 0.0, friction=0.4)
     simulation = Simulation(
         [layer, make_floor()], [link], t_end=5e-7,
@@ -119,7 +126,8 @@ def test_a_layer_at_rest_sticks():
 
 def test_a_block_slides_off_the_end_of_another():
     """Without weight it goes on as it was; after the end it flies freely: 1e-10."""
-    speed, length = 1000.0, 1e-3
+    speed = 1000.0
+    length = 1e-3
     low = make_body("low", "Al1100", box((0.0, -1e-3), (2e-3, 0.0), (20, 10)))
     high = make_body("high", "Cu", box((8e-4, 0.0), (8e-4 + length, 5e-4), (11, 5)), speed)
     for block in (low, high):

@@ -55,7 +55,8 @@ def find_end(simulation):
 
 def march_to_end(simulation):
     """Rows, and times and places at which the contact's end has come a cell further."""
-    ends, before = [], 0.0
+    ends = []
+    before = 0.0
 
     def note_end(rows):
         nonlocal before
@@ -113,12 +114,14 @@ def block_row(block, j):
 @pytest.mark.parametrize("degrees", [0.0, 0.01])
 def test_a_hundred_cells_meet_at_once(degrees):
     """Parallel, and nearly so, with nodes that do not match: nothing crosses, all is conserved."""
-    angle, speed = math.radians(degrees), 1000.0
+    angle = math.radians(degrees)
+    speed = 1000.0
     plate, base, simulation = make_wedge(
         angle, speed, height=4, below=4, length=100, stretch=1.25, materials=("Al1100", "SS304")
     )
     simulation.clock.t_end = 1.5e-7
-    rows, deepest = [simulation.start_row() | {"t": 0.0}], 0.0
+    rows = [simulation.start_row() | {"t": 0.0}]
+    deepest = 0.0
     while not simulation.finished:
         rows.append(simulation.advance())
         lower, upper = plate.nodes[:, :, 0], base.nodes[:, :, -1]
@@ -134,7 +137,9 @@ def test_a_hundred_cells_meet_at_once(degrees):
 @pytest.mark.slow
 def test_free_corners_curl_up():
     """A plate without walls comes down at 12 degrees and 3 km/s within a wider base: to the end."""
-    angle, speed, cells = math.radians(12.0), 3000.0, 60
+    angle = math.radians(12.0)
+    speed = 3000.0
+    cells = 60
     plate, _, _ = make_wedge(angle, speed, length=cells, materials=("Al1100", "SS304"))
     nodes = box((-5 * CELL, -10 * CELL), ((cells + 5) * CELL, 0.0), (cells + 10, 10))
     base = make_body("wide", "SS304", nodes)

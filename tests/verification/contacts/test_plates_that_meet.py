@@ -49,13 +49,15 @@ def test_impact_over_a_gap(flyer, target, speed, cells, p, after):
         assert take_plateau(middle_row(block, P), skip=skip) == pytest.approx(shock.p, rel=1e-3)
         u = take_plateau(middle_row(block, U), skip=skip)
         assert u == pytest.approx(speed - shock.particle_speed, abs=5e-4 * speed)
-    line, line_of_other = one.nodes[0, -1], other.nodes[0, 0]
+    line = one.nodes[0, -1]
+    line_of_other = other.nodes[0, 0]
     assert np.ptp(line) + np.ptp(line_of_other) + abs(line[0] - line_of_other[0]) < 1e-12
 
 
 def test_equal_plates():
     """The flyer stops but for what strong shocks keep, the target leaves: .3 %."""
-    speed, thickness = 1000.0, 2e-3
+    speed = 1000.0
+    thickness = 2e-3
     parting = find_parting(take("Cu"), None, speed, thickness)
     one = make_plate("flyer", "Cu", (0.0, thickness), 100, speed)
     other = make_plate("target", "Cu", (thickness + 1e-4, 2 * thickness + 1e-4), 100)
@@ -70,7 +72,8 @@ def test_equal_plates():
 
 def test_thin_soft_flyer_leaves_a_stiff_target():
     """Time of opening 1 %, speed .5 % of the impact's, by characteristics."""
-    speed, thickness = 1000.0, 1e-3
+    speed = 1000.0
+    thickness = 1e-3
     parting = find_parting(take("Al1100"), take("SS304"), speed, thickness)
     one = make_plate("flyer", "Al1100", (0.0, thickness), 100, speed)
     other = make_plate("target", "SS304", (thickness + 1e-4, 4e-3), 150)
@@ -90,7 +93,9 @@ def test_three_plates(cells, bar):
     contact opens.  The scheme spreads the release, which is nearly sharp at so low a speed, over a
     few cells more: an error of the order of the spread over the thickness.
     """
-    speed, thickness, gap = 100.0, 1e-3, 2e-6
+    speed = 100.0
+    thickness = 1e-3
+    gap = 2e-6
     blocks = [
         make_plate(
             name, "Cu", (k * (thickness + gap), k * (thickness + gap) + thickness), cells,

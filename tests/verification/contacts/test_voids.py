@@ -12,7 +12,8 @@ from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
 WATER = find_material("water-hugoniot")
-INNER, OUTER = 1e-3, 5e-3
+INNER = 1e-3
+OUTER = 5e-3
 
 
 def make_quarter(cells, speed, t_end, layers=32, water="water-hugoniot", **options):
@@ -60,7 +61,8 @@ def test_a_cylindrical_void_collapses(cells, layers, water):
     radii = []
     rows = march_whole(simulation, lambda rows: radii.append(float(block.nodes[0, -1, 0])))
     assert rows[-1]["voids"] == 1
-    t, radii = np.array([row["t"] for row in rows]), np.array(radii)
+    t = np.array([row["t"] for row in rows])
+    radii = np.array(radii)
     wanted = solve_ring((INNER, OUTER), speed, 0.0, 1.09e-5, t_eval=t[t < 1.09e-5]).y[0]
     late = wanted > 0.2 * INNER
     assert np.abs(radii[: wanted.size] - wanted)[late].max() < 1e-2 * INNER
@@ -79,7 +81,9 @@ def test_gas_between_plates_is_squeezed():
         make_plate("left", "water-hugoniot", (0.0, 1e-3), 10, 100.0),
         make_plate("right", "water-hugoniot", (2e-3, 3e-3), 10, -100.0),
     ]
-    gap, p, gamma = 1e-3, 2.5e6, 1.4
+    gap = 1e-3
+    p = 2.5e6
+    gamma = 1.4
     rows = march_whole(Simulation(plates, [], t_end=1.6e-5, void_fill=(p, gamma)))
     areas = np.array([row["void_area"] for row in rows[1:]])
     assert areas[0] == pytest.approx(gap * 1e-3, rel=1e-2) and rows[-1]["voids"] == 1
@@ -150,12 +154,16 @@ def make_ring(kind, cells, rays, radius, outer, load):
 )
 def test_a_round_void_in_water_shrinks_as_theory_says(kind, cells, rays, bar):
     """To a fifth of its radius, at Mach numbers of a few hundredths."""
-    radius, outer, load, part = 1.0, 2.0, 2e6, 0.2
+    radius = 1.0
+    outer = 2.0
+    load = 2e6
+    part = 0.2
     ring = make_ring(kind, cells, rays, radius, outer, load)
     wanted = find_time((radius, outer), load / WATER.rho0, part)
     geometry = "plane" if kind == "quarter" else "axisymmetric"
     simulation = Simulation([ring], [], t_end=2.0 * wanted, geometry=geometry)
-    inner, before = [radius], 0.0
+    inner = [radius]
+    before = 0.0
     while inner[-1] > part * radius and not simulation.finished:
         before = simulation.t
         simulation.advance()

@@ -49,8 +49,10 @@ def test_a_gas_bounces_off_a_wall(mach, cells, kept):
     (.015 at Mach .05).  The scheme spreads a step over four to six cells on its way there and back,
     and a quarter of these over the cells is lost: no bar for few cells is below that.
     """
-    gas, c = IdealGas(1.4), (1.4 * 1e5 / 1.2) ** 0.5
-    speed, gap = mach * c, 2e-4
+    gas = IdealGas(1.4)
+    c = (1.4 * 1e5 / 1.2) ** 0.5
+    speed = mach * c
+    gap = 2e-4
     nodes = box((gap, 0.0), (gap + 1e-2, 2e-2), (cells, 2))
     ball = Block("ball", gas, nodes, 1.2, -speed, 0.0, 1e5)
     free(ball, "i_min", "i_max", pressure=1e5)

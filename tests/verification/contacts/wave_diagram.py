@@ -68,13 +68,15 @@ def find_parting(flyer, target, speed, thickness, lines=400):
     eos, rho = flyer
     mirror = target is None
     one, other = find_impact(flyer, flyer if mirror else target, speed)
-    u, mass = speed - one.particle_speed, rho * thickness
+    u = speed - one.particle_speed
+    mass = rho * thickness
     release = Release(eos, one)
     beyond = None if mirror else Release(target[0], other)
     t_back = thickness / one.shock_speed
     whole = float(release.integral[-1])
     minus = u - whole  # u - F of the shocked flyer
-    contact_u, contact_f = u, 0.0 if mirror else float(beyond.integral[-1])
+    contact_u = u
+    contact_f = 0.0 if mirror else float(beyond.integral[-1])
 
     def meet(plus):
         """Pressure and speed at the contact for an arriving invariant u + F."""
@@ -91,19 +93,24 @@ def find_parting(flyer, target, speed, thickness, lines=400):
 
     column = []  # nodes of the line before on the lines that come back: (m, t, J-)
     plus_before = u + whole
-    impulse, before = 0.0, (0.0, one.p)
+    impulse = 0.0
+    before = (0.0, one.p)
     for k in range(lines + 1):
         own = whole * (1.0 - k / lines)  # F of this line of the fan
         plus = minus + 2.0 * own
-        m, t = 0.0, t_back
+        m = 0.0
+        t = t_back
         z = release.find_state(own)[1]
         nodes = []
         for m_right, t_right, back in column:
             _, z_right = release.find_state(0.5 * (plus_before - back))
             _, z_new = release.find_state(0.5 * (plus - back))
-            up, down = 0.5 * (z + z_new), 0.5 * (z_right + z_new)
+            up = 0.5 * (z + z_new)
+            down = 0.5 * (z_right + z_new)
             t_new = (m_right - m + up * t + down * t_right) / (up + down)
-            m, t, z = m + up * (t_new - t), t_new, z_new
+            m = m + up * (t_new - t)
+            t = t_new
+            z = z_new
             nodes.append((m, t, back))
         p, u_contact = meet(plus)
         z_new = release.find_state(release.find_integral(p) if p > 0.0 else p / release.z[0])[1]
@@ -117,5 +124,6 @@ def find_parting(flyer, target, speed, thickness, lines=400):
         before = t, p
         own_there = 0.5 * (plus - (u_contact - (plus - u_contact)))
         nodes.append((mass, t, u_contact - own_there))
-        column, plus_before = nodes, plus
+        column = nodes
+        plus_before = plus
     raise AssertionError("the plates do not part")

@@ -123,10 +123,13 @@ def test_a_disturbance_grows_in_time_as_its_eigenvalue_says():
 class Manufactured:
     """psi = a(t) f(x) g(y), T = b(t) h(x) k(y): no-slip; T = 0 at x = 0, 1; dT/dy = 0."""
 
-    viscosity, buoyancy = 0.7, (3.0, 50.0)
+    viscosity = 0.7
+    buoyancy = (3.0, 50.0)
     x = Polynomial([0.0, 1.0])
-    f, g = 40.0 * x**2 * (1.0 - x) ** 2 * (1.0 + 0.5 * x), x**2 * (1.0 - x) ** 2
-    h, k = 4.0 * x * (1.0 - x) * (1.0 + x), 1.0 - 6.0 * x**2 + 4.0 * x**3
+    f = 40.0 * x**2 * (1.0 - x) ** 2 * (1.0 + 0.5 * x)
+    g = x**2 * (1.0 - x) ** 2
+    h = 4.0 * x * (1.0 - x) * (1.0 + x)
+    k = 1.0 - 6.0 * x**2 + 4.0 * x**3
 
     @staticmethod
     def place(cells: int, t: float) -> tuple[np.ndarray, np.ndarray]:
@@ -139,7 +142,8 @@ class Manufactured:
 
     def amplitudes(self, t: float) -> tuple[float, float, float, float]:
         """a, b and their derivatives."""
-        a, b = 2.0 + math.sin(3.0 * t), 1.0 + 0.5 * math.cos(2.0 * t)
+        a = 2.0 + math.sin(3.0 * t)
+        b = 1.0 + 0.5 * math.cos(2.0 * t)
         return a, b, 3.0 * math.cos(3.0 * t), -math.sin(2.0 * t)
 
     def psi(self, x, y, t):
@@ -171,7 +175,8 @@ class Manufactured:
         return across, up, source
 
     def sources(self, equations: Equations, t: float) -> tuple[np.ndarray, np.ndarray]:
-        (x, y), momentum = equations.axes, equations.momentum
+        x, y = equations.axes
+        momentum = equations.momentum
         volumes = equations.split_faces(momentum.lengths * momentum.reaches)
         across = self.forces(x.nodes[:, None], y.centres, t)[0] * volumes[0]
         up = self.forces(x.centres[:, None], y.nodes, t)[1] * volumes[1]
@@ -197,7 +202,8 @@ class Manufactured:
     def run(self, cells: int, steps: int) -> np.ndarray:
         """(largest errors of u, v, T, mean ones, volume lost in a cell) at the end."""
         march, lost = self.march(cells, steps)
-        equations, t = march.equations, march.t
+        equations = march.equations
+        t = march.t
         x, y = equations.axes
         u, v = equations.compute_velocities(march.level.psi)
         errors = [

@@ -38,9 +38,11 @@ def find_errors(kind, cells, **given):
 @pytest.mark.parametrize(("peclet", "prandtl"), [(3.0, 1.0), (-8.0, 0.71), (40.0, 7.0)])
 def test_exact_solution_satisfies_its_equations(peclet, prandtl):
     """Differences of the sampled profiles: the residual falls with the square of the step."""
-    exact, residuals = VerticalPlates(1e3, prandtl, peclet), []
+    exact = VerticalPlates(1e3, prandtl, peclet)
+    residuals = []
     for n in (400, 800):
-        x, h = np.linspace(0.0, 1.0, n + 1), 1.0 / n
+        x = np.linspace(0.0, 1.0, n + 1)
+        h = 1.0 / n
         temperature, v = exact.sample(x)
         slope = (v[2:] - v[:-2]) / (2.0 * h)
         residual = np.diff(v, 2) / h**2 - peclet / prandtl * slope + 1e3 * temperature[1:-1]
@@ -106,7 +108,10 @@ def sway(n, t):
 
 def test_exact_solution():
     exact = BurgersFronts(0.01, (1.0, 0.3, -0.4), (0.2, 0.6))
-    x, t, h, dt = np.linspace(0.05, 0.95, 301), 0.31, 1e-4, 1e-5
+    x = np.linspace(0.05, 0.95, 301)
+    t = 0.31
+    h = 1e-4
+    dt = 1e-5
     u, up, down = (exact.compute_values(x + way * h, t) for way in (0, 1, -1))
     by_t = (exact.compute_values(x, t + dt) - exact.compute_values(x, t - dt)) / (2.0 * dt)
     residual = by_t + u * (up - down) / (2.0 * h) - 0.01 * (up - 2.0 * u + down) / h**2
@@ -122,20 +127,25 @@ def test_exact_solution():
 
 
 def test_uniform_flow_stays_uniform_on_shaken_nodes():
-    rng, x, u = np.random.default_rng(4), np.linspace(0.0, 1.0, 31), np.full(30, 0.7)
+    rng = np.random.default_rng(4)
+    x = np.linspace(0.0, 1.0, 31)
+    u = np.full(30, 0.7)
     for k in range(20):
         new = np.linspace(0.0, 1.0, 31)
         new[1:-1] += rng.uniform(-0.3, 0.3, 29) / 30
         step = step_front(x, new, u, 1e-3, 0.1 * k, 0.1, lambda t: np.array([0.7, 0.7]))
-        x, u = new, step.u
+        x = new
+        u = step.u
     assert np.abs(u - 0.7).max() < 1e-13
 
 
 def test_second_order_on_nodes_that_move_smoothly():
     """Space and time refined together, nodes swinging by a given law."""
-    exact, errors = BurgersFronts(0.02, (1.0, 0.0), (0.3,)), []
+    exact = BurgersFronts(0.02, (1.0, 0.0), (0.3,))
+    errors = []
     for n in (40, 80, 160, 320):
-        x, steps = sway(n, 0.0), n
+        x = sway(n, 0.0)
+        steps = n
         u = exact.compute_cell_averages(x, 0.0)
         for k in range(steps):
             new = sway(n, 0.6 * (k + 1) / steps)

@@ -44,9 +44,13 @@ def test_a_stream_carries_the_bubble_and_nothing_happens(gas):
             assert np.abs(moved[1]).max() < 1e-9 * RADIUS
 
 
-LIGHT, HEAVY = IdealGas(1.4), IdealGas(1.249)
-AIR_G, HEAVY_G = 1.0 / (LIGHT.gamma - 1.0), 1.0 / (HEAVY.gamma - 1.0)
-LEFT, RIGHT = (1.0, 0.0, 2.0), (3.0, 0.0, 1.0)  # density, velocity, pressure
+LIGHT = IdealGas(1.4)
+HEAVY = IdealGas(1.249)
+AIR_G = 1.0 / (LIGHT.gamma - 1.0)
+HEAVY_G = 1.0 / (HEAVY.gamma - 1.0)
+# density, velocity, pressure
+LEFT = (1.0, 0.0, 2.0)
+RIGHT = (3.0, 0.0, 1.0)
 
 
 def make_tube(n, upward):
@@ -97,7 +101,9 @@ def test_even_pressure_and_velocity_stay_even_where_gases_meet():
     rng = np.random.default_rng(7)
     state = np.ones((5, 12, 16))
     state[0] = rng.uniform(1.0, 4.0, state[0].shape)
-    state[1], state[2], state[3] = 0.6, 0.0, 2.0
+    state[1] = 0.6
+    state[2] = 0.0
+    state[3] = 2.0
     state[4] = rng.uniform(AIR_G, HEAVY_G, state[0].shape)
     flow = TwoGasFlow(state, (1.5, 0.6, 0.0, 2.0, AIR_G), 0.1)
     for _ in range(20):

@@ -144,7 +144,8 @@ def pair():
         run = RunControl(t_end=3.4e-6, cfl=0.8)
         problem = make_problem(cells=64, ripple_phase=phase, run=run)
         simulation = problem.build()
-        rows, lines = [simulation.start_row() | {"t": 0.0} | problem.measure(simulation)], []
+        rows = [simulation.start_row() | {"t": 0.0} | problem.measure(simulation)]
+        lines = []
         while not simulation.finished:
             rows.append(simulation.advance() | problem.measure(simulation))
             cone = next(block for block in simulation.blocks if block.name == "cone")
@@ -165,7 +166,8 @@ def find_line(lines, t, places, frame):
 def test_growth_is_that_of_the_impulse_and_the_slip(pair):
     """The bend of the side is the same in both runs and drops out of half their difference."""
     problem, history, _, simulation = pair[0]
-    frame, ripple = problem.ripple.frame, problem.ripple
+    frame = problem.ripple.frame
+    ripple = problem.ripple
     crossed, waves = measure_waves(problem, history)
     wave = waves[-1]  # the first still has the steel's fold in its window
     grown = []

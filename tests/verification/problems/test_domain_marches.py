@@ -57,7 +57,8 @@ def test_barrier_marches_to_the_end(name):
 @pytest.mark.parametrize("turn", TURNS)
 @pytest.mark.parametrize("name", ["airfoil", "swan", "chicane"])
 def test_same_grid_in_every_orientation(name, turn):
-    found, turned = march_turned(name), march_turned(name, turn)
+    found = march_turned(name)
+    turned = march_turned(name, turn)
     assert np.abs(turned.nodes - TURNS[turn](found.nodes)).max() < 1e-9 * np.ptp(found.nodes)
     assert turned.sine == pytest.approx(found.sine, rel=1e-6)
     assert turned.aspect == pytest.approx(found.aspect, rel=1e-6)

@@ -33,9 +33,11 @@ def test_a_shock_in_one_gas_flattens_a_line_and_adds_no_waves(ka0):
 
 
 CELLS = 64  # a wavelength
-LIGHT, HEAVY = Fluid(rho=1.0), Fluid(rho=3.0)
+LIGHT = Fluid(rho=1.0)
+HEAVY = Fluid(rho=3.0)
 GASES = {"1:1": (LIGHT, LIGHT), "1:3": (LIGHT, HEAVY), "3:1": (HEAVY, LIGHT)}
-ALUMINIUM, STEEL = Fluid(material="Al1100"), Fluid(material="SS304")
+ALUMINIUM = Fluid(material="Al1100")
+STEEL = Fluid(material="SS304")
 
 
 def follow_flat_line(first: Fluid, second: Fluid, farther: float, **deck) -> tuple[float, float]:
@@ -53,7 +55,8 @@ def follow_flat_line(first: Fluid, second: Fluid, farther: float, **deck) -> tup
     problem = InterfaceInstability(
         InterfaceDeck(first=first, second=second, cells=CELLS, gap=gap, **flat, **deck)
     )
-    flow, way = problem.build(), []
+    flow = problem.build()
+    way = []
     while flow.finished is None:
         flow.advance()
         way.append((flow.t, flow.blocks[0].nodes[0, -1, 0]))
@@ -134,7 +137,8 @@ def run_flat(mach: float, ratio: float, cfl: float, kct: float) -> list[np.ndarr
         run=RunControl(cfl=cfl),
     )
     problem = InterfaceInstability(deck)
-    flow, base = problem.build(), problem.theory.base
+    flow = problem.build()
+    base = problem.theory.base
     while flow.finished is None:
         flow.advance()
     since = flow.t - problem.arrival
@@ -162,7 +166,8 @@ def measure_rate(cells: int, kct: float, **deck) -> tuple[float, float]:
     """(da/dt)/(k a0) over 6 < k c t < `kct` in a run, and by linear theory."""
     problem = InterfaceInstability(InterfaceDeck(cells=cells, kct_end=kct, **deck))
     flow = problem.build()
-    times, heights = [], []
+    times = []
+    heights = []
     while flow.finished is None:
         flow.advance()
         times.append(flow.t)

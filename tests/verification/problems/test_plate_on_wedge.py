@@ -26,7 +26,9 @@ from regrid.measure.quality import least_corner_area
 from runs.cli.main import main
 from runs.store.reader import RunData
 
-BAR_PRESSURE, BAR_ANGLE, BAR_SPEED = 0.01, 0.15, 0.02
+BAR_PRESSURE = 0.01
+BAR_ANGLE = 0.15
+BAR_SPEED = 0.02
 ALONG = 0.97  # of the face: the polars are measured before A comes to B
 
 
@@ -36,7 +38,8 @@ def make_problem(**options) -> PlateOnWedge:
 
 def march_convex(problem, until=None):
     """Run to the end or until `until(run)`; returns run and history.  Every cell is convex."""
-    run, rows = problem.build(), []
+    run = problem.build()
+    rows = []
     while not run.finished and not (until and until(run)):
         rows.append(run.advance() | run.measure())
         for block in run.blocks:
@@ -60,7 +63,8 @@ def check_attached(problem, bar=BAR_PRESSURE, bar_angle=BAR_ANGLE) -> None:
         return run.measure()["contact_path"] > ALONG * problem.deck.face
 
     _, history = march_convex(problem, is_far)
-    theory, behind = problem.collision, measure_behind(problem, history)
+    theory = problem.collision
+    behind = measure_behind(problem, history)
     speed, spread = measure_contact_speed(problem, history)
     assert speed == pytest.approx(theory.contact_speed, rel=BAR_SPEED) and spread < BAR_SPEED
     assert measure_plateau(problem, history).p == pytest.approx(theory.p, rel=bar)
@@ -161,7 +165,8 @@ def test_impact_on_a_sliding_contact(pair):
         run.advance()
         if run.t > 1.25e-6:
             track.append((run.t, blocks[1].nodes[0, -1].mean()))
-    (start, back), (stop, further) = track[0], track[-1]
+    start, back = track[0]
+    stop, further = track[-1]
     released = shock.particle_speed + release(target.eos, shock.rho, p)[1]
     assert (further - back) / (stop - start) == pytest.approx(released, rel=2e-3)
     for block, part in zip(blocks, (slice(-30, -8), slice(6, columns // 3)), strict=True):

@@ -149,7 +149,8 @@ def run(**settings):
 @pytest.mark.parametrize("explosive", ["TNT", pytest.param("Comp-B", marks=pytest.mark.slow)])
 def test_peak_and_taylor_wave_converge(explosive):
     """The peak comes to pCJ from below, the wave behind it at first order, finest 400 cells."""
-    peaks, errors = [], []
+    peaks = []
+    errors = []
     for cells in (100, 200, 400):
         problem, history, simulation = run(explosive=explosive, behind="wall", cells=cells)
         found = problem.errors(history)
@@ -172,7 +173,8 @@ def test_a_front_left_to_itself_goes_at_the_chapman_jouguet_speed(explosive):
 @pytest.mark.parametrize("explosive", ["TNT", "Comp-B"])
 def test_the_peak_of_a_front_left_to_itself_converges(explosive):
     """What expands goes on burning; otherwise the peaks are 47, 35 and 23 % low."""
-    peaks, waves = [], []
+    peaks = []
+    waves = []
     for cells in (100, 200, 400):
         problem, history, _ = run(explosive=explosive, behind="wall", cells=cells, clock=0.1)
         found = problem.errors(history)

@@ -42,7 +42,8 @@ LEAST_STEPS = 5
 
 
 def assert_same(one, other, where):
-    one, other = np.asarray(one), np.asarray(other)
+    one = np.asarray(one)
+    other = np.asarray(other)
     assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), where
 
 
@@ -50,8 +51,11 @@ def assert_same(one, other, where):
 def test_five_steps_and_a_restart_in_the_middle_are_the_same_bits(name):
     """Every problem of the registry; those with many cells by default get few in SMALL."""
     deck = read_deck(name, SMALL.get(name, ()))
-    problem, problem_again = deck.make_problem(), deck.make_problem()
-    whole, half, again = problem.build(), deck.make_problem().build(), problem_again.build()
+    problem = deck.make_problem()
+    problem_again = deck.make_problem()
+    whole = problem.build()
+    half = deck.make_problem().build()
+    again = problem_again.build()
     start = whole.start_row() if hasattr(whole, "start_row") else {}
     rows = []
     while len(rows) < LEAST_STEPS and whole.finished is None:
@@ -65,7 +69,8 @@ def test_five_steps_and_a_restart_in_the_middle_are_the_same_bits(name):
         for key in row:
             if not key.startswith("seconds_"):
                 assert_same(row[key], same[key], key)
-    one, other = whole.get_state(), again.get_state()
+    one = whole.get_state()
+    other = again.get_state()
     assert one.keys() == other.keys()
     for key in one:
         assert_same(one[key], other[key], key)

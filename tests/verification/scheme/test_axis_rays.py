@@ -24,7 +24,8 @@ def make_problem(cells, part):
 
 def make_cut_shell(problem, part=0.5):
     """The same shell in two blocks, with a contact between two layers."""
-    shell, nodes = problem.shell, problem.make_grids()["shell"]
+    shell = problem.shell
+    nodes = problem.make_grids()["shell"]
     rho = shell.compute_density(problem.compute_layers(nodes), 0.0)
     cut = round(part * rho.shape[0])
     blocks = []

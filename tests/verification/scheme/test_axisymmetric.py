@@ -18,7 +18,8 @@ def make_grid(cells, low, high, left=-1.0, right=1.0):
     """Nodes between two lines y = low(x) and y = high(x)."""
     x = np.linspace(left, right, cells[0] + 1)
     part = np.linspace(0.0, 1.0, cells[1] + 1)
-    bottom, top = np.broadcast_to(low(x), x.shape), np.broadcast_to(high(x), x.shape)
+    bottom = np.broadcast_to(low(x), x.shape)
+    top = np.broadcast_to(high(x), x.shape)
     y = bottom[:, None] + (top - bottom)[:, None] * part
     return np.array([np.repeat(x[:, None], part.size, 1), y])
 
@@ -37,7 +38,8 @@ def measure_deviation(simulation, densities):
 @pytest.mark.parametrize("along", ["axial line", "radial line"])
 def test_shaken_grid_keeps_a_stream(contact, along):
     """Every node is thrown about at every step; those on the axis along it."""
-    n, random = 10, np.random.default_rng(5)
+    n = 10
+    random = np.random.default_rng(5)
     x, y = box((-1, 0), (1, 1), (2 * n, n))
     base = np.array([x + 0.1 * (1.0 - x * x) * np.cos(np.pi * y), y])
     if along == "axial line":
@@ -255,7 +257,8 @@ def make_shaken_rod(threads=1):
 
 
 def test_restart_and_threads_give_the_same_bits():
-    one, two = make_shaken_rod(), make_shaken_rod(threads=2)
+    one = make_shaken_rod()
+    two = make_shaken_rod(threads=2)
     march(one, 5)
     march(two, 5)
     assert get_bits(one) == get_bits(two)

@@ -23,8 +23,10 @@ def compute_rate(cut):
 
 def make_streams(cells, cut, k_a=1e-3):
     """Two streams of one gas, periodic along their contact, in the growing wave of theory."""
-    y, away = np.linspace(0.0, 1.0, cells + 1), np.linspace(0.0, 1.0, cells + 1)
-    amplitude, blocks = k_a / K, []
+    y = np.linspace(0.0, 1.0, cells + 1)
+    away = np.linspace(0.0, 1.0, cells + 1)
+    amplitude = k_a / K
+    blocks = []
     for sign, name in ((-1.0, "left"), (1.0, "right")):
         distance = away[::-1] if sign < 0.0 else away
         x = sign * distance[:, None] + amplitude * np.cos(K * y) * (1.0 - distance[:, None])
@@ -33,7 +35,8 @@ def make_streams(cells, cut, k_a=1e-3):
             nodes[:, 1:, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, 1:] + nodes[:, :-1, :-1]
         )
         fade = amplitude * np.exp(-K * np.abs(part[0]))
-        sine, cosine = np.sin(K * part[1]), np.cos(K * part[1])
+        sine = np.sin(K * part[1])
+        cosine = np.cos(K * part[1])
         # the gas moves by the growth and what takes the line back
         speed = 0.5 * sign * SLIP
         grows = 0.5 * K * SLIP * (compute_rate(cut) + 2.0 * cut**3)
@@ -83,7 +86,8 @@ def test_masses_and_energy_stay_though_material_flows_along_the_line():
         assert after[name] == pytest.approx(before[name], rel=1e-14)
 
 
-GAMMA, T_END = 1.4, 0.4
+GAMMA = 1.4
+T_END = 0.4
 
 
 def measure_error(kind: str, cells: int) -> float:

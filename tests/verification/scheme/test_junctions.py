@@ -29,31 +29,39 @@ def fill(corners, cells, bends=(0.0, 0.0, 0.0, 0.0)):
         arch = np.sin(math.pi * part)
         arch[[0, -1]] = 0.0
         points = start[:, None] + (end - start)[:, None] * part + bend * away[:, None] * arch
-        points[:, 0], points[:, -1] = start, end
+        points[:, 0] = start
+        points[:, -1] = end
         return points
 
     ni, nj = cells
-    low, right = line(a, b, ni, bends[0]), line(b, c, nj, bends[1])
-    high, left = line(d, c, ni, bends[2]), line(a, d, nj, bends[3])
-    s, q = np.linspace(0, 1, ni + 1)[None, :, None], np.linspace(0, 1, nj + 1)[None, None, :]
+    low = line(a, b, ni, bends[0])
+    right = line(b, c, nj, bends[1])
+    high = line(d, c, ni, bends[2])
+    left = line(a, d, nj, bends[3])
+    s = np.linspace(0, 1, ni + 1)[None, :, None]
+    q = np.linspace(0, 1, nj + 1)[None, None, :]
     nodes = (1 - q) * low[:, :, None] + q * high[:, :, None]
     nodes = nodes + (1 - s) * left[:, None, :] + s * right[:, None, :]
     corner_part = (1 - s) * ((1 - q) * a[:, None, None] + q * d[:, None, None])
     corner_part = corner_part + s * ((1 - q) * b[:, None, None] + q * c[:, None, None])
     nodes = nodes - corner_part
-    nodes[:, :, 0], nodes[:, :, -1] = low, high
-    nodes[:, 0], nodes[:, -1] = left, right
+    nodes[:, :, 0] = low
+    nodes[:, :, -1] = high
+    nodes[:, 0] = left
+    nodes[:, -1] = right
     return nodes
 
 
 def make_tee(geometry, make):
     """One stands beside two and three, which lie on each other; all lines are bent."""
-    middle, split = 0.1, 0.45
+    middle = 0.1
+    split = 0.45
     wall = 0.08
     one = fill(((-1, 0), (middle, 0), (middle, 1), (-1, 1)), (10, 12))
     # the line of one towards the others is bent as a whole, its nodes shared by both
     y = one[1, -1]
-    y[:6], y[5:] = np.linspace(0.0, split, 6), np.linspace(split, 1.0, 8)
+    y[:6] = np.linspace(0.0, split, 6)
+    y[5:] = np.linspace(split, 1.0, 8)
     one = np.array([
         np.linspace(-1.0, middle + wall * np.sin(2.0 * y), 11),
         np.broadcast_to(y, (11, y.size)),
@@ -83,7 +91,8 @@ def make_wye(geometry, make):
     ends = [np.array([0.05, 0.0]), np.array([0.95, 1.0]), np.array([-0.85, 1.0])]
     corners = [np.array([1.0, 0.0]), np.array([0.1, 1.2]), np.array([-1.0, 0.0])]
     # each block: centre, end k, outer corner, end k + 1, anticlockwise
-    blocks, n = [], 8
+    blocks = []
+    n = 8
     for k, name in enumerate(DENSITIES):
         nodes = fill(
             (centre, ends[k], corners[k], ends[(k + 1) % 3]), (n, n), (0.05, 0.0, 0.0, 0.05)
@@ -101,7 +110,8 @@ def make_wye(geometry, make):
 
 def make_sliding_tee(geometry, make, all_slide=False):
     """Two and three, with an interface between them, carry the line on which one slides."""
-    split, count = 0.45, 15
+    split = 0.45
+    count = 15
     y = np.concatenate((np.linspace(0.0, split, 7), np.linspace(split, 1.0, 10)[1:]))
     edge = np.array([0.1 + 0.08 * np.sin(2.0 * y), y])
     tip = edge[:, 6]

@@ -14,9 +14,11 @@ from hydro.eos import IdealGas
 from hydro.links import join
 from hydro.simulation import Simulation
 
-GAS, HEAVY = IdealGas(1.4), IdealGas(1.2)
+GAS = IdealGas(1.4)
+HEAVY = IdealGas(1.2)
 STEPS = 25
-NI, NJ = 14, 10
+NI = 14
+NJ = 10
 
 
 def turn(array, quarters):
@@ -43,7 +45,8 @@ def make_flow(kind, turn_left=0, turn_right=0, plane=False, mesh="regrid", leads
         middle = 0.25 * (grid[0, 1:, 1:] + grid[0, :-1, 1:] + grid[0, 1:, :-1] + grid[0, :-1, :-1])
         behind = middle < -0.3
         rho = np.where(behind, 1.6, 3.0 if heavy and name == "right" else 1.0)
-        p, u = np.where(behind, 2.0, 1.0), np.where(behind, 0.6, 0.0)
+        p = np.where(behind, 2.0, 1.0)
+        u = np.where(behind, 0.6, 0.0)
         blocks[name] = Block(
             name,
             HEAVY if heavy and name == "right" else GAS,

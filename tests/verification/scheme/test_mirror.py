@@ -10,7 +10,8 @@ from hydro.eos import IdealGas
 from hydro.links import join
 from hydro.simulation import Simulation
 
-NI, NJ = 14, 12
+NI = 14
+NJ = 12
 
 
 def make_flow(flip_x=False, flip_y=False, mesh="regrid"):
@@ -34,7 +35,8 @@ def make_flow(flip_x=False, flip_y=False, mesh="regrid"):
     blocks = {}
     for name, gamma, rho in (("light", 1.4, 1.0), ("heavy", 1.2, 4.0)):
         blocks[name] = Block(name, IdealGas(gamma), grids[name], rho, 0.0, 0.0, 1.0)
-    light, heavy = blocks["light"], blocks["heavy"]
+    light = blocks["light"]
+    heavy = blocks["heavy"]
     pair = (light, sides["i_max"]), (heavy, sides["i_min"])
     links = [join("interface", *(pair[::-1] if flip_x else pair))]
     if mesh == "regrid":
@@ -49,20 +51,24 @@ def make_flow(flip_x=False, flip_y=False, mesh="regrid"):
 
 def compare(flip_x, flip_y, steps=40, **options):
     """Largest difference of states and nodes between a flow and its mirror image turned back."""
-    plain, image = make_flow(**options), make_flow(flip_x, flip_y, **options)
+    plain = make_flow(**options)
+    image = make_flow(flip_x, flip_y, **options)
     worst = 0.0
     for _ in range(steps):
         plain.advance()
         image.advance()
         assert image.t == pytest.approx(plain.t, rel=1e-12)
     for one, two in zip(plain.blocks, image.blocks, strict=True):
-        state, nodes = two.state[:, 1:-1, 1:-1].copy(), two.nodes.copy()
+        state = two.state[:, 1:-1, 1:-1].copy()
+        nodes = two.nodes.copy()
         if flip_x:
-            state, nodes = state[:, ::-1], nodes[:, ::-1]
+            state = state[:, ::-1]
+            nodes = nodes[:, ::-1]
             state[1] *= -1.0
             nodes[0] *= -1.0
         if flip_y:
-            state, nodes = state[:, :, ::-1], nodes[:, :, ::-1]
+            state = state[:, :, ::-1]
+            nodes = nodes[:, :, ::-1]
             state[2] *= -1.0
             nodes[1] *= -1.0
         worst = max(worst, np.abs(state - one.state[:, 1:-1, 1:-1]).max())

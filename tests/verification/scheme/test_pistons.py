@@ -53,7 +53,8 @@ def test_uniform_flow_along_pistons(turn):
     velocity = (0.3, 0.5)
     blocks, rotation = make_layers(turn, velocity, bend=0.1)
     first = [block.nodes.copy() for block in blocks]
-    across, along = rotation @ (velocity[0], 0.0), rotation @ (0.0, velocity[1])
+    across = rotation @ (velocity[0], 0.0)
+    along = rotation @ (0.0, velocity[1])
     simulation, rows = run(
         blocks, [("piston", {"velocity": across}), ("piston", {"velocity": along})], 60
     )
@@ -121,7 +122,8 @@ def test_the_slope_ends_at_the_piston(side):
         first, count = block.side_faces(side)
         found = sign * block.rim.u_ghost[first : first + count]
         np.testing.assert_allclose(found, ghost, rtol=1e-14)
-        towards, away = float(found[0]) - 0.7, 0.7 - second
+        towards = float(found[0]) - 0.7
+        away = 0.7 - second
         slope = min(0.5 * (towards + away), 2.0 * towards, 2.0 * away)
         assert slope <= 0.6 + 1e-14
 
@@ -161,7 +163,8 @@ def test_release_has_the_speed_of_the_exact_isentrope(name, shocked_to, pressure
     simulation = Simulation([plate], [], t_end=0.7 * crossing)
     start = simulation.start_row()
     while not simulation.finished:
-        before, t = plate.nodes[0, -1].copy(), simulation.t
+        before = plate.nodes[0, -1].copy()
+        t = simulation.t
         row = simulation.advance()
     speed = (plate.nodes[0, -1] - before) / (simulation.t - t)
     exact = up + release(eos, shock.rho, shock.p, pressure)[1]
@@ -189,10 +192,12 @@ def test_work_of_a_pressure_piston_is_the_energy_gained(eos, rho, p):
 
     plate = make_plate(eos, (rho, 0.0, 0.0, p), cells, 0.0, pressure)
     simulation = Simulation([plate], [], t_end=0.8)
-    start, work = simulation.start_row(), 0.0
+    start = simulation.start_row()
+    work = 0.0
     height = np.ptp(plate.nodes[1, -1])
     while not simulation.finished:
-        before, t = plate.nodes[0, -1].copy(), simulation.t
+        before = plate.nodes[0, -1].copy()
+        t = simulation.t
         row = simulation.advance()
         along = np.diff(plate.nodes[1, -1]) / height
         moved = plate.nodes[0, -1] - before

@@ -20,10 +20,13 @@ from hydro.simulation import Simulation
 from reference_sliding import find_points, find_positions
 from reference_step import take_step
 
-GAS, WATER = (IdealGas(1.4), 1.2, 1e5), (StiffenedGas(4.4, 6e8), 1000.0, 3e8)
+GAS = (IdealGas(1.4), 1.2, 1e5)
+WATER = (StiffenedGas(4.4, 6e8), 1000.0, 3e8)
 METAL = (MieGruneisen(2707.0, 5386.0, 1.339, 1.97), 2800.0, 6e9)
 MATERIALS = {"gas": (GAS, GAS), "metal": (METAL, WATER)}
-STEPS, SHAKE = 6, 0.017  # of nodes [m]: a tenth of a cell, anew in every step
+# of nodes [m]: a tenth of a cell, anew in every step
+STEPS = 6
+SHAKE = 0.017
 OTHERS = "upper", "follower"  # blocks of the second material
 EXACT = 1e-12  # of the largest density, sound speed, rho c squared
 
@@ -32,7 +35,10 @@ class Shaken:
     """A mesh law: nodes that shake about where they were, those of linked sides alike."""
 
     def __init__(self, grids, alike, on_axis, random):
-        self.grids, self.alike, self.on_axis, self.random = grids, alike, on_axis, random
+        self.grids = grids
+        self.alike = alike
+        self.on_axis = on_axis
+        self.random = random
         self.shaken = {}
 
     def __call__(self, name, t):
@@ -46,7 +52,8 @@ class Shaken:
             for key in self.on_axis:
                 found[key][1, :, 0] = 0.0
             if "follower" in found:  # its nodes lie on the leader's line
-                line, points = found["leader"][:, :, -1], found["follower"][:, :, 0]
+                line = found["leader"][:, :, -1]
+                points = found["follower"][:, :, 0]
                 for end in (0, -1):
                     if self.grids["follower"][0, end, 0] == self.grids["leader"][0, end, 0]:
                         points[:, end] = line[:, end]
@@ -58,7 +65,8 @@ class Shaken:
 def make_state(nodes, material, rough, random):
     """Density, velocities and pressure: noise, or waves a few cells long."""
     eos, rho, p = material
-    c, (x, y) = float(eos.sound_speed(rho, p)), nodes[:, :-1, :-1]
+    c = float(eos.sound_speed(rho, p))
+    x, y = nodes[:, :-1, :-1]
     numbers = random.uniform(-2.0, 2.0, (4, 3))
     waves = [np.sin(a * x + b * y + phase) for a, b, phase in numbers]
     if rough:
@@ -75,13 +83,15 @@ def make_state(nodes, material, rough, random):
 
 def make_block(name, materials, nodes, rough, random, **options):
     eos, *_ = material = materials[name in OTHERS]
-    state, words = make_state(nodes(name, 0.0), material, rough, random), f"of {name in OTHERS}"
+    state = make_state(nodes(name, 0.0), material, rough, random)
+    words = f"of {name in OTHERS}"
     return Block(name, eos, nodes(name, 0.0), *state, material=words, **options)
 
 
 def make_flow(materials, geometry, rough, limiter=DEFAULT_LIMITER, flux=DEFAULT_FLUX, seed=1):
     """A block below and one above an interface, one beside the lower one, and one alone."""
-    random, curved = np.random.default_rng(seed), geometry == "axisymmetric"
+    random = np.random.default_rng(seed)
+    curved = geometry == "axisymmetric"
     low = 0.0 if curved else 0.5
     grids = {
         "lower": box((0.0, low), (1.0, low + 0.8), (6, 5)),
@@ -89,7 +99,8 @@ def make_flow(materials, geometry, rough, limiter=DEFAULT_LIMITER, flux=DEFAULT_
         "beside": box((1.0, low), (1.6, low + 0.8), (4, 5)),
         "alone": box((3.0, 1.0), (3.8, 1.9), (5, 6)),
     }
-    first_row, last_row = np.s_[:, :, 0], np.s_[:, :, -1]
+    first_row = np.s_[:, :, 0]
+    last_row = np.s_[:, :, -1]
     alike = [
         (("lower", last_row), ("upper", first_row), (0.0, 0.0)),
         (("lower", np.s_[:, -1, :]), ("beside", np.s_[:, 0, :]), (0.0, 0.0)),
@@ -102,7 +113,8 @@ def make_flow(materials, geometry, rough, limiter=DEFAULT_LIMITER, flux=DEFAULT_
     blocks = [make_block(name, materials, nodes, rough, random, **options) for name in grids]
     lower, upper, beside, alone = blocks
     (eos, rho, p), (other, other_rho, other_p) = materials
-    c, other_c = float(eos.sound_speed(rho, p)), float(other.sound_speed(other_rho, other_p))
+    c = float(eos.sound_speed(rho, p))
+    other_c = float(other.sound_speed(other_rho, other_p))
     links = [
         join("interface", (lower, "j_max"), (upper, "j_min")),
         join("seam", (lower, "i_max"), (beside, "i_min")),
@@ -132,7 +144,8 @@ def make_sliding_flow(materials, rough):
 
     The follower covers all of a gas; a condensed leader goes on, as a free surface, at one end.
     """
-    random, gas = np.random.default_rng(1), materials is MATERIALS["gas"]
+    random = np.random.default_rng(1)
+    gas = materials is MATERIALS["gas"]
     grids = {
         "leader": box((0.0, 0.0), (1.0, 0.8), (6, 5)),
         "follower": box((0.0, 0.8), (1.0 if gas else 0.87, 1.8), (8, 6)),
@@ -159,15 +172,18 @@ def follow(simulation):
     """March with the reference beside each step; kinds of sides, retries and torn cells seen."""
     torn = retries = 0
     for _ in range(STEPS):
-        start, given = simulation.t, [hold(block) for block in simulation.blocks]
+        start = simulation.t
+        given = [hold(block) for block in simulation.blocks]
         row = simulation.advance()
         retries += row["retries"]
         for block, now in zip(given, simulation.blocks, strict=True):
             block.nodes_new = now.nodes
-        exchange, curved = simulation.exchange, simulation.geometry.curved
+        exchange = simulation.exchange
+        curved = simulation.geometry.curved
         found = take_step(given, exchange.links, start, row["dt"], curved, exchange.contacts)
         for block, (state, void) in zip(simulation.blocks, found, strict=True):
-            rho, c2 = state[0].max(), block.eos.sound_speed(state[0], state[3]).max() ** 2
+            rho = state[0].max()
+            c2 = block.eos.sound_speed(state[0], state[3]).max() ** 2
             got = *block.state[:, 1:-1, 1:-1], block.void_energy
             sizes = rho, c2**0.5, c2**0.5, rho * c2, c2
             for fast, plain, size in zip(got, (*state, void), sizes, strict=True):

@@ -10,7 +10,8 @@ from hydro.links import join
 from hydro.simulation import Simulation
 from regrid.measure.corners import compute_centres
 
-NI, NJ = 40, 36
+NI = 40
+NJ = 36
 CUTS = {
     "halves along i": ((0, 17, NI), (0, NJ)),
     "halves along j": ((0, NI), (0, 15, NJ)),
@@ -38,9 +39,11 @@ def make_flow(cut_i, cut_j, fluid, geometry):
     eos, rho0, p0, c = FLUIDS[fluid]
     centre = compute_centres(place_all(0.0))
     hot = np.hypot(centre[0] - 0.4, centre[1] - 0.45) < 0.15
-    rho, p = np.where(hot, 1.2, 1.0) * rho0, np.where(hot, 6.0, 0.5) * p0
+    rho = np.where(hot, 1.2, 1.0) * rho0
+    p = np.where(hot, 6.0, 0.5) * p0
     u, v = 0.1 * c * np.sin(3.0 * centre[1]), 0.05 * c * np.cos(4.0 * centre[0])
-    blocks, spans = {}, {}
+    blocks = {}
+    spans = {}
     for a in range(len(cut_i) - 1):
         for b in range(len(cut_j) - 1):
             i = slice(cut_i[a], cut_i[a + 1])

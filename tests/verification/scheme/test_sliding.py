@@ -16,7 +16,8 @@ from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
 GAS = IdealGas(1.4)
-MACH, SLIP = 2.0, 0.7
+MACH = 2.0
+SLIP = 0.7
 P_SHOCKED = 1.0 + 2.8 / 2.4 * (MACH**2 - 1.0)
 U_PISTON = math.sqrt(1.4) * 2.0 / 2.4 * (MACH - 1.0 / MACH)
 ANGLES = (0.0, math.radians(33.0))
@@ -24,7 +25,8 @@ ANGLES = (0.0, math.radians(33.0))
 
 def turn_back(pair, angle):
     """Parts of vectors along and across the contact."""
-    cosine, sine = math.cos(angle), math.sin(angle)
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
     return cosine * pair[0] + sine * pair[1], cosine * pair[1] - sine * pair[0]
 
 
@@ -42,12 +44,15 @@ def make_planar(
     `speeds` along the contact: a leader's grid goes with it.  `cuts`: where the lower and the
     upper row are cut into blocks joined by seams; a follower's seams should be at rest.
     """
-    cosine, sine = math.cos(angle), math.sin(angle)
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
 
     def turned(along, across):
         return cosine * along - sine * across, sine * along + cosine * across
 
-    links, rows, blocks = [], [], []
+    links = []
+    rows = []
+    blocks = []
     for name, n, low, parts, speed in zip(
         ("low", "high"), cells, (-1.0, 0.0), cuts, speeds, strict=True
     ):
@@ -116,7 +121,9 @@ def test_matching_nodes_without_slip_are_an_interface():
         assert np.abs(one - two).max() < 1e-10
 
 
-RADII, SPEED, PRESSURE = (1.0, 2.0, 3.0), 1.0, 2.0
+RADII = (1.0, 2.0, 3.0)
+SPEED = 1.0
+PRESSURE = 2.0
 RATE = SPEED / RADII[1]
 HEAVY = 1000.0  # density of the ring: of equal densities the slipping layer would roll up
 
@@ -134,7 +141,8 @@ def compute_annulus_pressure(centres):
 
 def make_annulus(cells, turns):
     """`cells` across and 4 `cells` around each; the ring at rest has a quarter fewer around."""
-    around, around_ring = 4 * cells, 3 * cells
+    around = 4 * cells
+    around_ring = 3 * cells
     outside = make_ring(RADII[1], RADII[2], cells, around_ring)
     inside = make_ring(RADII[0], RADII[1], cells, around)
     places = np.linspace(0.0, around_ring, around + 1)
@@ -169,7 +177,8 @@ def measure_annulus(cells, turns):
 
 
 def check_annulus(cells, turns, bar, converging=("annulus", "ring", "radius")):
-    coarse, fine = measure_annulus(cells, turns), measure_annulus(2 * cells, turns)
+    coarse = measure_annulus(cells, turns)
+    fine = measure_annulus(2 * cells, turns)
     for name in ("annulus", "ring", "radius"):
         assert fine[name] < bar, name
     for name in converging:

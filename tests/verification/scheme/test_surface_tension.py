@@ -46,7 +46,9 @@ BOX = 2.0  # radius of the wall around a drop of radius 1
 
 def march_amplitude(simulation, measure):
     """March to the end; the frequency of what `measure()` gives, and the history."""
-    t, found, rows = [0.0], [measure()], [simulation.start_row()]
+    t = [0.0]
+    found = [measure()]
+    rows = [simulation.start_row()]
     while not simulation.finished:
         rows.append(simulation.advance())
         t.append(simulation.t)
@@ -80,7 +82,8 @@ def make_waves(cells, mach, rho, limiter="monotonised-central"):
         return omega * omega * inertia - tension * K * K
 
     omega = brentq(miss, 0.5, 1.2)
-    blocks, links = [], []
+    blocks = []
+    links = []
     parts = zip(("left", "right"), (1.0, -1.0), grids, rho, find_depths(omega), strict=False)
     for name, sign, grid, density, q in parts:
         x, y = compute_centres(grid)
@@ -100,7 +103,8 @@ def make_waves(cells, mach, rho, limiter="monotonised-central"):
 
 def measure_wave(simulation):
     x, y = simulation.blocks[0].nodes[:, -1]
-    steps, wave = np.diff(y), np.cos(K * 0.5 * (y[1:] + y[:-1]))
+    steps = np.diff(y)
+    wave = np.cos(K * 0.5 * (y[1:] + y[:-1]))
     return float((0.5 * (x[1:] + x[:-1]) * wave * steps).sum() / (wave * wave * steps).sum())
 
 
@@ -153,7 +157,8 @@ def make_drop_grids(cells, squash, curved, uneven):
     east = np.array([0.5 - 0.1 * part**2, 0.4 * part])
     core = np.zeros((2, part.size, part.size))
     core[0, :, 0] = core[1, 0] = 0.5 * part
-    core[:, -1], core[:, :, -1] = east, east[::-1]
+    core[:, -1] = east
+    core[:, :, -1] = east[::-1]
     fill_from_sides(core.copy(), core)
     grids = {"core": core}
     for turn, (name, curve) in enumerate((("east", east), ("north", east[::-1, ::-1]))):
@@ -186,10 +191,12 @@ def make_drop(cells, mach, rho, squash, curved, uneven=0.0, periods=PERIODS):
         return omega**2 * (rho[0] * pushes[0] - rho[1] * pushes[1]) - (4.0 if curved else 3.0)
 
     omega = brentq(miss, 0.5, 4.0)
-    b, links = {}, []
+    b = {}
+    links = []
     for name, grid in make_drop_grids(cells, squash, curved, uneven).items():
         around = name.startswith("around")
-        c, wall = speeds[around], BOX if around else None
+        c = speeds[around]
+        wall = BOX if around else None
         x, y = compute_centres(grid)
         push = find_push(np.hypot(x, y), omega / c, curved, wall)
         push *= rho[around] * omega**2 * squash * compute_mode(np.arctan2(y, x), curved)
@@ -218,8 +225,10 @@ def measure_drop(simulation, curved):
     """Amplitude of the second mode of the surface."""
     lines = [block.nodes[:, -1] for block in simulation.blocks if block.name in ("east", "north")]
     x, y = np.concatenate([lines[0], lines[1][:, 1:]], axis=1)
-    radius, angle = np.hypot(x, y), np.arctan2(y, x)
-    steps, middle = np.diff(angle), 0.5 * (angle[1:] + angle[:-1])
+    radius = np.hypot(x, y)
+    angle = np.arctan2(y, x)
+    steps = np.diff(angle)
+    middle = 0.5 * (angle[1:] + angle[:-1])
     mode = compute_mode(middle, curved)
     weight = mode * steps * (np.sin(middle) if curved else 1.0)
     return float(((0.5 * (radius[1:] + radius[:-1]) - 1.0) * weight).sum() / (mode * weight).sum())

@@ -98,7 +98,8 @@ class FailsOnce:
     """A regridder that fails at its third call."""
 
     def __init__(self, regridder):
-        self.regridder, self.calls = regridder, 0
+        self.regridder = regridder
+        self.calls = 0
 
     def regrid(self, previous, boundary):
         self.calls += 1
@@ -176,7 +177,9 @@ def test_a_follower_and_its_leader_cut(places):
 class SeesDensity:
     """A regridder of which nodes follow the density of cells anywhere in the block."""
 
-    sees_flow, owns_sides, free_sides = True, False, ()
+    sees_flow = True
+    owns_sides = False
+    free_sides = ()
 
     def take_step(self, fields, fraction):
         self.density = fields["rho"].copy()
@@ -201,10 +204,12 @@ def test_a_step_that_fails_in_a_band_is_tried_again_or_told_by_all(times, stands
         simulation = build_tube(
             u=lambda i, j: np.where(i < 47, -3.0, 3.0) + 0.01 * j, p=1e-3, mesh="fixed"
         )
-        simulation.clock.rate, simulation.clock.t_end = simulation.clock.rate / times, 1e9
+        simulation.clock.rate = simulation.clock.rate / times
+        simulation.clock.t_end = 1e9
         return simulation
 
-    places, seen = [(2, 0, 1)], []
+    places = [(2, 0, 1)]
+    seen = []
     if stands:
         assert check_cut(build, 6, places)[0]["retries"] > 0
         march_on_ranks(3, build, 1, places=places, look=lambda s: seen.append(s.last_reason))

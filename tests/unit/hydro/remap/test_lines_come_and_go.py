@@ -65,7 +65,8 @@ CHANGES = {4: ([0, 5, 11], []), 9: (range(15), []), 14: ([], [1, 3, 8]), 19: ([]
 def test_totals_stay_while_lines_come_and_go():
     push = (1.0, 0.3, 0.1, 1.0), (3.0, -0.2, 0.0, 1.5)
     flow = make_flow(push, CHANGES)
-    rows, counts = [flow.start_row() | {"t": 0.0}], []
+    rows = [flow.start_row() | {"t": 0.0}]
+    counts = []
     for _ in range(25):
         rows.append(flow.advance())
         counts.append(flow.blocks[0].nj)
@@ -116,7 +117,8 @@ def test_a_restart_before_at_and_after_new_lines_gives_the_same_bits():
     march_until_split(flow)
     at = flow.step
     assert at % EVERY == 0
-    flow, kept = make_mushroom(), {}
+    flow = make_mushroom()
+    kept = {}
     while flow.step < at + EVERY + 5:
         flow.advance()
         if flow.step in (at - 3, at - 1, at, at + 1, at + 7):

@@ -13,7 +13,8 @@ from hydro.remap.overlay import compute_cell_moments, lay_over, make_linear_fiel
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
 
-LOW, HIGH = (0.0, 0.3), (1.0, 1.5)
+LOW = (0.0, 0.3)
+HIGH = (1.0, 1.5)
 
 
 def shake(cells, seed, part=0.25):
@@ -21,22 +22,28 @@ def shake(cells, seed, part=0.25):
     nodes = box(LOW, HIGH, cells)
     steps = [(b - a) / n for a, b, n in zip(LOW, HIGH, cells, strict=True)]
     away = np.random.default_rng(seed).uniform(-part, part, nodes.shape)
-    away[:, [0, -1]], away[:, :, [0, -1]] = 0.0, 0.0
+    away[:, [0, -1]] = 0.0
+    away[:, :, [0, -1]] = 0.0
     return nodes + away * np.reshape(steps, (2, 1, 1))
 
 
 def average(function, nodes, curved):
     """Cell means of a function, by a fine grid of points in each cell."""
     points = (np.arange(12) + 0.5) / 12
-    total, weight = 0.0, 0.0
-    a, b, c, d = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
+    total = 0.0
+    weight = 0.0
+    a = nodes[:, :-1, :-1]
+    b = nodes[:, 1:, :-1]
+    c = nodes[:, 1:, 1:]
+    d = nodes[:, :-1, 1:]
     for s in points:
         for t in points:
             x, y = (1 - t) * ((1 - s) * a + s * b) + t * ((1 - s) * d + s * c)
             along = (1 - t) * (b - a) + t * (c - d)
             across = (1 - s) * (d - a) + s * (c - b)
             area = (along[0] * across[1] - along[1] * across[0]) * (y if curved else 1.0)
-            total, weight = total + function(x, y) * area, weight + area
+            total = total + function(x, y) * area
+            weight = weight + area
     return total / weight
 
 
@@ -53,7 +60,8 @@ def test_moments_of_cells_are_those_of_the_flow_and_of_quadrature(curved):
 @pytest.mark.parametrize("curved", [False, True])
 @pytest.mark.parametrize("cells", [(31, 23), (9, 40), (20, 17)])
 def test_linear_fields_are_exact_everywhere(curved, cells):
-    old, new = shake((20, 17), 1), shake(cells, 2)
+    old = shake((20, 17), 1)
+    new = shake(cells, 2)
 
     def linear(nodes):
         _, (x, y) = compute_cell_moments(nodes, curved)
@@ -64,7 +72,8 @@ def test_linear_fields_are_exact_everywhere(curved, cells):
 
 @pytest.mark.parametrize("curved", [False, True])
 def test_sums_are_kept_and_no_cell_is_missed(curved):
-    old, new = shake((24, 19), 4), shake((37, 11), 5)
+    old = shake((24, 19), 4)
+    new = shake((37, 11), 5)
     means = np.random.default_rng(6).normal(size=(3, 24, 19))
     volumes, centres = compute_cell_moments(old, curved)
     overlay = lay_over(old, centres, make_linear_fields(means, old, centres), new, curved)
@@ -82,7 +91,8 @@ def test_smooth_fields_are_of_second_order(curved):
 
     errors = []
     for n in (10, 20, 40):
-        old, new = shake((n, n), 12, 0.15), shake((3 * n // 2, n), 13, 0.15)
+        old = shake((n, n), 12, 0.15)
+        new = shake((3 * n // 2, n), 13, 0.15)
         found = remap_means(average(wave, old, curved)[None], old, new, curved)[0]
         volumes, _ = compute_cell_moments(new, curved)
         away = np.abs(found - average(wave, new, curved))
@@ -102,7 +112,8 @@ def sum_up(eos, nodes, state, void_energy, curved):
 
 def assert_same_totals(eos, old, new, curved=False):
     """old, new: nodes, state, void energy."""
-    before, after = sum_up(eos, *old, curved), sum_up(eos, *new, curved)
+    before = sum_up(eos, *old, curved)
+    after = sum_up(eos, *new, curved)
     volumes, _ = compute_cell_moments(old[0], curved)
     size = (np.abs(compute_conserved(eos, *old[1:])) * volumes).sum(axis=(1, 2))
     assert (np.abs(after - before) <= 1e-13 * size).all(), (after - before) / size
@@ -120,8 +131,10 @@ def wild_state(cells, seed):
 @pytest.mark.parametrize("curved", [False, True])
 @pytest.mark.parametrize("seed", range(3))
 def test_any_state_stays_one_and_keeps_its_totals(seed, curved):
-    old, new = shake((14, 18), seed), shake((29, 23), seed + 10)
-    state, nothing = wild_state((14, 18), seed), np.zeros((14, 18))
+    old = shake((14, 18), seed)
+    new = shake((29, 23), seed + 10)
+    state = wild_state((14, 18), seed)
+    nothing = np.zeros((14, 18))
     found, void, slivers = remap_state("gas", GAS, curved, old, state, nothing, new)
     assert is_state(GAS, found).all() and not void.any() and slivers.count == 0
     assert_same_totals(GAS, (old, state, nothing), (new, found, void), curved)
@@ -130,7 +143,8 @@ def test_any_state_stays_one_and_keeps_its_totals(seed, curved):
 
 
 def test_uniform_velocity_and_pressure_stay_so():
-    old, new = shake((20, 20), 1), shake((33, 27), 2)
+    old = shake((20, 20), 1)
+    new = shake((33, 27), 2)
     _, (x, _) = compute_cell_moments(old, False)
     rho = np.where(x > 0.4, 1000.0, 1.0)
     state = np.array([rho, *np.broadcast_to(np.reshape([3.0, -2.0, 5.0], (3, 1, 1)), (3, 20, 20))])
@@ -142,7 +156,8 @@ def test_uniform_velocity_and_pressure_stay_so():
 
 def test_bad_grids_are_told():
     old = shake((8, 8), 1)
-    state, nothing = wild_state((8, 8), 2), np.zeros((8, 8))
+    state = wild_state((8, 8), 2)
+    nothing = np.zeros((8, 8))
     with pytest.raises(BadInput, match=r"block 'gas': the outlines .* differ by .* of its volume"):
         remap_state("gas", GAS, False, old, state, nothing, 1.1 * old)
     folded = old.copy()
@@ -163,12 +178,14 @@ def make_pair(cells, pressures=(2.0, 1.0), second="wall"):
 
 @pytest.mark.parametrize("cells", [(12, 16), (9, 5), (8, 8)])
 def test_moving_lines_and_their_budget(cells):
-    old, new = make_pair((8, 8)), make_pair(cells)
+    old = make_pair((8, 8))
+    new = make_pair(cells)
     rows = [old.start_row(), *march(old, 12)]
     take_over(old, new)
     left, right = new.blocks
     assert (left.nodes[:, -1] == right.nodes[:, 0]).all(), "both have the same line"
-    line, before = left.nodes[:, -1], old.blocks[0].nodes[:, -1]
+    line = left.nodes[:, -1]
+    before = old.blocks[0].nodes[:, -1]
     assert (line[:, [0, -1]] == before[:, [0, -1]]).all(), "its ends stay where they are"
     assert np.abs(np.interp(line[1], before[1], before[0]) - line[0]).max() < 1e-13
     rows += march(new, 12)

@@ -29,7 +29,8 @@ def fine_form(work, d):
     work.change[:] = d
     total = 0.0
     for c in range(work.columns.size - 1):
-        first, last = work.whole_columns[c], work.whole_columns[c + 1]
+        first = work.whole_columns[c]
+        last = work.whole_columns[c + 1]
         multiply_fine(
             (work.solution, work.z, work.z), -1.0, first, last, work.H[c], work.product,
             work.totals, work.scratch[c],

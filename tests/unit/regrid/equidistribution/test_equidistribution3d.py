@@ -20,7 +20,8 @@ def horn(p):
 def shell(q):
     """Part of a spherical shell with equal volumes: r = (1 + 7 q1)^(1/3), cosine linear in q2."""
     r = np.cbrt(1.0 + 7.0 * q[0])
-    cosine, longitude = q[1] - 0.5, 1.2 * q[2]
+    cosine = q[1] - 0.5
+    longitude = 1.2 * q[2]
     sine = np.sqrt(1.0 - cosine * cosine)
     return r * np.array([sine * np.cos(longitude), sine * np.sin(longitude), -cosine])
 
@@ -46,7 +47,8 @@ def test_tensor_grid_is_exact():
 
 
 def test_spherical_shell_is_second_order():
-    errors, spreads = [], []
+    errors = []
+    spreads = []
     for steps in (6, 12):
         exact = shell(cube(steps, steps, steps))
         found = solve_ed3(exact, 1.0, 400, 1e-9)

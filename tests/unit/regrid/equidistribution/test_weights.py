@@ -42,7 +42,8 @@ def bent_grid(ni=16, nj=12):
 
 
 def test_position_follows_the_grid_and_fields_stay_with_the_cells():
-    grid, moved = bent_grid(), bent_grid() + 0.25
+    grid = bent_grid()
+    moved = bent_grid() + 0.25
     weight = Weight("1 + x*x").on(grid, grid)
     assert np.allclose(weight(moved), 1.0 + compute_centres(moved)[0] ** 2)
     carried = Weight("1 + rho", smoothing=0)

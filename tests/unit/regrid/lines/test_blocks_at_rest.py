@@ -9,12 +9,15 @@ from regrid.barrier.tuning import DEFAULT
 from regrid.domains import make_domain
 from regrid.measure.quality import measure_quality
 
-CELLS, STIFFEST = (60, 40), DEFAULT.stiffness
+CELLS = (60, 40)
+STIFFEST = DEFAULT.stiffness
 
 
 def marched(name):
-    domain, regridder = make_domain(name, *CELLS), BarrierRegridder()
-    nodes, steps = domain.start, domain.suggested_steps
+    domain = make_domain(name, *CELLS)
+    regridder = BarrierRegridder()
+    nodes = domain.start
+    steps = domain.suggested_steps
     for step in range(1, steps + 1):
         nodes = regridder.regrid(nodes, domain.boundary(step / steps)).nodes
     return nodes, np.ascontiguousarray(domain.boundary(1.0))
@@ -24,13 +27,16 @@ def marched(name):
 def test_a_sharp_block_settles(name):
     nodes, sides = marched(name)
     cell = np.ptp(nodes[0]) / 40.0
-    settled, strict = BarrierRegridder(), BarrierRegridder(floor=1e-7)
+    settled = BarrierRegridder()
+    strict = BarrierRegridder(floor=1e-7)
     for _ in range(50):
-        last, nodes = nodes, settled.regrid(nodes, sides).nodes
+        last = nodes
+        nodes = settled.regrid(nodes, sides).nodes
     assert np.abs(nodes - last).max() < 1e-6 * cell
     motions = []
     for _ in range(50):
-        last, nodes = nodes, strict.regrid(nodes, sides).nodes
+        last = nodes
+        nodes = strict.regrid(nodes, sides).nodes
         motions.append(np.abs(nodes - last).max() / cell)
     assert motions[-1] < 1e-4 and motions[-1] <= 0.01 * max(motions)
     assert name == "jet" or measure_quality(nodes).least_scaled_jacobian < 0.06

@@ -36,11 +36,13 @@ def last_sides(name, ni=24, nj=16):
 
 
 def march(domain, regridder):
-    nodes, steps = domain.start, domain.suggested_steps
+    nodes = domain.start
+    steps = domain.suggested_steps
     rescues = 0
     for step in range(1, steps + 1):
         result = regridder.regrid(nodes, domain.boundary(step / steps))
-        nodes, rescues = result.nodes, rescues + result.report.rescues + result.report.sub_moves
+        nodes = result.nodes
+        rescues = rescues + result.report.rescues + result.report.sub_moves
     return nodes, rescues
 
 

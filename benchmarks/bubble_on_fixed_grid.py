@@ -27,13 +27,13 @@ from hydro.formulas.reconstruction import limit_van_leer as limit
 from problems.shock_bubble import (
     AIR,
     AIR_DENSITY,
+    AIR_PRESSURE,
+    BUBBLE_RADIUS,
     FEATURES,
+    FIRST_GAP_RADII,
     FOCUS,
-    GAP,
     HALF_HEIGHT,
-    MICRO,
-    PRESSURE,
-    RADIUS,
+    SECONDS_PER_MICROSECOND,
     ShockBubble,
     ShockBubbleDeck,
 )
@@ -198,7 +198,7 @@ def measure(flow: TwoGasFlow, x: np.ndarray, problem: ShockBubble) -> tuple[floa
     gas = 1.0 / (problem.eos.gamma - 1.0)
     share = (flow.q[4] - air) / (gas - air)
     p = flow.state[3]
-    fronts = (p[0], 1.05 * PRESSURE), (p[-1], 0.5 * (PRESSURE + problem.shock.p))
+    fronts = (p[0], 1.05 * AIR_PRESSURE), (p[-1], 0.5 * (AIR_PRESSURE + problem.shock.p))
     return (
         find_first(share[0], 0.5, x),
         -find_first(share[0, ::-1], 0.5, -x[::-1]),
@@ -212,16 +212,18 @@ def make_flow(problem: ShockBubble, cells: int) -> tuple[TwoGasFlow, np.ndarray]
 
     The channel is so many whole cells high as come nearest to it, at 50 cells 1 % less or more.
     """
-    size = 2.0 * RADIUS / cells
-    x = (np.arange(round(LEFT * RADIUS / size), round(RIGHT * RADIUS / size)) + 0.5) * size
+    size = 2.0 * BUBBLE_RADIUS / cells
+    x = (
+        np.arange(round(LEFT * BUBBLE_RADIUS / size), round(RIGHT * BUBBLE_RADIUS / size)) + 0.5
+    ) * size
     y = (np.arange(round(HALF_HEIGHT / size)) + 0.5) * size
     points = size * ((np.arange(PARTS) + 0.5) / PARTS - 0.5)
     share = np.zeros((y.size, x.size))
     for along in points:
         for up in points:
-            share += np.hypot(x + along, y[:, None] + up) < RADIUS
+            share += np.hypot(x + along, y[:, None] + up) < BUBBLE_RADIUS
     share /= PARTS**2
-    behind = np.clip((-(1.0 + GAP) * RADIUS - x) / size + 0.5, 0.0, 1.0)
+    behind = np.clip((-(1.0 + FIRST_GAP_RADII) * BUBBLE_RADIUS - x) / size + 0.5, 0.0, 1.0)
     shock = problem.shock
     air = 1.0 / (AIR.gamma - 1.0)
     gas = 1.0 / (problem.eos.gamma - 1.0)
@@ -230,7 +232,7 @@ def make_flow(problem: ShockBubble, cells: int) -> tuple[TwoGasFlow, np.ndarray]
         outside + share * (problem.rho - outside),
         np.broadcast_to(behind * shock.particle_speed, share.shape),
         np.zeros(share.shape),
-        np.broadcast_to(PRESSURE + behind * (shock.p - PRESSURE), share.shape),
+        np.broadcast_to(AIR_PRESSURE + behind * (shock.p - AIR_PRESSURE), share.shape),
         air + share * (gas - air),
     ])  # fmt: skip
     return TwoGasFlow(state, (shock.rho, shock.particle_speed, 0.0, shock.p, air), size), x
@@ -252,7 +254,7 @@ def main(gas: str, cells: str, last: str) -> None:
     `last`: end [µs after the shock's arrival].
     """
     problem = ShockBubble(ShockBubbleDeck(gas=gas))
-    history = march(problem, int(cells), problem.arrival + float(last) * MICRO)
+    history = march(problem, int(cells), problem.arrival + float(last) * SECONDS_PER_MICROSECOND)
     for feature in FEATURES[gas]:
         print(f"{feature.words:28s}{problem.fit_velocity(history, feature)[1]:8.1f} m/s")
     if gas in FOCUS:

@@ -20,7 +20,7 @@ from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
 from hydro.interior.advance import allocate_scratch, count_tiles, make_flow_kernels
 from hydro.interior.cell_fields import (
-    SLAB,
+    SLAB_ROWS,
     CellFields,
     check_first_state,
     make_fill_sound_speed,
@@ -181,9 +181,9 @@ class Block:
         self.limiter = limiter
         self.flux_name = flux
         # one row per tile, and one for polygon cells of sliding contacts and sources
-        self.tile_totals = np.zeros((count_tiles(self.ni, self.nj) + 1, of.TOTALS))
+        self.tile_totals = np.zeros((count_tiles(self.ni, self.nj) + 1, of.TOTAL_ROWS))
         self.tile_totals[-1, of.LEAST_C2] = of.NO_C2
-        self.sums_array = np.zeros(of.TOTALS)  # of the tiles, and their list while valid
+        self.sums_array = np.zeros(of.TOTAL_ROWS)  # of the tiles, and their list while valid
         self._summed: list[float] | None = None
         self.scratch = allocate_scratch(1)
         count = 2 * (self.ni + self.nj)
@@ -463,8 +463,8 @@ class Block:
 
     def fill_energy(self, rho: np.ndarray, p: np.ndarray, voids: np.ndarray, e: np.ndarray) -> None:
         """Specific internal energies `e` [J/kg] from density, pressure and void energy: (n, nj)."""
-        for first in range(0, len(e), SLAB):
-            rows = slice(first, first + SLAB)
+        for first in range(0, len(e), SLAB_ROWS):
+            rows = slice(first, first + SLAB_ROWS)
             e[rows] = self.eos.energy(rho[rows], p[rows]) + voids[rows]
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:

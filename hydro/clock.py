@@ -9,7 +9,7 @@ import numpy as np
 from regrid.jit import read_clock
 
 START_FACTORS = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the stable step: the first steps of a run
-RECOVERY = 1.3  # growth of the step after it was cut
+STEP_RECOVERY = 1.3  # growth of the step after it was cut
 MOST_STRETCHING = 0.25  # relative displacement of neighbouring line nodes over their distance
 
 
@@ -69,7 +69,7 @@ class Clock:
 
     def tick(self, dt: float, limit: str, rate: float, stretching: float) -> bool:
         """Take a step that stands; returns whether it was the last."""
-        self.retry_dt = RECOVERY * dt if limit == "retry" else np.inf
+        self.retry_dt = STEP_RECOVERY * dt if limit == "retry" else np.inf
         last = dt >= self.t_end - self.t
         self.t = self.t_end if last else self.t + dt
         self.dt = dt

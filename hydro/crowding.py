@@ -14,9 +14,9 @@ from regrid.jit import kernel
 
 # Bins of the histogram of crowding: binary exponent and three mantissa bits, from 2^-128 to 2^128
 # per square metre.
-BINS = 2048
-CUT = 52 - 3
-FIRST = (1023 - 128) << 3
+SIZE_BINS = 2048
+BIN_SHIFT = 52 - 3
+FIRST_BIN = (1023 - 128) << 3
 FAR_OUT = 1.2  # times the crowding exceeded by the fraction `share` of a block's cells
 
 
@@ -27,7 +27,7 @@ def count_crowding(crowding, counts):
     for i in range(crowding.shape[0]):
         digits = crowding[i].view(np.int64)
         for j in range(digits.shape[0]):
-            counts[min(max((digits[j] >> CUT) - FIRST, 0), BINS - 1)] += 1
+            counts[min(max((digits[j] >> BIN_SHIFT) - FIRST_BIN, 0), SIZE_BINS - 1)] += 1
 
 
 @kernel
@@ -39,7 +39,7 @@ def choose_bin(counts, cells, share, far_out):
     """
     allowed = share * cells
     above = 0
-    top = BINS - 1
+    top = SIZE_BINS - 1
     while top > 0 and counts[top] == 0:
         top -= 1
     bin = top
@@ -47,8 +47,8 @@ def choose_bin(counts, cells, share, far_out):
         above += counts[bin]
         bin -= 1
     edges = np.empty(2, dtype=np.int64)
-    edges[0] = (bin + FIRST) << CUT
-    edges[1] = (top + 1 + FIRST) << CUT
+    edges[0] = (bin + FIRST_BIN) << BIN_SHIFT
+    edges[1] = (top + 1 + FIRST_BIN) << BIN_SHIFT
     low, high = edges.view(np.float64)
     if high <= far_out * low:
         return -1, 0, low
@@ -62,7 +62,7 @@ def keep_bin(crowding, bin, kept):
     for i in range(crowding.shape[0]):
         digits = crowding[i].view(np.int64)
         for j in range(digits.shape[0]):
-            if (digits[j] >> CUT) - FIRST == bin:
+            if (digits[j] >> BIN_SHIFT) - FIRST_BIN == bin:
                 kept[size] = crowding[i, j]
                 size += 1
     return size

@@ -24,7 +24,7 @@ FLUX_ROWS = 6
     TOTAL_ENERGY,
     VOIDED,
 ) = range(7)
-TOTALS = 7
+TOTAL_ROWS = 7
 CONSERVED = slice(TOTAL_MASS, VOIDED)
 MOMENTUM_AND_ENERGY = slice(TOTAL_MOMENTUM_X, VOIDED)
 NO_C2 = 1e300  # least c² of no cell at all

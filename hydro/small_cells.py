@@ -29,8 +29,8 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.crowding import (
-    BINS,
     FAR_OUT,
+    SIZE_BINS,
     find_most_crowded_of_bands,
     scan_rates,
     scan_rates_of_bands,
@@ -49,16 +49,18 @@ from regrid.jit import compiled_once, kernel
 
 MOST_REACH = 6  # cells of a neighbourhood on either side of its own cell
 CONSERVED_ROWS = 4  # per volume: mass, momentum x and y, energy
-RELAXED = 0.1  # fraction of a state redistributed per step, besides all of the step's change
+RELAXED_FRACTION = (
+    0.1  # fraction of a state redistributed per step, besides all of the step's change
+)
 # rows of a cell's record: what it redistributes per volume, mean and slope of its neighbourhood,
 # position of that mean along the line, volume, number of its neighbourhoods, what it keeps per
 # volume
-MEAN = 4
-SLOPE = 8
-LEVER = 12
-VOLUME = 13
-PARTS = 14
-KEPT = 15
+MEAN_ROW = 4
+SLOPE_ROW = 8
+LEVER_ROW = 12
+VOLUME_RECORD_ROW = 13
+PARTS_ROW = 14
+KEPT_PARTS = 15
 RECORD_ROWS = 19
 
 
@@ -185,8 +187,8 @@ def make_redistribution(eos_class, geometry: Geometry):
                     if marks[a, b] == 0:
                         marks[a, b] = 1
                         touched.append((a, b))
-                        record[PARTS, a, b] = 1.0 if reaches[a, b] == 0 else 0.0
-                    record[PARTS, a, b] += 1.0
+                        record[PARTS_ROW, a, b] = 1.0 if reaches[a, b] == 0 else 0.0
+                    record[PARTS_ROW, a, b] += 1.0
         for n in range(small.shape[0]):
             # a cell beyond either end of a neighbourhood determines its slope
             i, j = small[n]
@@ -197,7 +199,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                 if 0 <= a < ni and 0 <= b < nj and marks[a, b] == 0:
                     marks[a, b] = 2
                     touched.append((a, b))
-                    record[PARTS, a, b] = 1.0
+                    record[PARTS_ROW, a, b] = 1.0
 
     @compiled_once
     def fill_means(small, reaches, nodes, record):
@@ -207,7 +209,7 @@ def make_redistribution(eos_class, geometry: Geometry):
         for n in range(small.shape[0]):
             i, j = small[n]
             along_i = reaches[i, j] > 0
-            volume = record[VOLUME, i, j] / record[PARTS, i, j]
+            volume = record[VOLUME_RECORD_ROW, i, j] / record[PARTS_ROW, i, j]
             lever = 0.0
             for q in range(CONSERVED_ROWS):
                 total[q] = volume * record[q, i, j]
@@ -217,13 +219,13 @@ def make_redistribution(eos_class, geometry: Geometry):
                 a = max(row, 0)
                 b = max(column, 0)
                 if row == a and column == b:
-                    v1 = record[VOLUME, a, b] / record[PARTS, a, b]
+                    v1 = record[VOLUME_RECORD_ROW, a, b] / record[PARTS_ROW, a, b]
                     d1 = find_way(nodes, i, j, a, b)
                 row, column = (i + way, j) if along_i else (i, j + way)
                 c = min(row, ni - 1)
                 d = min(column, nj - 1)
                 if row == c and column == d:
-                    v2 = record[VOLUME, c, d] / record[PARTS, c, d]
+                    v2 = record[VOLUME_RECORD_ROW, c, d] / record[PARTS_ROW, c, d]
                     d2 = find_way(nodes, i, j, c, d)
                 # if a side has no such cell its weight is zero
                 volume += v1 + v2
@@ -233,8 +235,8 @@ def make_redistribution(eos_class, geometry: Geometry):
                         v2 * record[q, c, d] if v2 > 0.0 else 0.0
                     )
             for q in range(CONSERVED_ROWS):
-                record[MEAN + q, i, j] = total[q] / volume
-            record[LEVER, i, j] = lever / volume
+                record[MEAN_ROW + q, i, j] = total[q] / volume
+            record[LEVER_ROW, i, j] = lever / volume
 
     @compiled_once
     def fill_slopes(small, reaches, nodes, record):
@@ -249,23 +251,23 @@ def make_redistribution(eos_class, geometry: Geometry):
             a, b = (i - way, j) if along_i else (i, j - way)
             c, d = (i + way, j) if along_i else (i, j + way)
             low, high = a >= 0 and b >= 0, c < ni and d < nj
-            here = record[LEVER, i, j]
+            here = record[LEVER_ROW, i, j]
             before = after = 1.0
             if low:
-                turn = record[LEVER, a, b] if (reaches[a, b] > 0) == along_i else 0.0
+                turn = record[LEVER_ROW, a, b] if (reaches[a, b] > 0) == along_i else 0.0
                 far = find_way(nodes, i, j, a, b)
                 gap = here + far - turn
                 # neighbourhoods whose means nearly coincide determine no slope
                 before = 1.0 / gap if gap > 0.5 * far else 0.0
             if high:
-                turn = record[LEVER, c, d] if (reaches[c, d] > 0) == along_i else 0.0
+                turn = record[LEVER_ROW, c, d] if (reaches[c, d] > 0) == along_i else 0.0
                 far = find_way(nodes, i, j, c, d)
                 gap = far + turn - here
                 after = 1.0 / gap if gap > 0.5 * far else 0.0
             for q in range(CONSERVED_ROWS):
-                mean = record[MEAN + q, i, j]
-                one = (mean - record[MEAN + q, a, b]) * before if low else 0.0
-                two = (record[MEAN + q, c, d] - mean) * after if high else 0.0
+                mean = record[MEAN_ROW + q, i, j]
+                one = (mean - record[MEAN_ROW + q, a, b]) * before if low else 0.0
+                two = (record[MEAN_ROW + q, c, d] - mean) * after if high else 0.0
                 ones[q] = one if low else two
                 twos[q] = two if high else one
             # momentum along the line and across it, so that slopes are rotation invariant
@@ -275,10 +277,10 @@ def make_redistribution(eos_class, geometry: Geometry):
             x, y = x / length, y / length
             along = limit_slope(x * ones[1] + y * ones[2], x * twos[1] + y * twos[2])
             across = limit_slope(x * ones[2] - y * ones[1], x * twos[2] - y * twos[1])
-            record[SLOPE, i, j] = limit_slope(ones[0], twos[0])
-            record[SLOPE + 1, i, j] = x * along - y * across
-            record[SLOPE + 2, i, j] = y * along + x * across
-            record[SLOPE + 3, i, j] = limit_slope(ones[3], twos[3])
+            record[SLOPE_ROW, i, j] = limit_slope(ones[0], twos[0])
+            record[SLOPE_ROW + 1, i, j] = x * along - y * across
+            record[SLOPE_ROW + 2, i, j] = y * along + x * across
+            record[SLOPE_ROW + 3, i, j] = limit_slope(ones[3], twos[3])
 
     @compiled_once
     def gather_shares(i, j, reaches, nodes, record, pair, line, total):
@@ -298,18 +300,18 @@ def make_redistribution(eos_class, geometry: Geometry):
                         continue
                     far = find_way(nodes, i, j, a, b)
                     # the other cell's neighbourhood is on that side: this cell precedes it
-                    far = (-far if side > 0 else far) - record[LEVER, a, b]
+                    far = (-far if side > 0 else far) - record[LEVER_ROW, a, b]
                     for q in range(CONSERVED_ROWS):
-                        pair[q] += record[MEAN + q, a, b] + record[SLOPE + q, a, b] * far
+                        pair[q] += record[MEAN_ROW + q, a, b] + record[SLOPE_ROW + q, a, b] * far
                 for q in range(CONSERVED_ROWS):
                     line[q] += pair[q]
             for q in range(CONSERVED_ROWS):
                 total[q] += line[q]
-        far = -record[LEVER, i, j]
-        part = 1.0 / record[PARTS, i, j]
+        far = -record[LEVER_ROW, i, j]
+        part = 1.0 / record[PARTS_ROW, i, j]
         for q in range(CONSERVED_ROWS):
-            own = record[MEAN + q, i, j] + record[SLOPE + q, i, j] * far
-            total[q] = (total[q] + own) * part + record[KEPT + q, i, j]
+            own = record[MEAN_ROW + q, i, j] + record[SLOPE_ROW + q, i, j] * far
+            total[q] = (total[q] + own) * part + record[KEPT_PARTS + q, i, j]
 
     @kernel
     def redistribute(squeezed, grids, excess, inverse_dt, parameters, before, after, scratch):
@@ -335,13 +337,22 @@ def make_redistribution(eos_class, geometry: Geometry):
         for i, j in touched:
             voided -= 1 if marks[i, j] == 1 and void_energy[i, j] != 0.0 else 0
             fill_conserved(state, void_energy, i, j, 1.0, parameters, 0, record)
-            fill_conserved(start, start_void_energy, i, j, 1.0 - RELAXED, parameters, KEPT, record)
-            record[VOLUME, i, j] = find_volume(nodes_new, excess, i, j, ni, nj)
-            record[LEVER, i, j] = 0.0
+            fill_conserved(
+                start,
+                start_void_energy,
+                i,
+                j,
+                1.0 - RELAXED_FRACTION,
+                parameters,
+                KEPT_PARTS,
+                record,
+            )
+            record[VOLUME_RECORD_ROW, i, j] = find_volume(nodes_new, excess, i, j, ni, nj)
+            record[LEVER_ROW, i, j] = 0.0
             for q in range(CONSERVED_ROWS):
-                record[q, i, j] -= record[KEPT + q, i, j]
-                record[MEAN + q, i, j] = record[q, i, j]
-                record[SLOPE + q, i, j] = 0.0
+                record[q, i, j] -= record[KEPT_PARTS + q, i, j]
+                record[MEAN_ROW + q, i, j] = record[q, i, j]
+                record[SLOPE_ROW + q, i, j] = 0.0
         fill_means(small, reaches, nodes_new, record)
         fill_slopes(small, reaches, nodes_new, record)
         least = 1e300
@@ -392,7 +403,7 @@ def make_redistribution(eos_class, geometry: Geometry):
     return redistribute
 
 
-MARGIN = 1.0 + 1e-9  # a rate must exceed a limit by more than round-off
+RATE_MARGIN = 1.0 + 1e-9  # a rate must exceed a limit by more than round-off
 TOUCHED_REACH = MOST_REACH + 1  # rows beyond a squeezed cell that its redistribution reads
 
 
@@ -478,7 +489,7 @@ class SmallCells:
         self.allowed = float(share)
         self.start = start
         self.part = 0.0  # of `allowed`, by `set_time`
-        self.counts = np.zeros(BINS, dtype=np.int64)
+        self.counts = np.zeros(SIZE_BINS, dtype=np.int64)
         self.kept = np.empty(max(block.ni * block.nj for block in blocks))
         self.changed = 0
         self.fastest = Fastest(0.0, 0, 0, 0)
@@ -502,7 +513,7 @@ class SmallCells:
             if rate > most.rate:
                 most = Fastest(rate, number, int(i), int(j))
         self.fastest = most
-        if most.rate <= limit * MARGIN:
+        if most.rate <= limit * RATE_MARGIN:
             return most.rate
         above = self._find_rows_above(limit)
         for number, cut in self.blocks.cuts.items():
@@ -551,9 +562,9 @@ class SmallCells:
         self.changed = 0
         for sharing in self.sharing:
             sharing.block.shared_cells = 0  # from the last step, or from this one before a retry
-        if self.fastest.rate <= rate * MARGIN:
+        if self.fastest.rate <= rate * RATE_MARGIN:
             return
-        limit = rate * MARGIN
+        limit = rate * RATE_MARGIN
         above = self._find_rows_above(limit)
         for number, cut in self.blocks.cuts.items():
             block = cut.block

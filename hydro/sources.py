@@ -120,8 +120,8 @@ class BodySource:
         return push, gained
 
 
-LEAD = 0.5  # fraction of the front's width that is ahead of the front
-STARTED = 0.5  # burn fraction from which a self-propagating front burns the rest
+FRONT_LEAD_FRACTION = 0.5  # fraction of the front's width that is ahead of the front
+STARTED_BURN_FRACTION = 0.5  # burn fraction from which a self-propagating front burns the rest
 
 
 @dataclass(frozen=True)
@@ -213,7 +213,7 @@ class ProgrammedBurn:
             way = np.hypot(x, y)
         else:
             way = x * self.direction[0] + y * self.direction[1]
-        edge = speed * t + LEAD * self.width
+        edge = speed * t + FRONT_LEAD_FRACTION * self.width
         return 1.0 - (1.0 - np.clip((edge - way) / self.width, 0.0, 1.0)) ** 2
 
     def __call__(self, block, x, y, t, dt):
@@ -235,7 +235,7 @@ class ProgrammedBurn:
         # heat at constant volume raises p and with it the work in `burnt`
         lacking = lacking / (1.0 - 0.5 * eos.omega * rho * squeezed / eos.rho0)
         if t > stop:
-            ending = (burnt > STARTED) & find_expanding(block)
+            ending = (burnt > STARTED_BURN_FRACTION) & find_expanding(block)
             lacking = np.maximum(
                 lacking, np.where(ending, self.find_rest(block, explosive, dt), 0.0)
             )

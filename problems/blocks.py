@@ -54,10 +54,10 @@ from regrid.protocol import call_regridder
 from regrid.sides import SIDE_NAMES, compute_area
 from regrid.text_files import read_columns
 
-SAMPLES = 1025  # points on a curve given by formulas
+FORMULA_CURVE_POINTS = 1025  # points on a curve given by formulas
 # of the regridder; the last moves no node by more cells than that
-PASSES = 20
-SETTLED = 1e-3
+MOST_SETTLING_PASSES = 20
+SETTLED_NODE_MOVE = 1e-3
 # Text such as "1e5*(1 + 0.1*sin(pi*x))": of x and y [m] in a state, of the time t [s] at a side, of
 # the part s of the way from 0 to 1 along a curve; parsed (`Expression`), never run.
 Formula = float | str
@@ -239,7 +239,7 @@ def read_curve(block: BlockTable, side: str) -> np.ndarray:
         words = f"{len(curve.cells)} numbers for {pieces} straight lines between points"
         raise BadInput(f"{where}: cells has {words}")
     if curve.points is None:
-        s = {"s": np.linspace(0.0, 1.0, SAMPLES if block.cells else 2)}
+        s = {"s": np.linspace(0.0, 1.0, FORMULA_CURVE_POINTS if block.cells else 2)}
         values = [evaluate(getattr(curve, axis), s, f"{where}, {axis}") for axis in "xy"]
         return make_polyline(np.array(values), side, where)
     points = np.array(curve.points).T
@@ -298,11 +298,11 @@ def settle(nodes: np.ndarray, boundary: np.ndarray, deck: BlocksDeck) -> np.ndar
         return nodes
     count = (nodes.shape[1] - 1) * (nodes.shape[2] - 1)
     cell = np.sqrt(abs(compute_area(nodes)) / count)
-    for _ in range(PASSES):
+    for _ in range(MOST_SETTLING_PASSES):
         new = call_regridder(regridder, nodes, boundary).nodes
         moved = np.abs(new - nodes).max()
         nodes = new
-        if moved < SETTLED * cell:
+        if moved < SETTLED_NODE_MOVE * cell:
             break
     return nodes
 

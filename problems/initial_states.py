@@ -35,8 +35,8 @@ from regrid.measure.cells import compute_area_fractions
 from regrid.sides import SIDE_NAMES
 
 Symmetry = Literal["plane", "cylindrical", "spherical"]
-STRIP = 4  # cells across the strip of plane flow
-POINTS = 6  # for means over a cell, each way
+STRIP_CELLS = 4  # cells across the strip of plane flow
+CELL_MEAN_POINTS = 6  # for means over a cell, each way
 LEAST_RISE = 1e-3  # of the density over that of the cold gas: less is no shock
 
 
@@ -164,7 +164,7 @@ class RadialProblem(Problem):
     def lay_nodes(self, size: float) -> np.ndarray:
         """Nodes (2, cells + 1, n) of the rectangle from the centre to `size` [m]."""
         line = np.linspace(0.0, size, self.deck.cells + 1)
-        return make_plane_grid(line, line[: STRIP + 1] if self.plane else line)
+        return make_plane_grid(line, line[: STRIP_CELLS + 1] if self.plane else line)
 
     def simulate(self, blocks, links=(), kind=None, **options) -> Simulation:
         """As the base has it; the axis, and walls on sides that nothing is put on, come first."""
@@ -186,7 +186,7 @@ class RadialProblem(Problem):
             weight = point[1] if self.curved else 1.0
             return self.compute_density(self.compute_radii(point), evolution.t), weight
 
-        places = [((n + 0.5) / POINTS, 1.0) for n in range(POINTS)]
+        places = [((n + 0.5) / CELL_MEAN_POINTS, 1.0) for n in range(CELL_MEAN_POINTS)]
         exact = average_points(block.nodes, places, sample)
         weight = block.volume * (self.compute_radii(block.centres) < within)
         error = np.abs(block.state[0, 1:-1, 1:-1] - exact)
@@ -255,11 +255,13 @@ def mix_states(eos, fraction: np.ndarray, first, second):
 
 
 RUN_IN = 64  # cells that the shock runs before
-KEPT = 32  # cells behind it that keep what was computed
-AHEAD = 16  # cells before it
-MARGIN = 24  # cells behind the shock's first place
-SLOWEST = 0.5  # of the shock's speed beside the contact: its least speed over the cells beyond that
-ROWS = 2  # cells across
+KEPT_CELLS_BEHIND = 32  # cells behind it that keep what was computed
+CELLS_AHEAD = 16  # cells before it
+MARGIN_CELLS_BEHIND = 24  # cells behind the shock's first place
+SLOWEST_SHOCK_PART = (
+    0.5  # of the shock's speed beside the contact: its least speed over the cells beyond that
+)
+RUN_IN_ROWS = 2  # cells across
 State = tuple[float, float, float]  # density [kg/m3], velocity outwards [m/s], pressure [Pa]
 
 
@@ -309,14 +311,14 @@ def _settle(front: Front, cfl: float, limiter: str) -> tuple[int, np.ndarray]:
     contact = front.behind[1]
     # number of the strip's first node
     size = nodes[1] - nodes[0]
-    lowest = place - RUN_IN - MARGIN
-    numbers = np.arange(lowest, min(place + AHEAD + 4, nodes.size - 1) + 1)
+    lowest = place - RUN_IN - MARGIN_CELLS_BEHIND
+    numbers = np.arange(lowest, min(place + CELLS_AHEAD + 4, nodes.size - 1) + 1)
     first = np.where(numbers < 0, numbers * size, nodes[np.clip(numbers, 0, nodes.size - 1)])
-    begin = first[MARGIN]
+    begin = first[MARGIN_CELLS_BEHIND]
     relative = front.speed - contact
     rate = beyond = (front.end_speed - contact) / nodes[-1]
     if begin < 0.0:  # cells beyond the contact go on as those before it, but let a shock pass
-        beyond = max(rate, SLOWEST * relative / begin)
+        beyond = max(rate, SLOWEST_SHOCK_PART * relative / begin)
     stretch = np.where(first < 0.0, beyond, rate)
     duration = (nodes[place] - begin) / (relative - begin * beyond)
 
@@ -326,7 +328,7 @@ def _settle(front: Front, cfl: float, limiter: str) -> tuple[int, np.ndarray]:
 
     states = [(rho, 0.0, u, p) for rho, u, p in (front.behind, front.ahead)]
     ends = [{"kind": "inflow", "state": state} for state in states]
-    kept = slice(place - KEPT - lowest, None)
+    kept = slice(place - KEPT_CELLS_BEHIND - lowest, None)
     last = place_nodes(duration)
     shift = 0.0
     for _ in range(2):  # what the shock's start leaves behind moves its place
@@ -334,7 +336,7 @@ def _settle(front: Front, cfl: float, limiter: str) -> tuple[int, np.ndarray]:
         rho, u, p = run_strip(front.eos, place_nodes, size, *strip, cfl=cfl, limiter=limiter)
         excess = ((rho - front.ahead[0]) * np.diff(last))[kept].sum()
         shift -= excess / (front.behind[0] - front.ahead[0]) - (nodes[place] - last[kept][0])
-    start = max(0, place - KEPT)
+    start = max(0, place - KEPT_CELLS_BEHIND)
     return start, np.array([rho, u, p])[:, start - lowest :]
 
 
@@ -347,7 +349,9 @@ def run_strip(
     `begin` [m] is the first of both states (rho, 0, u, p), beyond it the second; ends: what the
     first and the last side are, as for `put`.  The row lies along j, as do the cells in memory.
     """
-    x = np.broadcast_to(size * np.arange(ROWS + 1.0)[:, None], (ROWS + 1, place_nodes(0.0).size))
+    x = np.broadcast_to(
+        size * np.arange(RUN_IN_ROWS + 1.0)[:, None], (RUN_IN_ROWS + 1, place_nodes(0.0).size)
+    )
 
     def lay_nodes(_, t):
         nodes = np.empty((2, *x.shape))
@@ -369,10 +373,10 @@ def run_strip(
     return rho, u, p
 
 
-ROOM = 0.8  # part of the room between piston and shock that it may use
+USED_ROOM_PART = 0.8  # part of the room between piston and shock that it may use
 MOST_KEPT = 24  # cells behind the shock that keep what was computed, at most:
-CLEAN = 0.5  # part of the way to the spot that the shock's start as a jump has left
-BEYOND = 12  # cells that the strip goes on beyond the last node, for the shock's foot
+CLEAN_WAY_PART = 0.5  # part of the way to the spot that the shock's start as a jump has left
+CELLS_BEYOND_STRIP = 12  # cells that the strip goes on beyond the last node, for the shock's foot
 
 
 @dataclass(frozen=True)
@@ -426,10 +430,10 @@ def settle_shock(
     ahead = (shock.rho_ahead, 0.0, 0.0, shock.p_ahead)
     cell = int(np.clip(np.searchsorted(x, position) - 1, 0, x.size - 2))
     size = float(x[cell + 1] - x[cell])
-    room = ROOM * (position - x[0]) / (1.0 - shock.particle_speed / shock.shock_speed)
+    room = USED_ROOM_PART * (position - x[0]) / (1.0 - shock.particle_speed / shock.shock_speed)
     way = min(RUN_IN * size, room)
     duration = way / shock.shock_speed
-    line = np.concatenate([x, x[-1] + (x[-1] - x[-2]) * np.arange(1.0, BEYOND + 1.0)])
+    line = np.concatenate([x, x[-1] + (x[-1] - x[-2]) * np.arange(1.0, CELLS_BEYOND_STRIP + 1.0)])
     part = np.maximum(x[-1] - line, 0.0) / (x[-1] - x[0])
 
     def place_nodes(t):
@@ -439,7 +443,7 @@ def settle_shock(
     strip = position - way, (behind, ahead), ends, duration
     rho, u, p = run_strip(eos, place_nodes, size, *strip, cfl=cfl, limiter=limiter)
     spot = way / size * (1.0 - shock.particle_speed / shock.shock_speed)  # cells behind the shock
-    front = max(0, cell - min(MOST_KEPT, int(CLEAN * spot)))
+    front = max(0, cell - min(MOST_KEPT, int(CLEAN_WAY_PART * spot)))
     rho[:front] = shock.rho
     u[:front] = shock.particle_speed
     p[:front] = shock.p

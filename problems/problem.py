@@ -417,8 +417,8 @@ class Problem:
         return {row.name: (row.computed, row.theory) for row in rows if row.studied}
 
 
-LARGE = 100_000  # cells
-PROGRAM = 190e6  # bytes of the program with its libraries and kernels, measured
+LARGE_GRID_CELLS = 100_000  # cells
+PROGRAM_BYTES = 190e6  # bytes of the program with its libraries and kernels, measured
 RUN_BYTES = 640  # per cell at the peak of a run, measured,
 LARGE_BYTES = 350  # for blocks of LARGE cells and more, two equal ones, with solves; without: 200
 
@@ -429,7 +429,9 @@ def estimate_memory(cells: int, blocks: Sequence[int] = ()) -> float:
     Without `blocks`, LARGE cells and more are assumed to be in large blocks.
     """
     blocks = blocks or [cells]
-    return PROGRAM + sum(n * (LARGE_BYTES if n >= LARGE else RUN_BYTES) for n in blocks)
+    return PROGRAM_BYTES + sum(
+        n * (LARGE_BYTES if n >= LARGE_GRID_CELLS else RUN_BYTES) for n in blocks
+    )
 
 
 def find_memory() -> float | None:

@@ -35,19 +35,21 @@ from problems.references.riemann import RiemannSolution, compute_cell_averages, 
 from regrid.errors import BadInput, suggest
 from regrid.roots import find_root
 
-WAY = 0.8  # of the length of a side that its fastest wave goes, where no end time is given
+FASTEST_WAVE_WAY = (
+    0.8  # of the length of a side that its fastest wave goes, where no end time is given
+)
 STARS = ("p_left", "p_right", "u_left", "u_right", "rho_left", "rho_right")
-REST = 1e-12  # of the sound speed: slower than that nothing moves
-BEYOND = 0.15  # of a side at the end: ahead of its outermost wave
-FIRST = 0.2  # of its last length that a side with a rarefaction has at first
+REST_SPEED_PART = 1e-12  # of the sound speed: slower than that nothing moves
+AHEAD_OF_WAVES_PART = 0.15  # of a side at the end: ahead of its outermost wave
+FIRST_LENGTH_PART = 0.2  # of its last length that a side with a rarefaction has at first
 GRADED_CELLS = 200  # for which the cases' gradings are chosen
 MOST_RATIO = 1e9  # of the largest cell of a side over its smallest
-SHARE = 0.3  # of a side's cells that are to be in its plateau
+PLATEAU_CELL_PART = 0.3  # of a side's cells that are to be in its plateau
 # of cells from one to the next
 LEAST_GROWTH = 1.0 + 1e-9
 MOST_GROWTH = 1.15
-LARGE = 40.0  # logarithm of a number beside which 1 is nothing
-UNITLESS = 1e4  # gases at lower pressures than this [Pa] are given without units
+LARGE_LOGARITHM = 40.0  # logarithm of a number beside which 1 is nothing
+UNITLESS_PRESSURE = 1e4  # gases at lower pressures than this [Pa] are given without units
 LABELS = {"rho": ("density", "kg/m3"), "u": ("velocity", "m/s"), "p": ("pressure", "Pa")}
 
 
@@ -143,8 +145,10 @@ def choose_domain(exact: RiemannSolution, cells: tuple[int, int], t_end: float |
     ends = []
     waves = exact.left_wave, exact.right_wave
     for sign, wave, count in zip((-1, 1), waves, cells, strict=True):
-        pace = sign * (wave.head - exact.u) / (1.0 - BEYOND)  # length at the end, over t
-        part = FIRST if wave.kind == "rarefaction" else 1.0
+        pace = (
+            sign * (wave.head - exact.u) / (1.0 - AHEAD_OF_WAVES_PART)
+        )  # length at the end, over t
+        part = FIRST_LENGTH_PART if wave.kind == "rarefaction" else 1.0
         last.append(pace)
         first.append(part * pace)
         ends.append(exact.u + sign * (1.0 - part) * pace)
@@ -157,15 +161,15 @@ def choose_domain(exact: RiemannSolution, cells: tuple[int, int], t_end: float |
 def find_growth(part: float, count: int) -> float:
     """Growth of `count` cells from one to the next, such that SHARE of them are in the first `part`
     of their length; 1 where that is so with even cells, MOST_GROWTH at most."""
-    first = SHARE * count
+    first = PLATEAU_CELL_PART * count
 
     def excess(growth):
         rate = math.log(growth)
-        if rate * count > LARGE:  # the ones count for nothing, and the powers overflow
+        if rate * count > LARGE_LOGARITHM:  # the ones count for nothing, and the powers overflow
             return math.exp(rate * (first - count)) - part
         return math.expm1(rate * first) / math.expm1(rate * count) - part
 
-    if part >= SHARE or excess(LEAST_GROWTH) <= 0.0:
+    if part >= PLATEAU_CELL_PART or excess(LEAST_GROWTH) <= 0.0:
         return 1.0
     if excess(MOST_GROWTH) > 0.0:
         return MOST_GROWTH
@@ -234,7 +238,7 @@ class Riemann(Problem):
         self.case = case
         self.limiter = deck.limiter or case.limiter
         gases = isinstance(case.left_eos, IdealGas) and isinstance(case.right_eos, IdealGas)
-        if gases and max(case.left[2], case.right[2]) < UNITLESS:
+        if gases and max(case.left[2], case.right[2]) < UNITLESS_PRESSURE:
             self.t_unit = "1"
         self.name = "own states" if deck.left is not None else deck.case
         self.on_line = deck.contact == "on-line"
@@ -271,7 +275,7 @@ class Riemann(Problem):
             ends = (case.left[1], case.right[1]) if self.on_line else (0.0, 0.0)
             speeds = ends[0] - exact.left_wave.head, exact.right_wave.head - ends[1]
             ways = zip(case.lengths, speeds, strict=True)
-            t = WAY * min(length / speed for length, speed in ways if speed > 0.0)
+            t = FASTEST_WAVE_WAY * min(length / speed for length, speed in ways if speed > 0.0)
             own = case.grading ** min(1.0, GRADED_CELLS / deck.cells)
             t_end = deck.run.t_end or case.t_end or t
             growths = (deck.grading or own,) * 2
@@ -282,7 +286,7 @@ class Riemann(Problem):
             domain = choose_domain(exact, cells, made_for)
         else:
             left, right = max(-exact.left_wave.head, 0.0), max(exact.right_wave.head, 0.0)
-            beyond = BEYOND * (left + right)
+            beyond = AHEAD_OF_WAVES_PART * (left + right)
             span = left + right + 2.0 * beyond
             t = 1.0 / span if made_for is None else made_for
             lengths = (left + beyond) * t, (right + beyond) * t
@@ -372,7 +376,7 @@ class Riemann(Problem):
         case = self.case
         speed = max(abs(exact.u), abs(exact.u - case.left[1]), abs(exact.u - case.right[1]))
         c = float(case.left_eos.sound_speed(case.left[0], case.left[2]))
-        speed = speed if speed > REST * c else c
+        speed = speed if speed > REST_SPEED_PART * c else c
         values = (exact.p, exact.p, exact.u, exact.u, exact.rho_left, exact.rho_right)
         return {
             name: (value, speed if name.startswith("u") else abs(value))

@@ -36,27 +36,29 @@ from problems.references.riemann import solve_riemann
 from regrid.algebraic import fill_from_sides
 from regrid.measure.cells import compute_area_fractions
 
-MICRO = 1e-6
-PRESSURE = 101325.0
+SECONDS_PER_MICROSECOND = 1e-6
+AIR_PRESSURE = 101325.0
 AIR_DENSITY = 1.225
 AIR = IdealGas(1.4)
 GASES = {"helium": (0.2228, IdealGas(1.648)), "R22": (3.863, IdealGas(1.249))}
-RADIUS = 0.025
+BUBBLE_RADIUS = 0.025
 HALF_HEIGHT = 0.0445
 # The barrel over the radius: its half width on the axis, its corners', its top's distance.
-CORE = 0.5
-CORNER = 0.68
-CROWN = 0.7
+CORE_PART = 0.5
+CORNER_PART = 0.68
+CROWN_PART = 0.7
 # Degrees from the axis where the three blocks around the bubble meet: the seam that leads from
 # there to the box's corner has to stay clear of the lobe that curls over it.
 JOINT = {"helium": 70.0, "R22": 38.0}
 PICTURE = {"helium": 427e-6, "R22": 417e-6}  # a photograph after the shock's arrival [s]
 # lengths of the tube before and behind the box [m]
-UPWIND = 0.1
-DOWNWIND = 0.16
-GAP = 0.1  # first distance of shock and bubble over the radius
+UPWIND_LENGTH = 0.1
+DOWNWIND_LENGTH = 0.16
+FIRST_GAP_RADII = 0.1  # first distance of shock and bubble over the radius
 BUBBLE = ("core", "west", "north", "east")
-DECADES = 1.3  # of gradients that are drawn, from those that 1 % of a picture's nodes exceed
+DRAWN_GRADIENT_DECADES = (
+    1.3  # of gradients that are drawn, from those that 1 % of a picture's nodes exceed
+)
 # Times of photographs [us] after the shock's arrival, the heavy gas's 115, 187 and 318 unchecked;
 # 340 added.
 PHOTOGRAPHS = {
@@ -141,40 +143,43 @@ class ShockBubble(Problem):
 
     def __init__(self, deck: ShockBubbleDeck):
         super().__init__(deck)
-        self.shock = shock = shock_with_mach(AIR, AIR_DENSITY, PRESSURE, deck.mach)
+        self.shock = shock = shock_with_mach(AIR, AIR_DENSITY, AIR_PRESSURE, deck.mach)
         self.behind = shock.rho, shock.particle_speed, 0.0, shock.p
         self.rho, self.eos = GASES[deck.gas]
-        self.far_end = HALF_HEIGHT + DOWNWIND
-        self.arrival = GAP * RADIUS / shock.shock_speed
+        self.far_end = HALF_HEIGHT + DOWNWIND_LENGTH
+        self.arrival = FIRST_GAP_RADII * BUBBLE_RADIUS / shock.shock_speed
         self.t_end = deck.run.t_end or self.arrival + PICTURE[deck.gas]
         # velocities of the experiment, at whose Mach number alone they are known
         self.features = FEATURES[deck.gas] if deck.mach == self.Deck().mach else ()
         air = shock.rho, shock.particle_speed, shock.p
-        self.contact = solve_riemann(AIR, air, self.eos, (self.rho, 0.0, PRESSURE))
+        self.contact = solve_riemann(AIR, air, self.eos, (self.rho, 0.0, AIR_PRESSURE))
 
     def make_grids(self, t=0.0):
         n = self.deck.cells
         high = HALF_HEIGHT
         joint = math.radians(JOINT[self.deck.gas])
-        core = CORE * RADIUS
+        core = CORE_PART * BUBBLE_RADIUS
         size = core / n
-        columns = max(4, round(1.2 * RADIUS * (math.pi - 2.0 * joint) / size))
+        columns = max(4, round(1.2 * BUBBLE_RADIUS * (math.pi - 2.0 * joint) / size))
         up = np.linspace(0.0, 1.0, round(n * joint / (0.25 * math.pi)) + 1)
         across = np.linspace(-1.0, 1.0, columns + 1)
-        x, y = CORNER * RADIUS * math.cos(joint), CORNER * RADIUS * math.sin(joint)
+        x, y = (
+            CORNER_PART * BUBBLE_RADIUS * math.cos(joint),
+            CORNER_PART * BUBBLE_RADIUS * math.sin(joint),
+        )
         mirror = np.array([[-1.0], [1.0]])
         east = np.array([x + (core - x) * (1.0 - up**2), y * up])
-        top = (CROWN * RADIUS - y) * (1.0 - across**2)
+        top = (CROWN_PART * BUBBLE_RADIUS - y) * (1.0 - across**2)
         barrel = {"west": mirror * east, "north": np.array([x * across, y + top]), "east": east}
         turn = 0.5 * math.pi - joint
-        arc = RADIUS * np.array([np.cos(joint * up), np.sin(joint * up)])
-        over = RADIUS * np.array([np.sin(turn * across), np.cos(turn * across)])
+        arc = BUBBLE_RADIUS * np.array([np.cos(joint * up), np.sin(joint * up)])
+        over = BUBBLE_RADIUS * np.array([np.sin(turn * across), np.cos(turn * across)])
         circle = {"west": mirror * arc, "north": over, "east": arc}
         side = np.array([np.full(up.size, high), high * up])
         lid = np.array([high * across, np.full(across.size, high)])
         box = {"west": mirror * side, "north": lid, "east": side}
-        inner = round((RADIUS - core) / size) + 1
-        outer = round(1.2 * (high - RADIUS) / size) + 1
+        inner = round((BUBBLE_RADIUS - core) / size) + 1
+        outer = round(1.2 * (high - BUBBLE_RADIUS) / size) + 1
         middle = np.zeros((2, across.size, up.size))
         middle[0, :, 0] = core * across
         middle[:, 0] = barrel["west"]
@@ -186,7 +191,10 @@ class ShockBubble(Problem):
             grids[place] = np.linspace(barrel[place], circle[place], inner, axis=1)
             grids["air-" + place] = np.linspace(circle[place], box[place], outer, axis=1)
         step = 2.0 * size
-        ends = {"upwind": (-high - UPWIND, -high), "downwind": (high, high + DOWNWIND)}
+        ends = {
+            "upwind": (-high - UPWIND_LENGTH, -high),
+            "downwind": (high, high + DOWNWIND_LENGTH),
+        }
         for name, (first, last) in ends.items():
             positions = np.linspace(first, last, round((last - first) / step) + 1)
             grids[name] = make_plane_grid(positions, box["east"][1])
@@ -202,13 +210,15 @@ class ShockBubble(Problem):
     def build(self):
         deck = self.deck
         blocks = {}
-        ahead = AIR_DENSITY, 0.0, 0.0, PRESSURE
+        ahead = AIR_DENSITY, 0.0, 0.0, AIR_PRESSURE
         for name, nodes in self.make_grids().items():
             eos = self.eos
-            state = (self.rho, 0.0, 0.0, PRESSURE)
+            state = (self.rho, 0.0, 0.0, AIR_PRESSURE)
             material = deck.gas
             if name not in BUBBLE:
-                part = compute_area_fractions(nodes, -RADIUS - GAP * RADIUS)
+                part = compute_area_fractions(
+                    nodes, -BUBBLE_RADIUS - FIRST_GAP_RADII * BUBBLE_RADIUS
+                )
                 eos = AIR
                 state = mix_states(AIR, part, self.behind, ahead)
                 material = "air"
@@ -256,14 +266,14 @@ class ShockBubble(Problem):
             "rear": min(float(line[0].min()) for line in lines),
             "height": max(float(line[1].max()) for line in lines),
             "volume": sum(volumes[name][0] for name in BUBBLE),
-            "axis_front": find_front(axis, 1.05 * PRESSURE),
-            "wall_front": find_front(wall, 0.5 * (PRESSURE + self.shock.p)),
+            "axis_front": find_front(axis, 1.05 * AIR_PRESSURE),
+            "wall_front": find_front(wall, 0.5 * (AIR_PRESSURE + self.shock.p)),
         }
 
     def find_focus(self, history) -> float:
         """When the refracted shock comes to its focus at the downwind end and turns it [us after
         the shock's arrival]; NaN before."""
-        since = (history["t"] - self.arrival) / MICRO
+        since = (history["t"] - self.arrival) / SECONDS_PER_MICROSECOND
         inside = np.flatnonzero((since > 100.0) & (since < 250.0))
         known = since[-1] >= 250.0
         return float(since[inside[np.argmin(history["downwind"][inside])]]) if known else math.nan
@@ -277,13 +287,13 @@ class ShockBubble(Problem):
         """
         leaves = find_time(history, history["axis_front"] > history["downwind"])
         start, end = (
-            leaves + float(mark.partition("+")[2] or 0.0) * MICRO
+            leaves + float(mark.partition("+")[2] or 0.0) * SECONDS_PER_MICROSECOND
             if isinstance(mark, str)  # from the refracted shock's exit on
-            else self.arrival + mark * MICRO
+            else self.arrival + mark * SECONDS_PER_MICROSECOND
             for mark in feature.window
         )
         last = float(history["t"][-1])
-        if feature.column == "rear" and last > start + 100.0 * MICRO:
+        if feature.column == "rear" and last > start + 100.0 * SECONDS_PER_MICROSECOND:
             end = min(end, last)
         if not start < end <= last * (1.0 + 1e-12):
             return None, math.nan
@@ -301,7 +311,9 @@ class ShockBubble(Problem):
         volume = history["volume"]
         first = math.nan
         # the upwind end while the shock goes a quarter of a radius on
-        start, end = (self.arrival + part * RADIUS / self.shock.shock_speed for part in (0.05, 0.3))
+        start, end = (
+            self.arrival + part * BUBBLE_RADIUS / self.shock.shock_speed for part in (0.05, 0.3)
+        )
         if t[-1] >= end:
             first = float(np.diff(np.interp([start, end], t, history["upwind"]))[0]) / (end - start)
         rows = [Row("first_upwind_speed", first, self.contact.u, error="upwind_speed")]
@@ -312,14 +324,15 @@ class ShockBubble(Problem):
             window, speed = self.fit_velocity(history, feature)
             rows.append(Row(name, speed, fixed if alone else measured, error=name))
             if window and self.features:
-                begin, end = ((time - self.arrival) / MICRO for time in window)
+                begin, end = ((time - self.arrival) / SECONDS_PER_MICROSECOND for time in window)
                 others = ["" if math.isnan(x) else f"{x:g}" for x in (fixed, measured, computed)]
                 table.append([name, f"{speed:.1f}", *others, f"{begin:.0f}-{end:.0f}"])
         if deck.gas in FOCUS:
             rows.append(Row("focus", self.find_focus(history), FOCUS[deck.gas], error="focus"))
         lines = [
             f"shock-bubble, {deck.gas} in air, Mach {deck.mach:g}, "
-            f"t = {(t[-1] - self.arrival) / MICRO:.4g} us after the shock's arrival:"
+            f"t = {(t[-1] - self.arrival) / SECONDS_PER_MICROSECOND:.4g} us "
+            "after the shock's arrival:"
         ]
         lines += align(table) if len(table) > 1 else []
         ends = [1e3 * get_last(history, name) for name in ("upwind", "downwind", "height")]
@@ -340,7 +353,7 @@ class ShockBubble(Problem):
         last = run_data.dumps[-1]
         chosen = {}
         for time in PHOTOGRAPHS[self.deck.gas]:
-            wanted = self.arrival + time * MICRO
+            wanted = self.arrival + time * SECONDS_PER_MICROSECOND
             dump = find_dump(run_data, wanted)
             if dump.t > self.arrival and wanted <= last.t * (1.0 + 1e-12):
                 chosen[dump.t] = dump
@@ -352,13 +365,15 @@ class ShockBubble(Problem):
             axis.remove()
         for axis, dump in zip(panels.ravel(), dumps, strict=False):
             draw_shadowgraph(axis, self.deck.gas, dump)
-            axis.set_title(f"{(dump.t - self.arrival) / MICRO:.0f} µs", fontsize="medium")
+            axis.set_title(
+                f"{(dump.t - self.arrival) / SECONDS_PER_MICROSECOND:.0f} µs", fontsize="medium"
+            )
 
     def draw_space_time(self, figure, run_data) -> None:
         """Places of the bubble's ends and of the shocks over time, and the measured velocities."""
         history = run_data.history
         axis = make_panels(figure, 7.5, 6.0)
-        t = (history["t"] - self.arrival) / MICRO
+        t = (history["t"] - self.arrival) / SECONDS_PER_MICROSECOND
         inside = history["axis_front"] < self.far_end - 1e-3
         columns = {
             "upwind": ("upwind end, then jet", "C3"),
@@ -377,7 +392,7 @@ class ShockBubble(Problem):
             ends = np.array(window)
             at = np.interp(np.linspace(*window, 101), history["t"], history[feature.column]).mean()
             places = at + feature.measured * (ends - ends.mean())
-            axis.plot(1e3 * places, (ends - self.arrival) / MICRO, "k--", lw=1.0)
+            axis.plot(1e3 * places, (ends - self.arrival) / SECONDS_PER_MICROSECOND, "k--", lw=1.0)
         axis.plot([], [], "k--", lw=1.0, label="measured velocities")
         far = 1e3 * max(float(history["downwind"].max()) + 0.03, 0.08)
         axis.set(xlim=(-40.0, far), ylim=(min(t[0], 0.0), t[-1]))
@@ -416,7 +431,7 @@ def draw_shadowgraph(axis, gas: str, dump) -> None:
     def darken(block):
         return np.log10(np.maximum(compute_slope(block) / most, 1e-9))
 
-    draw_field(axis, dump, darken, colours="Greys", low=-DECADES, high=0.2, mm=True)
+    draw_field(axis, dump, darken, colours="Greys", low=-DRAWN_GRADIENT_DECADES, high=0.2, mm=True)
     for block in dump.blocks:
         x, y = 1e3 * block.nodes
         draw_grid(axis, np.array([x, -y]), color="C0" if block.material == gas else "0.6")

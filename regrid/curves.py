@@ -26,9 +26,11 @@ from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
 from regrid.roots import find_root
 
-SETTLED = 1e-9  # relative spread of products that passes for equal
-RATIO = 1.15  # of neighbouring steps where a line is refined towards one end
-GROWING = 5.0  # nodes of a line over those within which steps grow by e towards the far ones
+SETTLED_PRODUCT_SPREAD = 1e-9  # relative spread of products that passes for equal
+REFINED_STEP_RATIO = 1.15  # of neighbouring steps where a line is refined towards one end
+NODES_OF_E_FOLD = (
+    5.0  # nodes of a line over those within which steps grow by e towards the far ones
+)
 
 
 def uniform_law(count: int) -> np.ndarray:
@@ -88,7 +90,7 @@ def fill_grown_law(least, length, at_end, law):
     """Law (n,) of a line whose steps grow from `least` at one end, as `meeting_laws` says."""
     number = law.shape[0] - 1
     step = length / number
-    q = max(0.0, 1.0 - GROWING / number)
+    q = max(0.0, 1.0 - NODES_OF_E_FOLD / number)
     total = 0.0
     power = 1.0
     for _ in range(number):
@@ -125,7 +127,7 @@ def fill_refined_law(least, length, at_end, law):
         if even <= last:
             break
         total += last
-        last *= RATIO
+        last *= REFINED_STEP_RATIO
     if even > last or even < least:
         fill_grown_law(least, length, at_end, law)
         return
@@ -134,7 +136,7 @@ def fill_refined_law(least, length, at_end, law):
     law[number if at_end else 0] = 1.0 if at_end else 0.0
     for k in range(1, number):
         position += min(step, even)
-        step *= RATIO
+        step *= REFINED_STEP_RATIO
         if at_end:
             law[number - k] = 1.0 - position / length
         else:
@@ -304,7 +306,7 @@ def equalise_products(
         x = trial
         product = trial_product
     spread = np.abs(product - product.mean()).max() / abs(product.mean())
-    if not spread <= SETTLED:
+    if not spread <= SETTLED_PRODUCT_SPREAD:
         worst = int(np.abs(product - product.mean()).argmax())
         raise RegridFailure(
             f"spacing: equidistribution stalled with products {spread:.1e} apart, worst on the "
@@ -315,7 +317,7 @@ def equalise_products(
 
 TURN = np.radians(10.0)  # that one segment takes where nodes suffice
 LEAST_EVEN = 0.3  # least part of the nodes that keep the first spacing
-SMOOTHINGS = 3  # of the turning, over neighbouring segments
+TURNING_SMOOTHINGS = 3  # of the turning, over neighbouring segments
 
 
 @kernel
@@ -344,7 +346,7 @@ def fill_turning(line, closed, wall_first, wall_last, wanted):
             turn[k] = abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))
     for k in range(edges):
         wanted[k] = 0.5 * (turn[k] + turn[k + 1]) / TURN
-    for _ in range(SMOOTHINGS):
+    for _ in range(TURNING_SMOOTHINGS):
         start = wanted[0]
         last = wanted[edges - 1]
         before = last if closed else start

@@ -30,7 +30,7 @@ from regrid.curves import arc_law, clustered_law
 from regrid.errors import BadInput, suggest
 from regrid.sides import SIDE_NAMES, copy_sides
 
-SAMPLES = 129  # amplitudes at which the motion of a side is measured,
+MOTION_SAMPLES = 129  # amplitudes at which the motion of a side is measured,
 SIDES_SAMPLES = 257  # and that of all sides, which may turn corners
 
 
@@ -122,7 +122,7 @@ def march_line(
             nodes[:, -1, j] = top
         return nodes
 
-    amplitudes = np.linspace(0.0, 1.0, SAMPLES)
+    amplitudes = np.linspace(0.0, 1.0, MOTION_SAMPLES)
     lines = np.array([distribute_by_arc_length(curve_at(a), count) for a in amplitudes])
     steps = np.hypot(*np.diff(lines, axis=0).transpose(1, 0, 2)).max(axis=1)
     grid = start.copy()
@@ -189,7 +189,7 @@ def find_shortest_edge(start: np.ndarray, side: str) -> float:
     return float(min(np.hypot(*along).min(), np.hypot(*away).min()))
 
 
-FINE = 2400  # points on the curve from which nodes are interpolated
+FINE_CURVE_POINTS = 2400  # points on the curve from which nodes are interpolated
 TONGUES = [
     {"centre": 0.22, "width": 0.12, "length": 0.75},
     {"centre": 0.5, "width": 0.10, "length": 1.0},
@@ -211,7 +211,7 @@ def _fingers(name: str, ni: int, nj: int, fingers: list[dict]) -> MovingDomain:
     arc that turns by `curl` radians over the full length.
     """
     start = make_unit_box(ni, nj)
-    x = np.linspace(1.0, 0.0, FINE)
+    x = np.linspace(1.0, 0.0, FINE_CURVE_POINTS)
 
     def curve_at(amplitude: float) -> np.ndarray:
         shape_x, shape_y = x.copy(), np.zeros_like(x)
@@ -294,7 +294,7 @@ def slender_finger(ni: int = 60, nj: int = 40) -> MovingDomain:
 def _graph(name: str, ni: int, nj: int, start: np.ndarray, shape: Callable) -> MovingDomain:
     """Domain whose lower side is the graph y = amplitude * shape(x), ends free on the walls."""
     width = start[0].max()
-    x = np.linspace(width, 0.0, FINE)
+    x = np.linspace(width, 0.0, FINE_CURVE_POINTS)
     return march_line(name, start, lambda amplitude: np.array([x, amplitude * shape(x)]))
 
 
@@ -358,7 +358,7 @@ def rectangle_shift(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 
 ANNULUS_ANGLE = 1.5 * np.pi
-TAIL = 0.00126  # half thickness of the profile's cut trailing edge, chords
+TAIL_HALF_THICKNESS = 0.00126  # half thickness of the profile's cut trailing edge, chords
 AIRFOIL_RADIUS = 1.5  # of the outer side, chords
 CHICANE_TURN = np.radians(135.0)
 CHICANE_WIDTH = 0.3  # over the length of a leg
@@ -463,19 +463,19 @@ def airfoil(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 def _naca_0012() -> np.ndarray:
     """The profile (2, n) round its mid-chord, from the upper trailing edge to the lower one."""
-    part = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, FINE // 2)))  # 0 at the nose
+    part = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, FINE_CURVE_POINTS // 2)))  # 0 at the nose
     root = np.sqrt(part)
     half = 0.6 * (
         0.2969 * root - 0.126 * part - 0.3516 * part**2 + 0.2843 * part**3 - 0.1015 * part**4
     )
-    half[-1] = TAIL
+    half[-1] = TAIL_HALF_THICKNESS
     x = np.concatenate([part[::-1], part[1:]]) - 0.5
     return np.array([x, np.concatenate([half[::-1], -half[1:]])])
 
 
 def _c_shape(tail: float) -> np.ndarray:
     """Half circle to the left of the middle, straight lines to x = tail above and below."""
-    angle = np.linspace(0.5 * np.pi, 1.5 * np.pi, FINE)
+    angle = np.linspace(0.5 * np.pi, 1.5 * np.pi, FINE_CURVE_POINTS)
     arc = AIRFOIL_RADIUS * np.array([np.cos(angle), np.sin(angle)])
     first = np.array([[tail], [AIRFOIL_RADIUS]])
     return np.concatenate([first, arc, first * np.array([[1.0], [-1.0]])], axis=1)

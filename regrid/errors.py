@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import numpy as np
 
-MISSPELT = 0.8  # likeness of names that differ by a slip
-LIKE = 0.6  # likeness of names from which one is offered for the other: less misleads
+MISSPELT_LIKENESS = 0.8  # likeness of names that differ by a slip
+OFFERED_LIKENESS = 0.6  # likeness of names from which one is offered for the other: less misleads
 
 
 class BadInput(Exception):
@@ -120,7 +120,7 @@ class RegridFailure(RunFailure):
         return f"regrid: block {self.block!r}{mark}{rest}"
 
 
-def find_nearest(name: str, known: Iterable[str], cutoff: float = LIKE) -> str | None:
+def find_nearest(name: str, known: Iterable[str], cutoff: float = OFFERED_LIKENESS) -> str | None:
     """The name in `known` that is most like `name`, or with which it begins, or None.
 
     `cutoff` 0 to 1 is the least likeness; at 0 there is one as soon as there are names.  Capitals,
@@ -134,7 +134,7 @@ def find_nearest(name: str, known: Iterable[str], cutoff: float = LIKE) -> str |
     for word in known:
         words.setdefault(plain(word), word)
     wrong = plain(str(name))
-    for least in (max(cutoff, MISSPELT), cutoff):
+    for least in (max(cutoff, MISSPELT_LIKENESS), cutoff):
         if close := difflib.get_close_matches(wrong, words, n=1, cutoff=least):
             return words[close[0]]
         if begun := [word for word in words if wrong.startswith(f"{word}-")]:
@@ -142,7 +142,7 @@ def find_nearest(name: str, known: Iterable[str], cutoff: float = LIKE) -> str |
     return None
 
 
-def suggest(name: str, known: Iterable[str], cutoff: float = LIKE) -> str:
+def suggest(name: str, known: Iterable[str], cutoff: float = OFFERED_LIKENESS) -> str:
     """The end of a sentence about a wrong name: "; did you mean 'x'?", else what names there are.
 
     Empty where there are none.

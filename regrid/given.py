@@ -30,9 +30,11 @@ from regrid.sides import SIDE_NAMES, get_side, get_sides
 
 ALIASES = dict(zip(("left", "right", "bottom", "top"), SIDE_NAMES, strict=True))
 # extents whose areas can be computed with
-LEAST = 1e-100
-MOST = 1e100
-GAP = 1e-6  # ends of sides that are to meet may lie so far apart, over the size of the whole
+LEAST_EXTENT = 1e-100
+MOST_EXTENT = 1e100
+MOST_CORNER_GAP = (
+    1e-6  # ends of sides that are to meet may lie so far apart, over the size of the whole
+)
 CORNERS = (  # a side and its end that meets the end of another
     ("i_min", 0, "j_min", 0), ("i_min", -1, "j_max", 0),
     ("i_max", 0, "j_min", -1), ("i_max", -1, "j_max", -1),
@@ -179,8 +181,8 @@ def check_nodes(nodes: np.ndarray, where: str) -> np.ndarray:
         raise BadInput(f"{where}: node ({node}) is not a finite number")
     extent = np.ptp(nodes.reshape(nodes.shape[0], -1), axis=1)
     for name, size in zip("xyz", extent, strict=False):
-        if not LEAST < size < MOST:
-            words = f"{size:g}; it must be between {LEAST:g} and {MOST:g}"
+        if not LEAST_EXTENT < size < MOST_EXTENT:
+            words = f"{size:g}; it must be between {LEAST_EXTENT:g} and {MOST_EXTENT:g}"
             raise BadInput(f"{where}: the grid's extent in {name} is {words}")
     return nodes
 
@@ -225,7 +227,7 @@ def orient_sides(
         if best is None or total < best[0]:
             best = total, turned, max(gaps, key=lambda pair: pair[0])
     _, turned, (gap, (first, second, point)) = best
-    if gap > GAP * size:
+    if gap > MOST_CORNER_GAP * size:
         x, y = point
         raise BadInput(
             f"{where}: curves {names[first]} and {names[second]} must have an end in common; near "
@@ -289,7 +291,7 @@ def take_sides(nodes: np.ndarray) -> np.ndarray:
     return boundary
 
 
-FLAT = 1e-9  # z over the extent of the plane, up to which a grid is plane
+FLAT_GRID_HEIGHT = 1e-9  # z over the extent of the plane, up to which a grid is plane
 
 
 def read_structured(path: Path) -> np.ndarray:
@@ -335,7 +337,7 @@ def read_structured(path: Path) -> np.ndarray:
     if counts[2] > 1:
         return nodes
     flat = nodes[:, :, :, 0]
-    if np.ptp(flat[2]) > FLAT * np.ptp(flat[:2]):
+    if np.ptp(flat[2]) > FLAT_GRID_HEIGHT * np.ptp(flat[:2]):
         raise BadInput(f"{path}: a surface in space; a plane grid with z = const is wanted")
     return np.ascontiguousarray(flat[:2])
 

@@ -26,7 +26,7 @@ from regrid.measure.quality import (
 from regrid.protocol import Regridder, RegridReport, call_regridder
 from regrid.sides import SIDE_NAMES, compute_area, get_sides
 
-SAMPLES = 513  # times at which the way of the boundary is measured
+BOUNDARY_PATH_SAMPLES = 513  # times at which the way of the boundary is measured
 
 
 @dataclass
@@ -186,9 +186,9 @@ def choose_times(
     begin, end = (float(t) for t in span)
     if not begin < end:
         raise BadInput(f"march: span {span} must begin before it ends")
-    fine = np.linspace(begin, end, SAMPLES)
+    fine = np.linspace(begin, end, BOUNDARY_PATH_SAMPLES)
     last = None
-    travel = np.zeros(SAMPLES)
+    travel = np.zeros(BOUNDARY_PATH_SAMPLES)
     for k, t in enumerate(fine):
         boundary = np.asarray(boundary_at(float(t)), dtype=np.float64)
         if boundary.shape != start.shape:

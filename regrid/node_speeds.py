@@ -19,13 +19,17 @@ from regrid.measure.corners import compute_doubled_area, find_triangle
 from regrid.measure.quality import find_bad_cells
 from regrid.work_arrays import share_memory
 
-HALVINGS = 8
-ROUNDS = 24  # at most, in which nodes of folded cells return to the new grid
-BLENDS = 12  # halvings of the distance to the new grid for all nodes if folds persist
-LOOSE = 2.0  # factor of the limit for nodes of cells that would otherwise be sharpened
-ROUND_OFF = 1e-12  # relative, well above that of an area or a comparison
-FLAT = 0.01  # sine of an obtuse corner below which it is nearly a straight line
-KEPT = 0.98  # fraction of the smaller of a corner's areas, old and new, left by the limit
+MOST_CELL_HALVINGS = 8
+MOST_RETURN_ROUNDS = 24  # at most, in which nodes of folded cells return to the new grid
+MOST_BLENDS = 12  # halvings of the distance to the new grid for all nodes if folds persist
+LOOSENED_LIMIT_FACTOR = (
+    2.0  # factor of the limit for nodes of cells that would otherwise be sharpened
+)
+ROUND_OFF_AREA = 1e-12  # relative, well above that of an area or a comparison
+FLAT_CORNER_SINE = 0.01  # sine of an obtuse corner below which it is nearly a straight line
+KEPT_AREA_FRACTION = (
+    0.98  # fraction of the smaller of a corner's areas, old and new, left by the limit
+)
 
 
 @kernel
@@ -36,7 +40,7 @@ def find_fast_rows(old, new, interpolated, most, first, last):
     The comparison is that of `fill_limited` without divisions, slightly stricter.
     """
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
-    part = (1.0 - ROUND_OFF) * most * most
+    part = (1.0 - ROUND_OFF_AREA) * most * most
     rows = 0
     for i in range(ni + 1):
         first[i] = nj
@@ -90,7 +94,7 @@ def measure_spacing(area, along, a, b, wide):
     area, along: cross and scalar product of the edges.  wide: of a FLAT corner the shorter edge,
     since a cell with a flat corner need not be thin.
     """
-    if wide and along < 0.0 and area * area < FLAT * FLAT * a * b:
+    if wide and along < 0.0 and area * area < FLAT_CORNER_SINE * FLAT_CORNER_SINE * a * b:
         return min(a, b)
     return area * area / max(a, b)
 
@@ -180,7 +184,7 @@ def relax_sharpened(old, new, limited, first, last, loose):
                 before = compute_doubled_area(old, i, j, corner)
                 after = compute_doubled_area(new, i, j, corner)
                 area = compute_doubled_area(limited, i, j, corner)
-                sharpened |= not (area >= KEPT * min(before, after))
+                sharpened |= not (area >= KEPT_AREA_FRACTION * min(before, after))
             if sharpened:
                 count += 1
                 mark_cell(loose, i, j)
@@ -212,7 +216,9 @@ def release_folded(new, limited, first, last, whole, loose):
                 ax, ay = x[far_i, q] - x[p, q], y[far_i, q] - y[p, q]
                 bx, by = x[p, far_j] - x[p, q], y[p, far_j] - y[p, q]
                 squares = (ax * ax + ay * ay) + (bx * bx + by * by)
-                folded |= not (compute_doubled_area(limited, i, j, corner) > ROUND_OFF * squares)
+                folded |= not (
+                    compute_doubled_area(limited, i, j, corner) > ROUND_OFF_AREA * squares
+                )
             if folded:
                 count += 1
                 mark_cell(loose, i, j)
@@ -265,19 +271,21 @@ class MotionLimiter:
         self.far_last[:] = last
         far_first = self.far_first
         far_last = self.far_last
-        fill_limited(old, new, interpolated, LOOSE * most, far_first, far_last, True, far)
-        for _ in range(HALVINGS):
+        fill_limited(
+            old, new, interpolated, LOOSENED_LIMIT_FACTOR * most, far_first, far_last, True, far
+        )
+        for _ in range(MOST_CELL_HALVINGS):
             if relax_sharpened(old, far, held, first, last, self.loose) == 0:
                 break
-        for halvings in range(ROUNDS):
-            whole = halvings >= HALVINGS
+        for halvings in range(MOST_RETURN_ROUNDS):
+            whole = halvings >= MOST_CELL_HALVINGS
             if release_folded(new, held, first, last, whole, self.loose) == 0:
                 return held, count
         if len(find_bad_cells(held)) == 0:
             return held, count
         find_fast_rows(old, new, interpolated, most, first, last)
         fill_limited(old, new, interpolated, most, first, last, False, held)
-        for halvings in range(BLENDS, 0, -1):
+        for halvings in range(MOST_BLENDS, 0, -1):
             np.subtract(new, held, out=far)
             far *= 0.5**halvings
             far += held
@@ -335,7 +343,7 @@ def limit_node_speeds(old: np.ndarray, new: np.ndarray, factor: float) -> np.nda
     with np.errstate(invalid="ignore", divide="ignore"):
         theta = (-slope + np.sqrt(slope**2 + square * room)) / square
     held = np.where(too_fast & (square > 0.0), 1.0 - np.clip(theta, 0.0, 1.0), 0.0)
-    for _ in range(HALVINGS):
+    for _ in range(MOST_CELL_HALVINGS):
         limited = new - held * extra
         if len(find_bad_cells(limited)) == 0:
             return limited

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-RELATIVE = 4.0 * 2.0**-52
-MOST_STEPS = 100
+RELATIVE_TOLERANCE = 4.0 * 2.0**-52
+MOST_ROOT_STEPS = 100
 
 
 def find_root(
@@ -18,7 +18,7 @@ def find_root(
     low: float,
     high: float,
     xtol: float = 2e-12,
-    rtol: float = RELATIVE,
+    rtol: float = RELATIVE_TOLERANCE,
 ) -> float:
     """Where `function`, of opposite signs at `low` and `high`, is 0: within xtol + rtol |root|.
 
@@ -44,7 +44,7 @@ def find_root(
         return here
     if (f_last < 0.0) == (f_here < 0.0):
         raise ValueError(f"find_root: the function has the same sign at {low:g} and {high:g}")
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_ROOT_STEPS):
         if f_last != 0.0 and f_here != 0.0 and (f_last < 0.0) != (f_here < 0.0):
             far = last
             f_far = f_last
@@ -78,4 +78,4 @@ def find_root(
         else:
             here += delta if half > 0.0 else -delta
         f_here = evaluate(here)
-    raise ValueError(f"find_root: no root to {xtol:g} after {MOST_STEPS} steps")
+    raise ValueError(f"find_root: no root to {xtol:g} after {MOST_ROOT_STEPS} steps")

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 MOST_BYTES = 64_000_000  # of a text that is read whole
-DEEPEST = 100  # tables and lists in one another
+DEEPEST_NESTING = 100  # tables and lists in one another
 MOST_BITS = 1024  # of a whole number: those of the largest float
 PIPES = ("/dev/stdin", "/dev/fd/", "/proc/self/fd/")  # given by a shell, with a writer
 
@@ -95,14 +95,14 @@ def load_toml(text: str) -> dict[str, Any]:
     return table
 
 
-_TOO_DEEP = f"lists or tables lie more than {DEEPEST} deep in one another"
+_TOO_DEEP = f"lists or tables lie more than {DEEPEST_NESTING} deep in one another"
 _TOO_LONG = "a whole number has hundreds of digits"
 
 
 def check_plain(value: Any) -> None:
     """Raise TooMuch for tables too deep and whole numbers beyond the largest float."""
     level = [value]
-    for _ in range(DEEPEST):
+    for _ in range(DEEPEST_NESTING):
         inner: list[Any] = []
         for one in level:
             if isinstance(one, Mapping):

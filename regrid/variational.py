@@ -48,7 +48,7 @@ from regrid.barrier import assembly as at
 from regrid.barrier.functional import corner_blocks
 from regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
 from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE
-from regrid.barrier.step_control import SPAN, shorten_steps
+from regrid.barrier.step_control import CHUNK_SPAN, shorten_steps
 from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
 from regrid.equidistribution.weights import WeightedRegridder, compute_side_density
@@ -73,11 +73,11 @@ def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonalit
     """
     for col in range(volume.shape[0]):
         ax = A[col]
-        ay = A[SPAN + col]
-        ga = A[3 * SPAN + col]
+        ay = A[CHUNK_SPAN + col]
+        ga = A[3 * CHUNK_SPAN + col]
         bx = B[col]
-        by = B[SPAN + col]
-        gb = B[3 * SPAN + col]
+        by = B[CHUNK_SPAN + col]
+        gb = B[3 * CHUNK_SPAN + col]
         keep = active[col]
         d = keep * area[col] + (1.0 - keep)
         wx, wy = ax - by, ay + bx
@@ -152,17 +152,17 @@ def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
             # Corners 2 and 3 take the line edge one column on, 3 and 4 the far side edge.
             shift = 1 if corner == 1 or corner == 2 else 0
             side = at.CX if corner >= 2 else at.BX
-            term = at.TERMS + corner * 14 * SPAN
-            area = at.AREA_1 + corner * SPAN
+            term = at.CORNER_TERM_ROWS + corner * 14 * CHUNK_SPAN
+            area = at.AREA_1 + corner * CHUNK_SPAN
             fill_variational_corner(
-                Z[at.AX + shift : at.AX + shift + 4 * SPAN],
-                Z[side : side + 4 * SPAN],
+                Z[at.AX + shift : at.AX + shift + 4 * CHUNK_SPAN],
+                Z[side : side + 4 * CHUNK_SPAN],
                 Z[area : area + count],
                 active[corner, i, low : low + count],
                 Z[at.WEIGHT : at.WEIGHT + count],
                 smoothness,
                 orthogonality,
-                Z[term : term + 14 * SPAN],
+                Z[term : term + 14 * CHUNK_SPAN],
             )
         at.fill_cell_blocks(count, now, Z)
         at.fill_line_blocks(count, now, Z)
@@ -216,7 +216,7 @@ def fill_variational_energy(nodes, sides, cells, energy, least, Z):
         least[i] = smallest
 
 
-START_RATIO = 0.25  # the moved grid is begun from where it keeps this much of every corner
+START_CORNER_RATIO = 0.25  # the moved grid is begun from where it keeps this much of every corner
 
 
 @dataclass(frozen=True)
@@ -237,7 +237,7 @@ def find_valid_start(
     previous: np.ndarray,
     boundary: np.ndarray,
     barrier: BarrierRegridder,
-    ratio: float = START_RATIO,
+    ratio: float = START_CORNER_RATIO,
 ) -> ValidStart:
     """A grid on the sides of `boundary` near `previous`: moved along, or found by `barrier`.
 
@@ -286,10 +286,10 @@ def measure_least_ratio(old: np.ndarray, new: np.ndarray, excluded: np.ndarray) 
 
 
 STEP_RATIO = 0.25  # a step keeps this much of every corner, node by node
-FORCING = 0.05  # each linear solve goes on to this part of its first residual
+FORCING_RESIDUAL = 0.05  # each linear solve goes on to this part of its first residual
 MOST_SOLVES = 40  # its iterations
-HALVINGS = 16
-ROUND_OFF = 1e-13  # of the functional: the last steps change it by less
+MOST_STEP_HALVINGS = 16
+ROUND_OFF_FUNCTIONAL = 1e-13  # of the functional: the last steps change it by less
 
 
 class VariationalRegridder(WeightedRegridder):
@@ -471,7 +471,7 @@ class VariationalFunctional:
                 work.base, self.sides, self.cells, work.columns[c], work.columns[c + 1], work.H[c],
                 work.gradient, work.scratch[c],
             )  # fmt: skip
-        return work.solve(FORCING, 0.0, MOST_SOLVES)[0]
+        return work.solve(FORCING_RESIDUAL, 0.0, MOST_SOLVES)[0]
 
     def measure(self, nodes) -> float:
         """The functional's value, infinite where an active corner is not positive."""
@@ -484,7 +484,7 @@ class VariationalFunctional:
         """Take `fraction` of the step, less where corners or the energy require it."""
         work = self.work
         before = self.measure(self.work.base)
-        for _ in range(HALVINGS):
+        for _ in range(MOST_STEP_HALVINGS):
             np.multiply(work.change, fraction, out=work.trial)
             work.trial += work.base
             # Corners of no area cannot be compared: there the energy alone keeps cells convex.
@@ -494,7 +494,7 @@ class VariationalFunctional:
                 wanted = work.trial.copy()
                 shorten_steps(work.base, work.trial, work.base, STEP_RATIO, work.shortening)
                 shortened = int((work.trial != wanted).any(axis=0).sum())
-            if self.measure(work.trial) <= before * (1.0 + ROUND_OFF):
+            if self.measure(work.trial) <= before * (1.0 + ROUND_OFF_FUNCTIONAL):
                 work.base[:] = work.trial
                 self.limited += shortened
                 return True

@@ -10,8 +10,8 @@ import threading
 
 import numpy as np
 
-LINE = 64  # bytes of a line of the cache: vectors that lie across two cost a tenth
-NUMBERS = LINE // 8
+CACHE_LINE_BYTES = 64  # bytes of a line of the cache: vectors that lie across two cost a tenth
+NUMBERS_PER_CACHE_LINE = CACHE_LINE_BYTES // 8
 
 _kept = threading.local()
 
@@ -29,17 +29,17 @@ class Carver:
 
     def __init__(self, whole: np.ndarray):
         self.whole = whole
-        self.at = (-whole.ctypes.data // 8) % NUMBERS
+        self.at = (-whole.ctypes.data // 8) % NUMBERS_PER_CACHE_LINE
         self.first = self.at
 
     def cut(self, *shape: int, column: int = 0) -> np.ndarray:
         """An array of `shape`; a line of the cache begins at `column` of its first row."""
-        begin = self.at + -column % NUMBERS
+        begin = self.at + -column % NUMBERS_PER_CACHE_LINE
         end = begin + math.prod(shape)
-        self.at = end + (self.first - end) % NUMBERS
+        self.at = end + (self.first - end) % NUMBERS_PER_CACHE_LINE
         return self.whole[begin:end].reshape(shape)
 
 
 def count_numbers(*shape: int) -> int:
     """How much of the memory `Carver.cut` takes at most for an array of `shape`."""
-    return math.prod(shape) + 2 * NUMBERS
+    return math.prod(shape) + 2 * NUMBERS_PER_CACHE_LINE

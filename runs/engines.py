@@ -44,7 +44,7 @@ class Engine(Protocol):
         ...
 
 
-DEATHS = 3  # of its process, after which a task is given up
+MOST_TASK_DEATHS = 3  # of its process, after which a task is given up
 
 
 class WorkerDied(Exception):
@@ -117,10 +117,12 @@ class Processes:
                     )
                 else:
                     deaths[number] += 1
-                    if deaths[number] < DEATHS:
+                    if deaths[number] < MOST_TASK_DEATHS:
                         waiting.append(number)
                         continue
-                    error = WorkerDied(f"its process died {DEATHS} times (out of memory?)")
+                    error = WorkerDied(
+                        f"its process died {MOST_TASK_DEATHS} times (out of memory?)"
+                    )
                 yield number, future.result() if error is None else error
 
     def _submit(self, task: Task, argument: Any) -> tuple[Future, ProcessPoolExecutor]:

@@ -32,25 +32,25 @@ ROW_BYTES = 600  # of a step in history.csv; measured
 # steps over those foretold, at the least and most: from a run to this time, or to another
 SAME = (0.75, 1.5)
 LIKE = (0.5, 5.0)
-TIGHT = 0.9  # part of the free disk that a run may be foretold to fill without a word
+TIGHT_DISK_PART = 0.9  # part of the free disk that a run may be foretold to fill without a word
 
 PAST_RUNS = Path(__file__).with_name("past_runs.json")
-SURE = 1.6  # a step's wall time may be so many times that of a past run, or less
-UNSURE = 0.25  # power of the ratio of cells by which that grows
-WORK = 0.8  # power of the number of cells with which a step's wall time grows
-WIDEST = 50.0  # of the longest time over the shortest: beyond, nothing is foretold
+SURE_TIME_FACTOR = 1.6  # a step's wall time may be so many times that of a past run, or less
+UNSURE_CELL_POWER = 0.25  # power of the ratio of cells by which that grows
+WORK_CELL_POWER = 0.8  # power of the number of cells with which a step's wall time grows
+WIDEST_TIME_RANGE = 50.0  # of the longest time over the shortest: beyond, nothing is foretold
 OTHER = ("run", "output", "gauge", "cells")  # keys of a deck that leave the flow as it is
 
 FIRST_STEPS = 12  # until there is a word: the first five are shortened on purpose
-GROWTH = 1.03  # of the steps from mark to mark: a few hundred marks for any run
-STEEPEST = 4.0  # change of a logarithm, at most, that is foretold from a fit alone
-UNUSUAL = 4.0  # times the usual wall time of a step: no speed, but an event
+MARK_GROWTH = 1.03  # of the steps from mark to mark: a few hundred marks for any run
+STEEPEST_LOG_CHANGE = 4.0  # change of a logarithm, at most, that is foretold from a fit alone
+UNUSUAL_STEP_FACTOR = 4.0  # times the usual wall time of a step: no speed, but an event
 PARTS = np.linspace(0.0, 1.0, 21)  # of the end time of a past run
 # what was left over what was foretold, at its least and most, at the very start of runs
 FITTED = (0.8, 3.0)
 REMEMBERED = (0.65, 1.8)
 
-FALLEN = 100.0  # times below its largest value: dt is worth a word
+FALLEN_STEP_FACTOR = 100.0  # times below its largest value: dt is worth a word
 
 
 class PastRun(msgspec.Struct, frozen=True):
@@ -109,7 +109,7 @@ def drop_events(seconds: np.ndarray) -> np.ndarray:
     """Wall times [s] of steps (n,), those of far slower ones made usual: kernels that compile when
     they are first needed, another program on the machine."""
     usual = float(np.median(seconds))
-    return np.where(seconds <= UNUSUAL * usual, seconds, usual)
+    return np.where(seconds <= UNUSUAL_STEP_FACTOR * usual, seconds, usual)
 
 
 def find_past(flow: str, cells: int) -> PastRun | None:
@@ -171,11 +171,11 @@ def foretell(
     if past is not None and steps is not None:
         low, likely, high = (max(round(float(f"{number:.2g}")), 1) for number in steps)
         words = f"about {likely}{f' ({low} to {high})' * (low < high)} steps; "
-        sure = SURE * math.exp(UNSURE * past.is_off(size.cells))
-        if steps[2] / steps[0] * sure**2 > WIDEST:
+        sure = SURE_TIME_FACTOR * math.exp(UNSURE_CELL_POWER * past.is_off(size.cells))
+        if steps[2] / steps[0] * sure**2 > WIDEST_TIME_RANGE:
             words += "the time of a step is measured in the run"
         else:
-            a_step = past.seconds * (max(size.cells, 1) / past.cells) ** WORK
+            a_step = past.seconds * (max(size.cells, 1) / past.cells) ** WORK_CELL_POWER
             seconds = describe_seconds(steps[0] * a_step / sure, steps[2] * a_step * sure)
             words += f"time stepping will take {seconds} on a desktop computer"
     cells = f"{size.cells} cells in {count(len(size.blocks), 'block')}"
@@ -201,7 +201,7 @@ def foretell(
         f"cost: {cells}; {words}",
         f"cost: memory about {describe_bytes(size.memory)}; disk about {needed} "
         f"({count(round(dumps), 'dump')} of {a_dump}{f', {there} free' * math.isfinite(free)})",
-    ], [f"caution: {told}"] * (disk > TIGHT * free)
+    ], [f"caution: {told}"] * (disk > TIGHT_DISK_PART * free)
 
 
 def find_free(folder: Path) -> float:
@@ -226,7 +226,7 @@ class TimeLeft:
     def note(self, step: int, t: float, wall: float) -> None:
         """Take note of a step that ended at time `t` [s] and wall time `wall` [s]."""
         if step >= self._next:
-            self._next = step * GROWTH + 1.0
+            self._next = step * MARK_GROWTH + 1.0
             self.marks.append((step, t, wall))
 
     def foretell(self, step: int, t: float, wall: float) -> tuple[float, float, float] | None:
@@ -255,7 +255,11 @@ class TimeLeft:
         weights = np.sqrt(counts[half])
         slope, level = np.polyfit(middles, rates, 1, w=weights)
         ahead = np.linspace(0.0, max(end - t, 0.0), 200)
-        trend = np.clip(slope * memory * (1.0 - np.exp(-ahead / memory)), -STEEPEST, STEEPEST)
+        trend = np.clip(
+            slope * memory * (1.0 - np.exp(-ahead / memory)),
+            -STEEPEST_LOG_CHANGE,
+            STEEPEST_LOG_CHANGE,
+        )
         left = float(np.trapezoid(np.exp(level + trend), ahead)) * a_step
         if self.course:
             first, now = np.interp([times[0] / self.t_end, t / self.t_end], PARTS, self.course)
@@ -288,7 +292,7 @@ class ShortSteps:
         if self.told or dt is None or limit in OWN_REASONS or not dt > 0.0:
             return
         self.largest = max(self.largest, dt)
-        if self.largest < FALLEN * dt:
+        if self.largest < FALLEN_STEP_FACTOR * dt:
             return
         self.told = True
         where = ""

@@ -21,12 +21,14 @@ from hydro.block import Block
 from problems.deck import Gauge, place_gauges
 from problems.evolution import BlockView, Evolution, get_material
 from regrid.errors import BadInput
-from regrid.measure.cells import OUTSIDE, find_places
+from regrid.measure.cells import OUTSIDE_BLOCK, find_places
 from runs.store.history import HistoryWriter
 
-GAP = 0.05  # cells beside a block at which a fixed point still counts as in it
-LEEWAY = 0.5  # the same for a point of the material, beside the blocks of that material
-NOWHERE = -1  # number of the block of a point outside of all
+FIXED_POINT_GAP = 0.05  # cells beside a block at which a fixed point still counts as in it
+MATERIAL_POINT_LEEWAY = (
+    0.5  # the same for a point of the material, beside the blocks of that material
+)
+OUTSIDE_ALL_BLOCKS = -1  # number of the block of a point outside of all
 POSITIVE = ("rho", "c")
 
 
@@ -41,7 +43,7 @@ class Places:
         self.position = position
         self.allowed = allowed
         self.reach = reach
-        self.block = np.full(count, NOWHERE, dtype=np.int64)
+        self.block = np.full(count, OUTSIDE_ALL_BLOCKS, dtype=np.int64)
         self.cell = np.zeros((2, count), dtype=np.int64)
         self.quad = np.zeros((2, count), dtype=np.int64)
         self.part = np.zeros((2, count))
@@ -50,7 +52,7 @@ class Places:
         """Find all points in the present grids, each first where it was last."""
         pending = np.isfinite(self.position).all(axis=0)
         last = self.block.copy()
-        self.block[~pending] = NOWHERE
+        self.block[~pending] = OUTSIDE_ALL_BLOCKS
         for number, block in enumerate(blocks):
             pending &= ~self._search(number, block, pending & (last == number))
         reaches = [0.0] if not pending.any() else [0.0, *np.unique(self.reach[pending])]
@@ -63,7 +65,7 @@ class Places:
                     if home:
                         tried &= last == number
                     pending &= ~self._search(number, block, tried, reach)
-        self.block[pending] = NOWHERE
+        self.block[pending] = OUTSIDE_ALL_BLOCKS
 
     def _search(
         self, number: int, block: BlockView, tried: np.ndarray, reach: float = 0.0
@@ -82,7 +84,7 @@ class Places:
         where = np.zeros(chosen.size, dtype=np.int64)
         nodes, points = map(np.ascontiguousarray, (block.nodes, self.position[:, chosen]))
         find_places(nodes, points, float(reach), cells, quads, parts, where)
-        here = where != OUTSIDE
+        here = where != OUTSIDE_BLOCK
         chosen = chosen[here]
         for kept, new in ((self.cell, cells), (self.quad, quads), (self.part, parts)):
             kept[:, chosen] = new[:, here]
@@ -124,11 +126,11 @@ def place_points(points: Sequence[Gauge], blocks: Sequence[BlockView]) -> Places
     position = np.array([point.at for point in points], dtype=float).reshape(-1, 2).T.copy()
     moves = np.array([point.moves for point in points], dtype=bool)
     everywhere = np.ones((len(blocks), len(points)), dtype=bool)
-    places = Places(position, everywhere, np.where(moves, 0.0, GAP))
+    places = Places(position, everywhere, np.where(moves, 0.0, FIXED_POINT_GAP))
     places.locate(blocks)
     materials = [get_material(block) for block in blocks]
     for number in np.flatnonzero(moves):
-        if places.block[number] == NOWHERE:
+        if places.block[number] == OUTSIDE_ALL_BLOCKS:
             x, y = position[:, number]
             low = np.min([block.nodes.min(axis=(1, 2)) for block in blocks], axis=0)
             high = np.max([block.nodes.max(axis=(1, 2)) for block in blocks], axis=0)
@@ -139,7 +141,7 @@ def place_points(points: Sequence[Gauge], blocks: Sequence[BlockView]) -> Places
             )
         own = materials[places.block[number]]
         places.allowed[:, number] = [material == own for material in materials]
-    places.reach[moves] = LEEWAY
+    places.reach[moves] = MATERIAL_POINT_LEEWAY
     return places
 
 
@@ -228,12 +230,12 @@ class Gauges:
         """Columns of gauges.csv at this step."""
         names = [block.name for block in self.evolution.blocks]
         row: dict[str, Any] = {"step": self.evolution.step, "t": self.evolution.t}
-        row["outside"] = int((self.places.block == NOWHERE).sum())
+        row["outside"] = int((self.places.block == OUTSIDE_ALL_BLOCKS).sum())
         for k, point in enumerate(self.points):
             if point.moves:
                 row[f"{point.name}_x"], row[f"{point.name}_y"] = self.places.position[:, k].tolist()
             number = int(self.places.block[k])
-            row[f"{point.name}_block"] = NO_BLOCK if number == NOWHERE else names[number]
+            row[f"{point.name}_block"] = NO_BLOCK if number == OUTSIDE_ALL_BLOCKS else names[number]
             for name in point.fields:
                 row[f"{point.name}_{name}"] = float(self.values[name][k])
         return row

@@ -12,7 +12,9 @@ import sys
 from shockgrid.shadowing import find_shadow
 
 BAD_INPUT = 2  # exit code, as in runs.cli.main
-UNCOLLECTED = 200_000  # new objects before Python looks for cycles: loading makes no garbage
+UNCOLLECTED_OBJECTS = (
+    200_000  # new objects before Python looks for cycles: loading makes no garbage
+)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -20,7 +22,7 @@ def main(arguments: list[str] | None = None) -> int:
     if shadow := find_shadow():
         print(f"shockgrid: {shadow}", file=sys.stderr)
         return BAD_INPUT
-    gc.set_threshold(UNCOLLECTED)
+    gc.set_threshold(UNCOLLECTED_OBJECTS)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for small matrices; idle threads spin
     from runs.cli.main import main as run_command
 

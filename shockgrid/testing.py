@@ -34,7 +34,7 @@ from regrid.sides import SIDES
 
 Make = Callable[..., Any]  # makes a regridder
 DOMAINS = ("dome", "valley", "jet", "strip")  # whose first steps any family can follow
-POISON = 1e30
+POISON_VALUE = 1e30
 
 
 def _demand(kept: Any, words: str) -> None:
@@ -74,7 +74,7 @@ def check_inputs(make: Make) -> None:
     """Inner nodes of the boundary are not read, and no argument is changed or returned."""
     previous, boundary = carry(make, "valley")
     filled = boundary.copy()
-    filled[:, 1:-1, 1:-1] = POISON
+    filled[:, 1:-1, 1:-1] = POISON_VALUE
     before = previous.copy()
     sides = boundary.copy()
     first = make().regrid(previous, boundary).nodes
@@ -331,14 +331,17 @@ def _check_ghosts(kind, side, options, eos, state) -> None:
     segment = kind(block, side, 1, count - 1, **options)
     block.segments.append(segment)
     ghosts = block.rim.rows[rim.RHO_GHOST : rim.LENGTH_GHOST + 1]
-    ghosts[...] = POISON
+    ghosts[...] = POISON_VALUE
     block.gather()
     block.fill_ghosts(0.0)
     own = np.zeros(block.rim.faces, dtype=bool)
     own[segment.first : segment.last] = True
-    _demand((ghosts[:, ~own] == POISON).all(), "ghosts of faces that are not its own change")
+    _demand((ghosts[:, ~own] == POISON_VALUE).all(), "ghosts of faces that are not its own change")
     inside = ghosts[: rim.P + 1, own]
-    _demand(np.isfinite(inside).all() and (inside != POISON).all(), "its ghosts are not all filled")
+    _demand(
+        np.isfinite(inside).all() and (inside != POISON_VALUE).all(),
+        "its ghosts are not all filled",
+    )
 
 
 def _check_flow(kind, side, options, eos, state) -> None:

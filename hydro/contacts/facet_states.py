@@ -28,7 +28,7 @@ from hydro.contacts.rows import (
     LEADER,
     NORMAL_X,
     NORMAL_Y,
-    SOUND,
+    SOUND_ROW,
     SWEPT_RATE,
 )
 from hydro.formulas.geometry import PLANE, Geometry
@@ -37,7 +37,9 @@ from hydro.rows import RHO
 from hydro.sliding.pieces import compute_at, measure_square
 from regrid.jit import compiled_once, kernel
 
-ROUNDING = 1e-12  # of rho c²: a pressure that is this little below that of the void is not below
+ROUND_OFF_PRESSURE = (
+    1e-12  # of rho c²: a pressure that is this little below that of the void is not below
+)
 
 
 @compiled_once
@@ -80,7 +82,7 @@ def solve_facets(
         u_other, v_other, p_other = compute_at(follower, other_middles, other_slopes, b, x, y)
         w_other = u_other * nx + v_other * ny
         rho_other = follower[RHO, b]
-        c_other = follower[SOUND, b]
+        c_other = follower[SOUND_ROW, b]
         void = other_open_p[b]
         stiffness = rho_other * c_other * c_other
         if rigid:
@@ -92,13 +94,13 @@ def solve_facets(
             u, v, p = compute_at(leader, middles, slopes, a, x, y)
             w = u * nx + v * ny
             rho = leader[RHO, a]
-            c = leader[SOUND, a]
+            c = leader[SOUND_ROW, a]
             void = max(void, open_p[a])
             stiffness = max(stiffness, rho * c * c)
             pressure, speed = compute_contact(
                 (rho, w, p, c, law), (rho_other, w_other, p_other, c_other, other_law), 0.0
             )
-        holds = pressure >= void - bond - ROUNDING * stiffness
+        holds = pressure >= void - bond - ROUND_OFF_PRESSURE * stiffness
         out[CLOSED, k] = 1.0 if holds else 0.0
         out[FACET_P, k] = pressure
         out[EXCESS_LEADER, k] = speed - w

@@ -32,16 +32,16 @@ from regrid.jit import compiled_once, kernel
 from regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
 
 BOTH, LATER, EARLIER = range(3)  # parts, see `may_lie_on`
-SNAP = 1e-9  # parts of a face closer than this to a node are at the node
-WINDOW = 3  # faces on either side of its old one on which a pin is looked for again
-BULGE = 0.1  # of a face: so far off it may the other line's nodes lie between its two pins
+SNAPPED_FACE_PART = 1e-9  # parts of a face closer than this to a node are at the node
+SEARCHED_FACES = 3  # faces on either side of its old one on which a pin is looked for again
+MOST_BULGE = 0.1  # of a face: so far off it may the other line's nodes lie between its two pins
 
 
 @compiled_once
 def snap_position(position):
     """A position on a line, at a node where it nearly is."""
     nearest = float(int(position + 0.5))
-    return nearest if abs(position - nearest) < SNAP else position
+    return nearest if abs(position - nearest) < SNAPPED_FACE_PART else position
 
 
 @compiled_once
@@ -158,7 +158,7 @@ def find_pins(
                 is_on = away <= tolerance * tolerance * square
                 if not is_on and 0.0 < at < 1.0 and faces_each_other(line, a, along_x, along_y):
                     deep = find_depth(line, a, x, y)
-                    is_on = 0.0 < deep <= BULGE * square**0.5
+                    is_on = 0.0 < deep <= MOST_BULGE * square**0.5
                     if a == 0 and at * square**0.5 < deep:
                         is_on = False  # behind the next side, at the corner of a body
                     if a == count - 1 and (1.0 - at) * square**0.5 < deep:
@@ -224,7 +224,7 @@ def follow_pins(points, line, positions, part, found):
             continue
         middle = min(int(positions[k]), last)
         least = 1e300
-        for a in range(max(0, middle - WINDOW), min(last, middle + WINDOW) + 1):
+        for a in range(max(0, middle - SEARCHED_FACES), min(last, middle + SEARCHED_FACES) + 1):
             if not may_lie_on(part, k, a):
                 continue
             at, away = project(line, a, points[0, k], points[1, k])
@@ -295,7 +295,7 @@ def lie_near(points, first, stop, line, a):
     """Do the points first..stop - 1 lie no further than BULGE from face `a` of a line?"""
     for k in range(first, stop):
         _, away = project(line, a, points[0, k], points[1, k])
-        if away > BULGE * BULGE * measure_square(line, a):
+        if away > MOST_BULGE * MOST_BULGE * measure_square(line, a):
             return False
     return True
 
@@ -333,7 +333,7 @@ def fill_facets(leader, follower, positions, back_positions, straight, pins, cov
             ends[FOLLOWER_START, facets] = high
             ends[FOLLOWER_STOP, facets] = low
             facets += 1
-        elif lie_near(leader, a + 1, int(stop - SNAP) + 1, follower, b):
+        elif lie_near(leader, a + 1, int(stop - SNAPPED_FACE_PART) + 1, follower, b):
             here = start
             other = high
             while here < stop:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.contacts.facets import BULGE, find_depth
+from hydro.contacts.facets import MOST_BULGE, find_depth
 from hydro.contacts.rows import (
     CLOSED,
     FOLLOWER_START,
@@ -14,10 +14,14 @@ from hydro.contacts.rows import (
 )
 from regrid.jit import compiled_once, kernel
 
-DEEP = 0.05  # of a face's length: so far the leader's nodes may lie behind the follower's chords
+DEEP_NODE_PART = (
+    0.05  # of a face's length: so far the leader's nodes may lie behind the follower's chords
+)
 MOST_LAID = 0.3  # of a face's length: nodes that have gone further into the other body fail
-MATCHED = 1e-6  # of a face's length: nodes of both lines that lie so near each other are a pair
-STILL = 1e-12  # of a face's length: a node this near is where it is to be
+MATCHED_NODE_DISTANCE = (
+    1e-6  # of a face's length: nodes of both lines that lie so near each other are a pair
+)
+STILL_NODE_DISTANCE = 1e-12  # of a face's length: a node this near is where it is to be
 
 
 @kernel
@@ -103,13 +107,13 @@ def lay(
         beside = abs(x * dx + y * dy) / length
         if back:
             at_end = (k == 0 or k == last) and not inner[k]
-            takes = (outside < 0.0 and at_end) or outside < -DEEP * length
+            takes = (outside < 0.0 and at_end) or outside < -DEEP_NODE_PART * length
         else:
             takes = outside < 0.0
         takes = takes or held[k] or hits[k] >= 0.0
         if not straight and (found[k] == 0.0 or found[k] == most):
             takes = takes and beside <= max(abs(outside), 1e-9 * length)
-        if not takes or (not straight and max(abs(x), abs(y)) <= STILL * length):
+        if not takes or (not straight and max(abs(x), abs(y)) <= STILL_NODE_DISTANCE * length):
             continue
         way = (x * x + y * y) ** 0.5
         if way > MOST_LAID * length:
@@ -120,7 +124,7 @@ def lay(
             dx = old_line[0, b] + at * (old_line[0, b + 1] - old_line[0, b]) - old_points[0, k]
             dy = old_line[1, b] + at * (old_line[1, b + 1] - old_line[1, b]) - old_points[1, k]
             was = (dx * dx + dy * dy) ** 0.5
-            if was > MATCHED * length:
+            if was > MATCHED_NODE_DISTANCE * length:
                 scale = max(0.0, 1.0 - (1.0 - part_back) * was / way)
                 x, y = scale * x, scale * y
         if 0 < k < last:
@@ -152,7 +156,7 @@ def match(points, line, places, hits, held, ends):
     ends[:] = 0.0
     for k in range(last + 1):
         m = int(places[k] + 0.5)
-        if places[k] < 0.0 or abs(places[k] - m) > MATCHED:
+        if places[k] < 0.0 or abs(places[k] - m) > MATCHED_NODE_DISTANCE:
             continue
         x, y = line[0, m] - points[0, k], line[1, m] - points[1, k]
         # faces that would be mirror images: from node m on, up to node k; or those before these
@@ -165,7 +169,7 @@ def match(points, line, places, hits, held, ends):
         square = dx * dx + dy * dy
         dx, dy = dx - (points[0, b + 1] - points[0, b]), dy - (points[1, b + 1] - points[1, b])
         way = x * x + y * y
-        most_slip = MATCHED * (way + MATCHED * square)  # squared
+        most_slip = MATCHED_NODE_DISTANCE * (way + MATCHED_NODE_DISTANCE * square)  # squared
         slips = (x * dx + y * dy) ** 2 > most_slip * (dx * dx + dy * dy)
         if slips or way > MOST_LAID * MOST_LAID * square:
             continue
@@ -227,7 +231,7 @@ def measure_clearance_of_plane(points, line, asked):
     for k in range(points.shape[1]):
         if asked[k]:
             high = -find_depth(line, 0, points[0, k], points[1, k])
-            least = min(least, high - BULGE * measure_shorter(points, k))
+            least = min(least, high - MOST_BULGE * measure_shorter(points, k))
     return least
 
 

@@ -31,11 +31,13 @@ from regrid.errors import Place, RunFailure
 
 LEAST_STEP = 2e-3  # of the stable step: a touch that comes sooner is taken at its end
 LEAST_BESIDE = 5e-2  # the same where surfaces touch already
-CUTS = 5  # times that a step is cut to the first touch, and made a little longer again
+MOST_TOUCH_CUTS = 5  # times that a step is cut to the first touch, and made a little longer again
 MOST_LONGER = 1.5  # a step that was cut too short
-REACHED = 1e-6  # of a step: a touch that comes so shortly before or after its end is at its end
-ROUND_OFF = 1e-12  # of a surface's length: ends so near to the axis are on it
-BACK = 0.2  # part that nodes behind the other line are taken back in a stable step
+REACHED_TOUCH_PART = (
+    1e-6  # of a step: a touch that comes so shortly before or after its end is at its end
+)
+ROUND_OFF_AXIS_DISTANCE = 1e-12  # of a surface's length: ends so near to the axis are on it
+RETURN_PART = 0.2  # part that nodes behind the other line are taken back in a stable step
 
 
 class Meetings:
@@ -149,7 +151,7 @@ class Meetings:
             surface.read_new()
         for pair in awake:
             pair.forget_hits()
-        part_back = min(1.0, BACK * dt / stable_dt)
+        part_back = min(1.0, RETURN_PART * dt / stable_dt)
         self._lay(self.touching, part_back)
         for surface in self._sides:
             surface.measure_way()
@@ -157,14 +159,17 @@ class Meetings:
         first = min(pair.find_touch(stretch) for pair in awake)
         least = LEAST_BESIDE if self.touching else LEAST_STEP
         other = max(first * dt, min(dt, least * stable_dt))
-        misses = other < (1.0 - REACHED) * dt or (1.0 + REACHED) * dt < other <= MOST_LONGER * dt
-        if misses and self._cuts < CUTS:
+        misses = (
+            other < (1.0 - REACHED_TOUCH_PART) * dt
+            or (1.0 + REACHED_TOUCH_PART) * dt < other <= MOST_LONGER * dt
+        )
+        if misses and self._cuts < MOST_TOUCH_CUTS:
             self._cuts += 1
             return other
         self._cuts = 0
-        if first < 1.0 + 2.0 * REACHED or self.touching:
+        if first < 1.0 + 2.0 * REACHED_TOUCH_PART or self.touching:
             for pair in awake:
-                pair.find_touch(1.0 + 2.0 * REACHED, cuts=False)
+                pair.find_touch(1.0 + 2.0 * REACHED_TOUCH_PART, cuts=False)
         else:
             for pair in awake:
                 pair.forget_hits()
@@ -209,7 +214,7 @@ class Meetings:
                 continue
             key_node.shift(_turn_into_wall(np.array(way), key_node.find_wall()))
             if self.geometry.curved:
-                key_node.put_on_axis(ROUND_OFF * surface.length)
+                key_node.put_on_axis(ROUND_OFF_AXIS_DISTANCE * surface.length)
             for other in self.surfaces:
                 if key_node in other.ends:
                     other.read_new()

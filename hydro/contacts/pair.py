@@ -7,9 +7,9 @@ import numpy as np
 from hydro.contacts.facet_states import add_friction, measure_closed, solve_facets
 from hydro.contacts.facets import (
     BOTH,
-    BULGE,
     EARLIER,
     LATER,
+    MOST_BULGE,
     fill_facets,
     find_deepest,
     find_pins,
@@ -32,9 +32,9 @@ from hydro.contacts.touch import fill_swept_boxes, find_touches, measure_distanc
 from hydro.motion.overlaps import is_inside
 from regrid.errors import Place, RegridFailure
 
-ON = 1e-6  # of a face's length: closer than this a node lies on the other line
+ON_LINE_DISTANCE = 1e-6  # of a face's length: closer than this a node lies on the other line
 MOST_BEHIND = 0.5  # of a face's length: lines that cross so far have lost each other
-FAR = 2.0  # longest faces: surfaces of one body are not looked for further off
+FAR_SEARCH_FACES = 2.0  # longest faces: surfaces of one body are not looked for further off
 
 
 class Pair:
@@ -135,12 +135,14 @@ class Pair:
         other = self.follower
         parts = self.parts
         pinned = find_pins(
-            other.line, other.inner, one.line, one.boxes, one.group, ON, BULGE * one.longest,
-            self.asked, self.one_body, parts[0], self.positions,
+            other.line, other.inner, one.line, one.boxes, one.group,
+            ON_LINE_DISTANCE, MOST_BULGE * one.longest, self.asked,
+            self.one_body, parts[0], self.positions,
         )  # fmt: skip
         return pinned + find_pins(
-            one.line, one.inner, other.line, other.boxes, other.group, ON, BULGE * other.longest,
-            self.back_asked, self.one_body, parts[1], self.back_positions,
+            one.line, one.inner, other.line, other.boxes, other.group,
+            ON_LINE_DISTANCE, MOST_BULGE * other.longest, self.back_asked,
+            self.one_body, parts[1], self.back_positions,
         )  # fmt: skip
 
     def find_crossing(self) -> tuple[Surface, Surface, int] | None:
@@ -164,8 +166,8 @@ class Pair:
         one = self.leader
         other = self.follower
         longest = max(one.longest, other.longest)
-        width = BULGE * longest
-        most = FAR * longest if self.one_body else np.inf
+        width = MOST_BULGE * longest
+        most = FAR_SEARCH_FACES * longest if self.one_body else np.inf
         near = measure_distance(
             other.line, other.inner, one.line, one.boxes, one.group, self.asked, self.parts[0],
             self.one_body, most,
@@ -350,7 +352,9 @@ class PlanePair(Pair):
         return measure_clearance_of_plane(self.follower.line, self.leader.line, self.asked)
 
     def _find_pins(self):
-        return find_plane_pins(self.follower.line, self.leader.line, ON, self.positions)
+        return find_plane_pins(
+            self.follower.line, self.leader.line, ON_LINE_DISTANCE, self.positions
+        )
 
     def find_crossing(self):
         return None

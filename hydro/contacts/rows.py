@@ -6,7 +6,7 @@ from __future__ import annotations
 AREA_X, AREA_Y, SWEPT_RATE, FACE_X, FACE_Y, NORMAL_X, NORMAL_Y = range(7)
 FACE_ROWS = 7
 AREAS = slice(AREA_X, SWEPT_RATE + 1)
-SOUND = 4  # row of the sound speed in states at faces and in traces
+SOUND_ROW = 4  # row of the sound speed in states at faces and in traces
 
 # owners (2, facets): the faces of the two lines that a facet belongs to, counted along them
 LEADER, FOLLOWER = range(2)

@@ -18,7 +18,7 @@ from hydro.motion.key_nodes import KeyNode
 from hydro.perimeter.contacts import fill_ghosts_from_faces
 from hydro.rim import SIDES
 from hydro.sliding.pieces import SLOPE_ROWS, fill_slopes
-from regrid.measure.crossings import GROUP, fill_boxes
+from regrid.measure.crossings import GROUP_EDGES, fill_boxes
 
 MOST_GROUPS = 64  # boxes of a line
 IN_LINE = 1e-9  # of the size of all: walls so near to a line are on it
@@ -36,7 +36,7 @@ class Surface:
         self.back = segment.side in ("i_min", "j_max")
         self.step = -1 if self.back else 1
         self.start = segment.last - 1 if self.back else segment.first
-        self.group = max(GROUP, -(-self.count // MOST_GROUPS))
+        self.group = max(GROUP_EDGES, -(-self.count // MOST_GROUPS))
         boxes = 4, -(-self.count // self.group)
         self.boxes = np.empty(boxes)
         self.swept = np.empty(boxes)

@@ -20,8 +20,12 @@ from hydro.sliding.pieces import measure_square, project
 from regrid.jit import compiled_once, kernel
 from regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
 
-BESIDE = 0.1  # of a face's length: a node that close to a pin on its own line comes on with it
-MARGIN = 1e-9  # parts of a face beyond its ends that belong to it: nodes do not pass between faces
+BESIDE_PIN_DISTANCE = (
+    0.1  # of a face's length: a node that close to a pin on its own line comes on with it
+)
+FACE_END_MARGIN = (
+    1e-9  # parts of a face beyond its ends that belong to it: nodes do not pass between faces
+)
 
 
 @kernel
@@ -146,7 +150,9 @@ def find_touch(x, y, dx, dy, old, new, a):
     e_x, e_y = e_x + time * de_x, e_y + time * de_y
     d_x, d_y = d_x + time * dd_x, d_y + time * dd_y
     part = (d_x * e_x + d_y * e_y) / (e_x * e_x + e_y * e_y)
-    return (time if -MARGIN <= part <= 1.0 + MARGIN else 2.0), min(1.0, max(0.0, part))
+    return (time if -FACE_END_MARGIN <= part <= 1.0 + FACE_END_MARGIN else 2.0), min(
+        1.0, max(0.0, part)
+    )
 
 
 @kernel
@@ -168,7 +174,7 @@ def find_touches(
     beside = np.zeros(last, np.bool_)
     for k in range(others.shape[0] if cuts else 0):
         node = int(others[k] + 0.5)
-        if others[k] >= 0.0 and abs(others[k] - node) < BESIDE:
+        if others[k] >= 0.0 and abs(others[k] - node) < BESIDE_PIN_DISTANCE:
             beside[node] = True
     for k in range(last):
         if k % group == 0:

@@ -20,11 +20,17 @@ from hydro.contacts.rows import FOLLOWER_START, FOLLOWER_STOP, LEADER_START, LEA
 from hydro.contacts.surface import Plane, Surface
 from regrid.errors import BadInput
 
-SMALL = 0.5  # of the depth of the cells around it: a void whose area has this side is closed
-ROUND = 0.02  # of its perimeter squared: such a void has no contact on its way to close by
-LEAST = 0.1  # of the same depth: slivers whose area has a smaller side are no voids
-LARGE = 8.0  # of the same: larger voids without gas are measured, and new ones looked for,
-SELDOM = 8  # every so many steps
+SMALL_VOID_DEPTHS = (
+    0.5  # of the depth of the cells around it: a void whose area has this side is closed
+)
+ROUND_VOID_PART = (
+    0.02  # of its perimeter squared: such a void has no contact on its way to close by
+)
+SLIVER_DEPTHS = 0.1  # of the same depth: slivers whose area has a smaller side are no voids
+LARGE_VOID_DEPTHS = (
+    8.0  # of the same: larger voids without gas are measured, and new ones looked for,
+)
+STEPS_PER_VOID_SEARCH = 8  # every so many steps
 Place = tuple[int, float]  # number of a curve, position on it
 
 
@@ -97,10 +103,10 @@ class Voids:
 
     def are_due(self, step: int, touching: bool) -> bool:
         """Are they to be looked for?  Large ones with nothing in them only now and then."""
-        if self._asked or self.pressure > 0.0 or step % SELDOM == 0:
+        if self._asked or self.pressure > 0.0 or step % STEPS_PER_VOID_SEARCH == 0:
             return touching or self._asked or bool(self.found)
         return any(
-            void.gas != 0.0 or void.rest != 0.0 or void.area < (LARGE * void.depth) ** 2
+            void.gas != 0.0 or void.rest != 0.0 or void.area < (LARGE_VOID_DEPTHS * void.depth) ** 2
             for void in self.found
         )
 
@@ -109,7 +115,7 @@ class Voids:
         self._asked = False
         before = self.found
         self.found = [self._measure(loop) for loop in self._find_loops()]
-        self.found = [void for void in self.found if void.area > (LEAST * void.depth) ** 2]
+        self.found = [void for void in self.found if void.area > (SLIVER_DEPTHS * void.depth) ** 2]
         self._hand_on(before)
         self._press()
 
@@ -260,8 +266,8 @@ class Voids:
                 void.growth = now - was
             void.rest = max((old.rest for old in parents), default=0.0)
             void.stiffness = max((old.stiffness for old in parents), default=0.0)
-            small = void.area < (SMALL * void.depth) ** 2
-            if void.rest == 0.0 and small and void.area > ROUND * void.around**2:
+            small = void.area < (SMALL_VOID_DEPTHS * void.depth) ** 2
+            if void.rest == 0.0 and small and void.area > ROUND_VOID_PART * void.around**2:
                 void.rest = void.volume
             elif void.volume > void.rest:
                 void.rest = void.stiffness = 0.0

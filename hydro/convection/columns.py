@@ -215,11 +215,11 @@ def to_nodes(x: np.ndarray, values: np.ndarray, walls: tuple[float, float]) -> n
     return np.interp(x, get_places(x), enclose(values, walls))
 
 
-SETTLED = 1e-12  # relative change in a time L^2/kappa below which the state is steady
-RESTING = 2e-14  # of the axis: nodes that move by less between steady solves have settled
-GROWTH = 1.25  # of dt from step to step
-FIRST = 1e-4  # first dt over L^2/kappa
-LONGEST = 0.01  # of the whole time: the grid needs a number of steps to settle
+STEADY_CHANGE = 1e-12  # relative change in a time L^2/kappa below which the state is steady
+RESTING_NODE_MOVE = 2e-14  # of the axis: nodes that move by less between steady solves have settled
+COLUMN_STEP_GROWTH = 1.25  # of dt from step to step
+FIRST_STEP_PART = 1e-4  # first dt over L^2/kappa
+LONGEST_STEP_PART = 0.01  # of the whole time: the grid needs a number of steps to settle
 
 
 def make_profile(column: Column, kind: str, x: np.ndarray, temperature, velocity):
@@ -253,7 +253,7 @@ def settle_column(
         profile = make_profile(column, kind, x, temperature, velocity)
         old = x
         x = correct_axis(kind, x, profile, **options)
-        if np.abs(x - old).max() <= RESTING * (x[-1] - x[0]):
+        if np.abs(x - old).max() <= RESTING_NODE_MOVE * (x[-1] - x[0]):
             break
     temperature, velocity, _ = solve_column(column, x)
     return x, temperature, velocity, count
@@ -308,7 +308,7 @@ class ColumnMarch:
         self.velocity = np.zeros(x.size - 1)
         self.reference = self.heat_in = 0.0
         self.still = False
-        self.dt = FIRST * (x[-1] - x[0]) ** 2 / column.diffusivity
+        self.dt = FIRST_STEP_PART * (x[-1] - x[0]) ** 2 / column.diffusivity
         described = {
             "T": ("K", "temperature"),
             "v": ("m/s", "velocity along the plates"),
@@ -333,7 +333,7 @@ class ColumnMarch:
     def advance(self) -> dict[str, float | str]:
         column = self.column
         dt = self.dt
-        limit = "growth" if dt < LONGEST * self.t_end else "longest"
+        limit = "growth" if dt < LONGEST_STEP_PART * self.t_end else "longest"
         if self.t + dt >= self.t_end * (1.0 - 1e-12):
             dt = self.t_end - self.t
             limit = "end"
@@ -361,8 +361,8 @@ class ColumnMarch:
         self.heat_in += dt * (inward - outward)
         self.t = self.t_end if limit == "end" else self.t + dt
         self.step += 1
-        self.dt = min(GROWTH * self.dt, LONGEST * self.t_end)
-        self.still = corrected and change < SETTLED
+        self.dt = min(COLUMN_STEP_GROWTH * self.dt, LONGEST_STEP_PART * self.t_end)
+        self.still = corrected and change < STEADY_CHANGE
         return {
             **{"t": self.t, "dt": dt, "dt_limit": limit, **self._totals(), "change": change},
             "flow": float(velocity @ np.diff(x)),
@@ -395,9 +395,9 @@ class ColumnMarch:
 
 
 FAMILIES = ("fixed", "after", "law", "first")
-GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
-NEWTON = 30  # iterations at most; four are typical
-LEAST = 0.2  # of a cell's length: the lagging speed may shrink it to that
+SDIRK_GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
+MOST_NEWTON_ITERATIONS = 30  # iterations at most; four are typical
+LEAST_CELL_SHRINKAGE = 0.2  # of a cell's length: the lagging speed may shrink it to that
 
 Ends = Callable[[float], np.ndarray]
 
@@ -447,34 +447,36 @@ def step_front(
     through = 0.0
     iterations = 0
     tolerance = 1e-14 * float(np.abs(before).max()) + 1e-300
-    for place, earlier in ((GAMMA, 0.0), (1.0, 1.0 - GAMMA)):
+    for place, earlier in ((SDIRK_GAMMA, 0.0), (1.0, 1.0 - SDIRK_GAMMA)):
         x = x_new if place == 1.0 else x_old + place * (x_new - x_old)
         sizes = np.diff(x)
         outside = ends(t + place * dt)
         values = enclose(u, outside)
         past = 0.5 * (values[:-1] + values[1:]) - speed
         factor = fit_diffusion("exponential", past * measure_distances(x) / viscosity)
-        for _ in range(NEWTON):
+        for _ in range(MOST_NEWTON_ITERATIONS):
             flux, by_left, by_right = compute_fluxes(x, u, outside, speed, viscosity, factor)
             residual = sizes * u - before
-            residual += dt * (earlier * stage_flux + GAMMA * np.diff(flux))
+            residual += dt * (earlier * stage_flux + SDIRK_GAMMA * np.diff(flux))
             if np.abs(residual).max() <= tolerance:
                 break
             iterations += 1
-            weight = GAMMA * dt
+            weight = SDIRK_GAMMA * dt
             u = u - solve_banded(
                 (1, 1), make_bands(weight * by_left, weight * by_right, sizes), residual
             )
         else:
             worst = int(np.abs(residual).argmax())
             raise RunFailure(
-                f"cell {worst}, t = {t:.4g} s: the implicit step did not settle in {NEWTON} "
-                "iterations; a smaller cfl would let it",
+                f"cell {worst}, t = {t:.4g} s: the implicit step did not settle in "
+                f"{MOST_NEWTON_ITERATIONS} iterations; a smaller cfl would let it",
                 cause="implicit-step",
                 place=Place("", (worst, 0)),  # the caller knows the column's name
             )
         stage_flux = np.diff(flux)
-        through += (GAMMA if place == 1.0 else 1.0 - GAMMA) * dt * float(flux[0] - flux[-1])
+        through += (
+            (SDIRK_GAMMA if place == 1.0 else 1.0 - SDIRK_GAMMA) * dt * float(flux[0] - flux[-1])
+        )
     return Step(u, through, iterations)
 
 
@@ -507,7 +509,7 @@ def follow_last_move(x: np.ndarray, last: np.ndarray) -> np.ndarray:
     steps = np.diff(x)
     change = np.diff(x - last)
     closing = float((change / steps).min())
-    part = 1.0 if closing >= LEAST - 1.0 else (LEAST - 1.0) / closing
+    part = 1.0 if closing >= LEAST_CELL_SHRINKAGE - 1.0 else (LEAST_CELL_SHRINKAGE - 1.0) / closing
     return x + part * (x - last)
 
 
@@ -571,10 +573,10 @@ class FrontColumn:
 
 
 FIRST_CORRECTIONS = 60  # at most, of the moving grids for the solution at t = 0
-PLACED = 1e-10  # of the column: nodes that move by less have settled
+PLACED_NODE_MOVE = 1e-10  # of the column: nodes that move by less have settled
 # of the blocks in pictures, one above the other
-HEIGHT = 0.08
-APART = 0.1
+DRAWN_BLOCK_HEIGHT = 0.08
+DRAWN_BLOCK_GAP = 0.1
 
 
 class Exact(Protocol):
@@ -609,7 +611,13 @@ class FrontRace:
                 self.columns[-1].last = self._place(x, -self.t_end / self.steps)
         described = {"u": ("m/s", "velocity"), "step": ("m", "length of the cell")}
         self.blocks = [
-            RowBlock(one.family, one.get_cells, described, APART * row, APART * row + HEIGHT)
+            RowBlock(
+                one.family,
+                one.get_cells,
+                described,
+                DRAWN_BLOCK_GAP * row,
+                DRAWN_BLOCK_GAP * row + DRAWN_BLOCK_HEIGHT,
+            )
             for row, one in enumerate(self.columns)
         ]
 
@@ -619,7 +627,7 @@ class FrontRace:
             means = self.exact.compute_cell_averages(x, t)
             last = x
             x = self.placing.correct(x, measure_gradient(x, means, self.ends(t)))
-            if np.abs(x - last).max() < PLACED:
+            if np.abs(x - last).max() < PLACED_NODE_MOVE:
                 break
         return x
 

@@ -372,7 +372,7 @@ class Equations:
         return sparse.bmat([[momentum, -self.buoyancy(fluid)], [heat_by_psi, heat]], "csc")
 
 
-TOLERANCE = 1e-6  # of the residual of a solution, relative to the right-hand side
+SOLUTION_TOLERANCE = 1e-6  # of the residual of a solution, relative to the right-hand side
 
 
 class Factors:
@@ -414,7 +414,7 @@ class Factors:
 
     def _is_good(self, solution: np.ndarray, right: np.ndarray) -> bool:
         residual = np.abs(self.matrix @ solution - right).max()
-        return bool(residual <= TOLERANCE * np.abs(right).max())
+        return bool(residual <= SOLUTION_TOLERANCE * np.abs(right).max())
 
 
 def _factorise(matrix: sparse.csc_matrix, **options):

@@ -33,7 +33,7 @@ from regrid.errors import BadInput, RunFailure
 # (equations of the new grid, time) -> (force on the control volumes of all faces [m4/s2],
 # heat over rho cp into the cells [K m2/s])
 Sources = Callable[[Equations, float], tuple[np.ndarray, np.ndarray]]
-GROWTH = 1.25  # dt grows only if it may grow by this factor, so that matrices are reused
+BOX_STEP_GROWTH = 1.25  # dt grows only if it may grow by this factor, so that matrices are reused
 
 
 @dataclass(frozen=True)
@@ -150,8 +150,8 @@ class March:
                 "convection: the fluid is at rest and no longest step is given; give one"
             )
         dt = self.dt
-        if not self.dt or dt > most or most > GROWTH * dt:
-            dt = most if limit == "longest" else most / math.sqrt(GROWTH)
+        if not self.dt or dt > most or most > BOX_STEP_GROWTH * dt:
+            dt = most if limit == "longest" else most / math.sqrt(BOX_STEP_GROWTH)
             self.limit = limit
         if dt >= remaining * (1.0 - 1e-12):
             self.limit = "end"

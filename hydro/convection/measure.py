@@ -132,9 +132,11 @@ def measure_energy(equations: Equations, psi: np.ndarray) -> float:
     return float(0.5 * (velocity**2 * momentum.lengths * momentum.reaches).sum())
 
 
-WANTED = 4  # eigenvalues, of which the fastest is taken
-DETUNING = 1e-3  # distance of the filter's shift from the growth rate, over the free-fall rate
-REPEATS = 20  # of the filter
+WANTED_EIGENVALUES = 4  # eigenvalues, of which the fastest is taken
+FILTER_DETUNING = (
+    1e-3  # distance of the filter's shift from the growth rate, over the free-fall rate
+)
+FILTER_REPEATS = 20  # of the filter
 
 
 def solve_rest(equations: Equations, fluid: Fluid) -> tuple[np.ndarray, np.ndarray]:
@@ -172,7 +174,7 @@ def compute_growth(
     start = np.random.default_rng(1).standard_normal(operator.shape[0])
     try:
         values, vectors = eigs(
-            operator, k=WANTED, M=mass, sigma=near, OPinv=inverse, v0=start, which="LM"
+            operator, k=WANTED_EIGENVALUES, M=mass, sigma=near, OPinv=inverse, v0=start, which="LM"
         )
     except ArpackError as error:
         words = f"convection: no growth rate was found near {near:g}: {error}"
@@ -181,7 +183,7 @@ def compute_growth(
     sizes = [np.abs(part).max(axis=0) for part in np.split(vectors, [equations.sizes[0]])]
     warm = sizes[1] * fluid.diffusivity > 1e-6 * sizes[0] * float(np.ptp(temperature))
     best = int(np.argmax(np.where(warm, values.real, -np.inf)))
-    vector = filter_disturbance(equations, operator, mass, values[best], DETUNING * scale)
+    vector = filter_disturbance(equations, operator, mass, values[best], FILTER_DETUNING * scale)
     flow, heat = np.split(vector, [equations.sizes[0]])
     size = np.abs(heat).max()
     return float(values[best].real), flow / size, heat / size
@@ -210,7 +212,7 @@ def filter_disturbance(
     factors = Factors((operator - (rate + detuning) * mass).tocsc(), "filter of disturbances")
     x, y = (axis.centres / axis.length for axis in equations.axes)
     vector = np.concatenate([np.zeros(equations.sizes[0]), np.exp(np.add.outer(x, y)).ravel()])
-    for _ in range(REPEATS):
+    for _ in range(FILTER_REPEATS):
         vector = -detuning * factors.solve(mass @ vector)
     return vector.real
 

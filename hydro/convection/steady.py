@@ -118,11 +118,11 @@ def to_nodes(axis: Axis, values: np.ndarray, k: int, low, high) -> np.ndarray:
 
 
 FIRST_RAYLEIGH = 1e4  # Newton's iteration converges from rest up to here
-ROUGHLY = 1e-3  # change at which a stage before the last counts as converged
+ROUGH_STAGE_CHANGE = 1e-3  # change at which a stage before the last counts as converged
 LONGEST_STAGE = 15  # iterations
 LEAST_FACTOR = 1e-3  # of a stage, in the decimal logarithm
 LEAST_CAUTION = 1e-3  # least fraction of a grid correction
-SETTLING = 1e-2  # change at which the grid is corrected
+GRID_CORRECTION_CHANGE = 1e-2  # change at which the grid is corrected
 
 # of the solver's state
 COUNTERS = ("iterations", "stage_iterations", "corrections")
@@ -278,13 +278,13 @@ class SteadySolver:
     def judge_stage(self) -> None:
         """Go to the next stage, or back to the last good one."""
         self.stage_best = min(self.stage_best, self.change)
-        if self.exponent < 0.0 and self.change <= ROUGHLY:
+        if self.exponent < 0.0 and self.change <= ROUGH_STAGE_CHANGE:
             self.good = (self.exponent, self.psi, self.temperature)
             self.exponent = min(0.0, self.exponent + self.factor)
             self._begin_stage()
         elif not math.isfinite(self.change) or self.change > 1e3 * max(self.stage_best, 1.0):
             self._take_back()
-        elif self.stage_iterations >= LONGEST_STAGE and self.change > ROUGHLY:
+        elif self.stage_iterations >= LONGEST_STAGE and self.change > ROUGH_STAGE_CHANGE:
             self._take_back()
 
     def _begin_stage(self) -> None:
@@ -325,7 +325,7 @@ class SteadySolver:
         self._begin_stage()
 
     def _is_correction_due(self) -> bool:
-        if not self.grid.follows or self.exponent < 0.0 or self.change > SETTLING:
+        if not self.grid.follows or self.exponent < 0.0 or self.change > GRID_CORRECTION_CHANGE:
             return False
         return self.stage_iterations >= self.grid.every or not self.corrections
 

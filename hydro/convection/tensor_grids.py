@@ -42,12 +42,12 @@ from regrid.errors import BadInput, suggest
 
 KINDS = ("uniform", "clustered", "polevikov", "monitor", "combined")
 WALLS = ("both", "low", "high")
-FLOOR = 0.02  # of the largest speed: lower speeds count as this
+LEAST_SPEED_FRACTION = 0.02  # of the largest speed: lower speeds count as this
 # Default bounds on the ratio of neighbouring spacings: Polevikov's grid has 1/(sqrt(2) - 1) = 2.414
 # beside a wall; for very thin layers 1.5 was best with the other kinds.
 RATIOS = {"polevikov": 2.5, "monitor": 1.5, "combined": 1.5}
-THINNEST = 1e-9  # of the axis: smaller spacings at a wall are lost to round-off
-FINER = 8  # points per old cell in the computation of a bounded spacing
+THINNEST_SPACING = 1e-9  # of the axis: smaller spacings at a wall are lost to round-off
+POINTS_PER_OLD_CELL = 8  # points per old cell in the computation of a bounded spacing
 
 Function = Callable[[np.ndarray], np.ndarray]
 
@@ -61,7 +61,7 @@ def make_axis(
     profile: Function | None = None,
     walls: str = "both",
     clustering: float = 2.0,
-    floor: float = FLOOR,
+    floor: float = LEAST_SPEED_FRACTION,
 ) -> np.ndarray:
     """Nodes (n + 1,) [m] of an axis of `n` cells from `low` to `high`.
 
@@ -103,7 +103,7 @@ def make_clustered_axis(
         q = np.linspace(0.0, 1.0, n + 1)
         law = np.tanh(clustering * q) / np.tanh(clustering)  # clustered at the high end
         law = 1.0 - law[::-1] if walls == "low" else law
-    if np.diff(law).min() < THINNEST:
+    if np.diff(law).min() < THINNEST_SPACING:
         raise BadInput(
             f"clustering = {clustering:g} makes a step of {np.diff(law).min():.0e} of the axis at "
             f"the wall with {n} cells, lost in round-off; take a smaller one (2 is usual)"
@@ -119,7 +119,7 @@ def correct_axis(
     x: np.ndarray,
     profile: np.ndarray | tuple[np.ndarray, np.ndarray],
     *,
-    floor: float = FLOOR,
+    floor: float = LEAST_SPEED_FRACTION,
     ratio: float | None = None,
     strength: float = 1.0,
     share: float = 0.5,
@@ -278,10 +278,10 @@ def place_nodes(x: np.ndarray, weight: np.ndarray, ratio: float) -> np.ndarray:
     free = invert_integral(x, weight, n)
     if compute_neighbour_ratio(free) <= ratio:
         return free
-    parts = np.arange(1, FINER + 1) / FINER
+    parts = np.arange(1, POINTS_PER_OLD_CELL + 1) / POINTS_PER_OLD_CELL
     fine = np.append(x[0], (x[:-1, None] + np.diff(x)[:, None] * parts).ravel())
     widths = np.diff(fine)
-    wanted = 1.0 / np.repeat(weight, FINER)
+    wanted = 1.0 / np.repeat(weight, POINTS_PER_OLD_CELL)
     reach = np.log(ratio) * 0.5 * (fine[1:] + fine[:-1])
 
     def cut(constant: float) -> np.ndarray:

@@ -195,12 +195,14 @@ def make_least_pressure(eos_class):
     return keep if strength_left_part is None else weaken
 
 
-SAMPLES = 64  # cells of a block that are looked at, besides its extremes
-STEP = 1e-5  # of the density, along the isentrope
+SAMPLED_CELLS = 64  # cells of a block that are looked at, besides its extremes
+ISENTROPE_DENSITY_STEP = 1e-5  # of the density, along the isentrope
 MOST_MISS = 1e-9  # of rho c²: from p to e and back
 MOST_SLOPE = 0.01  # of c²
-PUSH = 0.01  # of rho c²: a pressure beside that of a state
-TORN = 0.4  # of the strength left, under tension: from half of it on c² is that of separate pieces
+PROBED_PRESSURE_STEP = 0.01  # of rho c²: a pressure beside that of a state
+TORN_STRENGTH_PART = (
+    0.4  # of the strength left, under tension: from half of it on c² is that of separate pieces
+)
 
 
 def measure_inverse(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> np.ndarray:
@@ -214,7 +216,7 @@ def measure_slopes(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> list
     The midpoint rule; NaN where the material has no such states.
     """
     slopes = []
-    for step in (-STEP * rho, STEP * rho):
+    for step in (-ISENTROPE_DENSITY_STEP * rho, ISENTROPE_DENSITY_STEP * rho):
         half = 0.5 * step
         try:
             e = eos.energy(rho, p)
@@ -250,7 +252,7 @@ def find_disagreement(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> s
     """
     square = eos.sound_speed(rho, p) ** 2
     stiffness = rho * square
-    for push in (0.0, PUSH):
+    for push in (0.0, PROBED_PRESSURE_STEP):
         pushed = p + push * stiffness
         try:
             miss = np.abs(measure_inverse(eos, rho, pushed))
@@ -261,7 +263,7 @@ def find_disagreement(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> s
             return say_inverse(rho[k], pushed[k], miss[k])
     down, up = measure_slopes(eos, rho, p)
     eos_class: Any = type(eos)
-    whole = p >= TORN * make_least_pressure(eos_class)(rho, eos.parameters)
+    whole = p >= TORN_STRENGTH_PART * make_least_pressure(eos_class)(rho, eos.parameters)
     low, high = np.minimum(down, up), np.maximum(down, up)
     off = np.maximum(low - square, square - high) / square
     off = np.where(whole & np.isfinite(off), off, 0.0)
@@ -273,7 +275,7 @@ def find_disagreement(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> s
 
 def check_formulas(block: str, eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> None:
     """Raise BadInput where the formulas disagree at states of a block's first (ni, nj)."""
-    spread = np.linspace(0, rho.size - 1, min(SAMPLES, rho.size)).astype(np.int64)
+    spread = np.linspace(0, rho.size - 1, min(SAMPLED_CELLS, rho.size)).astype(np.int64)
     extremes = [field.argmin() for field in (rho, p)] + [field.argmax() for field in (rho, p)]
     at = np.unravel_index(np.unique(np.concatenate([spread, extremes])), rho.shape)
     with np.errstate(all="ignore"):

@@ -29,28 +29,28 @@ from regrid.jit import inlined
 from regrid.roots import find_root
 
 # positions in the parameter tuple, the first five as in Mie–Grüneisen
-RHO0 = 0
-C0 = 1
-S = 2
-GRUNEISEN = 3
-STRENGTH = 4
-SECOND = 5
+PARAMETER_RHO0 = 0
+PARAMETER_C0 = 1
+PARAMETER_S = 2
+PARAMETER_GRUNEISEN = 3
+PARAMETER_STRENGTH = 4
+SECOND_RHO0 = 5
 C_SECOND = 6
 S_SECOND = 7
 GRUNEISEN_SECOND = 8
 ETA_ONSET = 9
 ETA_COMPLETE = 10
-RISE = 11
+PRESSURE_RISE = 11
 P_COMPLETE = 12
 
 
 @inlined
 def second_hugoniot(eta, parameters):
     """Pressure of the second phase behind a shock from the first at rest, and its slope in eta."""
-    ratio = parameters[SECOND] / parameters[RHO0]
+    ratio = parameters[SECOND_RHO0] / parameters[PARAMETER_RHO0]
     own = 1.0 - ratio * (1.0 - eta)
     narrowing = 1.0 / (1.0 - parameters[S_SECOND] * own)
-    modulus = parameters[SECOND] * parameters[C_SECOND] * parameters[C_SECOND]
+    modulus = parameters[SECOND_RHO0] * parameters[C_SECOND] * parameters[C_SECOND]
     modulus = modulus * narrowing * narrowing
     pressure = modulus * own
     slope = modulus * narrowing * (1.0 + parameters[S_SECOND] * own)
@@ -71,15 +71,27 @@ def hugoniot(eta, parameters):
     compression = 0.5 * (eta + abs(eta))
     first = 0.5 * (compression + first_end - abs(compression - first_end))  # at most first_end
     stretched = 0.5 * (eta - abs(eta))
-    narrowing = 1.0 / (1.0 - parameters[S] * first)
-    modulus = parameters[RHO0] * parameters[C0] * parameters[C0] * narrowing * narrowing
-    pressure = modulus * first + parameters[RHO0] * parameters[C0] * parameters[C0] * stretched
-    slope = in_first * modulus * narrowing * (1.0 + parameters[S] * first)
+    narrowing = 1.0 / (1.0 - parameters[PARAMETER_S] * first)
+    modulus = (
+        parameters[PARAMETER_RHO0]
+        * parameters[PARAMETER_C0]
+        * parameters[PARAMETER_C0]
+        * narrowing
+        * narrowing
+    )
+    pressure = (
+        modulus * first
+        + parameters[PARAMETER_RHO0]
+        * parameters[PARAMETER_C0]
+        * parameters[PARAMETER_C0]
+        * stretched
+    )
+    slope = in_first * modulus * narrowing * (1.0 + parameters[PARAMETER_S] * first)
     after = eta - first_end
     room = second_start - first_end
     mixed = 0.5 * (0.5 * (after + abs(after)) + room - abs(0.5 * (after + abs(after)) - room))
-    pressure = pressure + parameters[RISE] * mixed
-    slope = slope + (1.0 - in_first) * (1.0 - in_second) * parameters[RISE]
+    pressure = pressure + parameters[PRESSURE_RISE] * mixed
+    slope = slope + (1.0 - in_first) * (1.0 - in_second) * parameters[PRESSURE_RISE]
     late = 0.5 * (eta + second_start + abs(eta - second_start))  # at least second_start
     second, second_slope = second_hugoniot(late, parameters)
     return pressure + (second - parameters[P_COMPLETE]), slope + in_second * second_slope
@@ -94,37 +106,37 @@ def gruneisen(eta, parameters):
     mixed = 0.5 * (after + abs(after))
     mixed = 0.5 * (mixed + room - abs(mixed - room))
     inside = 1.0 * (after > 0.0) * (after < room)
-    ratio = parameters[SECOND] / parameters[RHO0]
-    rise = (ratio * parameters[GRUNEISEN_SECOND] - parameters[GRUNEISEN]) / room
-    return parameters[GRUNEISEN] + rise * mixed, rise * inside
+    ratio = parameters[SECOND_RHO0] / parameters[PARAMETER_RHO0]
+    rise = (ratio * parameters[GRUNEISEN_SECOND] - parameters[PARAMETER_GRUNEISEN]) / room
+    return parameters[PARAMETER_GRUNEISEN] + rise * mixed, rise * inside
 
 
 @inlined
 def pressure(rho, e, parameters):
     """Pressure [Pa] from density [kg/m³] and specific internal energy [J/kg]."""
-    eta = 1.0 - parameters[RHO0] / rho
+    eta = 1.0 - parameters[PARAMETER_RHO0] / rho
     cold, _ = hugoniot(eta, parameters)
     factor, _ = gruneisen(eta, parameters)
     compression = 0.5 * (eta + abs(eta))
     reference = 0.5 * cold * compression
-    return cold + factor * (parameters[RHO0] * e - reference)
+    return cold + factor * (parameters[PARAMETER_RHO0] * e - reference)
 
 
 @inlined
 def energy(rho, p, parameters):
     """Specific internal energy [J/kg] from density [kg/m³] and pressure [Pa]."""
-    eta = 1.0 - parameters[RHO0] / rho
+    eta = 1.0 - parameters[PARAMETER_RHO0] / rho
     cold, _ = hugoniot(eta, parameters)
     factor, _ = gruneisen(eta, parameters)
     compression = 0.5 * (eta + abs(eta))
     reference = 0.5 * cold * compression
-    return (reference + (p - cold) / factor) / parameters[RHO0]
+    return (reference + (p - cold) / factor) / parameters[PARAMETER_RHO0]
 
 
 @inlined
 def sound_speed_squared(rho, p, parameters):
     """c² = dp/drho at constant e + (p/rho²) dp/de, except in failed material (`tension`)."""
-    ratio = parameters[RHO0] / rho
+    ratio = parameters[PARAMETER_RHO0] / rho
     eta = 1.0 - ratio
     cold, slope = hugoniot(eta, parameters)
     factor, factor_slope = gruneisen(eta, parameters)
@@ -133,8 +145,8 @@ def sound_speed_squared(rho, p, parameters):
     half = 0.5 * factor
     rise = slope * (1.0 - half * compression) - half * cold * compressed
     rise = rise + factor_slope * (p - cold) / factor
-    ratio = compute_whole_ratio(ratio, p, parameters[STRENGTH])
-    return ratio * ratio / parameters[RHO0] * (rise + factor * p)
+    ratio = compute_whole_ratio(ratio, p, parameters[PARAMETER_STRENGTH])
+    return ratio * ratio / parameters[PARAMETER_RHO0] * (rise + factor * p)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from hydro.formulas.reconstruction import compute_line_geometry
 from regrid.errors import BadInput, suggest
 from regrid.jit import inlined
 
-TINY = 1e-300  # avoids 0/0 at faces on the axis
+TINY_RADIUS = 1e-300  # avoids 0/0 at faces on the axis
 
 
 @inlined
@@ -90,7 +90,7 @@ def compute_radius_weighted_face(a, b, a_new, b_new, inverse_dt):
     middle = 0.5 * (radius + radius_new)
     area = way_x * edge_y - way_y * edge_x
     swept = weigh_area(area, (way_x, way_y), (edge_x, edge_y), twist, middle)
-    outwards = edge_y / (12.0 * middle + TINY)
+    outwards = edge_y / (12.0 * middle + TINY_RADIUS)
     return (
         (by - ay) * weight + (by_new - ay_new) * weight_new,
         (ax - bx) * weight + (ax_new - bx_new) * weight_new,

@@ -13,8 +13,10 @@ from __future__ import annotations
 
 from regrid.jit import inlined
 
-TINY = 1e-300  # keeps 0/0 of a uniform flow from being a NaN
-STRONG = 8.0  # differences over c/sqrt(8) around a cell are shocks whatever the rest says
+TINY_SLOPE = 1e-300  # keeps 0/0 of a uniform flow from being a NaN
+STRONG_SHOCK_FACTOR = (
+    8.0  # differences over c/sqrt(8) around a cell are shocks whatever the rest says
+)
 
 
 @inlined
@@ -143,11 +145,13 @@ def compute_acoustic_weight(a, b, c, d, lines, inverse, c2):
     u_x, u_y = compute_gradient(u_i, u_j, *lines, inverse)
     v_x, v_y = compute_gradient(v_i, v_j, *lines, inverse)
     divergence = u_x + v_y
-    whole = ((u_x * u_x + v_y * v_y) + (u_y * u_y + v_x * v_x)) + TINY
+    whole = ((u_x * u_x + v_y * v_y) + (u_y * u_y + v_x * v_x)) + TINY_SLOPE
     jumps = ((u_a * u_a + v_a * v_a) + (u_b * u_b + v_b * v_b)) + (
         (u_c * u_c + v_c * v_c) + (u_d * u_d + v_d * v_d)
     )
-    share = (4.0 * (divergence * divergence) + TINY) / whole + STRONG * jumps / c2
+    share = (
+        4.0 * (divergence * divergence) + TINY_SLOPE
+    ) / whole + STRONG_SHOCK_FACTOR * jumps / c2
     return share if share < 1.0 else 1.0
 
 
@@ -224,16 +228,16 @@ def compute_weights(before, here, after):
 # of material have gaps between them: its sound speed would be that of the body expanded as a whole,
 # hundreds of times that of the pieces, with which the time step was chosen.  Theory F4.10.
 
-WHOLE = 1e300  # marks a cell that has not failed
+WHOLE_CELL_MARK = 1e300  # marks a cell that has not failed
 
 
 @inlined
 def mark_torn(e, void):
     """The energy of a cell that has failed by its void energy; WHOLE elsewhere."""
-    return e if void < 0.0 else WHOLE
+    return e if void < 0.0 else WHOLE_CELL_MARK
 
 
 @inlined
 def choose_own(traced, own, torn):
     """The traced value; the cell's own value if `torn`, from `mark_torn`, is not WHOLE."""
-    return own if torn < WHOLE else traced
+    return own if torn < WHOLE_CELL_MARK else traced

@@ -97,7 +97,7 @@ def make_flow_kernels(
         inverse_dt = 1.0 / dt if dt > 0.0 else 0.0
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
-        chunks = (nj + at.CHUNK - 1) // at.CHUNK
+        chunks = (nj + at.CHUNK_CELLS - 1) // at.CHUNK_CELLS
         row0 = (tile // chunks) * TILE_ROWS
         row1 = min(ni, row0 + TILE_ROWS)
         j0 = (tile % chunks) * nj // chunks
@@ -114,7 +114,7 @@ def make_flow_kernels(
         node_count = min(nj, jb + 1) - node0 + 1
         first = j0 - ja + 1
         last = j1 - ja + 1
-        for k in range(at.SPAN):
+        for k in range(at.SCRATCH_SPAN):
             Z[at.LEAST_C2 + k] = 1e300
             Z[at.FIRST_ORDER + k] = 0.0
             Z[at.SUM_MASS + k] = 0.0
@@ -185,10 +185,12 @@ def make_flow_kernels(
             if row == 0:
                 for q in range(of.FLUX_ROWS):
                     for k in range(m):  # fluxes of a rim are outward
-                        Z[at.FLUX_I_MASS + q * at.SPAN + 1 + k] = -rim[on.MASS + q, ja + k]
+                        Z[at.FLUX_I_MASS + q * at.SCRATCH_SPAN + 1 + k] = -rim[on.MASS + q, ja + k]
             elif row == ni:
                 for q in range(of.FLUX_ROWS):
-                    copy_row(rim, on.MASS + q, nj + ja, m, Z, at.FLUX_I_MASS + q * at.SPAN + 1)
+                    copy_row(
+                        rim, on.MASS + q, nj + ja, m, Z, at.FLUX_I_MASS + q * at.SCRATCH_SPAN + 1
+                    )
             elif row >= row0:
                 fill_upwind_i(Z, w)
                 fill_flux_i(Z, w, parameters)
@@ -212,11 +214,13 @@ def make_flow_kernels(
                     fill_push_j(Z, n)
                 if j0 == 0:
                     for q in range(of.FLUX_ROWS):
-                        Z[at.FLUX_J_MASS + q * at.SPAN + first] = -rim[on.MASS + q, 2 * nj + row]
+                        Z[at.FLUX_J_MASS + q * at.SCRATCH_SPAN + first] = -rim[
+                            on.MASS + q, 2 * nj + row
+                        ]
                 if j1 == nj:
                     for q in range(of.FLUX_ROWS):
                         out = rim[on.MASS + q, 2 * nj + ni + row]
-                        Z[at.FLUX_J_MASS + q * at.SPAN + last] = out
+                        Z[at.FLUX_J_MASS + q * at.SCRATCH_SPAN + last] = out
             if inside and row > row0:
                 update_rows(Z, w, dt, inverse_dt, parameters)
             elif inside:
@@ -225,7 +229,7 @@ def make_flow_kernels(
                 fill_new_state(Z, w, dt, inverse_dt, parameters)
             if row > row0:
                 for q in range(of.STATE_ROWS):
-                    new = at.RHO_NEW + q * at.SPAN + first
+                    new = at.RHO_NEW + q * at.SCRATCH_SPAN + first
                     copy_back(Z, new, j1 - j0, state_new[q], row, j0 + 1)
                 if opens_voids:
                     copy_back(Z, at.VOID_NEW + first, j1 - j0, void_energy_new, row - 1, j0)
@@ -234,7 +238,7 @@ def make_flow_kernels(
             next_row(Z, n)
             row += 1
         least = 1e300
-        for q in range(of.TOTALS):
+        for q in range(of.TOTAL_ROWS):
             tile_totals[tile, q] = 0.0
         for k in range(first, last):
             c2 = Z[at.LEAST_C2 + k]
@@ -274,7 +278,7 @@ def make_flow_kernels(
 
 def count_tiles(ni: int, nj: int) -> int:
     """Number of tiles of a block of ni × nj cells, or before row ni of a larger one."""
-    return -(-ni // TILE_ROWS) * -(-nj // at.CHUNK)
+    return -(-ni // TILE_ROWS) * -(-nj // at.CHUNK_CELLS)
 
 
 def allocate_scratch(threads: int) -> np.ndarray:

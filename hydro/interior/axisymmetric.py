@@ -59,7 +59,7 @@ def fill_shift_after(Z, n):
 @compiled_once(allocates=False)
 def move_shifts(Z, n):
     """Make what `fill_shift_after` has found current."""
-    for k in range(1 - at.LANES, n + 1 + at.LANES):
+    for k in range(1 - at.VECTOR_LANES, n + 1 + at.VECTOR_LANES):
         Z[at.SHIFT_BEFORE + k] = Z[at.SHIFT + k]
         Z[at.SHIFT + k] = Z[at.SHIFT_AFTER + k]
         Z[at.SHIFT_J + k] = Z[at.SHIFT_J_AFTER + k]
@@ -70,7 +70,7 @@ def move_shifts(Z, n):
 @inlined
 def compute_plane_area_y(Z, a, b):
     """Radial normal per depth of a face at mid-time; places of x of its nodes, new ones follow."""
-    return 0.5 * ((Z[a] - Z[b]) + (Z[a + 2 * at.SPAN] - Z[b + 2 * at.SPAN]))
+    return 0.5 * ((Z[a] - Z[b]) + (Z[a + 2 * at.SCRATCH_SPAN] - Z[b + 2 * at.SCRATCH_SPAN]))
 
 
 @compiled_once(allocates=False)
@@ -103,7 +103,7 @@ def make_push(split, pressure, flux, node_a, node_b, area, push):
             momentum_y, force, hoop = split(Z[flux + k], Z[pressure + k], Z[area + k], plane_area_y)
             Z[flux + k] = momentum_y
             Z[push + k] = force
-            Z[push + at.SPAN + k] = hoop
+            Z[push + at.SCRATCH_SPAN + k] = hoop
 
     return fill_push
 

@@ -16,15 +16,15 @@ from hydro.rows import RHO, P
 from regrid.errors import BadInput
 from regrid.jit import kernel
 
-SLAB = 64  # rows for which something is computed at a time
+SLAB_ROWS = 64  # rows for which something is computed at a time
 ENERGY = "e"
 
 
 def check_first_state(name: str, eos: EquationOfState, state: np.ndarray) -> None:
     """Raise BadInput where a block's first `state` (4, ni, nj) is none of its material."""
     rho, _, _, p = state
-    for first in range(0, len(rho), SLAB):
-        rows = slice(first, first + SLAB)
+    for first in range(0, len(rho), SLAB_ROWS):
+        rows = slice(first, first + SLAB_ROWS)
         with np.errstate(all="ignore"):
             c = eos.sound_speed(rho[rows], p[rows])
         bad = ~(np.isfinite(state[:, rows]).all(axis=0) & (rho[rows] > 0.0) & (c > 0.0))

@@ -9,7 +9,7 @@ operations overlap between faces.
 from __future__ import annotations
 
 from hydro.formulas import riemann
-from hydro.formulas.reconstruction import WHOLE, choose_own, compute_face_state
+from hydro.formulas.reconstruction import WHOLE_CELL_MARK, choose_own, compute_face_state
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once, inlined
 
@@ -27,16 +27,16 @@ def make_faces(compute_face, node_a, node_b, target):
     def fill_faces(Z, n, inverse_dt):
         """Faces at mid-time (theory F3.1)."""
         for k in range(1, n + 1):
-            a = Z[node_a + k], Z[node_a + at.SPAN + k]
-            b = Z[node_b + k], Z[node_b + at.SPAN + k]
-            a_new = Z[node_a + 2 * at.SPAN + k], Z[node_a + 3 * at.SPAN + k]
-            b_new = Z[node_b + 2 * at.SPAN + k], Z[node_b + 3 * at.SPAN + k]
+            a = Z[node_a + k], Z[node_a + at.SCRATCH_SPAN + k]
+            b = Z[node_b + k], Z[node_b + at.SCRATCH_SPAN + k]
+            a_new = Z[node_a + 2 * at.SCRATCH_SPAN + k], Z[node_a + 3 * at.SCRATCH_SPAN + k]
+            b_new = Z[node_b + 2 * at.SCRATCH_SPAN + k], Z[node_b + 3 * at.SCRATCH_SPAN + k]
             area_x, area_y, sweep, x, y = compute_face(a, b, a_new, b_new, inverse_dt)
             Z[target + k] = area_x
-            Z[target + at.SPAN + k] = area_y
-            Z[target + 2 * at.SPAN + k] = sweep
-            Z[target + 3 * at.SPAN + k] = x
-            Z[target + 4 * at.SPAN + k] = y
+            Z[target + at.SCRATCH_SPAN + k] = area_y
+            Z[target + 2 * at.SCRATCH_SPAN + k] = sweep
+            Z[target + 3 * at.SCRATCH_SPAN + k] = x
+            Z[target + 4 * at.SCRATCH_SPAN + k] = y
 
     return fill_faces
 
@@ -76,7 +76,7 @@ def make_traces(sound_speed_squared_part, opens_voids):
                 Z[at.V_X + k], Z[at.V_Y + k], Z[at.P_X + k], Z[at.P_Y + k],
             ),
             (Z[at.RHO + k], Z[at.U + k], Z[at.V + k], Z[at.P + k], Z[at.C2 + k]),
-            Z[at.TORN + k] if opens_voids else WHOLE,
+            Z[at.TORN + k] if opens_voids else WHOLE_CELL_MARK,
             Z[at.X_CENTRE + k],
             Z[at.Y_CENTRE + k],
         )  # fmt: skip
@@ -129,25 +129,29 @@ def make_upwind(left, right, face, torn, acoustic_weight, low_mach, opens_voids)
         """State and wave on the face's side of the contact, and what the contact's speed is."""
         for k in range(1, n + 1):
             rho_l = Z[left + k]
-            u_l = Z[left + at.SPAN + k]
-            v_l = Z[left + 2 * at.SPAN + k]
-            p_l = Z[left + 3 * at.SPAN + k]
+            u_l = Z[left + at.SCRATCH_SPAN + k]
+            v_l = Z[left + 2 * at.SCRATCH_SPAN + k]
+            p_l = Z[left + 3 * at.SCRATCH_SPAN + k]
             rho_r = Z[right + k]
-            u_r = Z[right + at.SPAN + k]
-            v_r = Z[right + 2 * at.SPAN + k]
-            p_r = Z[right + 3 * at.SPAN + k]
+            u_r = Z[right + at.SCRATCH_SPAN + k]
+            v_r = Z[right + 2 * at.SCRATCH_SPAN + k]
+            p_r = Z[right + 3 * at.SCRATCH_SPAN + k]
             area_x = Z[face + k]
-            area_y = Z[face + at.SPAN + k]
+            area_y = Z[face + at.SCRATCH_SPAN + k]
             square = area_x * area_x + area_y * area_y
             w_l, w_r = riemann.compute_normal_speeds(
-                u_l, v_l, u_r, v_r, area_x, area_y, Z[face + 2 * at.SPAN + k]
+                u_l, v_l, u_r, v_r, area_x, area_y, Z[face + 2 * at.SCRATCH_SPAN + k]
             )
             if low_mach:
                 part_l = Z[acoustic_weight + k]
                 part_r = Z[at.ACOUSTIC + k]
                 w_l, w_r = riemann.reduce_jump(w_l, w_r, part_l if part_l > part_r else part_r)
             s_l, s_r = riemann.compute_waves(
-                w_l, Z[left + 4 * at.SPAN + k], w_r, Z[right + 4 * at.SPAN + k], square
+                w_l,
+                Z[left + 4 * at.SCRATCH_SPAN + k],
+                w_r,
+                Z[right + 4 * at.SCRATCH_SPAN + k],
+                square,
             )
             push, drag, flow_l, flow_r = riemann.compute_contact_speed(
                 (rho_l, p_l, w_l, s_l), (rho_r, p_r, w_r, s_r), square
@@ -215,12 +219,12 @@ def make_flux(energy_part, face, target, pressure_row, opens_voids):
             mass, momentum_x, momentum_y, energy, pressure = riemann.compute_star_flux(
                 (rho, Z[at.U_SIDE + k], Z[at.V_SIDE + k], p, e),
                 wave,
-                (Z[face + k], Z[face + at.SPAN + k], Z[face + 2 * at.SPAN + k]),
+                (Z[face + k], Z[face + at.SCRATCH_SPAN + k], Z[face + 2 * at.SCRATCH_SPAN + k]),
             )
             Z[target + k] = mass
-            Z[target + at.SPAN + k] = momentum_x
-            Z[target + 2 * at.SPAN + k] = momentum_y
-            Z[target + 3 * at.SPAN + k] = energy
+            Z[target + at.SCRATCH_SPAN + k] = momentum_x
+            Z[target + 2 * at.SCRATCH_SPAN + k] = momentum_y
+            Z[target + 3 * at.SCRATCH_SPAN + k] = energy
             if pressure_row:
                 Z[pressure_row + k] = pressure
 
@@ -240,36 +244,36 @@ def make_hll_flux(energy_part, faces, switch, torn, target, pressure_row, opens_
     @compiled_once(allocates=False)
     def use_hll(row, first, last, parameters):
         """HLL where one of the two cells needs it, at the faces first..last, in whole vectors."""
-        start = (first - 1) // at.LANES * at.LANES
+        start = (first - 1) // at.VECTOR_LANES * at.VECTOR_LANES
         Z = row[start:]  # loops that begin at a number which they do not know are not vectorised
         for k in range(1, at.count_padded(last - start - 1) + 1):
             rho_l = Z[left + k]
-            p_l = Z[left + 3 * at.SPAN + k]
+            p_l = Z[left + 3 * at.SCRATCH_SPAN + k]
             rho_r = Z[right + k]
-            p_r = Z[right + 3 * at.SPAN + k]
+            p_r = Z[right + 3 * at.SCRATCH_SPAN + k]
             e_l = energy_part(rho_l, p_l, parameters)
             e_r = energy_part(rho_r, p_r, parameters)
             if opens_voids:
                 e_l = choose_own(e_l, Z[torn + k], Z[torn + k])
                 e_r = choose_own(e_r, Z[at.TORN + k], Z[at.TORN + k])
-            u_l, v_l = Z[left + at.SPAN + k], Z[left + 2 * at.SPAN + k]
-            u_r, v_r = Z[right + at.SPAN + k], Z[right + 2 * at.SPAN + k]
-            c2_l = Z[left + 4 * at.SPAN + k]
-            c2_r = Z[right + 4 * at.SPAN + k]
+            u_l, v_l = Z[left + at.SCRATCH_SPAN + k], Z[left + 2 * at.SCRATCH_SPAN + k]
+            u_r, v_r = Z[right + at.SCRATCH_SPAN + k], Z[right + 2 * at.SCRATCH_SPAN + k]
+            c2_l = Z[left + 4 * at.SCRATCH_SPAN + k]
+            c2_r = Z[right + 4 * at.SCRATCH_SPAN + k]
             mass, momentum_x, momentum_y, energy, pressure = riemann.compute_hll_flux(
                 (rho_l, u_l, v_l, p_l, e_l, c2_l),
                 (rho_r, u_r, v_r, p_r, e_r, c2_r),
-                (Z[face + k], Z[face + at.SPAN + k], Z[face + 2 * at.SPAN + k]),
+                (Z[face + k], Z[face + at.SCRATCH_SPAN + k], Z[face + 2 * at.SCRATCH_SPAN + k]),
             )
             switch_on = Z[switch + k] + Z[at.HLL + k]
             sharp_mass = Z[target + k]
-            sharp_x = Z[target + at.SPAN + k]
-            sharp_y = Z[target + 2 * at.SPAN + k]
-            sharp_energy = Z[target + 3 * at.SPAN + k]
+            sharp_x = Z[target + at.SCRATCH_SPAN + k]
+            sharp_y = Z[target + 2 * at.SCRATCH_SPAN + k]
+            sharp_energy = Z[target + 3 * at.SCRATCH_SPAN + k]
             Z[target + k] = mass if switch_on > 0.0 else sharp_mass
-            Z[target + at.SPAN + k] = momentum_x if switch_on > 0.0 else sharp_x
-            Z[target + 2 * at.SPAN + k] = momentum_y if switch_on > 0.0 else sharp_y
-            Z[target + 3 * at.SPAN + k] = energy if switch_on > 0.0 else sharp_energy
+            Z[target + at.SCRATCH_SPAN + k] = momentum_x if switch_on > 0.0 else sharp_x
+            Z[target + 2 * at.SCRATCH_SPAN + k] = momentum_y if switch_on > 0.0 else sharp_y
+            Z[target + 3 * at.SCRATCH_SPAN + k] = energy if switch_on > 0.0 else sharp_energy
             if pressure_row:
                 sharp_pressure = Z[pressure_row + k]
                 Z[pressure_row + k] = pressure if switch_on > 0.0 else sharp_pressure

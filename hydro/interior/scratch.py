@@ -30,16 +30,18 @@ from numba.extending import intrinsic, overload
 
 from regrid.jit import compiled_once, inlined
 
-LANES = 8  # entries of the widest vector
-LINE = 8  # entries of a cache line
-SPAN = 136
+VECTOR_LANES = 8  # entries of the widest vector
+CACHE_LINE_ENTRIES = 8  # entries of a cache line
+SCRATCH_SPAN = 136
 # arguments of LLVM's prefetch
-READ = 0
+PREFETCH_READ = 0
 SECOND_LEVEL = 2
-DATA = 1
-CHUNK = SPAN - 3 * LANES  # updated cells of a chunk; up to two more are reconstructed
+PREFETCH_DATA = 1
+CHUNK_CELLS = (
+    SCRATCH_SPAN - 3 * VECTOR_LANES
+)  # updated cells of a chunk; up to two more are reconstructed
 
-_next = (LINE - 1 + SPAN * row for row in count())
+_next = (CACHE_LINE_ENTRIES - 1 + SCRATCH_SPAN * row for row in count())
 
 
 def _rows(number):
@@ -113,7 +115,7 @@ LEAN_J = (LEAN_J_X, LEAN_J_Y)
 @compiled_once(allocates=False)
 def count_padded(m):
     """Loop length for m cells and the next neighbour, in whole vectors."""
-    return (m + LANES) // LANES * LANES
+    return (m + VECTOR_LANES) // VECTOR_LANES * VECTOR_LANES
 
 
 @compiled_once(allocates=False)
@@ -124,8 +126,8 @@ def count_whole(m):
 
 def allocate(threads: int) -> np.ndarray:
     """Scratch of `threads` threads, (threads, SIZE), zeroed so that no row ever holds a NaN."""
-    whole = np.zeros(threads * SIZE + LINE)
-    start = -(whole.ctypes.data // whole.itemsize) % LINE
+    whole = np.zeros(threads * SIZE + CACHE_LINE_ENTRIES)
+    start = -(whole.ctypes.data // whole.itemsize) % CACHE_LINE_ENTRIES
     return whole[start : start + threads * SIZE].reshape(threads, SIZE)
 
 
@@ -233,13 +235,13 @@ def find_twist(a, b, c, d):
 def copy_rows(source, row, start, count, Z, offset):
     """The given row of every component of `source` (components, rows, columns), side by side."""
     for q in range(source.shape[0]):
-        copy_row(source[q], row, start, count, Z, offset + q * SPAN)
+        copy_row(source[q], row, start, count, Z, offset + q * SCRATCH_SPAN)
 
 
 @compiled_once(allocates=False)
 def shift_rows(Z, n):
     """Make the next row the current one."""
-    for k in range(1 - LANES, n + 1 + LANES):
+    for k in range(1 - VECTOR_LANES, n + 1 + VECTOR_LANES):
         Z[X_LOW + k] = Z[X_HIGH + k]
         Z[Y_LOW + k] = Z[Y_HIGH + k]
         Z[X_LOW_NEW + k] = Z[X_HIGH_NEW + k]
@@ -274,7 +276,7 @@ def _prefetch(typing_context, array, row, column):
             ir.FunctionType(ir.VoidType(), [pointer, number, number, number]),
             "llvm.prefetch.p0",
         )
-        hints = [ir.Constant(number, hint) for hint in (READ, SECOND_LEVEL, DATA)]
+        hints = [ir.Constant(number, hint) for hint in (PREFETCH_READ, SECOND_LEVEL, PREFETCH_DATA)]
         builder.call(function, [builder.bitcast(place, pointer), *hints])
         return context.get_dummy_value()
 
@@ -289,7 +291,7 @@ def _prefetch_in_kernels(array, row, column):
 @compiled_once(allocates=False)
 def prefetch_row(source, row, start, count):
     """Prefetch source[row, start : start + count]."""
-    for k in range(start, start + count + LINE, LINE):
+    for k in range(start, start + count + CACHE_LINE_ENTRIES, CACHE_LINE_ENTRIES):
         prefetch(source, row, k)
 
 

@@ -35,8 +35,10 @@ from hydro.formulas.reconstruction import (
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once, inlined
 
-SHOCK = 0.05  # jump of the pressure over rho c² from which on nothing is extrapolated to a side
-CALM = 0.01  # and up to which all of it is
+SHOCK_PRESSURE_JUMP = (
+    0.05  # jump of the pressure over rho c² from which on nothing is extrapolated to a side
+)
+CALM_PRESSURE_JUMP = 0.01  # and up to which all of it is
 
 
 @compiled_once(allocates=False)
@@ -243,7 +245,9 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
             jump = abs(p - Z[at.P + k])
             jump_beyond = abs(Z[at.P + k] - Z[at.P_AFTER + k])
             jump = jump if jump > jump_beyond else jump_beyond
-            rough = (jump / (rho * c * c) - CALM) / (SHOCK - CALM)
+            rough = (jump / (rho * c * c) - CALM_PRESSURE_JUMP) / (
+                SHOCK_PRESSURE_JUMP - CALM_PRESSURE_JUMP
+            )
             rough = rough if rough > 0.0 else 0.0
             rough = rough if rough < 1.0 else 1.0
             smooth = (1.0 - rough) * (1.0 - rough) * (1.0 + 2.0 * rough)

@@ -42,12 +42,14 @@ from hydro.sliding.pieces import fill_positions, find_last_crossing
 from regrid.curves import compute_arc_lengths, meeting_laws
 from regrid.errors import BadInput, Place, RegridFailure
 
-REACH = 3  # nodes of either line that the curve through a joint goes through
-MOST = 4.0  # spacings that a joint wants to slide at most, before `relax`
+JOINT_REACH_NODES = 3  # nodes of either line that the curve through a joint goes through
+MOST_JOINT_SLIDE = 4.0  # spacings that a joint wants to slide at most, before `relax`
 OPPOSITE_PART = (0.05, 0.95)  # where the parts of a side opposite to a contact point may meet
-ARRIVAL = 1.5  # steps' motion before the leader's end at which a contact point arrives there
-ROUNDS = 60  # at most, of moving a corner and laying on its lines what slides there
-NARROW = 0.1  # rad: corners at junctions stay as wide, or half as wide as at the start if less
+ARRIVAL_STEPS = 1.5  # steps' motion before the leader's end at which a contact point arrives there
+MOST_CORNER_ROUNDS = 60  # at most, of moving a corner and laying on its lines what slides there
+NARROW_CORNER_ANGLE = (
+    0.1  # rad: corners at junctions stay as wide, or half as wide as at the start if less
+)
 STRAIGHT_ENOUGH = 1e-13  # what a round moves, as part of the first one's, after which none follows
 
 
@@ -74,9 +76,9 @@ class Joint:
         lengths = [self._measure(nodes) for nodes in moved]
         way = relax * (self.share * sum(lengths) - lengths[0])
         near = min(float(np.hypot(*(nodes[:, 1] - nodes[:, 0]))) for nodes in moved)
-        way = min(max(way, -MOST * relax * near), MOST * relax * near)
-        before = moved[0][:, REACH:0:-1]
-        after = moved[1][:, 1 : REACH + 1]
+        way = min(max(way, -MOST_JOINT_SLIDE * relax * near), MOST_JOINT_SLIDE * relax * near)
+        before = moved[0][:, JOINT_REACH_NODES:0:-1]
+        after = moved[1][:, 1 : JOINT_REACH_NODES + 1]
         position = moved[0][:, 0].copy()
         curve = np.concatenate([before, position[:, None], after], axis=1)
         arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=1)))])
@@ -248,7 +250,7 @@ class FollowerMotion:
         goal, node = (arc[-1], line.shape[1] - 1) if end == 1 else (arc[0], 0)
         step = position - before if end == 1 else before - position
         left = abs(goal - position)
-        if step > 0.0 and left < ARRIVAL * step:
+        if step > 0.0 and left < ARRIVAL_STEPS * step:
             self.contact.fixed_new[end] = node
         return float(position)
 
@@ -277,7 +279,7 @@ class CornerGuard:
         self.narrow = 0.0
         if len(node.members) > 2 and all(segment.linked for segment, _ in node.ends):
             first = [measure_angle(*find_corner(*corner, old=True)) for corner in self.corners]
-            self.narrow = min([NARROW, *(0.5 * abs(angle) for angle in first)])
+            self.narrow = min([NARROW_CORNER_ANGLE, *(0.5 * abs(angle) for angle in first)])
 
     @classmethod
     def find(
@@ -298,7 +300,7 @@ class CornerGuard:
     def hold(self) -> float:
         """Move the node where a corner has opened or closed too far; returns how far [m]."""
         total = 0.0
-        for _ in range(ROUNDS if self.followers else 1):
+        for _ in range(MOST_CORNER_ROUNDS if self.followers else 1):
             moved = 0.0
             for member in self.corners:
                 way = compute_way(*find_corner(*member))

@@ -17,7 +17,7 @@ from hydro.links import Exchange
 from hydro.motion.line import LineRule
 from hydro.motion.sides import Sides, Span
 from hydro.ranks.blocks import Blocks
-from hydro.sliding.polygons import LEAST_LEFT, make_find_crushed
+from hydro.sliding.polygons import LEAST_VOLUME_LEFT, make_find_crushed
 from regrid.errors import BadInput, Place, RegridFailure, RunFailure
 from regrid.measure.quality import find_bad_cells, measure_worst, say_not_convex
 from regrid.node_speeds import MotionLimiter
@@ -227,7 +227,7 @@ class GridMotion(Sides):
             left, i, j = find_crushed(
                 block.nodes, block.nodes_new, block.excess_volume, block.excess_volume_new
             )
-            if left >= LEAST_LEFT:
+            if left >= LEAST_VOLUME_LEFT:
                 return
             if halvings == SPARING_HALVINGS:
                 break

@@ -28,7 +28,7 @@ from hydro.motion.line import Track
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import Place, RunFailure
 
-STRAIGHT = 1e-9  # sine of the angle up to which two lines are one
+STRAIGHT_LINE_SINE = 1e-9  # sine of the angle up to which two lines are one
 
 
 class KeyNode:
@@ -44,7 +44,9 @@ class KeyNode:
         self.constraining_faces: list[tuple[Block, int]] = []
         self.carried = False  # an end of a carried seam, which moves it
         self.on_piston = False  # a moving line ends on a straight piston and slides along it
-        self.corner = STRAIGHT  # sine of the angle from which two lines that hold the node are two
+        self.corner = (
+            STRAIGHT_LINE_SINE  # sine of the angle from which two lines that hold the node are two
+        )
         # curved tracks that hold the node; with a moving line's mirrors, and which end it has here
         self.tracks: list[tuple[Track, list | None, int]] = []
 
@@ -81,7 +83,9 @@ class KeyNode:
                 first_y = y
             elif abs(x * first_y - y * first_x) > self.corner:
                 return 2, first_x, first_y
-            elif self.corner > STRAIGHT:  # a smooth wall in chords: the normal between both
+            elif (
+                self.corner > STRAIGHT_LINE_SINE
+            ):  # a smooth wall in chords: the normal between both
                 sign = 1.0 if x * first_x + y * first_y > 0.0 else -1.0
                 x, y = first_x + sign * x, first_y + sign * y
                 length = math.hypot(x, y)
@@ -122,7 +126,7 @@ class KeyNode:
         normals = [(float(b.rim.nx[face]), float(b.rim.ny[face])) for b, face in faces]
         return bool(self.given) and all(
             abs(x * normals[0][1] - y * normals[0][0])
-            <= STRAIGHT * math.hypot(x, y) * math.hypot(*normals[0])
+            <= STRAIGHT_LINE_SINE * math.hypot(x, y) * math.hypot(*normals[0])
             for x, y in normals
         )
 

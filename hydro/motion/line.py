@@ -26,14 +26,16 @@ from hydro.rim import SIDES
 from regrid import curves
 from regrid.jit import compiled_once, kernel
 
-CORNER = 0.35  # sine of the angle from which two tracks that meet make a corner
+TRACK_CORNER_SINE = 0.35  # sine of the angle from which two tracks that meet make a corner
 # of sliding lines: strength, and turn [rad]; see `fill_line_damping`
-DAMPING = 4.0
-BEND = 0.35
+SLIDING_DAMPING = 4.0
+SLIDING_BEND_ANGLE = 0.35
 MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
 THICK_CELLS = 0.75  # default thickness of a contact, in its initial cells
-SHORTEST = 0.25  # segment required by turning, in thicknesses of its contact
-FOLLOWING = 0.2  # part of the way to its law that a line at or opposite a contact point goes
+SHORTEST_TURNED_SEGMENT = 0.25  # segment required by turning, in thicknesses of its contact
+FOLLOWED_WAY_PART = (
+    0.2  # part of the way to its law that a line at or opposite a contact point goes
+)
 
 
 class Span(NamedTuple):
@@ -396,8 +398,8 @@ class Line:
             self.extend(),
             self.segment.block.rim.rows,
             self.segment.first,
-            DAMPING,
-            BEND,
+            SLIDING_DAMPING,
+            SLIDING_BEND_ANGLE,
             MOST_DAMPING / dt,
             self.damping,
         )
@@ -455,7 +457,7 @@ class Line:
             relax = float(self.rule.relax * min(1.0, fraction))
         if self.at_contact or self.follows_contact:
             # a spline would loop in the fold above the tip of a jet
-            relax = FOLLOWING * min(1.0, fraction)
+            relax = FOLLOWED_WAY_PART * min(1.0, fraction)
             shape = "chord"
         if self.is_kinked:  # a spline would swing about the end of the contact
             shape = "chord"

@@ -29,11 +29,11 @@ from hydro.rim import SIDES
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import BadInput, Place, RunFailure
 from regrid.jit import kernel
-from regrid.measure.crossings import GROUP, fill_boxes, find_touching
+from regrid.measure.crossings import GROUP_EDGES, fill_boxes, find_touching
 from regrid.sides import trace_outline
 
-TIMES = 101  # at which pistons are checked beforehand
-INSIDE = 0.25  # fraction of the cells along a side: further in, blocks overlap
+CHECKED_TIMES = 101  # at which pistons are checked beforehand
+OVERLAP_DEPTH_PART = 0.25  # fraction of the cells along a side: further in, blocks overlap
 MOST_GROUPS = 64  # boxes of a line
 
 
@@ -62,11 +62,11 @@ def fill_outline(nodes, side, start, line, inset):
                 here = nodes[c, at, nj]
                 there = nodes[c, at, nj - 1]
             line[c, k] = here
-            inset[c, k] = here + INSIDE * (there - here)
+            inset[c, k] = here + OVERLAP_DEPTH_PART * (there - here)
         first_step = inset[c, 1] - inset[c, 0]
         last_step = inset[c, last - 1] - inset[c, last]
-        inset[c, 0] += INSIDE * first_step
-        inset[c, last] += INSIDE * last_step
+        inset[c, 0] += OVERLAP_DEPTH_PART * first_step
+        inset[c, last] += OVERLAP_DEPTH_PART * last_step
     x, y = line[0], line[1]
     return x.min(), x.max(), y.min(), y.max()
 
@@ -174,7 +174,7 @@ class Overlaps:
 
     def check_pistons(self, t_end: float) -> None:
         """Raise BadInput if a piston will enter a block bounded by walls only before `t_end`."""
-        times = np.linspace(0.0, t_end, TIMES)
+        times = np.linspace(0.0, t_end, CHECKED_TIMES)
         ways = {
             id(segment): integrate_motion(segment, times)
             for segment in self.segments
@@ -184,7 +184,7 @@ class Overlaps:
             own = [segment for segment in self.segments if segment.block is block]
             if not own or not all(isinstance(s, Wall) and not isinstance(s, Axis) for s in own):
                 continue
-            moved = [ways.get(id(segment), np.zeros((2, TIMES))) for segment in own]
+            moved = [ways.get(id(segment), np.zeros((2, CHECKED_TIMES))) for segment in own]
             if not all(np.array_equal(way, moved[0]) for way in moved):
                 continue  # it changes its shape: detected when it happens
             for segment in self.segments:
@@ -243,7 +243,7 @@ class Overlaps:
     @staticmethod
     def _make_outlines(segments: Sequence[Segment]) -> list[Outline]:
         longest = max((segment.stop - segment.start for segment in segments), default=0)
-        group = max(GROUP, -(-longest // MOST_GROUPS))
+        group = max(GROUP_EDGES, -(-longest // MOST_GROUPS))
         return [Outline(segment, group) for segment in segments]
 
     def _pair(self, segments: Sequence[Segment]) -> Pairs:

@@ -15,8 +15,8 @@ from hydro.links import Exchange
 from hydro.motion.constraints import CarriedSeam, CornerGuard, FollowerMotion, Joint
 from hydro.motion.key_nodes import KeyNode, find_key_nodes
 from hydro.motion.line import (
-    CORNER,
     LINES,
+    TRACK_CORNER_SINE,
     Line,
     LineRule,
     Span,
@@ -134,13 +134,13 @@ class Sides:
         position = node.position()
         a, b = (track.normal(track.locate(position)) for track in (one, other))
         joined = join_tracks(one, other, position)
-        if joined is None or abs(a[0] * b[1] - a[1] * b[0]) > CORNER:
+        if joined is None or abs(a[0] * b[1] - a[1] * b[0]) > TRACK_CORNER_SINE:
             return
         one.set_nodes(joined)
         for line in self.lines:
             if line.track is other:
                 line.track = one
-        node.corner = CORNER
+        node.corner = TRACK_CORNER_SINE
 
     def _let_slide_on_piston(self, node: KeyNode) -> None:
         """Let moving lines that end on a straight piston slide along it, pistons along pistons.

@@ -28,7 +28,7 @@ from hydro.motion.line import Line
 from hydro.rows import RHO
 from regrid.errors import BadInput
 
-TINY = 1e-300  # keeps a line that turns back on itself from dividing by zero
+TINY_LENGTH = 1e-300  # keeps a line that turns back on itself from dividing by zero
 
 
 def compute_tangents(line: np.ndarray) -> np.ndarray:
@@ -55,7 +55,7 @@ def _square(vectors: np.ndarray) -> np.ndarray:
 
 
 def _normalise(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.sqrt(_square(vectors) + TINY)
+    return vectors / np.sqrt(_square(vectors) + TINY_LENGTH)
 
 
 @dataclass

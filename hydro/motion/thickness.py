@@ -17,13 +17,15 @@ from __future__ import annotations
 import numpy as np
 
 from hydro import rim as on
-from hydro.motion.line import SHORTEST, THICK_CELLS, Line, find_node
+from hydro.motion.line import SHORTEST_TURNED_SEGMENT, THICK_CELLS, Line, find_node
 from regrid.curves import FREE_END
 from regrid.jit import compiled_once, kernel
 
-FLAT = 1e-3  # least sine of half the angle between two segments: where a line folds back on itself
+FOLDED_LINE_SINE = (
+    1e-3  # least sine of half the angle between two segments: where a line folds back on itself
+)
 HALF_BAND = 4  # of a closed line's matrix, its nodes numbered from both sides of the first one
-SETTLED = 1e-15  # change of a pass over the largest way
+SETTLED_PASS_CHANGE = 1e-15  # change of a pass over the largest way
 MOST_PASSES = 40  # that take the square of the displacement out of the area; 3 or 4 do
 
 
@@ -133,7 +135,7 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
                 bx, by = across * nx - ax, across * ny - ay
         tx, ty = 0.5 * (ax + bx), 0.5 * (ay + by)
         width = (tx * tx + ty * ty) ** 0.5
-        width = max(width, FLAT * (length[before] + length[after]))
+        width = max(width, FOLDED_LINE_SINE * (length[before] + length[after]))
         normal[0, k] = -ty / width
         normal[1, k] = tx / width
         mass[k] = part * width
@@ -198,7 +200,7 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
             new = base[k] + (before + after) * inverse[k]
             change = max(change, abs(new - way[k]))
             way[k] = new
-        if change <= SETTLED * most:
+        if change <= SETTLED_PASS_CHANGE * most:
             break
     for k in range(total):
         for c in range(2):
@@ -315,7 +317,7 @@ class ThickContact:
             line.closed = closed and len(parts) == 1
             if len(parts) == 1 and (closed or FREE_END not in line.walls):
                 # where lines meet their steps would jump
-                line.space_by_turning(SHORTEST * self.thickness)
+                line.space_by_turning(SHORTEST_TURNED_SEGMENT * self.thickness)
 
     def find_walls(self) -> tuple:
         """Unit normals of the walls at both ends, (0, 0) where there is none."""

@@ -17,7 +17,7 @@ from hydro.formulas.geometry import PLANE, Geometry
 from hydro.formulas.reconstruction import (
     DEFAULT_LIMITER,
     LOW_MACH,
-    WHOLE,
+    WHOLE_CELL_MARK,
     choose_own,
     compute_face_state,
 )
@@ -70,7 +70,7 @@ def copy_nodes(nodes, strip, row, start, count, Z, place):
     for k in range(first, last + 1):
         entry = k - start + 1
         Z[place + entry] = nodes[0, i + k * ki, j + k * kj]
-        Z[place + at.SPAN + entry] = nodes[1, i + k * ki, j + k * kj]
+        Z[place + at.SCRATCH_SPAN + entry] = nodes[1, i + k * ki, j + k * kj]
 
 
 @compiled_once(allocates=False)
@@ -90,7 +90,9 @@ def copy_state(state, strip, row, start, count, Z, place):
     ki, kj = strip[4], strip[5]
     for q in range(STATE_ROWS):
         for k in range(count + 2):
-            Z[place + q * at.SPAN + k] = state[q, i + 1 + (k - 1) * ki, j + 1 + (k - 1) * kj]
+            Z[place + q * at.SCRATCH_SPAN + k] = state[
+                q, i + 1 + (k - 1) * ki, j + 1 + (k - 1) * kj
+            ]
 
 
 @functools.cache
@@ -125,8 +127,8 @@ def make_side_kernels(
         for side in range(len(on.SIDES)):
             strip, along, first_face, step, _, _ = find_strip(side, ni, nj)
             deep = (ni if side < on.J_MIN else nj) > 2
-            for start in range(0, along, at.CHUNK):
-                m = min(at.CHUNK, along - start)
+            for start in range(0, along, at.CHUNK_CELLS):
+                m = min(at.CHUNK_CELLS, along - start)
                 n = at.count_padded(m)
                 first = first_face + start * step
                 wanted = False
@@ -165,7 +167,7 @@ def make_side_kernels(
         current row and the one after it; the strip's own lengths become those of the row before."""
         ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
         along = ni * abs(strip[4]) + nj * abs(strip[5])
-        m = min(at.CHUNK, along - start)
+        m = min(at.CHUNK_CELLS, along - start)
         n = at.count_padded(m)
         for row in range(2, 4 if deep else 3):
             next_row(Z, n)
@@ -182,8 +184,8 @@ def make_side_kernels(
         nj = nodes.shape[2] - 1
         for side in range(len(on.SIDES)):
             strip, along, first_face, step, before, after = find_strip(side, ni, nj)
-            for start in range(0, along, at.CHUNK):
-                m = min(at.CHUNK, along - start)
+            for start in range(0, along, at.CHUNK_CELLS):
+                m = min(at.CHUNK_CELLS, along - start)
                 n = at.count_padded(m)
                 first = first_face + start * step
                 # the ghosts, then the strip's own row and the next one
@@ -240,7 +242,7 @@ def make_side_kernels(
                     (y[a, b] + y[a, b + 1]) + (y[a + 1, b] + y[a + 1, b + 1])
                 )
             rim[on.C2, face] = Z[at.C2 + k]
-            rim[on.TORN, face] = Z[at.TORN + k] if opens_voids else WHOLE
+            rim[on.TORN, face] = Z[at.TORN + k] if opens_voids else WHOLE_CELL_MARK
             rim[on.HLL, face] = Z[at.HLL + k]
             # fluxes lessen jumps by it with low-mach alone, as inside
             rim[on.ACOUSTIC, face] = Z[at.ACOUSTIC + k] if low_mach else 1.0

@@ -24,7 +24,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.interior.advance import TILE_ROWS, count_tiles
 from hydro.interior.update import sum_tiles
-from hydro.rows import TOTALS
+from hydro.rows import TOTAL_ROWS
 
 MOST_UNCUT = 1.2  # times a rank's fair share: a block of more is cut
 GHOST_ROWS = 2  # of cells beyond a band, which its update reads
@@ -239,7 +239,7 @@ class CutBlock:
 
     def bring_failed(self) -> None:
         """Send the owner the new states of all cells, where they are not admissible."""
-        good = self.is_home and sum_tiles(self.block.tile_totals, np.empty(TOTALS))
+        good = self.is_home and sum_tiles(self.block.tile_totals, np.empty(TOTAL_ROWS))
         if not self.group.bcast(good, root=0):
             self.gather_rows(self.block.state_new)
 

@@ -39,13 +39,13 @@ from hydro.ranks.cutting import (
     find_bounds,
     spread_evenly,
 )
-from hydro.rows import TOTALS
+from hydro.rows import TOTAL_ROWS
 from regrid.errors import RunFailure
 
 STEP, COLLECT, COUNT, END = range(4)  # what the first rank tells the others to do
 # seconds that a rank waits wide awake, and that it sleeps then
-AWAKE = 5e-3
-NAP = 2e-4
+AWAKE_SECONDS = 5e-3
+NAP_SECONDS = 2e-4
 KEPT = ("nodes", "state", "void_energy", "rates")  # what pictures, dumps and measurements read
 
 
@@ -132,7 +132,7 @@ class Ranks(Blocks):
                     )
                 )
                 now.append(messages.Item(number, rank, [(attrgetter("state"), at)]))
-            sums = [(_get_sums, np.arange(TOTALS))]
+            sums = [(_get_sums, np.arange(TOTAL_ROWS))]
             new.append(messages.Item(number, there[0], sums, STATE_ROW))
             now.append(messages.Item(number, there[0], sums))
         comm = self.book.count("states")
@@ -364,7 +364,7 @@ def hear(comm: Any) -> tuple[int, int]:
     request = comm.Ibcast(word, root=0)
     began = time.monotonic()
     while not request.Test():
-        time.sleep(NAP if time.monotonic() - began > AWAKE else 0.0)
+        time.sleep(NAP_SECONDS if time.monotonic() - began > AWAKE_SECONDS else 0.0)
     return int(word[0]), int(word[1])
 
 

@@ -129,7 +129,7 @@ def share_slivers(
 LEAST_LEFT = 0.05  # of a cell's density and c² that its linear fields must leave at its corners
 FILTERS = (minimum_filter, maximum_filter)
 BEYOND_SIDES = 0.05  # of density and rho c²: how far beyond those around corners at a side may be
-CHUNK = 2048  # cells whose corners are looked at together, as they fit into the cache
+LOCATED_CELLS_CHUNK = 2048  # cells whose corners are looked at together, as they fit into the cache
 PARTS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the slopes, tried in this order
 MOST_SLIVERS = 0.05  # part of a block's volume by which outlines may differ
 
@@ -205,8 +205,8 @@ def lessen_slopes(eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, c
     ]  # fmt: skip
     cells = np.array(rows).reshape(len(rows), -1)
     factor = np.empty(cells.shape[1])
-    for start in range(0, factor.size, CHUNK):
-        stop = start + CHUNK
+    for start in range(0, factor.size, LOCATED_CELLS_CHUNK):
+        stop = start + LOCATED_CELLS_CHUNK
         factor[start:stop] = _find_parts(eos, cells[:, start:stop])
     fields[..., SLOPE_X:] *= factor.reshape(fields.shape[:2])[..., None, None]
     return int((factor < 1.0).sum())

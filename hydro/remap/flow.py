@@ -79,8 +79,8 @@ def sample_grid(old: np.ndarray, sides: dict[str, np.ndarray]) -> np.ndarray:
     return np.array([first, second])
 
 
-PASSES = 3  # of the regridder over a new grid, as each brings it a step nearer to its own
-SAME = 1e-9  # of a grid's size: nodes that depend on time alone
+NEW_GRID_PASSES = 3  # of the regridder over a new grid, as each brings it a step nearer to its own
+SAME_GRID_DISTANCE = 1e-9  # of a grid's size: nodes that depend on time alone
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ def settle_grid(
     cells: np.ndarray,
     nodes: np.ndarray,
     boundary: np.ndarray,
-    passes: int = PASSES,
+    passes: int = NEW_GRID_PASSES,
 ) -> np.ndarray:
     """The grid of a block inside the sides of `boundary`, by its own regridder from `nodes`.
 
@@ -240,7 +240,7 @@ def _follow_law(
     """Grids of a prescribed motion at the old time; one that depends on the flow is sampled."""
     for one, other in zip(blocks, new_blocks, strict=True):
         size = np.ptp(one.nodes, axis=(1, 2)).max()
-        if np.abs(law(one.name, t) - one.nodes).max() <= SAME * size:
+        if np.abs(law(one.name, t) - one.nodes).max() <= SAME_GRID_DISTANCE * size:
             other.nodes[...] = new_law(other.name, t)
             continue
         sides = {}
@@ -253,16 +253,16 @@ def _follow_law(
         other.nodes[...] = [map_coordinates(row, places, order=1) for row in one.nodes]
 
 
-EVERY = 50  # steps from one look at the lines to the next
-LONGEST = 3.0  # edges of the first ones' mean from which on a column is split
+STEPS_PER_LINE_CHECK = 50  # steps from one look at the lines to the next
+LONGEST_COLUMN_EDGE = 3.0  # edges of the first ones' mean from which on a column is split
 SHARPEST = np.radians(15.0)  # turn at a node from which on the columns beside it are split
 LEAST_SPLIT = 0.3  # of the first edges' mean: shorter ones are not split for a turn's sake
-CALM = 0.5  # part of both limits below which all edges and turns are before a line goes
+CALM_LIMIT_PART = 0.5  # part of both limits below which all edges and turns are before a line goes
 LONGEST_MERGED = 1.0  # edge of two merged columns, of the first mean
-SHARE = 0.125  # part of all columns that are split or merged at once
-MOST = 8  # times the first count of columns
-PASSES = 10  # of the regridders, so that grids settle before they move again
-TIE = 1e-6  # mirror images are chosen together
+MOST_CHANGED_COLUMNS = 0.125  # part of all columns that are split or merged at once
+MOST_COLUMN_GROWTH = 8  # times the first count of columns
+SETTLING_PASSES = 10  # of the regridders, so that grids settle before they move again
+MIRROR_TIE = 1e-6  # mirror images are chosen together
 
 Nodes = list[np.ndarray]
 # nodes and states (4, ni, nj) of all blocks -> blocks, links, what makes their regridders
@@ -288,7 +288,7 @@ class Refinement:
 
     def choose(self, step: int, lines: Sequence[Line]) -> np.ndarray | None:
         """After a step, where in numbers of the present columns the new lines lie; None: stay."""
-        if step % EVERY:
+        if step % STEPS_PER_LINE_CHECK:
             return None
         lines = [line for line in lines if line.segment.kind == "interface"]
         count = lines[0].segment.block.nj
@@ -299,19 +299,21 @@ class Refinement:
             first = line.segment.line(self.first[line.segment.block.name])
             edges = edges / (np.hypot(*np.diff(first, axis=1)).sum() / self.first_count)
             sharp = np.where(edges > LEAST_SPLIT, np.maximum(turns[:-1], turns[1:]), 0.0)
-            split = np.maximum(split, np.maximum(edges / LONGEST, sharp / SHARPEST))
+            split = np.maximum(split, np.maximum(edges / LONGEST_COLUMN_EDGE, sharp / SHARPEST))
             around = turns[:-2] + turns[1:-1] + turns[2:]
             long = (edges[:-1] + edges[1:]) / LONGEST_MERGED
-            kept = np.maximum(kept, np.maximum(long, around / (CALM * SHARPEST)))
-        most = max(1, int(SHARE * count))
-        columns = pick_largest(split, min(most, MOST * self.first_count - count))
+            kept = np.maximum(kept, np.maximum(long, around / (CALM_LIMIT_PART * SHARPEST)))
+        most = max(1, int(MOST_CHANGED_COLUMNS * count))
+        columns = pick_largest(split, min(most, MOST_COLUMN_GROWTH * self.first_count - count))
         if columns.size:
             return np.sort(np.append(np.arange(count + 1), columns + 0.5))
-        if count == self.first_count or split.max() > CALM:
+        if count == self.first_count or split.max() > CALM_LIMIT_PART:
             return None
         beside = np.minimum(np.append(kept[1:], np.inf), np.insert(kept[:-1], 0, np.inf))
-        kept = np.where(kept < beside * (1.0 - TIE), kept, np.inf)  # no two neighbours go at once
-        ease = 1.0 / np.maximum(kept, TIE)
+        kept = np.where(
+            kept < beside * (1.0 - MIRROR_TIE), kept, np.inf
+        )  # no two neighbours go at once
+        ease = 1.0 / np.maximum(kept, MIRROR_TIE)
         removed = 1 + pick_largest(ease, min(most, count - self.first_count))
         fits = 0 < removed.size <= count - self.first_count
         return np.delete(np.arange(count + 1.0), removed) if fits else None
@@ -336,7 +338,7 @@ class Refinement:
             cells = np.array(np.meshgrid(np.arange(one.ni), parents, indexing="ij"))
             first = sample_lines(one.nodes, places)
             sides = other.nodes_new
-            nodes = settle_grid(motion, number, one, cells, first, sides, PASSES).copy()
+            nodes = settle_grid(motion, number, one, cells, first, sides, SETTLING_PASSES).copy()
             held = one.nodes, one.state[:, 1:-1, 1:-1], one.void_energy
             state, void_energy, _ = remap_state(
                 one.name, one.eos, one.geometry.curved, *held, nodes
@@ -375,4 +377,4 @@ def pick_largest(scores: np.ndarray, most: int) -> np.ndarray:
     if most < 1 or above.size <= most:
         return above if most >= 1 else above[:0]
     least = np.sort(scores[above])[-most]
-    return above[scores[above] >= least * (1.0 - TIE)]
+    return above[scores[above] >= least * (1.0 - MIRROR_TIE)]

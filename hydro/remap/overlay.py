@@ -124,7 +124,7 @@ def compute_cell_moments(nodes: np.ndarray, curved: bool) -> tuple[np.ndarray, n
     return volumes, centres
 
 
-STEEPEST = 3.0  # times the difference before it: how far means go on beyond a side
+STEEPEST_CONTINUATION = 3.0  # times the difference before it: how far means go on beyond a side
 MEAN, SLOPE_X, SLOPE_Y = range(3)  # last index of linear fields (ni, nj, quantities, 3)
 
 
@@ -147,7 +147,7 @@ def _continue_line(means: np.ndarray) -> np.ndarray:
     """What comes before means [0], [1], ..., from the first three, or two where there are two."""
     rise = means[0] - means[1]
     before = means[1] - means[2] if len(means) > 2 else rise
-    least = np.minimum(np.abs(rise), STEEPEST * np.abs(before))
+    least = np.minimum(np.abs(rise), STEEPEST_CONTINUATION * np.abs(before))
     return means[0] + np.where(rise * before > 0.0, np.sign(rise) * least, 0.0)
 
 

@@ -16,10 +16,12 @@ from hydro.formulas.riemann import compute_contact, compute_speed_at_pressure
 from hydro.rows import RHO, P, U, V
 from regrid.jit import compiled_once, kernel
 
-SNAP = 1e-9  # parts of a face closer than this to a leader node are at the node
-NEAR = 1e-2  # squared distance, in squared lengths of a face, of a point that lies on the line
-PARALLEL = 1e-20  # squared sine of the angle below which two lines do not cross
-DEEP = 1e-6  # part of rho c² below which a negative contact pressure is rounding
+SNAPPED_LEADER_PART = 1e-9  # parts of a face closer than this to a leader node are at the node
+NEAR_LINE_DISTANCE = (
+    1e-2  # squared distance, in squared lengths of a face, of a point that lies on the line
+)
+PARALLEL_LINES_SINE = 1e-20  # squared sine of the angle below which two lines do not cross
+ROUND_OFF_TENSION = 1e-6  # part of rho c² below which a negative contact pressure is rounding
 
 # Rows of the arrays over the pieces, by name.
 # owners (2, pieces): the leader's and the follower's face that a piece belongs to
@@ -87,10 +89,10 @@ def fill_positions(leader, points, positions):
             if away < best:
                 best = away
                 position = a + part
-            elif best < NEAR * measure_square(leader, a):
+            elif best < NEAR_LINE_DISTANCE * measure_square(leader, a):
                 break
         nearest = float(int(position + 0.5))
-        if abs(position - nearest) < SNAP:
+        if abs(position - nearest) < SNAPPED_LEADER_PART:
             position = nearest
         last = position if position > last else last
         positions[k] = last
@@ -124,7 +126,7 @@ def find_last_crossing(line, other):
             ey = other[1, a + 1] - other[1, a]
             away_x, away_y = other[0, a] - x, other[1, a] - y
             cross = dx * ey - dy * ex
-            if cross * cross <= PARALLEL * (dx * dx + dy * dy) * (ex * ex + ey * ey):
+            if cross * cross <= PARALLEL_LINES_SINE * (dx * dx + dy * dy) * (ex * ex + ey * ey):
                 continue
             along = (away_x * ey - away_y * ex) / cross
             part = (away_x * dy - away_y * dx) / cross
@@ -368,7 +370,7 @@ def solve_pieces(one_side, other_side, owners, faces, count, out):
             )
             other_speed = speed
             slip = abs((u - u_other) * ny - (v - v_other) * nx)
-            if pressure < -DEEP * rho * c * c:
+            if pressure < -ROUND_OFF_TENSION * rho * c * c:
                 pulled += 1
         if pressure < 0.0:
             pressure = 0.0

@@ -22,7 +22,7 @@ from hydro.rows import RHO, P, U, V
 from hydro.sliding.pieces import AREA_X, AREA_Y, FOLLOWER, LEADER, STATE_E, SWEPT_RATE
 from regrid.jit import kernel
 
-LEAST_LEFT = 0.5  # of a polygon cell's volume after a step
+LEAST_VOLUME_LEFT = 0.5  # of a polygon cell's volume after a step
 
 
 @functools.cache

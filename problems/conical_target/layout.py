@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 
 LEAST_CELLS = 6  # a wave: the thickness of interfaces holds shorter ones back (theory F6.6)
-POINTS = 24  # between two nodes, in fits
-COVERED = 0.93  # of a window that the line has to fill
+FITTED_POINTS = 24  # between two nodes, in fits
+COVERED_WINDOW_PART = 0.93  # of a window that the line has to fill
 
 
 class SideFrame:
@@ -148,7 +148,7 @@ class Ripple:
 def densify(line: np.ndarray) -> np.ndarray:
     """POINTS times as many points (2, m) on the cubic spline through the line's nodes (2, n)."""
     arc = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line, axis=1)))))
-    fine = np.arange(POINTS * (arc.size - 1) + 1) / POINTS
+    fine = np.arange(FITTED_POINTS * (arc.size - 1) + 1) / FITTED_POINTS
     fine = np.interp(fine, np.arange(arc.size, dtype=float), arc)
     from scipy.interpolate import CubicSpline  # slow to load
 
@@ -163,7 +163,7 @@ def fit_wave(position: np.ndarray, height: np.ndarray, middle: float, length: fl
     """
     part = (position - middle) / length
     chosen = np.abs(part) <= 1.0
-    if chosen.sum() < 5 * LEAST_CELLS or np.ptp(part[chosen]) < 2.0 * COVERED:
+    if chosen.sum() < 5 * LEAST_CELLS or np.ptp(part[chosen]) < 2.0 * COVERED_WINDOW_PART:
         return math.nan
     step = np.hypot(np.gradient(position), np.gradient(height))[chosen]
     part = part[chosen]
@@ -174,7 +174,7 @@ def fit_wave(position: np.ndarray, height: np.ndarray, middle: float, length: fl
     return float(math.hypot(found[3], found[4]))
 
 
-THINNEST = 4  # through a part
+FEWEST_CELLS_THROUGH = 4  # through a part
 MATERIALS = {
     "impactor": "impactor", "front": "shell", "ring": "target", "cone": "filling",
     "beside": "target", "behind": "target", "side": "shell",
@@ -192,7 +192,7 @@ class Layout:
         self.within = count(deck.base)
         self.shell = count(deck.side)
         self.ring = count(deck.radius - deck.cover) if self.open else 0
-        self.covered = max(THINNEST, deck.cells - self.within - self.ring)
+        self.covered = max(FEWEST_CELLS_THROUGH, deck.cells - self.within - self.ring)
         self.inside = self.within + self.covered + self.ring
         self.impactor = count(deck.thickness)
         self.front = count(deck.front)
@@ -201,7 +201,7 @@ class Layout:
 
     def count_cells(self, length: float) -> int:
         """Cells along a part of that length [m], square ones where it is not very short."""
-        return max(THINNEST, round(length * self.deck.cells / self.deck.radius))
+        return max(FEWEST_CELLS_THROUGH, round(length * self.deck.cells / self.deck.radius))
 
     def estimate_cells(self) -> int:
         """Cells of all blocks, by arithmetic alone."""

@@ -83,11 +83,11 @@ class ConicalTargetDeck(Deck, kw_only=True):
     eos: EosNumbers = EosNumbers()
 
 
-THRESHOLD = 0.2  # of the impact's pressure: where a shock in the cone is
+SHOCK_PRESSURE_PART = 0.2  # of the impact's pressure: where a shock in the cone is
 AT_REST = 0.01  # of the impactor's speed
 # greatest pressure of a material, and the centre of that cell
 PEAK = {"pressure": "Pa", "x": "m", "y": "m"}
-BEHIND = 5  # cells behind the front: a shock is three or four wide
+CELLS_BEHIND_FRONT = 5  # cells behind the front: a shock is three or four wide
 
 
 class ConicalTarget(seen.Results, Problem):
@@ -191,7 +191,7 @@ class ConicalTarget(seen.Results, Problem):
         middle = departure[(part >= seen.MIDDLE[0]) & (part <= seen.MIDDLE[1])]
         row["line_amplitude"] = 0.5 * float(np.ptp(middle))
         row["line_length"] = float(np.hypot(*np.diff(line, axis=1)).sum())
-        threshold = THRESHOLD * self.impact[0]
+        threshold = SHOCK_PRESSURE_PART * self.impact[0]
         speed = AT_REST * self.deck.speed
         for name, number in (("axis", 0), ("side", -1)):
             front = measure_front(cone, number, threshold, speed)
@@ -226,4 +226,4 @@ def measure_front(block: Block, row: int, threshold: float, speed: float) -> tup
     if math.isnan(x) or math.hypot(u, v) > speed:
         return math.nan, math.nan
     last = int(np.flatnonzero(p > threshold)[-1])
-    return x, float(p[max(0, last - BEHIND) : last + 1].max())
+    return x, float(p[max(0, last - CELLS_BEHIND_FRONT) : last + 1].max())

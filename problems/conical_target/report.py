@@ -51,9 +51,11 @@ def find_peak(history, part: str) -> tuple[float, float, float, float]:
 PLATEAU = (0.5, 0.95)  # of the time until a wave is back: the impact face's pressure is its mean
 GAUGES = (0.1, 0.5, 0.9)  # of the length of the graphite's axis, as it is at the time
 STATIONS = (0.25, 0.5, 0.75)  # of the cone's length at first: where the shock's speed is told
-WIDTH = 0.1  # of that length, to either side: the stretch over which a speed is fitted
+FITTED_STRETCH_PART = (
+    0.1  # of that length, to either side: the stretch over which a speed is fitted
+)
 MIDDLE = (0.1, 0.9)  # of the cone's side by its length: its ends are drawn into roll-ups
-GROWTH = 0.5  # of the time from the first bend to the end: the latest stage
+LATEST_STAGE_PART = 0.5  # of the time from the first bend to the end: the latest stage
 
 
 def get_shock_path(history, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -74,7 +76,7 @@ def measure_passage(problem, history, name: str) -> list[tuple[float, float, flo
     found = []
     for station in STATIONS:
         position = deck.front + station * deck.cone
-        near = np.abs(x - position) < WIDTH * deck.cone
+        near = np.abs(x - position) < FITTED_STRETCH_PART * deck.cone
         if near.sum() < 4 or not x[near].min() < position < x[near].max():
             found.append((math.nan,) * 3)
             continue
@@ -108,13 +110,15 @@ def measure_growth(history) -> tuple[float, float, float]:
     if not top > 0.0 or t.size < 10:
         return (math.nan,) * 3
     begin, quarter = (int(np.argmax(amplitude > part * top)) for part in (0.05, 0.25))
-    late = t > t[-1] - GROWTH * (t[-1] - t[begin])
+    late = t > t[-1] - LATEST_STAGE_PART * (t[-1] - t[begin])
     first = slice(begin, max(quarter + 1, begin + 3))
     return float(t[begin]), fit_slope(t, amplitude, first), fit_slope(t, amplitude, late)
 
 
 AGES = (0.5e-6, 1.2e-6)  # after the passage: between them the rate of growth is told [s]
-COMPARABLE = 16.0  # cells per wave: amplitudes are within 10 % of theory from there on
+COMPARABLE_CELLS_PER_WAVE = (
+    16.0  # cells per wave: amplitudes are within 10 % of theory from there on
+)
 
 
 @dataclass(frozen=True)
@@ -169,8 +173,8 @@ def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
         f"ripple of {ripple.amplitude * MM:.3g} mm on waves of {ripple.wavelength * MM:.3g} mm on "
         f"the cone's side, k a = {k * ripple.amplitude:.3g}"
     ]
-    if ripple.cells_a_wave < COMPARABLE:
-        wanted = math.ceil(problem.deck.cells * COMPARABLE / ripple.cells_a_wave)
+    if ripple.cells_a_wave < COMPARABLE_CELLS_PER_WAVE:
+        wanted = math.ceil(problem.deck.cells * COMPARABLE_CELLS_PER_WAVE / ripple.cells_a_wave)
         notes.append(
             f"{ripple.cells_a_wave:.3g} cells per wave are too few to compare growth with theory: "
             f"the smoothing length of the interface slows it; take cells = {wanted} or more"
@@ -209,7 +213,7 @@ COLOURS = {"impactor": "tab:blue", "shell": "0.45", "target": "tab:purple", "fil
 FACES = {"impactor": "#cfe2f3", "shell": "0.88", "target": "#e6dcf0", "filling": "#f6e3b4"}
 LABELS = {"impactor": "impactor", "side": "shell", "behind": "target", "cone": "filling"}
 PAINTED = ("impactor", "front", "side", "cone", "ring", "beside", "behind")
-SHOWN = 6  # dumps in a picture that shows several times
+MOST_SHOWN_DUMPS = 6  # dumps in a picture that shows several times
 
 
 def _draw_materials(axis, dump, names: dict[str, str], grid: bool) -> None:
@@ -301,7 +305,7 @@ class Results:
         grid = figure.add_gridspec(2, 2, height_ratios=(1.25, 1.0))
         shape = figure.add_subplot(grid[0, :])
         amplitude, growth = (figure.add_subplot(grid[1, column]) for column in (0, 1))
-        dumps = spread_dumps(run, SHOWN)
+        dumps = spread_dumps(run, MOST_SHOWN_DUMPS)
         k = self.ripple.wavenumber
         for shade, dump in zip(np.linspace(0.0, 0.9, len(dumps)), dumps, strict=True):
             line = MM * dump.block("cone").nodes[:, :, -1]
@@ -379,7 +383,7 @@ class Results:
         tops = [float(dump["cone"].p.max()) for dump in run.dumps]
         shares = [float(np.interp(dump.t, t, share)) for dump in run.dumps]
         most = run.dumps[int(np.argmax(shares if max(shares) > 0.0 else tops))]
-        for dump in spread_dumps(run, SHOWN)[1:]:
+        for dump in spread_dumps(run, MOST_SHOWN_DUMPS)[1:]:
             rho = dump["cone"].rho.ravel()
             p = GPA * dump["cone"].p.ravel()
             states.plot(rho, p, ".", ms=1.5, zorder=2, label=f"{US * dump.t:.3g} us")
@@ -407,7 +411,7 @@ class Results:
     def draw_converging_shock(self, figure, run) -> None:
         """Place of the shock in the cone over time, pressure behind it and speed over the place."""
         path, pressure, speed = make_panels(figure, 11.0, 3.8, 1, 3)
-        reach = WIDTH * self.deck.cone
+        reach = FITTED_STRETCH_PART * self.deck.cone
         for name, words in (("axis", "on the axis"), ("side", "along the side")):
             t, x, p = get_shock_path(run.history, name)
             path.plot(US * t, MM * x, label=words)
@@ -422,7 +426,7 @@ class Results:
     def draw_cone_side(self, figure, run) -> None:
         """The line between graphite and lead, and its departure from its own straight line."""
         shape, away = make_panels(figure, 9.5, 4.0, 1, 2)
-        for dump in spread_dumps(run, SHOWN):
+        for dump in spread_dumps(run, MOST_SHOWN_DUMPS):
             line = dump.block("cone").nodes[:, :, -1]
             label = f"{US * dump.t:.2g} us"
             departure, part = measure_departure(line)

@@ -34,7 +34,7 @@ from problems.problem import BlockPlan, Problem, get_last
 FACTOR_BYTES = 38.0
 LARGEST_SHIFT = 0.1  # of a node in one step of the time march, in its shorter neighbouring step
 SIDES = {"i_min": "left", "i_max": "right", "j_min": "bottom", "j_max": "top"}
-LEVELS = 14  # of stream function and temperature in pictures
+CONTOUR_LEVELS = 14  # of stream function and temperature in pictures
 
 
 class ConvectionBlock:
@@ -299,10 +299,10 @@ class BoxProblem(Problem):
         flow = axes[0].contourf(x, y, psi, levels=shades, cmap="RdBu_r", vmin=-pale, vmax=pale)
         lines = {"linewidths": 0.7, "linestyles": "-"}
         if np.ptp(psi):
-            levels = np.linspace(psi.min(), psi.max(), LEVELS + 2)[1:-1]
+            levels = np.linspace(psi.min(), psi.max(), CONTOUR_LEVELS + 2)[1:-1]
             axes[0].contour(x, y, psi, levels=levels, colors="k", **lines)
         warm = axes[1].contourf(x, y, nodal, levels=40, cmap="inferno")
-        axes[1].contour(x, y, nodal, levels=LEVELS, colors="w", **lines)
+        axes[1].contour(x, y, nodal, levels=CONTOUR_LEVELS, colors="w", **lines)
         words = f"streamlines, |psi| up to {largest:.4g}", "isotherms"
         labels = "stream function [m2/s]", "temperature [K]"
         for axis, picture, title, label in zip(axes, (flow, warm), words, labels, strict=True):

@@ -27,8 +27,8 @@ from problems.deck import Deck, Output, RunControl, key
 from problems.problem import Problem, Report, compare, get_last, say_unreached
 from problems.references.convection import VerticalPlates
 
-NOTHING = 1e-12  # relative: differences below are rounding, no swing
-LASTING = 50.0  # slowest diffusive times that a run may take: steady long before
+ROUND_OFF_SWING = 1e-12  # relative: differences below are rounding, no swing
+LONGEST_DIFFUSIVE_TIMES = 50.0  # slowest diffusive times that a run may take: steady long before
 ERRORS = ("error_T", "error_v", "swings_T", "swings_v")
 
 
@@ -71,7 +71,7 @@ class Convection1D(Problem):
     def build(self) -> columns.ColumnMarch:
         deck = self.deck
         grid = self.deck.grid
-        t_end = deck.run.t_end or LASTING * max(1.0, 1.0 / deck.prandtl)
+        t_end = deck.run.t_end or LONGEST_DIFFUSIVE_TIMES * max(1.0, 1.0 / deck.prandtl)
         kind = t_end, grid.kind, grid.every
         column = self.make_column()
         first = grid.make(deck.cells)
@@ -93,7 +93,7 @@ class Convection1D(Problem):
             compare(history, "nusselt", self.exact.compute_nusselt(), "heat", digits=9),
         ]
         notes = say_unreached(history, "error_v")
-        if change >= columns.SETTLED and not notes:
+        if change >= columns.STEADY_CHANGE and not notes:
             notes.append(
                 f"NOT STEADY: the state still changes by {change:.1e} in a diffusive time, and the "
                 "exact profiles are the steady ones; a longer time (run.t_end)"
@@ -138,7 +138,7 @@ class Convection1D(Problem):
 def count_turns(values: np.ndarray) -> int:
     """How often a profile turns from rising to falling or back; level parts do not count."""
     change = np.diff(values)
-    change = np.sign(change[np.abs(change) > NOTHING * np.ptp(values)])
+    change = np.sign(change[np.abs(change) > ROUND_OFF_SWING * np.ptp(values)])
     return int(np.count_nonzero(change[1:] != change[:-1]))
 
 

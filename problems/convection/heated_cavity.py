@@ -23,10 +23,10 @@ from hydro.convection.steady import SteadySolver, make_rest
 from problems.convection.boxes import SIDES, AxisGrid, BoxProblem, SteadyEvolution
 from problems.deck import Deck, DeckTable, Output, RunControl, key
 from problems.problem import Report, compare, get_last
-from problems.references.convection import PRANDTL, STATES, CavityState
+from problems.references.convection import AIR_PRANDTL, STATES, CavityState
 from regrid.errors import BadInput
 
-TIME = 0.2  # of a march in time: past the swings of the start
+CAVITY_MARCH_TIME = 0.2  # of a march in time: past the swings of the start
 STEADY_ITERATIONS = 200
 ROWS = {
     "nusselt": "Nu mean, left wall",
@@ -65,7 +65,7 @@ class HeatedCavityDeck(Deck, kw_only=True):
     cells_up: key(int | None, "cells up. If left out: cells times aspect", ge=3, le=2000) = None
     aspect: key(float, "height over width", ge=0.01, le=100) = 1.0
     rayleigh: key(float, "Rayleigh number of the width", le=1e12) = 1e5
-    prandtl: key(float, "viscosity over diffusivity", le=1e6) = PRANDTL
+    prandtl: key(float, "viscosity over diffusivity", le=1e6) = AIR_PRANDTL
     tilt: key(float, "of gravity, anticlockwise from down [degrees]", ge=-360, le=360) = 0.0
     left: Side = Side(heat="isothermal", value=0.5)
     right: Side = Side(heat="isothermal", value=-0.5)
@@ -94,7 +94,7 @@ class HeatedCavity(BoxProblem):
         self.scale = (abs(deck.left.value - deck.right.value) if known else 1.0) or 1.0
         steady = deck.method == "steady"
         self.t_unit = "iterations" if steady else "s"
-        self.t_end = deck.run.t_end or float(STEADY_ITERATIONS if steady else TIME)
+        self.t_end = deck.run.t_end or float(STEADY_ITERATIONS if steady else CAVITY_MARCH_TIME)
 
     def build(self):
         deck = self.deck
@@ -133,7 +133,7 @@ class HeatedCavity(BoxProblem):
         same = all((side.heat, side.flow) == ("isothermal", "no-slip") for side in ends)
         same &= math.isclose(ends[0].value - ends[1].value, 1.0)
         same &= deck.top == deck.bottom == Side()
-        if not same or deck.aspect != 1.0 or deck.prandtl != PRANDTL or x != 0.0 or y < 0.0:
+        if not same or deck.aspect != 1.0 or deck.prandtl != AIR_PRANDTL or x != 0.0 or y < 0.0:
             return None
         return STATES.get(deck.rayleigh)
 

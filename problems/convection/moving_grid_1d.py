@@ -22,7 +22,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from hydro.convection.columns import FAMILIES, HEIGHT, FrontRace, Placing
+from hydro.convection.columns import DRAWN_BLOCK_HEIGHT, FAMILIES, FrontRace, Placing
 from problems.deck import Deck, DeckTable, RunControl, key
 from problems.problem import BlockPlan, Problem, Report, align
 from problems.references.convection import BurgersFronts
@@ -80,7 +80,9 @@ class MovingGrid1D(Problem):
     def plan(self) -> tuple[float, list[BlockPlan]]:
         """End time and the four columns."""
         size = (self.deck.cells, 1)
-        return self.t_end, [BlockPlan(name, size, (0.0, 0.0), (1.0, HEIGHT)) for name in FAMILIES]
+        return self.t_end, [
+            BlockPlan(name, size, (0.0, 0.0), (1.0, DRAWN_BLOCK_HEIGHT)) for name in FAMILIES
+        ]
 
     def build(self) -> FrontRace:
         return self.make_race(self.deck.cells)

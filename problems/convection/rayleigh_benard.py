@@ -31,17 +31,19 @@ from problems.problem import Report, Row, compare
 from problems.references import convection as linear
 from regrid.errors import BadInput
 
-TIME = 1.5
-SMALL = 1e-2  # of the last kinetic energy: below it a disturbance grows by linear theory
+BENARD_MARCH_TIME = 1.5
+LINEAR_ENERGY_PART = (
+    1e-2  # of the last kinetic energy: below it a disturbance grows by linear theory
+)
 LEAST_ROWS = 12  # of a history, for a rate of growth
 ONSET_BRACKET = (0.3, 3.0)  # of the reference, or of the deck's Rayleigh number
-STILL = 1e-9  # kinetic energy over the squared disturbance: less is no flow [m4/s2/K2]
-WIDENINGS = 3  # of the bracket, tenfold both ways
+STILL_ENERGY_RATIO = 1e-9  # kinetic energy over the squared disturbance: less is no flow [m4/s2/K2]
+BRACKET_WIDENINGS = 3  # of the bracket, tenfold both ways
 
 
 class RayleighBenardDeck(Deck, kw_only=True):
     output: Output = Output(dumps=6)
-    run: RunControl = RunControl(t_end=TIME)
+    run: RunControl = RunControl(t_end=BENARD_MARCH_TIME)
     shape: key(Literal["box", "layer"], "side walls, or periodic sides") = "box"
     sides: key(Literal["adiabatic", "conducting"], "side walls of a box") = "adiabatic"
     walls: key(Literal["no-slip", "free"], "floor and ceiling hold the fluid, or not") = "no-slip"
@@ -49,7 +51,7 @@ class RayleighBenardDeck(Deck, kw_only=True):
     cells_up: key(int, "cells up", ge=3, le=2000) = 40
     width: key(float | None, "over the height. If left out: 1, or critical", ge=0.01, le=100) = None
     rayleigh: key(float, "Rayleigh number of the height", le=1e12) = 5000.0
-    prandtl: key(float, "viscosity over diffusivity", le=1e6) = linear.PRANDTL
+    prandtl: key(float, "viscosity over diffusivity", le=1e6) = linear.AIR_PRANDTL
     tilt: key(float, "of gravity, anticlockwise from down [degrees]", gt=-90, lt=90) = 0.0
     amplitude: key(float, "of the first disturbance of the temperature [K]", ge=1e-12, le=1) = 1e-3
     onset: key(bool, "search for the onset at the end") = True
@@ -65,7 +67,7 @@ class RayleighBenard(BoxProblem):
 
     def __init__(self, deck: RayleighBenardDeck):
         super().__init__(deck)
-        self.t_end = deck.run.t_end or TIME
+        self.t_end = deck.run.t_end or BENARD_MARCH_TIME
         words = "those of a layer are periodic; leave sides out or take shape = 'box'"
         deck.refuse(deck.shape == "layer" and deck.sides != "adiabatic", "sides", words)
         self.fluid = make_fluid(deck.rayleigh, deck.prandtl, deck.tilt)
@@ -111,7 +113,7 @@ class RayleighBenard(BoxProblem):
         about = self.onset if math.isfinite(self.onset) else max(deck.rayleigh, 1.0)
         fluid = make_fluid(1.0, deck.prandtl, deck.tilt)
         low, high = (part * about for part in ONSET_BRACKET)
-        for _ in range(WIDENINGS):
+        for _ in range(BRACKET_WIDENINGS):
             try:
                 return measure.find_onset(equations, fluid, low, high)
             except BadInput:  # both ends grow, or both decay
@@ -146,7 +148,7 @@ class RayleighBenard(BoxProblem):
                 theory = linear.compute_layer_growth(*numbers, deck.walls == "free")
             rows.append(Row("eigenvalue", rate, theory, "growth rate, eigenvalue [1/s]"))
             seen = measure_growth(history["t"], history["kinetic_energy"])
-            if history["kinetic_energy"][0] < STILL * deck.amplitude**2:
+            if history["kinetic_energy"][0] < STILL_ENERGY_RATIO * deck.amplitude**2:
                 notes.append("the disturbance that decays most slowly is heat alone: nothing moves")
             elif math.isfinite(seen):
                 rows.append(Row("growth", seen, rate, "growth rate, in time [1/s]"))
@@ -186,7 +188,7 @@ def measure_growth(t: np.ndarray, energy: np.ndarray) -> float:
     if energy.size < LEAST_ROWS:
         return math.nan
     decays = energy[-1] < energy[0]
-    small = energy < (np.inf if decays else SMALL * energy.max())
+    small = energy < (np.inf if decays else LINEAR_ENERGY_PART * energy.max())
     end = int(np.argmin(small)) if not small.all() else small.size
     if end < LEAST_ROWS:
         return math.nan

@@ -23,10 +23,10 @@ from problems.interface_instability.spacing import grow_steps
 from problems.references.linear_growth import PerturbedFlow, PerturbedLayer
 from problems.references.riemann import compute_cell_averages
 
-CLEAR = 8.0  # least T over the time in which the shock runs over the line's amplitude
-THIN = 0.5  # cells: a thinner rarefaction is no more than its cells' averages
-FAINT = 1e-9  # of the largest: harmonics that are round-off
-REACH = 1.0  # wavelengths beyond a front in which lines become straight
+CLEAR_TIME_RATIO = 8.0  # least T over the time in which the shock runs over the line's amplitude
+THIN_RAREFACTION_CELLS = 0.5  # cells: a thinner rarefaction is no more than its cells' averages
+FAINT_HARMONIC_PART = 1e-9  # of the largest: harmonics that are round-off
+FRONT_REACH_WAVELENGTHS = 1.0  # wavelengths beyond a front in which lines become straight
 LEAST_JUMP = 1e-3  # of the pressure: a weaker shock's cells are its jump, mixed by volume
 
 
@@ -53,10 +53,10 @@ def find_waves(y: np.ndarray, x: np.ndarray, even: bool) -> list[Wave]:
     parts[0] = 0.0
     if even or cells % 2 == 0:
         parts[-1] *= 0.5
-    least = FAINT * np.abs(parts).max()
+    least = FAINT_HARMONIC_PART * np.abs(parts).max()
     return [
         Wave(unit * number, float(abs(part)), float(np.angle(part)))
-        if abs(part.imag) > FAINT * abs(part)
+        if abs(part.imag) > FAINT_HARMONIC_PART * abs(part)
         else Wave(unit * number, float(part.real), 0.0)
         for number, part in enumerate(parts)
         if abs(part) > least
@@ -138,7 +138,7 @@ class Side:
         self.length = abs(problem.find_ends()[int(sign > 0.0)] - base.u * start.since)
         self.speeds = [abs(self.wave.tail - base.u)]  # of fronts, from the interface
         size = deck.wavelength / deck.cells
-        if abs(self.wave.head - self.wave.tail) * start.since > THIN * size:
+        if abs(self.wave.head - self.wave.tail) * start.since > THIN_RAREFACTION_CELLS * size:
             self.speeds.append(abs(self.wave.head - base.u))
         self.away, self.places = self._make_spacing(size)
 
@@ -214,7 +214,7 @@ class Side:
         for speed in self.speeds:
             u = start.base.u + self.sign * speed
             amplitudes.append(1.0 - u / start.shock.shock_speed)
-        reach = REACH * 2.0 * math.pi / wave.wavenumber
+        reach = FRONT_REACH_WAVELENGTHS * 2.0 * math.pi / wave.wavenumber
         left = np.maximum(0.0, 1.0 - np.maximum(0.0, self.away - front) / min(reach, self.length))
         fade = left * left * (3.0 - 2.0 * left)
         if not self.is_shock:

@@ -33,7 +33,7 @@ from problems.initial_states import Fluid
 from problems.interface_instability.line import Mode, Spectrum
 from regrid.errors import BadInput
 
-LONGEST = 1e4  # wavelengths in a length
+LONGEST_WAVELENGTHS = 1e4  # wavelengths in a length
 
 
 class SecondShock(DeckTable, kw_only=True):
@@ -78,7 +78,7 @@ class InterfaceDeck(Deck, kw_only=True):
     line_file: key(
         str | None, "text file of a line, added to the modes: x and y, or x [m]", min_length=1
     ) = None
-    width: key(float, "width of the domain in wavelengths", ge=1e-12, le=LONGEST) = 0.5
+    width: key(float, "width of the domain in wavelengths", ge=1e-12, le=LONGEST_WAVELENGTHS) = 0.5
     sides: key(Literal["wall", "periodic"], "what bounds the domain along the interface") = "wall"
     cells: key(int, "cells per wavelength", ge=4, le=MOST_CELLS) = 64
     refine: key(bool, "add grid lines where the interface grows long or bends") = False
@@ -116,9 +116,11 @@ class InterfaceDeck(Deck, kw_only=True):
 
 
 LEAST_CELLS = 3  # in a wave: with fewer it hardly grows
-SQUARE = 2e-3  # most slope of a wave at a wall, over its largest: a phase of 3.14 is one of pi
-FLATTEST = 4.0  # of first cells at the interface: one side over the other
-DENSEST = 1e6  # most ratio of densities
+WALL_SLOPE_PART = (
+    2e-3  # most slope of a wave at a wall, over its largest: a phase of 3.14 is one of pi
+)
+MOST_CELL_RATIO = 4.0  # of first cells at the interface: one side over the other
+MOST_DENSITY_RATIO = 1e6  # most ratio of densities
 
 
 def check_sense(deck: InterfaceDeck, rho: tuple[float, float], drawn: Iterable[Mode]) -> None:
@@ -146,13 +148,13 @@ def _list_wave_faults(
                 f"{name}.number is {mode.number}: waves of {share:.3g} cells (fewer than "
                 f"{LEAST_CELLS}) hardly grow: take a number up to {most}, or cells = {least}"
             )
-        if deck.sides == "wall" and abs(math.sin(mode.phase)) > SQUARE:
+        if deck.sides == "wall" and abs(math.sin(mode.phase)) > WALL_SLOPE_PART:
             words = "with phase 0 or 3.141592653589793; or take sides = 'periodic'"
             yield f"{name}.phase is {mode.phase:g}; walls meet a line at a right angle, {words}"
     piece, what = (0.5, "halves of waves") if deck.sides == "wall" else (1.0, "waves")
     for name, mode in [*waves, *(("spectrum", mode) for mode in drawn)]:
         count = mode.number * deck.width / piece
-        if abs(math.sin(math.pi * count)) > SQUARE or round(count) < 1:
+        if abs(math.sin(math.pi * count)) > WALL_SLOPE_PART or round(count) < 1:
             right = max(1, round(count)) * piece / mode.number
             yield (
                 f"width is {deck.width:g} wavelengths, which holds {count:.4g} {what} of mode "
@@ -165,19 +167,21 @@ def _list_size_faults(deck: InterfaceDeck, rho: tuple[float, float]) -> Iterator
     """Cells far from square, lengths and densities out of all proportion."""
     rows = max(2, round(deck.cells * deck.width))
     aspect = deck.width / rows * deck.cells
-    if not 1.0 / FLATTEST <= aspect <= FLATTEST:
-        least = 2.0 / FLATTEST / deck.cells
+    if not 1.0 / MOST_CELL_RATIO <= aspect <= MOST_CELL_RATIO:
+        least = 2.0 / MOST_CELL_RATIO / deck.cells
         yield (
             f"width is {deck.width:g} wavelengths: its {rows} rows are {aspect:.3g} times as high "
             f"as cells are long; take a width from {least:.3g}, or more cells"
         )
     for place, length in enumerate(deck.lengths or ()):
-        if length > LONGEST * deck.wavelength:
-            most = f"take at most {LONGEST:g} wavelengths, {LONGEST * deck.wavelength:g}"
+        if length > LONGEST_WAVELENGTHS * deck.wavelength:
+            longest = LONGEST_WAVELENGTHS * deck.wavelength
+            most = f"take at most {LONGEST_WAVELENGTHS:g} wavelengths, {longest:g}"
             yield f"lengths.{place} is {length:g}, too long: {most}"
     ratio = rho[1] / rho[0]
-    if not 1.0 / DENSEST <= ratio <= DENSEST:
+    if not 1.0 / MOST_DENSITY_RATIO <= ratio <= MOST_DENSITY_RATIO:
         yield (
             f"the second material's density, {rho[1]:g}, is {ratio:.3g} times the first's; "
-            f"that has to lie between {1.0 / DENSEST:g} and {DENSEST:g} (first.rho, second.rho)"
+            f"that has to lie between {1.0 / MOST_DENSITY_RATIO:g} and {MOST_DENSITY_RATIO:g} "
+            "(first.rho, second.rho)"
         )

@@ -20,8 +20,8 @@ from regrid.errors import BadInput
 from regrid.jit import inlined, kernel
 from regrid.text_files import read_columns
 
-ROUGH = 5  # harmonics from this one on are none of a gentle wave's own
-NOTHING = 1e-12  # of the largest mode: what round-off leaves of modes that cancel
+FIRST_ROUGH_HARMONIC = 5  # harmonics from this one on are none of a gentle wave's own
+ROUND_OFF_MODE = 1e-12  # of the largest mode: what round-off leaves of modes that cancel
 
 
 class Mode(DeckTable, kw_only=True):
@@ -58,10 +58,10 @@ def find_harmonics(modes: Iterable[Mode], wavenumber: float) -> list[Harmonic]:
     most = max((abs(whole) for whole in sums.values()), default=0.0)
     return [
         Harmonic(number, whole.real, 0.0)
-        if abs(whole.imag) <= NOTHING * abs(whole)
+        if abs(whole.imag) <= ROUND_OFF_MODE * abs(whole)
         else Harmonic(number, abs(whole), cmath.phase(whole))
         for number, whole in sorted(sums.items())
-        if abs(whole) > NOTHING * most
+        if abs(whole) > ROUND_OFF_MODE * most
     ]
 
 
@@ -106,9 +106,9 @@ def measure_shape(line, wavenumber, left_out, even):
     x, y = line
     count = x.shape[0]
     width = y[-1] - y[0]
-    highest = math.ceil((count - 1) * math.pi / (wavenumber * width) - NOTHING)
-    cosines = np.zeros(max(highest, ROUGH))
-    sines = np.zeros(max(highest, ROUGH))
+    highest = math.ceil((count - 1) * math.pi / (wavenumber * width) - ROUND_OFF_MODE)
+    cosines = np.zeros(max(highest, FIRST_ROUGH_HARMONIC))
+    sines = np.zeros(max(highest, FIRST_ROUGH_HARMONIC))
     mean = 0.0
     most = x[0]
     least = x[0]
@@ -134,7 +134,7 @@ def measure_shape(line, wavenumber, left_out, even):
         if number < highest:
             cosines[number] = sines[number] = 0.0
     roughness = 0.0
-    for number in range(ROUGH, highest):
+    for number in range(FIRST_ROUGH_HARMONIC, highest):
         roughness += cosines[number] ** 2
         if not even:
             roughness += sines[number] ** 2
@@ -142,10 +142,10 @@ def measure_shape(line, wavenumber, left_out, even):
 
 
 Perturbation = Callable[[np.ndarray], np.ndarray]  # heights y (n,) [m] -> places x (n,) [m]
-STRONGEST = 12  # harmonics of a free line that are followed
-FAINT = 0.01  # of the strongest: weaker ones are not
+FOLLOWED_HARMONICS = 12  # harmonics of a free line that are followed
+FOLLOWED_HARMONIC_PART = 0.01  # of the strongest: weaker ones are not
 LEAST_CELLS = 8  # in a wave: shorter waves are damped by the scheme too much to compare
-CLOSED = 1e-6  # of a line's extent: so far its ends may differ between periodic sides
+PERIODIC_END_GAP = 1e-6  # of a line's extent: so far its ends may differ between periodic sides
 
 
 class Spectrum(DeckTable, kw_only=True):
@@ -228,7 +228,7 @@ class FreeLine:
             raise BadInput(f"deck: {what} {words}")
         if not even:
             gap = abs(x[-1] - x[0])
-            if gap > CLOSED * float(np.ptp(x)):
+            if gap > PERIODIC_END_GAP * float(np.ptp(x)):
                 words = f"its ends are {gap:g} apart in x; between periodic sides they must meet"
                 raise BadInput(f"deck: {what}: {words}")
             x = np.append(x[:-1], x[0])
@@ -255,5 +255,9 @@ class FreeLine:
                 size, phase = math.hypot(size, other), math.atan2(-other, size)
             found.append(Mode(number=number, ka0=size, phase=phase))
         found.sort(key=lambda mode: -abs(mode.ka0))
-        strongest = [m for m in found[:STRONGEST] if abs(m.ka0) > FAINT * abs(found[0].ka0)]
+        strongest = [
+            m
+            for m in found[:FOLLOWED_HARMONICS]
+            if abs(m.ka0) > FOLLOWED_HARMONIC_PART * abs(found[0].ka0)
+        ]
         return sorted(strongest, key=lambda mode: mode.number)

@@ -24,7 +24,11 @@ from hydro.rows import V
 from hydro.simulation import Simulation
 from problems.deck import MOST_CELLS, check_digests
 from problems.initial_states import put_walls, settle_shock
-from problems.interface_instability.crossed_start import CLEAR, CrossedStart, find_nearer_speed
+from problems.interface_instability.crossed_start import (
+    CLEAR_TIME_RATIO,
+    CrossedStart,
+    find_nearer_speed,
+)
 from problems.interface_instability.deck import InterfaceDeck, check_sense
 from problems.interface_instability.line import (
     FreeLine,
@@ -38,7 +42,7 @@ from problems.interface_instability.line import (
     read_line,
 )
 from problems.interface_instability.report import Results
-from problems.interface_instability.spacing import NODE_SPEED, ZONE, Spacing
+from problems.interface_instability.spacing import FINE_ZONE_WAVELENGTHS, NODE_SPEED, Spacing
 from problems.interface_instability.theories import Growth, find_cautions
 from problems.problem import BlockPlan, Problem
 from problems.references.hugoniot import (
@@ -52,10 +56,14 @@ from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells
 from regrid.roots import find_root
 
-BENDS = 6.0  # least reach over the amplitude: cells shrink or grow by no more than a quarter
-ROOM = 1.25  # least length over what waves take of it before a start after the passage
+LEAST_REACH_RATIO = (
+    6.0  # least reach over the amplitude: cells shrink or grow by no more than a quarter
+)
+LEAST_LENGTH_RATIO = (
+    1.25  # least length over what waves take of it before a start after the passage
+)
 MOST_SLOPE = 0.3  # sum of the k a0 up to which the state after the passage is that of linear theory
-FAR = 0.25  # part of each block, counted from its far side, that is called the far field
+FAR_FIELD_PART = 0.25  # part of each block, counted from its far side, that is called the far field
 
 
 class InterfaceInstability(Results, Problem):
@@ -125,7 +133,7 @@ class InterfaceInstability(Results, Problem):
             fault = "the materials part behind it"
         elif lengths is not None:
             ways = self._find_ways(self._choose_since())
-            short = [n for n in (0, 1) if lengths[n] < ROOM * ways[n]]
+            short = [n for n in (0, 1) if lengths[n] < LEAST_LENGTH_RATIO * ways[n]]
             if short:
                 fault = (
                     f"lengths.{short[0]} is {lengths[short[0]]:g}, of which the waves take "
@@ -142,7 +150,7 @@ class InterfaceInstability(Results, Problem):
         cells = self.deck.layer or min(max(self.deck.cells / (8.0 * shortest), 3.0), 8.0)
         layer = cells * self.deck.wavelength / self.deck.cells
         passage = self.amplitude / self.shock.shock_speed
-        return max(layer / find_nearer_speed(self.theory.base), CLEAR * passage)
+        return max(layer / find_nearer_speed(self.theory.base), CLEAR_TIME_RATIO * passage)
 
     def _find_ways(self, since: float) -> tuple[float, float]:
         """What of both lengths [m] waves take up to `since` [s] after the shock's arrival: how far
@@ -329,7 +337,10 @@ class InterfaceInstability(Results, Problem):
             law = self.spacing.make_last_law(length)
             ways.append(np.abs(law * length - self.spacing.make(length)).max())
             laws[name] = law if name == "second" else (1.0 - law)[::-1]
-        start = self._find_last_arrival() + ZONE * self.deck.wavelength / find_nearer_speed(base)
+        start = (
+            self._find_last_arrival()
+            + FINE_ZONE_WAVELENGTHS * self.deck.wavelength / find_nearer_speed(base)
+        )
         slowest = min(self.theory.sound_speed, self.c_first)
         return Respacing(laws, start, start + 1.5 * max(ways) / (NODE_SPEED * slowest))
 
@@ -379,7 +390,7 @@ class InterfaceInstability(Results, Problem):
             words = "the interface is too steep for a first grid by linear theory; take 'incident'"
             self.deck.refuse(any(len(find_bad_cells(grid)) for grid in grids), "start", words)
             return grids
-        reach = max(self.deck.reach * self.deck.wavelength, BENDS * np.abs(front).max())
+        reach = max(self.deck.reach * self.deck.wavelength, LEAST_REACH_RATIO * np.abs(front).max())
         grids = []
         for sign, length in zip((-1.0, 1.0), self.choose_lengths(), strict=True):
             away = self.spacing.make(length)
@@ -513,7 +524,7 @@ class InterfaceInstability(Results, Problem):
 
 def measure_far_speed(block: Block) -> tuple[float]:
     """The greatest transverse speed [m/s] in the far field of a block."""
-    depth = max(1, int(FAR * block.ni))
+    depth = max(1, int(FAR_FIELD_PART * block.ni))
     start = 1 if block.name == "first" else block.ni - depth + 1
     v = block.state[V, start : start + depth, 1:-1]
     return (max(0.0, float(v.max()), -float(v.min())),)

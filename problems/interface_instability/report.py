@@ -8,8 +8,8 @@ import numpy as np
 
 from problems.interface_instability.line import Harmonic
 from problems.interface_instability.theories import (
-    COUPLED,
     LEAST_WINDOW,
+    MOST_COUPLED_KA,
     WINDOW,
     Growth,
     get_kct,
@@ -20,9 +20,9 @@ from problems.pictures import draw_field, find_dump, name_axis, spread_dumps
 from problems.problem import Report, Row, fit_slope
 from regrid.measure.corners import compute_centres
 
-SHOWN = 3  # times drawn beside the growth
+SHOWN_TIMES = 3  # times drawn beside the growth
 MOST_CURVES = 6  # modes that a screen and a picture of growth show one by one, the strongest
-PASSED = 1.0  # k c t from which on computed rates are drawn
+FIRST_DRAWN_KCT = 1.0  # k c t from which on computed rates are drawn
 MOST_NAMED = 3  # curves of rates with names of their own: more have the colours of amplitudes
 NO_WAVE = 1e-6  # of the shock's pressure: a weaker reflected wave is none
 
@@ -109,7 +109,7 @@ def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
             since = f"from k c t = {reach:.3g} on" if reach else "from the start"
             notes.append(
                 f"the modes couple {since}: the sum of their k a, initially {start:.3g}, exceeds "
-                f"{COUPLED:g}; linear theory treats each mode alone"
+                f"{MOST_COUPLED_KA:g}; linear theory treats each mode alone"
             )
         if growth.model_fails:
             notes.append(f"beyond linear theory there is no model: {growth.model_fails}")
@@ -221,7 +221,7 @@ def _draw_rates(problem, axes, kct, t, curves: list[_Curve]) -> None:
     """Computed rates after the shock's passage."""
     width = max(1, len(kct) // 200)
     middle = 0.5 * (kct[width:] + kct[:-width])
-    shown = middle > PASSED
+    shown = middle > FIRST_DRAWN_KCT
     for n, c in enumerate(curves):
         speed = (c.values[width:] - c.values[:-width]) / (t[width:] - t[:-width])
         rate = speed / (c.number * problem.k * c.first)
@@ -280,7 +280,7 @@ class Results:
 
     def draw_growth(self, figure, run) -> None:
         """Amplitude and growth rate against theory, and the interface with its grid at the end."""
-        grid = figure.add_gridspec(2, SHOWN, height_ratios=(1.0, 1.1))
+        grid = figure.add_gridspec(2, SHOWN_TIMES, height_ratios=(1.0, 1.1))
         amplitude = figure.add_subplot(grid[0, 0])
         rate = figure.add_subplot(grid[0, 1:])
         column = _columns(self, run.history)
@@ -299,7 +299,7 @@ class Results:
         rate.set(xlabel=words, ylabel="(da/dt) / (k a0)")
         windows = []
         shown = []
-        dumps = spread_dumps(run, SHOWN)
+        dumps = spread_dumps(run, SHOWN_TIMES)
         margin = 0.05 * self.deck.wavelength
         lines = [dump.blocks[0].nodes[:, -1, :] for dump in dumps]
         # all panels are as wide as the widest needs
@@ -335,8 +335,8 @@ class Results:
         kct = np.asarray(get_kct(self, history["t"]), dtype=float)
         axes, lines = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
         axes.semilogy(numbers, np.abs(first) * self.k, "o-", color="0.6", ms=3, label="start")
-        for n in range(SHOWN):
-            row = known[np.argmin(np.abs(kct[known] - kct[known[-1]] * (n + 1) / SHOWN))]
+        for n in range(SHOWN_TIMES):
+            row = known[np.argmin(np.abs(kct[known] - kct[known[-1]] * (n + 1) / SHOWN_TIMES))]
             size = np.array([history[mode.column][row] for mode in modes])
             colour = f"C{n}"
             words = f"k c t = {kct[row]:.3g}"

@@ -16,9 +16,11 @@ from problems.deck import MOST_CELLS
 from problems.interface_instability.deck import InterfaceDeck
 from regrid.errors import BadInput
 
-ZONE = 0.05  # wavelengths on each side with the finest cells while the shock passes
-GROWTH = 1.1  # of the finer cells, from one to the next beyond that
-MOST = 10 * MOST_CELLS  # cells along a side
+FINE_ZONE_WAVELENGTHS = (
+    0.05  # wavelengths on each side with the finest cells while the shock passes
+)
+PASSAGE_CELL_GROWTH = 1.1  # of the finer cells, from one to the next beyond that
+MOST_SIDE_CELLS = 10 * MOST_CELLS  # cells along a side
 NODE_SPEED = 0.25  # most speed of nodes that are respaced, over that of sound
 
 
@@ -31,10 +33,11 @@ def grow_steps(steps: list[float], stretch: float, length: float) -> list[float]
     while reach < length * (1.0 - 1e-9):
         steps.append(steps[-1] * stretch)
         reach += steps[-1]
-        if len(steps) > MOST:
+        if len(steps) > MOST_SIDE_CELLS:
             words = "take fewer `cells`, shorter `lengths`, more `stretch`"
             raise BadInput(
-                f"deck: a block of length {length:g} would have {MOST} cells and more: {words}"
+                f"deck: a block of length {length:g} would have {MOST_SIDE_CELLS} cells and more: "
+                f"{words}"
             )
     return steps
 
@@ -52,7 +55,7 @@ class Spacing:
         size = deck.wavelength / deck.cells
         steps = list(self._make_finer_steps(size, length))
         even = min(length, deck.uniform * deck.wavelength) - sum(steps)
-        steps += [size] * max(0 if steps else 1, round(min(even / size, MOST)))
+        steps += [size] * max(0 if steps else 1, round(min(even / size, MOST_SIDE_CELLS)))
         steps = grow_steps(steps, deck.stretch, length)
         positions = np.concatenate([[0.0], np.cumsum(steps)])
         return positions * (length / positions[-1])
@@ -62,8 +65,12 @@ class Spacing:
         if self.finer == 1.0:
             return np.empty(0)
         first = size / self.finer
-        growing = first * GROWTH ** np.arange(1, math.log(self.finer) / math.log(GROWTH))
-        steps = np.append(np.full(round(ZONE * self.deck.wavelength / first), first), growing)
+        growing = first * PASSAGE_CELL_GROWTH ** np.arange(
+            1, math.log(self.finer) / math.log(PASSAGE_CELL_GROWTH)
+        )
+        steps = np.append(
+            np.full(round(FINE_ZONE_WAVELENGTHS * self.deck.wavelength / first), first), growing
+        )
         return steps[np.cumsum(steps) <= length]
 
     def make_last_law(self, length: float) -> np.ndarray:

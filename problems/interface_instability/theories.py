@@ -31,11 +31,13 @@ from problems.references.linear_growth import LinearGrowth, PadeModel
 
 WINDOW = (6.0, 30.0)  # k c t over which a growth rate is averaged
 LEAST_WINDOW = 1.0
-LINEAR = 0.3  # largest k a of one mode for linear theory, whatever its next term
-LOSS = 0.015  # of the rate, by that term, at the end of the window
-COUPLED = 0.1  # largest sum of the k a of several
-INCOMPRESSIBLE = 0.3  # largest growth rate over the sound speed for the Padé model
-STILL = 0.02  # of the interface's speed: a smaller theoretical rate is no scale for an error
+MOST_LINEAR_KA = 0.3  # largest k a of one mode for linear theory, whatever its next term
+MOST_RATE_LOSS = 0.015  # of the rate, by that term, at the end of the window
+MOST_COUPLED_KA = 0.1  # largest sum of the k a of several
+MOST_INCOMPRESSIBLE_RATE = 0.3  # largest growth rate over the sound speed for the Padé model
+STILL_RATE_PART = (
+    0.02  # of the interface's speed: a smaller theoretical rate is no scale for an error
+)
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ def is_still(theory: LinearGrowth, rate: float) -> bool:
     A wave does not grow where both materials are as one.  Its scale is the speed that the shock
     gives to the interface: what it would grow with at an Atwood number of 1.
     """
-    return abs(rate) < STILL * abs(theory.base.u)
+    return abs(rate) < STILL_RATE_PART * abs(theory.base.u)
 
 
 class Growth:
@@ -89,8 +91,10 @@ class Growth:
     def limit(self) -> float:
         """Largest sum of the modes' k a to which linear theory applies."""
         if len(self.problem.harmonics) > 1:
-            return COUPLED
-        return min(LINEAR, math.sqrt(8.0 * LOSS / (4.0 * self.theory.atwood**2 + 1.0)))
+            return MOST_COUPLED_KA
+        return min(
+            MOST_LINEAR_KA, math.sqrt(8.0 * MOST_RATE_LOSS / (4.0 * self.theory.atwood**2 + 1.0))
+        )
 
     @functools.cached_property
     def linear_reach(self) -> float:
@@ -157,7 +161,7 @@ class Growth:
         if slope >= 1.0:
             return f"the Padé model ends at k a+ = 1, here {slope:.2g}"
         speed = self.model.rate / theory.sound_speed
-        if speed > INCOMPRESSIBLE:
+        if speed > MOST_INCOMPRESSIBLE_RATE:
             return f"the Padé model is incompressible, growth is at {speed:.2g} of the sound speed"
         return ""
 
@@ -187,10 +191,12 @@ FEW_CELLS = 16  # in a wave: shorter ones grow by more than a twentieth less tha
 # cells of a wave, part of theory's growth found (start after the passage, Mach 1.5, 1 : 3)
 FOUND = ((3.0, 0.15), (4.0, 0.25), (6.0, 0.56), (8.0, 0.66), (12.0, 0.83), (16.0, 0.91))
 PATH = Path(__file__).with_name("accuracy.json")
-TRUSTED = 0.02  # a rate error above it is worth a sentence
+TRUSTED_RATE_ERROR = 0.02  # a rate error above it is worth a sentence
 ROUGH_LINE = 0.05  # of the largest mode: more in its higher harmonics is no wave of the deck's
-NEAR = 2.0  # factor between density ratios from which growth at the one says little of the other
-EDGE = 0.01  # of a Mach number or ratio: so far outside counts as inside
+NEAR_RATIO_FACTOR = (
+    2.0  # factor between density ratios from which growth at the one says little of the other
+)
+RANGE_EDGE_MARGIN = 0.01  # of a Mach number or ratio: so far outside counts as inside
 MATERIALS = {"gas": "two gases", "condensed": "two condensed materials"}
 
 
@@ -223,7 +229,7 @@ def read_rows(path: Path = PATH) -> tuple[Measured, ...]:
 def find_bracket(values: Sequence[float], wanted: float) -> tuple[float, ...] | None:
     """The one or two of the ascending `values` around `wanted`; None outside of them all."""
     for value in values:
-        if abs(value - wanted) <= EDGE * value:
+        if abs(value - wanted) <= RANGE_EDGE_MARGIN * value:
             return (value,)
     place = bisect.bisect(values, wanted)
     return (values[place - 1], values[place]) if 0 < place < len(values) else None
@@ -251,7 +257,7 @@ def sort_cautions(
             f"theory: measured are Mach {machs[0]:.3g} to {machs[-1]:.3g}, "
             f"ratios {ratios[0]:.3g} to {ratios[-1]:.3g}"
         ]
-    far = NEAR * (1.0 + EDGE)
+    far = NEAR_RATIO_FACTOR * (1.0 + RANGE_EDGE_MARGIN)
     near = [one for one in around if ratio / far <= one <= ratio * far]
     machs_told, ratios_told = (
         " to ".join(f"{value:.3g}" for value in values) for values in (near_machs, near or around)
@@ -265,12 +271,12 @@ def sort_cautions(
         if not there:
             return [], [f"growth was compared with theory at some of {where} only"]
         there.sort(key=lambda row: row.cells)
-        enough = [row for row in there if row.cells <= cells * (1.0 + EDGE)]
+        enough = [row for row in there if row.cells <= cells * (1.0 + RANGE_EDGE_MARGIN)]
         found.append(enough[-1] if enough else there[0])
 
     def find_error(row: Measured) -> float:
         """Of the deck's own rate."""
-        still = row.materials == "gas" and abs(row.ratio - 1.0) <= EDGE
+        still = row.materials == "gas" and abs(row.ratio - 1.0) <= RANGE_EDGE_MARGIN
         return abs(row.rate_error) / (growth if still else 1.0)
 
     worst = max(found, key=find_error)
@@ -278,13 +284,13 @@ def sort_cautions(
     of_cells = []
     told = []
     measured = f"with {worst.cells:g} cells per wavelength"
-    if worst.cells > cells * (1.0 + EDGE):
+    if worst.cells > cells * (1.0 + RANGE_EDGE_MARGIN):
         of_cells.append(
             f"{cells:.3g} cells per wavelength are fewer than the table of growth rates has: "
             f"errors are greater than those {measured}"
         )
         measured += f", and greater with {cells:.3g}"
-    if error > TRUSTED:
+    if error > TRUSTED_RATE_ERROR:
         words = f"{100.0 * error:.2g} %"
         if error != abs(worst.rate_error):
             words = (
@@ -301,7 +307,9 @@ def sort_cautions(
     return of_cells, told
 
 
-FREE = 0.25  # phase of a capillary wave up to which its growth is within 1 % of that without
+FREE_CAPILLARY_PHASE = (
+    0.25  # phase of a capillary wave up to which its growth is within 1 % of that without
+)
 
 
 def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str]:
@@ -322,11 +330,11 @@ def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str
     if tension and problem.harmonics:  # which is not in any theory here
         number = problem.harmonics[-1].number
         omega = math.sqrt(tension * (number * problem.k) ** 3 / (base.rho_left + base.rho_right))
-        if omega * (problem.t_end - problem.arrival) >= FREE:
+        if omega * (problem.t_end - problem.arrival) >= FREE_CAPILLARY_PHASE:
             told.append(
                 f"surface tension makes waves of mode {number} oscillate with a period of "
                 f"{2.0 * math.pi / omega:.3g} s; the theories of growth ignore it and hold "
-                f"until t = {problem.arrival + FREE / omega:.3g} s"
+                f"until t = {problem.arrival + FREE_CAPILLARY_PHASE / omega:.3g} s"
             )
     if history is not None and problem.harmonics and single:
         told += _caution_line(problem, history)

@@ -22,7 +22,7 @@ from regrid.sides import trace_outline
 # thousandths of A's path behind A between which pressures are averaged
 EDGES = (*range(10, 100, 10), 100, 125, 150, 175, 200, 250, 300, 350, 400, 450, 500)
 COLUMNS = tuple(f"behind_{edge}" for edge in EDGES[:-1])
-JET = 1.3  # material faster than this many times the plate's speed V belongs to a jet
+JET_SPEED_RATIO = 1.3  # material faster than this many times the plate's speed V belongs to a jet
 WIDE_ZONE = 0.15  # of A's path: the length of that zone from which no finer cells are needed
 PHASES = {
     "attached": "collision point runs",
@@ -30,18 +30,18 @@ PHASES = {
     "jet": "jet",
     "closed": "closed",
 }
-RISEN = 0.9  # of the faces behind it: there the numerical rise is over
-NEXT = 8  # faces behind a face that say what it rises to
-RINGING = 4  # faces from there on that belong to its crest and dip
+RISEN_PRESSURE_PART = 0.9  # of the faces behind it: there the numerical rise is over
+FACES_OF_RISE = 8  # faces behind a face that say what it rises to
+RINGING_FACES = 4  # faces from there on that belong to its crest and dip
 REFINED_RINGING = 5  # the same where cells at A are refined: rows are so by less than the faces
-SEEN = 0.1  # of all steps: a part seen in fewer is left out
+SEEN_STEP_PART = 0.1  # of all steps: a part seen in fewer is left out
 LEAST_RATIO = 2.5  # of a plateau's two ends' distances from A: a shorter one is chance
-SUBSONIC = 0.12  # below Mach 1 from which on the pressure is taken to fall from A on
+SUBSONIC_MACH_MARGIN = 0.12  # below Mach 1 from which on the pressure is taken to fall from A on
 LEAST_MISFIT = 1e-7  # relative to p², so that two good fits count alike
-FALLEN = 0.88  # of the highest pressure: so far the line of the fall is followed
+FALLEN_PRESSURE_PART = 0.88  # of the highest pressure: so far the line of the fall is followed
 LEAST_PARTS = 3  # that a fit needs
-FARTHEST = 0.15  # of A's path: where the profile has to begin at the latest
-BENDS = 40  # places of the bend that are tried
+FARTHEST_PROFILE_START = 0.15  # of A's path: where the profile has to begin at the latest
+TRIED_BENDS = 40  # places of the bend that are tried
 
 
 class Plateau(NamedTuple):
@@ -64,7 +64,7 @@ class Plateau(NamedTuple):
 
 
 def measure_profile(
-    arc: np.ndarray, p: np.ndarray, path: float, ringing: int = RINGING
+    arc: np.ndarray, p: np.ndarray, path: float, ringing: int = RINGING_FACES
 ) -> np.ndarray:
     """Mean pressures (len(COLUMNS),) between the parts EDGES of A's `path` behind A.
 
@@ -73,8 +73,8 @@ def measure_profile(
     and its ringing reach or the contact ends.
     """
     means = np.full(len(COLUMNS), math.nan)
-    for k in range(p.size - NEXT):
-        if p[k] >= RISEN * np.median(p[k + 1 : k + 1 + NEXT]):
+    for k in range(p.size - FACES_OF_RISE):
+        if p[k] >= RISEN_PRESSURE_PART * np.median(p[k + 1 : k + 1 + FACES_OF_RISE]):
             break
     else:
         return means
@@ -96,14 +96,18 @@ def find_plateau(profiles: np.ndarray, mach: float = 1.0) -> Plateau:
     from A on.
     """
     seen = np.isfinite(profiles)
-    known = np.flatnonzero(seen.sum(axis=0) > SEEN * max(len(profiles), 1))
+    known = np.flatnonzero(seen.sum(axis=0) > SEEN_STEP_PART * max(len(profiles), 1))
     edges = 1e-3 * np.array(EDGES)
-    if known.size < LEAST_PARTS or (np.diff(known) > 1).any() or edges[known[0]] > FARTHEST:
+    if (
+        known.size < LEAST_PARTS
+        or (np.diff(known) > 1).any()
+        or edges[known[0]] > FARTHEST_PROFILE_START
+    ):
         return Plateau()
     low, high = edges[:-1][known], edges[1:][known]
     profiles = profiles[:, known]
     p = np.nanmean(profiles, axis=0)
-    fallen = np.flatnonzero((p < FALLEN * p.max()) & (np.arange(p.size) > p.argmax()))
+    fallen = np.flatnonzero((p < FALLEN_PRESSURE_PART * p.max()) & (np.arange(p.size) > p.argmax()))
     count = max(int(fallen[0]) if fallen.size else p.size, LEAST_PARTS)
     x = 0.5 * (low + high)[:count]
     width = (high - low)[:count]
@@ -116,7 +120,7 @@ def find_plateau(profiles: np.ndarray, mach: float = 1.0) -> Plateau:
         miss = profiles[:, :flat] / level - 1.0
         scatter = float(np.sqrt(np.nanmean(miss**2)))
         return Plateau(level, scatter, float(low[0]), float(high[flat - 1]), True, 0.0)
-    share = min(max((1.0 - mach) / SUBSONIC, 0.0), 1.0)
+    share = min(max((1.0 - mach) / SUBSONIC_MACH_MARGIN, 0.0), 1.0)
     level = (1.0 - share) * broken.level + share * curved.level
     fit = (1.0 - share) * broken.values + share * curved.values
     miss = (profiles[:, :count] - fit) / level
@@ -149,7 +153,7 @@ def _fit_broken_line(x, p, width) -> tuple[_Fit, float]:
     """Flat as far as a bend, straight from there; also the bend, of all that are tried the best."""
     best = _fit(p, width)
     place = math.inf
-    for bend in np.linspace(x[1], x[-1], BENDS + 1)[:-1]:  # nearer to A none can be seen
+    for bend in np.linspace(x[1], x[-1], TRIED_BENDS + 1)[:-1]:  # nearer to A none can be seen
         found = _fit(p, width, np.maximum(0.0, x - bend))
         if found is not None and found.misfit < best.misfit:
             best = found
@@ -175,7 +179,7 @@ def _fit_parabola(x, p, width) -> _Fit:
 
 
 FITTED = (0.25, 0.95)  # part of the face over which the collision point's speed is fitted
-PARTS = 5  # parts of that path whose own speeds say how constant it is
+PATH_PARTS = 5  # parts of that path whose own speeds say how constant it is
 STEADY = (0.6, 0.95)  # part of the face over which states behind A are averaged
 COARSE_CELLS = 80  # along the plate: what was compared with theory at the least
 FINE_CELLS = 160  # along the plate: from there on the pressure behind A is right near critical, too
@@ -198,12 +202,12 @@ def measure_contact_speed(problem, history) -> tuple[float, float]:
     From a straight line through path and time over the part FITTED of the face.
     """
     rows = choose_rows(problem, history, FITTED)
-    if rows.sum() < 3 * PARTS:
+    if rows.sum() < 3 * PATH_PARTS:
         return math.nan, math.nan
     t = history["t"][rows]
     path = history["contact_path"][rows]
     speed = float(np.polyfit(t, path, 1)[0])
-    edges = np.linspace(path[0], path[-1], PARTS + 1)
+    edges = np.linspace(path[0], path[-1], PATH_PARTS + 1)
     times = np.interp(edges, path, t)
     own = np.diff(edges) / np.diff(times)
     return speed, float(np.abs(own / speed - 1.0).max())
@@ -281,13 +285,13 @@ def describe_jet(problem, history) -> str:
     return f"jet: {words}; {ahead} of the plate is ahead before {STEADY[1]:.0%} of the face"
 
 
-SHOWN = 6  # times in a picture
+SHOWN_PLATE_TIMES = 6  # times in a picture
 SHADES = ("#c9d4e2", "#8c99a8", "#e2cfa9")
 
 
 def _make_panels(figure, run) -> list[tuple]:
     """Panels of one frame in rows of three, each with a dump, evenly over the run."""
-    dumps = spread_dumps(run, SHOWN)
+    dumps = spread_dumps(run, SHOWN_PLATE_TIMES)
     columns = min(3, len(dumps))
     shape = -(-len(dumps) // columns), columns
     frames = make_panels(
@@ -358,7 +362,7 @@ class Results:
                     "the jet ahead of A is thinner than a cell: its speed and mass are estimates"
                 )
         else:
-            notes.append(f"no material faster than {JET:g} V")
+            notes.append(f"no material faster than {JET_SPEED_RATIO:g} V")
         times = final.times if final is not None else {}
         known = [f"{PHASES[n]} {1e6 * t:.3f} us" for n, t in times.items() if math.isfinite(t)]
         notes += ["phases: " + "; ".join(known)] if known else []

@@ -15,11 +15,11 @@ from regrid.curves import compute_arc_lengths
 from regrid.measure.corners import compute_centres
 
 LEAST_JET = 3  # cells that make a jet
-NEAR = 0.5  # of the local spacing: lines as near as this have met
+MET_LINE_SPACINGS = 0.5  # of the local spacing: lines as near as this have met
 BEHIND = (3, 9)  # faces behind the collision point between which pressure and angle are averaged
 SHOCK_ROWS = (2, 10)  # grid lines from the contact on which a shock's place is looked for
-HANGING = 0.1  # spacings below its undisturbed height at which a free surface is a jet's
-APART = 6  # nodes along a line that do not count as another part of it
+HANGING_SPACINGS = 0.1  # spacings below its undisturbed height at which a free surface is a jet's
+APART_NODES = 6  # nodes along a line that do not count as another part of it
 
 
 class PlateRun(Simulation):
@@ -89,7 +89,7 @@ class PlateRun(Simulation):
         free = self.get_free_line()
         away = self.get_end_face()[:, 0] - self.find_contact_point()
         step = free[:, 1] - free[:, 0] if free.shape[1] > 1 else np.full(2, np.inf)
-        return bool(np.hypot(*away) < NEAR * np.hypot(*step))
+        return bool(np.hypot(*away) < MET_LINE_SPACINGS * np.hypot(*step))
 
     def measure_along(self, point: np.ndarray) -> float:
         """How far a point is along the direction of the face [m]."""
@@ -112,7 +112,7 @@ class PlateRun(Simulation):
         if in_wedge:
             return 0.0, 0.0, 0.0, angle
         speed = np.hypot(*block.state[1:3, 1:-1, 1:-1])
-        fast = speed > report.JET * self.problem.plate_speed
+        fast = speed > report.JET_SPEED_RATIO * self.problem.plate_speed
         mass = float((block.volume * block.state[0, 1:-1, 1:-1])[fast].sum())
         return float(speed.max()), float(fast.sum()), mass, angle
 
@@ -135,7 +135,9 @@ class PlateRun(Simulation):
         if not arrived:
             arc = compute_arc_lengths(line)
             behind_a = pressure[:count][::-1]
-            ringing = report.REFINED_RINGING if self.problem.refinement > 1.0 else report.RINGING
+            ringing = (
+                report.REFINED_RINGING if self.problem.refinement > 1.0 else report.RINGING_FACES
+            )
             pressures = behind_a[: arc.size - 1]
             means = report.measure_profile(arc, pressures, self.measure_path(), ringing)
         free = surface[count:]
@@ -167,7 +169,7 @@ class PlateRun(Simulation):
         free = self.get_free_line()
         height = float(np.median(free[1, free.shape[1] // 2 :]))
         spacing = float(np.hypot(*np.diff(free)).mean())
-        hangs = free[:, free[1] < height - HANGING * spacing]
+        hangs = free[:, free[1] < height - HANGING_SPACINGS * spacing]
         sine = math.sin(self.problem.angle)
         cosine = math.cos(self.problem.angle)
         ahead = cosine * (hangs[0] - self.start[0]) - sine * (hangs[1] - self.start[1])
@@ -237,24 +239,26 @@ class PlateRun(Simulation):
         problem = self.problem
         steps = np.hypot(*np.diff(free))
         spacing = np.minimum(np.append(steps, steps[-1]), np.append(steps[0], steps))
-        near = NEAR * spacing
+        near = MET_LINE_SPACINGS * spacing
         if (free[1] < problem.base + near).any():
             return "the jet has met the base on which the wedge stands"
         if problem.deck.right == "symmetry":
-            inner = slice(0, free.shape[1] - APART)
+            inner = slice(0, free.shape[1] - APART_NODES)
             turned = np.maximum.accumulate(free[0])[:-1] > free[0][1:] + spacing[1:]
             away = problem.length - free[0][inner] < near[inner]
             if turned.any() and away.any():
                 return "cavity closed: the free surface has met the symmetry plane"
         if self.contact and math.isfinite(self.times["arrived"]):
             face = self.get_end_face()
-            if face.shape[1] > 4 and free.shape[1] > APART:
-                away = cdist(free[:, APART:].T, face[:, 2:].T)
-                if (away.min(axis=1) < near[APART:]).any() or self.is_folded(free, face, near):
+            if face.shape[1] > 4 and free.shape[1] > APART_NODES:
+                away = cdist(free[:, APART_NODES:].T, face[:, 2:].T)
+                if (away.min(axis=1) < near[APART_NODES:]).any() or self.is_folded(
+                    free, face, near
+                ):
                     return "cavity closed: the jet has met the end face of the wedge"
         away = cdist(free.T, free.T)
         index = np.arange(free.shape[1])
-        away[np.abs(index[:, None] - index) < APART] = np.inf
+        away[np.abs(index[:, None] - index) < APART_NODES] = np.inf
         if (away.min(axis=1) < near).any():
             return "cavity closed: the free surface has met itself"
         return None
@@ -264,7 +268,7 @@ class PlateRun(Simulation):
 
         Both lines begin at A, where no contact is between them.
         """
-        for k, (x, y) in enumerate(free[:, 1:APART].T, 1):
+        for k, (x, y) in enumerate(free[:, 1:APART_NODES].T, 1):
             if is_inside((x, y), self.wedge.nodes):
                 away = min(project(face, a, x, y)[1] for a in range(face.shape[1] - 1))
                 if away > near[k] ** 2:

@@ -12,7 +12,7 @@ from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, localcontext
 
 import numpy as np
 
-PRANDTL = 0.71
+AIR_PRANDTL = 0.71
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ LAYER_WAVENUMBER = 3.11632  # of the height
 FREE_LAYER_ONSET = 657.51136  # 27 pi^4 / 4
 FREE_LAYER_WAVENUMBER = 2.22144147  # pi / sqrt(2)
 BOX_ONSETS = {"adiabatic": 2585.019, "conducting": 5011.71}  # square, by its sides
-POINTS = 40  # of collocation; 32 give the same ten digits
+COLLOCATION_POINTS = 40  # of collocation; 32 give the same ten digits
 
 
 def compute_layer_growth(
@@ -60,7 +60,7 @@ def compute_layer_growth(
 
     from problems.references.linear_growth import make_chebyshev  # slow to load
 
-    n = POINTS
+    n = COLLOCATION_POINTS
     _, d, _ = make_chebyshev(n + 1)
     unit = np.eye(n + 1)
     k2 = wavenumber**2

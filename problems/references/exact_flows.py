@@ -16,7 +16,7 @@ from regrid.errors import BadInput
 from regrid.roots import find_root
 
 DIMENSIONS = {"plane": 1, "cylindrical": 2, "spherical": 3}
-SHELLS = 4000  # points of the tabulated profile
+PROFILE_SHELLS = 4000  # points of the tabulated profile
 
 
 class SedovBlast:
@@ -75,7 +75,7 @@ def _make_profile(n: int, gamma: float) -> tuple[np.ndarray, np.ndarray]:
     a5 = -2.0 / (2.0 - gamma)
     low, high = 2.0 / (m * gamma), 4.0 / (m * (gamma + 1.0))
     # dense where the profile bends: towards the centre, where density and place fall to zero
-    part = np.linspace(0.0, 1.0, SHELLS) ** 6
+    part = np.linspace(0.0, 1.0, PROFILE_SHELLS) ** 6
     v = low + (high - low) * part
     ratio = (gamma + 1.0) / (gamma - 1.0)
     x1 = 0.25 * m * (gamma + 1.0) * v
@@ -94,7 +94,7 @@ def _make_profile(n: int, gamma: float) -> tuple[np.ndarray, np.ndarray]:
     return position, profile
 
 
-POINTS = 4001  # of the tabulated wave
+WAVE_POINTS = 4001  # of the tabulated wave
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def compute_taylor_wave(eos: JWL) -> TaylorWave:
     products = make_isentrope(eos, density, pressure)
     first = speed * (1.0 - eos.rho0 / density)
     rest = find_root(lambda p: first - products.velocity_gain(p), 0.05 * pressure, pressure)
-    p = np.linspace(rest, pressure, POINTS)
+    p = np.linspace(rest, pressure, WAVE_POINTS)
     u = first - products.velocity_gain(p)
     rho = products.density(p)
     c = products.sound_speed(p)

@@ -22,7 +22,7 @@ from hydro.eos import IdealGas, StiffenedGas
 from regrid.errors import BadInput
 from regrid.roots import find_root
 
-TOLERANCE = 1e-12
+HUGONIOT_TOLERANCE = 1e-12
 
 
 def get_stiffened_parameters(eos) -> tuple[float, float] | None:
@@ -125,8 +125,8 @@ class GeneralIsentrope:
                 (p, p_end),
                 [rho, 0.0],
                 method="DOP853",
-                rtol=TOLERANCE,
-                atol=[TOLERANCE * rho, TOLERANCE * self.c],
+                rtol=HUGONIOT_TOLERANCE,
+                atol=[HUGONIOT_TOLERANCE * rho, HUGONIOT_TOLERANCE * self.c],
                 dense_output=True,
                 first_step=min(abs(p_end - p), 1e-3 * rho * self.c**2),
             )
@@ -181,7 +181,7 @@ def release(eos, rho: float, p: float, p_end: float = 0.0) -> tuple[float, float
 
 
 VOLUME_STEPS = 200
-RELATIVE = 8.9e-16
+RELATIVE_ROUND_OFF = 8.9e-16
 
 
 @dataclass(frozen=True)
@@ -262,7 +262,7 @@ def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
         if math.isnan(here) and not math.isnan(there):
             near, here = _find_edge(excess, near, far)
         if here * there <= 0.0:
-            return find_root(excess, near, far, xtol=1e-17 * ahead, rtol=RELATIVE)
+            return find_root(excess, near, far, xtol=1e-17 * ahead, rtol=RELATIVE_ROUND_OFF)
         outside |= math.isnan(there)
         left = math.isnan(there) and not math.isnan(here)  # the table: nothing lies further on
         near = far
@@ -333,7 +333,7 @@ def _shock_with(eos, rho: float, p: float, name: str, value: float, scale: float
             limit = high
         else:
             if beyond:
-                rise = find_root(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE)
+                rise = find_root(excess, low, high, xtol=1e-16 * scale, rtol=RELATIVE_ROUND_OFF)
                 return shock_to_pressure(eos, rho, p, p + rise)
             low = high
         high = min(2.0 * high, 0.5 * (low + limit))

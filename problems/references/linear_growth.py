@@ -53,7 +53,7 @@ from regrid.jit import compiled_once, kernel, remember
 
 P, U, V = range(3)
 CARRY, STRETCH, EXPAND, BULK, PILE, PUSH, LIFT, DRAG, LIGHT, SOURCE = range(10)
-COEFFICIENTS = 10
+SERIES_COEFFICIENTS = 10
 
 
 @dataclass(frozen=True)
@@ -235,8 +235,8 @@ class PadeModel:
 
 LAYER_POINTS = 40
 WEAK_WAVE = 0.004
-START = 1e-5
-STABLE = 2.3
+START_TIME = 1e-5
+STABLE_STEP = 2.3
 
 
 @dataclass(frozen=True)
@@ -443,7 +443,7 @@ def _make_layer(points: int, rho: float, c: float, width: float, edge, v: float)
     """Uniform material between the interface and its outer edge at speed `width`; at first its
     perturbation is a transverse velocity `v`."""
     xi, matrix, radius = make_chebyshev(points)
-    coefficients = np.zeros((COEFFICIENTS, points))
+    coefficients = np.zeros((SERIES_COEFFICIENTS, points))
     coefficients[CARRY] = xi
     coefficients[STRETCH] = rho * c * c
     coefficients[EXPAND] = 1.0 / width
@@ -495,7 +495,7 @@ def _make_fan_side(eos, base: RiemannSolution, ahead, incident_speed: float, poi
     tilt = p_slope * (1.0 - (base.u - position) / incident_speed) / rho
     transverse = np.zeros(fan_points)
     transverse[:-1] = np.linalg.solve(matrix[:-1, :-1], -(tilt / c)[:-1])
-    coefficients = np.zeros((COEFFICIENTS, fan_points))
+    coefficients = np.zeros((SERIES_COEFFICIENTS, fan_points))
     coefficients[CARRY] = c
     coefficients[STRETCH] = rho * c * c
     coefficients[EXPAND] = 1.0
@@ -575,12 +575,12 @@ def march_layers(first: _Side, second: _Side, kt_end: float):
     both sides, and the last states (3, points) of all zones, in their order.
     """
     zones = [*first.zones, *second.zones]
-    steps = math.ceil(-math.log(START) * max(zone.stiffness for zone in zones) / STABLE)
-    times = kt_end * START ** np.linspace(1.0, 0.0, steps + 1)
-    step = -math.log(START) / steps
+    steps = math.ceil(-math.log(START_TIME) * max(zone.stiffness for zone in zones) / STABLE_STEP)
+    times = kt_end * START_TIME ** np.linspace(1.0, 0.0, steps + 1)
+    step = -math.log(START_TIME) / steps
     sizes = np.array([zone.start.shape[1] for zone in zones])
     slopes = np.zeros((len(zones), sizes.max(), sizes.max()))
-    coefficients = np.zeros((len(zones), COEFFICIENTS, sizes.max()))
+    coefficients = np.zeros((len(zones), SERIES_COEFFICIENTS, sizes.max()))
     for number, (zone, size) in enumerate(zip(zones, sizes, strict=True)):
         slopes[number, :size, :size] = zone.matrix.T
         coefficients[number, :, :size] = zone.coefficients

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.references.hugoniot import RELATIVE, make_isentrope, shock_to_pressure
+from problems.references.hugoniot import RELATIVE_ROUND_OFF, make_isentrope, shock_to_pressure
 from regrid.errors import BadInput
 from regrid.roots import find_root
 
@@ -156,7 +156,11 @@ def solve_riemann(eos_left, left, eos_right, right, cavitation_pressure: float |
         low = high
         rise = 2.0 * rise
         high = low + rise
-    p = low if closing(low) == 0.0 else find_root(closing, low, high, xtol=1e-300, rtol=RELATIVE)
+    p = (
+        low
+        if closing(low) == 0.0
+        else find_root(closing, low, high, xtol=1e-300, rtol=RELATIVE_ROUND_OFF)
+    )
     return _join(sides, p, False)
 
 

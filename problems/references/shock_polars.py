@@ -58,7 +58,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from problems.references.hugoniot import (
-    RELATIVE,
+    RELATIVE_ROUND_OFF,
     Shock,
     release,
     shock_to_pressure,
@@ -193,7 +193,9 @@ def search_pressure(
     return low, float(found.x), -float(found.fun)
 
 
-LEAST = 1e-3  # of the greatest pressure on both polars: they leave one point together
+LEAST_SHARED_PRESSURE = (
+    1e-3  # of the greatest pressure on both polars: they leave one point together
+)
 
 
 @dataclass(frozen=True)
@@ -284,7 +286,7 @@ def cross_line(first: Body, second: Body, speed: float) -> CrossedLine:
         p = low + share * (top - low)
         return two.deflection(p) - one.deflection(p)
 
-    shares = np.linspace(LEAST, 1.0 - 1e-9, 60)
+    shares = np.linspace(LEAST_SHARED_PRESSURE, 1.0 - 1e-9, 60)
     values = np.array([excess(share) for share in shares])
     found = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
     if found.size == 0:
@@ -339,7 +341,11 @@ def solve_collision(plate: Body, wedge: Body | None, speed: float, angle: float)
     if total < angle:
         return Collision(contact_speed)
     p = find_root(
-        lambda p: sum_deflections(polars, p) - angle, low, high, xtol=1e-14 * high, rtol=RELATIVE
+        lambda p: sum_deflections(polars, p) - angle,
+        low,
+        high,
+        xtol=1e-14 * high,
+        rtol=RELATIVE_ROUND_OFF,
     )
     return Collision(contact_speed, p, *(polar.shock_to(p) for polar in polars))
 

@@ -25,8 +25,10 @@ from problems.deck import MOST_CELLS, Deck, RunControl, key
 from problems.initial_states import make_plane_grid
 from problems.problem import Problem, Report, Row, find_most
 
-BEND = 0.1  # of the line between the blocks and of its neighbours, over the height of the domain
-PRESSURE = 1e5
+LINE_BEND_PART = (
+    0.1  # of the line between the blocks and of its neighbours, over the height of the domain
+)
+FREE_STREAM_PRESSURE = 1e5
 
 
 class FreeStreamDeck(Deck, kw_only=True):
@@ -55,7 +57,7 @@ class FreeStream(Problem):
         deck.refuse(two, "materials", "a seam joins blocks of one")
         eos, rho = self.fluids["left"]
         turn = math.radians(deck.angle)
-        speed = deck.mach * float(eos.sound_speed(rho, PRESSURE))
+        speed = deck.mach * float(eos.sound_speed(rho, FREE_STREAM_PRESSURE))
         self.velocity = speed * math.cos(turn), speed * math.sin(turn)
 
     def make_grids(self, t=0.0):
@@ -63,7 +65,7 @@ class FreeStream(Problem):
         deck = self.deck
         n = self.deck.cells
         x, y = make_plane_grid(np.linspace(-1.0, 1.0, 2 * n + 1), np.linspace(0.0, 1.0, n + 1))
-        nodes = np.array([x + BEND * (1.0 - x * x) * np.sin(2.0 * math.pi * y), y])
+        nodes = np.array([x + LINE_BEND_PART * (1.0 - x * x) * np.sin(2.0 * math.pi * y), y])
         (bits,) = struct.unpack("<Q", struct.pack("<d", t))
         random = np.random.default_rng([deck.seed, bits])
         shift = random.uniform(-deck.shake / n, deck.shake / n, nodes.shape)
@@ -83,7 +85,7 @@ class FreeStream(Problem):
         blocks = []
         links = []
         for name, (eos, rho) in self.fluids.items():
-            stream = rho, *self.velocity, PRESSURE
+            stream = rho, *self.velocity, FREE_STREAM_PRESSURE
             material = "all" if deck.contact == "seam" else name
             block = Block(name, eos, grids[name], *stream, material=material)
             if deck.sides == "periodic":
@@ -102,9 +104,9 @@ class FreeStream(Problem):
     def measure_deviation(self, block: Block) -> tuple[float]:
         """Largest deviation of a block from the stream."""
         eos, density = self.fluids[block.name]
-        c = float(eos.sound_speed(density, PRESSURE))
-        stiffness = PRESSURE if eos.kind == "ideal-gas" else density * c * c
-        exact = np.reshape((density, *self.velocity, PRESSURE), (4, 1, 1))
+        c = float(eos.sound_speed(density, FREE_STREAM_PRESSURE))
+        stiffness = FREE_STREAM_PRESSURE if eos.kind == "ideal-gas" else density * c * c
+        exact = np.reshape((density, *self.velocity, FREE_STREAM_PRESSURE), (4, 1, 1))
         off = np.abs(block.state[:, 1:-1, 1:-1] - exact).max(axis=(1, 2))
         return (float((off / (density, c, c, stiffness)).max()),)
 

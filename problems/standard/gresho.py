@@ -22,7 +22,7 @@ from problems.pictures import draw_field, make_panels
 from problems.problem import Problem, Report, Row, compare
 from problems.references.exact_flows import GAUSS, average_points
 
-TURN = 0.4 * math.pi  # of the core [s]
+CORE_TURN_TIME = 0.4 * math.pi  # of the core [s]
 KINETIC_ENERGY = 8.0 * math.pi / 300.0
 
 
@@ -39,7 +39,7 @@ def compute_flow(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 class GreshoDeck(Deck, kw_only=True):
-    run: RunControl = RunControl(t_end=TURN, cfl=0.8)
+    run: RunControl = RunControl(t_end=CORE_TURN_TIME, cfl=0.8)
     cells: key(int, "cells along each side of the unit square", ge=8, le=MOST_CELLS) = 40
     mesh: key(Literal["fixed", "swing"], "grid at rest, or swinging smoothly") = "fixed"
     amplitude: key(float, "of the swinging nodes; the square is 1 wide", ge=0, le=0.1) = 0.03
@@ -53,7 +53,7 @@ class Gresho(Problem):
 
     def make_grids(self, t=0.0):
         """Every node swings about its position, twice in a turn."""
-        swing = self.deck.amplitude * math.sin(2.0 * (2.0 * math.pi) * t / TURN)
+        swing = self.deck.amplitude * math.sin(2.0 * (2.0 * math.pi) * t / CORE_TURN_TIME)
         return {"square": swing_square(self.deck.cells, -0.5, 1.0, swing)}
 
     def build(self):
@@ -77,7 +77,7 @@ class Gresho(Problem):
         deck = self.deck
         energy = history["kinetic_energy"]
         lost = 1.0 - float(energy[-1] / energy[0])
-        turns = f", {history['t'][-1] / TURN:.3g} turns" if history else ""
+        turns = f", {history['t'][-1] / CORE_TURN_TIME:.3g} turns" if history else ""
         rows = [
             compare(history, "kinetic_energy", KINETIC_ENERGY, "kinetic energy [J/m]", digits=7),
             Row("lost", lost, label="part lost since the start", digits=3, error="lost"),

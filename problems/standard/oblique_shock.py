@@ -23,7 +23,9 @@ from problems.pictures import draw_field, make_panels
 from problems.problem import Problem, Report, compare, find_crossing, fit_slope
 from problems.references.shock_polars import Body, ShockPolar, search_pressure, solve_collision
 
-BEFORE = 0.25  # length before the wedge; it is 1 long, and the top is 1 above its start
+LENGTH_BEFORE_WEDGE = (
+    0.25  # length before the wedge; it is 1 long, and the top is 1 above its start
+)
 
 
 class ObliqueShockDeck(Deck, kw_only=True):
@@ -61,8 +63,8 @@ class ObliqueShock(Problem):
     def make_grids(self, t=0.0):
         """Straight upright lines between the wall and the top."""
         cells = self.deck.cells
-        before = round(cells * BEFORE / (1.0 + BEFORE))
-        upstream = np.linspace(-BEFORE, 0.0, before + 1)[:-1]
+        before = round(cells * LENGTH_BEFORE_WEDGE / (1.0 + LENGTH_BEFORE_WEDGE))
+        upstream = np.linspace(-LENGTH_BEFORE_WEDGE, 0.0, before + 1)[:-1]
         x = np.concatenate([upstream, np.linspace(0.0, 1.0, cells - before + 1)])[:, None]
         wall = math.tan(self.angle) * np.maximum(x, 0.0)
         y = wall + (1.0 - wall) * np.linspace(0.0, 1.0, round(0.8 * cells) + 1)

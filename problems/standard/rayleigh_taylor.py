@@ -31,9 +31,9 @@ from problems.problem import Problem, Report, Row, compare, find_frequency, find
 from problems.references.exact_flows import compute_gravity_mode, compute_isentropic_layer
 from regrid.measure.corners import compute_centres
 
-GAMMA = 5.0 / 3.0
+GAS_GAMMA = 5.0 / 3.0
 WAVE_NUMBER = 2.0 * math.pi
-GRAVITY = 1.0
+GRAVITY_ACCELERATION = 1.0
 
 
 class RayleighTaylorDeck(Deck, kw_only=True):
@@ -57,8 +57,8 @@ class RayleighTaylor(Problem):
         super().__init__(deck)
         # at y = 0
         self.heavy = deck.above == "heavy"
-        self.pressure = deck.sound_speed**2 / GAMMA
-        wave = WAVE_NUMBER, GRAVITY, 2.0 if self.heavy else 0.0
+        self.pressure = deck.sound_speed**2 / GAS_GAMMA
+        wave = WAVE_NUMBER, GRAVITY_ACCELERATION, 2.0 if self.heavy else 0.0
         square = compute_gravity_mode(*wave, deck.tension)
         deck.refuse(square == 0.0, "tension", "there the wave neither grows nor swings")
         self.grows = square > 0.0
@@ -82,12 +82,12 @@ class RayleighTaylor(Problem):
     def build(self):
         tension = self.deck.tension
         blocks = []
-        layer = (GRAVITY, self.pressure, GAMMA)
+        layer = (GRAVITY_ACCELERATION, self.pressure, GAS_GAMMA)
         for name, grid in self.make_grids().items():
             density = 2.0 if name == "heavy" else 1.0
             # layers of the same height everywhere: the gas beside the wave is out of balance
             rho, p = compute_isentropic_layer(compute_centres(grid)[1], density, *layer)
-            blocks.append(Block(name, IdealGas(GAMMA), grid, rho, 0.0, 0.0, p))
+            blocks.append(Block(name, IdealGas(GAS_GAMMA), grid, rho, 0.0, 0.0, p))
         top = (blocks[0], "j_max")
         links = []
         if self.heavy:
@@ -95,7 +95,7 @@ class RayleighTaylor(Problem):
         else:
             put(*top, "free-surface", pressure=self.pressure, tension=tension)
         put_walls(*blocks)
-        return self.simulate(blocks, links, source=make_gravity(0.0, -GRAVITY))
+        return self.simulate(blocks, links, source=make_gravity(0.0, -GRAVITY_ACCELERATION))
 
     def measure(self, evolution) -> dict[str, float]:
         """Amplitude of the wave (its first Fourier coefficient) and height of the mean."""

@@ -34,7 +34,7 @@ PHASES = (
 )  # fmt: skip
 KINDS = {"mean": "mean", "rms": "root mean square", "worst": "worst cell"}  # of errors
 FIRST_STEP = 0.02  # of a cell that the shock crosses in the first step
-MIDDLE = 0.15  # of the length behind the shock that is left out at either end
+LEFT_OUT_PART = 0.15  # of the length behind the shock that is left out at either end
 
 
 class SaltzmannDeck(Deck, kw_only=True):
@@ -87,7 +87,7 @@ class Saltzmann(Problem):
         start, end, place, speed, exact = PHASES[phase]
         front = place + speed * (t - start)
         back = t if phase != 1 else 1.0
-        inside = np.abs(x - 0.5 * (front + back)) < (0.5 - MIDDLE) * abs(front - back)
+        inside = np.abs(x - 0.5 * (front + back)) < (0.5 - LEFT_OUT_PART) * abs(front - back)
         if t < 0.5 * (start + end) or not inside.any():
             return row
         error = block.state[0, 1:-1, 1:-1][inside] / exact - 1.0

@@ -31,7 +31,7 @@ from problems.references.exact_flows import (
 )
 from regrid.measure.corners import compute_centres
 
-PERIOD = 0.6  # of the swinging grid [s]: at t = 0.75 it is as far as it goes
+SWING_PERIOD = 0.6  # of the swinging grid [s]: at t = 0.75 it is as far as it goes
 PATH_STEPS = 12  # of Runge and Kutta along the paths that nodes follow
 
 
@@ -54,7 +54,7 @@ class TaylorGreen(Problem):
         nodes = BlockPlan("square", cells, (0.0, 0.0), (1.0, 1.0)).make_nodes()
         if self.deck.mesh == "follow":
             return {"square": follow_cell(nodes, t, PATH_STEPS)}
-        swing = self.deck.amplitude * math.sin(2.0 * math.pi * t / PERIOD)
+        swing = self.deck.amplitude * math.sin(2.0 * math.pi * t / SWING_PERIOD)
         return {"square": nodes + swing * compute_cell_velocity(nodes)}
 
     def build(self):

@@ -32,7 +32,7 @@ GASES = {
     "bottom": (IdealGas(1.4), (1.0, 0.0, 0.1), (1.0, 0.0), (7.0, 1.5)),
     "top": (IdealGas(1.5), (0.125, 0.0, 0.1), (1.0, 1.5), (7.0, 3.0)),
 }
-EARLY = 0.25  # until then the states beside the walls have not felt the point
+EARLY_TIME_PART = 0.25  # until then the states beside the walls have not felt the point
 
 
 class TriplePointDeck(Deck, kw_only=True):
@@ -92,7 +92,7 @@ class TriplePoint(Problem):
                 edges = gas.nodes[0, :, j] - 1.0
                 cells = gas.state[[0, 1, 3], 1:-1, 1:-1][..., j]
                 means = average_plateau(edges, cells, (exact.u * t, wave.tail * t))
-                known = 0.1 < t < EARLY and far < 0.9
+                known = 0.1 < t < EARLY_TIME_PART and far < 0.9
                 for q, mean in zip(("rho", "u", "p"), means, strict=True):
                     row[f"{q}_{name}_{side}"] = float(mean) if known else math.nan
         return row

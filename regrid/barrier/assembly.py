@@ -19,21 +19,21 @@ from numba import prange
 
 from regrid.barrier import functional
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
-from regrid.barrier.step_control import SPAN
+from regrid.barrier.step_control import CHUNK_SPAN
 from regrid.jit import inlined, kernel
 
 # Data of a column chunk for every row of nodes: the Hessian's couplings as 2 × 2 blocks (xx, xy,
 # yx, yy) to the nodes (i, j+1), (i+1, j+1), from (i+1, j) to (i, j+1), and to (i+1, j); the node's
 # own block; the inverse pivot of the line solve and the factor P^-1 E.  Stores are at least 2 kB
 # behind loads shifted by a column (see regrid.barrier.line_cg).
-NORTH = 0
-DIAGONAL = 4 * SPAN
-CROSS = 8 * SPAN
-EAST = 12 * SPAN
-OWN = 16 * SPAN
-PIVOT = 19 * SPAN
-FACTOR = 22 * SPAN
-NODE_ROWS = 26 * SPAN
+FINE_NORTH = 0
+FINE_DIAGONAL = 4 * CHUNK_SPAN
+FINE_CROSS = 8 * CHUNK_SPAN
+FINE_EAST = 12 * CHUNK_SPAN
+FINE_OWN = 16 * CHUNK_SPAN
+FINE_PIVOT = 19 * CHUNK_SPAN
+FINE_FACTOR = 22 * CHUNK_SPAN
+NODE_ROWS = 26 * CHUNK_SPAN
 
 # Scratch of the assembly: one row each.
 (
@@ -41,23 +41,29 @@ NODE_ROWS = 26 * SPAN
     BX, BY, B2, GB, CX, CY, C2, GC, LEFT_X, LEFT_Y, LEFT_Q, RIGHT_X, RIGHT_Y, RIGHT_Q,
     INV_1, INV_2, INV_3, INV_4, WEIGHT,
     LOW_GX, LOW_GY, UP_GX, UP_GY, LEFT_GX, LEFT_GY, RIGHT_GX, RIGHT_GY,
-) = (k * SPAN for k in range(35))  # fmt: skip
-LOW, UP, LEFT, RIGHT = (k * SPAN for k in (35, 39, 43, 47))
-OLD_RIGHT, OLD_RIGHT_GX, OLD_RIGHT_GY, OLD_FX, OLD_FY = (k * SPAN for k in (51, 55, 56, 57, 58))
-FLUX_X = 59 * SPAN
-FLUX_Y = 60 * SPAN
-AREA_1, AREA_2, AREA_3, AREA_4 = (k * SPAN for k in range(61, 65))
-SLOPE_1, SLOPE_2, SLOPE_3, SLOPE_4 = (k * SPAN for k in range(65, 69))
-KEPT = 69 * SPAN - OWN  # own blocks, pivots and factors on their way to the matrix
-W = 79 * SPAN  # position of the columns, by distance; by count in V
-FADING = 80 * SPAN
-TERMS = 81 * SPAN  # terms of the four corners: gradient in a and b, blocks aa, bb, ab
+) = (k * CHUNK_SPAN for k in range(35))  # fmt: skip
+LOW, UP, LEFT, RIGHT = (k * CHUNK_SPAN for k in (35, 39, 43, 47))
+OLD_RIGHT, OLD_RIGHT_GX, OLD_RIGHT_GY, OLD_FX, OLD_FY = (
+    k * CHUNK_SPAN for k in (51, 55, 56, 57, 58)
+)
+FLUX_X = 59 * CHUNK_SPAN
+FLUX_Y = 60 * CHUNK_SPAN
+AREA_1, AREA_2, AREA_3, AREA_4 = (k * CHUNK_SPAN for k in range(61, 65))
+SLOPE_1, SLOPE_2, SLOPE_3, SLOPE_4 = (k * CHUNK_SPAN for k in range(65, 69))
+KEPT_OWN_BLOCKS = (
+    69 * CHUNK_SPAN - FINE_OWN
+)  # own blocks, pivots and factors on their way to the matrix
+COLUMN_WEIGHT_ROW = 79 * CHUNK_SPAN  # position of the columns, by distance; by count in V
+FADING_ROW = 80 * CHUNK_SPAN
+CORNER_TERM_ROWS = (
+    81 * CHUNK_SPAN
+)  # terms of the four corners: gradient in a and b, blocks aa, bb, ab
 (
     GRAD_AX, GRAD_AY, GRAD_BX, GRAD_BY, AA_XX, AA_XY, AA_YY, BB_XX, BB_XY, BB_YY,
     AB_XX, AB_XY, AB_YX, AB_YY,
-) = (k * SPAN for k in range(14))  # fmt: skip
-CORNER_2, CORNER_3, CORNER_4 = (TERMS + k * 14 * SPAN for k in (1, 2, 3))
-ROWS = TERMS + 4 * 14 * SPAN
+) = (k * CHUNK_SPAN for k in range(14))  # fmt: skip
+CORNER_2, CORNER_3, CORNER_4 = (CORNER_TERM_ROWS + k * 14 * CHUNK_SPAN for k in (1, 2, 3))
+ASSEMBLY_ROWS = CORNER_TERM_ROWS + 4 * 14 * CHUNK_SPAN
 
 
 LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of its diagonal
@@ -123,7 +129,7 @@ def fill_line_edges(nodes, i, laws, low, count, Z):
     way_x, way_y = way[0, low : low + count], way[1, low : low + count]
     for col in range(count):
         v = Z[V + col]
-        s = length + Z[W + col] * length_change
+        s = length + Z[COLUMN_WEIGHT_ROW + col] * length_change
         t = step + v * step_change
         inverse = 1.0 / (s * t)
         g = t * inverse
@@ -169,7 +175,7 @@ def begin_columns(nodes, along_j, blend_i, blend_j, weight, low, cells, Z):
     nj = nodes.shape[2] - 1
     for col in range(cells + 1):
         Z[V + col] = (low + col) / nj
-        Z[W + col] = blend_j[low + col]
+        Z[COLUMN_WEIGHT_ROW + col] = blend_j[low + col]
     fill_side_edges(nodes, 0, along_j, blend_i, weight, low, cells, Z)
 
 
@@ -196,7 +202,7 @@ def end_row(cells, Z):
         Z[OLD_FY + col] = Z[FLUX_Y + col]
         Z[OLD_RIGHT_GX + col] = Z[RIGHT_GX + col]
         Z[OLD_RIGHT_GY + col] = Z[RIGHT_GY + col]
-    for k in range(0, 4 * SPAN, SPAN):
+    for k in range(0, 4 * CHUNK_SPAN, CHUNK_SPAN):
         for col in range(cells):
             Z[OLD_RIGHT + k + col] = Z[RIGHT + k + col]
 
@@ -211,7 +217,7 @@ def fill_fading(growth, cells, Z):
     """
     for col in range(cells):
         ratio = (Z[GA + col] + Z[GA + col + 1]) / (Z[GB + col] + Z[GC + col])
-        Z[FADING + col] = functional.fade(ratio, growth)
+        Z[FADING_ROW + col] = functional.fade(ratio, growth)
 
 
 @inlined
@@ -221,21 +227,24 @@ def fill_cell_numbers(aa, bb, ab, ba, to, cells, now, Z):
     `aa`, `bb`, `ab`: the rows of that entry in the terms of a corner, `ba` of the transposed one.
     """
     for col in range(cells):
-        near_1 = Z[TERMS + ab + col]
-        far_1 = Z[TERMS + ba + col]
+        near_1 = Z[CORNER_TERM_ROWS + ab + col]
+        far_1 = Z[CORNER_TERM_ROWS + ba + col]
         near_3 = Z[CORNER_3 + ab + col]
         far_3 = Z[CORNER_3 + ba + col]
         far_2 = Z[CORNER_2 + ba + col]
         near_4 = Z[CORNER_4 + ab + col]
-        low = Z[TERMS + aa + col] + Z[CORNER_4 + aa + col]
+        low = Z[CORNER_TERM_ROWS + aa + col] + Z[CORNER_4 + aa + col]
         up = Z[CORNER_2 + aa + col]
-        left, right = Z[TERMS + bb + col] + Z[CORNER_2 + bb + col], Z[CORNER_3 + bb + col]
+        left, right = (
+            Z[CORNER_TERM_ROWS + bb + col] + Z[CORNER_2 + bb + col],
+            Z[CORNER_3 + bb + col],
+        )
         Z[LOW + to + col] = (near_4 - far_1) - low
         Z[UP + to + col] = (far_2 - near_3) - (up + Z[CORNER_3 + aa + col])
         Z[LEFT + to + col] = (far_2 - near_1) - left
         Z[RIGHT + to + col] = (near_4 - far_3) - (right + Z[CORNER_4 + bb + col])
-        now[DIAGONAL + to + col] = -(near_4 + far_2)
-        now[CROSS + to + col] = near_1 + far_3
+        now[FINE_DIAGONAL + to + col] = -(near_4 + far_2)
+        now[FINE_CROSS + to + col] = near_1 + far_3
 
 
 @kernel(allocates=False)
@@ -246,18 +255,18 @@ def fill_cell_blocks(cells, now, Z):
     couplings across the cell into the matrix.
     """
     for col in range(cells):
-        Z[LOW_GX + col] = Z[TERMS + GRAD_AX + col] + Z[CORNER_4 + GRAD_AX + col]
-        Z[LOW_GY + col] = Z[TERMS + GRAD_AY + col] + Z[CORNER_4 + GRAD_AY + col]
+        Z[LOW_GX + col] = Z[CORNER_TERM_ROWS + GRAD_AX + col] + Z[CORNER_4 + GRAD_AX + col]
+        Z[LOW_GY + col] = Z[CORNER_TERM_ROWS + GRAD_AY + col] + Z[CORNER_4 + GRAD_AY + col]
         Z[UP_GX + col] = Z[CORNER_2 + GRAD_AX + col] + Z[CORNER_3 + GRAD_AX + col]
         Z[UP_GY + col] = Z[CORNER_2 + GRAD_AY + col] + Z[CORNER_3 + GRAD_AY + col]
-        Z[LEFT_GX + col] = Z[TERMS + GRAD_BX + col] + Z[CORNER_2 + GRAD_BX + col]
-        Z[LEFT_GY + col] = Z[TERMS + GRAD_BY + col] + Z[CORNER_2 + GRAD_BY + col]
+        Z[LEFT_GX + col] = Z[CORNER_TERM_ROWS + GRAD_BX + col] + Z[CORNER_2 + GRAD_BX + col]
+        Z[LEFT_GY + col] = Z[CORNER_TERM_ROWS + GRAD_BY + col] + Z[CORNER_2 + GRAD_BY + col]
         Z[RIGHT_GX + col] = Z[CORNER_3 + GRAD_BX + col] + Z[CORNER_4 + GRAD_BX + col]
         Z[RIGHT_GY + col] = Z[CORNER_3 + GRAD_BY + col] + Z[CORNER_4 + GRAD_BY + col]
     fill_cell_numbers(AA_XX, BB_XX, AB_XX, AB_XX, 0, cells, now, Z)
-    fill_cell_numbers(AA_XY, BB_XY, AB_XY, AB_YX, SPAN, cells, now, Z)
-    fill_cell_numbers(AA_XY, BB_XY, AB_YX, AB_XY, 2 * SPAN, cells, now, Z)
-    fill_cell_numbers(AA_YY, BB_YY, AB_YY, AB_YY, 3 * SPAN, cells, now, Z)
+    fill_cell_numbers(AA_XY, BB_XY, AB_XY, AB_YX, CHUNK_SPAN, cells, now, Z)
+    fill_cell_numbers(AA_XY, BB_XY, AB_YX, AB_XY, 2 * CHUNK_SPAN, cells, now, Z)
+    fill_cell_numbers(AA_YY, BB_YY, AB_YY, AB_YY, 3 * CHUNK_SPAN, cells, now, Z)
 
 
 @kernel(allocates=False)
@@ -267,10 +276,14 @@ def fill_line_blocks(cells, now, Z):
         q = Z[QA + col]
         Z[FLUX_X + col] = Z[FX + col] + (Z[LOW_GX + col] + Z[UP_GX + col - 1])
         Z[FLUX_Y + col] = Z[FY + col] + (Z[LOW_GY + col] + Z[UP_GY + col - 1])
-        now[EAST + col] = (Z[LOW + col] + Z[UP + col - 1]) - q
-        now[EAST + SPAN + col] = Z[LOW + SPAN + col] + Z[UP + SPAN + col - 1]
-        now[EAST + 2 * SPAN + col] = Z[LOW + 2 * SPAN + col] + Z[UP + 2 * SPAN + col - 1]
-        now[EAST + 3 * SPAN + col] = (Z[LOW + 3 * SPAN + col] + Z[UP + 3 * SPAN + col - 1]) - q
+        now[FINE_EAST + col] = (Z[LOW + col] + Z[UP + col - 1]) - q
+        now[FINE_EAST + CHUNK_SPAN + col] = Z[LOW + CHUNK_SPAN + col] + Z[UP + CHUNK_SPAN + col - 1]
+        now[FINE_EAST + 2 * CHUNK_SPAN + col] = (
+            Z[LOW + 2 * CHUNK_SPAN + col] + Z[UP + 2 * CHUNK_SPAN + col - 1]
+        )
+        now[FINE_EAST + 3 * CHUNK_SPAN + col] = (
+            Z[LOW + 3 * CHUNK_SPAN + col] + Z[UP + 3 * CHUNK_SPAN + col - 1]
+        ) - q
 
 
 @kernel(allocates=False)
@@ -280,10 +293,16 @@ def fill_side_blocks(cells, now, Z):
         q = Z[LEFT_Q + col]
         Z[LEFT_GX + col] = q * Z[LEFT_X + col] + (Z[LEFT_GX + col] + Z[OLD_RIGHT_GX + col])
         Z[LEFT_GY + col] = q * Z[LEFT_Y + col] + (Z[LEFT_GY + col] + Z[OLD_RIGHT_GY + col])
-        now[NORTH + col] = (Z[LEFT + col] + Z[OLD_RIGHT + col]) - q
-        now[NORTH + SPAN + col] = Z[LEFT + SPAN + col] + Z[OLD_RIGHT + SPAN + col]
-        now[NORTH + 2 * SPAN + col] = Z[LEFT + 2 * SPAN + col] + Z[OLD_RIGHT + 2 * SPAN + col]
-        now[NORTH + 3 * SPAN + col] = (Z[LEFT + 3 * SPAN + col] + Z[OLD_RIGHT + 3 * SPAN + col]) - q
+        now[FINE_NORTH + col] = (Z[LEFT + col] + Z[OLD_RIGHT + col]) - q
+        now[FINE_NORTH + CHUNK_SPAN + col] = (
+            Z[LEFT + CHUNK_SPAN + col] + Z[OLD_RIGHT + CHUNK_SPAN + col]
+        )
+        now[FINE_NORTH + 2 * CHUNK_SPAN + col] = (
+            Z[LEFT + 2 * CHUNK_SPAN + col] + Z[OLD_RIGHT + 2 * CHUNK_SPAN + col]
+        )
+        now[FINE_NORTH + 3 * CHUNK_SPAN + col] = (
+            Z[LEFT + 3 * CHUNK_SPAN + col] + Z[OLD_RIGHT + 3 * CHUNK_SPAN + col]
+        ) - q
 
 
 @kernel(allocates=False)
@@ -300,25 +319,35 @@ def fill_gradient(row_x, row_y, Z):
 def fill_own_blocks(cells, now, past, Z):
     """The diagonal blocks, minus the sum of their couplings, and the pivots of the line solve."""
     for col in range(1, cells):
-        e_xx, e_xy = past[EAST + col], past[EAST + SPAN + col]
-        e_yx, e_yy = past[EAST + 2 * SPAN + col], past[EAST + 3 * SPAN + col]
-        f_xx, f_xy = now[EAST + col], now[EAST + SPAN + col]
-        f_yx, f_yy = now[EAST + 2 * SPAN + col], now[EAST + 3 * SPAN + col]
-        xx = (e_xx + f_xx) + (now[NORTH + col] + now[NORTH + col - 1])
-        xx += now[DIAGONAL + col] + past[DIAGONAL + col - 1]
-        xx += past[CROSS + col] + now[CROSS + col - 1]
-        yy = (e_yy + f_yy) + (now[NORTH + 3 * SPAN + col] + now[NORTH + 3 * SPAN + col - 1])
-        yy += now[DIAGONAL + 3 * SPAN + col] + past[DIAGONAL + 3 * SPAN + col - 1]
-        yy += past[CROSS + 3 * SPAN + col] + now[CROSS + 3 * SPAN + col - 1]
-        xy = (e_yx + f_xy) + (now[NORTH + SPAN + col] + now[NORTH + 2 * SPAN + col - 1])
-        xy += now[DIAGONAL + SPAN + col] + past[DIAGONAL + 2 * SPAN + col - 1]
-        xy += past[CROSS + SPAN + col] + now[CROSS + 2 * SPAN + col - 1]
-        Z[KEPT + OWN + col] = -xx
-        Z[KEPT + OWN + SPAN + col] = -xy
-        Z[KEPT + OWN + 2 * SPAN + col] = -yy
+        e_xx, e_xy = past[FINE_EAST + col], past[FINE_EAST + CHUNK_SPAN + col]
+        e_yx, e_yy = past[FINE_EAST + 2 * CHUNK_SPAN + col], past[FINE_EAST + 3 * CHUNK_SPAN + col]
+        f_xx, f_xy = now[FINE_EAST + col], now[FINE_EAST + CHUNK_SPAN + col]
+        f_yx, f_yy = now[FINE_EAST + 2 * CHUNK_SPAN + col], now[FINE_EAST + 3 * CHUNK_SPAN + col]
+        xx = (e_xx + f_xx) + (now[FINE_NORTH + col] + now[FINE_NORTH + col - 1])
+        xx += now[FINE_DIAGONAL + col] + past[FINE_DIAGONAL + col - 1]
+        xx += past[FINE_CROSS + col] + now[FINE_CROSS + col - 1]
+        yy = (e_yy + f_yy) + (
+            now[FINE_NORTH + 3 * CHUNK_SPAN + col] + now[FINE_NORTH + 3 * CHUNK_SPAN + col - 1]
+        )
+        yy += (
+            now[FINE_DIAGONAL + 3 * CHUNK_SPAN + col]
+            + past[FINE_DIAGONAL + 3 * CHUNK_SPAN + col - 1]
+        )
+        yy += past[FINE_CROSS + 3 * CHUNK_SPAN + col] + now[FINE_CROSS + 3 * CHUNK_SPAN + col - 1]
+        xy = (e_yx + f_xy) + (
+            now[FINE_NORTH + CHUNK_SPAN + col] + now[FINE_NORTH + 2 * CHUNK_SPAN + col - 1]
+        )
+        xy += now[FINE_DIAGONAL + CHUNK_SPAN + col] + past[FINE_DIAGONAL + 2 * CHUNK_SPAN + col - 1]
+        xy += past[FINE_CROSS + CHUNK_SPAN + col] + now[FINE_CROSS + 2 * CHUNK_SPAN + col - 1]
+        Z[KEPT_OWN_BLOCKS + FINE_OWN + col] = -xx
+        Z[KEPT_OWN_BLOCKS + FINE_OWN + CHUNK_SPAN + col] = -xy
+        Z[KEPT_OWN_BLOCKS + FINE_OWN + 2 * CHUNK_SPAN + col] = -yy
         # E'P^-1 E with the factor T = P^-1 E of the previous row, zero at the boundary.
-        t_xx, t_xy = past[FACTOR + col], past[FACTOR + SPAN + col]
-        t_yx, t_yy = past[FACTOR + 2 * SPAN + col], past[FACTOR + 3 * SPAN + col]
+        t_xx, t_xy = past[FINE_FACTOR + col], past[FINE_FACTOR + CHUNK_SPAN + col]
+        t_yx, t_yy = (
+            past[FINE_FACTOR + 2 * CHUNK_SPAN + col],
+            past[FINE_FACTOR + 3 * CHUNK_SPAN + col],
+        )
         p_xx = -xx - (e_xx * t_xx + e_yx * t_yx)
         p_xy = -xy - (e_xx * t_xy + e_yx * t_yy)
         p_yy = -yy - (e_xy * t_xy + e_yy * t_yy)
@@ -329,16 +358,16 @@ def fill_own_blocks(cells, now, past, Z):
         v_xx = p_yy * scale
         v_xy = -(p_xy * scale)
         v_yy = p_xx * scale
-        Z[KEPT + PIVOT + col] = v_xx
-        Z[KEPT + PIVOT + SPAN + col] = v_xy
-        Z[KEPT + PIVOT + 2 * SPAN + col] = v_yy
-        Z[KEPT + FACTOR + col] = v_xx * f_xx + v_xy * f_yx
-        Z[KEPT + FACTOR + SPAN + col] = v_xx * f_xy + v_xy * f_yy
-        Z[KEPT + FACTOR + 2 * SPAN + col] = v_xy * f_xx + v_yy * f_yx
-        Z[KEPT + FACTOR + 3 * SPAN + col] = v_xy * f_xy + v_yy * f_yy
-    for k in range(OWN, NODE_ROWS, SPAN):
+        Z[KEPT_OWN_BLOCKS + FINE_PIVOT + col] = v_xx
+        Z[KEPT_OWN_BLOCKS + FINE_PIVOT + CHUNK_SPAN + col] = v_xy
+        Z[KEPT_OWN_BLOCKS + FINE_PIVOT + 2 * CHUNK_SPAN + col] = v_yy
+        Z[KEPT_OWN_BLOCKS + FINE_FACTOR + col] = v_xx * f_xx + v_xy * f_yx
+        Z[KEPT_OWN_BLOCKS + FINE_FACTOR + CHUNK_SPAN + col] = v_xx * f_xy + v_xy * f_yy
+        Z[KEPT_OWN_BLOCKS + FINE_FACTOR + 2 * CHUNK_SPAN + col] = v_xy * f_xx + v_yy * f_yx
+        Z[KEPT_OWN_BLOCKS + FINE_FACTOR + 3 * CHUNK_SPAN + col] = v_xy * f_xy + v_yy * f_yy
+    for k in range(FINE_OWN, NODE_ROWS, CHUNK_SPAN):
         for col in range(1, cells):
-            now[k + col] = Z[KEPT + k + col]
+            now[k + col] = Z[KEPT_OWN_BLOCKS + k + col]
 
 
 @kernel
@@ -368,7 +397,7 @@ def add_cost(near, far, sound, scale, weight, cells, now, Z):
                 (LOW_GX, dax, day), (UP_GX, dax, day), (LEFT_GX, dbx, dby), (RIGHT_GX, dbx, dby),
             ):  # fmt: skip
                 Z[edge + col] += half * dx
-                Z[edge + SPAN + col] += half * dy
+                Z[edge + CHUNK_SPAN + col] += half * dy
             less_xx, less_xy = 0.25 * (aa_xx - bb_xx), 0.25 * (aa_xy - bb_xy)
             less_yy = 0.25 * (aa_yy - bb_yy)
             odd = 0.25 * (ab_xy - ab_yx)
@@ -379,20 +408,20 @@ def add_cost(near, far, sound, scale, weight, cells, now, Z):
                 (RIGHT, 1.0, odd),
             ):
                 Z[edge + col] += sign * less_xx
-                Z[edge + SPAN + col] += sign * less_xy + turn
-                Z[edge + 2 * SPAN + col] += sign * less_xy - turn
-                Z[edge + 3 * SPAN + col] += sign * less_yy
+                Z[edge + CHUNK_SPAN + col] += sign * less_xy + turn
+                Z[edge + 2 * CHUNK_SPAN + col] += sign * less_xy - turn
+                Z[edge + 3 * CHUNK_SPAN + col] += sign * less_yy
             sum_xx = 0.25 * (aa_xx + bb_xx)
             sum_xy = 0.25 * (aa_xy + bb_xy)
             sum_yy = 0.25 * (aa_yy + bb_yy)
             even_xx = 0.5 * ab_xx
             even_xy = 0.25 * (ab_xy + ab_yx)
             even_yy = 0.5 * ab_yy
-            for block, sign in ((DIAGONAL, 1.0), (CROSS, -1.0)):
+            for block, sign in ((FINE_DIAGONAL, 1.0), (FINE_CROSS, -1.0)):
                 now[block + col] -= sum_xx + sign * even_xx
-                now[block + SPAN + col] -= sum_xy + sign * even_xy
-                now[block + 2 * SPAN + col] -= sum_xy + sign * even_xy
-                now[block + 3 * SPAN + col] -= sum_yy + sign * even_yy
+                now[block + CHUNK_SPAN + col] -= sum_xy + sign * even_xy
+                now[block + 2 * CHUNK_SPAN + col] -= sum_xy + sign * even_xy
+                now[block + 3 * CHUNK_SPAN + col] -= sum_yy + sign * even_yy
 
 
 def make_corner(corner_terms):
@@ -411,8 +440,8 @@ def make_corner(corner_terms):
                 gax, gay, gbx, gby, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy,
                 ab_xx, ab_xy, ab_yx, ab_yy,
             ) = corner_terms(
-                (A[col], A[SPAN + col], A[2 * SPAN + col], A[3 * SPAN + col]),
-                (B[col], B[SPAN + col], B[2 * SPAN + col], B[3 * SPAN + col]),
+                (A[col], A[CHUNK_SPAN + col], A[2 * CHUNK_SPAN + col], A[3 * CHUNK_SPAN + col]),
+                (B[col], B[CHUNK_SPAN + col], B[2 * CHUNK_SPAN + col], B[3 * CHUNK_SPAN + col]),
                 inverse[col], slope[col], weight[col], area,
             )  # fmt: skip
             out[GRAD_AX + col] = gax
@@ -524,19 +553,19 @@ def make_assembly(smooth):
                 Z[WEIGHT + col] = full if smooth else full * m1
             fill_fading(law.along_i[GROWTH, i], cells, Z)
             for col in range(cells):
-                Z[WEIGHT + col] *= Z[FADING + col]
+                Z[WEIGHT + col] *= Z[FADING_ROW + col]
             for corner in range(4):
                 # Corners 2 and 3 use the line edge one column on, 3 and 4 the far side edge.
                 shift = 1 if corner == 1 or corner == 2 else 0
                 side = CX if corner >= 2 else BX
-                term = TERMS + corner * 14 * SPAN
-                A = Z[AX + shift : AX + shift + 4 * SPAN]
-                B = Z[side : side + 4 * SPAN]
-                inverse = Z[INV_1 + corner * SPAN : INV_1 + corner * SPAN + cells]
-                stiff_row = SLOPE_1 + corner * SPAN if smooth else SLOPE_1
+                term = CORNER_TERM_ROWS + corner * 14 * CHUNK_SPAN
+                A = Z[AX + shift : AX + shift + 4 * CHUNK_SPAN]
+                B = Z[side : side + 4 * CHUNK_SPAN]
+                inverse = Z[INV_1 + corner * CHUNK_SPAN : INV_1 + corner * CHUNK_SPAN + cells]
+                stiff_row = SLOPE_1 + corner * CHUNK_SPAN if smooth else SLOPE_1
                 slope = Z[stiff_row : stiff_row + cells]
                 weight = Z[WEIGHT : WEIGHT + cells]
-                out = Z[term : term + 14 * SPAN]
+                out = Z[term : term + 14 * CHUNK_SPAN]
                 if smooth:
                     fill_smoothed_corner(A, B, inverse, slope, weight, area, out)
                 else:

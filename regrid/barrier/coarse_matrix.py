@@ -28,21 +28,21 @@ LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of 
 # (NORTH), xx, xy, yy across the cell that begins there (ACROSS: between its nodes (i+1, j) and
 # (i, j+1), with the other sign between (i, j) and (i+1, j+1)), of the node itself (OWN); the
 # inverse pivot of the line solve (PIVOT) and its factor (FACTOR).
-EAST = 0
-NORTH = 4
-ACROSS = 8
-OWN = 11
-PIVOT = 14
-FACTOR = 17
-ROWS = 21
+COARSE_EAST = 0
+COARSE_NORTH = 4
+COARSE_ACROSS = 8
+COARSE_OWN = 11
+COARSE_PIVOT = 14
+COARSE_FACTOR = 17
+COARSE_ROWS = 21
 # Scratch: the lower and upper edge along i, the near and far one along j, inverse conditional
 # lengths of the four, straight-line weights, sound speed, weight of the barrier, and T: aa, ab, bb.
 LOW_X, LOW_Y, UP_X, UP_Y, NEAR_X, NEAR_Y, FAR_X, FAR_Y = range(8)
 LOW_G, UP_G, NEAR_G, FAR_G, LINE_Q, SIDE_Q, SOUND, WEIGHT = range(8, 16)
-AA = 16
-AB = 19
-BB = 23
-SCRATCH = 26
+BLOCK_AA = 16
+BLOCK_AB = 19
+BLOCK_BB = 23
+COARSE_SCRATCH_ROWS = 26
 
 
 @inlined
@@ -163,10 +163,10 @@ def add_corners(near, far, a_g, b_g, law, count, Z):
 def add_blocks(k, blocks, Z):
     """Add blocks AA, BB and AB to T."""
     for row in range(3):
-        Z[AA + row, k] += blocks[row]
-        Z[BB + row, k] += blocks[3 + row]
+        Z[BLOCK_AA + row, k] += blocks[row]
+        Z[BLOCK_BB + row, k] += blocks[3 + row]
     for row in range(4):
-        Z[AB + row, k] += blocks[6 + row]
+        Z[BLOCK_AB + row, k] += blocks[6 + row]
 
 
 @kernel
@@ -190,60 +190,60 @@ def couple_nodes(stretch, lines, count, Z, now, then):
     """
     for k in range(count):
         along = 0.5 * lines[k] / stretch
-        aa_xx = along * Z[AA, k]
-        aa_xy = along * Z[AA + 1, k]
-        aa_yy = along * Z[AA + 2, k]
+        aa_xx = along * Z[BLOCK_AA, k]
+        aa_xy = along * Z[BLOCK_AA + 1, k]
+        aa_yy = along * Z[BLOCK_AA + 2, k]
         along = 0.5 * stretch / lines[k]
-        bb_xx = along * Z[BB, k]
-        bb_xy = along * Z[BB + 1, k]
-        bb_yy = along * Z[BB + 2, k]
-        odd = 0.25 * (Z[AB + 1, k] - Z[AB + 2, k])
-        even = 0.25 * (Z[AB + 1, k] + Z[AB + 2, k])
-        xx = 0.5 * Z[AB, k]
-        yy = 0.5 * Z[AB + 3, k]
-        now[EAST, k] -= aa_xx
-        now[EAST + 1, k] += odd - aa_xy
-        now[EAST + 2, k] -= odd + aa_xy
-        now[EAST + 3, k] -= aa_yy
-        now[NORTH, k] -= bb_xx
-        now[NORTH + 1, k] -= odd + bb_xy
-        now[NORTH + 2, k] += odd - bb_xy
-        now[NORTH + 3, k] -= bb_yy
-        then[NORTH, k] -= bb_xx
-        then[NORTH + 1, k] += odd - bb_xy
-        then[NORTH + 2, k] -= odd + bb_xy
-        then[NORTH + 3, k] -= bb_yy
-        now[ACROSS, k] = xx
-        now[ACROSS + 1, k] = even
-        now[ACROSS + 2, k] = yy
-        Z[AA, k] = aa_xx
-        Z[AA + 1, k] = aa_xy
-        Z[AA + 2, k] = aa_yy
-        Z[AB, k] = odd
+        bb_xx = along * Z[BLOCK_BB, k]
+        bb_xy = along * Z[BLOCK_BB + 1, k]
+        bb_yy = along * Z[BLOCK_BB + 2, k]
+        odd = 0.25 * (Z[BLOCK_AB + 1, k] - Z[BLOCK_AB + 2, k])
+        even = 0.25 * (Z[BLOCK_AB + 1, k] + Z[BLOCK_AB + 2, k])
+        xx = 0.5 * Z[BLOCK_AB, k]
+        yy = 0.5 * Z[BLOCK_AB + 3, k]
+        now[COARSE_EAST, k] -= aa_xx
+        now[COARSE_EAST + 1, k] += odd - aa_xy
+        now[COARSE_EAST + 2, k] -= odd + aa_xy
+        now[COARSE_EAST + 3, k] -= aa_yy
+        now[COARSE_NORTH, k] -= bb_xx
+        now[COARSE_NORTH + 1, k] -= odd + bb_xy
+        now[COARSE_NORTH + 2, k] += odd - bb_xy
+        now[COARSE_NORTH + 3, k] -= bb_yy
+        then[COARSE_NORTH, k] -= bb_xx
+        then[COARSE_NORTH + 1, k] += odd - bb_xy
+        then[COARSE_NORTH + 2, k] -= odd + bb_xy
+        then[COARSE_NORTH + 3, k] -= bb_yy
+        now[COARSE_ACROSS, k] = xx
+        now[COARSE_ACROSS + 1, k] = even
+        now[COARSE_ACROSS + 2, k] = yy
+        Z[BLOCK_AA, k] = aa_xx
+        Z[BLOCK_AA + 1, k] = aa_xy
+        Z[BLOCK_AA + 2, k] = aa_yy
+        Z[BLOCK_AB, k] = odd
         # at a corner itself: both of its edges, and their coupling
-        Z[BB, k] = aa_xx + bb_xx
-        Z[BB + 1, k] = aa_xy + bb_xy
-        Z[BB + 2, k] = aa_yy + bb_yy
-        now[OWN, k] += Z[BB, k] + xx
-        now[OWN + 1, k] += Z[BB + 1, k] + even
-        now[OWN + 2, k] += Z[BB + 2, k] + yy
-        then[OWN, k] += Z[BB, k] - xx
-        then[OWN + 1, k] += Z[BB + 1, k] - even
-        then[OWN + 2, k] += Z[BB + 2, k] - yy
+        Z[BLOCK_BB, k] = aa_xx + bb_xx
+        Z[BLOCK_BB + 1, k] = aa_xy + bb_xy
+        Z[BLOCK_BB + 2, k] = aa_yy + bb_yy
+        now[COARSE_OWN, k] += Z[BLOCK_BB, k] + xx
+        now[COARSE_OWN + 1, k] += Z[BLOCK_BB + 1, k] + even
+        now[COARSE_OWN + 2, k] += Z[BLOCK_BB + 2, k] + yy
+        then[COARSE_OWN, k] += Z[BLOCK_BB, k] - xx
+        then[COARSE_OWN + 1, k] += Z[BLOCK_BB + 1, k] - even
+        then[COARSE_OWN + 2, k] += Z[BLOCK_BB + 2, k] - yy
     for k in range(count):
-        now[EAST, k + 1] -= Z[AA, k]
-        now[EAST + 1, k + 1] -= Z[AB, k] + Z[AA + 1, k]
-        now[EAST + 2, k + 1] += Z[AB, k] - Z[AA + 1, k]
-        now[EAST + 3, k + 1] -= Z[AA + 2, k]
-        xx = now[ACROSS, k]
-        even = now[ACROSS + 1, k]
-        yy = now[ACROSS + 2, k]
-        now[OWN, k + 1] += Z[BB, k] - xx
-        now[OWN + 1, k + 1] += Z[BB + 1, k] - even
-        now[OWN + 2, k + 1] += Z[BB + 2, k] - yy
-        then[OWN, k + 1] += Z[BB, k] + xx
-        then[OWN + 1, k + 1] += Z[BB + 1, k] + even
-        then[OWN + 2, k + 1] += Z[BB + 2, k] + yy
+        now[COARSE_EAST, k + 1] -= Z[BLOCK_AA, k]
+        now[COARSE_EAST + 1, k + 1] -= Z[BLOCK_AB, k] + Z[BLOCK_AA + 1, k]
+        now[COARSE_EAST + 2, k + 1] += Z[BLOCK_AB, k] - Z[BLOCK_AA + 1, k]
+        now[COARSE_EAST + 3, k + 1] -= Z[BLOCK_AA + 2, k]
+        xx = now[COARSE_ACROSS, k]
+        even = now[COARSE_ACROSS + 1, k]
+        yy = now[COARSE_ACROSS + 2, k]
+        now[COARSE_OWN, k + 1] += Z[BLOCK_BB, k] - xx
+        now[COARSE_OWN + 1, k + 1] += Z[BLOCK_BB + 1, k] - even
+        now[COARSE_OWN + 2, k + 1] += Z[BLOCK_BB + 2, k] - yy
+        then[COARSE_OWN, k + 1] += Z[BLOCK_BB, k] + xx
+        then[COARSE_OWN + 1, k + 1] += Z[BLOCK_BB + 1, k] + even
+        then[COARSE_OWN + 2, k + 1] += Z[BLOCK_BB + 2, k] + yy
 
 
 @kernel
@@ -254,7 +254,7 @@ def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
     `regrid.barrier.side_laws.BarrierLaw`.  False if one of the gathered cells is folded.
     """
     parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
-    Z = np.empty((SCRATCH, parts_j))
+    Z = np.empty((COARSE_SCRATCH_ROWS, parts_j))
     lines = np.empty(parts_j)
     first_columns, last_columns = np.empty((2, parts_j), dtype=np.int64)
     for k in range(parts_j):
@@ -269,7 +269,7 @@ def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
         growth = 0.5 * (law.along_i[GROWTH, first] + law.along_i[GROWTH, last])
         if not weigh_cells(law, growth, parts_j, Z):
             return False
-        Z[AA:] = 0.0
+        Z[BLOCK_AA:] = 0.0
         add_corners(LOW_X, NEAR_X, LOW_G, NEAR_G, law, parts_j, Z)
         add_corners(UP_X, NEAR_X, UP_G, NEAR_G, law, parts_j, Z)
         add_corners(UP_X, FAR_X, UP_G, FAR_G, law, parts_j, Z)
@@ -277,10 +277,10 @@ def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
         if law.cost_weight > 0.0:
             add_costs(law.cost_scale, law.cost_weight * law.sigma, parts_j, Z)
         for k in range(parts_j):
-            Z[AA, k] += Z[LINE_Q, k]
-            Z[AA + 2, k] += Z[LINE_Q, k]
-            Z[BB, k] += Z[SIDE_Q, k]
-            Z[BB + 2, k] += Z[SIDE_Q, k]
+            Z[BLOCK_AA, k] += Z[LINE_Q, k]
+            Z[BLOCK_AA + 2, k] += Z[LINE_Q, k]
+            Z[BLOCK_BB, k] += Z[SIDE_Q, k]
+            Z[BLOCK_BB + 2, k] += Z[SIDE_Q, k]
         stretch = starts_i[part + 1] - starts_i[part]
         couple_nodes(stretch, lines, parts_j, Z, matrix[part], matrix[part + 1])
     return True
@@ -294,18 +294,18 @@ def factor_lines(matrix):
         past = matrix[i - 1]
         now = matrix[i]
         for j in range(1, n_j):
-            xx = now[OWN, j]
-            xy = now[OWN + 1, j]
-            yy = now[OWN + 2, j]
+            xx = now[COARSE_OWN, j]
+            xy = now[COARSE_OWN + 1, j]
+            yy = now[COARSE_OWN + 2, j]
             if i > 1:
-                a = past[EAST, j]
-                b = past[EAST + 1, j]
-                c = past[EAST + 2, j]
-                d = past[EAST + 3, j]
-                p = past[FACTOR, j]
-                q = past[FACTOR + 1, j]
-                r = past[FACTOR + 2, j]
-                s = past[FACTOR + 3, j]
+                a = past[COARSE_EAST, j]
+                b = past[COARSE_EAST + 1, j]
+                c = past[COARSE_EAST + 2, j]
+                d = past[COARSE_EAST + 3, j]
+                p = past[COARSE_FACTOR, j]
+                q = past[COARSE_FACTOR + 1, j]
+                r = past[COARSE_FACTOR + 2, j]
+                s = past[COARSE_FACTOR + 3, j]
                 xx -= a * p + c * r
                 xy -= a * q + c * s
                 yy -= b * q + d * s
@@ -314,17 +314,17 @@ def factor_lines(matrix):
             determinant = square - xy * xy
             scale = 1.0 / (determinant if determinant > least else least)
             xx, xy, yy = yy * scale, -(xy * scale), xx * scale
-            now[PIVOT, j] = xx
-            now[PIVOT + 1, j] = xy
-            now[PIVOT + 2, j] = yy
-            a = now[EAST, j]
-            b = now[EAST + 1, j]
-            c = now[EAST + 2, j]
-            d = now[EAST + 3, j]
-            now[FACTOR, j] = xx * a + xy * c
-            now[FACTOR + 1, j] = xx * b + xy * d
-            now[FACTOR + 2, j] = xy * a + yy * c
-            now[FACTOR + 3, j] = xy * b + yy * d
+            now[COARSE_PIVOT, j] = xx
+            now[COARSE_PIVOT + 1, j] = xy
+            now[COARSE_PIVOT + 2, j] = yy
+            a = now[COARSE_EAST, j]
+            b = now[COARSE_EAST + 1, j]
+            c = now[COARSE_EAST + 2, j]
+            d = now[COARSE_EAST + 3, j]
+            now[COARSE_FACTOR, j] = xx * a + xy * c
+            now[COARSE_FACTOR + 1, j] = xx * b + xy * d
+            now[COARSE_FACTOR + 2, j] = xy * a + yy * c
+            now[COARSE_FACTOR + 3, j] = xy * b + yy * d
 
 
 @kernel(allocates=False)
@@ -346,8 +346,8 @@ def solve_lines(matrix, r, z):
         else:
             for j in range(1, n_j):
                 u, v = b_x[j], b_y[j]
-                z_x[j] = r_x[j] - (past[FACTOR, j] * u + past[FACTOR + 2, j] * v)
-                z_y[j] = r_y[j] - (past[FACTOR + 1, j] * u + past[FACTOR + 3, j] * v)
+                z_x[j] = r_x[j] - (past[COARSE_FACTOR, j] * u + past[COARSE_FACTOR + 2, j] * v)
+                z_y[j] = r_y[j] - (past[COARSE_FACTOR + 1, j] * u + past[COARSE_FACTOR + 3, j] * v)
     for i in range(n_i - 1, 0, -1):
         now = matrix[i]
         z_x = z[0, i]
@@ -358,10 +358,10 @@ def solve_lines(matrix, r, z):
         a_y = z[1, i + 1]
         for j in range(1, n_j):
             u, v = z_x[j], z_y[j]
-            x = now[PIVOT, j] * u + now[PIVOT + 1, j] * v
-            y = now[PIVOT + 1, j] * u + now[PIVOT + 2, j] * v
-            z_x[j] = x - (now[FACTOR, j] * a_x[j] + now[FACTOR + 1, j] * a_y[j])
-            z_y[j] = y - (now[FACTOR + 2, j] * a_x[j] + now[FACTOR + 3, j] * a_y[j])
+            x = now[COARSE_PIVOT, j] * u + now[COARSE_PIVOT + 1, j] * v
+            y = now[COARSE_PIVOT + 1, j] * u + now[COARSE_PIVOT + 2, j] * v
+            z_x[j] = x - (now[COARSE_FACTOR, j] * a_x[j] + now[COARSE_FACTOR + 1, j] * a_y[j])
+            z_y[j] = y - (now[COARSE_FACTOR + 2, j] * a_x[j] + now[COARSE_FACTOR + 3, j] * a_y[j])
         for j in range(1, n_j):
             total += r_x[j] * z_x[j] + r_y[j] * z_y[j]
     return total
@@ -384,34 +384,37 @@ def fill_product(matrix, p, out):
         out_x, out_y = out[0, i], out[1, i]
         for j in range(1, n_j):
             u, v = h_x[j], h_y[j]
-            x, y = now[OWN, j] * u + now[OWN + 1, j] * v, now[OWN + 1, j] * u + now[OWN + 2, j] * v
+            x, y = (
+                now[COARSE_OWN, j] * u + now[COARSE_OWN + 1, j] * v,
+                now[COARSE_OWN + 1, j] * u + now[COARSE_OWN + 2, j] * v,
+            )
             u, v = a_x[j], a_y[j]
-            x += now[EAST, j] * u + now[EAST + 1, j] * v
-            y += now[EAST + 2, j] * u + now[EAST + 3, j] * v
+            x += now[COARSE_EAST, j] * u + now[COARSE_EAST + 1, j] * v
+            y += now[COARSE_EAST + 2, j] * u + now[COARSE_EAST + 3, j] * v
             u, v = b_x[j], b_y[j]
-            x += past[EAST, j] * u + past[EAST + 2, j] * v
-            y += past[EAST + 1, j] * u + past[EAST + 3, j] * v
+            x += past[COARSE_EAST, j] * u + past[COARSE_EAST + 2, j] * v
+            y += past[COARSE_EAST + 1, j] * u + past[COARSE_EAST + 3, j] * v
             u, v = h_x[j + 1], h_y[j + 1]
-            x += now[NORTH, j] * u + now[NORTH + 1, j] * v
-            y += now[NORTH + 2, j] * u + now[NORTH + 3, j] * v
+            x += now[COARSE_NORTH, j] * u + now[COARSE_NORTH + 1, j] * v
+            y += now[COARSE_NORTH + 2, j] * u + now[COARSE_NORTH + 3, j] * v
             u, v = h_x[j - 1], h_y[j - 1]
-            x += now[NORTH, j - 1] * u + now[NORTH + 2, j - 1] * v
-            y += now[NORTH + 1, j - 1] * u + now[NORTH + 3, j - 1] * v
+            x += now[COARSE_NORTH, j - 1] * u + now[COARSE_NORTH + 2, j - 1] * v
+            y += now[COARSE_NORTH + 1, j - 1] * u + now[COARSE_NORTH + 3, j - 1] * v
             out_x[j], out_y[j] = x, y
         for j in range(1, n_j):
             # the couplings across the four cells around the node are symmetric blocks
             u, v = a_x[j + 1], a_y[j + 1]
-            x = -(now[ACROSS, j] * u + now[ACROSS + 1, j] * v)
-            y = -(now[ACROSS + 1, j] * u + now[ACROSS + 2, j] * v)
+            x = -(now[COARSE_ACROSS, j] * u + now[COARSE_ACROSS + 1, j] * v)
+            y = -(now[COARSE_ACROSS + 1, j] * u + now[COARSE_ACROSS + 2, j] * v)
             u, v = a_x[j - 1], a_y[j - 1]
-            x += now[ACROSS, j - 1] * u + now[ACROSS + 1, j - 1] * v
-            y += now[ACROSS + 1, j - 1] * u + now[ACROSS + 2, j - 1] * v
+            x += now[COARSE_ACROSS, j - 1] * u + now[COARSE_ACROSS + 1, j - 1] * v
+            y += now[COARSE_ACROSS + 1, j - 1] * u + now[COARSE_ACROSS + 2, j - 1] * v
             u, v = b_x[j + 1], b_y[j + 1]
-            x += past[ACROSS, j] * u + past[ACROSS + 1, j] * v
-            y += past[ACROSS + 1, j] * u + past[ACROSS + 2, j] * v
+            x += past[COARSE_ACROSS, j] * u + past[COARSE_ACROSS + 1, j] * v
+            y += past[COARSE_ACROSS + 1, j] * u + past[COARSE_ACROSS + 2, j] * v
             u, v = b_x[j - 1], b_y[j - 1]
-            x -= past[ACROSS, j - 1] * u + past[ACROSS + 1, j - 1] * v
-            y -= past[ACROSS + 1, j - 1] * u + past[ACROSS + 2, j - 1] * v
+            x -= past[COARSE_ACROSS, j - 1] * u + past[COARSE_ACROSS + 1, j - 1] * v
+            y -= past[COARSE_ACROSS + 1, j - 1] * u + past[COARSE_ACROSS + 2, j - 1] * v
             out_x[j] += x
             out_y[j] += y
         for j in range(1, n_j):

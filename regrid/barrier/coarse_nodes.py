@@ -19,13 +19,13 @@ import math
 
 import numpy as np
 
-from regrid.barrier.coarse_matrix import ROWS, factor_lines, fill_coarse_matrix, solve
+from regrid.barrier.coarse_matrix import COARSE_ROWS, factor_lines, fill_coarse_matrix, solve
 from regrid.jit import kernel
 
 # Sums of the residual check: the gradient along the lines j = const and i = const at coarse lines
 # i = const, summed over the stretches on either side with hat functions.
-ALPHA = 0
-BETA = 1
+ALPHA_LINE = 0
+BETA_LINE = 1
 
 
 def cut_evenly(count: int, parts: int) -> np.ndarray:
@@ -48,8 +48,8 @@ def end_stretch(stretch, low, cells, Z, span, sums):
     columns 1..cells-1 are inner columns of nodes from `low` + 1 on.
     """
     for col in range(1, cells):
-        sums[ALPHA, stretch, low + col] = Z[col]
-        sums[BETA, stretch, low + col] = Z[span + col]
+        sums[ALPHA_LINE, stretch, low + col] = Z[col]
+        sums[BETA_LINE, stretch, low + col] = Z[span + col]
     for col in range(span):
         Z[col] = Z[2 * span + col]
         Z[span + col] = Z[3 * span + col]
@@ -192,7 +192,7 @@ class Level:
     def __init__(self, nodes_i: int, parts_j: int, nj: int):
         self.starts_j = cut_evenly(nj, parts_j)
         nodes_j = self.starts_j.size
-        self.shapes = (nodes_i, ROWS, nodes_j), (5, 2, nodes_i, nodes_j)
+        self.shapes = (nodes_i, COARSE_ROWS, nodes_j), (5, 2, nodes_i, nodes_j)
 
     def take_arrays(self, whole: np.ndarray) -> None:
         """Place matrix and vectors at the start of `whole` (n,)."""

@@ -11,15 +11,15 @@ from __future__ import annotations
 from numba import prange
 
 from regrid.barrier import assembly as at
-from regrid.barrier.step_control import SPAN
+from regrid.barrier.step_control import CHUNK_SPAN
 from regrid.jit import inlined, kernel
 
 # Scratch of the product: the direction in three rows of nodes, and the product in the middle one,
 # far from them: a store less than 2 kB behind a shifted load halves the vector length (LLVM
 # protects store-to-load forwarding).
-BEFORE_X, BEFORE_Y, HERE_X, HERE_Y, AFTER_X, AFTER_Y = (k * SPAN for k in range(6))
-OUT_X = 10 * SPAN
-OUT_Y = 11 * SPAN
+BEFORE_X, BEFORE_Y, HERE_X, HERE_Y, AFTER_X, AFTER_Y = (k * CHUNK_SPAN for k in range(6))
+OUT_X = 10 * CHUNK_SPAN
+OUT_Y = 11 * CHUNK_SPAN
 
 
 @inlined
@@ -30,33 +30,60 @@ def fill_product_row(now, past, count, Z):
     """
     for col in range(1, count + 1):
         x, y = Z[HERE_X + col], Z[HERE_Y + col]
-        own = now[at.OWN + SPAN + col]
-        s_x = now[at.OWN + col] * x + own * y
-        s_y = own * x + now[at.OWN + 2 * SPAN + col] * y
+        own = now[at.FINE_OWN + CHUNK_SPAN + col]
+        s_x = now[at.FINE_OWN + col] * x + own * y
+        s_y = own * x + now[at.FINE_OWN + 2 * CHUNK_SPAN + col] * y
         u, v = Z[AFTER_X + col], Z[AFTER_Y + col]
-        s_x += now[at.EAST + col] * u + now[at.EAST + SPAN + col] * v
-        s_y += now[at.EAST + 2 * SPAN + col] * u + now[at.EAST + 3 * SPAN + col] * v
+        s_x += now[at.FINE_EAST + col] * u + now[at.FINE_EAST + CHUNK_SPAN + col] * v
+        s_y += (
+            now[at.FINE_EAST + 2 * CHUNK_SPAN + col] * u
+            + now[at.FINE_EAST + 3 * CHUNK_SPAN + col] * v
+        )
         u, v = Z[BEFORE_X + col], Z[BEFORE_Y + col]
-        s_x += past[at.EAST + col] * u + past[at.EAST + 2 * SPAN + col] * v
-        s_y += past[at.EAST + SPAN + col] * u + past[at.EAST + 3 * SPAN + col] * v
+        s_x += past[at.FINE_EAST + col] * u + past[at.FINE_EAST + 2 * CHUNK_SPAN + col] * v
+        s_y += (
+            past[at.FINE_EAST + CHUNK_SPAN + col] * u
+            + past[at.FINE_EAST + 3 * CHUNK_SPAN + col] * v
+        )
         u, v = Z[HERE_X + col + 1], Z[HERE_Y + col + 1]
-        s_x += now[at.NORTH + col] * u + now[at.NORTH + SPAN + col] * v
-        s_y += now[at.NORTH + 2 * SPAN + col] * u + now[at.NORTH + 3 * SPAN + col] * v
+        s_x += now[at.FINE_NORTH + col] * u + now[at.FINE_NORTH + CHUNK_SPAN + col] * v
+        s_y += (
+            now[at.FINE_NORTH + 2 * CHUNK_SPAN + col] * u
+            + now[at.FINE_NORTH + 3 * CHUNK_SPAN + col] * v
+        )
         u, v = Z[HERE_X + col - 1], Z[HERE_Y + col - 1]
-        s_x += now[at.NORTH + col - 1] * u + now[at.NORTH + 2 * SPAN + col - 1] * v
-        s_y += now[at.NORTH + SPAN + col - 1] * u + now[at.NORTH + 3 * SPAN + col - 1] * v
+        s_x += now[at.FINE_NORTH + col - 1] * u + now[at.FINE_NORTH + 2 * CHUNK_SPAN + col - 1] * v
+        s_y += (
+            now[at.FINE_NORTH + CHUNK_SPAN + col - 1] * u
+            + now[at.FINE_NORTH + 3 * CHUNK_SPAN + col - 1] * v
+        )
         u, v = Z[AFTER_X + col + 1], Z[AFTER_Y + col + 1]
-        s_x += now[at.DIAGONAL + col] * u + now[at.DIAGONAL + SPAN + col] * v
-        s_y += now[at.DIAGONAL + 2 * SPAN + col] * u + now[at.DIAGONAL + 3 * SPAN + col] * v
+        s_x += now[at.FINE_DIAGONAL + col] * u + now[at.FINE_DIAGONAL + CHUNK_SPAN + col] * v
+        s_y += (
+            now[at.FINE_DIAGONAL + 2 * CHUNK_SPAN + col] * u
+            + now[at.FINE_DIAGONAL + 3 * CHUNK_SPAN + col] * v
+        )
         u, v = Z[BEFORE_X + col - 1], Z[BEFORE_Y + col - 1]
-        s_x += past[at.DIAGONAL + col - 1] * u + past[at.DIAGONAL + 2 * SPAN + col - 1] * v
-        s_y += past[at.DIAGONAL + SPAN + col - 1] * u + past[at.DIAGONAL + 3 * SPAN + col - 1] * v
+        s_x += (
+            past[at.FINE_DIAGONAL + col - 1] * u
+            + past[at.FINE_DIAGONAL + 2 * CHUNK_SPAN + col - 1] * v
+        )
+        s_y += (
+            past[at.FINE_DIAGONAL + CHUNK_SPAN + col - 1] * u
+            + past[at.FINE_DIAGONAL + 3 * CHUNK_SPAN + col - 1] * v
+        )
         u, v = Z[BEFORE_X + col + 1], Z[BEFORE_Y + col + 1]
-        s_x += past[at.CROSS + col] * u + past[at.CROSS + SPAN + col] * v
-        s_y += past[at.CROSS + 2 * SPAN + col] * u + past[at.CROSS + 3 * SPAN + col] * v
+        s_x += past[at.FINE_CROSS + col] * u + past[at.FINE_CROSS + CHUNK_SPAN + col] * v
+        s_y += (
+            past[at.FINE_CROSS + 2 * CHUNK_SPAN + col] * u
+            + past[at.FINE_CROSS + 3 * CHUNK_SPAN + col] * v
+        )
         u, v = Z[AFTER_X + col - 1], Z[AFTER_Y + col - 1]
-        s_x += now[at.CROSS + col - 1] * u + now[at.CROSS + 2 * SPAN + col - 1] * v
-        s_y += now[at.CROSS + SPAN + col - 1] * u + now[at.CROSS + 3 * SPAN + col - 1] * v
+        s_x += now[at.FINE_CROSS + col - 1] * u + now[at.FINE_CROSS + 2 * CHUNK_SPAN + col - 1] * v
+        s_y += (
+            now[at.FINE_CROSS + CHUNK_SPAN + col - 1] * u
+            + now[at.FINE_CROSS + 3 * CHUNK_SPAN + col - 1] * v
+        )
         Z[OUT_X + col] = s_x
         Z[OUT_Y + col] = s_y
 
@@ -150,9 +177,12 @@ def fill_line_solution(alpha, step, vectors, first, last, H, totals):
             for k in range(count):
                 col = k + 1
                 u, v = b_x[k], b_y[k]
-                z_x[k] = r_x[k] - (past[at.FACTOR + col] * u + past[at.FACTOR + 2 * SPAN + col] * v)
+                z_x[k] = r_x[k] - (
+                    past[at.FINE_FACTOR + col] * u + past[at.FINE_FACTOR + 2 * CHUNK_SPAN + col] * v
+                )
                 z_y[k] = r_y[k] - (
-                    past[at.FACTOR + SPAN + col] * u + past[at.FACTOR + 3 * SPAN + col] * v
+                    past[at.FINE_FACTOR + CHUNK_SPAN + col] * u
+                    + past[at.FINE_FACTOR + 3 * CHUNK_SPAN + col] * v
                 )
     for k in range(count):
         total[k] = 0.0
@@ -166,12 +196,13 @@ def fill_line_solution(alpha, step, vectors, first, last, H, totals):
             u, v = z_x[k], z_y[k]
             p = a_x[k]
             q = a_y[k]
-            off = now[at.PIVOT + SPAN + col]
-            s_x = (now[at.PIVOT + col] * u + off * v) - (
-                now[at.FACTOR + col] * p + now[at.FACTOR + SPAN + col] * q
+            off = now[at.FINE_PIVOT + CHUNK_SPAN + col]
+            s_x = (now[at.FINE_PIVOT + col] * u + off * v) - (
+                now[at.FINE_FACTOR + col] * p + now[at.FINE_FACTOR + CHUNK_SPAN + col] * q
             )
-            s_y = (off * u + now[at.PIVOT + 2 * SPAN + col] * v) - (
-                now[at.FACTOR + 2 * SPAN + col] * p + now[at.FACTOR + 3 * SPAN + col] * q
+            s_y = (off * u + now[at.FINE_PIVOT + 2 * CHUNK_SPAN + col] * v) - (
+                now[at.FINE_FACTOR + 2 * CHUNK_SPAN + col] * p
+                + now[at.FINE_FACTOR + 3 * CHUNK_SPAN + col] * q
             )
             z_x[k] = s_x
             z_y[k] = s_y

@@ -26,9 +26,9 @@ from regrid.measure.faults import find_impossible
 from regrid.protocol import RegridReport
 from regrid.sides import copy_sides, get_sides
 
-ROUND_OFF = 1e-12  # residual, in cells, that cannot be improved
-DOUBTFUL = 1e-6  # least ratio up to which the signs of corners are computed exactly
-SLOW = 0.3  # of `fast_sides`: slower sides count as at rest
+ROUND_OFF_RESIDUAL = 1e-12  # residual, in cells, that cannot be improved
+DOUBTFUL_CORNER_RATIO = 1e-6  # least ratio up to which the signs of corners are computed exactly
+SLOW_SIDE_FRACTION = 0.3  # of `fast_sides`: slower sides count as at rest
 LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
 
 
@@ -82,7 +82,9 @@ class NewtonMove:
         if self.moved_ratio > tuning.start_ratio and self._correct_smooth_error():
             strayed = np.inf
             corrected = True
-        good = self.estimate <= min(max(tuning.idle * tuning.floor, ROUND_OFF), self._get_lost())
+        good = self.estimate <= min(
+            max(tuning.idle * tuning.floor, ROUND_OFF_RESIDUAL), self._get_lost()
+        )
         if not (self.moved_ratio > tuning.start_ratio and good):
             return False
         self.residual = max(self.residual, self.estimate)
@@ -90,7 +92,7 @@ class NewtonMove:
         if not corrected:
             self.quality = work.get_quality()
             self.triangles = work.marks.bit_count()
-        if self.moved_ratio <= DOUBTFUL:  # all of the grid will be read
+        if self.moved_ratio <= DOUBTFUL_CORNER_RATIO:  # all of the grid will be read
             work.load_old()
         work.base, work.trial = work.trial, work.base
         return self._accept(self.moved_ratio)
@@ -203,7 +205,7 @@ class NewtonMove:
         if work.ni == 1 or work.nj == 1:
             work.trial[:] = work.base
             return self._accept(work.compare_corners(work.trial, work.old))
-        slow = SLOW * tuning.fast_sides
+        slow = SLOW_SIDE_FRACTION * tuning.fast_sides
         fast = tuning.fast_sides
         stiffness = compute_stiffness(work.old, work.sides, tuning.stiffness, slow, fast)
         work.law = work.law._replace(stiffness=stiffness)
@@ -336,7 +338,7 @@ class NewtonMove:
         work = self.work
         tuning = self.tuning
         scale = work.sigma * (work.ni - 1) * (work.nj - 1)
-        floor = max(tuning.floor, ROUND_OFF) ** 2 * scale
+        floor = max(tuning.floor, ROUND_OFF_RESIDUAL) ** 2 * scale
         if guess is None:
             done, first, last = work.solve(tuning.tolerance, floor, tuning.max_iterations)
         else:
@@ -358,7 +360,7 @@ class NewtonMove:
         self.ratio = min(self.ratio, ratio)
         if not ratio > 0.0 or self.broken:
             return False
-        return ratio > DOUBTFUL or not find_folded_cells(self.work.trial).size
+        return ratio > DOUBTFUL_CORNER_RATIO or not find_folded_cells(self.work.trial).size
 
     def _untangle(self) -> bool:
         """Untangle the better of the displaced grid and the trial into `work.trial`."""

@@ -26,7 +26,9 @@ from regrid.measure.faults import explain_failure, take_grids, take_nodes, take_
 from regrid.protocol import RegridResult
 from regrid.sides import compute_area, get_sides
 
-EVEN = 1e-6  # families whose weights differ by less are ranked by the block's shape
+EVEN_WEIGHT_DIFFERENCE = (
+    1e-6  # families whose weights differ by less are ranked by the block's shape
+)
 SERIAL_NODES = 6400  # smaller blocks stay on one thread
 
 
@@ -248,13 +250,15 @@ def _runs_along_j(weights, boundary) -> bool:
 
     A tie must not depend on round-off or on the naming of indices: more cells, then more length.
     """
-    if abs(weights[1] - weights[0]) > EVEN:
+    if abs(weights[1] - weights[0]) > EVEN_WEIGHT_DIFFERENCE:
         return bool(weights[1] > weights[0])
     ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
     if ni != nj:
         return nj > ni
     lengths = [np.hypot(*np.diff(side, axis=1)).sum() for side in get_sides(boundary)]
-    return bool(lengths[0] + lengths[1] > (1.0 + EVEN) * (lengths[2] + lengths[3]))
+    return bool(
+        lengths[0] + lengths[1] > (1.0 + EVEN_WEIGHT_DIFFERENCE) * (lengths[2] + lengths[3])
+    )
 
 
 class _FixedFamily(BarrierRegridder):

@@ -35,9 +35,11 @@ from regrid.measure.crossings import find_crossing
 from regrid.measure.faults import explain_failure
 from regrid.sides import compute_area, copy_sides
 
-ROUNDS = 20  # of projection
-BEYOND = 0.05  # how far a projected node goes past the segment, over the segment's length
-FEW = 0.02  # part of the cells up to which folds are local and projection is tried
+MOST_PROJECTION_ROUNDS = 20  # of projection
+PROJECTION_OVERSHOOT = (
+    0.05  # how far a projected node goes past the segment, over the segment's length
+)
+LOCAL_FOLD_FRACTION = 0.02  # part of the cells up to which folds are local and projection is tried
 NAMED_CELLS = 8
 
 
@@ -80,7 +82,7 @@ def repair_grid(nodes: np.ndarray, project: bool = True) -> Repaired:
     before = len(bad)
     projected = 0
     untangled = False
-    if len(bad) and project and len(bad) <= max(4, FEW * excluded[0].size):
+    if len(bad) and project and len(bad) <= max(4, LOCAL_FOLD_FRACTION * excluded[0].size):
         projected = project_nodes(nodes, excluded)
         bad = find_folded_cells(nodes, excluded)
     if len(bad):
@@ -111,7 +113,7 @@ def project_nodes(nodes: np.ndarray, excluded: np.ndarray) -> int:
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     moved: set[tuple[int, int]] = set()
-    for _ in range(ROUNDS):
+    for _ in range(MOST_PROJECTION_ROUNDS):
         wrong = (compute_corner_signs(nodes) <= 0) & ~excluded
         if not wrong.any():
             break
@@ -134,7 +136,7 @@ def project_nodes(nodes: np.ndarray, excluded: np.ndarray) -> int:
             part = min(max(float((here - start) @ step) / length, 0.1), 0.9)
             # Past the segment is to its right, so that before -> after turns left round the node.
             outward = np.array([step[1], -step[0]])
-            for beyond in (BEYOND, -BEYOND):
+            for beyond in (PROJECTION_OVERSHOOT, -PROJECTION_OVERSHOOT):
                 nodes[:, p, q] = start + part * step + beyond * outward
                 if _count_wrong(nodes, excluded, p, q) < count:
                     progress = True

@@ -26,7 +26,14 @@ from regrid.barrier.coarse_nodes import end_stretch
 from regrid.barrier.functional import cell_rate, corner_slope, cost_slope, fade, weigh
 from regrid.barrier.line_cg import add_columns
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
-from regrid.barrier.step_control import NOTHING, SPAN, UPRIGHT, round_up, take_edges, take_row
+from regrid.barrier.step_control import (
+    CHUNK_SPAN,
+    NO_LIMIT,
+    UPRIGHT,
+    round_up,
+    take_edges,
+    take_row,
+)
 from regrid.jit import inlined, kernel
 from regrid.measure.corners import mark_triangles
 from regrid.measure.quality import find_areas, square
@@ -45,18 +52,18 @@ from regrid.measure.quality import find_areas, square
     FLUX_X, FLUX_Y, PIVOT, PART_X, PART_Y, PASSED, SUM,
     SHRUNK, LEAST_AREA, SHARPEST, LONG, SHORT, OLD_AREA, LONG_LINE, LONG_SIDE, LIMITING,
     WHOLE_X, WHOLE_Y, NEAR_SUM_I, NEAR_SUM_J, FAR_SUM_I, FAR_SUM_J, PAST_X, PAST_Y,
-) = range(0, 74 * SPAN, SPAN)  # fmt: skip
+) = range(0, 74 * CHUNK_SPAN, CHUNK_SPAN)  # fmt: skip
 # TILE rows of x and as many of y: of the old grid and of this one, in a transposed frame, where
 # they are columns in memory.  Eight numbers fill a cache line.
-TILE = 8
-OLD_TILE = 74 * SPAN
-TILED = (74 + 2 * TILE) * SPAN
-LOOK_ROWS = (74 + 4 * TILE) * SPAN
+TILE_ROWS = 8
+OLD_TILE = 74 * CHUNK_SPAN
+END_OF_TILES = (74 + 2 * TILE_ROWS) * CHUNK_SPAN
+LOOK_ROWS = (74 + 4 * TILE_ROWS) * CHUNK_SPAN
 OLD_ROWS = OLD_X, OLD_Y, OLD_NEXT_X, OLD_NEXT_Y
 ROWS = HERE_X, HERE_Y, NEXT_X, NEXT_Y
 OLD_NEXT = OLD_ROWS[2:]
 NEXT = ROWS[2:]
-OWN = -NOTHING
+NO_OWN_BLOCK = -NO_LIMIT
 # Results of the residual check of a chunk of columns, and of the block: largest shrinkage of a
 # corner, least scaled corner area, distance of nodes from interpolated positions, largest squared
 # inverse sine of a corner and largest squared aspect ratio.
@@ -67,19 +74,19 @@ MOST_SHRUNK, LEAST_SCALED, STRAYED, COSECANT, ASPECT = range(5)
 def begin(law, motion, low, cells, Z):
     """Initialise sums, extremes and the tables along j before the first row of cells."""
     nj = law.along_j.shape[1]
-    for k in range(0, OLD_TILE, SPAN):
+    for k in range(0, OLD_TILE, CHUNK_SPAN):
         for col in range(round_up(cells + 2)):
             Z[k + col] = 0.0
     for col in range(cells):
-        Z[LEAST_AREA + col] = Z[OLD_AREA + col] = NOTHING
+        Z[LEAST_AREA + col] = Z[OLD_AREA + col] = NO_LIMIT
         Z[SHORT + col] = 1.0
         for k in range(4):
-            Z[SIDE_LENGTH + k * SPAN + col] = law.along_j[k, low + col]
+            Z[SIDE_LENGTH + k * CHUNK_SPAN + col] = law.along_j[k, low + col]
     for col in range(cells + 1):
         Z[V + col] = (low + col) / nj
         Z[BLEND + col] = law.blend_j[low + col]
         for k in range(6):
-            Z[LAW + k * SPAN + col] = motion.along_j[k, low + col]
+            Z[LAW + k * CHUNK_SPAN + col] = motion.along_j[k, low + col]
         if law.bent:
             Z[WAY_X + col] = law.way[0, low + col]
             Z[WAY_Y + col] = law.way[1, low + col]
@@ -101,22 +108,22 @@ def shift_rows(count, Z):
 def take_tile(nodes, i, mirrored, low, count, Z):
     """Load rows i to i + TILE - 1 of a transposed grid into the old grid's tile."""
     x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
-    rows = min(TILE, x.shape[1] - i)
+    rows = min(TILE_ROWS, x.shape[1] - i)
     for col in range(count):
         for k in range(rows):
-            Z[OLD_TILE + k * SPAN + col] = x[low + col, i + k]
-            Z[OLD_TILE + (TILE + k) * SPAN + col] = y[low + col, i + k]
+            Z[OLD_TILE + k * CHUNK_SPAN + col] = x[low + col, i + k]
+            Z[OLD_TILE + (TILE_ROWS + k) * CHUNK_SPAN + col] = y[low + col, i + k]
 
 
 @kernel(allocates=False)
 def give_tile(nodes, i, mirrored, low, count, Z):
     """Store the tile of this grid in rows i to i + TILE - 1 of a transposed grid."""
     x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
-    rows = min(TILE, x.shape[1] - i)
+    rows = min(TILE_ROWS, x.shape[1] - i)
     for col in range(count):
         for k in range(rows):
-            x[low + col, i + k] = Z[TILED + k * SPAN + col]
-            y[low + col, i + k] = Z[TILED + (TILE + k) * SPAN + col]
+            x[low + col, i + k] = Z[END_OF_TILES + k * CHUNK_SPAN + col]
+            y[low + col, i + k] = Z[END_OF_TILES + (TILE_ROWS + k) * CHUNK_SPAN + col]
 
 
 @inlined
@@ -126,12 +133,12 @@ def take_old_row(nodes, i, frame, low, count, Z):
     if not transposed:
         take_row(nodes, i, mirrored, low, count, OLD_NEXT, Z)
         return
-    k = i % TILE
+    k = i % TILE_ROWS
     if k == 0:
         take_tile(nodes, i, mirrored, low, count, Z)
     for col in range(count):
-        Z[OLD_NEXT_X + col] = Z[OLD_TILE + k * SPAN + col]
-        Z[OLD_NEXT_Y + col] = Z[OLD_TILE + (TILE + k) * SPAN + col]
+        Z[OLD_NEXT_X + col] = Z[OLD_TILE + k * CHUNK_SPAN + col]
+        Z[OLD_NEXT_Y + col] = Z[OLD_TILE + (TILE_ROWS + k) * CHUNK_SPAN + col]
 
 
 @inlined
@@ -139,11 +146,11 @@ def give_row(nodes, i, frame, low, count, Z):
     """Store the next row in row i of a grid in a `frame`: all rows in their order."""
     transposed, mirrored = frame
     if transposed:
-        k = i % TILE
+        k = i % TILE_ROWS
         for col in range(count):
-            Z[TILED + k * SPAN + col] = Z[NEXT_X + col]
-            Z[TILED + (TILE + k) * SPAN + col] = Z[NEXT_Y + col]
-        if k == TILE - 1 or i == nodes.shape[2] - 1:
+            Z[END_OF_TILES + k * CHUNK_SPAN + col] = Z[NEXT_X + col]
+            Z[END_OF_TILES + (TILE_ROWS + k) * CHUNK_SPAN + col] = Z[NEXT_Y + col]
+        if k == TILE_ROWS - 1 or i == nodes.shape[2] - 1:
             give_tile(nodes, i - k, mirrored, low, count, Z)
     else:
         x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
@@ -250,10 +257,10 @@ def take_cell(col, numbers, Z):
     o2 = Z[OLD_2 + col]
     o3 = Z[OLD_3 + col]
     o4 = Z[OLD_4 + col]
-    d1 = d1 if o1 > OWN else given
-    d2 = d2 if o2 > OWN else given
-    d3 = d3 if o3 > OWN else given
-    d4 = d4 if o4 > OWN else given
+    d1 = d1 if o1 > NO_OWN_BLOCK else given
+    d2 = d2 if o2 > NO_OWN_BLOCK else given
+    d3 = d3 if o3 > NO_OWN_BLOCK else given
+    d4 = d4 if o4 > NO_OWN_BLOCK else given
     # One division for the four corners and the fading; overflow leads to NaN.
     low = d1 * d2
     up = d3 * d4
@@ -283,10 +290,10 @@ def take_cell(col, numbers, Z):
     j2 = i2 * i2
     j3 = i3 * i3
     j4 = i4 * i4
-    c1 = (pa * pb) * j1 if o1 > OWN else 0.0
-    c2 = (pu * pb) * j2 if o2 > OWN else 0.0
-    c3 = (pu * pr) * j3 if o3 > OWN else 0.0
-    c4 = (pa * pr) * j4 if o4 > OWN else 0.0
+    c1 = (pa * pb) * j1 if o1 > NO_OWN_BLOCK else 0.0
+    c2 = (pu * pb) * j2 if o2 > NO_OWN_BLOCK else 0.0
+    c3 = (pu * pr) * j3 if o3 > NO_OWN_BLOCK else 0.0
+    c4 = (pa * pr) * j4 if o4 > NO_OWN_BLOCK else 0.0
     # Old over new areas of the corners.
     o1 = o1 * (h1 * i1)
     o2 = o2 * (h2 * i2)
@@ -379,9 +386,9 @@ def take_cells(i, law, shape, low, cells, Z):
         fill_old_areas(cells, Z)
     if i == 0 or i == ni - 1:
         if low == 0:
-            Z[OLD_1 if i == 0 else OLD_4] = OWN
+            Z[OLD_1 if i == 0 else OLD_4] = NO_OWN_BLOCK
         if low + cells == nj:
-            Z[(OLD_2 if i == 0 else OLD_3) + cells - 1] = OWN
+            Z[(OLD_2 if i == 0 else OLD_3) + cells - 1] = NO_OWN_BLOCK
     with_cost = law.cost_weight > 0.0
     if with_cost:
         sound = law.sound[i, low : low + cells]
@@ -457,8 +464,8 @@ def add_limiting_shares(scale, weight, cells, Z):
                 (SIDE_X, stiff_b, dbx, dby), (RIGHT_X, stiff_b, dbx, dby),
             ):  # fmt: skip
                 Z[edge + col] += half * dx
-                Z[edge + SPAN + col] += half * dy
-                Z[edge + 2 * SPAN + col] += stiff
+                Z[edge + CHUNK_SPAN + col] += half * dy
+                Z[edge + 2 * CHUNK_SPAN + col] += stiff
 
 
 @kernel(allocates=False)
@@ -566,12 +573,12 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
             end = starts[stretch + 1]
             add_to_stretch((i - here) / (end - here), cells, Z)
             if i + 1 == end:
-                end_stretch(stretch, low, cells, Z[NEAR_SUM_I:OLD_TILE], SPAN, sums)
+                end_stretch(stretch, low, cells, Z[NEAR_SUM_I:OLD_TILE], CHUNK_SPAN, sums)
                 stretch += 1
     for col in range(1, cells):
         totals[low + col] = Z[SUM + col]
     found[MOST_SHRUNK] = 0.0
-    found[LEAST_SCALED] = NOTHING
+    found[LEAST_SCALED] = NO_LIMIT
     found[STRAYED] = 0.0
     found[COSECANT] = 0.0
     found[ASPECT] = 0.0

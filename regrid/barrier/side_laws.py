@@ -71,9 +71,9 @@ class BarrierLaw(NamedTuple):
 
 
 COARSE_EDGES = 32  # a side's bend is measured on no more edges than about this many
-LEAST_BEND = 0.001  # bend that every side is taken to have, so that flat blocks weigh evenly
-FLAT = 1e-6  # bend up to which a pair of sides is straight
-SHORTEST = 1e-6  # shortest conditional length, relative to the side's mean edge
+ADDED_SIDE_BEND = 0.001  # bend that every side is taken to have, so that flat blocks weigh evenly
+STRAIGHT_SIDE_BEND = 1e-6  # bend up to which a pair of sides is straight
+SHORTEST_CONDITIONAL_LENGTH = 1e-6  # shortest conditional length, relative to the side's mean edge
 
 
 @kernel
@@ -180,19 +180,19 @@ def weigh_curves(sides, open_side, closed_side, barrier, half_barrier):
     bend_i, bend_j = measure_bends(sides)
     less = min(bend_i, bend_j)
     more = max(bend_i, bend_j)
-    if not less > FLAT:
+    if not less > STRAIGHT_SIDE_BEND:
         return 0.0, 0.0, 0.0
     range_of = open_side - closed_side
     open_i = min(1.0, max(0.0, (1.0 / (1.0 + bend_i) - closed_side) / range_of))
     open_j = min(1.0, max(0.0, (1.0 / (1.0 + bend_j) - closed_side) / range_of))
     # lines j = const start on the sides i_min, i_max and have the shapes of j_min, j_max
-    share_i = (bend_i + LEAST_BEND) * (bend_i + LEAST_BEND) * open_j
-    share_j = (bend_j + LEAST_BEND) * (bend_j + LEAST_BEND) * open_i
+    share_i = (bend_i + ADDED_SIDE_BEND) * (bend_i + ADDED_SIDE_BEND) * open_j
+    share_j = (bend_j + ADDED_SIDE_BEND) * (bend_j + ADDED_SIDE_BEND) * open_i
     both = share_i + share_j
     if not both > 0.0:
         return 0.0, 0.0, 0.0
     part = max(open_i, open_j)
-    weight = part * less / (less + LEAST_BEND)
+    weight = part * less / (less + ADDED_SIDE_BEND)
     alike = part * less / more
     alike *= alike
     least = barrier * alike / (alike + half_barrier * half_barrier)
@@ -207,8 +207,8 @@ def fill_family_weights(sides, weights):
     Theory R4.5.
     """
     bend_i, bend_j = measure_bends(sides)
-    bend_i += LEAST_BEND
-    bend_j += LEAST_BEND
+    bend_i += ADDED_SIDE_BEND
+    bend_j += ADDED_SIDE_BEND
     both = bend_i * bend_i + bend_j * bend_j
     weights[0] = bend_i * bend_i / both
     weights[1] = bend_j * bend_j / both
@@ -226,8 +226,8 @@ def fill_pair(low, high, laws):
     mean_low = mean_low if mean_low > 0.0 else mean_high
     mean_high = mean_high if mean_high > 0.0 else mean_low
     for k in range(count):
-        first = max(low[k], SHORTEST * mean_low)
-        second = max(high[k], SHORTEST * mean_high)
+        first = max(low[k], SHORTEST_CONDITIONAL_LENGTH * mean_low)
+        second = max(high[k], SHORTEST_CONDITIONAL_LENGTH * mean_high)
         laws[LENGTH, k] = first
         laws[LENGTH_CHANGE, k] = second - first
         laws[STEP, k] = first / mean_low

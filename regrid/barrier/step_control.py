@@ -15,18 +15,18 @@ from regrid.jit import inlined, kernel
 from regrid.measure.corners import compute_doubled_area, find_triangle
 from regrid.measure.quality import find_areas
 
-SPAN = 136  # length of a row of scratch: a multiple of 8, not a power of two
-WIDEST = 128  # nodes of one chunk of columns; the halo is one node on either side
-NOTHING = 1e300
+CHUNK_SPAN = 136  # length of a row of scratch: a multiple of 8, not a power of two
+MOST_CHUNK_NODES = 128  # nodes of one chunk of columns; the halo is one node on either side
+NO_LIMIT = 1e300
 
 # Scratch: rows i and i + 1 of both grids' nodes, then what is computed of the cells between them.
-NEW_ROWS, OLD_ROWS = (tuple((first + k) * SPAN for k in range(4)) for first in (0, 4))
-AREA_1, AREA_2, AREA_3, AREA_4, OLD_1, OLD_2, OLD_3, OLD_4 = (k * SPAN for k in range(8, 16))
-LEAST_RATIO, LEAST_AREA, NOT_A_NUMBER = (k * SPAN for k in range(16, 19))
-ROWS = 19 * SPAN
+NEW_ROWS, OLD_ROWS = (tuple((first + k) * CHUNK_SPAN for k in range(4)) for first in (0, 4))
+AREA_1, AREA_2, AREA_3, AREA_4, OLD_1, OLD_2, OLD_3, OLD_4 = (k * CHUNK_SPAN for k in range(8, 16))
+LEAST_RATIO, LEAST_AREA, NOT_A_NUMBER = (k * CHUNK_SPAN for k in range(16, 19))
+STEP_CONTROL_ROWS = 19 * CHUNK_SPAN
 
 FRACTION, FAILS = range(2)  # rows of a shortening: part of the step kept, last failing round
-HALVINGS = 8  # after this many, a node that still offends stays where it was
+MOST_NODE_HALVINGS = 8  # after this many, a node that still offends stays where it was
 
 
 UPRIGHT = False, False  # a frame: is it transposed, is it mirrored?
@@ -74,8 +74,8 @@ def measure_corners(trial, old, first, last, Z):
     ni, nj = trial.shape[1] - 1, trial.shape[2] - 1
     cells = last - first
     for col in range(cells):
-        Z[LEAST_RATIO + col] = NOTHING
-        Z[LEAST_AREA + col] = NOTHING
+        Z[LEAST_RATIO + col] = NO_LIMIT
+        Z[LEAST_AREA + col] = NO_LIMIT
         Z[NOT_A_NUMBER + col] = 0.0
     for i in range(ni):
         for grid, rows in ((trial, NEW_ROWS), (old, OLD_ROWS)):
@@ -124,8 +124,8 @@ def measure_corners(trial, old, first, last, Z):
             Z[LEAST_RATIO + col] = ratio if ratio < least else least
             Z[LEAST_AREA + col] = area
             Z[NOT_A_NUMBER + col] += bad
-    ratio = NOTHING
-    area = NOTHING
+    ratio = NO_LIMIT
+    area = NO_LIMIT
     bad = 0.0
     for col in range(cells):
         ratio = min(ratio, Z[LEAST_RATIO + col])
@@ -147,9 +147,9 @@ def shorten_steps(base, trial, old, least_ratio, tau):
             tau[FRACTION, i, j] = 1.0
             tau[FAILS, i, j] = 0.0
     change = trial - base
-    smallest = 0.5**HALVINGS
+    smallest = 0.5**MOST_NODE_HALVINGS
     marked = np.zeros(ni + 1, dtype=np.int64)  # the last round, from 1, that marked nodes of a row
-    for round in range(100 * HALVINGS):
+    for round in range(100 * MOST_NODE_HALVINGS):
         failed = False
         for i in range(ni):
             if round > 0 and marked[i] < round and marked[i + 1] < round:

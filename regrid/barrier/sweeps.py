@@ -55,40 +55,40 @@ from regrid.measure.quality import compute_corner_areas
 from regrid.protocol import RegridReport, RegridResult
 from regrid.sides import compute_area, copy_sides, get_sides
 
-SPAN = 136  # length of a scratch row: a multiple of 8, not a power of two
-WIDEST = 128  # lines in a chunk; a row of nodes has one more on either side
+SWEEP_SPAN = 136  # length of a scratch row: a multiple of 8, not a power of two
+MOST_CHUNK_LINES = 128  # lines in a chunk; a row of nodes has one more on either side
 # Per row of nodes: position across the block, and the edges along i (a) and j (b, then after the
 # row c) over their lengths, with the inverse lengths.
 (
     V, AX, AY, A2, AS, BX, BY, B2, BS, CX, CY, C2, CS,
     FX, FY, FQ, FN, LAST_FX, LAST_FY, LAST_FQ, LAST_FN,
-) = (k * SPAN for k in range(21))  # fmt: skip
+) = (k * SWEEP_SPAN for k in range(21))  # fmt: skip
 # Per cell: six numbers for each of its nodes 1 (i,j), 2 (i,j+1), 3 (i+1,j+1), 4 (i+1,j): the
 # gradient (x, y), the Hessian (xx, xy, yy) and the sum of squares of the gradient's terms.
-ONE, TWO, THREE, FOUR = (k * SPAN for k in (21, 27, 33, 39))
+ONE, TWO, THREE, FOUR = (k * SWEEP_SPAN for k in (21, 27, 33, 39))
 # The sums that the row of cells below leaves for the next row of nodes.
-SAVED = 45 * SPAN
+SAVED_ROW = 45 * SWEEP_SPAN
 # Two rows are unused here: a row read at l + 1 less than 256 numbers below one that is written
 # would prevent vectorisation (loads might wait for stores).  Elimination: inverse pivot (xx, xy,
 # yy), right-hand side (x, y) and q of this row of nodes.
-INVERSE = 53 * SPAN
-RIGHT = 56 * SPAN
-COUPLING = 58 * SPAN
+INVERSE_ROW = 53 * SWEEP_SPAN
+RIGHT_SIDE_ROW = 56 * SWEEP_SPAN
+COUPLING_ROW = 58 * SWEEP_SPAN
 # Per line, over all rows: sum of |R|², first and last active row.
-RESIDUAL, ACTIVE_FIRST, ACTIVE_LAST = (k * SPAN for k in range(59, 62))
-ROWS = 62 * SPAN
+RESIDUAL, ACTIVE_FIRST, ACTIVE_LAST = (k * SWEEP_SPAN for k in range(59, 62))
+SWEEP_ROWS = 62 * SWEEP_SPAN
 KEPT_ROWS = 6  # rows per node row for the back substitution: INVERSE, RIGHT, COUPLING
-KEPT = KEPT_ROWS * SPAN
+KEPT_LENGTH = KEPT_ROWS * SWEEP_SPAN
 NO_ROW = 1e9
 LINE_RESIDUAL, LINE_FIRST, LINE_LAST = range(3)  # rows of per-line results
 
 FUNCTIONALS = ("regularised", "ivanenko-charakhchyan")
 STARTS = ("displacement", "previous", "quasi-1d")
-MOST_HALVINGS = 10  # nested, of the boundary's motion
+MOST_BOUNDARY_HALVINGS = 10  # nested, of the boundary's motion
 MOST_TAU_ROUNDS = 400
-LEAST_TAU = 0.5**20
+LEAST_SWEEP_TAU = 0.5**20
 KEPT_SHARE = 0.5
-JOINED = 4  # boxes with a gap of fewer lines are one
+JOINING_GAP_LINES = 4  # boxes with a gap of fewer lines are one
 PARABOLA_RANGE = (0.05, 2.0)
 
 
@@ -96,13 +96,13 @@ PARABOLA_RANGE = (0.05, 2.0)
 def take_corner(Z, a, b):
     """Gradient and Hessian blocks, in both edges, of the corner with the edges at `a`, `b`."""
     ax = Z[a]
-    ay = Z[a + SPAN]
-    a2 = Z[a + 2 * SPAN]
-    ga = Z[a + 3 * SPAN]
+    ay = Z[a + SWEEP_SPAN]
+    a2 = Z[a + 2 * SWEEP_SPAN]
+    ga = Z[a + 3 * SWEEP_SPAN]
     bx = Z[b]
-    by = Z[b + SPAN]
-    b2 = Z[b + 2 * SPAN]
-    gb = Z[b + 3 * SPAN]
+    by = Z[b + SWEEP_SPAN]
+    b2 = Z[b + 2 * SWEEP_SPAN]
+    gb = Z[b + 3 * SWEEP_SPAN]
     v = ((ax, ay), (bx, by))
     g = ((by, -bx), (-ay, ax))
     inverse = 1.0 / (ax * by - ay * bx)
@@ -121,11 +121,11 @@ def put_node(Z, at, sign_a, sign_b, own, along, across):
     by = own[3] + across[3]
     both = sign_a * sign_b
     Z[at] = sign_a * ax + sign_b * bx
-    Z[at + SPAN] = sign_a * ay + sign_b * by
-    Z[at + 2 * SPAN] = (own[4] + along[4]) + (own[7] + across[7]) + both * (own[10] + own[10])
-    Z[at + 3 * SPAN] = (own[5] + along[5]) + (own[8] + across[8]) + both * (own[11] + own[12])
-    Z[at + 4 * SPAN] = (own[6] + along[6]) + (own[9] + across[9]) + both * (own[13] + own[13])
-    Z[at + 5 * SPAN] = (ax * ax + ay * ay) + (bx * bx + by * by)
+    Z[at + SWEEP_SPAN] = sign_a * ay + sign_b * by
+    Z[at + 2 * SWEEP_SPAN] = (own[4] + along[4]) + (own[7] + across[7]) + both * (own[10] + own[10])
+    Z[at + 3 * SWEEP_SPAN] = (own[5] + along[5]) + (own[8] + across[8]) + both * (own[11] + own[12])
+    Z[at + 4 * SWEEP_SPAN] = (own[6] + along[6]) + (own[9] + across[9]) + both * (own[13] + own[13])
+    Z[at + 5 * SWEEP_SPAN] = (ax * ax + ay * ay) + (bx * bx + by * by)
 
 
 @inlined
@@ -180,7 +180,7 @@ def fill_j_edges(x, y, lengths, changes, u, cells, Z):
 @inlined
 def sum_node(Z, row, col):
     """One of the six numbers of line `col`'s node, summed over its four cells."""
-    return Z[SAVED + row + col + 1] + (Z[ONE + row + col + 1] + Z[TWO + row + col])
+    return Z[SAVED_ROW + row + col + 1] + (Z[ONE + row + col + 1] + Z[TWO + row + col])
 
 
 @inlined
@@ -191,10 +191,10 @@ def eliminate_row(i, weight, tolerance, lines, Z):
     """
     for col in range(lines):
         n = col + 1
-        total_x, total_y = sum_node(Z, 0, col), sum_node(Z, SPAN, col)
-        total_xx, total_xy = sum_node(Z, 2 * SPAN, col), sum_node(Z, 3 * SPAN, col)
-        total_yy = sum_node(Z, 4 * SPAN, col)
-        terms = sum_node(Z, 5 * SPAN, col)
+        total_x, total_y = sum_node(Z, 0, col), sum_node(Z, SWEEP_SPAN, col)
+        total_xx, total_xy = sum_node(Z, 2 * SWEEP_SPAN, col), sum_node(Z, 3 * SWEEP_SPAN, col)
+        total_yy = sum_node(Z, 4 * SWEEP_SPAN, col)
+        terms = sum_node(Z, 5 * SWEEP_SPAN, col)
         q = Z[FQ + n]
         q_last = Z[LAST_FQ + n]
         residual_x = Z[LAST_FX + n] - Z[FX + n] + weight * total_x
@@ -202,20 +202,22 @@ def eliminate_row(i, weight, tolerance, lines, Z):
         square = residual_x * residual_x + residual_y * residual_y
         size = Z[FN + n] + Z[LAST_FN + n] + weight * np.sqrt(terms)
         # Pivot A - q_last² inverse, right-hand side -R + q_last inverse right, of the row before.
-        inv_xx, inv_xy = Z[INVERSE + col], Z[INVERSE + SPAN + col]
-        inv_yy = Z[INVERSE + 2 * SPAN + col]
-        right_x, right_y = Z[RIGHT + col], Z[RIGHT + SPAN + col]
+        inv_xx, inv_xy = Z[INVERSE_ROW + col], Z[INVERSE_ROW + SWEEP_SPAN + col]
+        inv_yy = Z[INVERSE_ROW + 2 * SWEEP_SPAN + col]
+        right_x, right_y = Z[RIGHT_SIDE_ROW + col], Z[RIGHT_SIDE_ROW + SWEEP_SPAN + col]
         both = q + q_last
         p_xx = both + weight * total_xx - q_last * q_last * inv_xx
         p_xy = weight * total_xy - q_last * q_last * inv_xy
         p_yy = both + weight * total_yy - q_last * q_last * inv_yy
         inverse = 1.0 / (p_xx * p_yy - p_xy * p_xy)
-        Z[INVERSE + col] = p_yy * inverse
-        Z[INVERSE + SPAN + col] = -p_xy * inverse
-        Z[INVERSE + 2 * SPAN + col] = p_xx * inverse
-        Z[RIGHT + col] = q_last * (inv_xx * right_x + inv_xy * right_y) - residual_x
-        Z[RIGHT + SPAN + col] = q_last * (inv_xy * right_x + inv_yy * right_y) - residual_y
-        Z[COUPLING + col] = q
+        Z[INVERSE_ROW + col] = p_yy * inverse
+        Z[INVERSE_ROW + SWEEP_SPAN + col] = -p_xy * inverse
+        Z[INVERSE_ROW + 2 * SWEEP_SPAN + col] = p_xx * inverse
+        Z[RIGHT_SIDE_ROW + col] = q_last * (inv_xx * right_x + inv_xy * right_y) - residual_x
+        Z[RIGHT_SIDE_ROW + SWEEP_SPAN + col] = (
+            q_last * (inv_xy * right_x + inv_yy * right_y) - residual_y
+        )
+        Z[COUPLING_ROW + col] = q
         Z[RESIDUAL + col] += square
         excess = square - tolerance * (size * size)
         here = i if excess > 0.0 else NO_ROW
@@ -260,11 +262,11 @@ def fill_directions(nodes, laws, numbers, boxes, kept, Z, out, per_line):
             Z[ACTIVE_FIRST + col] = NO_ROW
             Z[ACTIVE_LAST + col] = -1.0
             for k in range(KEPT_ROWS):
-                Z[INVERSE + k * SPAN + col] = 0.0
+                Z[INVERSE_ROW + k * SWEEP_SPAN + col] = 0.0
         at = (i0 - 1) / ni
         fill_j_edges(x[i0 - 1, left:stop], y[i0 - 1, left:stop], lengths, changes, at, cells, Z)
         for i in range(i0 - 1, i1):
-            for row in range(0, 4 * SPAN, SPAN):
+            for row in range(0, 4 * SWEEP_SPAN, SWEEP_SPAN):
                 for col in range(count):
                     Z[BX + row + col] = Z[CX + row + col]
                     Z[LAST_FX + row + col] = Z[FX + row + col]
@@ -278,16 +280,16 @@ def fill_directions(nodes, laws, numbers, boxes, kept, Z, out, per_line):
             fill_cells(cells, Z)
             if i >= i0:
                 eliminate_row(float(i), weight, tolerance, lines, Z)
-                for row in range(0, KEPT, SPAN):
+                for row in range(0, KEPT_LENGTH, SWEEP_SPAN):
                     for col in range(lines):
-                        kept[i * KEPT + row + col] = Z[INVERSE + row + col]
-            for row in range(0, 6 * SPAN, SPAN):
+                        kept[i * KEPT_LENGTH + row + col] = Z[INVERSE_ROW + row + col]
+            for row in range(0, 6 * SWEEP_SPAN, SWEEP_SPAN):
                 for col in range(lines):
-                    Z[SAVED + row + col + 1] = Z[FOUR + row + col + 1] + Z[THREE + row + col]
+                    Z[SAVED_ROW + row + col + 1] = Z[FOUR + row + col + 1] + Z[THREE + row + col]
         substitute_back(kept, j0, i0, i1, lines, Z, out)
         for k in range(3):
             for col in range(lines):
-                per_line[k, j0 + col] = Z[RESIDUAL + k * SPAN + col]
+                per_line[k, j0 + col] = Z[RESIDUAL + k * SWEEP_SPAN + col]
         for col in range(lines):
             total += Z[RESIDUAL + col]
             active += 1 if Z[ACTIVE_LAST + col] >= 0.0 else 0
@@ -301,15 +303,15 @@ def substitute_back(kept, j0, i0, i1, lines, Z, out):
         Z[AX + col] = 0.0
         Z[AY + col] = 0.0
     for i in range(i1 - 1, i0 - 1, -1):
-        base = i * KEPT
+        base = i * KEPT_LENGTH
         row_x, row_y = out[0, i, j0 : j0 + lines], out[1, i, j0 : j0 + lines]
         for col in range(lines):
-            q = kept[base + 5 * SPAN + col]
-            right_x = kept[base + 3 * SPAN + col] + q * Z[AX + col]
-            right_y = kept[base + 4 * SPAN + col] + q * Z[AY + col]
-            inv_xy = kept[base + SPAN + col]
+            q = kept[base + 5 * SWEEP_SPAN + col]
+            right_x = kept[base + 3 * SWEEP_SPAN + col] + q * Z[AX + col]
+            right_y = kept[base + 4 * SWEEP_SPAN + col] + q * Z[AY + col]
+            inv_xy = kept[base + SWEEP_SPAN + col]
             step_x = kept[base + col] * right_x + inv_xy * right_y
-            step_y = inv_xy * right_x + kept[base + 2 * SPAN + col] * right_y
+            step_y = inv_xy * right_x + kept[base + 2 * SWEEP_SPAN + col] * right_y
             Z[AX + col] = step_x
             Z[AY + col] = step_y
             row_x[col] = step_x
@@ -330,7 +332,11 @@ def fill_active_boxes(ni, nj, per_line, old_boxes, boxes):
             top = max(1, top)
             end = min(ni, end)
             last = boxes[count - 1]
-            if count > 0 and low - last[1] < JOINED and high - last[0] <= WIDEST:
+            if (
+                count > 0
+                and low - last[1] < JOINING_GAP_LINES
+                and high - last[0] <= MOST_CHUNK_LINES
+            ):
                 last[1], last[2], last[3] = max(high, last[1]), min(top, last[2]), max(end, last[3])
                 continue
             if count > 0:
@@ -347,7 +353,9 @@ def fill_active_boxes(ni, nj, per_line, old_boxes, boxes):
 
 def cut_block(ni: int, nj: int) -> np.ndarray:
     """Boxes (n, 4) of all inner nodes, of equal width."""
-    ends = 1 + (nj - 1) * np.arange(-(-(nj - 1) // WIDEST) + 1) // -(-(nj - 1) // WIDEST)
+    ends = 1 + (nj - 1) * np.arange(-(-(nj - 1) // MOST_CHUNK_LINES) + 1) // -(
+        -(nj - 1) // MOST_CHUNK_LINES
+    )
     rows = np.ones_like(ends[1:])
     return np.ascontiguousarray(np.stack([ends[:-1], ends[1:], rows, ni * rows], axis=1))
 
@@ -417,7 +425,7 @@ class Sweeps:
         wanted = old.copy()
         copy_sides(view, wanted)
         block.begin(self)
-        if not (compute_area(wanted) > 0.0 and block.move(old, wanted, MOST_HALVINGS)):
+        if not (compute_area(wanted) > 0.0 and block.move(old, wanted, MOST_BOUNDARY_HALVINGS)):
             raise explain_failure(boundary)
         nodes = np.empty(previous.shape)
         found = block.nodes[::-1] if mirrored else block.nodes
@@ -452,8 +460,8 @@ class _Block:
         self.tau = np.ones(shape[1:])
         self.laws_i, self.laws_j = np.zeros((4, ni)), np.zeros((4, nj))
         self.blends = np.zeros(ni + 1), np.zeros(nj + 1)
-        self.kept = np.zeros((ni + 1) * KEPT)
-        self.scratch = np.zeros(ROWS)
+        self.kept = np.zeros((ni + 1) * KEPT_LENGTH)
+        self.scratch = np.zeros(SWEEP_ROWS)
         self.per_line, self.other_lines = np.zeros((2, 3, nj + 1))
         self.workspace: Workspace | None = None
 
@@ -704,7 +712,7 @@ def halve_taus(areas, has, floors, tau) -> bool:
     for triangle, wrong in zip(TRIANGLES, low, strict=True):
         for i, j in triangle:
             marked[i : i + wrong.shape[0], j : j + wrong.shape[1]] |= wrong
-    tau[marked] = np.where(tau[marked] > LEAST_TAU, 0.5 * tau[marked], 0.0)
+    tau[marked] = np.where(tau[marked] > LEAST_SWEEP_TAU, 0.5 * tau[marked], 0.0)
     return True
 
 

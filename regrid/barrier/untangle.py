@@ -15,16 +15,16 @@ import numpy as np
 from regrid.barrier import assembly as at
 from regrid.barrier.functional import cell_rate, corner_value, cost_value, smooth_area
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP_CHANGE
-from regrid.barrier.step_control import SPAN
+from regrid.barrier.step_control import CHUNK_SPAN
 from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.jit import kernel
 from regrid.sides import copy_sides
 
-TERM_1, TERM_2, TERM_3, TERM_4 = (at.ROWS + k * SPAN for k in range(4))
-LEAST_1, LEAST_2, LEAST_3, LEAST_4 = (at.ROWS + k * SPAN for k in range(4, 8))
-ENERGY = at.ROWS + 8 * SPAN
-LEAST = at.ROWS + 9 * SPAN
-ENERGY_ROWS = at.ROWS + 10 * SPAN
+TERM_1, TERM_2, TERM_3, TERM_4 = (at.ASSEMBLY_ROWS + k * CHUNK_SPAN for k in range(4))
+LEAST_1, LEAST_2, LEAST_3, LEAST_4 = (at.ASSEMBLY_ROWS + k * CHUNK_SPAN for k in range(4, 8))
+ENERGY = at.ASSEMBLY_ROWS + 8 * CHUNK_SPAN
+LEAST = at.ASSEMBLY_ROWS + 9 * CHUNK_SPAN
+ENERGY_ROWS = at.ASSEMBLY_ROWS + 10 * CHUNK_SPAN
 
 
 @kernel
@@ -81,11 +81,11 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
             Z[TERM_4 + col] = corner_value(a2 + r2, d4, c, lam)
         if i == 0 or i == ni - 1:
             if first == 0:
-                corner = 0 if i == 0 else 3 * SPAN
+                corner = 0 if i == 0 else 3 * CHUNK_SPAN
                 Z[TERM_1 + corner] = 0.0
                 Z[LEAST_1 + corner] = 1e300
             if last == nj:
-                corner = (SPAN if i == 0 else 2 * SPAN) + cells - 1
+                corner = (CHUNK_SPAN if i == 0 else 2 * CHUNK_SPAN) + cells - 1
                 Z[TERM_1 + corner] = 0.0
                 Z[LEAST_1 + corner] = 1e300
         inside = 1.0 if i < ni - 1 else 0.0
@@ -107,7 +107,7 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
             m1 = m1 if m1 < m3 else m3
             least = Z[LEAST + col]
             straight = straight / Z[at.QA + col] if Z[at.QA + col] > 0.0 else 0.0  # F = q dx
-            terms *= Z[at.FADING + col]
+            terms *= Z[at.FADING_ROW + col]
             Z[ENERGY + col] += (quarter * parts[col]) * terms + 0.5 * (
                 straight + inside * Z[at.RIGHT_Q + col] * side
             )
@@ -136,7 +136,7 @@ LEAST_FREE_SPREAD = 1e-10
 ROUND_STEPS = 8
 ROUND_GAIN = 0.02
 FREE_SOLVE = 200  # iterations of one step of (R5.4)
-WIDE = 10.0  # e over the worst D of a nearly harmonic map
+WIDE_BARRIER_FACTOR = 10.0  # e over the worst D of a nearly harmonic map
 
 
 def untangle(work, nodes, tuning: Tuning = DEFAULT) -> bool:
@@ -166,7 +166,7 @@ def unfold(work, nodes, tuning: Tuning, spread_out: bool) -> bool:
     work.area_target = 1.0
     solve = tuning.exact_tolerance, FREE_SOLVE
     if spread_out:
-        spread = WIDE * max(1.0, -work.compute_energy(nodes, 1.0)[1])
+        spread = WIDE_BARRIER_FACTOR * max(1.0, -work.compute_energy(nodes, 1.0)[1])
         energy = work.compute_energy(nodes, spread)[0]
         for _ in range(ROUND_STEPS):
             energy = _step(work, nodes, spread, energy, solve)[1]

@@ -34,7 +34,7 @@ from regrid.barrier.residual_estimate import (
     look_threaded,
 )
 from regrid.barrier.side_laws import BarrierLaw, prepare, weigh_curves
-from regrid.barrier.step_control import SPAN, UPRIGHT, WIDEST, measure_corners
+from regrid.barrier.step_control import CHUNK_SPAN, MOST_CHUNK_NODES, UPRIGHT, measure_corners
 from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
 from regrid.measure.corners import BLOCK_CORNERS
@@ -44,7 +44,7 @@ from regrid.sides import copy_sides, get_sides
 from regrid.work_arrays import Carver, count_numbers, share_memory
 
 VECTORS = ("solution", "r", "z", "p", "p_old", "product")  # of the solve
-LEAST_BEND = 1e-12  # departures of laws below it are round-off
+LEAST_SPACING_BEND = 1e-12  # departures of laws below it are round-off
 
 
 def load_grid(nodes, out, transposed: bool, mirrored: bool, inside: bool) -> None:
@@ -76,7 +76,7 @@ def find_bend(first: np.ndarray) -> np.ndarray:
 
 def is_bent(bend: np.ndarray) -> bool:
     """Are departures (ni+1, nj+1) of `find_bend` more than round-off anywhere?"""
-    return bool(max(bend.max(), -bend.min()) > LEAST_BEND)
+    return bool(max(bend.max(), -bend.min()) > LEAST_SPACING_BEND)
 
 
 class Workspace:
@@ -122,7 +122,7 @@ class Workspace:
         self.most_bend = np.zeros(nj + 1)
         self.boundary_check = BoundaryCheck(ni, nj)
         inner = nj - 1
-        chunks = max(1, min(threads, inner // 8), -(-inner // WIDEST))
+        chunks = max(1, min(threads, inner // 8), -(-inner // MOST_CHUNK_NODES))
         self.columns = 1 + np.arange(chunks + 1, dtype=np.int64) * inner // chunks
         self.cell_columns = np.arange(chunks + 1, dtype=np.int64) * nj // chunks
         # Vectors of the solve have columns of zeros behind the last one, so that its loops run over
@@ -177,7 +177,7 @@ class Workspace:
             vector[:] = 0.0
         for side in get_sides(self.gradient):
             side[:] = 0.0
-        rows = self.H.reshape(self.columns.size - 1, self.ni + 1, -1, SPAN)
+        rows = self.H.reshape(self.columns.size - 1, self.ni + 1, -1, CHUNK_SPAN)
         rows[:, 0] = 0.0
         last = self.columns[-1]
         whole = self.whole_columns[-1]

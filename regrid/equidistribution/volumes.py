@@ -138,16 +138,16 @@ def solve_eds(
     )
 
 
-SPAN = 520  # longest row and its padding
-LONGEST = 512
+VOLUME_SPAN = 520  # longest row and its padding
+LONGEST_VOLUME_ROW = 512
 # Rows of the scratch: differences of x, y, z along the three directions at cell centres; three
 # coefficients; w J; sums over neighbours along k of this row of cells, also of the first two
 # coefficients; the same for the row before, and the third coefficient there.
-D, A, WV, K, KA, L, LA, LC = (k * SPAN for k in (0, 9, 12, 13, 22, 24, 33, 35))
-SCRATCH = 36 * SPAN
+D, A, WV, K, KA, L, LA, LC = (k * VOLUME_SPAN for k in (0, 9, 12, 13, 22, 24, 33, 35))
+VOLUME_SCRATCH = 36 * VOLUME_SPAN
 # rows of a plane's lines along k, transposed, after the right-hand sides
-SCALE = 3
-EDGE = 4
+SCALE_ROW = 3
+EDGE_ROW = 4
 
 
 @inlined
@@ -163,25 +163,25 @@ def difference_row(x, i, j, n, Z, at):
         right = r10[k] + r10[k + 1]
         high = r11[k] + r11[k + 1]
         Z[at + k] = 0.25 * ((high + right) - (left + low))
-        Z[at + 3 * SPAN + k] = 0.25 * ((high + left) - (right + low))
+        Z[at + 3 * VOLUME_SPAN + k] = 0.25 * ((high + left) - (right + low))
         upper = (r00[k + 1] + r11[k + 1]) + (r01[k + 1] + r10[k + 1])
-        Z[at + 6 * SPAN + k] = 0.25 * (upper - ((r00[k] + r11[k]) + (r01[k] + r10[k])))
+        Z[at + 6 * VOLUME_SPAN + k] = 0.25 * (upper - ((r00[k] + r11[k]) + (r01[k] + r10[k])))
 
 
 @inlined
 def weigh_row(weight, n, Z):
     """Coefficients w g22 g33, w g11 g33, w g11 g22 and w J along a row of cells."""
     for k in range(n):
-        a = (Z[D + k], Z[D + SPAN + k], Z[D + 2 * SPAN + k])
-        b = (Z[D + 3 * SPAN + k], Z[D + 4 * SPAN + k], Z[D + 5 * SPAN + k])
-        c = (Z[D + 6 * SPAN + k], Z[D + 7 * SPAN + k], Z[D + 8 * SPAN + k])
+        a = (Z[D + k], Z[D + VOLUME_SPAN + k], Z[D + 2 * VOLUME_SPAN + k])
+        b = (Z[D + 3 * VOLUME_SPAN + k], Z[D + 4 * VOLUME_SPAN + k], Z[D + 5 * VOLUME_SPAN + k])
+        c = (Z[D + 6 * VOLUME_SPAN + k], Z[D + 7 * VOLUME_SPAN + k], Z[D + 8 * VOLUME_SPAN + k])
         g11 = dot(a, a)
         g22 = dot(b, b)
         g33 = dot(c, c)
         w = weight[k]
         Z[A + k] = w * (g22 * g33)
-        Z[A + SPAN + k] = w * (g11 * g33)
-        Z[A + 2 * SPAN + k] = w * (g11 * g22)
+        Z[A + VOLUME_SPAN + k] = w * (g11 * g33)
+        Z[A + 2 * VOLUME_SPAN + k] = w * (g11 * g22)
         Z[WV + k] = w * dot(a, cross(b, c))
 
 
@@ -189,16 +189,18 @@ def weigh_row(weight, n, Z):
 def sum_row(n, Z):
     """Sums (along k, differences) over neighbours along k, at inner nodes 1..n-1 in 0..n-2."""
     for direction in range(3):
-        factor = A + direction * SPAN
+        factor = A + direction * VOLUME_SPAN
         sign = -1.0 if direction == 2 else 1.0
         a = Z[factor : factor + n]
-        for row in range(3 * direction * SPAN, 3 * (direction + 1) * SPAN, SPAN):
+        for row in range(
+            3 * direction * VOLUME_SPAN, 3 * (direction + 1) * VOLUME_SPAN, VOLUME_SPAN
+        ):
             d = Z[D + row : D + row + n]
             total = Z[K + row : K + row + n]
             for k in range(n - 1):
                 total[k] = a[k + 1] * d[k + 1] + sign * (a[k] * d[k])
         if direction < 2:
-            total = Z[KA + direction * SPAN : KA + direction * SPAN + n]
+            total = Z[KA + direction * VOLUME_SPAN : KA + direction * VOLUME_SPAN + n]
             for k in range(n - 1):
                 total[k] = a[k] + a[k + 1]
 
@@ -210,8 +212,8 @@ def give_row(to_lower, to_upper, lower, upper, n, Z, c):
     c: SPAN times the index of the component.
     """
     for k in range(n - 1):
-        across = Z[K + 3 * SPAN + c + k] - Z[L + 3 * SPAN + c + k]
-        across += Z[K + 6 * SPAN + c + k] + Z[L + 6 * SPAN + c + k]
+        across = Z[K + 3 * VOLUME_SPAN + c + k] - Z[L + 3 * VOLUME_SPAN + c + k]
+        across += Z[K + 6 * VOLUME_SPAN + c + k] + Z[L + 6 * VOLUME_SPAN + c + k]
         along = Z[K + c + k] + Z[L + c + k]
         if to_lower:
             lower[k] += 0.25 * (across + along)
@@ -246,14 +248,14 @@ def assemble_planes(nodes, weight, residual, edges, products, first, last, Z):
         low, high = max(i - 1, 0), min(i, n1 - 2)
         for j in range(n2):
             for c in range(3):
-                difference_row(nodes[c], i, j, n, Z, D + c * SPAN)
+                difference_row(nodes[c], i, j, n, Z, D + c * VOLUME_SPAN)
             weigh_row(weight[i, j], n, Z)
             sum_row(n, Z)
             if own:
                 row = products[i, j]
                 for k in range(n):
                     row[k] = Z[WV + k]
-            total = Z[KA + SPAN : KA + 2 * SPAN]
+            total = Z[KA + VOLUME_SPAN : KA + 2 * VOLUME_SPAN]
             for k in range(n - 1):
                 if to_lower:
                     e2[low, j, k] += 0.25 * total[k]
@@ -263,16 +265,16 @@ def assemble_planes(nodes, weight, residual, edges, products, first, last, Z):
                 if own:
                     give_edges(False, True, e1[i, j - 1], e1[i, j - 1], n - 1, Z, KA, LA)
                 lower, upper = e3[low, j - 1], e3[high, j - 1]
-                give_edges(to_lower, to_upper, lower, upper, n, Z, A + 2 * SPAN, LC)
+                give_edges(to_lower, to_upper, lower, upper, n, Z, A + 2 * VOLUME_SPAN, LC)
                 for c in range(3):
                     lower, upper = residual[c, low, j - 1], residual[c, high, j - 1]
-                    give_row(to_lower, to_upper, lower, upper, n, Z, c * SPAN)
+                    give_row(to_lower, to_upper, lower, upper, n, Z, c * VOLUME_SPAN)
             # this row's sums become those of the previous row
-            for at in range(0, L - K, SPAN):
+            for at in range(0, L - K, VOLUME_SPAN):
                 for k in range(n):
                     Z[L + at + k] = Z[K + at + k]
             for k in range(n):
-                Z[LC + k] = Z[A + 2 * SPAN + k]
+                Z[LC + k] = Z[A + 2 * VOLUME_SPAN + k]
 
 
 @inlined
@@ -371,22 +373,22 @@ def sweep_plane(residual, edges, tau, work, nodes, i, turned):
             turned[0, k, j] = px[k]
             turned[1, k, j] = py[k]
             turned[2, k, j] = pz[k]
-            turned[SCALE, k, j] = own[k]
-            turned[EDGE, k, j] = edge[k]
-        turned[EDGE, m, j] = edge[m]
+            turned[SCALE_ROW, k, j] = own[k]
+            turned[EDGE_ROW, k, j] = edge[k]
+        turned[EDGE_ROW, m, j] = edge[m]
     for k in range(m):
         p = max(k - 1, 0)
         link = tau if k > 0 else 0.0
         lines = turned[0, k, :n], turned[1, k, :n], turned[2, k, :n]
         past = (turned[0, p, :n], turned[1, p, :n], turned[2, p, :n])
-        own = turned[SCALE, k, :n]
-        low, high = turned[EDGE, k, :n], turned[EDGE, k + 1, :n]
-        eliminate(lines, past, (low, high), own, 0.0, tau, link, (turned[SCALE, p, :n], own))
+        own = turned[SCALE_ROW, k, :n]
+        low, high = turned[EDGE_ROW, k, :n], turned[EDGE_ROW, k + 1, :n]
+        eliminate(lines, past, (low, high), own, 0.0, tau, link, (turned[SCALE_ROW, p, :n], own))
     for k in range(m - 2, -1, -1):
         for c in range(3):
             row = turned[c, k]
             after = turned[c, k + 1]
-            here = turned[SCALE, k]
+            here = turned[SCALE_ROW, k]
             for j in range(n):
                 row[j] += here[j] * after[j]
     for c in range(3):
@@ -419,11 +421,11 @@ def sweep_on_threads(residual, edges, tau, work, nodes, lines, bounds, turned):
         sweep_chunk(residual, edges, tau, work, nodes, bounds[t], bounds[t + 1], turned[t])
 
 
-TAU = 1.0  # initial value, for the scaled operators with largest eigenvalue of about 4
+FIRST_TAU = 1.0  # initial value, for the scaled operators with largest eigenvalue of about 4
 LEAST_TAU = 0.1
 MOST_TAU = 8.0
-GROWTH = 1.1  # of tau while the residual falls; tau is halved when the residual grows
-CHECK = 10  # iterations between two tests of all corners
+TAU_GROWTH = 1.1  # of tau while the residual falls; tau is halved when the residual grows
+ITERATIONS_PER_CHECK = 10  # iterations between two tests of all corners
 
 
 class Ed3Operator:
@@ -434,10 +436,10 @@ class Ed3Operator:
 
     def __init__(self, shape: tuple[int, int, int], threads: int = 1):
         n1, n2, n3 = shape
-        if min(shape) < 2 or n3 > LONGEST:
+        if min(shape) < 2 or n3 > LONGEST_VOLUME_ROW:
             raise BadInput(
                 f"equidistribution: a volume needs at least 2 cells a direction and at most "
-                f"{LONGEST} along the third, got {shape}"
+                f"{LONGEST_VOLUME_ROW} along the third, got {shape}"
             )
         self.threads = threads = max(1, min(int(threads), n1 - 1, n2 - 1))
         self.bounds = np.linspace(1, n1, threads + 1).astype(np.int64)
@@ -450,7 +452,7 @@ class Ed3Operator:
         # zeros: the sweeps start with scratch times zero, which would keep a NaN
         self.work = np.zeros((2, n1 - 1, n2 - 1, n3 - 1))
         self.products = np.empty(shape)
-        self.scratch = np.zeros((threads, SCRATCH))
+        self.scratch = np.zeros((threads, VOLUME_SCRATCH))
         self.turned = np.empty((threads, 5, n3, n2 + 7))
 
     def evaluate(self, nodes: np.ndarray, weight: np.ndarray) -> float:
@@ -468,14 +470,16 @@ class Ed3Operator:
         return float(np.sqrt(size / count) / flux) if flux > 0.0 else np.inf
 
     def is_good(self, nodes: np.ndarray, iteration: int, ended: bool) -> bool:
-        return (ended or iteration % CHECK == 0) and is_valid(nodes, self.sign)
+        return (ended or iteration % ITERATIONS_PER_CHECK == 0) and is_valid(nodes, self.sign)
 
     def choose_tau(self, iteration: int, residuals: list[float]) -> float:
         if iteration == 0:
-            self.tau = TAU
+            self.tau = FIRST_TAU
         else:
             fell = residuals[-1] < residuals[-2]
-            self.tau = max(min(GROWTH * self.tau, MOST_TAU) if fell else 0.5 * self.tau, LEAST_TAU)
+            self.tau = max(
+                min(TAU_GROWTH * self.tau, MOST_TAU) if fell else 0.5 * self.tau, LEAST_TAU
+            )
         return self.tau
 
     def correct(self, nodes: np.ndarray, tau: float) -> None:

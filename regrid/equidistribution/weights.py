@@ -242,7 +242,9 @@ def _split_number(node: ast.expr) -> tuple[float, ast.expr | None]:
     return 1.0, node
 
 
-NOTHING = 1e-9  # differences of a field below this part of its size are round-off, not gradients
+ROUND_OFF_DIFFERENCE = (
+    1e-9  # differences of a field below this part of its size are round-off, not gradients
+)
 
 
 def weigh_points(weight, points: np.ndarray) -> np.ndarray:
@@ -388,7 +390,7 @@ def measure_gradient(field: np.ndarray, centres: np.ndarray) -> np.ndarray:
         np.gradient(centres, axis=k + 1) if field.shape[k] > 1 else np.zeros_like(centres)
         for k in (0, 1)
     )
-    least = NOTHING * np.abs(field).max()
+    least = ROUND_OFF_DIFFERENCE * np.abs(field).max()
     f1, f2 = (np.where(np.abs(f) > least, f, 0.0) for f in differences)
     area = along[0] * across[1] - along[1] * across[0]
     g11 = (along**2).sum(axis=0)

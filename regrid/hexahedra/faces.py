@@ -22,7 +22,7 @@ from regrid.measure.hexahedra import compute_corner_volumes, find_bad_hexahedra
 
 FACES = ("i_min", "i_max", "j_min", "j_max", "k_min", "k_max")
 LEAST_LENGTH = 1e-6  # of a family's mean edge
-BEND = 1e-3  # added to the curvature measure of a pair of faces
+ADDED_FACE_BEND = 1e-3  # added to the curvature measure of a pair of faces
 
 
 def get_face(nodes: np.ndarray, axis: int, end: int) -> np.ndarray:
@@ -82,7 +82,8 @@ def _vector_areas(face: np.ndarray) -> np.ndarray:
 def compute_family_weights(nodes: np.ndarray) -> np.ndarray:
     """Weights (3,) of the straight lines of each family, with sum 1 (R14.7)."""
     bends = [
-        max(measure_bend(get_face(nodes, axis, end)) for end in (0, -1)) + BEND for axis in range(3)
+        max(measure_bend(get_face(nodes, axis, end)) for end in (0, -1)) + ADDED_FACE_BEND
+        for axis in range(3)
     ]
     squares = np.minimum(bends, 1e6) ** 2
     return squares / squares.sum()
@@ -197,7 +198,7 @@ def _to_centres(length: np.ndarray, axis: int) -> np.ndarray:
     return length
 
 
-CROSSINGS = 3  # iterations for the intersection of three lines of the unit cube
+CROSSING_ITERATIONS = 3  # iterations for the intersection of three lines of the unit cube
 
 
 @kernel(allocates=False)
@@ -223,7 +224,7 @@ def fill_blended(values, law_i, law_j, law_k, rows):
                 p = 0.25 * (law_i[0, 0, i] + law_i[0, 1, i] + law_i[1, 0, i] + law_i[1, 1, i])
                 q = 0.25 * (law_j[0, 0, j] + law_j[0, 1, j] + law_j[1, 0, j] + law_j[1, 1, j])
                 r = 0.25 * (law_k[0, 0, k] + law_k[0, 1, k] + law_k[1, 0, k] + law_k[1, 1, k])
-                for _ in range(CROSSINGS):
+                for _ in range(CROSSING_ITERATIONS):
                     p, q, r = mix(law_i, i, q, r), mix(law_j, j, p, r), mix(law_k, k, p, q)
                 rows[0, k] = p
                 rows[1, k] = q

@@ -27,37 +27,37 @@ import math
 from regrid.barrier.functional import smooth_area
 from regrid.jit import kernel
 
-SHARP = 0.3  # corner sine below which the barrier is strengthened
+SHARP_CORNER_SINE = 0.3  # corner sine below which the barrier is strengthened
 CENTRE_E2 = 1e-6  # the centre of a cell with positive corners may be folded
-ENERGY = 0
-GRADIENT = 1
-MATRIX = 2
+ONLY_ENERGY = 0
+WITH_GRADIENT = 1
+WITH_MATRIX = 2
 
-SPAN = 296  # longest row of nodes and its padding
-LONGEST = 256  # cells along the third index
-VECTOR = 3 * SPAN  # from one edge's rows to the next one's
+HEXAHEDRON_SPAN = 296  # longest row of nodes and its padding
+LONGEST_HEXAHEDRON_ROW = 256  # cells along the third index
+VECTOR_LENGTH = 3 * HEXAHEDRON_SPAN  # from one edge's rows to the next one's
 # Eight edges: vectors, inverse lengths, straight-line weights, squared lengths; the vectors of
 # another grid or a direction; eight corner volumes, twice.
-EDGE, INVERSE, STRAIGHT, SQUARE, TURN = (k * SPAN for k in (0, 24, 32, 40, 48))
-VOLUME = 72 * SPAN
-OTHER_VOLUME = 80 * SPAN
-WEIGHT, SUM, LEAST = (k * SPAN for k in (88, 89, 90))  # of cells
-FLUX = 91 * SPAN  # of the eight edges, summed over corners
-HIGH = 115 * SPAN  # of those along i and j, from the cells before them
+EDGE, INVERSE, STRAIGHT, SQUARE, TURN = (k * HEXAHEDRON_SPAN for k in (0, 24, 32, 40, 48))
+VOLUME_ROW = 72 * HEXAHEDRON_SPAN
+OTHER_VOLUME = 80 * HEXAHEDRON_SPAN
+WEIGHT, SUM, LEAST = (k * HEXAHEDRON_SPAN for k in (88, 89, 90))  # of cells
+FLUX_ROW = 91 * HEXAHEDRON_SPAN  # of the eight edges, summed over corners
+HIGH_ROW = 115 * HEXAHEDRON_SPAN  # of those along i and j, from the cells before them
 # of cells: for the edge along i; summed over all three
-BLOCK = 127 * SPAN
-BLOCKS = 133 * SPAN
-ROWS = 139 * SPAN
+BLOCK_ROW = 127 * HEXAHEDRON_SPAN
+SUMMED_BLOCK_ROW = 133 * HEXAHEDRON_SPAN
+HEXAHEDRON_ROWS = 139 * HEXAHEDRON_SPAN
 # Direction of the eight edges, and their first nodes relative to the node (i, j).
 EDGES = (
     (0, 0, 0), (0, 0, 1), (1, 0, 0), (1, 1, 0), (2, 0, 0), (2, 0, 1), (2, 1, 0), (2, 1, 1),
 )  # fmt: skip
 # Edges and forces by name: two along i, two along j, four along k; forces of the corners c = 1.
-I0, I1, J0, J1, K0, K1, K2, K3 = (EDGE + k * VECTOR for k in range(8))
-FI0, FI1, FJ0, FJ1, FK0, FK1, FK2, FK3 = (FLUX + k * VECTOR for k in range(8))
-HI0, HI1, HJ0, HJ1 = (HIGH + k * VECTOR for k in range(4))
-VI0, VI1, VJ0, VJ1, VK0, VK1, VK2, VK3 = (INVERSE + k * SPAN for k in range(8))
-AWAY = TURN - EDGE
+I0, I1, J0, J1, K0, K1, K2, K3 = (EDGE + k * VECTOR_LENGTH for k in range(8))
+FI0, FI1, FJ0, FJ1, FK0, FK1, FK2, FK3 = (FLUX_ROW + k * VECTOR_LENGTH for k in range(8))
+HI0, HI1, HJ0, HJ1 = (HIGH_ROW + k * VECTOR_LENGTH for k in range(4))
+VI0, VI1, VJ0, VJ1, VK0, VK1, VK2, VK3 = (INVERSE + k * HEXAHEDRON_SPAN for k in range(8))
+AWAY_ROW = TURN - EDGE
 # Edges along i, j, k of the eight corners of a cell, and offsets of the forces on them.
 CORNERS = (
     (I0, J0, K0), (I0, J1, K2), (I1, J0, K1), (I1, J1, K3), (I0 + 1, J0 + 1, K0),
@@ -74,7 +74,7 @@ formula = kernel(allocates=False, forceinline=True)
 @formula
 def take(Z, at):
     """The vector whose x lies at `at`."""
-    return Z[at], Z[at + SPAN], Z[at + 2 * SPAN]
+    return Z[at], Z[at + HEXAHEDRON_SPAN], Z[at + 2 * HEXAHEDRON_SPAN]
 
 
 @formula
@@ -105,10 +105,12 @@ def take_mean(Z, p, q, r, s):
 
 @formula
 def take_mean_vector(Z, p, q, r, s):
-    two = 2 * SPAN
+    two = 2 * HEXAHEDRON_SPAN
     return (
         take_mean(Z, p, q, r, s),
-        take_mean(Z, p + SPAN, q + SPAN, r + SPAN, s + SPAN),
+        take_mean(
+            Z, p + HEXAHEDRON_SPAN, q + HEXAHEDRON_SPAN, r + HEXAHEDRON_SPAN, s + HEXAHEDRON_SPAN
+        ),
         take_mean(Z, p + two, q + two, r + two, s + two),
     )
 
@@ -124,14 +126,14 @@ def find_volume(Z, k, edges, away):
 def fill_volumes(Z, n, away, out):
     """Store the triple products of a row's corners in eight rows from `out`; see `find_volume`."""
     for k in range(n):
-        Z[out + 0 * SPAN + k] = find_volume(Z, k, CORNERS[0], away)
-        Z[out + 1 * SPAN + k] = find_volume(Z, k, CORNERS[1], away)
-        Z[out + 2 * SPAN + k] = find_volume(Z, k, CORNERS[2], away)
-        Z[out + 3 * SPAN + k] = find_volume(Z, k, CORNERS[3], away)
-        Z[out + 4 * SPAN + k] = find_volume(Z, k, CORNERS[4], away)
-        Z[out + 5 * SPAN + k] = find_volume(Z, k, CORNERS[5], away)
-        Z[out + 6 * SPAN + k] = find_volume(Z, k, CORNERS[6], away)
-        Z[out + 7 * SPAN + k] = find_volume(Z, k, CORNERS[7], away)
+        Z[out + 0 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[0], away)
+        Z[out + 1 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[1], away)
+        Z[out + 2 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[2], away)
+        Z[out + 3 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[3], away)
+        Z[out + 4 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[4], away)
+        Z[out + 5 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[5], away)
+        Z[out + 6 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[6], away)
+        Z[out + 7 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[7], away)
 
 
 @formula
@@ -140,8 +142,8 @@ def add_corner_force(Z, at, edges, shares, steep, p):
     a, b, c = edges
     own, far, near = shares
     Z[at] += own * a[0] - (far * b[0] + near * c[0]) + steep * p[0]
-    Z[at + SPAN] += own * a[1] - (far * b[1] + near * c[1]) + steep * p[1]
-    Z[at + 2 * SPAN] += own * a[2] - (far * b[2] + near * c[2]) + steep * p[2]
+    Z[at + HEXAHEDRON_SPAN] += own * a[1] - (far * b[1] + near * c[1]) + steep * p[1]
+    Z[at + 2 * HEXAHEDRON_SPAN] += own * a[2] - (far * b[2] + near * c[2]) + steep * p[2]
 
 
 @formula
@@ -188,8 +190,8 @@ def add_corner_value(Z, k, edges, forces, area_weight, e2):
 def add_corner_turn(Z, at, two, d, hc, bl, back, p):
     """Add a corner's Hessian product (R14.5) for one edge to its force."""
     Z[at] += two * (d[0] + hc[0] + bl[0] + back * p[0])
-    Z[at + SPAN] += two * (d[1] + hc[1] + bl[1] + back * p[1])
-    Z[at + 2 * SPAN] += two * (d[2] + hc[2] + bl[2] + back * p[2])
+    Z[at + HEXAHEDRON_SPAN] += two * (d[1] + hc[1] + bl[1] + back * p[1])
+    Z[at + 2 * HEXAHEDRON_SPAN] += two * (d[2] + hc[2] + bl[2] + back * p[2])
 
 
 @formula
@@ -204,9 +206,9 @@ def add_corner_product(Z, k, edges, forces, area_weight, e2):
     a = take(Z, i)
     b = take(Z, j)
     c = take(Z, e)
-    da = take(Z, i + AWAY)
-    db = take(Z, j + AWAY)
-    dc = take(Z, e + AWAY)
+    da = take(Z, i + AWAY_ROW)
+    db = take(Z, j + AWAY_ROW)
+    dc = take(Z, e + AWAY_ROW)
     p = cross(b, c)
     q = cross(c, a)
     r = cross(a, b)
@@ -242,7 +244,7 @@ def add_corner_product(Z, k, edges, forces, area_weight, e2):
 @kernel(allocates=False)
 def clear_sums(Z, n):
     """Set FLUX, HIGH and SUM to zero."""
-    for row in range(FLUX, BLOCK, SPAN):
+    for row in range(FLUX_ROW, BLOCK_ROW, HEXAHEDRON_SPAN):
         for k in range(n):
             Z[row + k] = 0.0
     for k in range(n):
@@ -334,18 +336,22 @@ def fill_centre_blocks(Z, n, area_weight, e2):
         x = turn_about(weight * f * f, (a, b, c), (1.0 + bb + cc, ab, ca), half, t, p)
         y = turn_about(weight * g * g, (b, c, a), (1.0 + cc + aa, bc, ab), half, t, q)
         z = turn_about(weight * h * h, (c, a, b), (1.0 + aa + bb, ca, bc), half, t, r)
-        put_six(Z, BLOCK + k, x)
-        put_six(Z, BLOCKS + k, (*plus(plus(x[:3], y[:3]), z[:3]), *plus(plus(x[3:], y[3:]), z[3:])))
+        put_six(Z, BLOCK_ROW + k, x)
+        put_six(
+            Z,
+            SUMMED_BLOCK_ROW + k,
+            (*plus(plus(x[:3], y[:3]), z[:3]), *plus(plus(x[3:], y[3:]), z[3:])),
+        )
 
 
 @formula
 def put_six(Z, at, x):
     Z[at] = x[0]
-    Z[at + SPAN] = x[1]
-    Z[at + 2 * SPAN] = x[2]
-    Z[at + 3 * SPAN] = x[3]
-    Z[at + 4 * SPAN] = x[4]
-    Z[at + 5 * SPAN] = x[5]
+    Z[at + HEXAHEDRON_SPAN] = x[1]
+    Z[at + 2 * HEXAHEDRON_SPAN] = x[2]
+    Z[at + 3 * HEXAHEDRON_SPAN] = x[3]
+    Z[at + 4 * HEXAHEDRON_SPAN] = x[4]
+    Z[at + 5 * HEXAHEDRON_SPAN] = x[5]
 
 
 @kernel(allocates=False)
@@ -360,7 +366,7 @@ def fill_edges(nodes, inverse, i, j, at, Z):
             low, high = nodes[component, p, q], nodes[component, p, q, 1:]
             if axis < 2:
                 high = nodes[component, p + 1 - axis, q + axis]
-            row = at + edge * VECTOR + component * SPAN
+            row = at + edge * VECTOR_LENGTH + component * HEXAHEDRON_SPAN
             out = Z[row : row + lengths.shape[0]]
             for k in range(lengths.shape[0]):
                 out[k] = (high[k] - low[k]) * lengths[k]
@@ -375,10 +381,10 @@ def fill_cell_rows(laws, cells, i, j, n, Z):
         q = j + EDGES[edge][2]
         inverse = laws.inverse[axis][p, q]
         way = laws.ways[axis][q if axis == 0 else p]
-        row = INVERSE + edge * SPAN
+        row = INVERSE + edge * HEXAHEDRON_SPAN
         for k in range(inverse.shape[0]):
             Z[row + k] = inverse[k]
-            Z[row + 8 * SPAN + k] = way[k] if axis < 2 else way[q]
+            Z[row + 8 * HEXAHEDRON_SPAN + k] = way[k] if axis < 2 else way[q]
     for k in range(n):
         Z[WEIGHT + k] = 0.125 * laws.scale * cells[k]
 
@@ -386,7 +392,7 @@ def fill_cell_rows(laws, cells, i, j, n, Z):
 @kernel(allocates=False)
 def add_straight(Z, edge, n, row):
     """Add the straight-line weights over length of a row of edges to an adjacent row of nodes."""
-    at = INVERSE + edge * SPAN
+    at = INVERSE + edge * HEXAHEDRON_SPAN
     inverse = Z[at : at + n]
     way = Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + n]
     if edge < 4:
@@ -401,9 +407,9 @@ def add_straight(Z, edge, n, row):
 def add_centre_blocks(Z, i, j, n, own, ahead):
     """Add blocks of a row of cells and its straight lines to those of the line solve (6, nodes)."""
     for entry in range(6):
-        at = BLOCKS + entry * SPAN
+        at = SUMMED_BLOCK_ROW + entry * HEXAHEDRON_SPAN
         total = Z[at : at + n]
-        at = BLOCK + entry * SPAN
+        at = BLOCK_ROW + entry * HEXAHEDRON_SPAN
         along = Z[at : at + n]
         diagonal = entry == 0 or entry == 3 or entry == 5
         for b in range(2):
@@ -427,15 +433,15 @@ def add_to_nodes(Z, edges, i, j, n, out):
     """Add the forces of the eight rows of edges and of the straight lines to four rows of nodes."""
     m = n + 1
     for edge in range(8):
-        at = INVERSE + edge * SPAN
+        at = INVERSE + edge * HEXAHEDRON_SPAN
         inverse = Z[at : at + m]
         straight = Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + m]
-        for component in range(0, VECTOR, SPAN):
-            at = edge * VECTOR + component
-            flux = Z[FLUX + at : FLUX + at + m]
+        for component in range(0, VECTOR_LENGTH, HEXAHEDRON_SPAN):
+            at = edge * VECTOR_LENGTH + component
+            flux = Z[FLUX_ROW + at : FLUX_ROW + at + m]
             vector = Z[edges + at : edges + at + m]
             if edge < 4:
-                high = Z[HIGH + at : HIGH + at + m]
+                high = Z[HIGH_ROW + at : HIGH_ROW + at + m]
                 for k in range(1, n):
                     flux[k] = (flux[k] + high[k - 1]) * inverse[k] + straight[k] * vector[k]
             else:
@@ -445,10 +451,12 @@ def add_to_nodes(Z, edges, i, j, n, out):
         for b in range(2):
             sign_i, sign_j = 2.0 * a - 1.0, 2.0 * b - 1.0
             for component in range(3):
-                at = FLUX + component * SPAN
-                along_i = Z[at + b * VECTOR : at + b * VECTOR + m]
-                along_j = Z[at + (2 + a) * VECTOR : at + (2 + a) * VECTOR + m]
-                along_k = Z[at + (4 + 2 * a + b) * VECTOR : at + (4 + 2 * a + b) * VECTOR + m]
+                at = FLUX_ROW + component * HEXAHEDRON_SPAN
+                along_i = Z[at + b * VECTOR_LENGTH : at + b * VECTOR_LENGTH + m]
+                along_j = Z[at + (2 + a) * VECTOR_LENGTH : at + (2 + a) * VECTOR_LENGTH + m]
+                along_k = Z[
+                    at + (4 + 2 * a + b) * VECTOR_LENGTH : at + (4 + 2 * a + b) * VECTOR_LENGTH + m
+                ]
                 row = out[component, i + a, j + b]
                 for k in range(1, n):
                     row[k] += (sign_i * along_i[k] + sign_j * along_j[k]) + (
@@ -461,11 +469,11 @@ def sum_straight(Z, n):
     """Straight-line part of J in a row of cells: half of weight over length times length²."""
     total = 0.0
     for edge in range(8):
-        row = EDGE + edge * VECTOR
-        inverse = INVERSE + edge * SPAN
-        straight = STRAIGHT + edge * SPAN
+        row = EDGE + edge * VECTOR_LENGTH
+        inverse = INVERSE + edge * HEXAHEDRON_SPAN
+        straight = STRAIGHT + edge * HEXAHEDRON_SPAN
         for k in range(n + 1 if edge < 4 else n):
-            x, y, z = Z[row + k], Z[row + SPAN + k], Z[row + 2 * SPAN + k]
+            x, y, z = Z[row + k], Z[row + HEXAHEDRON_SPAN + k], Z[row + 2 * HEXAHEDRON_SPAN + k]
             total += 0.5 * Z[straight + k] / Z[inverse + k] * (x * x + y * y + z * z)
     return total
 
@@ -483,11 +491,11 @@ def fill_strength(nodes, inverse, epsilon, most, strength, Z):
     for i in range(n1):
         for j in range(n2):
             fill_edges(nodes, inverse, i, j, EDGE, Z)
-            fill_volumes(Z, round_up(n), 0, VOLUME)
+            fill_volumes(Z, round_up(n), 0, VOLUME_ROW)
             for edge in range(8):
-                at = EDGE + edge * VECTOR
+                at = EDGE + edge * VECTOR_LENGTH
                 for k in range(n + 1):
-                    Z[SQUARE + edge * SPAN + k] = dot(take(Z, at + k), take(Z, at + k))
+                    Z[SQUARE + edge * HEXAHEDRON_SPAN + k] = dot(take(Z, at + k), take(Z, at + k))
             for k in range(n):
                 Z[LEAST + k] = 1.0
             for corner in range(8):
@@ -495,10 +503,10 @@ def fill_strength(nodes, inverse, epsilon, most, strength, Z):
                 a = corner & 1
                 b = (corner >> 1) & 1
                 c = corner >> 2
-                p = SQUARE + b * SPAN + c
-                q = SQUARE + (2 + a) * SPAN + c
-                r = SQUARE + (4 + 2 * a + b) * SPAN
-                volume = VOLUME + corner * SPAN
+                p = SQUARE + b * HEXAHEDRON_SPAN + c
+                q = SQUARE + (2 + a) * HEXAHEDRON_SPAN + c
+                r = SQUARE + (4 + 2 * a + b) * HEXAHEDRON_SPAN
+                volume = VOLUME_ROW + corner * HEXAHEDRON_SPAN
                 for k in range(n):
                     det = Z[volume + k]
                     least = Z[LEAST + k]
@@ -507,7 +515,7 @@ def fill_strength(nodes, inverse, epsilon, most, strength, Z):
             out = strength[i, j]
             for k in range(n):
                 sine2 = Z[LEAST + k]
-                factor = SHARP / math.sqrt(sine2 if sine2 > 1e-30 else 1e-30)
+                factor = SHARP_CORNER_SINE / math.sqrt(sine2 if sine2 > 1e-30 else 1e-30)
                 factor = factor if factor > 1.0 else 1.0
                 out[k] = epsilon * (factor if factor < most else most)
 
@@ -530,14 +538,14 @@ def assemble(nodes, functional, work, gradient, blocks, planes, Z):
             fill_edges(nodes, laws.inverse, i, j, EDGE, Z)
             fill_cell_rows(laws, strength[i, j], i, j, n, Z)
             fill_values(Z, padded, area_weight, e2)
-            if work >= MATRIX:
+            if work >= WITH_MATRIX:
                 fill_centre_blocks(Z, padded, area_weight, e2 + CENTRE_E2)
                 add_centre_blocks(Z, i, j, n, blocks[0], blocks[1])
             for k in range(n):
                 total += Z[SUM + k]
-            if work == ENERGY:
+            if work == ONLY_ENERGY:
                 total += sum_straight(Z, n)
-            if work >= GRADIENT:
+            if work >= WITH_GRADIENT:
                 add_to_nodes(Z, EDGE, i, j, n, gradient)
         planes[i] = total
 
@@ -572,18 +580,18 @@ def compare_corners(nodes, old, inverse, shape, Z):
         for j in range(n2):
             fill_edges(nodes, inverse, i, j, EDGE, Z)
             fill_edges(old, inverse, i, j, TURN, Z)
-            fill_volumes(Z, padded, 0, VOLUME)
-            fill_volumes(Z, padded, AWAY, OTHER_VOLUME)
-            for row in range(VOLUME, OTHER_VOLUME, SPAN):
+            fill_volumes(Z, padded, 0, VOLUME_ROW)
+            fill_volumes(Z, padded, AWAY_ROW, OTHER_VOLUME)
+            for row in range(VOLUME_ROW, OTHER_VOLUME, HEXAHEDRON_SPAN):
                 for k in range(padded):
-                    was = Z[row + OTHER_VOLUME - VOLUME + k]
-                    Z[row + OTHER_VOLUME - VOLUME + k] = was if was > 0.0 else 1.0
+                    was = Z[row + OTHER_VOLUME - VOLUME_ROW + k]
+                    Z[row + OTHER_VOLUME - VOLUME_ROW + k] = was if was > 0.0 else 1.0
                 for k in range(padded):
                     # not min(), which would lose a NaN
                     now = Z[row + k]
                     ratio = Z[LEAST + k]
                     least = Z[SUM + k]
-                    part = now / Z[row + OTHER_VOLUME - VOLUME + k]
+                    part = now / Z[row + OTHER_VOLUME - VOLUME_ROW + k]
                     Z[LEAST + k] = ratio if ratio <= part else part
                     Z[SUM + k] = least if least <= now else now
     ratio = math.inf
@@ -610,14 +618,14 @@ def halve_steps(nodes, old, inverse, floor, part, Z):
         for j in range(n2):
             fill_edges(nodes, inverse, i, j, EDGE, Z)
             fill_edges(old, inverse, i, j, TURN, Z)
-            fill_volumes(Z, round_up(n), 0, VOLUME)
-            fill_volumes(Z, round_up(n), AWAY, OTHER_VOLUME)
+            fill_volumes(Z, round_up(n), 0, VOLUME_ROW)
+            fill_volumes(Z, round_up(n), AWAY_ROW, OTHER_VOLUME)
             for corner in range(8):
                 a = corner & 1
                 b = (corner >> 1) & 1
                 c = corner >> 2
-                now = VOLUME + corner * SPAN
-                was = OTHER_VOLUME + corner * SPAN
+                now = VOLUME_ROW + corner * HEXAHEDRON_SPAN
+                was = OTHER_VOLUME + corner * HEXAHEDRON_SPAN
                 for k in range(n):
                     if not Z[now + k] >= floor * Z[was + k]:
                         short += 1

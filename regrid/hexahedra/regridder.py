@@ -29,10 +29,10 @@ from regrid.hexahedra.faces import (
     find_turned_edge,
 )
 from regrid.hexahedra.functional import (
-    ENERGY,
-    LONGEST,
-    MATRIX,
-    ROWS,
+    HEXAHEDRON_ROWS,
+    LONGEST_HEXAHEDRON_ROW,
+    ONLY_ENERGY,
+    WITH_MATRIX,
     assemble,
     compare_corners,
     fill_product,
@@ -43,23 +43,25 @@ from regrid.hexahedra.solve import CoarseBlock, factor_lines, solve, solve_lines
 from regrid.protocol import RegridReport, RegridResult
 
 LEAST_RATIO = 0.1  # least ratio of a predicted corner volume to its old value
-START_RATIO = 0.5  # the step starts from the moved grid if it keeps this much of every corner
+MOVED_GRID_START_RATIO = (
+    0.5  # the step starts from the moved grid if it keeps this much of every corner
+)
 STEP_RATIO = 0.25  # a step on the final faces keeps this much of every corner, node by node,
 SMOOTH_RATIO = 0.5  # and is followed by another one if it kept less than this
 LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
 MOST_SHORTENINGS = 40
-MOST_STEPS = 6  # Newton steps after the first
+MOST_NEWTON_STEPS = 6  # Newton steps after the first
 MOST_POLISH = 15  # Newton steps after untangling, until the residual is below SETTLED cells
-SETTLED = 0.02
+SETTLED_MOVE = 0.02
 # the solve that extends the faces' motion inward
 FAR_TOLERANCE = 0.01
 FAR_ITERATIONS = 30
 # a residual up to HOVER floors is solved down to DEEP floors
-HOVER = 1.3
-DEEP = 0.2
+HOVERING_FLOORS = 1.3
+DEEP_SOLVE_FLOORS = 0.2
 SMOOTH_FLOOR = 0.3  # floors: a smooth part below this is ignored
-ROUND_OFF = 1e-12
-MOST_HALVINGS = 6  # the motion is divided into at most 2**6 parts
+ROUND_OFF_STEP = 1e-12
+MOST_MOTION_HALVINGS = 6  # the motion is divided into at most 2**6 parts
 MOST_UNTANGLING = 60  # steps
 MOST_RESCUES = 8  # of one regrid, in all parts of its motion
 SMOOTHINGS = (0.2, 0.1, 0.05, 0.02)  # e of the last steps of an untangling
@@ -91,7 +93,7 @@ class Workspace:
         self.blocks = np.zeros((2, 6, *nodes))
         self.strength = np.empty(cells)
         self.planes = np.empty(cells[0])
-        self.scratch = np.zeros(ROWS)
+        self.scratch = np.zeros(HEXAHEDRON_ROWS)
         self.coarse = CoarseBlock(cells)
 
 
@@ -139,7 +141,7 @@ class HexahedraMove(Workspace):
             return False  # no interior makes that corner positive
         begin = self.old.copy()
         end = self.faces.copy()
-        for halving in range(1, MOST_HALVINGS + 1):
+        for halving in range(1, MOST_MOTION_HALVINGS + 1):
             parts = 2**halving
             self.old = begin.copy()
             self.ratio = np.inf
@@ -167,7 +169,7 @@ class HexahedraMove(Workspace):
             self.trial[:] = self.base
             return self._accept()
         self.rescued = False
-        if moved > START_RATIO:
+        if moved > MOVED_GRID_START_RATIO:
             self.trial[:] = self.base
             self.moved = False
             ratio = self._newton(self.old)
@@ -179,8 +181,8 @@ class HexahedraMove(Workspace):
             if predicted is None:
                 return False
             ratio = predicted
-        for step in range(MOST_POLISH if self.rescued else MOST_STEPS):
-            smooth = ratio > SMOOTH_RATIO and not (self.rescued and self.error > SETTLED)
+        for step in range(MOST_POLISH if self.rescued else MOST_NEWTON_STEPS):
+            smooth = ratio > SMOOTH_RATIO and not (self.rescued and self.error > SETTLED_MOVE)
             if smooth and step >= options.newton_steps - 1:
                 break
             ratio = self._newton(self.trial.copy())
@@ -202,13 +204,13 @@ class HexahedraMove(Workspace):
 
     def assemble_at(self, nodes: np.ndarray, work: int, e2: float = 0.0) -> float:
         """Value of J with the frozen strength, or gradient and factored lines, as `work` says."""
-        if work > ENERGY:
+        if work > ONLY_ENERGY:
             self.gradient[:] = 0.0
             self.blocks[:] = 0.0
         functional = self.functional(e2)
         planes = self.planes
         assemble(nodes, functional, work, self.gradient, self.blocks, planes, self.scratch)
-        if work == MATRIX:
+        if work == WITH_MATRIX:
             factor_lines(self.blocks)
         return float(self.planes.sum())
 
@@ -238,7 +240,7 @@ class HexahedraMove(Workspace):
         if far:
             r -= multiply(change)
         scale = self.laws.scale * self.inner
-        hover = (HOVER * options.floor) ** 2 * scale
+        hover = (HOVERING_FLOORS * options.floor) ** 2 * scale
         first = float((r * self.precondition(r)).sum())
         self.error = math.sqrt(max(first, 0.0) / scale) if np.isfinite(first) else np.inf
         corrected = False
@@ -255,9 +257,11 @@ class HexahedraMove(Workspace):
         if corrected:
             np.negative(self.gradient, out=r)
             r -= multiply(change)
-        floor = options.floor if first > hover and not corrected else DEEP * options.floor
+        floor = (
+            options.floor if first > hover and not corrected else DEEP_SOLVE_FLOORS * options.floor
+        )
         tolerance = FAR_TOLERANCE if far else options.tolerance
-        stop = max(max(floor, ROUND_OFF) ** 2 * scale, tolerance**2 * first)
+        stop = max(max(floor, ROUND_OFF_STEP) ** 2 * scale, tolerance**2 * first)
         most = FAR_ITERATIONS if far else options.max_iterations
         done, _, _ = solve(multiply, self.precondition, r, change, stop, most)
         self.iterations += done
@@ -270,7 +274,7 @@ class HexahedraMove(Workspace):
         """
         base = self.trial.copy()
         self.strengthen(base)
-        self.assemble_at(base, MATRIX)
+        self.assemble_at(base, WITH_MATRIX)
         change = self.change
         change[:] = 0.0
         if not self._solve(base, change) or not np.isfinite(change).all():
@@ -282,7 +286,7 @@ class HexahedraMove(Workspace):
 
     def _search(self, base, change, old) -> float:
         """The largest fraction of the step, shortened at corners as well, that decreases J."""
-        before = self.assemble_at(base, ENERGY)
+        before = self.assemble_at(base, ONLY_ENERGY)
         part = 1.0
         while part >= LEAST_PART:
             steps = np.full(base.shape[1:], part)
@@ -292,7 +296,7 @@ class HexahedraMove(Workspace):
                 inverse = self.laws.inverse
                 Z = self.scratch
                 if not halve_steps(self.trial, base, inverse, STEP_RATIO, steps, Z):
-                    if self.assemble_at(self.trial, ENERGY) < before:
+                    if self.assemble_at(self.trial, ONLY_ENERGY) < before:
                         return self._compare(self.trial, old)[0]
                     break
             part *= 0.5
@@ -302,7 +306,7 @@ class HexahedraMove(Workspace):
     def _predict(self, moved: float) -> float | None:
         """Extend the faces' motion inward by the old grid's Hessian, or else by other methods."""
         self.strengthen(self.old)
-        self.assemble_at(self.old, MATRIX)
+        self.assemble_at(self.old, WITH_MATRIX)
         change = self.base - self.old
         self._solve(self.old, change, far=True)
         np.add(self.old, change, out=self.trial)
@@ -356,15 +360,15 @@ class HexahedraMove(Workspace):
     def _smooth_step(self, e2: float) -> tuple[float, float]:
         """A Newton step of the smoothed functional, halved until J falls: J before and after."""
         base = self.trial.copy()
-        before = self.assemble_at(base, ENERGY, e2)
-        self.assemble_at(base, MATRIX, e2)
+        before = self.assemble_at(base, ONLY_ENERGY, e2)
+        self.assemble_at(base, WITH_MATRIX, e2)
         change = np.zeros_like(base)
         self._solve(base, change, e2)
         part = 1.0
         while part >= LEAST_PART:
             np.multiply(change, part, out=self.trial)
             self.trial += base
-            after = self.assemble_at(self.trial, ENERGY, e2)
+            after = self.assemble_at(self.trial, ONLY_ENERGY, e2)
             if after < before:
                 return before, after
             part *= 0.5
@@ -372,7 +376,7 @@ class HexahedraMove(Workspace):
         return before, before
 
 
-EVEN = 1e-6  # families whose weights differ by less are ranked by the numbers of cells
+EVEN_CELL_WEIGHTS = 1e-6  # families whose weights differ by less are ranked by the numbers of cells
 
 
 class BarrierRegridder3D:
@@ -436,8 +440,10 @@ class BarrierRegridder3D:
             np.ascontiguousarray(nodes.transpose(axes)[:: -1 if mirrored else 1])
             for nodes in (previous, boundary)
         )
-        if faces.shape[3] - 1 > LONGEST:
-            raise BadInput(f"regrid: a block in space has at most {LONGEST} cells a direction")
+        if faces.shape[3] - 1 > LONGEST_HEXAHEDRON_ROW:
+            raise BadInput(
+                f"regrid: a block in space has at most {LONGEST_HEXAHEDRON_ROW} cells a direction"
+            )
         cells = tuple(n - 1 for n in faces.shape[1:])
         if cells not in self._workspaces:
             self._workspaces[cells] = Workspace(cells)
@@ -457,7 +463,7 @@ def _order_axes(weights, shape: tuple[int, ...]) -> tuple[int, int, int]:
 
     A tie must not be decided by round-off; the longest rows come last because they run fastest.
     """
-    steps = np.round(np.asarray(weights) / EVEN)
+    steps = np.round(np.asarray(weights) / EVEN_CELL_WEIGHTS)
     order = sorted(range(3), key=lambda axis: (-steps[axis], shape[axis], axis))
     first = order[0]
     second, third = sorted(order[1:], key=lambda axis: (shape[axis], axis))

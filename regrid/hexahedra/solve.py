@@ -21,7 +21,7 @@ import numpy as np
 from regrid.barrier.coarse_nodes import cut_evenly
 from regrid.hexahedra.faces import FaceLaws, Functional
 from regrid.hexahedra.functional import (
-    MATRIX,
+    WITH_MATRIX,
     assemble,
     compare_corners,
     cross,
@@ -143,11 +143,11 @@ def solve(multiply, precondition, r, x, stop: float, most: int):
 
 
 LEAST_CELLS = 1000  # of corrected blocks: in smaller ones the fine solve removes all errors
-STRETCH = 4  # fine edges per coarse edge
+FINE_EDGES_PER_COARSE = 4  # fine edges per coarse edge
 LEAST_VOLUME = 0.02  # of a coarse corner, over that of its conditional lengths
 # of the coarse solve
-TOLERANCE = 0.05
-ITERATIONS = 12
+COARSE_TOLERANCE = 0.05
+COARSE_ITERATIONS = 12
 
 
 def cut_block(cells: int) -> np.ndarray:
@@ -155,7 +155,7 @@ def cut_block(cells: int) -> np.ndarray:
 
     About every fourth node, at least two coarse edges, symmetric about the middle.
     """
-    return cut_evenly(cells, max(2, cells // STRETCH))
+    return cut_evenly(cells, max(2, cells // FINE_EDGES_PER_COARSE))
 
 
 def make_hats(starts: np.ndarray) -> np.ndarray:
@@ -233,7 +233,7 @@ class CoarseBlock:
         functional = Functional(laws, strength, functional.area_weight)
         for array in (self.gradient, self.blocks, self.solution):
             array[:] = 0.0
-        assemble(coarse, functional, MATRIX, self.gradient, self.blocks, self.planes, Z)
+        assemble(coarse, functional, WITH_MATRIX, self.gradient, self.blocks, self.planes, Z)
         factor_lines(self.blocks)
 
         def multiply(p):
@@ -246,8 +246,8 @@ class CoarseBlock:
 
         right = contract(self.hats, r)
         left = right.copy()
-        stop = TOLERANCE**2 * float((left * precondition(left)).sum())
-        solve(multiply, precondition, left, self.solution, stop, ITERATIONS)
+        stop = COARSE_TOLERANCE**2 * float((left * precondition(left)).sum())
+        solve(multiply, precondition, left, self.solution, stop, COARSE_ITERATIONS)
         gain = float((right * self.solution).sum())
         return gain if math.isfinite(gain) else 0.0
 

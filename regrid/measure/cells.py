@@ -25,13 +25,13 @@ from regrid.jit import compiled_once, inlined, kernel
 from regrid.sides import compute_area
 
 # of the block: what `find_places` says of a point
-OUTSIDE = 0
-INSIDE = 1
-BESIDE = 2
+OUTSIDE_BLOCK = 0
+INSIDE_BLOCK = 1
+BESIDE_BLOCK = 2
 ON_EDGE = 1e-12  # of a cell: so far beyond a side counts as inside
 MOST_ITERATIONS = 30
 MOST_QUADS = 12  # that are tried around the cell
-CONVERGED = 1e-14  # of the distance between centres
+CONVERGED_DISTANCE = 1e-14  # of the distance between centres
 UNIT_PARTS = 1e-12
 
 
@@ -185,7 +185,7 @@ def _solve_quad(nodes, a, b, x, y):
             best = size
             best_s = s
             best_t = t
-        elif size <= 1e3 * CONVERGED * scale:
+        elif size <= 1e3 * CONVERGED_DISTANCE * scale:
             break  # round-off
         ds_x, ds_y = xs + t * xst, ys + t * yst
         dt_x, dt_y = xt + s * xst, yt + s * yst
@@ -196,7 +196,7 @@ def _solve_quad(nodes, a, b, x, y):
         t += (ds_x * ry - rx * ds_y) / determinant
         if not (abs(s) < 1e3 and abs(t) < 1e3):
             break
-    return best_s, best_t, best <= 1e3 * CONVERGED * scale
+    return best_s, best_t, best <= 1e3 * CONVERGED_DISTANCE * scale
 
 
 @compiled_once
@@ -247,7 +247,7 @@ def find_places(nodes, points, reach, cells, quads, parts, where):
     sign = 1.0 if compute_area(nodes) >= 0.0 else -1.0
     for k in range(points.shape[1]):
         x, y = points[0, k], points[1, k]
-        where[k] = OUTSIDE
+        where[k] = OUTSIDE_BLOCK
         if not (abs(x) < 1e300 and abs(y) < 1e300):  # nan, too
             continue
         i, j = min(max(cells[0, k], 0), ni - 1), min(max(cells[1, k], 0), nj - 1)
@@ -268,7 +268,7 @@ def find_places(nodes, points, reach, cells, quads, parts, where):
             far_j = nj - 0.5 + reach
             if not (placed and low <= a + s <= far_i and low <= b + t <= far_j):
                 continue
-        where[k] = INSIDE if inside else BESIDE
+        where[k] = INSIDE_BLOCK if inside else BESIDE_BLOCK
         cells[0, k] = i
         cells[1, k] = j
         quads[0, k] = a

@@ -45,8 +45,8 @@ def compute_hexahedron_centres(nodes: np.ndarray) -> np.ndarray:
     return 0.125 * (along[..., 1:] + along[..., :-1])
 
 
-UNIT = 2.0**-53
-BOUND = (3.0 + 16.0 * UNIT) * UNIT
+UNIT_ROUND_OFF = 2.0**-53
+ORIENTATION_ERROR_BOUND = (3.0 + 16.0 * UNIT_ROUND_OFF) * UNIT_ROUND_OFF
 UNDERFLOW = 4.0 * np.finfo(float).tiny
 # Corner triangles 1 to 4 of a cell: its node, and two neighbours so that convex means positive.
 TRIANGLES = (
@@ -58,8 +58,10 @@ TRIANGLES = (
 
 # Corner triangles all of whose nodes are boundary nodes: (corner, i, j) in (4, ni, nj).
 BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
-FLAT = 1e-2  # part of its cell up to which a block's corner triangle makes the cell a triangle
-TURNED = 1e-9  # part of its cell up to which it may be turned over, by rounding
+FLAT_TRIANGLE_PART = (
+    1e-2  # part of its cell up to which a block's corner triangle makes the cell a triangle
+)
+TURNED_TRIANGLE_PART = 1e-9  # part of its cell up to which it may be turned over, by rounding
 
 
 def turn_exactly(a, b, c) -> int:
@@ -78,7 +80,7 @@ def compute_turns(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarr
         left = (a[0] - c[0]) * (b[1] - c[1])
         right = (a[1] - c[1]) * (b[0] - c[0])
         area = left - right
-        bound = BOUND * (np.abs(left) + np.abs(right)) + UNDERFLOW
+        bound = ORIENTATION_ERROR_BOUND * (np.abs(left) + np.abs(right)) + UNDERFLOW
         sure = (np.abs(area) > bound) & np.isfinite(area)
         # Equal coordinates make both products exact zeros: collapsed edges, lines along x or y.
         sure |= ((a[0] == c[0]) | (b[1] == c[1])) & ((a[1] == c[1]) | (b[0] == c[0]))
@@ -143,7 +145,7 @@ def mark_triangles(nodes, areas):
         for k in range(4):
             others = others and (k == corner or areas[k] > 0.0)
         cell = areas[corner] + areas[(corner + 2) % 4]
-        flat = -TURNED * cell <= areas[corner] <= FLAT * cell
+        flat = -TURNED_TRIANGLE_PART * cell <= areas[corner] <= FLAT_TRIANGLE_PART * cell
         if cosine < 0.0 and others and flat:
             marks += 1 << corner
     return marks

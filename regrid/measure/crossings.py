@@ -18,16 +18,16 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.jit import kernel
-from regrid.measure.corners import BOUND, UNDERFLOW, compute_turns
+from regrid.measure.corners import ORIENTATION_ERROR_BOUND, UNDERFLOW, compute_turns
 
-LEAF = 4  # edges of the smallest pieces
+LEAF_EDGES = 4  # edges of the smallest pieces
 LOW_X, HIGH_X, LOW_Y, HIGH_Y = range(4)  # rows of the boxes
-NONE = -1
-COINCIDENT = -2
-RIGHTWARD = 1
-LEFTWARD = 2
-UPWARD = 4
-DOWNWARD = 8
+NO_CROSSING = -1
+COINCIDENT_EDGES = -2
+GOES_RIGHT = 1
+GOES_LEFT = 2
+GOES_UP = 4
+GOES_DOWN = 8
 
 
 @kernel
@@ -52,7 +52,7 @@ def find_turn(a_x, a_y, b_x, b_y, c_x, c_y):
     """1 where a, b, c turn left for certain, -1 right, 0 where rounding leaves it open."""
     left, right = (a_x - c_x) * (b_y - c_y), (a_y - c_y) * (b_x - c_x)
     area = left - right
-    bound = BOUND * (abs(left) + abs(right)) + UNDERFLOW
+    bound = ORIENTATION_ERROR_BOUND * (abs(left) + abs(right)) + UNDERFLOW
     return (1 if area > bound else 0) - (1 if area < -bound else 0)
 
 
@@ -93,8 +93,8 @@ def fill_tree(line, leaves, boxes, ways, ends):
     count = line.shape[1] - 1
     short = -1
     for leaf in range(leaves):
-        first = min(count, leaf * LEAF)
-        last = min(count, (leaf + 1) * LEAF)
+        first = min(count, leaf * LEAF_EDGES)
+        last = min(count, (leaf + 1) * LEAF_EDGES)
         low_x = np.inf
         low_y = np.inf
         high_x = -np.inf
@@ -103,8 +103,8 @@ def fill_tree(line, leaves, boxes, ways, ends):
         for k in range(first, last):
             low_x, high_x = min(low_x, x[k], x[k + 1]), max(high_x, x[k], x[k + 1])
             low_y, high_y = min(low_y, y[k], y[k + 1]), max(high_y, y[k], y[k + 1])
-            here = (RIGHTWARD if x[k + 1] > x[k] else 0) | (LEFTWARD if x[k + 1] < x[k] else 0)
-            here |= (UPWARD if y[k + 1] > y[k] else 0) | (DOWNWARD if y[k + 1] < y[k] else 0)
+            here = (GOES_RIGHT if x[k + 1] > x[k] else 0) | (GOES_LEFT if x[k + 1] < x[k] else 0)
+            here |= (GOES_UP if y[k + 1] > y[k] else 0) | (GOES_DOWN if y[k + 1] < y[k] else 0)
             way &= here
             if here == 0 and short < 0:
                 short = k
@@ -163,7 +163,7 @@ def search_meeting(nodes, line, boxes, ways, ends, stack):
     leaves = boxes.shape[1] // 2
     short = fill_tree(line, leaves, boxes, ways, ends)
     if short >= 0:
-        return COINCIDENT, short
+        return COINCIDENT_EDGES, short
     depth = 1
     stack[0, 0] = stack[1, 0] = 1
     while depth > 0:
@@ -203,7 +203,7 @@ def search_meeting(nodes, line, boxes, ways, ends, stack):
                     continue
                 if may_meet(line, a, b, count, closed):
                     return a, b
-    return NONE, NONE
+    return NO_CROSSING, NO_CROSSING
 
 
 class BoundaryCheck:
@@ -211,7 +211,7 @@ class BoundaryCheck:
 
     def __init__(self, ni: int, nj: int):
         count = 2 * (ni + nj)
-        leaves = 1 << max(0, (-(-count // LEAF) - 1).bit_length())
+        leaves = 1 << max(0, (-(-count // LEAF_EDGES) - 1).bit_length())
         self.scratch = (
             np.empty((2, count + 1)), np.empty((4, 2 * leaves)),
             np.empty(2 * leaves, dtype=np.int64), np.empty((2, 2 * leaves), dtype=np.int64),
@@ -228,7 +228,7 @@ class BoundaryCheck:
     @staticmethod
     def is_clear(first: int, nodes: np.ndarray) -> bool:
         """`is_simple`, where `search_meeting` has found `first`."""
-        return first == NONE or (first != COINCIDENT and find_crossing(nodes) is None)
+        return first == NO_CROSSING or (first != COINCIDENT_EDGES and find_crossing(nodes) is None)
 
 
 def walk_boundary(nodes: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]]]:
@@ -297,7 +297,7 @@ def _find_seams(nodes: np.ndarray) -> tuple[str, ...]:
     return seams
 
 
-GROUP = 12
+GROUP_EDGES = 12
 LEAST_X, MOST_X, LEAST_Y, MOST_Y = range(4)  # rows of the boxes
 
 
@@ -383,7 +383,7 @@ def find_touching(line, other, same, group, boxes, other_boxes):
 def find_self_crossing(line: np.ndarray) -> tuple[int, int] | None:
     """First nodes of the first two segments of a polyline (2, n) that cross or touch, or None."""
     line = np.ascontiguousarray(line, dtype=np.float64)
-    group = max(GROUP, line.shape[1] // 64)
+    group = max(GROUP_EDGES, line.shape[1] // 64)
     boxes = np.empty((4, -(-(line.shape[1] - 1) // group)))
     fill_boxes(line, group, boxes)
     first, second = find_touching(line, line, True, group, boxes, boxes)

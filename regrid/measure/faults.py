@@ -31,8 +31,10 @@ FLOAT64 = np.dtype(np.float64)
 # of a block, in m: squares of its areas are still numbers
 LEAST_SIZE = 1e-150
 MOST_SIZE = 1e150
-NEAR = 1e9  # sizes of the block from the origin up to which nothing has to be looked at
-COARSE = 0.01  # of a mean cell: the most that coordinates may be rounded to
+MOST_SIZES_FROM_ORIGIN = (
+    1e9  # sizes of the block from the origin up to which nothing has to be looked at
+)
+MOST_COORDINATE_ROUNDING = 0.01  # of a mean cell: the most that coordinates may be rounded to
 EVERYDAY = 1e-40, 1e40  # sizes whose tenth powers need no unit of their own
 
 
@@ -117,7 +119,7 @@ def are_ordinary(previous, boundary):
     for nodes in (previous, boundary):
         size = measure_corners_span(nodes)
         away = abs(nodes[0, 0, 0]) + abs(nodes[1, 0, 0])
-        if not (LEAST_SIZE < size and size < MOST_SIZE and away < NEAR * size):
+        if not (LEAST_SIZE < size and size < MOST_SIZE and away < MOST_SIZES_FROM_ORIGIN * size):
             return False
     return True
 
@@ -135,7 +137,7 @@ def _check_size(nodes: np.ndarray, name: str) -> None:
             f"{MOST_SIZE:g} m can be regridded: choose another unit of length"
         )
     cell = size / max(nodes.shape[1:])
-    if size > 0.0 and np.spacing(np.abs(sides).max()) > COARSE * cell:
+    if size > 0.0 and np.spacing(np.abs(sides).max()) > MOST_COORDINATE_ROUNDING * cell:
         raise BadInput(
             f"regrid: the block of {name} lies {np.abs(sides).max() / cell:.1g} of its cells away "
             "from the origin, and its coordinates have no digits left for its cells: give them "
@@ -143,8 +145,8 @@ def _check_size(nodes: np.ndarray, name: str) -> None:
         )
 
 
-LOOSE = 1e-10  # of the boundary's size: how far cuts are loosened
-ROUNDS = 3  # of cuts by neighbours' regions
+LOOSENED_CUT = 1e-10  # of the boundary's size: how far cuts are loosened
+NEIGHBOUR_CUT_ROUNDS = 3  # of cuts by neighbours' regions
 MOST_CELLS = 1600  # larger blocks are cut by their sides only
 MOST_VERTICES = 14  # regions with more, or with pairs of them that are more, cut no other
 
@@ -178,13 +180,13 @@ def find_impossible(boundary: np.ndarray) -> tuple[int, int] | None:
     given = [tuple(len(regions[node]) == 1 for node in triangle) for triangle in triangles]
     for triangle, known in zip(triangles, given, strict=True):
         if all(known):
-            if _double_area(*(regions[node][0] for node in triangle)) <= -LOOSE:
+            if _double_area(*(regions[node][0] for node in triangle)) <= -LOOSENED_CUT:
                 return triangle[0]
         elif sum(known) == 2 and not _cut(regions, triangle, known.index(False)):
             return triangle[known.index(False)]
     if ni * nj > MOST_CELLS:
         return None
-    for _ in range(ROUNDS):
+    for _ in range(NEIGHBOUR_CUT_ROUNDS):
         changed = False
         for triangle, known in zip(triangles, given, strict=True):
             if sum(known) > 1:
@@ -240,7 +242,7 @@ def _cut(regions, triangle, free: int) -> bool:
 
 def _clip(polygon: list[Point], b: Point, c: Point) -> list[Point]:
     """The part of a convex polygon to the left of b -> c, loosened; the same list if all of it."""
-    areas = [_double_area(b, c, point) + LOOSE for point in polygon]
+    areas = [_double_area(b, c, point) + LOOSENED_CUT for point in polygon]
     if min(areas) >= 0.0:
         return polygon
     part = []

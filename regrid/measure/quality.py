@@ -24,7 +24,7 @@ import numpy as np
 from regrid.errors import BadInput
 from regrid.jit import inlined, kernel
 from regrid.measure.corners import (
-    BOUND,
+    ORIENTATION_ERROR_BOUND,
     UNDERFLOW,
     compute_corner_signs,
     count_triangles,
@@ -241,7 +241,7 @@ def find_bad_cells(nodes: np.ndarray) -> np.ndarray:
     least = areas.min(axis=0)
     bad = ~(least > 0.0)
     edges = max(_longest(np.diff(nodes, axis=axis)) for axis in (1, 2))
-    doubt = np.abs(least) <= 4.0 * BOUND * edges * edges + UNDERFLOW
+    doubt = np.abs(least) <= 4.0 * ORIENTATION_ERROR_BOUND * edges * edges + UNDERFLOW
     if doubt.any():
         signs = compute_corner_signs(nodes)
         for flat in triangles:
@@ -254,7 +254,7 @@ def find_bad_cells(nodes: np.ndarray) -> np.ndarray:
 def _are_surely_convex(nodes: np.ndarray) -> bool:
     """Are all sines of corners beyond their rounding error?  (Of edges above 1e-77 m.)"""
     sine, _, bad = reduce_worst(_checked(nodes), np.empty((3, nodes.shape[2] - 1)))
-    return bad == 0 and sine > (8.0 * BOUND) ** 2
+    return bad == 0 and sine > (8.0 * ORIENTATION_ERROR_BOUND) ** 2
 
 
 def _longest(differences: np.ndarray) -> float:

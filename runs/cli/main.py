@@ -18,7 +18,7 @@ import click
 from regrid.errors import BadInput
 from runs.cli.grid import grid
 from runs.cli.terminal import (
-    BAD_INPUT,
+    EXIT_BAD_INPUT,
     Commands,
     describe_error,
     echo,
@@ -248,7 +248,7 @@ def info(path, deck) -> int:
         return 0
     told = describe(path)
     echo(told)
-    return BAD_INPUT if f"\n{DAMAGED}" in told else 0
+    return EXIT_BAD_INPUT if f"\n{DAMAGED}" in told else 0
 
 
 @cli.command()
@@ -415,7 +415,7 @@ def _main(arguments: list[str], world: object = None) -> int:
         return cli.main(arguments, prog_name="shockgrid", standalone_mode=False, obj=world) or 0
     except click.ClickException as error:
         echo_usage(error)
-        return BAD_INPUT
+        return EXIT_BAD_INPUT
     except (click.Abort, KeyboardInterrupt) as error:
         echo(f"stopped; {error}" if str(error) else "stopped", err=True)
         return 130

@@ -53,34 +53,34 @@ def echo_usage(error: click.ClickException) -> None:
 
 
 # exit codes
-BAD_INPUT = 2
-FAILED = 3
-INTERNAL = 70
+EXIT_BAD_INPUT = 2
+EXIT_FAILED = 3
+EXIT_INTERNAL = 70
 NULL = ("embedded null byte", "embedded null character")  # what Python says of a name
 
 
 def describe_error(error: Exception) -> tuple[int, str]:
     """The exit code for an error that ends a command, and the sentence about it."""
     if isinstance(error, MemoryError) or "unable to allocate memory" in str(error):  # HDF5's words
-        return BAD_INPUT, "not enough memory; fewer cells need less"
+        return EXIT_BAD_INPUT, "not enough memory; fewer cells need less"
     if isinstance(error, BadInput | RunFailure):
-        return BAD_INPUT if isinstance(error, BadInput) else FAILED, str(error)
+        return EXIT_BAD_INPUT if isinstance(error, BadInput) else EXIT_FAILED, str(error)
     if mistake := describe_mistake(error):
-        return BAD_INPUT, f"{mistake}; --debug shows the traceback"
+        return EXIT_BAD_INPUT, f"{mistake}; --debug shows the traceback"
     words = str(error)
     if isinstance(error, OSError) and error.errno is not None:
         if error.filename is not None:
-            return BAD_INPUT, describe_disk_error(error, Path(os.fsdecode(error.filename)))
-        return BAD_INPUT, f"a given file or device cannot be used: {os.strerror(error.errno)}"
+            return EXIT_BAD_INPUT, describe_disk_error(error, Path(os.fsdecode(error.filename)))
+        return EXIT_BAD_INPUT, f"a given file or device cannot be used: {os.strerror(error.errno)}"
     if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
-        return BAD_INPUT, "a given name is not valid UTF-8; rename it, or give another"
+        return EXIT_BAD_INPUT, "a given name is not valid UTF-8; rename it, or give another"
     if isinstance(error, RuntimeError) and words.startswith("Symlink loop from"):
         name = words.removeprefix("Symlink loop from ")
-        return BAD_INPUT, f"{name} is a link that leads back to itself"
+        return EXIT_BAD_INPUT, f"{name} is a link that leads back to itself"
     if isinstance(error, ValueError) and words in NULL:
-        return BAD_INPUT, "a file's name cannot hold the character \\u0000"
+        return EXIT_BAD_INPUT, "a file's name cannot hold the character \\u0000"
     kind = type(error).__name__
-    return INTERNAL, f"a mistake in shockgrid itself ({kind}: {error}); --debug shows where"
+    return EXIT_INTERNAL, f"a mistake in shockgrid itself ({kind}: {error}); --debug shows where"
 
 
 def print_what_can_be_shown() -> None:

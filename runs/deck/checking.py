@@ -362,8 +362,8 @@ def show(value: Any) -> str:
 
 
 # of a line; where its comment begins
-WIDTH = 100
-COLUMN = 34
+DECK_LINE_WIDTH = 100
+DECK_COMMENT_COLUMN = 34
 
 
 def describe_deck(name: str, deck: Deck, t_unit: str = "s") -> str:
@@ -410,12 +410,15 @@ def _write_table(table: DeckTable, path: str) -> Iterator[str]:
 
 def _explain(line: str, words: str) -> list[str]:
     """The line with its comment, which goes on below it, or stands above a long line."""
-    above = len(line) >= COLUMN
-    room = WIDTH - 2 - COLUMN * (not above)
+    above = len(line) >= DECK_COMMENT_COLUMN
+    room = DECK_LINE_WIDTH - 2 - DECK_COMMENT_COLUMN * (not above)
     lines = [f"# {one}" for one in textwrap.wrap(words, room, break_on_hyphens=False)] or [""]
     if above:
         return [*lines, line]
-    return [f"{line:{COLUMN}}{lines[0]}".rstrip(), *(" " * COLUMN + one for one in lines[1:])]
+    return [
+        f"{line:{DECK_COMMENT_COLUMN}}{lines[0]}".rstrip(),
+        *(" " * DECK_COMMENT_COLUMN + one for one in lines[1:]),
+    ]
 
 
 def _write_value(value: Any) -> str:

@@ -30,7 +30,7 @@ from problems.problem_file import (
 )
 from problems.registry import PROBLEMS, is_problem, load_problem
 from regrid.errors import BadInput, suggest
-from regrid.text_files import DEEPEST, TooMuch, cut, load_toml, read_text
+from regrid.text_files import DEEPEST_NESTING, TooMuch, cut, load_toml, read_text
 from runs.deck.checking import check_deck, wants_text
 
 DECKS = Path(__file__).resolve().parent / "packaged"
@@ -215,7 +215,7 @@ def apply_setting(table: dict[str, Any], setting: str, kind: type[Deck] | None =
     key, names = key.strip(), key.strip().split(".")
     if not equals or not all(names):
         raise BadInput(f"--set {setting!r}: the form is key=value, such as run.t_end=1e-3")
-    if len(names) - 1 > DEEPEST:
+    if len(names) - 1 > DEEPEST_NESTING:
         raise BadInput(f"--set {cut(key)}: a key of {len(names)} names is in no deck")
     branch: Any = table
     listed = kind is not None and any(name.isdigit() for name in names[1:])

@@ -38,10 +38,10 @@ from runs.store.files import write_atomically
 from runs.store.history import read_history
 from runs.store.reader import RunData
 
-BESIDE = 2  # cells: so near to a side is beside it
-CALM = 0.3  # of the usual dt: with less a run is in trouble already
-SHOWN = 3  # settings
-AROUND = 5  # cells on each side of the marked one in the picture
+CELLS_BESIDE_SIDE = 2  # cells: so near to a side is beside it
+CALM_STEP_PART = 0.3  # of the usual dt: with less a run is in trouble already
+SHOWN_SETTINGS = 3  # settings
+CELLS_AROUND_MARK = 5  # cells on each side of the marked one in the picture
 MOST_SHOWN = 0.3  # of the longer side of the domain: half a window at most
 MARK = "tab:red"
 
@@ -82,7 +82,7 @@ def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restar
         end.point = find_calm_point(directory)
 
     def list_commands() -> None:
-        told = list_settings(cause, deck)[:SHOWN]
+        told = list_settings(cause, deck)[:SHOWN_SETTINGS]
         end.settings = [setting for setting, _ in told]
         end.commands = [make_command(s, directory, deck, restart, end.point) for s in end.settings]
         end.lines += ["what has helped in such runs:"] * bool(told)
@@ -130,7 +130,7 @@ def find_calm_point(directory: RunDirectory) -> int | None:
     if not points or dt is None or len(steps) < 2:
         return points[-1] if points else None
     retried = history.get("retries", np.zeros(len(steps))) > 0
-    calm = steps[(dt >= CALM * float(np.nanmedian(dt))) & ~retried]
+    calm = steps[(dt >= CALM_STEP_PART * float(np.nanmedian(dt))) & ~retried]
     last = min(calm[-1] if len(calm) else points[0], steps[-1] - 1)
     return max((step for step in points if step <= last), default=points[0])
 
@@ -194,7 +194,7 @@ def describe_event(blocks: Sequence, place: Place | None) -> str:
     block, (i, j), _ = find_marked(blocks, place)
     areas = measure_areas(block.nodes)
     away = zip(SIDE_NAMES, (i, areas.shape[0] - 1 - i, j, areas.shape[1] - 1 - j), strict=True)
-    beside = [side for side, cells in away if cells < BESIDE]
+    beside = [side for side, cells in away if cells < CELLS_BESIDE_SIDE]
     where = f", beside {' and '.join(beside)}" if beside else ""
     x, y = block.nodes[:, i : i + 2, j : j + 2].mean(axis=(1, 2))
     share = float(areas[i, j] / np.median(areas))
@@ -223,7 +223,11 @@ def draw_early_end(run: RunData, title: str, place: Place | None, point: int | N
     sheets = fields.make_sheets(dump, [name], fields.View())
     extent = fields.find_extent([sheets])
     scale, unit = pick_prefix(float(np.abs(extent).max()), dump.length_unit)
-    part = block.nodes[:, max(i - AROUND, 0) : i + AROUND + 2, max(j - AROUND, 0) : j + AROUND + 2]
+    part = block.nodes[
+        :,
+        max(i - CELLS_AROUND_MARK, 0) : i + CELLS_AROUND_MARK + 2,
+        max(j - CELLS_AROUND_MARK, 0) : j + CELLS_AROUND_MARK + 2,
+    ]
     corners = block.nodes[:, [i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
     x, y = corners.mean(axis=1)
     reach = 1.05 * max(np.abs(part[0] - x).max(), np.abs(part[1] - y).max())

@@ -210,7 +210,7 @@ HEAD = (
     f"{'family':34s} {'steps':>12s} {'gap':>7s} {'min. sine':>10s} {'aspect':>8s}"
     f" {'us/node':>8s} {'sub-moves':>9s} {'folded':>7s}"
 )
-REASON = 110  # characters of a reason that are shown
+REASON_CHARACTERS = 110  # characters of a reason that are shown
 Compared = tuple[March, str, np.ndarray]  # what came of a family, its steps, the sides drawn
 Compute = Callable[[str, dict[str, Any]], Compared]  # from the name and options of a family
 
@@ -269,7 +269,7 @@ def compare_families(
             yield describe_march(label, march, done)
             if march.failure:
                 why = march.failure.removeprefix("regrid: ")
-                why = textwrap.shorten(why, REASON, placeholder="...")
+                why = textwrap.shorten(why, REASON_CHARACTERS, placeholder="...")
                 reasons.append(f"  {label}, step {march.done + 1}: {why}")
             number, _, part = done.partition(" ")
             words = f"{label}: {number} steps" + f", {part.strip()}" * bool(part)

@@ -63,7 +63,7 @@ FAMILIES_IN_SPACE = {
 }
 MOST_LOSS = 0.5  # a pass may leave the minimum scaled Jacobian no smaller than this part of it
 LEAST_PART = 0.02  # of a pass
-SETTLED = 1e-3  # cells: a pass that moves no node further is the last
+SETTLED_PASS_MOVE = 1e-3  # cells: a pass that moves no node further is the last
 
 
 @dataclass(eq=False)
@@ -332,7 +332,7 @@ def settle(nodes, boundary, regridder, passes: int, words: str) -> Grid:
     moved = np.inf
     sine = _least_sine(nodes)
     count = March(nodes, passes)
-    while count.done < passes and moved >= SETTLED:
+    while count.done < passes and moved >= SETTLED_PASS_MOVE:
         begun = time.process_time()
         try:
             result = call_regridder(regridder, nodes, boundary)

@@ -21,8 +21,8 @@ from runs.grids.quality import Judgement
 from runs.pictures.command import new_figure, save
 from runs.pictures.fields import draw_grid_lines, lay_out
 
-LONG = 6.0  # a domain longer than this, in its widths, is shown in part
-DPI = 120
+LONG_DOMAIN_WIDTHS = 6.0  # a domain longer than this, in its widths, is shown in part
+GRID_PICTURE_DPI = 120
 LINE = "0.2"
 BAD = "tab:red"
 COLOURS = "viridis"
@@ -70,7 +70,7 @@ def draw_grid(
     words = f"{number} cells not convex" if number else "every cell convex"
     words += "; red: the sides without a grid" * (sides is not None)
     coloured.set_title(words, fontsize=10)
-    return save(figure, path, DPI)
+    return save(figure, path, GRID_PICTURE_DPI)
 
 
 def draw_comparison(
@@ -96,7 +96,7 @@ def draw_comparison(
         axes.set_title(name, fontsize=9)
         axes.tick_params(labelsize=7)
     figure.suptitle(title, fontsize=11)
-    return save(figure, path, DPI)
+    return save(figure, path, GRID_PICTURE_DPI)
 
 
 def draw_gallery(marches: Sequence[tuple[str, March]], path: Path) -> Path:
@@ -108,7 +108,7 @@ def draw_gallery(marches: Sequence[tuple[str, March]], path: Path) -> Path:
         frame(axes, march.nodes)
         axes.set_title(f"{name}\nsine {march.sine:.2f}, aspect {march.aspect:.0f}", fontsize=9)
         axes.set_axis_off()
-    return save(figure, path, DPI)
+    return save(figure, path, GRID_PICTURE_DPI)
 
 
 def _outline(sides: np.ndarray) -> np.ndarray:
@@ -130,7 +130,7 @@ def frame(axes, nodes: np.ndarray, everything: np.ndarray | None = None) -> None
     low, high = points.min(axis=1), points.max(axis=1)
     size = high - low
     long = int(np.argmax(size))
-    if size[long] > LONG * size[1 - long]:
+    if size[long] > LONG_DOMAIN_WIDTHS * size[1 - long]:
         line = max((nodes[long, :, 0], nodes[long, 0]), key=np.ptp)  # the side along it
         finest = line[np.nanargmin(np.abs(np.diff(line)))]
         reach = 2.0 * size[1 - long]
@@ -183,4 +183,4 @@ def draw_block(
         side.hist(sines.ravel(), bins=30, color="0.4")
         side.set_xlabel("scaled Jacobian")
         side.set_ylabel("cells")
-    return save(figure, path, DPI)
+    return save(figure, path, GRID_PICTURE_DPI)

@@ -26,7 +26,7 @@ from runs.deck.checking import show
 from runs.quantities import add_unit, count
 from runs.store.reader import BlockData, Dump, RunData, Table
 
-SHOWN = 8  # differences, and earlier dumps
+SHOWN_DIFFERENCES = 8  # differences, and earlier dumps
 SAME_TIME = 1e-2  # relative: steps of one number nearer than this are the same
 
 
@@ -222,8 +222,10 @@ def report(differences: list[Difference], a: Side, b: Side) -> list[str]:
     most = max(differences, key=lambda difference: difference.relative)
     lines = [f"first: {first}"] + [f"most:  {most}"] * (most is not first)
     rest = [one for one in differences if one is not first and one is not most]
-    lines += [f"       {one}" for one in rest[:SHOWN]]
-    return lines + [f"       and {len(rest) - SHOWN} more"] * (len(rest) > SHOWN)
+    lines += [f"       {one}" for one in rest[:SHOWN_DIFFERENCES]]
+    return lines + [f"       and {len(rest) - SHOWN_DIFFERENCES} more"] * (
+        len(rest) > SHOWN_DIFFERENCES
+    )
 
 
 def _describe_makers(a: Side, b: Side) -> list[str]:
@@ -282,7 +284,9 @@ def compare_by_norms(a: Side, b: Side, rtol: float, atol: float) -> tuple[list[s
         lines = [f"steps differ: {parted}"]
     dumps = count(len(pairs), "dump")
     lines.append(f"{dumps} at about the same times, {within} within the tolerances:")
-    for (one, other), rows in zip(pairs[:-1][-SHOWN:], found[:-1][-SHOWN:], strict=True):
+    for (one, other), rows in zip(
+        pairs[:-1][-SHOWN_DIFFERENCES:], found[:-1][-SHOWN_DIFFERENCES:], strict=True
+    ):
         words = "no fields of cells that both have"
         if rows:
             most, block, name = max((l1 / (size or 1.0), *row) for *row, l1, _, _, size in rows)

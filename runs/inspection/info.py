@@ -213,7 +213,7 @@ def describe_history(history: Mapping[str, np.ndarray], t_unit: str = "s") -> li
     return lines
 
 
-LONGEST = 60  # characters of a text that are shown
+LONGEST_SHOWN_TEXT = 60  # characters of a text that are shown
 SAID = ("units", "long_name")  # attributes that a dataset's own line tells
 SCALES = ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid")  # HDF5's own
 
@@ -324,8 +324,8 @@ def _say_value(value: Any) -> str:
         value = value.decode("utf-8", "replace")
     if isinstance(value, str):
         lines = value.splitlines()
-        if len(lines) > 1 or len(value) > 4 * LONGEST:
-            return f"text, {count(len(lines), 'line')}: {lines[0][:LONGEST]} ..."
+        if len(lines) > 1 or len(value) > 4 * LONGEST_SHOWN_TEXT:
+            return f"text, {count(len(lines), 'line')}: {lines[0][:LONGEST_SHOWN_TEXT]} ..."
         return repr(value)
     if isinstance(value, np.generic):
         value = value.item()

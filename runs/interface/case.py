@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 
 FIRST_SIGNAL = 128  # exit codes from here on: stopped by a signal
-INTERRUPTED = 130
+EXIT_INTERRUPTED = 130
 
 
 class Drawn:
@@ -188,7 +188,7 @@ def open_run(directory: str | os.PathLike) -> OpenRun:
 
 def finish(runner: Runner, ending: Ending, quiet: bool) -> OpenRun:
     """The data of a run that has ended; KeyboardInterrupt or SystemExit where it was stopped."""
-    if ending.exit_code == INTERRUPTED:
+    if ending.exit_code == EXIT_INTERRUPTED:
         raise KeyboardInterrupt(f"{ending.reason}; {runner.directory} can be restarted from")
     if ending.exit_code >= FIRST_SIGNAL:
         raise SystemExit(ending.exit_code)

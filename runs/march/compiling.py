@@ -19,10 +19,10 @@ from typing import Any
 from regrid.jit import count_compiling
 
 LOOK_EVERY = 0.2  # wall seconds until the run is looked at again: how much does it compile?
-MANY = 5  # compiled kernels from which on a second process is worth its start
-PATIENCE = 3.0  # wall seconds of compiling before a message explains the wait
-USUAL = 30  # kernels that most runs call
-STEPS = 3  # of the small grid: those that need no solve, and those that do
+MANY_KERNELS = 5  # compiled kernels from which on a second process is worth its start
+PATIENCE_SECONDS = 3.0  # wall seconds of compiling before a message explains the wait
+USUAL_KERNELS = 30  # kernels that most runs call
+SMALL_GRID_STEPS = 3  # of the small grid: those that need no solve, and those that do
 WORDS = "compiling kernels, kept for later runs"
 BAR = "{desc}: {n_fmt} of about {total_fmt}|{bar:12}| {elapsed}"
 
@@ -60,14 +60,14 @@ def _watch(done: threading.Event, stream: Any, quiet: bool, helped: bool) -> Non
     with contextlib.ExitStack() as started:
         while not done.wait(LOOK_EVERY):
             ready, compiled, seconds = count_compiling()
-            if helped and compiled - before >= MANY:
+            if helped and compiled - before >= MANY_KERNELS:
                 helped = False
                 program = [sys.executable, "-m", "runs.march.compiling"]
                 none = subprocess.DEVNULL
                 process = subprocess.Popen(program, stdin=none, stdout=none, stderr=none)
                 started.enter_context(process)
                 started.callback(process.terminate)
-            if quiet or compiled == before or seconds - since < PATIENCE:
+            if quiet or compiled == before or seconds - since < PATIENCE_SECONDS:
                 continue
             if bar is not None:
                 bar.total = max(bar.total, ready)
@@ -76,7 +76,9 @@ def _watch(done: threading.Event, stream: Any, quiet: bool, helped: bool) -> Non
             elif stream.isatty():
                 from tqdm import tqdm
 
-                bar = tqdm(total=USUAL, desc=WORDS, bar_format=BAR, file=stream, leave=False)
+                bar = tqdm(
+                    total=USUAL_KERNELS, desc=WORDS, bar_format=BAR, file=stream, leave=False
+                )
                 started.callback(bar.close)
             elif not _told:
                 _told = True
@@ -87,5 +89,5 @@ if __name__ == "__main__":  # the kernels of the default regridder: some steps o
     from problems.grid_march import GridMarch, GridMarchDeck
 
     evolution = GridMarch(GridMarchDeck(domain="three_fingers", ni=24, nj=16)).build()
-    for _ in range(STEPS):
+    for _ in range(SMALL_GRID_STEPS):
         evolution.advance()

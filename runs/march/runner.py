@@ -93,8 +93,10 @@ class Background:
             self.finish()
 
 
-MARGIN = 2.0  # times the longest of the last steps and the longest write: time left for both
-REMEMBERED = 50  # steps
+TIME_LEFT_MARGIN = (
+    2.0  # times the longest of the last steps and the longest write: time left for both
+)
+REMEMBERED_STEPS = 50  # steps
 FORM = re.compile(r"(?:(\d+(?:\.\d+)?)h)?(?:(\d+(?:\.\d+)?)m)?(?:(\d+(?:\.\d+)?)s?)?")
 CLOCK = re.compile(r"(\d+):([0-5]\d):([0-5]\d)")
 
@@ -123,7 +125,7 @@ class WallLimit:
     def __init__(self, text: str):
         self.text = text
         self.end = time.monotonic() + parse_duration(text)
-        self._steps: deque[float] = deque(maxlen=REMEMBERED)
+        self._steps: deque[float] = deque(maxlen=REMEMBERED_STEPS)
         self._write = 0.0
 
     def __str__(self) -> str:
@@ -134,7 +136,7 @@ class WallLimit:
         """Would one more step, and the restart point after it, come too late?"""
         if not self._steps:
             return False
-        needed = MARGIN * (max(self._steps) + self._write)
+        needed = TIME_LEFT_MARGIN * (max(self._steps) + self._write)
         return time.monotonic() + needed >= self.end
 
     def note_step(self, seconds: float) -> None:

@@ -60,9 +60,9 @@ HEEDED = {  # of the options that choose what is shown, by picture; a problem's 
     "line": ("FIELDS", "--at", "--mirror", "--line", "--csv"),
 }
 BESIDE = ("fields", "line")  # pictures that can show a second run
-TIMES = 4
-SLENDER = 1000.0  # a picture's longer side over the other
-PAD = 0.1  # inches around each panel: less cuts titles at the edge
+DEFAULT_TIMES = 4
+SLENDER_PICTURE_RATIO = 1000.0  # a picture's longer side over the other
+PANEL_PAD_INCHES = 0.1  # inches around each panel: less cuts titles at the edge
 FIRST_CHOICE = ("rho", "p")
 
 
@@ -214,7 +214,7 @@ def new_figure() -> Figure:
     """An empty figure that can be saved; no window."""
     figure = Picture(figsize=(10.0, 6.0), layout="constrained")
     FigureCanvasAgg(figure)
-    figure.get_layout_engine().set(w_pad=PAD, h_pad=PAD)
+    figure.get_layout_engine().set(w_pad=PANEL_PAD_INCHES, h_pad=PANEL_PAD_INCHES)
     return figure
 
 
@@ -253,7 +253,10 @@ def default_fields(run: RunData) -> list[str]:
 
 
 def choose_dumps(
-    run: RunData, at: Numbers | float, count: int = TIMES, say: Callable[[str], None] | None = None
+    run: RunData,
+    at: Numbers | float,
+    count: int = DEFAULT_TIMES,
+    say: Callable[[str], None] | None = None,
 ) -> list[Dump]:
     """The dumps nearest to the times in `at`, or `count` of them from first to last.
 
@@ -320,8 +323,10 @@ def parse_zoom(zoom: Numbers) -> tuple[float, ...] | None:
     if zoom is None:
         return None
     x0, x1, y0, y1 = parse_numbers("--zoom", zoom, "x0,x1,y0,y1 with x0 < x1, y0 < y1", rising=2)
-    if not 1.0 / SLENDER <= (x1 - x0) / (y1 - y0) <= SLENDER:
-        raise BadInput(f"--zoom {zoom}: one side is more than {SLENDER:g} times the other")
+    if not 1.0 / SLENDER_PICTURE_RATIO <= (x1 - x0) / (y1 - y0) <= SLENDER_PICTURE_RATIO:
+        raise BadInput(
+            f"--zoom {zoom}: one side is more than {SLENDER_PICTURE_RATIO:g} times the other"
+        )
     return x0, x1, y0, y1
 
 

@@ -29,7 +29,7 @@ from runs.store.dumps import LONG_NAMES
 from runs.store.files import check_free, make_csv, write_atomically
 from runs.store.reader import Dump, RunData
 
-CLOSE = 1e-9  # of the interfaces' extent: closer ends are one point
+CLOSE_END_DISTANCE = 1e-9  # of the interfaces' extent: closer ends are one point
 
 
 def find_curves(blocks: Sequence) -> dict[str, np.ndarray]:
@@ -41,7 +41,7 @@ def find_curves(blocks: Sequence) -> dict[str, np.ndarray]:
         found.setdefault(pair, []).append(line)
     curves = {}
     for pair, lines in found.items():
-        near = CLOSE * max(float(np.ptp(line, axis=1).max()) for line in lines)
+        near = CLOSE_END_DISTANCE * max(float(np.ptp(line, axis=1).max()) for line in lines)
         joined = []
         while lines:
             joined.append(_extend(lines.pop(0), lines, near))
@@ -130,11 +130,11 @@ def draw_interfaces(figure, dumps: list[Dump], view: View) -> None:
     axes.set_title(f"interface, {first} to {last}{note}", fontsize=10)
 
 
-LEAST = 1e-9  # of the line: shorter pieces touch a corner only
+SHORTEST_PIECE = 1e-9  # of the line: shorter pieces touch a corner only
 STYLES = ("-", "--")  # of the first run and the one compared with it
 # inches: of the picture, of a panel
-WIDTH = 8.0
-HEIGHT = 2.6
+CURVE_WIDTH_INCHES = 8.0
+CURVE_HEIGHT_INCHES = 2.6
 Line = tuple[float, float, float, float]  # x0, y0, x1, y1 [m]
 
 
@@ -169,7 +169,7 @@ def find_pieces(nodes: np.ndarray, line: Line) -> tuple[np.ndarray, np.ndarray]:
         enter = np.where(rate > 0.0, np.maximum(enter, meet), enter)
         leave = np.where(rate < 0.0, np.minimum(leave, meet), leave)
         leave = np.where((rate == 0.0) & (inside < 0.0), -1.0, leave)
-    cells = np.argwhere(leave - enter > LEAST)
+    cells = np.argwhere(leave - enter > SHORTEST_PIECE)
     return cells, np.stack([enter, leave], axis=-1)[cells[:, 0], cells[:, 1]]
 
 
@@ -224,7 +224,7 @@ def draw_lineouts(
             label = name
     largest = max(float(np.abs(one.columns[way]).max()) for run in lineouts for one in run)
     scale, length = pick_prefix(largest, first.dump.length_unit)
-    figure.set_size_inches(WIDTH, HEIGHT * len(names) + 0.8)
+    figure.set_size_inches(CURVE_WIDTH_INCHES, CURVE_HEIGHT_INCHES * len(names) + 0.8)
     panels = figure.subplots(len(names), 1, squeeze=False, sharex=True)[:, 0]
     for axes, name in zip(panels, names, strict=True):
         style = fields.get_style(first.dump, name)
@@ -267,18 +267,18 @@ def write_csv(
     return path
 
 
-FLAT = 1e-9  # relative variation of what is called constant
+CONSTANT_VARIATION = 1e-9  # relative variation of what is called constant
 PLAIN = ("step", "t", "dt", "dt_limit", "finished", "fastest_block", "fastest_i", "fastest_j")
 GRID = ("least_scaled_jacobian", "worst_aspect", "cells_not_convex")
-SHARED = 30.0  # columns in one panel are of one size within this factor
-MOST = 4  # of them
+SHARED_PANEL_FACTOR = 30.0  # columns in one panel are of one size within this factor
+MOST_PANEL_COLUMNS = 4  # of them
 LOGARITHMIC = ("residual", "change", "error")  # words in names of quantities that fall by decades
-DECADES = 1e3
+LOGARITHMIC_AXIS_RANGE = 1e3
 # inches: of the picture, of a row
 HISTORY_WIDTH = 13.5
 HISTORY_HEIGHT = 2.4
-LETTERS = 12.0  # an inch, of the line below the panels
-HEADROOM = 0.8  # of the range of the conserved totals, above them: for the legend
+LETTERS_PER_INCH = 12.0  # an inch, of the line below the panels
+LEGEND_HEADROOM = 0.8  # of the range of the conserved totals, above them: for the legend
 Panel = list[str]  # names of columns; "dt" and "drift" are drawn their own way
 
 
@@ -310,7 +310,7 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
         draw_panel(axes, history["t"] * factor, history, chosen, units)
     if constant:
         words = ", ".join(f"{_say(name)} {np.nanmax(history[name]):.4g}" for name in constant)
-        letters = int(LETTERS * figure.get_size_inches()[0])
+        letters = int(LETTERS_PER_INCH * figure.get_size_inches()[0])
         label += "\n\n" + textwrap.fill(f"constant: {words}", letters)
     figure.supxlabel(label, fontsize=9)
 
@@ -344,8 +344,10 @@ def choose_panels(
             first = together[0]
             other = np.nanmax(np.abs(history[first]))
             alike = name.split("_")[0] == first.split("_")[0]
-            alike = alike and units.get(name) == units.get(first) and len(together) < MOST
-            if alike and max(size, other) <= SHARED * min(size, other):
+            alike = (
+                alike and units.get(name) == units.get(first) and len(together) < MOST_PANEL_COLUMNS
+            )
+            if alike and max(size, other) <= SHARED_PANEL_FACTOR * min(size, other):
                 together.append(name)
                 break
         else:
@@ -354,7 +356,7 @@ def choose_panels(
 
 
 def _is_flat(values: np.ndarray) -> bool:
-    return np.nanmax(values) - np.nanmin(values) <= FLAT * np.nanmax(np.abs(values))
+    return np.nanmax(values) - np.nanmin(values) <= CONSTANT_VARIATION * np.nanmax(np.abs(values))
 
 
 def _say(name: str) -> str:
@@ -394,14 +396,14 @@ def draw_panel(axes, t, history, names: Panel, units) -> None:
     axes.set_title(title, fontsize=9)
     if names == ["drift"]:
         low, high = axes.get_ylim()
-        axes.set_ylim(low, high + HEADROOM * (high - low))
+        axes.set_ylim(low, high + LEGEND_HEADROOM * (high - low))
         close = {"columnspacing": 0.8, "handlelength": 1.2, "borderaxespad": 0.2}
         axes.legend(fontsize=6, framealpha=0.6, loc="upper center", ncols=2, **close)
     elif len(curves) > 1:
         axes.legend(fontsize=7, framealpha=0.6)
     size = np.concatenate([np.abs(values) for _, values, _ in curves])
     falls = any(word in LOGARITHMIC for name in names for word in name.split("_"))
-    if falls and np.nanmax(size) > DECADES * np.nanmin(size[size > 0.0]):
+    if falls and np.nanmax(size) > LOGARITHMIC_AXIS_RANGE * np.nanmin(size[size > 0.0]):
         axes.set_yscale("log", nonpositive="mask")
     if curves and curves[0][2]:
         axes.set_ylim(bottom=0.0)
@@ -411,7 +413,7 @@ def draw_panel(axes, t, history, names: Panel, units) -> None:
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg", "c": "m/s"}
 MOST_NAMED = 10  # gauges with a line in the legend; more are distinguished by a row of colours
-COLUMNS = 3
+LEGEND_COLUMNS = 3
 # inches of a panel
 GAUGES_WIDTH = 4.4
 GAUGES_HEIGHT = 3.0
@@ -440,7 +442,7 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
     factor, unit = fields.scale_times(run.dumps, table["t"][-1])
     in_units = not run.dumps or run.dumps[-1].t_unit != "1"
     colours = colormaps["turbo"](np.linspace(0.05, 0.95, len(chosen)))
-    columns = min(COLUMNS, len(shown))
+    columns = min(LEGEND_COLUMNS, len(shown))
     size = max(GAUGES_WIDTH, 7.0 / columns), GAUGES_HEIGHT
     grid = fields.lay_out(figure, len(shown), columns, size, sharex=True)
     lines = {}

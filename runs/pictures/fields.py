@@ -23,7 +23,7 @@ from regrid.sides import SIDE_NAMES, get_side
 from runs.quantities import is_time, pick_prefix
 from runs.store.reader import BlockData, Dump
 
-CLOSE = 0.05  # of an edge: above the gap between different chords of one curve
+CHORD_GAP_EDGES = 0.05  # of an edge: above the gap between different chords of one curve
 
 
 Outline = tuple[list[tuple[tuple[str, str], np.ndarray]], list[np.ndarray]]
@@ -41,7 +41,7 @@ def trace_outline(blocks: Sequence) -> Outline:
         for side in SIDE_NAMES:
             line = get_side(block.nodes, side)
             edges = np.hypot(*np.diff(line, axis=1))
-            reach = CLOSE * float(np.median(edges)) if edges.size else 0.0
+            reach = CHORD_GAP_EDGES * float(np.median(edges)) if edges.size else 0.0
             touched = np.zeros(edges.size, dtype=bool)
             for m, other in enumerate(blocks):
                 low, high = other.nodes.min(axis=(1, 2)), other.nodes.max(axis=(1, 2))
@@ -156,14 +156,16 @@ def list_fields(dump: Dump) -> list[str]:
 
 
 # inches: of every picture, wished for
-WIDTH = 12.0
-PAGE = 6.5
+PICTURE_WIDTH_INCHES = 12.0
+PAGE_HEIGHT_INCHES = 6.5
 # at most, at most of one panel
-TALLEST = 16.0
+TALLEST_PICTURE_INCHES = 16.0
 TALLEST_ALONE = 8.0
-LONG = 4.0  # in a domain longer than this, in its heights, the panels follow the interface
-AROUND = 0.6  # of the interface's size: what is shown on each side of it
-DECADES = 1.7
+LONG_DOMAIN_HEIGHTS = (
+    4.0  # in a domain longer than this, in its heights, the panels follow the interface
+)
+SHOWN_AROUND_INTERFACE = 0.6  # of the interface's size: what is shown on each side of it
+FIELD_LOG_DECADES = 1.7
 VELOCITIES = "u", "v", "u_node", "v_node"
 FLIPPED = {  # what changes sign in the mirror
     "x": ("u", "u_node", "vorticity"),
@@ -353,11 +355,13 @@ def choose_boxes(
     low, high = np.array(whole[::2]), np.array(whole[1::2])
     size = high - low
     spans = [np.reshape(span, (2, 2)) for _, span in extents if span]
-    long = size.max() > LONG * size.min()
+    long = size.max() > LONG_DOMAIN_HEIGHTS * size.min()
     if len(spans) < len(extents) or not (follow or long):
         return [whole] * len(extents), False
     widest = np.max([np.ptp(span, axis=1) for span in spans], axis=0)
-    wanted = np.minimum(widest + 2.0 * AROUND * max(widest.max(), 0.5 * size.min()), size)
+    wanted = np.minimum(
+        widest + 2.0 * SHOWN_AROUND_INTERFACE * max(widest.max(), 0.5 * size.min()), size
+    )
     starts = [np.clip(span.mean(axis=1) - 0.5 * wanted, low, high - wanted) for span in spans]
     boxes = [
         (x, x + float(wanted[0]), y, y + float(wanted[1]))
@@ -400,16 +404,18 @@ def make_panels(
     words = 0.75 if apart else 0.45  # above and below a panel
 
     def measure_height(columns: int, rows: int) -> float:
-        return rows * (WIDTH / columns * 0.85 * ratio + words) + 0.3
+        return rows * (PICTURE_WIDTH_INCHES / columns * 0.85 * ratio + words) + 0.3
 
     across = ratio >= 0.6
     columns, rows = (times, fields) if across else (fields, times)
     if fields == 1:
         pages = [(n, times // n) for n in range(1, times + 1) if times % n == 0]  # none is empty
-        columns, rows = min(pages, key=lambda page: abs(np.log(measure_height(*page) / PAGE)))
+        columns, rows = min(
+            pages, key=lambda page: abs(np.log(measure_height(*page) / PAGE_HEIGHT_INCHES))
+        )
     height = measure_height(columns, rows)
-    shrink = min(1.0, (TALLEST if fields * times > 1 else TALLEST_ALONE) / height)
-    size = max(WIDTH * shrink, 5.0) / columns, max(height * shrink, 2.2) / rows
+    shrink = min(1.0, (TALLEST_PICTURE_INCHES if fields * times > 1 else TALLEST_ALONE) / height)
+    size = max(PICTURE_WIDTH_INCHES * shrink, 5.0) / columns, max(height * shrink, 2.2) / rows
     grid = np.reshape(lay_out(figure, fields * times, columns, size), (rows, columns))
     for axes in grid.flat:
         axes.tick_params(labelsize=8)
@@ -458,7 +464,7 @@ def choose_colours(
     elif both_signs:
         reach = max(-low, high) * factor
         norm = Normalize(-reach, reach)
-    elif low > 0 and not velocity and np.log10(high / low) > DECADES:
+    elif low > 0 and not velocity and np.log10(high / low) > FIELD_LOG_DECADES:
         norm = LogNorm(low * factor, high * factor)
     elif low == high:
         margin = 0.5 * factor * (abs(low) or 1.0)

@@ -28,14 +28,14 @@ from runs.store.files import check_folder, disk_errors
 from runs.store.provenance import describe_software, hash_deck
 from runs.store.reader import Dump, RunData
 
-SECONDS = 8.0  # length of a film, within the frame rates below
-SLOWEST = 3
-FASTEST = 25
+FILM_SECONDS = 8.0  # length of a film, within the frame rates below
+SLOWEST_FRAME_RATE = 3
+FASTEST_FRAME_RATE = 25
 # inches
-WIDTH = 9.0
-LOWEST = 2.4
-TALLEST = 8.0
-SLENDER = 0.3  # height over width of a window, below which the colour bar is under it
+FILM_WIDTH_INCHES = 9.0
+LOWEST_FILM_INCHES = 2.4
+TALLEST_FILM_INCHES = 8.0
+SLENDER_WINDOW_RATIO = 0.3  # height over width of a window, below which the colour bar is under it
 KINDS = (".mp4", ".gif")
 
 
@@ -93,10 +93,17 @@ def make_film(
         fields.find_range(fields.make_sheets(Dump(one), [name], view), name, box)
         for one, box in zip(paths, boxes, strict=True)
     ]
-    rate = fps or int(np.clip(round(len(paths) / SECONDS), SLOWEST, FASTEST))
+    rate = fps or int(
+        np.clip(round(len(paths) / FILM_SECONDS), SLOWEST_FRAME_RATE, FASTEST_FRAME_RATE)
+    )
     figure = command.new_figure()
     ratio = (boxes[0][3] - boxes[0][2]) / (boxes[0][1] - boxes[0][0])
-    figure.set_size_inches(WIDTH, float(np.clip(0.8 * WIDTH * ratio + 1.0, LOWEST, TALLEST)))
+    figure.set_size_inches(
+        FILM_WIDTH_INCHES,
+        float(
+            np.clip(0.8 * FILM_WIDTH_INCHES * ratio + 1.0, LOWEST_FILM_INCHES, TALLEST_FILM_INCHES)
+        ),
+    )
     draw_frame = make_frames(figure, run.dumps, name, view, boxes, ranges)
     command.clean_words(figure)
     part = path.with_name(f".{path.stem}.part{path.suffix}")
@@ -134,7 +141,7 @@ def make_frames(
     scale, unit = pick_prefix(float(np.abs(boxes).max()), first.length_unit)
     labels = [name_axis(axis, unit) for axis in first.axes]
     place = {"shrink": 0.9, "pad": 0.015}
-    if box[3] - box[2] < SLENDER * (box[1] - box[0]):  # no room for labels at the side
+    if box[3] - box[2] < SLENDER_WINDOW_RATIO * (box[1] - box[0]):  # no room for labels at the side
         place = {"location": "bottom", "aspect": 50}
     figure.colorbar(ScalarMappable(*look[:2]), ax=axes, label=look[3], **place)
 

@@ -34,8 +34,8 @@ from runs.ranks.map import describe_shares, share_evolution
 from runs.ranks.started import count_started, find_rank
 from runs.store.dumps import EMPTY
 
-BUILD = END + 1  # told first: the deck follows
-BEGIN = END + 2  # told once: who has what and, of a run that goes on, the state follow
+BUILD_MESSAGE = END + 1  # told first: the deck follows
+BEGIN_MESSAGE = END + 2  # told once: who has what and, of a run that goes on, the state follow
 
 
 class World:
@@ -57,7 +57,7 @@ class World:
         if self._sent == (text := deck.to_toml()):
             return
         self._beginning = True
-        tell(self.comm, BUILD)
+        tell(self.comm, BUILD_MESSAGE)
         file = str(deck.file.path) if deck.file else None
         self.comm.bcast((text, deck.origin, file), root=0)
         self._sent = text
@@ -82,7 +82,7 @@ class World:
         self.build(deck)
         self._reads_cells = problem.reads_cells
         self._beginning = True
-        tell(self.comm, BEGIN)
+        tell(self.comm, BEGIN_MESSAGE)
         _, self.ranks = share_flow(self.comm, evolution, shares, state)
         self._beginning = False
         return describe_shares([block.name for block in evolution.blocks], shares, self.size)
@@ -152,8 +152,8 @@ def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str
 
 
 # exit codes, as in `runs.cli.main`
-BAD_INPUT = 2
-INTERNAL = 70
+EXIT_BAD_INPUT = 2
+EXIT_INTERNAL = 70
 
 
 def run_on_ranks(command: Callable[[World | None], int], say: Callable[[str], None]) -> int:
@@ -169,13 +169,13 @@ def run_on_ranks(command: Callable[[World | None], int], say: Callable[[str], No
                 f"{count_started()} ranks of MPI were started, which needs mpi4py and an MPI "
                 f"library: pip install 'shockgrid[mpi]' ({error})"
             )
-        return BAD_INPUT
+        return EXIT_BAD_INPUT
     comm = MPI.COMM_WORLD
     if comm.size == 1:
         return command(None)
     if comm.rank == 0:
         world = World(comm)
-        code = INTERNAL
+        code = EXIT_INTERNAL
         try:
             code = command(world)
         finally:
@@ -201,7 +201,7 @@ def follow(comm: Any, screen: TextIO) -> int:
     try:
         built: Evolution | Exception | None = None
         word, code = hear(comm)
-        while word == BUILD:
+        while word == BUILD_MESSAGE:
             built = build(comm)
             word, code = hear(comm)
         if word == END:
@@ -219,7 +219,9 @@ def follow(comm: Any, screen: TextIO) -> int:
             elif word == COUNT:
                 ranks.count()
     except BaseException as error:
-        code = BAD_INPUT if isinstance(error, BadInput | MemoryError | OSError) else INTERNAL
+        code = (
+            EXIT_BAD_INPUT if isinstance(error, BadInput | MemoryError | OSError) else EXIT_INTERNAL
+        )
         words = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"
         print(f"shockgrid: rank {comm.rank}: {words}; all ranks end", file=screen, flush=True)
         comm.Abort(code)

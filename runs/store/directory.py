@@ -38,9 +38,9 @@ from runs.store.files import (
     try_lock,
     write_atomically,
 )
-from runs.store.provenance import NOTED, hash_deck
+from runs.store.provenance import NOTED_DIGITS, hash_deck
 
-SHOWN = 3  # changed keys
+SHOWN_KEYS = 3  # changed keys
 KEPT_RESTARTS = 2
 STUDY_FILE = "study.toml"  # what a study is known by; its runs lie in its folder `runs`
 _NAME = re.compile(r"(dump|restart)_(\d+)\.h5")
@@ -251,7 +251,7 @@ def open_directory(path: str | os.PathLike) -> RunDirectory:
 
 def write_noted(directory: RunDirectory, path: Path, text: str) -> None:
     """Write a file of the run whose digest the log notes first; see `is_noted`."""
-    directory.note(f"{path.stem}: SHA-256 {hash_deck(text)[:NOTED]}")
+    directory.note(f"{path.stem}: SHA-256 {hash_deck(text)[:NOTED_DIGITS]}")
     write_atomically(path, text)
 
 
@@ -259,8 +259,8 @@ def is_noted(directory: RunDirectory, path: Path) -> bool:
     """Has a file one of the digests that the log has noted of it?  True where it has none."""
     try:
         log = directory.log.read_text(encoding="utf-8", errors="replace")
-        noted = re.findall(rf"\b{path.stem}: SHA-256 ([0-9a-f]{{{NOTED}}})", log)
-        return not noted or hashlib.sha256(path.read_bytes()).hexdigest()[:NOTED] in noted
+        noted = re.findall(rf"\b{path.stem}: SHA-256 ([0-9a-f]{{{NOTED_DIGITS}}})", log)
+        return not noted or hashlib.sha256(path.read_bytes()).hexdigest()[:NOTED_DIGITS] in noted
     except OSError:  # told of where it is read
         return True
 
@@ -293,8 +293,8 @@ def check_deck(directory: RunDirectory) -> str:
                     "is taken"
                 )
             words = [f"{one.key} is {show(one.now)}, was {show(one.before)}" for one in changed]
-            more = [f"and {len(words) - SHOWN} more"] * (len(words) > SHOWN)
-            told = f" ({'; '.join(words[:SHOWN] + more)})"
+            more = [f"and {len(words) - SHOWN_KEYS} more"] * (len(words) > SHOWN_KEYS)
+            told = f" ({'; '.join(words[:SHOWN_KEYS] + more)})"
         way = (
             f"the last dump has it: shockgrid info --deck {shlex.quote(str(found.path))} > "
             f"{shlex.quote(str(directory.deck))}"

@@ -32,7 +32,7 @@ from problems.evolution import (
     is_axisymmetric,
 )
 from regrid.errors import BadInput
-from runs.store.files import BLANK, CHECKSUM, find_sum
+from runs.store.files import BLANK_CHECKSUM, CHECKSUM, find_sum
 from runs.store.provenance import find_provenance
 
 FORMAT = "shockgrid dump"
@@ -121,7 +121,7 @@ def make_image(
     with h5py.File("dump", "w", driver="core", backing_store=False) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
-        file.attrs[CHECKSUM] = np.bytes_(BLANK)
+        file.attrs[CHECKSUM] = np.bytes_(BLANK_CHECKSUM)
         file.attrs["problem"] = names.problem
         file.attrs["deck"] = names.deck_text
         file.attrs.update(_list_numbers(evolution))
@@ -148,7 +148,7 @@ def make_image(
         return image
     while _KEPT:
         _KEPT.popitem()[1][0].close()
-    file = h5py.File(h5py.h5f.open_file_image(image, WRITABLE))
+    file = h5py.File(h5py.h5f.open_file_image(image, WRITABLE_IMAGE))
     stored = _list_stored(arrays, linked)
     places = {path: h5py.h5d.open(file.id, path.encode()).get_offset() for path in stored}
     _KEPT[form] = file, places
@@ -159,7 +159,7 @@ def make_image(
 # the last whole dump stays open in memory, and the numbers of the next are written over its own,
 # arrays at the places in the file that HDF5 has given them.
 _KEPT: dict[str, tuple[h5py.File, dict[str, int]]] = {}
-WRITABLE = 1  # H5LT_FILE_IMAGE_OPEN_RW
+WRITABLE_IMAGE = 1  # H5LT_FILE_IMAGE_OPEN_RW
 
 
 def _describe(block: BlockView, arrays: Arrays) -> tuple:

@@ -34,8 +34,8 @@ with contextlib.suppress(ImportError):
     import msvcrt
 
 # s
-TRIES = 20
-PAUSE = 0.05
+OPEN_TRIES = 20
+PAUSE_SECONDS = 0.05
 SYSTEM = ("dev", "proc", "sys")  # folders at the root that hold no files of people
 DUMPS = "dumps"  # folder of a run
 LOCK = ".lock"
@@ -92,14 +92,14 @@ def replace_file(source: Path, path: Path) -> None:
 
     Raises OSError.
     """
-    for _ in range(TRIES):
+    for _ in range(OPEN_TRIES):
         try:
             os.replace(source, path)
             return
         except PermissionError as error:
             if getattr(error, "winerror", None) is None:  # elsewhere waiting does not help
                 raise
-            time.sleep(PAUSE)
+            time.sleep(PAUSE_SECONDS)
     os.replace(source, path)
 
 
@@ -197,10 +197,12 @@ def try_lock(file: IO) -> bool:
 
 CHECKSUM = "checksum"  # name of the attribute
 SUM_HEAD = b"crc32 of all other bytes: "
-DIGITS = 8
-BLANK = SUM_HEAD + b"0" * DIGITS  # the text of the attribute before the sum is known
-SEARCHED = 1 << 20  # bytes from a file's start in which the attribute lies
-CHUNK = 1 << 22  # bytes that are read at a time
+CHECKSUM_DIGITS = 8
+BLANK_CHECKSUM = (
+    SUM_HEAD + b"0" * CHECKSUM_DIGITS
+)  # the text of the attribute before the sum is known
+SEARCHED_BYTES = 1 << 20  # bytes from a file's start in which the attribute lies
+CHUNK_BYTES = 1 << 22  # bytes that are read at a time
 
 judged: dict[tuple, str | None] = {}  # sums of the files that this process has read
 
@@ -209,12 +211,12 @@ def seal(image: bytes) -> list[memoryview | bytes]:
     """The bytes of a file with its checksum in place of the blank one, in parts that follow one
     another.  Raises ValueError where it has no attribute for it."""
     view = memoryview(image)
-    place = bytes(view[:SEARCHED]).find(SUM_HEAD)
+    place = bytes(view[:SEARCHED_BYTES]).find(SUM_HEAD)
     if place < 0:
         raise ValueError("a file without the attribute for its checksum")
     start = place + len(SUM_HEAD)
     head = view[:start]
-    tail = view[start + DIGITS :]
+    tail = view[start + CHECKSUM_DIGITS :]
     return [head, b"%08x" % zlib.crc32(tail, zlib.crc32(head)), tail]
 
 
@@ -234,12 +236,12 @@ def find_sum(path: Path) -> str | None:
         now = os.fstat(file.fileno())
         key = str(path.absolute()), now.st_ino, now.st_size, now.st_mtime_ns
         if key not in judged:
-            first = file.read(SEARCHED)
+            first = file.read(SEARCHED_BYTES)
             place = first.find(SUM_HEAD)
             start = place + len(SUM_HEAD)
-            found = zlib.crc32(first[start + DIGITS :], zlib.crc32(first[:start]))
-            while place >= 0 and (chunk := file.read(CHUNK)):
+            found = zlib.crc32(first[start + CHECKSUM_DIGITS :], zlib.crc32(first[:start]))
+            while place >= 0 and (chunk := file.read(CHUNK_BYTES)):
                 found = zlib.crc32(chunk, found)
-            sound = first[start : start + DIGITS] == b"%08x" % found
+            sound = first[start : start + CHECKSUM_DIGITS] == b"%08x" % found
             judged[key] = None if place < 0 else f"{found:08x}" if sound else ""
         return judged[key]

@@ -17,8 +17,8 @@ from pathlib import Path
 
 HOME = Path(__file__).resolve().parents[2]  # the folder in which the packages lie
 DISTRIBUTION = "shockgrid"
-NOTED = 16  # digits of a digest that screens and logs show
-DIGITS = 12  # of a commit
+NOTED_DIGITS = 16  # digits of a digest that screens and logs show
+COMMIT_DIGITS = 12  # of a commit
 PACKAGES = ("numpy", "numba", "scipy", "h5py")
 
 
@@ -45,7 +45,7 @@ def describe_provenance(provenance: dict[str, str]) -> list[str]:
         made.append(f"commit {known['commit']}")
     lines = [f"made by: {', '.join([*made, *packages])}; {known.get('platform', '?')}"]
     if "deck_sha256" in known:
-        lines.append(f"deck: SHA-256 {known['deck_sha256'][:NOTED]}")
+        lines.append(f"deck: SHA-256 {known['deck_sha256'][:NOTED_DIGITS]}")
     return lines
 
 
@@ -91,7 +91,7 @@ def find_commit(home: Path) -> str:
         if done.returncode or commit == "(initial)":
             return ""
         differs = any(not line.startswith("#") for line in lines)
-        return commit[:DIGITS] + ("-dirty" if differs else "")
+        return commit[:COMMIT_DIGITS] + ("-dirty" if differs else "")
     try:
         noted = metadata.distribution(DISTRIBUTION).read_text("direct_url.json")
     except metadata.PackageNotFoundError:

@@ -18,7 +18,7 @@ from runs.study.definition import NUMBER, check_same_deck, read_vary
 from runs.study.orders import describe_series
 from runs.study.study import Study, make_study
 
-FAILED = 3
+EXIT_FAILED = 3
 MOST_CAUTIONS = 10  # on the screen
 STATES = {"done": "done", "failed": "failed", "half": "half done", "other": "of another deck"}
 
@@ -66,7 +66,7 @@ def study(
     paths = made.write()
     say(describe_study(made, progress, time.monotonic() - began))
     say("written: " + "  ".join(str(path) for path in paths))
-    return FAILED if made.failures else 0
+    return EXIT_FAILED if made.failures else 0
 
 
 def read_words(

@@ -41,10 +41,10 @@ NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 RANGE = re.compile(rf"({NUMBER}):({NUMBER}):(\d+)(?::(log))?")
 LIKE_RANGE = re.compile(rf"{NUMBER}:{NUMBER}|[^,'\"\[{{]*:[^,'\"\[{{]*:[^,'\"\[{{]*")
 MOST_VALUES = 100_000  # of one range
-DIGITS = 6
+VALUE_DIGITS = 6
 LONGEST_NAME = 120  # of a folder
 MOST_WHOLE = 1e15  # floats from here on keep their exponent
-SHORT = 40  # a longer value is cut in a folder's name
+SHORT_NAME_CHARACTERS = 40  # a longer value is cut in a folder's name
 
 
 class Point(dict[str, Any]):
@@ -66,7 +66,7 @@ def _shorten(value: Any) -> str:
     if isinstance(value, float) and value.is_integer() and abs(value) < MOST_WHOLE:
         value = int(value)  # 3.0 and 3 are one point
     text = value if isinstance(value, str) else write_value(value)
-    plain = re.sub(r"[^\w.+-]+", "-", text)[:SHORT]
+    plain = re.sub(r"[^\w.+-]+", "-", text)[:SHORT_NAME_CHARACTERS]
     return plain if plain == text else f"{plain.strip('-')}-{_digest(text)}"
 
 
@@ -144,7 +144,7 @@ def _spread(first: str, last: str, count: str, log: str | None) -> list[Any]:
     if not good or (log and min(start, end) <= 0.0):
         return []
     values = np.geomspace(start, end, number) if log else np.linspace(start, end, number)
-    rounded = [float(f"{value:.{DIGITS}g}") for value in values]
+    rounded = [float(f"{value:.{VALUE_DIGITS}g}") for value in values]
     if len(set(rounded)) < number:  # closer than the digits tell
         rounded = values.tolist()
     whole = not set(".eE") & set(first + last) and all(value.is_integer() for value in rounded)

@@ -22,13 +22,13 @@ from runs.study.computing import Result, find_names
 from runs.study.definition import Definition, write_value
 
 # factors of safety for three grids, and for two
-SAFETY = 1.25
+THREE_GRID_SAFETY = 1.25
 SAFETY_TWO = 3.0
-ASSUMED = 1.0  # order of two grids without an exact value: captured shocks
+ASSUMED_ORDER = 1.0  # order of two grids without an exact value: captured shocks
 MOST_TRUSTED = 2.0  # a higher order than that of the scheme is not used for the uncertainty
 ROUND_OFF = 1e-12  # of the value: smaller changes are none
 MOST_CREDIBLE = 4.0  # orders above are not credible: the grids are not in the asymptotic range
-HIGHEST = 20.0  # stands for all orders above it
+HIGHEST_ORDER = 20.0  # stands for all orders above it
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def refine(sizes: Sequence[float], values: Sequence[float]) -> Refined:
         return Refined("one grid")
     if len(known) == 2:
         (h2, v2), (h1, v1) = known
-        gain = (h2 / h1) ** ASSUMED - 1.0
+        gain = (h2 / h1) ** ASSUMED_ORDER - 1.0
         return Refined("two grids", uncertainty=SAFETY_TWO * abs(v2 - v1) / gain)
     (h3, v3), (h2, v2), (h1, v1) = known[-3:]
     change_32 = v3 - v2
@@ -103,7 +103,7 @@ def refine(sizes: Sequence[float], values: Sequence[float]) -> Refined:
         return Refined("diverging" if math.isnan(order) else "not asymptotic")
     ratio = h2 / h1
     extrapolated = v1 - change_21 / (ratio**order - 1.0)
-    uncertainty = SAFETY * abs(change_21) / (ratio ** min(order, MOST_TRUSTED) - 1.0)
+    uncertainty = THREE_GRID_SAFETY * abs(change_21) / (ratio ** min(order, MOST_TRUSTED) - 1.0)
     return Refined("monotone", order, extrapolated, uncertainty)
 
 
@@ -122,9 +122,9 @@ def find_order(h1: float, h2: float, h3: float, ratio: float) -> float:
     least = 1e-6
     if mismatch(least) >= 0.0:
         return math.nan
-    if mismatch(HIGHEST) <= 0.0:
-        return HIGHEST
-    return find_root(mismatch, least, HIGHEST)
+    if mismatch(HIGHEST_ORDER) <= 0.0:
+        return HIGHEST_ORDER
+    return find_root(mismatch, least, HIGHEST_ORDER)
 
 
 CELLS = "cells"

@@ -23,7 +23,7 @@ from runs.study.orders import Series
 
 FEW_LINES = 5  # in a panel, with colours and a column of the legend for them
 LEAST_MAP = 4  # values of each key from which a map is drawn
-WRITTEN = 240  # runs up to which numbers are written into a map
+MOST_WRITTEN_RUNS = 240  # runs up to which numbers are written into a map
 BOUNDS = (-10.0, -5.0, -2.0, -1.0, 1.0, 2.0, 5.0, 10.0)  # per cent, of the map's colours
 
 
@@ -156,7 +156,7 @@ def _draw_map(axes: Any, study: Any, name: str) -> None:
     edges = (_find_edges(x), _find_edges(y))
     look = {"cmap": "RdBu_r", "edgecolors": "w", "lw": 0.5}
     mesh = axes.pcolormesh(*edges, errors.T, norm=norm, **look)
-    for (i, j), error in np.ndenumerate(errors) if errors.size <= WRITTEN else ():
+    for (i, j), error in np.ndenumerate(errors) if errors.size <= MOST_WRITTEN_RUNS else ():
         text = f"{error:+.1f}"
         colour = "w" if abs(error) > BOUNDS[-2] else "k"
         words = {"ha": "center", "va": "center", "fontsize": 6, "color": colour}

@@ -32,7 +32,7 @@ def shockgrid(capfd, monkeypatch):
 
     The line that says that kernels are compiled, which a slow machine gets, is not printed.
     """
-    monkeypatch.setattr(compiling, "PATIENCE", math.inf)
+    monkeypatch.setattr(compiling, "PATIENCE_SECONDS", math.inf)
 
     def call(*words: str) -> tuple[int, str, str]:
         code = main(list(words))

@@ -13,7 +13,7 @@ from runs.deck.checking import make_parts, resolve
 from runs.deck.reading import resolve_deck
 from runs.inspection.listing import describe_plan
 
-SMALL = size.PROGRAM + 20_000 * size.RUN_BYTES  # bytes of a machine that holds so many cells
+SMALL = size.PROGRAM_BYTES + 20_000 * size.RUN_BYTES  # bytes of a machine that holds so many cells
 HUGE = (2**63 - 1, 10**30)
 SHARED = ("run.", "output.", "gauge.")  # tables that all decks have
 

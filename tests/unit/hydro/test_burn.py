@@ -7,7 +7,7 @@ from builders import SIDES, march, wall_off
 from hydro.block import Block
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
-from hydro.sources import LEAD, ProgrammedBurn
+from hydro.sources import FRONT_LEAD_FRACTION, ProgrammedBurn
 from problems.initial_states import make_plane_grid
 
 TNT = find_material("TNT").eos
@@ -17,7 +17,7 @@ def test_the_front_is_a_plane_or_a_circle():
     x, y = np.array([1.0, 2.0, 0.0]), np.array([1.0, 0.0, 3.0])
     plane = ProgrammedBurn((0.0, 0.0), (3.0, 4.0), 0.5)
     way = 0.6 * x + 0.8 * y
-    lead = LEAD * 0.5
+    lead = FRONT_LEAD_FRACTION * 0.5
     assert plane.compute_timed(2.0, x, y, 0.9) == pytest.approx(
         1.0 - (1.0 - np.clip((1.8 + lead - way) / 0.5, 0.0, 1.0)) ** 2
     )
@@ -66,7 +66,7 @@ def test_a_cell_gets_what_its_state_lacks():
             e = rest + 0.5 * p * volume + burnt * TNT.heat
             p = float(TNT.pressure(density, e))
         block = Block("bar", TNT, nodes, density, 0.0, 0.0, p)
-        heat = burn(block, 5.0, 0.5, t - LEAD / speed, 0.0)[2].max()
+        heat = burn(block, 5.0, 0.5, t - FRONT_LEAD_FRACTION / speed, 0.0)[2].max()
         p = float(TNT.pressure(density, e + heat))
         return (e + heat - rest - 0.5 * p * volume) / TNT.heat - burnt
 

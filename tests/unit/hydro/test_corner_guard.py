@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hydro.motion.constraints import NARROW, compute_way, compute_way_in, find_corner
+from hydro.motion.constraints import NARROW_CORNER_ANGLE, compute_way, compute_way_in, find_corner
 from problems.deck import Regrid
 from problems.standard.triple_point import TriplePoint, TriplePointDeck
 from regrid.measure.corners import find_triangles
@@ -43,12 +43,12 @@ def test_a_corner_that_closes_keeps_an_angle(angle):
     before = place + 0.2 * np.array([math.cos(angle), math.sin(angle)])
     moved = place.copy()
     for _ in range(40):
-        way = compute_way_in(moved, before, after, NARROW)
+        way = compute_way_in(moved, before, after, NARROW_CORNER_ANGLE)
         assert np.hypot(*way) <= 0.5 * np.hypot(*(after - moved)) + 1e-15
         moved += way
     if angle > 0.0:
-        assert measure_angle(moved, before, after) == pytest.approx(NARROW, rel=1e-3)
-    wide = compute_way_in(place, place + np.array([0.0, 0.1]), after, NARROW)
+        assert measure_angle(moved, before, after) == pytest.approx(NARROW_CORNER_ANGLE, rel=1e-3)
+    wide = compute_way_in(place, place + np.array([0.0, 0.1]), after, NARROW_CORNER_ANGLE)
     assert not wide.any()
 
 

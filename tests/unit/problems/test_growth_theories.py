@@ -21,7 +21,7 @@ from problems.interface_instability.theories import (
     read_rows,
     sort_cautions,
 )
-from problems.standard.rayleigh_taylor import GRAVITY, WAVE_NUMBER, RayleighTaylor
+from problems.standard.rayleigh_taylor import GRAVITY_ACCELERATION, WAVE_NUMBER, RayleighTaylor
 from problems.standard.rayleigh_taylor import RayleighTaylorDeck as Deck
 from regrid.errors import BadInput
 from runs.deck.reading import read_deck
@@ -147,6 +147,6 @@ def test_links_and_free_surfaces_of_blocks(tmp_path):
 
 def test_a_wave_at_the_cut_off_has_no_rate():
     with pytest.raises(BadInput, match="neither grows nor swings"):
-        RayleighTaylor(Deck(tension=GRAVITY / WAVE_NUMBER**2))
+        RayleighTaylor(Deck(tension=GRAVITY_ACCELERATION / WAVE_NUMBER**2))
     assert RayleighTaylor(Deck()).t_end == 3.0
     assert RayleighTaylor(Deck(above="nothing")).t_end == 6.0

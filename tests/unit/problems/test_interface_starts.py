@@ -10,8 +10,8 @@ import pytest
 from problems.deck import RunControl
 from problems.interface_instability.deck import Fluid, InterfaceDeck, SecondShock
 from problems.interface_instability.line import Mode, Spectrum, measure_mode
-from problems.interface_instability.problem import BENDS, InterfaceInstability
-from problems.interface_instability.theories import TRUSTED, get_kct, predict_amplitude
+from problems.interface_instability.problem import LEAST_REACH_RATIO, InterfaceInstability
+from problems.interface_instability.theories import TRUSTED_RATE_ERROR, get_kct, predict_amplitude
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells, measure_quality
 
@@ -46,7 +46,7 @@ def measure_distances(problem: InterfaceInstability):
 
 def find_reach(problem: InterfaceInstability, length: float) -> float:
     most = np.abs(problem.make_interface()[0]).max()
-    return min(max(problem.deck.reach, BENDS * most), length)
+    return min(max(problem.deck.reach, LEAST_REACH_RATIO * most), length)
 
 
 @pytest.mark.parametrize("name", list(DECKS))
@@ -72,7 +72,7 @@ def test_every_cell_is_convex_and_bent_by_no_more_than_a_quarter(name):
         seen = grid if sign > 0.0 else grid[:, ::-1]
         quality = measure_quality(np.ascontiguousarray(seen))
         assert quality.bad_cells == 0 and quality.least_corner_area > 0.0
-        if away[-1] >= BENDS * problem.amplitude:  # room for the whole bend
+        if away[-1] >= LEAST_REACH_RATIO * problem.amplitude:  # room for the whole bend
             part = sign * np.diff(grid[0], axis=0) / np.diff(away)[:, None]
             assert 0.75 - 1e-12 < part.min() and part.max() < 1.25 + 1e-12
 
@@ -127,7 +127,7 @@ def test_each_mode_of_a_small_spectrum_grows_as_theory_says():
     assert len(fine) == 2
     for mode in fine:
         expected = mode.amplitude * predict_amplitude(problem.theory, mode.number * kct)
-        assert row[mode.column] == pytest.approx(float(expected), rel=TRUSTED)
+        assert row[mode.column] == pytest.approx(float(expected), rel=TRUSTED_RATE_ERROR)
 
 
 HEAVY = Fluid(rho=3.0)

@@ -13,8 +13,16 @@ from problems.grid_march import GridMarch, GridMarchDeck
 from problems.interface_instability.deck import InterfaceDeck
 from problems.interface_instability.problem import InterfaceInstability
 from problems.plate_on_wedge.problem import PlateOnWedge, PlateOnWedgeDeck
-from problems.riemann import BEYOND, MOST_GROWTH, SHARE, Riemann, RiemannDeck, SideState, grade
-from regrid.curves import RATIO, meeting_laws
+from problems.riemann import (
+    AHEAD_OF_WAVES_PART,
+    MOST_GROWTH,
+    PLATEAU_CELL_PART,
+    Riemann,
+    RiemannDeck,
+    SideState,
+    grade,
+)
+from regrid.curves import REFINED_STEP_RATIO, meeting_laws
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells
 from regrid.registry import REGRIDDERS
@@ -40,10 +48,10 @@ def test_every_plateau_has_its_cells_and_every_wave_its_place(seed):
             assert sign * (sign * length + (end - wave.head) * t) > 0.0
         last = length + sign * (end - exact.u) * domain.t_end
         zone = sign * (wave.head - exact.u) * domain.t_end
-        assert zone == pytest.approx((1.0 - BEYOND) * last)
+        assert zone == pytest.approx((1.0 - AHEAD_OF_WAVES_PART) * last)
         edges = last * grade(100, growth)
         inside = np.count_nonzero(edges[1:] <= sign * (wave.tail - exact.u) * domain.t_end)
-        assert inside >= 100 * SHARE - 1 or growth == MOST_GROWTH
+        assert inside >= 100 * PLATEAU_CELL_PART - 1 or growth == MOST_GROWTH
         if wave.kind == "shock":
             assert end == pytest.approx(exact.u) and growth == 1.0
 
@@ -133,7 +141,7 @@ def test_refined_laws_meet_in_one_short_step(counts, lengths, refinement):
     assert steps[1][0] == pytest.approx(steps[0][-1])
     for one, length in zip((steps[0][::-1], steps[1]), lengths, strict=True):
         ratio = one[1:] / one[:-1]
-        assert ratio.min() > 1.0 - 1e-9 and ratio.max() < RATIO + 1e-9
+        assert ratio.min() > 1.0 - 1e-9 and ratio.max() < REFINED_STEP_RATIO + 1e-9
         assert one.sum() == pytest.approx(length)
 
 

@@ -13,7 +13,7 @@ from hydro.eos import IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
 from problems import initial_states
 from problems.initial_states import (
-    KEPT,
+    KEPT_CELLS_BEHIND,
     Front,
     SettledShock,
     settle_front,
@@ -73,7 +73,7 @@ def find_by(density: np.ndarray, behind: float, ahead: float) -> float:
 def test_exact_states_far_from_it(name):
     line, shock = settle(name)
     cell = np.searchsorted(X, POSITION) - 1
-    far = slice(0, cell - KEPT)
+    far = slice(0, cell - KEPT_CELLS_BEHIND)
     assert (line.rho[far] == shock.rho).all() and (line.p[far] == shock.p).all()
     assert (line.u[far] == shock.particle_speed).all()
     ahead = slice(cell + 16, None)
@@ -82,7 +82,7 @@ def test_exact_states_far_from_it(name):
     assert np.abs(line.u[ahead]).max() < 1e-12 * shock.particle_speed
     assert line.rho[ahead] == pytest.approx(shock.rho_ahead, rel=1e-12)
     # the seam where the exact state begins is a step no larger than what the shock sends back
-    assert np.abs(line.p[cell - KEPT] - shock.p) < 2e-3 * rise
+    assert np.abs(line.p[cell - KEPT_CELLS_BEHIND] - shock.p) < 2e-3 * rise
 
 
 @pytest.mark.parametrize("name", MATERIALS)

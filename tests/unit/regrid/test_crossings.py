@@ -7,7 +7,7 @@ from benchmarks.random_motions import is_simple
 from builders import unit_steps
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.measure.crossings import (
-    GROUP,
+    GROUP_EDGES,
     BoundaryCheck,
     fill_boxes,
     find_crossing,
@@ -37,10 +37,10 @@ def test_random_walks_agree_with_every_pair(seed):
     line = np.cumsum(rng.normal(0.35, 1.0, (2, 90)), axis=1)
     other = np.cumsum(rng.normal(0.35, 1.0, (2, 70)), axis=1) + 10.0
     assert find_self_crossing(line) == naive_pairs(line, line, lambda a: a + 2)
-    boxes = [np.empty((4, -(-(one.shape[1] - 1) // GROUP))) for one in (line, other)]
+    boxes = [np.empty((4, -(-(one.shape[1] - 1) // GROUP_EDGES))) for one in (line, other)]
     for one, box in zip((line, other), boxes, strict=True):
-        fill_boxes(one, GROUP, box)
-    found = find_touching(line, other, False, GROUP, *boxes)
+        fill_boxes(one, GROUP_EDGES, box)
+    found = find_touching(line, other, False, GROUP_EDGES, *boxes)
     assert (None if found[0] < 0 else found) == naive_pairs(line, other, lambda a: 0)
 
 

@@ -7,7 +7,7 @@ from builders import tensor
 from regrid.domains_in_space import SHAPES, make_moving_block
 from regrid.errors import BadInput, RegridFailure
 from regrid.hexahedra.faces import compute_face_laws, gather_faces
-from regrid.hexahedra.functional import ENERGY, MATRIX, fill_product
+from regrid.hexahedra.functional import ONLY_ENERGY, WITH_MATRIX, fill_product
 from regrid.hexahedra.regridder import BarrierRegridder3D, HexahedraMove
 from regrid.measure.hexahedra import compute_hexahedron_sines, compute_least_corner_volumes
 
@@ -43,11 +43,11 @@ def throw(nodes, size, seed=1):
 def test_gradient_is_that_of_the_value(size, e2):
     nodes = throw(graded(), size)
     move = begin(nodes)
-    move.assemble_at(nodes, MATRIX, e2)
+    move.assemble_at(nodes, WITH_MATRIX, e2)
     gradient = move.gradient.copy()
     way = throw(np.zeros_like(nodes), 1.0, 2)
     h = 1e-5
-    ahead, behind = (move.assemble_at(nodes + s * h * way, ENERGY, e2) for s in (1.0, -1.0))
+    ahead, behind = (move.assemble_at(nodes + s * h * way, ONLY_ENERGY, e2) for s in (1.0, -1.0))
     slope = (gradient * way)[INNER].sum()
     scale = np.sqrt((gradient[INNER] ** 2).sum() * (way**2).sum())
     assert abs((ahead - behind) / (2.0 * h) - slope) < 1e-6 * scale
@@ -57,7 +57,7 @@ def test_gradient_is_that_of_the_value(size, e2):
 def test_matrix_and_line_solve_are_symmetric_and_positive(size, e2):
     nodes = throw(graded(), size)
     move = begin(nodes)
-    move.assemble_at(nodes, MATRIX, e2)
+    move.assemble_at(nodes, WITH_MATRIX, e2)
     places = np.argwhere(np.ones_like(nodes[INNER], dtype=bool)) + (0, 1, 1, 1)
     matrix = []
     inverse = []
@@ -74,10 +74,10 @@ def test_matrix_and_line_solve_are_symmetric_and_positive(size, e2):
 def test_graded_boxes_are_stationary_and_cost_nothing():
     nodes = graded((4, 3, 5), 1.8)
     move = begin(nodes)
-    move.assemble_at(nodes, MATRIX)
+    move.assemble_at(nodes, WITH_MATRIX)
     assert np.abs(move.gradient[INNER]).max() < 1e-14 * np.sqrt(move.laws.scale)
     straight = begin(nodes, (0.0, 0.0, 0.0))
-    assert abs(straight.assemble_at(nodes, ENERGY)) < 1e-13 * straight.laws.scale * 60
+    assert abs(straight.assemble_at(nodes, ONLY_ENERGY)) < 1e-13 * straight.laws.scale * 60
     found = BarrierRegridder3D().regrid(nodes, nodes)
     assert np.abs(found.nodes - nodes).max() < 1e-14 * np.abs(nodes).max()
 
@@ -108,7 +108,7 @@ def test_a_smooth_error_is_mostly_taken_away_at_once():
     move = HexahedraMove(BarrierRegridder3D().options, thrown, end, np.full(3, 1.0 / 3.0))
     move.laws = compute_face_laws(end, move.weights, True)
     move.strengthen(thrown)
-    move.assemble_at(thrown, MATRIX)
+    move.assemble_at(thrown, WITH_MATRIX)
     inner = np.s_[:, 1:-1, 1:-1, 1:-1]
     residual = -move.gradient
     change = np.zeros_like(thrown)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from regrid.errors import BadInput
 from runs.study.definition import read_definition, read_vary, write_value
-from runs.study.orders import SAFETY, refine
+from runs.study.orders import THREE_GRID_SAFETY, refine
 
 VALUES = st.recursive(
     st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | st.text(),
@@ -105,7 +105,9 @@ def test_a_power_law_gives_its_order_and_limit(order, exact, slope):
     assert found.order == pytest.approx(order, rel=1e-5, abs=1e-5)
     assert found.extrapolated == pytest.approx(exact, abs=1e-5 * abs(slope))
     distance = abs(values[-1] - exact)
-    assert found.uncertainty >= SAFETY * distance * (1.0 - 1e-3)  # a high order is cut: more
+    assert found.uncertainty >= THREE_GRID_SAFETY * distance * (
+        1.0 - 1e-3
+    )  # a high order is cut: more
 
 
 def test_the_formula_of_three_equal_steps():

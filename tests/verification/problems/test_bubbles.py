@@ -9,8 +9,8 @@ from hydro.eos import IdealGas
 from problems.references.riemann import solve_riemann
 from problems.shock_bubble import (
     AIR_DENSITY,
-    PRESSURE,
-    RADIUS,
+    AIR_PRESSURE,
+    BUBBLE_RADIUS,
     ShockBubble,
     ShockBubbleDeck,
 )
@@ -24,11 +24,11 @@ def test_a_stream_carries_the_bubble_and_nothing_happens(gas):
     simulation = ShockBubble(ShockBubbleDeck(gas=gas, cells=6)).build()
     for block in simulation.blocks:
         rho = block.state[0].max() if block.material == gas else AIR_DENSITY
-        block.state[:, 1:-1, 1:-1] = np.reshape([rho, SPEED, 0.0, PRESSURE], (4, 1, 1))
+        block.state[:, 1:-1, 1:-1] = np.reshape([rho, SPEED, 0.0, AIR_PRESSURE], (4, 1, 1))
         block.update(0.0)
         for segment in block.segments:
             if segment.kind == "inflow":
-                segment.state = lambda t: (AIR_DENSITY, SPEED, 0.0, PRESSURE)
+                segment.state = lambda t: (AIR_DENSITY, SPEED, 0.0, AIR_PRESSURE)
     first = [block.nodes.copy() for block in simulation.blocks]
     march(simulation, 20)
     assert simulation.t > 8e-6
@@ -37,11 +37,11 @@ def test_a_stream_carries_the_bubble_and_nothing_happens(gas):
             continue
         _, u, v, p = block.state[:, 1:-1, 1:-1]
         assert np.abs(u - SPEED).max() < 1e-10 and np.abs(v).max() < 1e-10
-        assert np.abs(p / PRESSURE - 1.0).max() < 1e-12
+        assert np.abs(p / AIR_PRESSURE - 1.0).max() < 1e-12
         for side in ("i_min", "i_max"):  # contacts, and the seams that they carry
             moved = block.side_line(side, block.nodes) - block.side_line(side, nodes)
-            assert np.abs(moved[0] - SPEED * simulation.t).max() < 1e-9 * RADIUS
-            assert np.abs(moved[1]).max() < 1e-9 * RADIUS
+            assert np.abs(moved[0] - SPEED * simulation.t).max() < 1e-9 * BUBBLE_RADIUS
+            assert np.abs(moved[1]).max() < 1e-9 * BUBBLE_RADIUS
 
 
 LIGHT = IdealGas(1.4)

@@ -29,7 +29,7 @@ from hydro.links import join
 from hydro.simulation import Simulation
 from problems.problem import find_frequency, find_growth_rate
 from problems.standard.rayleigh_taylor import (
-    GRAVITY,
+    GRAVITY_ACCELERATION,
     WAVE_NUMBER,
     RayleighTaylor,
     RayleighTaylorDeck,
@@ -263,7 +263,7 @@ def test_a_round_drop_rests(uneven, periods, curved):
 @pytest.mark.parametrize(("part", "grows"), [(0.95, True), (1.05, False)])
 def test_rayleigh_taylor_is_cut_off(part, grows):
     """From sigma k² = (rho2 - rho1) g on, waves of a heavy layer on a light one swing."""
-    tension = part * GRAVITY / WAVE_NUMBER**2
+    tension = part * GRAVITY_ACCELERATION / WAVE_NUMBER**2
     problem = RayleighTaylor(RayleighTaylorDeck(cells=12, tension=tension))
     assert problem.grows is grows
     evolution = problem.build()

@@ -9,7 +9,7 @@ from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.links import join
-from hydro.remap.flow import EVERY, Refinement
+from hydro.remap.flow import STEPS_PER_LINE_CHECK, Refinement
 from hydro.simulation import Simulation
 from problems.deck import RunControl
 from problems.interface_instability.deck import InterfaceDeck
@@ -116,10 +116,10 @@ def test_a_restart_before_at_and_after_new_lines_gives_the_same_bits():
     flow = make_mushroom()
     march_until_split(flow)
     at = flow.step
-    assert at % EVERY == 0
+    assert at % STEPS_PER_LINE_CHECK == 0
     flow = make_mushroom()
     kept = {}
-    while flow.step < at + EVERY + 5:
+    while flow.step < at + STEPS_PER_LINE_CHECK + 5:
         flow.advance()
         if flow.step in (at - 3, at - 1, at, at + 1, at + 7):
             kept[flow.step] = flow.get_state()

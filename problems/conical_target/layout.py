@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from hydro.block import Block
 
 
-LEAST_CELLS = 6  # a wave: the thickness of interfaces holds shorter ones back (theory F6.6)
+LEAST_RIPPLE_CELLS = 6  # a wave: the thickness of interfaces holds shorter ones back (theory F6.6)
 FITTED_POINTS = 24  # between two nodes, in fits
 COVERED_WINDOW_PART = 0.93  # of a window that the line has to fill
 
@@ -86,9 +86,9 @@ class Ripple:
     def check(self, cells: int, grids: dict[str, np.ndarray]) -> None:
         """Raise BadInput for waves of too few of the side's `cells`, or grids that they fold."""
         number = cells * self.wavelength / self.frame.length
-        least = LEAST_CELLS * self.frame.length / cells
+        least = LEAST_RIPPLE_CELLS * self.frame.length / cells
         words = f"that are {number:.3g} cells; give at least {least:.3g} m, or more `cells`"
-        self.deck.refuse(number < LEAST_CELLS, "ripple_wavelength", words)
+        self.deck.refuse(number < LEAST_RIPPLE_CELLS, "ripple_wavelength", words)
         bad = any(len(find_bad_cells(nodes)) for nodes in grids.values())
         words = "cells beside the cone's side would not be convex; give a smaller one"
         self.deck.refuse(bad, "ripple_amplitude", words)
@@ -163,7 +163,7 @@ def fit_wave(position: np.ndarray, height: np.ndarray, middle: float, length: fl
     """
     part = (position - middle) / length
     chosen = np.abs(part) <= 1.0
-    if chosen.sum() < 5 * LEAST_CELLS or np.ptp(part[chosen]) < 2.0 * COVERED_WINDOW_PART:
+    if chosen.sum() < 5 * LEAST_RIPPLE_CELLS or np.ptp(part[chosen]) < 2.0 * COVERED_WINDOW_PART:
         return math.nan
     step = np.hypot(np.gradient(position), np.gradient(height))[chosen]
     part = part[chosen]

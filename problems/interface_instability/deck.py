@@ -115,7 +115,7 @@ class InterfaceDeck(Deck, kw_only=True):
         return msgspec.structs.replace(self, line_file=path, digests=digests)
 
 
-LEAST_CELLS = 3  # in a wave: with fewer it hardly grows
+LEAST_WAVE_CELLS = 3  # in a wave: with fewer it hardly grows
 WALL_SLOPE_PART = (
     2e-3  # most slope of a wave at a wall, over its largest: a phase of 3.14 is one of pi
 )
@@ -140,13 +140,13 @@ def _list_wave_faults(
 ) -> Iterator[str]:
     """Waves of too few cells, and whether waves fit into the width and stand square on walls."""
     for name, mode in waves:
-        if LEAST_CELLS * mode.number > deck.cells:
+        if LEAST_WAVE_CELLS * mode.number > deck.cells:
             share = deck.cells / mode.number
-            most = deck.cells // LEAST_CELLS
-            least = LEAST_CELLS * mode.number
+            most = deck.cells // LEAST_WAVE_CELLS
+            least = LEAST_WAVE_CELLS * mode.number
             yield (
                 f"{name}.number is {mode.number}: waves of {share:.3g} cells (fewer than "
-                f"{LEAST_CELLS}) hardly grow: take a number up to {most}, or cells = {least}"
+                f"{LEAST_WAVE_CELLS}) hardly grow: take a number up to {most}, or cells = {least}"
             )
         if deck.sides == "wall" and abs(math.sin(mode.phase)) > WALL_SLOPE_PART:
             words = "with phase 0 or 3.141592653589793; or take sides = 'periodic'"

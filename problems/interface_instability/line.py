@@ -144,7 +144,7 @@ def measure_shape(line, wavenumber, left_out, even):
 Perturbation = Callable[[np.ndarray], np.ndarray]  # heights y (n,) [m] -> places x (n,) [m]
 FOLLOWED_HARMONICS = 12  # harmonics of a free line that are followed
 FOLLOWED_HARMONIC_PART = 0.01  # of the strongest: weaker ones are not
-LEAST_CELLS = 8  # in a wave: shorter waves are damped by the scheme too much to compare
+LEAST_COMPARED_CELLS = 8  # in a wave: shorter waves are damped by the scheme too much to compare
 PERIODIC_END_GAP = 1e-6  # of a line's extent: so far its ends may differ between periodic sides
 
 
@@ -247,7 +247,7 @@ class FreeLine:
         line = np.array([self.x, self.y])
         per_wave = (self.y.size - 1) * 2.0 * math.pi / (wavenumber * (self.y[-1] - self.y[0]))
         found = []
-        for number in range(1, max(1, int(per_wave / LEAST_CELLS)) + 1):
+        for number in range(1, max(1, int(per_wave / LEAST_COMPARED_CELLS)) + 1):
             size = wavenumber * measure_mode(line, wavenumber, number, 0.0)
             phase = 0.0
             if not self.even:

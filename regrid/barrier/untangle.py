@@ -22,14 +22,14 @@ from regrid.sides import copy_sides
 
 TERM_1, TERM_2, TERM_3, TERM_4 = (at.ASSEMBLY_ROWS + k * CHUNK_SPAN for k in range(4))
 LEAST_1, LEAST_2, LEAST_3, LEAST_4 = (at.ASSEMBLY_ROWS + k * CHUNK_SPAN for k in range(4, 8))
-ENERGY = at.ASSEMBLY_ROWS + 8 * CHUNK_SPAN
-LEAST = at.ASSEMBLY_ROWS + 9 * CHUNK_SPAN
+ENERGY_ROW = at.ASSEMBLY_ROWS + 8 * CHUNK_SPAN
+LEAST_AREA_ROW = at.ASSEMBLY_ROWS + 9 * CHUNK_SPAN
 ENERGY_ROWS = at.ASSEMBLY_ROWS + 10 * CHUNK_SPAN
 
 
 @kernel
 def fill_energy(nodes, law, spread, barrier, first, last, Z):
-    """Smoothed energy and least scaled corner area, one a column of cells, in ENERGY and LEAST.
+    """Smoothed energy and least scaled corner area, one a column of cells, in ENERGY_ROW and LEAST_AREA_ROW.
 
     `barrier` (ni, nj) is e_c/epsilon of the cells; at `spread` 0 the energy is that of convex
     grids, J itself.  Cells of columns first..last-1; the block's own corners are left out.
@@ -41,8 +41,8 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
     lam = law.area_weight
     quarter = 0.25 * law.sigma * law.epsilon
     for col in range(cells):
-        Z[ENERGY + col] = 0.0
-        Z[LEAST + col] = 1e300
+        Z[ENERGY_ROW + col] = 0.0
+        Z[LEAST_AREA_ROW + col] = 1e300
     at.begin_columns(nodes, law.along_j, law.blend_i, law.blend_j, law.kj, first, cells, Z)
     for i in range(ni):
         at.begin_row(nodes, i, laws, first, cells, Z)
@@ -105,13 +105,13 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
             m1 = m1 if m1 < m2 else m2
             m3 = m3 if m3 < m4 else m4
             m1 = m1 if m1 < m3 else m3
-            least = Z[LEAST + col]
+            least = Z[LEAST_AREA_ROW + col]
             straight = straight / Z[at.QA + col] if Z[at.QA + col] > 0.0 else 0.0  # F = q dx
             terms *= Z[at.FADING_ROW + col]
-            Z[ENERGY + col] += (quarter * parts[col]) * terms + 0.5 * (
+            Z[ENERGY_ROW + col] += (quarter * parts[col]) * terms + 0.5 * (
                 straight + inside * Z[at.RIGHT_Q + col] * side
             )
-            Z[LEAST + col] = m1 if m1 < least else least
+            Z[LEAST_AREA_ROW + col] = m1 if m1 < least else least
         if spread == 0.0 and law.cost_weight > 0.0:
             x0 = nodes[0, i]
             y0 = nodes[1, i]
@@ -125,7 +125,7 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
                 bx = 0.5 * ((x0[j + 1] - x0[j]) + (x1[j + 1] - x1[j]))
                 by = 0.5 * ((y0[j + 1] - y0[j]) + (y1[j + 1] - y1[j]))
                 rho = cell_rate(ax, ay, bx, by, law.sound[i, j], law.cost_scale)
-                Z[ENERGY + col] += weight * cost_value(rho)
+                Z[ENERGY_ROW + col] += weight * cost_value(rho)
 
 
 FIRST_PART = 0.2  # e of the first step, over the worst D

@@ -36,7 +36,7 @@ from regrid.barrier.residual_estimate import (
 from regrid.barrier.side_laws import BarrierLaw, prepare, weigh_curves
 from regrid.barrier.step_control import CHUNK_SPAN, MOST_CHUNK_NODES, UPRIGHT, measure_corners
 from regrid.barrier.tuning import DEFAULT, Tuning
-from regrid.barrier.untangle import ENERGY, ENERGY_ROWS, LEAST, fill_energy
+from regrid.barrier.untangle import ENERGY_ROW, ENERGY_ROWS, LEAST_AREA_ROW, fill_energy
 from regrid.measure.corners import BLOCK_CORNERS
 from regrid.measure.crossings import BoundaryCheck
 from regrid.measure.quality import compute_scaled_jacobians
@@ -436,6 +436,6 @@ class Workspace:
             rows = self.scratch[c]
             count = last - first
             fill_energy(nodes, self.law, spread, barrier, first, last, rows)
-            energy += float(rows[ENERGY : ENERGY + count].sum())
-            least = min(least, float(rows[LEAST : LEAST + count].min()))
+            energy += float(rows[ENERGY_ROW : ENERGY_ROW + count].sum())
+            least = min(least, float(rows[LEAST_AREA_ROW : LEAST_AREA_ROW + count].min()))
         return energy, least

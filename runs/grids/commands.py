@@ -37,7 +37,7 @@ from runs.grids.quality import describe, plan_outputs
 from runs.quantities import add_unit
 from runs.store.files import check_free
 
-MOST_CELLS = 4_000_000
+MOST_GRID_CELLS = 4_000_000
 Files = tuple[tuple[str, ...], bool, bool]  # names given with -o, --force, --plot
 
 
@@ -71,7 +71,7 @@ def draw_every_domain(picture: str, force: bool) -> str:
     marches = []
     for name in DOMAINS:
         domain = make_domain(name, *making.default_cells(name))
-        found = making.march(domain, choose_family("barrier"), making.STEPS)
+        found = making.march(domain, choose_family("barrier"), making.MOTION_STEPS)
         marches.append((name.replace("_", "-"), found))
     return f"picture: {draw_gallery(marches, path)}"
 
@@ -94,8 +94,8 @@ def parse_cells(text: str | None, dimensions: int = 2) -> tuple[int, ...] | None
         cells = ()
     if len(cells) != dimensions or min(cells) < 2:
         raise BadInput(f"--cells {text}: write {example}, with at least 2 cells each way")
-    if math.prod(cells) > MOST_CELLS:
-        raise BadInput(f"--cells {text}: more than {MOST_CELLS} cells; take fewer")
+    if math.prod(cells) > MOST_GRID_CELLS:
+        raise BadInput(f"--cells {text}: more than {MOST_GRID_CELLS} cells; take fewer")
     return cells
 
 

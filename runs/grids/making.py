@@ -54,7 +54,8 @@ from runs.grids.quality import Judgement, judge, plan_outputs, write_grid
 Cells = tuple[int, ...]
 Family = str | Regridder
 NONE: Mapping[str, Any] = MappingProxyType({})
-PASSES = STEPS = 40
+MOST_PASSES = 40
+MOTION_STEPS = 40
 CELLS_IN_SPACE = (20, 20, 20)
 SPATIAL_OPTIONS = ("iterations", "sides", "threads")
 FAMILIES_IN_SPACE = {
@@ -176,7 +177,7 @@ def make(
     family: Family | None = None,
     *,
     cells: Cells | None = None,
-    steps: int = STEPS,
+    steps: int = MOTION_STEPS,
     at: float = 1.0,
     weight: str | None = None,
     block: str | None = None,
@@ -208,11 +209,11 @@ def make(
         regridder = choose_family(family or used, options, weight)
         if isinstance(source, np.ndarray):
             nodes = check_nodes(source, "the array")
-            made = make_on_curves(nodes, regridder, PASSES, "the array")
+            made = make_on_curves(nodes, regridder, MOST_PASSES, "the array")
         elif name in DOMAINS:
             made = make_on_domain(name, used, regridder, cells or default_cells(name), steps, at)
         elif is_file_name(told):
-            made = make_on_curves(read_sides(told, block, cells), regridder, PASSES, told)
+            made = make_on_curves(read_sides(told, block, cells), regridder, MOST_PASSES, told)
         else:
             known = [name.replace("_", "-") for name in (*DOMAINS, *BLOCKS, *SHAPES)]
             raise BadInput(f"no domain and no file is called {told!r}{suggest(told, known)}")
@@ -237,7 +238,7 @@ def regrid(
     if nodes.shape[0] == 3:
         made = regrid_space(nodes, make_spatial_law(options, weight), options)
     else:
-        made = regrid_plane(nodes, choose_family(family or used, options, weight), PASSES)
+        made = regrid_plane(nodes, choose_family(family or used, options, weight), MOST_PASSES)
     made.made_by = {"source": source, "family": used}
     return _finish(made, options, weight)
 
@@ -266,7 +267,7 @@ def make_on_domain(name: str, family: str, regridder, cells: Cells, steps: int, 
     """Grid of a named domain at part `at` of its motion; a failure says the step."""
     domain = make_domain(name, *cells)
     if steps == 0:
-        return make_on_curves(domain.boundary(at), regridder, PASSES, name)
+        return make_on_curves(domain.boundary(at), regridder, MOST_PASSES, name)
     found = march(domain, regridder, steps, at)
     if found.failure:
         s = at * (found.done + 1) / steps

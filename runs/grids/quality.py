@@ -132,7 +132,7 @@ def describe(judgement: Judgement) -> list[str]:
 
 
 FORMAT = "shockgrid grid"
-FORMAT_VERSION = 1
+QUALITY_FORMAT_VERSION = 1
 ENDINGS = (".h5", ".vts", ".npz")
 
 
@@ -178,7 +178,7 @@ def write_grid(
 def _make_image(nodes, fields, made_by) -> bytes:
     with h5py.File("grid", "w", driver="core", backing_store=False) as file:
         file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = FORMAT_VERSION
+        file.attrs["format_version"] = QUALITY_FORMAT_VERSION
         for key, value in made_by.items():
             file.attrs[key] = value
         made = file.create_group("provenance", track_order=True)

@@ -13,7 +13,7 @@ import numpy as np
 from regrid.domains import DOMAINS, make_domain
 from regrid.given import read_grid
 from runs.grids import making
-from runs.grids.making import STEPS, Family, Grid, March, find_nodes, make, regrid
+from runs.grids.making import MOTION_STEPS, Family, Grid, March, find_nodes, make, regrid
 from runs.grids.quality import Judgement, judge
 
 __all__ = ("Grid", "compare", "make", "quality", "read", "regrid", "write")
@@ -40,7 +40,7 @@ def compare(
     families: Sequence[Family] | Mapping[str, Family],
     *,
     cells: tuple[int, int] | None = None,
-    steps: int = STEPS,
+    steps: int = MOTION_STEPS,
 ) -> dict[str, March]:
     """Named domain marched in `steps` steps by each family; what came of it, by its label.
 

@@ -36,7 +36,7 @@ from runs.store.history import find_restart_point, restore, truncate_history
 
 CELLS = "cells"
 SET_UP = "run.t_set_up"
-MOST_CELLS = 1_000_000  # that are built to look
+MOST_PREVIEWED_CELLS = 1_000_000  # that are built to look
 
 
 def check_deck_fully(read: ReadDeck, problem: Problem) -> None:
@@ -57,7 +57,7 @@ def check_deck_fully(read: ReadDeck, problem: Problem) -> None:
             check_cut(read.deck.run.cut, [block.name for block in plan[1]])
         if not (read.deck.gauge or output.fields or output.columns or (output.times and not plan)):
             return
-        if problem.estimate_cells() > MOST_CELLS:
+        if problem.estimate_cells() > MOST_PREVIEWED_CELLS:
             return
         check_requests(read, problem.build())
 

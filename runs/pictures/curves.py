@@ -412,7 +412,9 @@ def draw_panel(axes, t, history, names: Panel, units) -> None:
 
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg", "c": "m/s"}
-MOST_NAMED = 10  # gauges with a line in the legend; more are distinguished by a row of colours
+MOST_NAMED_GAUGES = (
+    10  # gauges with a line in the legend; more are distinguished by a row of colours
+)
 LEGEND_COLUMNS = 3
 # inches of a panel
 GAUGES_WIDTH = 4.4
@@ -463,6 +465,6 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
     moving = "; dashed: moves with the material" * any(point.moves for point in chosen)
     figure.supxlabel(name_axis("t", unit) + moving, fontsize=9)
     handles = [lines[k] for k in sorted(lines)]
-    named = handles[:: -(-len(handles) // MOST_NAMED)]
+    named = handles[:: -(-len(handles) // MOST_NAMED_GAUGES)]
     title = f"{len(named)} of {len(handles)}" if len(named) < len(handles) else None
     figure.legend(handles=named, loc="outside right upper", fontsize=8, title=title)

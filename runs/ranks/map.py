@@ -45,7 +45,7 @@ def share_evolution(evolution: Simulation, ranks: int, cut: Mapping[str, int]) -
     return share_named_blocks(blocks, ranks, cut, evolution.flow.source.law is not None)
 
 
-MOST_NAMED = 8  # ranks that are told one by one
+MOST_NAMED_RANKS = 8  # ranks that are told one by one
 
 
 def describe_map(
@@ -62,12 +62,12 @@ def describe_map(
     pieces = name_pieces([name for name, _ in blocks], shares, ranks)
     lines = []
     memories = estimate_memories(cells, shares, ranks)
-    for rank in range(min(ranks, MOST_NAMED)):
+    for rank in range(min(ranks, MOST_NAMED_RANKS)):
         memory = memories[rank] / 1e6
         words = ", ".join(pieces[rank]) or "nothing"
         lines.append(f"rank {rank}: {words}; {loads[rank]} cells, about {memory:.0f} MB")
-    if ranks > MOST_NAMED:
-        lines.append(f"and {ranks - MOST_NAMED} more ranks")
+    if ranks > MOST_NAMED_RANKS:
+        lines.append(f"and {ranks - MOST_NAMED_RANKS} more ranks")
     advice = ""
     idle = loads.count(0)
     if idle:

@@ -29,7 +29,7 @@ ENERGY_ROWS = at.ASSEMBLY_ROWS + 10 * CHUNK_SPAN
 
 @kernel
 def fill_energy(nodes, law, spread, barrier, first, last, Z):
-    """Smoothed energy and least scaled corner area, one a column of cells, in ENERGY_ROW and LEAST_AREA_ROW.
+    """Smoothed energy and least scaled corner area of columns, in ENERGY_ROW and LEAST_AREA_ROW.
 
     `barrier` (ni, nj) is e_c/epsilon of the cells; at `spread` 0 the energy is that of convex
     grids, J itself.  Cells of columns first..last-1; the block's own corners are left out.

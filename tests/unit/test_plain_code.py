@@ -1,0 +1,113 @@
+"""The code stays plain: one statement a line, names that say their whole meaning."""
+
+import ast
+import re
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PRODUCT = ("regrid", "hydro", "problems", "runs", "shockgrid")
+MOST_PARALLEL_PART = 0.01  # of all assignments of a package
+# parts of names that tell the components of one thing from each other
+COMPONENTS = (
+    ("x", "y"),
+    ("x", "y", "z"),
+    ("i", "j"),
+    ("i", "j", "k"),
+    ("u", "v"),
+    ("u", "v", "w"),
+    ("r", "z"),
+    ("left", "right"),
+    ("low", "high"),
+    ("lower", "upper"),
+)
+UNITS = {"MM", "GPA", "US"}  # numbers of one word that everybody knows
+
+
+def read_trees(package: str) -> Iterator[tuple[Path, ast.Module]]:
+    for path in sorted((ROOT / package).rglob("*.py")):
+        yield path, ast.parse(path.read_text(encoding="utf-8"))
+
+
+def find_name(target: ast.expr) -> str:
+    if isinstance(target, ast.Subscript):
+        return find_name(target.value)
+    return getattr(target, "attr", getattr(target, "id", ""))
+
+
+def strip_component(name: str, component: str) -> str | None:
+    """The name without the component at one of its ends or between two of its words."""
+    for pattern in (rf"(^|_){component}(_|$)", rf"{component}$", rf"^{component}"):
+        if re.search(pattern, name):
+            return re.sub(pattern, "", name, count=1)
+    return None
+
+
+def are_components(names: list[str]) -> bool:
+    """Whether the names are those of one thing's components: x, y; area_i, area_j."""
+    for components in COMPONENTS:
+        if len(components) == len(names):
+            stems = {strip_component(*both) for both in zip(names, components, strict=True)}
+            if len(stems) == 1 and None not in stems:
+                return True
+    return False
+
+
+def is_exchange(targets: list[ast.expr], values: list[ast.expr]) -> bool:
+    """Whether a value needs what an earlier target was, so that lines of their own would differ."""
+    written = {ast.unparse(target) for target in targets}
+    read = {ast.unparse(node) for value in values for node in ast.walk(value)}
+    return bool(written & read)
+
+
+def is_packed(node: ast.AST) -> bool:
+    """Whether an assignment joins things that are not one: a parallel one of different things."""
+    if not isinstance(node, ast.Assign):
+        return False
+    target = node.targets[0]
+    if not isinstance(target, ast.Tuple) or not isinstance(node.value, ast.Tuple):
+        return False
+    names = [find_name(one) for one in target.elts]
+    return not are_components(names) and not is_exchange(target.elts, node.value.elts)
+
+
+@pytest.mark.parametrize("package", [*PRODUCT, "tests", "benchmarks"])
+def test_assignments_are_not_packed(package):
+    assignments = 0
+    packed = []
+    for path, tree in read_trees(package):
+        for node in ast.walk(tree):
+            assignments += isinstance(node, ast.Assign | ast.AnnAssign | ast.AugAssign)
+            if is_packed(node):
+                packed.append(f"{path.relative_to(ROOT)}:{node.lineno}: {ast.unparse(node)}")
+    assert len(packed) <= MOST_PARALLEL_PART * assignments, "\n".join(packed)
+
+
+def find_numbers(tree: ast.Module) -> Iterator[tuple[str, str]]:
+    """Numeric constants of a module and their values: numbers, and sums of such."""
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            name = node.targets[0].id
+            parts = list(ast.walk(node.value))
+            numbers = [one for one in parts if isinstance(one, ast.Constant)]
+            numeric = all(isinstance(one.value, int | float) for one in numbers)
+            plain = not any(
+                isinstance(one, ast.Call | ast.Tuple | ast.List | ast.Subscript) for one in parts
+            )
+            if name.isupper() and numbers and numeric and plain:
+                yield name, ast.unparse(node.value)
+
+
+@pytest.mark.parametrize("package", PRODUCT)
+def test_constants_say_their_whole_meaning(package):
+    values = defaultdict(set)
+    words = Counter()
+    for _, tree in read_trees(package):
+        for name, value in find_numbers(tree):
+            values[name].add(value)
+            words[name] += "_" not in name.strip("_")
+    assert not {name for name, count in words.items() if count} - UNITS
+    assert not {name: found for name, found in values.items() if len(found) > 1}

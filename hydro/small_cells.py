@@ -49,9 +49,8 @@ from regrid.jit import compiled_once, kernel
 
 MOST_REACH = 6  # cells of a neighbourhood on either side of its own cell
 CONSERVED_ROWS = 4  # per volume: mass, momentum x and y, energy
-RELAXED_FRACTION = (
-    0.1  # fraction of a state redistributed per step, besides all of the step's change
-)
+# fraction of a state redistributed per step, besides all of the step's change
+RELAXED_FRACTION = 0.1
 # rows of a cell's record: what it redistributes per volume, mean and slope of its neighbourhood,
 # position of that mean along the line, volume, number of its neighbourhoods, what it keeps per
 # volume

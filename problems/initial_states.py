@@ -258,9 +258,8 @@ RUN_IN = 64  # cells that the shock runs before
 KEPT_CELLS_BEHIND = 32  # cells behind it that keep what was computed
 CELLS_AHEAD = 16  # cells before it
 MARGIN_CELLS_BEHIND = 24  # cells behind the shock's first place
-SLOWEST_SHOCK_PART = (
-    0.5  # of the shock's speed beside the contact: its least speed over the cells beyond that
-)
+# of the shock's speed beside the contact: its least speed over the cells beyond that
+SLOWEST_SHOCK_PART = 0.5
 RUN_IN_ROWS = 2  # cells across
 State = tuple[float, float, float]  # density [kg/m3], velocity outwards [m/s], pressure [Pa]
 

@@ -35,9 +35,8 @@ from problems.references.riemann import RiemannSolution, compute_cell_averages, 
 from regrid.errors import BadInput, suggest
 from regrid.roots import find_root
 
-FASTEST_WAVE_WAY = (
-    0.8  # of the length of a side that its fastest wave goes, where no end time is given
-)
+# of the length of a side that its fastest wave goes, where no end time is given
+FASTEST_WAVE_WAY = 0.8
 STARS = ("p_left", "p_right", "u_left", "u_right", "rho_left", "rho_right")
 REST_SPEED_PART = 1e-12  # of the sound speed: slower than that nothing moves
 AHEAD_OF_WAVES_PART = 0.15  # of a side at the end: ahead of its outermost wave

@@ -56,9 +56,8 @@ UPWIND_LENGTH = 0.1
 DOWNWIND_LENGTH = 0.16
 FIRST_GAP_RADII = 0.1  # first distance of shock and bubble over the radius
 BUBBLE = ("core", "west", "north", "east")
-DRAWN_GRADIENT_DECADES = (
-    1.3  # of gradients that are drawn, from those that 1 % of a picture's nodes exceed
-)
+# of gradients that are drawn, from those that 1 % of a picture's nodes exceed
+DRAWN_GRADIENT_DECADES = 1.3
 # Times of photographs [us] after the shock's arrival, the heavy gas's 115, 187 and 318 unchecked;
 # 340 added.
 PHOTOGRAPHS = {

@@ -28,9 +28,8 @@ from regrid.roots import find_root
 
 SETTLED_PRODUCT_SPREAD = 1e-9  # relative spread of products that passes for equal
 REFINED_STEP_RATIO = 1.15  # of neighbouring steps where a line is refined towards one end
-NODES_OF_E_FOLD = (
-    5.0  # nodes of a line over those within which steps grow by e towards the far ones
-)
+# nodes of a line over those within which steps grow by e towards the far ones
+NODES_OF_E_FOLD = 5.0
 
 
 def uniform_law(count: int) -> np.ndarray:

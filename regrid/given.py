@@ -32,9 +32,8 @@ ALIASES = dict(zip(("left", "right", "bottom", "top"), SIDE_NAMES, strict=True))
 # extents whose areas can be computed with
 LEAST_EXTENT = 1e-100
 MOST_EXTENT = 1e100
-MOST_CORNER_GAP = (
-    1e-6  # ends of sides that are to meet may lie so far apart, over the size of the whole
-)
+# ends of sides that are to meet may lie so far apart, over the size of the whole
+MOST_CORNER_GAP = 1e-6
 CORNERS = (  # a side and its end that meets the end of another
     ("i_min", 0, "j_min", 0), ("i_min", -1, "j_max", 0),
     ("i_max", 0, "j_min", -1), ("i_max", -1, "j_max", -1),

@@ -22,14 +22,12 @@ from regrid.work_arrays import share_memory
 MOST_CELL_HALVINGS = 8
 MOST_RETURN_ROUNDS = 24  # at most, in which nodes of folded cells return to the new grid
 MOST_BLENDS = 12  # halvings of the distance to the new grid for all nodes if folds persist
-LOOSENED_LIMIT_FACTOR = (
-    2.0  # factor of the limit for nodes of cells that would otherwise be sharpened
-)
+# factor of the limit for nodes of cells that would otherwise be sharpened
+LOOSENED_LIMIT_FACTOR = 2.0
 ROUND_OFF_AREA = 1e-12  # relative, well above that of an area or a comparison
 FLAT_CORNER_SINE = 0.01  # sine of an obtuse corner below which it is nearly a straight line
-KEPT_AREA_FRACTION = (
-    0.98  # fraction of the smaller of a corner's areas, old and new, left by the limit
-)
+# fraction of the smaller of a corner's areas, old and new, left by the limit
+KEPT_AREA_FRACTION = 0.98
 
 
 @kernel

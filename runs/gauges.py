@@ -25,9 +25,8 @@ from regrid.measure.cells import OUTSIDE_BLOCK, find_places
 from runs.store.history import HistoryWriter
 
 FIXED_POINT_GAP = 0.05  # cells beside a block at which a fixed point still counts as in it
-MATERIAL_POINT_LEEWAY = (
-    0.5  # the same for a point of the material, beside the blocks of that material
-)
+# the same for a point of the material, beside the blocks of that material
+MATERIAL_POINT_LEEWAY = 0.5
 OUTSIDE_ALL_BLOCKS = -1  # number of the block of a point outside of all
 POSITIVE = ("rho", "c")
 

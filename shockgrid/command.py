@@ -12,9 +12,8 @@ import sys
 from shockgrid.shadowing import find_shadow
 
 BAD_INPUT = 2  # exit code, as in runs.cli.main
-UNCOLLECTED_OBJECTS = (
-    200_000  # new objects before Python looks for cycles: loading makes no garbage
-)
+# new objects before Python looks for cycles: loading makes no garbage
+UNCOLLECTED_OBJECTS = 200_000
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -37,9 +37,8 @@ from hydro.rows import RHO
 from hydro.sliding.pieces import compute_at, measure_square
 from regrid.jit import compiled_once, kernel
 
-ROUND_OFF_PRESSURE = (
-    1e-12  # of rho c²: a pressure that is this little below that of the void is not below
-)
+# of rho c²: a pressure that is this little below that of the void is not below
+ROUND_OFF_PRESSURE = 1e-12
 
 
 @compiled_once

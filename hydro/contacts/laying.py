@@ -14,13 +14,11 @@ from hydro.contacts.rows import (
 )
 from regrid.jit import compiled_once, kernel
 
-DEEP_NODE_PART = (
-    0.05  # of a face's length: so far the leader's nodes may lie behind the follower's chords
-)
+# of a face's length: so far the leader's nodes may lie behind the follower's chords
+DEEP_NODE_PART = 0.05
 MOST_LAID = 0.3  # of a face's length: nodes that have gone further into the other body fail
-MATCHED_NODE_DISTANCE = (
-    1e-6  # of a face's length: nodes of both lines that lie so near each other are a pair
-)
+# of a face's length: nodes of both lines that lie so near each other are a pair
+MATCHED_NODE_DISTANCE = 1e-6
 STILL_NODE_DISTANCE = 1e-12  # of a face's length: a node this near is where it is to be
 
 

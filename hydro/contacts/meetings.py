@@ -33,9 +33,8 @@ LEAST_STEP = 2e-3  # of the stable step: a touch that comes sooner is taken at i
 LEAST_BESIDE = 5e-2  # the same where surfaces touch already
 MOST_TOUCH_CUTS = 5  # times that a step is cut to the first touch, and made a little longer again
 MOST_LONGER = 1.5  # a step that was cut too short
-REACHED_TOUCH_PART = (
-    1e-6  # of a step: a touch that comes so shortly before or after its end is at its end
-)
+# of a step: a touch that comes so shortly before or after its end is at its end
+REACHED_TOUCH_PART = 1e-6
 ROUND_OFF_AXIS_DISTANCE = 1e-12  # of a surface's length: ends so near to the axis are on it
 RETURN_PART = 0.2  # part that nodes behind the other line are taken back in a stable step
 

@@ -20,12 +20,10 @@ from hydro.sliding.pieces import measure_square, project
 from regrid.jit import compiled_once, kernel
 from regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
 
-BESIDE_PIN_DISTANCE = (
-    0.1  # of a face's length: a node that close to a pin on its own line comes on with it
-)
-FACE_END_MARGIN = (
-    1e-9  # parts of a face beyond its ends that belong to it: nodes do not pass between faces
-)
+# of a face's length: a node that close to a pin on its own line comes on with it
+BESIDE_PIN_DISTANCE = 0.1
+# parts of a face beyond its ends that belong to it: nodes do not pass between faces
+FACE_END_MARGIN = 1e-9
 
 
 @kernel

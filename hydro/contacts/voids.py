@@ -20,16 +20,13 @@ from hydro.contacts.rows import FOLLOWER_START, FOLLOWER_STOP, LEADER_START, LEA
 from hydro.contacts.surface import Plane, Surface
 from regrid.errors import BadInput
 
-SMALL_VOID_DEPTHS = (
-    0.5  # of the depth of the cells around it: a void whose area has this side is closed
-)
-ROUND_VOID_PART = (
-    0.02  # of its perimeter squared: such a void has no contact on its way to close by
-)
+# of the depth of the cells around it: a void whose area has this side is closed
+SMALL_VOID_DEPTHS = 0.5
+# of its perimeter squared: such a void has no contact on its way to close by
+ROUND_VOID_PART = 0.02
 SLIVER_DEPTHS = 0.1  # of the same depth: slivers whose area has a smaller side are no voids
-LARGE_VOID_DEPTHS = (
-    8.0  # of the same: larger voids without gas are measured, and new ones looked for,
-)
+# of the same: larger voids without gas are measured, and new ones looked for,
+LARGE_VOID_DEPTHS = 8.0
 STEPS_PER_VOID_SEARCH = 8  # every so many steps
 Place = tuple[int, float]  # number of a curve, position on it
 

@@ -133,9 +133,8 @@ def measure_energy(equations: Equations, psi: np.ndarray) -> float:
 
 
 WANTED_EIGENVALUES = 4  # eigenvalues, of which the fastest is taken
-FILTER_DETUNING = (
-    1e-3  # distance of the filter's shift from the growth rate, over the free-fall rate
-)
+# distance of the filter's shift from the growth rate, over the free-fall rate
+FILTER_DETUNING = 1e-3
 FILTER_REPEATS = 20  # of the filter
 
 

@@ -200,9 +200,8 @@ ISENTROPE_DENSITY_STEP = 1e-5  # of the density, along the isentrope
 MOST_MISS = 1e-9  # of rho c²: from p to e and back
 MOST_SLOPE = 0.01  # of c²
 PROBED_PRESSURE_STEP = 0.01  # of rho c²: a pressure beside that of a state
-TORN_STRENGTH_PART = (
-    0.4  # of the strength left, under tension: from half of it on c² is that of separate pieces
-)
+# of the strength left, under tension: from half of it on c² is that of separate pieces
+TORN_STRENGTH_PART = 0.4
 
 
 def measure_inverse(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> np.ndarray:

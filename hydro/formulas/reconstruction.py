@@ -14,9 +14,8 @@ from __future__ import annotations
 from regrid.jit import inlined
 
 TINY_SLOPE = 1e-300  # keeps 0/0 of a uniform flow from being a NaN
-STRONG_SHOCK_FACTOR = (
-    8.0  # differences over c/sqrt(8) around a cell are shocks whatever the rest says
-)
+# differences over c/sqrt(8) around a cell are shocks whatever the rest says
+STRONG_SHOCK_FACTOR = 8.0
 
 
 @inlined

@@ -35,9 +35,8 @@ from hydro.formulas.reconstruction import (
 from hydro.interior import scratch as at
 from regrid.jit import compiled_once, inlined
 
-SHOCK_PRESSURE_JUMP = (
-    0.05  # jump of the pressure over rho c² from which on nothing is extrapolated to a side
-)
+# jump of the pressure over rho c² from which on nothing is extrapolated to a side
+SHOCK_PRESSURE_JUMP = 0.05
 CALM_PRESSURE_JUMP = 0.01  # and up to which all of it is
 
 

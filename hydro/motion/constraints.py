@@ -47,9 +47,8 @@ MOST_JOINT_SLIDE = 4.0  # spacings that a joint wants to slide at most, before `
 OPPOSITE_PART = (0.05, 0.95)  # where the parts of a side opposite to a contact point may meet
 ARRIVAL_STEPS = 1.5  # steps' motion before the leader's end at which a contact point arrives there
 MOST_CORNER_ROUNDS = 60  # at most, of moving a corner and laying on its lines what slides there
-NARROW_CORNER_ANGLE = (
-    0.1  # rad: corners at junctions stay as wide, or half as wide as at the start if less
-)
+# rad: corners at junctions stay as wide, or half as wide as at the start if less
+NARROW_CORNER_ANGLE = 0.1
 STRAIGHT_ENOUGH = 1e-13  # what a round moves, as part of the first one's, after which none follows
 
 

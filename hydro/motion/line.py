@@ -33,9 +33,8 @@ SLIDING_BEND_ANGLE = 0.35
 MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
 THICK_CELLS = 0.75  # default thickness of a contact, in its initial cells
 SHORTEST_TURNED_SEGMENT = 0.25  # segment required by turning, in thicknesses of its contact
-FOLLOWED_WAY_PART = (
-    0.2  # part of the way to its law that a line at or opposite a contact point goes
-)
+# part of the way to its law that a line at or opposite a contact point goes
+FOLLOWED_WAY_PART = 0.2
 
 
 class Span(NamedTuple):

@@ -21,9 +21,8 @@ from hydro.motion.line import SHORTEST_TURNED_SEGMENT, THICK_CELLS, Line, find_n
 from regrid.curves import FREE_END
 from regrid.jit import compiled_once, kernel
 
-FOLDED_LINE_SINE = (
-    1e-3  # least sine of half the angle between two segments: where a line folds back on itself
-)
+# least sine of half the angle between two segments: where a line folds back on itself
+FOLDED_LINE_SINE = 1e-3
 HALF_BAND = 4  # of a closed line's matrix, its nodes numbered from both sides of the first one
 SETTLED_PASS_CHANGE = 1e-15  # change of a pass over the largest way
 MOST_PASSES = 40  # that take the square of the displacement out of the area; 3 or 4 do

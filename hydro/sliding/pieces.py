@@ -17,9 +17,8 @@ from hydro.rows import RHO, P, U, V
 from regrid.jit import compiled_once, kernel
 
 SNAPPED_LEADER_PART = 1e-9  # parts of a face closer than this to a leader node are at the node
-NEAR_LINE_DISTANCE = (
-    1e-2  # squared distance, in squared lengths of a face, of a point that lies on the line
-)
+# squared distance, in squared lengths of a face, of a point that lies on the line
+NEAR_LINE_DISTANCE = 1e-2
 PARALLEL_LINES_SINE = 1e-20  # squared sine of the angle below which two lines do not cross
 ROUND_OFF_TENSION = 1e-6  # part of rho c² below which a negative contact pressure is rounding
 

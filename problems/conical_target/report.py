@@ -51,9 +51,8 @@ def find_peak(history, part: str) -> tuple[float, float, float, float]:
 PLATEAU = (0.5, 0.95)  # of the time until a wave is back: the impact face's pressure is its mean
 GAUGES = (0.1, 0.5, 0.9)  # of the length of the graphite's axis, as it is at the time
 STATIONS = (0.25, 0.5, 0.75)  # of the cone's length at first: where the shock's speed is told
-FITTED_STRETCH_PART = (
-    0.1  # of that length, to either side: the stretch over which a speed is fitted
-)
+# of that length, to either side: the stretch over which a speed is fitted
+FITTED_STRETCH_PART = 0.1
 MIDDLE = (0.1, 0.9)  # of the cone's side by its length: its ends are drawn into roll-ups
 LATEST_STAGE_PART = 0.5  # of the time from the first bend to the end: the latest stage
 
@@ -116,9 +115,8 @@ def measure_growth(history) -> tuple[float, float, float]:
 
 
 AGES = (0.5e-6, 1.2e-6)  # after the passage: between them the rate of growth is told [s]
-COMPARABLE_CELLS_PER_WAVE = (
-    16.0  # cells per wave: amplitudes are within 10 % of theory from there on
-)
+# cells per wave: amplitudes are within 10 % of theory from there on
+COMPARABLE_CELLS_PER_WAVE = 16.0
 
 
 @dataclass(frozen=True)

@@ -32,9 +32,8 @@ from problems.references import convection as linear
 from regrid.errors import BadInput
 
 BENARD_MARCH_TIME = 1.5
-LINEAR_ENERGY_PART = (
-    1e-2  # of the last kinetic energy: below it a disturbance grows by linear theory
-)
+# of the last kinetic energy: below it a disturbance grows by linear theory
+LINEAR_ENERGY_PART = 1e-2
 LEAST_ROWS = 12  # of a history, for a rate of growth
 ONSET_BRACKET = (0.3, 3.0)  # of the reference, or of the deck's Rayleigh number
 STILL_ENERGY_RATIO = 1e-9  # kinetic energy over the squared disturbance: less is no flow [m4/s2/K2]

@@ -116,9 +116,8 @@ class InterfaceDeck(Deck, kw_only=True):
 
 
 LEAST_WAVE_CELLS = 3  # in a wave: with fewer it hardly grows
-WALL_SLOPE_PART = (
-    2e-3  # most slope of a wave at a wall, over its largest: a phase of 3.14 is one of pi
-)
+# most slope of a wave at a wall, over its largest: a phase of 3.14 is one of pi
+WALL_SLOPE_PART = 2e-3
 MOST_CELL_RATIO = 4.0  # of first cells at the interface: one side over the other
 MOST_DENSITY_RATIO = 1e6  # most ratio of densities
 

@@ -56,12 +56,10 @@ from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells
 from regrid.roots import find_root
 
-LEAST_REACH_RATIO = (
-    6.0  # least reach over the amplitude: cells shrink or grow by no more than a quarter
-)
-LEAST_LENGTH_RATIO = (
-    1.25  # least length over what waves take of it before a start after the passage
-)
+# least reach over the amplitude: cells shrink or grow by no more than a quarter
+LEAST_REACH_RATIO = 6.0
+# least length over what waves take of it before a start after the passage
+LEAST_LENGTH_RATIO = 1.25
 MOST_SLOPE = 0.3  # sum of the k a0 up to which the state after the passage is that of linear theory
 FAR_FIELD_PART = 0.25  # part of each block, counted from its far side, that is called the far field
 

@@ -16,9 +16,8 @@ from problems.deck import MOST_CELLS
 from problems.interface_instability.deck import InterfaceDeck
 from regrid.errors import BadInput
 
-FINE_ZONE_WAVELENGTHS = (
-    0.05  # wavelengths on each side with the finest cells while the shock passes
-)
+# wavelengths on each side with the finest cells while the shock passes
+FINE_ZONE_WAVELENGTHS = 0.05
 PASSAGE_CELL_GROWTH = 1.1  # of the finer cells, from one to the next beyond that
 MOST_SIDE_CELLS = 10 * MOST_CELLS  # cells along a side
 NODE_SPEED = 0.25  # most speed of nodes that are respaced, over that of sound

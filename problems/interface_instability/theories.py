@@ -35,9 +35,8 @@ MOST_LINEAR_KA = 0.3  # largest k a of one mode for linear theory, whatever its 
 MOST_RATE_LOSS = 0.015  # of the rate, by that term, at the end of the window
 MOST_COUPLED_KA = 0.1  # largest sum of the k a of several
 MOST_INCOMPRESSIBLE_RATE = 0.3  # largest growth rate over the sound speed for the Padé model
-STILL_RATE_PART = (
-    0.02  # of the interface's speed: a smaller theoretical rate is no scale for an error
-)
+# of the interface's speed: a smaller theoretical rate is no scale for an error
+STILL_RATE_PART = 0.02
 
 
 @dataclass(frozen=True)
@@ -193,9 +192,8 @@ FOUND = ((3.0, 0.15), (4.0, 0.25), (6.0, 0.56), (8.0, 0.66), (12.0, 0.83), (16.0
 PATH = Path(__file__).with_name("accuracy.json")
 TRUSTED_RATE_ERROR = 0.02  # a rate error above it is worth a sentence
 ROUGH_LINE = 0.05  # of the largest mode: more in its higher harmonics is no wave of the deck's
-NEAR_RATIO_FACTOR = (
-    2.0  # factor between density ratios from which growth at the one says little of the other
-)
+# factor between density ratios from which growth at the one says little of the other
+NEAR_RATIO_FACTOR = 2.0
 RANGE_EDGE_MARGIN = 0.01  # of a Mach number or ratio: so far outside counts as inside
 MATERIALS = {"gas": "two gases", "condensed": "two condensed materials"}
 
@@ -307,9 +305,8 @@ def sort_cautions(
     return of_cells, told
 
 
-FREE_CAPILLARY_PHASE = (
-    0.25  # phase of a capillary wave up to which its growth is within 1 % of that without
-)
+# phase of a capillary wave up to which its growth is within 1 % of that without
+FREE_CAPILLARY_PHASE = 0.25
 
 
 def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str]:

@@ -193,9 +193,8 @@ def search_pressure(
     return low, float(found.x), -float(found.fun)
 
 
-LEAST_SHARED_PRESSURE = (
-    1e-3  # of the greatest pressure on both polars: they leave one point together
-)
+# of the greatest pressure on both polars: they leave one point together
+LEAST_SHARED_PRESSURE = 1e-3
 
 
 @dataclass(frozen=True)

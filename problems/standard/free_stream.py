@@ -25,9 +25,8 @@ from problems.deck import MOST_CELLS, Deck, RunControl, key
 from problems.initial_states import make_plane_grid
 from problems.problem import Problem, Report, Row, find_most
 
-LINE_BEND_PART = (
-    0.1  # of the line between the blocks and of its neighbours, over the height of the domain
-)
+# of the line between the blocks and of its neighbours, over the height of the domain
+LINE_BEND_PART = 0.1
 FREE_STREAM_PRESSURE = 1e5
 
 

@@ -23,9 +23,8 @@ from problems.pictures import draw_field, make_panels
 from problems.problem import Problem, Report, compare, find_crossing, fit_slope
 from problems.references.shock_polars import Body, ShockPolar, search_pressure, solve_collision
 
-LENGTH_BEFORE_WEDGE = (
-    0.25  # length before the wedge; it is 1 long, and the top is 1 above its start
-)
+# length before the wedge; it is 1 long, and the top is 1 above its start
+LENGTH_BEFORE_WEDGE = 0.25
 
 
 class ObliqueShockDeck(Deck, kw_only=True):

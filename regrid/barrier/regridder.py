@@ -26,9 +26,8 @@ from regrid.measure.faults import explain_failure, take_grids, take_nodes, take_
 from regrid.protocol import RegridResult
 from regrid.sides import compute_area, get_sides
 
-EVEN_WEIGHT_DIFFERENCE = (
-    1e-6  # families whose weights differ by less are ranked by the block's shape
-)
+# families whose weights differ by less are ranked by the block's shape
+EVEN_WEIGHT_DIFFERENCE = 1e-6
 SERIAL_NODES = 6400  # smaller blocks stay on one thread
 
 

@@ -36,9 +36,8 @@ from regrid.measure.faults import explain_failure
 from regrid.sides import compute_area, copy_sides
 
 MOST_PROJECTION_ROUNDS = 20  # of projection
-PROJECTION_OVERSHOOT = (
-    0.05  # how far a projected node goes past the segment, over the segment's length
-)
+# how far a projected node goes past the segment, over the segment's length
+PROJECTION_OVERSHOOT = 0.05
 LOCAL_FOLD_FRACTION = 0.02  # part of the cells up to which folds are local and projection is tried
 NAMED_CELLS = 8
 

@@ -242,9 +242,8 @@ def _split_number(node: ast.expr) -> tuple[float, ast.expr | None]:
     return 1.0, node
 
 
-ROUND_OFF_DIFFERENCE = (
-    1e-9  # differences of a field below this part of its size are round-off, not gradients
-)
+# differences of a field below this part of its size are round-off, not gradients
+ROUND_OFF_DIFFERENCE = 1e-9
 
 
 def weigh_points(weight, points: np.ndarray) -> np.ndarray:

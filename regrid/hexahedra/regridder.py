@@ -43,9 +43,8 @@ from regrid.hexahedra.solve import CoarseBlock, factor_lines, solve, solve_lines
 from regrid.protocol import RegridReport, RegridResult
 
 LEAST_RATIO = 0.1  # least ratio of a predicted corner volume to its old value
-MOVED_GRID_START_RATIO = (
-    0.5  # the step starts from the moved grid if it keeps this much of every corner
-)
+# the step starts from the moved grid if it keeps this much of every corner
+MOVED_GRID_START_RATIO = 0.5
 STEP_RATIO = 0.25  # a step on the final faces keeps this much of every corner, node by node,
 SMOOTH_RATIO = 0.5  # and is followed by another one if it kept less than this
 LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill

@@ -58,9 +58,8 @@ TRIANGLES = (
 
 # Corner triangles all of whose nodes are boundary nodes: (corner, i, j) in (4, ni, nj).
 BLOCK_CORNERS = ((0, 0, 0), (1, 0, -1), (2, -1, -1), (3, -1, 0))
-FLAT_TRIANGLE_PART = (
-    1e-2  # part of its cell up to which a block's corner triangle makes the cell a triangle
-)
+# part of its cell up to which a block's corner triangle makes the cell a triangle
+FLAT_TRIANGLE_PART = 1e-2
 TURNED_TRIANGLE_PART = 1e-9  # part of its cell up to which it may be turned over, by rounding
 
 

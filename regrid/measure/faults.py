@@ -31,9 +31,8 @@ FLOAT64 = np.dtype(np.float64)
 # of a block, in m: squares of its areas are still numbers
 LEAST_SIZE = 1e-150
 MOST_SIZE = 1e150
-MOST_SIZES_FROM_ORIGIN = (
-    1e9  # sizes of the block from the origin up to which nothing has to be looked at
-)
+# sizes of the block from the origin up to which nothing has to be looked at
+MOST_SIZES_FROM_ORIGIN = 1e9
 MOST_COORDINATE_ROUNDING = 0.01  # of a mean cell: the most that coordinates may be rounded to
 EVERYDAY = 1e-40, 1e40  # sizes whose tenth powers need no unit of their own
 

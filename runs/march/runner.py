@@ -93,9 +93,8 @@ class Background:
             self.finish()
 
 
-TIME_LEFT_MARGIN = (
-    2.0  # times the longest of the last steps and the longest write: time left for both
-)
+# times the longest of the last steps and the longest write: time left for both
+TIME_LEFT_MARGIN = 2.0
 REMEMBERED_STEPS = 50  # steps
 FORM = re.compile(r"(?:(\d+(?:\.\d+)?)h)?(?:(\d+(?:\.\d+)?)m)?(?:(\d+(?:\.\d+)?)s?)?")
 CLOCK = re.compile(r"(\d+):([0-5]\d):([0-5]\d)")

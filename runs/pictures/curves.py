@@ -412,9 +412,8 @@ def draw_panel(axes, t, history, names: Panel, units) -> None:
 
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg", "c": "m/s"}
-MOST_NAMED_GAUGES = (
-    10  # gauges with a line in the legend; more are distinguished by a row of colours
-)
+# gauges with a line in the legend; more are distinguished by a row of colours
+MOST_NAMED_GAUGES = 10
 LEGEND_COLUMNS = 3
 # inches of a panel
 GAUGES_WIDTH = 4.4

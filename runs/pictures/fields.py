@@ -161,9 +161,8 @@ PAGE_HEIGHT_INCHES = 6.5
 # at most, at most of one panel
 TALLEST_PICTURE_INCHES = 16.0
 TALLEST_ALONE = 8.0
-LONG_DOMAIN_HEIGHTS = (
-    4.0  # in a domain longer than this, in its heights, the panels follow the interface
-)
+# in a domain longer than this, in its heights, the panels follow the interface
+LONG_DOMAIN_HEIGHTS = 4.0
 SHOWN_AROUND_INTERFACE = 0.6  # of the interface's size: what is shown on each side of it
 FIELD_LOG_DECADES = 1.7
 VELOCITIES = "u", "v", "u_node", "v_node"

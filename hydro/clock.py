@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -77,6 +79,26 @@ class Clock:
         self.rate = rate
         self.stretch_rate = stretching / dt
         return last
+
+    def get_state(self) -> dict[str, float | int]:
+        """All that the next step depends on, under names that no block's arrays have."""
+        return {
+            "clock/t": self.t,
+            "clock/step": self.step,
+            "clock/dt": self.dt,
+            "clock/retry_dt": self.retry_dt,
+            "clock/rate": self.rate,
+            "clock/stretch_rate": self.stretch_rate,
+        }
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Take up a state of `get_state`."""
+        self.t = float(state["clock/t"])
+        self.step = int(state["clock/step"])
+        self.dt = float(state["clock/dt"])
+        self.retry_dt = float(state["clock/retry_dt"])
+        self.rate = float(state["clock/rate"])
+        self.stretch_rate = float(state["clock/stretch_rate"])
 
 
 class Phase:

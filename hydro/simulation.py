@@ -11,6 +11,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.clock import Clock, Stopwatch
 from hydro.contacts.meetings import Meetings
+from hydro.contacts.voids import FACES_IN_STATE, VOIDS_IN_STATE
 from hydro.formulas.geometry import find_geometry
 from hydro.history import compute_columns
 from hydro.ledger import Ledger
@@ -70,6 +71,8 @@ class Simulation:
     for a run that has come to its end before `t_end`.  Raises BadInput for sides that are not
     covered once by segments, and for blocks that lie on each other.
     """
+
+    lists_in_state = (FACES_IN_STATE, VOIDS_IN_STATE)
 
     def __init__(
         self,
@@ -381,12 +384,7 @@ class Simulation:
     def get_state(self) -> dict:
         """All that the next step depends on."""
         state: dict[str, Any] = {
-            "t": self.t,
-            "step": self.step,
-            "dt": self.dt,
-            "ceiling": self.clock.retry_dt,
-            "rate": self.clock.rate,
-            "stretch_rate": self.clock.stretch_rate,
+            **self.clock.get_state(),
             **self.ledger.get_state(),
             **self.meetings.get_state(),
         }
@@ -405,13 +403,7 @@ class Simulation:
     def set_state(self, state) -> None:
         """Take up a state of `get_state` of the same blocks."""
         self.take_cells(state)
-        clock = self.clock
-        clock.t = float(state["t"])
-        clock.step = int(state["step"])
-        clock.dt = float(state["dt"])
-        clock.retry_dt = float(state["ceiling"])
-        clock.rate = float(state["rate"])
-        clock.stretch_rate = float(state["stretch_rate"])
+        self.clock.set_state(state)
         self._measured = None
         self.ledger.set_state(state)
         self.meetings.set_state(state)

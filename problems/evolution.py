@@ -26,6 +26,8 @@ of an Evolution
 - `missed`: what a run that ends now has not reached, in a few words; such a run has exit code 3
 - `geometry.curved`: is y the distance from the axis x?
 - `take_cells(state)`: have as many cells as a state of `get_state`, before `set_state` takes it up
+- `lists_in_state`: names of the arrays of `get_state` with a row for each thing that comes and goes
+  (a void, say), which may be more or fewer than when the deck was built
 
 of a block
 - `material`: its name
@@ -97,6 +99,11 @@ def is_axisymmetric(evolution: Evolution) -> bool:
 def take_cells(evolution: Evolution, state: State) -> None:
     """Let the evolution have as many cells as the state, where it can have others."""
     getattr(evolution, "take_cells", lambda state: None)(state)
+
+
+def get_lists_in_state(evolution: Evolution) -> Sequence[str]:
+    """Names of the state's arrays that may have any number of rows."""
+    return getattr(evolution, "lists_in_state", ())
 
 
 def get_material(block: BlockView) -> str:

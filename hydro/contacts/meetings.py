@@ -330,6 +330,12 @@ class Meetings:
         counts = np.array(numbers, dtype=np.int64)
         return {"contacts/counts": counts, "contacts/length": self.length} | self.voids.get_state()
 
+    def get_state_for(self, other: Meetings) -> dict[str, Any]:
+        """The same for a simulation of the same surfaces, with other numbers of faces."""
+        if not self.pairs or len(self.pairs) != len(other.pairs):
+            return {}
+        return self.get_state() | self.voids.get_state_for(other.voids)
+
     def set_state(self, state: Any) -> None:
         """Take up a state of `get_state`; a restart point without one had met nothing."""
         self._found = False

@@ -29,6 +29,8 @@ SLIVER_DEPTHS = 0.1  # of the same depth: slivers whose area has a smaller side 
 LARGE_VOID_DEPTHS = 8.0
 STEPS_PER_VOID_SEARCH = 8  # every so many steps
 Place = tuple[int, float]  # number of a curve, position on it
+FACES_IN_STATE = "contacts/void_faces"  # of `get_state`: a row for each stretch of a void's faces
+VOIDS_IN_STATE = "contacts/voids"  # a row for each void
 
 
 @dataclass
@@ -301,18 +303,29 @@ class Voids:
             (v.area, v.volume, v.around, v.depth, v.gas, v.rest, v.stiffness) for v in self.found
         ]
         return {
-            "contacts/void_faces": np.array(faces, dtype=np.int64).reshape(-1, 4),
+            FACES_IN_STATE: np.array(faces, dtype=np.int64).reshape(-1, 4),
             "contacts/voids_asked": self._asked,
-            "contacts/voids": np.array(numbers, dtype=np.float64).reshape(-1, 7),
+            VOIDS_IN_STATE: np.array(numbers, dtype=np.float64).reshape(-1, 7),
         }
+
+    def get_state_for(self, other: Voids) -> dict[str, Any]:
+        """The state for the same surfaces with other numbers of faces."""
+        state = self.get_state()
+        for row in state[FACES_IN_STATE]:
+            curve = row[1]
+            count = self.surfaces[curve].count
+            count_there = other.surfaces[curve].count
+            row[2] = row[2] * count_there // count
+            row[3] = -(-row[3] * count_there // count)
+        return state
 
     def set_state(self, state: Any) -> None:
         """Take up a state of `get_state`."""
         self.found = []
-        if state.get("contacts/voids") is not None:
+        if state.get(VOIDS_IN_STATE) is not None:
             self._asked = bool(state["contacts/voids_asked"])
-            self.found = [Void([], *map(float, row)) for row in state["contacts/voids"]]
-            for number, *faces in np.asarray(state["contacts/void_faces"]).tolist():
+            self.found = [Void([], *map(float, row)) for row in state[VOIDS_IN_STATE]]
+            for number, *faces in np.asarray(state[FACES_IN_STATE]).tolist():
                 self.found[number].faces.append(tuple(faces))
         self._pushed = True
 

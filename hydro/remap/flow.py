@@ -121,11 +121,9 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
     new.set_state(
         state
         | {
-            "t": old.t,
-            "step": old.step,
-            "dt": old.dt,
-            "stretch_rate": old.clock.stretch_rate,
+            **old.clock.get_state(),
             **old.ledger.get_state(),
+            **old.meetings.get_state_for(new.meetings),
         }
     )
     for block in new.blocks:
@@ -133,6 +131,7 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
             block.start[...] = block.state
         block.update(0.0)  # rates and totals of this state
         block.rates[...] = block.rates_new
+    new.clock.retry_dt = np.inf  # it was for the old cells
     new.clock.rate = new.small_cells.find_first_rate(old.t)
     return report
 

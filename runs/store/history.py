@@ -26,7 +26,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from problems.evolution import Evolution, get_start_row, take_cells
+from problems.evolution import Evolution, get_lists_in_state, get_start_row, take_cells
 from regrid.errors import BadInput
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state, open_dump, read_state
@@ -324,10 +324,12 @@ def restore(
             f"the restart point of step {step} in {directory} was written by another version: "
             f"it lacks {', '.join(missing[:4])}"
         )
+    lists = get_lists_in_state(evolution)
     for name, value in expected.items():
         shape = np.shape(value)
         stored = np.shape(state[name])
-        if shape != stored:
+        differs = shape[1:] != stored[1:] if name in lists else shape != stored
+        if differs:
             raise BadInput(
                 f"the restart point of step {step} in {directory} has {name} of shape {stored}, "
                 f"with this deck it would be {shape}: the deck's changes change the grid; "

@@ -92,7 +92,7 @@ def test_a_flow_that_ends_early_ends_well_with_the_setting_that_is_told(shockgri
     code, screen, _ = shockgrid(*words[1:], "-q", "-o", "again")
     assert code == 0 and "t_end reached" in screen
     state = RunData("again").outputs[-1].state()
-    assert state["t"] == 1.0 > end.t and state["gas/state"][0].min() > 0.0
+    assert state["clock/t"] == 1.0 > end.t and state["gas/state"][0].min() > 0.0
 
 
 @pytest.mark.parametrize("cells", [8, 20, 50])

@@ -5,8 +5,18 @@ import pytest
 from plates import make_plate
 from scipy.integrate import solve_ivp
 
-from builders import box, check_budget, check_restarts, free, make_body, march_whole, wall_off
+from builders import (
+    box,
+    check_budget,
+    check_restarts,
+    free,
+    make_body,
+    march,
+    march_whole,
+    wall_off,
+)
 from hydro.eos.materials import find_material
+from hydro.remap.flow import take_over
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
@@ -99,6 +109,26 @@ def test_gas_between_plates_is_squeezed():
 def test_nonsense_fills_are_bad_input(fill):
     with pytest.raises(BadInput, match=r"void_fill = .*a pressure of 0 Pa or more"):
         make_quarter(4, 1.0, 1e-6, 4, void_fill=fill)
+
+
+def test_gas_in_a_void_stays_on_other_cells():
+    """A compressed gas keeps p V^gamma when the flow goes on with other cells."""
+    fill = 1e6, 1.4
+    _, before = make_quarter(9, 50.0, 1.25e-5, 27, void_fill=fill)
+    first = measure_gas(before)
+    march(before, 20)
+    for cells, layers in ((12, 30), (7, 27)):
+        _, after = make_quarter(cells, 50.0, 1.25e-5, layers, void_fill=fill)
+        take_over(before, after)
+        assert measure_gas(before) == pytest.approx(first, rel=1e-14)
+        assert measure_gas(after) == pytest.approx(first, rel=1e-14)
+
+
+def measure_gas(simulation):
+    """p V^gamma of the one void, after the next step."""
+    simulation.advance()
+    (void,) = simulation.meetings.voids.found
+    return void.gas
 
 
 def test_restarts_while_a_void_closes():

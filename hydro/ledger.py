@@ -1,6 +1,7 @@
 """Conserved totals and the inflow through the boundary, step by step.
 
-The totals are the mass of each material and the momentum and energy of all blocks.  The boundary
+The totals are the mass of each material and the momentum and energy of all blocks.  Blocks that
+exchange mass through seams have one material (`hydro.links.name_materials`).  The boundary
 part is the time integral of the inward fluxes through all segments that are not linked to another
 segment.  Contributions of body sources and of surface tension are counted as inflow.  The
 difference total - boundary is constant to round-off.  In axisymmetric flow all quantities are per
@@ -37,7 +38,7 @@ def sum_fluxes(rim, spans):
 
 
 class Ledger:
-    """Running boundary integrals, and the totals of the blocks."""
+    """Running boundary integrals, and the totals of the blocks, by the label of their material."""
 
     def __init__(self, blocks: list[Block]):
         self.blocks = blocks

@@ -7,12 +7,16 @@ result into both rims; it changes nothing else in either block.  A sliding conta
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from hydro.block import Block
 from hydro.boundary import Linked, Seam, Sliding, put
+from hydro.eos.base import is_same_material
 from hydro.perimeter.contacts import (
     AT_TRACES,
     pass_seam,
@@ -25,12 +29,14 @@ from regrid.errors import BadInput
 class Link:
     """Two linked segments, `leader` and `follower`, and how their nodes correspond.
 
-    The follower's nodes, in reverse order if `reverse`, are the leader's plus `shift`.
+    The follower's nodes, in reverse order if `reverse`, are the leader's plus `shift`;
+    `passes_mass`: material crosses from one block to the other.
     """
 
     def __init__(self, leader: Linked, follower: Linked):
         self.leader, self.follower = leader, follower
         self.segments = [leader, follower]
+        _check_materials(leader, follower)
         one = leader.line(leader.block.nodes)
         two = follower.line(follower.block.nodes)
         if one.shape != two.shape:
@@ -55,7 +61,7 @@ class Link:
         self._laws = leader.block.wave_law, follower.block.wave_law
         # of a smoothed line, for `add_layer_flux`: its added velocities, whether it is closed
         self.layer = np.empty((2, 0)), False
-        self._passes = isinstance(leader, Seam)
+        self.passes_mass = isinstance(leader, Seam)
         # make matching nodes bitwise equal
         two[...] = self.to_follower(one)
 
@@ -67,7 +73,7 @@ class Link:
         """Contact states of both sides in a phase of `hydro.perimeter.contacts`, with ghosts
         AT_CELLS and fluxes AT_FLUX; for a seam only these."""
         curved = self.leader.block.geometry.curved
-        if not self._passes:
+        if not self.passes_mass:
             speeds, closed = self.layer
             layer = speeds, self.reverse, closed
             solve_link.entry(*self._rims, *self._laws, layer, phase, curved)
@@ -78,6 +84,17 @@ class Link:
         """Copy the leader's new nodes to the follower."""
         line = self.leader.line(self.leader.block.nodes_new)
         self.follower.line(self.follower.block.nodes_new)[...] = self.to_follower(line)
+
+
+def _check_materials(leader: Linked, follower: Linked) -> None:
+    """Raise BadInput where a seam joins two materials."""
+    one = leader.block.eos
+    two = follower.block.eos
+    if isinstance(leader, Seam) and not is_same_material(one, two):
+        raise BadInput(
+            f"{leader.kind}: material passes between {leader} and {follower}, and their equations "
+            f"of state differ: {one} and {two}; join two materials by an interface"
+        )
 
 
 def _misfit(one: np.ndarray, two: np.ndarray, periodic: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -110,6 +127,31 @@ class Exchange:
         """Accept the step."""
         for contact in self.contacts:
             contact.accept()
+
+
+MOST_JOINED_NAMES = 3  # of materials in one label
+
+
+def name_materials(blocks: Sequence[Block], links: Sequence[Link | SlidingContact]) -> None:
+    """Give one material's label to all blocks between which mass passes, as through seams.
+
+    Blocks that bring several labels share these, joined by "+", so that the ledger keeps one
+    balance of their mass.
+    """
+    numbers = {id(block): number for number, block in enumerate(blocks)}
+    joined = [link for link in links if isinstance(link, Link) and link.passes_mass]
+    leaders = [numbers[id(link.leader.block)] for link in joined]
+    followers = [numbers[id(link.follower.block)] for link in joined]
+    graph = coo_array((np.ones(len(joined)), (leaders, followers)), shape=(len(blocks),) * 2)
+    count, bodies = connected_components(graph, directed=False)
+    for body in range(count):
+        members = [block for block, own in zip(blocks, bodies, strict=True) if own == body]
+        labels = list(dict.fromkeys(block.material for block in members))
+        rest = len(labels) - MOST_JOINED_NAMES
+        if rest > 0:
+            labels[MOST_JOINED_NAMES:] = [f"{rest} more"]
+        for block in members:
+            block.material = "+".join(labels)
 
 
 Faces = tuple[Block, str] | tuple[Block, str, int, int]

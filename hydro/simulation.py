@@ -15,7 +15,7 @@ from hydro.contacts.voids import FACES_IN_STATE, VOIDS_IN_STATE
 from hydro.formulas.geometry import find_geometry
 from hydro.history import compute_columns
 from hydro.ledger import Ledger
-from hydro.links import Exchange, Link
+from hydro.links import Exchange, Link, name_materials
 from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import Line, LineRule
 from hydro.motion.overlaps import Overlaps
@@ -143,6 +143,7 @@ class Simulation:
             _check_cover(block)
             _check_axis(block)
         _check_links(blocks, links)
+        name_materials(blocks, links)
         self._overlaps = Overlaps(blocks, links)
         self._overlaps.check_start()
         for link in links:
@@ -460,6 +461,10 @@ def _check_parts(blocks: Any, links: Any) -> None:
 
 def _check_links(blocks: list[Block], links: list[Link | SlidingContact]) -> None:
     """Every segment that needs a partner is in exactly one link; raises BadInput otherwise."""
+    given = {id(block) for block in blocks}
+    for segment in (segment for link in links for segment in link.segments):
+        if id(segment.block) not in given:
+            raise BadInput(f"{segment} is linked, and its block is not among the simulation's")
     linked = [id(segment) for link in links for segment in link.segments]
     for block in blocks:
         for segment in block.segments:

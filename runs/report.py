@@ -20,6 +20,7 @@ from regrid.errors import BadInput, RunFailure
 from regrid.text_files import escape_controls
 from runs.grids.quality import judge
 from runs.inspection.account import (
+    CONSERVATION_ERROR_LIMIT,
     HEAD,
     describe_cautions,
     describe_convexity,
@@ -142,7 +143,7 @@ def describe_run_in_words(run: RunData, left_out: list[str]) -> dict[str, Any]:
     if drifts:
         worst = max(drifts, key=drifts.__getitem__)
         words = f"largest conservation error: {drifts[worst]:.1e} ({worst.replace('_', ' ')})"
-        states.append((words, bool(np.isfinite(drifts[worst]))))
+        states.append((words, drifts[worst] <= CONSERVATION_ERROR_LIMIT))
     names = [block.name for block in last.blocks] if last else []
     deck = read_text(run.directory.deck)
     return {

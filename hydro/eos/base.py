@@ -152,6 +152,14 @@ def check_eos(block: str, eos: object) -> None:
         raise BadInput(f"{where} is of the class {kind.__name__}, which lacks wave_law") from None
 
 
+def is_same_material(one: Any, two: Any) -> bool:
+    """Do two equations of state give the same pressure everywhere: one kind, equal parameters?"""
+    if type(one) is not type(two):
+        return False
+    pairs = zip(one.parameters, two.parameters, strict=True)
+    return one is two or all(np.array_equal(first, second) for first, second in pairs)
+
+
 @inlined
 def compute_whole_ratio(ratio, p, strength):
     """rho0/rho for the sound speed: that of the solid fragments where material has failed.

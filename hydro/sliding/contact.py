@@ -16,6 +16,7 @@ import numpy as np
 
 from hydro import rim as on
 from hydro.boundary import NodeMotion, Sliding
+from hydro.eos.base import is_same_material
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.perimeter.contacts import AT_CELLS, AT_FLUX
 from hydro.rows import FLUX_ROWS
@@ -191,7 +192,8 @@ class SlidingContact:
         self.name = f"{leader[0].block.name}/{follower[0].block.name}"
         if self.leader.orientation == self.follower.orientation:
             self.follower.reverse()  # so that both run the same way
-        if len({segment.block.material for segment in follower}) > 1:
+        first = follower[0].block.eos
+        if not all(is_same_material(first, segment.block.eos) for segment in follower):
             raise BadInput(
                 f"sliding: {follower[0]} and the follower's segments after it are of several "
                 "materials; lines on which materials meet are the leader's"

@@ -22,6 +22,7 @@ History = Mapping[str, np.ndarray]
 HEAD = "caution: "
 OWN_REASONS = ("start", "t_end", "end", "dump", "retry")  # of a step's length: no trend
 NONE = np.zeros(0)
+CONSERVATION_ERROR_LIMIT = 1e-10  # round-off is below
 
 
 def count_cells(evolution: Evolution) -> int:
@@ -251,7 +252,7 @@ RULES = (
     Rule("dt", lambda history, _: measure_shrinkage(history), 100.0, "dt fell {value:.3g} times",
          "how many times dt fell below its largest value"),
     Rule("drift", lambda history, _: max(measure_drifts(history).values(), default=np.nan),
-         1e-10, "conservation error {value:.1e}",
+         CONSERVATION_ERROR_LIMIT, "conservation error {value:.1e}",
          "largest relative conservation error of mass, energy or momentum; round-off is below the "
          "limit"),
 )  # fmt: skip

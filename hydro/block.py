@@ -352,20 +352,6 @@ class Block:
             self.state_new, self.void_energy_new, self.nodes_new, self.rates_new, self.crowding
         )  # fmt: skip
 
-    def count_ghosts(self, array: np.ndarray) -> int:
-        """Rows of ghosts before the first cells in an array of this block: 1 or 0."""
-        return int(array.shape[-2] == self.ni + 2)
-
-    def get_inside(self, name: str) -> np.ndarray:
-        """A view of an array of the block by its name, such as those of STEP_ARRAYS: no ghosts."""
-        array = getattr(self, name)
-        return array[..., 1:-1, 1:-1] if self.count_ghosts(array) else array
-
-    def list_held(self, suffix: str = "") -> list[np.ndarray]:
-        """The arrays of HELD_ARRAYS: at the start of the step, or with the suffix `_new`."""
-        names = [name if suffix or name != "state" else "start" for name in of.HELD_ARRAYS]
-        return [getattr(self, f"{name}{suffix}") for name in names]
-
     @property
     def start(self) -> np.ndarray:
         """The state (4, ni + 2, nj + 2) that a step starts from: `state`, or a source's copy."""
@@ -382,10 +368,10 @@ class Block:
 
     def accept(self) -> None:
         """Make the new grid and state the current ones."""
-        for name in of.STEP_ARRAYS:
-            old = getattr(self, name)
-            setattr(self, name, getattr(self, f"{name}_new"))
-            setattr(self, f"{name}_new", old)
+        self.nodes, self.nodes_new = self.nodes_new, self.nodes
+        self.state, self.state_new = self.state_new, self.state
+        self.void_energy, self.void_energy_new = self.void_energy_new, self.void_energy
+        self.rates, self.rates_new = self.rates_new, self.rates
 
     def find_failure(self) -> RunFailure | None:
         """Why the new state is not admissible, with the cell's indices, or None."""

@@ -9,7 +9,6 @@ from typing import Any, Protocol
 import numpy as np
 
 from hydro.block import Block
-from hydro.boundary import OpenSides
 from hydro.clock import Clock, Stopwatch
 from hydro.contacts.meetings import Meetings
 from hydro.contacts.voids import FACES_IN_STATE, VOIDS_IN_STATE
@@ -22,7 +21,6 @@ from hydro.motion.line import Line, LineRule
 from hydro.motion.overlaps import Overlaps
 from hydro.motion.tension import SurfaceTension
 from hydro.ranks.blocks import Blocks
-from hydro.rows import STEP_ARRAYS
 from hydro.sliding.contact import SlidingContact
 from hydro.small_cells import SmallCells
 from hydro.sources import BodySource, SourceLaw
@@ -52,8 +50,8 @@ class Refining(Protocol):
 
     def lay(
         self, places: np.ndarray, blocks: Sequence[Block], motion: GridMotion, t: float
-    ) -> list[tuple[np.ndarray, dict[str, np.ndarray]]]:
-        """Nodes, and what cells hold (HELD_ARRAYS), of all blocks; `motion` moves the new ones."""
+    ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Nodes, states and void energies of all blocks, whose new ones `motion` moves."""
         ...
 
 
@@ -176,7 +174,6 @@ class Simulation:
         self._flow = Flow(
             self._shared,
             self.exchange,
-            OpenSides(self._shared),
             self.motion,
             self.meetings,
             self.tension,
@@ -269,7 +266,8 @@ class Simulation:
             clock.tension_dt = self.tension.find_step()
         try:
             self._check_collapse()
-            touching = self.meetings.find(clock.t, clock.step)
+            meets = bool(self.meetings.pairs)
+            touching = self.meetings.find(clock.t, clock.step) if meets else set()
             self._overlaps.check(clock.t, clock.step, touching)
             record = take_step(self._flow)
         except RunFailure:  # all ranks have agreed on it
@@ -307,10 +305,10 @@ class Simulation:
         except RunFailure:
             self.__dict__.update(before)
             return
-        for block, (nodes, held) in zip(self._blocks, found, strict=True):
+        for block, (nodes, state, void_energy) in zip(self._blocks, found, strict=True):
             block.nodes[...] = block.nodes_new[...] = nodes
-            for name, array in held.items():
-                block.get_inside(name)[...] = array
+            block.state[:, 1:-1, 1:-1] = state
+            block.void_energy[...] = void_energy
         self.motion.counts = before["motion"].counts  # of the step that is over
         self._update_rates()
         self.clock.rate = self.small_cells.find_first_rate(self.t)
@@ -394,8 +392,13 @@ class Simulation:
         for number, contact in enumerate(self.exchange.contacts):
             state[f"contact{number}/fixed"] = contact.fixed.copy()
         for block in self.blocks:
-            for name in STEP_ARRAYS:
-                state[f"{block.name}/{name}"] = block.get_inside(name).copy()
+            for name, array in (
+                ("nodes", block.nodes),
+                ("state", block.state[:, 1:-1, 1:-1]),
+                ("void_energy", block.void_energy),
+                ("rates", block.rates),
+            ):
+                state[f"{block.name}/{name}"] = array.copy()
         return state
 
     def set_state(self, state) -> None:
@@ -410,8 +413,10 @@ class Simulation:
         for number, contact in enumerate(self.exchange.contacts):
             contact.fixed[:] = state[f"contact{number}/fixed"]
         for block in self.blocks:
-            for name in STEP_ARRAYS:
-                block.get_inside(name)[...] = state[f"{block.name}/{name}"]
+            block.nodes[...] = state[f"{block.name}/nodes"]
+            block.state[:, 1:-1, 1:-1] = state[f"{block.name}/state"]
+            block.void_energy[...] = state[f"{block.name}/void_energy"]
+            block.rates[...] = state[f"{block.name}/rates"]
         self.small_cells.find_fastest()
         self._note_end()
 

@@ -36,7 +36,7 @@ from hydro.crowding import (
     scan_rates_of_bands,
     scan_state,
 )
-from hydro.eos.conversion import make_conversion
+from hydro.eos.base import make_least_pressure
 from hydro.formulas.geometry import Geometry
 from hydro.interior.update import compute_rate
 from hydro.perimeter.faces import measure_lines, measure_volume
@@ -59,7 +59,7 @@ SLOPE_ROW = 8
 LEVER_ROW = 12
 VOLUME_RECORD_ROW = 13
 PARTS_ROW = 14
-KEPT_ROW = 15
+KEPT_PARTS = 15
 RECORD_ROWS = 19
 
 
@@ -152,9 +152,10 @@ def limit_slope(before, after):
 @functools.cache
 def make_redistribution(eos_class, geometry: Geometry):
     """The kernel `redistribute` of an equation of state and a geometry."""
-    conversion = make_conversion(eos_class)
-    to_energy = conversion.to_energy
-    to_state = conversion.to_state
+    pressure_part = eos_class.pressure_part
+    energy_part = eos_class.energy_part
+    sound_speed_squared_part = eos_class.sound_speed_squared_part
+    find_least_pressure = make_least_pressure(eos_class)
     find_volume, find_share = make_measures(geometry)
 
     @compiled_once
@@ -164,7 +165,7 @@ def make_redistribution(eos_class, geometry: Geometry):
         u = state[U, i + 1, j + 1]
         v = state[V, i + 1, j + 1]
         p = state[P, i + 1, j + 1]
-        e = to_energy(rho, p, void_energy[i, j], parameters)
+        e = energy_part(rho, p, parameters) + void_energy[i, j]
         rho *= part
         record[first, i, j] = rho
         record[first + 1, i, j] = rho * u
@@ -309,7 +310,7 @@ def make_redistribution(eos_class, geometry: Geometry):
         part = 1.0 / record[PARTS_ROW, i, j]
         for q in range(CONSERVED_ROWS):
             own = record[MEAN_ROW + q, i, j] + record[SLOPE_ROW + q, i, j] * far
-            total[q] = (total[q] + own) * part + record[KEPT_ROW + q, i, j]
+            total[q] = (total[q] + own) * part + record[KEPT_PARTS + q, i, j]
 
     @kernel
     def redistribute(squeezed, grids, excess, inverse_dt, parameters, before, after, scratch):
@@ -342,13 +343,13 @@ def make_redistribution(eos_class, geometry: Geometry):
                 j,
                 1.0 - RELAXED_FRACTION,
                 parameters,
-                KEPT_ROW,
+                KEPT_PARTS,
                 record,
             )
             record[VOLUME_RECORD_ROW, i, j] = find_volume(nodes_new, excess, i, j, ni, nj)
             record[LEVER_ROW, i, j] = 0.0
             for q in range(CONSERVED_ROWS):
-                record[q, i, j] -= record[KEPT_ROW + q, i, j]
+                record[q, i, j] -= record[KEPT_PARTS + q, i, j]
                 record[MEAN_ROW + q, i, j] = record[q, i, j]
                 record[SLOPE_ROW + q, i, j] = 0.0
         fill_means(small, reaches, nodes_new, record)
@@ -363,10 +364,18 @@ def make_redistribution(eos_class, geometry: Geometry):
                 continue
             changed += 1
             gather_shares(i, j, reaches, nodes_new, record, pair, line, total)
-            found = to_state(total[0], total[1], total[2], total[3], parameters)
-            rho, u, v = found[0]
-            p, void_energy[i, j], is_voided, c2 = found[1]
-            voided += 1 if is_voided else 0
+            rho = total[0]
+            u = total[1] / total[0]
+            v = total[2] / total[0]
+            e = total[3] / total[0] - 0.5 * (u * u + v * v)
+            p = pressure_part(rho, e, parameters)
+            void_energy[i, j] = 0.0
+            bound = find_least_pressure(rho, parameters)
+            if p < bound:
+                p = bound
+                void_energy[i, j] = e - energy_part(rho, p, parameters)
+                voided += 1
+            c2 = sound_speed_squared_part(rho, p, parameters)
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
             state[RHO, i + 1, j + 1] = rho
             state[U, i + 1, j + 1] = u
@@ -456,7 +465,7 @@ class BlockSharing:
         self.fill_reaches(small, block.rates, limit, block.nodes, block.excess_volume, self.reaches)
         block.shared_cells, least, voided = self.redistribute(
             (small, self.reaches), (block.nodes, block.nodes_new), block.excess_volume_new,
-            inverse_dt, block.parameters, tuple(block.list_held()), _list_mended(block),
+            inverse_dt, block.parameters, (block.start, block.void_energy), _list_mended(block),
             (self.marks, self.record),
         )  # fmt: skip
         block.take_shared(least, voided)
@@ -558,7 +567,8 @@ class SmallCells:
         above = self._find_rows_above(limit)
         for number, cut in self.blocks.cuts.items():
             block = cut.block
-            for array in (*_list_mended(block), block.rates, *block.list_held()):
+            read = block.rates, block.start, block.void_energy
+            for array in (*_list_mended(block), *read):
                 cut.gather_rows(array, above[number])
         changed = [
             [self.sharing[number].share(limit, 1.0 / dt, above[number])]
@@ -572,4 +582,4 @@ class SmallCells:
 
 def _list_mended(block: Block) -> tuple[np.ndarray, ...]:
     """The arrays that redistribution changes."""
-    return *block.list_held("_new"), block.rates_new
+    return block.state_new, block.void_energy_new, block.rates_new

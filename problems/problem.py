@@ -232,6 +232,14 @@ def find_time(history: History, condition: np.ndarray) -> float:
     return float(history["t"][met[0]]) if met.size else math.nan
 
 
+def keep_until(history: History, t: float) -> History:
+    """The rows of a history up to the time `t` [s], the first at least: as far as theory goes."""
+    if not history:
+        return history
+    rows = max(1, int(np.searchsorted(history["t"], t, side="right")))
+    return {name: column[:rows] for name, column in history.items()}
+
+
 def say_unreached(history: History, name: str) -> list[str]:
     """A sentence if a column that is measured at the end time has no value."""
     known = not math.isnan(get_last(history, name))

@@ -30,7 +30,7 @@ from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import Fluid, make_plane_grid, put_walls
 from problems.pictures import name_axis, title_time
-from problems.problem import Problem, Report, average_plateau, compare, get_last
+from problems.problem import Problem, Report, average_plateau, compare, get_last, keep_until
 from problems.references.riemann import RiemannSolution, compute_cell_averages, solve_riemann
 from regrid.errors import BadInput, suggest
 from regrid.roots import find_root
@@ -49,6 +49,13 @@ LEAST_GROWTH = 1.0 + 1e-9
 MOST_GROWTH = 1.15
 LARGE_LOGARITHM = 40.0  # logarithm of a number beside which 1 is nothing
 UNITLESS_PRESSURE = 1e4  # gases at lower pressures than this [Pa] are given without units
+# of the gases' kinetic energy that is left between two that part: with less, errors of their large
+# energies are errors of the pressure
+COLD_ENERGY_PART = 0.1
+# pressure between two gases that part, over the lower one of theirs: less is a vacuum, as energies
+# have too few digits for it
+VACUUM_PRESSURE_RATIO = 1e-6
+TRUSTED_STAR_ERROR = 0.05  # an error of a star state above it is worth a sentence
 LABELS = {"rho": ("density", "kg/m3"), "u": ("velocity", "m/s"), "p": ("pressure", "Pa")}
 
 
@@ -181,6 +188,34 @@ def grade(count: int, growth: float) -> np.ndarray:
     return positions / positions[-1]
 
 
+def find_pressure_ratio(case: Case, p: float) -> float:
+    """The pressure `p` [Pa] between two ideal gases that part, over the lower one of theirs; inf
+    for others."""
+    gases = isinstance(case.left_eos, IdealGas) and isinstance(case.right_eos, IdealGas)
+    least = min(case.left[2], case.right[2])
+    return p / least if gases and p < least else math.inf
+
+
+def find_fastest_parting(case: Case) -> float:
+    """Velocity difference [m/s] at which the pressure between two gases is just no vacuum."""
+    (rho_left, _, p_left), (rho_right, _, p_right) = case.left, case.right
+    wanted = math.log(VACUUM_PRESSURE_RATIO)
+
+    def excess(speed):
+        right = rho_right, speed, p_right
+        found = solve_riemann(case.left_eos, (rho_left, 0.0, p_left), case.right_eos, right)
+        if found.gap:
+            return -math.inf
+        return math.log(found.p / min(p_left, p_right)) - wanted
+
+    low = 0.0
+    high = case.right[1] - case.left[1]
+    while high - low > 1e-7 * high:  # bisection: beyond the vacuum there is no number
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
+    return low
+
+
 Length = Annotated[float, Meta(ge=1e-9, le=1e9)]
 
 
@@ -253,6 +288,15 @@ class Riemann(Problem):
                 f"{exact.u_right:.6g} m/s, so there is no contact; they part with {parting:.6g} "
                 f"m/s, make that less than {parting - (exact.u_right - exact.u_left):.6g} m/s"
             )
+        ratio = find_pressure_ratio(case, exact.p)
+        if ratio < VACUUM_PRESSURE_RATIO:
+            parting = case.right[1] - case.left[1]
+            raise BadInput(
+                f"deck: the two gases part so fast that the pressure between them falls to "
+                f"{ratio:.2g} of theirs, and below {VACUUM_PRESSURE_RATIO:g} it counts as a "
+                f"vacuum; they part with {parting:.6g} m/s, make that "
+                f"{find_fastest_parting(case):.6g} m/s or less"
+            )
         self.domain = self.choose_domain()
         growth = max(self.domain.growths)
         count = deck.cells - deck.cells // 2
@@ -263,6 +307,40 @@ class Riemann(Problem):
                 f"{MOST_RATIO:g} times the first; take grading = {right:.4g}, or fewer cells"
             )
         self.t_end = self.domain.t_end
+
+    def measure_heat_left(self) -> float:
+        """Specific internal energy between two gases that part, over the kinetic energy of their
+        motion against each other: the smaller one of both sides; inf for others."""
+        case = self.case
+        exact = self.exact
+        if math.isinf(find_pressure_ratio(case, exact.p)):
+            return math.inf
+        speed = 0.5 * (case.right[1] - case.left[1])
+        sides = (case.left_eos, exact.rho_left), (case.right_eos, exact.rho_right)
+        return min(float(eos.energy(rho, exact.p)) for eos, rho in sides) / (0.5 * speed * speed)
+
+    def cautions(self, history=None) -> list[str]:
+        """Before a run that gases part near vacuum speed, after it what this has done."""
+        heat = self.measure_heat_left()
+        ratio = find_pressure_ratio(self.case, self.exact.p)
+        parting = (
+            f"the gases part so fast that the pressure between them falls to {ratio:.2g} of theirs "
+            f"and their heat to {100.0 * heat:.2g} % of their kinetic energy, whose errors are "
+            "errors of the pressure"
+        )
+        rows = self.report(history).rows if history is not None else []
+        known = [row for row in rows if not math.isnan(row.difference)]
+        if not known:
+            words = "with few cells it is off by tens of per cent; compare runs of several `cells`"
+            return [f"{parting}: {words}"] if heat < COLD_ENERGY_PART else []
+        worst = max(known, key=lambda row: abs(row.difference))
+        off = worst.difference
+        if abs(off) <= TRUSTED_STAR_ERROR:
+            return []
+        size = f"{1.0 + off:.3g} times" if off > 1.0 else f"{100.0 * abs(off):.3g} % off"
+        told = f"{worst.label} is {size} the exact solution"
+        why = parting if heat < COLD_ENERGY_PART else "its plateau has too few cells"
+        return [f"{told}: {why}; take more `cells`"]
 
     def choose_domain(self) -> Domain:
         """Lengths, growths and end time: the deck's, the case's, or by the waves, of which one is
@@ -292,6 +370,15 @@ class Riemann(Problem):
             domain = Domain(lengths, (1.0, 1.0), (0.0, 0.0), t, span * t)
         growths = domain.growths if deck.grading is None else (deck.grading,) * 2
         return replace(domain, t_end=deck.run.t_end or domain.t_end, growths=growths)
+
+    def find_leaving_time(self) -> float:
+        """When the first wave meets an end of the domain [s], beyond which the exact solution,
+        of materials without ends, says nothing; inf if none does."""
+        domain = self.domain
+        waves = self.exact.left_wave, self.exact.right_wave
+        sides = zip((-1.0, 1.0), domain.lengths, domain.ends, waves, strict=True)
+        found = [(length, sign * (wave.head - end)) for sign, length, end, wave in sides]
+        return min((length / speed for length, speed in found if speed > 0.0), default=math.inf)
 
     def make_grids(self, t=0.0):
         """Straight lines, cells about as wide as long.  A captured contact is on a grid at rest,
@@ -385,6 +472,14 @@ class Riemann(Problem):
     def report(self, history, final=None) -> Report:
         deck = self.deck
         exact = self.exact
+        notes = []
+        leaving = self.find_leaving_time()
+        if history and history["t"][-1] > leaving:
+            history = keep_until(history, leaving)
+            notes.append(
+                f"a wave meets an end of the domain at t = {leaving:.4g}: "
+                "compared up to there; longer `lengths` let the run go on"
+            )
         t = get_last(history, "t")
         where = "on a grid line" if self.on_line else f"captured, grid {deck.mesh}"
         rows = [
@@ -394,7 +489,7 @@ class Riemann(Problem):
             )
             for name, (value, size) in self.star_states().items()
         ]  # fmt: skip
-        notes = [
+        notes += [
             f"the {side} plateau, {abs(wave.tail - exact.u) * t:.3g} m wide, has no cell in its "
             "middle half: more cells, lengths left out, or a larger grading"
             for side, wave in (("left", exact.left_wave), ("right", exact.right_wave))

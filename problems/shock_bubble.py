@@ -317,16 +317,16 @@ class ShockBubble(Problem):
             first = float(np.diff(np.interp([start, end], t, history["upwind"]))[0]) / (end - start)
         rows = [Row("first_upwind_speed", first, self.contact.u, error="upwind_speed")]
         table = [["velocities [m/s]", "here", "fixed grid", "measured", "computed", "window [us]"]]
-        for feature in FEATURES[deck.gas]:
+        for feature in self.features:
             name, *_, measured, computed, fixed = feature
             alone = math.isnan(feature.measured)
             window, speed = self.fit_velocity(history, feature)
             rows.append(Row(name, speed, fixed if alone else measured, error=name))
-            if window and self.features:
+            if window:
                 begin, end = ((time - self.arrival) / SECONDS_PER_MICROSECOND for time in window)
                 others = ["" if math.isnan(x) else f"{x:g}" for x in (fixed, measured, computed)]
                 table.append([name, f"{speed:.1f}", *others, f"{begin:.0f}-{end:.0f}"])
-        if deck.gas in FOCUS:
+        if self.features and deck.gas in FOCUS:
             rows.append(Row("focus", self.find_focus(history), FOCUS[deck.gas], error="focus"))
         lines = [
             f"shock-bubble, {deck.gas} in air, Mach {deck.mach:g}, "

@@ -40,7 +40,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.environment import Environment, _rebuild_env, lookup_environment
 from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python
-from numba.extending import overload, register_jitable
+from numba.extending import register_jitable
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("regrid", "hydro", "problems")
@@ -164,8 +164,9 @@ class KernelCache:
         return find_kept(self._function.__name__, self._contents, str(types))
 
     def load_overload(self, types, context):
-        with contextlib.suppress(Exception):  # what another release of numba has written
-            parts = _Reader(io.BytesIO(read_kept(self._find(types, context)))).load()
+        with contextlib.suppress(Exception):  # no file, or a damaged one, which may raise anything
+            with self._find(types, context).open("rb") as file:
+                parts = _Reader(file).load()
             context.codegen().unserialize_library = functools.partial(_Loaded, context.codegen())
             return CompileResult._rebuild(context, *parts)
         prepare_compiler()
@@ -181,28 +182,7 @@ def find_kept(name: str, *words: str) -> Path:
     key = hashlib.sha256(repr((words, machine, VERSIONS)).encode()).hexdigest()
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     folder = os.environ.get("SHOCKGRID_CACHE_DIR") or os.path.join(home, "shockgrid")
-    return Path(folder, "kernels", f"{name}-{key[:24]}.kept")
-
-
-def compute_checksum(contents: bytes) -> bytes:
-    """What a file of the cache begins with: SHA-256 of all bytes after it."""
-    return hashlib.sha256(contents).digest()
-
-
-def read_kept(path: Path) -> bytes:
-    """What `keep` has put into a file of the cache.
-
-    Machine code of which one bit is wrong runs, and its numbers look sound: nothing of a file is
-    used before all of it is known to be as it was written.  Raises OSError where there is no file
-    that can be read, ValueError where it is damaged or cut off.
-    """
-    kept = path.read_bytes()
-    size = hashlib.sha256().digest_size
-    checksum = kept[:size]
-    contents = kept[size:]
-    if checksum != compute_checksum(contents):
-        raise ValueError(f"{path} is damaged")
-    return contents
+    return Path(folder, "kernels", f"{name}-{key[:24]}")
 
 
 def keep(path: Path, contents: bytes) -> None:
@@ -210,7 +190,7 @@ def keep(path: Path, contents: bytes) -> None:
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
         part = path.with_name(uuid.uuid4().hex)
-        part.write_bytes(compute_checksum(contents) + contents)
+        part.write_bytes(contents)
         part.replace(path)
         found = list(path.parent.iterdir())
         if len(found) > KEPT_FILES:
@@ -232,11 +212,13 @@ def remember(name: str, words: Any, compute: Callable[[], Any]) -> Any:
     """
     words = hashlib.sha256(pickle.dumps(words)).hexdigest()
     path = find_kept(name, digest_sources(), words)
-    with contextlib.suppress(OSError, ValueError):
-        return pickle.loads(read_kept(path))
-    found = compute()
+    with contextlib.suppress(OSError):
+        kept = path.read_bytes()
+        if hashlib.sha256(kept[32:]).digest() == kept[:32]:  # else it is damaged
+            return pickle.loads(kept[32:])
+    contents = pickle.dumps(found := compute())
     if not is_interpreting():  # there the last bits may be others
-        keep(path, pickle.dumps(found))
+        keep(path, hashlib.sha256(contents).digest() + contents)
     return found
 
 
@@ -365,31 +347,6 @@ def read_clock() -> float:
     return (_compiling.begun or time.perf_counter()) - _compiling.seconds
 
 
-# was this process forked from one whose kernels had started threads?
-_forked = SimpleNamespace(from_threads=False)
-
-
-def can_use_threads() -> bool:
-    """Can kernels with `parallel=True` be called in this process?
-
-    Not in one that was forked from a process in which some have run: the threads are not there any
-    more, GNU OpenMP cannot start others, and numba then leaves out the loop and sends SIGTERM.  Who
-    calls such a kernel asks first, and calls its serial form, which gives the same bits.
-    """
-    return not _forked.from_threads
-
-
-def _note_fork() -> None:
-    """Find out, in a forked process, whether its parent's kernels had started threads."""
-    with contextlib.suppress(ValueError):  # none has
-        numba.threading_layer()
-        _forked.from_threads = True
-
-
-if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
-    os.register_at_fork(after_in_child=_note_fork)
-
-
 def kernel(function=None, *, allocates=True, **options):
     """Compile `function` with numba: cached, without the interpreter lock, IEEE division.
 
@@ -436,17 +393,3 @@ def compiled_once(function=None, *, allocates=True, **options):
 
     _before_compiling.append(register)
     return function
-
-
-def choose(condition, yes, no):
-    """`yes` where the condition holds, else `no`: numbers in kernels, arrays too in Python."""
-    return np.where(condition, yes, no)
-
-
-def _register_choose() -> None:
-    @overload(choose, jit_options={"_nrt": False, "forceinline": True}, prefer_literal=False)
-    def type_choose(condition, yes, no):
-        return lambda condition, yes, no: yes if condition else no
-
-
-_before_compiling.append(_register_choose)

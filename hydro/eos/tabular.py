@@ -9,7 +9,6 @@ with a message.
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,29 +16,17 @@ import numpy as np
 
 from hydro.eos.base import EquationOfState
 from regrid.errors import BadInput
-from regrid.hdf5_files import open_hdf5
-from regrid.jit import choose, compiled_once, inlined
+from regrid.jit import compiled_once, inlined
 
 
 @compiled_once
 def find_interval(axis, value):
-    """i with axis[i] <= value <= axis[i + 1]; outside the axis the nearest interval."""
-    last = axis.size - 2
+    """i with axis[i] <= value <= axis[i + 1], or -1 outside (NaN too)."""
+    last = axis.size - 1
+    if not (axis[0] <= value <= axis[last]):
+        return -1
     i = np.searchsorted(axis, value, side="right") - 1
-    i = choose(i > 0, i, 0)
-    return choose(i < last, i, last)
-
-
-@compiled_once
-def is_inside(axis, value):
-    """Whether a value lies on the axis; NaN does not."""
-    return (axis[0] <= value) & (value <= axis[axis.size - 1])
-
-
-@compiled_once
-def interpolate(table, i, k, a):
-    """Pressure at the part `a` from density i to i + 1, at the energy k."""
-    return table[i, k] + a * (table[i + 1, k] - table[i, k])
+    return i if i < last else last - 1
 
 
 @compiled_once
@@ -47,19 +34,20 @@ def find_pressure(axis_rho, axis_e, table, rho, e):
     """Pressure, dp/drho and dp/de; NaN outside the table."""
     i = find_interval(axis_rho, rho)
     k = find_interval(axis_e, e)
+    if i < 0 or k < 0:
+        return np.nan, np.nan, np.nan
     width = axis_rho[i + 1] - axis_rho[i]
     height = axis_e[k + 1] - axis_e[k]
     a = (rho - axis_rho[i]) / width
     b = (e - axis_e[k]) / height
-    low = interpolate(table, i, k, a)
-    high = interpolate(table, i, k + 1, a)
+    low = table[i, k] + a * (table[i + 1, k] - table[i, k])
+    high = table[i, k + 1] + a * (table[i + 1, k + 1] - table[i, k + 1])
     rise_low = table[i + 1, k] - table[i, k]
     rise_high = table[i + 1, k + 1] - table[i, k + 1]
-    inside = is_inside(axis_rho, rho) & is_inside(axis_e, e)
     return (
-        choose(inside, low + b * (high - low), np.nan),
-        choose(inside, (rise_low + b * (rise_high - rise_low)) / width, np.nan),
-        choose(inside, (high - low) / height, np.nan),
+        low + b * (high - low),
+        (rise_low + b * (rise_high - rise_low)) / width,
+        (high - low) / height,
     )
 
 
@@ -67,23 +55,24 @@ def find_pressure(axis_rho, axis_e, table, rho, e):
 def find_energy(axis_rho, axis_e, table, rho, p):
     """Energy for the given density and pressure; NaN if the table has none."""
     i = find_interval(axis_rho, rho)
+    if i < 0:
+        return np.nan
     a = (rho - axis_rho[i]) / (axis_rho[i + 1] - axis_rho[i])
-    low = 0 * i
-    high = low + (axis_e.size - 1)
-    inside = is_inside(axis_rho, rho)
-    inside = inside & (interpolate(table, i, low, a) <= p) & (p <= interpolate(table, i, high, a))
-    # bisection: as many halvings as the longest interval needs, those of one cell change nothing
-    remaining = axis_e.size - 1
-    while remaining > 1:
+    low, high = 0, axis_e.size - 1
+    p_low = table[i, low] + a * (table[i + 1, low] - table[i, low])
+    p_high = table[i, high] + a * (table[i + 1, high] - table[i, high])
+    if not (p_low <= p <= p_high):
+        return np.nan
+    while high - low > 1:
         middle = (low + high) // 2
-        is_above = interpolate(table, i, middle, a) <= p
-        low, high = choose(is_above, middle, low), choose(is_above, high, middle)
-        remaining = (remaining + 1) // 2
-    high = low + 1
-    p_low = interpolate(table, i, low, a)
-    p_high = interpolate(table, i, high, a)
-    e = axis_e[low] + (axis_e[high] - axis_e[low]) * ((p - p_low) / (p_high - p_low))
-    return choose(inside, e, np.nan)
+        p_middle = table[i, middle] + a * (table[i + 1, middle] - table[i, middle])
+        if p_middle <= p:
+            low = middle
+            p_low = p_middle
+        else:
+            high = middle
+            p_high = p_middle
+    return axis_e[low] + (axis_e[high] - axis_e[low]) * ((p - p_low) / (p_high - p_low))
 
 
 @inlined
@@ -115,6 +104,12 @@ def least_pressure(parameters):
     return -1e300
 
 
+def _each(function, *values):
+    """Apply `function` to every entry of the arrays."""
+    with np.errstate(invalid="ignore"):  # NaN outside the table
+        return np.vectorize(function, otypes=[float])(*values)
+
+
 @dataclass(frozen=True)
 class Tabular(EquationOfState):
     """Table in the HDF5 file `path`.
@@ -124,7 +119,6 @@ class Tabular(EquationOfState):
     """
 
     path: str = ""
-    digest: str = field(init=False, repr=False)  # of the numbers: what tells two tables apart
     axis_rho: np.ndarray = field(init=False, repr=False, compare=False)
     axis_e: np.ndarray = field(init=False, repr=False, compare=False)
     table: np.ndarray = field(init=False, repr=False, compare=False)
@@ -138,10 +132,12 @@ class Tabular(EquationOfState):
     opens_voids = False
 
     def __post_init__(self):
+        import h5py
+
         if not Path(self.path).is_file():
             raise BadInput(f"table: there is no file {self.path!r}")
         try:
-            with open_hdf5(self.path) as file:
+            with h5py.File(self.path, "r") as file:
                 arrays = [np.array(file[name], dtype=np.float64) for name in ("rho", "e", "p")]
         except (OSError, KeyError) as error:
             raise BadInput(
@@ -166,8 +162,6 @@ class Tabular(EquationOfState):
             raise BadInput(f"table {self.path}: rho starts at {rho[0]:g}; it must be positive")
         for name, values in zip(("axis_rho", "axis_e", "table"), arrays, strict=True):
             object.__setattr__(self, name, np.ascontiguousarray(values))
-        contents = b"".join(values.tobytes() for values in (rho, e, p))
-        object.__setattr__(self, "digest", hashlib.sha256(contents).hexdigest())
 
     @property
     def parameters(self) -> tuple[np.ndarray, ...]:
@@ -206,8 +200,15 @@ class Tabular(EquationOfState):
 
     def pressure(self, rho, e):
         """Pressure [Pa]; BadInput outside the table."""
-        return self._check(super().pressure(rho, e), rho, e, "e")
+        found = _each(lambda r, q: find_pressure(*self.parameters, r, q)[0], rho, e)
+        return self._check(found, rho, e, "e")
 
     def energy(self, rho, p):
         """Specific internal energy [J/kg]; BadInput outside the table."""
-        return self._check(super().energy(rho, p), rho, p, "p")
+        found = _each(lambda r, q: find_energy(*self.parameters, r, q), rho, p)
+        return self._check(found, rho, p, "p")
+
+    def sound_speed(self, rho, p):
+        """Sound speed [m/s]; NaN outside the table."""
+        found = _each(lambda r, q: sound_speed_squared(r, q, self.parameters), rho, p)
+        return np.sqrt(found)

@@ -15,7 +15,6 @@ of an eighth of a face's angle of turn, in a metal many gigapascals.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +22,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import cKDTree
 
 from hydro.eos import EquationOfState
-from hydro.eos.conversion import make_conversion
+from hydro.eos.base import make_least_pressure
 from hydro.remap.overlay import (
     MEAN,
     SLOPE_X,
@@ -140,15 +139,24 @@ def compute_conserved(eos: EquationOfState, state: np.ndarray, void_energy) -> n
 
     void_energy (...) [J/kg]: what voids take from the internal energy.
     """
-    to_conserved = make_conversion(type(eos)).to_conserved
-    return np.array(to_conserved(*state, void_energy, eos.parameters))
+    rho, u, v, p = state
+    energy = eos.energy(rho, p) + void_energy + 0.5 * (u * u + v * v)
+    return np.array([rho, rho * u, rho * v, rho * energy])
 
 
 def find_state(eos: EquationOfState, conserved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """rho, u, v, p (4, ...) and the void energy (...) [J/kg] from `compute_conserved`."""
-    to_state = make_conversion(type(eos)).to_state
+    rho, momentum_x, momentum_y, total = conserved
     with np.errstate(all="ignore"):
-        (rho, u, v), (p, void_energy, *_) = to_state(*conserved, eos.parameters)
+        u, v = momentum_x / rho, momentum_y / rho
+        e = total / rho - 0.5 * (u * u + v * v)
+        p = eos.pressure(rho, e)
+        void_energy = np.zeros_like(rho)
+        if eos.opens_voids:
+            least = make_least_pressure(type(eos))(rho, eos.parameters) + np.zeros_like(rho)
+            voided = p < least
+            void_energy = np.where(voided, e - eos.energy(rho, least), 0.0)
+            p = np.where(voided, least, p)
     return np.array([rho, u, v, p]), void_energy
 
 
@@ -206,7 +214,6 @@ def lessen_slopes(eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, c
 
 def _find_parts(eos: EquationOfState, cells: np.ndarray) -> np.ndarray:
     """The largest of PARTS (n,) with which all corners of the cells (rows, n) are states."""
-    to_pressure = make_conversion(type(eos)).to_pressure
     factor = np.zeros(cells.shape[1])
     waiting = np.arange(cells.shape[1])
     for part in PARTS:
@@ -221,7 +228,10 @@ def _find_parts(eos: EquationOfState, cells: np.ndarray) -> np.ndarray:
             for way_x, way_y in cells[18:].reshape(4, 2, -1):
                 rho, x, y, total = means + part * (slope_x * way_x + slope_y * way_y)
                 e = (total - 0.5 * (x * x + y * y) / rho) / rho
-                p, _, _, c2 = to_pressure(rho, e, eos.parameters)
+                p = eos.pressure_part(rho, e, eos.parameters)
+                if eos.opens_voids:
+                    p = np.maximum(p, make_least_pressure(type(eos))(rho, eos.parameters))
+                c2 = eos.sound_speed_squared_part(rho, p, eos.parameters)
                 good &= (rho > left_rho) & (c2 > left_c2) & (rho >= least_rho) & (rho <= most_rho)
                 good &= (p >= least_p) & (p <= most_p)
         factor[waiting[good]] = part
@@ -261,20 +271,20 @@ def remap_state(
     eos: EquationOfState,
     curved: bool,
     nodes: np.ndarray,
-    held: Mapping[str, np.ndarray],
+    state: np.ndarray,
+    void_energy: np.ndarray,
     new_nodes: np.ndarray,
-) -> tuple[dict[str, np.ndarray], Slivers]:
-    """What the cells of a block hold on a new grid, and the slivers; theory F12.
+) -> tuple[np.ndarray, np.ndarray, Slivers]:
+    """rho, u, v, p (4, mi, mj), void energy (mi, mj) on a new grid, and the slivers; theory F12.
 
-    held: the arrays of `hydro.rows.HELD_ARRAYS` without ghosts, state (4, ni, nj) and void_energy
-    (ni, nj), on `nodes` (2, ni+1, nj+1); new_nodes (2, mi+1, mj+1).  Returns such arrays.
+    state (4, ni, nj), void_energy (ni, nj) on `nodes` (2, ni+1, nj+1); new_nodes (2, mi+1, mj+1).
     Raises BadInput, with the block's name, for cells that are not convex and for outlines that
     differ by more than slivers; RunFailure where an average is no state of the material.
     """
     check_convex(name, nodes)
     check_convex(name, new_nodes)
     volumes, centres = compute_cell_moments(nodes, curved)
-    conserved = compute_conserved(eos, held["state"], held["void_energy"])
+    conserved = compute_conserved(eos, state, void_energy)
     fields = make_linear_fields(conserved, nodes, centres)
     lessen_slopes(eos, fields, nodes, centres)
     for _ in range(2):
@@ -290,7 +300,7 @@ def remap_state(
         new_state, new_void = find_state(eos, found)
         bad = ~is_state(eos, new_state)
         if not bad.any():
-            return {"state": new_state, "void_energy": new_void}, slivers
+            return new_state, new_void, slivers
         fields[..., SLOPE_X:] = 0.0  # averages of states, where those of linear fields fail
     i, j = (int(index) for index in np.argwhere(bad)[0])
     raise RunFailure(

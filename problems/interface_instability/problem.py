@@ -22,7 +22,7 @@ from hydro.links import Link, join
 from hydro.motion.line import THICK_CELLS, LineRule, Respacing
 from hydro.rows import V
 from hydro.simulation import Simulation
-from problems.deck import MOST_CELLS
+from problems.deck import MOST_CELLS, check_digests
 from problems.initial_states import put_walls, settle_shock
 from problems.interface_instability.crossed_start import (
     CLEAR_TIME_RATIO,
@@ -222,6 +222,7 @@ class InterfaceInstability(Results, Problem):
         y = self.make_heights()
         sources = [("the perturbation", perturbation)] if perturbation is not None else []
         if deck.line_file is not None:
+            check_digests(deck.digests)
             sources.append((f"line_file {deck.line_file!r}", read_line(deck.line_file, y[-1])))
         return [FreeLine(source, y, even, what) for what, source in sources]
 
@@ -287,9 +288,13 @@ class InterfaceInstability(Results, Problem):
         first = push * self.begun - length  # the piston's first place
         meet = -(first + head * t0) / (push - head)
         position = push * meet + first
-        chase = 1.1 * self.c_first + max(push, base.u) - base.u
         gap = base.u * (meet - t0) - position
-        return meet + gap / chase
+        return meet + gap / self._find_chase()
+
+    def _find_chase(self) -> float:
+        """At most how fast the wave that the piston sends back nears the interface [m/s]."""
+        u = self.theory.base.u
+        return 1.1 * self.c_first + max(self.shock.particle_speed, u) - u
 
     def _find_second_echo(self) -> tuple[float, float]:
         """Speeds [m/s] of the transmitted shock, and of the one back from the far wall."""
@@ -313,6 +318,12 @@ class InterfaceInstability(Results, Problem):
         front, back = self._find_second_echo()
         late = second * (front - self.theory.base.u + back) / (front * back)
         return {"first": self._find_first_echo(first), "second": self.arrival + late}
+
+    def find_echo_speeds(self) -> dict[str, float]:
+        """How fast these waves run towards the interface [m/s], by the block's name."""
+        if self.has_open_ends:
+            return {"first": self.c_first, "second": self.theory.sound_speed}
+        return {"first": self._find_chase(), "second": self._find_second_echo()[1]}
 
     @functools.cached_property
     def spacing(self) -> Spacing:

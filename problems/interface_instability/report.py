@@ -44,7 +44,8 @@ def _predict(problem) -> list[Row]:
     known = {"interface_speed": theory.base.u, "atwood_number": theory.atwood}
     rows = [Row(name, theory=value) for name, value in known.items()]
     if problem.harmonics:
-        last = min(WINDOW[1], float(get_kct(problem, problem.t_end)))
+        reach = min(problem.t_end, Growth(problem).open_time)
+        last = min(WINDOW[1], float(get_kct(problem, reach)))
         if last > WINDOW[0] + LEAST_WINDOW:
             rows.append(Row("growth_rate", theory=theory.get_mean_rate(WINDOW[0], last)))
         rows.append(Row("impulsive_rate", theory=theory.impulsive))
@@ -76,7 +77,8 @@ def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
     notes = []
     t = column["t"]
     exact = float(theory.base.u)
-    after = t > problem.arrival + 0.3 * (t[-1] - problem.arrival)
+    until = min(t[-1], growth.open_time)
+    after = (t > problem.arrival + 0.3 * (until - problem.arrival)) & (t <= until)
     speed = fit_slope(t, column["interface_mean"], after)
     words = "interface speed" if math.isfinite(speed) else ""
     source = "exact Riemann solution"
@@ -137,8 +139,11 @@ def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, sho
             Row(name, studied=True),
             Row(f"{name}_beyond", rate, expected, words, digits=5, **beyond),
         ]
+    returned = mode.number * growth.open_reach
+    if window.last == returned:
+        source += ", until waves return from the far sides"
     if not is_still(theory, expected):
-        if not several and window.last < min(WINDOW[1], kct):
+        if not several and window.last < min(WINDOW[1], kct, returned):
             source += f", up to k a = {growth.limit:.2g}, its limit"
         return [Row(name, rate, expected, words, digits=5, studied=True, source=source)]
     share = f"{100.0 * (rate - expected) / theory.base.u:+.2f} % of u"
@@ -163,7 +168,8 @@ def _compare_model(growth, column, kct: float) -> Row:
     model = float(growth.compute_model(np.array([t]))[-1])
     ends = last < kct
     words = f"amplitude at k c t = {last:.3g}" if ends else "amplitude at the end"
-    source = "Padé model, rough" + (": its range ends there" if ends else "")
+    why = "waves return" if last == growth.open_reach else "its range ends"
+    source = "Padé model, rough" + (f": {why} there" if ends else "")
     return Row("model_amplitude", computed, model, words, digits=5, source=source)
 
 
@@ -192,7 +198,7 @@ def _draw_theory(amplitude, rate, growth, curves: list[_Curve], column, kct: np.
     """Theories of the curves, and the time up to which they hold, where it ends."""
     problem = growth.problem
     theory = growth.theory
-    known = (kct > 0.0) & (kct <= theory.kt[-1] * theory.sound_speed)
+    known = (kct > 0.0) & (kct <= min(theory.kt[-1] * theory.sound_speed, growth.open_reach))
     t = column["t"][known] - problem.arrival
     reach = growth.linear_reach
     several = len(curves) > 1
@@ -208,6 +214,9 @@ def _draw_theory(amplitude, rate, growth, curves: list[_Curve], column, kct: np.
     if modes and 0.0 < reach < kct[-1]:
         for axes in (amplitude, rate):
             axes.axvline(reach, color="0.4", lw=0.8, ls=":", label="waves couple")
+    if growth.open_reach < kct[-1]:
+        for axes in (amplitude, rate):
+            axes.axvline(growth.open_reach, color="0.4", lw=0.8, ls="-.", label="waves return")
     rate.axhline(theory.impulsive, color="0.6", lw=0.8, label=f"impulsive ({theory.impulse})")
     if reach == 0.0 and not growth.model_fails:
         model = growth.compute_model(column["t"]) / curves[0].first

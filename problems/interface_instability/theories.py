@@ -5,7 +5,8 @@ is the next term of perturbation theory (A: Atwood number), and k a <= LINEAR; t
 sum of their k a is <= COUPLED [Haan1991].  The Padé model [ZhangSohn1997] is one for a single mode
 and a reflected shock, with k a+ < 1 and growth slower than INCOMPRESSIBLE, up to `PadeModel.reach`.
 k is the mode's own wavenumber, and so are its times k c t; c is the sound speed of the shocked
-second material, t counts from the shock's arrival at the mean interface.
+second material, t counts from the shock's arrival at the mean interface.  All theories are of an
+interface between materials without ends: they stop where waves return from the far sides.
 
 `accuracy.json` beside this file has a row for each run of `benchmarks/growth_accuracy.py`, see
 `Measured`.  A deck is looked up at the corners of the box of Mach numbers and density ratios around
@@ -33,6 +34,10 @@ WINDOW = (6.0, 30.0)  # k c t over which a growth rate is averaged
 LEAST_WINDOW = 1.0
 MOST_LINEAR_KA = 0.3  # largest k a of one mode for linear theory, whatever its next term
 MOST_RATE_LOSS = 0.015  # of the rate, by that term, at the end of the window
+SHOCK_CELLS = 6.0  # that a computed shock is wide
+# what of a shock and a wave is ahead of its mean place, at most: lengths that the deck leaves out
+# are longer by half a wavelength
+MOST_FRONT_WAVELENGTHS = 0.4
 MOST_COUPLED_KA = 0.1  # largest sum of the k a of several
 MOST_INCOMPRESSIBLE_RATE = 0.3  # largest growth rate over the sound speed for the Padé model
 # of the interface's speed: a smaller theoretical rate is no scale for an error
@@ -96,6 +101,28 @@ class Growth:
         )
 
     @functools.cached_property
+    def open_time(self) -> float:
+        """Time [s] up to which no wave is back from the far sides.
+
+        A computed shock is some cells wide, and the crest that is ahead meets it first.
+        """
+        problem = self.problem
+        wavelength = problem.deck.wavelength
+        found = []
+        for name, t in problem.find_echoes().items():
+            kct = max(0.0, float(get_kct(problem, t)))
+            growth = 1.0 + kct * abs(self.theory.impulsive) / self.theory.sound_speed
+            front = SHOCK_CELLS / problem.deck.cells * wavelength + problem.amplitude * growth
+            speed = problem.find_echo_speeds()[name]
+            found.append(t - min(front, MOST_FRONT_WAVELENGTHS * wavelength) / speed)
+        return min(found)
+
+    @functools.cached_property
+    def open_reach(self) -> float:
+        """k c t (k of the wavelength) up to which no wave is back from the far sides."""
+        return float(get_kct(self.problem, self.open_time))
+
+    @functools.cached_property
     def linear_reach(self) -> float:
         """k c t (k of the wavelength) up to which linear theory applies; 0 where nowhere."""
         modes = self.problem.harmonics
@@ -113,9 +140,10 @@ class Growth:
         return float(kct[steep[0]]) if steep.size else math.inf
 
     def find_window(self, mode: Harmonic, kct_end: float) -> Window | None:
-        """The window of a mode for a run up to `kct_end` (k of the wavelength); None: too short."""
+        """The window of a mode for a run up to `kct_end` (k of the wavelength), or until waves
+        return; None: too short."""
         first = max(WINDOW[0], mode.number * float(get_kct(self.problem, 0.0)))
-        last = min(WINDOW[1], mode.number * kct_end)
+        last = min(WINDOW[1], mode.number * min(kct_end, self.open_reach))
         linear = min(last, mode.number * self.linear_reach)
         if linear > first + LEAST_WINDOW:
             return Window(first, linear, True)
@@ -179,7 +207,8 @@ class Growth:
         """k c t (k of the wavelength) up to which the Padé model can be right; 0 where nowhere."""
         if self.model_fails:
             return 0.0
-        return self.model.reach * self.problem.k * self.theory.sound_speed
+        own = self.model.reach * self.problem.k * self.theory.sound_speed
+        return min(own, self.open_reach)
 
     def compute_model(self, t: np.ndarray) -> np.ndarray:
         """Amplitude by the Padé model at the times t (n,)."""
@@ -373,7 +402,7 @@ def _caution_line(problem, history) -> list[str]:
     modes = [mode.column for mode in problem.harmonics if mode.column in history]
     growth = Growth(problem)
     kct = get_kct(problem, history["t"])
-    gentle = (kct > 1.0) & (kct <= growth.linear_reach)
+    gentle = (kct > 1.0) & (kct <= min(growth.linear_reach, growth.open_reach))
     if "roughness" not in history or not modes or not gentle.any():  # of an earlier version, short
         return []
     last = float(growth.scale_roughness(history)[gentle][-1])

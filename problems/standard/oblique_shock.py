@@ -24,6 +24,8 @@ from problems.problem import Problem, Report, compare, find_crossing, fit_slope
 from problems.references.shock_polars import Body, ShockPolar, search_pressure, solve_collision
 
 # length before the wedge; it is 1 long, and the top is 1 above its start
+LAST_TIME_PART = 0.1  # of the time: in it a steady flow does not change
+STEADY_CHANGE = 0.005  # relative change in that time: less is steady
 LENGTH_BEFORE_WEDGE = 0.25
 
 
@@ -102,13 +104,30 @@ class ObliqueShock(Problem):
         deck = self.deck
         beta = math.degrees(self.beta)
         words = "angle of the shock [degrees]", "pressure on the wall over exact"
+        notes = [f"exact pressure: {self.pressure / self.ahead:.5g} of the stream's"]
+        more = {}
+        change = self.measure_change(history)
+        if change > STEADY_CHANGE:
+            more = {"off": "--", "source": "not steady yet"}
+            notes.append(
+                f"in the last {LAST_TIME_PART:.0%} of the time they changed by up to "
+                f"{100.0 * change:.2g} %: theory is of the steady flow, which a later run.t_end has"
+            )
         rows = [
-            compare(history, "shock_angle", beta, words[0], error="angle"),
-            compare(history, "wall_pressure_ratio", 1.0, words[1], error="pressure"),
+            compare(history, "shock_angle", beta, words[0], error="angle", **more),
+            compare(history, "wall_pressure_ratio", 1.0, words[1], error="pressure", **more),
         ]
         head = f"oblique-shock, Mach {deck.mach:g} on {deck.angle:g} degrees, {deck.cells} cells"
-        exact = f"exact pressure: {self.pressure / self.ahead:.5g} of the stream's"
-        return Report(head, rows, [exact])
+        return Report(head, rows, notes)
+
+    @staticmethod
+    def measure_change(history) -> float:
+        """Largest relative change of angle and pressure over the last part of the time."""
+        t = history["t"]
+        columns = [history[name] for name in ("shock_angle", "wall_pressure_ratio")]
+        before = [np.interp((1.0 - LAST_TIME_PART) * t[-1], t, column) for column in columns]
+        pairs = zip(columns, before, strict=True)
+        return max(abs(float(column[-1] / old - 1.0)) for column, old in pairs)
 
     def draw_oblique_shock(self, figure, run_data) -> None:
         """Pressure with the grid and the exact shock, and pressure along the wall."""

@@ -27,13 +27,23 @@ from hydro.sources import make_gravity
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
 from problems.initial_states import put_walls
 from problems.pictures import draw_columns
-from problems.problem import Problem, Report, Row, compare, find_frequency, find_growth_rate
+from problems.problem import (
+    Problem,
+    Report,
+    Row,
+    compare,
+    find_frequency,
+    find_growth_rate,
+    find_time,
+    keep_until,
+)
 from problems.references.exact_flows import compute_gravity_mode, compute_isentropic_layer
 from regrid.measure.corners import compute_centres
 
 GAS_GAMMA = 5.0 / 3.0
 WAVE_NUMBER = 2.0 * math.pi
 GRAVITY_ACCELERATION = 1.0
+MOST_LINEAR_KA = 0.1  # steepest wave for linear theory, whose next term is (k a)²
 
 
 class RayleighTaylorDeck(Deck, kw_only=True):
@@ -109,14 +119,25 @@ class RayleighTaylor(Problem):
 
     def report(self, history, final=None) -> Report:
         find = find_growth_rate if self.grows else find_frequency
-        rate = find(history["t"], history["amplitude"])
+        linear = keep_until(history, self.find_linear_end(history))
+        rate = find(linear["t"], linear["amplitude"])
+        notes = []
+        if len(linear["t"]) < len(history["t"]):
+            until = f"k a = {MOST_LINEAR_KA:g} at t = {linear['t'][-1]:.4g}"
+            notes.append(f"linear theory ends at {until}: the rate is that up to there")
         what = "growth rate [1/s]" if self.grows else "angular frequency [1/s]"
         mean = history["interface_mean"]
         head = f"rayleigh-taylor, {self.deck.above} above, {self.deck.cells} cells per wavelength"
         row = Row("rate", rate, self.exact, what, digits=7, error="rate")
         rows = [row, compare(history, "amplitude", label="last amplitude", digits=4)]
         moved = f"the mean has moved by at most {np.abs(mean - mean[0]).max():.1e} m"
-        return Report(head, rows, ["theory is without compression", moved])
+        return Report(head, rows, ["theory is without compression", *notes, moved])
+
+    def find_linear_end(self, history) -> float:
+        """The last time [s] before the wave is steeper than MOST_LINEAR_KA."""
+        steep = WAVE_NUMBER * np.abs(history["amplitude"]) > MOST_LINEAR_KA
+        first = find_time(history, steep)
+        return math.inf if math.isnan(first) else math.nextafter(first, -math.inf)
 
     def draw_growth(self, figure, run_data) -> None:
         """Amplitude against theory."""

@@ -15,12 +15,10 @@ import h5py
 import msgspec
 import numpy as np
 
-from problems.deck import DIGESTS
 from problems.evolution import get_material
 from problems.problem_file import read_head
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
-from regrid.hdf5_files import open_hdf5
 from runs.deck.checking import find_changes
 from runs.inspection.account import describe_cautions, describe_run, describe_verdict, judge
 from runs.quantities import add_unit, count, describe_seconds, describe_time
@@ -156,7 +154,7 @@ def describe_directory(path: str) -> str:
             words = f"{figures} (shockgrid plot {quoted} --what NAME)"
             lines += ["", f"pictures of this problem: {words}"]
     except BadInput as error:
-        lines.append(f"no results of the problem: its deck cannot be used any more: {error}")
+        lines.append(f"the deck does not suit this version of the problem: {error}")
     return "\n".join([*lines, *run.said, *_list_damage(run)])
 
 
@@ -195,8 +193,6 @@ def describe_settings(run: RunData) -> list[str]:
         usual, now = (msgspec.to_builtins(deck) for deck in (type(run.deck)(), run.deck))
     except BadInput:
         return []
-    del now[DIGESTS]  # of files whose names are shown
-    del usual[DIGESTS]
     changed = {one.key: one.now for one in find_changes(usual, now)}
     if "gauge" in changed:
         changed["gauge"] = ", ".join(gauge.name for gauge in run.deck.gauge)
@@ -241,7 +237,7 @@ def inspect(file: str | os.PathLike) -> str:
 
 def describe_tree(path: Path) -> str:
     """What `inspect` says, read in this process."""
-    with open_tree(path) as tree:
+    with open_hdf5(path) as tree:
         head = f"{path}: {path.stat().st_size} bytes"
         if (found := find_sum(path)) is not None:
             head += f", checksum {'as stored' if found else 'NOT AS STORED'}"
@@ -259,7 +255,7 @@ def describe_tree(path: Path) -> str:
 
 
 @contextlib.contextmanager
-def open_tree(path: Path) -> Iterator[h5py.File]:
+def open_hdf5(path: Path) -> Iterator[h5py.File]:
     """The file, open for reading; BadInput where it is missing, no HDF5, or its tree is damaged."""
     if not path.is_file():
         words = (
@@ -267,7 +263,7 @@ def open_tree(path: Path) -> Iterator[h5py.File]:
         )
         raise BadInput(f"{path} {words}")
     try:
-        file = open_hdf5(path)
+        file = h5py.File(path, "r")
     except OSError as error:
         raise BadInput(
             f"{path} is not a readable HDF5 file (truncated, damaged or a different format)"

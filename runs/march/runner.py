@@ -15,7 +15,6 @@ import os
 import platform
 import re
 import signal
-import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
@@ -32,7 +31,6 @@ from problems.evolution import Evolution, get_missed, get_start_row
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure
 from regrid.jit import read_clock
-from regrid.text_files import escape_controls
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import ENDS
 from runs.gauges import Gauges
@@ -213,7 +211,7 @@ class Runner:
 
     def start(self) -> Ending:
         """Run in a new directory, from the beginning or the state that another run has given."""
-        with self.directory.claimed(self._caution):
+        with self.directory.claimed():
             write_atomically(self.directory.deck, self.deck_text)
             if self.deck.file:
                 keep_problem_file(self.directory, self.deck.file)
@@ -222,7 +220,7 @@ class Runner:
 
     def resume(self, at: int | None = None, say=lambda text: None) -> Ending:
         """Go on from the last good restart point, or from the one of step `at`."""
-        with self.directory.claimed(self._caution):
+        with self.directory.claimed():
             check_columns(self.directory.history, self.evolution, self._measure())
             tables = [self.directory.history]
             tables += [self.directory.gauges] * bool(self.gauges.points)
@@ -258,12 +256,6 @@ class Runner:
             self.last_point = step
             self.directory.forget_early_end()
             return self._run()
-
-    def _caution(self, text: str) -> None:
-        """A caution about the disk, for the person and the log."""
-        self.directory.note(f"caution: {text}")
-        if not self.quiet:
-            print(f"caution: {escape_controls(text)}", file=sys.stderr)
 
     def _note_start(self, what: str) -> None:
         made, deck = describe_provenance(find_provenance(self.deck_text))

@@ -25,6 +25,11 @@ from hydro.perimeter.contacts import (
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import BadInput
 
+# of the least of the cells' edges beside a link: nodes of both sides so near are one
+LARGEST_CLOSED_GAP = 1e-4
+# of the link's extent
+ROUND_OFF_GAP = 1e-9
+
 
 class Link:
     """Two linked segments, `leader` and `follower`, and how their nodes correspond.
@@ -48,11 +53,14 @@ class Link:
         self.reverse = bool(misses[1][0].max() < misses[0][0].max())
         gaps, self.shift = misses[self.reverse]
         worst = int(gaps.argmax())
-        if gaps[worst] > 1e-9 * np.ptp(one, axis=1).max():
+        closed_gap = LARGEST_CLOSED_GAP * min(map(measure_least_cell, (leader, follower)))
+        if gaps[worst] > max(closed_gap, ROUND_OFF_GAP * np.ptp(one, axis=1).max()):
             x, y = one[:, worst]
             raise BadInput(
                 f"{leader.kind}: nodes of {leader} and of {follower} do not match: the largest gap "
-                f"is {gaps[worst]:.3g} m at node {leader.start + worst}, ({x:.6g}, {y:.6g})"
+                f"is {gaps[worst]:.3g} m at node {leader.start + worst}, ({x:.6g}, {y:.6g}); cut "
+                f"both sides the same way, from the same points or formula (gaps of rounded "
+                f"coordinates, up to {closed_gap:.1g} m, are closed)"
             )
         follower.has_own_line = False
         order = (follower.last - 1, -1) if self.reverse else (follower.first, 1)
@@ -95,6 +103,16 @@ def _check_materials(leader: Linked, follower: Linked) -> None:
             f"{leader.kind}: material passes between {leader} and {follower}, and their equations "
             f"of state differ: {one} and {two}; join two materials by an interface"
         )
+
+
+def measure_least_cell(segment: Linked) -> float:
+    """The least edge [m] along a segment and across it; those that are points do not count."""
+    nodes = segment.block.nodes
+    within = nodes[:, 1:-1] if segment.side.startswith("i") else nodes[:, :, 1:-1]
+    line = segment.line(nodes)
+    edges = np.append(np.diff(line, axis=1), segment.line(within) - line, axis=1)
+    lengths = np.hypot(*edges)
+    return float(lengths[lengths > 0.0].min())
 
 
 def _misfit(one: np.ndarray, two: np.ndarray, periodic: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -11,6 +11,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.clock import Clock, Stopwatch
 from hydro.contacts.meetings import Meetings
+from hydro.contacts.start import check_overlaps
 from hydro.contacts.voids import FACES_IN_STATE, VOIDS_IN_STATE
 from hydro.formulas.geometry import find_geometry
 from hydro.history import compute_columns
@@ -111,6 +112,9 @@ class Simulation:
         self.refining = refining
         self._counts_cells = refining is not None
         self._connect(blocks, links, make_regridder)
+        check_overlaps(blocks, links)
+        if self.meetings.set_in_contact():
+            self._connect(blocks, links, make_regridder)
         self._overlaps.check_pistons(float(t_end))
         if refining is not None:  # contacts stay as thick as they are on the first cells
             thickness = [contact.thickness for contact in self.motion.contacts]

@@ -21,6 +21,7 @@ from hydro.boundary import Piston
 from hydro.contacts.facet_states import make_add_facet_flux
 from hydro.contacts.pair import Pair, PlanePair
 from hydro.contacts.rows import AREAS, COVERED, FOLLOWER, LEADER
+from hydro.contacts.start import fill_normals
 from hydro.contacts.surface import Plane, Surface, find_planes, is_surface
 from hydro.contacts.voids import Voids
 from hydro.formulas.geometry import Geometry
@@ -51,6 +52,7 @@ class Meetings:
         void_fill: tuple[float, float] | None = None,
     ):
         self.geometry = geometry
+        self.blocks = list(blocks)
         self.add_flux = make_add_facet_flux(geometry)
         surfaces, self.pairs = _find_pairs(blocks, links, motion, geometry)
         used = {id(s) for pair in self.pairs for s in (pair.leader, pair.follower)}
@@ -76,6 +78,33 @@ class Meetings:
         self._cuts = 0
         self.made = self.opened = 0
         self.length = 0.0
+
+    def set_in_contact(self) -> bool:
+        """Before the first step: lay surfaces on each other that touch but for rounding or chords.
+
+        Has any node moved?
+        """
+        for surface in self.surfaces:
+            surface.read()
+            surface.read_new()
+        for plane in self.planes:
+            plane.read()
+        for pair in self.pairs:
+            pair.find_lying()
+        lying = [pair for pair in self.pairs if pair.touched]
+        if not lying:
+            return False
+        for block in self.blocks:
+            fill_normals(block)
+        self._lay_followers_and_leaders(lying, part_back=1.0)
+        for pair in lying:
+            pair.forget_hits()
+        moved = False
+        for block in self.blocks:
+            if not np.array_equal(block.nodes, block.nodes_new):
+                block.nodes[...] = block.nodes_new
+                moved = True
+        return moved
 
     def find(self, t: float, step: int) -> set[frozenset[int]]:
         """Facets of the present grid; the pairs of blocks (by id) that touch, before a step.
@@ -187,6 +216,9 @@ class Meetings:
                 ):  # fmt: skip
                     surface.write_new()
                     self._shift_ends(surface, shifts)
+        self._lay_followers_and_leaders(pairs, part_back)
+
+    def _lay_followers_and_leaders(self, pairs: list[Pair], part_back: float) -> None:
         for pair in pairs:
             self._lay_line(pair, False, part_back)
         if any([self._lay_line(pair, True, part_back) for pair in pairs]):

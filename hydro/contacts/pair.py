@@ -27,12 +27,17 @@ from hydro.contacts.laying import (
     measure_clearance_of_plane,
 )
 from hydro.contacts.rows import AREAS, END_ROWS, FACE_ROWS, FACET_ROWS
+from hydro.contacts.start import (
+    ON_LINE_DISTANCE,
+    find_lying,
+    find_lying_on_plane,
+    measure_sizes,
+)
 from hydro.contacts.surface import Plane, Surface
 from hydro.contacts.touch import fill_swept_boxes, find_touches, measure_distance
 from hydro.motion.overlaps import is_inside
 from regrid.errors import Place, RegridFailure
 
-ON_LINE_DISTANCE = 1e-6  # of a face's length: closer than this a node lies on the other line
 MOST_BEHIND = 0.5  # of a face's length: lines that cross so far have lost each other
 FAR_SEARCH_FACES = 2.0  # longest faces: surfaces of one body are not looked for further off
 
@@ -249,6 +254,24 @@ class Pair:
         self.back_hits.fill(-1.0)
         self.touched = False
 
+    def find_lying(self) -> None:
+        """At the start: nodes of the follower that lie on the leader but for rounding or chords.
+
+        They count as if they had come through in this step, and so do the leader's ends.
+        """
+        self.forget_hits()
+        if self.one_body:
+            return
+        one = self.leader
+        other = self.follower
+        one_sizes = measure_sizes(one.line, one.inner)
+        other_sizes = measure_sizes(other.line, other.inner)
+        self.hits[:] = find_lying(other.line, other_sizes, one.line, one_sizes)
+        ends = [0, -1]
+        found = find_lying(one.line[:, ends], one_sizes[ends], other.line, other_sizes)
+        self.back_hits[ends] = found
+        self.touched = bool((self.hits >= 0.0).any() or (found >= 0.0).any())
+
     def may_touch(self, stretch: float) -> bool:
         """May nodes of one come to the other within so many steps as this one?"""
         ways = self.leader.way + self.follower.way
@@ -347,6 +370,14 @@ class PlanePair(Pair):
         for end, key_node in enumerate(surface.ends):
             self.asked[-end] = key_node is None or not plane.holds(key_node)
         self.common = int((~self.asked).sum())
+
+    def find_lying(self):
+        """The nodes that lie on the plane but for rounding."""
+        self.forget_hits()
+        other = self.follower
+        sizes = measure_sizes(other.line, other.inner)
+        self.hits[:] = find_lying_on_plane(other.line, sizes, self.leader.line)
+        self.touched = bool((self.hits >= 0.0).any())
 
     def _measure_clearance(self):
         return measure_clearance_of_plane(self.follower.line, self.leader.line, self.asked)

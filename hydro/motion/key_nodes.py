@@ -23,7 +23,7 @@ import numpy as np
 from hydro import rim as on
 from hydro.block import Block
 from hydro.boundary import NodeMotion, Segment
-from hydro.links import Link
+from hydro.links import LARGEST_CLOSED_GAP, Link
 from hydro.motion.line import Track
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import Place, RunFailure
@@ -49,6 +49,18 @@ class KeyNode:
         )
         # curved tracks that hold the node; with a moving line's mirrors, and which end it has here
         self.tracks: list[tuple[Track, list | None, int]] = []
+
+    def join_members(self) -> None:
+        """Put members that rounding has set apart where the first one is.
+
+        Those of a periodic side lie elsewhere.
+        """
+        first = self.position()
+        for block, i, j in self.members[1:]:
+            own = block.nodes[:, i, j]
+            gap = np.abs(own - first).max()
+            if gap > 0.0 and gap <= LARGEST_CLOSED_GAP * _measure_least_way(block.nodes, i, j):
+                own[:] = first
 
     def position(self) -> np.ndarray:
         """Where the first member is."""
@@ -228,6 +240,13 @@ def _end_nodes(segment: Segment) -> list[tuple[int, int, int]]:
     return found
 
 
+def _measure_least_way(nodes: np.ndarray, i: int, j: int) -> float:
+    """The shortest way from a node to those around it that lie elsewhere."""
+    near = nodes[:, max(0, i - 1) : i + 2, max(0, j - 1) : j + 2]
+    lengths = np.hypot(*(near - nodes[:, i : i + 1, j : j + 1]).reshape(2, -1))
+    return float(lengths[lengths > 0.0].min())
+
+
 def find_key_nodes(
     blocks: list[Block], links: list[Link], contacts: Sequence[SlidingContact] = ()
 ) -> list[KeyNode]:
@@ -275,4 +294,5 @@ def find_key_nodes(
         groups[root(point)].ends.append((segment, face))
     for node in groups.values():
         node.sort_ends()
+        node.join_members()
     return list(groups.values())

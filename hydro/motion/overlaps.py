@@ -269,7 +269,10 @@ class Overlaps:
         )
 
 
-ADVICE = "blocks may touch, not overlap; where they are in contact, link their sides"
+ADVICE = (
+    "blocks may touch, not overlap; link sides that stay together, and cut curves that touch the "
+    "same way, or finer"
+)
 
 
 def _leaves(segment: Segment) -> bool:

@@ -348,24 +348,33 @@ class PlateImpact(NamedTuple):
     In mass coordinates the release from the flyer's back crosses the flyer and follows the shock
     through the target; in the fan from the free surface m (t - out) is constant along it.
 
-    Of the first impact: pressure [Pa] and speed [m/s] behind it, its time [s], and the time
-    until the release from the flyer's back is at the contact, `back` [s].
+    Of the first impact: pressure [Pa] and speed [m/s] behind it, its time [s], and the times after
+    it [s] at which the release from the flyer's back, `back`, and the wave from the target's other
+    side, `returned`, are at the contact.
 
-    Of the target's free surface: speed `free` [m/s] from `out` to `end` [s]; `end` is NaN where the
-    release has met the shock before.
+    Of the target's free surface: speed `free` [m/s] from `out` to `end` [s], and in a target so
+    thin that waves ring in it to `ring` only, when the first of them is there; `end` is NaN where
+    the release has met the shock before.
     """
 
     pressure: float
     u: float
     impact: float
     back: float
+    returned: float
     free: float
     out: float
     end: float
+    ring: float
+
+    @property
+    def last(self) -> float:
+        """Until when the free surface has its speed [s]; NaN without `end`."""
+        return min(self.end, self.ring) if math.isfinite(self.end) else math.nan
 
     def make_trace(self, unit: float = 1.0) -> np.ndarray:
         """Corners (2, 4) of the surface's speed over time, times `unit`, until the release."""
-        end = self.end if math.isfinite(self.end) else self.out
+        end = self.last if math.isfinite(self.last) else self.out
         t = unit * np.array([0.0, self.out, self.out, end])
         return np.array([t, [0.0, 0.0, self.free, self.free]])
 
@@ -376,8 +385,41 @@ class PlateImpact(NamedTuple):
         out, end = (
             float(t[a.argmax()]) if a.any() else math.nan for a in (trace > 0.5 * self.free, fallen)
         )
-        late = trace[(t > max(self.out, 0.5 * (self.out + self.end))) & (t < self.end)]
+        late = trace[(t > max(self.out, 0.5 * (self.out + self.last))) & (t < self.last)]
+        end = end if self.end < self.ring else math.nan
         return out, float(np.median(late)) if late.size > 3 else math.nan, end
+
+
+class WindowImpact(NamedTuple):
+    """The shock of a plate impact passes into a window behind the target, without a gap.
+
+    Pressure `p` [Pa] and speed `u` [m/s] of the face between target and window, from `start` to
+    `end` [s], when a release is there from the flyer's back or from the window's other side.
+    """
+
+    p: float
+    u: float
+    start: float
+    end: float
+
+
+def compute_window_impact(
+    impact: PlateImpact, flyer: Material, target: Material, window: Material, speed: float,
+    depth: float, thickness: float,
+) -> WindowImpact:  # fmt: skip
+    """An impact at `speed` [m/s] on a target of `depth` [m] with a window of `thickness` [m].
+
+    The shocked target meets the window at rest: the Riemann problem of both.  The release from the
+    flyer's back is in the target at the least as early as without the wave from the window.
+    """
+    hit = solve_riemann(flyer.eos, (flyer.rho0, speed, 0.0), target.eos, (target.rho0, 0.0, 0.0))
+    shocked = hit.rho_right, hit.u, hit.p
+    passed = solve_riemann(target.eos, shocked, window.eos, (window.rho0, 0.0, 0.0))
+    z = hit.rho_right * float(target.eos.sound_speed(hit.rho_right, hit.p))
+    z_window = passed.rho_right * float(window.eos.sound_speed(passed.rho_right, passed.p))
+    behind = impact.impact + impact.back + target.rho0 * depth / z
+    beyond = thickness / passed.right_wave.head + window.rho0 * thickness / z_window
+    return WindowImpact(passed.p, passed.u, impact.out, min(behind, impact.out + beyond))
 
 
 def compute_plate_impact(
@@ -393,6 +435,8 @@ def compute_plate_impact(
     z = hit.rho_right * float(target.eos.sound_speed(hit.rho_right, hit.p))
     z_free = target.rho0 * float(target.eos.sound_speed(target.rho0, 0.0))
     back = thickness / (speed - hit.left_wave.head) + flyer.rho0 * thickness / z_flyer
+    returned = out - impact + target.rho0 * depth / z
     catch = (target.rho0 * depth + z * (impact + back - out)) / (2.0 * z)  # after `out`, at the fan
     end = out + 2.0 * catch * math.sqrt(z / z_free) if catch > 0.0 else math.nan
-    return PlateImpact(hit.p, hit.u, impact, back, free, out, end)
+    ring = out + 2.0 * (impact + returned - out)  # released material is slower: not before
+    return PlateImpact(hit.p, hit.u, impact, back, returned, free, out, end, ring)

@@ -2,16 +2,22 @@
 
 Plates of given materials stand in a row with gaps between them; the first one has a speed.  Where
 plates meet a contact closes; it opens again where it would go into tension, so plates separate by
-themselves (theory F16).  The problem measures the mean speed of every plate and the speed of the
-last plate's free surface, as a velocity interferometer sees it.  Theory gives the time of impact
-and, by the Hugoniots and the isentrope of each material, pressure and speed at the impact; for two
-plates also when the shock reaches the free surface, the speed of the surface then, and how long it
-lasts, because the release from the flyer's back follows the shock.
+themselves (theory F16).  A plate without a gap touches the one before it from the start, as a
+window does behind a target: that is no impact.  `bond` is the tension that contacts hold; that of a
+plate is of its contact with the plate before it.
+
+The problem measures the mean speed of every plate and the speed of the last plate's free surface,
+as a velocity interferometer sees it.  Theory gives the time of impact and, by the Hugoniots and the
+isentrope of each material, pressure and speed at the impact; for two plates also when the shock
+reaches the free surface, the speed of the surface then, and how long it lasts, because the release
+from the flyer's back follows the shock.  For a third plate without a gap, a window, theory gives
+the speed and the pressure of its face behind the target.
 
 Note: a release is sharp at low speeds, and the scheme spreads it over some cells; plates then
 separate a little early.  Use cells of an eightieth of the thinnest plate or less.
 """
 
+import math
 from typing import ClassVar
 
 import numpy as np
@@ -23,7 +29,7 @@ from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, VoidF
 from problems.initial_states import put_walls
 from problems.pictures import draw_columns
 from problems.problem import BlockPlan, Problem, Report, Row, find_time, reduce_between
-from problems.references.exact_flows import compute_plate_impact
+from problems.references.exact_flows import compute_plate_impact, compute_window_impact
 
 
 class PlateTable(DeckTable, kw_only=True):
@@ -31,6 +37,12 @@ class PlateTable(DeckTable, kw_only=True):
     thickness: key(float, "[m]", ge=1e-9, le=1e3) = 2e-3
     cells: key(int, "cells across it", ge=2, le=MOST_CELLS) = 160
     gap: key(float, "to the plate before it [m]; of the first: 0", ge=0, le=1e3) = 0.0
+    bond: key(
+        float | None,
+        "of its contact with the plate before it [Pa]. If left out: bond",
+        ge=0,
+        le=1e20,
+    ) = None
 
 
 PLATES = PlateTable(material="Al1100", thickness=1e-3, cells=100), PlateTable(gap=1e-4)
@@ -48,16 +60,27 @@ class FlyerTargetDeck(Deck, kw_only=True):
 
 class FlyerTarget(Problem):
     Deck = FlyerTargetDeck
-    units: ClassVar = {"free_surface_speed": "m/s", "contact_pressure": "Pa"}
+    units: ClassVar = {
+        **dict.fromkeys(("free_surface_speed", "window_speed"), "m/s"),
+        **dict.fromkeys(("contact_pressure", "window_pressure"), "Pa"),
+    }
 
     def __init__(self, deck: FlyerTargetDeck):
         super().__init__(deck)
         first, second, *more = deck.plates
         first.refuse(first.gap, "gap", "nothing is before the first plate, whose gap must be 0")
+        words = "nothing is before the first plate; give it to the next one"
+        first.refuse(first.bond is not None, "bond", words)
         self.materials = [find_material(plate.material) for plate in deck.plates]
         impact = deck.speed, second.gap, first.thickness, second.thickness
         self.theory = compute_plate_impact(*self.materials[:2], *impact)
         self.is_pair = not more
+        # contacts from the start on, besides that of the flyer
+        self.touching = sum(plate.gap == 0.0 for plate in more)
+        self.window = None
+        if more and more[0].gap == 0.0:
+            sizes = deck.speed, second.thickness, more[0].thickness
+            self.window = compute_window_impact(self.theory, *self.materials[:3], *sizes)
         self.names = [f"plate-{number}" for number in range(1, len(deck.plates) + 1)]
 
     def list_boxes(self):  # cells 8 times as high as the thinnest: square ones halve the time step
@@ -72,12 +95,17 @@ class FlyerTarget(Problem):
         return boxes
 
     def build(self):
+        deck = self.deck
         blocks = []
-        for (name, nodes), material in zip(self.make_grids().items(), self.materials, strict=True):
-            state = material.rho0, 0.0 if blocks else self.deck.speed, 0.0, 0.0
+        # of both surfaces of each plate; a contact holds the smaller one of its two
+        own = [deck.bond if plate.bond is None else plate.bond for plate in deck.plates]
+        bonds = zip(own, [*own[1:], deck.bond], strict=True)
+        bodies = zip(self.make_grids().items(), self.materials, bonds, strict=True)
+        for (name, nodes), material, pair in bodies:
+            state = material.rho0, 0.0 if blocks else deck.speed, 0.0, 0.0
             blocks.append(Block(name, material.eos, nodes, *state, material=name))
-            for side in ("i_min", "i_max"):
-                put(blocks[-1], side, "free-surface", bond=self.deck.bond)
+            for side, bond in zip(("i_min", "i_max"), pair, strict=True):
+                put(blocks[-1], side, "free-surface", bond=bond)
             put_walls(blocks[-1])
         return self.simulate(blocks)
 
@@ -88,7 +116,11 @@ class FlyerTarget(Problem):
             row[f"speed_{block.name}"] = float(np.average(u, weights=rho * block.volume))
         meeting = 0.5 * (states[0][3, -1].mean() + states[1][3, 0].mean())  # of the first two
         surface = float(states[-1][1, -1].mean())
-        return {**row, "free_surface_speed": surface, "contact_pressure": float(meeting)}
+        row |= {"free_surface_speed": surface, "contact_pressure": float(meeting)}
+        if self.window is not None:
+            face = 0.5 * (states[1][:, -1].mean(axis=1) + states[2][:, 0].mean(axis=1))
+            row |= {"window_speed": float(face[1]), "window_pressure": float(face[3])}
+        return row
 
     def report(self, history, final=None) -> Report:
         deck = self.deck
@@ -98,17 +130,22 @@ class FlyerTarget(Problem):
         p = history["contact_pressure"]
         parted = history["contacts_opened"] > 0
         # a contact that a step has made was there at its start
-        impact = find_time(history, np.append(history["contacts_made"][1:] > 0, False))
-        pressure = reduce_between(np.median, t, p, impact, impact + 0.7 * theory.back, 4)
+        made = history["contacts_made"][1:] > self.touching
+        impact = find_time(history, np.append(made, False))
+        until = impact + 0.7 * min(theory.back, theory.returned)
+        pressure = reduce_between(np.median, t, p, impact, until, 4)
         out, free, end = theory.read_trace(t, trace)
+        ends = theory.end if theory.end < theory.ring else math.nan
         rows = [
             Row("impact", impact, theory.impact, "time of impact [s]", digits=5),
             Row("pressure", pressure, theory.pressure, "pressure [GPa]", 1e9, 5),
             Row("out", out, theory.out, "arrival of the shock at the free surface [s]", digits=5),
             Row("free", free, theory.free, "speed of the free surface [m/s]", digits=5),
-            Row("end", end, theory.end, "arrival of the release [s]", digits=5),
+            Row("end", end, ends, "arrival of the release [s]", digits=5),
         ]
         rows = [row for row in rows[: 5 if self.is_pair else 2] if not np.isnan(row.theory)]
+        if self.window is not None:
+            rows += self.compare_window(history)
         first = deck.plates[0]
         notes = []
         plate = f"{first.material} of {1e3 * first.thickness:g} mm at {deck.speed:g} m/s"
@@ -119,6 +156,25 @@ class FlyerTarget(Problem):
         if parted.any():
             notes.append(f"plates first separated at t = {find_time(history, parted):.4g} s")
         return Report(f"flyer-target: {plate}, {len(deck.plates)} plates", rows, notes)
+
+    def compare_window(self, history) -> list[Row]:
+        """Speed and pressure of the window's face, medians over the middle half of the time in
+        which theory has them constant; none where a release overtakes the shock before."""
+        window = self.window
+        span = window.end - window.start
+        if not span > 0.0:
+            return []
+        t = history["t"]
+        middle = window.start + 0.25 * span, window.end - 0.25 * span
+        speed, p = (
+            reduce_between(np.median, t, history[name], *middle, 4)
+            for name in ("window_speed", "window_pressure")
+        )
+        material = self.deck.plates[2].material
+        return [
+            Row("window_speed", speed, window.u, f"speed of the {material} window [m/s]", digits=5),
+            Row("window_pressure", p, window.p, "pressure at the window [GPa]", 1e9, 5),
+        ]
 
     def draw_flyer_target(self, figure, run_data) -> None:
         """The free surface's speed beside theory."""

@@ -2,6 +2,7 @@
 
 import math
 
+import msgspec
 import pytest
 
 from builders import march_measured
@@ -12,6 +13,7 @@ from problems.interface_instability.problem import InterfaceInstability
 from problems.interface_instability.theories import get_kct
 from problems.riemann import Riemann, RiemannDeck, SideState
 from problems.standard.detonation import Detonation, DetonationDeck
+from problems.standard.flyer_target import FlyerTarget, FlyerTargetDeck, PlateTable
 from problems.standard.oblique_shock import ObliqueShock, ObliqueShockDeck
 from problems.standard.rayleigh_taylor import RayleighTaylor, RayleighTaylorDeck
 
@@ -110,3 +112,47 @@ def test_gases_that_part_near_vacuum_speed(gases, cells, contact):
     errors = find_errors(report)
     trusted = errors and max(errors.values()) < 0.05
     assert trusted != bool(problem.cautions(history))
+
+
+COPPER = PlateTable(material="Cu", thickness=1e-3, cells=60)
+ALUMINIUM = PlateTable(material="Al6061", thickness=1e-3, cells=60, gap=1e-4)
+
+
+def run_plates(*plates, t_end=8e-7):
+    deck = FlyerTargetDeck(plates=plates, speed=500.0, run=RunControl(t_end=t_end))
+    return run(FlyerTarget(deck))
+
+
+@pytest.mark.parametrize("window", ["PMMA", "Pb"])
+@pytest.mark.parametrize("gap", [0.0, 1e-4])
+def test_plates_that_touch_from_the_start_are_no_impact(window, gap):
+    """A window behind the target, softer and stiffer than it."""
+    target = msgspec.structs.replace(ALUMINIUM, gap=gap)
+    _, report = run_plates(COPPER, target, PlateTable(material=window, thickness=1e-3, cells=60))
+    times = {row.name: (row.computed, row.theory) for row in report.rows}
+    assert times["impact"] == pytest.approx((gap / 500.0,) * 2, rel=1e-3)
+    errors = find_errors(report)
+    assert {"pressure", "window_speed", "window_pressure"} <= set(errors)
+    assert max(errors.values()) < 2e-3
+
+
+def test_a_plate_is_bonded_to_the_one_before_it():
+    """The stack stays one body with a bond and comes apart at its window without."""
+    window = PlateTable(material="PMMA", thickness=1e-3, cells=60)
+    opened = {}
+    for bond in (None, 1e12):
+        tied = msgspec.structs.replace(window, bond=bond)
+        history, _ = run_plates(COPPER, ALUMINIUM, tied)
+        last = {name: history[f"speed_plate-{name}"][-1] for name in (1, 2, 3)}
+        opened[bond] = history["contacts_opened"][-1]
+        assert last[3] > last[2] > last[1]
+    assert opened[1e12] < opened[None]
+
+
+def test_waves_that_ring_in_a_thin_target():
+    thin = msgspec.structs.replace(ALUMINIUM, thickness=0.4e-3, cells=40)
+    _, report = run_plates(COPPER, thin)
+    errors = find_errors(report)
+    assert errors["free"] < 2e-3
+    assert errors["pressure"] < 2e-3
+    assert "end" not in errors

@@ -24,6 +24,7 @@ SHOWN_TIMES = 3  # times drawn beside the growth
 MOST_CURVES = 6  # modes that a screen and a picture of growth show one by one, the strongest
 FIRST_DRAWN_KCT = 1.0  # k c t from which on computed rates are drawn
 MOST_NAMED = 3  # curves of rates with names of their own: more have the colours of amplitudes
+SAID_THEORY_ERROR = 2e-4  # error of the theory's numbers from which on it is said
 NO_WAVE = 1e-6  # of the shock's pressure: a weaker reflected wave is none
 
 
@@ -132,6 +133,8 @@ def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, sho
     rate = growth.measure_rate(column, mode, window.first, window.last)
     expected = float(theory.get_mean_rate(window.first, window.last))
     source = "linear compressible theory"
+    if theory.error > SAID_THEORY_ERROR:
+        source += f" (its own error up to {100.0 * theory.error:.1g} %)"
     if not window.linear:
         limit = "waves couple" if several else f"k a > {growth.limit:.2g}"
         beyond = {"off": "--", "source": f"{source}, beyond its range, {limit}"}

@@ -16,7 +16,9 @@ from regrid.errors import BadInput
 from regrid.roots import find_root
 
 DIMENSIONS = {"plane": 1, "cylindrical": 2, "spherical": 3}
-PROFILE_SHELLS = 4000  # points of the tabulated profile
+PROFILE_SHELLS = 4000  # points of the tabulated profile, at first
+MOST_PROFILE_SHELLS = 256_000
+ALPHA_ERROR = 1e-5  # of alpha, up to which the profile has enough points
 
 
 class SedovBlast:
@@ -39,13 +41,22 @@ class SedovBlast:
         if 2.0 * (n * (gamma - 1.0) + 2.0) > 0.99 * (n + 2.0) * (gamma + 1.0):
             words = "from 7 on a spherical blast is hollow, and near that the closed form fails"
             raise BadInput(f"sedov: gamma is {gamma:g}; {words}")
-        self.positions, self.profile = _make_profile(n, gamma)
-        # E t²/R^(n+2), from the profile in units of R and t
-        r = self.positions
-        rho, u, p = self.profile
-        density = (0.5 * rho * u * u + p / (gamma - 1.0)) * r ** (n - 1)
+        shells = PROFILE_SHELLS
+        while True:
+            self.positions, self.profile = _make_profile(n, gamma, shells)
+            self.alpha = self._sum_energy(1)
+            enough = abs(self._sum_energy(2) / self.alpha - 1.0) <= ALPHA_ERROR
+            if enough or shells >= MOST_PROFILE_SHELLS:
+                break
+            shells *= 4
+
+    def _sum_energy(self, stride: int) -> float:
+        """E t²/R^(n+2), from every `stride`-th point of the profile in units of R and t."""
+        r = self.positions[::-stride][::-1]
+        rho, u, p = self.profile[:, ::-stride][:, ::-1]
+        density = (0.5 * rho * u * u + p / (self.gamma - 1.0)) * r ** (self.dimensions - 1)
         inside = 0.5 * ((density[1:] + density[:-1]) * np.diff(r)).sum()
-        self.alpha = float({1: 2.0, 2: 2.0 * np.pi, 3: 4.0 * np.pi}[n] * inside)
+        return float({1: 2.0, 2: 2.0 * np.pi, 3: 4.0 * np.pi}[self.dimensions] * inside)
 
     def radius(self, t: float) -> float:
         """Radius of the shock at time t [m]."""
@@ -63,8 +74,8 @@ class SedovBlast:
 
 
 @functools.cache
-def _make_profile(n: int, gamma: float) -> tuple[np.ndarray, np.ndarray]:
-    """Places r/R from 0 to 1, and rho, u t/R, p t²/R² there, (3, places)."""
+def _make_profile(n: int, gamma: float, shells: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places r/R (shells,) from 0 to 1, and rho, u t/R, p t²/R² there, (3, shells)."""
     m = n + 2.0
     spread = 2.0 + n * (gamma - 1.0)
     a0 = 2.0 / m
@@ -75,7 +86,7 @@ def _make_profile(n: int, gamma: float) -> tuple[np.ndarray, np.ndarray]:
     a5 = -2.0 / (2.0 - gamma)
     low, high = 2.0 / (m * gamma), 4.0 / (m * (gamma + 1.0))
     # dense where the profile bends: towards the centre, where density and place fall to zero
-    part = np.linspace(0.0, 1.0, PROFILE_SHELLS) ** 6
+    part = np.linspace(0.0, 1.0, shells) ** 6
     v = low + (high - low) * part
     ratio = (gamma + 1.0) / (gamma - 1.0)
     x1 = 0.25 * m * (gamma + 1.0) * v

@@ -8,7 +8,7 @@ import pytest
 from hydro.eos import JWL, IdealGas, MieGruneisen, StiffenedGas
 from hydro.eos.materials import find_material
 from problems.initial_states import mix_states
-from problems.references.exact_flows import Vortex, compute_taylor_wave
+from problems.references.exact_flows import SedovBlast, Vortex, compute_taylor_wave
 from problems.references.hugoniot import (
     GeneralIsentrope,
     make_isentrope,
@@ -221,3 +221,10 @@ def test_equal_velocity_and_pressure_of_an_ideal_gas_stay():
     rho, u, v, p = mix_states(IdealGas(1.4), np.array([[0.25]]), (1, 2, 3, 5), (4, 2, 3, 5))
     assert rho[0, 0] == 3.25
     assert [u[0, 0], v[0, 0], p[0, 0]] == pytest.approx([2, 3, 5], rel=1e-14)
+
+
+@pytest.mark.parametrize("gamma", [1.05, 1.4, 5.0, 6.5])
+def test_energy_of_a_blast_does_not_depend_on_the_points_of_its_profile(gamma):
+    blast = SedovBlast("spherical", gamma)
+    alpha = blast._sum_energy(2)  # a sum that is four times as wrong
+    assert alpha == pytest.approx(blast.alpha, rel=1e-5)

@@ -8,8 +8,9 @@ import pytest
 
 from hydro.eos import IdealGas, MieGruneisen
 from hydro.eos.materials import find_material
-from problems.references.hugoniot import shock_with_mach
+from problems.references.hugoniot import make_isentrope, shock_with_mach
 from problems.references.linear_growth import PadeModel, compute_linear_growth
+from problems.references.perturbed_layers import Cut, find_kinks, interpolate_zones, march_layers
 from problems.references.shock_polars import Body, cross_line
 
 
@@ -19,6 +20,14 @@ def test_pade_amplitude_is_the_integral():
     assert amplitude[0] == 0.05
     exact = 0.05 + math.log1p(0.3 * 0.05 * 4 * 3.0) / (0.05 * 4)
     assert amplitude[-1] == pytest.approx(exact, rel=1e-10)
+
+
+@pytest.mark.parametrize("rate", [1.0, 1e2, 1e4])
+def test_pade_amplitude_after_a_long_time(rate):
+    model = PadeModel(2.0 * math.pi, 0.02, rate, 0.9)
+    slowing = rate * 0.02 * (2.0 * math.pi) ** 2  # its square vanishes: the integral is a logarithm
+    exact = 0.02 + rate * math.log1p(slowing * 30.0) / slowing
+    assert model.compute_amplitude(np.array([30.0]))[0] == pytest.approx(exact, rel=1e-8)
 
 
 def test_pade_ends_where_its_growth_falls_faster_than_one_over_t():
@@ -141,3 +150,58 @@ def test_a_ripple_is_flattened_as_the_shock_runs_over_it(crossed):
     late = [normal @ (0.0, y) / front for y in (height, -height)]
     moved = [y - crossed.normal_speed * t for y, t in zip((height, -height), late, strict=True)]
     assert (moved[0] - moved[1]) / (2.0 * height) == pytest.approx(crossed.compression, rel=1e-12)
+
+
+GAS = {gamma: IdealGas(gamma) for gamma in (1.02, 1.1, 1.4)}
+WATER, AL1100 = (find_material(name) for name in ("water", "Al1100"))
+# first and second material with their densities, pressures ahead of and behind the shock: liquid
+# and gas both ways, a metal that is released to a gas, gammas near 1, a strong shock, a heavy gas
+PAIRS = {
+    "water-gas": (WATER.eos, WATER.rho0, GAS[1.4], 50.0, 1e5, 1e8),
+    "gas-water": (GAS[1.4], 1.2, WATER.eos, WATER.rho0, 1e5, 1e6),
+    "metal-gas": (AL1100.eos, AL1100.rho0, GAS[1.4], 10.0, 1e5, 5e10),
+    "isothermal": (GAS[1.1], 1.0, GAS[1.1], 3.0, 1.0, 100.0),
+    "rarefied": (GAS[1.02], 1.0, GAS[1.02], 0.3, 1.0, 100.0),
+    "strong": (GAS[1.4], 1.0, GAS[1.4], 3.0, 1.0, 1e5),
+    "heavy": (GAS[1.4], 1.0, GAS[1.4], 1000.0, 1.0, 5.0),
+}
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_growth_does_not_depend_on_how_the_layers_are_cut(name):
+    growth = compute_linear_growth(*PAIRS[name])
+    finest = march_layers(growth.layers, Cut(24, 2.0), growth.kt_end)
+    grown = finest.growth
+    known = growth.get_amplitude(1.0, finest.times) - growth.compression
+    assert growth.error < 1.5e-3
+    assert np.abs(grown - known).max() < 2e-3 * np.abs(grown).max()
+
+
+def test_a_layer_of_hundreds_of_waves_thickness_needs_more_than_one_zone():
+    growth = compute_linear_growth(*PAIRS["water-gas"])
+    one_zone = march_layers(growth.layers, Cut(40), growth.kt_end)
+    assert one_zone.growth[-1] > 0.7 * (growth.get_amplitude(1.0, growth.kt_end) - 1.0)
+    assert growth.get_mean_rate() == pytest.approx(-95.3, abs=0.2)
+
+
+def test_a_kink_of_the_isentrope_is_an_edge_of_the_fan_s_zones():
+    growth = compute_linear_growth(*PAIRS["metal-gas"])
+    isentrope = make_isentrope(AL1100.eos, growth.incident.rho, growth.incident.p)
+    (kink,) = find_kinks(isentrope, growth.base.p)
+    assert isentrope.density(kink) == pytest.approx(AL1100.rho0, rel=1e-6)
+    assert not find_kinks(make_isentrope(GAS[1.4], 1.0, 1.0), 0.01)
+    assert growth.error < 1e-4
+
+
+def test_perturbed_fields_at_a_start_do_not_depend_on_the_cut():
+    growth = compute_linear_growth(*PAIRS["water-gas"])
+    kt = 1.0 / growth.sound_speed
+    layer = growth.compute_fields(kt).first
+    finest = march_layers(growth.layers, Cut(24, 2.0, 1.0), kt)
+    for place, field in enumerate((layer.p, layer.u, layer.v)):
+        side = finest.sides[0]
+        speeds = np.concatenate([zone.speed for zone in side.zones[:-1]])
+        exact = np.concatenate(finest.split_states()[0][:-1], axis=1)[place]
+        inside = speeds < 0.99 * side.zones[-2].speed[-1]
+        found = interpolate_zones(layer.speed, field[None], speeds)[0]
+        assert np.abs(found - exact)[inside].max() < 1e-3 * np.abs(exact).max()

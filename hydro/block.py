@@ -171,7 +171,9 @@ class Block:
         self.take_rows(0, self.ni)
         self.nodes_new = self.nodes.copy()
         self.state_new = np.zeros(self.state.shape)
-        self._start: np.ndarray | None = None  # separate if a body source acts
+        # separate if a body source acts
+        self._start: np.ndarray | None = None
+        self._start_void_energy = self.void_energy
         # of the types for which kernels are compiled, as those of a user's own need not be
         self.parameters = tuple(
             np.ascontiguousarray(value, dtype=float) if np.ndim(value) else float(value)
@@ -279,8 +281,8 @@ class Block:
     def predict(self, dt: float) -> None:
         """From the ghosts: mid-time predictions, and traces at moving faces at the old time."""
         self.sides.predict_sides.entry(
-            self.start, self.void_energy, self.nodes, 0.5 * dt, self.parameters, self.plan.moving,
-            self.scratch, self.rim.rows,
+            self.start, self.start_void_energy, self.nodes, 0.5 * dt, self.parameters,
+            self.plan.moving, self.scratch, self.rim.rows,
         )  # fmt: skip
 
     def fill_speeds(self, t: float) -> None:
@@ -343,7 +345,7 @@ class Block:
     @property
     def _old(self) -> tuple[np.ndarray, ...]:
         """Kernel input at the start of the step: state, void energy, nodes."""
-        return self.start, self.void_energy, self.nodes
+        return self.start, self.start_void_energy, self.nodes
 
     @property
     def _new(self) -> tuple[np.ndarray, ...]:
@@ -357,9 +359,21 @@ class Block:
         """The state (4, ni + 2, nj + 2) that a step starts from: `state`, or a source's copy."""
         return self.state if self._start is None else self._start
 
+    @property
+    def start_void_energy(self) -> np.ndarray:
+        """The void energy (ni, nj) [J/kg] of `start`."""
+        return self.void_energy if self._start is None else self._start_void_energy
+
     def part_start(self, apart: bool) -> None:
         """Set whether steps start from a copy of the state that a body source may modify."""
         self._start = self.state.copy() if apart else None
+        self._start_void_energy = self.void_energy.copy() if apart else self.void_energy
+
+    def copy_start(self) -> None:
+        """Let the next step start from the present state, where it starts from a copy."""
+        if self._start is not None:
+            self._start[...] = self.state
+            self._start_void_energy[...] = self.void_energy
 
     @property
     def is_follower(self) -> bool:
@@ -380,9 +394,9 @@ class Block:
         with np.errstate(all="ignore"):
             c = self.eos.sound_speed(rho, p)
         bad = ~((rho > 0.0) & (c > 0.0))
-        if self.shared_cells and np.isfinite(totals).all() and not bad.any():
-            return None  # the failed cells have been redistributed since
-        i, j = (int(index) for index in np.argwhere(bad)[0]) if bad.any() else (0, 0)
+        if not bad.any():
+            return self._find_failed_totals(totals)
+        i, j = (int(index) for index in np.argwhere(bad)[0])
         rho, p = self.state_new[[of.RHO, of.P], i + 1, j + 1]
         known = f", its pressure {p:.6g} Pa" if np.isfinite(p) else ""
         return RunFailure(
@@ -390,6 +404,28 @@ class Block:
             f"its density is {rho:.6g} kg/m3{known}",
             cause=self.eos.failure_cause,
             place=Place(self.name, (i, j)),
+        )
+
+    def _find_failed_totals(self, totals: np.ndarray) -> RunFailure | None:
+        """Why the totals of the new state are none though every cell has a state, or None."""
+        names = np.array(("mass", "momentum x", "momentum y", "energy"))
+        lost = names[~np.isfinite(totals[:, of.CONSERVED]).all(axis=0)]
+        if lost.size:
+            return RunFailure(
+                f"flow: block {self.name!r}: its {' and '.join(lost)} cannot be summed to a finite "
+                "number, though the state of every cell is one",
+                cause=self.eos.failure_cause,
+                place=Place(self.name),
+            )
+        if self.shared_cells:
+            return None  # the failed cells have been redistributed since
+        flat = find_bad_cells(self.nodes_new)
+        cell = (int(flat[0, 0]), int(flat[0, 1])) if len(flat) else None
+        where = f"cell i={cell[0]}, j={cell[1]}" if cell else "a cell"
+        return RunFailure(
+            f"flow: block {self.name!r}: the area of {where} is lost to round-off in the step",
+            cause="flat-cell",
+            place=Place(self.name, cell),
         )
 
     def find_rate(self) -> float:

@@ -463,9 +463,10 @@ class BlockSharing:
         if len(small) == 0:
             return 0
         self.fill_reaches(small, block.rates, limit, block.nodes, block.excess_volume, self.reaches)
+        before = block.start, block.start_void_energy
         block.shared_cells, least, voided = self.redistribute(
             (small, self.reaches), (block.nodes, block.nodes_new), block.excess_volume_new,
-            inverse_dt, block.parameters, (block.start, block.void_energy), _list_mended(block),
+            inverse_dt, block.parameters, before, _list_mended(block),
             (self.marks, self.record),
         )  # fmt: skip
         block.take_shared(least, voided)
@@ -567,7 +568,7 @@ class SmallCells:
         above = self._find_rows_above(limit)
         for number, cut in self.blocks.cuts.items():
             block = cut.block
-            read = block.rates, block.start, block.void_energy
+            read = block.rates, block.start, block.start_void_energy
             for array in (*_list_mended(block), *read):
                 cut.gather_rows(array, above[number])
         changed = [

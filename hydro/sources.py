@@ -40,6 +40,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.eos import JWL
+from hydro.eos.base import find_pressure
 from hydro.ranks.blocks import Blocks
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
@@ -75,8 +76,9 @@ class BodySource:
         pushes = []
         gains = []
         for block in (self.blocks[number] for number in self.blocks.own):
-            block.start[...] = block.state
-            push, gained = self._apply(block, block.start, t, 0.5 * dt)
+            block.copy_start()
+            start = block.start, block.start_void_energy
+            push, gained = self._apply(block, start, t, 0.5 * dt)
             pushes.append(block.take_perimeter(push))
             gains.append((*gained, push.any()))
         pushes = self.blocks.share_starts(pushes)
@@ -91,7 +93,7 @@ class BodySource:
             return
         gains = []
         for block in (self.blocks[number] for number in self.blocks.own):
-            _, gained = self._apply(block, block.state, t + 0.5 * dt, 0.5 * dt)
+            _, gained = self._apply(block, (block.state, block.void_energy), t + 0.5 * dt, 0.5 * dt)
             block.add_source_totals(gained)
             gains.append(gained)
         for gained in self.blocks.share_rows(gains, 3):
@@ -99,15 +101,16 @@ class BodySource:
         self.blocks.share_states()
 
     def _apply(
-        self, block: Block, state: np.ndarray, t: float, dt: float
+        self, block: Block, held: tuple[np.ndarray, np.ndarray], t: float, dt: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Add the source over dt to a state (4, ni + 2, nj + 2) of a block.
+        """Add the source over dt to state (4, ni + 2, nj + 2) and void energy (ni, nj) of a block.
 
         Returns the acceleration (2, ni, nj) and the block's gain (see `gained`).
         """
         x, y = compute_centres(block.nodes)
         push_x, push_y, heat = self.law(block, x, y, t, dt)
         push = np.array([np.broadcast_to(q, x.shape) for q in (push_x, push_y)])
+        state, void_energy = held
         rho, u, v, p = state[:, 1:-1, 1:-1]
         du, dv = np.broadcast_arrays(dt * np.asarray(push_x), dt * np.asarray(push_y))
         mass = rho * block.volume
@@ -116,7 +119,8 @@ class BodySource:
         u += du
         v += dv
         if np.any(heat):
-            p[...] = block.eos.pressure(rho, block.eos.energy(rho, p) + heat)
+            e = block.eos.energy(rho, p) + void_energy + heat
+            p[...], void_energy[...] = find_pressure(block.eos, rho, e)
         return push, gained
 
 

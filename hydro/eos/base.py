@@ -63,6 +63,12 @@ class EquationOfState:
     failure: ClassVar[str] = "density or sound speed is no longer positive"
     failure_cause: ClassVar[str] = "no-state"  # its id in `runs.early_end.causes`
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        """A gas that opens no voids fails otherwise than a material with a strength."""
+        super().__init_subclass__(**options)
+        if not cls.opens_voids and cls.failure_cause == EquationOfState.failure_cause:
+            cls.failure_cause = "cold-gas"
+
     def check_numbers(self) -> None:
         """Raise BadInput for a parameter that is to be a number and is none."""
         for field in fields(self):
@@ -201,6 +207,25 @@ def make_least_pressure(eos_class):
         return least_pressure_part(parameters) * strength_left_part(rho, parameters)
 
     return keep if strength_left_part is None else weaken
+
+
+def find_pressure(
+    eos: EquationOfState, rho: np.ndarray, e: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pressure [Pa] and void energy [J/kg] of arrays of density and specific internal energy.
+
+    Under more tension than the material bears voids open: the pressure is that tension, and the
+    void energy what `e` is less than that of full material there (theory F4.11); else it is 0.
+    """
+    p = eos.pressure(rho, e)
+    void_energy = np.zeros_like(p)
+    if eos.opens_voids:
+        eos_class: Any = type(eos)
+        least = make_least_pressure(eos_class)(rho, eos.parameters) + np.zeros_like(p)
+        voided = p < least
+        void_energy = np.where(voided, e - eos.energy(rho, least), 0.0)
+        p = np.where(voided, least, p)
+    return p, void_energy
 
 
 SAMPLED_CELLS = 64  # cells of a block that are looked at, besides its extremes

@@ -99,6 +99,7 @@ class StiffenedGas(EquationOfState):
     p_inf: float = 6.0e8
 
     kind = "stiffened-gas"
+    failure_cause = "cold-gas"
     pressure_part = staticmethod(stiffened_pressure)
     energy_part = staticmethod(stiffened_energy)
     sound_speed_squared_part = staticmethod(stiffened_sound_speed_squared)

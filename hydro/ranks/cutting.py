@@ -207,7 +207,7 @@ class CutBlock:
     def bring_fields(self) -> None:
         """Send the owner the states of all cells at the start of the step."""
         self.gather_rows(self.block.start)
-        self.gather_rows(self.block.void_energy)
+        self.gather_rows(self.block.start_void_energy)
 
     def bring_states(self) -> None:
         """Send the owner the present states of all cells."""

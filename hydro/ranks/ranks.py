@@ -131,7 +131,11 @@ class Ranks(Blocks):
                         [(attrgetter("state_new"), at), (attrgetter("void_energy_new"), ring)],
                     )
                 )
-                now.append(messages.Item(number, rank, [(attrgetter("state"), at)]))
+                now.append(
+                    messages.Item(
+                        number, rank, [(attrgetter("state"), at), (attrgetter("void_energy"), ring)]
+                    )
+                )
             sums = [(_get_sums, np.arange(TOTAL_ROWS))]
             new.append(messages.Item(number, there[0], sums, STATE_ROW))
             now.append(messages.Item(number, there[0], sums))
@@ -199,8 +203,15 @@ class Ranks(Blocks):
         if self._starts is None:
             self._pushes = [np.zeros((2, block.rim.faces)) for block in self]
             places = [(attrgetter("start"), messages.find_ring_of_cells(b)) for b in self]
+            voids = [
+                (
+                    attrgetter("start_void_energy"),
+                    messages.find_ring(b.ni, b.nj, messages.CELLS_DEEP),
+                )
+                for b in self
+            ]
             pushed = [(lambda _, push=push: push, np.arange(push.size)) for push in self._pushes]
-            parts = [list(both) for both in zip(places, pushed, strict=True)]
+            parts = [list(all_of) for all_of in zip(places, voids, pushed, strict=True)]
             self._starts = self._make("sources", parts)
         for number, push in zip(self.own, pushes, strict=True):
             self._pushes[number][...] = push

@@ -22,7 +22,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import cKDTree
 
 from hydro.eos import EquationOfState
-from hydro.eos.base import make_least_pressure
+from hydro.eos.base import find_pressure, make_least_pressure
 from hydro.remap.overlay import (
     MEAN,
     SLOPE_X,
@@ -150,13 +150,7 @@ def find_state(eos: EquationOfState, conserved: np.ndarray) -> tuple[np.ndarray,
     with np.errstate(all="ignore"):
         u, v = momentum_x / rho, momentum_y / rho
         e = total / rho - 0.5 * (u * u + v * v)
-        p = eos.pressure(rho, e)
-        void_energy = np.zeros_like(rho)
-        if eos.opens_voids:
-            least = make_least_pressure(type(eos))(rho, eos.parameters) + np.zeros_like(rho)
-            voided = p < least
-            void_energy = np.where(voided, e - eos.energy(rho, least), 0.0)
-            p = np.where(voided, least, p)
+        p, void_energy = find_pressure(eos, rho, e)
     return np.array([rho, u, v, p]), void_energy
 
 

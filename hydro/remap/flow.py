@@ -127,8 +127,7 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
         }
     )
     for block in new.blocks:
-        if block.start is not block.state:
-            block.start[...] = block.state
+        block.copy_start()
         block.update(0.0)  # rates and totals of this state
         block.rates[...] = block.rates_new
     new.clock.retry_dt = np.inf  # it was for the old cells

@@ -31,6 +31,7 @@ from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import Fluid, make_plane_grid, put_walls
 from problems.pictures import name_axis, title_time
 from problems.problem import Problem, Report, average_plateau, compare, get_last, keep_until
+from problems.references.hugoniot import caution_fit
 from problems.references.riemann import RiemannSolution, compute_cell_averages, solve_riemann
 from regrid.errors import BadInput, suggest
 from regrid.roots import find_root
@@ -288,7 +289,19 @@ class Riemann(Problem):
         return min(float(eos.energy(rho, exact.p)) for eos, rho in sides) / (0.5 * speed * speed)
 
     def cautions(self, history=None) -> list[str]:
-        """Before a run that gases part near vacuum speed, after it what this has done."""
+        """Before a run that gases part near vacuum speed, after it what this has done; shocks
+        beyond a Hugoniot."""
+        case = self.case
+        sides = ("left", case.left_eos), ("right", case.right_eos)
+        told = [
+            words
+            for side, eos in sides
+            for words in caution_fit(f"the {side} material", eos, self.exact.p)
+        ]
+        return told + self.caution_stars(history)
+
+    def caution_stars(self, history) -> list[str]:
+        """What is off the exact solution, or may be, by how much and why."""
         heat = self.measure_heat_left()
         ratio = find_pressure_ratio(self.case, self.exact.p)
         parting = (

@@ -15,7 +15,7 @@ import numpy as np
 from hydro.block import Block
 from problems.pictures import draw_field, draw_grid, make_panels, spread_dumps
 from problems.problem import Report, Row, fit_slope, reduce_between
-from problems.references.hugoniot import shock_to_pressure
+from problems.references.hugoniot import caution_fit, shock_to_pressure
 from problems.references.shock_polars import CrossedLine
 from regrid.curves import compute_arc_lengths
 from regrid.errors import BadInput
@@ -291,6 +291,16 @@ class Results:
             words = f"from {begin * US:.2f} us on; {late:.3g} m/s in the latest half"
             tell("line_growth", first, "initial growth of the side's amplitude [m/s]", 1.0, words)
         return Report(head, rows)
+
+    def cautions(self, history=None) -> list[str]:
+        """Materials beyond their Hugoniots at the impact."""
+        deck = self.deck
+        return [
+            words
+            for part in ("impactor", "shell")
+            if part in self.materials
+            for words in caution_fit(getattr(deck, part), self.materials[part].eos, self.impact[0])
+        ]
 
     def figures(self):
         return {n: draw for n, draw in super().figures().items() if n != "ripple" or self.ripple}

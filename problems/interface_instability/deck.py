@@ -87,7 +87,7 @@ class InterfaceDeck(Deck, kw_only=True):
     reach: key(float, "grid lines bend within so many wavelengths", ge=1e-12, le=1e4) = 0.1
     lengths: key(
         tuple[float, float] | None,
-        "of both sides [m]. If left out: so long that no reflection returns",
+        "of both sides in metres, not wavelengths. If left out: so long that no reflection returns",
     ) = None
     start: key(
         Literal["auto", "crossed", "incident"],

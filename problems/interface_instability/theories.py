@@ -27,7 +27,9 @@ from pathlib import Path
 import numpy as np
 
 from hydro.eos import IdealGas
+from hydro.eos.base import is_same_material
 from problems.interface_instability.line import Harmonic
+from problems.references.hugoniot import caution_fit
 from problems.references.linear_growth import LinearGrowth, PadeModel
 
 WINDOW = (6.0, 30.0)  # k c t over which a growth rate is averaged
@@ -343,6 +345,11 @@ def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str
     told = [words for some in sort_deck(problem) for words in some] if problem.harmonics else []
     deck = problem.deck
     base = problem.theory.base
+    told += _caution_no_interface(problem) + _caution_steep_line(problem, history)
+    for name in ("first", "second"):
+        side = getattr(deck, name)
+        label = side.material or f"the {name} material"
+        told += caution_fit(label, getattr(problem, f"eos_{name}"), max(base.p, problem.shock.p))
     single = deck.second_shock is None
     tension = deck.line.tension
     if single:  # waves that are back from the far ends before the run's end
@@ -364,6 +371,48 @@ def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str
             )
     if history is not None and problem.harmonics and single:
         told += _caution_line(problem, history)
+    return told
+
+
+MOST_COMPARED_KA = 2.0  # k a0 of the steepest lines that were compared with anything
+ROLLED_UP_KA = 2.0  # k times the amplitude from which on a wave rolls up
+LEAST_MUSHROOM_CELLS = 64  # in a wavelength: with fewer the stem and the cap are a few cells
+
+
+def _caution_no_interface(problem) -> list[str]:
+    """That nothing can grow: one material on both sides, or a line without waves."""
+    told = []
+    same = is_same_material(problem.eos_first, problem.eos_second)
+    if same and problem.rho_first == problem.rho_second:
+        told.append(
+            f"both materials are the same, of density {problem.rho_first:g}: there is no "
+            "interface, and theory has no growth; take another second.rho or material"
+        )
+    if not problem.harmonics:
+        told.append(
+            "the interface is flat, with every ka0 0: there is no growth to measure; give a mode "
+            "a ka0 such as 0.02"
+        )
+    return told
+
+
+def _caution_steep_line(problem, history) -> list[str]:
+    """That the first line is steeper than any that was compared, or that few cells carry it."""
+    deck = problem.deck
+    slope = problem.k * problem.amplitude
+    told = []
+    if slope > MOST_COMPARED_KA:
+        told.append(
+            f"the first line has k a0 = {slope:.3g}, {slope / (2.0 * math.pi):.2g} wavelengths; "
+            f"lines beyond {MOST_COMPARED_KA:g} were never compared with theory or experiment"
+        )
+    most = 0.0 if history is None else problem.k * float(np.nanmax(history["amplitude"]))
+    if most > ROLLED_UP_KA and deck.cells < LEAST_MUSHROOM_CELLS and not deck.refine:
+        told.append(
+            f"the wave has grown to k a = {most:.3g} on {deck.cells} cells per wavelength, "
+            f"{problem.count_rows()} along the line: too few for a mushroom's stem and cap; take "
+            f"cells = {2 * LEAST_MUSHROOM_CELLS} or refine = true"
+        )
     return told
 
 

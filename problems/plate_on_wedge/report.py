@@ -16,6 +16,7 @@ import numpy as np
 
 from problems.pictures import draw_field, make_panels, spread_dumps
 from problems.problem import Report, Row
+from problems.references.hugoniot import caution_fit
 from problems.references.shock_polars import compute_jet_speed
 from regrid.sides import trace_outline
 
@@ -400,7 +401,18 @@ class Results:
         return "\n".join(lines)
 
     def cautions(self, history=None) -> list[str]:
-        """Where the pressure behind A is low: too few cells close to the critical angle."""
+        """Where the pressure behind A is low: too few cells close to the critical angle; and where
+        it is beyond the Hugoniots."""
+        p = self.collision.p or 0.0
+        beyond = [
+            words
+            for name, body in self.materials.items()
+            for words in caution_fit(f"the {name}", body.eos, p)
+        ]
+        return beyond + self.caution_cells()
+
+    def caution_cells(self) -> list[str]:
+        """Too few cells close to the critical angle."""
         deck = self.deck
         cells = self.deck.cells[0]
         if not self.collision.attached or self.zone >= WIDE_ZONE or cells >= FINE_CELLS:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydro.eos import IdealGas, StiffenedGas
+from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
 from regrid.errors import BadInput
 from regrid.roots import find_root
 
@@ -275,6 +275,23 @@ def _find_edge(excess, outside: float, inside: float) -> tuple[float, float]:
         middle = 0.5 * (outside + inside)
         outside, inside = (middle, inside) if math.isnan(excess(middle)) else (outside, middle)
     return inside, excess(inside)
+
+
+FITTED_PARTICLE_SPEED = 5e3  # [m/s]: about as far as the data of linear Hugoniots of metals go
+
+
+def caution_fit(name: str, eos, p: float) -> list[str]:
+    """A sentence where a shock to `p` [Pa] into a material at rest is beyond its Hugoniot."""
+    if not isinstance(eos, MieGruneisen):
+        return []
+    speed = shock_to_pressure(eos, eos.rho0, 0.0, p).particle_speed if p > 0.0 else 0.0
+    if speed <= FITTED_PARTICLE_SPEED:
+        return []
+    return [
+        f"a shock moves {name} at {1e-3 * speed:.3g} km/s; its Hugoniot is a straight line through "
+        f"data up to some {1e-3 * FITTED_PARTICLE_SPEED:g} km/s, beyond which pressures may be off "
+        "by tens of per cent: take a lower speed or a material of your own"
+    ]
 
 
 def shock_with_particle_speed(eos, rho: float, p: float, particle_speed: float) -> Shock:

@@ -26,7 +26,7 @@ from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, VoidFill, key
 from problems.initial_states import lay_rays, put_walls
 from problems.pictures import draw_field, find_dump, make_panels
 from problems.problem import Problem, Report, Row, find_most, find_time, measure_below
-from problems.references.hugoniot import release, shock_with_particle_speed
+from problems.references.hugoniot import caution_fit, release, shock_with_particle_speed
 
 
 class CavityDeck(Deck, kw_only=True):
@@ -92,6 +92,10 @@ class Cavity(Problem):
         width = float(x[-1] - x[0])
         row = {"void_size": size, "void_width": width, "jet_speed": float(u[0, 0])}
         return {**row, "far_speed": float(u[-1, 0]), "most_pressure": float(p.max())}
+
+    def cautions(self, history=None) -> list[str]:
+        """A piston beyond the Hugoniot."""
+        return caution_fit(self.deck.material, self.material.eos, self.shock.p)
 
     def report(self, history, final=None) -> Report:
         deck = self.deck

@@ -30,6 +30,7 @@ from problems.initial_states import put_walls
 from problems.pictures import draw_columns
 from problems.problem import BlockPlan, Problem, Report, Row, find_time, reduce_between
 from problems.references.exact_flows import compute_plate_impact, compute_window_impact
+from problems.references.hugoniot import caution_fit
 
 
 class PlateTable(DeckTable, kw_only=True):
@@ -45,6 +46,7 @@ class PlateTable(DeckTable, kw_only=True):
     ) = None
 
 
+LARGE_LENGTH = 0.2  # of a plate or a gap [m]: more may be meant in mm
 PLATES = PlateTable(material="Al1100", thickness=1e-3, cells=100), PlateTable(gap=1e-4)
 
 
@@ -108,6 +110,26 @@ class FlyerTarget(Problem):
                 put(blocks[-1], side, "free-surface", bond=bond)
             put_walls(blocks[-1])
         return self.simulate(blocks)
+
+    def cautions(self, history=None) -> list[str]:
+        """Lengths that may be meant in mm, an end before the impact, speeds beyond a Hugoniot."""
+        deck = self.deck
+        told = [
+            f"plates.{number}.{name} is {getattr(plate, name):g} m; lengths are in metres: 1 mm is "
+            "1e-3"
+            for number, plate in enumerate(deck.plates)
+            for name in ("thickness", "gap")
+            if getattr(plate, name) >= LARGE_LENGTH
+        ]
+        if self.t_end <= self.theory.impact:
+            told.append(
+                f"the run ends at t = {self.t_end:.4g} s, before the impact at "
+                f"{self.theory.impact:.4g} s; take a later run.t_end, or a smaller gap"
+            )
+        hit = dict(zip((plate.material for plate in deck.plates), self.materials, strict=True))
+        for name in dict.fromkeys(plate.material for plate in deck.plates[:2]):
+            told += caution_fit(name, hit[name].eos, self.theory.pressure)
+        return told
 
     def measure(self, evolution) -> dict[str, float]:
         row = {}

@@ -1,0 +1,62 @@
+"""Decks that are allowed and hardly meant get a caution with the number; usual ones get none."""
+
+import re
+
+import numpy as np
+import pytest
+
+from problems.deck import RunControl
+from problems.interface_instability.deck import Fluid, InterfaceDeck
+from problems.interface_instability.line import Mode
+from problems.interface_instability.problem import InterfaceInstability
+from problems.riemann import Riemann, RiemannDeck
+from problems.standard.cavity import Cavity, CavityDeck
+from problems.standard.flyer_target import FlyerTarget, FlyerTargetDeck, PlateTable
+
+
+def make_interface(**deck):
+    return InterfaceInstability(InterfaceDeck(**{"cells": 128, **deck}))
+
+
+METRES = PlateTable(material="Al1100", thickness=1.0, cells=20), PlateTable(gap=1e-4)
+STRANGE = {
+    "no interface": (lambda: make_interface(second=Fluid(rho=1.0)), "density 1: there is no int"),
+    "flat": (lambda: make_interface(modes=[Mode(ka0=0.0)]), "flat"),
+    "steep": (lambda: make_interface(modes=[Mode(ka0=5.0)]), "k a0 = 5"),
+    "mm": (lambda: FlyerTarget(FlyerTargetDeck(plates=METRES)), r"plates\.0\.thickness is 1 m"),
+    "early end": (
+        lambda: FlyerTarget(FlyerTargetDeck(run=RunControl(t_end=5e-8))), "before the impact at 1e",
+    ),
+    "fast flyer": (lambda: FlyerTarget(FlyerTargetDeck(speed=2e4)), r"Al1100 at 13\.3 km/s"),
+    "fast piston": (lambda: Cavity(CavityDeck(speed=2e4)), "20 km/s"),
+}  # fmt: skip
+USUAL = {
+    "interface": make_interface,
+    "same gas, other density": lambda: make_interface(second=Fluid(rho=3.0)),
+    "rather steep": lambda: make_interface(modes=[Mode(ka0=1.0)]),
+    "flyer": lambda: FlyerTarget(FlyerTargetDeck(speed=3e3)),
+    "cavity": lambda: Cavity(CavityDeck()),
+    "impact at 4 km/s": lambda: Riemann(RiemannDeck(case="al-ss304-4")),
+}
+
+
+@pytest.mark.parametrize("name", STRANGE)
+def test_what_is_hardly_meant(name):
+    make, words = STRANGE[name]
+    assert re.search(words, "\n".join(make().cautions()))
+
+
+@pytest.mark.parametrize("name", USUAL)
+def test_usual_decks(name):
+    assert USUAL[name]().cautions() == []
+
+
+@pytest.mark.parametrize(("cells", "told"), [(48, 1), (128, 0)])
+def test_a_mushroom_on_few_cells(cells, told):
+    problem = make_interface(cells=cells, modes=[Mode(ka0=0.2)])
+    t = np.linspace(0.0, problem.t_end, 50)
+    history = {"t": t, "amplitude": np.linspace(0.03, 0.5, 50)}
+    history["amplitude_mode_1"] = history["amplitude"]
+    found = [one for one in problem.cautions(history) if "mushroom" in one]
+    assert len(found) == told
+    assert all("24 along the line" in one for one in found)

@@ -535,11 +535,14 @@ def make_assembly(smooth):
                 Z[AREA_3 + col] = m3
                 Z[AREA_4 + col] = m4
             if i == 0 or i == ni - 1:
-                # The block's own corners must not enter e_c.
+                # The block's own corners must not enter e_c; where the sides make one flat, its
+                # 1/D is infinite, and infinity times the zeros of a boundary is no number.
                 if low == 0:
                     Z[(AREA_1 if i == 0 else AREA_4)] = 0.0
+                    Z[(INV_1 if i == 0 else INV_4)] = 0.0
                 if last == nj:
                     Z[(AREA_2 if i == 0 else AREA_3) + cells - 1] = 0.0
+                    Z[(INV_2 if i == 0 else INV_3) + cells - 1] = 0.0
             for col in range(cells):
                 m1 = Z[AREA_1 + col]
                 m2 = Z[AREA_2 + col]

@@ -32,15 +32,21 @@ SLOW_SIDE_FRACTION = 0.3  # of `fast_sides`: slower sides count as at rest
 LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
 
 
+class Folded(Exception):
+    """A grid has to be untangled, and how the block is looked at was not chosen for that."""
+
+
 class NewtonMove:
     """One regrid in the workspace's frame: from `work.old` to `work.sides`, into `work.trial`.
 
-    `begin` (ki, kj and other arguments of `Workspace.begin`) are used at the start of each part.
+    `untangles`: False lets it raise `Folded` where it would untangle.  `begin` (ki, kj and other
+    arguments of `Workspace.begin`) are used at the start of each part.
     """
 
-    def __init__(self, tuning: Tuning, work: Workspace, **begin):
+    def __init__(self, tuning: Tuning, work: Workspace, untangles: bool = True, **begin):
         self.tuning = tuning
         self.work = work
+        self.untangles = untangles
         self.arguments = begin
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual = 0.0
@@ -159,6 +165,7 @@ class NewtonMove:
 
     def _unfold(self) -> bool:
         """The last resort (theory R5.4), unless the boundary alone rules out a valid grid."""
+        self._check_look()
         work = self.work
         if work.ni == 1 or work.nj == 1 or find_impossible(work.sides) is not None:
             return False
@@ -187,6 +194,10 @@ class NewtonMove:
         self.broken = False
         work.trial[:] = found
         return self._accept(work.compare_corners(found, work.old))
+
+    def _check_look(self) -> None:
+        if not self.untangles:
+            raise Folded
 
     def _begin(self) -> None:
         """Spacing of the part's sides, and their motion."""
@@ -364,6 +375,7 @@ class NewtonMove:
 
     def _untangle(self) -> bool:
         """Untangle the better of the displaced grid and the trial into `work.trial`."""
+        self._check_look()
         work = self.work
         self.rescues += 1
         self.start = "untangled"

@@ -17,18 +17,35 @@ from typing import Any
 
 import numpy as np
 
-from regrid.barrier.newton_move import NewtonMove
+from regrid.barrier.newton_move import Folded, NewtonMove
 from regrid.barrier.side_laws import fill_family_weights
 from regrid.barrier.tuning import DEFAULT, Tuning
+from regrid.barrier.turning import Look, choose_look, is_convex, turn_bend
 from regrid.barrier.workspace import Workspace, find_bend, is_bent
-from regrid.errors import BadInput
+from regrid.errors import BadInput, RegridFailure
 from regrid.measure.faults import explain_failure, take_grids, take_nodes, take_numbers
 from regrid.protocol import RegridResult
-from regrid.sides import compute_area, get_sides
+from regrid.sides import compute_area, copy_sides, get_sides
 
 # families whose weights differ by less are ranked by the block's shape
 EVEN_WEIGHT_DIFFERENCE = 1e-6
 SERIAL_NODES = 6400  # smaller blocks stay on one thread
+
+
+class _NoGrid(Exception):
+    """No grid was found; `trial` came closest, in a workspace's frame; `flat`: it is too sharp."""
+
+    def __init__(self, trial: np.ndarray, transposed: bool, flat: bool):
+        super().__init__()
+        self.trial = trial
+        self.transposed = transposed
+        self.flat = flat
+
+    def turn_back(self, look: Look) -> tuple[np.ndarray, bool, bool]:
+        """The same of the block as it was before it was turned."""
+        turn = look.turn.exchange() if self.transposed else look.turn
+        trial = turn.apply(self.trial)
+        return (trial[::-1] if turn.mirrors else trial), self.transposed, self.flat
 
 
 class BarrierRegridder:
@@ -139,20 +156,28 @@ class BarrierRegridder:
         target = boundary
         previous, boundary = take_grids(previous, boundary)
         into = boundary if in_place and boundary is target else None
-        weights = self.family
-        if weights is None:
-            weights = np.empty(2)
-            fill_family_weights(boundary, weights)
-        transposed = _runs_along_j(weights, boundary)
+        if sound_speed is not None:
+            sound_speed = _take_sound(sound_speed, previous)
+        given = previous, boundary, sound_speed, float(least_limiting_rate)
+        try:
+            return self._move(*given, into, untangles=False)
+        except Folded:
+            return self._untangle(*given, into)
+        except _NoGrid as end:
+            raise explain_failure(boundary, end.trial, end.transposed, end.flat) from None
+
+    def _move(
+        self, previous, boundary, sound_speed, least_limiting_rate, into, untangles: bool
+    ) -> RegridResult:
+        """`regrid` of checked arrays; raises `_NoGrid`, and `Folded` unless it `untangles`."""
+        weights, transposed = self._weigh(boundary)
         ki, kj = (weights[1], weights[0]) if transposed else (weights[0], weights[1])
         mirrored = (compute_area(previous) < 0.0) != transposed
         work = self._workspace(previous.shape, transposed)
-        if sound_speed is not None:
-            sound_speed = _take_sound(sound_speed, previous)
         work.take(previous, boundary, transposed, mirrored, sound_speed, into)
-        work.least_limiting_rate = float(least_limiting_rate)
+        work.least_limiting_rate = least_limiting_rate
         move = NewtonMove(
-            self.tuning, work, conditional=self.conditional, ki=float(ki), kj=float(kj),
+            self.tuning, work, untangles, conditional=self.conditional, ki=float(ki), kj=float(kj),
             cost=sound_speed is not None, curved=self.curved,
         )  # fmt: skip
         simple = work.block.area > 0.0 and (self.meets_itself or work.is_simple)
@@ -167,11 +192,63 @@ class BarrierRegridder:
             if not simple:
                 raise explain_failure(boundary, previous=previous)
             if not move.run():
-                raise explain_failure(boundary, work.trial, transposed, move.broken)
+                raise _NoGrid(work.trial, transposed, move.broken)
         report = move.report()
         if report.quality and mirrored != transposed:  # of a clockwise grid
             report = replace(report, quality=None)
         return RegridResult(work.give(), report)
+
+    def _weigh(self, boundary):
+        """The weights of the two families, and whether the lines i = const are the heavier one."""
+        weights = self.family
+        if weights is None:
+            weights = np.empty(2)
+            fill_family_weights(boundary, weights)
+        return weights, _runs_along_j(weights, boundary)
+
+    def _untangle(self, previous, boundary, sound_speed, least_limiting_rate, into) -> RegridResult:
+        """`_move` as its mirror image is moved; a symmetric block stays symmetric."""
+        cells = [] if sound_speed is None else [sound_speed]
+        transposed = self._weigh(boundary)[1]
+        look = choose_look(previous, boundary, cells, transposed, self.bend)
+        before = look.turn_grid(previous)
+        after = before.copy()
+        copy_sides(look.turn_grid(boundary), after)
+        sound = None if sound_speed is None else look.turn_cells(sound_speed)
+        given = before, after, sound, least_limiting_rate
+        if self.bend is not None:
+            self._workspace(before.shape, False).take_laws(turn_bend(look.turn, self.bend))
+        try:
+            result = self._move_evenly(look, *given) if look.same else None
+            result = result or self._move(*given, None, untangles=True)
+        except _NoGrid as end:
+            raise explain_failure(boundary, *end.turn_back(look)) from None
+        finally:
+            if self.bend is not None:
+                self._workspace(before.shape, False).take_laws(self.bend)
+        nodes = look.turn_grid(result.nodes)
+        copy_sides(boundary, nodes)  # zeros may have changed their sign
+        if into is not None:
+            into[:] = nodes
+            nodes = into
+        return replace(result, nodes=nodes)
+
+    def _move_evenly(
+        self, look: Look, before, after, sound, least_limiting_rate
+    ) -> RegridResult | None:
+        """`_move` of a turned block that is symmetric up to rounding, as if it were exactly so."""
+        if sound is not None:
+            sound = look.even_out_cells(sound)
+        even = look.even_out(before, before), look.even_out(after, after), sound
+        try:
+            result = self._move(*even, least_limiting_rate, None, untangles=True)
+        except (_NoGrid, RegridFailure):
+            return None
+        for nodes in (look.even_out(result.nodes, after), result.nodes):
+            copy_sides(after, nodes)
+            if is_convex(nodes):
+                return replace(result, nodes=nodes)
+        return None
 
     def compute_limiting_rate(self, boundary: np.ndarray, sound_speed: np.ndarray) -> float:
         """R [1/s] of theory R4.11: the rate implied by these sides for any interior.

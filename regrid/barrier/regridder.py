@@ -23,7 +23,13 @@ from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.turning import Look, choose_look, is_convex, turn_bend
 from regrid.barrier.workspace import Workspace, find_bend, is_bent
 from regrid.errors import BadInput, RegridFailure
-from regrid.measure.faults import explain_failure, take_grids, take_nodes, take_numbers
+from regrid.measure.faults import (
+    explain_failure,
+    find_unit,
+    take_grids,
+    take_nodes,
+    take_numbers,
+)
 from regrid.protocol import RegridResult
 from regrid.sides import compute_area, copy_sides, get_sides
 
@@ -158,6 +164,9 @@ class BarrierRegridder:
         into = boundary if in_place and boundary is target else None
         if sound_speed is not None:
             sound_speed = _take_sound(sound_speed, previous)
+        unit = find_unit(previous)
+        if unit != 1.0:  # eighth powers of lengths would not be numbers
+            return self._regrid_in(unit, previous, boundary, sound_speed, least_limiting_rate, into)
         given = previous, boundary, sound_speed, float(least_limiting_rate)
         try:
             return self._move(*given, into, untangles=False)
@@ -165,6 +174,20 @@ class BarrierRegridder:
             return self._untangle(*given, into)
         except _NoGrid as end:
             raise explain_failure(boundary, end.trial, end.transposed, end.flat) from None
+
+    def _regrid_in(
+        self, unit: float, previous, boundary, sound_speed, least_limiting_rate, into
+    ) -> RegridResult:
+        """`regrid` with lengths measured in `unit` [m], a power of two."""
+        if sound_speed is not None:
+            sound_speed = sound_speed / unit
+        result = self.regrid(previous / unit, boundary / unit, sound_speed, least_limiting_rate)
+        nodes = result.nodes * unit
+        copy_sides(boundary, nodes)  # the smallest numbers lose digits
+        if into is not None:
+            into[:] = nodes
+            nodes = into
+        return replace(result, nodes=nodes)
 
     def _move(
         self, previous, boundary, sound_speed, least_limiting_rate, into, untangles: bool

@@ -35,6 +35,7 @@ Source: [KhakimzyanovShokina1998] §3 to §5.
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -51,6 +52,7 @@ from regrid.hexahedra.faces import (
     compute_volume,
     copy_faces,
     fill_blended,
+    find_unit_in_space,
 )
 from regrid.hexahedra.functional import cross, dot
 from regrid.jit import inlined, kernel
@@ -650,6 +652,9 @@ class EquidistributionRegridder3D:
         has only positive corners.
         """
         previous, boundary = check_grids_in_space(previous, boundary)
+        unit = find_unit_in_space(previous)
+        if unit != 1.0:  # sixth powers of lengths would not be numbers
+            return self._regrid_in(unit, previous, boundary)
         sign = 1.0 if compute_volume(previous) >= 0.0 else -1.0
         nodes = np.empty_like(previous)
         start = "displacement"
@@ -669,6 +674,15 @@ class EquidistributionRegridder3D:
         done = found.residuals.size - 1
         residual = float(found.residuals[found.best])
         return RegridResult(found.nodes, self._report(done, residual, previous, found.nodes, start))
+
+    def _regrid_in(self, unit: float, previous, boundary) -> RegridResult:
+        """`regrid` with lengths measured in `unit` [m]."""
+        weight = self.weight
+        other = copy(self)
+        if callable(weight):
+            other.weight = lambda *place: weight(*(unit * part for part in place))
+        result = other.regrid(previous / unit, boundary / unit)
+        return replace(result, nodes=result.nodes * unit)
 
     @staticmethod
     def _report(done: int, residual: float, previous, nodes, start: str) -> RegridReport:

@@ -17,7 +17,7 @@ import numpy as np
 
 from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
-from regrid.measure.faults import take_nodes
+from regrid.measure.faults import check_size, choose_unit, take_nodes
 from regrid.measure.hexahedra import compute_corner_volumes, find_bad_hexahedra
 
 FACES = ("i_min", "i_max", "j_min", "j_max", "k_min", "k_max")
@@ -310,7 +310,8 @@ def carry_faces(previous: np.ndarray, boundary: np.ndarray, out: np.ndarray) -> 
 def check_grids_in_space(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
     """Both as contiguous float64 of one shape (3, ni+1, nj+1, nk+1); otherwise BadInput.
 
-    Inner nodes of `boundary` are ignored.
+    Inner nodes of `boundary` are ignored.  BadInput also for blocks too small or too large, and for
+    those too far from the origin (`regrid.measure.faults.check_size`).
     """
     previous = take_nodes(previous, "previous", "ijk")
     boundary = take_nodes(boundary, "boundary", "ijk")
@@ -323,7 +324,14 @@ def check_grids_in_space(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
         raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
     if not np.isfinite(gather_faces(boundary)).all():
         raise BadInput("regrid: the boundary has nodes that are not finite numbers")
+    for nodes, name in ((previous, "previous"), (boundary, "boundary")):
+        check_size(gather_faces(nodes), max(nodes.shape[1:]), name)
     return previous, boundary
+
+
+def find_unit_in_space(nodes: np.ndarray) -> float:
+    """`regrid.measure.faults.find_unit` of a grid (3, ni+1, nj+1, nk+1), by its faces."""
+    return choose_unit(float(np.ptp(gather_faces(nodes), axis=1).max()))
 
 
 def find_turned_edge(nodes: np.ndarray) -> tuple[str, str, tuple[int, ...]] | None:

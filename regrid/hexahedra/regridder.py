@@ -27,6 +27,7 @@ from regrid.hexahedra.faces import (
     copy_faces,
     explain_failure,
     find_turned_edge,
+    find_unit_in_space,
 )
 from regrid.hexahedra.functional import (
     HEXAHEDRON_ROWS,
@@ -430,6 +431,10 @@ class BarrierRegridder3D:
         none is found.
         """
         previous, boundary = check_grids_in_space(previous, boundary)
+        unit = find_unit_in_space(previous)
+        if unit != 1.0:  # sixth powers of lengths would not be numbers
+            previous = previous / unit
+            boundary = boundary / unit
         weights = compute_family_weights(boundary) if self.family is None else self.family
         order = _order_axes(weights, previous.shape[1:])
         axes = (0, *(axis + 1 for axis in order))
@@ -451,6 +456,9 @@ class BarrierRegridder3D:
         valid = compute_volume(faces) > 0.0 and move.run()
         back = (0, *(int(axis) + 1 for axis in np.argsort(order)))
         nodes = move.trial[:: -1 if mirrored else 1].transpose(back).copy(order="C")
+        if unit != 1.0:
+            nodes *= unit
+            boundary = boundary * unit
         if not valid:
             upright = slice(None, None, -1 if mirrored != odd else 1)
             raise explain_failure(boundary[upright], nodes[upright])

@@ -95,7 +95,11 @@ def find_unit(nodes: np.ndarray) -> float:
 
     1 for everyday sizes; in other units a block has the same bits, but for the exponent.
     """
-    size = measure_corners_span(nodes)
+    return choose_unit(measure_corners_span(nodes))
+
+
+def choose_unit(size: float) -> float:
+    """The same for a block of this size, in m."""
     if EVERYDAY[0] < size < EVERYDAY[1] or not 0.0 < size < math.inf:
         return 1.0
     return 2.0 ** math.frexp(size)[1]
@@ -125,7 +129,14 @@ def are_ordinary(previous, boundary):
 
 def _check_size(nodes: np.ndarray, name: str) -> None:
     """Refuse what is no block's size or place; the corners alone could not tell."""
-    sides = np.concatenate(get_sides(nodes), axis=1)
+    check_size(np.concatenate(get_sides(nodes), axis=1), max(nodes.shape[1:]), name)
+
+
+def check_size(sides: np.ndarray, count: int, name: str) -> None:
+    """BadInput for the size or place of a block by the nodes (2 or 3, n) of its sides.
+
+    `count`: of the most nodes along one of them; `name`: of the grid, for the message.
+    """
     if not np.isfinite(sides).all():
         return  # named by whoever explains failures
     with np.errstate(over="ignore"):
@@ -135,7 +146,7 @@ def _check_size(nodes: np.ndarray, name: str) -> None:
             f"regrid: the block of {name} is {size:.3g} m across; sizes between {LEAST_SIZE:g} and "
             f"{MOST_SIZE:g} m can be regridded: choose another unit of length"
         )
-    cell = size / max(nodes.shape[1:])
+    cell = size / count
     if size > 0.0 and np.spacing(np.abs(sides).max()) > MOST_COORDINATE_ROUNDING * cell:
         raise BadInput(
             f"regrid: the block of {name} lies {np.abs(sides).max() / cell:.1g} of its cells away "

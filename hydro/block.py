@@ -16,7 +16,7 @@ from hydro import rows as of
 from hydro.eos import EquationOfState
 from hydro.eos.base import check_eos, check_formulas
 from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
-from hydro.formulas.reconstruction import DEFAULT_LIMITER
+from hydro.formulas.reconstruction import DEFAULT_LIMITER, FIRST_ORDER_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
 from hydro.interior.advance import allocate_scratch, count_tiles, make_flow_kernels
 from hydro.interior.cell_fields import (
@@ -204,15 +204,25 @@ class Block:
         """
         self.geometry = geometry
         self._plan = PerimeterPlan([], self.rim.faces)
-        variant: tuple[Any, ...] = type(self.eos), self.limiter, geometry, self.flux_name
-        self.flow = make_flow_kernels(*variant)
-        self.sides = make_side_kernels(*variant)
+        self.is_first_order = False
+        self._choose_kernels(self.limiter)
         lowest = self.nodes[1].min()
         if geometry.curved and lowest < 0.0:
             raise BadInput(
                 f"block {self.name!r}: its nodes reach down to y = {lowest:g} m; "
                 "in axisymmetric flow y is the radius and may not be negative"
             )
+
+    def _choose_kernels(self, limiter: str) -> None:
+        variant: tuple[Any, ...] = type(self.eos), limiter, self.geometry, self.flux_name
+        self.flow = make_flow_kernels(*variant)
+        self.sides = make_side_kernels(*variant)
+
+    def use_first_order(self, lowered: bool) -> None:
+        """Set whether the following steps take cells for constant, as a last resort."""
+        if lowered != self.is_first_order:
+            self.is_first_order = lowered
+            self._choose_kernels(FIRST_ORDER_LIMITER if lowered else self.limiter)
 
     # --- perimeter -----------------------------------------------------------------------------
 

@@ -66,6 +66,8 @@ def count_special_cells(flow: Flow) -> dict[str, float | int]:
     first_order = voided = 0
     for block in flow.blocks:
         first_order += int(block.sums[FIRST_ORDER])
+        if block.is_first_order:  # all of its faces
+            first_order += 2 * block.ni * block.nj
         voided += int(block.sums[VOIDED])
     row: dict[str, float | int] = {"first_order_faces": first_order, "voided_cells": voided}
     if flow.exchange.contacts:

@@ -76,11 +76,14 @@ def take_step(flow: Flow) -> StepRecord:
     then untouched.
     """
     record = StepRecord()
+    for block in flow.blocks:
+        block.use_first_order(False)
     # 1 dt from the largest rate of all blocks; halved for as long as the step fails
     dt, record.limit = flow.clock.choose_dt()
+    first_dt = dt
     while reason := try_step(flow, dt):
         if isinstance(reason, Touch):
-            dt = float(reason)
+            first_dt = dt = float(reason)
             record.limit = "touch"
             continue
         record.reason = reason
@@ -91,10 +94,25 @@ def take_step(flow: Flow) -> StepRecord:
                 f"{MOST_RETRIES} times to {dt:.3g} s without success",
                 RunFailure,
             )
-        dt = 0.5 * dt
+        dt = first_dt if lower_order(flow, reason) else 0.5 * dt
         record.limit = "retry"
     accept_step(flow, dt, record)
     return record
+
+
+def lower_order(flow: Flow, reason: RunFailure) -> bool:
+    """Let all gases take this step at first order, where one has got too cold; False if they do.
+
+    A variation over a cell can take more internal energy out of it than it has, in however short
+    a step, where gas expands towards a vacuum; constant cells cannot.
+    """
+    cause = "cold-gas"
+    gases = [block for block in flow.blocks if block.eos.failure_cause == cause]
+    if reason.cause != cause or all(block.is_first_order for block in gases):
+        return False
+    for block in gases:
+        block.use_first_order(True)
+    return True
 
 
 class Touch(float):

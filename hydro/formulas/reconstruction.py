@@ -52,6 +52,12 @@ def limit_monotonised_central(a, b):
     return mean if mean < most else most
 
 
+@inlined
+def limit_wholly(a, b):
+    """No variation at all: cells are constant."""
+    return 0.0 * (a + b)
+
+
 LIMITERS = {
     "monotonised-central": limit_monotonised_central,
     "van-leer": limit_van_leer,
@@ -61,6 +67,7 @@ LIMITERS = {
     "low-mach": limit_monotonised_central,
 }
 LOW_MACH = "low-mach"
+FIRST_ORDER_LIMITER = "first-order"  # of steps that no other limiter brings to an end
 RELAXED = ("smooth-shear", LOW_MACH)  # limiters that leave slopes of turning flow alone
 DEFAULT_LIMITER = "monotonised-central"
 

@@ -101,7 +101,7 @@ def make_parting(speed, gamma=1.4, p=(0.4, 0.4), **options):
 @pytest.mark.parametrize("cells", [16, 50, 100, 200])
 @pytest.mark.parametrize(
     "gases",
-    [{"speed": 2.4}, {"speed": 2.8}, {"speed": 3.2},
+    [{"speed": 2.4}, {"speed": 2.8}, {"speed": 3.5}, {"speed": 2.4, "p": (0.4, 0.2)},
      {"speed": 1.6, "gamma": 5 / 3}, {"speed": 3.9, "gamma": 1.25}],
     ids=str,
 )  # fmt: skip

@@ -27,9 +27,13 @@ if TYPE_CHECKING:
     from regrid.curves import redistribute as redistribute
     from regrid.curves import uniform_law as uniform_law
     from regrid.domains import make_domain as make_domain
+    from regrid.equidistribution.volumes import (
+        EquidistributionRegridder3D as EquidistributionRegridder3D,
+    )
     from regrid.errors import BadInput as BadInput
     from regrid.errors import RegridFailure as RegridFailure
     from regrid.given import find_start as find_start
+    from regrid.hexahedra.regridder import BarrierRegridder3D as BarrierRegridder3D
     from regrid.marching import March as March
     from regrid.marching import choose_times as choose_times
     from regrid.marching import march as march
@@ -50,8 +54,10 @@ NAMES = {
     "regrid.barrier.repair": "repair_grid",
     "regrid.curves": "arc_law clustered_law geometric_law redistribute uniform_law",
     "regrid.domains": "make_domain",
+    "regrid.equidistribution.volumes": "EquidistributionRegridder3D",
     "regrid.errors": "BadInput RegridFailure",
     "regrid.given": "find_start",
+    "regrid.hexahedra.regridder": "BarrierRegridder3D",
     "regrid.marching": "March choose_times march march_domain",
     "regrid.measure.quality": "Quality compute_corner_areas find_bad_cells "
     "measure_first_line_gap measure_quality",

@@ -16,6 +16,7 @@ import hashlib
 import io
 import os
 import pickle
+import signal
 import sys
 import threading
 import time
@@ -173,6 +174,7 @@ class KernelCache:
 
     def save_overload(self, types, result) -> None:
         _compiling.compiled += 1
+        _tell()
         keep(self._find(types, result.target_context), serialize.dumps(result._reduce()))
 
 
@@ -307,8 +309,53 @@ def interpreted():
 
 # wall seconds of compiling and loading until now; when the present one began, 0 where there is none
 _compiling = SimpleNamespace(
-    lock=threading.Lock(), seconds=0.0, begun=0.0, ready=0, compiled=0, processor=0.0
+    lock=threading.Lock(), seconds=0.0, begun=0.0, ready=0, compiled=0, processor=0.0, told=False
 )
+SILENT_SECONDS = 3.0  # wall seconds of compiling from which on a person at a terminal is told
+
+
+def _tell() -> None:
+    """Say once, to a person at a terminal, what the first call waits for."""
+    now = time.perf_counter() - _compiling.begun
+    if _compiling.told or not _compiling.begun or _compiling.seconds + now < SILENT_SECONDS:
+        return
+    _compiling.told = True
+    if sys.stderr is not None and sys.stderr.isatty():
+        words = "compiling kernels, kept for later runs: a minute, several on a busy machine ..."
+        print(f"regrid: {words}", file=sys.stderr, flush=True)
+
+
+def leave_telling() -> None:
+    """Whoever calls this tells a person itself that kernels are compiled."""
+    _compiling.told = True
+
+
+@contextlib.contextmanager
+def _interrupts_kept():
+    """In this block an interrupt ends as KeyboardInterrupt, whatever numba makes of it.
+
+    Where numba is interrupted it may raise that it has "no compiled object yet", or go on.
+    """
+    mine = threading.current_thread() is threading.main_thread()
+    if not (mine and signal.getsignal(signal.SIGINT) is signal.default_int_handler):
+        yield
+        return
+    interrupted = []
+
+    def remember(number, frame):
+        interrupted.append(number)
+        signal.default_int_handler(number, frame)
+
+    signal.signal(signal.SIGINT, remember)
+    try:
+        yield
+    except Exception:
+        if not interrupted:
+            raise
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        if interrupted:
+            raise KeyboardInterrupt from None
 
 
 def _compile_or_interpret(compiled: Dispatcher, *arguments):
@@ -319,7 +366,8 @@ def _compile_or_interpret(compiled: Dispatcher, *arguments):
         _compiling.begun = time.perf_counter()
         processor = time.thread_time()
         try:
-            found = type(compiled)._compile_for_args(compiled, *arguments)
+            with _interrupts_kept():
+                found = type(compiled)._compile_for_args(compiled, *arguments)
             compiled.entry = found if len(compiled.overloads) == 1 else compiled
             KERNEL_CODES.add(id(found))
             return found

@@ -33,8 +33,8 @@ class RegridReport:
     corners that its sides make flat (`regrid.measure.corners`), `limited_nodes` the nodes whose
     motion was cut short because a corner would have folded or a speed been too high.  `strayed` is
     how far inner nodes are at most from where interpolation of the sides' motion puts them, in
-    heights of the old cells, where the regridder knows it; no more than that, at least.  `quality`
-    is what `regrid.measure.quality.measure_worst` says of the grid, where the regridder knows it.
+    heights of the old cells; None where the regridder does not know it.  `quality` is what
+    `regrid.measure.quality.measure_worst` says of the grid, where the regridder knows it.
     """
 
     iterations: int = 0
@@ -47,7 +47,7 @@ class RegridReport:
     exempt_corners: int = 0
     limited_nodes: int = 0
     triangles: int = 0
-    strayed: float = math.inf
+    strayed: float | None = None
     quality: tuple[float, float, int, int] | None = None
 
 

@@ -38,7 +38,6 @@ Sources: [IvanenkoCharakhchyan1988]; [AndersonTannehillPletcher1984] §10.4; [Hu
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -374,7 +373,7 @@ class VariationalRegridder(WeightedRegridder):
             residual=residual,
             limited_nodes=limited,
             triangles=0,
-            strayed=math.inf,
+            strayed=None,
         )
         return RegridResult(nodes, report)
 

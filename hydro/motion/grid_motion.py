@@ -209,7 +209,8 @@ class GridMotion(Sides):
             raise
         nodes = result.nodes
         most = MOST_EXCESS * min(1.0, fraction)
-        if result.report.strayed > most:
+        strayed = result.report.strayed
+        if strayed is None or strayed > most:
             nodes, self._limited[number] = self.limiters[number].limit(block.nodes, nodes, most)
         if nodes is not block.nodes_new:
             block.nodes_new[...] = nodes

@@ -71,7 +71,7 @@ class NewtonMove:
             start=self.start,
             exempt_corners=self.exempt,
             triangles=count_triangles(self.work.trial) if self.triangles < 0 else self.triangles,
-            strayed=self.strayed,
+            strayed=self.strayed if self.strayed < np.inf else None,
             quality=self.quality,
         )
 

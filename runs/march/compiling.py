@@ -16,7 +16,7 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
-from regrid.jit import count_compiling
+from regrid.jit import count_compiling, leave_telling
 
 LOOK_EVERY = 0.2  # wall seconds until the run is looked at again: how much does it compile?
 MANY_KERNELS = 5  # compiled kernels from which on a second process is worth its start
@@ -37,6 +37,7 @@ def compiling(quiet: bool, helped: bool = True) -> Iterator[None]:
     In a terminal it is a bar, elsewhere a line, once a command.  Kernels that come from the disk,
     which takes a second or so, are not spoken of.
     """
+    leave_telling()
     if not _watched.acquire(blocking=False):
         yield
         return

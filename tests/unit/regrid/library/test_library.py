@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 
 import regrid
 from builders import ROOT
 
 PUBLIC = """
-AlgebraicRegridder BadInput BarrierRegridder March Quality RegridFailure RegridReport RegridResult
+AlgebraicRegridder BadInput BarrierRegridder BarrierRegridder3D EquidistributionRegridder3D
+March Quality RegridFailure RegridReport RegridResult
 Regridder arc_law choose_times clustered_law compute_corner_areas find_bad_cells find_start
 geometric_law make_domain make_regridder march march_domain measure_first_line_gap measure_quality
 redistribute repair_grid transfinite_grid uniform_law
@@ -31,3 +33,27 @@ def test_public_names_are_these():
 def test_the_page_has_every_public_name():
     words = set(re.findall(r"\w+", PAGE.read_text(encoding="utf-8")))
     assert set(regrid.__all__) <= words
+
+
+def test_a_report_has_no_number_for_what_is_not_known():
+    line = np.linspace(0.0, 1.0, 9)
+    nodes = np.array(np.meshgrid(line, line, indexing="ij"))
+    boundary = nodes.copy()
+    boundary[1, :, 0] += 0.3 * np.sin(np.pi * line)
+    known = regrid.BarrierRegridder(family="i").regrid(nodes, nodes.copy()).report
+    assert known.strayed == 0.0
+    for name in ("barrier", "winslow", "transfinite", "brackbill-saltzman"):
+        report = regrid.make_regridder(name).regrid(nodes, boundary.copy()).report
+        assert report.strayed is None or np.isfinite(report.strayed)
+
+
+def test_a_grid_may_be_written_into_its_boundary():
+    line = np.linspace(0.0, 1.0, 9)
+    nodes = np.array(np.meshgrid(line, line, indexing="ij"))
+    boundary = nodes.copy()
+    boundary[1, :, 0] += 0.3 * np.sin(np.pi * line)
+    wanted = regrid.BarrierRegridder().regrid(nodes, boundary).nodes
+    boundary[:, 1:-1, 1:-1] = np.nan
+    found = regrid.BarrierRegridder().regrid(nodes, boundary, in_place=True).nodes
+    assert found is boundary
+    assert np.array_equal(found, wanted)

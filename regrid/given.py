@@ -1,4 +1,4 @@
-"""Grids, curves and initial grids from files (npz, HDF5, VTK), and initial grids for given sides.
+"""Grids, curves and first grids from files (npz, HDF5, VTK, Plot3D), and those for given sides.
 
 Boundary curves are four polylines with any number of points, named `i_min`, `i_max`, `j_min`,
 `j_max`, or `left`, `right`, `bottom`, `top` in that order: i then runs from left to right.  Each
@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from regrid import plot3d
 from regrid.algebraic import quasi_1d_grid, transfinite_grid
 from regrid.barrier.repair import RepairReport, repair_grid
 from regrid.domains import distribute_by_arc_length
@@ -38,7 +39,17 @@ CORNERS = (  # a side and its end that meets the end of another
     ("i_min", 0, "j_min", 0), ("i_min", -1, "j_max", 0),
     ("i_max", 0, "j_min", -1), ("i_max", -1, "j_max", -1),
 )  # fmt: skip
-ENDINGS = (".npz", ".h5", ".hdf5", ".vts", ".vtk")
+ENDINGS = (".npz", ".h5", ".hdf5", ".vts", ".vtk", *plot3d.ENDINGS)
+# meshes whose cells lie in no order, and how to get blocks from those who write them
+UNORDERED = {
+    ".msh": "Gmsh writes its transfinite surfaces and volumes as blocks: gmsh FILE.geo -3 "
+    "-format p3d -o FILE.p3d (-2 for a plane), or Save As, Plot3D structured mesh",
+    ".mesh": "write the nodes of each block, in the order of its lines, as arrays x and y to an "
+    ".npz file",
+    ".vtu": "write the nodes of each block as a structured grid (.vts)",
+    ".cgns": "write the zones as Plot3D: cgns_to_plot3d FILE.cgns FILE.xyz",
+    ".su2": "write the nodes of each block as Plot3D",
+}
 
 
 def is_file_name(word: str) -> bool:
@@ -61,7 +72,31 @@ def read_source(name: str, block: str | None = None) -> np.ndarray | dict[str, n
         return _understand(_read_npz(path), str(path))
     if ending in (".h5", ".hdf5"):
         return _understand(*_read_hdf5(path, block))
+    if ending in plot3d.ENDINGS:
+        return _choose_block(plot3d.read_plot3d(path), path, block)
+    if ending in UNORDERED:
+        remedy = UNORDERED[ending]
+        raise BadInput(f"{path}: its cells lie in no order of lines, blocks are wanted; {remedy}")
     raise BadInput(f"{path}: files read are {', '.join(ENDINGS)}")
+
+
+def _choose_block(blocks: list[np.ndarray], path: Path, block: str | None) -> np.ndarray:
+    """One block of a file whose blocks are numbered from 1."""
+    known = {str(number): nodes for number, nodes in enumerate(blocks, 1)}
+    if block is not None and block not in known:
+        raise BadInput(f"{path} has no block '{block}' with a grid; {_say_sizes(known)}")
+    if block is None and len(known) > 1:
+        raise BadInput(f"{path} has several blocks; choose one with --block: {_say_sizes(known)}")
+    chosen = block or "1"
+    return check_nodes(known[chosen], f"{path}, block '{chosen}'")
+
+
+def _say_sizes(known: Mapping[str, np.ndarray]) -> str:
+    words = [
+        f"'{name}' ({' x '.join(str(n - 1) for n in nodes.shape[1:])} cells)"
+        for name, nodes in known.items()
+    ]
+    return "there are: " + ", ".join(words)
 
 
 def read_grid(name: str, block: str | None = None) -> np.ndarray:

@@ -30,8 +30,8 @@ def grid() -> None:
     ends have to meet at four corners.  In Python:
       numpy.savez("curves.npz", left=..., right=..., bottom=..., top=...)
     A grid: arrays x and y (and z) of shape (ni+1, nj+1[, nk+1]), or nodes of
-    shape (2, ni+1, nj+1), in .npz or .h5, a dump of a run, or a structured .vts
-    or .vtk of VTK.
+    shape (2, ni+1, nj+1), in .npz or .h5, a dump of a run, a structured .vts
+    or .vtk of VTK, or Plot3D (.p3d, .xyz, .x, .g, .fmt).
     """
 
 

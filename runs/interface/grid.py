@@ -20,7 +20,7 @@ __all__ = ("Grid", "compare", "make", "quality", "read", "regrid", "write")
 
 
 def read(path: str | Path, block: str | None = None) -> np.ndarray:
-    """The nodes (2 or 3, ...) [m] in a file (.npz, .h5, .vts, .vtk).
+    """The nodes (2 or 3, ...) [m] in a file (.npz, .h5, .vts, .vtk, Plot3D).
 
     block: which one, where it has several.  Raises BadInput for a file that holds no grid.
     """

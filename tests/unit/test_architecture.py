@@ -25,6 +25,7 @@ ROOMS = (
     ("regrid.algebraic",),
     ("regrid.barrier", "regrid.domains", "regrid.domains_in_space", "regrid.node_speeds"),
     ("regrid.hexahedra",),
+    ("regrid.plot3d",),
     ("regrid.equidistribution", "regrid.given", "regrid.marching"),
     ("regrid.variational", "regrid.winslow"),
     ("regrid.registry",),

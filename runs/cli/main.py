@@ -385,14 +385,16 @@ def _with_threads(settings: tuple[str, ...], threads: int | None) -> tuple[str, 
 
 
 def _finish(ending, directory, picture: bool) -> int:
-    paths = []
-    if picture and ending.exit_code < 128:  # not where a signal stopped it
-        from runs.pictures.command import draw_all
-
-        paths = draw_all(str(directory), _say)
     echo(ending.screen)
-    if paths:
-        echo("pictures:    " + "  ".join(str(path) for path in paths))
+    if picture and ending.exit_code < 128:  # not where a signal stopped it
+        try:
+            from runs.pictures.command import draw_all
+
+            paths = draw_all(str(directory), _say)
+        except Exception as error:  # whatever it is: the run has ended as it has
+            _say(f"no pictures: {describe_error(error)[1].removeprefix('shockgrid: ')}")
+        else:
+            echo("pictures:    " + "  ".join(str(path) for path in paths))
     return ending.exit_code
 
 

@@ -9,41 +9,28 @@ from __future__ import annotations
 import contextlib
 import re
 import shlex
-import textwrap
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.patches import Polygon, Rectangle
 
-from problems.pictures import name_axis
-from regrid.errors import BadInput, Place, RunFailure
-from regrid.measure.quality import compute_corner_areas
-from regrid.sides import SIDE_NAMES, get_side
+from regrid.errors import BadInput, RunFailure
 from runs.deck.checking import is_runtime_key
 from runs.deck.reading import ReadDeck, resolve_deck
 from runs.early_end.causes import ENDS, Cause
-from runs.pictures import fields
-from runs.pictures.command import default_fields, new_figure, save
-from runs.pictures.curves import draw_panel
-from runs.quantities import pick_prefix
+from runs.early_end.place import describe_event
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state
 from runs.store.files import write_atomically
 from runs.store.history import read_history
 from runs.store.reader import RunData
 
-CELLS_BESIDE_SIDE = 2  # cells: so near to a side is beside it
 CALM_STEP_PART = 0.3  # of the usual dt: with less a run is in trouble already
 SHOWN_SETTINGS = 3  # settings
-CELLS_AROUND_MARK = 5  # cells on each side of the marked one in the picture
-MOST_SHOWN = 0.3  # of the longer side of the domain: half a window at most
-MARK = "tab:red"
 
 
 @dataclass
@@ -90,6 +77,8 @@ def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restar
             end.lines.append(f"  {command}   ({words})")
 
     def draw() -> None:
+        from runs.early_end.picture import draw_early_end  # matplotlib may not be there
+
         title = re.split("; last restart point is|; there is no restart point yet", str(failure))[0]
         end.picture = draw_early_end(RunData(directory.path), title, place, end.point)
         end.lines.append(f"picture of the place: {end.picture}")
@@ -161,100 +150,3 @@ def make_command(
     if is_runtime_key(setting.partition("=")[0], type(deck.deck)) and point is not None:
         return f"{restart} --at {point} {words}"
     return f"shockgrid run {shlex.quote(str(directory.deck))} {words}"
-
-
-def find_marked(blocks: Sequence, place: Place | None) -> tuple[Any, tuple[int, int], bool]:
-    """The block and the cell (i, j) that a place names, and whether it names a cell: beside the
-    first of a side's nodes.  If not, it is the smallest of the block, or of all blocks."""
-    named = [block for block in blocks if place is not None and block.name == place.block]
-    areas = [measure_areas(block.nodes) for block in named or blocks]
-    number = int(np.argmin([area.min() / np.median(area) for area in areas]))
-    block = (named or blocks)[number]
-    last = np.array(areas[number].shape) - 1
-    cell = np.array(np.unravel_index(areas[number].argmin(), areas[number].shape))
-    known = bool(named and place is not None and (place.cell or (place.side and place.nodes)))
-    if known and place is not None:
-        cell = np.array(place.cell or 2 * place.nodes[:1])
-        if not place.cell and place.side:
-            cell["ij".index(place.side[0])] = last.max() if place.side.endswith("max") else 0
-    i, j = np.clip(cell, 0, last).tolist()
-    return block, (i, j), known
-
-
-def measure_areas(nodes: np.ndarray) -> np.ndarray:
-    """Areas [m2] of cells (ni, nj)."""
-    return 0.5 * np.abs(compute_corner_areas(nodes).sum(axis=0))
-
-
-def describe_event(blocks: Sequence, place: Place | None) -> str:
-    """A sentence on how small the cell where it failed, or the smallest, is, and what is beside.
-
-    blocks: with `name` and `nodes` (2, ni + 1, nj + 1) [m].
-    """
-    block, (i, j), _ = find_marked(blocks, place)
-    areas = measure_areas(block.nodes)
-    away = zip(SIDE_NAMES, (i, areas.shape[0] - 1 - i, j, areas.shape[1] - 1 - j), strict=True)
-    beside = [side for side, cells in away if cells < CELLS_BESIDE_SIDE]
-    where = f", beside {' and '.join(beside)}" if beside else ""
-    x, y = block.nodes[:, i : i + 2, j : j + 2].mean(axis=(1, 2))
-    share = float(areas[i, j] / np.median(areas))
-    return (
-        f"cell i={i}, j={j} of block '{block.name}' at ({x:.6g}, {y:.6g}){where} has {share:.2g} "
-        "of the usual area of the block's cells"
-    )
-
-
-def draw_early_end(run: RunData, title: str, place: Place | None, point: int | None) -> Path:
-    """Write DIR/early-end.png from the last dump of `run`; returns its path.
-
-    The place with its grid, the whole domain, dt over the steps with those retried and the restart
-    point of step `point`.  A failure without a cell is marked at the smallest.  Raises BadInput
-    where the disk is full.
-    """
-    figure = new_figure()
-    dump = run.outputs[-1]
-    figure.set_size_inches(13.0, 6.8)
-    figure.suptitle(textwrap.fill(title, 190), fontsize=9, x=0.01, ha="left")
-    left, right = figure.subfigures(1, 2, width_ratios=(1.35, 1.0))
-    near = left.subplots()
-    whole, below = right.subplots(2, 1, height_ratios=(1.25, 1.0))
-    block, (i, j), named = find_marked(dump.blocks, place)
-    name = default_fields(run)[0]
-    sheets = fields.make_sheets(dump, [name], fields.View())
-    extent = fields.find_extent([sheets])
-    scale, unit = pick_prefix(float(np.abs(extent).max()), dump.length_unit)
-    part = block.nodes[
-        :,
-        max(i - CELLS_AROUND_MARK, 0) : i + CELLS_AROUND_MARK + 2,
-        max(j - CELLS_AROUND_MARK, 0) : j + CELLS_AROUND_MARK + 2,
-    ]
-    corners = block.nodes[:, [i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
-    x, y = corners.mean(axis=1)
-    reach = 1.05 * max(np.abs(part[0] - x).max(), np.abs(part[1] - y).max())
-    reach = min(reach, MOST_SHOWN * max(extent[1] - extent[0], extent[3] - extent[2]))
-    window = x - reach, x + reach, y - reach, y + reach
-    words = f"block {block.name!r}, cell i={i}, j={j}{'' if named else ': the smallest'}"
-    for axes, box, title in ((near, window, words), (whole, extent, "the whole domain")):
-        look = fields.choose_colours(dump, name, [fields.find_range(sheets, name, box)])
-        fields.draw_blocks(axes, sheets, name, look, scale, box)
-        figure.colorbar(ScalarMappable(*look[:2]), ax=axes, label=look[3], shrink=0.9)
-        axes.set_title(title, fontsize=10, color=MARK if axes is near else "k")
-        axes.set(**{f"{a}label": name_axis(n, unit) for a, n in zip("xy", dump.axes, strict=True)})
-        ring = {"markersize": 16, "markeredgewidth": 1.8, "fillstyle": "none", "zorder": 6}
-        axes.plot(x * scale, y * scale, "o", color=MARK, **ring)  # seen however flat the cell is
-    near.add_patch(Polygon(corners.T * scale, fill=False, edgecolor=MARK, linewidth=2.0, zorder=5))
-    if place is not None and place.side and place.nodes:
-        line = get_side(block.nodes, place.side)
-        there = [node for node in place.nodes if node < line.shape[1]]
-        near.plot(*(line[:, there] * scale), "o", markersize=5, color=MARK, zorder=7)
-    box = (window[0] * scale, window[2] * scale), 2 * reach * scale, 2 * reach * scale
-    whole.add_patch(Rectangle(*box, fill=False, edgecolor=MARK, zorder=5))
-    if len(run.history.get("dt", ())):
-        draw_panel(below, run.history["step"], run.history, ["dt"], {"dt": dump.t_unit})
-    below.axvline(dump.step, color=MARK, label=f"end, step {dump.step}")
-    if point is not None:
-        below.axvline(point, color="tab:blue", ls="--", label=f"restart point, step {point}")
-    below.set(xlabel="step", yscale="log")
-    below.autoscale(axis="y")
-    below.legend(fontsize=8, loc="lower left")
-    return save(figure, run.directory.early_picture, 120)

@@ -64,6 +64,7 @@ def list_everything() -> str:
 
 def draw_every_domain(picture: str, force: bool) -> str:
     """`grid list --plot`: the last grid of every domain, marched in 40 steps by the barrier."""
+    import runs.pictures  # noqa: F401 - loads matplotlib
     from runs.grids.pictures import draw_gallery
 
     path = Path(picture)
@@ -199,6 +200,7 @@ def _write(compute: Callable[[], Grid], label: str, stem: str, files: Files) -> 
 
 
 def _draw(made: Grid, title: str, path: Path) -> Path:
+    import runs.pictures  # noqa: F401 - loads matplotlib
     from runs.grids.pictures import draw_block, draw_grid
 
     if made.nodes.shape[0] == 3:
@@ -276,6 +278,7 @@ def compare_families(
             drawn.append((words, march, sides))
         yield from reasons
         if name in pictures:
+            import runs.pictures  # noqa: F401 - loads matplotlib
             from runs.grids.pictures import draw_comparison
 
             yield f"picture: {draw_comparison(drawn, name, pictures[name])}"

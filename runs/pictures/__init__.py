@@ -1,4 +1,38 @@
 """Pictures of a run: fields, history, interfaces.
 
 May import: `runs.deck`, `runs.store`, `runs.inspection` and all below them.
+
+Importing this package loads matplotlib, whatever the variable MPLBACKEND says: a notebook's kernel
+sets it to a backend that its Python has and that of a command may lack, and matplotlib then refuses
+to load.  Nothing here needs a backend.  Raises BadInput where matplotlib cannot be loaded.
 """
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+
+from regrid.errors import BadInput
+
+BACKEND = "MPLBACKEND"
+
+
+def _load_matplotlib() -> None:
+    if "matplotlib" in sys.modules:
+        return
+    wanted = os.environ.pop(BACKEND, None)
+    try:
+        import matplotlib
+    except Exception as error:  # a broken installation may raise anything
+        words = str(error).partition("\n")[0] or type(error).__name__
+        raise BadInput(f"pictures need matplotlib, which cannot be loaded here: {words}") from error
+    finally:
+        if wanted is not None:
+            os.environ[BACKEND] = wanted
+    if wanted:
+        with contextlib.suppress(ValueError):  # a backend that is not there
+            matplotlib.rcParams["backend"] = wanted
+
+
+_load_matplotlib()

@@ -63,7 +63,7 @@ def study(
             return 128 + (signal.SIGTERM if told else signal.SIGINT)
         finally:
             progress.close()
-    paths = made.write()
+    paths = made.write(note)
     say(describe_study(made, progress, time.monotonic() - began))
     say("written: " + "  ".join(str(path) for path in paths))
     return EXIT_FAILED if made.failures else 0

@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
+PICTURE_DPI = 130
 OWN = {FILE, "runs", "study.csv", "orders.csv", "study.png", "superseded", ".lock"}
 FUNCTION = re.compile(r"[\w.]+:[\w.<>]+")  # module and name
 
@@ -188,18 +189,19 @@ class Study:
 
     def plot(self, path: Path | str | None = None) -> Figure:
         """The figure of `shown`, written to `path` if given."""
-        from runs.pictures.command import save
+        from runs.pictures.command import save  # first: it loads matplotlib
         from runs.study.pictures import draw_study
 
         figure = draw_study(self)
         if path is not None:
-            save(figure, Path(path), 130, self.definition.to_toml())
+            save(figure, Path(path), PICTURE_DPI, self.definition.to_toml())
         return figure
 
-    def write(self) -> list[Path]:
+    def write(self, note: Callable[[str], None] = warnings.warn) -> list[Path]:
         """Write the table, the orders and the picture, if there is one; returns their paths.
 
-        Raises BadInput if they cannot be written.
+        note: is told of a picture that cannot be drawn.  Raises BadInput if a file cannot be
+        written.
         """
         paths = [self.path / "study.csv"]
         columns = [
@@ -212,8 +214,12 @@ class Study:
             paths.append(self.path / "orders.csv")
             write_atomically(paths[-1], make_csv([HEADS, *map(make_row, self.orders)]))
         if any(result is not None and not result.failure for result in self.results):
-            paths.append(self.path / "study.png")
-            self.plot(paths[-1])
+            try:
+                self.plot(picture := self.path / "study.png")
+            except Exception as error:  # whatever it is: the numbers are there
+                note(f"no picture of the study: {error}")
+            else:
+                paths.append(picture)
         return paths
 
     def check(self) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from regrid.errors import Place
-from runs.early_end.explain import describe_event
+from runs.early_end.place import describe_event
 
 
 @pytest.mark.parametrize(

@@ -69,7 +69,7 @@ def main() -> None:
             curve = draw_curve(nodes)
             length = np.hypot(*np.diff(curve, axis=0).T).sum()
             turn = np.degrees(np.abs(measure_turns(nodes)).sum())
-            row = f"{name} | {0.5 * np.ptp(line.x):.4f} | {length / np.ptp(curve[:, 0]):.4f}"
+            row = f"{name} | {0.5 * np.ptp(line.x):.4f} | {length / np.ptp(curve[:, 1]):.4f}"
             row += f" | {turn:.0f}"
             if before is not None:
                 distance = measure_distance(before, curve)

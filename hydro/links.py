@@ -67,7 +67,7 @@ class Link:
         pairs = (leader.first, *order, leader.last - leader.first)
         self._rims = leader.block.rim.rows, follower.block.rim.rows, pairs
         self._laws = leader.block.wave_law, follower.block.wave_law
-        # of a smoothed line, for `add_layer_flux`: its added velocities, whether it is closed
+        # of a line, for `add_layer_flux`: velocities beside its contact's, whether it is closed
         self.layer = np.empty((2, 0)), False
         self.passes_mass = isinstance(leader, Seam)
         # make matching nodes bitwise equal

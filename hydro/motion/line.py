@@ -176,24 +176,49 @@ def move_line(nodes, nodes_new, span, rim, damping, dt, out):
     return most
 
 
+@compiled_once(allocates=False)
+def limit_spreading(moved, rim, first, dt, out):
+    """Let no node of `out` (2, n) be farther from its place in `moved` than sound comes in dt.
+
+    All are taken back by the same part, so that none passes another.
+    """
+    count = moved.shape[1]
+    sound = 0.0
+    farthest = 0.0
+    for k in range(count - 1):
+        sound = max(sound, rim[on.C, first + k])
+        x, y = out[0, k] - moved[0, k], out[1, k] - moved[1, k]
+        farthest = max(farthest, x * x + y * y)
+    farthest = farthest**0.5
+    if farthest > sound * dt:
+        part = sound * dt / farthest
+        for c in range(2):
+            for k in range(count):
+                out[c, k] = moved[c, k] + part * (out[c, k] - moved[c, k])
+
+
 @kernel
 def carry_line(nodes, nodes_new, span, rim, dt, arrays, spacing, walls):
     """Move a line's nodes (`move_line`, where dt > 0), spread them and write them to `nodes_new`.
 
-    arrays: damping and moved nodes (2, n), spacing law (n,), scratch for another (n,), turning
-    (n - 1,), scratch (8, n).  spacing: how far to the law the nodes go, `relax` (not spread where
-    it is 0, nor written below), is the curve a spline, is it periodic, is it closed, and the
-    shortest segment that turning asks for (0: none, as of `fill_turning_law`).  walls at both ends
-    as in `fill_redistributed`.  Returns the stretching, and what that returns: below 0 if all is
-    well.
+    arrays: damping, what the nodes move beside the contact velocities [m/s] and moved nodes (2, n),
+    spacing law (n,), scratch for another (n,), turning (n - 1,), scratch (8, n).  spacing: how far
+    to the law the nodes go, `relax` (not spread where it is 0, nor written below), is the curve a
+    spline, is it periodic, is it closed, and the shortest segment that turning asks for (0: none,
+    as of `fill_turning_law`).  walls at both ends as in `fill_redistributed`.  Returns the
+    stretching, and what that returns: below 0 if all is well.  No node is spread faster than sound:
+    in a step that a thin cell elsewhere makes very short, a part of the way would be a jump.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    damping, moved, law, turned, turning, work = arrays
+    damping, beside, moved, law, turned, turning, work = arrays
     relax, spline, periodic, closed, shortest = spacing
-    side, start, count, _, _ = span
+    side, start, count, first, _ = span
     stretching = 0.0
     if dt > 0.0:
         stretching = move_line(nodes, nodes_new, span, rim, damping, dt, moved)
+        for c in range(2):
+            for k in range(count):
+                beside[c, k] = damping[c, k]
     if relax < 0.0:
         return stretching, -1
     if shortest > 0.0 and relax > 0.0:
@@ -211,6 +236,11 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, spacing, walls):
             moved, turned if shortest > 0.0 else law, np.array([0, count - 1]), spline, relax,
             periodic, walls[0], walls[1], work[:6], out,
         )  # fmt: skip
+        if dt > 0.0:
+            limit_spreading(moved, rim, first, dt, out)
+            for c in range(2):
+                for k in range(1, count - 1):
+                    beside[c, k] += (out[c, k] - moved[c, k]) / dt
     for k in range(count):
         i, j = find_node(side, start + k, ni, nj)
         nodes_new[0, i, j] = out[0, k]
@@ -356,6 +386,7 @@ class Line:
         self.period: np.ndarray | None = None  # from the first node to the last, where they repeat
         self.neighbours: list[tuple[Line, int] | None] = [None, None]  # that go on, at which end
         self.damping = np.zeros_like(line)
+        self.beside_contact = np.zeros_like(line)  # what its nodes move, respaced or damped [m/s]
         self.extended = np.empty((2, line.shape[1] + 4))
         self.moved = np.empty_like(line)
         side = SIDES.index(segment.side)
@@ -470,7 +501,10 @@ class Line:
     def _carry(self, relax: float, shape: str, dt: float) -> float:
         block = self.segment.block
         spacing = relax, shape == "spline", self.period is not None, self.closed, self.shortest
-        arrays = self.damping, self.moved, self.law, self._law, self._turning, self._work
+        arrays = (
+            self.damping, self.beside_contact, self.moved, self.law, self._law, self._turning,
+            self._work,
+        )  # fmt: skip
         stretching, failed = carry_line.entry(
             block.nodes, block.nodes_new, self.span, block.rim.rows, dt, arrays, spacing,
             tuple(self.walls),

@@ -96,7 +96,7 @@ class Sides:
         for link in exchange.links:
             line = self._find_line(link.leader)
             if line is not None and link.leader.kind == "interface":
-                link.layer = line.damping, line.closed
+                link.layer = line.beside_contact, line.closed
         for follower in self.followers:
             for end in (0, 1):
                 self._end_follower(follower, end)

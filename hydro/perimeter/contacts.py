@@ -135,11 +135,11 @@ def let_pass(rim, k, other, m, beyond, hll, acoustic_weight, curved):
 def add_layer_flux(rim, speeds, backwards, closed, first):
     """Add to the outward fluxes through a contact's faces what flows on to the next cell.
 
-    Where a line with a thickness (`hydro.motion.thickness`) moves out of a block beside its contact
-    speed, the cell there gains volume; elsewhere on the line others lose as much.  The material of
-    that volume goes from these to those along the line, so that the gas is neither compressed nor
-    stretched: the pressure would push the line back within the time that sound takes through a
-    cell.  Theory F6.5.
+    Where a line is smoothed (`hydro.motion.thickness`) or its nodes are respaced around a bend, it
+    moves beside its contact speed: the cell there gains volume, and others lose as much.  The
+    material of that volume goes from these to those along the line, so that the gas is neither
+    compressed nor stretched: the pressure would push the line back within the time that sound takes
+    through a cell, and at a kink the pressures of two cells would run apart.  Theory F6.5.
 
     speeds (2, n + 1): of the line's nodes beside the contact speeds, in the other direction where
     `backwards`; `first`: number of the first of n faces; closed: does the last cell lie beside the

@@ -376,6 +376,7 @@ def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str
 
 MOST_COMPARED_KA = 2.0  # k a0 of the steepest lines that were compared with anything
 ROLLED_UP_KA = 2.0  # k times the amplitude from which on a wave rolls up
+POLYGON_TURN = 45.0  # degrees from segment to segment from which on a line is a polygon
 LEAST_MUSHROOM_CELLS = 64  # in a wavelength: with fewer the stem and the cap are a few cells
 
 
@@ -413,6 +414,15 @@ def _caution_steep_line(problem, history) -> list[str]:
             f"{problem.count_rows()} along the line: too few for a mushroom's stem and cap; take "
             f"cells = {2 * LEAST_MUSHROOM_CELLS} or refine = true"
         )
+    if history is not None and "largest_turn" in history:  # not of an earlier version
+        first = float(history["largest_turn"][0])
+        turn = float(np.nanmax(history["largest_turn"]))
+        if turn > max(POLYGON_TURN, 1.2 * first):
+            told.append(
+                f"the line turns by up to {turn:.0f} degrees from one segment to the next: it is a "
+                "polygon where it rolls up, and what it looks like there depends on its nodes; "
+                "take more cells, refine = true, or a greater line.thickness"
+            )
     return told
 
 

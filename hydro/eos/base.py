@@ -60,6 +60,7 @@ class EquationOfState:
     positive: ClassVar[tuple[str, ...]] = ()  # parameters that must be greater than 0
     # eta = 1 - rho0/rho where a mixture of two phases starts and ends on the Hugoniot
     mixed_region: ClassVar[tuple[float, float] | None] = None
+    limits: ClassVar[str] = ""  # a sentence on the states that there are, where that can be said
     failure: ClassVar[str] = "density or sound speed is no longer positive"
     failure_cause: ClassVar[str] = "no-state"  # its id in `runs.early_end.causes`
 

@@ -177,6 +177,15 @@ class Tabular(EquationOfState):
         )
 
     @property
+    def limits(self) -> str:
+        """The states that the table has."""
+        return (
+            f"the table {self.path} has states of rho {self.axis_rho[0]:g} to "
+            f"{self.axis_rho[-1]:g} kg/m3 and e {self.axis_e[0]:g} to {self.axis_e[-1]:g} J/kg, p "
+            f"{self.table[0, 0]:g} to {self.table[-1, -1]:g} Pa"
+        )
+
+    @property
     def wave_law(self) -> tuple[float, float, float]:
         """Wave curve of an ideal gas with the stiffness rho c²/p of the middle of the table."""
         rho = self.axis_rho[self.axis_rho.size // 2]

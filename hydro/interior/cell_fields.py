@@ -35,6 +35,7 @@ def check_first_state(name: str, eos: EquationOfState, state: np.ndarray) -> Non
         raise BadInput(
             f"block {name!r}: cell i={i}, j={j} starts with density {rho[i, j]:g} and "
             f"pressure {p[i, j]:g}; both must give a positive density and sound speed"
+            + (f"; {eos.limits}" if eos.limits else "")
         )
 
 

@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
-import h5py
 import numpy as np
 
 from regrid.errors import BadInput
 from regrid.measure import hexahedra, quality
 from regrid.measure.corners import compute_corner_signs, find_excluded_corners
 from regrid.measure.faults import name_cells
-from runs.store.dumps import write_block
+from runs.store.dumps import create_in_memory, write_block
 from runs.store.files import check_free, write_atomically
 from runs.store.paraview import HEAD, TAIL, describe_block, write_vts
 from runs.store.provenance import describe_software, find_provenance
@@ -176,7 +175,7 @@ def write_grid(
 
 
 def _make_image(nodes, fields, made_by) -> bytes:
-    with h5py.File("grid", "w", driver="core", backing_store=False) as file:
+    with create_in_memory() as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = QUALITY_FORMAT_VERSION
         for key, value in made_by.items():

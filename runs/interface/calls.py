@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import sys
 from collections.abc import MutableMapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from hydro.boundary import SEGMENTS, Segment
 from hydro.eos import EQUATIONS_OF_STATE
@@ -35,6 +38,7 @@ from runs.march.launching import check_changeable, check_requests, read_restart_
 from runs.march.runner import Runner
 from runs.ranks.started import check_single
 from runs.store.directory import RunDirectory, open_directory
+from runs.store.provenance import NOTED_DIGITS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -114,9 +118,18 @@ def _describe_materials(simulation: Evolution) -> dict[str, str]:
     for block in simulation.blocks:
         words[block.name] = get_material(block)
         if eos := getattr(block, "eos", None):
-            numbers = " ".join(f"{n:.6g}" for n in getattr(eos, "parameters", ())[:8])
+            numbers = " ".join(map(_describe_parameter, getattr(eos, "parameters", ())[:8]))
             words[block.name] += f", {getattr(eos, 'kind', type(eos).__name__)} {numbers}".rstrip()
     return words
+
+
+def _describe_parameter(value: Any) -> str:
+    """A number; of an array, such as a table of pressures, its size and a digest."""
+    if np.ndim(value) == 0:
+        return f"{value:.6g}"
+    array = np.ascontiguousarray(value)
+    digest = hashlib.sha256(array.tobytes()).hexdigest()[:NOTED_DIGITS]
+    return f"{' x '.join(map(str, array.shape))} numbers {digest}"
 
 
 def _find_script() -> str:

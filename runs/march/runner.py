@@ -2,9 +2,9 @@
 
 A run ends in one of five ways: finished (exit 0, or 3 where it has not reached what it is for),
 at its limit of wall time (a restart point is written, exit code 0), stopped by a signal (the same,
-exit code 130 or 143), failed in its physics (exit 3), or out of disk (exit 2).  In each the
-directory can be read and continued.  SIGUSR1 writes a restart point, and the run continues.  Dumps
-fall on the first step past their time and never change dt.
+exit code 128 and the signal's number), failed in its physics (exit 3), or out of disk (exit 2).  In
+each the directory can be read and continued.  SIGUSR1 writes a restart point, and the run
+continues.  Dumps fall on the first step past their time and never change dt.
 """
 
 from __future__ import annotations
@@ -45,6 +45,14 @@ from runs.march.progress import (
 )
 from runs.quantities import count, describe_seconds, describe_time, drop_units, is_time
 from runs.ranks.world import World, describe_ranks
+from runs.signals import (
+    POINT,
+    STOPPING,
+    find_numbers,
+    is_hang_up,
+    leave_terminals,
+    list_terminals,
+)
 from runs.store.directory import RunDirectory, keep_problem_file, read_verdict, write_noted
 from runs.store.dumps import EMPTY, Names, list_arrays, make_image
 from runs.store.files import write_atomically, write_sealed
@@ -526,25 +534,28 @@ class Runner:
 
     @contextlib.contextmanager
     def _signals_caught(self):
-        """SIGINT and SIGTERM ask for a stop after the step; a second SIGINT is not waited for.
+        """Signals that end a run ask for a stop after the step; a second SIGINT is not waited for.
 
         SIGUSR1 asks for a restart point after the step.
         """
+        terminals = list_terminals()
 
-        def ask(number, frame):
-            if number not in (signal.SIGINT, signal.SIGTERM):
-                self._point_wanted = True
-                return
+        def ask_to_stop(number, frame):
             self._signal = number
             signal.signal(signal.SIGINT, signal.default_int_handler)
-            if not self.quiet:
+            if is_hang_up(number):
+                leave_terminals(terminals)
+            elif not self.quiet:
                 os.write(2, b"\nstopping after this step (again Ctrl-C: at once)\n")
 
-        names = ("SIGINT", "SIGTERM", "SIGUSR1")  # the last one not on Windows
-        numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+        def ask_for_point(number, frame):
+            self._point_wanted = True
+
+        wanted = dict.fromkeys(find_numbers(*STOPPING), ask_to_stop)
+        wanted |= dict.fromkeys(find_numbers(POINT), ask_for_point)
         before = {}
         with contextlib.suppress(ValueError):  # not in the main thread: somebody else owns them
-            before = {number: signal.signal(number, ask) for number in numbers}
+            before = {number: signal.signal(number, ask) for number, ask in wanted.items()}
         try:
             yield
         finally:

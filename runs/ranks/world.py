@@ -32,6 +32,7 @@ from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck, resolve_deck
 from runs.ranks.map import describe_shares, share_evolution
 from runs.ranks.started import count_started, find_rank
+from runs.signals import POINT, STOPPING, find_numbers
 from runs.store.dumps import EMPTY
 
 BUILD_MESSAGE = END + 1  # told first: the deck follows
@@ -181,9 +182,8 @@ def run_on_ranks(command: Callable[[World | None], int], say: Callable[[str], No
         finally:
             world.dismiss(code)
         return code
-    for name in ("SIGINT", "SIGTERM", "SIGUSR1"):  # the first rank says when it is time to end
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    for number in find_numbers(*STOPPING, POINT):  # the first rank says when it is time to end
+        signal.signal(number, signal.SIG_IGN)
     screen = sys.stderr
     with (
         open(os.devnull, "w", encoding="utf-8") as nowhere,

@@ -12,6 +12,8 @@ the same bytes.
 
 from __future__ import annotations
 
+import threading
+import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -103,6 +105,11 @@ class Virtual(NamedTuple):
 Arrays: TypeAlias = Mapping[str, Sequence[tuple[str, np.ndarray]]]  # by the block's name
 
 
+def create_in_memory() -> h5py.File:
+    """A new HDF5 file in memory alone; its name is its own, as HDF5 opens none twice."""
+    return h5py.File(uuid.uuid4().hex, "w", driver="core", backing_store=False)
+
+
 def make_image(
     evolution: Evolution, names: Names, besides: State = EMPTY, output: Output | None = None
 ) -> bytes | bytearray:
@@ -116,9 +123,10 @@ def make_image(
     form = repr((names, evolution.finished, is_axisymmetric(evolution)))
     form += repr([_describe(block, arrays) for block in evolution.blocks])
     form += repr({key: _describe_kind(value) for key, value in (linked or {}).items()})
-    if linked is not None and form in _KEPT:
-        return _refill(*_KEPT[form], evolution, arrays, linked)
-    with h5py.File("dump", "w", driver="core", backing_store=False) as file:
+    kept = _kept.dumps
+    if linked is not None and form in kept:
+        return _refill(*kept[form], evolution, arrays, linked)
+    with create_in_memory() as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
         file.attrs[CHECKSUM] = np.bytes_(BLANK_CHECKSUM)
@@ -146,19 +154,25 @@ def make_image(
         image = file.id.get_file_image()
     if linked is None:
         return image
-    while _KEPT:
-        _KEPT.popitem()[1][0].close()
+    while kept:
+        kept.popitem()[1][0].close()
     file = h5py.File(h5py.h5f.open_file_image(image, WRITABLE_IMAGE))
     stored = _list_stored(arrays, linked)
     places = {path: h5py.h5d.open(file.id, path.encode()).get_offset() for path in stored}
-    _KEPT[form] = file, places
-    return _refill(*_KEPT[form], evolution, arrays, linked)
+    kept[form] = file, places
+    return _refill(*kept[form], evolution, arrays, linked)
 
 
 # HDF5 takes its time over groups, scales and attributes, which are the same in all dumps of a run:
 # the last whole dump stays open in memory, and the numbers of the next are written over its own,
 # arrays at the places in the file that HDF5 has given them.
-_KEPT: dict[str, tuple[h5py.File, dict[str, int]]] = {}
+# Each thread has its own: two may write dumps of two runs.
+class _Kept(threading.local):
+    def __init__(self) -> None:
+        self.dumps: dict[str, tuple[h5py.File, dict[str, int]]] = {}
+
+
+_kept = _Kept()
 WRITABLE_IMAGE = 1  # H5LT_FILE_IMAGE_OPEN_RW
 
 

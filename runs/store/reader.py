@@ -366,6 +366,11 @@ class RunData:
     def __fspath__(self) -> str:
         return str(self.path)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """For another process: all but what holds functions, which it reads again."""
+        left_out = ("read_deck", "deck", "problem", "final")
+        return {name: value for name, value in self.__dict__.items() if name not in left_out}
+
     @cached_property
     def read_deck(self) -> ReadDeck:
         """The checked deck with its problem's name, to build the problem again."""

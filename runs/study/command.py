@@ -13,6 +13,7 @@ from typing import Any
 from regrid.errors import BadInput
 from runs.deck.reading import parse_value
 from runs.quantities import count
+from runs.signals import STOPPING, find_numbers, is_hang_up, leave_terminals, list_terminals
 from runs.study.computing import Result
 from runs.study.definition import NUMBER, check_same_deck, read_vary
 from runs.study.orders import describe_series
@@ -59,8 +60,8 @@ def study(
         except KeyboardInterrupt as stop:  # by now all workers have stopped
             left = count(made.results.count(None), "run")
             note(f"stopped with {left} to do; repeat the command to continue")
-            told = signal.SIGTERM in caught or signal.SIGTERM.name in str(stop)  # by a run
-            return 128 + (signal.SIGTERM if told else signal.SIGINT)
+            told = [number for number in find_numbers(*STOPPING) if _name(number) in str(stop)]
+            return 128 + [signal.SIGINT, *told, *caught][-1]  # `told`: by a run
         finally:
             progress.close()
     paths = made.write(note)
@@ -144,18 +145,27 @@ class Progress:
 
 @contextlib.contextmanager
 def terminate_softly() -> Iterator[list[int]]:
-    """In the block SIGTERM is a KeyboardInterrupt; the list then holds its number."""
+    """In the block signals that end a run are a KeyboardInterrupt; the list holds their numbers."""
     caught: list[int] = []
+    terminals = list_terminals()
 
     def stop(number, frame):
         caught.append(number)
+        if is_hang_up(number):
+            leave_terminals(terminals)
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, stop)
+    numbers = find_numbers(*STOPPING)
+    before = {number: signal.signal(number, stop) for number in numbers}
     try:
         yield caught
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _name(number: int) -> str:
+    return signal.Signals(number).name
 
 
 def describe_study(study: Study, progress: Progress, seconds: float) -> str:

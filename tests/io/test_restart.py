@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import random
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
 import pytest
+import toy_problem
 from processes import wait_for
 
 from runs.store.reader import RunData
@@ -30,7 +35,13 @@ def test_killed_at_a_random_moment(shockgrid, spawn, toy, seed):
     assert code == 0, text
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+STOPPING = {"SIGINT": 130, "SIGTERM": 143, "SIGHUP": 129, "SIGXCPU": 152}
+SIGNALS = [
+    (getattr(signal, name), code) for name, code in STOPPING.items() if hasattr(signal, name)
+]
+
+
+@pytest.mark.parametrize(("number", "code"), SIGNALS)
 def test_signal_leaves_a_restart_point(shockgrid, spawn, toy, number, code):
     words = ("--set", "output.dumps=1")
     process = spawn("run", "toy", "-o", "stopped", *words, "--set", "holds=[4]")
@@ -47,6 +58,32 @@ def test_signal_leaves_a_restart_point(shockgrid, spawn, toy, number, code):
     code, text, _ = shockgrid("compare", "whole", "stopped")
     assert code == 0, text
     assert not RunData("stopped").directory.list_points("restart")
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="this system has no SIGHUP")
+@pytest.mark.parametrize("ignored", [False, True], ids=["a lost terminal", "nohup"])
+def test_a_run_whose_terminal_is_gone(shockgrid, toy, ignored):
+    ours, theirs = os.openpty()
+    process = subprocess.Popen(
+        [sys.executable, toy_problem.__file__, "run", "toy", "-o", "run", "--set", "holds=[4]"],
+        stdin=theirs, stdout=theirs, stderr=theirs,
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN) if ignored else None,
+    )  # fmt: skip
+    os.close(theirs)
+    wait_for(toy / "held-4", process)
+    if not ignored:
+        os.close(ours)  # whatever is written to the terminal from now on is an error
+    process.send_signal(signal.SIGHUP)
+    Path("go-4").touch()
+    if ignored:
+        while process.poll() is None:
+            with contextlib.suppress(OSError):
+                os.read(ours, 1000)
+        os.close(ours)
+    assert process.wait() == (0 if ignored else 129)
+    stopped = RunData("run").directory.list_points()[-1][0]
+    assert stopped > 5 if ignored else stopped == 5
+    assert "SIGHUP" in Path("run/run.log").read_text() or ignored
 
 
 def test_damaged_last_dump_is_skipped(shockgrid):

@@ -54,7 +54,7 @@ ROOMS = (
     ("problems.interface_instability", "problems.plate_on_wedge", "problems.conical_target",
      "problems.shock_bubble", "problems.riemann", "problems.blocks", "problems.standard",
      "problems.convection"),
-    ("runs.quantities",),
+    ("runs.quantities", "runs.signals"),
     ("runs.deck", "runs.engines"),
     ("runs.store",),
     ("runs.ranks",),

@@ -145,3 +145,12 @@ def test_bad_tables_are_refused(write_of_tabular, tmp_path):
     table = Tabular(write_of_tabular())
     with pytest.raises(BadInput, match="the state rho = 9 kg/m3, e = 1 J/kg is outside the table"):
         table.pressure(9.0, 1.0)
+
+
+def test_a_first_state_outside_a_table_is_told_with_what_the_table_has(write_of_tabular):
+    table = Tabular(write_of_tabular())
+    nodes = np.array(np.meshgrid([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], indexing="ij"))
+    with pytest.raises(
+        BadInput, match=r"rho 0\.05 to 8 kg/m3 and e 0\.2 to 20 J/kg, p 0\.004 to 64 Pa"
+    ):
+        Block("gas", table, nodes, 1.2, 0.0, 0.0, 1e5)

@@ -7,8 +7,10 @@ import os
 import pickle
 import subprocess
 import sys
+import threading
 from dataclasses import dataclass
 
+import h5py
 import numpy as np
 import pytest
 
@@ -164,16 +166,70 @@ def test_data_of_a_run(run):
     assert run.interface().t == 0.1
 
 
-def test_data_of_a_run_go_to_other_processes(run):
-    one = sg.open(run.path)
+@pytest.mark.parametrize("opened", [True, False], ids=["opened", "just made"])
+def test_data_of_a_run_go_to_other_processes(run, opened):
+    one = sg.open(run.path) if opened else run
     block = one.dumps[-1]["right"]
     history = one.history
     rho = block.rho
     for other in (pickle.loads(pickle.dumps(one)), copy.deepcopy(one)):
         assert other.history.t.tolist() == history.t.tolist()
         assert other.history.units == history.units
+        assert other.reason == one.reason and other.deck == one.deck
         assert np.array_equal(other.dumps[-1]["right"].rho, rho)
         assert np.array_equal(other.dumps[-1]["right"].nodes, block.nodes)
+
+
+def test_two_runs_in_two_threads_are_as_one_after_the_other(tmp_path):
+    found = {}
+
+    def make(name, cells):
+        try:
+            found[name] = sg.run(NAME, tmp_path / name, cells=cells, dumps=6, run={"max_steps": 12})
+        except BaseException as error:
+            found[name] = error
+
+    several = {"one": 8, "other": 12, "third": 8}
+    threads = [threading.Thread(target=make, args=work) for work in several.items()]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for name, cells in several.items():
+        alone = sg.run(
+            NAME, tmp_path / f"{name}-alone", cells=cells, dumps=6, run={"max_steps": 12}
+        )
+        assert not isinstance(found[name], BaseException), found[name]
+        assert sg.compare(found[name], alone) == []
+
+
+def test_blocks_of_a_table_run_as_those_of_its_gas_and_restart_with_it_alone(tmp_path):
+    def write(gamma):
+        rho = np.linspace(0.01, 4.0, 30)
+        e = np.linspace(0.2, 40.0, 30)
+        with h5py.File(tmp_path / "table.h5", "w") as file:
+            file["rho"] = rho
+            file["e"] = e
+            file["p"] = (gamma - 1.0) * rho[:, None] * e
+
+    def make(eos):
+        p = 1.0 + np.arange(8.0)[:, None] * np.ones(4)
+        block = sg.Block("gas", eos, box((0, 0), (1, 1), (8, 4)), 1.0, 0.0, 0.0, p)
+        wall_off(block)
+        return sg.Simulation([block], [], t_end=0.1)
+
+    write(1.4)
+    path = str(tmp_path / "table.h5")
+    most = {"max_steps": 6}
+    table = sg.run(make(sg.Tabular(path)), tmp_path / "table", run=most)
+    gas = sg.run(make(sg.IdealGas(1.4)), tmp_path / "gas", run=most)
+    assert table.dumps[-1]["gas"].p == pytest.approx(gas.dumps[-1]["gas"].p, rel=1e-10)
+    write(1.5)
+    with pytest.raises(sg.BadInput, match="another flow"):
+        sg.restart(table, simulation=make(sg.Tabular(path)), run={"max_steps": 8})
+    write(1.4)
+    longer = sg.restart(table, simulation=make(sg.Tabular(path)), run={"max_steps": 8})
+    assert longer.dumps[-1].step == 8
 
 
 def test_restart_with_blocks_made_anew_ends_in_the_same_bits(run, tmp_path):

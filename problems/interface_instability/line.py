@@ -193,13 +193,36 @@ def _draw_normal(seed: int, count: int) -> np.ndarray:
     return np.array([radius * np.cos(angle), radius * np.sin(angle)])
 
 
-def read_line(path: str, width: float) -> Perturbation:
+class FileLine:
+    """Places x [m] of a line at heights y [m] (any shape): a cubic spline through points of a file.
+
+    points (2, n): x and y, which rises.
+    """
+
+    def __init__(self, points: np.ndarray):
+        from scipy.interpolate import CubicSpline  # slow to load
+
+        self.points = points
+        self.spline = CubicSpline(points[1], points[0])
+
+    def __call__(self, y: np.ndarray) -> np.ndarray:
+        return self.spline(y)
+
+    def measure_overshoot(self, y: np.ndarray) -> float:
+        """How far [m] the line at heights y (n,) goes beyond the two points around it, at most."""
+        x, heights = self.points
+        place = np.clip(np.searchsorted(heights, y, side="right") - 1, 0, x.size - 2)
+        low = np.minimum(x[place], x[place + 1])
+        high = np.maximum(x[place], x[place + 1])
+        line = self.spline(y)
+        return float(np.maximum(line - high, low - line).max())
+
+
+def read_line(path: str, width: float) -> FileLine:
     """The line in a text file: columns x, y [m], or x alone evenly from y = 0 to `width` [m].
 
-    Between its points the line is a cubic spline.  Raises BadInput for a file that is no such line.
+    Raises BadInput for a file that is no such line.
     """
-    from scipy.interpolate import CubicSpline  # slow to load
-
     where = f"deck: line_file {path!r}"
     table = read_columns(path, (1, 2), where)
     x, y = table if len(table) == 2 else (table[0], np.linspace(0.0, width, table.shape[1]))
@@ -211,7 +234,7 @@ def read_line(path: str, width: float) -> Perturbation:
     if y[0] > 1e-9 * width or y[-1] < width * (1.0 - 1e-9):
         words = f"y = {y[0]:g} to {y[-1]:g}; the domain has 0 to {width:g}"
         raise BadInput(f"{where} covers {words}")
-    return CubicSpline(y, x)
+    return FileLine(np.array([x, y]))
 
 
 class FreeLine:

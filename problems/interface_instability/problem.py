@@ -96,6 +96,7 @@ class InterfaceInstability(Results, Problem):
         drawn = draw_modes(deck, even)
         check_sense(deck, (self.rho_first, self.rho_second), drawn)
         self.modes = [*deck.modes, *drawn]
+        self.file_line = None
         self.free_lines = self._find_free_lines(perturbation, even)
         self.amplitude = sum(abs(mode.ka0) for mode in deck.modes) / self.k
         if drawn or self.free_lines:  # far less than the sum of their amplitudes
@@ -223,7 +224,8 @@ class InterfaceInstability(Results, Problem):
         sources = [("the perturbation", perturbation)] if perturbation is not None else []
         if deck.line_file is not None:
             check_digests(deck.digests)
-            sources.append((f"line_file {deck.line_file!r}", read_line(deck.line_file, y[-1])))
+            self.file_line = read_line(deck.line_file, y[-1])
+            sources.append((f"line_file {deck.line_file!r}", self.file_line))
         return [FreeLine(source, y, even, what) for what, source in sources]
 
     def make_heights(self) -> np.ndarray:

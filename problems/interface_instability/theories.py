@@ -345,7 +345,8 @@ def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str
     told = [words for some in sort_deck(problem) for words in some] if problem.harmonics else []
     deck = problem.deck
     base = problem.theory.base
-    told += _caution_no_interface(problem) + _caution_steep_line(problem, history)
+    told += _caution_no_interface(problem) + _caution_few_points(problem)
+    told += _caution_steep_line(problem, history)
     for name in ("first", "second"):
         side = getattr(deck, name)
         label = side.material or f"the {name} material"
@@ -374,6 +375,7 @@ def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str
     return told
 
 
+MOST_OVERSHOOT = 0.1  # of a line's extent: a spline that goes farther beyond its points is told
 MOST_COMPARED_KA = 2.0  # k a0 of the steepest lines that were compared with anything
 ROLLED_UP_KA = 2.0  # k times the amplitude from which on a wave rolls up
 POLYGON_TURN = 45.0  # degrees from segment to segment from which on a line is a polygon
@@ -395,6 +397,22 @@ def _caution_no_interface(problem) -> list[str]:
             "a ka0 such as 0.02"
         )
     return told
+
+
+def _caution_few_points(problem) -> list[str]:
+    """That the spline through the points of a line_file is another line than they make."""
+    if problem.file_line is None:
+        return []
+    x = problem.file_line.points[0]
+    extent = float(np.ptp(x))
+    beyond = problem.file_line.measure_overshoot(problem.make_heights())
+    if beyond <= MOST_OVERSHOOT * extent:
+        return []
+    return [
+        f"line_file: the cubic spline through its {x.size} points goes {beyond:.3g} m beyond "
+        f"them, {100.0 * beyond / extent:.0f} % of their extent of {extent:.3g} m; give more "
+        "points where the line bends or is to be straight"
+    ]
 
 
 def _caution_steep_line(problem, history) -> list[str]:

@@ -150,3 +150,17 @@ def test_a_wave_at_the_cut_off_has_no_rate():
         RayleighTaylor(Deck(tension=GRAVITY_ACCELERATION / WAVE_NUMBER**2))
     assert RayleighTaylor(Deck()).t_end == 3.0
     assert RayleighTaylor(Deck(above="nothing")).t_end == 6.0
+
+
+@pytest.mark.parametrize("points, told", [(6, True), (65, False)])
+def test_a_spline_that_leaves_its_points_is_a_caution(tmp_path, points, told):
+    y = np.linspace(0.0, 1.0, points)
+    x = 0.1 * np.cos(2.0 * np.pi * y)
+    if points == 6:  # a square tooth, told by its corners
+        y = np.array([0.0, 0.2, 0.21, 0.7, 0.71, 1.0])
+        x = np.array([-0.1, -0.1, 0.1, 0.1, -0.1, -0.1])
+    path = tmp_path / "line.txt"
+    np.savetxt(path, np.array([x, y]).T)
+    deck = InterfaceDeck(modes=[], line_file=str(path), width=1.0, sides="periodic")
+    cautions = InterfaceInstability(deck).cautions()
+    assert told == any("spline through its 6 points goes" in words for words in cautions)

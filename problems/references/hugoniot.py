@@ -23,6 +23,10 @@ from regrid.errors import BadInput
 from regrid.roots import find_root
 
 HUGONIOT_TOLERANCE = 1e-12
+# of the first state's: with less an isentrope has come to its end; products of explosives expand
+# far, metals do not, but lose their sound speed before
+LEAST_DENSITY_RATIO = 1e-6
+LEAST_SOUND_RATIO = 1e-3
 
 
 def get_stiffened_parameters(eos) -> tuple[float, float] | None:
@@ -113,7 +117,7 @@ class GeneralIsentrope:
 
         def slope(pressure, state):
             c = float(eos.sound_speed(state[0], pressure))
-            if not (state[0] > 1e-3 * rho and c > 1e-3 * self.c):
+            if not (state[0] > LEAST_DENSITY_RATIO * rho and c > LEAST_SOUND_RATIO * self.c):
                 raise refusal
             return [1.0 / c**2, -1.0 / (state[0] * c)]
 

@@ -17,6 +17,7 @@ from regrid.errors import BadInput
 from regrid.roots import find_root
 
 GAUSS_POINTS = 8
+MOST_HALVINGS = 60  # of the higher given pressure, to find one below the common pressure
 
 
 @dataclass(frozen=True)
@@ -144,12 +145,15 @@ def solve_riemann(eos_left, left, eos_right, right, cavitation_pressure: float |
     def closing(p):
         return sides[0].velocity(p) - sides[1].velocity(p)
 
-    if math.isfinite(least):
-        if closing(least) <= 0.0:
-            return _join(sides, least, True)
-        low = least
-    else:
-        low = _search_low(sides, closing)
+    try:
+        if math.isfinite(least):
+            if closing(least) <= 0.0:
+                return _join(sides, least, True)
+            low = least
+        else:
+            low = _search_low(sides, closing)
+    except BadInput:  # an isentrope that does not reach so low; maybe it need not
+        low = _search_near(sides, closing, least)
     rise = max(abs(side.p - low) + side.rho * side.isentrope.c**2 * 1e-3 for side in sides)
     high = low + rise
     while closing(high) > 0.0:
@@ -186,6 +190,23 @@ def _search_low(sides, closing) -> float:
             drop *= 0.5
         else:
             low -= drop
+    raise BadInput(
+        f"riemann problem: the states pull apart and have no common pressure above p = {low:g}; "
+        "give a cavitation pressure at which they may part"
+    )
+
+
+def _search_near(sides, closing, least: float) -> float:
+    """A pressure at which the two sides close on each other, searched from the higher given one
+    down: no lower than need be.  Products of an explosive, as dense as this, expand into a gas a
+    thousandfold before they have its pressure.
+    """
+    floor = least if math.isfinite(least) else 0.0
+    high = max(side.p for side in sides)
+    for halvings in range(1, MOST_HALVINGS):
+        low = floor + (high - floor) * 0.5**halvings
+        if closing(low) > 0.0:
+            return low
     raise BadInput(
         f"riemann problem: the states pull apart and have no common pressure above p = {low:g}; "
         "give a cavitation pressure at which they may part"

@@ -84,7 +84,10 @@ def choose_cases(names: tuple[str, ...]) -> list[Case]:
     known = list(dict.fromkeys(case.deck for case in CASES))
     for name in names:
         if name not in known:
-            raise BadInput(f"verify knows no problem {name!r}{suggest_deck(name, known)}")
+            raise BadInput(
+                f"there is no verification case for {name!r}{suggest_deck(name, known)}; a study "
+                "over cells shows the errors of any problem (shockgrid study)"
+            )
     return [case for case in CASES if not names or case.deck in names]
 
 

@@ -103,6 +103,8 @@ ELSEWHERE = {
     "open": "open_run",
 }  # other names there
 SUBMODULES = ("grid", "testing")  # names that are modules themselves
+# functions that commands call, too: their messages name options
+OF_COMMANDS = ("compare", "film", "inspect", "report", "study")
 
 __all__ = [
     "JWL",
@@ -170,6 +172,10 @@ def __getattr__(name: str) -> object:
             value = importlib.import_module(f"{MODULES[name]}.{name}")
         else:
             value = getattr(importlib.import_module(MODULES[name]), ELSEWHERE.get(name, name))
+        if name in OF_COMMANDS and callable(value):
+            from runs.interface.wording import said_in_python
+
+            value = said_in_python()(value)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value

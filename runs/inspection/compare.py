@@ -20,10 +20,12 @@ import numpy as np
 from hydro.remap.conserved import check_convex, remap_means
 from hydro.remap.overlay import compute_cell_moments
 from problems.problem import align
+from problems.problem_file import is_problem_file
 from regrid.errors import BadInput
 from runs.deck.checking import find_differences as find_changed_keys
 from runs.deck.checking import show
 from runs.quantities import add_unit, count
+from runs.store.provenance import NOTED_DIGITS
 from runs.store.reader import BlockData, Dump, RunData, Table
 
 SHOWN_DIFFERENCES = 8  # differences, and earlier dumps
@@ -101,8 +103,12 @@ def describe_runs(a: RunData, b: RunData) -> list[str]:
     try:
         rows = [(x.key, show(x.before), show(x.now)) for x in find_changed_keys(a.deck, b.deck)]
         results = [run.problem.report(run.history).rows for run in (a, b)]
+        files = [run.read_deck.file for run in (a, b)]
     except BadInput:  # a deck of another version
         return []
+    digests = [file.digest[:NOTED_DIGITS] if file else "" for file in files]
+    if digests[0] != digests[1]:
+        rows.insert(0, ("content of the problem's file", *digests))
     theirs = {row.name: row for row in results[1]}
     for row in results[0]:
         values = row.computed, getattr(theirs.get(row.name), "computed", math.nan)
@@ -114,7 +120,7 @@ def describe_runs(a: RunData, b: RunData) -> list[str]:
 def _find_differences(a: Side, b: Side, rtol: float, atol: float) -> list[Difference]:
     if a.history is None or b.history is None:
         return list(compare_dumps(a.dumps[0], b.dumps[0], rtol, atol))
-    if a.problem != b.problem:
+    if _name_problem(a.problem) != _name_problem(b.problem):
         raise BadInput(f"{a.path} is {a.problem}, {b.path} is {b.problem}: not comparable")
     found = list(compare_histories(a, b, rtol, atol))
     one, other = ({dump.step: dump for dump in run.dumps} for run in (a, b))
@@ -126,6 +132,11 @@ def _find_differences(a: Side, b: Side, rtol: float, atol: float) -> list[Differ
     for step in sorted(set(one) & set(other)):
         found += compare_dumps(one[step], other[step], rtol, atol)
     return sorted(found, key=lambda difference: difference.order)
+
+
+def _name_problem(problem: str) -> str:
+    """The name of a problem; of one in a file that of the file, as studies give its full path."""
+    return Path(problem).name if is_problem_file(problem) else problem
 
 
 def compare_histories(a: Side, b: Side, rtol: float, atol: float) -> Iterator[Difference]:
@@ -238,7 +249,7 @@ def _describe_makers(a: Side, b: Side) -> list[str]:
 
 def _needs_norms(a: Side, b: Side) -> bool:
     """Are they of the same blocks with other cells, or runs with other steps?"""
-    if a.dumps[0].problem != b.dumps[0].problem:
+    if _name_problem(a.dumps[0].problem) != _name_problem(b.dumps[0].problem):
         return False
     one, other = ({k.name: k.cells for k in side.dumps[0].blocks} for side in (a, b))
     return list(one) == list(other) and (one != other or bool(find_other_steps(a, b)))

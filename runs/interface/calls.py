@@ -31,9 +31,9 @@ from runs.interface.case import (
     load,
     make_settings,
     open_run,
-    said_in_python,
     say,
 )
+from runs.interface.wording import said_in_python
 from runs.march.launching import check_changeable, check_requests, read_restart_deck, remap_runner
 from runs.march.runner import Runner
 from runs.ranks.started import check_single
@@ -252,7 +252,10 @@ def register(name: str, thing: type) -> None:
     is taken, and for one with characters other than lower-case letters, digits and hyphens.
     """
     if not isinstance(thing, type):
-        raise BadInput(f"{name!r}: a class is registered, not a {type(thing).__name__}")
+        raise BadInput(
+            f"{name!r}: only classes can be registered, not a {type(thing).__name__}; a history "
+            "column needs a package with an entry point or a line in hydro.history.COLUMNS"
+        )
     if not PLAIN.fullmatch(name):
         raise BadInput(f"{name!r} is not a valid name: use lower-case letters, digits and hyphens")
     place = f"{thing.__module__}:{thing.__qualname__}"
@@ -274,5 +277,5 @@ def register(name: str, thing: type) -> None:
         return
     raise BadInput(
         f"{thing.__name__} is not a problem, equation of state, boundary kind or regridder: it "
-        "is derived from none of them and has no method regrid"
+        "derives from none of these classes and has no method `regrid`"
     )

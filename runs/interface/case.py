@@ -14,8 +14,7 @@ import math
 import os
 import sys
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -34,6 +33,7 @@ from problems.evolution import (
 from problems.problem import Problem, check_memory
 from regrid.errors import BadInput, suggest
 from runs.deck.reading import ReadDeck, read_deck, resolve_deck
+from runs.interface.wording import said_in_python
 from runs.march.compiling import compiling
 from runs.march.launching import start_runner
 from runs.march.runner import Ending, Runner
@@ -87,7 +87,8 @@ class Drawn:
         if mirror not in (None, "x", "y"):
             raise BadInput(f"mirror = {mirror!r}: 'x' or 'y' is wanted")
         wanted = Wanted(fields, what, at, mesh, zoom, mirror, beside, line, limits, colours)
-        fill_figure(figure := new_figure(), self, wanted)  # type: ignore[arg-type]
+        with said_in_python():
+            fill_figure(figure := new_figure(), self, wanted)  # type: ignore[arg-type]
         return figure
 
 
@@ -151,7 +152,8 @@ class OpenRun(Drawn, RunData):
         """
         from runs.pictures.film import make_film
 
-        return make_film(self.path, field, output, **options)
+        with said_in_python():
+            return make_film(self.path, field, output, **options)
 
     def report(self, output: str | Path | None = None, **options: Any) -> Path:
         """Write a report of the run in one HTML file; returns its path [DIR/report.html].
@@ -160,7 +162,8 @@ class OpenRun(Drawn, RunData):
         """
         from runs.report import report
 
-        return report(self.path, output, **options)
+        with said_in_python():
+            return report(self.path, output, **options)
 
     @property
     def _state(self) -> str:
@@ -203,30 +206,6 @@ def finish(runner: Runner, ending: Ending, quiet: bool) -> OpenRun:
 def make_settings(keywords: Mapping[str, Any]) -> tuple[str, ...]:
     """`key=value` for each value, tables with dots; BadInput for what no deck holds."""
     return write_settings(flatten(keywords))
-
-
-SAID = (  # on the command line, in Python
-    ("--set: ", ""),
-    (" and --set", " and the keywords"),
-    ("--set ", ""),
-    ("choose another with -o, or --force to", "choose another, or force=True to"),
-    ("choose another with -o", "choose another"),
-    ("choose another folder with -o", "choose another folder"),
-    ("another directory with -o", "another directory"),
-    ("choose an earlier one with --at", "choose an earlier one with at="),
-)
-
-
-@contextmanager
-def said_in_python() -> Iterator[None]:
-    """Sentences of BadInput that name options of the command line name keywords instead."""
-    try:
-        yield
-    except BadInput as error:
-        words = str(error)
-        for option, keyword in SAID:
-            words = words.replace(option, keyword)
-        raise BadInput(words) from error
 
 
 def say(text: str) -> None:
@@ -375,7 +354,7 @@ class Case(Drawn):
 
         It is made at its first use.  Changes to it change the run.
         """
-        with self.read.numbers_in_reach():
+        with said_in_python(), self.read.numbers_in_reach():
             check_memory(self.problem)
             return self.problem.build()
 

@@ -437,7 +437,7 @@ def make_study(
         definition = replace(definition, shown=tuple(shown) or definition.shown)
         output = output or (file.parent if Path(str(deck)).is_dir() else "")
     if not str(output):
-        raise BadInput("study: the output folder is missing; name it with -o DIR (output)")
+        raise BadInput("study: the output folder is missing (-o DIR)")
     return Study(definition, output, refine)
 
 

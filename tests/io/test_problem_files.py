@@ -59,6 +59,14 @@ def test_restart_goes_on_with_the_same_file_only(file, shockgrid):
     assert [(one.where, "steps 10" in one.words) for one in differences] == [("dumps", True)]
 
 
+def test_a_run_by_the_full_path_of_a_file_is_compared_with_one_by_its_name(file, shockgrid):
+    words = ("--set", "run.max_steps=2", "-q")
+    assert shockgrid("run", "my_heat.py", "-o", "one", *words)[0] == 0
+    assert shockgrid("run", str(file.resolve()), "-o", "other", *words)[0] == 0
+    code, text, error = shockgrid("compare", "one", "other")
+    assert (code, error) == (0, "") and "no difference" in text
+
+
 def test_a_damaged_copy_is_not_run(file, shockgrid):
     assert shockgrid("run", "my_heat.py", "-o", "run", "--set", "run.max_steps=2", "-q")[0] == 0
     (file.parent / "run" / "problem.py").write_text(FILE + "\n")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import os
 import pickle
+import re
 import subprocess
 import sys
 import threading
@@ -19,6 +20,8 @@ from builders import ROOT, box, two_blocks, wall_off
 from hydro.eos.gases import energy, pressure, sound_speed_squared
 from runs.cli.main import main
 from runs.deck.reading import read_deck
+from runs.inspection.compare import compare_in_words
+from runs.interface.wording import say_in_python
 
 DECK = {"cells": 8, "run": {"max_steps": 12}}
 NAME = "interface-instability"
@@ -57,6 +60,11 @@ def test_wrong_keywords_are_told_without_words_of_the_command_line(settings, wor
     with pytest.raises(sg.BadInput, match=words) as found:
         sg.load(NAME, **settings)
     assert "--set" not in str(found.value)
+
+
+def test_a_mistake_beside_keywords_says_that_it_is_in_them(tmp_path):
+    with pytest.raises(sg.BadInput, match=r"and the keywords: output\.columns: no installed"):
+        sg.run(NAME, tmp_path / "run", output={"columns": ["none"]}, **DECK)
 
 
 def test_ghost_cells_never_show(case):
@@ -411,3 +419,66 @@ def test_a_bad_hook_or_measure_leaves_no_directory(tmp_path):
 def test_a_run_is_opened_by_its_directory():
     with pytest.raises(sg.BadInput, match=r"a Case is not the directory of a run"):
         sg.open(sg.load("riemann"))
+
+
+SENTENCES = {  # on the command line, in Python
+    "--set: mach = -1": "mach = -1",
+    "defaults of tube.py and --set: no package": "defaults of tube.py and the keywords: no package",
+    "--set a.b: b is not an index": "a.b: b is not an index",
+    "--zoom 1,2: 4 numbers are wanted": "zoom=1,2: 4 numbers are wanted",
+    "--line (0, 0, 0, 0): the same": "line=(0, 0, 0, 0): the same",
+    "choose an earlier one with --at": "choose an earlier one with `at`",
+    "choose another with -o, or --force to clear it": "choose another, or force=True to clear it",
+    "choose another directory with -o": "choose another directory",
+    "shockgrid run a.toml -o a --force; or --force": (
+        "shockgrid run a.toml -o a --force; or force=True"
+    ),
+    "a-o b/-o c--set: d": "a-o b/-o c--set: d",
+}
+
+
+@pytest.mark.parametrize("words", SENTENCES)
+def test_options_become_keywords_once(words):
+    assert say_in_python(words) == SENTENCES[words]
+
+
+def test_messages_to_python_name_no_options(tmp_path):
+    """Every way into the package from Python, with a value that is refused there."""
+    run = load().run(tmp_path / "run")
+    wrong = [
+        lambda: sg.load("noh", cells=-3),
+        lambda: sg.load("interface-instability", **{"modes.7.ka0": 1}),
+        lambda: sg.run("noh", run.path, output={"columns": ["not-there"]}),
+        lambda: sg.run("noh", run.path),
+        lambda: sg.run("noh", tmp_path, force=True),
+        lambda: sg.restart(run, mach=3.0),
+        lambda: sg.restart(run, cells=7, output=run.path),
+        lambda: run.plot("rho", zoom=(1, 2)),
+        lambda: run.plot(what="line"),
+        lambda: run.plot("rho", colours="not-there"),
+        lambda: run.film(zoom=(0, 1)),
+        lambda: sg.film(run.path, follow=True, zoom=(0, 1, 0, 1)),
+        lambda: sg.compare(run, run, rtol=-1.0),
+        lambda: sg.study("noh", vary={"cells": [8, 16]}),
+        lambda: sg.study("noh", output=tmp_path, vary={}),
+    ]
+    for call in wrong:
+        with pytest.raises(sg.BadInput) as found:
+            call()
+        assert not re.search(r"(?<!\w)(--\w|-o\b)", str(found.value)), found.value
+
+
+def test_a_problem_file_is_compared_by_its_name(tmp_path):
+    """The same file under two paths is one problem; other content is named."""
+    source = (ROOT / "tests/io/toy_problem.py").read_text()
+    places = [tmp_path / "one" / "toy.py", tmp_path / "two" / "toy.py"]
+    for place in places:
+        place.parent.mkdir()
+        place.write_text(source)
+    runs = [sg.run(place, place.parent / "out") for place in places]
+    assert sg.compare(*runs) == []
+    places[1].write_text(source + "\n# other content\n")
+    edited = sg.run(places[1], tmp_path / "edited")
+    assert sg.compare(runs[0], edited) == []
+    words, differ = compare_in_words(str(runs[0].path), str(edited.path), 0.0, 0.0)
+    assert "content of the problem's file" in words and not differ

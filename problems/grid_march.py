@@ -134,7 +134,7 @@ class GridMarch(Problem):
                 rows.append(Row(name, value, wanted, label, digits=4, off=" "))
         inner = (deck.ni - 1) * (deck.nj - 1)
         cost = 1e6 * float(np.median(made["seconds_regrid"])) / inner
-        rows.append(Row("cost", cost, label="cost per node and step, median [us]", digits=4))
+        rows.append(Row("cost", cost, label="cost per node and step, median [µs]", digits=4))
         method = f" ({deck.regrid.method})" if deck.regrid.name.startswith("barrier") else ""
         head = (
             f"{deck.domain} {deck.ni} x {deck.nj}, regridder {deck.regrid.name}{method}: "

@@ -7,12 +7,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from problems.prefixes import pick_prefix
+
 
 def name_axis(words: str, unit: str) -> str:
     """`words [unit]`; the words alone where there is no unit."""
     return words if unit in ("", "1") else f"{words} [{unit}]"
 
 
+MOST_RATES = 200  # intervals of a run in which rates are drawn
 UNITS = {"s": 1.0, "1": 1.0, "ms": 1e3, "µs": 1e6}  # of a time axis, in a second
 
 
@@ -69,8 +72,9 @@ def draw_field(
 
 
 def title_time(dump) -> str:
-    """`t = 0.6`, with the unit of the dump's time where it has one."""
-    return f"t = {dump.t:.3g}" + ("" if dump.t_unit == "1" else f" {dump.t_unit}")
+    """`t = 0.6`, or `t = 1.11 µs` where the dump's time has a unit."""
+    factor, unit = pick_prefix(dump.t, dump.t_unit)
+    return f"t = {factor * dump.t:.3g} {unit}".rstrip()
 
 
 def draw_grid(axis, nodes: np.ndarray, every: int = 1, color="k", lw=0.2) -> None:
@@ -91,6 +95,20 @@ def draw_profiles(axis, dumps, name: str, unit: float, exact=None) -> None:
         if exact and dump.t > 0.0:
             x, values = exact.compute_profile(dump.t)
             axis.plot(1e3 * x, values / unit, "k", lw=0.7)
+
+
+def compute_rates(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Middles of equal intervals of time [s], and the rates at which `values` (n,) change in them.
+
+    Rates from step to step are round-off over dt where steps are short, as before an early end.
+    """
+    known = np.isfinite(t) & np.isfinite(values)
+    if np.count_nonzero(known) < 2:
+        return np.empty(0), np.empty(0)
+    count = min(MOST_RATES, np.count_nonzero(known) - 1)
+    edges = np.linspace(t[known][0], t[known][-1], count + 1)
+    sums = np.interp(edges, t[known], values[known])
+    return 0.5 * (edges[1:] + edges[:-1]), np.diff(sums) / np.diff(edges)
 
 
 def draw_columns(axis, history, labels: Mapping[str, str], words: str = "", unit="s") -> None:

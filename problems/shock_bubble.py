@@ -98,7 +98,7 @@ FEATURES = {
         Feature("incident shock", "wall_front", (0, 100), 415, 420, 415.2),
         Feature("refracted shock", "axis_front", (5, 170), 240, 254, 241.6),
         Feature("upwind end", "upwind", (0, 200), 73, 74, 70.2),
-        Feature("upwind end to 400 us", "upwind", (0, 400), math.nan, math.nan, 65.0),
+        Feature("upwind end to 400 µs", "upwind", (0, 400), math.nan, math.nan, 65.0),
         Feature("downwind end", "downwind", (200, 400), 78, 116, 91.9),
     ),
 }
@@ -316,7 +316,7 @@ class ShockBubble(Problem):
         if t[-1] >= end:
             first = float(np.diff(np.interp([start, end], t, history["upwind"]))[0]) / (end - start)
         rows = [Row("first_upwind_speed", first, self.contact.u, error="upwind_speed")]
-        table = [["velocities [m/s]", "here", "fixed grid", "measured", "computed", "window [us]"]]
+        table = [["velocities [m/s]", "here", "fixed grid", "measured", "computed", "window [µs]"]]
         for feature in self.features:
             name, *_, measured, computed, fixed = feature
             alone = math.isnan(feature.measured)
@@ -330,7 +330,7 @@ class ShockBubble(Problem):
             rows.append(Row("focus", self.find_focus(history), FOCUS[deck.gas], error="focus"))
         lines = [
             f"shock-bubble, {deck.gas} in air, Mach {deck.mach:g}, "
-            f"t = {(t[-1] - self.arrival) / SECONDS_PER_MICROSECOND:.4g} us "
+            f"t = {(t[-1] - self.arrival) / SECONDS_PER_MICROSECOND:.4g} µs "
             "after the shock's arrival:"
         ]
         lines += align(table) if len(table) > 1 else []

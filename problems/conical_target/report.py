@@ -188,7 +188,7 @@ def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
             f"{math.degrees(crossed.deflection):.3g} degrees and moved across itself at "
             f"{crossed.normal_speed:.3g} m/s",
             f"slip {crossed.slip:.3g} m/s, Atwood number {crossed.atwood:.3g}; rates of the "
-            f"impulse {impulse / US:.3g} and of the slip {slip / US:.3g} a us",
+            f"impulse {impulse / US:.3g} and of the slip {slip / US:.3g} a µs",
         ]
     for number, wave in enumerate(waves):
         if not np.isfinite(wave.amplitude).any():
@@ -198,11 +198,11 @@ def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
         rate = wave.measure_rate()
         grown = wave.get_amplitude(AGES[1]) / wave.amplitude[0]
         if math.isfinite(rate):
-            words = ["theory of small slopes", f"a/a0 = {grown:.3g} at {AGES[1] * US:.2g} us"]
+            words = ["theory of small slopes", f"a/a0 = {grown:.3g} at {AGES[1] * US:.2g} µs"]
         most = wave.amplitude[top]
-        when = f"at {history['t'][top] * US:.2f} us"
+        when = f"at {history['t'][top] * US:.2f} µs"
         words.append(f"at most {most * MM:.3g} mm, k a = {k * most:.2g}, {when}")
-        label = f"wave {number + 1}, passed at {wave.passed * US:.2f} us: growth [1/us]"
+        label = f"wave {number + 1}, passed at {wave.passed * US:.2f} µs: growth [1/µs]"
         rows.append(Row(f"growth_{number}", rate, theory, label, US, 3, source="; ".join(words)))
     return rows, notes
 
@@ -243,7 +243,7 @@ class Results:
         t = history["t"]
         first, last = (part * self.impact[2] for part in PLATEAU)
         impact = reduce_between(np.mean, t, history["pressure_impact"], first, last)
-        words = f"mean from {US * first:.2f} to {US * last:.2f} us; impedances match"
+        words = f"mean from {US * first:.2f} to {US * last:.2f} µs; impedances match"
         label = "pressure on the impact face [GPa]"
         rows = [Row("impact", impact, self.impact[0], label, 1e9, 5, "impact", source=words)]
 
@@ -252,7 +252,7 @@ class Results:
 
         for part in PARTS:
             p, t, x, y = find_peak(history, part)
-            words = f"at {t * US:.3g} us, x = {x * MM:.3g}, r = {y * MM:.2g} mm"
+            words = f"at {t * US:.3g} µs, x = {x * MM:.3g}, r = {y * MM:.2g} mm"
             label = f"greatest pressure in the {part}, {getattr(deck, part)} [GPa]"
             tell(f"peak_{part}", p, label, 1e9, words)
         for number, part in enumerate(GAUGES):
@@ -267,7 +267,7 @@ class Results:
                 if math.isfinite(t):
                     x = MM * (deck.front + station * deck.cone)
                     label = f"shock {where} at x = {x:.4g} mm [km/s]"
-                    words = f"at {t * US:.3f} us, {p * GPA:.3g} GPa behind it"
+                    words = f"at {t * US:.3f} µs, {p * GPA:.3g} GPa behind it"
                     tell(f"shock_{name}_{station:g}", speed, label, 1e3, words)
         head = (
             f"conical-target: {deck.impactor} at {deck.speed:g} m/s on {deck.shell}, "
@@ -279,7 +279,7 @@ class Results:
         begin, first, late = measure_growth(history)
         widest = int(np.nanargmax(history["line_amplitude"]))
         top, when = (history[name][widest] for name in ("line_amplitude", "t"))
-        words = f"half of peak to peak at the end; at most {top * MM:.2g} mm at {when * US:.2f} us"
+        words = f"half of peak to peak at the end; at most {top * MM:.2g} mm at {when * US:.2f} µs"
         label = "side: deviation from its own line [mm]"
         tell("line_amplitude", history["line_amplitude"][-1], label, 1e-3, words)
         bend = history["line_bend"][-1]
@@ -288,7 +288,7 @@ class Results:
         label = "side: deviation from its chord [mm]"
         tell("line_bend", bend, label, 1e-3, words)
         if math.isfinite(first):
-            words = f"from {begin * US:.2f} us on; {late:.3g} m/s in the latest half"
+            words = f"from {begin * US:.2f} µs on; {late:.3g} m/s in the latest half"
             tell("line_growth", first, "initial growth of the side's amplitude [m/s]", 1.0, words)
         return Report(head, rows)
 
@@ -318,7 +318,7 @@ class Results:
         for shade, dump in zip(np.linspace(0.0, 0.9, len(dumps)), dumps, strict=True):
             line = MM * dump.block("cone").nodes[:, :, -1]
             colour = colormaps["viridis"](shade)
-            shape.plot(*line, lw=1.4, label=f"{US * dump.t:.2g} us", color=colour)
+            shape.plot(*line, lw=1.4, label=f"{US * dump.t:.2g} µs", color=colour)
         shape.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
         shape.set_title("line between graphite and lead", fontsize="medium")
         crossed, waves = measure_waves(self, run.history)
@@ -346,9 +346,9 @@ class Results:
             ):
                 growth.plot(US * age, values, style, lw=0.9, label=words)
             growth.set_ylim(0.75, 2.0 * top / np.nanmean([wave.amplitude[0] for wave in waves]))
-        amplitude.set(xlabel="t [us]", ylabel="amplitude [mm]")
+        amplitude.set(xlabel="t [µs]", ylabel="amplitude [mm]")
         amplitude.set_title("dashed: theory of small slopes", fontsize="medium")
-        growth.set(xlabel="time since the shock was at the wave [us]", ylabel="a / a0")
+        growth.set(xlabel="time since the shock was at the wave [µs]", ylabel="a / a0")
 
     def draw_conical_target(self, figure, run) -> None:
         """Materials at the start and the end, pressure at the end; graphite and its corner near."""
@@ -362,9 +362,9 @@ class Results:
         names = {block: getattr(self.deck, part).split("-")[0] for block, part in LABELS.items()}
         for axis, dump in zip(top, (first, last), strict=False):
             _draw_materials(axis, dump, names, grid=False)
-            axis.set_title(f"t = {dump.t * US:.3g} us", fontsize="medium")
+            axis.set_title(f"t = {dump.t * US:.3g} µs", fontsize="medium")
         lines = [trace_outline(block.nodes) for block in last.blocks]
-        words = {"title": f"t = {last.t * US:.3g} us", "bar": "pressure [GPa]", "lines": lines}
+        words = {"title": f"t = {last.t * US:.3g} µs", "bar": "pressure [GPa]", "lines": lines}
         draw_field(top[2], last, "p", unit=1e9, mm=True, **words)
         for axis in (near, corner):
             axis.set_facecolor(FACES["shell"])  # what shows between chords and the line
@@ -373,7 +373,7 @@ class Results:
         left, _ = cone.min(axis=(1, 2))
         right, high = cone.max(axis=(1, 2))
         near.set(xlim=(left - 1.5, right + 1.5), ylim=(0.0, high + 1.5))
-        near.set_title(f"the graphite at {last.t * US:.3g} us", fontsize="medium")
+        near.set_title(f"the graphite at {last.t * US:.3g} µs", fontsize="medium")
         x, y = cone[:, 0, -1]
         corner.set(xlim=(x - 1.6, x + 3.2), ylim=(y - 1.9, y + 1.3))
         corner.set_title("where graphite, steel and lead meet", fontsize="medium")
@@ -387,14 +387,14 @@ class Results:
         share = run.history["transformed"]
         part.plot(US * t, 100.0 * share, color="k")
         part.set(xlim=(0.0, US * t[-1]), ylim=(0.0, None))
-        part.set(xlabel="t [us]", ylabel="in the second phase [% of the cone's mass]")
+        part.set(xlabel="t [µs]", ylabel="in the second phase [% of the cone's mass]")
         tops = [float(dump["cone"].p.max()) for dump in run.dumps]
         shares = [float(np.interp(dump.t, t, share)) for dump in run.dumps]
         most = run.dumps[int(np.argmax(shares if max(shares) > 0.0 else tops))]
         for dump in spread_dumps(run, MOST_SHOWN_DUMPS)[1:]:
             rho = dump["cone"].rho.ravel()
             p = GPA * dump["cone"].p.ravel()
-            states.plot(rho, p, ".", ms=1.5, zorder=2, label=f"{US * dump.t:.3g} us")
+            states.plot(rho, p, ".", ms=1.5, zorder=2, label=f"{US * dump.t:.3g} µs")
         shocks = [(material.rho0, 0.0)]
         with contextlib.suppress(BadInput):  # beyond its table
             for p in np.linspace(0.0, 1.05 * max(tops), 60)[1:]:
@@ -413,7 +413,7 @@ class Results:
         picture = map_axes.pcolormesh(*(MM * cone.nodes), values, **style)
         map_axes.plot(*(MM * trace_outline(cone.nodes)), "k", lw=0.8)
         map_axes.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
-        map_axes.set_title(f"t = {US * most.t:.3g} us", fontsize="medium")
+        map_axes.set_title(f"t = {US * most.t:.3g} µs", fontsize="medium")
         figure.colorbar(picture, ax=map_axes, shrink=0.7, label="second phase [%]")
 
     def draw_converging_shock(self, figure, run) -> None:
@@ -429,14 +429,14 @@ class Results:
             speed.plot(MM * positions, 1e-3 * np.array(speeds), label=words)
         pressure.set(xlabel="x of the shock [mm]", ylabel="greatest pressure just behind [GPa]")
         speed.set(xlabel="x of the shock [mm]", ylabel="speed [km/s]")
-        path.set(xlabel="t [us]", ylabel="x of the shock [mm]")
+        path.set(xlabel="t [µs]", ylabel="x of the shock [mm]")
 
     def draw_cone_side(self, figure, run) -> None:
         """The line between graphite and lead, and its departure from its own straight line."""
         shape, away = make_panels(figure, 9.5, 4.0, 1, 2)
         for dump in spread_dumps(run, MOST_SHOWN_DUMPS):
             line = dump.block("cone").nodes[:, :, -1]
-            label = f"{US * dump.t:.2g} us"
+            label = f"{US * dump.t:.2g} µs"
             departure, part = measure_departure(line)
             shape.plot(*(MM * line), lw=1.0, label=label)
             away.plot(part, MM * departure, lw=1.0, label=label)

@@ -16,7 +16,13 @@ from problems.interface_instability.theories import (
     is_still,
     predict_amplitude,
 )
-from problems.pictures import draw_field, find_dump, name_axis, spread_dumps
+from problems.pictures import (
+    compute_rates,
+    draw_field,
+    find_dump,
+    name_axis,
+    spread_dumps,
+)
 from problems.problem import Report, Row, fit_slope
 from regrid.measure.corners import compute_centres
 
@@ -229,16 +235,15 @@ def _draw_theory(amplitude, rate, growth, curves: list[_Curve], column, kct: np.
         amplitude.set_ylim(0.0, 1.6 * top)
 
 
-def _draw_rates(problem, axes, kct, t, curves: list[_Curve]) -> None:
+def _draw_rates(problem, axes, t, curves: list[_Curve]) -> None:
     """Computed rates after the shock's passage."""
-    width = max(1, len(kct) // 200)
-    middle = 0.5 * (kct[width:] + kct[:-width])
-    shown = middle > FIRST_DRAWN_KCT
     for n, c in enumerate(curves):
-        speed = (c.values[width:] - c.values[:-width]) / (t[width:] - t[:-width])
+        times, speed = compute_rates(t, c.values)
+        kct = get_kct(problem, times)
+        shown = kct > FIRST_DRAWN_KCT
         rate = speed / (c.number * problem.k * c.first)
         label = f"{c.label} (after shock passage)" if len(curves) <= MOST_NAMED else None
-        axes.plot(middle[shown], rate[shown], color=f"C{n}", label=label)
+        axes.plot(kct[shown], rate[shown], color=f"C{n}", label=label)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
 
 
@@ -305,7 +310,7 @@ class Results:
         if growth is not None:
             _draw_theory(amplitude, rate, growth, curves, column, kct)
         if len(kct) > 3:
-            _draw_rates(self, rate, kct, column["t"], curves)
+            _draw_rates(self, rate, column["t"], curves)
         words = "k c t after the shock's arrival" + ", k of mode 1" * several
         amplitude.set(xlabel=words, ylabel="a / a0")
         rate.set(xlabel=words, ylabel="(da/dt) / (k a0)")

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from problems.pictures import draw_field, make_panels, spread_dumps
+from problems.pictures import compute_rates, draw_field, make_panels, spread_dumps
 from problems.problem import Report, Row
 from problems.references.hugoniot import caution_fit
 from problems.references.shock_polars import compute_jet_speed
@@ -299,7 +299,7 @@ def _make_panels(figure, run) -> list[tuple]:
         figure, 15.0, 4.0 * shape[0], *shape, sharex=True, sharey=True, squeeze=False
     )
     for panel, dump in zip(frames.flat, dumps, strict=False):
-        panel.set_title(f"t = {1e6 * dump.t:.2f} us", fontsize="medium")
+        panel.set_title(f"t = {1e6 * dump.t:.2f} µs", fontsize="medium")
         panel.set_aspect("equal")
     return list(zip(frames.flat, dumps, strict=False))
 
@@ -365,7 +365,7 @@ class Results:
         else:
             notes.append(f"no material faster than {JET_SPEED_RATIO:g} V")
         times = final.times if final is not None else {}
-        known = [f"{PHASES[n]} {1e6 * t:.3f} us" for n, t in times.items() if math.isfinite(t)]
+        known = [f"{PHASES[n]} {1e6 * t:.3f} µs" for n, t in times.items() if math.isfinite(t)]
         notes += ["phases: " + "; ".join(known)] if known else []
         return Report(self.describe, rows, notes)
 
@@ -454,15 +454,16 @@ class Results:
             line = (t - t[rows][0]) * theory + path[rows][0]
             inside = (line > 0.0) & (line < self.deck.face)
             paths.plot(1e6 * t[inside], MM * line[inside], "k--", label="V / sin(angle)")
-            speed = np.gradient(path[rows], t[rows]) / 1e3
-            speeds.plot(MM * path[rows], speed, lw=0.7, alpha=0.5, label="computed, step by step")
+            times, speed = compute_rates(t[rows], path[rows])
+            there = np.interp(times, t[rows], path[rows])
+            speeds.plot(MM * there, speed / 1e3, lw=0.7, alpha=0.5, label="computed")
             ends = np.linspace(path[rows][0], path[rows][-1], 16)
             mean = np.diff(ends) / np.diff(np.interp(ends, path[rows], t[rows])) / 1e3
             middles = 0.5 * MM * (ends[1:] + ends[:-1])
             speeds.plot(middles, mean, "o-", ms=3, label="mean over a fifteenth of the path")
             speeds.axhline(theory / 1e3, color="k", ls="--", label="theory")
             speeds.set_ylim(0.8 * speed.min(), 1.1 * np.percentile(speed, 98.0))
-        paths.set(xlabel="t [us]", ylabel="path of A along the face [mm]")
+        paths.set(xlabel="t [µs]", ylabel="path of A along the face [mm]")
         speeds.set(xlabel="path of A along the face [mm]", ylabel="speed of A [km/s]")
 
     def draw_configuration(self, figure, run) -> None:

@@ -62,13 +62,16 @@ class FlyerTargetDeck(Deck, kw_only=True):
 
 class FlyerTarget(Problem):
     Deck = FlyerTargetDeck
-    units: ClassVar = {
+    units: ClassVar[dict[str, str]] = {
         **dict.fromkeys(("free_surface_speed", "window_speed"), "m/s"),
         **dict.fromkeys(("contact_pressure", "window_pressure"), "Pa"),
     }
 
     def __init__(self, deck: FlyerTargetDeck):
         super().__init__(deck)
+        self.units = type(self).units | {
+            f"speed_plate-{number}": "m/s" for number in range(1, len(deck.plates) + 1)
+        }
         first, second, *more = deck.plates
         first.refuse(first.gap, "gap", "nothing is before the first plate, whose gap must be 0")
         words = "nothing is before the first plate; give it to the next one"

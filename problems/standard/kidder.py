@@ -115,7 +115,11 @@ class Kidder(RadialProblem):
             dump = min(dumps, key=lambda dump: abs(shrink(dump.t) - h))
             draw_field(left, dump, "rho", low=0.0, high=high, every=4, bar=bar)
             words = f"t = {dump.t / self.shell.tau:.3g} tau"
-            left.text(0.02, 1.01 * RADII[1] * shrink(dump.t), words)
+            outer = 1.01 * RADII[1] * shrink(dump.t)
+            if self.deck.n == 1:
+                left.text(outer, 0.5, words, rotation=90, va="center", fontsize="small")
+            else:
+                left.text(0.02, outer, words)
         times, h = np.array([(dump.t / self.shell.tau, shrink(dump.t)) for dump in dumps]).T
         for edge, words, exact in ((-1, "outer", None), (0, "inner", "exact")):
             radius = [self.compute_radii(d["shell"].nodes[:, edge, :]).mean() for d in dumps]

@@ -189,7 +189,7 @@ def compare(source, cells, picture, force, **words) -> None:
     of several of these with commas between.  Figures are the worst of all steps
     survived, for a file those of the last grid: gap is the first line's distance
     from a deforming side (in a file: any side) over that of the quasi-1D grid,
-    us/node the median step.
+    µs/node the median step.
     """
     from runs.grids.commands import compare_families, parse_cells
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from problems.pictures import name_axis
+from problems.prefixes import pick_prefix
 from regrid.errors import Place
 from regrid.sides import get_side
 from runs.early_end.place import find_marked
 from runs.pictures import fields
 from runs.pictures.command import default_fields, new_figure, save
 from runs.pictures.curves import draw_panel
-from runs.quantities import pick_prefix
 from runs.store.reader import RunData
 
 CELLS_AROUND_MARK = 5  # cells on each side of the marked one in the picture
@@ -58,7 +58,8 @@ def draw_early_end(run: RunData, title: str, place: Place | None, point: int | N
     for axes, box, title in ((near, window, words), (whole, extent, "the whole domain")):
         look = fields.choose_colours(dump, name, [fields.find_range(sheets, name, box)])
         fields.draw_blocks(axes, sheets, name, look, scale, box)
-        figure.colorbar(ScalarMappable(*look[:2]), ax=axes, label=look[3], shrink=0.9)
+        bar = {"label": look.label, "extend": look.extend, "shrink": 0.9}
+        figure.colorbar(ScalarMappable(look.norm, look.map), ax=axes, **bar)
         axes.set_title(title, fontsize=10, color=MARK if axes is near else "k")
         axes.set(**{f"{a}label": name_axis(n, unit) for a, n in zip("xy", dump.axes, strict=True)})
         ring = {"markersize": 16, "markeredgewidth": 1.8, "fillstyle": "none", "zorder": 6}

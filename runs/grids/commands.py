@@ -210,7 +210,7 @@ def _draw(made: Grid, title: str, path: Path) -> Path:
 
 HEAD = (
     f"{'family':34s} {'steps':>12s} {'gap':>7s} {'min. sine':>10s} {'aspect':>8s}"
-    f" {'us/node':>8s} {'sub-moves':>9s} {'folded':>7s}"
+    f" {'µs/node':>8s} {'sub-moves':>9s} {'folded':>7s}"
 )
 REASON_CHARACTERS = 110  # characters of a reason that are shown
 Compared = tuple[March, str, np.ndarray]  # what came of a family, its steps, the sides drawn

@@ -278,7 +278,7 @@ def make_on_domain(name: str, family: str, regridder, cells: Cells, steps: int, 
         if found.folded is not None:
             return Grid(found.folded, [], failure)
         return Grid(found.nodes, [], failure, domain.boundary(s))
-    note = f"marched in {steps} steps, {found.cost:.2f} us per node and step"
+    note = f"marched in {steps} steps, {found.cost:.2f} µs per node and step"
     if found.sub_moves or found.rescues:
         note += f", {found.sub_moves} sub-moves, {found.rescues} untangling events"
     return Grid(found.nodes, [note])
@@ -449,7 +449,7 @@ def make_moving(
         words = f"{block.name}, family {family}: no grid at step {found.done + 1} of {steps}"
         return Grid(found.nodes, [], f"{words}; {found.failure}")
     note = (
-        f"marched in {steps} steps, {found.cost:.2f} us per node and step, {found.iterations} "
+        f"marched in {steps} steps, {found.cost:.2f} µs per node and step, {found.iterations} "
         f"iterations, {found.sub_moves} sub-moves, {found.rescues} untangling events"
     )
     creased = int((~(hexahedra.compute_least_jacobian(found.nodes) > 0.0)).sum())

@@ -26,6 +26,7 @@ from regrid.errors import BadInput, suggest
 from regrid.text_files import escape_controls
 from runs.pictures import curves
 from runs.pictures.fields import View, draw_fields, time_titles
+from runs.pictures.finishing import finish_figure
 from runs.quantities import add_unit, is_time
 from runs.store.files import check_folder, check_free, disk_errors
 from runs.store.provenance import describe_software, hash_deck
@@ -190,6 +191,7 @@ def fill_figure(
         if (value := given.get(f"--{name}")) is not None:
             shown.append(name if value is True else f"{name}-{value}")
     shown += [f"beside-{Path(beside).name}"] if beside else []
+    finish_figure(figure)
     return "-".join(re.sub(r"[^\w.+-]+", "_", word) for word in shown), write_table
 
 
@@ -227,6 +229,7 @@ def save(figure: Figure, path: Path, dpi: int, deck_text: str | None = None) -> 
     if ending not in figure.canvas.get_supported_filetypes():
         raise BadInput(f"{path}: a picture's name has to end in .png, .pdf or .svg")
     check_folder(path)
+    finish_figure(figure)
     clean_words(figure)
     maker, content = NAMES.get(ending, (None, None))
     metadata = {maker: describe_software()} if maker else {}

@@ -20,11 +20,13 @@ from matplotlib.colors import Normalize
 
 from problems.deck import place_gauges
 from problems.pictures import name_axis
+from problems.prefixes import pick_prefix
 from regrid.errors import BadInput
 from runs.inspection.account import compute_drifts
 from runs.pictures import fields
 from runs.pictures.fields import View
-from runs.quantities import is_time, pick_prefix
+from runs.pictures.finishing import FLAT_MARGIN, ROUND_OFF
+from runs.quantities import is_time
 from runs.store.dumps import LONG_NAMES
 from runs.store.files import check_free, make_csv, write_atomically
 from runs.store.reader import Dump, RunData
@@ -301,7 +303,7 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
     panels = [[name] for name in names]
     constant = []
     if not names:
-        panels, constant = choose_panels(history, units)
+        panels, constant = choose_panels(history, units, find_sizes(run))
     number = len(panels)
     columns = min(min((4, 3, 5), key=lambda n: -number % n), number)  # the fewest empty panels
     size = max(HISTORY_WIDTH / max(columns, 3), 6.0 / columns), HISTORY_HEIGHT
@@ -315,13 +317,31 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
     figure.supxlabel(label, fontsize=9)
 
 
+def find_sizes(run: RunData) -> dict[str, float]:
+    """Sizes of the flow by unit: the domain [m], the largest speed [m/s] and pressure [Pa]."""
+    dumps = run.dumps[:1] + run.dumps[-1:]
+    blocks = [block for dump in dumps for block in dump.blocks]
+    pressures = [block.cell_fields["p"] for block in blocks if "p" in block.cell_fields]
+    return {
+        "m": max((float(np.ptp(block.nodes, axis=(1, 2)).max()) for block in blocks), default=0.0),
+        "m/s": fields.find_size(dumps, "u"),
+        "Pa": max((float(np.nanmax(np.abs(p))) for p in pressures), default=0.0),
+    }
+
+
 def choose_panels(
-    history: Mapping[str, np.ndarray], units: Mapping[str, str]
+    history: Mapping[str, np.ndarray], units: Mapping[str, str], sizes: Mapping[str, float]
 ) -> tuple[list[Panel], list[str]]:
     """Panels in order, and the constant columns, which need none.
 
-    Measured columns with the same first word, unit and size share a panel.
+    Measured columns with the same first word, unit and size share a panel.  A column whose values
+    are round-off of the flow's `sizes` (by unit) counts as constant.
     """
+
+    def is_constant(name: str) -> bool:
+        size = sizes.get(units.get(name, "1"), 0.0)
+        return _is_flat(history[name]) or np.nanmax(np.abs(history[name])) <= ROUND_OFF * size
+
     known = [
         name
         for name, values in history.items()
@@ -330,7 +350,7 @@ def choose_panels(
         and values.dtype.kind in "fi"
         and np.isfinite(values).sum() > 1
     ]
-    constant = [name for name in known if _is_flat(history[name])]
+    constant = [name for name in known if is_constant(name)]
     moving = [name for name in known if name not in constant]
     grid = [name for name in moving if name in GRID or name.startswith(("regrid_", "grid_"))]
     panels = [] if moving and _is_flat(history["dt"]) else [["dt"]]
@@ -442,6 +462,7 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
     shown = [name for name in shown if any(name in point.fields for point in chosen)]
     factor, unit = fields.scale_times(run.dumps, table["t"][-1])
     in_units = not run.dumps or run.dumps[-1].t_unit != "1"
+    speed = fields.find_size(run.dumps[:1] + run.dumps[-1:], "u")
     colours = colormaps["turbo"](np.linspace(0.05, 0.95, len(chosen)))
     columns = min(LEGEND_COLUMNS, len(shown))
     size = max(GAUGES_WIDTH, 7.0 / columns), GAUGES_HEIGHT
@@ -451,7 +472,11 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
         writers = [(k, p) for k, p in enumerate(chosen) if field in p.fields]
         values = [np.asarray(table[f"{p.name}_{field}"], dtype=float) for _, p in writers]
         largest = max(np.abs(v[np.isfinite(v)]).max(initial=0.0) for v in values)
-        scale, field_unit = pick_prefix(float(largest), UNITS[field] if in_units else "1")
+        is_round_off = largest <= ROUND_OFF * speed and field in fields.VELOCITIES
+        size = speed if is_round_off else float(largest)
+        scale, field_unit = pick_prefix(size, UNITS[field] if in_units else "1")
+        if is_round_off:
+            axes.set_ylim(-FLAT_MARGIN * size * scale, FLAT_MARGIN * size * scale)
         for (k, point), curve in zip(writers, values, strict=True):
             style = "--" if point.moves else "-"
             words = point.name + " (outside of all blocks)" * (not np.isfinite(curve).any())

@@ -17,10 +17,12 @@ from matplotlib.colors import LogNorm, Normalize, PowerNorm
 
 from problems.evolution import get_material
 from problems.pictures import name_axis
+from problems.prefixes import pick_prefix
 from regrid.errors import BadInput, suggest
 from regrid.measure.corners import compute_centres
 from regrid.sides import SIDE_NAMES, get_side
-from runs.quantities import is_time, pick_prefix
+from runs.pictures.finishing import FLAT_MARGIN, ROUND_OFF, find_usual_range
+from runs.quantities import is_time
 from runs.store.reader import BlockData, Dump
 
 CHORD_GAP_EDGES = 0.05  # of an edge: above the gap between different chords of one curve
@@ -158,13 +160,28 @@ def list_fields(dump: Dump) -> list[str]:
 # inches: of every picture, wished for
 PICTURE_WIDTH_INCHES = 12.0
 PAGE_HEIGHT_INCHES = 6.5
-# at most, at most of one panel
+# at most, at most of one row of panels
 TALLEST_PICTURE_INCHES = 16.0
-TALLEST_ALONE = 8.0
+TALLEST_ROW_INCHES = 8.0
 # in a domain longer than this, in its heights, the panels follow the interface
 LONG_DOMAIN_HEIGHTS = 4.0
 SHOWN_AROUND_INTERFACE = 0.6  # of the interface's size: what is shown on each side of it
+# of the size of the domain: an interface that reaches less along a long domain is a plane one of a
+# flow in one dimension, which is shown as a whole
+FLAT_INTERFACE = 1e-6
+# one panel shows the bodies at its time where all times together are mostly blank
+MOST_BLANK_RATIO = 2.5
+# height over width of what is drawn to scale; beyond it panels have a shape of their own
+LOWEST_TO_SCALE = 1.0 / 20.0
+HIGHEST_TO_SCALE = 6.0
+LOW_PANEL_RATIO = 1.0 / 6.0
+HIGH_PANEL_RATIO = 3.0
 FIELD_LOG_DECADES = 1.7
+# cells, as a part of all, that do not stretch the scale of colours where the others differ by less
+# than this part of the whole range
+EXTREME_CELLS_PART = 0.002
+EXTREMES_RATIO = 4.0
+FEWEST_CELLS_WITH_EXTREMES = 50
 VELOCITIES = "u", "v", "u_node", "v_node"
 FLIPPED = {  # what changes sign in the mirror
     "x": ("u", "u_node", "vorticity"),
@@ -243,24 +260,46 @@ def draw_fields(
     out what is far from the interface.
     """
     moments = [make_sheets(dump, names, view) for dump in dumps]
-    boxes, following = choose_boxes([measure_extent(sheets) for sheets in moments], view)
+    extents = [measure_extent(sheets) for sheets in moments]
+    boxes, apart = choose_boxes(extents, view)
+    if view.zoom is None:
+        boxes, apart = follow_bodies(boxes, extents) if not apart else (boxes, apart)
+        boxes = crop_boxes(boxes, moments) if apart else boxes
     scale, unit = pick_prefix(np.abs(boxes).max(), dumps[0].length_unit)
     lengths = [name_axis(name, unit) for name in dumps[0].axes]
-    panels = make_panels(figure, boxes[0], max(len(names), 1), len(dumps), lengths, following)
-    titles = titles or time_titles(dumps)
+    panels = make_panels(figure, boxes[0], max(len(names), 1), len(dumps), lengths, apart)
+    titles = list(titles or time_titles(dumps))
+    if is_slender(boxes[0]):
+        titles[0] += ", axes not to one scale"
     for k, name in enumerate(names or ("",)):
         pairs = zip(moments, boxes, strict=True)
         ranges = [find_range(sheets, name, box) for sheets, box in pairs] if name else []
-        look = choose_colours(dumps[0], name, ranges, view) if name else None
+        look = (
+            choose_colours(dumps[0], name, ranges, view, find_size(dumps, name)) if name else None
+        )
         for axes, sheets, box, title in zip(panels[k], moments, boxes, titles, strict=True):
             draw_blocks(axes, sheets, name, look, scale, box, view.mesh)
             if name and get_style(dumps[0], name).marked:
                 mark_largest(axes, sheets, name, scale, box)
             axes.set_title(title, fontsize=10)
         if look:
-            bar = ScalarMappable(*look[:2])
-            figure.colorbar(bar, ax=panels[k], label=look[3], shrink=0.9, pad=0.015)
-    return following
+            bar = ScalarMappable(look.norm, look.map)
+            words = {"label": look.label, "extend": look.extend}
+            figure.colorbar(bar, ax=panels[k], shrink=0.9, pad=0.015, **words)
+    pairs = zip(boxes, extents, strict=True)
+    return view.zoom is None and not all(_is_inside(extent, box) for box, (extent, _) in pairs)
+
+
+def _is_inside(extent: Box, box: Box) -> bool:
+    slack = 1e-9 * max(box[1] - box[0], box[3] - box[2])
+    low = extent[0] >= box[0] - slack and extent[2] >= box[2] - slack
+    return low and extent[1] <= box[1] + slack and extent[3] <= box[3] + slack
+
+
+def is_slender(box: Box) -> bool:
+    """Whether a box is so long and thin that it cannot be drawn to scale."""
+    ratio = (box[3] - box[2]) / (box[1] - box[0])
+    return not LOWEST_TO_SCALE <= ratio <= HIGHEST_TO_SCALE
 
 
 def draw_blocks(
@@ -268,14 +307,13 @@ def draw_blocks(
 ) -> None:
     """A field (or "": the grids in the blocks' colours) with the lines about it, over the box.
 
-    look: (norm, colour map, factor, label); mesh: draw the grid over what was computed.
+    look: the field's `Colours`; mesh: draw the grid over what was computed.
     """
     for sheet in sheets:
         if name in sheet.fields:
-            norm, colours, factor, _ = look
             nodes = sheet.nodes * scale
-            values = sheet.fields[name] * factor
-            axes.pcolormesh(*nodes, values, norm=norm, cmap=colours, rasterized=True)
+            values = sheet.fields[name] * look.factor
+            axes.pcolormesh(*nodes, values, norm=look.norm, cmap=look.map, rasterized=True)
     names = list(dict.fromkeys(sheet.name.removesuffix(" mirrored") for sheet in sheets))
     for sheet in sheets:
         if name and (not mesh or sheet.name.endswith(" mirrored")):
@@ -285,7 +323,7 @@ def draw_blocks(
     interfaces, outer = trace_outline(sheets)
     axes.add_collection(LineCollection([line.T * scale for line in outer], **OUTLINE))
     axes.add_collection(LineCollection([line.T * scale for _, line in interfaces], **INTERFACE))
-    axes.set_aspect("equal")
+    axes.set_aspect("auto" if is_slender(box) else "equal")
     axes.set_xlim(box[0] * scale, box[1] * scale)
     axes.set_ylim(box[2] * scale, box[3] * scale)
 
@@ -312,9 +350,10 @@ def draw_grid_lines(axes, nodes: np.ndarray, colour: str, alpha: float = 1.0) ->
 
 
 Box = tuple[float, float, float, float]  # x0, x1, y0, y1 [m]
+Extent = tuple[Box, Box | None]  # of all sheets; of the interfaces in them
 
 
-def measure_extent(sheets: Sequence[Sheet], follow: bool = True) -> tuple[Box, Box | None]:
+def measure_extent(sheets: Sequence[Sheet], follow: bool = True) -> Extent:
     """Extents of all sheets and of the interfaces in them; None if there are none, or not wanted
     (`follow`)."""
     every = np.concatenate([sheet.nodes.reshape(2, -1) for sheet in sheets], axis=1)
@@ -340,7 +379,7 @@ def _join_boxes(boxes: Sequence[Box]) -> Box:
 
 
 def choose_boxes(
-    extents: Sequence[tuple[Box, Box | None]], view: View, follow: bool = False
+    extents: Sequence[Extent], view: View, follow: bool = False
 ) -> tuple[list[Box], bool]:
     """(What is shown at each time, of one size; does it go with the interface?), from what
     `measure_extent` found at each.
@@ -354,7 +393,9 @@ def choose_boxes(
     low, high = np.array(whole[::2]), np.array(whole[1::2])
     size = high - low
     spans = [np.reshape(span, (2, 2)) for _, span in extents if span]
-    long = size.max() > LONG_DOMAIN_HEIGHTS * size.min()
+    along = int(size.argmax())
+    bent = any(np.ptp(span[along]) > FLAT_INTERFACE * size.min() for span in spans)
+    long = size.max() > LONG_DOMAIN_HEIGHTS * size.min() and bent
     if len(spans) < len(extents) or not (follow or long):
         return [whole] * len(extents), False
     widest = np.max([np.ptp(span, axis=1) for span in spans], axis=0)
@@ -367,6 +408,47 @@ def choose_boxes(
         for x, y in map(np.ndarray.tolist, starts)
     ]
     return boxes, bool(np.any(wanted < size))
+
+
+def follow_bodies(boxes: list[Box], extents: Sequence[Extent]) -> tuple[list[Box], bool]:
+    """Boxes of one size about all bodies at each time, and True, if `boxes` are mostly blank."""
+    own = np.array([extent for extent, _ in extents])
+    width = float(np.max(own[:, 1] - own[:, 0]))
+    height = float(np.max(own[:, 3] - own[:, 2]))
+    x0, x1, y0, y1 = boxes[0]
+    if (x1 - x0) * (y1 - y0) <= MOST_BLANK_RATIO * width * height:
+        return boxes, False
+    middles = 0.5 * np.stack([own[:, 0] + own[:, 1], own[:, 2] + own[:, 3]], axis=1)
+    return [
+        (x - 0.5 * width, x + 0.5 * width, y - 0.5 * height, y + 0.5 * height)
+        for x, y in middles.tolist()
+    ], True
+
+
+def crop_boxes(boxes: Sequence[Box], moments: Sequence[Sequence[Sheet]]) -> list[Box]:
+    """The boxes without what is blank at their edges, still all of one size."""
+    filled = []
+    for box, sheets in zip(boxes, moments, strict=True):
+        low = np.array(box[::2])
+        high = np.array(box[1::2])
+        ends = []
+        for sheet in sheets:
+            nodes = sheet.nodes
+            pairs = nodes[:, :-1], nodes[:, 1:]
+            corners = np.stack([part for one in pairs for part in (one[:, :, :-1], one[:, :, 1:])])
+            first = corners.min(axis=0).reshape(2, -1).T
+            last = corners.max(axis=0).reshape(2, -1).T
+            shown = np.all((last > low) & (first < high), axis=1)
+            ends += [np.maximum(first[shown], low), np.minimum(last[shown], high)]
+        points = np.concatenate(ends)
+        filled.append((points.min(axis=0), points.max(axis=0)) if points.size else (low, high))
+    size = np.max([last - first for first, last in filled], axis=0)
+    cropped = []
+    for box, (first, last) in zip(boxes, filled, strict=True):
+        room = np.array(box[1::2]) - size
+        x, y = np.clip(0.5 * (first + last - size), box[::2], np.maximum(room, box[::2])).tolist()
+        cropped.append((x, x + float(size[0]), y, y + float(size[1])))
+    return cropped
 
 
 def check_zoom(zoom, whole) -> None:
@@ -400,6 +482,8 @@ def make_panels(
 ) -> list[list]:
     """Axes `[field][time]`, labelled with `lengths` at the edges; a single field fills the page."""
     ratio = (box[3] - box[2]) / (box[1] - box[0])
+    if is_slender(box):
+        ratio = HIGH_PANEL_RATIO if ratio > 1.0 else LOW_PANEL_RATIO
     words = 0.75 if apart else 0.45  # above and below a panel
 
     def measure_height(columns: int, rows: int) -> float:
@@ -413,7 +497,8 @@ def make_panels(
             pages, key=lambda page: abs(np.log(measure_height(*page) / PAGE_HEIGHT_INCHES))
         )
     height = measure_height(columns, rows)
-    shrink = min(1.0, (TALLEST_PICTURE_INCHES if fields * times > 1 else TALLEST_ALONE) / height)
+    tallest = TALLEST_PICTURE_INCHES if rows > 1 else TALLEST_ROW_INCHES
+    shrink = min(1.0, tallest / height)
     size = max(PICTURE_WIDTH_INCHES * shrink, 5.0) / columns, max(height * shrink, 2.2) / rows
     grid = np.reshape(lay_out(figure, fields * times, columns, size), (rows, columns))
     for axes in grid.flat:
@@ -429,8 +514,17 @@ def make_panels(
     return (grid if across else grid.T).tolist()
 
 
-def find_range(sheets: Sequence[Sheet], name: str, box) -> tuple[float, float]:
-    """Least and largest visible value of a field; (inf, -inf) if none is finite."""
+class ValueRange(NamedTuple):
+    """Least and largest visible value of a field; the same without a few extreme cells."""
+
+    low: float
+    high: float
+    usual_low: float
+    usual_high: float
+
+
+def find_range(sheets: Sequence[Sheet], name: str, box) -> ValueRange:
+    """The range of a field's visible values; (inf, -inf, inf, -inf) if none is finite."""
     values = np.empty(0)
     for sheet in sheets:
         if name in sheet.fields:
@@ -438,19 +532,52 @@ def find_range(sheets: Sequence[Sheet], name: str, box) -> tuple[float, float]:
             inside = (x >= box[0]) & (x <= box[1]) & (y >= box[2]) & (y <= box[3])
             values = np.append(values, sheet.fields[name][inside])
     values = values[np.isfinite(values)]
-    return float(values.min(initial=np.inf)), float(values.max(initial=-np.inf))
+    ends = float(values.min(initial=np.inf)), float(values.max(initial=-np.inf))
+    usual = ends
+    if values.size >= FEWEST_CELLS_WITH_EXTREMES:
+        usual = find_usual_range(values, EXTREME_CELLS_PART)
+    return ValueRange(*ends, *usual)
+
+
+def find_size(dumps: Sequence[Dump], name: str) -> float:
+    """For a velocity the largest speed of flow or sound [m/s], about; else 0.
+
+    A component that is smaller than this by many orders of magnitude is round-off.
+    """
+    if name not in VELOCITIES:
+        return 0.0
+    sizes = [0.0]
+    for dump in dumps:
+        for block in dump.blocks:
+            known = block.cell_fields
+            sizes += [float(np.nanmax(np.abs(known[one]))) for one in ("u", "v") if one in known]
+            if "p" in known and "rho" in known:
+                p, rho = (float(np.nanmax(np.abs(known[one]))) for one in ("p", "rho"))
+                sizes.append(float(np.sqrt(p / rho)) if rho > 0.0 else 0.0)
+    return max(sizes)
+
+
+class Colours(NamedTuple):
+    """How the values of a field become colours: of values times `factor`; label of the bar."""
+
+    norm: Normalize
+    map: str
+    factor: float
+    label: str
+    extend: str  # the ends of the bar that values exceed
 
 
 def choose_colours(
-    dump: Dump, name: str, ranges: Sequence[tuple[float, float]], view: View = PLAIN
-):
-    """Norm, colour map, factor and label for a field with values in these ranges, SI units."""
+    dump: Dump, name: str, ranges: Sequence[ValueRange], view: View = PLAIN, size: float = 0.0
+) -> Colours:
+    """Colours for a field with values in these ranges, SI units; size: see `find_size`."""
     if view.limits:
-        ranges = [view.limits]
-    low, high = min(one[0] for one in ranges), max(one[1] for one in ranges)
-    if low > high:
-        low, high = 0.0, 1.0
+        ranges = [ValueRange(*view.limits, *view.limits)]
     style = get_style(dump, name)
+    low, high, extend = choose_limits(ranges, cut=not style.marked)
+    is_round_off = max(abs(low), abs(high)) <= ROUND_OFF * size
+    if is_round_off and not view.limits:
+        low, high = -FLAT_MARGIN * size, FLAT_MARGIN * size
     factor, unit = pick_prefix(max(abs(low), abs(high)), style.unit)
     both_signs = low < 0 < high and min(-low, high) > 0.05 * max(-low, high)
     colours = style.colours or ("RdBu_r" if both_signs else "viridis")
@@ -465,10 +592,37 @@ def choose_colours(
         norm = Normalize(-reach, reach)
     elif low > 0 and not velocity and np.log10(high / low) > FIELD_LOG_DECADES:
         norm = LogNorm(low * factor, high * factor)
-    elif low == high:
+    elif high - low <= ROUND_OFF * max(abs(low), abs(high)):
         margin = 0.5 * factor * (abs(low) or 1.0)
         norm = Normalize(low * factor - margin, high * factor + margin)
-    return norm, view.colours or colours, factor, name_axis(style.words, unit)
+    label = name_axis(style.words, unit)
+    return Colours(norm, view.colours or colours, factor, label, extend)
+
+
+def choose_limits(ranges: Sequence[ValueRange], cut: bool) -> tuple[float, float, str]:
+    """Ends of a colour scale, and which of them values exceed ("neither", "min", "max", "both").
+
+    cut: a few cells far beyond all others do not stretch the scale.
+    """
+    low, high = min(one.low for one in ranges), max(one.high for one in ranges)
+    if low > high:
+        return 0.0, 1.0, "neither"
+    usual_low = min(one.usual_low for one in ranges)
+    usual_high = max(one.usual_high for one in ranges)
+    spread = usual_high - usual_low
+    if not cut or spread <= ROUND_OFF * max(abs(usual_low), abs(usual_high)):
+        return low, high, "neither"
+    if usual_low > 0.0 and low > 0.0 and usual_high / usual_low > 10.0**FIELD_LOG_DECADES:
+        ratio = np.log(high / low) / np.log(usual_high / usual_low)  # on a logarithmic scale
+        is_stretched = ratio > EXTREMES_RATIO
+    else:
+        is_stretched = high - low > EXTREMES_RATIO * spread
+    if not is_stretched:
+        return low, high, "neither"
+    below = low < usual_low - spread
+    above = high > usual_high + spread
+    extend = {(1, 1): "both", (1, 0): "min", (0, 1): "max"}.get((below, above), "neither")
+    return usual_low if below else low, usual_high if above else high, extend
 
 
 def time_titles(dumps: Sequence[Dump]) -> list[str]:

@@ -19,11 +19,11 @@ from matplotlib.cm import ScalarMappable
 from tqdm import tqdm
 
 from problems.pictures import name_axis
+from problems.prefixes import pick_prefix
 from regrid.errors import BadInput
 from runs.pictures import command, fields
 from runs.pictures.command import Numbers
 from runs.pictures.fields import View
-from runs.quantities import pick_prefix
 from runs.store.files import check_folder, disk_errors
 from runs.store.provenance import describe_software, hash_deck
 from runs.store.reader import Dump, RunData
@@ -137,13 +137,15 @@ def make_frames(
     first = Dump(paths[0])
     axes = figure.subplots()
     box = boxes[0]
-    look = fields.choose_colours(first, name, ranges, view)
+    last = Dump(paths[-1])
+    look = fields.choose_colours(first, name, ranges, view, fields.find_size([first, last], name))
     scale, unit = pick_prefix(float(np.abs(boxes).max()), first.length_unit)
     labels = [name_axis(axis, unit) for axis in first.axes]
     place = {"shrink": 0.9, "pad": 0.015}
     if box[3] - box[2] < SLENDER_WINDOW_RATIO * (box[1] - box[0]):  # no room for labels at the side
         place = {"location": "bottom", "aspect": 50}
-    figure.colorbar(ScalarMappable(*look[:2]), ax=axes, label=look[3], **place)
+    words = {"label": look.label, "extend": look.extend}
+    figure.colorbar(ScalarMappable(look.norm, look.map), ax=axes, **words, **place)
 
     def draw(number: int) -> None:
         axes.clear()

@@ -340,6 +340,9 @@ class Dump(Snapshot):
         return read_state(self.path)
 
 
+UNITS_OF_CONTACTS = {"contact_length": "m", "void_area": "m2"}  # columns of any problem
+
+
 class RunData:
     """Lazy access to a run directory: `.deck`, `.history`, `.dumps`, `.problem`.
 
@@ -403,7 +406,8 @@ class RunData:
         seconds = (name for name in self.history if name.startswith("seconds_"))
         units = dict.fromkeys(("t", "dt", *seconds), "s")
         try:
-            return units | self.problem.find_units()
+            own = self.problem.find_units()
+            return units | (UNITS_OF_CONTACTS if own["t"] != "1" else {}) | own
         except BadInput:  # a deck of another version can still be drawn
             return units
 

@@ -153,7 +153,7 @@ def test_a_grid_over_a_field_leaves_the_mirror_image_free(name, halves, monkeypa
     monkeypatch.setattr(fields, "draw_grid_lines", lambda _, nodes, *words: drawn.append(nodes))
     sheet = fields.Sheet(block.nodes, "gas", "gas", block.cell_fields)
     image = fields.Sheet(block.nodes * [[[1]], [[-1]]], "gas", "gas mirrored", sheet.fields)
-    look = Normalize(0, 1), "viridis", 1.0, "density"
+    look = fields.Colours(Normalize(0, 1), "viridis", 1.0, "density", "neither")
     fields.draw_blocks(Figure().add_subplot(), [sheet, image], name, look, 1.0, (0, 1, 0, 1))
     assert len(drawn) == halves and (drawn[0][1] > -0.1).all()
 

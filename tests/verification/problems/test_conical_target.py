@@ -89,7 +89,7 @@ def test_five_microseconds():
     assert 0.5e-6 < begin < 1.2e-6 and growth > 0.0
     assert history["line_amplitude"][-1] > 0.1e-3 > 1e6 * history["line_amplitude"][0]
     text = problem.summary(history, simulation)
-    assert "impact face" in text and "mean from 0.27 to 0.52 us" in text and "26.98" in text
+    assert "impact face" in text and "mean from 0.27 to 0.52 µs" in text and "26.98" in text
     top, _, x, y = find_peak(history, "target")
     assert 40e9 < top < 60e9 and 13e-3 < x < 20e-3 and 8e-3 < y < 12e-3, "the focus in the lead"
     assert "greatest pressure in the target, Pb" in text

@@ -23,7 +23,7 @@ from msgspec import Meta
 
 from hydro.block import Block
 from hydro.boundary import put
-from hydro.eos.materials import Material, find_material, make_material
+from hydro.eos.materials import Material, find_material, find_name, make_material
 from hydro.links import join, slide
 from hydro.simulation import Simulation
 from hydro.sources import make_gravity
@@ -401,8 +401,8 @@ class Blocks(Problem):
         rho = material.rho0 if table.rho is None else table.rho
         given = {"rho": rho, "u": table.u, "v": table.v, "p": table.p}.items()
         state = [evaluate(text, places, f"{where}, {name}") for name, text in given]
-        label = table.material if isinstance(table.material, str) else table.name
-        options = {"material": label.rpartition(":")[2], "limiter": self.deck.limiter}
+        label = find_name(table.material) if isinstance(table.material, str) else table.name
+        options = {"material": label, "limiter": self.deck.limiter}
         block = Block(table.name, material.eos, nodes, *state, **options)
         for side in table.side:
             if side.kind in LINKED.values():

@@ -22,11 +22,15 @@ LIBRARY = Path(__file__).with_name("materials.toml")
 
 @dataclass(frozen=True)
 class Material:
-    """A material's equation of state, its density at rest in kg/m³, and where they come from."""
+    """A material's equation of state, its density at rest in kg/m³, and where they come from.
+
+    names: other names by which it is found.
+    """
 
     eos: EquationOfState
     rho0: float
     source: str
+    names: tuple[str, ...] = ()
 
 
 def _hint(name: str, known) -> str:
@@ -47,6 +51,7 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
     numbers = dict(table)
     eos_class = EQUATIONS_OF_STATE[numbers.pop("eos")]
     source = numbers.pop("source")
+    names = tuple(numbers.pop("names", ()))
     rho0 = numbers["rho0"]
     if "rho0" not in _list_parameters(eos_class):
         del numbers["rho0"]
@@ -56,7 +61,7 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
         eos = eos_class(**numbers)
     except BadInput as error:
         raise BadInput(f"{where}: {error}") from None
-    return Material(eos, float(rho0), source)
+    return Material(eos, float(rho0), source, names)
 
 
 def _list_parameters(eos_class: type[EquationOfState]) -> dict[str, str]:
@@ -82,6 +87,10 @@ def _find_mistakes(table: dict) -> Iterator[str]:
     wanted = _list_parameters(eos_class)
     for key, value in table.items():
         if key in ("eos", "source"):
+            continue
+        if key == "names":
+            if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
+                yield f"names is {value!r}; it must be a list of names"
             continue
         if key not in wanted and key != "rho0":
             hint = _hint(key, wanted)
@@ -119,23 +128,47 @@ def read_materials(path: Path) -> dict[str, Material]:
     return {name: _read_material(path, name) for name in _read_tables(path)}
 
 
+def _list_names(tables: dict[str, dict]) -> dict[str, str]:
+    """All names in small letters, and the material of each; a name of two materials is left out."""
+    found: dict[str, set[str]] = {}
+    for name, table in tables.items():
+        others = table.get("names", ()) if isinstance(table, dict) else ()
+        for one in (name, *filter(lambda other: isinstance(other, str), others)):
+            found.setdefault(one.lower(), set()).add(name)
+    return {one: materials.pop() for one, materials in found.items() if len(materials) == 1}
+
+
 def forget_read_files() -> None:
     """Read material files again at their next use: they may have been rewritten."""
     _read_tables.cache_clear()
     _read_material.cache_clear()
 
 
-def find_material(name: str) -> Material:
-    """Material `name` of the library, or "FILE.toml:NAME"; BadInput with the nearest name.
-
-    Of a user's file only the material asked for is looked at: a mistake elsewhere is no matter.
-    """
+def _find_table(name: str) -> tuple[Path, str]:
+    """File of material `name` and its name there; BadInput with the nearest name."""
     file, colon, own = name.rpartition(":")
     path, own = (Path(file), own) if colon and file.endswith(".toml") else (LIBRARY, name)
     tables = _read_tables(path)
-    if own not in tables:
-        raise BadInput(
-            f"there is no material {name!r}{_hint(own, tables)} (known: "
-            f"{', '.join(tables)}; or FILE.toml:NAME for one of your own)"
-        )
-    return _read_material(path, own)
+    if own in tables:
+        return path, own
+    names = _list_names(tables)
+    if own.lower() in names:
+        return path, names[own.lower()]
+    raise BadInput(
+        f"there is no material {name!r}{_hint(own, [*tables, *names])} (known: "
+        f"{', '.join(tables)}; or FILE.toml:NAME for one of your own)"
+    )
+
+
+def find_name(name: str) -> str:
+    """The name under which the library, or FILE.toml, lists a material: "Cu" of "copper"."""
+    return _find_table(name)[1]
+
+
+def find_material(name: str) -> Material:
+    """Material `name` of the library, or "FILE.toml:NAME"; BadInput with the nearest name.
+
+    A name may be one of the material's others, such as "copper" of Cu, in large or small letters.
+    In a user's file only the material asked for is looked at: a mistake elsewhere is no matter.
+    """
+    return _read_material(*_find_table(name))

@@ -21,7 +21,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.boundary import put
-from hydro.eos.materials import find_material
+from hydro.eos.materials import find_material, find_name
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, VoidFill, key
 from problems.initial_states import lay_rays, put_walls
 from problems.pictures import draw_field, find_dump, make_panels
@@ -73,7 +73,7 @@ class Cavity(Problem):
         deck = self.deck
         (nodes, (_, first, second, last)) = self.lay()
         state = (self.material.rho0, 0.0, 0.0, 0.0)
-        material = deck.material.rpartition(":")[2]
+        material = find_name(deck.material)
         block = Block("metal", self.material.eos, nodes, *state, material=material)
         put(block, "j_min", "free-surface")
         put(block, "j_max", "piston", 0, first, velocity=(deck.speed, 0.0))

@@ -52,7 +52,7 @@ class FreeStream(Problem):
         for block, name in zip(("left", "right"), deck.materials, strict=True):
             found = None if name == "gas" else find_material(name)
             self.fluids[block] = (found.eos, found.rho0) if found else (IdealGas(1.4), 1.0)
-        two = deck.contact == "seam" and deck.materials[0] != deck.materials[1]
+        two = deck.contact == "seam" and self.fluids["left"] != self.fluids["right"]
         deck.refuse(two, "materials", "a seam joins blocks of one")
         eos, rho = self.fluids["left"]
         turn = math.radians(deck.angle)

@@ -43,7 +43,7 @@ from regrid.measure.corners import compute_centres
 GAS_GAMMA = 5.0 / 3.0
 WAVE_NUMBER = 2.0 * math.pi
 GRAVITY_ACCELERATION = 1.0
-MOST_LINEAR_KA = 0.1  # steepest wave for linear theory, whose next term is (k a)²
+STEEPEST_LINEAR_KA = 0.1  # steepest wave for linear theory, whose next term is (k a)²
 
 
 class RayleighTaylorDeck(Deck, kw_only=True):
@@ -123,7 +123,7 @@ class RayleighTaylor(Problem):
         rate = find(linear["t"], linear["amplitude"])
         notes = []
         if len(linear["t"]) < len(history["t"]):
-            until = f"k a = {MOST_LINEAR_KA:g} at t = {linear['t'][-1]:.4g}"
+            until = f"k a = {STEEPEST_LINEAR_KA:g} at t = {linear['t'][-1]:.4g}"
             notes.append(f"linear theory ends at {until}: the rate is that up to there")
         what = "growth rate [1/s]" if self.grows else "angular frequency [1/s]"
         mean = history["interface_mean"]
@@ -134,8 +134,8 @@ class RayleighTaylor(Problem):
         return Report(head, rows, ["theory is without compression", *notes, moved])
 
     def find_linear_end(self, history) -> float:
-        """The last time [s] before the wave is steeper than MOST_LINEAR_KA."""
-        steep = WAVE_NUMBER * np.abs(history["amplitude"]) > MOST_LINEAR_KA
+        """The last time [s] before the wave is steeper than STEEPEST_LINEAR_KA."""
+        steep = WAVE_NUMBER * np.abs(history["amplitude"]) > STEEPEST_LINEAR_KA
         first = find_time(history, steep)
         return math.inf if math.isnan(first) else math.nextafter(first, -math.inf)
 

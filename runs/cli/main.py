@@ -20,6 +20,7 @@ from runs.cli.grid import grid
 from runs.cli.terminal import (
     EXIT_BAD_INPUT,
     Commands,
+    check_pairs,
     describe_error,
     echo,
     echo_sentences,
@@ -49,7 +50,7 @@ setting = click.option(
     metavar="KEY=VALUE",
     help="Change a key of the deck, such as run.t_end=1e-3; can be repeated.",
 )
-quiet = click.option("-q", "--quiet", is_flag=True, help="No progress, only the summary.")
+quiet = click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 zoom = click.option("--zoom", metavar="X0,X1,Y0,Y1", help="Part of the plane [m] to show.")
 mesh = click.option("--mesh", is_flag=True, help="Draw the grid over the field.")
 mirror = click.option("--mirror", type=click.Choice(["x", "y"]), help="Complete a half domain.")
@@ -74,6 +75,15 @@ def list_problems(name: str | None) -> None:
     from runs.inspection import listing
 
     echo(listing.describe_problem(name) if name else listing.describe_all())
+
+
+@cli.command()
+@click.argument("name", required=False)
+def materials(name) -> None:
+    """List the materials of the library, or print the parameters of one."""
+    from runs.inspection import listing
+
+    echo(listing.describe_materials(name))
 
 
 @cli.command()
@@ -125,7 +135,7 @@ def run(
         runner.limit = limit
         runner.world = world
         end = runner.start()
-    return _finish(end, runner.directory, picture)
+    return _finish(end, runner.directory, picture, quiet)
 
 
 @cli.command()
@@ -160,13 +170,13 @@ def restart(
         runner = remap_runner(opened, cells, settings, at, output, force, quiet, _say)
         runner.limit = limit
         runner.world = world
-        return _finish(runner.start(), runner.directory, picture)
+        return _finish(runner.start(), runner.directory, picture, quiet)
     if output is not None or force:
         raise BadInput("restart: -o and --force need --cells; a run continues in its directory")
     runner = continue_runner(opened, settings, quiet, at, _say, world)
     runner.limit = limit
     runner.world = world
-    return _finish(runner.resume(at, _say), opened, picture)
+    return _finish(runner.resume(at, _say), opened, picture, quiet)
 
 
 @cli.command()
@@ -384,17 +394,21 @@ def _with_threads(settings: tuple[str, ...], threads: int | None) -> tuple[str, 
     return (*settings, f"run.threads={threads}")
 
 
-def _finish(ending, directory, picture: bool) -> int:
-    echo(ending.screen)
+def _finish(ending, directory, picture: bool, quiet: bool) -> int:
+    if not quiet:
+        echo(ending.screen)
+    elif ending.exit_code:
+        _say(f"shockgrid: {ending.reason}; {directory} can be continued")
     if picture and ending.exit_code < 128:  # not where a signal stopped it
         try:
             from runs.pictures.command import draw_all
 
-            paths = draw_all(str(directory), _say)
+            paths = draw_all(str(directory), None if quiet else _say)
         except Exception as error:  # whatever it is: the run has ended as it has
             _say(f"no pictures: {describe_error(error)[1].removeprefix('shockgrid: ')}")
         else:
-            echo("pictures:    " + "  ".join(str(path) for path in paths))
+            if not quiet:
+                echo("pictures:    " + "  ".join(str(path) for path in paths))
     return ending.exit_code
 
 
@@ -414,6 +428,7 @@ def _main(arguments: list[str], world: object = None) -> int:
     debug = "--debug" in arguments
     arguments = [argument for argument in arguments if argument != "--debug"]
     try:
+        check_pairs(arguments)
         return cli.main(arguments, prog_name="shockgrid", standalone_mode=False, obj=world) or 0
     except click.ClickException as error:
         echo_usage(error)

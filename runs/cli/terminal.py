@@ -6,13 +6,16 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import sys
+from collections.abc import Sequence
 from io import TextIOWrapper
 from pathlib import Path
 
 import click
 
 from problems.problem_file import describe_mistake
+from problems.registry import is_problem
 from regrid.errors import BadInput, RunFailure, suggest
 from regrid.text_files import MOST_IN_LINE, cut, escape_controls
 from runs.store.files import describe_disk_error
@@ -31,6 +34,36 @@ class Commands(click.Group):
             hint = suggest(args[0], self.commands)
             raise BadInput(f"there is no command {args[0]!r}{within}{hint}")
         return super().resolve_command(ctx, args)
+
+
+PAIRS = ("--set", "--vary", "--option")  # options whose value is key=value
+NUMBER = re.compile(r"-[\d.]")  # begins a negative one, and no option
+
+
+def check_pairs(arguments: Sequence[str]) -> None:
+    """Raise BadInput for `--set mach 2` and the like, with the form that is meant: `--set mach=2`.
+
+    A word that may be the deck is not taken for a value.
+    """
+    for place, option in enumerate(arguments):
+        if option not in PAIRS:
+            continue
+        key, *rest = [*arguments[place + 1 : place + 4], ""]
+        name = key.removesuffix("=")
+        if not name or name.startswith("-") or "=" in name:
+            continue
+        words = rest[:2] if rest[0] == "=" else rest[:1]
+        value = "".join(words).removeprefix("=")
+        if not value or (value.startswith("-") and not NUMBER.match(value)) or is_deck(value):
+            continue
+        raise BadInput(f"{' '.join([option, key, *words])}: write {option} {name}={value}")
+
+
+def is_deck(word: str) -> bool:
+    """Whether an argument may be the problem, deck or directory that a command is for."""
+    from runs.deck.reading import packaged_decks
+
+    return is_problem(word) or word in packaged_decks() or Path(word).exists()
 
 
 def echo(text: object = "", err: bool = False, nl: bool = True) -> None:

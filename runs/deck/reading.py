@@ -8,6 +8,7 @@ was given and what would be right.
 from __future__ import annotations
 
 import contextlib
+import re
 import shlex
 import tomllib
 from collections.abc import Sequence
@@ -33,6 +34,7 @@ from regrid.errors import BadInput, suggest
 from regrid.text_files import DEEPEST_NESTING, TooMuch, cut, load_toml, read_text
 from runs.deck.checking import check_deck, wants_text
 
+PLAIN_KEY = re.compile(r"\w+(\.\w+)*")  # as it stands in a setting
 DECKS = Path(__file__).resolve().parent / "packaged"
 
 
@@ -214,6 +216,8 @@ def apply_setting(table: dict[str, Any], setting: str, kind: type[Deck] | None =
     key, equals, text = setting.partition("=")
     key, names = key.strip(), key.strip().split(".")
     if not equals or not all(names):
+        if PLAIN_KEY.fullmatch(setting):
+            raise BadInput(f"--set {setting}: its value is missing; write --set {setting}=VALUE")
         raise BadInput(f"--set {setting!r}: the form is key=value, such as run.t_end=1e-3")
     if len(names) - 1 > DEEPEST_NESTING:
         raise BadInput(f"--set {cut(key)}: a key of {len(names)} names is in no deck")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import textwrap
+from dataclasses import fields
 from pathlib import Path
 
 from problems.problem import check_memory
@@ -84,6 +86,32 @@ def describe_problem(name: str) -> str:
     if name in packaged_decks():
         return packaged_decks()[name].read_text(encoding="utf-8").rstrip()
     raise BadInput(f"there is no problem or deck {name!r}{suggest_deck(name)}")
+
+
+def describe_materials(name: str | None = None) -> str:
+    """A line on each material of the library; the numbers of the one called `name` and their
+    source, also of one in a user's file ("FILE.toml:NAME")."""
+    from hydro.eos.materials import LIBRARY, find_material, find_name, read_materials
+
+    if name is None:
+        lines = [f"{'material':18}{'kind':18}{'density':>14}   other names"]
+        for one, material in read_materials(LIBRARY).items():
+            density = f"{material.rho0:g} kg/m3"
+            others = ", ".join(material.names)
+            lines.append(f"{one:18}{material.eos.kind:18}{density:>14}   {others}".rstrip())
+        usage = "shockgrid materials NAME: its parameters and their source"
+        return "\n".join([*lines, "", usage])
+    material = find_material(name)
+    lines = [f"{find_name(name)}: {material.eos.kind}"]
+    lines[0] += f", also {', '.join(material.names)}" if material.names else ""
+    numbers = {
+        one.name: getattr(material.eos, one.name) for one in fields(material.eos) if one.init
+    }
+    for one, value in ({"rho0": material.rho0} | numbers).items():
+        lines.append(f"  {one} = {value:g}" if isinstance(value, float) else f"  {one} = {value}")
+    return "\n".join(
+        [*lines, "", *textwrap.wrap(f"source: {' '.join(material.source.split())}", 90)]
+    )
 
 
 def describe_deck(path: Path) -> str:

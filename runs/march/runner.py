@@ -365,7 +365,7 @@ class Runner:
         dumps = count(len(directory.list_points("dump")), "dump")
         lines += [
             "",
-            f"in {directory}: {dumps}, history.csv, run.xmf (ParaView)",
+            f"in {directory}: {dumps}, history.csv, run.xmf (ParaView, VisIt, pyvista.XdmfReader)",
             f"see it:      shockgrid plot {directory.quoted}    shockgrid info {directory.quoted}",
         ]
         if evolution.finished is None:

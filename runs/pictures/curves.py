@@ -25,7 +25,7 @@ from regrid.errors import BadInput
 from runs.inspection.account import compute_drifts
 from runs.pictures import fields
 from runs.pictures.fields import View
-from runs.pictures.finishing import FLAT_MARGIN, ROUND_OFF
+from runs.pictures.finishing import FLAT_MARGIN, SHOWN_ROUND_OFF
 from runs.quantities import is_time
 from runs.store.dumps import LONG_NAMES
 from runs.store.files import check_free, make_csv, write_atomically
@@ -340,7 +340,7 @@ def choose_panels(
 
     def is_constant(name: str) -> bool:
         size = sizes.get(units.get(name, "1"), 0.0)
-        return _is_flat(history[name]) or np.nanmax(np.abs(history[name])) <= ROUND_OFF * size
+        return _is_flat(history[name]) or np.nanmax(np.abs(history[name])) <= SHOWN_ROUND_OFF * size
 
     known = [
         name
@@ -472,7 +472,7 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
         writers = [(k, p) for k, p in enumerate(chosen) if field in p.fields]
         values = [np.asarray(table[f"{p.name}_{field}"], dtype=float) for _, p in writers]
         largest = max(np.abs(v[np.isfinite(v)]).max(initial=0.0) for v in values)
-        is_round_off = largest <= ROUND_OFF * speed and field in fields.VELOCITIES
+        is_round_off = largest <= SHOWN_ROUND_OFF * speed and field in fields.VELOCITIES
         size = speed if is_round_off else float(largest)
         scale, field_unit = pick_prefix(size, UNITS[field] if in_units else "1")
         if is_round_off:

@@ -21,7 +21,7 @@ from problems.prefixes import pick_prefix
 from regrid.errors import BadInput, suggest
 from regrid.measure.corners import compute_centres
 from regrid.sides import SIDE_NAMES, get_side
-from runs.pictures.finishing import FLAT_MARGIN, ROUND_OFF, find_usual_range
+from runs.pictures.finishing import FLAT_MARGIN, SHOWN_ROUND_OFF, find_usual_range
 from runs.quantities import is_time
 from runs.store.reader import BlockData, Dump
 
@@ -575,7 +575,7 @@ def choose_colours(
         ranges = [ValueRange(*view.limits, *view.limits)]
     style = get_style(dump, name)
     low, high, extend = choose_limits(ranges, cut=not style.marked)
-    is_round_off = max(abs(low), abs(high)) <= ROUND_OFF * size
+    is_round_off = max(abs(low), abs(high)) <= SHOWN_ROUND_OFF * size
     if is_round_off and not view.limits:
         low, high = -FLAT_MARGIN * size, FLAT_MARGIN * size
     factor, unit = pick_prefix(max(abs(low), abs(high)), style.unit)
@@ -592,7 +592,7 @@ def choose_colours(
         norm = Normalize(-reach, reach)
     elif low > 0 and not velocity and np.log10(high / low) > FIELD_LOG_DECADES:
         norm = LogNorm(low * factor, high * factor)
-    elif high - low <= ROUND_OFF * max(abs(low), abs(high)):
+    elif high - low <= SHOWN_ROUND_OFF * max(abs(low), abs(high)):
         margin = 0.5 * factor * (abs(low) or 1.0)
         norm = Normalize(low * factor - margin, high * factor + margin)
     label = name_axis(style.words, unit)
@@ -610,7 +610,7 @@ def choose_limits(ranges: Sequence[ValueRange], cut: bool) -> tuple[float, float
     usual_low = min(one.usual_low for one in ranges)
     usual_high = max(one.usual_high for one in ranges)
     spread = usual_high - usual_low
-    if not cut or spread <= ROUND_OFF * max(abs(usual_low), abs(usual_high)):
+    if not cut or spread <= SHOWN_ROUND_OFF * max(abs(usual_low), abs(usual_high)):
         return low, high, "neither"
     if usual_low > 0.0 and low > 0.0 and usual_high / usual_low > 10.0**FIELD_LOG_DECADES:
         ratio = np.log(high / low) / np.log(usual_high / usual_low)  # on a logarithmic scale

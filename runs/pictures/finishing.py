@@ -22,7 +22,7 @@ from matplotlib.ticker import ScalarFormatter
 from problems.prefixes import PREFIXED, pick_prefix
 
 # relative to the size of a quantity: smaller differences are those of round-off
-ROUND_OFF = 1e-11
+SHOWN_ROUND_OFF = 1e-11
 FLAT_MARGIN = 0.05  # of its size: shown about a quantity that is constant
 # points beyond the usual range by this factor do not set the range of an axis
 SPIKE_RATIO = 50.0
@@ -72,7 +72,7 @@ def _keep_round_off_flat(axes: Axes) -> None:
     low = min(values.min() for values in curves)
     high = max(values.max() for values in curves)
     size = max(abs(low), abs(high))
-    if 0.0 < high - low <= ROUND_OFF * size:
+    if 0.0 < high - low <= SHOWN_ROUND_OFF * size:
         axes.set_ylim(low - FLAT_MARGIN * size, high + FLAT_MARGIN * size)
 
 
@@ -93,7 +93,7 @@ def _leave_out_spikes(axes: Axes) -> None:
     high = max(one[1] for one in ranges)
     bottom = min(values.min() for values in curves)
     top = max(values.max() for values in curves)
-    if not high - low > ROUND_OFF * max(abs(low), abs(high)):
+    if not high - low > SHOWN_ROUND_OFF * max(abs(low), abs(high)):
         return
     if top - bottom <= SPIKE_RATIO * (high - low):
         return

@@ -65,8 +65,9 @@ def study(
         finally:
             progress.close()
     paths = made.write(note)
-    say(describe_study(made, progress, time.monotonic() - began))
-    say("written: " + "  ".join(str(path) for path in paths))
+    if not quiet:
+        say(describe_study(made, progress, time.monotonic() - began))
+        say("written: " + "  ".join(str(path) for path in paths))
     return EXIT_FAILED if made.failures else 0
 
 

@@ -170,3 +170,41 @@ def test_history_has_units(run_of_pictures):
     assert legend == {"mean", "min", "max"}
     state = data.problem.build()
     assert set(data.problem.units) <= set(data.problem.measure(state))
+
+
+def test_quiet_prints_nothing_but_errors(shockgrid, toy):
+    run = ("run", "toy", "-q", "--plot", "-o", "run", "--set", "run.t_end=0.1")
+    assert shockgrid(*run) == (0, "", "")
+    assert Path("run/summary.txt").stat().st_size > 100 and list(Path("run").glob("*.png"))
+    assert shockgrid("restart", "run", "-q", "--set", "run.t_end=0.2") == (0, "", "")
+    study = ("study", "toy", "-q", "--jobs", "1", "--set", "run.t_end=0.02", "--set", "shape=flat")
+    assert shockgrid(*study, "--vary", "cells=4,6", "-o", "study") == (0, "", "")
+    code, out, error = shockgrid(*run, "--set", "fail_at=3", "--force")
+    assert code == 3 and out == "" and error.startswith("shockgrid: ")
+
+
+@pytest.mark.parametrize(
+    ("words", "form"),
+    [
+        (("run", "toy", "--set", "cells", "8"), "--set cells 8: write --set cells=8"),
+        (("run", "--set", "cells", "8", "toy"), "--set cells 8: write --set cells=8"),
+        (("check", "toy", "--set", "cells", "=", "8"), "--set cells = 8: write --set cells=8"),
+        (("check", "toy", "--set", "cells=", "8"), "--set cells= 8: write --set cells=8"),
+        (("check", "toy", "--set", "cells", "-3.5"), "write --set cells=-3.5"),
+        (("check", "--set", "cells", "toy"), "write --set cells=VALUE"),
+        (("study", "toy", "--vary", "cells", "4,6"), "write --vary cells=4,6"),
+        (("grid", "make", "dome", "--option", "epsilon", "0.1"), "write --option epsilon=0.1"),
+    ],
+)
+def test_a_key_and_its_value_as_two_words(shockgrid, toy, words, form):
+    code, out, error = shockgrid(*words)
+    assert code == 2 and out == "" and error.count("\n") == 1
+    assert error.rstrip().endswith(form), error
+
+
+def test_materials_are_listed_with_all_their_names(shockgrid):
+    code, out, _ = shockgrid("materials")
+    assert code == 0 and "\nCu " in out and "copper" in out
+    assert shockgrid("materials", "copper") == shockgrid("materials", "Cu")
+    code, out, error = shockgrid("materials", "coper")
+    assert code == 2 and out == "" and "did you mean 'copper'?" in error

@@ -28,7 +28,7 @@ def file(toy):
 
 
 def test_a_file_is_run_and_looked_at_like_a_packaged_problem(file, shockgrid):
-    code, out, _ = shockgrid("run", "my_heat.py", "--set", "run.t_end=0.1", "-q")
+    code, out, _ = shockgrid("run", "my_heat.py", "--set", "run.t_end=0.1")
     assert code == 0 and "hottest at the end" in out
     assert sorted(path.name for path in (file.parent / "out" / "my_heat-1").glob("problem.*")) == [
         "problem.json", "problem.py",

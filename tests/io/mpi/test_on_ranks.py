@@ -56,7 +56,7 @@ def compare_ends(whole, part, step):
 def test_a_run_on_ranks_and_its_restart_on_others_are_those_of_one_process(tmp_path):
     whole = tmp_path / "whole"
     part = tmp_path / "part"
-    out, err, code = finish(start(2, "run", *DECK, "--set", "run.max_steps=6", "-o", part, "-q"))
+    out, err, code = finish(start(2, "run", *DECK, "--set", "run.max_steps=6", "-o", part))
     assert code == 0, err
     assert out.count("verdict:") == 1 and "rank" not in err  # one rank has a voice
     assert finish(start(3, "restart", part, "--set", "run.max_steps=14", "-q"))[2] == 0

@@ -51,7 +51,7 @@ def read_table(name: str) -> bytes:
 
 
 def test_a_restart_writes_the_same_bits(shockgrid, deck):
-    code, text, error = shockgrid("run", deck, "-o", "whole", "-q")
+    code, text, error = shockgrid("run", deck, "-o", "whole")
     assert code == 0, error
     rows = len(RunData("whole").history["step"])
     assert f"6 gauges in gauges.csv; outside of all blocks: far in {rows} of {rows} rows" in text

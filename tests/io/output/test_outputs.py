@@ -81,7 +81,7 @@ def test_the_first_lines_and_a_dry_run_say_cells_memory_and_disk(shockgrid):
 
 
 def test_a_finished_run_says_so_in_its_second_line_and_in_a_file(shockgrid):
-    code, out, _ = shockgrid("run", "toy", "-o", "a", "-q")
+    code, out, _ = shockgrid("run", "toy", "-o", "a")
     line = out.splitlines()[1]
     assert code == 0 and line == "verdict: finished; no warnings"
     verdict = RunData("a").verdict

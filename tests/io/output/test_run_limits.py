@@ -40,14 +40,14 @@ def test_a_run_ends_at_its_limit_and_goes_on(shockgrid, toy, monkeypatch):
     minutes = itertools.count()
     clock = SimpleNamespace(**vars(time) | {"monotonic": lambda: 60.0 * next(minutes)})
     monkeypatch.setattr(limits, "time", clock)
-    words = ("--set", "output.dumps=2", "-q")
+    words = ("--set", "output.dumps=2")
     code, output, error = shockgrid("run", "toy", "-o", "limited", "--max-wall", "12m", *words)
     assert code == 0, error
     assert "--max-wall 12m reached" in output and "shockgrid restart limited" in output
     steps = [RunData("limited").history["step"][-1]]
     assert RunData("limited").directory.list_points()[-1][0] == steps[0] >= 1
     while "t_end reached" not in output:  # as a queue would: again and again
-        code, output, error = shockgrid("restart", "limited", "-q", "--max-wall", "12m")
+        code, output, error = shockgrid("restart", "limited", "--max-wall", "12m")
         assert code == 0, error
         steps.append(RunData("limited").history["step"][-1])
         assert steps[-1] > steps[-2]

@@ -42,7 +42,7 @@ TUBE = ("riemann", "--set", "cells=20", "--set", "run.max_steps=3")
 
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_pictures_are_drawn_whatever_backend_a_notebook_wants(tmp_path, backend):
-    code, _, error = call("run", *TUBE, "-o", "a", "-q", "--plot", backend=backend)
+    code, _, error = call("run", *TUBE, "-o", "a", "--plot", backend=backend)
     assert code == 0 and Path("a/profiles.png").exists(), error
     for words in (("plot", "a", "-o", "a.png"), ("grid", "list", "--plot", "g.png")):
         assert call(*words, backend=backend)[0] == 0
@@ -51,7 +51,7 @@ def test_pictures_are_drawn_whatever_backend_a_notebook_wants(tmp_path, backend)
 
 
 def test_without_matplotlib_results_are_there_all_the_same(no_matplotlib):
-    code, text, error = call("run", *TUBE, "-o", "a", "-q", "--plot", folder=no_matplotlib)
+    code, text, error = call("run", *TUBE, "-o", "a", "--plot", folder=no_matplotlib)
     assert code == 0 and "max_steps = 3 reached" in text
     assert "no pictures: pictures need matplotlib" in error
     assert json.loads(Path("a/verdict.json").read_text())["trust"] is not None

@@ -9,7 +9,13 @@ import pytest
 from builders import SIDES, box, march, wall_off
 from hydro.block import Block
 from hydro.eos import IdealGas, Tabular
-from hydro.eos.materials import LIBRARY, find_material, forget_read_files, read_materials
+from hydro.eos.materials import (
+    LIBRARY,
+    find_material,
+    find_name,
+    forget_read_files,
+    read_materials,
+)
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
 
@@ -54,6 +60,32 @@ def test_a_material_of_one_s_own(write):
 
 
 @pytest.mark.parametrize(
+    ("name", "listed"),
+    [
+        ("copper", "Cu"), ("cu", "Cu"), ("Steel", "SS304"), ("aluminum", "Al1100"),
+        ("aluminium", "Al1100"), ("WATER", "water"), ("tnt", "TNT"), ("w", "W"), ("iron", "Fe"),
+    ],
+)  # fmt: skip
+def test_other_names_are_those_of_one_material(name, listed):
+    assert find_name(name) == listed
+    assert find_material(name) is find_material(listed)
+    every = [
+        one.lower()
+        for name, material in read_materials(LIBRARY).items()
+        for one in {name.lower(), *map(str.lower, material.names)}
+    ]
+    assert len(every) == len(set(every)), "a name of two materials is none"
+
+
+def test_a_name_of_two_materials_is_refused(write):
+    two = GOOD + GOOD.replace("[Ti]", "[VT6]")
+    file = write(two.replace("eos =", 'names = ["alloy"]\neos =')).rpartition(":")[0]
+    with pytest.raises(BadInput, match="there is no material"):
+        find_material(f"{file}:alloy")
+    assert find_material(f"{file}:vt6").names == ("alloy",)
+
+
+@pytest.mark.parametrize(
     "old, new, words",
     [
         ('"mie-gruneisen"', '"mie-grueneisen"', "did you mean 'mie-gruneisen'"),
@@ -63,6 +95,7 @@ def test_a_material_of_one_s_own(write):
         ("c0 = 5220.0", 'c0 = "5 km/s"', "it must be a number in SI units"),
         ("c0 = 5220.0", "c0 = -1", "c0 is -1"),
         ("c0 = 5220.0", "c0 = ", "cannot be read"),
+        ("c0 = 5220.0", "c0 = 5220.0\nnames = 3", "must be a list of names"),
         ("[Ti]", "[V]", "there is no material 'mine.toml:Ti'"),
     ],
 )

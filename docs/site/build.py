@@ -9,6 +9,8 @@ fetches anything.
 from __future__ import annotations
 
 import ast
+import json
+import re
 from importlib import metadata
 from pathlib import Path
 
@@ -44,13 +46,30 @@ def write_page(room: Path) -> str:
     modules = [path for path in sorted(room.glob("*.py")) if not path.name.startswith("__")]
     parts = ["---\nsearch:\n  boost: 0.3\n---", f"# {name}", text]  # found after the pages
     if name == "shockgrid":
-        found = shockgrid.MODULES.items()
-        names = [
-            f"- [`{one}`][{module}.{shockgrid.ELSEWHERE.get(one, one)}]" for one, module in found
-        ]
-        parts.append("Names to import from it:\n\n" + "\n".join(names))
+        parts.append(describe_names())
     parts += [f"::: {name_module(path)}" for path in modules]
     return "\n\n".join(parts) + "\n"
+
+
+def describe_names() -> str:
+    """A table with a line for each public name: what it is, by the first sentence about it."""
+    rows = []
+    for one, module in sorted(shockgrid.MODULES.items(), key=lambda item: item[0].lower()):
+        inner = shockgrid.ELSEWHERE.get(one, one)
+        rows.append(f"| [`sg.{one}`][{module}.{inner}] | {find_sentence(module, inner)} |")
+    return "\n".join(["| name | what it is |", "|---|---|", *rows])
+
+
+def find_sentence(module: str, name: str) -> str:
+    """The first sentence of the docstring of a class, function or module."""
+    path = ROOT.joinpath(*module.split("."))
+    path = path / f"{name}.py" if (path / f"{name}.py").is_file() else path.with_suffix(".py")
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    kinds = ast.ClassDef | ast.FunctionDef
+    found = [node for node in tree.body if isinstance(node, kinds) and node.name == name]
+    text = ast.get_docstring(found[0] if found else tree) or ""
+    first = " ".join(text.partition("\n\n")[0].split())
+    return re.split(r"(?<=\.) (?=[A-Z])", first)[0].replace("|", "\\|")
 
 
 def on_config(config):
@@ -81,3 +100,55 @@ def on_files(files: Files, config):
             source = str(file.locate())
             files.append(File.generated(config, f"mathjax/{inner}", abs_src_path=source))
     return files
+
+
+GREEK = dict(
+    zip(
+        "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu nu xi pi rho sigma tau phi "
+        "chi psi omega Gamma Delta Theta Lambda Pi Sigma Phi Psi Omega".split(),
+        "αβγδεζηθκλμνξπρστφχψωΓΔΘΛΠΣΦΨΩ",
+        strict=True,
+    )
+)
+SIGNS = {
+    "le": "≤", "leq": "≤", "ge": "≥", "geq": "≥", "lt": "<", "gt": ">", "times": "×", "cdot": "·",
+    "approx": "≈", "sim": "~", "pm": "±", "partial": "∂", "nabla": "∇", "infty": "∞", "sum": "Σ",
+    "int": "∫", "to": "→", "in": "∈", "neq": "≠", "ne": "≠", "propto": "∝", "ll": "≪", "gg": "≫",
+    "quad": " ", "qquad": " ", "sqrt": "√", "dots": "...", "ldots": "...", "cdots": "...",
+}  # fmt: skip
+FORMULA = re.compile(r"\\\((.+?)\\\)|\\\[(.+?)\\\]|\$\$(.+?)\$\$", re.S)
+
+FORMULA_OF_NOTEBOOK = re.compile(r"\$\$(.+?)\$\$|\$([^$\n]+)\$", re.S)
+
+
+def write_plainly(tex: str) -> str:
+    """A formula in plain signs, as a hit of the search shows it: `k a_0` for `\\(k\\,a_0\\)`."""
+    group = r"\{([^{}]*)\}"
+    for _ in range(4):  # from the inside
+        tex = re.sub(rf"\\[dt]?frac\s*{group}\s*{group}", r"(\1)/(\2)", tex)
+        tex = re.sub(rf"\\(?:mathrm|mathbf|mathit|text|operatorname|bar|hat|tilde|vec)\s*{group}",
+                     r"\1", tex)  # fmt: skip
+        tex = re.sub(rf"([_^]){group}", r"\1\2", tex)
+    tex = re.sub(
+        r"\\([A-Za-z]+) ?", lambda found: {**GREEK, **SIGNS}.get(found[1], found[1] + " "), tex
+    )
+    tex = re.sub(r"\\[,;:! ]", " ", tex)
+    return " ".join(re.sub(r"[{}\\]|&amp;", " ", tex).split())
+
+
+def clean_entry(location: str, text: str) -> str:
+    """The text of a page or section as the search needs it: plain formulas, no source code."""
+    if location.startswith("reference/"):
+        text = text.partition("Source code in <code>")[0]
+    formulas = FORMULA_OF_NOTEBOOK if location.startswith("notebooks/") else FORMULA
+    return formulas.sub(lambda found: write_plainly(next(filter(None, found.groups()))), text)
+
+
+def on_post_build(config):
+    """Rewrite the index of the search; see `clean_entry`."""
+    path = Path(config.site_dir, "search", "search_index.json")
+    index = json.loads(path.read_text(encoding="utf-8"))
+    for entry in index["docs"]:
+        for part in ("title", "text"):
+            entry[part] = clean_entry(entry["location"], entry[part])
+    path.write_text(json.dumps(index, ensure_ascii=False), encoding="utf-8")

@@ -160,7 +160,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """A public name, imported now; ImportError where another package hides ours."""
+    """Import a public name; ImportError if another package hides one of shockgrid's."""
     if name == "__version__":
         value: object = _find_version()
     elif name in MODULES:

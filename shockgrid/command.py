@@ -17,12 +17,12 @@ UNCOLLECTED_OBJECTS = 200_000
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run a command; returns the exit code: 2 with a sentence where a package is hidden."""
+    """Run a command; returns the exit code, 2 if another package hides one of shockgrid's."""
     if shadow := find_shadow():
         print(f"shockgrid: {shadow}", file=sys.stderr)
         return BAD_INPUT
     gc.set_threshold(UNCOLLECTED_OBJECTS)
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for small matrices; idle threads spin
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small, and idle threads spin
     from runs.cli.main import main as run_command
 
     try:

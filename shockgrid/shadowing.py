@@ -12,7 +12,7 @@ from pathlib import Path
 
 PACKAGES = ("regrid", "hydro", "problems", "runs")
 HOME = Path(__file__).resolve().parents[1]  # the folder in which all five packages lie
-WAY_OUT = "install shockgrid in an environment of its own (python3 -m venv) and run it from there"
+WAY_OUT = "install shockgrid in a separate environment (python3 -m venv) and run it there"
 
 
 def find_shadow() -> str:
@@ -40,7 +40,7 @@ def _describe_shadow(package: str) -> str:
 
 
 def _find_owner(found: Path) -> str:
-    """Words for the distribution that brought a file; "" where none lists it."""
+    """A description of the distribution that installed a file; "" if none lists it."""
     from importlib import metadata  # slow to load
 
     tail = "/".join(found.parts[-2:])

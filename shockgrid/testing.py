@@ -93,7 +93,7 @@ def check_repeats(make: Make) -> None:
     regridder.regrid(*carry(make, "valley"))
     again = regridder.regrid(previous, boundary)
     same = np.array_equal(first.nodes, again.nodes) and first.report == again.report
-    _demand(same, "the same call gives other nodes, or another report, after another one")
+    _demand(same, "the same call gives different nodes or a different report after another call")
 
 
 def turn(nodes: np.ndarray, angle: float) -> np.ndarray:
@@ -130,7 +130,7 @@ def check_threads(make: Make) -> None:
     boundary = moving.boundary(0.12)
     grids = [make(threads=threads).regrid(previous, boundary).nodes for threads in (1, 2, 3)]
     same = np.array_equal(grids[0], grids[1]) and np.array_equal(grids[0], grids[2])
-    _demand(same, "another number of threads gives other bits")
+    _demand(same, "another number of threads gives different bits")
 
 
 def check_hard_motion(make: Make, domain: str) -> None:
@@ -140,7 +140,7 @@ def check_hard_motion(make: Make, domain: str) -> None:
     try:
         nodes = make().regrid(moving.start, boundary).nodes
     except RegridFailure as failure:
-        _demand(str(failure), f"{domain}: the RegridFailure says nothing")
+        _demand(str(failure), f"{domain}: the RegridFailure has no message")
         return
     bad = find_bad_cells(nodes)
     _demand(not len(bad), f"{domain}: {len(bad)} cells are not convex, and no RegridFailure")
@@ -176,7 +176,7 @@ def check_shapes(make: Make) -> None:
 REGRIDDER_PROMISES: dict[str, Callable[[Make], None]] = {
     "cells are convex, side nodes are unchanged": check_cells_and_sides,
     "calls repeat": check_repeats,
-    "inputs are left alone": check_inputs,
+    "inputs are not changed": check_inputs,
     **{f"domain {motion}": functools.partial(check_motion, motion=motion) for motion in MOTIONS},
     "hard motion": functools.partial(check_hard_motion, domain="swan"),
     "folded outline": check_folded_outline,
@@ -185,10 +185,10 @@ REGRIDDER_PROMISES: dict[str, Callable[[Make], None]] = {
 
 
 def check_regridder(regridder: Any) -> None:
-    """Check a regridder in all respects; AssertionError says what is wrong and how.
+    """Check a regridder in all respects; AssertionError names the fault.
 
-    regridder: an object with `regrid(previous, boundary)`, a class of such, or a function that
-    makes one.  If that takes `threads`, numbers of threads are compared, too.
+    regridder: an object with `regrid(previous, boundary)`, its class, or a function that makes one.
+    If class or function take `threads`, numbers of threads are compared, too.
     """
     if not isinstance(regridder, type) and hasattr(regridder, "regrid"):
         given = regridder
@@ -234,7 +234,7 @@ def check_numbers(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> None:
     _demand(all(type(one) is float for one in numbers), f"parameters {numbers} are not all floats")
     law = eos.wave_law
     good = len(law) == 3 and np.isfinite(law).all() and law[0] >= law[1] >= 0.0 <= law[2]
-    _demand(good, f"wave_law is {law}: three numbers a >= b >= 0 and z >= 0 are wanted")
+    _demand(good, f"wave_law is {law}: it must have three numbers a >= b >= 0 and z >= 0")
     c = eos.sound_speed(rho, p)
     _demand((np.isfinite(c) & (c > 0.0)).all(), "the sound speed is not positive everywhere")
     _demand(c.shape == rho.shape, f"arrays {rho.shape} give a sound speed of shape {c.shape}")
@@ -254,7 +254,7 @@ def check_compiled(eos: EquationOfState, rho: float, p: float) -> None:
         formula = njit(lambda a, b, numbers, part=part: part(a, b, numbers))
         try:
             found = formula(rho, second, parameters)
-        except Exception as error:  # whatever numba says of somebody's formula
+        except Exception as error:  # numba may raise anything for a user's formula
             raise AssertionError(
                 f"{name}_part cannot be compiled ({type(error).__name__}); is it marked inlined?"
             ) from error
@@ -336,7 +336,7 @@ def _check_ghosts(kind, side, options, eos, state) -> None:
     block.fill_ghosts(0.0)
     own = np.zeros(block.rim.faces, dtype=bool)
     own[segment.first : segment.last] = True
-    _demand((ghosts[:, ~own] == POISON_VALUE).all(), "ghosts of faces that are not its own change")
+    _demand((ghosts[:, ~own] == POISON_VALUE).all(), "ghosts of faces of other segments change")
     inside = ghosts[: rim.P + 1, own]
     _demand(
         np.isfinite(inside).all() and (inside != POISON_VALUE).all(),
@@ -410,12 +410,12 @@ def _check_problem(kind: type[Problem], deck: Deck, steps: int) -> None:
     third = kind(deck).build()
     for _ in range(steps):
         again.advance()
-    _demand(_same(half, _copy_state(again)), "two builds of one deck march to different bits")
+    _demand(_same(half, _copy_state(again)), "two builds of one deck give different bits")
     third.set_state(half)
     for evolution in (flow, third):
         evolution.advance()
     same = _same(_copy_state(flow), _copy_state(third))
-    _demand(same, "a build that takes up a state marches to other bits than the one it is of")
+    _demand(same, "a build that continues from a state gives different bits than the original run")
 
 
 def _copy_state(evolution: Any) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The command line: one function a command; what is heavy is imported inside it.
+"""The command line: one function per command, which imports heavy packages itself.
 
 May import: everything.
 """

@@ -1,10 +1,10 @@
-"""The command line: `shockgrid list | run | restart | study | check | schema | info | inspect |
-plot | film | export | report | compare | grid | verify`.
+"""The command line: `shockgrid list | run | restart | study | check | schema | materials | info |
+inspect | plot | film | export | report | compare | grid | verify`.
 
-Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes:
-0 well, 1 `compare` found a difference or `verify` a missed bar, 2 bad input, 3 the physics
-failed or a steady state was not reached, 130 / 143 stopped by a signal, 70 a mistake in shockgrid
-itself (`--debug` shows where).
+Heavy packages are imported inside the commands, so that `--help` answers at once.  Exit codes: 0
+success, 1 `compare` found a difference or `verify` an error above its bar, 2 bad input, 3 the
+physics failed or a steady state was not reached, 130 / 143 stopped by a signal, 70 a bug in
+shockgrid (`--debug` shows where).
 """
 
 from __future__ import annotations
@@ -75,15 +75,6 @@ def list_problems(name: str | None) -> None:
     from runs.inspection import listing
 
     echo(listing.describe_problem(name) if name else listing.describe_all())
-
-
-@cli.command()
-@click.argument("name", required=False)
-def materials(name) -> None:
-    """List the materials of the library, or print the parameters of one."""
-    from runs.inspection import listing
-
-    echo(listing.describe_materials(name))
 
 
 @cli.command()
@@ -244,6 +235,15 @@ def schema(problem) -> None:
 
 
 @cli.command()
+@click.argument("name", required=False)
+def materials(name) -> None:
+    """List the materials of the library, or print the parameters of one."""
+    from runs.inspection import listing
+
+    echo(listing.describe_materials(name))
+
+
+@cli.command()
 @click.argument("path", metavar="DIR_OR_FILE")
 @click.option("--deck", is_flag=True, help="Print the deck stored in the (last) dump.")
 def info(path, deck) -> int:
@@ -389,7 +389,7 @@ def verify(**words) -> int:
 def _with_threads(settings: tuple[str, ...], threads: int | None) -> tuple[str, ...]:
     if threads is None:
         return settings
-    if threads > (os.cpu_count() or 1):  # numba allows no more than it is told at its start
+    if threads > (os.cpu_count() or 1):  # numba reads its limit when it is imported
         os.environ.setdefault("NUMBA_NUM_THREADS", str(threads))
     return (*settings, f"run.threads={threads}")
 
@@ -424,7 +424,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _main(arguments: list[str], world: object = None) -> int:
-    """The command, on the first of the ranks of `world` where there are more than one."""
+    """Run a command; with several ranks only the first of `world` calls this."""
     debug = "--debug" in arguments
     arguments = [argument for argument in arguments if argument != "--debug"]
     try:

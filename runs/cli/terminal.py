@@ -1,5 +1,5 @@
-"""The terminal: commands by their nearest name, words without control characters, errors of the
-system in one sentence.
+"""Terminal output: the nearest name for a mistyped command, text without control characters,
+system errors as one sentence.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from runs.store.files import describe_disk_error
 
 
 class Commands(click.Group):
-    """Commands in the order of a first acquaintance; a mistyped one gets the nearest name."""
+    """Commands in the order in which users meet them; mistyped ones get the nearest name."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)
@@ -41,9 +41,9 @@ NUMBER = re.compile(r"-[\d.]")  # begins a negative one, and no option
 
 
 def check_pairs(arguments: Sequence[str]) -> None:
-    """Raise BadInput for `--set mach 2` and the like, with the form that is meant: `--set mach=2`.
+    """Raise BadInput for `--set mach 2` and the like, with the correct form: `--set mach=2`.
 
-    A word that may be the deck is not taken for a value.
+    An argument that may be the deck is not taken for the value.
     """
     for place, option in enumerate(arguments):
         if option not in PAIRS:
@@ -67,7 +67,7 @@ def is_deck(word: str) -> bool:
 
 
 def echo(text: object = "", err: bool = False, nl: bool = True) -> None:
-    """Print to standard output, or to standard error, what people or files may have written."""
+    """Print text from users or files to standard output or standard error, escaped."""
     click.echo(escape_controls(str(text)), err=err, nl=nl)
 
 
@@ -78,7 +78,7 @@ def echo_sentences(text: str, start: str = "shockgrid: ") -> None:
 
 
 def echo_usage(error: click.ClickException) -> None:
-    """Print what click has to say about a mistyped command."""
+    """Print click's message about a mistyped command."""
     words = io.StringIO()
     error.show(file=words)
     for line in words.getvalue().splitlines():
@@ -89,11 +89,11 @@ def echo_usage(error: click.ClickException) -> None:
 EXIT_BAD_INPUT = 2
 EXIT_FAILED = 3
 EXIT_INTERNAL = 70
-NULL = ("embedded null byte", "embedded null character")  # what Python says of a name
+NULL = ("embedded null byte", "embedded null character")  # Python's messages about a name
 
 
 def describe_error(error: Exception) -> tuple[int, str]:
-    """The exit code for an error that ends a command, and the sentence about it."""
+    """Exit code and message for an error that ends a command."""
     if isinstance(error, MemoryError) or "unable to allocate memory" in str(error):  # HDF5's words
         return EXIT_BAD_INPUT, "not enough memory; fewer cells need less"
     if isinstance(error, BadInput | RunFailure):
@@ -117,10 +117,9 @@ def describe_error(error: Exception) -> tuple[int, str]:
 
 
 def print_what_can_be_shown() -> None:
-    """From here on standard output and error show "?" for signs that their encoding has not got.
+    """Make standard output and error print "?" for characters that their encoding lacks.
 
-    Python opens standard output so that such a sign raises UnicodeEncodeError: a name in Greek, in
-    a pipe on Windows.
+    By default Python raises UnicodeEncodeError for them, as for a Greek name in a pipe on Windows.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):

@@ -1,4 +1,4 @@
-"""Words about runs: listing, info, account, comparison, units.
+"""Descriptions of runs: listing, info, account, comparison.
 
 May import: `runs.deck`, `runs.store` and all below them.
 """

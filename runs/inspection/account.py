@@ -1,7 +1,7 @@
-"""What a run's history says in words, and the verdict on it: how it ended, what limits trust in it.
+"""A run's history summarised in text, and the verdict: how it ended and what may be wrong.
 
 A verdict is plain data: `status` ("finished", "stopped", "ended early", "unfinished"), `name` (the
-reason in a word or two), `reason` (its sentence), `trust` (list of what RULES found, each with
+reason in a word or two), `reason` (the sentence), `trust` (what the RULES found, each with
 `rule`, `value`, `limit`, `words`).
 """
 
@@ -31,9 +31,9 @@ def count_cells(evolution: Evolution) -> int:
 
 
 def describe_run(history: History, cells: int, blocks: Sequence[str] = ()) -> list[str]:
-    """Lines about dt, regridding, speed and conservation: those that the history can tell.
+    """Lines about dt, regridding, speed and conservation, as far as the history has the columns.
 
-    blocks: their names.
+    blocks: names of the blocks.
     """
     drifts = [f"{n.replace('_', ' ')} {v:.1e}" for n, v in measure_drifts(history).items()]
     lines = (
@@ -59,7 +59,7 @@ def describe_limits(history: History) -> str:
 
 
 def describe_fastest(history: History, blocks: Sequence[str]) -> str:
-    """Where the cell of largest rate was mostly, and what not waiting for it has saved."""
+    """Most frequent location of the fastest cell, and steps saved by state redistribution."""
     over = history.get("fastest_over_limit", NONE)
     known = np.isfinite(over)
     if not known.any():
@@ -92,7 +92,7 @@ def describe_regridding(history: History) -> str:
 
 
 def describe_contacts(history: History) -> str:
-    """How many contacts of bodies were made and opened, and when the first of each."""
+    """Number of contacts between bodies that closed and opened, and the first times."""
     told = []
     for name in ("made", "opened"):
         counts = np.nan_to_num(history.get(f"contacts_{name}", NONE))
@@ -105,7 +105,7 @@ def describe_contacts(history: History) -> str:
 def describe_convexity(history: History) -> str:
     """Whether every cell was convex in every step; if not, in how many steps, since when.
 
-    Cells at blocks' corners that the sides make triangles are counted apart.  Histories without
+    Triangular cells at the corners of blocks are counted separately.  Histories without
     `cells_not_convex` are judged by `least_scaled_jacobian`; "" without both.
     """
     sine = history.get("least_scaled_jacobian")
@@ -172,9 +172,9 @@ def describe_speed(history: History, cells: int) -> str:
 
 
 def describe_cautions(problem: Problem, history: History | None = None) -> list[str]:
-    """A line for each of the problem's cautions; a history of one row tells no more than none.
+    """A line for each of the problem's cautions; a history of one row is ignored.
 
-    Where a reference that they need cannot be computed, a line says so.
+    If a reference that they need cannot be computed, a line reports it.
     """
     told = history if history and len(history.get("step", ())) > 1 else None
     try:
@@ -185,18 +185,18 @@ def describe_cautions(problem: Problem, history: History | None = None) -> list[
 
 
 def describe_own(problem: Problem, history: History, final: Evolution | None = None) -> str:
-    """The problem's summary of columns of a history and, where there is one, the final state."""
+    """The problem's summary of the history and of the final state, if there is one."""
     try:
         return drop_units(problem.summary(history, final).strip("\n"), problem.t_unit)
     except RunFailure as error:
-        return f"there is no comparison with theory: {error}"
+        return f"no comparison with theory: {error}"
 
 
 class Rule(NamedTuple):
-    """What is measured (nan where the run has no such thing) of a history and the number of cells,
-    and the value above which it is reported.
+    """A quantity of a history and the number of cells, and the value above which it is reported.
 
-    words: with `{value}`, `{share}`; meaning: for the table in the pages.
+    The quantity is nan if the run lacks it.  words: with `{value}`, `{share}`; meaning: for the
+    table in the pages.
     """
 
     name: str
@@ -212,7 +212,7 @@ def most(name: str) -> Callable[[History, int], float]:
 
 
 def mean(name: str, part: Callable[[np.ndarray, int], Any]) -> Callable[[History, int], float]:
-    """The mean over all steps of what `part` makes of a column and the number of cells."""
+    """The mean over all steps of `part`, a function of a column and the number of cells."""
 
     def measure(history: History, cells: int) -> float:
         values = np.asarray(history.get(name, NONE), dtype=float)[1:]
@@ -223,7 +223,7 @@ def mean(name: str, part: Callable[[np.ndarray, int], Any]) -> Callable[[History
 
 
 def measure_shrinkage(history: History) -> float:
-    """How many times dt fell below its largest value before, steps cut on purpose left out."""
+    """By what factor dt fell below its earlier maximum, ignoring steps cut on purpose."""
     dts = history.get("dt")
     limits = history.get("dt_limit")
     if dts is None or limits is None or dts.dtype.kind != "f":
@@ -268,7 +268,7 @@ def judge(
 ) -> dict[str, Any]:
     """The verdict on a run from its history; `cells`: of all its blocks; see the module.
 
-    name: of the cause of an early end, in a word or two; "failed" where it has none.
+    name: the cause of an early end in a word or two; "failed" if unknown.
     """
     found = []
     for rule in RULES if history else ():

@@ -3,7 +3,7 @@
 Columns `seconds_*` of the history are wall times and are left out.  Numbers agree when
 `|a - b| <= atol + rtol * scale`, with `scale` the largest size in that array (a field that passes
 through zero is not judged against its zeros); nan agrees with nan.  Runs of other cells or other
-steps are compared by norms instead: dumps of about the same time, one laid on the other's grid.
+steps are compared by norms instead: dumps of about the same time, one remapped to the other's grid.
 """
 
 from __future__ import annotations
@@ -62,9 +62,9 @@ class Side:
 def open_both(
     a: str | os.PathLike, b: str | os.PathLike, rtol: float, atol: float
 ) -> tuple[Side, Side]:
-    """Two runs or two dumps; BadInput where they are not of one kind, and for bad tolerances."""
+    """Open two runs or two dumps; BadInput for one of each, and for invalid tolerances."""
     if not (0.0 <= rtol < np.inf and 0.0 <= atol < np.inf):
-        raise BadInput("--rtol and --atol have to be finite numbers, at least 0")
+        raise BadInput("--rtol and --atol must be finite and not negative")
     one = Path(a)
     other = Path(b)
     if missing := [path for path in (one, other) if not path.exists()]:
@@ -77,10 +77,10 @@ def open_both(
 def compare(
     a: str | os.PathLike, b: str | os.PathLike, *, rtol: float = 0.0, atol: float = 0.0
 ) -> list[Difference]:
-    """Differences of two runs or two dumps, first in time first; none where they agree.
+    """Differences of two runs or two dumps, the earliest first; [] if they agree.
 
-    rtol: relative to the largest size in an array; atol: in its unit.  Raises BadInput where the
-    two cannot be compared: of different kind, problem, blocks or shapes.
+    rtol: relative to the largest size in an array; atol: in its unit.  Raises BadInput if the
+    two cannot be compared: different kinds, problems, blocks or shapes.
     """
     return _find_differences(*open_both(a, b, rtol, atol), rtol, atol)
 
@@ -99,7 +99,7 @@ def compare_in_words(a: str, b: str, rtol: float, atol: float) -> tuple[str, boo
 
 
 def describe_runs(a: RunData, b: RunData) -> list[str]:
-    """A table of what differs in the decks of two runs of one problem and in their results."""
+    """A table of the settings and results that differ between two runs of one problem."""
     try:
         rows = [(x.key, show(x.before), show(x.now)) for x in find_changed_keys(a.deck, b.deck)]
         results = [run.problem.report(run.history).rows for run in (a, b)]
@@ -135,7 +135,7 @@ def _find_differences(a: Side, b: Side, rtol: float, atol: float) -> list[Differ
 
 
 def _name_problem(problem: str) -> str:
-    """The name of a problem; of one in a file that of the file, as studies give its full path."""
+    """The name of a problem, or the name of its file without the folder, which studies add."""
     return Path(problem).name if is_problem_file(problem) else problem
 
 
@@ -177,7 +177,7 @@ def compare_dumps(a: Dump, b: Dump, rtol: float, atol: float) -> Iterator[Differ
     for one, other in zip(a.blocks, b.blocks, strict=True):
         if one.cells != other.cells:
             raise BadInput(
-                f"block {one.name!r} has other numbers of cells in {a.path} and {b.path}: "
+                f"block {one.name!r} has different numbers of cells in {a.path} and {b.path}: "
                 "not comparable"
             )
         where = f"step {a.step}, block {one.name}"
@@ -196,7 +196,7 @@ def compare_dumps(a: Dump, b: Dump, rtol: float, atol: float) -> Iterator[Differ
 def describe_difference(
     x: np.ndarray, y: np.ndarray, rtol: float = 0.0, atol: float = 0.0
 ) -> tuple[str, float]:
-    """Words for how two arrays differ, "" where they do not; how much relative to their size."""
+    """A description of how two arrays differ, "" if they agree, and the relative difference."""
     bad, relative = find_differences(x, y, rtol, atol)
     if not bad.any():
         return "", relative
@@ -240,7 +240,7 @@ def report(differences: list[Difference], a: Side, b: Side) -> list[str]:
 
 
 def _describe_makers(a: Side, b: Side) -> list[str]:
-    """A line on what differs in what made the two: versions, commit, packages; [] for nothing."""
+    """A line on differences in versions, commit and packages; [] if there are none."""
     one, other = (side.dumps[-1].provenance for side in (a, b))
     names = [n for n in one if n in other and n != "deck_sha256" and one[n] != other[n]]
     words = ", ".join(f"{n} {one[n] or 'unknown'} and {other[n] or 'unknown'}" for n in names)
@@ -248,7 +248,7 @@ def _describe_makers(a: Side, b: Side) -> list[str]:
 
 
 def _needs_norms(a: Side, b: Side) -> bool:
-    """Are they of the same blocks with other cells, or runs with other steps?"""
+    """Whether both have the same blocks with different cells, or runs have different steps."""
     if _name_problem(a.dumps[0].problem) != _name_problem(b.dumps[0].problem):
         return False
     one, other = ({k.name: k.cells for k in side.dumps[0].blocks} for side in (a, b))
@@ -256,9 +256,10 @@ def _needs_norms(a: Side, b: Side) -> bool:
 
 
 def find_other_steps(a: Side, b: Side) -> str:
-    """Words on how two runs march at other times from their first common step on, else "".
+    """A description if two runs have different times already at their first common step, else "".
 
-    Runs whose times part later, and those of no step yet, are none: their rows belong together.
+    The rows of runs whose times differ later, or that have made no step, are still compared in
+    pairs.
     """
     one = a.history or {}
     other = b.history or {}
@@ -312,8 +313,9 @@ def compare_by_norms(a: Side, b: Side, rtol: float, atol: float) -> tuple[list[s
 
 
 def _compare_blocks(one: BlockData, other: BlockData) -> list[tuple[Any, ...]]:
-    """Block, field, norms L1, L2, Linf of the difference and the field's largest size, of all
-    fields of cells that both blocks have, on the grid of `one`."""
+    """For each cell field that both blocks have: block, field, norms L1, L2, Linf of the difference
+    on
+    the grid of `one`, and the largest size of the field."""
     for block in (one, other):
         check_convex(block.name, block.nodes)
     curved = one.axes[1] == "r"
@@ -335,7 +337,7 @@ def _compare_blocks(one: BlockData, other: BlockData) -> list[tuple[Any, ...]]:
 
 
 def _pair(ours: list[Dump], theirs: list[Dump]) -> list[tuple[Dump, Dump]]:
-    """Dumps that are nearest to each other in time, less than half a dump's distance apart."""
+    """Pairs of dumps nearest to each other in time, at most half an output interval apart."""
 
     def find_interval(dumps: list[Dump]) -> float:
         if len(dumps) == 1:  # any other may be near

@@ -1,4 +1,4 @@
-"""What `shockgrid info` says about a run directory or a single dump."""
+"""What `shockgrid info` prints about a run directory or a single dump."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def describe(path: str) -> str:
 
 
 def find_deck(path: str) -> str:
-    """The text of the deck that a dump keeps, or the last dump of a run directory."""
+    """The text of the deck stored in a dump, or in the last dump of a run directory."""
     if not Path(path).is_dir():
         return Dump(path).deck_text
     found = read_stored_deck(RunDirectory(path))
@@ -46,7 +46,7 @@ def find_deck(path: str) -> str:
 
 
 def describe_file(path: Path) -> str:
-    """What one dump holds."""
+    """The contents of one dump."""
     dump = Dump(path)
     t = describe_time(dump.t, dump.t_unit)
     lines = [f"{path}: {dump.problem}, step {dump.step}, {t} of {dump.t_end:.6g}"]
@@ -79,13 +79,13 @@ def describe_blocks(dump: Dump) -> list[str]:
 
 
 def other_name(block) -> str:
-    """The material in brackets, where it says more than the block's name."""
+    """The material in brackets, if it differs from the block's name."""
     material = get_material(block)
     return f" ({material})" if material != block.name else ""
 
 
 def say_restart(run: RunData) -> str:
-    """How to continue a run; the usual command where its problem cannot be made."""
+    """The command that continues a run; the usual one if its problem cannot be built."""
     try:
         return run.problem.say_restart(run.directory.quoted)
     except BadInput:
@@ -93,7 +93,7 @@ def say_restart(run: RunData) -> str:
 
 
 def describe_problem(run: RunData) -> str:
-    """The first line of the problem's words in brackets; "" where it has none."""
+    """The first line of the problem's docstring in brackets; "" if it has none."""
     if run.problem_name in PROBLEMS:
         return f" ({summary_line(run.problem_name)})"
     if run.directory.problem_copy.exists():
@@ -103,7 +103,7 @@ def describe_problem(run: RunData) -> str:
 
 
 def describe_state(last: Dump, history: Mapping[str, np.ndarray]) -> str:
-    """How far a run came, by its history where it has one, else by its last dump."""
+    """How far a run got, from its history or else from its last dump."""
     told = len(history.get("t", ()))
     t, step = (history["t"][-1], int(history["step"][-1])) if told else (last.t, last.step)
     ending = last.finished or "not finished"
@@ -113,7 +113,7 @@ def describe_state(last: Dump, history: Mapping[str, np.ndarray]) -> str:
 
 
 def describe_directory(path: str) -> str:
-    """What was run, how far it came, its conservation errors, and what there is to see."""
+    """The problem, how far the run got, its conservation errors, and its pictures."""
     run = RunData(path, lenient=True)
     lines = [f"{run.path}: {run.problem_name}{describe_problem(run)}"]
     quoted = run.directory.quoted
@@ -159,7 +159,7 @@ def describe_directory(path: str) -> str:
 
 
 def _list_damage(run: RunData) -> list[str]:
-    """What is damaged, a line each; those restart points that nothing else reads are looked at."""
+    """A line for each damaged file, restart points included."""
     known = [dump.path for dump in run.dumps]
     for _, path in run.directory.list_points():
         if path not in known:
@@ -171,9 +171,9 @@ def _list_damage(run: RunData) -> list[str]:
 
 
 def find_verdict(run: RunData) -> dict[str, Any] | None:
-    """The verdict; of a run that has not ended, what its history tells so far; None without one.
+    """The verdict; for an unfinished run the verdict on its history so far; None without a history.
 
-    Raises BadInput where a file is damaged; that of the verdict itself is among `run.skipped` then.
+    Raises BadInput if a file is damaged; a damaged verdict is listed in `run.skipped`.
     """
     try:
         verdict = run.verdict
@@ -188,7 +188,7 @@ def find_verdict(run: RunData) -> dict[str, Any] | None:
 
 
 def describe_settings(run: RunData) -> list[str]:
-    """Those keys of the deck that differ from the problem's defaults."""
+    """The keys of the deck that differ from the problem's defaults."""
     try:
         usual, now = (msgspec.to_builtins(deck) for deck in (type(run.deck)(), run.deck))
     except BadInput:
@@ -203,7 +203,7 @@ def describe_settings(run: RunData) -> list[str]:
 def describe_history(history: Mapping[str, np.ndarray], t_unit: str = "s") -> list[str]:
     """Steps, range of dt, wall time."""
     if not len(history["step"]):
-        return ["no row of the history is known"]
+        return ["the history has no rows"]
     lines = [f"{int(history['step'][-1])} steps"]
     dt = history.get("dt", np.zeros(0))
     if np.isfinite(dt).any():
@@ -214,15 +214,15 @@ def describe_history(history: Mapping[str, np.ndarray], t_unit: str = "s") -> li
 
 
 LONGEST_SHOWN_TEXT = 60  # characters of a text that are shown
-SAID = ("units", "long_name")  # attributes that a dataset's own line tells
+SAID = ("units", "long_name")  # attributes that the line of a dataset shows
 SCALES = ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid")  # HDF5's own
 
 
 def inspect(file: str | os.PathLike) -> str:
-    """The tree of an HDF5 file in words: for each array shape, type, range, unit, bad values.
+    """Describe the tree of an HDF5 file: shape, type, range, unit and bad values of each array.
 
-    file: a file or a dump of an opened run.  One whose checksum is wrong is read in a process of
-    its own, for it may crash HDF5's library.  Raises BadInput then, and where it is no HDF5 file.
+    file: a file or a dump of an opened run.  A file with a wrong checksum is read in a separate
+    process, because it may crash the HDF5 library.  Raises BadInput then, and for other files.
     """
     path = Path(file)
     if not path.is_file() or find_sum(path) != "":
@@ -236,7 +236,7 @@ def inspect(file: str | os.PathLike) -> str:
 
 
 def describe_tree(path: Path) -> str:
-    """What `inspect` says, read in this process."""
+    """As `inspect`, in this process."""
     with open_hdf5(path) as tree:
         head = f"{path}: {path.stat().st_size} bytes"
         if (found := find_sum(path)) is not None:
@@ -256,10 +256,12 @@ def describe_tree(path: Path) -> str:
 
 @contextlib.contextmanager
 def open_hdf5(path: Path) -> Iterator[h5py.File]:
-    """The file, open for reading; BadInput where it is missing, no HDF5, or its tree is damaged."""
+    """The file, open for reading; BadInput if it is missing, not HDF5 or damaged."""
     if not path.is_file():
         words = (
-            "is no HDF5 file; `shockgrid info` is for runs" if path.is_dir() else "does not exist"
+            "is not an HDF5 file; `shockgrid info` describes runs"
+            if path.is_dir()
+            else "does not exist"
         )
         raise BadInput(f"{path} {words}")
     try:
@@ -286,7 +288,7 @@ def list_items(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
 
 
 def describe_attributes(item: h5py.Group | h5py.Dataset, said: Sequence[str] = ()) -> list[str]:
-    """A line for each attribute that no other words tell."""
+    """A line for each attribute that is not shown otherwise."""
     names = [name for name in item.attrs if name not in (*SCALES, *said)]
     return [f"@{name} = {_say_value(item.attrs[name])}" for name in names]
 

@@ -1,4 +1,4 @@
-"""What there is to run, and what a deck would run: the words of `list` and `run --dry-run`."""
+"""The text of `list`, `materials` and `run --dry-run`."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ def describe_all() -> str:
 
 
 def describe_installed() -> list[str]:
-    """Lines on what other installed packages bring, with their origin; none where there is none.
+    """Lines on the parts that other installed packages provide, with their origin.
 
-    A name that shockgrid has itself, or that two packages have, is said to be of no use.
+    Names that shockgrid or a second package also has are marked as not used.
     """
     plug_ins = {group: find_plug_ins(group) for group in GROUPS}
     if not any(plug_ins.values()):
@@ -75,7 +75,7 @@ def describe_installed() -> list[str]:
 
 
 def describe_problem(name: str) -> str:
-    """The page of one problem, of a problem's own file, or the deck of that name."""
+    """The docstring of a problem or of its file, or the packaged deck of that name."""
     if is_problem_file(name):
         return read_docstring(name) or f"{name} has no docstring"
     if name in PROBLEMS:
@@ -89,8 +89,7 @@ def describe_problem(name: str) -> str:
 
 
 def describe_materials(name: str | None = None) -> str:
-    """A line on each material of the library; the numbers of the one called `name` and their
-    source, also of one in a user's file ("FILE.toml:NAME")."""
+    """A line for each material of the library, or the parameters and source of material `name`."""
     from hydro.eos.materials import LIBRARY, find_material, find_name, read_materials
 
     if name is None:
@@ -115,7 +114,7 @@ def describe_materials(name: str | None = None) -> str:
 
 
 def describe_deck(path: Path) -> str:
-    """What the comment at a deck's head begins with, up to a semicolon or a bracket."""
+    """The beginning of a deck's first comment, up to a semicolon or a bracket."""
     words = []
     for line in path.read_text(encoding="utf-8").splitlines():
         if not line.startswith("#"):

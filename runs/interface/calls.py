@@ -54,11 +54,11 @@ def make_case(
     measure: Measure | None = None,
     begun: RunDirectory | None = None,
 ) -> Case:
-    """A case of a simulation that a script has made; `begun`: goes on with the run there.
+    """A case of a simulation that a script has made; begun: the directory of a run to continue.
 
-    settings: `key=value` of run.max_steps, output.* and gauge; all else is the simulation's own.
-    Raises BadInput for other keys, for what is no simulation, and where that of a run that goes on
-    has marched already or has blocks of other materials.
+    settings: `key=value` of run.max_steps, output.* and gauge; the simulation defines the rest.
+    Raises BadInput for other keys, for an object that is not a simulation, and, when continuing, if
+    the simulation has made steps or its blocks have other materials.
     """
     table: dict[str, Any] = {"problem": NAME, "run": _describe_march(simulation)}
     table |= {"script": _find_script(), "materials": _describe_materials(simulation)}
@@ -75,15 +75,15 @@ def make_case(
             )
         if simulation.step:
             raise BadInput(
-                f"the simulation has made {simulation.step} steps already; a restart needs one as "
-                "it was before its first step"
+                f"the simulation has made {simulation.step} steps already; a restart needs one "
+                "before its first step"
             )
         was = before.get("materials", {})
         for name in {**was, **now}:
             if was.get(name) != now.get(name):
                 raise BadInput(
                     f"block {name!r} is of {now.get(name, 'no block')} in this simulation, of "
-                    f"{was.get(name, 'no block')} in the run in {begun}: that is another flow"
+                    f"{was.get(name, 'no block')} in the run in {begun}: these are different flows"
                 )
         table |= {key: before[key] for key in ("output", "gauge") if key in before}
         most = before.get("run", {}).get("max_steps")
@@ -100,7 +100,7 @@ def make_case(
 
 
 def _describe_march(simulation: Evolution) -> dict[str, Any]:
-    """What the deck can say of how a simulation marches; BadInput where it is none."""
+    """The time stepping of a simulation as keys of a deck; BadInput if it is not a simulation."""
     if not isinstance(simulation, Evolution):
         raise BadInput(
             f"a {type(simulation).__name__} is not a simulation; give a shockgrid.Simulation, a "
@@ -113,7 +113,7 @@ def _describe_march(simulation: Evolution) -> dict[str, Any]:
 
 
 def _describe_materials(simulation: Evolution) -> dict[str, str]:
-    """Material and equation of state of each block, by which a run is known again."""
+    """Material and equation of state of each block, to recognise the run in a restart."""
     words = {}
     for block in simulation.blocks:
         words[block.name] = get_material(block)
@@ -124,7 +124,7 @@ def _describe_materials(simulation: Evolution) -> dict[str, str]:
 
 
 def _describe_parameter(value: Any) -> str:
-    """A number; of an array, such as a table of pressures, its size and a digest."""
+    """A number, or the size and digest of an array, such as a table of pressures."""
     if np.ndim(value) == 0:
         return f"{value:.6g}"
     array = np.ascontiguousarray(value)

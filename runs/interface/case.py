@@ -85,7 +85,7 @@ class Drawn:
             what = fields[0]
             fields = ()
         if mirror not in (None, "x", "y"):
-            raise BadInput(f"mirror = {mirror!r}: 'x' or 'y' is wanted")
+            raise BadInput(f"mirror = {mirror!r}: it must be 'x' or 'y'")
         wanted = Wanted(fields, what, at, mesh, zoom, mirror, beside, line, limits, colours)
         with said_in_python():
             fill_figure(figure := new_figure(), self, wanted)  # type: ignore[arg-type]
@@ -119,12 +119,12 @@ class OpenRun(Drawn, RunData):
     """A run as data: `.deck`, `.history`, `.dumps[-1]["second"].rho`, `.problem` and more.
 
     Everything is read at first use.  To see more of a run that is still in progress, open it
-    again.  `dumps` are in order of time; `reason` says why a run ended that was just made, and
-    is "" for a directory that was opened.
+    again.  `dumps` are in order of time; `reason` is why a run ended that was just computed, "" for
+    a directory that was opened.
     """
 
     reason: str = ""
-    final: Evolution | None = None  # the state in memory of the run that was just made
+    final: Evolution | None = None  # the state in memory of the run that was just computed
 
     def interface(self, t: float | None = None) -> Curve:
         """The curve between blocks of different materials in the dump nearest to `t` [s].
@@ -190,7 +190,7 @@ def open_run(directory: str | os.PathLike) -> OpenRun:
 
 
 def finish(runner: Runner, ending: Ending, quiet: bool) -> OpenRun:
-    """The data of a run that has ended; KeyboardInterrupt or SystemExit where it was stopped."""
+    """The data of a run that has ended; KeyboardInterrupt or SystemExit if it was stopped."""
     if ending.exit_code == EXIT_INTERRUPTED:
         raise KeyboardInterrupt(f"{ending.reason}; {runner.directory} can be restarted from")
     if ending.exit_code >= FIRST_SIGNAL:
@@ -204,20 +204,20 @@ def finish(runner: Runner, ending: Ending, quiet: bool) -> OpenRun:
 
 
 def make_settings(keywords: Mapping[str, Any]) -> tuple[str, ...]:
-    """`key=value` for each value, tables with dots; BadInput for what no deck holds."""
+    """`key=value` for each value, tables with dots; BadInput for values that TOML lacks."""
     return write_settings(flatten(keywords))
 
 
 def say(text: str) -> None:
-    """A line for the person on standard error."""
+    """Print a line to standard error."""
     print(text, file=sys.stderr)
 
 
-HookFunction = Callable[[Any], Any]  # of the case; None, or words on why to stop
+HookFunction = Callable[[Any], Any]  # of the case; returns None, or why to stop
 
 
 def is_count(value: object) -> bool:
-    """Is it a whole number of at least 1?"""
+    """Whether the value is a whole number of at least 1."""
     return type(value) is int and value >= 1
 
 
@@ -237,15 +237,15 @@ class Hook:
         if steps is not None and time is not None:
             raise BadInput("a hook is called every so many steps or seconds: steps= or time=")
         if steps is not None and not is_count(steps):
-            raise BadInput(f"steps = {steps!r} of a hook: a whole number of at least 1 is wanted")
+            raise BadInput(f"steps = {steps!r} of a hook: it must be a whole number of at least 1")
         if time is not None and not 0.0 < time < math.inf:
-            raise BadInput(f"time = {time!r} s of a hook: a positive number is wanted")
+            raise BadInput(f"time = {time!r} s of a hook: it must be a positive number")
         self.function = function
         self.steps = steps or 1
         self.time = time
 
     def is_due(self, case: Any, t_before: float) -> bool:
-        """Is it to be called after the step from `t_before` to the time of the case?"""
+        """Whether to call it after the step from `t_before` to the time of the case."""
         if self.time is not None:
             return math.floor(case.t / self.time) > math.floor(t_before / self.time)
         return case.step % self.steps == 0
@@ -255,9 +255,9 @@ HooksGiven = Sequence[Hook | HookFunction] | Hook | HookFunction
 
 
 def join_hooks(case: Any, given: HooksGiven) -> Callable[[float], str | None]:
-    """What a runner calls after each step, from a time [s] on: all hooks that are due.
+    """Return a function that calls all hooks that are due after a step from a given time [s].
 
-    It returns the first reason to stop, and raises BadInput where a hook returns neither None nor
+    It returns the first reason to stop, and raises BadInput if a hook returns neither None nor
     text.
     """
     several = given if isinstance(given, Sequence) else [given]
@@ -269,7 +269,7 @@ def join_hooks(case: Any, given: HooksGiven) -> Callable[[float], str | None]:
             if not isinstance(reason, str | None):
                 name = getattr(hook.function, "__name__", "hook")
                 raise BadInput(
-                    f"{name} returned {reason!r}: a hook returns None, or words on why to stop"
+                    f"{name} returned {reason!r}: a hook returns None, or text on why to stop"
                 )
             if reason:
                 return reason
@@ -330,7 +330,7 @@ class Case(Drawn):
         self.problem = problem
         self.deck = read.deck
         self.name = self.problem_name = read.label
-        self.path = Path(read.label)  # as it is named in messages
+        self.path = Path(read.label)  # its name in messages
         self._runs = False
 
     @property
@@ -414,7 +414,7 @@ class Case(Drawn):
         if self._runs:
             raise BadInput(words)
         if self.finished:
-            raise BadInput(f"{self.name} is at its end already: {self.finished}")
+            raise BadInput(f"{self.name} has already finished ({self.finished})")
 
     def run(
         self,
@@ -461,7 +461,7 @@ class Case(Drawn):
         return self.march(runner, runner.start, quiet)
 
     def march(self, runner: Runner, start: Any, quiet: bool) -> OpenRun:
-        """Let a runner of this case `start`, which gives an ending; the data of its directory."""
+        """Run `start`, a method of a runner of this case; return the data of its directory."""
         self._runs = True
         try:
             ending = start()

@@ -22,7 +22,7 @@ __all__ = ("Grid", "compare", "make", "quality", "read", "regrid", "write")
 def read(path: str | Path, block: str | None = None) -> np.ndarray:
     """The nodes (2 or 3, ...) [m] in a file (.npz, .h5, .vts, .vtk, Plot3D).
 
-    block: which one, where it has several.  Raises BadInput for a file that holds no grid.
+    block: which of several.  Raises BadInput for a file without a grid.
     """
     return read_grid(str(path), block)
 
@@ -42,12 +42,12 @@ def compare(
     cells: tuple[int, int] | None = None,
     steps: int = MOTION_STEPS,
 ) -> dict[str, March]:
-    """Named domain marched in `steps` steps by each family; what came of it, by its label.
+    """March a named domain in `steps` steps with each family; the results by label.
 
-    families: names or regridders of one's own, with labels where it is a mapping.  Of a march:
+    families: names or your own regridders, as a mapping with labels.  A result has
     `done` steps of `steps`, `failure`, the last `nodes`, and the worst of all steps: `sine` of a
-    corner, `aspect` ratio, first-line `gap`; `cost` in µs a node and step.  Raises BadInput for a
-    domain or family that there is not.
+    corner, `aspect` ratio, first-line `gap`; `cost` in µs a node and step.  Raises BadInput for an
+    unknown domain or family.
     """
     if not isinstance(families, Mapping):
         families = {making.name_family(family, domain, False): family for family in families}
@@ -61,6 +61,6 @@ def compare(
 
 
 def write(grid: Grid | np.ndarray, *paths: str | Path, force: bool = False) -> list[Path]:
-    """Write a grid to files of the kinds their names end in; see `Grid.write`."""
+    """Write a grid to files, each in the format of its suffix; see `Grid.write`."""
     grid = grid if isinstance(grid, Grid) else Grid(find_nodes(grid))
     return grid.write(*paths, force=force)

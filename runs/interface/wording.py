@@ -8,8 +8,7 @@ from contextlib import contextmanager
 
 from regrid.errors import BadInput
 
-# what messages say for people who type commands, and for callers in Python; the longest first, each
-# part of a message is replaced once
+# text in messages for the command line, and for callers in Python
 PHRASES: Mapping[str, str] = {
     " and --set": " and the keywords",
     " with restart --set, or with --set in a new run": " in shockgrid.restart or in a new run",
@@ -33,9 +32,9 @@ WORDS = re.compile(rf"(?P<command>{COMMAND})|(?P<phrase>{'|'.join(ALTERNATIVES)}
 
 
 def say_in_python(words: str) -> str:
-    """The message with keywords of Python in place of options; commands stay as they are.
+    """The message with Python keywords in place of options; commands stay as they are.
 
-    It is searched once, from left to right: what replaces an option is not searched again.
+    The message is searched once from left to right, so replacements are not searched again.
     """
 
     def name_keyword(found: re.Match) -> str:
@@ -51,7 +50,7 @@ def say_in_python(words: str) -> str:
 
 @contextmanager
 def said_in_python() -> Iterator[None]:
-    """Sentences of BadInput that name options of the command line name keywords instead."""
+    """Replace options of the command line by keywords in the messages of BadInput."""
     try:
         yield
     except BadInput as error:

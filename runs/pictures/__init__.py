@@ -2,9 +2,9 @@
 
 May import: `runs.deck`, `runs.store`, `runs.inspection` and all below them.
 
-Importing this package loads matplotlib, whatever the variable MPLBACKEND says: a notebook's kernel
-sets it to a backend that its Python has and that of a command may lack, and matplotlib then refuses
-to load.  Nothing here needs a backend.  Raises BadInput where matplotlib cannot be loaded.
+Importing this package loads matplotlib and ignores the variable MPLBACKEND: a notebook's kernel
+sets it to a backend that the Python of a command may lack, and matplotlib then refuses to load.
+Nothing here needs a backend.  Raises BadInput where matplotlib cannot be loaded.
 """
 
 from __future__ import annotations

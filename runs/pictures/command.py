@@ -71,7 +71,7 @@ Numbers = str | Sequence[float] | None  # of the command line, with commas betwe
 
 
 class Wanted(NamedTuple):
-    """What picture, in the words of `shockgrid plot`.
+    """The picture to draw, by the options of `shockgrid plot`.
 
     fields: names, of derived fields too; what: fields, mesh, interface, history, line or one of the
     problem's; at: times [s]; zoom: x0,x1,y0,y1 [m]; mirror: x or y; beside: another run, drawn to
@@ -101,10 +101,10 @@ def draw(
     say: Callable[[str], None] | None = None,
     table: str | None = None,
 ) -> list[Path]:
-    """Write one picture of a run; returns its path, and that of the table of a line, if wished.
+    """Write one picture of a run; return its path and, with `table`, the path of the CSV file.
 
-    table: a CSV file for the values along a line; `say` takes remarks.  Raises BadInput for what is
-    not there.
+    table: a CSV file for the values along a line; say: receives remarks.  Raises BadInput if the
+    run lacks the picture, the field or the time.
     """
     run = RunData(directory)
     figure = new_figure()
@@ -121,9 +121,10 @@ def draw(
 def fill_figure(
     figure: Figure, run: RunData, wanted: Wanted, say: Callable[[str], None] | None = None
 ) -> tuple[str, Callable[[Path], Path] | None]:
-    """Draw one picture of a run into `figure`; raises BadInput for what is not there.
+    """Draw one picture of a run into `figure`.
 
-    Returns the stem of a name for it, and what writes the table of a line's values, if it is one.
+    Returns a stem for its file name and, for values along a line, a function that writes their
+    table. Raises BadInput if the run lacks the picture, the field or the time.
     """
     at = wanted.at
     beside = wanted.beside
@@ -176,7 +177,7 @@ def fill_figure(
             raise BadInput(f"there is no picture {what!r} of {run.problem_name}{hint}")
         try:
             own[what](figure, run)
-        except KeyError as error:  # perhaps of a column, where there is no history
+        except KeyError as error:  # a missing column, perhaps because there is no history
             if len(run.history.get("t", ())):
                 raise
             raise BadInput(f"{run.path} has no history yet: no step was made") from error
@@ -184,7 +185,7 @@ def fill_figure(
     if idle and say:
         say(f"{', '.join(idle)} does not apply to the picture {what!r}")
     if part and say:
-        say("the panels show only the region around the interface; --zoom shows any other part")
+        say("the panels show only a part of the domain; --zoom shows any other part")
     if what not in BESIDE:
         shown += names
     for name in OPTIONS:
@@ -263,7 +264,7 @@ def choose_dumps(
 ) -> list[Dump]:
     """The dumps nearest to the times in `at`, or `count` of them from first to last.
 
-    Without times of its own (iterations) a run is shown by its last state.
+    A run that counts iterations instead of time is shown by its last state.
 
     `say` receives a message for times outside the run.
     """
@@ -295,9 +296,9 @@ def choose_dumps(
 def choose_pairs(
     runs: list[RunData], at: Numbers | float, say: Callable[[str], None] | None = None
 ) -> list[Dump]:
-    """Dumps of the first run, after each the one of every other run that is nearest in time.
+    """Dumps of the first run, each followed by the dumps of the other runs nearest to it in time.
 
-    Without times: those halfway and at the end.
+    at: None for halfway and the end.
     """
     first = choose_dumps(runs[0], at, 3, say)
     if at is None and len(first) > 2:
@@ -312,7 +313,7 @@ def name_paths(runs: list[RunData]) -> list[str]:
 
 
 def make_view(zoom: Numbers, mirror, mesh: bool, limits: Numbers, colours: str | None) -> View:
-    """What a picture or a film shows of a field, and how; BadInput for invalid values."""
+    """The view of a picture or film; BadInput for invalid values."""
     if limits is not None:
         limits = parse_numbers("--limits", limits, "low,high with low < high", 1)
     if colours is not None and colours not in colormaps:
@@ -336,7 +337,7 @@ def parse_zoom(zoom: Numbers) -> tuple[float, ...] | None:
 def parse_numbers(
     option: str, given: str | Sequence[float], form: str, rising: int = 0
 ) -> tuple[float, ...]:
-    """As many finite numbers as `form` names between its commas; the first `rising` pairs rise."""
+    """Parse as many finite numbers as `form` lists; the first `rising` pairs must increase."""
     wanted = form.partition(" ")[0].strip(",").count(",") + 1
     text = given if isinstance(given, str) else ",".join(map(str, given))
     numbers = tuple(parse_number(option, text, word) for word in text.split(","))
@@ -347,7 +348,7 @@ def parse_numbers(
 
 
 def parse_number(option: str, text: str, word: str) -> float:
-    """A finite number, one of those in the `text` of an option."""
+    """Parse `word`, one of the numbers in the `text` of an option; BadInput if it is not finite."""
     with contextlib.suppress(ValueError):
         if math.isfinite(number := float(word)):
             return number

@@ -35,8 +35,9 @@ CLOSE_END_DISTANCE = 1e-9  # of the interfaces' extent: closer ends are one poin
 
 
 def find_curves(blocks: Sequence) -> dict[str, np.ndarray]:
-    """All interfaces of some blocks by name, after their materials in the blocks' order: x, y and
-    the length along the curve from its first node, (3, n) [m]."""
+    """All interfaces between blocks, named by their materials in the order of the blocks.
+
+    Each is an array (3, n) [m]: x, y and the length along the curve from its first node."""
     found: dict[tuple[str, str], list[np.ndarray]] = {}
     for pair, line in fields.trace_outline(blocks)[0]:
         pair = pair if pair[::-1] not in found else pair[::-1]
@@ -55,7 +56,7 @@ def find_curves(blocks: Sequence) -> dict[str, np.ndarray]:
 
 
 def _extend(line: np.ndarray, others: list[np.ndarray], near: float) -> np.ndarray:
-    """The line with all of `others` that meet its ends, which are removed from the list."""
+    """Extend a line by those of `others` that meet its ends, and remove them from the list."""
     for number, other in enumerate(others):
         for piece in (other, other[:, ::-1]):
             if np.hypot(*(line[:, -1] - piece[:, 0])) <= near:
@@ -70,7 +71,7 @@ def _extend(line: np.ndarray, others: list[np.ndarray], near: float) -> np.ndarr
 
 
 def export_interfaces(directory: str, output: str | None = None) -> Path:
-    """Write the interfaces at all dumps of a run as a CSV file [DIR/interfaces.csv]; its path.
+    """Write the interfaces at all dumps of a run as CSV [DIR/interfaces.csv]; return the path.
 
     Raises BadInput if there is no dump or no interface.
     """
@@ -149,7 +150,7 @@ class Lineout(NamedTuple):
 
 
 def find_pieces(nodes: np.ndarray, line: Line) -> tuple[np.ndarray, np.ndarray]:
-    """Cells (n, 2) that a line meets and the ends (n, 2) of its piece in each, as fractions of it.
+    """Cells (n, 2) that a line meets, and where it enters and leaves each (n, 2), as fractions.
 
     nodes: (2, ni+1, nj+1) [m] of convex cells of either orientation.
     """
@@ -255,7 +256,7 @@ def draw_lineouts(
 def write_csv(
     path: Path, lineouts: Sequence[Sequence[Lineout]], names: Sequence[str], runs: Sequence[str]
 ) -> Path:
-    """One row per cell: run, step, t, block, i, j, x, y, way, fields; the head has the units."""
+    """One row per cell: run, step, t, block, i, j, x, y, way, fields; the header has the units."""
     first = lineouts[0][0].dump
     units = [name_axis(name, fields.get_style(first, name).unit) for name in names]
     heads = ["run", "step", name_axis("t", first.t_unit), "block", "i", "j"]
@@ -293,7 +294,7 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
         if name not in history:
             raise BadInput(f"{run.path} has no column {name!r}; there are: {', '.join(history)}")
         if history[name].dtype.kind not in "fi":
-            raise BadInput(f"the column {name!r} of {run.path} holds words, no numbers")
+            raise BadInput(f"the column {name!r} of {run.path} holds text, not numbers")
     units = run.find_units()
     factor, unit = fields.scale_times(run.dumps, history["t"][-1])
     label = name_axis("t", unit)
@@ -332,7 +333,7 @@ def find_sizes(run: RunData) -> dict[str, float]:
 def choose_panels(
     history: Mapping[str, np.ndarray], units: Mapping[str, str], sizes: Mapping[str, float]
 ) -> tuple[list[Panel], list[str]]:
-    """Panels in order, and the constant columns, which need none.
+    """The panels in order, and the columns that are constant and need no panel.
 
     Measured columns with the same first word, unit and size share a panel.  A column whose values
     are round-off of the flow's `sizes` (by unit) counts as constant.
@@ -441,7 +442,7 @@ GAUGES_HEIGHT = 3.0
 
 
 def draw_gauges(figure, run: RunData, names: list[str]) -> None:
-    """Fields over time at all gauges that write them; `names`: these fields or gauges alone.
+    """Fields over time at the gauges; names: only these fields or gauges.
 
     Raises BadInput if a run has no gauges, and for an unknown name.
     """

@@ -60,7 +60,7 @@ def trace_outline(blocks: Sequence) -> Outline:
 
 
 def find_interfaces(blocks: Sequence) -> list[np.ndarray]:
-    """The interfaces alone, as polylines (2, n)."""
+    """The interfaces as polylines (2, n)."""
     return [line for _, line in trace_outline(blocks)[0]]
 
 
@@ -256,8 +256,8 @@ def draw_fields(
 ) -> bool:
     """Fill `figure` with a panel for each field and each dump; titles: instead of the times.
 
-    Without names the grids are drawn, a colour for each block.  Returns whether the panels leave
-    out what is far from the interface.
+    Without names the grids are drawn, a colour for each block.  Returns whether the panels show
+    only a part of the domain.
     """
     moments = [make_sheets(dump, names, view) for dump in dumps]
     extents = [measure_extent(sheets) for sheets in moments]
@@ -329,7 +329,7 @@ def draw_blocks(
 
 
 def mark_largest(axes, sheets: Sequence[Sheet], name: str, scale: float, box) -> None:
-    """A ring about the cell with the largest value of the field, and text on its position."""
+    """Draw a ring around the cell with the largest value of the field, and print its position."""
     sheet = max((s for s in sheets if name in s.fields), key=lambda s: np.nanmax(s.fields[name]))
     place = np.unravel_index(np.nanargmax(sheet.fields[name]), sheet.fields[name].shape)
     x, y = compute_centres(sheet.nodes)[:, *place] * scale
@@ -354,8 +354,7 @@ Extent = tuple[Box, Box | None]  # of all sheets; of the interfaces in them
 
 
 def measure_extent(sheets: Sequence[Sheet], follow: bool = True) -> Extent:
-    """Extents of all sheets and of the interfaces in them; None if there are none, or not wanted
-    (`follow`)."""
+    """Extents of all sheets and of their interfaces; None without any, or without `follow`."""
     every = np.concatenate([sheet.nodes.reshape(2, -1) for sheet in sheets], axis=1)
     lines = find_interfaces(sheets) if follow else []
     return _bound(every), _bound(np.concatenate(lines, axis=1)) if lines else None
@@ -381,10 +380,10 @@ def _join_boxes(boxes: Sequence[Box]) -> Box:
 def choose_boxes(
     extents: Sequence[Extent], view: View, follow: bool = False
 ) -> tuple[list[Box], bool]:
-    """(What is shown at each time, of one size; does it go with the interface?), from what
-    `measure_extent` found at each.
+    """Windows of one size, one for each time, and whether they follow the interface.
 
-    It does with `follow`, and in a long domain, where the surroundings of the interface are shown.
+    extents: of `measure_extent` at each time.  Windows follow the interface with `follow`, and in a
+    long domain if the interface is not plane.
     """
     whole = _join_boxes([box for box, _ in extents])
     if view.zoom is not None:
@@ -411,7 +410,7 @@ def choose_boxes(
 
 
 def follow_bodies(boxes: list[Box], extents: Sequence[Extent]) -> tuple[list[Box], bool]:
-    """Boxes of one size about all bodies at each time, and True, if `boxes` are mostly blank."""
+    """Boxes of one size around all bodies at each time and True, if `boxes` are mostly blank."""
     own = np.array([extent for extent, _ in extents])
     width = float(np.max(own[:, 1] - own[:, 0]))
     height = float(np.max(own[:, 3] - own[:, 2]))
@@ -426,7 +425,7 @@ def follow_bodies(boxes: list[Box], extents: Sequence[Extent]) -> tuple[list[Box
 
 
 def crop_boxes(boxes: Sequence[Box], moments: Sequence[Sequence[Sheet]]) -> list[Box]:
-    """The boxes without what is blank at their edges, still all of one size."""
+    """The boxes without blank margins, still all of one size."""
     filled = []
     for box, sheets in zip(boxes, moments, strict=True):
         low = np.array(box[::2])
@@ -540,7 +539,7 @@ def find_range(sheets: Sequence[Sheet], name: str, box) -> ValueRange:
 
 
 def find_size(dumps: Sequence[Dump], name: str) -> float:
-    """For a velocity the largest speed of flow or sound [m/s], about; else 0.
+    """For a velocity, roughly the largest speed of flow or sound [m/s]; else 0.
 
     A component that is smaller than this by many orders of magnitude is round-off.
     """
@@ -558,7 +557,7 @@ def find_size(dumps: Sequence[Dump], name: str) -> float:
 
 
 class Colours(NamedTuple):
-    """How the values of a field become colours: of values times `factor`; label of the bar."""
+    """How the values of a field, times `factor`, become colours; label: of the colour bar."""
 
     norm: Normalize
     map: str
@@ -640,7 +639,7 @@ def time_titles(dumps: Sequence[Dump]) -> list[str]:
 
 
 def scale_times(dumps: Sequence[Dump], last: float = 0.0) -> tuple[float, str]:
-    """Factor and unit for the times of `dumps`, or for one of `last` [s] where there are none."""
+    """Factor and unit for the times of `dumps`; without dumps for the time `last` [s]."""
     if not dumps:
         return pick_prefix(last, "s")
     return pick_prefix(max(dump.t for dump in dumps), dumps[-1].t_unit)

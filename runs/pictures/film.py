@@ -77,7 +77,9 @@ def make_film(
     if kind not in KINDS:
         raise BadInput(f"{path}: a film's name has to end in .mp4 or .gif")
     if kind == ".mp4" and not has_ffmpeg:
-        raise BadInput(f"{path}: an mp4 needs the program ffmpeg, which is not here; take a .gif")
+        raise BadInput(
+            f"{path}: an mp4 needs the program ffmpeg, which is not installed; choose a .gif"
+        )
     check_folder(path)
     paths = [dump.path for dump in run.dumps]
     if len(paths) < 2:
@@ -131,7 +133,7 @@ def make_film(
 def make_frames(
     figure, dumps: Sequence[Dump], name: str, view: View, boxes, ranges
 ) -> Callable[[int], None]:
-    """A function that draws the frame of a dump, by its number from 0, into the same axes."""
+    """Return a function that draws the frame of a dump, by its number from 0, into one axes."""
     paths = [dump.path for dump in dumps]
     titles = fields.time_titles(dumps)
     first = Dump(paths[0])

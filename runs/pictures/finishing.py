@@ -1,4 +1,4 @@
-"""What every picture gets in the end, whoever has drawn it: readable numbers and no blank space.
+"""The finish of every picture, whoever has drawn it: readable numbers and no blank space.
 
 Axes labelled with an SI unit get a prefix (`x [m]` up to 0.002 becomes `x [mm]` up to 2), so that
 problems may draw in SI units.  Curves that only differ by round-off are drawn flat, single points
@@ -56,7 +56,7 @@ def _is_graph(axes: Axes) -> bool:
 
 
 def _get_curves(axes: Axes) -> Iterator[np.ndarray]:
-    """The finite ordinates of each curve; straight lines across the axes are none."""
+    """The finite ordinates of each curve, ignoring straight lines across the axes."""
     for line in axes.lines:
         if line.get_transform() == axes.transData:
             values = np.asarray(line.get_ydata(), dtype=float)
@@ -77,14 +77,14 @@ def _keep_round_off_flat(axes: Axes) -> None:
 
 
 def find_usual_range(values: np.ndarray, share: float) -> tuple[float, float]:
-    """Least and largest of the finite `values` without a share of them at each end, one or more."""
+    """Least and largest of the finite `values` without a share (at least one) at each end."""
     number = max(1, int(share * values.size))
     ordered = np.sort(values)
     return float(ordered[number]), float(ordered[-1 - number])
 
 
 def _leave_out_spikes(axes: Axes) -> None:
-    """Show the usual range of curves with single points far beyond it, and say how far they go."""
+    """Limit the axis to the usual range of curves if single points lie far beyond it."""
     curves = [values for values in _get_curves(axes) if values.size >= LEAST_CURVE_POINTS]
     if not curves or not axes.get_autoscaley_on():
         return
@@ -135,7 +135,7 @@ class Prefixed(ScalarFormatter):
 
 
 class Labelled(NamedTuple):
-    """An axis whose label, or the title of whose panel, has an SI unit."""
+    """An axis with an SI unit in its label or in the title of its panel."""
 
     axes: Axes
     axis: Axis
@@ -183,7 +183,7 @@ def _use_prefixes(figure: Figure) -> None:
 
 
 def _find_unlabelled(figure: Figure, one: Labelled) -> Iterator[Axis]:
-    """The axes beside a labelled one that have no label because they share its."""
+    """Axes beside a labelled one that share its label."""
     place = one.axes.get_subplotspec()
     is_y = one.axis is one.axes.yaxis
     if place is None or one.in_title:
@@ -226,7 +226,7 @@ def _remove_blank(figure: Figure) -> None:
 def _measure_panels(
     panels: list[Axes], number: int, inches: float, down: bool
 ) -> tuple[list[float], float]:
-    """Sizes [inches] that the rows (or columns) of panels need, and how much of theirs is blank."""
+    """Sizes [inches] that the rows (or columns) of panels need, and how much space is blank."""
     needs = np.zeros(number)
     used = np.zeros(number)
     slots = np.zeros(number)

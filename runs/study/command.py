@@ -61,7 +61,7 @@ def study(
             left = count(made.results.count(None), "run")
             note(f"stopped with {left} to do; repeat the command to continue")
             told = [number for number in find_numbers(*STOPPING) if _name(number) in str(stop)]
-            return 128 + [signal.SIGINT, *told, *caught][-1]  # `told`: by a run
+            return 128 + [signal.SIGINT, *told, *caught][-1]  # `told`: signals that runs reported
         finally:
             progress.close()
     paths = made.write(note)
@@ -139,14 +139,14 @@ class Progress:
             self.note(text)
 
     def close(self) -> None:
-        """Leave the bar as it is."""
+        """Stop updating the bar."""
         if self.bar is not None:
             self.bar.close()
 
 
 @contextlib.contextmanager
 def terminate_softly() -> Iterator[list[int]]:
-    """In the block signals that end a run are a KeyboardInterrupt; the list holds their numbers."""
+    """Turn signals that end a run into KeyboardInterrupt; the list holds their numbers."""
     caught: list[int] = []
     terminals = list_terminals()
 

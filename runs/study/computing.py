@@ -41,10 +41,7 @@ from runs.verify import CASES
 
 
 def find_error_columns(problem: str, measured: Iterable[str] = ()) -> tuple[str, ...]:
-    """Names of errors that `verify` checks for `problem`, including columns.
-
-    And those of `measured` that begin with `error`.
-    """
+    """Errors that `verify` checks for `problem`, and columns that begin with `error`."""
 
     def find_problem(deck: str) -> str:
         return deck if deck in PROBLEMS else str(read_toml(packaged_decks()[deck])["problem"])

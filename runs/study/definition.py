@@ -52,9 +52,9 @@ class Point(dict[str, Any]):
 
     @property
     def name(self) -> str:
-        """The name of its folder: `mach=1.2,cells=32`; other than plain words are cut and hashed.
+        """The name of its folder, such as `mach=1.2,cells=32`; other characters are hashed.
 
-        It depends on this point alone, so other points can be added or removed.
+        It does not depend on other points, so these can be added or removed.
         """
         name = ",".join(f"{key}={_shorten(value)}" for key, value in self.items())
         if len(name) > LONGEST_NAME:
@@ -145,7 +145,7 @@ def _spread(first: str, last: str, count: str, log: str | None) -> list[Any]:
         return []
     values = np.geomspace(start, end, number) if log else np.linspace(start, end, number)
     rounded = [float(f"{value:.{VALUE_DIGITS}g}") for value in values]
-    if len(set(rounded)) < number:  # closer than the digits tell
+    if len(set(rounded)) < number:  # closer than the digits resolve
         rounded = values.tolist()
     whole = not set(".eE") & set(first + last) and all(value.is_integer() for value in rounded)
     return [int(value) for value in rounded] if whole else rounded
@@ -211,7 +211,7 @@ class StudyFile(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class Definition:
-    """A study: `source` as `runs.deck.reading.read_deck` takes it, `fixed` keys of all points.
+    """A study: `source` as for `runs.deck.reading.read_deck`, `fixed` keys of all points.
 
     vary: the values of each key if the points are their product; {} if they are listed. shown:
     names of plotted quantities; () for the problem's results.  function: computes a point from its
@@ -250,7 +250,7 @@ class Definition:
 
 
 def write_settings(values: Mapping[str, Any]) -> tuple[str, ...]:
-    """Values by key as settings of a deck, `key=value`; BadInput for what no deck can hold."""
+    """Values by key as settings of a deck, `key=value`; BadInput for values that TOML lacks."""
     return tuple(f"{key}={write_value(value, key)}" for key, value in values.items())
 
 
@@ -318,7 +318,7 @@ def check_same_deck(folder: Path, definition: Definition) -> None:
     if Path(there).name != Path(given).name:
         raise BadInput(
             f"{folder} holds a study of {there}, not of {given}; choose another folder with -o, or "
-            f"go on with the study there: shockgrid study {shlex.quote(str(folder))}"
+            f"continue the study there: shockgrid study {shlex.quote(str(folder))}"
         )
 
 

@@ -26,9 +26,9 @@ THREE_GRID_SAFETY = 1.25
 SAFETY_TWO = 3.0
 ASSUMED_ORDER = 1.0  # order of two grids without an exact value: captured shocks
 MOST_TRUSTED = 2.0  # a higher order than that of the scheme is not used for the uncertainty
-ROUND_OFF = 1e-12  # of the value: smaller changes are none
+ROUND_OFF = 1e-12  # of the value: smaller changes do not count
 MOST_CREDIBLE = 4.0  # orders above are not credible: the grids are not in the asymptotic range
-HIGHEST_ORDER = 20.0  # stands for all orders above it
+HIGHEST_ORDER = 20.0  # represents all orders above it
 
 
 @dataclass(frozen=True)

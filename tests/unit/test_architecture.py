@@ -45,6 +45,7 @@ ROOMS = (
     ("hydro.history",),
     ("hydro.simulation",),
     ("hydro.remap",),
+    ("problems.prefixes",),
     ("problems.deck", "problems.evolution", "problems.pictures"),
     ("problems.problem",),
     ("problems.problem_file", "problems.own_simulation"),

@@ -66,10 +66,10 @@ def test_a_stranger_called_runs_is_named(tmp_path, command):
     assert (done.returncode, done.stdout) == (2, "")
     (line,) = done.stderr.splitlines()
     assert line.startswith(f"shockgrid: {stranger} hides shockgrid's own package 'runs'")
-    assert "environment of its own" in line
+    assert "separate environment" in line
 
 
 def test_public_names_say_it_too(tmp_path):
     make_package(tmp_path, "runs")
     done = run_python("-c", "from shockgrid import BadInput", within=tmp_path)
-    assert "ImportError" in done.stderr and "environment of its own" in done.stderr
+    assert "ImportError" in done.stderr and "separate environment" in done.stderr

@@ -233,7 +233,7 @@ def test_blocks_of_a_table_run_as_those_of_its_gas_and_restart_with_it_alone(tmp
     gas = sg.run(make(sg.IdealGas(1.4)), tmp_path / "gas", run=most)
     assert table.dumps[-1]["gas"].p == pytest.approx(gas.dumps[-1]["gas"].p, rel=1e-10)
     write(1.5)
-    with pytest.raises(sg.BadInput, match="another flow"):
+    with pytest.raises(sg.BadInput, match="different flows"):
         sg.restart(table, simulation=make(sg.Tabular(path)), run={"max_steps": 8})
     write(1.4)
     longer = sg.restart(table, simulation=make(sg.Tabular(path)), run={"max_steps": 8})

@@ -281,12 +281,13 @@ class Shell:
         return PRESSURES[0] * rise, PRESSURES[1] * rise
 
     def compute_density(self, r: np.ndarray, t: float) -> np.ndarray:
-        """Density at time t [kg/m³] at the radii r [m]."""
+        """Density at time t [kg/m³] at the radii r [m]; nan so far inside that it has none."""
         h = self.compute_shrinking(t)
         power = self.gamma - 1.0
         part = ((r / h) ** 2 - RADII[0] ** 2) / (RADII[1] ** 2 - RADII[0] ** 2)
         inner, outer = (rho**power for rho in self.densities)
-        return ((1.0 - part) * inner + part * outer) ** (1.0 / power) / h**self.n
+        with np.errstate(invalid="ignore"):
+            return ((1.0 - part) * inner + part * outer) ** (1.0 / power) / h**self.n
 
 
 CELL_GAMMA = 5.0 / 3.0

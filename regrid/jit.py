@@ -165,9 +165,8 @@ class KernelCache:
         return find_kept(self._function.__name__, self._contents, str(types))
 
     def load_overload(self, types, context):
-        with contextlib.suppress(Exception):  # no file, or a damaged one, which may raise anything
-            with self._find(types, context).open("rb") as file:
-                parts = _Reader(file).load()
+        with contextlib.suppress(Exception):  # what another release of numba has written
+            parts = _Reader(io.BytesIO(read_kept(self._find(types, context)))).load()
             context.codegen().unserialize_library = functools.partial(_Loaded, context.codegen())
             return CompileResult._rebuild(context, *parts)
         prepare_compiler()
@@ -184,7 +183,28 @@ def find_kept(name: str, *words: str) -> Path:
     key = hashlib.sha256(repr((words, machine, VERSIONS)).encode()).hexdigest()
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     folder = os.environ.get("SHOCKGRID_CACHE_DIR") or os.path.join(home, "shockgrid")
-    return Path(folder, "kernels", f"{name}-{key[:24]}")
+    return Path(folder, "kernels", f"{name}-{key[:24]}.kept")
+
+
+def compute_checksum(contents: bytes) -> bytes:
+    """What a file of the cache begins with: SHA-256 of all bytes after it."""
+    return hashlib.sha256(contents).digest()
+
+
+def read_kept(path: Path) -> bytes:
+    """What `keep` has put into a file of the cache.
+
+    Machine code of which one bit is wrong runs, and its numbers look sound: nothing of a file is
+    used before all of it is known to be as it was written.  Raises OSError where there is no file
+    that can be read, ValueError where it is damaged or cut off.
+    """
+    kept = path.read_bytes()
+    size = hashlib.sha256().digest_size
+    checksum = kept[:size]
+    contents = kept[size:]
+    if checksum != compute_checksum(contents):
+        raise ValueError(f"{path} is damaged")
+    return contents
 
 
 def keep(path: Path, contents: bytes) -> None:
@@ -192,7 +212,7 @@ def keep(path: Path, contents: bytes) -> None:
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
         part = path.with_name(uuid.uuid4().hex)
-        part.write_bytes(contents)
+        part.write_bytes(compute_checksum(contents) + contents)
         part.replace(path)
         found = list(path.parent.iterdir())
         if len(found) > KEPT_FILES:
@@ -214,13 +234,11 @@ def remember(name: str, words: Any, compute: Callable[[], Any]) -> Any:
     """
     words = hashlib.sha256(pickle.dumps(words)).hexdigest()
     path = find_kept(name, digest_sources(), words)
-    with contextlib.suppress(OSError):
-        kept = path.read_bytes()
-        if hashlib.sha256(kept[32:]).digest() == kept[:32]:  # else it is damaged
-            return pickle.loads(kept[32:])
-    contents = pickle.dumps(found := compute())
+    with contextlib.suppress(OSError, ValueError):
+        return pickle.loads(read_kept(path))
+    found = compute()
     if not is_interpreting():  # there the last bits may be others
-        keep(path, hashlib.sha256(contents).digest() + contents)
+        keep(path, pickle.dumps(found))
     return found
 
 

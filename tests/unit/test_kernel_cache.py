@@ -237,8 +237,21 @@ def test_code_that_uses_numpy_is_loaded_without_numba_np_and_scipy(tmp_path):
     assert run(tmp_path, script=str(script)) == (2.0, 0)
 
 
-@pytest.mark.parametrize("damaged", [b"", b"\x80\x04X\x02\0\0\0\xff\xff.", pickle.dumps((1, 2))])
-def test_a_damaged_file_is_compiled_anew(tmp_path, monkeypatch, damaged):
+FLIPPED_PLACES = 40  # spread over a file of the cache, its first and last byte among them
+
+
+def list_damaged(whole: bytes) -> list[bytes]:
+    """What a file may have become: one bit flipped somewhere, cut off, longer, another file."""
+    damaged = []
+    for k in range(FLIPPED_PLACES):
+        flipped = bytearray(whole)
+        flipped[k * (len(whole) - 1) // (FLIPPED_PLACES - 1)] ^= 1 << k % 8
+        damaged.append(bytes(flipped))
+    damaged += [whole[:cut] for cut in (0, 1, 31, 32, 33, len(whole) // 2, len(whole) - 1)]
+    return [*damaged, whole + b"\0", bytes(len(whole)), pickle.dumps((1, 2))]
+
+
+def test_a_damaged_file_is_compiled_anew(tmp_path, monkeypatch):
     monkeypatch.setenv("SHOCKGRID_CACHE_DIR", str(tmp_path))
 
     def compile_and_call():
@@ -252,9 +265,17 @@ def test_a_damaged_file_is_compiled_anew(tmp_path, monkeypatch, damaged):
     compile_and_call()
     (file,) = tmp_path.joinpath("kernels").iterdir()
     whole = file.read_bytes()
-    file.write_bytes(damaged)
+    assert compile_and_call().stats.cache_hits
+    for damaged in list_damaged(whole):  # each would run, crash or compute something else
+        file.write_bytes(damaged)
+        with pytest.raises(ValueError, match="damaged"):
+            jit.read_kept(file)
+    for place in (len(whole) // 3, len(whole) // 2, len(whole) - 1):
+        file.write_bytes(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
+        assert not compile_and_call().stats.cache_hits
+        assert len(jit.read_kept(file)) > 0.9 * len(whole)
+    file.write_bytes(jit.compute_checksum(b"no kernel") + b"no kernel")  # sound, of another numba
     assert not compile_and_call().stats.cache_hits
-    assert len(file.read_bytes()) > 0.9 * len(whole)
 
 
 def test_what_was_computed_is_remembered_until_its_file_is_damaged(tmp_path, monkeypatch):

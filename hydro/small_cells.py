@@ -36,7 +36,7 @@ from hydro.crowding import (
     scan_rates_of_bands,
     scan_state,
 )
-from hydro.eos.base import make_least_pressure
+from hydro.eos.conversion import make_conversion
 from hydro.formulas.geometry import Geometry
 from hydro.interior.update import compute_rate
 from hydro.perimeter.faces import measure_lines, measure_volume
@@ -152,10 +152,9 @@ def limit_slope(before, after):
 @functools.cache
 def make_redistribution(eos_class, geometry: Geometry):
     """The kernel `redistribute` of an equation of state and a geometry."""
-    pressure_part = eos_class.pressure_part
-    energy_part = eos_class.energy_part
-    sound_speed_squared_part = eos_class.sound_speed_squared_part
-    find_least_pressure = make_least_pressure(eos_class)
+    conversion = make_conversion(eos_class)
+    to_energy = conversion.to_energy
+    to_state = conversion.to_state
     find_volume, find_share = make_measures(geometry)
 
     @compiled_once
@@ -165,7 +164,7 @@ def make_redistribution(eos_class, geometry: Geometry):
         u = state[U, i + 1, j + 1]
         v = state[V, i + 1, j + 1]
         p = state[P, i + 1, j + 1]
-        e = energy_part(rho, p, parameters) + void_energy[i, j]
+        e = to_energy(rho, p, void_energy[i, j], parameters)
         rho *= part
         record[first, i, j] = rho
         record[first + 1, i, j] = rho * u
@@ -364,18 +363,10 @@ def make_redistribution(eos_class, geometry: Geometry):
                 continue
             changed += 1
             gather_shares(i, j, reaches, nodes_new, record, pair, line, total)
-            rho = total[0]
-            u = total[1] / total[0]
-            v = total[2] / total[0]
-            e = total[3] / total[0] - 0.5 * (u * u + v * v)
-            p = pressure_part(rho, e, parameters)
-            void_energy[i, j] = 0.0
-            bound = find_least_pressure(rho, parameters)
-            if p < bound:
-                p = bound
-                void_energy[i, j] = e - energy_part(rho, p, parameters)
-                voided += 1
-            c2 = sound_speed_squared_part(rho, p, parameters)
+            found = to_state(total[0], total[1], total[2], total[3], parameters)
+            rho, u, v = found[0]
+            p, void_energy[i, j], is_voided, c2 = found[1]
+            voided += 1 if is_voided else 0
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
             state[RHO, i + 1, j + 1] = rho
             state[U, i + 1, j + 1] = u

@@ -40,7 +40,7 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.eos import JWL
-from hydro.eos.base import find_pressure
+from hydro.eos.conversion import make_conversion
 from hydro.ranks.blocks import Blocks
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
@@ -119,8 +119,10 @@ class BodySource:
         u += du
         v += dv
         if np.any(heat):
-            e = block.eos.energy(rho, p) + void_energy + heat
-            p[...], void_energy[...] = find_pressure(block.eos, rho, e)
+            conversion = make_conversion(type(block.eos))
+            parameters = block.eos.parameters
+            e = conversion.to_energy(rho, p, void_energy, parameters) + heat
+            p[...], void_energy[...], *_ = conversion.to_pressure(rho, e, parameters)
         return push, gained
 
 

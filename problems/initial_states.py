@@ -22,6 +22,7 @@ from hydro.boundary import put
 from hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from hydro.eos.materials import find_material
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
+from hydro.remap.conserved import compute_conserved, find_state
 from hydro.simulation import Simulation
 from hydro.step import take_step
 from problems.deck import DeckTable, key
@@ -239,18 +240,14 @@ def mix_states(eos, fraction: np.ndarray, first, second):
     (fraction 0 or 1) keep their state bitwise.
     """
     fraction = np.asarray(fraction, dtype=float)
-    conserved = []
-    for rho, u, v, p in (first, second):
-        total = rho * eos.energy(rho, p) + 0.5 * rho * (u * u + v * v)
-        conserved.append((rho, rho * u, rho * v, total))
-    rho, momentum_x, momentum_y, total = (
-        fraction * a + (1.0 - fraction) * b for a, b in zip(*conserved, strict=True)
-    )
-    u, v = momentum_x / rho, momentum_y / rho
-    p = eos.pressure(rho, total / rho - 0.5 * (u * u + v * v))
+    conserved = [compute_conserved(eos, state, 0.0) for state in (first, second)]
+    mixed = [
+        fraction * one + (1.0 - fraction) * other for one, other in zip(*conserved, strict=True)
+    ]
+    state, _ = find_state(eos, np.array(mixed))
     return tuple(
-        np.where(fraction == 1.0, a, np.where(fraction == 0.0, b, value))
-        for value, a, b in zip((rho, u, v, p), first, second, strict=True)
+        np.where(fraction == 1.0, one, np.where(fraction == 0.0, other, value))
+        for value, one, other in zip(state, first, second, strict=True)
     )
 
 

@@ -41,7 +41,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.environment import Environment, _rebuild_env, lookup_environment
 from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python
-from numba.extending import register_jitable
+from numba.extending import overload, register_jitable
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("regrid", "hydro", "problems")
@@ -459,3 +459,17 @@ def compiled_once(function=None, *, allocates=True, **options):
 
     _before_compiling.append(register)
     return function
+
+
+def choose(condition, yes, no):
+    """`yes` where the condition holds, else `no`: numbers in kernels, arrays too in Python."""
+    return np.where(condition, yes, no)
+
+
+def _register_choose() -> None:
+    @overload(choose, jit_options={"_nrt": False, "forceinline": True}, prefer_literal=False)
+    def type_choose(condition, yes, no):
+        return lambda condition, yes, no: yes if condition else no
+
+
+_before_compiling.append(_register_choose)

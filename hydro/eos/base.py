@@ -210,25 +210,6 @@ def make_least_pressure(eos_class):
     return keep if strength_left_part is None else weaken
 
 
-def find_pressure(
-    eos: EquationOfState, rho: np.ndarray, e: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Pressure [Pa] and void energy [J/kg] of arrays of density and specific internal energy.
-
-    Under more tension than the material bears voids open: the pressure is that tension, and the
-    void energy what `e` is less than that of full material there (theory F4.11); else it is 0.
-    """
-    p = eos.pressure(rho, e)
-    void_energy = np.zeros_like(p)
-    if eos.opens_voids:
-        eos_class: Any = type(eos)
-        least = make_least_pressure(eos_class)(rho, eos.parameters) + np.zeros_like(p)
-        voided = p < least
-        void_energy = np.where(voided, e - eos.energy(rho, least), 0.0)
-        p = np.where(voided, least, p)
-    return p, void_energy
-
-
 SAMPLED_CELLS = 64  # cells of a block that are looked at, besides its extremes
 ISENTROPE_DENSITY_STEP = 1e-5  # of the density, along the isentrope
 MOST_MISS = 1e-9  # of rho c²: from p to e and back

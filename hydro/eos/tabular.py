@@ -16,17 +16,28 @@ import numpy as np
 
 from hydro.eos.base import EquationOfState
 from regrid.errors import BadInput
-from regrid.jit import compiled_once, inlined
+from regrid.jit import choose, compiled_once, inlined
 
 
 @compiled_once
 def find_interval(axis, value):
-    """i with axis[i] <= value <= axis[i + 1], or -1 outside (NaN too)."""
-    last = axis.size - 1
-    if not (axis[0] <= value <= axis[last]):
-        return -1
+    """i with axis[i] <= value <= axis[i + 1]; outside the axis the nearest interval."""
+    last = axis.size - 2
     i = np.searchsorted(axis, value, side="right") - 1
-    return i if i < last else last - 1
+    i = choose(i > 0, i, 0)
+    return choose(i < last, i, last)
+
+
+@compiled_once
+def is_inside(axis, value):
+    """Whether a value lies on the axis; NaN does not."""
+    return (axis[0] <= value) & (value <= axis[axis.size - 1])
+
+
+@compiled_once
+def interpolate(table, i, k, a):
+    """Pressure at the part `a` from density i to i + 1, at the energy k."""
+    return table[i, k] + a * (table[i + 1, k] - table[i, k])
 
 
 @compiled_once
@@ -34,20 +45,19 @@ def find_pressure(axis_rho, axis_e, table, rho, e):
     """Pressure, dp/drho and dp/de; NaN outside the table."""
     i = find_interval(axis_rho, rho)
     k = find_interval(axis_e, e)
-    if i < 0 or k < 0:
-        return np.nan, np.nan, np.nan
     width = axis_rho[i + 1] - axis_rho[i]
     height = axis_e[k + 1] - axis_e[k]
     a = (rho - axis_rho[i]) / width
     b = (e - axis_e[k]) / height
-    low = table[i, k] + a * (table[i + 1, k] - table[i, k])
-    high = table[i, k + 1] + a * (table[i + 1, k + 1] - table[i, k + 1])
+    low = interpolate(table, i, k, a)
+    high = interpolate(table, i, k + 1, a)
     rise_low = table[i + 1, k] - table[i, k]
     rise_high = table[i + 1, k + 1] - table[i, k + 1]
+    inside = is_inside(axis_rho, rho) & is_inside(axis_e, e)
     return (
-        low + b * (high - low),
-        (rise_low + b * (rise_high - rise_low)) / width,
-        (high - low) / height,
+        choose(inside, low + b * (high - low), np.nan),
+        choose(inside, (rise_low + b * (rise_high - rise_low)) / width, np.nan),
+        choose(inside, (high - low) / height, np.nan),
     )
 
 
@@ -55,24 +65,23 @@ def find_pressure(axis_rho, axis_e, table, rho, e):
 def find_energy(axis_rho, axis_e, table, rho, p):
     """Energy for the given density and pressure; NaN if the table has none."""
     i = find_interval(axis_rho, rho)
-    if i < 0:
-        return np.nan
     a = (rho - axis_rho[i]) / (axis_rho[i + 1] - axis_rho[i])
-    low, high = 0, axis_e.size - 1
-    p_low = table[i, low] + a * (table[i + 1, low] - table[i, low])
-    p_high = table[i, high] + a * (table[i + 1, high] - table[i, high])
-    if not (p_low <= p <= p_high):
-        return np.nan
-    while high - low > 1:
+    low = 0 * i
+    high = low + (axis_e.size - 1)
+    inside = is_inside(axis_rho, rho)
+    inside = inside & (interpolate(table, i, low, a) <= p) & (p <= interpolate(table, i, high, a))
+    # bisection: as many halvings as the longest interval needs, those of one cell change nothing
+    remaining = axis_e.size - 1
+    while remaining > 1:
         middle = (low + high) // 2
-        p_middle = table[i, middle] + a * (table[i + 1, middle] - table[i, middle])
-        if p_middle <= p:
-            low = middle
-            p_low = p_middle
-        else:
-            high = middle
-            p_high = p_middle
-    return axis_e[low] + (axis_e[high] - axis_e[low]) * ((p - p_low) / (p_high - p_low))
+        is_above = interpolate(table, i, middle, a) <= p
+        low, high = choose(is_above, middle, low), choose(is_above, high, middle)
+        remaining = (remaining + 1) // 2
+    high = low + 1
+    p_low = interpolate(table, i, low, a)
+    p_high = interpolate(table, i, high, a)
+    e = axis_e[low] + (axis_e[high] - axis_e[low]) * ((p - p_low) / (p_high - p_low))
+    return choose(inside, e, np.nan)
 
 
 @inlined
@@ -102,12 +111,6 @@ def sound_speed_squared(rho, p, parameters):
 def least_pressure(parameters):
     """Pressure [Pa] below which the material fails: none, the table sets the limit."""
     return -1e300
-
-
-def _each(function, *values):
-    """Apply `function` to every entry of the arrays."""
-    with np.errstate(invalid="ignore"):  # NaN outside the table
-        return np.vectorize(function, otypes=[float])(*values)
 
 
 @dataclass(frozen=True)
@@ -209,15 +212,8 @@ class Tabular(EquationOfState):
 
     def pressure(self, rho, e):
         """Pressure [Pa]; BadInput outside the table."""
-        found = _each(lambda r, q: find_pressure(*self.parameters, r, q)[0], rho, e)
-        return self._check(found, rho, e, "e")
+        return self._check(super().pressure(rho, e), rho, e, "e")
 
     def energy(self, rho, p):
         """Specific internal energy [J/kg]; BadInput outside the table."""
-        found = _each(lambda r, q: find_energy(*self.parameters, r, q), rho, p)
-        return self._check(found, rho, p, "p")
-
-    def sound_speed(self, rho, p):
-        """Sound speed [m/s]; NaN outside the table."""
-        found = _each(lambda r, q: sound_speed_squared(r, q, self.parameters), rho, p)
-        return np.sqrt(found)
+        return self._check(super().energy(rho, p), rho, p, "p")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.eos.base import make_least_pressure
+from hydro.eos.conversion import make_conversion
 from hydro.formulas.geometry import compute_lever, push_outwards, stretch_ring
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior import scratch as at
@@ -35,10 +35,7 @@ def make_update(eos_class, geometry, finishes, gathers):
     `gathers`: it closes the row's own account but for the fluxes through the faces towards +i.
     Both in one loop: the one adds and multiplies where the other waits for divisions and roots.
     """
-    pressure_part = eos_class.pressure_part
-    energy_part = eos_class.energy_part
-    sound_speed_squared_part = eos_class.sound_speed_squared_part
-    find_least_pressure = make_least_pressure(eos_class)
+    to_pressure = make_conversion(eos_class).to_pressure
     opens_voids = eos_class.opens_voids
     weigh = geometry.volume
     curved = geometry.curved
@@ -47,10 +44,7 @@ def make_update(eos_class, geometry, finishes, gathers):
     def update_rows(Z, n, dt, inverse_dt, parameters):
         """Primitive state with the flux through the faces towards +i; sums, rates, least c².
 
-        Material has its tensile strength: where the equation of state gives a greater tension, the
-        cell is taken for material with voids at that tension, and what its energy is less than
-        that of full material of this pressure and density is kept as its void energy (<= 0).
-        Nothing is reset.  Where the equation of state opens no voids the pressure is what it gives.
+        Voids of material in tension are those of `hydro.eos.conversion`.
         Velocities below 1e-30 of the sound speed are set to zero: subnormal numbers would cost
         hundreds of cycles each.  Then the row's own conserved quantities, less the fluxes known so
         far, with the source, and its new cells.
@@ -77,15 +71,10 @@ def make_update(eos_class, geometry, finishes, gathers):
                 u = momentum_x * inverse_mass
                 v = momentum_y * inverse_mass
                 e = total * inverse_mass - 0.5 * (u * u + v * v)
-                p = pressure_part(rho, e, parameters)
+                p, void_energy, voided, c2 = to_pressure(rho, e, parameters)
                 if opens_voids:
-                    least = find_least_pressure(rho, parameters)
-                    voided = p < least
-                    p = least if voided else p
-                    void = e - energy_part(rho, least, parameters)
-                    Z[at.VOID_NEW + k] = void if voided else 0.0
+                    Z[at.VOID_NEW + k] = void_energy
                     Z[at.SUM_VOIDED + k] += 1.0 if voided else 0.0
-                c2 = sound_speed_squared_part(rho, p, parameters)
                 slow = 1e-60 * c2
                 u = u if u * u > slow else 0.0
                 v = v if v * v > slow else 0.0

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from hydro import rim as on
 from hydro import rows as of
-from hydro.eos.base import make_least_pressure
+from hydro.eos.conversion import make_conversion
 from hydro.formulas.geometry import Geometry, compute_plane_face
 from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior.scratch import find_twist
@@ -104,10 +104,7 @@ def place_traces_on_axis(nodes, nodes_new, start, stop, rim):
 
 def make_fill_polygons(eos_class, geometry: Geometry):
     """Kernel that adds to a new state what cells hold beyond their straight faces."""
-    pressure_part = eos_class.pressure_part
-    energy_part = eos_class.energy_part
-    find_least_pressure = make_least_pressure(eos_class)
-    sound_speed_squared_part = eos_class.sound_speed_squared_part
+    to_energy, to_pressure, *_ = make_conversion(eos_class)
     weigh = geometry.volume
 
     @kernel
@@ -148,9 +145,9 @@ def make_fill_polygons(eos_class, geometry: Geometry):
             u_old = state[of.U, i + 1, j + 1]
             v_old = state[of.V, i + 1, j + 1]
             p_old = state[of.P, i + 1, j + 1]
-            energy = energy_part(rho, p, parameters) + void_energy_new[i, j]
+            energy = to_energy(rho, p, void_energy_new[i, j], parameters)
             energy += 0.5 * (u * u + v * v)
-            energy_old = energy_part(rho_old, p_old, parameters) + void_energy[i, j]
+            energy_old = to_energy(rho_old, p_old, void_energy[i, j], parameters)
             energy_old += 0.5 * (u_old * u_old + v_old * v_old)
             held = old * rho_old
             mass = volume * rho + held
@@ -162,17 +159,11 @@ def make_fill_polygons(eos_class, geometry: Geometry):
             rates_new[i, j] *= thinner
             crowding_new[i, j] *= thinner * thinner
             energy -= 0.5 * (u * u + v * v)
-            p = pressure_part(rho, energy, parameters)
-            void_energy_new[i, j] = 0.0
-            least = find_least_pressure(rho, parameters)
-            if p < least:
-                p = least
-                void_energy_new[i, j] = energy - energy_part(rho, p, parameters)
+            p, void_energy_new[i, j], _, c2 = to_pressure(rho, energy, parameters)
             state_new[of.RHO, i + 1, j + 1] = rho
             state_new[of.U, i + 1, j + 1] = u
             state_new[of.V, i + 1, j + 1] = v
             state_new[of.P, i + 1, j + 1] = p
-            c2 = sound_speed_squared_part(rho, p, parameters)
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
             totals[of.LEAST_C2] = totals[of.LEAST_C2] if totals[of.LEAST_C2] < c2 else c2
             totals[of.TOTAL_MASS] += held

@@ -22,7 +22,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import cKDTree
 
 from hydro.eos import EquationOfState
-from hydro.eos.base import find_pressure, make_least_pressure
+from hydro.eos.conversion import make_conversion
 from hydro.remap.overlay import (
     MEAN,
     SLOPE_X,
@@ -139,18 +139,15 @@ def compute_conserved(eos: EquationOfState, state: np.ndarray, void_energy) -> n
 
     void_energy (...) [J/kg]: what voids take from the internal energy.
     """
-    rho, u, v, p = state
-    energy = eos.energy(rho, p) + void_energy + 0.5 * (u * u + v * v)
-    return np.array([rho, rho * u, rho * v, rho * energy])
+    to_conserved = make_conversion(type(eos)).to_conserved
+    return np.array(to_conserved(*state, void_energy, eos.parameters))
 
 
 def find_state(eos: EquationOfState, conserved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """rho, u, v, p (4, ...) and the void energy (...) [J/kg] from `compute_conserved`."""
-    rho, momentum_x, momentum_y, total = conserved
+    to_state = make_conversion(type(eos)).to_state
     with np.errstate(all="ignore"):
-        u, v = momentum_x / rho, momentum_y / rho
-        e = total / rho - 0.5 * (u * u + v * v)
-        p, void_energy = find_pressure(eos, rho, e)
+        (rho, u, v), (p, void_energy, *_) = to_state(*conserved, eos.parameters)
     return np.array([rho, u, v, p]), void_energy
 
 
@@ -208,6 +205,7 @@ def lessen_slopes(eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, c
 
 def _find_parts(eos: EquationOfState, cells: np.ndarray) -> np.ndarray:
     """The largest of PARTS (n,) with which all corners of the cells (rows, n) are states."""
+    to_pressure = make_conversion(type(eos)).to_pressure
     factor = np.zeros(cells.shape[1])
     waiting = np.arange(cells.shape[1])
     for part in PARTS:
@@ -222,10 +220,7 @@ def _find_parts(eos: EquationOfState, cells: np.ndarray) -> np.ndarray:
             for way_x, way_y in cells[18:].reshape(4, 2, -1):
                 rho, x, y, total = means + part * (slope_x * way_x + slope_y * way_y)
                 e = (total - 0.5 * (x * x + y * y) / rho) / rho
-                p = eos.pressure_part(rho, e, eos.parameters)
-                if eos.opens_voids:
-                    p = np.maximum(p, make_least_pressure(type(eos))(rho, eos.parameters))
-                c2 = eos.sound_speed_squared_part(rho, p, eos.parameters)
+                p, _, _, c2 = to_pressure(rho, e, eos.parameters)
                 good &= (rho > left_rho) & (c2 > left_c2) & (rho >= least_rho) & (rho <= most_rho)
                 good &= (p >= least_p) & (p <= most_p)
         factor[waiting[good]] = part

@@ -172,8 +172,7 @@ class Block:
         self.nodes_new = self.nodes.copy()
         self.state_new = np.zeros(self.state.shape)
         # separate if a body source acts
-        self._start: np.ndarray | None = None
-        self._start_void_energy = self.void_energy
+        self._starts: dict[str, np.ndarray] = {}  # separate if a body source acts
         # of the types for which kernels are compiled, as those of a user's own need not be
         self.parameters = tuple(
             np.ascontiguousarray(value, dtype=float) if np.ndim(value) else float(value)
@@ -364,26 +363,45 @@ class Block:
             self.state_new, self.void_energy_new, self.nodes_new, self.rates_new, self.crowding
         )  # fmt: skip
 
+    def count_ghosts(self, array: np.ndarray) -> int:
+        """Rows of ghosts before the first cells in an array of this block: 1 or 0."""
+        return int(array.shape[-2] == self.ni + 2)
+
+    def get_inside(self, name: str) -> np.ndarray:
+        """A view of an array of the block by its name, such as those of STEP_ARRAYS: no ghosts."""
+        array = getattr(self, name)
+        return array[..., 1:-1, 1:-1] if self.count_ghosts(array) else array
+
+    def list_new(self) -> list[np.ndarray]:
+        """The arrays of HELD_ARRAYS that a step makes."""
+        return [getattr(self, f"{name}_new") for name in of.HELD_ARRAYS]
+
+    def list_starts(self) -> list[np.ndarray]:
+        """The arrays of HELD_ARRAYS that a step starts from; see `get_start`."""
+        return [self.get_start(name) for name in of.HELD_ARRAYS]
+
+    def get_start(self, name: str) -> np.ndarray:
+        """One of HELD_ARRAYS as a step starts from it: the present one, or a source's copy."""
+        return self._starts.get(name, getattr(self, name))
+
     @property
     def start(self) -> np.ndarray:
-        """The state (4, ni + 2, nj + 2) that a step starts from: `state`, or a source's copy."""
-        return self.state if self._start is None else self._start
+        """The state (4, ni + 2, nj + 2) that a step starts from."""
+        return self.get_start("state")
 
     @property
     def start_void_energy(self) -> np.ndarray:
         """The void energy (ni, nj) [J/kg] of `start`."""
-        return self.void_energy if self._start is None else self._start_void_energy
+        return self.get_start("void_energy")
 
     def part_start(self, apart: bool) -> None:
-        """Set whether steps start from a copy of the state that a body source may modify."""
-        self._start = self.state.copy() if apart else None
-        self._start_void_energy = self.void_energy.copy() if apart else self.void_energy
+        """Set whether steps start from copies of what cells hold, which a source may modify."""
+        self._starts = {name: getattr(self, name).copy() for name in of.HELD_ARRAYS if apart}
 
     def copy_start(self) -> None:
-        """Let the next step start from the present state, where it starts from a copy."""
-        if self._start is not None:
-            self._start[...] = self.state
-            self._start_void_energy[...] = self.void_energy
+        """Let the next step start from the present state, where it starts from copies."""
+        for name, copy in self._starts.items():
+            copy[...] = getattr(self, name)
 
     @property
     def is_follower(self) -> bool:
@@ -392,10 +410,10 @@ class Block:
 
     def accept(self) -> None:
         """Make the new grid and state the current ones."""
-        self.nodes, self.nodes_new = self.nodes_new, self.nodes
-        self.state, self.state_new = self.state_new, self.state
-        self.void_energy, self.void_energy_new = self.void_energy_new, self.void_energy
-        self.rates, self.rates_new = self.rates_new, self.rates
+        for name in of.STEP_ARRAYS:
+            old = getattr(self, name)
+            setattr(self, name, getattr(self, f"{name}_new"))
+            setattr(self, f"{name}_new", old)
 
     def find_failure(self) -> RunFailure | None:
         """Why the new state is not admissible, with the cell's indices, or None."""

@@ -8,6 +8,12 @@ and per radian in HOOP (theory F9.5). Totals of a tile (tiles, 7): see below.
 
 from __future__ import annotations
 
+# Arrays of a block by their names: what its cells hold, which moves with the mass that crosses
+# faces; and all that the next step starts from.  Each has one of the same name with `_new` for the
+# step.  Acceptance, restarts, ranks, cut blocks, refinement and remapping go through these lists.
+HELD_ARRAYS = ("state", "void_energy")
+STEP_ARRAYS = ("nodes", *HELD_ARRAYS, "rates")
+
 RHO, U, V, P = range(4)
 STATE_ROWS = 4
 MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, PUSH, HOOP = range(6)

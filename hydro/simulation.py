@@ -22,6 +22,7 @@ from hydro.motion.line import Line, LineRule
 from hydro.motion.overlaps import Overlaps
 from hydro.motion.tension import SurfaceTension
 from hydro.ranks.blocks import Blocks
+from hydro.rows import STEP_ARRAYS
 from hydro.sliding.contact import SlidingContact
 from hydro.small_cells import SmallCells
 from hydro.sources import BodySource, SourceLaw
@@ -309,10 +310,10 @@ class Simulation:
         except RunFailure:
             self.__dict__.update(before)
             return
-        for block, (nodes, state, void_energy) in zip(self._blocks, found, strict=True):
+        for block, (nodes, held) in zip(self._blocks, found, strict=True):
             block.nodes[...] = block.nodes_new[...] = nodes
-            block.state[:, 1:-1, 1:-1] = state
-            block.void_energy[...] = void_energy
+            for name, array in held.items():
+                block.get_inside(name)[...] = array
         self.motion.counts = before["motion"].counts  # of the step that is over
         self._update_rates()
         self.clock.rate = self.small_cells.find_first_rate(self.t)
@@ -396,13 +397,8 @@ class Simulation:
         for number, contact in enumerate(self.exchange.contacts):
             state[f"contact{number}/fixed"] = contact.fixed.copy()
         for block in self.blocks:
-            for name, array in (
-                ("nodes", block.nodes),
-                ("state", block.state[:, 1:-1, 1:-1]),
-                ("void_energy", block.void_energy),
-                ("rates", block.rates),
-            ):
-                state[f"{block.name}/{name}"] = array.copy()
+            for name in STEP_ARRAYS:
+                state[f"{block.name}/{name}"] = block.get_inside(name).copy()
         return state
 
     def set_state(self, state) -> None:
@@ -417,10 +413,8 @@ class Simulation:
         for number, contact in enumerate(self.exchange.contacts):
             contact.fixed[:] = state[f"contact{number}/fixed"]
         for block in self.blocks:
-            block.nodes[...] = state[f"{block.name}/nodes"]
-            block.state[:, 1:-1, 1:-1] = state[f"{block.name}/state"]
-            block.void_energy[...] = state[f"{block.name}/void_energy"]
-            block.rates[...] = state[f"{block.name}/rates"]
+            for name in STEP_ARRAYS:
+                block.get_inside(name)[...] = state[f"{block.name}/{name}"]
         self.small_cells.find_fastest()
         self._note_end()
 

@@ -59,7 +59,7 @@ SLOPE_ROW = 8
 LEVER_ROW = 12
 VOLUME_RECORD_ROW = 13
 PARTS_ROW = 14
-KEPT_PARTS = 15
+KEPT_ROW = 15
 RECORD_ROWS = 19
 
 
@@ -309,7 +309,7 @@ def make_redistribution(eos_class, geometry: Geometry):
         part = 1.0 / record[PARTS_ROW, i, j]
         for q in range(CONSERVED_ROWS):
             own = record[MEAN_ROW + q, i, j] + record[SLOPE_ROW + q, i, j] * far
-            total[q] = (total[q] + own) * part + record[KEPT_PARTS + q, i, j]
+            total[q] = (total[q] + own) * part + record[KEPT_ROW + q, i, j]
 
     @kernel
     def redistribute(squeezed, grids, excess, inverse_dt, parameters, before, after, scratch):
@@ -342,13 +342,13 @@ def make_redistribution(eos_class, geometry: Geometry):
                 j,
                 1.0 - RELAXED_FRACTION,
                 parameters,
-                KEPT_PARTS,
+                KEPT_ROW,
                 record,
             )
             record[VOLUME_RECORD_ROW, i, j] = find_volume(nodes_new, excess, i, j, ni, nj)
             record[LEVER_ROW, i, j] = 0.0
             for q in range(CONSERVED_ROWS):
-                record[q, i, j] -= record[KEPT_PARTS + q, i, j]
+                record[q, i, j] -= record[KEPT_ROW + q, i, j]
                 record[MEAN_ROW + q, i, j] = record[q, i, j]
                 record[SLOPE_ROW + q, i, j] = 0.0
         fill_means(small, reaches, nodes_new, record)
@@ -454,10 +454,9 @@ class BlockSharing:
         if len(small) == 0:
             return 0
         self.fill_reaches(small, block.rates, limit, block.nodes, block.excess_volume, self.reaches)
-        before = block.start, block.start_void_energy
         block.shared_cells, least, voided = self.redistribute(
             (small, self.reaches), (block.nodes, block.nodes_new), block.excess_volume_new,
-            inverse_dt, block.parameters, before, _list_mended(block),
+            inverse_dt, block.parameters, tuple(block.list_starts()), _list_mended(block),
             (self.marks, self.record),
         )  # fmt: skip
         block.take_shared(least, voided)
@@ -559,8 +558,7 @@ class SmallCells:
         above = self._find_rows_above(limit)
         for number, cut in self.blocks.cuts.items():
             block = cut.block
-            read = block.rates, block.start, block.start_void_energy
-            for array in (*_list_mended(block), *read):
+            for array in (*_list_mended(block), block.rates, *block.list_starts()):
                 cut.gather_rows(array, above[number])
         changed = [
             [self.sharing[number].share(limit, 1.0 / dt, above[number])]
@@ -574,4 +572,4 @@ class SmallCells:
 
 def _list_mended(block: Block) -> tuple[np.ndarray, ...]:
     """The arrays that redistribution changes."""
-    return block.state_new, block.void_energy_new, block.rates_new
+    return *block.list_new(), block.rates_new

@@ -42,6 +42,7 @@ from hydro.block import Block
 from hydro.eos import JWL
 from hydro.eos.conversion import make_conversion
 from hydro.ranks.blocks import Blocks
+from hydro.rows import HELD_ARRAYS
 from regrid.errors import BadInput
 from regrid.measure.corners import compute_centres
 
@@ -77,8 +78,7 @@ class BodySource:
         gains = []
         for block in (self.blocks[number] for number in self.blocks.own):
             block.copy_start()
-            start = block.start, block.start_void_energy
-            push, gained = self._apply(block, start, t, 0.5 * dt)
+            push, gained = self._apply(block, block.list_starts(), t, 0.5 * dt)
             pushes.append(block.take_perimeter(push))
             gains.append((*gained, push.any()))
         pushes = self.blocks.share_starts(pushes)
@@ -93,7 +93,8 @@ class BodySource:
             return
         gains = []
         for block in (self.blocks[number] for number in self.blocks.own):
-            _, gained = self._apply(block, (block.state, block.void_energy), t + 0.5 * dt, 0.5 * dt)
+            held = [getattr(block, name) for name in HELD_ARRAYS]
+            _, gained = self._apply(block, held, t + 0.5 * dt, 0.5 * dt)
             block.add_source_totals(gained)
             gains.append(gained)
         for gained in self.blocks.share_rows(gains, 3):
@@ -101,7 +102,7 @@ class BodySource:
         self.blocks.share_states()
 
     def _apply(
-        self, block: Block, held: tuple[np.ndarray, np.ndarray], t: float, dt: float
+        self, block: Block, held: list[np.ndarray], t: float, dt: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Add the source over dt to state (4, ni + 2, nj + 2) and void energy (ni, nj) of a block.
 

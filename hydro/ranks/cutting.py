@@ -24,7 +24,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.interior.advance import TILE_ROWS, count_tiles
 from hydro.interior.update import sum_tiles
-from hydro.rows import TOTAL_ROWS
+from hydro.rows import HELD_ARRAYS, TOTAL_ROWS
 
 MOST_UNCUT = 1.2  # times a rank's fair share: a block of more is cut
 GHOST_ROWS = 2  # of cells beyond a band, which its update reads
@@ -182,13 +182,13 @@ class CutBlock:
 
     def gather_rows(self, array: np.ndarray, rows: Rows | None = None) -> None:
         """Send the owner these rows, all of them if None, of an array (ni, nj) or of a state."""
-        shift = _count_ghosts(array, self.block)
+        shift = self.block.count_ghosts(array)
         rows = (0, self.block.ni) if rows is None else rows
         self.send_rows(array, _shift(self.bands, shift), _shift(self._for_home(rows), shift))
 
     def return_rows(self, array: np.ndarray, rows: Rows) -> None:
         """Return these rows of the owner to the ranks in whose bands they lie."""
-        shift = _count_ghosts(array, self.block)
+        shift = self.block.count_ghosts(array)
         need = [_find_common(band, rows) for band in self.bands]
         need[0] = (0, 0)
         self.send_rows(array, _shift(self._for_home(rows), shift), _shift(need, shift))
@@ -206,13 +206,13 @@ class CutBlock:
 
     def bring_fields(self) -> None:
         """Send the owner the states of all cells at the start of the step."""
-        self.gather_rows(self.block.start)
-        self.gather_rows(self.block.start_void_energy)
+        for array in self.block.list_starts():
+            self.gather_rows(array)
 
     def bring_states(self) -> None:
         """Send the owner the present states of all cells."""
-        self.gather_rows(self.block.state)
-        self.gather_rows(self.block.void_energy)
+        for name in HELD_ARRAYS:
+            self.gather_rows(getattr(self.block, name))
 
     def send_nodes(self) -> None:
         """Give every rank the new nodes of its band, with those of its ghost rows."""
@@ -226,8 +226,8 @@ class CutBlock:
         ni = self.block.ni
         block = self.block
         need = [(max(a - GHOST_ROWS, 0), min(b + GHOST_ROWS, ni)) for a, b in self.bands]
-        for array in (block.state_new, block.void_energy_new):
-            shift = _count_ghosts(array, block)
+        for array in block.list_new():
+            shift = block.count_ghosts(array)
             self.send_rows(array, _shift(self.bands, shift), _shift(need, shift))
 
     def bring_totals(self) -> None:
@@ -263,8 +263,3 @@ def _find_common(one: Rows, other: Rows) -> Rows:
 
 def _shift(rows: Sequence[Rows], by: int) -> list[Rows]:
     return [(first + by, last + by) for first, last in rows]
-
-
-def _count_ghosts(array: np.ndarray, block: Block) -> int:
-    """Rows of ghosts before the first row of cells of an array."""
-    return (array.shape[-2] - block.ni) // 2

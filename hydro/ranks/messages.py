@@ -43,28 +43,25 @@ def find_ring(ni: int, nj: int, deep: int) -> np.ndarray:
     return np.flatnonzero(~inside)
 
 
-def find_ring_of_cells(
+def find_ring_of_array(
     block: Block,
+    name: str,
     rows: Rows | None = None,
     deep: int = CELLS_DEEP,
 ) -> np.ndarray:
-    """Flat places of the cells of a ring in the array of a block's `state`, all its quantities.
+    """Flat places of the cells of a ring in an array of a block, all its quantities.
 
-    rows: of cells, where not all are meant.
+    name: of an array of cells, with ghosts or without; rows: of cells, where not all are meant.
     """
     ni, nj = block.ni, block.nj
-    chosen = np.zeros((len(block.state), ni, nj), dtype=bool)
+    array = getattr(block, name)
+    ghosts = block.count_ghosts(array)
+    chosen = np.zeros((array.size // (array.shape[-2] * array.shape[-1]), ni, nj), dtype=bool)
     chosen.reshape(len(chosen), -1)[:, find_ring(ni, nj, deep)] = True
     if rows is not None:
         chosen[:, : rows[0]] = chosen[:, rows[1] :] = False
     row, i, j = np.nonzero(chosen)
-    return (row * (ni + 2) + i + 1) * (nj + 2) + j + 1
-
-
-def find_part_of_ring(block: Block, deep: int, rows: Rows) -> np.ndarray:
-    """`find_ring` of a block's cells, of these rows of cells alone."""
-    ring = find_ring(block.ni, block.nj, deep)
-    return ring[(ring >= rows[0] * block.nj) & (ring < rows[1] * block.nj)]
+    return (row * array.shape[-2] + i + ghosts) * array.shape[-1] + j + ghosts
 
 
 def find_ring_of_nodes(block: Block) -> np.ndarray:

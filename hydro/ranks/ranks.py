@@ -39,14 +39,13 @@ from hydro.ranks.cutting import (
     find_bounds,
     spread_evenly,
 )
-from hydro.rows import TOTAL_ROWS
+from hydro.rows import HELD_ARRAYS, STEP_ARRAYS, TOTAL_ROWS
 from regrid.errors import RunFailure
 
 STEP, COLLECT, COUNT, END = range(4)  # what the first rank tells the others to do
 # seconds that a rank waits wide awake, and that it sleeps then
 AWAKE_SECONDS = 5e-3
 NAP_SECONDS = 2e-4
-KEPT = ("nodes", "state", "void_energy", "rates")  # what pictures, dumps and measurements read
 
 
 class Ranks(Blocks):
@@ -122,20 +121,16 @@ class Ranks(Blocks):
             there = self.places[number]
             bounds = self.bounds[number]
             for rank, rows in zip(there, pairwise(bounds), strict=True):
-                at = messages.find_ring_of_cells(block, rows)
-                ring = messages.find_part_of_ring(block, messages.CELLS_DEEP, rows)
-                new.append(
-                    messages.Item(
-                        number,
-                        rank,
-                        [(attrgetter("state_new"), at), (attrgetter("void_energy_new"), ring)],
-                    )
-                )
-                now.append(
-                    messages.Item(
-                        number, rank, [(attrgetter("state"), at), (attrgetter("void_energy"), ring)]
-                    )
-                )
+                messages_of = (("_new", new), ("", now))
+                for suffix, items in messages_of:
+                    parts = [
+                        (
+                            attrgetter(name + suffix),
+                            messages.find_ring_of_array(block, name, rows),
+                        )
+                        for name in HELD_ARRAYS
+                    ]
+                    items.append(messages.Item(number, rank, parts))
             sums = [(_get_sums, np.arange(TOTAL_ROWS))]
             new.append(messages.Item(number, there[0], sums, STATE_ROW))
             now.append(messages.Item(number, there[0], sums))
@@ -202,16 +197,8 @@ class Ranks(Blocks):
     def share_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
         if self._starts is None:
             self._pushes = [np.zeros((2, block.rim.faces)) for block in self]
-            places = [(attrgetter("start"), messages.find_ring_of_cells(b)) for b in self]
-            voids = [
-                (
-                    attrgetter("start_void_energy"),
-                    messages.find_ring(b.ni, b.nj, messages.CELLS_DEEP),
-                )
-                for b in self
-            ]
             pushed = [(lambda _, push=push: push, np.arange(push.size)) for push in self._pushes]
-            parts = [list(all_of) for all_of in zip(places, voids, pushed, strict=True)]
+            parts = [[*_find_starts(block), push] for block, push in zip(self, pushed, strict=True)]
             self._starts = self._make("sources", parts)
         for number, push in zip(self.own, pushes, strict=True):
             self._pushes[number][...] = push
@@ -318,11 +305,11 @@ class Ranks(Blocks):
         """Who has what of a block, as rank, tag, name of an array and its rows; nodes at home."""
         block = self[number]
         found = []
-        for tag, name in enumerate(KEPT, len(KEPT) * number):
+        for tag, name in enumerate(STEP_ARRAYS, len(STEP_ARRAYS) * number):
             if name == "nodes":
                 found.append((self.owners[number], tag, name, (0, block.ni + 1)))
                 continue
-            shift = 1 if name == "state" else 0  # its row of ghosts
+            shift = block.count_ghosts(getattr(block, name))
             for rank, rows in zip(self.places[number], pairwise(self.bounds[number]), strict=True):
                 found.append((rank, tag, name, (rows[0] + shift, rows[1] + shift)))
         return found
@@ -337,12 +324,9 @@ class Ranks(Blocks):
             first = max(first - GHOST_ROWS, 0)
             last = min(last + GHOST_ROWS, block.ni)
         parted = block.start is not block.state
-        rings = {
-            "nodes": messages.find_ring_of_nodes(block),
-            "state": messages.find_ring_of_cells(block),
-        }
-        rings["void_energy"] = messages.find_ring(block.ni, block.nj, messages.CELLS_DEEP)
-        for name in (*KEPT, *(f"{kept}_new" for kept in KEPT), "crowding"):
+        rings = {name: messages.find_ring_of_array(block, name) for name in HELD_ARRAYS}
+        rings["nodes"] = messages.find_ring_of_nodes(block)
+        for name in (*STEP_ARRAYS, *(f"{name}_new" for name in STEP_ARRAYS), "crowding"):
             array = getattr(block, name)
             if name.startswith("nodes") and block.is_here:
                 continue
@@ -383,13 +367,21 @@ def _get_sums(block: Block) -> np.ndarray:
     return block.share_sums()
 
 
+def _find_starts(block: Block) -> list[messages.Part]:
+    """Of what a step starts from, the cells along the sides."""
+    return [
+        (
+            lambda of_block, name=name: of_block.get_start(name),
+            messages.find_ring_of_array(block, name),
+        )
+        for name in HELD_ARRAYS
+    ]
+
+
 def _find_polygon_parts(block: Block, rows: Rows) -> list[messages.Part]:
     """What polygon cells read and change of an update."""
-    ring = messages.find_part_of_ring(block, 1, rows)
-    return [
-        (attrgetter("state_new"), messages.find_ring_of_cells(block, rows, 1)),
-        *((attrgetter(name), ring) for name in ("void_energy_new", "rates_new", "crowding")),
-    ]
+    names = (*(f"{name}_new" for name in HELD_ARRAYS), "rates_new", "crowding")
+    return [(attrgetter(name), messages.find_ring_of_array(block, name, rows, 1)) for name in names]
 
 
 def _find_all_bounds(

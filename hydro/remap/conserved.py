@@ -15,6 +15,7 @@ of an eighth of a face's angle of turn, in a metal many gigapascals.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -260,20 +261,20 @@ def remap_state(
     eos: EquationOfState,
     curved: bool,
     nodes: np.ndarray,
-    state: np.ndarray,
-    void_energy: np.ndarray,
+    held: Mapping[str, np.ndarray],
     new_nodes: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, Slivers]:
-    """rho, u, v, p (4, mi, mj), void energy (mi, mj) on a new grid, and the slivers; theory F12.
+) -> tuple[dict[str, np.ndarray], Slivers]:
+    """What the cells of a block hold on a new grid, and the slivers; theory F12.
 
-    state (4, ni, nj), void_energy (ni, nj) on `nodes` (2, ni+1, nj+1); new_nodes (2, mi+1, mj+1).
+    held: the arrays of `hydro.rows.HELD_ARRAYS` without ghosts, state (4, ni, nj) and void_energy
+    (ni, nj), on `nodes` (2, ni+1, nj+1); new_nodes (2, mi+1, mj+1).  Returns such arrays.
     Raises BadInput, with the block's name, for cells that are not convex and for outlines that
     differ by more than slivers; RunFailure where an average is no state of the material.
     """
     check_convex(name, nodes)
     check_convex(name, new_nodes)
     volumes, centres = compute_cell_moments(nodes, curved)
-    conserved = compute_conserved(eos, state, void_energy)
+    conserved = compute_conserved(eos, held["state"], held["void_energy"])
     fields = make_linear_fields(conserved, nodes, centres)
     lessen_slopes(eos, fields, nodes, centres)
     for _ in range(2):
@@ -289,7 +290,7 @@ def remap_state(
         new_state, new_void = find_state(eos, found)
         bad = ~is_state(eos, new_state)
         if not bad.any():
-            return new_state, new_void, slivers
+            return {"state": new_state, "void_energy": new_void}, slivers
         fields[..., SLOPE_X:] = 0.0  # averages of states, where those of linear fields fail
     i, j = (int(index) for index in np.argwhere(bad)[0])
     raise RunFailure(

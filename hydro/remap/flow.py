@@ -35,6 +35,7 @@ from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import Line, StraightLine
 from hydro.remap.conserved import Slivers, remap_state
 from hydro.rim import SIDES
+from hydro.rows import HELD_ARRAYS
 from hydro.simulation import Simulation
 from regrid.curves import compute_arc_lengths
 from regrid.errors import BadInput
@@ -93,6 +94,12 @@ class RemappedBlock:
     slivers: Slivers
 
 
+def _remap_block(block: Block, nodes: np.ndarray) -> tuple[dict[str, np.ndarray], Slivers]:
+    """What the cells of a block hold on new nodes (2, mi+1, mj+1): see `remap_state`."""
+    held = {name: block.get_inside(name) for name in HELD_ARRAYS}
+    return remap_state(block.name, block.eos, block.geometry.curved, block.nodes, held, nodes)
+
+
 def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
     """Give `new`, at its first step, the time, the ledger and the remapped state of `old`.
 
@@ -110,13 +117,10 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
     state = dict(new.get_state())
     report = []
     for one, other in zip(old.blocks, new.blocks, strict=True):
-        found, void_energy, slivers = remap_state(
-            one.name, one.eos, one.geometry.curved, one.nodes, one.state[:, 1:-1, 1:-1],
-            one.void_energy, other.nodes,
-        )  # fmt: skip
+        found, slivers = _remap_block(one, other.nodes)
         state[f"{one.name}/nodes"] = other.nodes.copy()
-        state[f"{one.name}/state"] = found
-        state[f"{one.name}/void_energy"] = void_energy
+        for name, array in found.items():
+            state[f"{one.name}/{name}"] = array
         report.append(RemappedBlock(one.name, (one.ni, one.nj), (other.ni, other.nj), slivers))
     new.set_state(
         state
@@ -337,11 +341,8 @@ class Refinement:
             first = sample_lines(one.nodes, places)
             sides = other.nodes_new
             nodes = settle_grid(motion, number, one, cells, first, sides, SETTLING_PASSES).copy()
-            held = one.nodes, one.state[:, 1:-1, 1:-1], one.void_energy
-            state, void_energy, _ = remap_state(
-                one.name, one.eos, one.geometry.curved, *held, nodes
-            )
-            found.append((nodes, state, void_energy))
+            held, _ = _remap_block(one, nodes)
+            found.append((nodes, held))
         return found
 
 

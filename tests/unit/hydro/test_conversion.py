@@ -76,9 +76,8 @@ def test_a_table_is_remapped_like_its_gas(tmp_path):
     new_nodes[0, 1:-1, 1:-1] += 0.03
     x, y = np.meshgrid(np.linspace(0.0, 1.0, 8), np.linspace(0.0, 1.0, 8), indexing="ij")
     state = np.array([1.0 + 0.3 * x, 0.1 * y, 0.2 * x, 1.0 + 0.2 * x * y])
-    void_energy = np.zeros((8, 8))
+    held = {"state": state, "void_energy": np.zeros((8, 8))}
     found = [
-        remap_state("gas", eos, False, nodes, state, void_energy, new_nodes)[0]
-        for eos in (gas, table)
+        remap_state("gas", eos, False, nodes, held, new_nodes)[0]["state"] for eos in (gas, table)
     ]
     assert found[1] == pytest.approx(found[0], rel=1e-10)

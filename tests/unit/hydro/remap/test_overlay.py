@@ -135,7 +135,10 @@ def test_any_state_stays_one_and_keeps_its_totals(seed, curved):
     new = shake((29, 23), seed + 10)
     state = wild_state((14, 18), seed)
     nothing = np.zeros((14, 18))
-    found, void, slivers = remap_state("gas", GAS, curved, old, state, nothing, new)
+    held = {"state": state, "void_energy": nothing}
+    new_held, slivers = remap_state("gas", GAS, curved, old, held, new)
+    found = new_held["state"]
+    void = new_held["void_energy"]
     assert is_state(GAS, found).all() and not void.any() and slivers.count == 0
     assert_same_totals(GAS, (old, state, nothing), (new, found, void), curved)
     low, high = state[0].min(), state[0].max()
@@ -148,7 +151,8 @@ def test_uniform_velocity_and_pressure_stay_so():
     _, (x, _) = compute_cell_moments(old, False)
     rho = np.where(x > 0.4, 1000.0, 1.0)
     state = np.array([rho, *np.broadcast_to(np.reshape([3.0, -2.0, 5.0], (3, 1, 1)), (3, 20, 20))])
-    found, _, _ = remap_state("gas", GAS, False, old, state, np.zeros((20, 20)), new)
+    held = {"state": state, "void_energy": np.zeros((20, 20))}
+    found = remap_state("gas", GAS, False, old, held, new)[0]["state"]
     assert np.abs(found[1] - 3.0).max() < 1e-12 and np.abs(found[2] + 2.0).max() < 1e-12
     assert np.abs(found[3] / 5.0 - 1.0).max() < 1e-9
     assert found[0].max() > 999.0 and found[0].min() < 1.001
@@ -157,13 +161,13 @@ def test_uniform_velocity_and_pressure_stay_so():
 def test_bad_grids_are_told():
     old = shake((8, 8), 1)
     state = wild_state((8, 8), 2)
-    nothing = np.zeros((8, 8))
+    held = {"state": state, "void_energy": np.zeros((8, 8))}
     with pytest.raises(BadInput, match=r"block 'gas': the outlines .* differ by .* of its volume"):
-        remap_state("gas", GAS, False, old, state, nothing, 1.1 * old)
+        remap_state("gas", GAS, False, old, held, 1.1 * old)
     folded = old.copy()
     folded[:, 3, 3] = folded[:, 5, 5]
     with pytest.raises(BadInput, match=r"block 'gas': .* cells are not convex .* i="):
-        remap_state("gas", GAS, False, folded, state, nothing, old)
+        remap_state("gas", GAS, False, folded, held, old)
 
 
 def make_pair(cells, pressures=(2.0, 1.0), second="wall"):

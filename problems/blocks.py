@@ -38,8 +38,6 @@ from problems.deck import (
     Regrid,
     RunControl,
     VoidFill,
-    check_digests,
-    compute_digests,
     key,
     place_file,
 )
@@ -165,27 +163,21 @@ class BlocksDeck(Deck, kw_only=True):
     void_fill: VoidFill = VoidFill()
     block: key(tuple[BlockTable, ...], "the blocks, [[block]] each", min_length=1) = (CHANNEL,)
     link: key(tuple[LinkTable, ...], "the links, [[link]] each") = ()
-    digests: key(dict[str, str], "sha256 of the files, which a run stores by itself") = NONE
 
-    def find_files(self, folder: Path) -> BlocksDeck:
-        """The same deck, the files that it names taken from `folder` where they are relative."""
+    def place_own_files(self, folder: Path, names: list[str]) -> BlocksDeck:
         blocks = []
-        names = []
         for block in self.block:
-            changed: dict[str, Any] = {"grid": block.grid and place_file(block.grid, folder)}
-            names.append(changed["grid"])
-            if isinstance(block.material, str) and ".toml:" in block.material:
-                file, _, name = block.material.rpartition(":")
-                names.append(place_file(file, folder))
-                changed["material"] = f"{names[-1]}:{name}"
+            changed: dict[str, Any] = {}
+            if block.grid:
+                changed["grid"] = place_file(block.grid, folder)
+                names.append(changed["grid"])
             if block.curves is not None:
                 sides = {side: getattr(block.curves, side) for side in SIDE_NAMES}
                 files = {s: place_file(c, folder) for s, c in sides.items() if isinstance(c, str)}
                 changed["curves"] = msgspec.structs.replace(block.curves, **files)
                 names += files.values()
             blocks.append(msgspec.structs.replace(block, **changed))
-        digests = compute_digests(filter(None, names), self.digests)
-        return msgspec.structs.replace(self, block=tuple(blocks), digests=digests)
+        return msgspec.structs.replace(self, block=tuple(blocks))
 
 
 def make_grid(deck: BlocksDeck, block: BlockTable) -> np.ndarray:
@@ -347,7 +339,6 @@ class Blocks(Problem):
     @functools.cached_property
     def grids(self) -> dict[str, np.ndarray]:
         """Nodes (2, ni+1, nj+1) of every block; BadInput where there is no valid grid."""
-        check_digests(self.deck.digests)
         return {block.name: make_grid(self.deck, block) for block in self.deck.block}
 
     def estimate_cells(self) -> int:

@@ -18,6 +18,7 @@ import collections
 import contextlib
 import hashlib
 import operator
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union, get_args
@@ -27,6 +28,7 @@ from msgspec import Meta
 
 from regrid.equidistribution.weights import FIELDS, GEOMETRY, Expression
 from regrid.errors import BadInput
+from regrid.text_files import load_toml, read_text
 
 if TYPE_CHECKING:
     from hydro.eos.materials import Material
@@ -228,9 +230,23 @@ class Deck(DeckTable, kw_only=True):
     run: RunControl = RunControl()
     output: Output = Output()
     gauge: key(list[Gauge], "points at which the flow is recorded after every step") = []
+    digests: key(dict[str, str], "sha256 of the files, which a run stores by itself") = NONE
 
     def find_files(self, folder: Path) -> Deck:
-        """The same deck with the files that it names taken from `folder`, that of the deck."""
+        """The same deck with full paths of the files that it names, and with their digests.
+
+        folder: that of the deck.  Materials of a file, and the tables that they name, are found in
+        every deck; a deck with other files places these (`place_own_files`).
+        """
+        names: list[str] = []
+        placed = _place_materials(self, folder, names)
+        placed = placed.place_own_files(folder, names)
+        digests = compute_digests(names, self.digests)
+        return msgspec.structs.replace(placed, digests=digests)
+
+    def place_own_files(self, folder: Path, names: list[str]) -> Deck:
+        """The same deck with full paths of the files that only this kind of deck can name; these
+        are appended to `names`."""
         return self
 
 
@@ -265,9 +281,63 @@ def place_gauges(tables: Iterable[Gauge]) -> list[Gauge]:
     return points
 
 
+DIGESTS = "digests"  # key of every deck
+
+
 def place_file(name: str, folder: Path) -> str:
     """The full path of file `name`, from `folder` where it is relative; ~ is the home folder."""
     return str((folder / Path(name).expanduser()).resolve())
+
+
+def find_file(name: str, folder: Path) -> str:
+    """The full path of file `name` in `folder` or, where it is not there, from here."""
+    placed = place_file(name, folder)
+    here = place_file(name, Path())
+    return here if Path(here).is_file() and not Path(placed).is_file() else placed
+
+
+OWN_MATERIAL = re.compile(r"([^\n]+\.toml):([^:\n]+)")  # FILE.toml:NAME
+
+
+def _place_materials(value: Any, folder: Path, names: list[str]) -> Any:
+    """A part of a deck, its materials of files with full paths; the files are appended to `names`.
+
+    Also those of tables that a material needs: in such a file, or in a material that is written in
+    the deck itself.
+    """
+    if isinstance(value, DeckTable):
+        parts = {name: getattr(value, name) for name in value.__struct_fields__}
+        placed = {name: _place_materials(part, folder, names) for name, part in parts.items()}
+        changed = {name: part for name, part in placed.items() if part is not parts[name]}
+        return msgspec.structs.replace(value, **changed) if changed else value
+    if isinstance(value, list | tuple):
+        entries = [_place_materials(entry, folder, names) for entry in value]
+        changes = any(new is not old for new, old in zip(entries, value, strict=True))
+        return type(value)(entries) if changes else value
+    if isinstance(value, dict) and "eos" in value and isinstance(value.get(TABLE_KEY), str):
+        names.append(find_file(value[TABLE_KEY], folder))
+        return {**value, TABLE_KEY: names[-1]}
+    if isinstance(value, str) and (found := OWN_MATERIAL.fullmatch(value)):
+        file = find_file(found[1], folder)
+        tables = _list_tables(file, found[2])
+        if tables is not None:
+            names += [file, *tables]
+            return f"{file}:{found[2]}"
+    return value
+
+
+TABLE_KEY = "path"  # of a material: its file with a table of pressures
+
+
+def _list_tables(file: str, name: str) -> list[str] | None:
+    """The files with tables that material `name` of a file needs; None where it cannot be read."""
+    from hydro.eos.materials import find_name  # loads numba, which most decks' names do not need
+
+    try:
+        table = load_toml(read_text(file))[find_name(f"{file}:{name}")].get(TABLE_KEY)
+    except (OSError, ValueError, KeyError, AttributeError, BadInput):  # reported where it is used
+        return None
+    return [place_file(table, Path(file).parent)] if isinstance(table, str) else []
 
 
 def compute_digests(names: Iterable[str], known: Mapping[str, str]) -> dict[str, str]:

@@ -1,8 +1,9 @@
 """Materials by name: equation of state and density at rest, with the source of the numbers.
 
 The library is `materials.toml` beside this file.  A user's own file has the same form; a material
-of it is called "FILE.toml:NAME", the file looked for from the current directory.  Note: a run
-that is to go on elsewhere needs that file there too.
+of it is called "FILE.toml:NAME".  A deck looks for the file in its own folder, then in the current
+directory, and a run keeps its full path and digest.  A file is read whenever one of its materials
+is asked for, so an edited one counts from then on.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from hydro.eos import EQUATIONS_OF_STATE, EquationOfState
 from regrid.errors import BadInput, find_nearest
 from regrid.text_files import load_toml, read_text
 
+KEPT_TEXTS = 32  # of files of materials that are parsed once, as long as they stay as they are
 LIBRARY = Path(__file__).with_name("materials.toml")
 
 
@@ -106,26 +108,29 @@ def _find_mistakes(table: dict) -> Iterator[str]:
         yield f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
 
 
-@functools.cache
 def _read_tables(path: Path) -> dict[str, dict]:
-    """The tables of a TOML file as they stand there; BadInput where it cannot be read."""
+    """The tables of a TOML file as they stand there now; BadInput where it cannot be read."""
     try:
-        return load_toml(read_text(path))
+        return _parse_tables(read_text(path))
     except FileNotFoundError:
         raise BadInput(f"materials: there is no file {str(path)!r}") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise BadInput(f"materials: {path} cannot be read: {error}") from None
 
 
-@functools.cache
-def _read_material(path: Path, name: str) -> Material:
-    where = f"material {name!r} in {path.name}"
-    return make_material(where, _read_tables(path)[name], path.parent)
+@functools.lru_cache(maxsize=KEPT_TEXTS)
+def _parse_tables(text: str) -> dict[str, dict]:
+    return load_toml(text)
+
+
+def _make_own(path: Path, name: str, tables: dict[str, dict]) -> Material:
+    return make_material(f"material {name!r} in {path.name}", tables[name], path.parent)
 
 
 def read_materials(path: Path) -> dict[str, Material]:
     """All materials of a TOML file; BadInput names file, material and mistake."""
-    return {name: _read_material(path, name) for name in _read_tables(path)}
+    tables = _read_tables(path)
+    return {name: _make_own(path, name, tables) for name in tables}
 
 
 def _list_names(tables: dict[str, dict]) -> dict[str, str]:
@@ -136,12 +141,6 @@ def _list_names(tables: dict[str, dict]) -> dict[str, str]:
         for one in (name, *filter(lambda other: isinstance(other, str), others)):
             found.setdefault(one.lower(), set()).add(name)
     return {one: materials.pop() for one, materials in found.items() if len(materials) == 1}
-
-
-def forget_read_files() -> None:
-    """Read material files again at their next use: they may have been rewritten."""
-    _read_tables.cache_clear()
-    _read_material.cache_clear()
 
 
 def _find_table(name: str) -> tuple[Path, str]:
@@ -171,4 +170,5 @@ def find_material(name: str) -> Material:
     A name may be one of the material's others, such as "copper" of Cu, in large or small letters.
     In a user's file only the material asked for is looked at: a mistake elsewhere is no matter.
     """
-    return _read_material(*_find_table(name))
+    path, own = _find_table(name)
+    return _make_own(path, own, _read_tables(path))

@@ -9,6 +9,7 @@ with a message.
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -122,6 +123,7 @@ class Tabular(EquationOfState):
     """
 
     path: str = ""
+    digest: str = field(init=False, repr=False)  # of the numbers: what tells two tables apart
     axis_rho: np.ndarray = field(init=False, repr=False, compare=False)
     axis_e: np.ndarray = field(init=False, repr=False, compare=False)
     table: np.ndarray = field(init=False, repr=False, compare=False)
@@ -165,6 +167,8 @@ class Tabular(EquationOfState):
             raise BadInput(f"table {self.path}: rho starts at {rho[0]:g}; it must be positive")
         for name, values in zip(("axis_rho", "axis_e", "table"), arrays, strict=True):
             object.__setattr__(self, name, np.ascontiguousarray(values))
+        contents = b"".join(values.tobytes() for values in (rho, e, p))
+        object.__setattr__(self, "digest", hashlib.sha256(contents).hexdigest())
 
     @property
     def parameters(self) -> tuple[np.ndarray, ...]:

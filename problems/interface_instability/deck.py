@@ -19,13 +19,11 @@ import msgspec
 
 from problems.deck import (
     MOST_CELLS,
-    NONE,
     Deck,
     DeckTable,
     Limiter,
     Regrid,
     RunControl,
-    compute_digests,
     key,
     place_file,
 )
@@ -104,15 +102,12 @@ class InterfaceDeck(Deck, kw_only=True):
     limiter: Limiter = "smooth-shear"
     line: LineMotion = LineMotion()
     regrid: Regrid = Regrid()
-    digests: key(dict[str, str], "sha256 of line_file, which a run stores by itself") = NONE
 
-    def find_files(self, folder: Path) -> InterfaceDeck:
-        """The same deck, its line_file taken from `folder` where it is relative."""
+    def place_own_files(self, folder: Path, names: list[str]) -> InterfaceDeck:
         if self.line_file is None:
             return self
-        path = place_file(self.line_file, folder)
-        digests = compute_digests([path], self.digests)
-        return msgspec.structs.replace(self, line_file=path, digests=digests)
+        names.append(place_file(self.line_file, folder))
+        return msgspec.structs.replace(self, line_file=names[-1])
 
 
 LEAST_WAVE_CELLS = 3  # in a wave: with fewer it hardly grows

@@ -22,7 +22,7 @@ from hydro.links import Link, join
 from hydro.motion.line import THICK_CELLS, LineRule, Respacing
 from hydro.rows import V
 from hydro.simulation import Simulation
-from problems.deck import MOST_CELLS, check_digests
+from problems.deck import MOST_CELLS
 from problems.initial_states import put_walls, settle_shock
 from problems.interface_instability.crossed_start import (
     CLEAR_TIME_RATIO,
@@ -223,7 +223,6 @@ class InterfaceInstability(Results, Problem):
         y = self.make_heights()
         sources = [("the perturbation", perturbation)] if perturbation is not None else []
         if deck.line_file is not None:
-            check_digests(deck.digests)
             self.file_line = read_line(deck.line_file, y[-1])
             sources.append((f"line_file {deck.line_file!r}", self.file_line))
         return [FreeLine(source, y, even, what) for what, source in sources]

@@ -20,12 +20,11 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from problems.deck import Deck, DeckTable
+from problems.deck import DIGESTS, Deck, DeckTable
 from problems.registry import load_problem, read_docstring
 from regrid.errors import BadInput, find_nearest
 from runs.quantities import drop_units
 
-DIGESTS = "digests"
 UNIONS = (typing.Union, type(int | str))
 
 
@@ -384,6 +383,8 @@ def _write_table(table: DeckTable, path: str) -> Iterator[str]:
         yield f"{settings.tag_field} = {show(settings.tag)}"
     for field in msgspec.structs.fields(table):
         value = getattr(table, field.name)
+        if field.name == DIGESTS and not value:  # a run's own key: nobody types it
+            continue
         part = make_parts(field.type)
         inner = resolve(part, part)
         words = part.get("description", inner.get("description", "")).strip().partition("\n")[0]

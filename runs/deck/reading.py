@@ -21,7 +21,7 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from problems.deck import Deck, DeckTable, place_gauges
+from problems.deck import DIGESTS, Deck, DeckTable, check_digests, place_gauges
 from problems.problem_file import (
     ProblemFile,
     describe_mistake,
@@ -57,7 +57,9 @@ class ReadDeck:
         return self.file.path.stem if self.file else self.problem
 
     def make_problem(self):
-        """The problem for this deck; raises BadInput for what the deck's fields say together."""
+        """The problem for this deck; raises BadInput for what the deck's fields say together, and
+        for a file that is no longer the one that the deck has the digest of."""
+        check_digests(self.deck.digests)
         with self.numbers_in_reach(always=True):
             place_gauges(self.deck.gauge)
             return (self.file.problem if self.file else load_problem(self.problem))(self.deck)
@@ -266,7 +268,10 @@ def parse_value(text: str) -> Any:
 
 def to_toml(problem: str, deck: Deck) -> str:
     """A deck as TOML; keys without a value (None) are left out, as TOML has no word for them."""
-    return tomli_w.dumps({"problem": problem, **_drop_none(msgspec.to_builtins(deck))})
+    table = _drop_none(msgspec.to_builtins(deck))
+    if not deck.digests:
+        del table[DIGESTS]
+    return tomli_w.dumps({"problem": problem, **table})
 
 
 def _drop_none(value: Any) -> Any:

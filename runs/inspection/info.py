@@ -15,6 +15,7 @@ import h5py
 import msgspec
 import numpy as np
 
+from problems.deck import DIGESTS
 from problems.evolution import get_material
 from problems.problem_file import read_head
 from problems.registry import PROBLEMS, summary_line
@@ -154,7 +155,7 @@ def describe_directory(path: str) -> str:
             words = f"{figures} (shockgrid plot {quoted} --what NAME)"
             lines += ["", f"pictures of this problem: {words}"]
     except BadInput as error:
-        lines.append(f"the deck does not suit this version of the problem: {error}")
+        lines.append(f"no results of the problem: its deck cannot be used any more: {error}")
     return "\n".join([*lines, *run.said, *_list_damage(run)])
 
 
@@ -193,6 +194,8 @@ def describe_settings(run: RunData) -> list[str]:
         usual, now = (msgspec.to_builtins(deck) for deck in (type(run.deck)(), run.deck))
     except BadInput:
         return []
+    del now[DIGESTS]  # of files whose names are shown
+    del usual[DIGESTS]
     changed = {one.key: one.now for one in find_changes(usual, now)}
     if "gauge" in changed:
         changed["gauge"] = ", ".join(gauge.name for gauge in run.deck.gauge)

@@ -5,7 +5,6 @@ import pytest
 
 from hydro.boundary import make_segment
 from hydro.eos import EQUATIONS_OF_STATE
-from hydro.eos.materials import forget_read_files
 from problems.registry import PROBLEMS
 from regrid.errors import BadInput
 from regrid.plug_ins import find_plug_ins
@@ -77,7 +76,6 @@ def somebody(tmp_path_factory, monkeypatch):
     find_plug_ins.cache_clear()
     yield folder
     find_plug_ins.cache_clear()
-    forget_read_files()
 
 
 def test_list_names_them_with_their_origin(somebody, shockgrid):

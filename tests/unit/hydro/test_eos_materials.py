@@ -9,13 +9,7 @@ import pytest
 from builders import SIDES, box, march, wall_off
 from hydro.block import Block
 from hydro.eos import IdealGas, Tabular
-from hydro.eos.materials import (
-    LIBRARY,
-    find_material,
-    find_name,
-    forget_read_files,
-    read_materials,
-)
+from hydro.eos.materials import LIBRARY, find_material, find_name, read_materials
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
 
@@ -38,7 +32,6 @@ strength = 3.0e9
 @pytest.fixture
 def write(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    forget_read_files()
 
     def make(text):
         (tmp_path / "mine.toml").write_text(text)

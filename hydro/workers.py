@@ -13,6 +13,8 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
+from regrid.jit import can_use_threads
+
 LEAST_SIDE_BY_SIDE = 8000  # cells of a block from which a thread of its own pays off
 LEAST_INSIDE = 6400  # cells of a block from which threads inside it pay off
 
@@ -30,7 +32,7 @@ class Workers:
     `wanted` None: one a large block, as far as there are `processors`, without these as far as the
     process may use some.
 
-    `threads`: how many in all; `inside`: how many in each block.
+    `threads`: how many in all.
     """
 
     def __init__(self, cells: Sequence[int], wanted: int | None, processors: int | None = None):
@@ -42,8 +44,14 @@ class Workers:
         beside = max(max(cells), sum(cells) / self.threads) if large > 1 else sum(cells)
         inside = sum(n / self.threads if n >= LEAST_INSIDE else n for n in cells)
         self.side_by_side = self.threads > 1 and large > 1 and beside <= inside
-        self.inside = 1 if self.side_by_side else self.threads
+        self._inside = 1 if self.side_by_side else self.threads
         self._pool: ThreadPoolExecutor | None = None
+        self._process = os.getpid()  # that the pool's threads are of
+
+    @property
+    def inside(self) -> int:
+        """Threads of the kernels in each block."""
+        return self._inside if can_use_threads() else 1
 
     def run(self, call: Callable[[int], None], count: int) -> None:
         """`call(0)` to `call(count - 1)`, side by side; raises what the first that fails raises."""
@@ -51,7 +59,8 @@ class Workers:
             for number in range(count):
                 call(number)
             return
-        if self._pool is None:
+        if self._pool is None or self._process != os.getpid():  # a fork leaves threads behind
+            self._process = os.getpid()
             sys.setswitchinterval(1e-4)
             self._pool = ThreadPoolExecutor(self.threads - 1, thread_name_prefix="block")
         waiting = {n: self._pool.submit(call, n) for n in range(1, count)}

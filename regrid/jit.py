@@ -413,6 +413,31 @@ def read_clock() -> float:
     return (_compiling.begun or time.perf_counter()) - _compiling.seconds
 
 
+# was this process forked from one whose kernels had started threads?
+_forked = SimpleNamespace(from_threads=False)
+
+
+def can_use_threads() -> bool:
+    """Can kernels with `parallel=True` be called in this process?
+
+    Not in one that was forked from a process in which some have run: the threads are not there any
+    more, GNU OpenMP cannot start others, and numba then leaves out the loop and sends SIGTERM.  Who
+    calls such a kernel asks first, and calls its serial form, which gives the same bits.
+    """
+    return not _forked.from_threads
+
+
+def _note_fork() -> None:
+    """Find out, in a forked process, whether its parent's kernels had started threads."""
+    with contextlib.suppress(ValueError):  # none has
+        numba.threading_layer()
+        _forked.from_threads = True
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
+    os.register_at_fork(after_in_child=_note_fork)
+
+
 def kernel(function=None, *, allocates=True, **options):
     """Compile `function` with numba: cached, without the interpreter lock, IEEE division.
 

@@ -37,6 +37,7 @@ from regrid.barrier.side_laws import BarrierLaw, prepare, weigh_curves
 from regrid.barrier.step_control import CHUNK_SPAN, MOST_CHUNK_NODES, UPRIGHT, measure_corners
 from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.barrier.untangle import ENERGY_ROW, ENERGY_ROWS, LEAST_AREA_ROW, fill_energy
+from regrid.jit import can_use_threads
 from regrid.measure.corners import BLOCK_CORNERS
 from regrid.measure.crossings import BoundaryCheck
 from regrid.measure.quality import compute_scaled_jacobians
@@ -317,8 +318,7 @@ class Workspace:
         The ratio is 0 unless all areas are positive numbers; the estimate is infinite then.
         """
         look = look_serial
-        if self.threads > 1:
-            self._set_threads()
+        if self._set_threads():
             look = look_threaded
         given = (self.old, self.base, UPRIGHT)
         if self.given is not None:
@@ -350,8 +350,7 @@ class Workspace:
         """Gradient and Hessian of the functional on a convex grid."""
         if not self.clean:
             self._clear()
-        if self.threads > 1:
-            self._set_threads()
+        if self._set_threads():
             assemble_on_threads(nodes, self.law, self.columns, self.H, self.gradient, self.scratch)
         else:
             self._assemble(assemble_barrier.entry, nodes, 0.0)
@@ -368,8 +367,12 @@ class Workspace:
             last = self.columns[c + 1]
             kernel(nodes, self.law, spread, first, last, self.H[c], self.gradient, self.scratch[c])
 
-    def _set_threads(self) -> None:
+    def _set_threads(self) -> bool:
+        """Are the chunks to be computed on threads?  As many are set then."""
+        if self.threads == 1 or not can_use_threads():
+            return False
         numba.set_num_threads(min(self.threads, numba.config.NUMBA_NUM_THREADS))
+        return True
 
     def solve(self, tolerance: float, floor: float, most: int = 16, guess=None):
         """Fill `change` with the solution of `H change = -gradient`, that of the last assembly.
@@ -392,8 +395,7 @@ class Workspace:
             np.add(self.gradient, self.product[:, :, : self.nj + 1], out=right)
             np.negative(right, out=right)
         solver = solve_serial
-        if self.threads > 1:
-            self._set_threads()
+        if self._set_threads():
             solver = solve_threaded
         done, first, last = solver.entry(
             self.whole_columns, self.H, (self.solution, self.r, self.z),

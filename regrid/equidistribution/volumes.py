@@ -55,7 +55,7 @@ from regrid.hexahedra.faces import (
     find_unit_in_space,
 )
 from regrid.hexahedra.functional import cross, dot
-from regrid.jit import inlined, kernel
+from regrid.jit import can_use_threads, inlined, kernel
 from regrid.measure.corners import compute_centres, compute_hexahedron_centres
 from regrid.measure.faults import name_cells
 from regrid.measure.hexahedra import (
@@ -460,7 +460,7 @@ class Ed3Operator:
     def evaluate(self, nodes: np.ndarray, weight: np.ndarray) -> float:
         """Evaluate the equations at `nodes`; returns the rms residual over a typical flux."""
         arrays = nodes, weight, self.residual, self.edges, self.products
-        if self.threads > 1:
+        if self.threads > 1 and can_use_threads():
             assemble_on_threads(*arrays, self.bounds, self.scratch)
         else:
             assemble_planes(*arrays, *self.bounds, self.scratch[0])
@@ -487,7 +487,7 @@ class Ed3Operator:
     def correct(self, nodes: np.ndarray, tau: float) -> None:
         """One stabilising correction of the inner nodes, after `evaluate`."""
         arrays = self.residual, self.edges, tau, self.work
-        if self.threads > 1:
+        if self.threads > 1 and can_use_threads():
             sweep_on_threads(*arrays, nodes, self.lines, self.bounds, self.turned)
         else:
             sweep_first(*arrays, *self.lines)

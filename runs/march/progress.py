@@ -13,7 +13,7 @@ import numpy as np
 from problems.deck import Deck, place_gauges
 from problems.evolution import Evolution
 from problems.problem import Problem
-from regrid.jit import read_clock
+from regrid.jit import can_use_threads, read_clock
 from regrid.text_files import escape_controls
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import name_failure
@@ -209,6 +209,8 @@ def describe_threads(wanted: int | None, evolution: Evolution) -> str:
     wanted = workers.threads if workers else wanted or 1
     if wanted == 1 or numba is None:
         return "1"
+    if not can_use_threads():
+        return f"1; {wanted} wanted, but a process forked from one with threads can start none"
     allowed = numba.config.NUMBA_NUM_THREADS
     try:
         layer = numba.threading_layer()

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
 
 import pytest
 
+from builders import ROOT
 from hydro.workers import Workers
 
 
@@ -50,3 +54,44 @@ def test_the_first_block_that_fails_is_told_whoever_fails_first():
     called = []
     workers.run(called.append, 3)  # goes on after a failure
     assert len(called) == 3
+
+
+FORKED = """
+import os, signal, sys
+import numpy as np, numba
+import shockgrid as sg
+
+def load():
+    return sg.load("interface-instability", cells=128, run={"threads": 2})
+
+def list_numbers(case):
+    return [block.state.tobytes() for block in case.simulation.blocks]
+
+begun = load()
+begun.advance(2)
+numba.threading_layer()  # raises where none has been started
+other = load()
+read, write = os.pipe()
+child = os.fork()
+if not child:
+    begun.advance(2)  # begun on threads, that of the parent
+    other.advance(2)
+    with open(write, "wb") as file:
+        file.write(b"".join(list_numbers(begun) + list_numbers(other)))
+    os._exit(0)
+os.close(write)
+with open(read, "rb") as file:
+    found = file.read()
+assert os.waitpid(child, 0)[1] == 0
+begun.advance(2)
+other.advance(2)
+assert found == b"".join(list_numbers(begun) + list_numbers(other))
+"""
+
+
+@pytest.mark.kernels
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+def test_a_forked_process_computes_the_same_without_threads():
+    command = [sys.executable, "-c", FORKED]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=500)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -26,6 +26,7 @@ from regrid.algebraic import quasi_1d_grid, transfinite_grid
 from regrid.barrier.repair import RepairReport, repair_grid
 from regrid.domains import distribute_by_arc_length
 from regrid.errors import BadInput, RegridFailure
+from regrid.hdf5_files import open_hdf5
 from regrid.measure.quality import find_bad_cells
 from regrid.sides import SIDE_NAMES, get_side, get_sides
 
@@ -138,7 +139,7 @@ def _read_hdf5(path: Path, block: str | None) -> tuple[dict[str, np.ndarray], st
             groups.setdefault(group.removeprefix("blocks/"), {})[name] = item
 
     try:
-        with h5py.File(path, "r") as file:
+        with open_hdf5(path) as file:
             file.visititems(take)
             known = {name: arrays for name, arrays in groups.items() if _kind_of(arrays)}
             if block is not None and block not in known:

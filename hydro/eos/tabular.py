@@ -17,6 +17,7 @@ import numpy as np
 
 from hydro.eos.base import EquationOfState
 from regrid.errors import BadInput
+from regrid.hdf5_files import open_hdf5
 from regrid.jit import choose, compiled_once, inlined
 
 
@@ -137,12 +138,10 @@ class Tabular(EquationOfState):
     opens_voids = False
 
     def __post_init__(self):
-        import h5py
-
         if not Path(self.path).is_file():
             raise BadInput(f"table: there is no file {self.path!r}")
         try:
-            with h5py.File(self.path, "r") as file:
+            with open_hdf5(self.path) as file:
                 arrays = [np.array(file[name], dtype=np.float64) for name in ("rho", "e", "p")]
         except (OSError, KeyError) as error:
             raise BadInput(

@@ -20,6 +20,7 @@ from problems.evolution import get_material
 from problems.problem_file import read_head
 from problems.registry import PROBLEMS, summary_line
 from regrid.errors import BadInput
+from regrid.hdf5_files import open_hdf5
 from runs.deck.checking import find_changes
 from runs.inspection.account import describe_cautions, describe_run, describe_verdict, judge
 from runs.quantities import add_unit, count, describe_seconds, describe_time
@@ -240,7 +241,7 @@ def inspect(file: str | os.PathLike) -> str:
 
 def describe_tree(path: Path) -> str:
     """As `inspect`, in this process."""
-    with open_hdf5(path) as tree:
+    with open_tree(path) as tree:
         head = f"{path}: {path.stat().st_size} bytes"
         if (found := find_sum(path)) is not None:
             head += f", checksum {'as stored' if found else 'NOT AS STORED'}"
@@ -258,7 +259,7 @@ def describe_tree(path: Path) -> str:
 
 
 @contextlib.contextmanager
-def open_hdf5(path: Path) -> Iterator[h5py.File]:
+def open_tree(path: Path) -> Iterator[h5py.File]:
     """The file, open for reading; BadInput if it is missing, not HDF5 or damaged."""
     if not path.is_file():
         words = (
@@ -268,7 +269,7 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
         )
         raise BadInput(f"{path} {words}")
     try:
-        file = h5py.File(path, "r")
+        file = open_hdf5(path)
     except OSError as error:
         raise BadInput(
             f"{path} is not a readable HDF5 file (truncated, damaged or a different format)"

@@ -15,6 +15,7 @@ import os
 import platform
 import re
 import signal
+import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
@@ -31,6 +32,7 @@ from problems.evolution import Evolution, get_missed, get_start_row
 from problems.problem import Problem
 from regrid.errors import BadInput, RunFailure
 from regrid.jit import read_clock
+from regrid.text_files import escape_controls
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import ENDS
 from runs.gauges import Gauges
@@ -219,7 +221,7 @@ class Runner:
 
     def start(self) -> Ending:
         """Run in a new directory, from the beginning or the state that another run has given."""
-        with self.directory.claimed():
+        with self.directory.claimed(self._caution):
             write_atomically(self.directory.deck, self.deck_text)
             if self.deck.file:
                 keep_problem_file(self.directory, self.deck.file)
@@ -228,7 +230,7 @@ class Runner:
 
     def resume(self, at: int | None = None, say=lambda text: None) -> Ending:
         """Go on from the last good restart point, or from the one of step `at`."""
-        with self.directory.claimed():
+        with self.directory.claimed(self._caution):
             check_columns(self.directory.history, self.evolution, self._measure())
             tables = [self.directory.history]
             tables += [self.directory.gauges] * bool(self.gauges.points)
@@ -264,6 +266,12 @@ class Runner:
             self.last_point = step
             self.directory.forget_early_end()
             return self._run()
+
+    def _caution(self, text: str) -> None:
+        """A caution about the disk, for the person and the log."""
+        self.directory.note(f"caution: {text}")
+        if not self.quiet:
+            print(f"caution: {escape_controls(text)}", file=sys.stderr)
 
     def _note_start(self, what: str) -> None:
         made, deck = describe_provenance(find_provenance(self.deck_text))

@@ -32,6 +32,7 @@ from runs.store.files import (
     DUMPS,
     KEPT_NAMES,
     LOCK,
+    NoLocks,
     disk_errors,
     get_part,
     replace_file,
@@ -119,15 +120,24 @@ class RunDirectory:
             file.write(f"{stamp}  {escape_controls(text)}\n")
 
     @contextlib.contextmanager
-    def claimed(self):
+    def claimed(self, caution: Callable[[str], None] = lambda text: None):
         """Hold the directory for one process; BadInput when another has it already.
 
         The lock is the system's, on a file that stays: it goes with its process, however that ends.
+        `caution` is given a sentence where the file system has no locks: nothing is held then.
         """
         with disk_errors(self.lock):
             file = open(self.lock, "a", encoding="utf-8")
         with file:
-            if not try_lock(file):
+            try:
+                free = try_lock(file)
+            except NoLocks as error:
+                free = True
+                caution(
+                    f"the file system of {self.path} has no locks ({error}): nothing keeps another "
+                    "shockgrid from writing there at the same time"
+                )
+            if not free:
                 raise BadInput(f"{self.path} is in use: another shockgrid runs there")
             for path in _find_leftovers(self):  # those of other commands are theirs
                 with contextlib.suppress(OSError):

@@ -34,6 +34,7 @@ from problems.evolution import (
     is_axisymmetric,
 )
 from regrid.errors import BadInput
+from regrid.hdf5_files import open_hdf5
 from runs.store.files import BLANK_CHECKSUM, CHECKSUM, find_sum
 from runs.store.provenance import find_provenance
 
@@ -335,7 +336,7 @@ def open_dump(path: Path) -> h5py.File:
     if crc == "":
         raise BadInput(f"{path} is truncated or damaged: its checksum is wrong (shockgrid inspect)")
     try:
-        file = h5py.File(path, "r")
+        file = open_hdf5(path)
     except OSError as error:
         raise BadInput(
             f"{path} is not a readable HDF5 file (truncated, damaged or a different format)"

@@ -175,17 +175,25 @@ def describe_disk_error(error: OSError, path: Path) -> str:
     return f"{path}: {error.strerror or error}"
 
 
+HELD_LOCK = (errno.EAGAIN, errno.EWOULDBLOCK, errno.EACCES)  # by another; the last one over NFS
+
+
+class NoLocks(Exception):
+    """A file system that has no locks; in the words of the system."""
+
+
 def try_lock(file: IO) -> bool:
     """Lock an open file for this process alone, without waiting; False where another has it.
 
-    The lock is given up when the file is closed.  Raises OSError where the file system has no
-    locks.
+    The lock is given up when the file is closed.  Raises NoLocks where the file system has none.
     """
     if fcntl is not None:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
+        except OSError as error:
+            if error.errno in HELD_LOCK:
+                return False
+            raise NoLocks(error.strerror) from error
     elif msvcrt is not None:
         file.seek(0)
         try:
@@ -225,6 +233,17 @@ def write_sealed(path: Path, image: bytes) -> None:
     write_atomically(path, seal(image))
 
 
+HDF5_HEAD = b"\x89HDF\r\n\x1a\n\0"  # of a file as dumps are written
+OPEN_FLAG = 20  # place of the byte that is 1 while a program has the file open for writing
+
+
+def _mark_closed(first: bytes) -> bytes:
+    """The first bytes of a file as they are when no program has it open for writing."""
+    if first.startswith(HDF5_HEAD) and first[OPEN_FLAG : OPEN_FLAG + 1] == b"\1":
+        return first[:OPEN_FLAG] + b"\0" + first[OPEN_FLAG + 1 :]
+    return first
+
+
 def find_sum(path: Path) -> str | None:
     """The checksum of a file that has the bytes that were written; "" where it has others, None
     where it has no checksum.
@@ -236,7 +255,7 @@ def find_sum(path: Path) -> str | None:
         now = os.fstat(file.fileno())
         key = str(path.absolute()), now.st_ino, now.st_size, now.st_mtime_ns
         if key not in judged:
-            first = file.read(SEARCHED_BYTES)
+            first = _mark_closed(file.read(SEARCHED_BYTES))
             place = first.find(SUM_HEAD)
             start = place + len(SUM_HEAD)
             found = zlib.crc32(first[start + CHECKSUM_DIGITS :], zlib.crc32(first[:start]))

@@ -18,7 +18,8 @@ ORDER = ("regrid", "hydro", "problems", "runs", "shockgrid")
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
 ROOMS = (
     ("regrid.errors",),
-    ("regrid.jit", "regrid.plug_ins", "regrid.roots", "regrid.text_files", "regrid.work_arrays"),
+    ("regrid.hdf5_files", "regrid.jit", "regrid.plug_ins", "regrid.roots", "regrid.text_files",
+     "regrid.work_arrays"),
     ("regrid.sides",),
     ("regrid.protocol",),
     ("regrid.curves", "regrid.measure"),

@@ -17,7 +17,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections import ChainMap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import Enum
 from typing import Any, ClassVar
 
@@ -452,3 +452,28 @@ def put(
     segment = make_segment(kind, block, side, start, count if stop is None else stop, options)
     block.segments.append(segment)
     return segment
+
+
+class OpenSides:
+    """The segments of all blocks that fill ghosts, speeds or fluxes themselves, such as free ones.
+
+    A coupling of `hydro.step`.
+    """
+
+    def __init__(self, blocks: Sequence[Block]):
+        self.blocks = blocks
+
+    def fill_ghosts(self, t: float, dt: float) -> None:
+        """Ghosts beyond open sides and free surfaces at the start of the step."""
+        for block in self.blocks:
+            block.fill_ghosts(t)
+
+    def fill_speeds(self, t: float, dt: float) -> None:
+        """Contact speeds of free surfaces, and the states beyond inflow sides."""
+        for block in self.blocks:
+            block.fill_speeds(t)
+
+    def fill_fluxes(self, t: float, dt: float) -> None:
+        """Fluxes of free surfaces; those of walls and open sides are known from the traces."""
+        for block in self.blocks:
+            block.fill_flux(t)

@@ -18,6 +18,8 @@ from hydro.block import Block
 from hydro.boundary import Linked, Seam, Sliding, put
 from hydro.eos.base import is_same_material
 from hydro.perimeter.contacts import (
+    AT_CELLS,
+    AT_FLUX,
     AT_TRACES,
     pass_seam,
     solve_link,
@@ -135,9 +137,19 @@ class Exchange:
         for contact in self.contacts:
             contact.cut()
 
-    def solve(self, phase: int, dt: float) -> None:
-        """Contact states of all sides in a phase of `hydro.perimeter.contacts`: on the old grid
-        from the cells, with ghosts, or from the traces; between both grids with fluxes."""
+    def fill_ghosts(self, t: float, dt: float) -> None:
+        """Contact states from the cells on the old grid, with the ghosts that stand for them."""
+        self._solve(AT_CELLS, dt)
+
+    def fill_speeds(self, t: float, dt: float) -> None:
+        """Contact states from the traces on the old grid, with which the lines move."""
+        self._solve(AT_TRACES, dt)
+
+    def fill_fluxes(self, t: float, dt: float) -> None:
+        """Contact states from the traces between both grids, and the fluxes of both sides."""
+        self._solve(AT_FLUX, dt)
+
+    def _solve(self, phase: int, dt: float) -> None:
         for link in self.all:
             link.solve(phase, dt)
 

@@ -44,9 +44,12 @@ X_TRACE, Y_TRACE = _rows(2)
 RHO_TRACE, U_TRACE, V_TRACE, P_TRACE, C_TRACE, E_TRACE, C2_TRACE = _rows(7)
 # open faces: the state beyond them
 RHO_BEYOND, U_BEYOND, V_BEYOND, P_BEYOND, C_BEYOND, E_BEYOND, C2_BEYOND = _rows(7)
-# contact states: pressure, speed outwards, velocity, slip; the jump of the pressure by surface
-# tension, inside less outside
-P_STAR, W_STAR, U_STAR, V_STAR, SLIP, JUMP = _rows(6)
+# contact states: pressure, speed outwards, velocity, slip
+P_STAR, W_STAR, U_STAR, V_STAR, SLIP = _rows(5)
+# what acts on an impermeable face besides the material beyond: the jump of the pressure by surface
+# tension, inside less outside; the pressure of gas in a void; and a force on the block, besides all
+# pressure, as the flux is: per depth or per radian
+JUMP, VOID_P, TRACTION_X, TRACTION_Y = _rows(4)
 # the faces: outward normal times length, swept area per time (outwards), middle
 NX, NY, SWEEP, X, Y = _rows(5)
 # what flux passes through: the same in plane flow, else weighted by the radius
@@ -66,7 +69,7 @@ GHOST = slice(RHO_GHOST, P_GHOST + 1)
 TRACE = slice(RHO_TRACE, C2_TRACE + 1)  # rho, u, v, p, c, e, c²
 BEYOND = slice(RHO_BEYOND, C2_BEYOND + 1)
 CONTACT = slice(P_STAR, SLIP + 1)
-CONTACT_VELOCITY = slice(U_STAR, V_STAR + 1)
+TRACTION = slice(TRACTION_X, TRACTION_Y + 1)
 NORMAL = slice(NX, NY + 1)
 AREA = slice(AREA_X, AREA_Y + 1)
 AREAS = slice(AREA_X, SWEPT + 1)

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from hydro.block import Block
+from hydro.boundary import OpenSides
 from hydro.clock import Clock, Stopwatch
 from hydro.contacts.meetings import Meetings
 from hydro.contacts.start import check_overlaps
@@ -52,8 +53,8 @@ class Refining(Protocol):
 
     def lay(
         self, places: np.ndarray, blocks: Sequence[Block], motion: GridMotion, t: float
-    ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Nodes, states and void energies of all blocks, whose new ones `motion` moves."""
+    ) -> list[tuple[np.ndarray, dict[str, np.ndarray]]]:
+        """Nodes, and what cells hold (HELD_ARRAYS), of all blocks; `motion` moves the new ones."""
         ...
 
 
@@ -179,6 +180,7 @@ class Simulation:
         self._flow = Flow(
             self._shared,
             self.exchange,
+            OpenSides(self._shared),
             self.motion,
             self.meetings,
             self.tension,
@@ -271,8 +273,7 @@ class Simulation:
             clock.tension_dt = self.tension.find_step()
         try:
             self._check_collapse()
-            meets = bool(self.meetings.pairs)
-            touching = self.meetings.find(clock.t, clock.step) if meets else set()
+            touching = self.meetings.find(clock.t, clock.step)
             self._overlaps.check(clock.t, clock.step, touching)
             record = take_step(self._flow)
         except RunFailure:  # all ranks have agreed on it

@@ -6,9 +6,12 @@ sources, too, apply their first half to a copy of the state.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Protocol
 
+from hydro.boundary import OpenSides
 from hydro.clock import MOST_STRETCHING, Clock, Stopwatch
 from hydro.contacts.meetings import Meetings
 from hydro.ledger import Ledger
@@ -17,13 +20,14 @@ from hydro.motion import sides as on_sides
 from hydro.motion.grid_motion import GridMotion
 from hydro.motion.sides import Sides, Span
 from hydro.motion.tension import SurfaceTension
-from hydro.perimeter.contacts import AT_CELLS, AT_FLUX, AT_TRACES
 from hydro.ranks.blocks import Blocks
 from hydro.small_cells import SmallCells
 from hydro.sources import BodySource
 from regrid.errors import RegridFailure, RunFailure
 
 MOST_RETRIES = 12
+# of the stable step, after halvings: a gas that is too cold then takes its step at first order
+LEAST_SECOND_ORDER_PART = 1.0 / 16.0
 
 # Phase 4, how the nodes along the sides of all blocks move: passes in their order, what each does,
 # and why it stands there.  They are in `hydro.motion.sides`.
@@ -43,12 +47,39 @@ SIDE_PASSES: tuple[tuple[Callable[[Sides, Span], None], str, str], ...] = (
 )
 
 
+class Coupling(Protocol):
+    """What acts on the sides of blocks from beyond them; three calls a step, in this order.
+
+    dt: length of the step [s]; t: its start for the ghosts, its middle for speeds and fluxes [s].
+    Without members, such as links or surfaces that may meet, a coupling does nothing.
+    """
+
+    def fill_ghosts(self, t: float, dt: float) -> None:
+        """On the old grid, from the cells: the states that stand for what is beyond the sides."""
+
+    def fill_speeds(self, t: float, dt: float) -> None:
+        """On the old grid, from the traces at mid-time: contact states, with which lines move."""
+
+    def fill_fluxes(self, t: float, dt: float) -> None:
+        """Between both grids, from the traces on the moved faces: fluxes through the sides."""
+
+
+# The couplings of a flow in the order in which a step calls them, and why each stands there.
+COUPLINGS: tuple[tuple[str, str], ...] = (
+    ("tension", "surface tension: jumps of the pressure, and tractions, for all contact states"),
+    ("exchange", "links and sliding contacts between blocks"),
+    ("open_sides", "open sides and free surfaces; where these touch, contacts replace them"),
+    ("meetings", "contacts between free surfaces that touch, over the states of the free ones"),
+)
+
+
 @dataclass(frozen=True)
 class Flow:
     """What a step works on; made once, by `hydro.simulation.Simulation`."""
 
     blocks: Blocks
     exchange: Exchange
+    open_sides: OpenSides
     motion: GridMotion
     meetings: Meetings
     tension: SurfaceTension
@@ -57,6 +88,11 @@ class Flow:
     clock: Clock
     small_cells: SmallCells
     watch: Stopwatch
+
+    @property
+    def couplings(self) -> list[Coupling]:
+        """The members of COUPLINGS, in their order."""
+        return [getattr(self, name) for name, _ in COUPLINGS]
 
 
 @dataclass
@@ -67,6 +103,13 @@ class StepRecord:
     retries: int = 0
     reason: RunFailure | None = None
     last: bool = False
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Surfaces come to touch before the step is over: it ends there instead, after `dt` [s]."""
+
+    dt: float
 
 
 def take_step(flow: Flow) -> StepRecord:
@@ -83,7 +126,8 @@ def take_step(flow: Flow) -> StepRecord:
     first_dt = dt
     while reason := try_step(flow, dt):
         if isinstance(reason, Touch):
-            first_dt = dt = float(reason)
+            dt = reason.dt
+            first_dt = dt
             record.limit = "touch"
             continue
         record.reason = reason
@@ -94,102 +138,107 @@ def take_step(flow: Flow) -> StepRecord:
                 f"{MOST_RETRIES} times to {dt:.3g} s without success",
                 RunFailure,
             )
-        dt = first_dt if lower_order(flow, reason) else 0.5 * dt
+        if lower_order(flow, reason, 0.5 * dt):
+            dt = first_dt
+        else:
+            dt = 0.5 * dt
         record.limit = "retry"
     accept_step(flow, dt, record)
     return record
 
 
-def lower_order(flow: Flow, reason: RunFailure) -> bool:
+def lower_order(flow: Flow, reason: RunFailure, dt: float) -> bool:
     """Let all gases take this step at first order, where one has got too cold; False if they do.
 
     A variation over a cell can take more internal energy out of it than it has, in however short
-    a step, where gas expands towards a vacuum; constant cells cannot.
+    a step, where gas expands towards a vacuum; constant cells cannot.  Only where `dt` [s] would be
+    LEAST_SECOND_ORDER_PART of the stable step or less: a shorter step helps where a flow begins.
     """
     cause = "cold-gas"
     gases = [block for block in flow.blocks if block.eos.failure_cause == cause]
     if reason.cause != cause or all(block.is_first_order for block in gases):
+        return False
+    if flow.clock.compute_fraction(dt) > LEAST_SECOND_ORDER_PART:
         return False
     for block in gases:
         block.use_first_order(True)
     return True
 
 
-class Touch(float):
-    """The shorter step [s] that ends where surfaces come to touch."""
-
-
 def try_step(flow: Flow, dt: float) -> RunFailure | Touch | None:
     """Phases 2 to 6, into the new nodes and states; why the step does not stand, or None."""
-    blocks = flow.blocks
-    exchange = flow.exchange
-    motion = flow.motion
-    watch = flow.watch
-    meetings = flow.meetings
-    tension = flow.tension
-    # is there any of them?
-    touches = bool(meetings.pairs)
-    pulls = bool(tension.lines)
-    # agreed: do all ranks hear of what fails?
-    sides = watch("sides")
-    agreed = False
-    t = flow.clock.t
-    middle = flow.clock.t + 0.5 * dt
-    flow.small_cells.set_time(t)
     fraction = flow.clock.compute_fraction(dt)  # of the stable step
+    flow.small_cells.set_time(flow.clock.t)
     try:
-        with sides:
-            # 2 states beyond all sides; slopes and mid-time states of the cells along them
-            exchange.cut_contacts()  # sliding contacts: both lines cut into pieces
-            flow.source.start_step(t, dt)  # first half of gravity and heating
-            for block in blocks:
-                block.gather(t)  # cells along the sides, mirrored in walls
-            if pulls:
-                tension.fill_jumps(new=False)  # of the pressure, by surface tension
-            exchange.solve(AT_CELLS, dt)  # ghosts beyond links and sliding contacts
-            for block in blocks:
-                block.fill_ghosts(t)  # beyond open sides and free surfaces
-            if touches:
-                meetings.fill_ghosts(t)  # beyond facets of surfaces that touch
-            for block in blocks:
-                block.predict(dt)
-            # 3 contact speeds of all sides that move with the flow, from traces at mid-time
-            exchange.solve(AT_TRACES, dt)
-            for block in blocks:
-                block.fill_speeds(middle)  # free surfaces; states beyond inflow sides
-            if touches:
-                meetings.fill_speeds(middle)
-        with watch("regrid"):
-            # 4 nodes along the sides moved; surfaces that have come to touch laid on each other
-            move_sides(motion, Span(t, dt, fraction))
-            if touches and (shorter := meetings.meet(dt, dt / fraction)):
-                return Touch(shorter)
+        with agree_on_failures(flow.motion, fraction):
+            fill_states_beyond(flow, dt)
+            find_contact_speeds(flow, dt)
+            touch = move_lines(flow, dt, fraction)
+        if touch is not None:
+            return touch
+        with flow.watch("regrid"):
             # 5 interiors regridded, convexity proved; the new nodes along all sides are shared
-            agreed = True
-            motion.regrid(fraction)
-        with sides:
-            # 6 fluxes through the sides, from traces on the moved faces
-            for block in blocks:
-                block.trace(dt)  # with the fluxes of walls and open sides
-            if pulls:
-                tension.fill_jumps(new=True)
-            for block in blocks:
-                block.fill_flux(middle)  # of free surfaces
-            exchange.solve(AT_FLUX, dt)  # of links and sliding contacts
-            if touches:
-                meetings.fill_flux(middle, dt)  # of facets
-            if pulls:
-                tension.add_rest()  # what of surface tension is no jump of the pressure
-        with watch("flow"):
-            # then the inside: slopes, traces, swept volumes, fluxes, new states; small cells share
-            blocks.update(dt)
-            flow.small_cells.share_states(flow.clock.cfl / dt, dt)
-    except RunFailure as failure:
-        reason = failure if agreed else agree_on(flow, fraction, failure)
-        if not isinstance(reason, RegridFailure):
-            raise reason from None
-        return reason
+            flow.motion.regrid(fraction)
+        update_states(flow, dt)
+    except RegridFailure as failure:
+        return failure
     return find_failure(flow)
+
+
+@contextmanager
+def agree_on_failures(motion: GridMotion, fraction: float) -> Iterator[None]:
+    """What fails in this block of code on one rank fails on all; others wait in the regridding."""
+    try:
+        yield
+    except RunFailure as failure:
+        motion.regrid(fraction, failure)  # raises the first failure of all ranks
+        raise
+
+
+def fill_states_beyond(flow: Flow, dt: float) -> None:
+    """Phase 2."""
+    t = flow.clock.t
+    with flow.watch("sides"):
+        # 2 states beyond all sides; slopes and mid-time states of the cells along them
+        flow.exchange.cut_contacts()  # sliding contacts: both lines cut into pieces
+        flow.source.start_step(t, dt)  # first half of gravity and heating
+        for block in flow.blocks:
+            block.gather(t)  # cells along the sides, mirrored in walls
+        for coupling in flow.couplings:
+            coupling.fill_ghosts(t, dt)
+        for block in flow.blocks:
+            block.predict(dt)
+
+
+def find_contact_speeds(flow: Flow, dt: float) -> None:
+    """Phase 3."""
+    with flow.watch("sides"):
+        # 3 contact speeds of all sides that move with the flow, from traces at mid-time
+        for coupling in flow.couplings:
+            coupling.fill_speeds(flow.clock.t + 0.5 * dt, dt)
+
+
+def move_lines(flow: Flow, dt: float, fraction: float) -> Touch | None:
+    """Phase 4; the shorter step, if surfaces come to touch within this one."""
+    with flow.watch("regrid"):
+        # 4 nodes along the sides moved; surfaces that have come to touch laid on each other
+        move_sides(flow.motion, Span(flow.clock.t, dt, fraction))
+        shorter = flow.meetings.meet(dt, dt / fraction)
+    return None if shorter is None else Touch(shorter)
+
+
+def update_states(flow: Flow, dt: float) -> None:
+    """Phase 6."""
+    with flow.watch("sides"):
+        # 6 fluxes through the sides, from traces on the moved faces
+        for block in flow.blocks:
+            block.trace(dt)  # with the fluxes of walls and open sides
+        for coupling in flow.couplings:
+            coupling.fill_fluxes(flow.clock.t + 0.5 * dt, dt)
+    with flow.watch("flow"):
+        # then the inside: slopes, traces, swept volumes, fluxes, new states; small cells share
+        flow.blocks.update(dt)
+        flow.small_cells.share_states(flow.clock.cfl / dt, dt)
 
 
 def move_sides(motion: GridMotion, span: Span) -> None:
@@ -200,15 +249,6 @@ def move_sides(motion: GridMotion, span: Span) -> None:
     for move, moved, _ in SIDE_PASSES:
         if getattr(motion, moved):
             move(motion, span)
-
-
-def agree_on(flow: Flow, fraction: float, failure: RunFailure) -> RunFailure:
-    """Tell the other ranks of a failure before the regridding; the one that counts for all."""
-    try:
-        flow.motion.regrid(fraction, failure)
-    except RunFailure as first:
-        return first
-    return failure
 
 
 def find_failure(flow: Flow) -> RunFailure | None:
@@ -232,8 +272,7 @@ def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
     for block in flow.blocks:
         block.accept()
     flow.exchange.accept()
-    if flow.meetings.pairs:
-        flow.meetings.accept()
+    flow.meetings.accept()
     flow.source.end_step(flow.clock.t, dt)
     if flow.source.law is not None:
         flow.ledger.add_source(flow.source.gained)

@@ -130,7 +130,7 @@ class Meetings:
 
     # --- phases of a step ------------------------------------------------------------------------
 
-    def fill_ghosts(self, t: float) -> None:
+    def fill_ghosts(self, t: float, dt: float) -> None:
         """Facets of the old grid; ghosts and contact states beside them, from the cells."""
         if not self.pairs:
             return
@@ -143,7 +143,7 @@ class Meetings:
                 surface.put_cover(on.RHO_FACE)
                 surface.fill_ghosts()
 
-    def fill_speeds(self, t: float) -> None:
+    def fill_speeds(self, t: float, dt: float) -> None:
         """Contact states from the traces, with which the lines move."""
         if self.near:
             self._set_velocities(t)
@@ -250,7 +250,7 @@ class Meetings:
                 if key_node in other.ends:
                     other.read_new()
 
-    def fill_flux(self, t: float, dt: float) -> None:
+    def fill_fluxes(self, t: float, dt: float) -> None:
         """Add the fluxes through closed facets to those of the free surfaces."""
         if not self.near:
             return

@@ -136,7 +136,7 @@ class Surface:
 
     def press(self, pressure: float, first: int = 0, last: int | None = None) -> None:
         """Put a pressure beside faces first..last - 1 of the line, beyond the segment's own."""
-        self.segment.rim.jump[:: self.step][first:last] = pressure
+        self.segment.rim.void_p[:: self.step][first:last] = pressure
 
     def find_stiffness(self, face: int) -> float:
         """rho c² [Pa] of the cell along a face of the line."""

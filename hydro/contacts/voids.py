@@ -272,7 +272,7 @@ class Voids:
                 void.rest = void.stiffness = 0.0
 
     def _press(self) -> None:
-        """Write the pressures in the voids beside their faces, as jumps of the free surfaces'."""
+        """Write the pressures in the voids beside their faces."""
         pressures = [void.compute_pressure(self.gamma) for void in self.found]
         if self._pushed or any(pressures):
             for surface in self.surfaces:

@@ -7,7 +7,7 @@ The tension pulls on each face at its two end nodes, along the tangents t there,
 
 so that what pulls one face pulls the next the other way, and over a closed line nothing is left.
 The part of F across the face is the jump of the pressure of the contact states; the rest, which
-vanishes on a circle, is added to the fluxes of both sides by their densities.  Tangents are those
+vanishes on a circle, pulls on the material of both sides by their densities.  Tangents are those
 of the circle through a node and two others, so that on circles (in axisymmetric flow on spheres)
 the jump is that of Laplace on every face, however the nodes are spaced.
 """
@@ -63,13 +63,12 @@ class TenseLine:
     """A line under tension, the sides that it acts on, and its forces on their faces.
 
     `sides`: the segment that has the line and, at an interface, its partner; `orders`: of their
-    faces against the line's; `rest` (2, n): what of the forces is no jump of the pressure.
+    faces against the line's.
     """
 
     line: Line
     sides: list[Segment]
     orders: list[int]
-    rest: np.ndarray
 
     @property
     def tension(self) -> float:
@@ -99,26 +98,40 @@ class SurfaceTension:
             if link := partners.get(id(line.segment)):
                 sides = [link.leader, link.follower]
                 orders = [1, -1 if link.reverse else 1]
-            rest = np.zeros((2, line.segment.stop - line.segment.start))
-            self.lines.append(TenseLine(line, sides, orders, rest))
+            self.lines.append(TenseLine(line, sides, orders))
 
-    def fill_jumps(self, new: bool) -> None:
-        """Write the `jump` of the blocks' faces: of the old nodes, or at mid-time with the `new`.
-
-        The faces must be those of that time.  Theory F14.3.
-        """
+    def fill_ghosts(self, t: float, dt: float) -> None:
+        """The jumps of the pressure on the faces of the old nodes."""
         for tense in self.lines:
-            line = tense.line.extend()
-            if new:
-                old = line.copy()
-                line = 0.5 * (old + tense.line.extend(new=True))
-            force = tense.tension * self._compute_force(line)
-            lead = tense.sides[0]
-            area = lead.rim.rows[on.AREA]
-            jump = -(force * area).sum(axis=0) / _square(area)
-            tense.rest[...] = force + jump * area
-            for side, order, sign in zip(tense.sides, tense.orders, (1.0, -1.0), strict=False):
-                side.rim.jump[:] = sign * jump[::order]
+            self._fill_jump(tense, tense.line.extend())
+
+    def fill_speeds(self, t: float, dt: float) -> None:
+        """Nothing: contact speeds follow from the jumps of the old nodes."""
+
+    def fill_fluxes(self, t: float, dt: float) -> None:
+        """The jumps on the faces at mid-time, and what of the forces is none, as tractions."""
+        for tense in self.lines:
+            old = tense.line.extend().copy()
+            rest = self._fill_jump(tense, 0.5 * (old + tense.line.extend(new=True)))
+            densities = [
+                side.rim.rho_trace[::order]
+                for side, order in zip(tense.sides, tense.orders, strict=True)
+            ]
+            total = sum(densities)
+            for side, order, rho in zip(tense.sides, tense.orders, densities, strict=True):
+                side.rim.rows[on.TRACTION] = (rho / total * rest)[:, ::order]
+
+    def _fill_jump(self, tense: TenseLine, line: np.ndarray) -> np.ndarray:
+        """Write the jumps of a line's faces, which must be those of its nodes `line`; the rest.
+
+        Returns (2, n): what of the forces is no jump of the pressure.  Theory F14.3.
+        """
+        force = tense.tension * self._compute_force(line)
+        area = tense.sides[0].rim.rows[on.AREA]
+        jump = -(force * area).sum(axis=0) / _square(area)
+        for side, order, sign in zip(tense.sides, tense.orders, (1.0, -1.0), strict=False):
+            side.rim.jump[:] = sign * jump[::order]
+        return force + jump * area
 
     def _compute_force(self, line: np.ndarray) -> np.ndarray:
         """Forces (2, n) on a line's faces at tension 1; (2, n + 5) nodes.  Theory F14.1, F14.4."""
@@ -132,21 +145,6 @@ class SurfaceTension:
         mean = 0.5 * (tangents[:, 1:] + tangents[:, :-1])
         force[1] -= (steps * mean).sum(axis=0)  # the tension around the axis
         return force
-
-    def add_rest(self) -> None:
-        """Add to the fluxes of both sides, by their densities, what is no jump of the pressure."""
-        for tense in self.lines:
-            parts = [
-                side.rim.rho_trace[::order]
-                for side, order in zip(tense.sides, tense.orders, strict=True)
-            ]
-            total = sum(parts)
-            for side, order, part in zip(tense.sides, tense.orders, parts, strict=True):
-                force = (part / total * tense.rest)[:, ::order]
-                rim = side.rim
-                rim.momentum_x[:] -= force[0]
-                rim.momentum_y[:] -= force[1]
-                rim.energy[:] -= (force * rim.rows[on.CONTACT_VELOCITY]).sum(axis=0)
 
     def find_step(self) -> float:
         """The step [s] that the shortest capillary waves allow: theory F14.5; inf without any."""

@@ -91,13 +91,19 @@ def fill_ghost_from_face(rim, k):
 
 @compiled_once(allocates=False)
 def press(rim, k, curved):
-    """Flux through an impermeable face: the pressure P_STAR on the moving face."""
+    """Flux through an impermeable face: the pressure P_STAR on the moving face, and the traction.
+
+    The traction works with the velocity of the contact state.
+    """
     pressure = rim[on.P_STAR, k]
     push = rim[on.P_STAR, k] * rim[on.AREA_Y, k]
+    traction_x, traction_y = rim[on.TRACTION_X, k], rim[on.TRACTION_Y, k]
+    work = traction_x * rim[on.U_STAR, k] + traction_y * rim[on.V_STAR, k]
     rim[on.MASS, k] = 0.0
-    rim[on.MOMENTUM_X, k] = pressure * rim[on.AREA_X, k]
-    rim[on.ENERGY, k] = pressure * rim[on.SWEPT, k]
+    rim[on.MOMENTUM_X, k] = pressure * rim[on.AREA_X, k] - traction_x
+    rim[on.ENERGY, k] = pressure * rim[on.SWEPT, k] - work
     split_momentum(rim, k, push, pressure, curved)
+    rim[on.MOMENTUM_Y, k] -= traction_y
 
 
 @compiled_once(allocates=False)
@@ -264,7 +270,7 @@ def fill_free_surface(rim, spans, law, pressure, phase, curved):
     state = on.RHO_FACE if phase == AT_CELLS else on.RHO_TRACE
     for number in range(spans.shape[0]):
         for k in range(spans[number, 0], spans[number, 1]):
-            inside = pressure + rim[on.JUMP, k]
+            inside = pressure + (rim[on.VOID_P, k] + rim[on.JUMP, k])
             rim[on.P_STAR, k] = inside
             if phase == AT_FLUX:
                 press(rim, k, curved)

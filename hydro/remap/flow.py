@@ -322,8 +322,8 @@ class Refinement:
 
     def lay(
         self, places: np.ndarray, blocks: Sequence[Block], motion: GridMotion, t: float
-    ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Nodes, states and void energies of all blocks on lines at these places.
+    ) -> list[tuple[np.ndarray, dict[str, np.ndarray]]]:
+        """Nodes, and what cells hold (HELD_ARRAYS), of all blocks on lines at these places.
 
         The nodes of interfaces stay, or lie half way between two of them; straight sides are spread
         by their laws at t [s], and the grids inside settle before they get the states.  `motion`:

@@ -26,8 +26,6 @@ from hydro.sources import BodySource
 from regrid.errors import RegridFailure, RunFailure
 
 MOST_RETRIES = 12
-# of the stable step, after halvings: a gas that is too cold then takes its step at first order
-LEAST_SECOND_ORDER_PART = 1.0 / 16.0
 
 # Phase 4, how the nodes along the sides of all blocks move: passes in their order, what each does,
 # and why it stands there.  They are in `hydro.motion.sides`.
@@ -138,7 +136,7 @@ def take_step(flow: Flow) -> StepRecord:
                 f"{MOST_RETRIES} times to {dt:.3g} s without success",
                 RunFailure,
             )
-        if lower_order(flow, reason, 0.5 * dt):
+        if lower_order(flow, reason):
             dt = first_dt
         else:
             dt = 0.5 * dt
@@ -147,18 +145,15 @@ def take_step(flow: Flow) -> StepRecord:
     return record
 
 
-def lower_order(flow: Flow, reason: RunFailure, dt: float) -> bool:
+def lower_order(flow: Flow, reason: RunFailure) -> bool:
     """Let all gases take this step at first order, where one has got too cold; False if they do.
 
     A variation over a cell can take more internal energy out of it than it has, in however short
-    a step, where gas expands towards a vacuum; constant cells cannot.  Only where `dt` [s] would be
-    LEAST_SECOND_ORDER_PART of the stable step or less: a shorter step helps where a flow begins.
+    a step, where gas expands towards a vacuum; constant cells cannot.
     """
     cause = "cold-gas"
     gases = [block for block in flow.blocks if block.eos.failure_cause == cause]
     if reason.cause != cause or all(block.is_first_order for block in gases):
-        return False
-    if flow.clock.compute_fraction(dt) > LEAST_SECOND_ORDER_PART:
         return False
     for block in gases:
         block.use_first_order(True)

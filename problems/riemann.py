@@ -284,9 +284,9 @@ class Riemann(Problem):
         motion against each other: the smaller one of both sides; inf for others."""
         case = self.case
         exact = self.exact
-        if math.isinf(find_pressure_ratio(case, exact.p)):
-            return math.inf
         speed = 0.5 * (case.right[1] - case.left[1])
+        if math.isinf(find_pressure_ratio(case, exact.p)) or not speed > 0.0:
+            return math.inf
         sides = (case.left_eos, exact.rho_left), (case.right_eos, exact.rho_right)
         return min(float(eos.energy(rho, exact.p)) for eos, rho in sides) / (0.5 * speed * speed)
 

@@ -26,7 +26,7 @@ import numpy as np
 
 from hydro.eos.base import make_least_pressure
 from hydro.formulas import riemann
-from hydro.formulas.reconstruction import LIMITERS, RELAXED
+from hydro.formulas.reconstruction import FIRST_ORDER_LIMITER, LIMITERS, RELAXED, limit_wholly
 from reference_sliding import SlidingContact, dot, find_free_speed, solve_contact
 
 GAUSS = 0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5
@@ -40,7 +40,7 @@ def take_step(blocks, links, t, dt, curved=False, contacts=()):
     """New states (4, ni, nj) and void energies of all blocks, in their order.
 
     A block has `nodes`, `nodes_new`, `state` (4, ni + 2, nj + 2), whose ghosts are not read,
-    `void_energy`, `eos`, `limiter`, `flux_name` and `segments`.
+    `void_energy`, `eos`, `limiter`, `is_first_order`, `flux_name` and `segments`.
     """
     patches = [Patch(block, dt, curved) for block in blocks]
     sides = {id(s): Side(patch, s) for patch in patches for s in patch.block.segments}
@@ -223,6 +223,11 @@ class Patch:
         ways = upper(cells, axis)[4] + lower(cells, axis)[5]
         return [(take(steps, axis), take(ways, axis)) for take in (lower, upper)]
 
+    @property
+    def limiter(self):
+        """Its name; of constant cells where the step is taken at first order."""
+        return FIRST_ORDER_LIMITER if self.block.is_first_order else self.block.limiter
+
     def find_variations(self, axis):
         """What the state varies over each cell towards the one before and after (theory F3.3)."""
         return [2.0 * self.lengths[axis] / way * step for step, way in self.find_steps(axis)]
@@ -231,7 +236,7 @@ class Patch:
     def limit_variations(self, axis):
         """Limited variations along an axis; of the velocity's parts along and across the line."""
         a, b = self.find_variations(axis)
-        limit = np.vectorize(LIMITERS[self.block.limiter])
+        limit = np.vectorize({**LIMITERS, FIRST_ORDER_LIMITER: limit_wholly}[self.limiter])
         line = self.mid_lines[axis]
         found = limit(a, b)
         along = limit(dot(line, a[1:3]), dot(line, b[1:3]))
@@ -261,7 +266,7 @@ class Patch:
         variations = {axis: self.find_variations(axis) for axis in "ij"}
         limited = {axis: self.limit_variations(axis) for axis in "ij"}
         self.acoustic = np.ones_like(self.rho)
-        if self.block.limiter in RELAXED:  # plain means where the flow turns: theory F3.11
+        if self.limiter in RELAXED:  # plain means where the flow turns: theory F3.11
             means = {axis: 0.5 * (a + b)[1:3] for axis, (a, b) in variations.items()}
             (u_x, v_x), (u_y, v_y) = self.find_gradient(means["i"], means["j"])
             jumps = sum(dot(q[1:3], q[1:3]) for pair in variations.values() for q in pair)
@@ -269,7 +274,7 @@ class Patch:
             weight = np.minimum(share + 8.0 * jumps / self.c2, 1.0)
             for axis, mean in means.items():
                 limited[axis][1:3] = weight * limited[axis][1:3] + (1.0 - weight) * mean
-            if self.block.limiter == "low-mach":
+            if self.limiter == "low-mach":
                 self.acoustic = weight
         self.slopes = self.find_gradient(limited["i"], limited["j"])  # (x or y, quantity, i, j)
         steps = [step[3] for axis in "ij" for step, _ in self.find_steps(axis)]

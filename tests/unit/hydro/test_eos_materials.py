@@ -61,7 +61,7 @@ def test_a_material_of_one_s_own(write):
 )  # fmt: skip
 def test_other_names_are_those_of_one_material(name, listed):
     assert find_name(name) == listed
-    assert find_material(name) is find_material(listed)
+    assert find_material(name) == find_material(listed)
     every = [
         one.lower()
         for name, material in read_materials(LIBRARY).items()

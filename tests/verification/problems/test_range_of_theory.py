@@ -156,3 +156,13 @@ def test_waves_that_ring_in_a_thin_target():
     assert errors["free"] < 2e-3
     assert errors["pressure"] < 2e-3
     assert "end" not in errors
+
+
+def test_gases_at_one_speed_do_not_part():
+    """A pressure that falls in one of two gases at rest, or moving together, is no vacuum."""
+    for speed in (0.0, -3.0):
+        side = {"gamma": 1.4, "rho": 1.0, "u": speed}
+        deck = RiemannDeck(left=SideState(p=1.0, **side), right=SideState(p=0.1, **side))
+        problem = Riemann(deck)
+        assert math.isinf(problem.measure_heat_left())
+        assert problem.cautions() == []

@@ -1,6 +1,7 @@
 """Conserved totals and the inflow through the boundary, step by step.
 
-The totals are the mass of each material and the momentum and energy of all blocks.  Blocks that
+The totals are the mass of each material and the momentum and energy of all blocks, with the energy
+of round voids that resist their closing (theory F16.7).  Blocks that
 exchange mass through seams have one material (`hydro.links.name_materials`).  The boundary
 part is the time integral of the inward fluxes through all segments that are not linked to another
 segment.  Contributions of body sources and of surface tension are counted as inflow.  The
@@ -46,6 +47,7 @@ class Ledger:
         self.mass_in = dict.fromkeys(self.materials, 0.0)
         self.momentum_in = np.zeros(2)
         self.energy_in = 0.0
+        self.energy_in_voids = 0.0
 
     def add_boundary(self, dt: float) -> None:
         """Add what came in during a step from the fluxes of the perimeters."""
@@ -61,6 +63,11 @@ class Ledger:
         self.momentum_in += gained[:2]
         self.energy_in += float(gained[2])
 
+    def keep_in_voids(self, work: float, energy: float) -> None:
+        """The work of voids that resist did not come from outside: it is that of their energy."""
+        self.energy_in -= work
+        self.energy_in_voids = energy
+
     def compute_row(self) -> dict[str, float]:
         """Columns `total_*` and `boundary_*` of the history."""
         sums = {name: 0.0 for name in self.materials}
@@ -75,7 +82,7 @@ class Ledger:
         row |= {
             "total_momentum_x": momentum_x,
             "total_momentum_y": momentum_y,
-            "total_energy": energy,
+            "total_energy": energy + self.energy_in_voids,
         }
         row |= {f"boundary_mass_{name}": value for name, value in self.mass_in.items()}
         row |= {
@@ -94,6 +101,7 @@ class Ledger:
             "ledger/momentum_x": float(self.momentum_in[0]),
             "ledger/momentum_y": float(self.momentum_in[1]),
             "ledger/energy": self.energy_in,
+            "ledger/energy_in_voids": self.energy_in_voids,
         }
 
     def set_state(self, state) -> None:
@@ -104,3 +112,4 @@ class Ledger:
             [float(state["ledger/momentum_x"]), float(state["ledger/momentum_y"])]
         )
         self.energy_in = float(state["ledger/energy"])
+        self.energy_in_voids = float(state["ledger/energy_in_voids"])

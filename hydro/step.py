@@ -14,6 +14,7 @@ from typing import Protocol
 from hydro.boundary import OpenSides
 from hydro.clock import MOST_STRETCHING, Clock, Stopwatch
 from hydro.contacts.meetings import Meetings
+from hydro.contacts.voids import Voids
 from hydro.ledger import Ledger
 from hydro.links import Exchange
 from hydro.motion import sides as on_sides
@@ -66,6 +67,7 @@ class Coupling(Protocol):
 COUPLINGS: tuple[tuple[str, str], ...] = (
     ("tension", "surface tension: jumps of the pressure, and tractions, for all contact states"),
     ("exchange", "links and sliding contacts between blocks"),
+    ("voids", "pressures in voids, for the free surfaces around them"),
     ("open_sides", "open sides and free surfaces; where these touch, contacts replace them"),
     ("meetings", "contacts between free surfaces that touch, over the states of the free ones"),
 )
@@ -86,6 +88,11 @@ class Flow:
     clock: Clock
     small_cells: SmallCells
     watch: Stopwatch
+
+    @property
+    def voids(self) -> Voids:
+        """Between the surfaces that may meet."""
+        return self.meetings.voids
 
     @property
     def couplings(self) -> list[Coupling]:
@@ -272,5 +279,6 @@ def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
     if flow.source.law is not None:
         flow.ledger.add_source(flow.source.gained)
     flow.ledger.add_boundary(dt)
+    flow.ledger.keep_in_voids(flow.voids.work, flow.voids.energy_left)
     rate = flow.small_cells.find_rate()
     record.last = flow.clock.tick(dt, record.limit, rate, flow.motion.stretching)

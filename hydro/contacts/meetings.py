@@ -136,7 +136,6 @@ class Meetings:
             return
         if self.pairs and not self._found:
             self._find()
-        self.voids.find_stiffness()
         if self.near:
             self._set_velocities(t)
             for surface in self._solve(on.AT_FACE):

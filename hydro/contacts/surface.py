@@ -120,6 +120,14 @@ class Surface:
         """The pressure on the line's faces where it is free."""
         return self.gather(slice(on.P_STAR, on.P_STAR + 1))[0]
 
+    def gather_void_pressure(self) -> np.ndarray:
+        """The pressure in the voids beside the line's faces."""
+        return self.gather(slice(on.VOID_P, on.VOID_P + 1))[0]
+
+    def gather_swept(self) -> np.ndarray:
+        """Volume swept by the line's faces in a second, outwards."""
+        return self.gather(slice(on.SWEPT, on.SWEPT + 1))[0]
+
     def fill_slopes(self, states: np.ndarray, line: np.ndarray) -> None:
         """Slopes of the states along a line, which is this one at some time."""
         np.add(line[:, 1:], line[:, :-1], out=self.middles)
@@ -135,7 +143,7 @@ class Surface:
         fill_ghosts_from_faces(self.block.rim.rows, self.segment.spans)
 
     def press(self, pressure: float, first: int = 0, last: int | None = None) -> None:
-        """Put a pressure beside faces first..last - 1 of the line, beyond the segment's own."""
+        """Put the pressure in a void beside faces first..last - 1 of the line."""
         self.segment.rim.void_p[:: self.step][first:last] = pressure
 
     def find_stiffness(self, face: int) -> float:

@@ -18,7 +18,7 @@ import numpy as np
 from hydro.contacts.pair import Pair, PlanePair
 from hydro.contacts.rows import FOLLOWER_START, FOLLOWER_STOP, LEADER_START, LEADER_STOP
 from hydro.contacts.surface import Plane, Surface
-from regrid.errors import BadInput
+from regrid.errors import BadInput, RegridFailure
 
 # of the depth of the cells around it: a void whose area has this side is closed
 SMALL_VOID_DEPTHS = 0.5
@@ -28,7 +28,11 @@ SLIVER_DEPTHS = 0.1  # of the same depth: slivers whose area has a smaller side 
 # of the same: larger voids without gas are measured, and new ones looked for,
 LARGE_VOID_DEPTHS = 8.0
 STEPS_PER_VOID_SEARCH = 8  # every so many steps
+# of a void's volume: up to this change in a step the pressure is that in the middle
+SMALL_VOLUME_CHANGE = 1e-5
+LEAST_VOID_VOLUME_LEFT = 0.1  # by a step, of a void that resists
 Place = tuple[int, float]  # number of a curve, position on it
+Stretch = tuple[int, float, float]  # number of a curve, first and last position on it
 FACES_IN_STATE = "contacts/void_faces"  # of `get_state`: a row for each stretch of a void's faces
 VOIDS_IN_STATE = "contacts/voids"  # a row for each void
 
@@ -37,8 +41,9 @@ VOIDS_IN_STATE = "contacts/voids"  # a row for each void
 class Void:
     """A void: its faces (curve, first, after the last), area, volume, perimeter, cells' depth.
 
-    gas: p V^gamma; rest: the volume at which it was found closed (0: it is not); stiffness: rho c²
-    around it then; growth: of its volume in the step before.
+    shrinks_alone: its faces are one run of a single body's, without a contact: no two lines around
+    it can close on each other; gas: p V^gamma; rest: the volume at which it was found closed (0: it
+    is not); stiffness: rho c² around it then; growth: of its volume in the step before.
     """
 
     faces: list[tuple[int, int, int]]
@@ -46,18 +51,44 @@ class Void:
     volume: float
     around: float
     depth: float
+    shrinks_alone: bool = False
     gas: float = 0.0
     rest: float = 0.0
     stiffness: float = 0.0
     growth: float = 0.0
 
-    def compute_pressure(self, gamma: float) -> float:
-        """In the middle of the step: of the gas, and what little is left as of the material."""
+    def predict_pressure(self, gamma: float) -> float:
+        """In the middle of the step, if the volume goes on as in the step before."""
         volume = self.volume + 0.5 * max(-0.5 * self.volume, min(self.growth, self.volume))
+        return self._compute_pressure(volume, gamma)
+
+    def _compute_pressure(self, volume: float, gamma: float) -> float:
+        """Of the gas, and what little is left as of the material."""
         pressure = self.gas / volume**gamma
         if self.rest > volume:
             pressure += self.stiffness * (self.rest / volume - 1.0)
         return pressure
+
+    def compute_resistance_energy(self, volume: float) -> float:
+        """What it has taken to compress it below `rest`, [J] per depth or per radian."""
+        if volume >= self.rest:
+            return 0.0
+        return self.stiffness * (self.rest * math.log(self.rest / volume) - self.rest + volume)
+
+    def compute_gas_energy(self, volume: float, gamma: float) -> float:
+        """Of the gas in it, [J] per depth or per radian."""
+        return self.gas * volume ** (1.0 - gamma) / (gamma - 1.0)
+
+    def compute_mean_pressure(self, change: float, gamma: float) -> float:
+        """That does the work by which the void's energy falls, in a change of its volume."""
+        volume = self.volume + change
+        if abs(change) < SMALL_VOLUME_CHANGE * self.volume:
+            return self._compute_pressure(self.volume + 0.5 * change, gamma)
+        lost = self.compute_gas_energy(self.volume, gamma)
+        lost -= self.compute_gas_energy(volume, gamma)
+        lost += self.compute_resistance_energy(self.volume)
+        lost -= self.compute_resistance_energy(volume)
+        return lost / change
 
 
 class Voids:
@@ -97,6 +128,9 @@ class Voids:
                 self.numbers[id(pair.leader)] = len(self.surfaces) + place
         self._steps = self._find_lasting_steps()
         self.found: list[Void] = []
+        # of the voids that resist: their work in this step, and their energy after it [J]
+        self.work = 0.0
+        self.energy_left = 0.0
         self._asked = True  # at the start
         self._pushed = False  # has any face a pressure from a void?
 
@@ -113,15 +147,18 @@ class Voids:
         """The voids of the present lines, with what those before held; their faces' pressures."""
         self._asked = False
         before = self.found
-        self.found = [self._measure(loop) for loop in self._find_loops()]
+        self.found = [self._measure(*loop) for loop in self._find_loops()]
         self.found = [void for void in self.found if void.area > (SLIVER_DEPTHS * void.depth) ** 2]
         self._hand_on(before)
         self._press()
 
     # --- ways round ------------------------------------------------------------------------------
 
-    def _find_loops(self) -> list[list[tuple[int, float, float]]]:
-        """Ways round that close, as stretches of curves; none that are points."""
+    def _find_loops(self) -> list[tuple[list[Stretch], bool]]:
+        """Ways round that close, as stretches of curves; none that are points.
+
+        And of each, whether no contact is on it.
+        """
         steps = self._find_steps()
         loops = []
         seen = set()
@@ -129,6 +166,7 @@ class Voids:
             here = start
             stretches = []
             length = 0.0
+            is_free = True
             while here not in seen:
                 seen.add(here)
                 curve, position = here
@@ -136,10 +174,11 @@ class Voids:
                 if not beyond:
                     break
                 stop, here = min(beyond)
+                is_free = is_free and (curve, stop, here) not in self._contact_steps
                 stretches.append((curve, position, stop))
                 length += stop - position if curve < len(self.surfaces) else 0.0
             if stretches and here == start and length > 1e-6:
-                loops.append(stretches)
+                loops.append((stretches, is_free))
         return loops
 
     def _find_lasting_steps(self) -> list[tuple[int, float, int, float]]:
@@ -181,6 +220,7 @@ class Voids:
                 found.append((side, place, number, 0.0))
             else:
                 found.append((number, float(surface.count), side, place))
+        first_contact = len(found)
         for pair in self.pairs:
             if not (pair.is_near and pair.count):
                 continue
@@ -194,6 +234,10 @@ class Voids:
             for k in (*breaks, pair.count - 1):
                 place = self._convert(pair, ends[LEADER_STOP, k])
                 found.append((other, float(ends[FOLLOWER_STOP, k]), one, place))
+        self._contact_steps = {
+            (curve, position, (target, place))
+            for curve, position, target, place in found[first_contact:]
+        }
         steps: dict[int, list[tuple[float, Place]]] = {}
         for curve, position, target, place in found:
             steps.setdefault(curve, []).append((position, (target, place)))
@@ -222,8 +266,25 @@ class Voids:
         )
         return np.concatenate([first, line[:, a + 1 : math.ceil(stop)], last], axis=1)
 
-    def _measure(self, stretches: list[tuple[int, float, float]]) -> Void:
-        """Area and volume of a loop, depth of the cells along it."""
+    def _shrinks_alone(self, stretches: list[Stretch], is_free: bool) -> bool:
+        """Do the surfaces of a loop follow each other, but for planes that hold the outer ends?"""
+        surfaces = [curve for curve, _, _ in stretches if curve < len(self.surfaces)]
+        if not is_free or any(self._resists_nothing(self.surfaces[curve]) for curve in surfaces):
+            return False
+        are_planes = [curve >= len(self.surfaces) for curve, _, _ in stretches]
+        # times that the way round leaves a plane for a surface
+        before = [are_planes[-1], *are_planes[:-1]]
+        runs = sum(was and not is_now for was, is_now in zip(before, are_planes, strict=True))
+        # a third plane would be opposite to the surfaces
+        return runs <= 1 and sum(are_planes) <= 2
+
+    @staticmethod
+    def _resists_nothing(surface: Surface) -> bool:
+        """Is a surface one that voids do not press on?"""
+        return surface.rigid or surface.segment.tension > 0.0
+
+    def _measure(self, stretches: list[Stretch], is_free: bool) -> Void:
+        """Area and volume of a loop, depth of the cells along it; is_free: without a contact."""
         points = np.concatenate([self._cut(*stretch) for stretch in stretches], axis=1)
         x, y = points
         x_next, y_next = np.roll(points, -1, axis=1)
@@ -244,7 +305,8 @@ class Voids:
                 ways = surface.inner[:, first : last + 1] - surface.line[:, first : last + 1]
                 depth.append(float(np.hypot(*ways).mean()))
         around = float(np.hypot(x_next - x, y_next - y).sum())
-        return Void(faces, area, volume, around, sum(depth) / max(1, len(depth)))
+        alone = self._shrinks_alone(stretches, is_free)
+        return Void(faces, area, volume, around, sum(depth) / max(1, len(depth)), alone)
 
     # --- what they hold --------------------------------------------------------------------------
 
@@ -263,17 +325,24 @@ class Voids:
                 void.gas += pressure * old.volume / was * (was / now * void.volume) ** self.gamma
             if len(parents) == len(children) == 1:
                 void.growth = now - was
-            void.rest = max((old.rest for old in parents), default=0.0)
+            # its share of what its parents resist
+            void.rest = sum(old.rest for old in parents) * (void.volume / now if parents else 0.0)
             void.stiffness = max((old.stiffness for old in parents), default=0.0)
-            small = void.area < (SMALL_VOID_DEPTHS * void.depth) ** 2
-            if void.rest == 0.0 and small and void.area > ROUND_VOID_PART * void.around**2:
+            if void.rest == 0.0 and self._is_closing(void):
                 void.rest = void.volume
             elif void.volume > void.rest:
                 void.rest = void.stiffness = 0.0
 
+    @staticmethod
+    def _is_closing(void: Void) -> bool:
+        """Are these the last cells of a round void, on which no two lines could close?"""
+        small = void.area < (SMALL_VOID_DEPTHS * void.depth) ** 2
+        is_round = void.area > ROUND_VOID_PART * void.around**2
+        return void.shrinks_alone and small and is_round
+
     def _press(self) -> None:
         """Write the pressures in the voids beside their faces."""
-        pressures = [void.compute_pressure(self.gamma) for void in self.found]
+        pressures = [void.predict_pressure(self.gamma) for void in self.found]
         if self._pushed or any(pressures):
             for surface in self.surfaces:
                 if not surface.rigid and surface.segment.tension == 0.0:
@@ -284,13 +353,53 @@ class Voids:
                         self.surfaces[curve].press(pressure, first, last)
         self._pushed = any(pressures)
 
-    def find_stiffness(self) -> None:
-        """Of voids that have just closed, from the cells of this step."""
+    # --- phases of a step ------------------------------------------------------------------------
+
+    def fill_ghosts(self, t: float, dt: float) -> None:
+        """The pressures with which a step begins, every time that it is tried."""
         for void in self.found:
-            if void.rest > 0.0 and void.stiffness == 0.0:
+            if void.rest > 0.0 and void.stiffness == 0.0:  # it has just closed
                 void.stiffness = max(
                     self.surfaces[curve].find_stiffness(first) for curve, first, _ in void.faces
                 )
+        if any(void.rest > 0.0 for void in self.found):
+            self._press()
+
+    def fill_speeds(self, t: float, dt: float) -> None:
+        """Nothing: the pressures are those of the ghosts."""
+
+    def fill_fluxes(self, t: float, dt: float) -> None:
+        """The pressures that do the work by which the energy of resisting voids changes.
+
+        What their faces sweep is known then.  Raises RegridFailure where a void would close.
+        """
+        self.work = 0.0
+        self.energy_left = 0.0
+        pressed: dict[int, set[int]] = {}
+        for void in self.found:
+            if void.rest == 0.0:
+                continue
+            change = 0.0
+            for curve, first, last in void.faces:
+                change -= dt * float(self.surfaces[curve].gather_swept()[first:last].sum())
+                pressed.setdefault(curve, set()).update(range(first, last))
+            if void.volume + change < LEAST_VOID_VOLUME_LEFT * void.volume:
+                raise RegridFailure("contact: a void closes in one step", cause="contact-lost")
+            pressure = void.compute_mean_pressure(change, self.gamma)
+            self._pushed = True
+            for curve, first, last in void.faces:
+                if self.surfaces[curve].segment.tension == 0.0:
+                    self.surfaces[curve].press(pressure, first, last)
+            self.work -= void.compute_gas_energy(void.volume, self.gamma)
+            self.work += void.compute_gas_energy(void.volume + change, self.gamma)
+            self.energy_left += void.compute_resistance_energy(void.volume + change)
+        # as the fluxes have it: a face that two voids share has the pressure of one of them
+        for curve, faces in pressed.items():
+            surface = self.surfaces[curve]
+            power = -dt * surface.gather_void_pressure() * surface.gather_swept()
+            self.work += float(power[sorted(faces)].sum())
+
+    # --- what is kept ----------------------------------------------------------------------------
 
     def compute_row(self) -> dict[str, float | int]:
         """Columns of the history: how many voids, their area [m²]."""
@@ -300,12 +409,13 @@ class Voids:
         """What the voids held, and the faces by which they are known again."""
         faces = [(n, *face) for n, void in enumerate(self.found) for face in void.faces]
         numbers = [
-            (v.area, v.volume, v.around, v.depth, v.gas, v.rest, v.stiffness) for v in self.found
+            (v.area, v.volume, v.around, v.depth, v.shrinks_alone, v.gas, v.rest, v.stiffness)
+            for v in self.found
         ]
         return {
             FACES_IN_STATE: np.array(faces, dtype=np.int64).reshape(-1, 4),
             "contacts/voids_asked": self._asked,
-            VOIDS_IN_STATE: np.array(numbers, dtype=np.float64).reshape(-1, 7),
+            VOIDS_IN_STATE: np.array(numbers, dtype=np.float64).reshape(-1, 8),
         }
 
     def get_state_for(self, other: Voids) -> dict[str, Any]:

@@ -28,11 +28,12 @@ from hydro.interior.cell_fields import (
 from hydro.interior.update import sum_tiles
 from hydro.perimeter.contacts import fill_open_flux
 from hydro.perimeter.strips import make_side_kernels
-from hydro.rim import SIDES, make_rim
+from hydro.rim import find_first_face, make_rim
 from hydro.workers import LEAST_INSIDE
 from regrid.errors import BadInput, Place, RunFailure, suggest
 from regrid.measure.corners import compute_centres
 from regrid.measure.quality import find_bad_cells
+from regrid.sides import J_MIN, SIDE_NAMES, get_side, get_sides
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg"}
 LONG_NAMES = {
@@ -227,18 +228,16 @@ class Block:
 
     def side_faces(self, side: str) -> tuple[int, int]:
         """First face of a side on the perimeter, and the number of its faces."""
-        if side not in SIDES:
-            hint = suggest(side, SIDES, cutoff=0.85)  # "x_min" is ambiguous
+        if side not in SIDE_NAMES:
+            hint = suggest(side, SIDE_NAMES, cutoff=0.85)  # "x_min" is ambiguous
             raise BadInput(f"block {self.name!r} has no side {side!r}{hint}")
-        code = SIDES.index(side)
-        first = (0, self.nj, 2 * self.nj, 2 * self.nj + self.ni)[code]
-        return first, self.nj if code < 2 else self.ni
+        code = SIDE_NAMES.index(side)
+        count = self.nj if code < J_MIN else self.ni
+        return find_first_face(code, self.ni, self.nj), count
 
     def side_line(self, side: str, nodes: np.ndarray) -> np.ndarray:
         """View (2, n + 1) of the nodes of a side."""
-        code = SIDES.index(side)
-        edge = -1 if code % 2 else 0
-        return nodes[:, edge, :] if code < 2 else nodes[:, :, edge]
+        return get_side(nodes, side)
 
     # --- phases of a step ----------------------------------------------------------------------
 
@@ -279,8 +278,7 @@ class Block:
     @staticmethod
     def take_perimeter(field: np.ndarray) -> np.ndarray:
         """Values (2, faces) of a field (2, ni, nj) in the cells along the perimeter."""
-        sides = field[:, 0, :], field[:, -1, :], field[:, :, 0], field[:, :, -1]
-        return np.concatenate(sides, axis=1)
+        return np.concatenate(get_sides(field), axis=1)
 
     def fill_ghosts(self, t: float) -> None:
         """Fill the ghosts of the other sides at time t, and contact states of moving sides."""
@@ -551,10 +549,8 @@ class Block:
         """
         volume = compute_volumes(self.geometry, self.nodes)
         if self.is_follower:
-            for side, edge in (("i_min", 0), ("i_max", -1)):
+            for side in SIDE_NAMES:
                 first, count = self.side_faces(side)
-                volume[edge, :] += self.excess_volume_new[first : first + count]
-            for side, edge in (("j_min", 0), ("j_max", -1)):
-                first, count = self.side_faces(side)
-                volume[:, edge] += self.excess_volume_new[first : first + count]
+                cells = get_side(volume[None], side)[0]
+                cells += self.excess_volume_new[first : first + count]
         return volume

@@ -1,7 +1,7 @@
 """The rim of a block: its cells and faces along the four sides, as one array with named rows.
 
-The faces are numbered consecutively in the order of SIDES, on each side by increasing i or j.  Each
-quantity of a face (its cell, ghost, traces, contact state, flux) is one row (2 (ni + nj),) of
+The faces are numbered consecutively in the order of SIDE_NAMES, on each side by increasing i or j.
+Each quantity of a face (its cell, ghost, traces, contact state, flux) is one row (2 (ni + nj),) of
 `Rim.rows`.  Python code uses rows as attributes, `rim.rho`, `rim.p_star`; kernels take `rim.rows`
 and index it by the constants of this module (`from hydro import rim as on`, then
 `rim[on.P_STAR, k]`).  Note: faces towards -i and -j have outward normals, too.
@@ -15,9 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from regrid.jit import compiled_once, inlined
-
-SIDES = ("i_min", "i_max", "j_min", "j_max")
-I_MIN, I_MAX, J_MIN, J_MAX = range(4)
+from regrid.sides import find_node
 
 _next = count()
 
@@ -59,8 +57,7 @@ MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, PUSH, HOOP = _rows(6)
 
 ROWS = next(_next)
 _NAMES = {name.lower(): row for name, row in vars().items() if name.isupper()}
-for _other in ("sides", "i_min", "i_max", "j_min", "j_max", "rows"):
-    _NAMES.pop(_other, None)
+_NAMES.pop("rows")
 
 # rows that are taken together
 STATE = slice(RHO, P + 1)
@@ -120,36 +117,34 @@ def make_rim(faces: int) -> Rim:
 
 
 @inlined
+def find_first_face(side, ni, nj):
+    """The first face of a side, by its number in SIDE_NAMES."""
+    return side * nj if side < 2 else 2 * nj + (side - 2) * ni
+
+
+@inlined
 def find_face(face, ni, nj):
     """Side and position along it of a face of the rim."""
     side = (1 if face >= nj else 0) + (1 if face >= 2 * nj else 0)
     side += 1 if face >= 2 * nj + ni else 0
-    before = side * nj if side < 2 else 2 * nj + (side - 2) * ni
-    return side, face - before
+    return side, face - find_first_face(side, ni, nj)
 
 
 @inlined
 def find_ends(face, ni, nj):
     """Side of a face of the rim, and the nodes (i, j) at its ends."""
     side, k = find_face(face, ni, nj)
-    if side < 2:
-        i = 0 if side == 0 else ni
-        return side, i, k, i, k + 1
-    j = 0 if side == 2 else nj
-    return side, k, j, k + 1, j
+    i, j = find_node(side, k, 0, ni, nj)
+    i_end, j_end = find_node(side, k + 1, 0, ni, nj)
+    return side, i, j, i_end, j_end
 
 
 @compiled_once
 def find_cell(face, ni, nj):
     """Side and cell (i, j) of a face of the rim."""
     side, k = find_face(face, ni, nj)
-    if side == 0:
-        return side, 0, k
-    if side == 1:
-        return side, ni - 1, k
-    if side == 2:
-        return side, k, 0
-    return side, k, nj - 1
+    i, j = find_node(side, k, 0, ni - 1, nj - 1)
+    return side, i, j
 
 
 @inlined

@@ -31,6 +31,7 @@ from hydro.step import Flow, take_step
 from hydro.workers import Workers
 from regrid.errors import BadInput, Place, RunFailure
 from regrid.jit import is_interpreting
+from regrid.sides import SIDE_NAMES
 
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
 SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
@@ -489,7 +490,7 @@ def _check_axis(block: Block) -> None:
 
 def _check_cover(block: Block) -> None:
     """Every face of a side belongs to exactly one segment; raises BadInput otherwise."""
-    for side in ("i_min", "i_max", "j_min", "j_max"):
+    for side in SIDE_NAMES:
         segments = sorted((s for s in block.segments if s.side == side), key=lambda s: s.start)
         next_face = 0
         count = block.side_faces(side)[1]

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.jit import kernel
+from regrid.jit import inlined, kernel
 
 SIDE_NAMES = ("i_min", "i_max", "j_min", "j_max")
+I_MIN, I_MAX, J_MIN, J_MAX = range(4)  # their numbers, as kernels take them
+OPPOSITE_SIDES = {"i_min": "i_max", "i_max": "i_min", "j_min": "j_max", "j_max": "j_min"}
 SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[:, :, 0], np.s_[:, :, -1])
 SLICES = dict(zip(SIDE_NAMES, SIDES, strict=True))
 
@@ -27,8 +29,26 @@ def get_sides(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np
 
 
 def get_side(nodes: np.ndarray, name: str) -> np.ndarray:
-    """A view of the side called `name`, its nodes in ascending index; KeyError for other names."""
+    """A view of the side called `name`, its nodes in ascending index; KeyError for other names.
+
+    Also for cells: of a field (n, ni, nj) it is the row of cells along the side.
+    """
     return nodes[SLICES[name]]
+
+
+@inlined
+def find_node(side, k, deep, ni, nj):
+    """Indices (i, j) of node k of a side, by its number in SIDE_NAMES, or `deep` nodes inwards.
+
+    ni, nj: cells of the grid.  With ni - 1, nj - 1 it is the same for the cells along the side.
+    """
+    if side == I_MIN:
+        return deep, k
+    if side == I_MAX:
+        return ni - deep, k
+    if side == J_MIN:
+        return k, deep
+    return k, nj - deep
 
 
 def trace_outline(nodes: np.ndarray) -> np.ndarray:

@@ -21,7 +21,6 @@ from hydro.block import Block
 from hydro.boundary import SEGMENTS, NodeMotion, Segment, put
 from hydro.eos.base import EquationOfState, measure_inverse, measure_slopes, say_inverse, say_slope
 from hydro.eos.gases import IdealGas
-from hydro.rim import SIDES as SIDE_NAMES
 from hydro.simulation import Simulation
 from problems.deck import Deck
 from problems.problem import Problem
@@ -30,7 +29,7 @@ from regrid.algebraic import transfinite_grid
 from regrid.domains import make_domain
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells
-from regrid.sides import SIDES
+from regrid.sides import SIDE_NAMES, SIDES
 
 Make = Callable[..., Any]  # makes a regridder
 DOMAINS = ("dome", "valley", "jet", "strip")  # whose first steps any family can follow

@@ -16,9 +16,9 @@ from hydro.contacts.touch import fill_inner, measure_longest, measure_way
 from hydro.motion.grid_motion import GridMotion
 from hydro.motion.key_nodes import KeyNode
 from hydro.perimeter.contacts import fill_ghosts_from_faces
-from hydro.rim import SIDES
 from hydro.sliding.pieces import SLOPE_ROWS, fill_slopes
 from regrid.measure.crossings import GROUP_EDGES, fill_boxes
+from regrid.sides import SIDE_NAMES, find_node
 
 MOST_GROUPS = 64  # boxes of a line
 IN_LINE = 1e-9  # of the size of all: walls so near to a line are on it
@@ -32,7 +32,7 @@ class Surface:
         self.block = segment.block
         self.rigid = isinstance(segment, Wall)
         self.count = segment.last - segment.first
-        self.side = SIDES.index(segment.side)
+        self.side = SIDE_NAMES.index(segment.side)
         self.back = segment.side in ("i_min", "j_max")
         self.step = -1 if self.back else 1
         self.start = segment.last - 1 if self.back else segment.first
@@ -63,10 +63,7 @@ class Surface:
     def _find_key_node(self, key_nodes: list[KeyNode], node: int) -> KeyNode | None:
         """The key node at the line's first or last node."""
         at = self.segment.stop - node if self.back else self.segment.start + node
-        ni, nj = self.block.ni, self.block.nj
-        i, j = {"i_min": (0, at), "i_max": (ni, at), "j_min": (at, 0), "j_max": (at, nj)}[
-            self.segment.side
-        ]
+        i, j = find_node(self.side, at, 0, self.block.ni, self.block.nj)
         for key_node in key_nodes:
             if any(b is self.block and (p, q) == (i, j) for b, p, q in key_node.members):
                 return key_node

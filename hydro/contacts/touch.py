@@ -19,6 +19,7 @@ from hydro.contacts.facets import (
 from hydro.sliding.pieces import measure_square, project
 from regrid.jit import compiled_once, kernel
 from regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
+from regrid.sides import find_node
 
 # of a face's length: a node that close to a pin on its own line comes on with it
 BESIDE_PIN_DISTANCE = 0.1
@@ -84,11 +85,11 @@ def measure_distance(points, inner, line, boxes, group, asked, part, one_body, m
 
 @kernel
 def measure_way(nodes, nodes_new, side, start, stop):
-    """How far the node goes that goes furthest, of nodes start..stop of a side (as in SIDES)."""
+    """How far the node goes that goes furthest, of nodes start..stop of a side."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     most = 0.0
     for k in range(start, stop + 1):
-        i, j = (ni * side, k) if side < 2 else (k, nj * (side - 2))
+        i, j = find_node(side, k, 0, ni, nj)
         dx = nodes_new[0, i, j] - nodes[0, i, j]
         dy = nodes_new[1, i, j] - nodes[1, i, j]
         most = max(most, dx * dx + dy * dy)
@@ -111,9 +112,7 @@ def fill_inner(nodes, side, start, back, inner):
     last = inner.shape[1] - 1
     for n in range(last + 1):
         k = start + (last - n if back else n)
-        i, j = (1, k) if side == 0 else (ni - 1, k)
-        if side > 1:
-            i, j = (k, 1) if side == 2 else (k, nj - 1)
+        i, j = find_node(side, k, 1, ni, nj)
         inner[0, n] = nodes[0, i, j]
         inner[1, n] = nodes[1, i, j]
 

@@ -27,6 +27,7 @@ import numpy as np
 from scipy import sparse
 
 from regrid.errors import BadInput
+from regrid.sides import SIDE_NAMES
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,6 @@ def make_fluid(rayleigh: float, prandtl: float, tilt: float = 0.0) -> Fluid:
     return Fluid(prandtl, 1.0, (-strength * x, -strength * y))
 
 
-SIDES = ("i_min", "i_max", "j_min", "j_max")
 PAIRS = (("i_min", "i_max"), ("j_min", "j_max"))
 Along = float | Callable[[np.ndarray], np.ndarray]
 
@@ -154,10 +154,12 @@ PERIODIC = Wall("periodic")
 
 def check_walls(walls: Mapping[str, Wall]) -> None:
     """Raise BadInput for walls that are missing, unknown, or contradict each other."""
-    if set(walls) != set(SIDES):
-        wrong = sorted(set(walls) ^ set(SIDES))
-        raise BadInput(f"a convection cell has the sides {', '.join(SIDES)}; check {wrong[0]!r}")
-    for side in SIDES:
+    if set(walls) != set(SIDE_NAMES):
+        wrong = sorted(set(walls) ^ set(SIDE_NAMES))
+        raise BadInput(
+            f"a convection cell has the sides {', '.join(SIDE_NAMES)}; check {wrong[0]!r}"
+        )
+    for side in SIDE_NAMES:
         wall = walls[side]
         if wall.flow not in ("no-slip", "free", "periodic"):
             raise BadInput(

@@ -39,8 +39,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from hydro.convection.box import PAIRS, SIDES, Axis, Fluid, Wall, check_walls
+from hydro.convection.box import PAIRS, Axis, Fluid, Wall, check_walls
 from regrid.errors import RunFailure
+from regrid.sides import SIDE_NAMES
 
 Matrix = sparse.csr_matrix
 Ends = tuple[float, float]  # of an axis: 1 if the wall's value is given, 0 if the slope vanishes
@@ -338,7 +339,7 @@ class Equations:
 
     def compute_wall_heat(self, fluid: Fluid, temperature: np.ndarray, side: str) -> np.ndarray:
         """Heat over rho cp that enters through each face of a wall [K m2/s], shape (cells,)."""
-        k, high = divmod(SIDES.index(side), 2)
+        k, high = divmod(SIDE_NAMES.index(side), 2)
         faces = self.split_faces(self.compute_conduction(fluid, temperature))[k]
         return np.take(faces, -1 if high else 0, axis=k) * (1.0 if high else -1.0)
 

@@ -23,10 +23,11 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
-from hydro.convection.box import PAIRS, SIDES, Fluid, adiabatic
+from hydro.convection.box import PAIRS, Fluid, adiabatic
 from hydro.convection.equations import Equations, Factors
 from hydro.convection.steady import slip
 from regrid.errors import BadInput, RunFailure
+from regrid.sides import SIDE_NAMES
 
 
 def compute_local_nusselt(
@@ -38,7 +39,7 @@ def compute_local_nusselt(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(coordinates, Nusselt numbers) (cells,) along a wall: heat flux into the fluid over kappa
     times `scale` (temperature difference over distance of the walls)."""
-    k = SIDES.index(side) // 2
+    k = SIDE_NAMES.index(side) // 2
     cross = equations.axes[1 - k]
     heat = equations.compute_wall_heat(fluid, temperature, side)
     return cross.centres, heat / cross.widths / (fluid.diffusivity * scale)
@@ -52,7 +53,7 @@ def compute_mean_nusselt(
     scale: float = 1.0,
 ) -> float:
     """Mean of the local Nusselt number over a wall."""
-    length = equations.axes[1 - SIDES.index(side) // 2].length
+    length = equations.axes[1 - SIDE_NAMES.index(side) // 2].length
     heat = equations.compute_wall_heat(fluid, temperature, side)
     return float(heat.sum() / (fluid.diffusivity * scale * length))
 
@@ -84,7 +85,7 @@ def find_nusselt_maximum(
     At an adiabatic wall the flux has zero slope along the wall: it is continued by reflection, so
     that a maximum near the corner is not cut off.
     """
-    k = SIDES.index(side) // 2
+    k = SIDE_NAMES.index(side) // 2
     places, values = compute_local_nusselt(equations, fluid, temperature, side, scale)
     ends = equations.axes[1 - k].nodes[[0, -1]]
     insulated = (equations.walls[s] in (adiabatic(), adiabatic("free")) for s in PAIRS[1 - k])

@@ -20,10 +20,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from hydro.convection.box import PAIRS, SIDES, Axis, Fluid, fixes_temperature
+from hydro.convection.box import PAIRS, Axis, Fluid, fixes_temperature
 from hydro.convection.equations import Equations, Factors
 from hydro.convection.tensor_grids import check_kind, correct_tensor_grid
 from regrid.errors import BadInput, RunFailure
+from regrid.sides import SIDE_NAMES
 
 
 def transfer(
@@ -408,5 +409,5 @@ def check_steady(equations: Equations) -> None:
         )
     raise BadInput(
         "no wall is isothermal, so that the steady temperature is fixed nowhere; make one so, "
-        f"of {', '.join(SIDES)}"
+        f"of {', '.join(SIDE_NAMES)}"
     )

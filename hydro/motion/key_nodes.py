@@ -27,6 +27,7 @@ from hydro.links import LARGEST_CLOSED_GAP, Link
 from hydro.motion.line import Track
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import Place, RunFailure
+from regrid.sides import SIDE_NAMES, find_node
 
 STRAIGHT_LINE_SINE = 1e-9  # sine of the angle up to which two lines are one
 
@@ -235,8 +236,8 @@ def _end_nodes(segment: Segment) -> list[tuple[int, int, int]]:
     block = segment.block
     found = []
     for k, face in ((segment.start, segment.first), (segment.stop, segment.last - 1)):
-        edge = {"i_min": (0, k), "i_max": (block.ni, k), "j_min": (k, 0), "j_max": (k, block.nj)}
-        found.append((*edge[segment.side], face))
+        i, j = find_node(SIDE_NAMES.index(segment.side), k, 0, block.ni, block.nj)
+        found.append((i, j, face))
     return found
 
 

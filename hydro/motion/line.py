@@ -7,9 +7,9 @@ other.  Note: a node moved along the tangent leaves a curved track by the square
 nothing would ever bring it back.
 
 The kernels read and write the nodes of the block themselves.  The `span` (5,) of a line gives its
-location: the number of its side in SIDES, its first node and its number of nodes on that side, the
-perimeter's number of its first face, and the start of its spacing in an array of the spacings of
-several lines.
+location: the number of its side in SIDE_NAMES, its first node and its number of nodes on that side,
+the perimeter's number of its first face, and the start of its spacing in an array of the spacings
+of several lines.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ import numpy as np
 
 from hydro import rim as on
 from hydro.boundary import NodeMotion, Segment
-from hydro.rim import SIDES
 from regrid import curves
 from regrid.jit import compiled_once, kernel
+from regrid.sides import SIDE_NAMES, find_node
 
 TRACK_CORNER_SINE = 0.35  # sine of the angle from which two tracks that meet make a corner
 # of sliding lines: strength, and turn [rad]; see `fill_line_damping`
@@ -102,32 +102,20 @@ class Track:
         return self.at(first + law * (last - first))
 
 
-@compiled_once
-def find_node(side, k, ni, nj):
-    """Indices (i, j) of node k of a side, counted in the order of SIDES."""
-    if side == 0:
-        return 0, k
-    if side == 1:
-        return ni, k
-    if side == 2:
-        return k, 0
-    return k, nj
-
-
 @kernel
 def spread_straight(nodes, spans, laws):
     """Spread nodes of a block by `laws` on straight lines between their ends; spans (n, 5)."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     for n in range(spans.shape[0]):
         side, start, count, _, place = spans[n]
-        i, j = find_node(side, start, ni, nj)
-        i_end, j_end = find_node(side, start + count - 1, ni, nj)
+        i, j = find_node(side, start, 0, ni, nj)
+        i_end, j_end = find_node(side, start + count - 1, 0, ni, nj)
         for c in range(2):
             first = nodes[c, i, j]
             last = nodes[c, i_end, j_end]
             for k in range(1, count - 1):
                 law = laws[place + k]
-                i_here, j_here = find_node(side, start + k, ni, nj)
+                i_here, j_here = find_node(side, start + k, 0, ni, nj)
                 nodes[c, i_here, j_here] = first * (1.0 - law) + last * law
 
 
@@ -146,12 +134,12 @@ def move_line(nodes, nodes_new, span, rim, damping, dt, out):
     side, start, count, first, _ = span
     for end in range(2):
         k = end * (count - 1)
-        i, j = find_node(side, start + k, ni, nj)
+        i, j = find_node(side, start + k, 0, ni, nj)
         out[0, k] = nodes_new[0, i, j]
         out[1, k] = nodes_new[1, i, j]
     for node in range(1, count - 1):
         k = first + node
-        i, j = find_node(side, start + node, ni, nj)
+        i, j = find_node(side, start + node, 0, ni, nj)
         a_x, a_y = rim[on.NX, k - 1], rim[on.NY, k - 1]
         b_x, b_y = rim[on.NX, k], rim[on.NY, k]
         length_a = (a_x * a_x + a_y * a_y) ** 0.5
@@ -162,9 +150,9 @@ def move_line(nodes, nodes_new, span, rim, damping, dt, out):
             speed = weight_a * rim[on.U_STAR + q, k - 1] + weight_b * rim[on.U_STAR + q, k]
             out[q, node] = nodes[q, i, j] + dt * (damping[q, node] + speed)
     most = 0.0
-    i, j = find_node(side, start, ni, nj)
+    i, j = find_node(side, start, 0, ni, nj)
     for k in range(count - 1):
-        i_next, j_next = find_node(side, start + k + 1, ni, nj)
+        i_next, j_next = find_node(side, start + k + 1, 0, ni, nj)
         step_x = nodes[0, i_next, j_next] - nodes[0, i, j]
         step_y = nodes[1, i_next, j_next] - nodes[1, i, j]
         length = (step_x * step_x + step_y * step_y) ** 0.5
@@ -225,7 +213,7 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, spacing, walls):
         curves.fill_turning_law(moved, law, turning, closed, walls[0], walls[1], shortest, turned)
     for end in range(2):
         k = end * (count - 1)
-        i, j = find_node(side, start + k, ni, nj)
+        i, j = find_node(side, start + k, 0, ni, nj)
         moved[0, k] = nodes_new[0, i, j]
         moved[1, k] = nodes_new[1, i, j]
     failed = -1
@@ -242,7 +230,7 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, spacing, walls):
                 for k in range(1, count - 1):
                     beside[c, k] += (out[c, k] - moved[c, k]) / dt
     for k in range(count):
-        i, j = find_node(side, start + k, ni, nj)
+        i, j = find_node(side, start + k, 0, ni, nj)
         nodes_new[0, i, j] = out[0, k]
         nodes_new[1, i, j] = out[1, k]
     return stretching, failed
@@ -257,7 +245,7 @@ def fill_extended(nodes, span, walls, out):
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     side, start, count, _, _ = span
     for k in range(count):
-        i, j = find_node(side, start + k, ni, nj)
+        i, j = find_node(side, start + k, 0, ni, nj)
         out[0, k + 2] = nodes[0, i, j]
         out[1, k + 2] = nodes[1, i, j]
     for end in range(2):
@@ -389,7 +377,7 @@ class Line:
         self.beside_contact = np.zeros_like(line)  # what its nodes move, respaced or damped [m/s]
         self.extended = np.empty((2, line.shape[1] + 4))
         self.moved = np.empty_like(line)
-        side = SIDES.index(segment.side)
+        side = SIDE_NAMES.index(segment.side)
         count = line.shape[1]
         self.span = np.array([side, segment.start, count, segment.first, 0])
         self._work = np.empty((8, count))

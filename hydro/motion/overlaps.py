@@ -25,12 +25,11 @@ import numpy as np
 from hydro.block import Block
 from hydro.boundary import Axis, NodeMotion, Piston, Segment, Wall
 from hydro.links import Link
-from hydro.rim import SIDES
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import BadInput, Place, RunFailure
 from regrid.jit import kernel
 from regrid.measure.crossings import GROUP_EDGES, fill_boxes, find_touching
-from regrid.sides import trace_outline
+from regrid.sides import SIDE_NAMES, find_node, trace_outline
 
 CHECKED_TIMES = 101  # at which pistons are checked beforehand
 OVERLAP_DEPTH_PART = 0.25  # fraction of the cells along a side: further in, blocks overlap
@@ -48,19 +47,10 @@ def fill_outline(nodes, side, start, line, inset):
     last = line.shape[1] - 1
     for c in range(2):
         for k in range(last + 1):
-            at = start + k
-            if side == 0:
-                here = nodes[c, 0, at]
-                there = nodes[c, 1, at]
-            elif side == 1:
-                here = nodes[c, ni, at]
-                there = nodes[c, ni - 1, at]
-            elif side == 2:
-                here = nodes[c, at, 0]
-                there = nodes[c, at, 1]
-            else:
-                here = nodes[c, at, nj]
-                there = nodes[c, at, nj - 1]
+            i, j = find_node(side, start + k, 0, ni, nj)
+            i_next, j_next = find_node(side, start + k, 1, ni, nj)
+            here = nodes[c, i, j]
+            there = nodes[c, i_next, j_next]
             line[c, k] = here
             inset[c, k] = here + OVERLAP_DEPTH_PART * (there - here)
         first_step = inset[c, 1] - inset[c, 0]
@@ -88,7 +78,7 @@ class Outline:
     def follow(self) -> None:
         """Update from the current nodes."""
         segment = self.segment
-        side = SIDES.index(segment.side)
+        side = SIDE_NAMES.index(segment.side)
         self.bounds = fill_outline(segment.block.nodes, side, segment.start, self.line, self.inset)
         self.is_boxed = False
 

@@ -26,8 +26,7 @@ from hydro.motion.line import (
 )
 from hydro.motion.thickness import ThickContact, find_thick_contacts
 from regrid.errors import BadInput
-
-OPPOSITE_SIDES = {"i_min": "i_max", "i_max": "i_min", "j_min": "j_max", "j_max": "j_min"}
+from regrid.sides import OPPOSITE_SIDES, SIDE_NAMES
 
 
 class StraightSides:
@@ -224,7 +223,7 @@ class Sides:
 
     def find_free_sides(self, block: Block) -> tuple[str, ...]:
         """The sides of a block that no other block shares: straight walls."""
-        free = set(OPPOSITE_SIDES)
+        free = set(SIDE_NAMES)
         for segment in block.segments:
             line = self._find_line(segment)
             whole = segment.stop - segment.start == block.side_faces(segment.side)[1]

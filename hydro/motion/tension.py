@@ -27,6 +27,7 @@ from hydro.motion.grid_motion import GridMotion
 from hydro.motion.line import Line
 from hydro.rows import RHO
 from regrid.errors import BadInput
+from regrid.sides import get_side
 
 TINY_LENGTH = 1e-300  # keeps a line that turns back on itself from dividing by zero
 
@@ -176,6 +177,5 @@ class SurfaceTension:
 
 def _take_density(segment: Segment) -> np.ndarray:
     """Densities (n,) of the cells along a segment."""
-    rho = segment.block.state[RHO]
-    edge = {"i_min": rho[1, 1:-1], "i_max": rho[-2, 1:-1], "j_min": rho[1:-1, 1]}
-    return edge.get(segment.side, rho[1:-1, -2])[segment.start : segment.stop]
+    cells = segment.block.state[RHO : RHO + 1, 1:-1, 1:-1]
+    return get_side(cells, segment.side)[0, segment.start : segment.stop]

@@ -17,9 +17,10 @@ from __future__ import annotations
 import numpy as np
 
 from hydro import rim as on
-from hydro.motion.line import SHORTEST_TURNED_SEGMENT, THICK_CELLS, Line, find_node
+from hydro.motion.line import SHORTEST_TURNED_SEGMENT, THICK_CELLS, Line
 from regrid.curves import FREE_END
 from regrid.jit import compiled_once, kernel
+from regrid.sides import find_node
 
 # least sine of half the angle between two segments: where a line folds back on itself
 FOLDED_LINE_SINE = 1e-3
@@ -258,7 +259,7 @@ def take_part(nodes, span, rim, start, backwards, line, faces):
     side, first_node, count, first, _ = span
     for k in range(count):
         at = count - 1 - k if backwards else k
-        i, j = find_node(side, first_node + at, ni, nj)
+        i, j = find_node(side, first_node + at, 0, ni, nj)
         line[0, start + k] = nodes[0, i, j]
         line[1, start + k] = nodes[1, i, j]
     for k in range(count - 1):

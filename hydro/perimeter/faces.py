@@ -13,6 +13,7 @@ from hydro.formulas.reconstruction import compute_line_geometry
 from hydro.interior.scratch import find_twist
 from hydro.rim import find_cell
 from regrid.jit import compiled_once, inlined, kernel
+from regrid.sides import I_MAX, J_MIN, find_node
 
 
 @inlined
@@ -56,7 +57,7 @@ def make_fill_faces(geometry: Geometry):
         nj = nodes.shape[2] - 1
         for face in range(rim.shape[1]):
             side, i, j, i_end, j_end = on.find_ends(face, ni, nj)
-            sign = 1.0 if side == on.I_MAX or side == on.J_MIN else -1.0
+            sign = 1.0 if side == I_MAX or side == J_MIN else -1.0
             a = nodes[0, i, j], nodes[1, i, j]
             b = nodes[0, i_end, j_end], nodes[1, i_end, j_end]
             a_new = nodes_new[0, i, j], nodes_new[1, i, j]
@@ -90,11 +91,12 @@ def place_traces_on_axis(nodes, nodes_new, start, stop, rim):
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     for face in range(start, stop):
         side, i, j, i_end, j_end = on.find_ends(face, ni, nj)
-        di = (1 if side == on.I_MIN else 0) - (1 if side == on.I_MAX else 0)
-        dj = (1 if side == on.J_MIN else 0) - (1 if side == on.J_MAX else 0)
-        y = 0.5 * (nodes[1, i + di, j + dj] + nodes_new[1, i + di, j + dj])
-        y_end = nodes[1, i_end + di, j_end + dj] + nodes_new[1, i_end + di, j_end + dj]
-        y_end *= 0.5
+        # the radius along the next line of nodes inwards
+        _, k = on.find_face(face, ni, nj)
+        i_next, j_next = find_node(side, k, 1, ni, nj)
+        y = 0.5 * (nodes[1, i_next, j_next] + nodes_new[1, i_next, j_next])
+        i_next, j_next = find_node(side, k + 1, 1, ni, nj)
+        y_end = 0.5 * (nodes[1, i_next, j_next] + nodes_new[1, i_next, j_next])
         part = (y_end - y) / (6.0 * (y_end + y))
         for c in range(2):
             here = 0.5 * (nodes[c, i, j] + nodes_new[c, i, j])

@@ -27,8 +27,10 @@ from hydro.interior.reconstruction import make_row_phases
 from hydro.interior.slopes import fill_steps
 from hydro.perimeter.contacts import AXIS, mirror_in_walls, pass_open_sides, press_on_walls
 from hydro.perimeter.faces import make_fill_faces, make_fill_polygons, place_traces_on_axis
+from hydro.rim import find_first_face
 from hydro.rows import STATE_ROWS
 from regrid.jit import compiled_once, kernel
+from regrid.sides import I_MAX, I_MIN, J_MAX, J_MIN, SIDE_NAMES, find_node
 
 
 class SideKernels(NamedTuple):
@@ -48,14 +50,23 @@ def find_strip(side, ni, nj):
     inwards, i along, j along); cells along; the first cell's face, the step to the next one's, and
     the faces of the sides at both ends that lie beside the strip's first and last cell.
     """
-    low, high = 2 * nj, 2 * nj + ni  # the first faces of j_min and j_max
-    if side == on.I_MIN:
-        return (0, 0, 1, 0, 0, 1), nj, 0, 1, low, high
-    if side == on.I_MAX:
-        return (ni, nj, -1, 0, 0, -1), nj, 2 * nj - 1, -1, high + ni - 1, high - 1
-    if side == on.J_MIN:
-        return (ni, 0, 0, 1, -1, 0), ni, high - 1, -1, nj, 0
-    return (0, nj, 0, -1, 1, 0), ni, high, 1, nj - 1, 2 * nj - 1
+    along = nj if side < J_MIN else ni
+    step = 1 if side == I_MIN or side == J_MAX else -1
+    start = 0 if step > 0 else along
+    i, j = find_node(side, start, 0, ni, nj)
+    i_inwards, j_inwards = find_node(side, start, 1, ni, nj)
+    i_along, j_along = find_node(side, start + step, 0, ni, nj)
+    strip = (i, j, i_inwards - i, j_inwards - j, i_along - i, j_along - j)
+    first_face = find_first_face(side, ni, nj) + min(start, along - 1)
+    # the sides that meet this one at its low and its high end, and which of their ends it is
+    low_side = J_MIN if side < J_MIN else I_MIN
+    across = ni if side < J_MIN else nj
+    their_end = across - 1 if side == I_MAX or side == J_MAX else 0
+    low = find_first_face(low_side, ni, nj) + their_end
+    high = find_first_face(low_side + 1, ni, nj) + their_end
+    if step > 0:
+        return strip, along, first_face, step, low, high
+    return strip, along, first_face, step, high, low
 
 
 @compiled_once(allocates=False)
@@ -124,9 +135,9 @@ def make_side_kernels(
         """
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
-        for side in range(len(on.SIDES)):
+        for side in range(len(SIDE_NAMES)):
             strip, along, first_face, step, _, _ = find_strip(side, ni, nj)
-            deep = (ni if side < on.J_MIN else nj) > 2
+            deep = (ni if side < J_MIN else nj) > 2
             for start in range(0, along, at.CHUNK_CELLS):
                 m = min(at.CHUNK_CELLS, along - start)
                 n = at.count_padded(m)
@@ -182,7 +193,7 @@ def make_side_kernels(
         """State at mid-time at the cells' centres, gradients, switches; ghosts must be known."""
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
-        for side in range(len(on.SIDES)):
+        for side in range(len(SIDE_NAMES)):
             strip, along, first_face, step, before, after = find_strip(side, ni, nj)
             for start in range(0, along, at.CHUNK_CELLS):
                 m = min(at.CHUNK_CELLS, along - start)

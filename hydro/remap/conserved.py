@@ -36,9 +36,9 @@ from hydro.remap.overlay import (
 from hydro.rows import RHO, P, U, V
 from regrid.errors import BadInput, Place, RunFailure
 from regrid.measure.quality import find_bad_cells, say_not_convex
+from regrid.sides import J_MIN, SIDE_NAMES, get_sides
 
 LEAST_SLIVER = 1e-13  # part of a cell from which on a gap is no round-off
-SIDES = {"i_min": (0, 0), "i_max": (0, -1), "j_min": (1, 0), "j_max": (1, -1)}  # axis, which end
 
 
 @dataclass(frozen=True)
@@ -51,18 +51,14 @@ class Slivers:
 
 
 def find_side_faces(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Middles (2, n) of the faces of all four sides, and (n, 3): axis and end of SIDES, row.
+    """Middles (2, n) of the faces of all four sides, and the number (n,) of each one's side.
 
     nodes (2, ni+1, nj+1) [m].
     """
-    middles = []
-    owners = []
-    for axis, end in SIDES.values():
-        line = np.take(nodes, end, axis=1 + axis)
-        middles.append(0.5 * (line[:, 1:] + line[:, :-1]))
-        rows = np.arange(line.shape[1] - 1)
-        owners.append(np.stack([np.full_like(rows, axis), np.full_like(rows, end), rows], axis=1))
-    return np.concatenate(middles, axis=1), np.concatenate(owners)
+    lines = get_sides(nodes)
+    middles = [0.5 * (line[:, 1:] + line[:, :-1]) for line in lines]
+    owners = np.repeat(np.arange(len(lines)), [line.shape[1] - 1 for line in lines])
+    return np.concatenate(middles, axis=1), owners
 
 
 def fill_in(overlay: Overlay, fields: np.ndarray, centres: np.ndarray) -> np.ndarray:
@@ -120,10 +116,11 @@ def share_slivers(
     middles, owners = find_side_faces(new_nodes)
     balance = np.zeros((len(owners), content.shape[-1]))
     np.add.at(balance, cKDTree(middles.T).query(positions)[1], np.concatenate([gifts, -loans]))
-    for axis, end in SIDES.values():
-        mine = (owners[:, 0] == axis) & (owners[:, 1] == end)
+    # what is missing beside a side's face goes to the cells of the line that starts there
+    for side in range(len(SIDE_NAMES)):
+        axis = 0 if side < J_MIN else 1
         mass = content[..., 0] / content[..., 0].sum(axis=axis, keepdims=True)
-        content = content + mass[..., None] * np.expand_dims(balance[mine], axis)
+        content = content + mass[..., None] * np.expand_dims(balance[owners == side], axis)
     return content, slivers
 
 

@@ -34,13 +34,13 @@ from hydro.boundary import NodeMotion
 from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import Line, StraightLine
 from hydro.remap.conserved import Slivers, remap_state
-from hydro.rim import SIDES
 from hydro.rows import HELD_ARRAYS
 from hydro.simulation import Simulation
 from regrid.curves import compute_arc_lengths
 from regrid.errors import BadInput
 from regrid.measure.quality import measure_turns
 from regrid.protocol import call_regridder
+from regrid.sides import SIDE_NAMES
 
 
 def spread_anew(line: np.ndarray, law: np.ndarray, new_law: np.ndarray) -> np.ndarray:
@@ -197,7 +197,7 @@ def _lay_line(before: Line, line: Line, t: float) -> None:
 
 def _make_grid(before: Block, block: Block, new: Simulation, number: int) -> None:
     """The block's grid inside its new sides: the old one sampled, then its regridder over it."""
-    sides = {side: block.side_line(side, block.nodes_new).copy() for side in SIDES}
+    sides = {side: block.side_line(side, block.nodes_new).copy() for side in SIDE_NAMES}
     places = sample_grid(before.nodes, sides)
     nodes = np.array([map_coordinates(row, places, order=1) for row in before.nodes])
     for side, line in sides.items():
@@ -246,7 +246,7 @@ def _follow_law(
             other.nodes[...] = new_law(other.name, t)
             continue
         sides = {}
-        for side in SIDES:
+        for side in SIDE_NAMES:
             first = other.side_line(side, other.nodes)
             before = one.side_line(side, one.nodes)
             even = np.linspace(0.0, 1.0, before.shape[1])

@@ -19,7 +19,7 @@ from regrid.algebraic import prepare_motion
 from regrid.jit import kernel
 from regrid.measure.corners import count_turned_corners
 from regrid.measure.crossings import search_meeting
-from regrid.sides import compute_area
+from regrid.sides import J_MIN, SIDE_NAMES, compute_area, find_node
 
 # Rows of the laws along i (one column an edge of the sides j_min and j_max) and along j; GROWTH is
 # for the workspace alone: up to which length over the shortest one the barrier fades.
@@ -132,17 +132,12 @@ def compute_stiffness(old, sides, stiffest, slow, fast):
         )
     farthest = 0.0
     shortest = np.inf
-    for side in range(4):
-        count = nj if side < 2 else ni
+    for side in range(len(SIDE_NAMES)):
+        count = nj if side < J_MIN else ni
         length = 0.0
-        i = 0
-        j = 0
         last_x, last_y = 0.0, 0.0
         for k in range(count + 1):
-            if side < 2:
-                i, j = side * ni, k
-            else:
-                i, j = k, (side - 2) * nj
+            i, j = find_node(side, k, 0, ni, nj)
             x, y = sides[0, i, j], sides[1, i, j]
             way_x, way_y = x - old[0, i, j] - mean[0], y - old[1, i, j] - mean[1]
             farthest = max(farthest, way_x * way_x + way_y * way_y)

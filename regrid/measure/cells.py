@@ -22,7 +22,7 @@ import numpy as np
 
 from regrid.errors import BadInput
 from regrid.jit import compiled_once, inlined, kernel
-from regrid.sides import compute_area
+from regrid.sides import I_MIN, J_MAX, compute_area, find_node
 
 # of the block: what `find_places` says of a point
 OUTSIDE_BLOCK = 0
@@ -39,30 +39,13 @@ UNIT_PARTS = 1e-12
 def _compute_excess(nodes, i, j, side, x, y):
     """Distance of a point beyond a side of a cell, over the side's length; > 0 is beyond.
 
-    Sides: 0 i_min, 1 i_max, 2 j_min, 3 j_max, of a grid whose cells go anticlockwise.
+    Sides are those of a grid whose cells go anticlockwise.
     """
-    if side == 0:
-        ai = i
-        aj = j + 1
-        bi = i
-        bj = j
-    elif side == 1:
-        ai = i + 1
-        aj = j
-        bi = i + 1
-        bj = j + 1
-    elif side == 2:
-        ai = i
-        aj = j
-        bi = i + 1
-        bj = j
-    else:
-        ai = i + 1
-        aj = j + 1
-        bi = i
-        bj = j + 1
-    ax, ay = nodes[0, ai, aj], nodes[1, ai, aj]
-    dx, dy = nodes[0, bi, bj] - ax, nodes[1, bi, bj] - ay
+    start = 1 if side == I_MIN or side == J_MAX else 0  # the cell is on the left of its edges
+    di, dj = find_node(side, start, 0, 1, 1)
+    ax, ay = nodes[0, i + di, j + dj], nodes[1, i + di, j + dj]
+    di, dj = find_node(side, 1 - start, 0, 1, 1)
+    dx, dy = nodes[0, i + di, j + dj] - ax, nodes[1, i + di, j + dj] - ay
     length2 = dx * dx + dy * dy
     if length2 == 0.0:  # a side of no length bounds nothing
         return -1.0

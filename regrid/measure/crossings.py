@@ -19,6 +19,7 @@ import numpy as np
 
 from regrid.jit import kernel
 from regrid.measure.corners import ORIENTATION_ERROR_BOUND, UNDERFLOW, compute_turns
+from regrid.sides import get_side
 
 LEAF_EDGES = 4  # edges of the smallest pieces
 LOW_X, HIGH_X, LOW_Y, HIGH_Y = range(4)  # rows of the boxes
@@ -236,9 +237,8 @@ def walk_boundary(nodes: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]]]
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     positions = [("i_min", j) for j in range(nj)] + [("j_max", i) for i in range(ni)]
     positions += [("i_max", j) for j in range(nj, 0, -1)] + [("j_min", i) for i in range(ni, 0, -1)]
-    at = {"i_min": lambda k: (0, k), "i_max": lambda k: (ni, k)}
-    at |= {"j_min": lambda k: (k, 0), "j_max": lambda k: (k, nj)}
-    return np.array([nodes[(slice(None), *at[side](k))] for side, k in positions]).T, positions
+    points = [get_side(nodes, side)[:, k] for side, k in positions]
+    return np.array(points).T, positions
 
 
 def find_crossing(nodes: np.ndarray) -> tuple[tuple[str, int], tuple[str, int]] | None:

@@ -1,7 +1,7 @@
 """Jones–Wilkins–Lee products of an explosive, and the explosive itself before it burns.
 
 p = A (1 - w/(R1 V)) exp(-R1 V) + B (1 - w/(R2 V)) exp(-R2 V) + w rho0 e / V with V = rho0/rho.  The
-explosive at rest is the same EOS at the low energy for which p = 0; burning (`hydro.sources`) adds
+explosive at rest is the same EOS at the low energy for which p = 0; burning (`hydro.burn`) adds
 the difference to the energy E0 of the products [Lee, Hornig & Kury 1968].  Note: `energy0` is an
 energy per volume of the explosive, whereas e is per mass.
 """

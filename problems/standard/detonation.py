@@ -21,9 +21,9 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.boundary import put
+from hydro.burn import FRONT_LEAD_FRACTION, ProgrammedBurn
 from hydro.eos import JWL
 from hydro.eos.materials import find_material
-from hydro.sources import FRONT_LEAD_FRACTION, ProgrammedBurn
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import put_walls
 from problems.pictures import draw_profiles, make_panels, spread_dumps

@@ -31,6 +31,7 @@ ROOMS = (
     ("regrid.variational", "regrid.winslow"),
     ("regrid.registry",),
     ("hydro.formulas", "hydro.eos", "hydro.rows", "hydro.rim"),
+    ("hydro.burn",),
     ("hydro.workers", "hydro.clock"),
     ("hydro.interior", "hydro.convection"),
     ("hydro.perimeter",),

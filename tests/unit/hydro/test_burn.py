@@ -5,9 +5,9 @@ import pytest
 
 from builders import SIDES, march, wall_off
 from hydro.block import Block
+from hydro.burn import FRONT_LEAD_FRACTION, ProgrammedBurn
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
-from hydro.sources import FRONT_LEAD_FRACTION, ProgrammedBurn
 from problems.initial_states import make_plane_grid
 
 TNT = find_material("TNT").eos

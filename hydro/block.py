@@ -6,7 +6,7 @@ swaps them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,20 +16,20 @@ from hydro import rows as of
 from hydro.eos import EquationOfState
 from hydro.eos.base import check_eos, check_formulas
 from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
-from hydro.formulas.reconstruction import DEFAULT_LIMITER, FIRST_ORDER_LIMITER
+from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
-from hydro.interior.advance import allocate_scratch, count_tiles, make_flow_kernels
+from hydro.interior.advance import count_tiles
 from hydro.interior.cell_fields import (
     SLAB_ROWS,
     CellFields,
     check_first_state,
     make_fill_sound_speed,
 )
-from hydro.interior.update import sum_tiles
+from hydro.kernels import BlockKernels
 from hydro.perimeter.contacts import fill_open_flux
-from hydro.perimeter.strips import make_side_kernels
+from hydro.perimeter.plan import PerimeterPlan
 from hydro.rim import find_first_face, make_rim
-from hydro.workers import LEAST_INSIDE
+from hydro.totals import TileTotals
 from regrid.errors import BadInput, Place, RunFailure, suggest
 from regrid.measure.corners import compute_centres
 from regrid.measure.quality import find_bad_cells
@@ -54,47 +54,31 @@ def _check_name(name: object, what: str, other: str = "/,") -> None:
         raise BadInput(f"{what} is called {name!r}: a name has one sign at least, and no {signs}")
 
 
-class PerimeterPlan:
-    """Data of a block's segments (`hydro.boundary.Segment`) for the phases of a step, made once.
-
-    `ghosts`, `speeds`, `fluxes`: the segments that fill these themselves; `walls` (n, 3), `opened`
-    (n, 3): the others, for kernels, with their kinds and the rows of the states beyond; `pistons`:
-    indices of moving walls, whose velocities are in `wall_speeds` (n, 2); `inwards` (faces,): faces
-    that need the next cells inward; `moving` (n, 2): the spans of faces that move with the flow;
-    `counted` (n, 2): the spans through which totals change, of segments without a partner or with
-    surface tension; `is_follower`: whether a sliding contact places nodes of these segments on
-    another's line.
-    """
-
-    def __init__(self, segments: Sequence[Any], faces: int = 0):
-        self.segments = list(segments)
-        self.ghosts, self.speeds, self.fluxes = (
-            [segment for segment in segments if segment.has(phase)]
-            for phase in ("fill_ghosts", "fill_speeds", "fill_flux")
+def _read_nodes(name: str, given: Any) -> np.ndarray:
+    """The nodes (2, ni + 1, nj + 1) of a new block; raises BadInput where they make no grid."""
+    try:
+        nodes = np.array(given, dtype=np.float64, order="C")
+    except (TypeError, ValueError) as error:
+        raise BadInput(f"block {name!r}: its nodes are not an array of numbers ({error})") from None
+    if nodes.ndim != 3 or nodes.shape[0] != 2 or min(nodes.shape[1:]) < 3:
+        raise BadInput(
+            f"block {name!r}: nodes have shape {nodes.shape}; "
+            "they must be (2, ni + 1, nj + 1) with at least 2 cells each way"
         )
-        walls = [s for s in segments if s.wall is not None]
-        self.walls = _collect([(s.first, s.last, s.wall) for s in walls], 3)
-        self.opened = _collect(
-            [(s.first, s.last, s.beyond) for s in segments if s.beyond is not None], 3
+    bad = find_bad_cells(nodes)
+    if len(bad):
+        i, j = (int(index) for index in bad[0])
+        raise BadInput(
+            f"block {name!r}: {len(bad)} cells of the first grid are not convex or are turned "
+            f"over (the first is cell i={i}, j={j}); i and j must turn counter-clockwise"
         )
-        self.pistons = [(n, wall) for n, wall in enumerate(walls) if wall.moves]
-        self.wall_speeds = np.zeros((len(walls), 2))
-        self.moving = _collect([(s.first, s.last) for s in segments if s.follows_flow], 2)
-        self.inwards = np.zeros(faces, dtype=np.bool_)
-        for segment in segments:
-            self.inwards[segment.first : segment.last] = segment.moves
-        counted = [(s.first, s.last) for s in segments if not s.linked or s.tension > 0.0]
-        self.counted = _collect(counted, 2)
-        self.is_follower = any(segment.is_follower for segment in segments)
-
-
-def _collect(rows: list, width: int) -> np.ndarray:
-    return np.array(rows, dtype=np.int64).reshape(-1, width)
+    return nodes
 
 
 class Block:
-    """One material on one structured grid.
+    """One material on one structured grid: nodes, state, equation of state and segments.
 
+    `hydro.phases` advances it, with the kernels of `kernels`; its sums are in `totals`.
     nodes (2, ni + 1, nj + 1); rho, u, v, p: numbers or arrays (ni, nj), cell averages, SI.
     flux: "hllc", with HLL at strong shocks, or "hll" on all faces, which damps the errors that
     skewed grid lines leave behind a shock, but smears contacts inside the block.
@@ -125,56 +109,26 @@ class Block:
         self.name = name
         self.material = material or name
         self.eos = eos
-        try:
-            self.nodes = np.array(nodes, dtype=np.float64, order="C")
-        except (TypeError, ValueError) as error:
-            raise BadInput(
-                f"block {name!r}: its nodes are not an array of numbers ({error})"
-            ) from None
-        if self.nodes.ndim != 3 or self.nodes.shape[0] != 2 or min(self.nodes.shape[1:]) < 3:
-            raise BadInput(
-                f"block {name!r}: nodes have shape {self.nodes.shape}; "
-                "they must be (2, ni + 1, nj + 1) with at least 2 cells each way"
-            )
+        self.nodes = _read_nodes(name, nodes)
         self.ni, self.nj = (size - 1 for size in self.nodes.shape[1:])
-        bad = find_bad_cells(self.nodes)
-        if len(bad):
-            i, j = (int(index) for index in bad[0])
-            raise BadInput(
-                f"block {name!r}: {len(bad)} cells of the first grid are not convex or are turned "
-                f"over (the first is cell i={i}, j={j}); i and j must turn counter-clockwise"
-            )
         self.state = np.zeros((of.STATE_ROWS, self.ni + 2, self.nj + 2))
-        for row, (label, value) in enumerate(
-            zip(("rho", "u", "v", "p"), (rho, u, v, p), strict=True)
-        ):
-            value = value(*self.centres) if callable(value) else value
-            try:
-                self.state[row, 1:-1, 1:-1] = value
-            except (TypeError, ValueError):
-                if not np.shape(value):
-                    raise BadInput(f"block {name!r}: {label} is {value!r}, no number") from None
-                raise BadInput(
-                    f"block {name!r}: {label} has shape {np.shape(value)}; "
-                    f"the block has {self.ni} x {self.nj} cells"
-                ) from None
+        self._read_state({"rho": rho, "u": u, "v": v, "p": p})
         check_first_state(name, eos, self.state[:, 1:-1, 1:-1])
         check_formulas(name, eos, *self.state[[of.RHO, of.P], 1:-1, 1:-1])
-        # rates of the cells (theory F7.1), and the number of cells redistributed in the step
+        # what a step finds besides the state: rates of the cells (theory F7.1), their crowding on
+        # the new grid (F7.3), and the number of those that were redistributed
         self.rates = np.zeros((self.ni, self.nj))
         self.rates_new = np.zeros((self.ni, self.nj))
-        self.crowding = np.zeros((self.ni, self.nj))  # of the new grid, theory F7.3
-        # after those: memory freed by the checks is reused for arrays that are written anyway
+        self.crowding = np.zeros((self.ni, self.nj))
+        self.shared_cells = 0
+        # made after those: memory freed by the checks is reused for arrays that are written anyway
         self.void_energy = np.zeros((self.ni, self.nj))
         self.void_energy_new = np.zeros((self.ni, self.nj))
-        self.shared_cells = 0
-        self.is_here = True  # whether this process holds the whole block (`hydro.ranks`)
-        self.take_rows(0, self.ni)
         self.nodes_new = self.nodes.copy()
         self.state_new = np.zeros(self.state.shape)
-        # separate if a body source acts
         self._starts: dict[str, np.ndarray] = {}  # separate if a body source acts
-        # of the types for which kernels are compiled, as those of a user's own need not be
+        # the equation of state's numbers, of the types for which kernels are compiled, as those of
+        # a user's own need not be
         self.parameters = tuple(
             np.ascontiguousarray(value, dtype=float) if np.ndim(value) else float(value)
             for value in eos.parameters
@@ -182,20 +136,36 @@ class Block:
         self.wave_law = tuple(float(value) for value in eos.wave_law)
         self.limiter = limiter
         self.flux_name = flux
-        # one row per tile, and one for polygon cells of sliding contacts and sources
-        self.tile_totals = np.zeros((count_tiles(self.ni, self.nj) + 1, of.TOTAL_ROWS))
-        self.tile_totals[-1, of.LEAST_C2] = of.NO_C2
-        self.sums_array = np.zeros(of.TOTAL_ROWS)  # of the tiles, and their list while valid
-        self._summed: list[float] | None = None
-        self.scratch = allocate_scratch(1)
-        count = 2 * (self.ni + self.nj)
-        self.rim = make_rim(count)
-        # acceleration by a body source of the rim's cells
+        self.kernels = BlockKernels(type(eos), limiter, flux)
+        # which cells this process updates, and whether it holds all of them (`hydro.ranks`)
+        self.update_rows_only(0, self.ni)
+        self.is_here = True
+        self.totals = TileTotals(count_tiles(self.ni, self.nj))
+        # the perimeter: its faces, accelerations (2, faces) by a body source of their cells, and
+        # volumes of polygon cells beyond their straight faces
+        faces = 2 * (self.ni + self.nj)
+        self.rim = make_rim(faces)
         self.body_acceleration: np.ndarray | None = None
-        self.excess_volume = np.zeros(count)  # areas of polygon cells beyond their straight faces
-        self.excess_volume_new = np.zeros(count)
+        self.excess_volume = np.zeros(faces)
+        self.excess_volume_new = np.zeros(faces)
         self.segments: list[Any] = []  # `hydro.boundary.put` adds them
         self.set_geometry(PLANE)
+
+    def _read_state(self, given: Mapping[str, Any]) -> None:
+        """Fill the first state with numbers, arrays (ni, nj) or functions of the cells' centres."""
+        for row, (label, value) in enumerate(given.items()):
+            value = value(*self.centres) if callable(value) else value
+            try:
+                self.state[row, 1:-1, 1:-1] = value
+            except (TypeError, ValueError):
+                if not np.shape(value):
+                    raise BadInput(
+                        f"block {self.name!r}: {label} is {value!r}, no number"
+                    ) from None
+                raise BadInput(
+                    f"block {self.name!r}: {label} has shape {np.shape(value)}; "
+                    f"the block has {self.ni} x {self.nj} cells"
+                ) from None
 
     def set_geometry(self, geometry: Geometry) -> None:
         """Make the flow plane or axisymmetric; called by the simulation.
@@ -204,25 +174,13 @@ class Block:
         """
         self.geometry = geometry
         self._plan = PerimeterPlan([], self.rim.faces)
-        self.is_first_order = False
-        self._choose_kernels(self.limiter)
+        self.kernels.set_geometry(geometry)
         lowest = self.nodes[1].min()
         if geometry.curved and lowest < 0.0:
             raise BadInput(
                 f"block {self.name!r}: its nodes reach down to y = {lowest:g} m; "
                 "in axisymmetric flow y is the radius and may not be negative"
             )
-
-    def _choose_kernels(self, limiter: str) -> None:
-        variant: tuple[Any, ...] = type(self.eos), limiter, self.geometry, self.flux_name
-        self.flow = make_flow_kernels(*variant)
-        self.sides = make_side_kernels(*variant)
-
-    def use_first_order(self, lowered: bool) -> None:
-        """Set whether the following steps take cells for constant, as a last resort."""
-        if lowered != self.is_first_order:
-            self.is_first_order = lowered
-            self._choose_kernels(FIRST_ORDER_LIMITER if lowered else self.limiter)
 
     # --- perimeter -----------------------------------------------------------------------------
 
@@ -239,7 +197,15 @@ class Block:
         """View (2, n + 1) of the nodes of a side."""
         return get_side(nodes, side)
 
-    # --- phases of a step ----------------------------------------------------------------------
+    def fill_open_flux(self, spans: np.ndarray) -> None:
+        """Outward fluxes between traces and the states beyond, through the faces `spans` (n, 2).
+
+        For kinds of segments (`fill_flux`) that write the state beyond themselves.
+        """
+        opened = np.array([(first, last, on.RHO_BEYOND) for first, last in spans])
+        fill_open_flux(self.rim.rows, opened, self.geometry.curved)
+
+    # --- states of a step ----------------------------------------------------------------------
 
     @property
     def centres(self) -> np.ndarray:
@@ -253,113 +219,20 @@ class Block:
             self._plan = PerimeterPlan(self.segments, self.rim.faces)
         return self._plan
 
-    def gather(self, t: float = 0.0) -> None:
-        """Compute faces at the old time, perimeter cell states, and ghosts beyond walls."""
-        plan = self.plan
-        for number, wall in plan.pistons:
-            plan.wall_speeds[number] = wall.velocity(t)
-        self.sides.start_sides.entry(
-            self.start, self.nodes, self.parameters, plan.inwards, plan.walls, plan.wall_speeds,
-            self.scratch, self.rim.rows,
-        )  # fmt: skip
-        if self.body_acceleration is not None:
-            self._add_weight(self.body_acceleration)
-
-    def _add_weight(self, acceleration: np.ndarray) -> None:
-        """Hydrostatic ghosts: pressure mirrored about that of a layer at rest on the wall."""
-        rim = self.rim
-        normal = rim.rows[on.NORMAL]
-        centres = self.take_perimeter(compute_centres(self.nodes))
-        across = (acceleration * normal).sum(axis=0) / (normal * normal).sum(axis=0)
-        way = ((rim.rows[on.AREA_CENTRE] - centres) * normal).sum(axis=0)
-        for first, last, _ in self.plan.walls:
-            rim.p_ghost[first:last] += (2.0 * rim.rho * across * way)[first:last]
-
     @staticmethod
     def take_perimeter(field: np.ndarray) -> np.ndarray:
         """Values (2, faces) of a field (2, ni, nj) in the cells along the perimeter."""
         return np.concatenate(get_sides(field), axis=1)
 
-    def fill_ghosts(self, t: float) -> None:
-        """Fill the ghosts of the other sides at time t, and contact states of moving sides."""
-        for segment in self.plan.ghosts:
-            segment.fill_ghosts(t)
-
-    def predict(self, dt: float) -> None:
-        """From the ghosts: mid-time predictions, and traces at moving faces at the old time."""
-        self.sides.predict_sides.entry(
-            self.start, self.start_void_energy, self.nodes, 0.5 * dt, self.parameters,
-            self.plan.moving, self.scratch, self.rim.rows,
-        )  # fmt: skip
-
-    def fill_speeds(self, t: float) -> None:
-        """Contact states from the traces at mid-time t on all sides that move with the flow."""
-        for segment in self.plan.speeds:
-            segment.fill_speeds(t)
-
-    def trace(self, dt: float) -> None:
-        """From the new nodes: mid-time faces, their traces, and fluxes that need nothing else."""
-        plan = self.plan
-        self.sides.trace_sides.entry(
-            self.nodes, self.nodes_new, 1.0 / dt, self.parameters, self.wave_law, plan.walls,
-            plan.opened, self.rim.rows,
-        )  # fmt: skip
-
-    def fill_flux(self, t: float) -> None:
-        """Outward fluxes through the other sides from the traces at mid-time t."""
-        for segment in self.plan.fluxes:
-            segment.fill_flux(t)
-
-    def fill_open_flux(self, spans: np.ndarray) -> None:
-        """Outward fluxes between traces and the states beyond, through the faces `spans` (n, 2)."""
-        opened = np.array([(first, last, on.RHO_BEYOND) for first, last in spans])
-        fill_open_flux(self.rim.rows, opened, self.geometry.curved)
-
-    def update(self, dt: float, threads: int = 1) -> None:
-        """From the fluxes through the perimeter: the new state and its totals.
-
-        In a cut block: the rows of this process only, without polygon cells.
-        """
-        if (self.last_row - self.first_row) * self.nj < LEAST_INSIDE:
-            threads = 1
-        self._summed = None
-        if threads > 1 and self.scratch.shape[0] != threads:
-            self.scratch = allocate_scratch(threads)
-        self.tile_totals[-1, of.LEAST_C2] = of.NO_C2
-        self.tile_totals[-1, of.VOIDED] = 0.0
-        advance = self.flow.advance_threaded if threads > 1 else self.flow.advance
-        advance.entry(
-            self._old, self._new, self.rim.rows, dt, self.parameters, self.scratch, self.tiles,
-            self.tile_totals[:-1],
-        )  # fmt: skip
-        if self.is_follower and not self.is_cut:
-            self.fill_polygons()
-
-    def take_rows(self, first: int, last: int) -> None:
+    def update_rows_only(self, first: int, last: int) -> None:
         """From now on update only the cell rows first..last - 1, which are whole rows of tiles."""
-        self.first_row = first
-        self.last_row = last
+        self.rows = range(first, last)
         self.tiles = count_tiles(first, self.nj), count_tiles(last, self.nj)
-        self.is_cut = last - first < self.ni
-
-    def fill_polygons(self) -> None:
-        """Add the parts of polygon cells beyond their straight faces to the new state."""
-        excess = self.excess_volume, self.excess_volume_new
-        self.sides.fill_polygons(
-            self._old, self._new, excess, self.parameters, self.tile_totals[-1]
-        )
 
     @property
-    def _old(self) -> tuple[np.ndarray, ...]:
-        """Kernel input at the start of the step: state, void energy, nodes."""
-        return self.start, self.start_void_energy, self.nodes
-
-    @property
-    def _new(self) -> tuple[np.ndarray, ...]:
-        """Kernel output for known new nodes: the same three, rates and crowding."""
-        return (
-            self.state_new, self.void_energy_new, self.nodes_new, self.rates_new, self.crowding
-        )  # fmt: skip
+    def is_cut(self) -> bool:
+        """Whether this process updates only some of the rows of cells (`hydro.ranks`)."""
+        return len(self.rows) < self.ni
 
     def count_ghosts(self, array: np.ndarray) -> int:
         """Rows of ghosts before the first cells in an array of this block: 1 or 0."""
@@ -415,13 +288,12 @@ class Block:
 
     def find_failure(self) -> RunFailure | None:
         """Why the new state is not admissible, with the cell's indices, or None."""
-        totals = self.tile_totals
         rho, _, _, p = self.state_new[:, 1:-1, 1:-1]
         with np.errstate(all="ignore"):
             c = self.eos.sound_speed(rho, p)
         bad = ~((rho > 0.0) & (c > 0.0))
         if not bad.any():
-            return self._find_failed_totals(totals)
+            return self._find_failed_totals()
         i, j = (int(index) for index in np.argwhere(bad)[0])
         rho, p = self.state_new[[of.RHO, of.P], i + 1, j + 1]
         known = f", its pressure {p:.6g} Pa" if np.isfinite(p) else ""
@@ -432,11 +304,10 @@ class Block:
             place=Place(self.name, (i, j)),
         )
 
-    def _find_failed_totals(self, totals: np.ndarray) -> RunFailure | None:
+    def _find_failed_totals(self) -> RunFailure | None:
         """Why the totals of the new state are none though every cell has a state, or None."""
-        names = np.array(("mass", "momentum x", "momentum y", "energy"))
-        lost = names[~np.isfinite(totals[:, of.CONSERVED]).all(axis=0)]
-        if lost.size:
+        lost = self.totals.find_lost()
+        if lost:
             return RunFailure(
                 f"flow: block {self.name!r}: its {' and '.join(lost)} cannot be summed to a finite "
                 "number, though the state of every cell is one",
@@ -456,46 +327,7 @@ class Block:
 
     def find_rate(self) -> float:
         """Largest rate [1/s] of the cells updated by this process: the inverse of their step."""
-        return float(self.rates[self.first_row : self.last_row].max())
-
-    def take_shared(self, least_c2: float, voided: int) -> None:
-        """Update the sums after redistribution of the new state."""
-        self._summed = None
-        last = self.tile_totals[-1]
-        last[of.LEAST_C2] = min(last[of.LEAST_C2], least_c2)
-        last[of.VOIDED] += voided
-
-    @property
-    def sums(self) -> list[float]:
-        """Sums over the tiles (7,) in the last step, columns as in `hydro.rows` (c²: minimum)."""
-        if self._summed is None:
-            self.sum_up()
-            assert self._summed is not None
-        return self._summed
-
-    def sum_up(self) -> bool:
-        """Sum the tiles; returns whether the state is valid.  See `sum_tiles`."""
-        good = sum_tiles(self.tile_totals, self.sums_array)
-        self.take_sums()
-        return good
-
-    def share_sums(self) -> np.ndarray:
-        """The array of `sums`, filled on the rank that has the block; `take_sums` reads it."""
-        if self.is_here and self._summed is None:
-            self.sum_up()
-        return self.sums_array
-
-    def take_sums(self) -> None:
-        """Read `sums` from `sums_array`."""
-        self._summed = self.sums_array.tolist()
-
-    def add_source_totals(self, gained: np.ndarray) -> None:
-        """Add momentum x, y and energy (3,) of a body source after the update."""
-        self._summed = None
-        last = self.tile_totals[-1]
-        if not self.is_follower:  # otherwise the polygons' part is there
-            last[of.CONSERVED] = 0.0
-        last[of.MOMENTUM_AND_ENERGY] += gained
+        return float(self.rates[self.rows.start : self.rows.stop].max())
 
     # --- fields for pictures and dumps -----------------------------------------------------------
 
@@ -507,7 +339,7 @@ class Block:
         is 0 in the others.
         """
         rho, u, v, p = self.state[:, 1:-1, 1:-1]
-        rows = slice(0, self.ni) if self.is_here else slice(self.first_row, self.last_row)
+        rows = slice(0, self.ni) if self.is_here else slice(self.rows.start, self.rows.stop)
 
         def compute_energy() -> np.ndarray:
             e = np.zeros(rho.shape)
@@ -537,7 +369,7 @@ class Block:
         """
         kind: Any = type(self.eos)
         make_fill_sound_speed(kind).entry(
-            state, self.parameters, self.first_row, self.last_row, self.rates_new
+            state, self.parameters, self.rows.start, self.rows.stop, self.rates_new
         )
         return self.rates_new
 

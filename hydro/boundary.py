@@ -466,14 +466,17 @@ class OpenSides:
     def fill_ghosts(self, t: float, dt: float) -> None:
         """Ghosts beyond open sides and free surfaces at the start of the step."""
         for block in self.blocks:
-            block.fill_ghosts(t)
+            for segment in block.plan.ghosts:
+                segment.fill_ghosts(t)
 
     def fill_speeds(self, t: float, dt: float) -> None:
         """Contact speeds of free surfaces, and the states beyond inflow sides."""
         for block in self.blocks:
-            block.fill_speeds(t)
+            for segment in block.plan.speeds:
+                segment.fill_speeds(t)
 
     def fill_fluxes(self, t: float, dt: float) -> None:
         """Fluxes of free surfaces; those of walls and open sides are known from the traces."""
         for block in self.blocks:
-            block.fill_flux(t)
+            for segment in block.plan.fluxes:
+                segment.fill_flux(t)

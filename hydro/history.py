@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from hydro.rows import FIRST_ORDER, VOIDED
 from hydro.step import Flow
 from regrid.errors import BadInput, suggest
 from regrid.measure.quality import measure_worst
@@ -65,10 +64,11 @@ def count_special_cells(flow: Flow) -> dict[str, float | int]:
     """Numbers of first-order faces, cells with voids, and sliding-contact pieces under tension."""
     first_order = voided = 0
     for block in flow.blocks:
-        first_order += int(block.sums[FIRST_ORDER])
-        if block.is_first_order:  # all of its faces
+        sums = block.totals.sums
+        first_order += int(sums.first_order)
+        if block.kernels.is_first_order:  # all of its faces
             first_order += 2 * block.ni * block.nj
-        voided += int(block.sums[VOIDED])
+        voided += int(sums.voided)
     row: dict[str, float | int] = {"first_order_faces": first_order, "voided_cells": voided}
     if flow.exchange.contacts:
         row["pulled_pieces"] = sum(contact.pulled for contact in flow.exchange.contacts)

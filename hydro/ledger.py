@@ -15,7 +15,6 @@ import numpy as np
 
 from hydro import rim as on
 from hydro.block import Block
-from hydro.rows import CONSERVED, ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y
 from regrid.jit import kernel
 
 
@@ -73,11 +72,11 @@ class Ledger:
         sums = {name: 0.0 for name in self.materials}
         momentum_x = momentum_y = energy = 0.0
         for block in self.blocks:
-            total = block.sums[CONSERVED]
-            sums[block.material] += total[MASS]
-            momentum_x += total[MOMENTUM_X]
-            momentum_y += total[MOMENTUM_Y]
-            energy += total[ENERGY]
+            total = block.totals.sums
+            sums[block.material] += total.mass
+            momentum_x += total.momentum_x
+            momentum_y += total.momentum_y
+            energy += total.energy
         row = {f"total_mass_{name}": value for name, value in sums.items()}
         row |= {
             "total_momentum_x": momentum_x,

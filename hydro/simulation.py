@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from hydro import phases
 from hydro.block import Block
 from hydro.boundary import OpenSides
 from hydro.clock import Clock, Stopwatch
@@ -174,7 +175,7 @@ class Simulation:
     def _update_rates(self) -> None:
         """Rates and totals of states that no step has made."""
         for block in self._blocks:
-            block.update(0.0)
+            phases.update(block, 0.0)
             block.rates[...] = block.rates_new
 
     def _make_flow(self) -> None:

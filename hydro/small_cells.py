@@ -459,7 +459,7 @@ class BlockSharing:
             inverse_dt, block.parameters, tuple(block.list_starts()), _list_mended(block),
             (self.marks, self.record),
         )  # fmt: skip
-        block.take_shared(least, voided)
+        block.totals.add_redistributed(least, voided)
         self._forget(small)
         return block.shared_cells
 
@@ -520,16 +520,16 @@ class SmallCells:
         cut = self.blocks.cuts.get(number)
         if cut is None:
             found = scan_state.entry(
-                block.tile_totals, block.sums_array, block.rates_new, block.crowding, self.part,
+                block.totals.rows, block.totals.array, block.rates_new, block.crowding, self.part,
                 self.counts, self.kept,
             )  # fmt: skip
-            block.take_sums()
+            block.totals.read_array()
             return found
         edge = np.inf
         if self.part > 0.0:
             how = self.part, FAR_OUT * FAR_OUT, self.counts, self.kept
             edge = find_most_crowded_of_bands(cut, *how)
-        return (*scan_rates_of_bands(cut, edge), block.sum_up())
+        return (*scan_rates_of_bands(cut, edge), block.totals.sum_up())
 
     def _find_rows_above(self, limit: float) -> dict[int, Rows]:
         """The rows of each block on this rank to be searched for rates above `limit`."""

@@ -67,7 +67,7 @@ class BodySource:
         for block in (self.blocks[number] for number in self.blocks.own):
             held = [getattr(block, name) for name in HELD_ARRAYS]
             _, gained = self._apply(block, held, t + 0.5 * dt, 0.5 * dt)
-            block.add_source_totals(gained)
+            block.totals.add_source(gained, block.is_follower)
             gains.append(gained)
         for gained in self.blocks.share_rows(gains, 3):
             self.gained += gained

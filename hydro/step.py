@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
+from hydro import phases
 from hydro.boundary import OpenSides
 from hydro.clock import MOST_STRETCHING, Clock, Stopwatch
 from hydro.contacts.meetings import Meetings
@@ -125,7 +126,7 @@ def take_step(flow: Flow) -> StepRecord:
     """
     record = StepRecord()
     for block in flow.blocks:
-        block.use_first_order(False)
+        block.kernels.use_first_order(False)
     # 1 dt from the largest rate of all blocks; halved for as long as the step fails
     dt, record.limit = flow.clock.choose_dt()
     first_dt = dt
@@ -160,10 +161,10 @@ def lower_order(flow: Flow, reason: RunFailure) -> bool:
     """
     cause = "cold-gas"
     gases = [block for block in flow.blocks if block.eos.failure_cause == cause]
-    if reason.cause != cause or all(block.is_first_order for block in gases):
+    if reason.cause != cause or all(block.kernels.is_first_order for block in gases):
         return False
     for block in gases:
-        block.use_first_order(True)
+        block.kernels.use_first_order(True)
     return True
 
 
@@ -205,11 +206,11 @@ def fill_states_beyond(flow: Flow, dt: float) -> None:
         flow.exchange.cut_contacts()  # sliding contacts: both lines cut into pieces
         flow.source.start_step(t, dt)  # first half of gravity and heating
         for block in flow.blocks:
-            block.gather(t)  # cells along the sides, mirrored in walls
+            phases.gather(block, t)  # cells along the sides, mirrored in walls
         for coupling in flow.couplings:
             coupling.fill_ghosts(t, dt)
         for block in flow.blocks:
-            block.predict(dt)
+            phases.predict(block, dt)
 
 
 def find_contact_speeds(flow: Flow, dt: float) -> None:
@@ -234,7 +235,7 @@ def update_states(flow: Flow, dt: float) -> None:
     with flow.watch("sides"):
         # 6 fluxes through the sides, from traces on the moved faces
         for block in flow.blocks:
-            block.trace(dt)  # with the fluxes of walls and open sides
+            phases.trace(block, dt)  # with the fluxes of walls and open sides
         for coupling in flow.couplings:
             coupling.fill_fluxes(flow.clock.t + 0.5 * dt, dt)
     with flow.watch("flow"):

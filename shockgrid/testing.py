@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from hydro import rim
+from hydro import phases, rim
 from hydro.block import Block
 from hydro.boundary import SEGMENTS, NodeMotion, Segment, put
 from hydro.eos.base import EquationOfState, measure_inverse, measure_slopes, say_inverse, say_slope
@@ -331,8 +331,9 @@ def _check_ghosts(kind, side, options, eos, state) -> None:
     block.segments.append(segment)
     ghosts = block.rim.rows[rim.RHO_GHOST : rim.LENGTH_GHOST + 1]
     ghosts[...] = POISON_VALUE
-    block.gather()
-    block.fill_ghosts(0.0)
+    phases.gather(block)
+    for segment in block.segments:
+        segment.fill_ghosts(0.0)
     own = np.zeros(block.rim.faces, dtype=bool)
     own[segment.first : segment.last] = True
     _demand((ghosts[:, ~own] == POISON_VALUE).all(), "ghosts of faces of other segments change")

@@ -158,7 +158,7 @@ def spoil(block) -> None:
     """
     rows = np.zeros(block.ni, dtype=bool)
     if block.is_here or block.is_cut:
-        rows[max(block.first_row - 2, 0) : block.last_row + 2] = True
+        rows[max(block.rows.start - 2, 0) : block.rows.stop + 2] = True
     others = np.flatnonzero(~rows)
     others = others[(others >= 3) & (others < block.ni - 3)]
     nodes = others[(others >= 4) & ~np.isin(others - 1, np.flatnonzero(rows))]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hydro import phases
 from hydro.block import Block
 from hydro.boundary import NodeMotion, Segment
 from hydro.links import Exchange
@@ -152,7 +153,7 @@ class Sides:
         if not all(line.track.straight for line in pistons):
             return
         for segment, _ in node.given:
-            segment.block.gather()  # the faces' normals
+            phases.gather(segment.block)  # the faces' normals
         node.on_piston = bool(node.flowing) and node.lies_on_one_piston(walls=True)
         for line in pistons:
             line.slides |= node.on_piston or not node.lies_on_one_piston(walls=False)

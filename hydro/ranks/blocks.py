@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from hydro import phases
 from hydro.block import Block
 from hydro.ranks.cutting import CutBlock, Piece
 from hydro.workers import Workers
@@ -48,7 +49,9 @@ class Blocks(list[Block]):
         """New states of all blocks."""
         pieces = self.pieces
         workers = self.workers
-        workers.run(lambda n: self[pieces[n].number].update(dt, workers.inside), len(pieces))
+        workers.run(
+            lambda n: phases.update(self[pieces[n].number], dt, workers.inside), len(pieces)
+        )
 
     def check_new_states(self, scan: Callable[[int], Row]) -> Table:
         """The row of STATE_ROW numbers that `scan` finds of every block, before whether it stands.

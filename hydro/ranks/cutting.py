@@ -232,14 +232,14 @@ class CutBlock:
 
     def bring_totals(self) -> None:
         """Send the owner the totals of all tiles."""
-        totals = self.block.tile_totals
+        totals = self.block.totals.rows
         nj = self.block.nj
         tiles = [(count_tiles(a, nj), count_tiles(b, nj)) for a, b in self.bands]
         self.send_rows(totals, tiles, self._for_home((0, len(totals) - 1)))
 
     def bring_failed(self) -> None:
         """Send the owner the new states of all cells, where they are not admissible."""
-        good = self.is_home and sum_tiles(self.block.tile_totals, np.empty(TOTAL_ROWS))
+        good = self.is_home and sum_tiles(self.block.totals.rows, np.empty(TOTAL_ROWS))
         if not self.group.bcast(good, root=0):
             self.gather_rows(self.block.state_new)
 

@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from hydro import phases
 from hydro.block import Block
 from hydro.ranks import messages
 from hydro.ranks.blocks import NODE_ROW, STATE_ROW, Blocks, Row, Table
@@ -107,7 +108,7 @@ class Ranks(Blocks):
                     group = self.book.count_group(group)
                     self.cuts[number] = CutBlock(group, self[number], self.bounds[number])
         for number, first, last in self.pieces:
-            self[number].take_rows(first, last)
+            self[number].update_rows_only(first, last)
 
     def _make_messages(self) -> None:
         blocks = self
@@ -192,7 +193,7 @@ class Ranks(Blocks):
     def _take_sums(self) -> None:
         for number, owner in enumerate(self.owners):
             if owner != self.rank:
-                self[number].take_sums()
+                self[number].totals.read_array()
 
     def share_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
         if self._starts is None:
@@ -248,7 +249,7 @@ class Ranks(Blocks):
         for number, cut in self.cuts.items():
             if number in self._polygons:  # done by all ranks of the block
                 self._polygons[number].share()
-                cut.block.fill_polygons()
+                phases.fill_polygons(cut.block)
             cut.bring_totals()
 
     def check_new_states(self, scan: Callable[[int], Row]) -> Table:
@@ -364,7 +365,10 @@ def hear(comm: Any) -> tuple[int, int]:
 
 
 def _get_sums(block: Block) -> np.ndarray:
-    return block.share_sums()
+    """The array of a block's sums, summed where the block is; the others receive it."""
+    if block.is_here:
+        _ = block.totals.sums
+    return block.totals.array
 
 
 def _find_starts(block: Block) -> list[messages.Part]:

@@ -29,6 +29,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import map_coordinates
 
+from hydro import phases
 from hydro.block import Block
 from hydro.boundary import NodeMotion
 from hydro.motion.grid_motion import GridMotion, MeshLaw
@@ -132,7 +133,7 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
     )
     for block in new.blocks:
         block.copy_start()
-        block.update(0.0)  # rates and totals of this state
+        phases.update(block, 0.0)  # rates and totals of this state
         block.rates[...] = block.rates_new
     new.clock.retry_dt = np.inf  # it was for the old cells
     new.clock.rate = new.small_cells.find_first_rate(old.t)

@@ -57,8 +57,8 @@ def test_totals_that_fail_are_named():
     wall_off(block)
     march(Simulation([block], [], t_end=1.0, mesh="fixed"), 1)
     block.state_new[...] = block.state
-    block.tile_totals[0, TOTAL_ENERGY] = np.inf
-    block.tile_totals[0, TOTAL_MOMENTUM_X] = np.nan
+    block.totals.rows[0, TOTAL_ENERGY] = np.inf
+    block.totals.rows[0, TOTAL_MOMENTUM_X] = np.nan
     failure = block.find_failure()
     assert failure.place.block == "gas" and failure.place.cell is None
     for word in ("energy", "momentum x", "'gas'"):

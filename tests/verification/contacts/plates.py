@@ -34,7 +34,7 @@ def find_event(rows, column, number=1):
 
 
 def mean_speed(block):
-    mass, momentum = block.sums[CONSERVED][:2]
+    mass, momentum = block.totals.sums[CONSERVED][:2]
     return momentum / mass
 
 

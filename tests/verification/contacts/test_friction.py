@@ -15,7 +15,7 @@ from builders import (
 )
 from hydro.eos.materials import find_material
 from hydro.links import join
-from hydro.rows import CONSERVED, RHO, P, U, V
+from hydro.rows import RHO, P, U, V
 from hydro.simulation import Simulation
 from hydro.sources import make_gravity
 
@@ -76,7 +76,7 @@ def make_layers(friction=0.0, weld=False, p=2e8, speed=100.0):
 
 def measure_heat(block):
     """Energy of a block less its kinetic energy."""
-    energy = block.sums[CONSERVED][3]
+    energy = block.totals.sums.energy
     rho, u, v, _ = block.state[:, 1:-1, 1:-1]
     return energy - float((0.5 * rho * block.volume * (u * u + v * v)).sum())
 
@@ -86,7 +86,7 @@ def test_layers_rub_on_each_other():
     (low, high), simulation = make_layers(friction=0.2)
     heat = [measure_heat(block) for block in (low, high)]
     speeds = [mean_speed(block) for block in (low, high)]
-    masses = [block.sums[CONSERVED][0] for block in (low, high)]
+    masses = [block.totals.sums.mass for block in (low, high)]
     rows = march_whole(simulation)
     for block, speed, mass, sign in zip((low, high), speeds, masses, (1.0, -1.0), strict=True):
         push = mass * (mean_speed(block) - speed) / (4e-7 * LENGTH)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from builders import box, check_budget, march, tensor, unit_steps, wall_off
+from hydro import phases
 from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
@@ -104,8 +105,9 @@ def make_piston(nodes, u, side, speed, axis=0):
     velocity = (u, 0.0) if axis == 0 else (0.0, u)
     block = Block("gas", IdealGas(1.4), nodes, 1.0, *velocity, 1.0)
     put(block, side, "piston", velocity=(speed, 0.0) if axis == 0 else (0.0, speed))
-    block.gather()
-    block.fill_ghosts(0.0)
+    phases.gather(block)
+    for segment in block.segments:
+        segment.fill_ghosts(0.0)
     return block
 
 

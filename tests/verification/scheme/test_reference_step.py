@@ -178,7 +178,7 @@ def follow(simulation):
         retries += row["retries"]
         for block, now in zip(given, simulation.blocks, strict=True):
             block.nodes_new = now.nodes
-            block.is_first_order = now.is_first_order
+            block.is_first_order = now.kernels.is_first_order
         exchange = simulation.exchange
         curved = simulation.geometry.curved
         found = take_step(given, exchange.links, start, row["dt"], curved, exchange.contacts)

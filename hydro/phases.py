@@ -1,0 +1,95 @@
+"""The phases of a step on one block: each calls a kernel with the block's arrays.
+
+In the order in which a step needs them: cells along the sides, their predictions, traces on the
+moved faces, the new state.  What lies beyond the sides comes from the couplings of `hydro.step`
+between them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hydro import rim as on
+from hydro.block import Block
+from hydro.workers import LEAST_INSIDE
+from regrid.measure.corners import compute_centres
+
+
+def gather(block: Block, t: float = 0.0) -> None:
+    """Compute faces at the old time, perimeter cell states, and ghosts beyond walls."""
+    plan = block.plan
+    kernels = block.kernels
+    for number, wall in plan.pistons:
+        plan.wall_speeds[number] = wall.velocity(t)
+    kernels.sides.start_sides.entry(
+        block.start, block.nodes, block.parameters, plan.inwards, plan.walls, plan.wall_speeds,
+        kernels.scratch, block.rim.rows,
+    )  # fmt: skip
+    if block.body_acceleration is not None:
+        _add_weight(block, block.body_acceleration)
+
+
+def _add_weight(block: Block, acceleration: np.ndarray) -> None:
+    """Hydrostatic ghosts: pressure mirrored about that of a layer at rest on the wall."""
+    rim = block.rim
+    normal = rim.rows[on.NORMAL]
+    centres = block.take_perimeter(compute_centres(block.nodes))
+    across = (acceleration * normal).sum(axis=0) / (normal * normal).sum(axis=0)
+    way = ((rim.rows[on.AREA_CENTRE] - centres) * normal).sum(axis=0)
+    for first, last, _ in block.plan.walls:
+        rim.p_ghost[first:last] += (2.0 * rim.rho * across * way)[first:last]
+
+
+def predict(block: Block, dt: float) -> None:
+    """From the ghosts: mid-time predictions, and traces at moving faces at the old time."""
+    kernels = block.kernels
+    kernels.sides.predict_sides.entry(
+        block.start, block.start_void_energy, block.nodes, 0.5 * dt, block.parameters,
+        block.plan.moving, kernels.scratch, block.rim.rows,
+    )  # fmt: skip
+
+
+def trace(block: Block, dt: float) -> None:
+    """From the new nodes: mid-time faces, their traces, and fluxes that need nothing else."""
+    plan = block.plan
+    block.kernels.sides.trace_sides.entry(
+        block.nodes, block.nodes_new, 1.0 / dt, block.parameters, block.wave_law, plan.walls,
+        plan.opened, block.rim.rows,
+    )  # fmt: skip
+
+
+def update(block: Block, dt: float, threads: int = 1) -> None:
+    """From the fluxes through the perimeter: the new state and its totals.
+
+    In a cut block: the rows of this process only, without polygon cells.
+    """
+    kernels = block.kernels
+    if len(block.rows) * block.nj < LEAST_INSIDE:
+        threads = 1
+    kernels.use_threads(threads)
+    block.totals.start_update()
+    advance = kernels.flow.advance_threaded if threads > 1 else kernels.flow.advance
+    advance.entry(
+        _list_old(block), _list_new(block), block.rim.rows, dt, block.parameters, kernels.scratch,
+        block.tiles, block.totals.of_tiles,
+    )  # fmt: skip
+    if block.is_follower and not block.is_cut:
+        fill_polygons(block)
+
+
+def fill_polygons(block: Block) -> None:
+    """Add the parts of polygon cells beyond their straight faces to the new state."""
+    excess = block.excess_volume, block.excess_volume_new
+    block.kernels.sides.fill_polygons(
+        _list_old(block), _list_new(block), excess, block.parameters, block.totals.rest
+    )
+
+
+def _list_old(block: Block) -> tuple[np.ndarray, ...]:
+    """Kernel input at the start of the step: state, void energy, nodes."""
+    return *block.list_starts(), block.nodes
+
+
+def _list_new(block: Block) -> tuple[np.ndarray, ...]:
+    """Kernel output for known new nodes: the same three, rates and crowding."""
+    return *block.list_new(), block.nodes_new, block.rates_new, block.crowding

@@ -76,6 +76,9 @@ class InterfaceDeck(Deck, kw_only=True):
     line_file: key(
         str | None, "text file of a line, added to the modes: x and y, or x [m]", min_length=1
     ) = None
+    line_curve: key(
+        Literal["spline", "straight"], "between the points of a line_file: cubic spline or straight"
+    ) = "spline"
     width: key(float, "width of the domain in wavelengths", ge=1e-12, le=LONGEST_WAVELENGTHS) = 0.5
     sides: key(Literal["wall", "periodic"], "what bounds the domain along the interface") = "wall"
     cells: key(int, "cells per wavelength", ge=4, le=MOST_CELLS) = 64

@@ -193,19 +193,28 @@ def _draw_normal(seed: int, count: int) -> np.ndarray:
     return np.array([radius * np.cos(angle), radius * np.sin(angle)])
 
 
-class FileLine:
-    """Places x [m] of a line at heights y [m] (any shape): a cubic spline through points of a file.
+FILE_CURVES = {"spline": 4, "straight": 2}  # curves through a file's points: fewest points
 
-    points (2, n): x and y, which rises.
+
+class FileLine:
+    """Places x [m] of a line at heights y [m] (any shape) through points of a file.
+
+    points (2, n): x and y, which rises; curve: "spline", a cubic one, or "straight" from point to
+    point.
     """
 
-    def __init__(self, points: np.ndarray):
-        from scipy.interpolate import CubicSpline  # slow to load
-
+    def __init__(self, points: np.ndarray, curve: str = "spline"):
         self.points = points
-        self.spline = CubicSpline(points[1], points[0])
+        self.spline = None
+        if curve == "spline":
+            from scipy.interpolate import CubicSpline  # slow to load
+
+            self.spline = CubicSpline(points[1], points[0])
 
     def __call__(self, y: np.ndarray) -> np.ndarray:
+        if self.spline is None:
+            x, heights = self.points
+            return np.interp(y, heights, x)
         return self.spline(y)
 
     def measure_overshoot(self, y: np.ndarray) -> float:
@@ -214,27 +223,28 @@ class FileLine:
         place = np.clip(np.searchsorted(heights, y, side="right") - 1, 0, x.size - 2)
         low = np.minimum(x[place], x[place + 1])
         high = np.maximum(x[place], x[place + 1])
-        line = self.spline(y)
+        line = self(y)
         return float(np.maximum(line - high, low - line).max())
 
 
-def read_line(path: str, width: float) -> FileLine:
+def read_line(path: str, width: float, curve: str = "spline") -> FileLine:
     """The line in a text file: columns x, y [m], or x alone evenly from y = 0 to `width` [m].
 
-    Raises BadInput for a file that is no such line.
+    curve: between its points, one of FILE_CURVES.  Raises BadInput for a file that is no such line.
     """
     where = f"deck: line_file {path!r}"
     table = read_columns(path, (1, 2), where)
     x, y = table if len(table) == 2 else (table[0], np.linspace(0.0, width, table.shape[1]))
-    if x.size < 4:
-        raise BadInput(f"{where} has {x.size} points; at least 4 are wanted")
+    if x.size < FILE_CURVES[curve]:
+        words = f"a {curve} line_curve needs at least {FILE_CURVES[curve]}"
+        raise BadInput(f"{where} has {x.size} points; {words}")
     if not (np.diff(y) > 0.0).all():
         row = int(np.flatnonzero(np.diff(y) <= 0.0)[0]) + 2
         raise BadInput(f"{where}: y must rise from row to row; it does not at row {row}")
     if y[0] > 1e-9 * width or y[-1] < width * (1.0 - 1e-9):
         words = f"y = {y[0]:g} to {y[-1]:g}; the domain has 0 to {width:g}"
         raise BadInput(f"{where} covers {words}")
-    return FileLine(np.array([x, y]))
+    return FileLine(np.array([x, y]), curve)
 
 
 class FreeLine:

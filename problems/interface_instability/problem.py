@@ -223,7 +223,7 @@ class InterfaceInstability(Results, Problem):
         y = self.make_heights()
         sources = [("the perturbation", perturbation)] if perturbation is not None else []
         if deck.line_file is not None:
-            self.file_line = read_line(deck.line_file, y[-1])
+            self.file_line = read_line(deck.line_file, y[-1], deck.line_curve)
             sources.append((f"line_file {deck.line_file!r}", self.file_line))
         return [FreeLine(source, y, even, what) for what, source in sources]
 

@@ -410,8 +410,8 @@ def _caution_few_points(problem) -> list[str]:
         return []
     return [
         f"line_file: the cubic spline through its {x.size} points goes {beyond:.3g} m beyond "
-        f"them, {100.0 * beyond / extent:.0f} % of their extent of {extent:.3g} m; give more "
-        "points where the line bends or is to be straight"
+        f"them, {100.0 * beyond / extent:.0f} % of their extent of {extent:.3g} m; take "
+        "line_curve = 'straight', or give more points where the line bends"
     ]
 
 

@@ -152,15 +152,41 @@ def test_a_wave_at_the_cut_off_has_no_rate():
     assert RayleighTaylor(Deck(above="nothing")).t_end == 6.0
 
 
+TOOTH = np.array(  # x and y of a square tooth, told by its corners
+    [[-0.1, -0.1, 0.1, 0.1, -0.1, -0.1], [0.0, 0.2, 0.21, 0.7, 0.71, 1.0]]
+)
+
+
+def make_from_points(folder, points, **keys):
+    """The problem whose line is that of a file with these points (2, n)."""
+    path = folder / "line.txt"
+    np.savetxt(path, points.T)
+    keys = {"width": 1.0, "sides": "periodic"} | keys
+    return InterfaceInstability(InterfaceDeck(modes=[], line_file=str(path), **keys))
+
+
 @pytest.mark.parametrize("points, told", [(6, True), (65, False)])
 def test_a_spline_that_leaves_its_points_is_a_caution(tmp_path, points, told):
     y = np.linspace(0.0, 1.0, points)
-    x = 0.1 * np.cos(2.0 * np.pi * y)
-    if points == 6:  # a square tooth, told by its corners
-        y = np.array([0.0, 0.2, 0.21, 0.7, 0.71, 1.0])
-        x = np.array([-0.1, -0.1, 0.1, 0.1, -0.1, -0.1])
-    path = tmp_path / "line.txt"
-    np.savetxt(path, np.array([x, y]).T)
-    deck = InterfaceDeck(modes=[], line_file=str(path), width=1.0, sides="periodic")
-    cautions = InterfaceInstability(deck).cautions()
+    line = TOOTH if points == 6 else np.array([0.1 * np.cos(2.0 * np.pi * y), y])
+    cautions = make_from_points(tmp_path, line).cautions()
     assert told == any("spline through its 6 points goes" in words for words in cautions)
+
+
+@pytest.mark.parametrize("cells", [32, 100])
+def test_a_straight_line_from_point_to_point_stays_between_them(tmp_path, cells):
+    problem = make_from_points(tmp_path, TOOTH, line_curve="straight", cells=cells)
+    y = problem.make_heights()
+    x = problem.shape(y)
+    assert np.ptp(x) == pytest.approx(0.2, rel=1e-12)
+    assert x - x[0] == pytest.approx(np.interp(y, TOOTH[1], TOOTH[0]) + 0.1, abs=1e-12)
+    assert not any("line_file" in words for words in problem.cautions())
+
+
+def test_two_points_are_enough_for_a_straight_line_alone(tmp_path):
+    points = np.array([[0.0, 0.05], [0.0, 0.5]])
+    keys = {"sides": "wall", "width": 0.5}
+    straight = make_from_points(tmp_path, points, line_curve="straight", **keys)
+    assert np.ptp(straight.shape(straight.make_heights())) == pytest.approx(0.05)
+    with pytest.raises(BadInput, match="2 points; a spline line_curve needs at least 4"):
+        make_from_points(tmp_path, points, **keys)

@@ -42,8 +42,8 @@ class BlockKernels:
             self._choose()
 
     def use_threads(self, threads: int) -> None:
-        """Let there be scratch for so many threads."""
-        if threads > 1 and self.scratch.shape[0] != threads:
+        """Let there be scratch for so many threads: more than one."""
+        if self.scratch.shape[0] != threads:
             self.scratch = allocate_scratch(threads)
 
     def _choose(self) -> None:

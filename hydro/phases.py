@@ -66,7 +66,8 @@ def update(block: Block, dt: float, threads: int = 1) -> None:
     kernels = block.kernels
     if len(block.rows) * block.nj < LEAST_INSIDE:
         threads = 1
-    kernels.use_threads(threads)
+    if threads > 1:
+        kernels.use_threads(threads)
     block.totals.start_update()
     advance = kernels.flow.advance_threaded if threads > 1 else kernels.flow.advance
     advance.entry(

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 from hydro import phases
@@ -95,7 +96,7 @@ class Flow:
         """Between the surfaces that may meet."""
         return self.meetings.voids
 
-    @property
+    @cached_property
     def couplings(self) -> list[Coupling]:
         """The members of COUPLINGS, in their order."""
         return [getattr(self, name) for name, _ in COUPLINGS]

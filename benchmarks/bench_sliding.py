@@ -80,7 +80,7 @@ def measure_contact_point(cells: tuple[int, int]) -> float:
 
         return clocked
 
-    follower = run.motion.followers[0]
+    follower = run.motion.sides.followers[0]
     for name in ("share_nodes", "_find_contact_point"):
         setattr(follower, name, clock(getattr(follower, name)))
     start = time.process_time()

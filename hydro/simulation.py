@@ -121,7 +121,7 @@ class Simulation:
             self._connect(blocks, links, make_regridder)
         self._overlaps.check_pistons(float(t_end))
         if refining is not None:  # contacts stay as thick as they are on the first cells
-            thickness = [contact.thickness for contact in self.motion.contacts]
+            thickness = [contact.thickness for contact in self.motion.sides.contacts]
             self._line_rule = replace(self._line_rule, thickness=max(thickness, default=None))
         self.ledger = Ledger(blocks)
         self.watch = Stopwatch()
@@ -301,7 +301,7 @@ class Simulation:
 
     def _refine(self, refining: Refining) -> None:
         """Add or take away grid lines where it is time and a grid is found for them."""
-        places = refining.choose(self.step, self.motion.lines)
+        places = refining.choose(self.step, self.motion.sides.lines)
         if places is None:
             return
         before = dict(self.__dict__)

@@ -251,8 +251,8 @@ def move_sides(motion: GridMotion, span: Span) -> None:
         motion.follow_mesh(span)
         return
     for move, moved, _ in SIDE_PASSES:
-        if getattr(motion, moved):
-            move(motion, span)
+        if getattr(motion.sides, moved):
+            move(motion.sides, span)
 
 
 def find_failure(flow: Flow) -> RunFailure | None:
@@ -262,7 +262,7 @@ def find_failure(flow: Flow) -> RunFailure | None:
         small_cells.scanned = flow.blocks.check_new_states(small_cells.scan)
     except RunFailure as failure:
         return failure
-    if flow.motion.stretching > 2.0 * MOST_STRETCHING:
+    if flow.motion.sides.stretching > 2.0 * MOST_STRETCHING:
         return RunFailure(
             "lines: neighbouring nodes of a moving line would come too far in one step",
             cause="line-torn",
@@ -283,4 +283,4 @@ def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
     flow.ledger.add_boundary(dt)
     flow.ledger.keep_in_voids(flow.voids.work, flow.voids.energy_left)
     rate = flow.small_cells.find_rate()
-    record.last = flow.clock.tick(dt, record.limit, rate, flow.motion.stretching)
+    record.last = flow.clock.tick(dt, record.limit, rate, flow.motion.sides.stretching)

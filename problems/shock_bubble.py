@@ -236,10 +236,10 @@ class ShockBubble(Problem):
         )
         west_seam, east_seam, west, east, _, top = (link.leader for link in links[:6])
         for side in (west, east):  # else the vortex takes these points into the fold of the jet
-            simulation.motion.let_slide(side, top)
+            simulation.motion.sides.let_slide(side, top)
         # left to the gas, the middle square would be run over by the jet
         for seam in (west_seam, east_seam):
-            simulation.motion.carry(seam, west, east)
+            simulation.motion.sides.carry(seam, west, east)
         return simulation
 
     def measure(self, evolution) -> dict[str, float]:

@@ -58,7 +58,7 @@ class Meetings:
         used = {id(s) for pair in self.pairs for s in (pair.leader, pair.follower)}
         self.surfaces = [surface for surface in surfaces if id(surface) in used]
         ends = {id(node) for surface in self.surfaces for node in surface.ends}
-        self.guards = [guard for guard in motion.guards if id(guard.node) in ends]
+        self.guards = [guard for guard in motion.sides.guards if id(guard.node) in ends]
         self.planes = [pair.leader for pair in self.pairs if isinstance(pair, PlanePair)]
         # regridders of blocks whose own surfaces may meet: their boundaries then touch themselves
         self._folding = [
@@ -311,7 +311,7 @@ class Meetings:
         self._sides = [s for s in self.surfaces if id(s) in sides and not s.rigid]
         self._walls = [s for s in self.surfaces if id(s) in sides and s.rigid]
         for surface in self.surfaces:
-            surface.moving_line.is_kinked = id(surface) in sides
+            surface.moving_line.lie_on_body(id(surface) in sides)
         self._found = True
         if self.voids.are_due(step, bool(self.near)):
             self._read_lines((*self.surfaces, *self.planes))
@@ -410,7 +410,7 @@ def _find_pairs(
     planes = find_planes(blocks, geometry.curved)
     bounds = {id(segment) for plane in planes for segment in plane.segments}
     surfaces = [
-        Surface(segment, motion)
+        Surface(segment, motion.sides)
         for block in blocks
         for segment in block.segments
         if is_surface(segment) and id(segment) not in bounds

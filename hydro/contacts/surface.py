@@ -13,8 +13,9 @@ from hydro.contacts.facet_states import cover_surface
 from hydro.contacts.laying import fit_plane
 from hydro.contacts.rows import COVER_ROWS
 from hydro.contacts.touch import fill_inner, measure_longest, measure_way
-from hydro.motion.grid_motion import GridMotion
 from hydro.motion.key_nodes import KeyNode
+from hydro.motion.line import Role
+from hydro.motion.sides import Sides
 from hydro.perimeter.contacts import fill_ghosts_from_faces
 from hydro.sliding.pieces import SLOPE_ROWS, fill_slopes
 from regrid.measure.crossings import GROUP_EDGES, fill_boxes
@@ -27,7 +28,7 @@ IN_LINE = 1e-9  # of the size of all: walls so near to a line are on it
 class Surface:
     """A segment's faces in the order in which what is outside lies to the right."""
 
-    def __init__(self, segment: Segment, motion: GridMotion):
+    def __init__(self, segment: Segment, sides: Sides):
         self.segment = segment
         self.block = segment.block
         self.rigid = isinstance(segment, Wall)
@@ -55,10 +56,10 @@ class Surface:
         self.bond = np.inf if self.rigid else float(getattr(segment, "bond", 0.0))
         self.friction = np.inf if self.rigid else float(getattr(segment, "friction", 0.0))
         self.way = 0.0  # of the node that goes furthest in this step
-        self.moving_line = next(line for line in motion.lines if line.segment is segment)
+        self.moving_line = next(line for line in sides.lines if line.segment is segment)
         self.read()
         self.length = float(np.hypot(*np.diff(self.line)).sum())
-        self.ends = [self._find_key_node(motion.key_nodes, node) for node in (0, self.count)]
+        self.ends = [self._find_key_node(sides.key_nodes, node) for node in (0, self.count)]
 
     def _find_key_node(self, key_nodes: list[KeyNode], node: int) -> KeyNode | None:
         """The key node at the line's first or last node."""
@@ -72,7 +73,7 @@ class Surface:
     @property
     def at_sliding_contact(self) -> bool:
         """Does it go on from the end of a sliding contact, or lie opposite to it?"""
-        return self.moving_line.at_contact or self.moving_line.follows_contact
+        return self.moving_line.role in (Role.AT_CONTACT, Role.OPPOSITE)
 
     def read(self) -> None:
         """Take up the present nodes."""

@@ -142,12 +142,12 @@ class FollowerMotion:
 
     For each of the follower's two ends: `key_nodes`, `free_lines` that go on from there, `starts`
     (do those begin there, or end?) and `opposites`, the lines of the sides opposite to those.
-    `law`: the spacing law of the follower's nodes, (n + 1,).
+    `spacing` (n + 1,) of the follower's nodes, from 0 to 1.
     """
 
     def __init__(self, contact: SlidingContact):
         self.contact = contact
-        self.law = contact.first_law
+        self.spacing = contact.first_spacing
         self.key_nodes: list[KeyNode | None] = [None, None]
         self.free_lines: list[Line | None] = [None, None]
         self.starts = [True, True]
@@ -177,7 +177,7 @@ class FollowerMotion:
                 cause="contact-lost",
                 place=Place(self.contact.follower.segments[0].block.name),
             )
-        wanted = ends[0] + self.law * (ends[1] - ends[0])
+        wanted = ends[0] + self.spacing * (ends[1] - ends[0])
         points = np.array([np.interp(wanted, arc, row) for row in line])
         shifts = points[:, [0, -1]] - self.contact.follower.new_ends()
         one, other = self.key_nodes
@@ -187,7 +187,7 @@ class FollowerMotion:
         self.contact.follower.write_line(points)
 
     def share_nodes(self) -> None:
-        """Spacing laws around contact points, from the old lines' lengths.
+        """Spacings around contact points, from the old lines' lengths.
 
         The contact and the free line that goes on from it have the same step where they meet; the
         contact's `refinement` shortens it.
@@ -202,27 +202,31 @@ class FollowerMotion:
             segment = free.segment
             other = np.ascontiguousarray(segment.line(segment.block.nodes))
             other_length = float(compute_arc_lengths(other)[-1])
-            law, other_law = meeting_laws(
+            spacing, other_spacing = meeting_laws(
                 (line.shape[1], other.shape[1]),
                 (length, other_length),
                 self.contact.refinement,
             )
-            self.law = law if end == 1 else (1.0 - law)[::-1]
+            self.spacing = spacing if end == 1 else (1.0 - spacing)[::-1]
             own = self.contact.follower.segments[-end]
             # does the contact come after?
             flip = self.contact.follower.reversed[-end] != (end == 0)
-            first, second = (law, other_law) if not flip else (other_law, law)
+            first = spacing
+            second = other_spacing
             if flip:
-                first, second = (1.0 - other_law)[::-1], (1.0 - law)[::-1]
-            free.law = np.ascontiguousarray(second if not flip else first)
+                first = (1.0 - other_spacing)[::-1]
+                second = (1.0 - spacing)[::-1]
+            free.set_spacing(second if not flip else first)
             opposite = self.opposites[end]
-            if opposite is not None and first.size + second.size == opposite.law.size + 1:
+            if opposite is not None and first.size + second.size == opposite.spacing.size + 1:
                 across = opposite.segment.line(own.block.nodes)
                 chord = across[:, -1] - across[:, 0]
                 point = line[:, -end] - across[:, 0]
                 part = float((point @ chord) / (chord @ chord))
                 part = min(max(part, OPPOSITE_PART[0]), OPPOSITE_PART[1])
-                opposite.law = np.concatenate((part * first, part + (1.0 - part) * second[1:]))
+                opposite.set_spacing(
+                    np.concatenate((part * first, part + (1.0 - part) * second[1:]))
+                )
 
     def _find_contact_point(self, end, line, start, arc) -> float:
         """Arc length on the leader's line of the contact point at an end of the follower."""

@@ -38,8 +38,11 @@ NO_COUNTS = (0, 0, 0, 0, 0, 0, math.inf)  # of a block that was not regridded
 MeshLaw = Callable[[str, float], np.ndarray]
 
 
-class GridMotion(Sides):
-    """Moves the grids of blocks: "regrid" (default), "fixed" or a motion (block, t) -> nodes."""
+class GridMotion:
+    """Moves the grids of blocks: "regrid" (default), "fixed" or a motion (block, t) -> nodes.
+
+    sides: the lines and key nodes along the blocks' sides; there are none where a mesh is given.
+    """
 
     def __init__(
         self,
@@ -52,6 +55,7 @@ class GridMotion(Sides):
         if not (mesh in ("regrid", "fixed") or callable(mesh)):
             raise BadInput(f"mesh is {mesh!r}; it must be 'regrid', 'fixed' or a function")
         self.mesh = mesh
+        self.exchange = exchange
         self.regridders = _make_regridders(make_regridder, blocks) if mesh == "regrid" else []
         self.spread(blocks)
         self.flow_aware = [find_flow_aware(regridder) for regridder in self.regridders]
@@ -62,7 +66,7 @@ class GridMotion(Sides):
         # of all blocks after a step: `measure_worst`, `_count`
         self.quality: list | None = None
         self.counts: list = [NO_COUNTS] * len(blocks)
-        super().__init__(blocks if mesh == "regrid" else (), exchange, rule)
+        self.sides = Sides(blocks if mesh == "regrid" else (), exchange, rule)
         self._has_followers = mesh == "regrid" and any(block.is_follower for block in blocks)
         if mesh == "regrid":
             self._find_free_sides()
@@ -83,7 +87,7 @@ class GridMotion(Sides):
             return
         for block, aware in zip(self.blocks, self.flow_aware, strict=True):
             if aware is not None:
-                aware.free_sides = self.find_free_sides(block)
+                aware.free_sides = self.sides.find_free_sides(block)
         if not any(aware.free_sides for aware in owners):
             raise BadInput(
                 "regridder: boundary 'equidistributed' needs a side that lies whole on a straight "

@@ -24,7 +24,7 @@ from hydro import rim as on
 from hydro.block import Block
 from hydro.boundary import NodeMotion, Segment
 from hydro.links import LARGEST_CLOSED_GAP, Link
-from hydro.motion.line import Track
+from hydro.motion.track import Track
 from hydro.sliding.contact import SlidingContact
 from regrid.errors import Place, RunFailure
 from regrid.sides import SIDE_NAMES, find_node

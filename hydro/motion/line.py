@@ -1,11 +1,5 @@
 """The moving line of a segment: its track, its spacing, and the motion of its nodes.
 
-A track is the polyline of a segment's initial nodes; nodes of walls and open sides stay on it while
-they slide along it.  Where two tracks continue smoothly into each other at a key node (the end of
-an interface on a curved wall), they form one track, so that the key node can pass from one to the
-other.  Note: a node moved along the tangent leaves a curved track by the square of its step, and
-nothing would ever bring it back.
-
 The kernels read and write the nodes of the block themselves.  The `span` (5,) of a line gives its
 location: the number of its side in SIDE_NAMES, its first node and its number of nodes on that side,
 the perimeter's number of its first face, and the start of its spacing in an array of the spacings
@@ -16,24 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
 
 from hydro import rim as on
 from hydro.boundary import NodeMotion, Segment
+from hydro.motion.track import Track
 from regrid import curves
 from regrid.jit import compiled_once, kernel
 from regrid.sides import SIDE_NAMES, find_node
 
-TRACK_CORNER_SINE = 0.35  # sine of the angle from which two tracks that meet make a corner
-# of sliding lines: strength, and turn [rad]; see `fill_line_damping`
-SLIDING_DAMPING = 4.0
-SLIDING_BEND_ANGLE = 0.35
-MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
-THICK_CELLS = 0.75  # default thickness of a contact, in its initial cells
-SHORTEST_TURNED_SEGMENT = 0.25  # segment required by turning, in thicknesses of its contact
-# part of the way to its law that a line at or opposite a contact point goes
+# part of the way to its spacing that a line at or opposite a contact point goes in a full step
 FOLLOWED_WAY_PART = 0.2
 
 
@@ -45,66 +34,9 @@ class Span(NamedTuple):
     fraction: float = 1.0
 
 
-class Track:
-    """A polyline `nodes` (2, n) and its arc lengths; closed where it ends at its first node."""
-
-    def __init__(self, nodes: np.ndarray):
-        self.set_nodes(nodes)
-
-    def set_nodes(self, nodes: np.ndarray) -> None:
-        """Take up another polyline (2, n)."""
-        self.nodes = np.ascontiguousarray(nodes)
-        self.arc = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(self.nodes)))))
-        chord = self.nodes[:, -1] - self.nodes[:, 0]
-        length = float(np.hypot(*chord))
-        self.closed = length <= 1e-9 * self.arc[-1]
-        self.straight = False
-        if not self.closed:
-            normal = np.array([-chord[1], chord[0]]) / length**2
-            self.straight = bool(np.abs(normal @ (self.nodes - self.nodes[:, :1])).max() < 1e-12)
-        chords = np.diff(self.nodes) / np.diff(self.arc)
-        self.tangents = np.concatenate([chords[:, :1], chords[:, 1:] + chords[:, :-1],
-                                        chords[:, -1:]], axis=1)  # fmt: skip
-        self.tangents /= np.hypot(*self.tangents)
-
-    def locate(self, point: np.ndarray) -> float:
-        """Arc length of the position on the track nearest to a point."""
-        track = self.nodes
-        steps = np.diff(track)
-        squares = (steps**2).sum(axis=0)
-        part = ((point[:, None] - track[:, :-1]) * steps).sum(axis=0) / squares
-        part = np.clip(part, 0.0, 1.0)
-        miss = ((track[:, :-1] + part * steps - point[:, None]) ** 2).sum(axis=0)
-        k = int(miss.argmin())
-        return float(self.arc[k] + part[k] * (self.arc[k + 1] - self.arc[k]))
-
-    def at(self, positions) -> np.ndarray:
-        """Points (2, ...) of the track at arc lengths."""
-        return np.array([np.interp(positions, self.arc, row) for row in self.nodes])
-
-    def normal(self, position: float) -> tuple[float, float]:
-        """Unit normal at an arc length, turning evenly from node to node."""
-        step = self.nodes[:, -1] - self.nodes[:, 0]
-        if not self.straight:
-            step = np.array([np.interp(position, self.arc, row) for row in self.tangents])
-        step = step / np.hypot(*step)
-        return float(-step[1]), float(step[0])
-
-    def spread(self, start: np.ndarray, end: np.ndarray, law: np.ndarray) -> np.ndarray:
-        """Nodes (2, n) by the spacing law between two points of the track.
-
-        On a closed track that is the full turn from the first point.
-        """
-        first = self.locate(start)
-        last = self.locate(end)
-        if self.closed:
-            return self.at((first + law * self.arc[-1]) % self.arc[-1])
-        return self.at(first + law * (last - first))
-
-
 @kernel
-def spread_straight(nodes, spans, laws):
-    """Spread nodes of a block by `laws` on straight lines between their ends; spans (n, 5)."""
+def spread_straight(nodes, spans, spacings):
+    """Spread nodes of a block by `spacings` on straight lines between their ends; spans (n, 5)."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     for n in range(spans.shape[0]):
         side, start, count, _, place = spans[n]
@@ -114,9 +46,9 @@ def spread_straight(nodes, spans, laws):
             first = nodes[c, i, j]
             last = nodes[c, i_end, j_end]
             for k in range(1, count - 1):
-                law = laws[place + k]
+                part = spacings[place + k]
                 i_here, j_here = find_node(side, start + k, 0, ni, nj)
-                nodes[c, i_here, j_here] = first * (1.0 - law) + last * law
+                nodes[c, i_here, j_here] = first * (1.0 - part) + last * part
 
 
 @compiled_once
@@ -186,20 +118,20 @@ def limit_spreading(moved, rim, first, dt, out):
 
 
 @kernel
-def carry_line(nodes, nodes_new, span, rim, dt, arrays, spacing, walls):
+def carry_line(nodes, nodes_new, span, rim, dt, arrays, shaping, walls):
     """Move a line's nodes (`move_line`, where dt > 0), spread them and write them to `nodes_new`.
 
     arrays: damping, what the nodes move beside the contact velocities [m/s] and moved nodes (2, n),
-    spacing law (n,), scratch for another (n,), turning (n - 1,), scratch (8, n).  spacing: how far
-    to the law the nodes go, `relax` (not spread where it is 0, nor written below), is the curve a
+    spacing (n,), scratch for another (n,), turning (n - 1,), scratch (8, n).  shaping: how far to
+    the spacing the nodes go, `relax` (not spread where it is 0, nor written below), is the curve a
     spline, is it periodic, is it closed, and the shortest segment that turning asks for (0: none,
     as of `fill_turning_law`).  walls at both ends as in `fill_redistributed`.  Returns the
     stretching, and what that returns: below 0 if all is well.  No node is spread faster than sound:
     in a step that a thin cell elsewhere makes very short, a part of the way would be a jump.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    damping, beside, moved, law, turned, turning, work = arrays
-    relax, spline, periodic, closed, shortest = spacing
+    damping, beside, moved, spacing, turned, turning, work = arrays
+    relax, spline, periodic, closed, shortest = shaping
     side, start, count, first, _ = span
     stretching = 0.0
     if dt > 0.0:
@@ -210,7 +142,9 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, spacing, walls):
     if relax < 0.0:
         return stretching, -1
     if shortest > 0.0 and relax > 0.0:
-        curves.fill_turning_law(moved, law, turning, closed, walls[0], walls[1], shortest, turned)
+        curves.fill_turning_law(
+            moved, spacing, turning, closed, walls[0], walls[1], shortest, turned
+        )
     for end in range(2):
         k = end * (count - 1)
         i, j = find_node(side, start + k, 0, ni, nj)
@@ -221,7 +155,7 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, spacing, walls):
     if relax > 0.0:
         out = work[6:]
         failed = curves.fill_redistributed(
-            moved, turned if shortest > 0.0 else law, np.array([0, count - 1]), spline, relax,
+            moved, turned if shortest > 0.0 else spacing, np.array([0, count - 1]), spline, relax,
             periodic, walls[0], walls[1], work[:6], out,
         )  # fmt: skip
         if dt > 0.0:
@@ -264,69 +198,15 @@ def fill_extended(nodes, span, walls, out):
                 out[1, at - n * inwards] = out[1, at] + away_y - 2.0 * normal_y * across
 
 
-@kernel
-def fill_line_damping(line, rim, start, strength, bend, most, out):
-    """Velocities that damp the shortest waves of a sliding contact; out (2, n).
-
-        w = -strength × V / spacing × (fourth difference, normal part) / 16,     theory F6.7
-
-    with V = slip + speed of the contact relative to the line's mean.  Where materials slip, waves
-    of many nodes still roll up into kinks that no cell beside the line can follow: the strength
-    grows by 1 + (turn / bend)² with the turn of the line at the node [rad], so that what is bent
-    sharper than `bend` a node is taken back.
-    line (2, n + 4): the nodes with two images beyond each end; most: largest rate [1/s].
-    """
-    count = out.shape[1]
-    mean_x = 0.0
-    mean_y = 0.0
-    for k in range(start, start + count - 1):
-        mean_x += rim[on.U_STAR, k]
-        mean_y += rim[on.V_STAR, k]
-    mean_x /= count - 1
-    mean_y /= count - 1
-    for k in range(count):
-        m = k + 2
-        tx = line[0, m + 1] - line[0, m - 1]
-        ty = line[1, m + 1] - line[1, m - 1]
-        square = tx * tx + ty * ty
-        fourth_x = (
-            (line[0, m + 2] + line[0, m - 2])
-            - 4.0 * (line[0, m + 1] + line[0, m - 1])
-            + 6.0 * line[0, m]
-        )
-        fourth_y = (
-            (line[1, m + 2] + line[1, m - 2])
-            - 4.0 * (line[1, m + 1] + line[1, m - 1])
-            + 6.0 * line[1, m]
-        )
-        speed = 0.0
-        for face in (max(start, start + k - 1), min(start + count - 2, start + k)):
-            away_x = rim[on.U_STAR, face] - mean_x
-            away_y = rim[on.V_STAR, face] - mean_y
-            speed += 0.5 * (rim[on.SLIP, face] + (away_x * away_x + away_y * away_y) ** 0.5)
-        spacing = 0.5 * square**0.5
-        rate = strength * speed / (16.0 * spacing)
-        ax = line[0, m] - line[0, m - 1]
-        ay = line[1, m] - line[1, m - 1]
-        bx = line[0, m + 1] - line[0, m]
-        by = line[1, m + 1] - line[1, m]
-        turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by) / bend
-        rate *= 1.0 + turn * turn
-        rate = rate if rate < most else most
-        along = (fourth_x * ty - fourth_y * tx) / square
-        out[0, k] = -rate * along * ty
-        out[1, k] = rate * along * tx
-
-
 @dataclass(frozen=True)
 class Respacing:
     """Spacings of sides that change on the way, smoothly, from the first ones to others.
 
-    `laws`: by the block's name, the last spacing (ni + 1,) from 0 to 1 of its sides j_min and
+    `spacings`: by the block's name, the last one (ni + 1,) from 0 to 1 of its sides j_min and
     j_max; `start`, `end` [s]: when they begin to change and when they have done so.
     """
 
-    laws: Mapping[str, np.ndarray]
+    spacings: Mapping[str, np.ndarray]
     start: float
     end: float
 
@@ -342,8 +222,8 @@ class LineRule:
 
     `shape` of the line between nodes when they are re-spaced, "chord" or "spline"; `relax`: part
     of the way to the spacing in a full step; `thickness` [m] of interfaces, see
-    `hydro.motion.thickness`, None: THICK_CELLS of their first cells; `respacing` of straight sides
-    and of seams.
+    `hydro.motion.smoothing`, None: its THICK_CELLS of their first cells; `respacing` of straight
+    sides and of seams.
     """
 
     shape: str = "spline"
@@ -352,8 +232,42 @@ class LineRule:
     respacing: Respacing | None = None
 
 
+class Role(Enum):
+    """What shapes a line in a step; see ROLES."""
+
+    WITH_ENDS = "lies between its ends as its kind of motion says"
+    FLOWING = "moves with the contact speeds of its faces"
+    ON_BODY = "does so, and lies on another body's surface in part"
+    AT_CONTACT = "goes on from an end of a sliding contact, which cuts it off"
+    OPPOSITE = "lies opposite to such a contact point, whose spacing it shares"
+
+
+class Shaping(NamedTuple):
+    """How a line is kept in shape.
+
+    `relax`: part of the way to its spacing that the nodes go along the line in a full step;
+    `shape` of the line between nodes, "chord" or "spline".  None: that of the flow's `LineRule`.
+    """
+
+    relax: float | None
+    shape: str | None
+
+
+ROLES: dict[Role, Shaping] = {
+    Role.WITH_ENDS: Shaping(0.0, None),
+    Role.FLOWING: Shaping(None, None),
+    # a spline would swing about the end of the contact with the body
+    Role.ON_BODY: Shaping(None, "chord"),
+    # a spline would loop in the fold above the tip of a jet
+    Role.AT_CONTACT: Shaping(FOLLOWED_WAY_PART, "chord"),
+    Role.OPPOSITE: Shaping(FOLLOWED_WAY_PART, "chord"),
+}
+
+
 class Line:
     """One segment's line: its spacing and, where it slides, the track it stays on.
+
+    `spacing` (n + 1,): where its nodes are to be along it, from 0 to 1; `role`: see ROLES.
 
     `waits`: is it moved after the sliding contacts?  `respaced`: is it spread along itself?
     """
@@ -366,10 +280,10 @@ class Line:
         self.rule = rule
         line = np.ascontiguousarray(segment.line(segment.block.nodes))
         self.track = Track(line)
-        self.law = curves.arc_law(line)
-        self.last_law = None  # where the spacing changes on the way
+        self.spacing = curves.arc_law(line)
+        self.last_spacing = None  # where it changes on the way
         if rule.respacing is not None and segment.side in ("j_min", "j_max"):
-            self.last_law = rule.respacing.laws.get(segment.block.name)
+            self.last_spacing = rule.respacing.spacings.get(segment.block.name)
         self.walls = [curves.FREE_END, curves.FREE_END]
         self.period: np.ndarray | None = None  # from the first node to the last, where they repeat
         self.neighbours: list[tuple[Line, int] | None] = [None, None]  # that go on, at which end
@@ -383,20 +297,32 @@ class Line:
         self._work = np.empty((8, count))
         self.closed = False  # does it end where it begins, or at its periodic image?
         self.shortest = 0.0  # segment that turning asks for [m]; 0: spaced by length alone
-        self._law = self.law.copy()
+        self._turned_spacing = self.spacing.copy()
         self._turning = np.zeros(line.shape[1] - 1)
         self.carried: Callable[[], np.ndarray] | None = None  # displacement of a carried seam
-        self.shortened = False
-        self.slides = False  # a straight piston, an end of which goes along it
-        self.at_contact = False  # goes on from an end of a sliding contact
-        self.is_kinked = False  # does it lie on another body's surface in part?
-        self.follows_contact = False  # lies opposite to a contact point, whose law it shares
+        self.role = Role.FLOWING if self.respaced else Role.WITH_ENDS
+        self._is_cut = False  # in this step, by a sliding contact
 
-    def find_law(self, t: float) -> np.ndarray:
+    def find_spacing(self, t: float) -> np.ndarray:
         """The spacing at t [s]."""
-        if self.last_law is None:
-            return self.law
-        return self.law + self.rule.respacing.compute_share(t) * (self.last_law - self.law)
+        if self.last_spacing is None:
+            return self.spacing
+        change = self.last_spacing - self.spacing
+        return self.spacing + self.rule.respacing.compute_share(t) * change
+
+    def set_spacing(self, spacing: np.ndarray) -> None:
+        """Where the nodes are to be along the line from now on: (n + 1,) from 0 to 1."""
+        self.spacing = np.ascontiguousarray(spacing)
+
+    def lie_on_body(self, lies: bool) -> None:
+        """Whether it lies on another body's surface in part, if it moves with the flow."""
+        if self.role in (Role.FLOWING, Role.ON_BODY):
+            self.role = Role.ON_BODY if lies else Role.FLOWING
+
+    def lie_opposite(self) -> None:
+        """It lies opposite to a contact point, if it is not at one itself."""
+        if self.role is not Role.AT_CONTACT:
+            self.role = Role.OPPOSITE
 
     def beside(self, end: int, new: bool = False) -> np.ndarray:
         """The two old (or new) nodes (2, 2) next to an end, the nearer first."""
@@ -409,18 +335,6 @@ class Line:
         self.shortest = shortest
         line = np.ascontiguousarray(self.segment.line(self.segment.block.nodes))
         curves.fill_turning(line, self.closed, *self.walls, self._turning)
-
-    def damp(self, dt: float) -> None:
-        """Fill `damping`, the velocities against a sliding line's shortest waves, for all nodes."""
-        fill_line_damping(
-            self.extend(),
-            self.segment.block.rim.rows,
-            self.segment.first,
-            SLIDING_DAMPING,
-            SLIDING_BEND_ANGLE,
-            MOST_DAMPING / dt,
-            self.damping,
-        )
 
     def extend(self, new: bool = False) -> np.ndarray:
         """The old nodes, or the new ones, with two images (2, n + 5) beyond each end; one array."""
@@ -445,11 +359,11 @@ class Line:
         segment = self.segment
         old = np.ascontiguousarray(segment.line(segment.block.nodes))
         new = segment.line(segment.block.nodes_new)
-        self.shortened = False
+        self._is_cut = False
         self.moved[:, 0] = new[:, 0]
         self.moved[:, -1] = new[:, -1]
         self.fill_moved(old, new, span)
-        return 0.0 if self.at_contact else self.settle(span.fraction)
+        return 0.0 if self.role is Role.AT_CONTACT else self.settle(span.fraction)
 
     def fill_moved(self, old: np.ndarray, new: np.ndarray, span: Span) -> None:
         """Fill the inner nodes of `moved` from the old nodes and new ends (2, n + 1)."""
@@ -460,7 +374,7 @@ class Line:
         away = self.moved if at_start else self.moved[:, ::-1]
         part = np.arange(face + 1) / (face + 1.0)
         away[:, : face + 1] = point[:, None] * (1.0 - part) + away[:, face + 1, None] * part
-        self.shortened = True
+        self._is_cut = True
 
     def settle(self, fraction: float, dt: float = 0.0) -> float:
         """Spread the moved nodes by the spacing and write them between the new ends.
@@ -469,18 +383,11 @@ class Line:
         `fraction`: dt over the stable step.  With a dt they are moved before; returns the
         stretching.
         """
-        relax = 0.0
-        shape = self.rule.shape
-        if self.respaced or self.follows_contact:
-            relax = float(self.rule.relax * min(1.0, fraction))
-        if self.at_contact or self.follows_contact:
-            # a spline would loop in the fold above the tip of a jet
-            relax = FOLLOWED_WAY_PART * min(1.0, fraction)
-            shape = "chord"
-        if self.is_kinked:  # a spline would swing about the end of the contact
-            shape = "chord"
-        if self.shortened:
-            relax = 1.0
+        relax, shape = ROLES[self.role]
+        if relax is None:
+            relax = self.rule.relax
+        relax = 1.0 if self._is_cut else float(relax * min(1.0, fraction))
+        shape = self.rule.shape if shape is None else shape
         if relax == dt == 0.0:
             self.segment.line(self.segment.block.nodes_new)[:, 1:-1] = self.moved[:, 1:-1]
             return 0.0
@@ -488,13 +395,13 @@ class Line:
 
     def _carry(self, relax: float, shape: str, dt: float) -> float:
         block = self.segment.block
-        spacing = relax, shape == "spline", self.period is not None, self.closed, self.shortest
+        shaping = relax, shape == "spline", self.period is not None, self.closed, self.shortest
         arrays = (
-            self.damping, self.beside_contact, self.moved, self.law, self._law, self._turning,
-            self._work,
+            self.damping, self.beside_contact, self.moved, self.spacing, self._turned_spacing,
+            self._turning, self._work,
         )  # fmt: skip
         stretching, failed = carry_line.entry(
-            block.nodes, block.nodes_new, self.span, block.rim.rows, dt, arrays, spacing,
+            block.nodes, block.nodes_new, self.span, block.rim.rows, dt, arrays, shaping,
             tuple(self.walls),
         )  # fmt: skip
         if failed >= 0:
@@ -509,8 +416,8 @@ class FlowLine(Line):
     respaced = True
 
     def move(self, span):
-        self.shortened = False
-        if self.at_contact:
+        self._is_cut = False
+        if self.role is Role.AT_CONTACT:
             return self._carry(-1.0, self.rule.shape, span.dt)
         return self.settle(span.fraction, span.dt)
 
@@ -520,7 +427,7 @@ class StraightLine(Line):
 
     def lies_straight(self) -> bool:
         """Does it, and need not be spread by another line?"""
-        return self.track.straight and not self.follows_contact
+        return self.track.straight and self.role is not Role.OPPOSITE
 
     def move(self, span):
         if not self.lies_straight():
@@ -534,19 +441,27 @@ class StraightLine(Line):
 
     def spread_straight(self, t: float) -> None:
         """New nodes by its spacing at t [s] on the straight line between the new ends."""
-        spread_straight(self.segment.block.nodes_new, self.span[None], self.find_law(t))
+        spread_straight(self.segment.block.nodes_new, self.span[None], self.find_spacing(t))
 
 
 class GivenLine(StraightLine):
-    """A line with a given velocity; `slides`: a straight piston, an end of which goes along it."""
+    """A line with a given velocity, such as a piston's."""
 
     waits = False
 
+    def __init__(self, segment, rule):
+        super().__init__(segment, rule)
+        self.has_sliding_end = False
+
+    def let_end_slide(self) -> None:
+        """An end goes along this straight line: it lies between its ends from now on."""
+        self.has_sliding_end = True
+
     def lies_straight(self):
-        return self.slides and not self.follows_contact
+        return self.has_sliding_end and self.role is not Role.OPPOSITE
 
     def fill_moved(self, old, new, span):
-        if self.slides:
+        if self.has_sliding_end:
             super().fill_moved(old, new, span)
             return
         x, y = self.segment.velocity(span.t + 0.5 * span.dt)
@@ -561,7 +476,7 @@ class TrackLine(StraightLine):
         if self.track.straight:
             super().fill_moved(old, new, span)
         else:
-            spread = self.track.spread(new[:, 0], new[:, -1], self.law)
+            spread = self.track.spread(new[:, 0], new[:, -1], self.spacing)
             self.moved[:, 1:-1] = spread[:, 1:-1]
 
 
@@ -573,12 +488,12 @@ class JoinedLine(Line):
             self.moved[:, 1:-1] = old[:, 1:-1] + self.carried()[:, 1:-1]
             return
         step = new[:, [0, -1]] - old[:, [0, -1]]
-        law = self.find_law(span.t)
+        spacing = self.find_spacing(span.t)
         self.moved[:, 1:-1] = old[:, 1:-1] + (
-            step[:, :1] * (1.0 - law[1:-1]) + step[:, 1:] * law[1:-1]
+            step[:, :1] * (1.0 - spacing[1:-1]) + step[:, 1:] * spacing[1:-1]
         )
-        if self.last_law is not None:
-            change = self.find_law(span.t + span.dt) - law
+        if self.last_spacing is not None:
+            change = self.find_spacing(span.t + span.dt) - spacing
             self.moved[:, 1:-1] += (new[:, -1:] - new[:, :1]) * change[1:-1]
 
 

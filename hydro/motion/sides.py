@@ -17,17 +17,19 @@ from hydro.motion.constraints import CarriedSeam, CornerGuard, FollowerMotion, J
 from hydro.motion.key_nodes import KeyNode, find_key_nodes
 from hydro.motion.line import (
     LINES,
-    TRACK_CORNER_SINE,
     Line,
     LineRule,
+    Role,
     Span,
     StraightLine,
-    Track,
     spread_straight,
 )
-from hydro.motion.thickness import ThickContact, find_thick_contacts
+from hydro.motion.smoothing import SlidingLine, ThickContact, find_thick_contacts
+from hydro.motion.track import join_tracks
 from regrid.errors import BadInput
 from regrid.sides import OPPOSITE_SIDES, SIDE_NAMES
+
+TRACK_CORNER_SINE = 0.35  # sine of the angle from which two tracks that meet make a corner
 
 
 class StraightSides:
@@ -36,12 +38,12 @@ class StraightSides:
     def __init__(self, lines: list[StraightLine]):
         self.lines = lines
         self.block = lines[0].segment.block
-        self.laws = np.concatenate([line.law for line in lines])
+        self.spacings = np.concatenate([line.spacing for line in lines])
         self.spans = np.array([line.span for line in lines])
-        counts = [line.law.size for line in lines]
+        counts = [line.spacing.size for line in lines]
         self.spans[:, -1] = np.cumsum(counts) - counts
         self.respacing = None
-        if any(line.last_law is not None for line in lines):
+        if any(line.last_spacing is not None for line in lines):
             self.respacing = lines[0].rule.respacing
             self.share = -1.0
 
@@ -49,8 +51,8 @@ class StraightSides:
         """Lay their new nodes, by their spacings at t [s], between their new ends."""
         if self.respacing is not None and (share := self.respacing.compute_share(t)) != self.share:
             self.share = share
-            self.laws = np.concatenate([line.find_law(t) for line in self.lines])
-        spread_straight(self.block.nodes_new, self.spans, self.laws)
+            self.spacings = np.concatenate([line.find_spacing(t) for line in self.lines])
+        spread_straight(self.block.nodes_new, self.spans, self.spacings)
 
     @classmethod
     def find(cls, lines: list[Line]) -> list[StraightSides]:
@@ -69,7 +71,6 @@ class Sides:
     """
 
     def __init__(self, blocks, exchange: Exchange, rule: LineRule):
-        self.exchange = exchange
         self.stretching = 0.0
         self.carried_seams: list[CarriedSeam] = []
         self.joints: list[Joint] = []
@@ -103,11 +104,13 @@ class Sides:
         self.guards = CornerGuard.find(self.key_nodes, self.followers)
         # lines in the order in which the passes take them
         self.moving = [line for line in self.lines if not line.waits]
-        self.damped = [line for line in self.moving if line.segment.kind == "sliding"]
+        self.damped: list[SlidingLine | ThickContact] = [
+            SlidingLine(line) for line in self.moving if line.segment.kind == "sliding"
+        ]
         self.damped += self.contacts
         self.turning = [node for node in self.key_nodes if node.tracks]
         self.links = exchange.links
-        self.cut = [line for line in self.moving if line.at_contact]
+        self.cut = [line for line in self.moving if line.role is Role.AT_CONTACT]
         self.straight = StraightSides.find(self.lines)
         spread = {id(line) for sides in self.straight for line in sides.lines}
         self.waiting = [line for line in self.lines if line.waits and id(line) not in spread]
@@ -156,7 +159,8 @@ class Sides:
             phases.gather(segment.block)  # the faces' normals
         node.on_piston = bool(node.flowing) and node.lies_on_one_piston(walls=True)
         for line in pistons:
-            line.slides |= node.on_piston or not node.lies_on_one_piston(walls=False)
+            if node.on_piston or not node.lies_on_one_piston(walls=False):
+                line.let_end_slide()
 
     def _end_lines(self, node: KeyNode) -> None:
         """Tell the lines that end at a key node what they end on, and the node its tracks."""
@@ -212,7 +216,7 @@ class Sides:
             line = self._find_line(other)
             if line is None or other.kind != "free-surface":
                 continue
-            line.at_contact = True
+            line.role = Role.AT_CONTACT
             follower.free_lines[end] = line
             follower.starts[end] = face == other.first
             side = OPPOSITE_SIDES[other.side]
@@ -220,7 +224,7 @@ class Sides:
             opposite = self._find_line(across[0]) if len(across) == 1 else None
             follower.opposites[end] = opposite
             if opposite is not None:
-                opposite.follows_contact = True
+                opposite.lie_opposite()
 
     def find_free_sides(self, block: Block) -> tuple[str, ...]:
         """The sides of a block that no other block shares: straight walls."""
@@ -259,25 +263,6 @@ class Sides:
             node.carried = True
         self._by_segment[id(seam)].carried = carried.compute_displacement
         self.carried_seams.append(carried)
-
-
-def join_tracks(one: Track, other: Track, point: np.ndarray) -> np.ndarray | None:
-    """Both as one polyline if they meet at `point` with their ends; None where they do not.
-
-    Also None where the other ends meet too: a closed track has no position to slide to or from.
-    """
-    size = 1e-9 * (one.arc[-1] + other.arc[-1])
-
-    def meets(track, end):
-        return np.abs(track.nodes[:, end] - point).max() <= size
-
-    if not all(meets(track, 0) or meets(track, -1) for track in (one, other)):
-        return None
-    a = one.nodes if meets(one, -1) else one.nodes[:, ::-1]
-    b = other.nodes if meets(other, 0) else other.nodes[:, ::-1]
-    if np.abs(a[:, 0] - b[:, -1]).max() <= size:
-        return None
-    return np.concatenate([a, b[:, 1:]], axis=1)
 
 
 # --- passes; `hydro.step.SIDE_PASSES` says what each does, and why it stands where it does -------

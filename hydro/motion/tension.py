@@ -91,7 +91,7 @@ class SurfaceTension:
                     )
         partners = {id(link.leader): link for link in exchange.links}
         self.lines: list[TenseLine] = []
-        for line in motion.lines:
+        for line in motion.sides.lines:
             if line.segment.tension == 0.0:
                 continue
             sides = [line.segment]

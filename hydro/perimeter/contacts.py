@@ -141,7 +141,7 @@ def let_pass(rim, k, other, m, beyond, hll, acoustic_weight, curved):
 def add_layer_flux(rim, speeds, backwards, closed, first):
     """Add to the outward fluxes through a contact's faces what flows on to the next cell.
 
-    Where a line is smoothed (`hydro.motion.thickness`) or its nodes are respaced around a bend, it
+    Where a line is smoothed (`hydro.motion.smoothing`) or its nodes are respaced around a bend, it
     moves beside its contact speed: the cell there gains volume, and others lose as much.  The
     material of that volume goes from these to those along the line, so that the gas is neither
     compressed nor stretched: the pressure would push the line back within the time that sound takes

@@ -44,13 +44,15 @@ from regrid.protocol import call_regridder
 from regrid.sides import SIDE_NAMES
 
 
-def spread_anew(line: np.ndarray, law: np.ndarray, new_law: np.ndarray) -> np.ndarray:
+def spread_anew(line: np.ndarray, spacing: np.ndarray, new_spacing: np.ndarray) -> np.ndarray:
     """Nodes (2, m) on the polyline `line` (2, n) [m], the ends the same.
 
-    law (n,), new_law (m,): spacing laws of both, from 0 to 1, increasing.
+    spacing (n,), new_spacing (m,): of both, from 0 to 1, increasing.
     """
     arc = compute_arc_lengths(line)
-    positions = PchipInterpolator(law, arc)(new_law) if line.shape[1] > 2 else new_law * arc[-1]
+    positions = (
+        PchipInterpolator(spacing, arc)(new_spacing) if line.shape[1] > 2 else new_spacing * arc[-1]
+    )
     nodes = np.array([np.interp(positions, arc, row) for row in line])
     nodes[:, 0] = line[:, 0]
     nodes[:, -1] = line[:, -1]
@@ -162,8 +164,8 @@ def _check_same(old: Simulation, new: Simulation) -> None:
 
 def _lay_sides(old: Simulation, new: Simulation) -> None:
     """Fill the sides of the new blocks' `nodes_new`: key nodes, lines between them, followers."""
-    pairs = list(zip(old.motion.lines, new.motion.lines, strict=True))
-    for before, node in zip(old.motion.key_nodes, new.motion.key_nodes, strict=True):
+    pairs = list(zip(old.motion.sides.lines, new.motion.sides.lines, strict=True))
+    for before, node in zip(old.motion.sides.key_nodes, new.motion.sides.key_nodes, strict=True):
         for (block, i, j), (other, k, m) in zip(before.members, node.members, strict=True):
             other.nodes_new[:, k, m] = block.nodes[:, i, j]
         if node.tracks and not node.given:
@@ -179,20 +181,20 @@ def _lay_sides(old: Simulation, new: Simulation) -> None:
 
 def _lay_line(before: Line, line: Line, t: float) -> None:
     """The inner nodes of a line between its new ends, by the spacings at t [s]."""
-    law = line.find_law(t)
+    spacing = line.find_spacing(t)
     target = line.segment.line(line.segment.block.nodes_new)
     if line.segment.motion is NodeMotion.SLIDE:
         if line.track.straight:
             first = target[:, :1].copy()
             last = target[:, -1:].copy()
-            target[:, 1:-1] = (first + (last - first) * law)[:, 1:-1]
+            target[:, 1:-1] = (first + (last - first) * spacing)[:, 1:-1]
         else:
-            target[:, 1:-1] = line.track.spread(target[:, 0], target[:, -1], law)[:, 1:-1]
+            target[:, 1:-1] = line.track.spread(target[:, 0], target[:, -1], spacing)[:, 1:-1]
         return
     curve = before.segment.line(before.segment.block.nodes)
-    spread = spread_anew(curve, before.find_law(t), law)
+    spread = spread_anew(curve, before.find_spacing(t), spacing)
     miss = target[:, [0, -1]] - spread[:, [0, -1]]  # ends that went on to a finer track
-    spread += miss[:, :1] * (1.0 - law) + miss[:, 1:] * law
+    spread += miss[:, :1] * (1.0 - spacing) + miss[:, 1:] * spacing
     target[:, 1:-1] = spread[:, 1:-1]
 
 
@@ -327,12 +329,12 @@ class Refinement:
         """Nodes, and what cells hold (HELD_ARRAYS), of all blocks on lines at these places.
 
         The nodes of interfaces stay, or lie half way between two of them; straight sides are spread
-        by their laws at t [s], and the grids inside settle before they get the states.  `motion`:
-        of the new blocks.  Raises RunFailure, and nothing has changed.
+        by their spacings at t [s], and the grids inside settle before they get the states.
+        `motion`: of the new blocks.  Raises RunFailure, and nothing has changed.
         """
         for one, other in zip(blocks, motion.blocks, strict=True):
             other.nodes_new[...] = sample_lines(one.nodes, places)
-        for line in motion.lines:
+        for line in motion.sides.lines:
             if isinstance(line, StraightLine) and line.track.straight:
                 line.spread_straight(t)
         found = []

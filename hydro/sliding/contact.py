@@ -231,7 +231,7 @@ class SlidingContact:
             )
         if not (np.diff(positions) > 0.0).all():
             raise BadInput(f"sliding: {follower[0]} and {leader[0]} do not lie along each other")
-        self.first_law = arc_law(np.ascontiguousarray(other))
+        self.first_spacing = arc_law(np.ascontiguousarray(other))
         self.refinement = 1.0  # how many times shorter the steps at a contact point are
         self.fixed_new = self.fixed.copy()
         self.follower.write_line(points, new=False)

@@ -19,7 +19,8 @@ import numpy as np
 from hydro.block import Block
 from hydro.boundary import put
 from hydro.links import Link, join
-from hydro.motion.line import THICK_CELLS, LineRule, Respacing
+from hydro.motion.line import LineRule, Respacing
+from hydro.motion.smoothing import THICK_CELLS
 from hydro.rows import V
 from hydro.simulation import Simulation
 from problems.deck import MOST_CELLS

@@ -61,7 +61,7 @@ def make_triple_point(cells=4):
 
 @pytest.mark.kernels
 def test_guards_stand_at_free_junctions_only():
-    guards = make_triple_point().motion.guards
+    guards = make_triple_point().motion.sides.guards
     assert len(guards) == 1
     assert {block.name for block, _, _ in guards[0].corners} == {"bottom", "top"}
     assert guards[0].hold() == 0.0
@@ -71,7 +71,7 @@ def test_guards_stand_at_free_junctions_only():
 @pytest.mark.parametrize("name", ["top", "bottom"])
 def test_the_point_is_moved_for_all_blocks(name):
     simulation = make_triple_point()
-    (guard,) = simulation.motion.guards
+    (guard,) = simulation.motion.sides.guards
     (corner,) = (member for member in guard.corners if member[0].name == name)
     place, before, after = find_corner(*corner)
     guard.node.shift(1.2 * (0.5 * (before + after) - place))  # into the cell, past the diagonal

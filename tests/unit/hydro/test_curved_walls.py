@@ -9,7 +9,7 @@ from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.links import join
 from hydro.motion.key_nodes import find_key_nodes
-from hydro.motion.line import Track
+from hydro.motion.track import Track
 from hydro.simulation import Simulation
 
 GAS = IdealGas(1.4)

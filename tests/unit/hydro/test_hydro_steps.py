@@ -11,7 +11,7 @@ from hydro.boundary import put
 from hydro.eos import IdealGas, MieGruneisen
 from hydro.interior.advance import make_flow_kernels
 from hydro.links import join
-from hydro.motion import line, thickness
+from hydro.motion import line, smoothing
 from hydro.perimeter import contacts
 from hydro.perimeter.strips import make_side_kernels
 from hydro.simulation import Simulation
@@ -91,7 +91,7 @@ def test_one_signature_a_kernel(eos_class):
     kernels = [make_flow_kernels(eos_class).advance, *make_side_kernels(eos_class)]
     kernels += [
         value
-        for module in (contacts, line, thickness)
+        for module in (contacts, line, smoothing)
         for value in vars(module).values()
         if hasattr(value, "signatures") and value.__module__ == module.__name__
     ]

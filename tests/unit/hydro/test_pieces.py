@@ -151,13 +151,13 @@ def make_wavy_contact(ends, stream, cells=((24, 8), (17, 6))):
 def test_free_stream_while_the_follower_slides_on_a_curve(ends):
     simulation, _ = make_wavy_contact(ends, STREAM)
     low, high = simulation.blocks
-    (follower,) = simulation.motion.followers
-    law = follower.law.copy()
+    (follower,) = simulation.motion.sides.followers
+    first = follower.spacing.copy()
     moved = 0.0
     for step in range(100):
-        follower.law = law + 0.1 * np.sin(np.pi * law) * np.sin(0.25 * step)
+        follower.spacing = first + 0.1 * np.sin(np.pi * first) * np.sin(0.25 * step)
         simulation.advance()
-        moved = max(moved, float(np.abs(follower.law - law).max()))
+        moved = max(moved, float(np.abs(follower.spacing - first).max()))
     assert moved > 2.0 / low.ni, "the nodes have passed two of the leader's"
     for block, rho in ((low, 1.0), (high, 3.0)):
         for row, value in enumerate((rho, *STREAM, 1.0)):
@@ -201,10 +201,10 @@ def test_sums_are_kept_while_the_follower_slides_on_a_curve(ends):
         phases.update(block, 0.0)
     simulation.clock.rate = max(block.find_rate() for block in simulation.blocks)
     start = simulation.start_row()
-    (follower,) = simulation.motion.followers
-    law = follower.law.copy()
+    (follower,) = simulation.motion.sides.followers
+    first = follower.spacing.copy()
     for step in range(60):
-        follower.law = law + 0.1 * np.sin(np.pi * law) * np.sin(0.25 * step)
+        follower.spacing = first + 0.1 * np.sin(np.pi * first) * np.sin(0.25 * step)
         row = simulation.advance()
     masses = {block.name: (block.volume * block.cell_fields["rho"]).sum() for block in (low, high)}
     for name, mass in masses.items():

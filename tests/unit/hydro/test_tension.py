@@ -13,8 +13,8 @@ from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.links import join
+from hydro.motion.smoothing import fill_thickness_way
 from hydro.motion.tension import compute_tangents
-from hydro.motion.thickness import fill_thickness_way
 from hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y, P
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
@@ -203,8 +203,10 @@ def respace_kinked_line(beside):
     for block in blocks:
         wall_off(block)
     simulation = Simulation(blocks, links, t_end=5.0)
-    (line,) = (line for line in simulation.flow.motion.lines if line.segment.kind == "interface")
-    line.law = line.law**1.5  # where its nodes are to go
+    (line,) = (
+        line for line in simulation.flow.motion.sides.lines if line.segment.kind == "interface"
+    )
+    line.set_spacing(line.spacing**1.5)  # where its nodes are to go
     if not beside:
         links[0].layer = np.empty((2, 0)), False
     march(simulation, 20)

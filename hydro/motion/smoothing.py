@@ -1,9 +1,12 @@
-"""A contact with a thickness: waves shorter than its cut-off decay, longer ones grow (theory F6.3).
+"""Smoothing of contacts: velocities of their nodes by which the shortest waves decay.
+
+Contacts between linked blocks have a thickness (theory F6.3): waves shorter than its cut-off decay,
+longer ones grow.  Sliding contacts lose their waves of a few nodes only (theory F6.7).
 
 A contact of no thickness is unstable at every wavelength, the shorter the faster: after a shock
 (Richtmyer and Meshkov) and where materials slip (Kelvin and Helmholtz).  Waves of a few nodes then
-grow out of round-off and shock noise, the more the finer the grid.  The line is given the cut-off
-of a layer of the thickness delta,
+grow out of round-off and shock noise, the more the finer the grid.  A linked contact is given the
+cut-off of a layer of the thickness delta,
 
     normal velocity = -V delta^3 d/ds (d curvature / ds),
 
@@ -17,11 +20,17 @@ from __future__ import annotations
 import numpy as np
 
 from hydro import rim as on
-from hydro.motion.line import SHORTEST_TURNED_SEGMENT, THICK_CELLS, Line
+from hydro.motion.line import Line
 from regrid.curves import FREE_END
 from regrid.jit import compiled_once, kernel
 from regrid.sides import find_node
 
+THICK_CELLS = 0.75  # default thickness of a contact, in its initial cells
+SHORTEST_TURNED_SEGMENT = 0.25  # segment required by turning, in thicknesses of its contact
+# of sliding lines: strength, and turn [rad]; see `fill_sliding_damping`
+SLIDING_DAMPING = 4.0
+SLIDING_BEND_ANGLE = 0.35
+MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
 # least sine of half the angle between two segments: where a line folds back on itself
 FOLDED_LINE_SINE = 1e-3
 HALF_BAND = 4  # of a closed line's matrix, its nodes numbered from both sides of the first one
@@ -293,6 +302,80 @@ def fill_speeds(nodes, faces, closed, walls, cube, dt, out):
     for k in range(out.shape[1]):
         for c in range(2):
             out[c, k] /= dt
+
+
+@kernel
+def fill_sliding_damping(line, rim, start, strength, bend, most, out):
+    """Velocities that damp the shortest waves of a sliding contact; out (2, n).
+
+        w = -strength × V / spacing × (fourth difference, normal part) / 16,     theory F6.7
+
+    with V = slip + speed of the contact relative to the line's mean.  Where materials slip, waves
+    of many nodes still roll up into kinks that no cell beside the line can follow: the strength
+    grows by 1 + (turn / bend)² with the turn of the line at the node [rad], so that what is bent
+    sharper than `bend` a node is taken back.
+    line (2, n + 4): the nodes with two images beyond each end; most: largest rate [1/s].
+    """
+    count = out.shape[1]
+    mean_x = 0.0
+    mean_y = 0.0
+    for k in range(start, start + count - 1):
+        mean_x += rim[on.U_STAR, k]
+        mean_y += rim[on.V_STAR, k]
+    mean_x /= count - 1
+    mean_y /= count - 1
+    for k in range(count):
+        m = k + 2
+        tx = line[0, m + 1] - line[0, m - 1]
+        ty = line[1, m + 1] - line[1, m - 1]
+        square = tx * tx + ty * ty
+        fourth_x = (
+            (line[0, m + 2] + line[0, m - 2])
+            - 4.0 * (line[0, m + 1] + line[0, m - 1])
+            + 6.0 * line[0, m]
+        )
+        fourth_y = (
+            (line[1, m + 2] + line[1, m - 2])
+            - 4.0 * (line[1, m + 1] + line[1, m - 1])
+            + 6.0 * line[1, m]
+        )
+        speed = 0.0
+        for face in (max(start, start + k - 1), min(start + count - 2, start + k)):
+            away_x = rim[on.U_STAR, face] - mean_x
+            away_y = rim[on.V_STAR, face] - mean_y
+            speed += 0.5 * (rim[on.SLIP, face] + (away_x * away_x + away_y * away_y) ** 0.5)
+        spacing = 0.5 * square**0.5
+        rate = strength * speed / (16.0 * spacing)
+        ax = line[0, m] - line[0, m - 1]
+        ay = line[1, m] - line[1, m - 1]
+        bx = line[0, m + 1] - line[0, m]
+        by = line[1, m + 1] - line[1, m]
+        turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by) / bend
+        rate *= 1.0 + turn * turn
+        rate = rate if rate < most else most
+        along = (fourth_x * ty - fourth_y * tx) / square
+        out[0, k] = -rate * along * ty
+        out[1, k] = rate * along * tx
+
+
+class SlidingLine:
+    """A line of a sliding contact, whose shortest waves decay."""
+
+    def __init__(self, line: Line):
+        self.line = line
+
+    def damp(self, dt: float) -> None:
+        """Fill the velocities of the line's nodes, of its ends too, that let short waves decay."""
+        segment = self.line.segment
+        fill_sliding_damping(
+            self.line.extend(),
+            segment.block.rim.rows,
+            segment.first,
+            SLIDING_DAMPING,
+            SLIDING_BEND_ANGLE,
+            MOST_DAMPING / dt,
+            self.line.damping,
+        )
 
 
 class ThickContact:

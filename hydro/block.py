@@ -15,6 +15,7 @@ from hydro import rim as on
 from hydro import rows as of
 from hydro.eos import EquationOfState
 from hydro.eos.base import check_eos, check_formulas
+from hydro.eos.conversion import compute_energy
 from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
@@ -111,7 +112,8 @@ class Block:
         self.eos = eos
         self.nodes = _read_nodes(name, nodes)
         self.ni, self.nj = (size - 1 for size in self.nodes.shape[1:])
-        self.state = np.zeros((of.STATE_ROWS, self.ni + 2, self.nj + 2))
+        held = of.make_held(self.ni, self.nj)
+        self.state = held["state"]
         self._read_state({"rho": rho, "u": u, "v": v, "p": p})
         check_first_state(name, eos, self.state[:, 1:-1, 1:-1])
         check_formulas(name, eos, *self.state[[of.RHO, of.P], 1:-1, 1:-1])
@@ -122,10 +124,11 @@ class Block:
         self.crowding = np.zeros((self.ni, self.nj))
         self.shared_cells = 0
         # made after those: memory freed by the checks is reused for arrays that are written anyway
-        self.void_energy = np.zeros((self.ni, self.nj))
-        self.void_energy_new = np.zeros((self.ni, self.nj))
         self.nodes_new = self.nodes.copy()
-        self.state_new = np.zeros(self.state.shape)
+        self.state_new: np.ndarray
+        for array_name, array in of.make_held(self.ni, self.nj).items():
+            setattr(self, array_name, held[array_name])
+            setattr(self, f"{array_name}_new", array)
         self._starts: dict[str, np.ndarray] = {}  # separate if a body source acts
         # the equation of state's numbers, of the types for which kernels are compiled, as those of
         # a user's own need not be
@@ -260,11 +263,6 @@ class Block:
         """The state (4, ni + 2, nj + 2) that a step starts from."""
         return self.get_start("state")
 
-    @property
-    def start_void_energy(self) -> np.ndarray:
-        """The void energy (ni, nj) [J/kg] of `start`."""
-        return self.get_start("void_energy")
-
     def part_start(self, apart: bool) -> None:
         """Set whether steps start from copies of what cells hold, which a source may modify."""
         self._starts = {name: getattr(self, name).copy() for name in of.HELD_ARRAYS if apart}
@@ -343,7 +341,7 @@ class Block:
 
         def compute_energy() -> np.ndarray:
             e = np.zeros(rho.shape)
-            self.fill_energy(rho[rows], p[rows], self.void_energy[rows], e[rows])
+            self._fill_energy(self.state, rows, e)
             return e
 
         return CellFields({"rho": rho, "u": u, "v": v, "p": p}, compute_energy)
@@ -352,14 +350,25 @@ class Block:
         """`cell_fields` of a state (4, ni + 2, nj + 2) of this block: views, and a new `e`."""
         rho, u, v, p = state[:, 1:-1, 1:-1]
         e = np.empty(rho.shape)
-        self.fill_energy(rho, p, self.void_energy, e)
+        self._fill_energy(state, slice(0, self.ni), e)
         return {"rho": rho, "u": u, "v": v, "p": p, "e": e}
 
-    def fill_energy(self, rho: np.ndarray, p: np.ndarray, voids: np.ndarray, e: np.ndarray) -> None:
-        """Specific internal energies `e` [J/kg] from density, pressure and void energy: (n, nj)."""
-        for first in range(0, len(e), SLAB_ROWS):
-            rows = slice(first, first + SLAB_ROWS)
-            e[rows] = self.eos.energy(rho[rows], p[rows]) + voids[rows]
+    def _fill_energy(self, state: np.ndarray, rows: slice, e: np.ndarray) -> None:
+        """Fill these rows of `e` (ni, nj): specific internal energies [J/kg] of a state.
+
+        A few rows at a time, so that intermediate arrays fit into the cache.
+        """
+        inside = state[:, 1:-1, 1:-1]
+        others = [self.get_inside(name) for name in of.HELD_ARRAYS if name != "state"]
+        for first in range(rows.start, rows.stop, SLAB_ROWS):
+            slab = slice(first, min(first + SLAB_ROWS, rows.stop))
+            e[slab] = compute_energy(self.eos, inside[:, slab], *(held[slab] for held in others))
+
+    def compute_energy_at(self, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+        """Specific internal energies [J/kg] of the cells [i, j], shaped as i."""
+        return compute_energy(
+            self.eos, *(self.get_inside(name)[..., i, j] for name in of.HELD_ARRAYS)
+        )
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
         """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2).

@@ -44,8 +44,8 @@ def predict(block: Block, dt: float) -> None:
     """From the ghosts: mid-time predictions, and traces at moving faces at the old time."""
     kernels = block.kernels
     kernels.sides.predict_sides.entry(
-        block.start, block.start_void_energy, block.nodes, 0.5 * dt, block.parameters,
-        block.plan.moving, kernels.scratch, block.rim.rows,
+        _list_old(block), 0.5 * dt, block.parameters, block.plan.moving, kernels.scratch,
+        block.rim.rows,
     )  # fmt: skip
 
 
@@ -87,10 +87,10 @@ def fill_polygons(block: Block) -> None:
 
 
 def _list_old(block: Block) -> tuple[np.ndarray, ...]:
-    """Kernel input at the start of the step: state, void energy, nodes."""
+    """Kernel input at the start of the step: what cells hold (HELD_ARRAYS), then nodes."""
     return *block.list_starts(), block.nodes
 
 
 def _list_new(block: Block) -> tuple[np.ndarray, ...]:
-    """Kernel output for known new nodes: the same three, rates and crowding."""
+    """Kernel output for known new nodes: the same arrays, then rates and crowding."""
     return *block.list_new(), block.nodes_new, block.rates_new, block.crowding

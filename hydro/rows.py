@@ -8,6 +8,8 @@ and per radian in HOOP (theory F9.5). Totals of a tile (tiles, 7): see below.
 
 from __future__ import annotations
 
+import numpy as np
+
 # Arrays of a block by their names: what its cells hold, which moves with the mass that crosses
 # faces; and all that the next step starts from.  Each has one of the same name with `_new` for the
 # step.  Acceptance, restarts, ranks, cut blocks, refinement and remapping go through these lists.
@@ -16,6 +18,13 @@ STEP_ARRAYS = ("nodes", *HELD_ARRAYS, "rates")
 
 RHO, U, V, P = range(4)
 STATE_ROWS = 4
+
+
+def make_held(ni: int, nj: int) -> dict[str, np.ndarray]:
+    """Arrays of HELD_ARRAYS for ni × nj cells, zero: the state has a layer of ghosts around."""
+    return {"state": np.zeros((STATE_ROWS, ni + 2, nj + 2)), "void_energy": np.zeros((ni, nj))}
+
+
 MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, PUSH, HOOP = range(6)
 FLUX_ROWS = 6
 

@@ -36,14 +36,13 @@ from hydro.crowding import (
     scan_rates_of_bands,
     scan_state,
 )
-from hydro.eos.conversion import make_conversion
+from hydro.eos.conversion import has_voids, make_conversion
 from hydro.formulas.geometry import Geometry
 from hydro.interior.update import compute_rate
 from hydro.perimeter.faces import measure_lines, measure_volume
 from hydro.ranks.blocks import Blocks
 from hydro.ranks.cutting import Rows
 from hydro.rim import find_excess
-from hydro.rows import RHO, P, U, V
 from regrid.errors import BadInput
 from regrid.jit import compiled_once, kernel
 
@@ -153,23 +152,19 @@ def limit_slope(before, after):
 def make_redistribution(eos_class, geometry: Geometry):
     """The kernel `redistribute` of an equation of state and a geometry."""
     conversion = make_conversion(eos_class)
-    to_energy = conversion.to_energy
-    to_state = conversion.to_state
+    read_cell = conversion.read_cell
+    write_cell = conversion.write_cell
     find_volume, find_share = make_measures(geometry)
 
     @compiled_once
-    def fill_conserved(state, void_energy, i, j, part, parameters, first, record):
+    def fill_conserved(held, i, j, part, parameters, first, record):
         """Store a fraction of a cell's state per volume in four rows of its record."""
-        rho = state[RHO, i + 1, j + 1]
-        u = state[U, i + 1, j + 1]
-        v = state[V, i + 1, j + 1]
-        p = state[P, i + 1, j + 1]
-        e = to_energy(rho, p, void_energy[i, j], parameters)
+        rho, u, v, total = read_cell(held, i, j, parameters)
         rho *= part
         record[first, i, j] = rho
         record[first + 1, i, j] = rho * u
         record[first + 2, i, j] = rho * v
-        record[first + 3, i, j] = rho * (e + 0.5 * (u * u + v * v))
+        record[first + 3, i, j] = rho * total
 
     @compiled_once
     def mark_neighbourhoods(small, reaches, marks, record, touched):
@@ -316,35 +311,25 @@ def make_redistribution(eos_class, geometry: Geometry):
         """State redistribution of cells `small` (n, 2) over neighbourhoods `reaches` (ni, nj).
 
         squeezed: (small, reaches); grids: nodes (2, ni + 1, nj + 1) before and after the step;
-        excess (faces,): volume of perimeter cells beyond their straight faces; before: state (4, ni
-        + 2, nj + 2) and void energy (ni, nj); after: these and rates (ni, nj), updated in place;
-        scratch: marks (ni, nj), zero on entry and exit, and records (RECORD_ROWS, ni, nj).  Returns
-        the number of changed cells, their least c², and the increase in the number of cells with
-        voids.
+        excess (faces,): volume of perimeter cells beyond their straight faces; before: the arrays
+        of HELD_ARRAYS that the step started from; after: these and rates (ni, nj), updated in
+        place; scratch: marks (ni, nj), zero on entry and exit, and records (RECORD_ROWS, ni, nj).
+        Returns the number of changed cells, their least c², and the increase in the number of cells
+        with voids.
         """
         small, reaches = squeezed
         nodes, nodes_new = grids
         marks, record = scratch
-        start, start_void_energy = before
-        state, void_energy, rates = after
+        rates = after[-1]
         ni, nj = rates.shape
         touched = [(0, 0)]
         touched.clear()
         mark_neighbourhoods(small, reaches, marks, record, touched)
         voided = 0
         for i, j in touched:
-            voided -= 1 if marks[i, j] == 1 and void_energy[i, j] != 0.0 else 0
-            fill_conserved(state, void_energy, i, j, 1.0, parameters, 0, record)
-            fill_conserved(
-                start,
-                start_void_energy,
-                i,
-                j,
-                1.0 - RELAXED_FRACTION,
-                parameters,
-                KEPT_ROW,
-                record,
-            )
+            voided -= 1 if marks[i, j] == 1 and has_voids(after, i, j) else 0
+            fill_conserved(after, i, j, 1.0, parameters, 0, record)
+            fill_conserved(before, i, j, 1.0 - RELAXED_FRACTION, parameters, KEPT_ROW, record)
             record[VOLUME_RECORD_ROW, i, j] = find_volume(nodes_new, excess, i, j, ni, nj)
             record[LEVER_ROW, i, j] = 0.0
             for q in range(CONSERVED_ROWS):
@@ -363,15 +348,12 @@ def make_redistribution(eos_class, geometry: Geometry):
                 continue
             changed += 1
             gather_shares(i, j, reaches, nodes_new, record, pair, line, total)
-            found = to_state(total[0], total[1], total[2], total[3], parameters)
-            rho, u, v = found[0]
-            p, void_energy[i, j], is_voided, c2 = found[1]
+            rho = total[0]
+            u = total[1] / rho
+            v = total[2] / rho
+            is_voided, c2 = write_cell(after, i, j, rho, u, v, total[3] / rho, parameters)
             voided += 1 if is_voided else 0
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
-            state[RHO, i + 1, j + 1] = rho
-            state[U, i + 1, j + 1] = u
-            state[V, i + 1, j + 1] = v
-            state[P, i + 1, j + 1] = p
             least = min(least, c2)
             xi, yi, xj, yj, area = measure_lines(nodes_new, i, j)
             w_x = w_y = 0.0

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hydro.block import Block
-from hydro.eos.conversion import make_conversion
+from hydro.eos.conversion import add_heat
 from hydro.ranks.blocks import Blocks
 from hydro.rows import HELD_ARRAYS
 from regrid.measure.corners import compute_centres
@@ -76,15 +76,16 @@ class BodySource:
     def _apply(
         self, block: Block, held: list[np.ndarray], t: float, dt: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Add the source over dt to state (4, ni + 2, nj + 2) and void energy (ni, nj) of a block.
+        """Add the source over dt to the arrays `held` of a block, in the order of HELD_ARRAYS.
 
         Returns the acceleration (2, ni, nj) and the block's gain (see `gained`).
         """
         x, y = compute_centres(block.nodes)
         push_x, push_y, heat = self.law(block, x, y, t, dt)
         push = np.array([np.broadcast_to(q, x.shape) for q in (push_x, push_y)])
-        state, void_energy = held
-        rho, u, v, p = state[:, 1:-1, 1:-1]
+        state, *others = held
+        inside = state[:, 1:-1, 1:-1]
+        rho, u, v, _ = inside
         du, dv = np.broadcast_arrays(dt * np.asarray(push_x), dt * np.asarray(push_y))
         mass = rho * block.volume
         work = (u + 0.5 * du) * du + (v + 0.5 * dv) * dv + heat
@@ -92,8 +93,5 @@ class BodySource:
         u += du
         v += dv
         if np.any(heat):
-            conversion = make_conversion(type(block.eos))
-            parameters = block.eos.parameters
-            e = conversion.to_energy(rho, p, void_energy, parameters) + heat
-            p[...], void_energy[...], *_ = conversion.to_pressure(rho, e, parameters)
+            add_heat(block.eos, heat, inside, *others)
         return push, gained

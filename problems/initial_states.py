@@ -20,9 +20,9 @@ import numpy as np
 from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos import EquationOfState, IdealGas, StiffenedGas
+from hydro.eos.conversion import compute_conserved, find_held
 from hydro.eos.materials import find_material
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
-from hydro.remap.conserved import compute_conserved, find_state
 from hydro.simulation import Simulation
 from hydro.step import take_step
 from problems.deck import DeckTable, key
@@ -240,11 +240,11 @@ def mix_states(eos, fraction: np.ndarray, first, second):
     (fraction 0 or 1) keep their state bitwise.
     """
     fraction = np.asarray(fraction, dtype=float)
-    conserved = [compute_conserved(eos, state, 0.0) for state in (first, second)]
+    conserved = [compute_conserved(eos, state) for state in (first, second)]
     mixed = [
         fraction * one + (1.0 - fraction) * other for one, other in zip(*conserved, strict=True)
     ]
-    state, _ = find_state(eos, np.array(mixed))
+    state = find_held(eos, np.array(mixed))["state"]
     return tuple(
         np.where(fraction == 1.0, one, np.where(fraction == 0.0, other, value))
         for value, one, other in zip(state, first, second, strict=True)

@@ -172,7 +172,7 @@ def take_cells(
     found = {"rho": rho, "u": u, "v": v, "p": p}
     for name in fields:
         if name == "e":
-            found["e"] = block.eos.energy(rho, p) + block.void_energy[i, j]
+            found["e"] = block.compute_energy_at(i, j)
         elif name == "c":
             found["c"] = block.eos.sound_speed(rho, p)
     return found

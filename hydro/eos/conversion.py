@@ -1,10 +1,11 @@
 """A cell's state turned into conserved quantities, and back: one text for kernels and for arrays.
 
-A cell holds density, velocity, pressure and void energy.  Material has its tensile strength: where
-the equation of state gives a greater tension, the cell is taken for material with voids at that
-tension, and what its energy is less than that of full material of this pressure and density is kept
-as its void energy (<= 0).  Nothing is reset.  Where the equation of state opens no voids the
-pressure is what it gives (theory F4.10).
+A cell holds density, velocity, pressure and void energy, in the arrays HELD_ARRAYS of `hydro.rows`.
+Only this file and the kernels that load rows of cells know which these are.  Material has its
+tensile strength: where the equation of state gives a greater tension, the cell is taken for
+material with voids at that tension, and what its energy is less than that of full material of this
+pressure and density is kept as its void energy (<= 0).  Nothing is reset.  Where the equation of
+state opens no voids the pressure is what it gives (theory F4.10).
 """
 
 from __future__ import annotations
@@ -13,7 +14,10 @@ import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from hydro.eos.base import make_least_pressure
+import numpy as np
+
+from hydro.eos.base import EquationOfState, make_least_pressure
+from hydro.rows import RHO, P, U, V
 from regrid.jit import choose, inlined
 
 
@@ -27,12 +31,27 @@ class Conversion(NamedTuple):
       energy, each per volume
     - `to_state(mass, momentum_x, momentum_y, total, parameters)`: of these (rho, u, v), then what
       `to_pressure` gives
+
+    In kernels only, of cell (i, j) of a block whose arrays begin the tuple `held`, in the order of
+    HELD_ARRAYS (state with ghosts):
+
+    - `read_cell(held, i, j, parameters)`: rho, u, v and the total energy per mass [J/kg]
+    - `write_cell(held, i, j, rho, u, v, total, parameters)`: stores a cell of these; returns
+      whether the material has voids, and c²
     """
 
     to_energy: Callable[..., Any]
     to_pressure: Callable[..., Any]
     to_conserved: Callable[..., Any]
     to_state: Callable[..., Any]
+    read_cell: Callable[..., Any]
+    write_cell: Callable[..., Any]
+
+
+@inlined
+def has_voids(held, i, j):
+    """Whether cell (i, j) of the arrays `held` of a block has voids (see `Conversion`)."""
+    return held[1][i, j] != 0.0
 
 
 @functools.cache
@@ -76,4 +95,54 @@ def make_conversion(eos_class) -> Conversion:
         e = total / mass - 0.5 * (u * u + v * v)
         return (mass, u, v), to_pressure(mass, e, parameters)
 
-    return Conversion(to_energy, to_pressure, to_conserved, to_state)
+    @inlined
+    def read_cell(held, i, j, parameters):
+        state = held[0]
+        rho = state[RHO, i + 1, j + 1]
+        u = state[U, i + 1, j + 1]
+        v = state[V, i + 1, j + 1]
+        e = to_energy(rho, state[P, i + 1, j + 1], held[1][i, j], parameters)
+        return rho, u, v, e + 0.5 * (u * u + v * v)
+
+    @inlined
+    def write_cell(held, i, j, rho, u, v, total, parameters):
+        p, void_energy, voided, c2 = to_pressure(rho, total - 0.5 * (u * u + v * v), parameters)
+        state = held[0]
+        state[RHO, i + 1, j + 1] = rho
+        state[U, i + 1, j + 1] = u
+        state[V, i + 1, j + 1] = v
+        state[P, i + 1, j + 1] = p
+        held[1][i, j] = void_energy
+        return voided, c2
+
+    return Conversion(to_energy, to_pressure, to_conserved, to_state, read_cell, write_cell)
+
+
+# --- arrays without ghosts: state (4, ...) and void energy (...), in the order of HELD_ARRAYS ---
+
+
+def compute_energy(eos: EquationOfState, state: np.ndarray, void_energy) -> np.ndarray:
+    """Specific internal energies (...) [J/kg]."""
+    return eos.energy(state[RHO], state[P]) + void_energy
+
+
+def compute_conserved(eos: EquationOfState, state: np.ndarray, void_energy=0.0) -> np.ndarray:
+    """Density, momentum x, y and total energy per volume (4, ...)."""
+    to_conserved = make_conversion(type(eos)).to_conserved
+    return np.array(to_conserved(*state, void_energy, eos.parameters))
+
+
+def find_held(eos: EquationOfState, conserved: np.ndarray) -> dict[str, np.ndarray]:
+    """What cells hold, by the names of HELD_ARRAYS, from the result of `compute_conserved`."""
+    to_state = make_conversion(type(eos)).to_state
+    with np.errstate(all="ignore"):
+        (rho, u, v), (p, void_energy, *_) = to_state(*conserved, eos.parameters)
+    return {"state": np.array([rho, u, v, p]), "void_energy": void_energy}
+
+
+def add_heat(eos: EquationOfState, heat, state: np.ndarray, void_energy: np.ndarray) -> None:
+    """Give cells `heat` (...) [J/kg] at constant density, in place; first it closes their voids."""
+    conversion = make_conversion(type(eos))
+    rho, _, _, p = state
+    e = conversion.to_energy(rho, p, void_energy, eos.parameters) + heat
+    p[...], void_energy[...], *_ = conversion.to_pressure(rho, e, eos.parameters)

@@ -106,7 +106,9 @@ def place_traces_on_axis(nodes, nodes_new, start, stop, rim):
 
 def make_fill_polygons(eos_class, geometry: Geometry):
     """Kernel that adds to a new state what cells hold beyond their straight faces."""
-    to_energy, to_pressure, *_ = make_conversion(eos_class)
+    conversion = make_conversion(eos_class)
+    read_cell = conversion.read_cell
+    write_cell = conversion.write_cell
     weigh = geometry.volume
 
     @kernel
@@ -119,53 +121,38 @@ def make_fill_polygons(eos_class, geometry: Geometry):
         the polygon; excess: b of both times, (faces,) each; totals (7,): what this adds, columns as
         in `hydro.rows`.
         """
-        state, void_energy, _ = old
-        state_new, void_energy_new, nodes_new, rates_new, crowding_new = new
+        _, _, nodes_new, rates_new, crowding_new = new
         excess_volume, excess_volume_new = excess
-        ni = state.shape[1] - 2
-        nj = state.shape[2] - 2
+        ni, nj = rates_new.shape
         totals[:] = 0.0
         totals[of.LEAST_C2] = of.NO_C2
         for face in range(excess_volume.shape[0]):
             side, i, j = find_cell(face, ni, nj)
-            old = excess_volume[face]
-            new = excess_volume_new[face]
+            # volumes beyond the straight faces, in a corner of the block those of both its sides
+            beyond = excess_volume[face]
+            beyond_new = excess_volume_new[face]
             if side >= 2 and (i == 0 or i == ni - 1):
                 continue  # a corner cell: done with its other side
             if side < 2 and (j == 0 or j == nj - 1):
                 other = 2 * nj + i if j == 0 else 2 * nj + ni + i
-                old += excess_volume[other]
-                new += excess_volume_new[other]
-            if old == 0.0 and new == 0.0:
+                beyond += excess_volume[other]
+                beyond_new += excess_volume_new[other]
+            if beyond == 0.0 and beyond_new == 0.0:
                 continue
+            # the update's result and the part beyond, mixed by mass
             volume = measure_volume(nodes_new, i, j, weigh)
-            rho = state_new[of.RHO, i + 1, j + 1]
-            u = state_new[of.U, i + 1, j + 1]
-            v = state_new[of.V, i + 1, j + 1]
-            p = state_new[of.P, i + 1, j + 1]
-            rho_old = state[of.RHO, i + 1, j + 1]
-            u_old = state[of.U, i + 1, j + 1]
-            v_old = state[of.V, i + 1, j + 1]
-            p_old = state[of.P, i + 1, j + 1]
-            energy = to_energy(rho, p, void_energy_new[i, j], parameters)
-            energy += 0.5 * (u * u + v * v)
-            energy_old = to_energy(rho_old, p_old, void_energy[i, j], parameters)
-            energy_old += 0.5 * (u_old * u_old + v_old * v_old)
-            held = old * rho_old
+            rho, u, v, energy = read_cell(new, i, j, parameters)
+            rho_old, u_old, v_old, energy_old = read_cell(old, i, j, parameters)
+            held = beyond * rho_old
             mass = volume * rho + held
             u = (volume * rho * u + held * u_old) / mass
             v = (volume * rho * v + held * v_old) / mass
             energy = (volume * rho * energy + held * energy_old) / mass
-            rho = mass / (volume + new)
-            thinner = volume / (volume + new)
+            rho = mass / (volume + beyond_new)
+            _, c2 = write_cell(new, i, j, rho, u, v, energy, parameters)
+            thinner = volume / (volume + beyond_new)
             rates_new[i, j] *= thinner
             crowding_new[i, j] *= thinner * thinner
-            energy -= 0.5 * (u * u + v * v)
-            p, void_energy_new[i, j], _, c2 = to_pressure(rho, energy, parameters)
-            state_new[of.RHO, i + 1, j + 1] = rho
-            state_new[of.U, i + 1, j + 1] = u
-            state_new[of.V, i + 1, j + 1] = v
-            state_new[of.P, i + 1, j + 1] = p
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
             totals[of.LEAST_C2] = totals[of.LEAST_C2] if totals[of.LEAST_C2] < c2 else c2
             totals[of.TOTAL_MASS] += held

@@ -189,8 +189,9 @@ def make_side_kernels(
             next_row(Z, n)
 
     @compiled_once(allocates=False)
-    def predict(state, void_energy, nodes, half_dt, parameters, Z, rim):
+    def predict(old, half_dt, parameters, Z, rim):
         """State at mid-time at the cells' centres, gradients, switches; ghosts must be known."""
+        state, void_energy, nodes = old
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         for side in range(len(SIDE_NAMES)):
@@ -329,10 +330,13 @@ def make_side_kernels(
         mirror_in_walls(rim, walls, speeds)
 
     @kernel(allocates=False)
-    def predict_sides(state, void_energy, nodes, half_dt, parameters, moving, scratch, rim):
-        """With the ghosts known: `predict`, and traces at the faces of the spans `moving`."""
-        spread_ghosts(rim, state)
-        predict(state, void_energy, nodes, half_dt, parameters, scratch[0], rim)
+    def predict_sides(old, half_dt, parameters, moving, scratch, rim):
+        """With the ghosts known: `predict`, and traces at the faces of the spans `moving`.
+
+        old: state, void energy and nodes, as `advance` of `hydro.interior.advance` takes them.
+        """
+        spread_ghosts(rim, old[0])
+        predict(old, half_dt, parameters, scratch[0], rim)
         # at mid-time these faces are half a step further: traced there, not where they were
         trace_moving(rim, half_dt, parameters, moving)
 

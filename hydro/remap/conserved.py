@@ -23,7 +23,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import cKDTree
 
 from hydro.eos import EquationOfState
-from hydro.eos.conversion import make_conversion
+from hydro.eos.conversion import compute_conserved, find_held, make_conversion
 from hydro.remap.overlay import (
     MEAN,
     SLOPE_X,
@@ -132,23 +132,6 @@ PARTS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the slopes, tried in this order
 MOST_SLIVERS = 0.05  # part of a block's volume by which outlines may differ
 
 
-def compute_conserved(eos: EquationOfState, state: np.ndarray, void_energy) -> np.ndarray:
-    """Density, momentum x, y and total energy per volume (4, ...), from rho, u, v, p (4, ...).
-
-    void_energy (...) [J/kg]: what voids take from the internal energy.
-    """
-    to_conserved = make_conversion(type(eos)).to_conserved
-    return np.array(to_conserved(*state, void_energy, eos.parameters))
-
-
-def find_state(eos: EquationOfState, conserved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """rho, u, v, p (4, ...) and the void energy (...) [J/kg] from `compute_conserved`."""
-    to_state = make_conversion(type(eos)).to_state
-    with np.errstate(all="ignore"):
-        (rho, u, v), (p, void_energy, *_) = to_state(*conserved, eos.parameters)
-    return np.array([rho, u, v, p]), void_energy
-
-
 def is_state(eos: EquationOfState, state: np.ndarray) -> np.ndarray:
     """Are rho, u, v, p (4, ...) finite, with a density and a c² above 0?"""
     with np.errstate(all="ignore"):
@@ -184,7 +167,7 @@ def lessen_slopes(eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, c
     """
     means = np.ascontiguousarray(np.moveaxis(fields[..., MEAN], -1, 0))
     slopes = np.ascontiguousarray(np.moveaxis(fields[..., SLOPE_X:], (-1, -2), (0, 1)))
-    state, _ = find_state(eos, means)
+    state = find_held(eos, means)["state"]
     least, greatest = find_bounds(eos, state)
     stiffness = eos.sound_speed_squared_part(state[RHO], state[P], eos.parameters)
     corners = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
@@ -263,15 +246,15 @@ def remap_state(
 ) -> tuple[dict[str, np.ndarray], Slivers]:
     """What the cells of a block hold on a new grid, and the slivers; theory F12.
 
-    held: the arrays of `hydro.rows.HELD_ARRAYS` without ghosts, state (4, ni, nj) and void_energy
-    (ni, nj), on `nodes` (2, ni+1, nj+1); new_nodes (2, mi+1, mj+1).  Returns such arrays.
+    held: the arrays of `hydro.rows.HELD_ARRAYS` by name, without ghosts, (..., ni, nj) each, on
+    `nodes` (2, ni+1, nj+1); new_nodes (2, mi+1, mj+1).  Returns such arrays.
     Raises BadInput, with the block's name, for cells that are not convex and for outlines that
     differ by more than slivers; RunFailure where an average is no state of the material.
     """
     check_convex(name, nodes)
     check_convex(name, new_nodes)
     volumes, centres = compute_cell_moments(nodes, curved)
-    conserved = compute_conserved(eos, held["state"], held["void_energy"])
+    conserved = compute_conserved(eos, **held)
     fields = make_linear_fields(conserved, nodes, centres)
     lessen_slopes(eos, fields, nodes, centres)
     for _ in range(2):
@@ -284,10 +267,10 @@ def remap_state(
                 "grids of one outline can take over each other's state"
             )
         found = np.moveaxis(content / overlay.volumes[..., None], -1, 0)
-        new_state, new_void = find_state(eos, found)
-        bad = ~is_state(eos, new_state)
+        new_held = find_held(eos, found)
+        bad = ~is_state(eos, new_held["state"])
         if not bad.any():
-            return {"state": new_state, "void_energy": new_void}, slivers
+            return new_held, slivers
         fields[..., SLOPE_X:] = 0.0  # averages of states, where those of linear fields fail
     i, j = (int(index) for index in np.argwhere(bad)[0])
     raise RunFailure(

@@ -49,7 +49,7 @@ def test_a_rejected_step_leaves_no_trace_in_the_voids():
     before = block.void_energy.copy()
     flow.flow.source.start_step(0.0, 1e-9)
     assert np.array_equal(block.void_energy, before)
-    assert (block.start_void_energy > before).all()
+    assert (block.get_start("void_energy") > before).all()
 
 
 def test_totals_that_fail_are_named():

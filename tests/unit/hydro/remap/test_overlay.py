@@ -6,8 +6,9 @@ import pytest
 from builders import box, check_budget, march, two_blocks, wall_off
 from hydro.boundary import put
 from hydro.eos import IdealGas
+from hydro.eos.conversion import compute_conserved
 from hydro.formulas.geometry import GEOMETRIES, compute_volumes
-from hydro.remap.conserved import compute_conserved, is_state, remap_means, remap_state
+from hydro.remap.conserved import is_state, remap_means, remap_state
 from hydro.remap.flow import take_over
 from hydro.remap.overlay import compute_cell_moments, lay_over, make_linear_fields
 from hydro.simulation import Simulation

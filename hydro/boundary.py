@@ -260,6 +260,7 @@ class Inflow(Segment):
         rim.e_beyond[:] = eos.energy(rho, p)
         rim.c_beyond[:] = c
         rim.c2_beyond[:] = c * c
+        rim.part_beyond[:] = 1.0
 
 
 class FreeSurface(Segment):

@@ -61,15 +61,22 @@ def count_regridding(flow: Flow) -> dict[str, float | int]:
 
 
 def count_special_cells(flow: Flow) -> dict[str, float | int]:
-    """Numbers of first-order faces, cells with voids, and sliding-contact pieces under tension."""
-    first_order = voided = 0
+    """Numbers of first-order faces, cells with voids, emptied cells, pulled pieces of contacts."""
+    first_order = 0
+    voided = 0
+    emptied = 0
     for block in flow.blocks:
         sums = block.totals.sums
         first_order += int(sums.first_order)
         if block.kernels.is_first_order:  # all of its faces
             first_order += 2 * block.ni * block.nj
         voided += int(sums.voided)
-    row: dict[str, float | int] = {"first_order_faces": first_order, "voided_cells": voided}
+        emptied += int(sums.emptied)
+    row: dict[str, float | int] = {
+        "first_order_faces": first_order,
+        "voided_cells": voided,
+        "emptied_cells": emptied,
+    }
     if flow.exchange.contacts:
         row["pulled_pieces"] = sum(contact.pulled for contact in flow.exchange.contacts)
     return row

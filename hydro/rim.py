@@ -37,11 +37,13 @@ RHO_GHOST, U_GHOST, V_GHOST, P_GHOST, LENGTH_GHOST = _rows(5)
 RHO_HALF, U_HALF, V_HALF, P_HALF = _rows(4)
 RHO_X, RHO_Y, U_X, U_Y, V_X, V_Y, P_X, P_Y = _rows(8)
 X_CELL, Y_CELL, C2, TORN, HLL, ACOUSTIC = _rows(6)
-# traces: where on the faces, state, sound speed, internal energy, c²
+# traces: where on the faces, state, sound speed, internal energy, c², part of it that may leave
 X_TRACE, Y_TRACE = _rows(2)
 RHO_TRACE, U_TRACE, V_TRACE, P_TRACE, C_TRACE, E_TRACE, C2_TRACE = _rows(7)
+PART_TRACE = next(_next)
 # open faces: the state beyond them
 RHO_BEYOND, U_BEYOND, V_BEYOND, P_BEYOND, C_BEYOND, E_BEYOND, C2_BEYOND = _rows(7)
+PART_BEYOND = next(_next)
 # contact states: pressure, speed outwards, velocity, slip
 P_STAR, W_STAR, U_STAR, V_STAR, SLIP = _rows(5)
 # what acts on an impermeable face besides the material beyond: the jump of the pressure by surface

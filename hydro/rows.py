@@ -3,7 +3,7 @@
 State (4, ni + 2, nj + 2), also the first rows of what perimeters hold: RHO, U, V, P [kg/m³, m/s,
 Pa]. Flux (6, faces): MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, per time and depth (or radian). In
 axisymmetric flow the pressure's radial force is not in MOMENTUM_Y but by itself, per depth in PUSH
-and per radian in HOOP (theory F9.5). Totals of a tile (tiles, 7): see below.
+and per radian in HOOP (theory F9.5). Totals of a tile (tiles, 8): see below.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, PUSH, HOOP = range(6)
 FLUX_ROWS = 6
 
 # columns of what a tile of cells adds up to: least c² (negative where there is
-# no sound speed), cells of first order, mass, momentum, energy, cells with voids
+# no sound speed), cells of first order, mass, momentum, energy, cells with voids, emptied cells
 (
     LEAST_C2,
     FIRST_ORDER,
@@ -38,8 +38,9 @@ FLUX_ROWS = 6
     TOTAL_MOMENTUM_Y,
     TOTAL_ENERGY,
     VOIDED,
-) = range(7)
-TOTAL_ROWS = 7
+    EMPTIED,
+) = range(8)
+TOTAL_ROWS = 8
 CONSERVED = slice(TOTAL_MASS, VOIDED)
 MOMENTUM_AND_ENERGY = slice(TOTAL_MOMENTUM_X, VOIDED)
 NO_C2 = 1e300  # least c² of no cell at all

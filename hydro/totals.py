@@ -18,7 +18,8 @@ class Sums(NamedTuple):
     """Sums over the tiles of a block, in the order of the columns of `hydro.rows`.
 
     least_c2: the least c² [m²/s²]; first_order: faces of first order; mass, momentum, energy: per
-    depth, in axisymmetric flow per radian [kg/m, N s/m, J/m; kg, N s, J]; voided: cells with voids.
+    depth, in axisymmetric flow per radian [kg/m, N s/m, J/m; kg, N s, J]; voided: cells with voids;
+    emptied: cells of fragments that have given up almost all of their mass.
     """
 
     least_c2: float
@@ -28,12 +29,13 @@ class Sums(NamedTuple):
     momentum_y: float
     energy: float
     voided: float
+    emptied: float
 
 
 class TileTotals:
-    """Totals of `tiles` tiles: `rows` (tiles + 1, 7), columns as in `hydro.rows`.
+    """Totals of `tiles` tiles: `rows` (tiles + 1, 8), columns as in `hydro.rows`.
 
-    of_tiles: the rows that the update writes; rest: the last row, see above; array (7,): the sums,
+    of_tiles: the rows that the update writes; rest: the last row, see above; array (8,): the sums,
     as kernels and other ranks write them.
     """
 
@@ -50,6 +52,7 @@ class TileTotals:
         self._sums = None
         self.rest[of.LEAST_C2] = of.NO_C2
         self.rest[of.VOIDED] = 0.0
+        self.rest[of.EMPTIED] = 0.0
 
     def add_redistributed(self, least_c2: float, voided: int) -> None:
         """Take in the cells that redistribution has changed: their least c², voids gained."""

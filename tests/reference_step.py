@@ -32,7 +32,7 @@ from reference_sliding import SlidingContact, dot, find_free_speed, solve_contac
 GAUSS = 0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5
 SIDES = ("i_min", "i_max", "j_min", "j_max")
 TINY = 1e-300
-Trace = namedtuple("Trace", "rho u v p e c2 hll acoustic")  # rows of what is traced to faces
+Trace = namedtuple("Trace", "rho u v p e c2 hll acoustic part")  # rows of what is traced to faces
 find_wall_pressure = np.vectorize(riemann.compute_wave_pressure, excluded={3})
 
 
@@ -137,7 +137,7 @@ def fade(jump, calm, strong):
 
 
 def compute_flux(left, right, normal, sweep):
-    """Mass, momentum x and y, energy per time between traces (8, ...), and the pressure in it."""
+    """Mass, momentum x and y, energy per time between traces (9, ...), and the pressure in it."""
     left, right = Trace(*left), Trace(*right)
     square = dot(normal, normal)
     rough = left.hll + right.hll > 0.0
@@ -171,7 +171,12 @@ def compute_flux(left, right, normal, sweep):
         hllc = [*hllc, f + cut * (star - q)]
     amounts[1][4] = 0.5 * (left.rho + right.rho) * (w_r - w_l) / square
     hll = cut_r * simple[0] - cut_l * simple[1] + cut_l * cut_r * (amounts[1] - amounts[0])
-    return np.where(rough, hll / (cut_r - cut_l), np.where(contact >= 0.0, *hllc))
+    flux = np.where(rough, hll / (cut_r - cut_l), np.where(contact >= 0.0, *hllc))
+    donor = Trace(*np.where(flux[0] > 0.0, left, right))
+    total = donor.e + 0.5 * (donor.u**2 + donor.v**2)
+    held = (1.0 - donor.part) * flux[0]  # theory F4.12
+    flux[:4] -= held * np.stack((1.0 + 0.0 * total, donor.u, donor.v, total))
+    return flux
 
 
 class Patch:
@@ -305,7 +310,17 @@ class Patch:
         good = (found[0] > 0.0) & (c2 > 0.0)
         rho, u, v, p = np.where(good, found, self.state)
         e = np.where(torn, self.e, self.eos.energy(rho, p))
-        return np.stack((rho, u, v, p, e, np.where(good, c2, self.c2), self.hll, self.acoustic))
+        part = self.find_leaving_part(rho)
+        c2 = np.where(good, c2, self.c2)
+        return np.stack((rho, u, v, p, e, c2, self.hll, self.acoustic, part))
+
+    def find_leaving_part(self, rho):
+        """The fraction of the flux with which material of a density leaves a cell."""
+        kind = type(self.eos)
+        if not hasattr(kind, "least_density_part"):
+            return np.ones_like(rho)
+        least = kind.least_density_part(self.eos.parameters)
+        return np.clip(rho / least - 1.0, 0.0, 1.0)
 
     def trace_to(self, side):
         """States at the cells' faces on one side of each."""
@@ -473,7 +488,7 @@ class Side:
         rho, u, v, p = (value * ones for value in self.segment.state(t))
         e = eos.energy(rho, p)
         c2 = self.patch.compute_c2(rho, p)
-        return np.stack((rho, u, v, p, e, c2, 0.0 * p, 0.0 * p))
+        return np.stack((rho, u, v, p, e, c2, 0.0 * p, 0.0 * p, ones))
 
     def fill_flux(self, t):
         """Fluxes through the side; t is the mid-time (theory F4.5)."""

@@ -28,7 +28,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from regrid.errors import BadInput
-from regrid.jit import inlined
+from regrid.jit import choose, inlined
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,8 @@ class EquationOfState:
       voids open (see `hydro.interior.update.make_update`)
     - `strength_left_part(rho, parameters)`, optional: the fraction of that tension that fragments
       with gaps between them can bear (`hydro.eos.base`); by default all of it
+    - `least_density_part(parameters)`, optional: the density [kg/m³] down to which fragments leave
+      a cell (`make_leaving_part`); by default they all do
     - `opens_voids`: False if there is no such pressure; the flow kernels then omit voids
 
     Kernels share a division that several formulas contain if all write it as `1.0 / rho`.
@@ -208,6 +210,32 @@ def make_least_pressure(eos_class):
         return least_pressure_part(parameters) * strength_left_part(rho, parameters)
 
     return keep if strength_left_part is None else weaken
+
+
+# of the full density: what is left of a cell of fragments that has emptied
+REMAINING_DENSITY_PART = 1e-9
+
+
+def make_leaving_part(eos_class):
+    """`part(rho, parameters)` of a class: the fraction of its flux with which material of a density
+    leaves a cell, or None without `least_density_part`.
+
+    A cell between fragments that part loses mass to both without end: at 1e-16 of its full density
+    nothing but round-off is left of its energy and sound speed, and the next flux may take more
+    than there is.  Below twice the least density less leaves, below the least nothing.  Theory
+    F4.12.
+    """
+    least_density_part: Any = getattr(eos_class, "least_density_part", None)
+    if least_density_part is None:
+        return None
+
+    @inlined
+    def find_leaving_part(rho, parameters):
+        excess = rho * (1.0 / least_density_part(parameters)) - 1.0
+        part = choose(excess < 1.0, excess, 1.0 + 0.0 * rho)
+        return choose(part > 0.0, part, 0.0 * rho)
+
+    return find_leaving_part
 
 
 SAMPLED_CELLS = 64  # cells of a block that are looked at, besides its extremes

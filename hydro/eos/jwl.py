@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydro.eos.base import EquationOfState, compute_whole_ratio
-from hydro.eos.mie_gruneisen import strength_left
+from hydro.eos.mie_gruneisen import least_density, strength_left
 from regrid.errors import BadInput
 from regrid.jit import inlined
 
@@ -90,6 +90,7 @@ class JWL(EquationOfState):
     sound_speed_squared_part = staticmethod(sound_speed_squared)
     least_pressure_part = staticmethod(least_pressure)
     strength_left_part = staticmethod(strength_left)
+    least_density_part = staticmethod(least_density)
 
     def __post_init__(self):
         self.check_positive()

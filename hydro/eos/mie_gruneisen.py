@@ -10,7 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hydro.eos.base import EquationOfState, compute_strength_left, compute_whole_ratio
+from hydro.eos.base import (
+    REMAINING_DENSITY_PART,
+    EquationOfState,
+    compute_strength_left,
+    compute_whole_ratio,
+)
 from regrid.jit import inlined
 
 RHO0, C0, S, GRUNEISEN, STRENGTH = range(5)  # positions in the parameter tuple
@@ -76,6 +81,12 @@ def strength_left(rho, parameters):
     return compute_strength_left(parameters[RHO0] / rho)
 
 
+@inlined
+def least_density(parameters):
+    """Density [kg/m³] down to which fragments leave a cell."""
+    return REMAINING_DENSITY_PART * parameters[RHO0]
+
+
 @dataclass(frozen=True)
 class MieGruneisen(EquationOfState):
     """Mie–Grüneisen EOS: `rho0` in kg/m³, `c0` in m/s, `s`, `gruneisen` (rho G = rho0 G0) and
@@ -97,6 +108,7 @@ class MieGruneisen(EquationOfState):
     sound_speed_squared_part = staticmethod(sound_speed_squared)
     least_pressure_part = staticmethod(least_pressure)
     strength_left_part = staticmethod(strength_left)
+    least_density_part = staticmethod(least_density)
 
     def __post_init__(self):
         self.check_positive()

@@ -23,7 +23,7 @@ from functools import cached_property
 import numpy as np
 
 from hydro.eos.base import EquationOfState, compute_whole_ratio
-from hydro.eos.mie_gruneisen import least_pressure, strength_left
+from hydro.eos.mie_gruneisen import least_density, least_pressure, strength_left
 from regrid.errors import BadInput
 from regrid.jit import inlined
 from regrid.roots import find_root
@@ -181,6 +181,7 @@ class PhaseTransition(EquationOfState):
     sound_speed_squared_part = staticmethod(sound_speed_squared)
     least_pressure_part = staticmethod(least_pressure)
     strength_left_part = staticmethod(strength_left)
+    least_density_part = staticmethod(least_density)
 
     def __post_init__(self):
         self.check_positive()

@@ -163,6 +163,25 @@ def compute_hll_flux(left, right, face):
     )
 
 
+@inlined
+def withhold(flux, side, part):
+    """A flux of which only a part of the mass leaves the cell that it comes from.
+
+    flux: (mass, momentum x, momentum y, energy, pressure); side: (u, v, e) there; `part`: of
+    `hydro.eos.base.make_leaving_part`.  The pressure acts as it does.
+    """
+    mass, momentum_x, momentum_y, energy, pressure = flux
+    u, v, e = side
+    held = (1.0 - part) * mass
+    return (
+        mass - held,
+        momentum_x - held * u,
+        momentum_y - held * v,
+        energy - held * (e + 0.5 * (u * u + v * v)),
+        pressure,
+    )
+
+
 @compiled_once(allocates=False)
 def compute_wave_pressure(rho, p, c, law, du):
     """Pressure behind a wave that changes the normal velocity by `du`, and its slope in du.

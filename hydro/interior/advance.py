@@ -17,6 +17,7 @@ import numpy as np
 
 from hydro import rim as on
 from hydro import rows as of
+from hydro.eos.base import make_leaving_part
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.formulas.reconstruction import DEFAULT_LIMITER, LOW_MACH
 from hydro.formulas.riemann import DEFAULT_FLUX
@@ -72,13 +73,14 @@ def make_flow_kernels(
     j_faces = at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J
     fill_upwind_i = make_upwind(*i_faces, at.TORN_BEFORE, at.ACOUSTIC_BEFORE, low_mach, opens_voids)
     fill_upwind_j = make_upwind(*j_faces, at.TORN - 1, at.ACOUSTIC - 1, low_mach, opens_voids)
-    fill_flux_i = make_flux(energy, at.AREA_X_I, at.FLUX_I_MASS, pressure_i, opens_voids)
-    fill_flux_j = make_flux(energy, at.AREA_X_J, at.FLUX_J_MASS, pressure_j, opens_voids)
+    voids = opens_voids, make_leaving_part(eos_class)
+    fill_flux_i = make_flux(energy, at.AREA_X_I, at.FLUX_I_MASS, pressure_i, *voids)
+    fill_flux_j = make_flux(energy, at.AREA_X_J, at.FLUX_J_MASS, pressure_j, *voids)
     use_hll_i = make_hll_flux(
-        energy, i_faces, at.HLL_BEFORE, at.TORN_BEFORE, at.FLUX_I_MASS, pressure_i, opens_voids
+        energy, i_faces, at.HLL_BEFORE, at.TORN_BEFORE, at.FLUX_I_MASS, pressure_i, *voids
     )
     use_hll_j = make_hll_flux(
-        energy, j_faces, at.HLL - 1, at.TORN - 1, at.FLUX_J_MASS, pressure_j, opens_voids
+        energy, j_faces, at.HLL - 1, at.TORN - 1, at.FLUX_J_MASS, pressure_j, *voids
     )
     # axisymmetric flow alone
     fill_source_pressure = make_source_pressure(sound)
@@ -122,6 +124,7 @@ def make_flow_kernels(
             Z[at.SUM_Y + k] = 0.0
             Z[at.SUM_ENERGY + k] = 0.0
             Z[at.SUM_VOIDED + k] = 0.0
+            Z[at.SUM_EMPTIED + k] = 0.0
         row = max(0, row0 - 1)
         # the row before the first one is loaded as the current one, then shifted
         if row > 0:
@@ -249,6 +252,7 @@ def make_flow_kernels(
             tile_totals[tile, of.TOTAL_MOMENTUM_Y] += Z[at.SUM_Y + k]
             tile_totals[tile, of.TOTAL_ENERGY] += Z[at.SUM_ENERGY + k]
             tile_totals[tile, of.VOIDED] += Z[at.SUM_VOIDED + k]
+            tile_totals[tile, of.EMPTIED] += Z[at.SUM_EMPTIED + k]
         tile_totals[tile, of.LEAST_C2] = least
 
     @kernel(allocates=False)
@@ -260,7 +264,7 @@ def make_flow_kernels(
         nodes (2, ni + 1, nj + 1).  new: the same three, of which the first two are written, and the
         rates and crowding (ni, nj) of the new cells, theory F7.1, F7.3.  rim: rows of `hydro.rim`
         with the fluxes through the sides and the lengths of the ghosts; scratch (threads, SIZE);
-        tile_totals (tiles, 7): columns as in `hydro.rows`.
+        tile_totals (tiles, 8): columns as in `hydro.rows`.
         """
         for tile in range(tiles[0], tiles[1]):
             advance_tile(old, new, rim, dt, parameters, tile, scratch[0], tile_totals)

@@ -196,12 +196,14 @@ def find_hll(Z, m):
     return first, last
 
 
-def make_flux(energy_part, face, target, pressure_row, opens_voids):
+def make_flux(energy_part, face, target, pressure_row, opens_voids, find_leaving_part=None):
     """Phase that turns the upwind sides of a row of faces into fluxes: second half of HLLC.
 
     Scratch offsets: `face`: the faces' normals; `target`: mass flux (momentum, energy follow);
-    `pressure_row`: where the pressure in them is kept, 0: nowhere.
+    `pressure_row`: where the pressure in them is kept, 0: nowhere.  `find_leaving_part`: of
+    `hydro.eos.base.make_leaving_part`, where emptied cells keep what they have.
     """
+    withholds = find_leaving_part is not None
 
     @compiled_once(allocates=False)
     def fill_flux(Z, n, parameters):
@@ -216,11 +218,16 @@ def make_flux(energy_part, face, target, pressure_row, opens_voids):
                 Z[at.W_SIDE + k], Z[at.FLOW_SIDE + k], Z[at.S_SIDE + k], Z[at.S_CUT + k],
                 Z[at.PUSH + k], Z[at.DRAG + k], Z[at.SQUARE + k],
             )  # fmt: skip
-            mass, momentum_x, momentum_y, energy, pressure = riemann.compute_star_flux(
-                (rho, Z[at.U_SIDE + k], Z[at.V_SIDE + k], p, e),
+            u = Z[at.U_SIDE + k]
+            v = Z[at.V_SIDE + k]
+            flux = riemann.compute_star_flux(
+                (rho, u, v, p, e),
                 wave,
                 (Z[face + k], Z[face + at.SCRATCH_SPAN + k], Z[face + 2 * at.SCRATCH_SPAN + k]),
             )
+            if withholds:
+                flux = riemann.withhold(flux, (u, v, e), find_leaving_part(rho, parameters))
+            mass, momentum_x, momentum_y, energy, pressure = flux
             Z[target + k] = mass
             Z[target + at.SCRATCH_SPAN + k] = momentum_x
             Z[target + 2 * at.SCRATCH_SPAN + k] = momentum_y
@@ -231,7 +238,9 @@ def make_flux(energy_part, face, target, pressure_row, opens_voids):
     return fill_flux
 
 
-def make_hll_flux(energy_part, faces, switch, torn, target, pressure_row, opens_voids):
+def make_hll_flux(
+    energy_part, faces, switch, torn, target, pressure_row, opens_voids, find_leaving_part=None
+):
     """Phase that replaces HLLC fluxes by HLL ones at the faces of cells whose switch is on.
 
     Scratch offsets as in `make_flux`; `faces`: the traced densities on both sides and the normals
@@ -240,6 +249,7 @@ def make_hll_flux(energy_part, faces, switch, torn, target, pressure_row, opens_
     """
 
     left, right, face = faces
+    withholds = find_leaving_part is not None
 
     @compiled_once(allocates=False)
     def use_hll(row, first, last, parameters):
@@ -260,11 +270,19 @@ def make_hll_flux(energy_part, faces, switch, torn, target, pressure_row, opens_
             u_r, v_r = Z[right + at.SCRATCH_SPAN + k], Z[right + 2 * at.SCRATCH_SPAN + k]
             c2_l = Z[left + 4 * at.SCRATCH_SPAN + k]
             c2_r = Z[right + 4 * at.SCRATCH_SPAN + k]
-            mass, momentum_x, momentum_y, energy, pressure = riemann.compute_hll_flux(
+            flux = riemann.compute_hll_flux(
                 (rho_l, u_l, v_l, p_l, e_l, c2_l),
                 (rho_r, u_r, v_r, p_r, e_r, c2_r),
                 (Z[face + k], Z[face + at.SCRATCH_SPAN + k], Z[face + 2 * at.SCRATCH_SPAN + k]),
             )
+            if withholds:
+                from_left = flux[0] > 0.0
+                rho = rho_l if from_left else rho_r
+                u = u_l if from_left else u_r
+                v = v_l if from_left else v_r
+                e = e_l if from_left else e_r
+                flux = riemann.withhold(flux, (u, v, e), find_leaving_part(rho, parameters))
+            mass, momentum_x, momentum_y, energy, pressure = flux
             switch_on = Z[switch + k] + Z[at.HLL + k]
             sharp_mass = Z[target + k]
             sharp_x = Z[target + at.SCRATCH_SPAN + k]

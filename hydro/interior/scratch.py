@@ -94,7 +94,8 @@ MI_X_NEW, MI_Y_NEW, MJ_X_NEW, MJ_Y_NEW, VOLUME_NEW, W_X, W_Y = _rows(7)
 # the new state, rate and crowding of the finished row
 RHO_NEW, U_NEW, V_NEW, P_NEW, VOID_NEW, RATE_NEW, CROWDING_NEW = _rows(7)
 # running extremes and sums over the rows of a tile
-LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY, SUM_VOIDED = _rows(7)
+LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY = _rows(6)
+SUM_VOIDED, SUM_EMPTIED = _rows(2)
 
 SIZE = next(_next) + 1
 

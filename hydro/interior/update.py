@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hydro.eos.base import make_leaving_part
 from hydro.eos.conversion import make_conversion
 from hydro.formulas.geometry import compute_lever, push_outwards, stretch_ring
 from hydro.formulas.reconstruction import compute_line_geometry
@@ -37,6 +38,8 @@ def make_update(eos_class, geometry, finishes, gathers):
     """
     to_pressure = make_conversion(eos_class).to_pressure
     opens_voids = eos_class.opens_voids
+    find_leaving_part = make_leaving_part(eos_class)
+    withholds = find_leaving_part is not None
     weigh = geometry.volume
     curved = geometry.curved
 
@@ -75,6 +78,9 @@ def make_update(eos_class, geometry, finishes, gathers):
                 if opens_voids:
                     Z[at.VOID_NEW + k] = void_energy
                     Z[at.SUM_VOIDED + k] += 1.0 if voided else 0.0
+                if withholds:
+                    part = find_leaving_part(rho, parameters)
+                    Z[at.SUM_EMPTIED + k] += 1.0 if part < 1.0 else 0.0
                 slow = 1e-60 * c2
                 u = u if u * u > slow else 0.0
                 v = v if v * v > slow else 0.0
@@ -175,7 +181,7 @@ def make_update(eos_class, geometry, finishes, gathers):
 
 @kernel
 def sum_tiles(tile_totals, sums):
-    """Sums (7,) of the rows of `tile_totals` (tiles, 7), columns as in `hydro.rows`; c² the least.
+    """Sums (8,) of the rows of `tile_totals` (tiles, 8), columns as in `hydro.rows`; c² the least.
 
     Returns whether all are finite and the least c² is positive.
     """

@@ -133,6 +133,11 @@ def let_pass(rim, k, other, m, beyond, hll, acoustic_weight, curved):
         flux = riemann.compute_hll_flux(inside, outside, face)
     else:
         flux = riemann.compute_hllc_flux(inside, outside, face, acoustic_weight)
+    if flux[0] > 0.0:
+        flux = riemann.withhold(flux, (inside[1], inside[2], inside[4]), rim[on.PART_TRACE, k])
+    else:
+        part = other[on.PART_TRACE + row, m]
+        flux = riemann.withhold(flux, (outside[1], outside[2], outside[4]), part)
     rim[on.MASS, k], rim[on.MOMENTUM_X, k], momentum_y, rim[on.ENERGY, k], pressure = flux
     split_momentum(rim, k, momentum_y, pressure, curved)
 

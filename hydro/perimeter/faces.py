@@ -118,7 +118,7 @@ def make_fill_polygons(eos_class, geometry: Geometry):
         The block's update took every cell for a quadrilateral of volume V; a polygon cell has V +
         b, so (V + b_new) U_new = V U + b U_old, with U the update's result.  old, new: as of
         `hydro.interior.advance`; rates and crowding, those of the quadrilateral, are made those of
-        the polygon; excess: b of both times, (faces,) each; totals (7,): what this adds, columns as
+        the polygon; excess: b of both times, (faces,) each; totals (8,): what this adds, columns as
         in `hydro.rows`.
         """
         _, _, nodes_new, rates_new, crowding_new = new

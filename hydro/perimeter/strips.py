@@ -13,6 +13,7 @@ import functools
 from typing import Any, NamedTuple
 
 from hydro import rim as on
+from hydro.eos.base import make_leaving_part
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.formulas.reconstruction import (
     DEFAULT_LIMITER,
@@ -125,6 +126,8 @@ def make_side_kernels(
     reconstruct = rows.reconstruct
     extrapolate = rows.extrapolate
     fill_faces = make_fill_faces(geometry)
+    find_leaving_part = make_leaving_part(eos_class)
+    withholds = find_leaving_part is not None
 
     @compiled_once(allocates=False)
     def gather(state, nodes, parameters, inwards, Z, rim):
@@ -283,6 +286,7 @@ def make_side_kernels(
             rim[on.E_TRACE, k] = choose_own(energy(rho, p, parameters), torn, torn)
             rim[on.C_TRACE, k] = c2**0.5
             rim[on.C2_TRACE, k] = c2
+            rim[on.PART_TRACE, k] = find_leaving_part(rho, parameters) if withholds else 1.0
 
     @compiled_once(allocates=False)
     def trace_moving(rim, half_dt, parameters, spans):

@@ -22,12 +22,11 @@ from pathlib import Path
 import numpy as np
 
 from regrid import plot3d
-from regrid.algebraic import quasi_1d_grid, transfinite_grid
+from regrid.algebraic import transfinite_grid
 from regrid.barrier.repair import RepairReport, repair_grid
 from regrid.domains import distribute_by_arc_length
-from regrid.errors import BadInput, RegridFailure
+from regrid.errors import BadInput
 from regrid.hdf5_files import open_hdf5
-from regrid.measure.quality import find_bad_cells
 from regrid.sides import SIDE_NAMES, get_side, get_sides
 
 ALIASES = dict(zip(("left", "right", "bottom", "top"), SIDE_NAMES, strict=True))
@@ -380,17 +379,13 @@ def read_structured(path: Path) -> np.ndarray:
 def find_start(boundary: np.ndarray) -> tuple[np.ndarray, str]:
     """A valid grid on the sides of `boundary` and words for it; RegridFailure where none is found.
 
-    Transfinite interpolation, untangled where it is folded; else straight lines of a family.
+    Transfinite interpolation, repaired where it is folded.
     """
-    first = transfinite_grid(boundary)
-    try:
-        repaired = repair_grid(first)
-        return repaired.nodes, f"transfinite interpolation{describe_repair(repaired.report)}"
-    except RegridFailure:
-        for straight in (quasi_1d_grid(boundary, "i"), quasi_1d_grid(boundary, "j")):
-            if len(find_bad_cells(straight)) == 0:
-                return straight, "straight lines"
-        raise
+    repaired = repair_grid(transfinite_grid(boundary))
+    return repaired.nodes, f"transfinite interpolation{describe_repair(repaired.report)}"
+
+
+BEGINNINGS = {"transfinite": " from transfinite interpolation", "quasi-1d": " from straight lines"}
 
 
 def describe_repair(report: RepairReport) -> str:
@@ -399,7 +394,7 @@ def describe_repair(report: RepairReport) -> str:
     if report.projected_nodes:
         words += f", {report.projected_nodes} nodes projected"
     if report.untangled:
-        words += ", untangled"
+        words += f", untangled{BEGINNINGS.get(report.start, '')}"
     if report.excluded_corners:
         words += f", {report.excluded_corners} corner triangles left out"
     return words

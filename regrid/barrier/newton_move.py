@@ -4,7 +4,8 @@
     2 Newton steps from it, shortened where corners would lose too much area (R4.8)
     3 if it lost too much itself: the motion of the sides extended by the old grid's Hessian
     4 if that folds: untangling (R5.1)
-    5 half of the motion of the sides at a time, then a map without folds from any grid (R5.4)
+    5 half of the motion of the sides at a time
+    6 a grid made from the sides alone (R5.4); if the old grid is folded, this is all
 
 If all of this fails, the error names side and nodes.
 """
@@ -12,14 +13,15 @@ If all of this fails, the error names side and nodes.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
-from regrid.algebraic import fill_quasi_1d, transfinite_grid
+from regrid.algebraic import fill_quasi_1d, quasi_1d_grid, transfinite_grid
 from regrid.barrier.side_laws import compute_stiffness
 from regrid.barrier.step_control import shorten_steps
 from regrid.barrier.tuning import Tuning
-from regrid.barrier.untangle import unfold, untangle
+from regrid.barrier.untangle import Unfolding, unfold, untangle
 from regrid.barrier.workspace import Workspace
 from regrid.measure.corners import count_triangles, find_folded_cells
 from regrid.measure.faults import find_impossible
@@ -32,6 +34,13 @@ SLOW_SIDE_FRACTION = 0.3  # of `fast_sides`: slower sides count as at rest
 LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
 
 
+def list_straight_grids(sides: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """Grids (2, ni+1, nj+1) that the sides alone define, with their names; they may be folded."""
+    yield "transfinite", transfinite_grid(sides)
+    yield "quasi-1d", quasi_1d_grid(sides, "i")
+    yield "quasi-1d", quasi_1d_grid(sides, "j")
+
+
 class Folded(Exception):
     """A grid has to be untangled, and how the block is looked at was not chosen for that."""
 
@@ -39,14 +48,23 @@ class Folded(Exception):
 class NewtonMove:
     """One regrid in the workspace's frame: from `work.old` to `work.sides`, into `work.trial`.
 
-    `untangles`: False lets it raise `Folded` where it would untangle.  `begin` (ki, kj and other
-    arguments of `Workspace.begin`) are used at the start of each part.
+    `untangles`: False lets it raise `Folded` where it would untangle; `repairs`: the old grid is
+    folded.  `begin` (ki, kj and other arguments of `Workspace.begin`) are used at the start of each
+    part.
     """
 
-    def __init__(self, tuning: Tuning, work: Workspace, untangles: bool = True, **begin):
+    def __init__(
+        self,
+        tuning: Tuning,
+        work: Workspace,
+        untangles: bool = True,
+        repairs: bool = False,
+        **begin,
+    ):
         self.tuning = tuning
         self.work = work
         self.untangles = untangles
+        self.repairs = repairs
         self.arguments = begin
         self.iterations = self.rescues = self.sub_moves = 0
         self.residual = 0.0
@@ -137,6 +155,8 @@ class NewtonMove:
         if work.sides is not work.own_sides:  # the displaced grid may share its array
             copy_sides(work.sides, work.own_sides)
             work.sides = work.own_sides
+        if self.repairs:
+            return self._make_anew()
         if self._advance():
             return True
         begin = work.old.copy()
@@ -161,39 +181,92 @@ class NewtonMove:
                 self.strayed = np.inf
                 return True
         work.keep_own(begin, end)
-        return self._unfold()
+        return self._make_anew()
 
-    def _unfold(self) -> bool:
-        """The last resort (theory R5.4), unless the boundary alone rules out a valid grid."""
+    def _make_anew(self) -> bool:
+        """A grid for the sides alone, which no motion leads to: the first that steps can settle.
+
+        It starts from a grid without folds that the sides define, else from one that unfolds
+        (theory R5.4).  Where none settles, the one closest to it is taken.
+        """
         self._check_look()
         work = self.work
-        if work.ni == 1 or work.nj == 1 or find_impossible(work.sides) is not None:
+        if work.ni == 1 or work.nj == 1:
             return False
+        self.rescues += 1
+        self.sub_moves = 0
+        self.residual = 0.0
+        self.strayed = np.inf
         broken = self.broken
-        self.quality = None
-        self.triangles = -1
         self._begin()
         work.look()
-        straight = transfinite_grid(work.sides)
-        for start in (work.base.copy(), straight, None):
-            found = straight.copy() if start is None else start
-            if unfold(work, found, self.tuning, spread_out=start is None):
-                break
-        else:
-            self.broken = broken
-            return False
-        self.ratio = np.inf
-        self.sub_moves = 0
-        self.rescues += 1
-        self.start = "untangled"
-        self.strayed = np.inf
-        work.trial[:] = found
-        self._polish(0.0, self.tuning.most_polish)
-        if not self.broken and self._accept(work.compare_corners(work.trial, work.old)):
+        displaced = work.base.copy()
+        for start, nodes in list_straight_grids(work.sides):
+            if not find_folded_cells(nodes).size:
+                self.start = start
+                self._settle(nodes)
+                return self._accept_anew()
+        if find_impossible(work.sides) is None and self._settle_unfolded(displaced):
             return True
+        work.trial[:] = displaced
+        self.broken = broken
+        return False
+
+    def _settle_unfolded(self, displaced: np.ndarray) -> bool:
+        """Unfold a grid and settle it; True when `work.trial` is valid."""
+        work = self.work
+        self.start = "untangled"
+        straight = transfinite_grid(work.sides)
+        best: np.ndarray | None = None
+        least = np.inf
+        for begin, way in (
+            (straight, Unfolding.STRAIGHT),
+            (straight, Unfolding.GRADED_SPREAD),
+            (straight, Unfolding.GRADED),
+            (displaced, Unfolding.GRADED),
+            (displaced, Unfolding.EVEN),
+            (straight, Unfolding.EVEN),
+            (straight, Unfolding.EVEN_SPREAD),
+        ):
+            found = begin.copy()
+            self._begin()
+            if not unfold(work, found, self.tuning, way):
+                continue
+            error = self._settle(found)
+            if best is None or error < least:
+                best = work.trial.copy()
+                least = error
+            if error <= self.tuning.settled:
+                break
+        if best is None:
+            return False
+        work.trial[:] = best
         self.broken = False
-        work.trial[:] = found
-        return self._accept(work.compare_corners(found, work.old))
+        return self._accept_anew()
+
+    def _settle(self, nodes: np.ndarray) -> float:
+        """Steps from valid nodes (2, ni+1, nj+1) into `work.trial`; the residual left, in cells.
+
+        Where the steps fail, the nodes themselves and infinity.
+        """
+        work = self.work
+        work.trial[:] = nodes
+        self.broken = False
+        self.quality = None
+        self.triangles = -1
+        self._polish(0.0, self.tuning.most_settling)
+        if self.broken or find_folded_cells(work.trial).size:
+            self.broken = False
+            work.trial[:] = nodes
+            return np.inf
+        return self.error
+
+    def _accept_anew(self) -> bool:
+        """`_accept` of `work.trial`, against itself where the grid before is folded."""
+        work = self.work
+        old = work.trial if self.repairs else work.old
+        self.ratio = np.inf
+        return self._accept(work.compare_corners(work.trial, old))
 
     def _check_look(self) -> None:
         if not self.untangles:

@@ -190,9 +190,19 @@ class BarrierRegridder:
         return replace(result, nodes=nodes)
 
     def _move(
-        self, previous, boundary, sound_speed, least_limiting_rate, into, untangles: bool
+        self,
+        previous,
+        boundary,
+        sound_speed,
+        least_limiting_rate,
+        into,
+        untangles: bool,
+        repairs: bool = False,
     ) -> RegridResult:
-        """`regrid` of checked arrays; raises `_NoGrid`, and `Folded` unless it `untangles`."""
+        """`regrid` of checked arrays; raises `_NoGrid`, and `Folded` unless it `untangles`.
+
+        `repairs`: the previous grid is folded.
+        """
         weights, transposed = self._weigh(boundary)
         ki, kj = (weights[1], weights[0]) if transposed else (weights[0], weights[1])
         mirrored = (compute_area(previous) < 0.0) != transposed
@@ -200,8 +210,8 @@ class BarrierRegridder:
         work.take(previous, boundary, transposed, mirrored, sound_speed, into)
         work.least_limiting_rate = least_limiting_rate
         move = NewtonMove(
-            self.tuning, work, untangles, conditional=self.conditional, ki=float(ki), kj=float(kj),
-            cost=sound_speed is not None, curved=self.curved,
+            self.tuning, work, untangles, repairs, conditional=self.conditional, ki=float(ki),
+            kj=float(kj), cost=sound_speed is not None, curved=self.curved,
         )  # fmt: skip
         simple = work.block.area > 0.0 and (self.meets_itself or work.is_simple)
         if not (simple and move.is_settled()):
@@ -241,9 +251,10 @@ class BarrierRegridder:
         given = before, after, sound, least_limiting_rate
         if self.bend is not None:
             self._workspace(before.shape, False).take_laws(turn_bend(look.turn, self.bend))
+        repairs = not is_convex(before)
         try:
             result = self._move_evenly(look, *given) if look.same else None
-            result = result or self._move(*given, None, untangles=True)
+            result = result or self._move(*given, None, untangles=True, repairs=repairs)
         except _NoGrid as end:
             raise explain_failure(boundary, *end.turn_back(look)) from None
         finally:

@@ -4,12 +4,13 @@
     exclusion    triangles that no inner node can make positive (`regrid.measure.corners`)
     projection   an inner node that makes a corner of more than 180 degrees moves to the segment
                  between its two neighbours in that cell, and slightly beyond (theory R7.1)
-    untangling   the barrier on a smoothed denominator (`regrid.barrier.untangle`)
+    regridding   what the barrier regridder makes of a folded grid at rest: a grid that the sides
+                 alone define, or untangling (`regrid.barrier.newton_move`)
 
 The nodes of the sides do not move.  All repairs are counted.  Note: projection repairs one node at
 a time and may only move the fold to the next cell.  It is accepted if it leaves fewer bad corners
-around the node.  Cells that are still folded after a few rounds are untangled, which moves every
-inner node.
+around the node.  A grid with cells that are still folded after a few rounds is regridded, which
+moves every inner node.
 
 Source: [ProkopovND] §5; theory R5, R7.
 """
@@ -20,9 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrid.barrier.side_laws import fill_family_weights
-from regrid.barrier.untangle import untangle
-from regrid.barrier.workspace import Workspace
+from regrid.barrier.regridder import BarrierRegridder
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.corners import (
     TRIANGLES,
@@ -33,7 +32,7 @@ from regrid.measure.corners import (
 )
 from regrid.measure.crossings import find_crossing
 from regrid.measure.faults import explain_failure
-from regrid.sides import compute_area, copy_sides
+from regrid.sides import compute_area
 
 MOST_PROJECTION_ROUNDS = 20  # of projection
 # how far a projected node goes past the segment, over the segment's length
@@ -45,13 +44,15 @@ NAMED_CELLS = 8
 @dataclass(frozen=True)
 class RepairReport:
     """What a grid needed: bad cells before, corner triangles left out because no inner node can
-    turn them, nodes projected, whether the whole grid was untangled.
+    turn them, nodes projected, whether the whole grid was made anew, and then from what
+    (`RegridReport.start`).
     """
 
     bad_cells: int
     excluded_corners: int
     projected_nodes: int
     untangled: bool
+    start: str = ""
 
 
 @dataclass(frozen=True)
@@ -80,13 +81,13 @@ def repair_grid(nodes: np.ndarray, project: bool = True) -> Repaired:
     bad = find_folded_cells(nodes, excluded)
     before = len(bad)
     projected = 0
-    untangled = False
+    start = ""
     if len(bad) and project and len(bad) <= max(4, LOCAL_FOLD_FRACTION * excluded[0].size):
         projected = project_nodes(nodes, excluded)
         bad = find_folded_cells(nodes, excluded)
     if len(bad):
         if find_crossing(nodes) is None and min(nodes.shape[1:]) > 2 and not is_collapsed(excluded):
-            untangled = _untangle(nodes)
+            start = _regrid(nodes)
         bad = find_folded_cells(nodes, excluded)
     if len(bad):
         named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
@@ -100,7 +101,7 @@ def repair_grid(nodes: np.ndarray, project: bool = True) -> Repaired:
         raise explain_failure(nodes, nodes, also=also, grid=nodes[flip])
     if before and find_crossing(nodes) is not None:
         raise explain_failure(nodes, grid=nodes[flip])
-    report = RepairReport(before, int(excluded.sum()), projected, untangled)
+    report = RepairReport(before, int(excluded.sum()), projected, bool(start), start)
     return Repaired(np.ascontiguousarray(nodes[flip]), report)
 
 
@@ -154,17 +155,11 @@ def _count_wrong(nodes, excluded, p: int, q: int) -> int:
     return int(((signs <= 0) & ~excluded[:, p - 1 : p + 1, q - 1 : q + 1]).sum())
 
 
-def _untangle(nodes: np.ndarray) -> bool:
-    """Untangle a grid in place by the barrier; True where that was done."""
-    weights = np.empty(2)
-    fill_family_weights(nodes, weights)
-    turned = bool(weights[1] > weights[0])
-    view = nodes.transpose(0, 2, 1)[::-1] if turned else nodes
-    work = Workspace(view.shape[1] - 1, view.shape[2] - 1, 1)
-    work.base[:] = view
-    copy_sides(view, work.sides)
-    work.begin(True, float(weights.max()), float(weights.min()))
-    if not untangle(work, work.base):
-        return False
-    view[:] = work.base
-    return True
+def _regrid(nodes: np.ndarray) -> str:
+    """Regrid a folded grid in place on its own sides; how it was begun, "" where none was found."""
+    try:
+        result = BarrierRegridder().regrid(nodes, nodes)
+    except RegridFailure:
+        return ""
+    nodes[:] = result.nodes
+    return result.report.start

@@ -42,6 +42,7 @@ class Tuning:
     more_steps: int = 6  # R4.8, step 3: at most, after the first
     most_polish: int = 15  # R4.8, step 3: at most, after untangling,
     settled: float = 5e-3  # R4.8, step 3: until the residual in cells is below this
+    most_settling: int = 60  # R5.4: Newton steps of a grid that no motion leads to, at most
     most_halvings: int = 6  # R4.8, step 4: of the sides' motion
     # untangling
     untangle_tolerance: float = 0.2  # R5.2: of a step's solve

@@ -10,6 +10,8 @@ has its greatest weight everywhere.
 
 from __future__ import annotations
 
+from enum import Enum
+
 import numpy as np
 
 from regrid.barrier import assembly as at
@@ -154,18 +156,33 @@ def untangle(work, nodes, tuning: Tuning = DEFAULT) -> bool:
     return found is not None
 
 
-def unfold(work, nodes, tuning: Tuning, spread_out: bool) -> bool:
-    """Unfold `nodes` (2, ni+1, nj+1) in place without straight lines and spacings (theory R5.4).
+class Unfolding(Enum):
+    """How a grid is unfolded that nothing near is known of (theory R5.4).
 
-    Their sides are set first; with `spread_out` a nearly harmonic map is where it begins.
+    STRAIGHT: with straight lines, by `untangle`; GRADED: without them, every edge with the length
+    that the sides ask for; EVEN: with two lengths for all.  With SPREAD the grid is a nearly
+    harmonic map at first.
     """
+
+    STRAIGHT = 0
+    GRADED_SPREAD = 1
+    GRADED = 2
+    EVEN = 3
+    EVEN_SPREAD = 4
+
+
+def unfold(work, nodes, tuning: Tuning, way: Unfolding) -> bool:
+    """Unfold `nodes` (2, ni+1, nj+1) in place, their sides set first; True where that is done."""
     copy_sides(work.sides, nodes)
+    if way is Unfolding.STRAIGHT:
+        return untangle(work, nodes, tuning)
     law = work.law
     area_target = work.area_target
-    work.law = make_free_law(work)
+    graded = way in (Unfolding.GRADED, Unfolding.GRADED_SPREAD)
+    work.law = make_graded_law(work) if graded else make_even_law(work)
     work.area_target = 1.0
     solve = tuning.exact_tolerance, FREE_SOLVE
-    if spread_out:
+    if way in (Unfolding.GRADED_SPREAD, Unfolding.EVEN_SPREAD):
         spread = WIDE_BARRIER_FACTOR * max(1.0, -work.compute_energy(nodes, 1.0)[1])
         energy = work.compute_energy(nodes, spread)[0]
         for _ in range(ROUND_STEPS):
@@ -176,7 +193,7 @@ def unfold(work, nodes, tuning: Tuning, spread_out: bool) -> bool:
     return found is not None
 
 
-def make_free_law(work):
+def make_even_law(work):
     """The law of (R5.4): two lengths for the whole block, no straight lines; D is 1 in the mean."""
     mean = [
         sum(np.hypot(*np.diff(side, axis=1)).sum() for side in sides) / count
@@ -193,6 +210,19 @@ def make_free_law(work):
     return work.law._replace(
         along_i=along[0], along_j=along[1], ki=0.0, kj=0.0, curved=False, area_target=1.0,
         epsilon=1.0, area_weight=1.0, cost_weight=0.0,
+    )  # fmt: skip
+
+
+def make_graded_law(work):
+    """The same with the conditional lengths of all edges, scaled so that D is 1 in the mean."""
+    scale = np.sqrt(work.law.area_target)
+    along = [np.array(laws) for laws in (work.along_i, work.along_j)]
+    for laws in along:
+        laws[[LENGTH, LENGTH_CHANGE]] *= scale
+        laws[GROWTH] = 1.0
+    return work.law._replace(
+        along_i=along[0], along_j=along[1], ki=0.0, kj=0.0, curved=False, bent=False,
+        area_target=1.0, epsilon=1.0, area_weight=1.0, cost_weight=0.0,
     )  # fmt: skip
 
 

@@ -51,7 +51,7 @@ from regrid.hexahedra.faces import (
     compute_face_density,
     compute_volume,
     copy_faces,
-    fill_blended,
+    fill_from_faces,
     find_unit_in_space,
 )
 from regrid.hexahedra.functional import cross, dot
@@ -540,8 +540,8 @@ def is_valid(nodes: np.ndarray, sign: float = 1.0) -> bool:
 def interpolate_faces(nodes: np.ndarray) -> np.ndarray:
     """A copy of `nodes` (3, ...), its interior interpolated from the six faces (Boolean sum)."""
     found = np.array(nodes, dtype=np.float64, order="C")
-    laws = (np.tile(np.linspace(0.0, 1.0, n), (2, 2, 1)) for n in found.shape[1:])
-    fill_blended(found, *laws, np.empty((3, found.shape[3])))
+    laws = [np.tile(np.linspace(0.0, 1.0, n), (2, 2, 1)) for n in found.shape[1:]]
+    fill_from_faces(found, laws)
     return found
 
 

@@ -10,6 +10,7 @@ Source: theory R14.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -288,6 +289,14 @@ def copy_faces(source: np.ndarray, target: np.ndarray) -> None:
             get_face(target, axis, end)[:] = get_face(source, axis, end)
 
 
+def fill_from_faces(nodes: np.ndarray, laws: Sequence[np.ndarray]) -> None:
+    """Interpolate the interior of `nodes` (3, n1+1, n2+1, n3+1) between its faces, in place.
+
+    A Boolean sum; `laws` as `compute_laws` gives them.
+    """
+    fill_blended(nodes, *laws, np.empty((3, nodes.shape[3])))
+
+
 def carry_faces(previous: np.ndarray, boundary: np.ndarray, out: np.ndarray) -> None:
     """Fill `out` with the grid `previous` moved along with the faces of `boundary` (R14.8)."""
     before = gather_faces(previous)
@@ -302,7 +311,7 @@ def carry_faces(previous: np.ndarray, boundary: np.ndarray, out: np.ndarray) -> 
         for end in (0, -1):
             rest = get_face(boundary, axis, end) - get_face(moved, axis, end)
             get_face(out, axis, end)[:] = rest
-    fill_blended(out, *compute_laws(previous), np.empty((3, out.shape[3])))
+    fill_from_faces(out, compute_laws(previous))
     out += moved
     copy_faces(boundary, out)
 

@@ -23,9 +23,11 @@ from regrid.hexahedra.faces import (
     check_grids_in_space,
     compute_face_laws,
     compute_family_weights,
+    compute_laws,
     compute_volume,
     copy_faces,
     explain_failure,
+    fill_from_faces,
     find_turned_edge,
     find_unit_in_space,
 )
@@ -61,6 +63,7 @@ HOVERING_FLOORS = 1.3
 DEEP_SOLVE_FLOORS = 0.2
 SMOOTH_FLOOR = 0.3  # floors: a smooth part below this is ignored
 ROUND_OFF_STEP = 1e-12
+MOST_SETTLING = 60  # Newton steps of a grid that no motion leads to, until the same
 MOST_MOTION_HALVINGS = 6  # the motion is divided into at most 2**6 parts
 MOST_UNTANGLING = 60  # steps
 MOST_RESCUES = 8  # of one regrid, in all parts of its motion
@@ -119,6 +122,7 @@ class HexahedraMove(Workspace):
         self.error = 0.0
         self.ratio = np.inf
         self.moved = False
+        self.repairs = False  # whether the old grid is folded
         self.start = "displacement"
 
     @property
@@ -139,6 +143,8 @@ class HexahedraMove(Workspace):
             return True
         if find_turned_edge(self.faces) is not None:
             return False  # no interior makes that corner positive
+        if self.repairs:
+            return self._make_anew()
         begin = self.old.copy()
         end = self.faces.copy()
         for halving in range(1, MOST_MOTION_HALVINGS + 1):
@@ -155,7 +161,55 @@ class HexahedraMove(Workspace):
                 self.sub_moves = parts - 1
                 self.start = "halved"
                 return True
-        return False
+        self.old = begin
+        self.faces = end
+        return self._make_anew()
+
+    def _make_anew(self) -> bool:
+        """A grid for the faces alone, which no motion leads to: the first that steps can settle.
+
+        It starts from the grid interpolated between the faces, unfolded if necessary; where that
+        cannot be done, from the displaced grid.  Where none settles, the one closest to it is
+        taken.  True if `trial` is valid.
+        """
+        self.laws = compute_face_laws(self.faces, self.weights, self.options.conditional)
+        carry_faces(self.old, self.faces, self.base)
+        displaced = self.base.copy()
+        interpolated = np.empty_like(self.faces)
+        copy_faces(self.faces, interpolated)
+        fill_from_faces(interpolated, compute_laws(self.faces))
+        best = displaced
+        least_error = np.inf
+        self.rescues = 1
+        self.sub_moves = 0
+        for start in (interpolated, displaced):
+            self.trial[:] = start
+            self.start = "transfinite"
+            if not self._compare(self.trial)[1] > 0.0 and not self._untangle():
+                continue
+            error = self._settle()
+            if error < least_error:
+                best = self.trial.copy()
+                least_error = error
+            if error <= SETTLED_MOVE:
+                break
+        self.trial[:] = best
+        if self.repairs:
+            self.old = best
+        self.ratio = np.inf
+        return self._accept()
+
+    def _settle(self) -> float:
+        """Newton steps from the valid `trial`; returns the residual left, in cells."""
+        self.residual = 0.0
+        for _ in range(MOST_SETTLING):
+            base = self.trial.copy()
+            ratio = self._newton(base)
+            if ratio > SMOOTH_RATIO and self.error <= SETTLED_MOVE:
+                break
+            if (self.trial == base).all():
+                break
+        return self.error if self._compare(self.trial)[1] > 0.0 else np.inf
 
     def _advance(self) -> bool:
         """One part of the motion, from `old` to `faces`; True if `trial` is valid."""
@@ -177,6 +231,9 @@ class HexahedraMove(Workspace):
                 self.ratio = min(self.ratio, moved)
                 return least > 0.0
         else:
+            self.repairs = not self._compare(self.old)[1] > 0.0
+            if self.repairs:
+                return False
             predicted = self._predict(moved)
             if predicted is None:
                 return False

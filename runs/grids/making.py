@@ -228,7 +228,7 @@ def regrid(
     weight: str | None = None,
     **options: Any,
 ) -> Grid:
-    """A grid regenerated on its own sides; a plane one that is not valid is untangled first.
+    """A grid regenerated on its own sides; one that is not valid is untangled first.
 
     grid: nodes (2 or 3, ...), a `Grid`, or a file.  Other arguments and what is raised: `make`.
     """
@@ -370,14 +370,26 @@ def _least_sine(nodes: np.ndarray) -> float:
 
 
 def regrid_space(nodes: np.ndarray, law, options: Mapping[str, Any]) -> Grid:
-    """A user's grid in space equidistributed inside its own faces; valid grids only."""
+    """A user's grid in space equidistributed inside its own faces; untangled first if it has to."""
     if options.get("sides"):
         raise BadInput("--option sides: the faces of a grid from a file stay as they are")
+    bad = len(_find_bad_in_space(nodes))
     try:
-        found = volumes.solve_ed3(nodes, law, **{k: v for k, v in options.items() if k != "sides"})
+        start = BarrierRegridder3D().regrid(nodes, nodes).nodes if bad else nodes
+        found = volumes.solve_ed3(start, law, **{k: v for k, v in options.items() if k != "sides"})
     except RegridFailure as failure:
         return Grid(nodes, [], str(failure))
-    return _describe_ed3(found, law)
+    made = _describe_ed3(found, law)
+    if bad:
+        made.notes.insert(0, f"started from the given grid with {bad} bad cells, untangled")
+    return made
+
+
+def _find_bad_in_space(nodes: np.ndarray) -> np.ndarray:
+    """Cells (n, 3) with a corner that is not positive, whichever way round the grid goes."""
+    bad = hexahedra.find_bad_hexahedra(nodes)
+    other = hexahedra.find_bad_hexahedra(nodes[::-1]) if len(bad) else bad
+    return min(bad, other, key=len)
 
 
 def make_spatial_law(options: Mapping[str, Any], weight: str | None) -> Any:
@@ -392,9 +404,9 @@ def make_spatial_law(options: Mapping[str, Any], weight: str | None) -> Any:
 
 
 def _describe_ed3(found: volumes.Equidistributed, law) -> Grid:
-    bad = hexahedra.find_bad_hexahedra(found.nodes)
+    bad = _find_bad_in_space(found.nodes)
     failure = None
-    if len(bad) and len(hexahedra.find_bad_hexahedra(found.nodes[::-1])):
+    if len(bad):
         failure = f"cells {name_cells(bad, 8)} have corners that are not positive"
     first = found.spreads[0]
     last = found.spreads[found.best]

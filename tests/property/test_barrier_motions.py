@@ -10,7 +10,7 @@ from builders import unit_steps
 from regrid.algebraic import transfinite_grid
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.barrier.tuning import DEFAULT
-from regrid.barrier.untangle import unfold
+from regrid.barrier.untangle import Unfolding, unfold
 from regrid.barrier.workspace import Workspace
 from regrid.domains import make_domain
 from regrid.errors import RegridFailure
@@ -121,7 +121,8 @@ def unfold_from(start, sides):
     work.sides[:] = sides
     work.begin(True, 1.0, 0.0)
     nodes = transfinite_grid(sides) if start is None else start
-    return unfold(work, nodes, DEFAULT, spread_out=start is None)
+    way = Unfolding.EVEN_SPREAD if start is None else Unfolding.EVEN
+    return unfold(work, nodes, DEFAULT, way)
 
 
 @pytest.mark.parametrize("turned", [False, True])

@@ -5,7 +5,7 @@ The main files are in the folder itself: `block`, `step`, `clock`, `ledger`, `hi
 file imports only those to its left:
 
     formulas, eos <- interior, perimeter <- block <- ranks <- boundary, crowding <- small_cells
-    <- sliding <- links <- motion, sources <- step <- history <- simulation
+    <- facets, sliding <- links <- motion, sources <- step <- history <- simulation
 
 All of them may import `regrid`; `convection` is independent of the others.
 """

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.contacts.rows import (
+from hydro.facets.lines import find_curve_normal, find_point, measure_square, project
+from hydro.facets.rows import (
     AREA_X,
     AREA_Y,
     FACE_X,
@@ -26,8 +27,6 @@ from hydro.contacts.rows import (
     NORMAL_Y,
     SWEPT_RATE,
 )
-from hydro.formulas.geometry import compute_radius_weighted_face
-from hydro.sliding.pieces import compute_normal_at, measure_square, project
 from regrid.jit import compiled_once, kernel
 from regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
 
@@ -301,13 +300,15 @@ def lie_near(points, first, stop, line, a):
 
 
 @kernel
-def fill_facets(leader, follower, positions, back_positions, straight, pins, covered, owners, ends):
+def fill_facets(leader, follower, positions, back_positions, straight, pins, covered, facets):
     """Facets between the pins, by their positions on both lines (see `merge_pins`); how many.
 
-    Fills `owners` (2, n) and `ends` (4, n).  straight: the leader is a plane, whose face goes on.
+    Fills their owners and ends.  straight: the leader is a plane, whose face goes on.
     covered (m + 1,): set for the leader's nodes that lie between pins on one face of the follower.
     """
-    facets = 0
+    owners = facets.owners
+    ends = facets.ends
+    found = 0
     count = merge_pins(back_positions, positions, pins)
     last = leader.shape[1] - 2
     last_follower = follower.shape[1] - 2
@@ -326,13 +327,13 @@ def fill_facets(leader, follower, positions, back_positions, straight, pins, cov
         if high > b + 1.0 or not faces_each_other(leader, a, along_x, along_y):
             continue
         if straight or stop <= a + 1.0:
-            owners[LEADER, facets] = a
-            owners[FOLLOWER, facets] = b
-            ends[LEADER_START, facets] = start
-            ends[LEADER_STOP, facets] = stop
-            ends[FOLLOWER_START, facets] = high
-            ends[FOLLOWER_STOP, facets] = low
-            facets += 1
+            owners[LEADER, found] = a
+            owners[FOLLOWER, found] = b
+            ends[LEADER_START, found] = start
+            ends[LEADER_STOP, found] = stop
+            ends[FOLLOWER_START, found] = high
+            ends[FOLLOWER_STOP, found] = low
+            found += 1
         elif lie_near(leader, a + 1, int(stop - SNAPPED_FACE_PART) + 1, follower, b):
             here = start
             other = high
@@ -344,45 +345,30 @@ def fill_facets(leader, follower, positions, back_positions, straight, pins, cov
                     covered[node] = True
                     part, _ = project(follower, b, leader[0, node], leader[1, node])
                     next_other = max(low, min(other, b + part))
-                owners[LEADER, facets] = int(here)
-                owners[FOLLOWER, facets] = b
-                ends[LEADER_START, facets] = here
-                ends[LEADER_STOP, facets] = there
-                ends[FOLLOWER_START, facets] = other
-                ends[FOLLOWER_STOP, facets] = next_other
-                facets += 1
+                owners[LEADER, found] = int(here)
+                owners[FOLLOWER, found] = b
+                ends[LEADER_START, found] = here
+                ends[LEADER_STOP, found] = there
+                ends[FOLLOWER_START, found] = other
+                ends[FOLLOWER_STOP, found] = next_other
+                found += 1
                 here = there
                 other = next_other
-    return facets
-
-
-@compiled_once
-def find_point(line, a, position):
-    """Point of face `a` of a line at a position."""
-    part = position - a
-    return (
-        line[0, a] + part * (line[0, a + 1] - line[0, a]),
-        line[1, a] + part * (line[1, a + 1] - line[1, a]),
-    )
-
-
-@compiled_once
-def find_curve_normal(line, a, part):
-    """Normal, of length 1 or a little less, of the curve for which a line stands, in face `a`."""
-    start_x, start_y = compute_normal_at(line, a, 0, False, 1.0)
-    end_x, end_y = compute_normal_at(line, a, 1, False, 1.0)
-    return start_x + part * (end_x - start_x), start_y + part * (end_y - start_y)
+    return found
 
 
 @kernel
-def measure_facets(line, other, rigid, moved, inverse_dt, owners, ends, count, faces):
-    """Fill `faces` (7, facets): rows as of a perimeter's faces, outwards of the leader; normal.
+def measure_facets(line, other, rigid, moved, inverse_dt, facets, count):
+    """Fill the facets' `faces`: rows as of a perimeter's faces, outwards of the leader; normal.
 
-    line (2, m + 1): the leader at mid-time; moved: its nodes' displacements; the normal is the mean
-    of those of both curves, or a rigid leader's own.
+    line (2, m + 1): the leader at mid-time; other (2, n + 1): the follower; moved (2, m + 1): the
+    displacements of the leader's nodes.  The normal is the mean of those of both curves, or a rigid
+    leader's own.
     """
+    ends = facets.ends
+    faces = facets.faces
     for k in range(count):
-        a = owners[LEADER, k]
+        a = facets.owners[LEADER, k]
         start = ends[LEADER_START, k]
         stop = ends[LEADER_STOP, k]
         x, y = find_point(line, a, start)
@@ -395,28 +381,12 @@ def measure_facets(line, other, rigid, moved, inverse_dt, owners, ends, count, f
         faces[SWEPT_RATE, k] = inverse_dt * (speed_x * area_x + speed_y * area_y)
         faces[FACE_X, k] = 0.5 * (x + x_end)
         faces[FACE_Y, k] = 0.5 * (y + y_end)
-        normal_x, normal_y = find_curve_normal(line, a, middle - a)
+        normal_x, normal_y = find_curve_normal(line, a, middle - a, False, 1.0)
         if not rigid:
-            b = owners[FOLLOWER, k]
+            b = facets.owners[FOLLOWER, k]
             part = 0.5 * (ends[FOLLOWER_START, k] + ends[FOLLOWER_STOP, k]) - b
-            other_x, other_y = find_curve_normal(other, b, part)
+            other_x, other_y = find_curve_normal(other, b, part, False, 1.0)
             normal_x, normal_y = normal_x - other_x, normal_y - other_y
         length = (normal_x * normal_x + normal_y * normal_y) ** 0.5
         faces[NORMAL_X, k] = normal_x / length
         faces[NORMAL_Y, k] = normal_y / length
-
-
-@kernel
-def measure_radius_weighted_facets(old, new, inverse_dt, owners, ends, count, areas):
-    """Rows AREAS (3, facets) in axisymmetric flow; the leader's old and new line."""
-    for k in range(count):
-        a = owners[LEADER, k]
-        start = ends[LEADER_START, k]
-        stop = ends[LEADER_STOP, k]
-        area_x, area_y, sweep, _, _ = compute_radius_weighted_face(
-            find_point(old, a, start), find_point(old, a, stop),
-            find_point(new, a, start), find_point(new, a, stop), inverse_dt,
-        )  # fmt: skip
-        areas[AREA_X, k] = area_x
-        areas[AREA_Y, k] = area_y
-        areas[SWEPT_RATE, k] = sweep

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.contacts.facets import MOST_BULGE, find_depth
-from hydro.contacts.rows import (
+from hydro.facets.rows import (
     CLOSED,
     FOLLOWER_START,
     FOLLOWER_STOP,
@@ -23,13 +23,15 @@ STILL_NODE_DISTANCE = 1e-12  # of a face's length: a node this near is where it 
 
 
 @kernel
-def find_held(states, ends, count, back_positions, held, back_held, inner, closed_before):
+def find_held(facets, count, back_positions, held, back_held, inner, closed_before):
     """Mark the nodes that the contact lays on the other line.
 
     held: those of the follower at which a closed facet ends; back_held: those of the leader at
     which the closed part ends within a face of the follower; inner: the leader's nodes within it;
     closed_before: those of the leader at which a closed facet stops.
     """
+    states = facets.states
+    ends = facets.ends
     held[:] = False
     closed_before[:] = False
     back_held[:] = False

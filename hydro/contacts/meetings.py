@@ -18,12 +18,12 @@ import numpy as np
 from hydro import rim as on
 from hydro.block import Block
 from hydro.boundary import Piston
-from hydro.contacts.facet_states import make_add_facet_flux
 from hydro.contacts.pair import Pair, PlanePair
-from hydro.contacts.rows import AREAS, COVERED, FOLLOWER, LEADER
 from hydro.contacts.start import fill_normals
 from hydro.contacts.surface import Plane, Surface, find_planes, is_surface
 from hydro.contacts.voids import Voids
+from hydro.facets.rows import FOLLOWER, LEADER, WEIGHT
+from hydro.facets.states import make_add_facet_flux
 from hydro.formulas.geometry import Geometry
 from hydro.links import Link
 from hydro.motion.grid_motion import GridMotion
@@ -257,17 +257,18 @@ class Meetings:
         for surface in (*self._sides, *self._walls):
             surface.read_middle()
         for pair in self.near:
-            pair.cut_middle(dt, self.geometry.curved)
+            pair.cut_middle(dt)
         self._solve(on.TRACE, middle=True)
+        for surface in self._sides:
+            surface.read_flux()
         for pair in self.near:
             for side, surface in ((LEADER, pair.leader), (FOLLOWER, pair.follower)):
                 if not surface.rigid:
-                    self.add_flux(
-                        pair.states, pair.weighted, pair.faces[AREAS], pair.owners, pair.count,
-                        side, surface.start, surface.step, surface.block.rim.rows,
-                    )  # fmt: skip
+                    self.add_flux.entry(pair.facets, pair.count, side, surface.arrays)
             if pair.closed and pair.friction > 0.0:
                 pair.rub(dt)
+        for surface in self._sides:
+            surface.write_flux()
 
     def accept(self) -> None:
         """The step stands: count what closed and opened, and how far lines may have come."""
@@ -320,25 +321,20 @@ class Meetings:
     def _set_velocities(self, t: float) -> None:
         for surface in self.surfaces:
             if isinstance(surface.segment, Piston):
-                surface.velocity[:] = surface.segment.velocity(t)
+                surface.arrays.velocity[:] = surface.segment.velocity(t)
 
     def _solve(self, rows: slice, middle: bool = False) -> list[Surface]:
         """Solve all near pairs' facets; the surfaces that closed ones cover a part of.
 
         middle: at mid-time, for the fluxes; the covers are left as they are.
         """
-        states = {}
-        pressures = {}
         for surface in self._sides:
-            states[id(surface)] = surface.gather(rows)
-            pressures[id(surface)] = surface.gather_pressure()
-            line = surface.middle if middle else surface.line
-            surface.fill_slopes(states[id(surface)], line)
+            surface.read_states(rows, surface.middle if middle else surface.line)
             if not middle:
-                surface.cover.fill(0.0)
+                surface.arrays.sums[:] = 0.0  # nothing covers the faces yet
         for pair in self.near:
-            pair.solve(states, pressures, not middle)
-        return [surface for surface in self._sides if surface.cover[COVERED].any()]
+            pair.solve(cover=not middle)
+        return [surface for surface in self._sides if surface.arrays.sums[WEIGHT].any()]
 
     # --- what is kept ----------------------------------------------------------------------------
 
@@ -422,10 +418,14 @@ def _find_pairs(
         one_body = bodies[id(one.block)] == bodies[id(other.block)]
         if one_body and (one.at_sliding_contact or other.at_sliding_contact):
             continue  # what closes there is the sliding contact
-        pairs.append(Pair(one, other, one_body))
+        pairs.append(Pair(one, other, one_body, geometry.curved))
     pairs.sort(key=lambda pair: (not pair.leader.rigid, -pair.leader.length))
     free = [surface for surface in surfaces if not surface.rigid]
-    pairs += [PlanePair(plane.put_under(surface), surface) for plane in planes for surface in free]
+    pairs += [
+        PlanePair(plane.put_under(surface), surface, geometry.curved)
+        for plane in planes
+        for surface in free
+    ]
     return surfaces, pairs
 
 

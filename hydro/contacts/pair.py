@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.contacts.facet_states import add_friction, measure_closed, solve_facets
 from hydro.contacts.facets import (
     BOTH,
     EARLIER,
@@ -15,8 +14,8 @@ from hydro.contacts.facets import (
     find_pins,
     follow_pins,
     measure_facets,
-    measure_radius_weighted_facets,
 )
+from hydro.contacts.friction import add_friction, measure_closed
 from hydro.contacts.laying import (
     find_held,
     find_plane_pins,
@@ -26,7 +25,6 @@ from hydro.contacts.laying import (
     match,
     measure_clearance_of_plane,
 )
-from hydro.contacts.rows import AREAS, END_ROWS, FACE_ROWS, FACET_ROWS
 from hydro.contacts.start import (
     ON_LINE_DISTANCE,
     find_lying,
@@ -35,10 +33,14 @@ from hydro.contacts.start import (
 )
 from hydro.contacts.surface import Plane, Surface
 from hydro.contacts.touch import fill_swept_boxes, find_touches, measure_distance
+from hydro.facets.lines import fill_radius_weighted_areas
+from hydro.facets.rows import make_facets
+from hydro.facets.states import solve_facets, sum_over_faces
 from hydro.motion.overlaps import is_inside
 from regrid.errors import Place, RegridFailure
 
 MOST_BEHIND = 0.5  # of a face's length: lines that cross so far have lost each other
+ROUND_OFF_PRESSURE = 1e-12  # part of rho c² by which a pressure below that of the void is rounding
 FAR_SEARCH_FACES = 2.0  # longest faces: surfaces of one body are not looked for further off
 
 
@@ -53,7 +55,7 @@ class Pair:
 
     straight = False  # is the leader a plane?
 
-    def __init__(self, one: Surface, other: Surface, one_body: bool = False):
+    def __init__(self, one: Surface, other: Surface, one_body: bool = False, curved: bool = False):
         first = one.rigid or (not other.rigid and one.length >= other.length)
         self.leader, self.follower = (one, other) if first else (other, one)
         self.bond = min(one.bond, other.bond)
@@ -83,11 +85,8 @@ class Pair:
         self.back_held = self.covered.copy()
         self.inner = self.covered.copy()
         self.closed_before = self.covered.copy()  # leader's nodes at which a closed facet stops
-        self.owners = np.zeros((2, facets), dtype=np.int64)
-        self.ends = np.zeros((END_ROWS, facets))
-        self.faces = np.zeros((FACE_ROWS, facets))
-        self.weighted = np.zeros((3, facets))
-        self.states = np.zeros((FACET_ROWS, facets))
+        self.curved = curved
+        self.facets = make_facets(facets, curved)
         self._still = np.zeros((2, back))
         self._ways = np.empty((2, facets))
         self.shifts = np.zeros((4, 3))
@@ -185,66 +184,52 @@ class Pair:
         return near - width
 
     def _cut(self, leader, follower, positions, back_positions, covered) -> None:
-        self.count = fill_facets(
+        self.count = fill_facets.entry(
             leader, follower, positions, back_positions, self.straight, self._pins, covered,
-            self.owners, self.ends,
+            self.facets,
         )  # fmt: skip
 
     def _measure(self, line, other, moved, inverse_dt) -> None:
-        measure_facets(
-            line, other, self.leader.rigid, moved, inverse_dt, self.owners, self.ends, self.count,
-            self.faces,
-        )  # fmt: skip
+        rigid = self.leader.rigid
+        measure_facets.entry(line, other, rigid, moved, inverse_dt, self.facets, self.count)
 
     # --- what passes -----------------------------------------------------------------------------
 
-    def solve(self, states: dict, pressures: dict, cover: bool) -> None:
-        """Contact states of the facets; `pressures` of the void beside both lines.
+    def solve(self, cover: bool) -> None:
+        """Contact states of the facets, between the states that both surfaces' arrays have.
 
-        cover: add what closed facets cover to both surfaces' `cover`.
+        cover: add what closed facets cover to the sums over both surfaces' faces.
         """
-        one = self.leader
-        other = self.follower
-        lead = other if one.rigid else one  # a wall has no states: these are not looked at
-        self.closed = solve_facets(
-            states[id(lead)], states[id(other)], lead.block.wave_law, other.block.wave_law,
-            lead.middles, other.middles, lead.slopes, other.slopes, pressures[id(lead)],
-            pressures[id(other)], one.rigid, one.velocity, self.bond, self.owners, self.faces,
-            self.count, self.states, one.line, other.line, lead.cover, other.cover, cover,
-        )  # fmt: skip
+        arrays = self.leader.arrays, self.follower.arrays
+        self.closed, _ = solve_facets.entry(
+            *arrays, self.facets, self.count, self.bond, ROUND_OFF_PRESSURE
+        )
+        if cover:
+            sum_over_faces.entry(*arrays, self.facets, self.count, False)
 
     def rub(self, dt: float) -> None:
         """Add friction to the fluxes of both sides."""
-        one = self.leader
-        other = self.follower
-        lead = other if one.rigid else one
-        add_friction(
-            lead.block.rim.rows, other.block.rim.rows, one.rigid, one.velocity, self.friction, dt,
-            self.states, self.faces, self.weighted, self.owners, self.count, lead.start, lead.step,
-            other.start, other.step,
-        )  # fmt: skip
+        sides = [(side.gather_cells(), side.arrays) for side in (self.leader, self.follower)]
+        add_friction.entry(*sides, self.facets, self.count, self.friction, dt)
 
-    def cut_middle(self, dt: float, curved: bool) -> None:
+    def cut_middle(self, dt: float) -> None:
         """Facets at mid-time, both grids being known."""
         leader = self.leader
         self._follow(self.follower.middle, leader.middle, self.positions, self._found, 0)
         self._follow(leader.middle, self.follower.middle, self.back_positions, self._back_found, 1)
         self._cut(leader.middle, self.follower.middle, self._found, self._back_found, self._covered)
         self._measure(leader.middle, self.follower.middle, leader.moved, 1.0 / dt)
-        if curved:
-            measure_radius_weighted_facets(
-                leader.line, leader.new, 1.0 / dt, self.owners, self.ends, self.count,
-                self.weighted,
-            )  # fmt: skip
-        else:
-            self.weighted[...] = self.faces[AREAS]
+        if self.curved:
+            fill_radius_weighted_areas.entry(
+                leader.line, leader.new, 1.0, 1.0 / dt, self.facets, self.count
+            )
 
     def _follow(self, points, line, positions, found, side: int) -> None:
         follow_pins(points, line, positions, self.parts[side], found)
 
     def measure_closed(self) -> tuple[int, float]:
         """Closed stretches and their length."""
-        return measure_closed(self.states, self.faces, self.owners, self.ends, self.count)
+        return measure_closed.entry(self.facets, self.count)
 
     # --- new lines -------------------------------------------------------------------------------
 
@@ -315,9 +300,9 @@ class Pair:
 
     def find_held(self) -> None:
         """Mark the nodes that the contact lays on the other line."""
-        find_held(
-            self.states, self.ends, self.count, self.back_positions, self.held, self.back_held,
-            self.inner, self.closed_before,
+        find_held.entry(
+            self.facets, self.count, self.back_positions, self.held, self.back_held, self.inner,
+            self.closed_before,
         )  # fmt: skip
 
     def match(self) -> int:
@@ -364,8 +349,8 @@ class PlanePair(Pair):
     straight = True
     leader: Plane  # type: ignore[assignment]
 
-    def __init__(self, plane: Plane, surface: Surface):
-        super().__init__(plane, surface)  # type: ignore[arg-type]
+    def __init__(self, plane: Plane, surface: Surface, curved: bool = False):
+        super().__init__(plane, surface, curved=curved)  # type: ignore[arg-type]
         self.asked[:] = True
         for end, key_node in enumerate(surface.ends):
             self.asked[-end] = key_node is None or not plane.holds(key_node)

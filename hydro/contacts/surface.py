@@ -9,15 +9,15 @@ import numpy as np
 from hydro import rim as on
 from hydro.block import Block
 from hydro.boundary import Axis, FreeSurface, Piston, Segment, Wall
-from hydro.contacts.facet_states import cover_surface
+from hydro.contacts.friction import cover_surface
 from hydro.contacts.laying import fit_plane
-from hydro.contacts.rows import COVER_ROWS
-from hydro.contacts.touch import fill_inner, measure_longest, measure_way
+from hydro.contacts.touch import fill_inner, measure_way
+from hydro.facets.lines import fill_slopes, fill_squares
+from hydro.facets.rows import make_line_arrays
 from hydro.motion.key_nodes import KeyNode
 from hydro.motion.line import Role
 from hydro.motion.sides import Sides
 from hydro.perimeter.contacts import fill_ghosts_from_faces
-from hydro.sliding.pieces import SLOPE_ROWS, fill_slopes
 from regrid.measure.crossings import GROUP_EDGES, fill_boxes
 from regrid.sides import SIDE_NAMES, find_node
 
@@ -49,10 +49,8 @@ class Surface:
         self.middle = np.empty(nodes)
         self.moved = np.empty(nodes)
         self.inner = np.empty(nodes)  # the next nodes inwards
-        self.middles = np.empty((2, self.count))
-        self.slopes = np.zeros((SLOPE_ROWS, self.count))
-        self.cover = np.zeros((COVER_ROWS, self.count))
-        self.velocity = np.zeros(2)
+        laws = np.repeat(np.reshape(self.block.wave_law, (3, 1)), self.count, axis=1)
+        self.arrays = make_line_arrays(laws, self.rigid)
         self.bond = np.inf if self.rigid else float(getattr(segment, "bond", 0.0))
         self.friction = np.inf if self.rigid else float(getattr(segment, "friction", 0.0))
         self.way = 0.0  # of the node that goes furthest in this step
@@ -79,7 +77,7 @@ class Surface:
         """Take up the present nodes."""
         self.line[...] = self.segment.line(self.block.nodes)[:, :: self.step]
         fill_boxes(self.line, self.group, self.boxes)
-        self.longest = measure_longest(self.line)
+        self.longest = fill_squares(self.line, self.arrays.squares)
         fill_inner(self.block.nodes, self.side, self.segment.start, self.back, self.inner)
 
     def read_new(self) -> None:
@@ -111,30 +109,43 @@ class Surface:
 
     def gather(self, rows: slice) -> np.ndarray:
         """Rows of the rim in the line's order."""
-        part = self.block.rim.rows[rows, self.segment.first : self.segment.last]
-        return np.ascontiguousarray(part[:, :: self.step])
+        return np.ascontiguousarray(self._view(rows))
 
-    def gather_pressure(self) -> np.ndarray:
-        """The pressure on the line's faces where it is free."""
-        return self.gather(slice(on.P_STAR, on.P_STAR + 1))[0]
+    def _view(self, rows: slice | int) -> np.ndarray:
+        part = self.block.rim.rows[rows, self.segment.first : self.segment.last]
+        return part[..., :: self.step]
 
     def gather_void_pressure(self) -> np.ndarray:
         """The pressure in the voids beside the line's faces."""
-        return self.gather(slice(on.VOID_P, on.VOID_P + 1))[0]
+        return np.ascontiguousarray(self._view(on.VOID_P))
 
     def gather_swept(self) -> np.ndarray:
         """Volume swept by the line's faces in a second, outwards."""
-        return self.gather(slice(on.SWEPT, on.SWEPT + 1))[0]
+        return np.ascontiguousarray(self._view(on.SWEPT))
 
-    def fill_slopes(self, states: np.ndarray, line: np.ndarray) -> None:
-        """Slopes of the states along a line, which is this one at some time."""
-        np.add(line[:, 1:], line[:, :-1], out=self.middles)
-        self.middles *= 0.5
-        fill_slopes(states, self.middles, self.slopes)
+    def gather_cells(self) -> np.ndarray:
+        """The cells beside the line's faces: the rows RHO to LENGTH of the rim."""
+        return self.gather(slice(on.RHO, on.LENGTH + 1))
+
+    def read_states(self, rows: slice, line: np.ndarray) -> None:
+        """Take up states from these rows of the rim, their slopes along a line, which is this one
+        at some time, and the pressure where it is free."""
+        arrays = self.arrays
+        arrays.states[: rows.stop - rows.start] = self._view(rows)
+        arrays.open_p[:] = self._view(on.P_STAR)
+        fill_slopes.entry(line, arrays)
 
     def put_cover(self, state: int) -> None:
         """Put contact states over those of the free surface."""
-        cover_surface(self.cover, self.start, self.step, state, self.block.rim.rows)
+        cover_surface(self.arrays.sums, self.start, self.step, state, self.block.rim.rows)
+
+    def read_flux(self) -> None:
+        """Take up the flux with which the free surface is filled."""
+        self.arrays.flux[...] = self._view(on.FLUX)
+
+    def write_flux(self) -> None:
+        """Write the flux back into the rim."""
+        self._view(on.FLUX)[...] = self.arrays.flux
 
     def fill_ghosts(self) -> None:
         """Ghosts beyond the faces from the states there."""
@@ -180,7 +191,7 @@ class Plane:
         self.along = along
         self.segments = list(segments)
         self.under = under
-        self.velocity = np.zeros(2)
+        self.arrays = make_line_arrays(np.zeros((3, 1)), rigid=True)
         self.line = np.zeros((2, 2))
         self.moved = np.zeros((2, 2))
         self.new = self.middle = self.line  # at rest
@@ -194,6 +205,10 @@ class Plane:
     def holds(self, key_node: KeyNode) -> bool:
         """Does a line that ends there keep to the plane?"""
         return any(segment in self.segments for segment, _ in key_node.ends)
+
+    def gather_cells(self) -> np.ndarray:
+        """None: the face is a wall."""
+        return np.zeros((on.LENGTH + 1, 1))
 
     def read(self) -> None:
         """Begin before the present nodes of the surface that it is under."""

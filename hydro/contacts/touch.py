@@ -16,7 +16,7 @@ from hydro.contacts.facets import (
     may_lie_on,
     snap_position,
 )
-from hydro.sliding.pieces import measure_square, project
+from hydro.facets.lines import project
 from regrid.jit import compiled_once, kernel
 from regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
 from regrid.sides import find_node
@@ -93,15 +93,6 @@ def measure_way(nodes, nodes_new, side, start, stop):
         dx = nodes_new[0, i, j] - nodes[0, i, j]
         dy = nodes_new[1, i, j] - nodes[1, i, j]
         most = max(most, dx * dx + dy * dy)
-    return most**0.5
-
-
-@kernel
-def measure_longest(line):
-    """Length of the longest face of a line (2, m + 1)."""
-    most = 0.0
-    for a in range(line.shape[1] - 1):
-        most = max(most, measure_square(line, a))
     return most**0.5
 
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from hydro.contacts.pair import Pair, PlanePair
-from hydro.contacts.rows import FOLLOWER_START, FOLLOWER_STOP, LEADER_START, LEADER_STOP
 from hydro.contacts.surface import Plane, Surface
+from hydro.facets.rows import FOLLOWER_START, FOLLOWER_STOP, LEADER_START, LEADER_STOP
 from regrid.errors import BadInput, RegridFailure
 
 # of the depth of the cells around it: a void whose area has this side is closed
@@ -226,7 +226,7 @@ class Voids:
                 continue
             one = self.numbers[id(pair.leader)]
             other = self.numbers[id(pair.follower)]
-            ends = pair.ends[:, : pair.count]
+            ends = pair.facets.ends[:, : pair.count]
             breaks = np.flatnonzero(ends[LEADER_START, 1:] != ends[LEADER_STOP, :-1])
             for k in (0, *(breaks + 1)):
                 place = self._convert(pair, ends[LEADER_START, k])

@@ -1,5 +1,5 @@
 """Sliding contacts: two lines whose nodes do not match, divided into common pieces.
 
 May import: `regrid`, `hydro.rows`, `hydro.rim`, `hydro.formulas`, `hydro.perimeter`,
-`hydro.boundary`.
+`hydro.boundary`, `hydro.facets`.
 """

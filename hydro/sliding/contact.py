@@ -17,31 +17,25 @@ import numpy as np
 from hydro import rim as on
 from hydro.boundary import NodeMotion, Sliding
 from hydro.eos.base import is_same_material
+from hydro.facets.lines import fill_radius_weighted_areas, fill_slopes
+from hydro.facets.rows import (
+    FOLLOWER,
+    LEADER,
+    SWEPT_RATE,
+    make_facets,
+    make_line_arrays,
+)
+from hydro.facets.states import make_add_facet_flux, solve_facets, sum_over_faces
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.perimeter.contacts import AT_CELLS, AT_FLUX
-from hydro.rows import FLUX_ROWS
 from hydro.sliding.pieces import (
-    AREAS,
-    PIECE_FACE_ROWS,
-    PIECE_P,
-    PIECE_ROWS,
-    SLOPE_ROWS,
     SURFACE_ROWS,
-    SWEPT_RATE,
-    average_pieces,
     fill_pieces,
     fill_points,
     fill_positions,
-    fill_radius_weighted_pieces,
-    fill_slopes,
     fill_surface,
-    solve_pieces,
 )
-from hydro.sliding.polygons import (
-    make_add_closing_flux,
-    make_fill_excess_volume,
-    make_fill_piece_flux,
-)
+from hydro.sliding.polygons import make_add_closing_flux, make_fill_excess_volume
 from regrid.curves import arc_law
 from regrid.errors import BadInput
 from regrid.measure.crossings import find_self_crossing
@@ -93,11 +87,14 @@ class Chain:
         key = rows.start, rows.stop
         if key not in self.gathered:
             self.gathered[key] = np.empty((rows.stop - rows.start, self.count))
-        values = self.gathered[key]
+        self.read(rows, self.gathered[key])
+        return self.gathered[key]
+
+    def read(self, rows: slice, values: np.ndarray) -> None:
+        """Fill values (rows, faces) with those rows of the blocks' rims along the chain."""
         for number, (segment, back) in enumerate(self._parts()):
             part = segment.rim.rows[rows]
             values[:, self.slice(number)] = part[:, ::-1] if back else part
-        return values
 
     def scatter(self, rows: slice, values: np.ndarray) -> None:
         """Write values (rows, faces) into rows of the blocks' rims."""
@@ -236,21 +233,12 @@ class SlidingContact:
         self.fixed_new = self.fixed.copy()
         self.follower.write_line(points, new=False)
         self.pulled = 0  # pieces under tension in the current step
-        pieces = self.leader.count + self.follower.count + 2
-        self.owners = np.zeros((2, pieces), dtype=np.int64)
-        self.faces = np.zeros((PIECE_FACE_ROWS, pieces))
-        self.parts = np.zeros((2, pieces))
-        self.states = np.zeros((PIECE_ROWS, pieces))
-        self.count = 0
+        self.count = 0  # of the pieces
         self.positions = np.empty(self.follower.count + 1)
         self.positions_new = np.empty(self.follower.count + 1)
         chains = self.leader, self.follower
-        self.laws = [chain.spread_laws() for chain in chains]
-        self.slopes = [np.zeros((SLOPE_ROWS, chain.count)) for chain in chains]
-        self.middles = [np.zeros((2, chain.count)) for chain in chains]  # where the pieces are cut
-        self.averages = [np.zeros((PIECE_ROWS, chain.count)) for chain in chains]
+        self.halves = [make_line_arrays(chain.spread_laws()) for chain in chains]
         self.surfaces = [np.zeros((SURFACE_ROWS, chain.count)) for chain in chains]
-        self.fluxes = [np.zeros((FLUX_ROWS, chain.count)) for chain in chains]
         self.lines = [chain.line() for chain in chains]  # of the old grid
         self.still = np.zeros_like(self.lines[0])
         self.excess_volume = np.zeros(self.follower.count)
@@ -261,10 +249,10 @@ class SlidingContact:
         """Make the contact plane or axisymmetric; done by the simulation."""
         self.geometry = geometry
         self.fill_excess_volume = make_fill_excess_volume(geometry)
-        self.fill_piece_flux = make_fill_piece_flux(geometry)
+        self.add_facet_flux = make_add_facet_flux(geometry)
         self.add_closing_flux = make_add_closing_flux(geometry)
-        # of the pieces: what flux passes through, rows AREAS
-        self.areas = np.zeros_like(self.faces[AREAS]) if geometry.curved else self.faces[AREAS]
+        most = self.leader.count + self.follower.count + 2
+        self.pieces = make_facets(most, geometry.curved)
 
     # --- contact states ------------------------------------------------------------------------
 
@@ -272,17 +260,9 @@ class SlidingContact:
         """Pieces, positions and polygon areas of the old grid."""
         line, other = self.lines = self.leader.line(), self.follower.line()
         fill_positions(line, other, self.positions)
-        self.count = fill_pieces(
-            line,
-            self.still,
-            self.positions,
-            self.leader.orientation,
-            0.0,
-            self.owners,
-            self.faces,
-            self.parts,
+        self.count = fill_pieces.entry(
+            line, self.still, self.positions, self.leader.orientation, 0.0, self.pieces
         )
-        self._keep_middles(line, other)
         self.fill_excess_volume(
             line, other, self.positions, self.leader.orientation, self.excess_volume
         )
@@ -299,42 +279,37 @@ class SlidingContact:
         )
         self.follower.scatter_excess("excess_volume_new", self.excess_volume_new)
 
-    def _keep_middles(self, line: np.ndarray, other: np.ndarray) -> None:
-        for middles, nodes in zip(self.middles, (line, other), strict=True):
-            np.add(nodes[:, 1:], nodes[:, :-1], out=middles)
-            middles *= 0.5
-
     def solve(self, phase: int, dt: float) -> None:
         """Contact states of both sides from the cells, extrapolated to their faces, or from the
         traces; or fluxes from the traces."""
         if phase == AT_FLUX:
             self.fill_flux(dt)
         else:
-            rows = on.AT_FACE if phase == AT_CELLS else on.TRACE
-            self._solve(self.leader.gather(rows), self.follower.gather(rows))
+            self._solve_pieces(on.AT_FACE if phase == AT_CELLS else on.TRACE, *self.lines)
+            self._fill_surfaces()
 
-    def _solve(self, mine: np.ndarray, other: np.ndarray) -> None:
-        """States of the pieces, averaged to the faces; writes the contact states of both sides."""
-        self._solve_pieces(mine, other)
-        for side, chain, states in ((0, self.leader, mine), (1, self.follower, other)):
-            averages = self.averages[side]
-            surface = self.surfaces[side]
-            averages[:] = 0.0
-            average_pieces(self.states, self.faces, self.owners, side, self.count, averages)
-            fill_surface(states, averages, 1.0 - 2.0 * side, chain.gather(on.NORMAL), surface)
+    def _fill_surfaces(self) -> None:
+        """The means of the pieces' states over the faces of both sides, into the rims."""
+        for half in self.halves:
+            half.sums[:] = 0.0
+        sum_over_faces.entry(*self.halves, self.pieces, self.count, True)
+        chains = (LEADER, self.leader), (FOLLOWER, self.follower)
+        for (side, chain), half, surface in zip(chains, self.halves, self.surfaces, strict=True):
+            fill_surface.entry(half, side, chain.gather(on.NORMAL), surface)
             chain.scatter(on.CONTACT, surface)
 
-    def _solve_pieces(self, mine: np.ndarray, other: np.ndarray) -> None:
-        for states, middles, slopes in zip((mine, other), self.middles, self.slopes, strict=True):
-            fill_slopes(states, middles, slopes)
-        sides = zip((mine, other), self.laws, self.middles, self.slopes, strict=True)
-        self.pulled = solve_pieces(*sides, self.owners, self.faces, self.count, self.states)
+    def _solve_pieces(self, rows: slice, line: np.ndarray, other: np.ndarray) -> None:
+        """States of the pieces between both lines from these rows of the rims."""
+        chains = self.leader, self.follower
+        for chain, half, nodes in zip(chains, self.halves, (line, other), strict=True):
+            chain.read(rows, half.states[: rows.stop - rows.start])
+            fill_slopes.entry(nodes, half)
+        _, self.pulled = solve_facets.entry(*self.halves, self.pieces, self.count, 0.0, 0.0)
 
     def fill_flux(self, dt: float) -> None:
         """Fluxes of both sides' faces from the mid-time traces."""
         leader, follower = self.leader, self.follower
         old, follower_old = self.lines
-        flux, follower_flux = self.fluxes
         new = leader.line(new=True)
         follower_new = follower.line(new=True)
         middle = 0.5 * (old + new)
@@ -342,37 +317,25 @@ class SlidingContact:
         follower_middle = 0.5 * (follower_old + follower_new)
         fill_positions(middle, follower_middle, self.positions)
         orientation = leader.orientation
-        self.count = fill_pieces(
-            middle,
-            moved,
-            self.positions,
-            orientation,
-            1.0 / dt,
-            self.owners,
-            self.faces,
-            self.parts,
+        self.count = fill_pieces.entry(
+            middle, moved, self.positions, orientation, 1.0 / dt, self.pieces
         )
         if self.geometry.curved:
-            fill_radius_weighted_pieces(
-                old, new, self.parts, orientation, 1.0 / dt, self.owners, self.count, self.areas
+            fill_radius_weighted_areas.entry(
+                old, new, orientation, 1.0 / dt, self.pieces, self.count
             )
-        self._keep_middles(middle, follower_middle)
-        mine = leader.gather(on.TRACE)
-        other = follower.gather(on.TRACE)
-        self._solve_pieces(mine, other)
-        self.fill_piece_flux(
-            self.states[PIECE_P], self.areas, self.faces[AREAS], self.owners, self.count, flux,
-            follower_flux,
-        )  # fmt: skip
+        self._solve_pieces(on.TRACE, middle, follower_middle)
+        for side, half in ((LEADER, self.halves[LEADER]), (FOLLOWER, self.halves[FOLLOWER])):
+            half.flux[:] = 0.0
+            self.add_facet_flux.entry(self.pieces, self.count, side, half)
         closing = self._measure_closing(middle, moved, follower_middle, follower_new - follower_old)
         growth = (1.0 / dt) * (self.excess_volume_new - self.excess_volume)
         growth += follower.gather(on.AREAS)[SWEPT_RATE]
-        self.add_closing_flux(
-            other, closing, growth, self.areas, self.owners, self.count, self._part_at_first(),
-            follower_flux,
-        )  # fmt: skip
-        leader.scatter(on.FLUX, flux)
-        follower.scatter(on.FLUX, follower_flux)
+        self.add_closing_flux.entry(
+            self.halves[FOLLOWER], closing, growth, self.pieces, self.count, self._part_at_first()
+        )
+        leader.scatter(on.FLUX, self.halves[LEADER].flux)
+        follower.scatter(on.FLUX, self.halves[FOLLOWER].flux)
 
     def _measure_closing(self, middle, moved, follower, follower_moved) -> np.ndarray:
         """Normal times area (2, n + 1) of the closing faces at the follower's nodes.

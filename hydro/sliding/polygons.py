@@ -15,11 +15,11 @@ from __future__ import annotations
 
 import functools
 
+from hydro.facets.rows import FOLLOWER, STATE_E, SWEPT_RATE
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.perimeter.faces import measure_volume
 from hydro.rim import find_cell, find_excess
 from hydro.rows import RHO, P, U, V
-from hydro.sliding.pieces import AREA_X, AREA_Y, FOLLOWER, LEADER, STATE_E, SWEPT_RATE
 from regrid.jit import kernel
 
 LEAST_VOLUME_LEFT = 0.5  # of a polygon cell's volume after a step
@@ -55,55 +55,27 @@ def make_fill_excess_volume(geometry: Geometry = PLANE):
 
 
 @functools.cache
-def make_fill_piece_flux(geometry: Geometry = PLANE):
-    """Kernel that sums the pressure's fluxes; `Geometry.split`."""
-    split = geometry.split
-
-    @kernel
-    def fill_piece_flux(pressure, areas, plane_areas, owners, count, leader_flux, follower_flux):
-        """Sum the pressure's momentum and work over both sides' faces, (6, m) and (6, n), outwards.
-
-        areas, plane_areas (3, pieces): rows AREAS of a perimeter's faces, per radian and depth.
-
-        What the leader's face gets is taken from the follower's to the bit.
-        """
-        leader_flux[:] = 0.0
-        follower_flux[:] = 0.0
-        for k in range(count):
-            one = owners[LEADER, k]
-            two = owners[FOLLOWER, k]
-            p = pressure[k]
-            momentum_y, push, hoop = split(
-                p * areas[AREA_Y, k], p, areas[AREA_Y, k], plane_areas[AREA_Y, k]
-            )
-            parts = (0.0, p * areas[AREA_X, k], momentum_y, p * areas[SWEPT_RATE, k], push, hoop)
-            for q in range(1, 6):
-                leader_flux[q, one] += parts[q]
-                if two >= 0:
-                    follower_flux[q, two] -= parts[q]
-
-    return fill_piece_flux
-
-
-@functools.cache
 def make_add_closing_flux(geometry: Geometry = PLANE):
     """Kernel that adds what passes through closing faces; `Geometry.split`."""
     split = geometry.split
 
     @kernel
-    def add_closing_flux(traces, closing, growth, areas, owners, count, first, flux):
+    def add_closing_flux(line, closing, growth, facets, count, first):
         """Add what passes between neighbouring follower cells through their closing faces.
 
-        traces (rows, n): TRACE of the follower's rim; closing (2, n + 1): normal times area of the
-        closing faces, from the nodes at mid-time to their positions' points on the mid-time leader,
+        line: the follower's, with its traces; closing (2, n + 1): normal times area of the closing
+        faces, from the nodes at mid-time to their positions' points on the mid-time leader,
         outwards of the cell after the node; in axisymmetric flow also the radial one per depth,
         (3, n + 1); growth (n,) per time: volume swept outwards by the follower's straight faces,
-        and that of its `excess_volume`; areas (3, pieces): of the pieces.
+        and that of its `excess_volume`.
         The closing face's own swept volume is what the polygon's budget leaves for it, summed along
         the line.  The budget of the whole line has a rest where an end is a contact point: the part
-        `first` of it is left in the first cell, the others in the last one. flux (6, n): outward
-        fluxes of the follower's faces.
+        `first` of it is left in the first cell, the others in the last one.
         """
+        traces = line.states
+        flux = line.flux
+        owners = facets.owners
+        areas = facets.areas
         cells = flux.shape[1]
         rest = 0.0
         for piece in range(count):

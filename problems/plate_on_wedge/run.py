@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from hydro.block import Block
+from hydro.facets.lines import project
 from hydro.motion.overlaps import is_inside
 from hydro.simulation import Simulation
 from hydro.sliding.contact import SlidingContact
-from hydro.sliding.pieces import project
 from problems.plate_on_wedge import report
 from problems.problem import find_crossing
 from regrid.curves import compute_arc_lengths

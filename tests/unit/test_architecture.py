@@ -42,6 +42,7 @@ ROOMS = (
     ("hydro.ranks",),
     ("hydro.boundary", "hydro.crowding", "hydro.ledger"),
     ("hydro.small_cells",),
+    ("hydro.facets",),
     ("hydro.sliding",),
     ("hydro.links",),
     ("hydro.motion", "hydro.sources"),

@@ -8,12 +8,26 @@ from hydro import phases
 from hydro.block import Block
 from hydro.boundary import put
 from hydro.eos import IdealGas, StiffenedGas
+from hydro.facets.lines import fill_slopes
+from hydro.facets.rows import (
+    AREAS,
+    CLOSED,
+    EXCESS_FOLLOWER,
+    EXCESS_LEADER,
+    FACET_P,
+    FACET_SLIP,
+    FOLLOWER,
+    LEADER,
+    STATE_C,
+    make_facets,
+    make_line_arrays,
+)
+from hydro.facets.states import make_add_facet_flux, solve_facets
 from hydro.formulas.geometry import find_geometry
 from hydro.links import join, slide
-from hydro.rows import FLUX_ROWS, HOOP, MOMENTUM_Y, PUSH, RHO, V
+from hydro.rows import HOOP, MOMENTUM_Y, PUSH, RHO, U, V
 from hydro.simulation import Simulation
-from hydro.sliding.pieces import fill_pieces, fill_points, solve_pieces
-from hydro.sliding.polygons import make_fill_piece_flux
+from hydro.sliding.pieces import fill_pieces, fill_points
 
 SEEDS = range(3)
 
@@ -35,14 +49,11 @@ def make_places(random, faces, count, whole):
     return places
 
 
-def cut(line, places, turn=1.0, moved=None, inverse_dt=0.0):
-    most = line.shape[1] + places.size + 2
-    owners = np.zeros((2, most), dtype=np.int64)
-    faces = np.zeros((7, most))
+def cut(line, places, turn=1.0, moved=None, inverse_dt=0.0, curved=False):
+    pieces = make_facets(line.shape[1] + places.size + 2, curved)
     moved = np.zeros_like(line) if moved is None else moved
-    parts = np.zeros((2, most))
-    count = fill_pieces(line, moved, places, turn, inverse_dt, owners, faces, parts)
-    return owners[:, :count], faces[:, :count]
+    count = fill_pieces(line, moved, places, turn, inverse_dt, pieces)
+    return pieces, count
 
 
 @pytest.mark.parametrize("whole", [True, False], ids=["whole cover", "part"])
@@ -51,7 +62,9 @@ def test_pieces_are_the_common_refinement(seed, whole):
     random = np.random.default_rng(seed)
     line = make_line(random, 13)
     places = make_places(random, 13, 29, whole)
-    owners, faces = cut(line, places)
+    pieces, count = cut(line, places)
+    owners = pieces.owners[:, :count]
+    faces = pieces.faces[:, :count]
     bounds = np.unique(np.concatenate((np.arange(14.0), places)))
     assert owners.shape[1] == bounds.size - 1
     middles = 0.5 * (bounds[1:] + bounds[:-1])
@@ -79,39 +92,46 @@ def test_what_one_side_gives_the_other_takes(seed, geometry):
     random = np.random.default_rng(seed)
     line = make_line(random, 13)
     places = make_places(random, 13, 29, True)
-    owners, faces = cut(line, places, 1.0, 0.1 * random.random((2, 14)), 1.0)
-    pressure = random.random(faces.shape[1])
-    leader, follower = np.empty((FLUX_ROWS, 13)), np.empty((FLUX_ROWS, places.size - 1))
-    fill_piece_flux = make_fill_piece_flux(find_geometry(geometry))
-    radius_weighted = faces * (2.0 if geometry == "axisymmetric" else 1.0)
-    fill_piece_flux(pressure, radius_weighted, faces, owners, faces.shape[1], leader, follower)
+    curved = geometry == "axisymmetric"
+    pieces, count = cut(line, places, 1.0, 0.1 * random.random((2, 14)), 1.0, curved)
+    pieces.states[FACET_P] = random.random(pieces.states.shape[1])
+    pieces.states[CLOSED] = 1.0
+    pieces.areas[...] = pieces.faces[AREAS] * (2.0 if curved else 1.0)
+    add_facet_flux = make_add_facet_flux(find_geometry(geometry))
+    lines = [make_line_arrays(np.ones((3, n))) for n in (13, places.size - 1)]
+    for side, half in zip((LEADER, FOLLOWER), lines, strict=True):
+        add_facet_flux(pieces, count, side, half)
+    leader, follower = (half.flux for half in lines)
     assert np.abs(leader.sum(axis=1) + follower.sum(axis=1)).max() < 1e-15
     assert not leader[0].any() and not follower[0].any()
-    curved = geometry == "axisymmetric"
     for row in (MOMENTUM_Y, PUSH, HOOP):  # the pressure's part of y is in one or in the others
         assert (np.abs(leader[row]).max() > 1e-3) == (curved != (row == MOMENTUM_Y))
 
 
 def test_contact_does_not_pull():
     line = np.array([[0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 0.0]])
-    owners, faces = cut(line, np.array([0.0, 1.0, 2.0]), turn=-1.0)  # outwards: +y
+    pieces, count = cut(line, np.array([0.0, 1.0, 2.0]), turn=-1.0)  # outwards: +y
     rho = 2.0
     c = 3.0
-    mine = np.tile(np.array([[rho], [0.0], [0.0], [0.0], [c]]), (1, 3))
-    other = np.tile(np.array([[rho], [5.0], [0.0], [0.0], [c]]), (1, 2))
-    other[2] = 0.1, -0.1  # the first flies off, the second comes
-    laws = np.repeat(np.reshape((1.5, 1.5, 0.0), (3, 1)), 3, axis=1)
-    middles = 0.5 * (line[:, 1:] + line[:, :-1])
-    rest = np.zeros((5, 3))
-    out = np.empty((6, 3))
-    sides = (mine, laws, middles, rest), (other, laws, middles, rest)
-    pulled = solve_pieces(*sides, owners, faces, 3, out)
-    assert pulled == 1
-    assert out[0, 0] == 0.0 and out[0, 2] == 0.0
-    assert not out[1:3, 0].any(), "each goes on with its own speed"
-    assert out[1:3, 1] == pytest.approx([-0.05, 0.05])
-    assert out[0, 1] == pytest.approx(rho * 0.05 * (c + 1.5 * 0.05), rel=1e-3)
-    assert out[3, :2] == pytest.approx(5.0)
+    law = np.reshape((1.5, 1.5, 0.0), (3, 1))
+    mine = make_line_arrays(np.repeat(law, 3, axis=1))
+    other = make_line_arrays(np.repeat(law, 2, axis=1))
+    for half, nodes in ((mine, line), (other, line[:, :3])):
+        half.states[RHO] = rho
+        half.states[STATE_C] = c
+        fill_slopes(nodes, half)
+    other.states[U] = 5.0
+    other.states[V] = 0.1, -0.1  # the first flies off, the second comes
+    closed, pulled = solve_facets(mine, other, pieces, count, 0.0, 0.0)
+    assert (count, closed, pulled) == (3, 1, 1)
+    found = pieces.states[:, :count]
+    assert found[CLOSED].tolist() == [0.0, 1.0, 0.0]
+    assert found[FACET_P, 0] == 0.0 and found[FACET_P, 2] == 0.0
+    excess = found[[EXCESS_LEADER, EXCESS_FOLLOWER]]
+    assert not excess[:, 0].any(), "each goes on with its own speed"
+    assert excess[:, 1] == pytest.approx([-0.05, 0.05])
+    assert found[FACET_P, 1] == pytest.approx(rho * 0.05 * (c + 1.5 * 0.05), rel=1e-3)
+    assert found[FACET_SLIP, :2] == pytest.approx(5.0)
 
 
 STREAM = 0.4, 0.3

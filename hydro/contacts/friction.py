@@ -1,0 +1,125 @@
+"""Kernels that bring the states of facets to the surfaces: cover, friction, length in contact."""
+
+from __future__ import annotations
+
+from hydro import rim as on
+from hydro.facets.rows import (
+    AREA_X,
+    AREA_Y,
+    CLOSED,
+    FACET_P,
+    FOLLOWER,
+    LEADER,
+    LEADER_START,
+    LEADER_STOP,
+    NORMAL_X,
+    NORMAL_Y,
+    SUM_EXCESS,
+    SUM_P,
+    SUM_SLIP,
+    WEIGHT,
+)
+from hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y
+from regrid.jit import compiled_once, kernel
+
+
+@kernel
+def cover_surface(sums, start, step, state, rim):
+    """Put the contact's states over those of the free surface, by the part of a face covered.
+
+    sums (6, faces): of `sum_over_faces`, the weights parts of a face; state: first of the rows rho,
+    u, v on which they were solved; face k of the line is the rim's face start + step k.
+    """
+    for k in range(sums.shape[1]):
+        covered = sums[WEIGHT, k]
+        if covered <= 0.0:
+            continue
+        face = start + step * k
+        scale = 1.0 if covered <= 1.0 else 1.0 / covered
+        bare = max(0.0, 1.0 - covered)
+        area_x, area_y = rim[on.NX, face], rim[on.NY, face]
+        length = (area_x * area_x + area_y * area_y) ** 0.5
+        nx, ny = area_x / length, area_y / length
+        u, v = rim[state + on.U, face], rim[state + on.V, face]
+        own = u * nx + v * ny
+        excess = bare * (rim[on.W_STAR, face] - own) + scale * sums[SUM_EXCESS, k]
+        rim[on.P_STAR, face] = bare * rim[on.P_STAR, face] + scale * sums[SUM_P, k]
+        rim[on.W_STAR, face] = own + excess
+        rim[on.U_STAR, face] = u + excess * nx
+        rim[on.V_STAR, face] = v + excess * ny
+        rim[on.SLIP, face] = scale * sums[SUM_SLIP, k]
+
+
+@compiled_once
+def add_force(flux, face, force, direction, speed):
+    """Add a force along a direction, and its work at a speed, to the outward flux of a face."""
+    x, y = direction
+    flux[MOMENTUM_X, face] += force * x
+    flux[MOMENTUM_Y, face] += force * y
+    flux[ENERGY, face] += force * speed
+
+
+@kernel
+def add_friction(leader, follower, facets, count, friction, dt):
+    """Add Coulomb friction to the outward fluxes of both sides of closed facets.
+
+    leader, follower: (cells, line), the rows RHO to LENGTH of the rim (6, faces) and `LineArrays`.
+    The traction is `friction` times the contact pressure against the slip of the cells beside the
+    facet, but no more than stops it within the step; without end it welds.  It works at the mean
+    of both velocities by the other's impedance, so that its heat goes into the cells as their
+    impedances.  Theory F16.5.
+    """
+    own_cells, own_line = leader
+    cells, line = follower
+    for k in range(count):
+        if facets.states[CLOSED, k] == 0.0:
+            continue
+        own = facets.owners[LEADER, k]
+        other = facets.owners[FOLLOWER, k]
+        x, y = -facets.faces[NORMAL_Y, k], facets.faces[NORMAL_X, k]
+        # both sides' velocities, inverse masses per area, and the leader's part of the impedances
+        z_other = cells[on.RHO, other] * cells[on.C, other]
+        inverse = 1.0 / (cells[on.RHO, other] * cells[on.LENGTH, other])
+        u_other, v_other = cells[on.U, other], cells[on.V, other]
+        u, v = own_line.velocity[0], own_line.velocity[1]
+        part = 0.0
+        own_inverse = 0.0
+        if not own_line.rigid:
+            u, v = own_cells[on.U, own], own_cells[on.V, own]
+            z = own_cells[on.RHO, own] * own_cells[on.C, own]
+            part = z / (z + z_other)
+            own_inverse = 1.0 / (own_cells[on.RHO, own] * own_cells[on.LENGTH, own])
+        # traction on the leader, along (x, y)
+        slip = (u_other - u) * x + (v_other - v) * y
+        traction = abs(slip) / (dt * (inverse + own_inverse))
+        if friction < 1e300:
+            traction = min(traction, max(0.0, friction * facets.states[FACET_P, k]))
+        push = traction if slip > 0.0 else -traction
+        area = (facets.areas[AREA_X, k] ** 2 + facets.areas[AREA_Y, k] ** 2) ** 0.5
+        # velocities along the facet in the middle of the step
+        w = u * x + v * y + 0.5 * dt * push * own_inverse
+        w_other = u_other * x + v_other * y - 0.5 * dt * push * inverse
+        force = push * area
+        speed = w + part * (w_other - w)
+        add_force(line.flux, other, force, (x, y), speed)
+        if not own_line.rigid:
+            add_force(own_line.flux, own, -force, (x, y), speed)
+
+
+@kernel
+def measure_closed(facets, count):
+    """Stretches of closed facets, and their length.
+
+    Facets are in the order of the leader; a stretch ends where one is open or does not go on.
+    """
+    stretches = 0
+    length = 0.0
+    before = -1.0
+    for k in range(count):
+        if facets.states[CLOSED, k] == 0.0:
+            continue
+        length += (facets.faces[AREA_X, k] ** 2 + facets.faces[AREA_Y, k] ** 2) ** 0.5
+        if facets.ends[LEADER_START, k] != before:
+            stretches += 1
+        before = facets.ends[LEADER_STOP, k]
+    return stretches, length

@@ -1,0 +1,162 @@
+"""Geometry of a line (2, n + 1) of nodes: its faces, points on them, normals, slopes along it."""
+
+from __future__ import annotations
+
+from hydro.facets.rows import (
+    ALONG_X,
+    ALONG_Y,
+    AREA_X,
+    AREA_Y,
+    LEADER,
+    LEADER_START,
+    LEADER_STOP,
+    P_SLOPE,
+    SWEPT_RATE,
+    U_SLOPE,
+    V_SLOPE,
+)
+from hydro.formulas.geometry import compute_radius_weighted_face
+from hydro.rows import P, U, V
+from regrid.jit import compiled_once, kernel
+
+
+@compiled_once
+def measure_square(line, a):
+    """Squared length of face `a` of a line."""
+    return (line[0, a + 1] - line[0, a]) ** 2 + (line[1, a + 1] - line[1, a]) ** 2
+
+
+@kernel
+def fill_squares(line, squares):
+    """Squared lengths (n,) of all faces of a line; returns the length of the longest."""
+    most = 0.0
+    for a in range(squares.shape[0]):
+        squares[a] = measure_square(line, a)
+        most = max(most, squares[a])
+    return most**0.5
+
+
+@compiled_once
+def project(line, a, point_x, point_y):
+    """Part of face `a` of a line nearest to a point (0..1), and the squared distance."""
+    x, y = line[0, a], line[1, a]
+    dx = line[0, a + 1] - x
+    dy = line[1, a + 1] - y
+    part = ((point_x - x) * dx + (point_y - y) * dy) / (dx * dx + dy * dy)
+    part = min(1.0, max(0.0, part))
+    away_x = x + part * dx - point_x
+    away_y = y + part * dy - point_y
+    return part, away_x * away_x + away_y * away_y
+
+
+@compiled_once
+def find_point(line, a, position):
+    """Point of face `a` of a line at a position: the number of the face and a part of it."""
+    part = position - a
+    return (
+        line[0, a] + part * (line[0, a + 1] - line[0, a]),
+        line[1, a] + part * (line[1, a + 1] - line[1, a]),
+    )
+
+
+@compiled_once
+def compute_normal(line, a, orientation):
+    """Unit normal of face `a`: to the right of the line's direction where `orientation` is 1."""
+    dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
+    length = orientation * (dx * dx + dy * dy) ** 0.5
+    return dy / length, -dx / length
+
+
+@compiled_once
+def compute_normal_at(line, a, end, ring, orientation):
+    """Normal of the curve that the line stands for, at the start (0) or the end (1) of face `a`.
+
+    The mean of the two faces' normals; at a corner sharper than 26 to 37 degrees the face's own.
+    `ring`: the line's ends meet.
+    """
+    last = line.shape[1] - 2
+    b = a - 1 + 2 * end
+    if ring:
+        b = last if b < 0 else (0 if b > last else b)
+    b = min(max(b, 0), last)
+    x, y = compute_normal(line, a, orientation)
+    x_next, y_next = compute_normal(line, b, orientation)
+    part = 0.5 * min(1.0, max(0.0, 10.0 * (x * x_next + y * y_next - 0.8)))
+    return x + part * (x_next - x), y + part * (y_next - y)
+
+
+@compiled_once
+def find_curve_normal(line, a, part, ring, orientation):
+    """Normal, of length 1 or a little less, of the curve at a part of face `a`."""
+    start_x, start_y = compute_normal_at(line, a, 0, ring, orientation)
+    end_x, end_y = compute_normal_at(line, a, 1, ring, orientation)
+    return start_x + part * (end_x - start_x), start_y + part * (end_y - start_y)
+
+
+@kernel
+def fill_radius_weighted_areas(old, new, orientation, inverse_dt, facets, count):
+    """Rows AREAS of the facets' `areas` in axisymmetric flow, exactly.
+
+    old, new (2, m + 1): the leader.  A facet keeps its part of the leader's face while that moves.
+    """
+    areas = facets.areas
+    for k in range(count):
+        a = facets.owners[LEADER, k]
+        start = facets.ends[LEADER_START, k]
+        stop = facets.ends[LEADER_STOP, k]
+        area_x, area_y, sweep, _, _ = compute_radius_weighted_face(
+            find_point(old, a, start), find_point(old, a, stop),
+            find_point(new, a, start), find_point(new, a, stop), inverse_dt,
+        )  # fmt: skip
+        areas[AREA_X, k] = orientation * area_x
+        areas[AREA_Y, k] = orientation * area_y
+        areas[SWEPT_RATE, k] = orientation * sweep
+
+
+@compiled_once
+def compute_share(before, after):
+    """Weights of two differences in van Leer's mean, from their squares."""
+    before = before**0.5
+    after = after**0.5
+    total = before + after
+    return (after / total, before / total) if total > 0.0 else (0.0, 0.0)
+
+
+@kernel
+def fill_slopes(nodes, line):
+    """Middles of the faces, and limited slopes of the states along the line: of `LineArrays`.
+
+    nodes (2, n + 1).  The velocity is limited as a vector, so that a turned flow has the same
+    slopes; there are none at both ends.
+    """
+    states = line.states
+    middles = line.middles
+    slopes = line.slopes
+    last = middles.shape[1] - 1
+    for k in range(last + 1):
+        middles[0, k] = 0.5 * (nodes[0, k + 1] + nodes[0, k])
+        middles[1, k] = 0.5 * (nodes[1, k + 1] + nodes[1, k])
+    slopes[:] = 0.0
+    for k in range(1, last):
+        dx = middles[0, k + 1] - middles[0, k - 1]
+        dy = middles[1, k + 1] - middles[1, k - 1]
+        length = (dx * dx + dy * dy) ** 0.5
+        slopes[ALONG_X, k] = dx / length
+        slopes[ALONG_Y, k] = dy / length
+        before = (middles[0, k] - middles[0, k - 1]) ** 2 + (middles[1, k] - middles[1, k - 1]) ** 2
+        after = (middles[0, k + 1] - middles[0, k]) ** 2 + (middles[1, k + 1] - middles[1, k]) ** 2
+        before = 1.0 / before**0.5
+        after = 1.0 / after**0.5
+        u = (states[U, k] - states[U, k - 1]) * before
+        u_next = (states[U, k + 1] - states[U, k]) * after
+        v = (states[V, k] - states[V, k - 1]) * before
+        v_next = (states[V, k + 1] - states[V, k]) * after
+        p = (states[P, k] - states[P, k - 1]) * before
+        p_next = (states[P, k + 1] - states[P, k]) * after
+        if u * u_next + v * v_next > 0.0:
+            one, two = compute_share(u * u + v * v, u_next * u_next + v_next * v_next)
+            slopes[U_SLOPE, k] = one * u + two * u_next
+            slopes[V_SLOPE, k] = one * v + two * v_next
+        if p * p_next > 0.0:
+            one, two = compute_share(p * p, p_next * p_next)
+            slopes[P_SLOPE, k] = one * p + two * p_next

@@ -108,7 +108,12 @@ def time_left_behind(tables: Tables, ni: int, nj: int) -> None:
     behind[:, 1:-1, 1:-1] = moving.start[:, 1:-1, 1:-1]
     regridders = {
         f"{steps} Newton steps": BarrierRegridder(
-            1e-2, family="i", tolerance=0.04, max_iterations=40, floor=1e-9, newton_steps=steps
+            epsilon=1e-2,
+            family="i",
+            tolerance=0.04,
+            max_iterations=40,
+            floor=1e-9,
+            newton_steps=steps,
         )
         for steps in (2, 4, 7)
     }

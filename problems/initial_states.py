@@ -11,9 +11,9 @@ that runs outwards from a contact.
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.simulation import Simulation
 from hydro.step import take_step
 from problems.deck import DeckTable, key
-from problems.pictures import draw_field, make_panels, title_time
+from problems.pictures import Colours, draw_field, make_panels, title_time
 from problems.problem import BlockPlan, Problem, find_crossing, say_unreached
 from problems.references.exact_flows import average_points
 from problems.references.hugoniot import Shock, shock_with_mach
@@ -216,10 +216,10 @@ class RadialProblem(Problem):
         known = np.isfinite(found)
         return float(found[known].mean()) if level > 1.0 + 0.5 * LEAST_RISE and known.any() else 0.0
 
-    def draw(self, figure, dump, reach: float, **options) -> None:
+    def draw(self, figure, dump, reach: float, high: float | None = None, every: int = 0) -> None:
         """Density out to `reach` [m], and of every cell against its radius beside the exact one."""
         left, right = make_panels(figure, 11.5, 4.8, 1, 2)
-        draw_field(left, dump, "rho", low=0.0, bar="density", **options)
+        draw_field(left, dump, "rho", Colours(low=0.0, high=high), every=every, bar="density")
         if not self.plane:
             left.set(xlim=(0.0, reach), ylim=(0.0, reach))
         gas = dump["gas"]
@@ -297,8 +297,8 @@ def settle_front(front: Front, *, cfl: float, limiter: str) -> tuple[int, np.nda
         return _settle(front, cfl, limiter)
     eos = front.eos
     rest = [getattr(front, one.name) for one in fields(front)[1:]]
-    words = type(eos).__qualname__, eos.parameters, rest, cfl, limiter
-    return remember("settled", words, lambda: _settle(front, cfl, limiter))
+    key_numbers = type(eos).__qualname__, eos.parameters, rest, cfl, limiter
+    return remember("settled", key_numbers, lambda: _settle(front, cfl, limiter))
 
 
 def _settle(front: Front, cfl: float, limiter: str) -> tuple[int, np.ndarray]:
@@ -328,37 +328,51 @@ def _settle(front: Front, cfl: float, limiter: str) -> tuple[int, np.ndarray]:
     last = place_nodes(duration)
     shift = 0.0
     for _ in range(2):  # what the shock's start leaves behind moves its place
-        strip = nodes[place] - front.speed * duration + shift, states, ends, duration
-        rho, u, p = run_strip(front.eos, place_nodes, size, *strip, cfl=cfl, limiter=limiter)
+        begin = nodes[place] - front.speed * duration + shift
+        strip = Strip(front.eos, place_nodes, size, begin, states, ends)
+        rho, u, p = run_strip(strip, duration, cfl=cfl, limiter=limiter)
         excess = ((rho - front.ahead[0]) * np.diff(last))[kept].sum()
         shift -= excess / (front.behind[0] - front.ahead[0]) - (nodes[place] - last[kept][0])
     start = max(0, place - KEPT_CELLS_BEHIND)
     return start, np.array([rho, u, p])[:, start - lowest :]
 
 
-def run_strip(
-    eos, place_nodes, size, begin, states, ends, duration, *, cfl, limiter
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Density, velocity and pressure (n,) of a row of cells after `duration` [s].
+class Strip(NamedTuple):
+    """A row of cells in which a shock runs; it lies along j, as do the cells in memory.
 
-    place_nodes: time -> places (n + 1) [m] of the nodes; size: its width over ROWS [m]; before
-    `begin` [m] is the first of both states (rho, 0, u, p), beyond it the second; ends: what the
-    first and the last side are, as for `put`.  The row lies along j, as do the cells in memory.
+    place_nodes: time -> places (n + 1) [m] of the nodes; cell_width: its width over RUN_IN_ROWS
+    [m]; before `begin` [m] is the first of both states (rho, 0, u, p), beyond it the second; ends:
+    what the first and the last side are, as for `put`.
     """
+
+    eos: EquationOfState
+    place_nodes: Callable[[float], np.ndarray]
+    cell_width: float
+    begin: float
+    states: Sequence[tuple[float, ...]]
+    ends: Sequence[Mapping[str, Any]]
+
+
+def run_strip(
+    strip: Strip, duration: float, *, cfl: float, limiter: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Density, velocity and pressure (n,) of the cells of a strip after `duration` [s]."""
     x = np.broadcast_to(
-        size * np.arange(RUN_IN_ROWS + 1.0)[:, None], (RUN_IN_ROWS + 1, place_nodes(0.0).size)
+        strip.cell_width * np.arange(RUN_IN_ROWS + 1.0)[:, None],
+        (RUN_IN_ROWS + 1, strip.place_nodes(0.0).size),
     )
 
     def lay_nodes(_, t):
         nodes = np.empty((2, *x.shape))
         nodes[0] = x
-        nodes[1] = place_nodes(t)
+        nodes[1] = strip.place_nodes(t)
         return nodes
 
     nodes = lay_nodes("", 0.0)
-    part = compute_area_fractions(nodes, begin, along="x")
-    block = Block("strip", eos, nodes, *mix_states(eos, part, *states), limiter=limiter)
-    for side, end in zip(("j_min", "j_max"), ends, strict=True):
+    part = compute_area_fractions(nodes, strip.begin, along="x")
+    state = mix_states(strip.eos, part, *strip.states)
+    block = Block("strip", strip.eos, nodes, *state, limiter=limiter)
+    for side, end in zip(("j_min", "j_max"), strip.ends, strict=True):
         put(block, side, **end)
     for side in ("i_min", "i_max"):
         put(block, side, "wall")
@@ -436,8 +450,8 @@ def settle_shock(
         return line - part * shock.particle_speed * (duration - t)
 
     ends = {"kind": "piston", "velocity": (0.0, shock.particle_speed)}, {"kind": "wall"}
-    strip = position - way, (behind, ahead), ends, duration
-    rho, u, p = run_strip(eos, place_nodes, size, *strip, cfl=cfl, limiter=limiter)
+    strip = Strip(eos, place_nodes, size, position - way, (behind, ahead), ends)
+    rho, u, p = run_strip(strip, duration, cfl=cfl, limiter=limiter)
     spot = way / size * (1.0 - shock.particle_speed / shock.shock_speed)  # cells behind the shock
     front = max(0, cell - min(MOST_KEPT, int(CLEAN_WAY_PART * spot)))
     rho[:front] = shock.rho

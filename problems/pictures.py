@@ -3,7 +3,8 @@
 `run_data` is runs.store.reader.RunData: `.deck`, `.history` (dict of arrays), `.dumps`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,40 +36,60 @@ def spread_dumps(run_data, count: int) -> list:
     return run_data.dumps[-1 :: -max(1, len(run_data.dumps) // count)][count - 1 :: -1]
 
 
+class Colours(NamedTuple):
+    """How values become colours: shown over `unit`, as the ends `low` and `high` of the scale are.
+
+    `map`: a colour map of matplotlib; an end that is None is that of the values.
+    """
+
+    unit: float = 1.0
+    low: float | None = None
+    high: float | None = None
+    map: str = "viridis"
+
+
+COLOURS_OF_VALUES = Colours()
+
+
 def draw_field(
-    axis, dump, values, *, unit=1.0, colours="viridis", low=None, high=None, every=0, lines=(),
-    bar="", title="", mm=False,
+    axis, dump, values, colours=COLOURS_OF_VALUES, *, every=0, bar="", title="", mm=False
 ):  # fmt: skip
     """Draw a field of all blocks of a dump on an axis; returns the picture for a colour bar.
 
-    values: a name of `cell_fields` or a function `block -> (ni, nj)`, shown over `unit`, as low
-    and high are; every: draw each so many grid lines, 0 none; lines: polylines (2, n) drawn over
-    it; bar: words at a colour bar, none without; title: above the panel, "t" for the time; mm:
-    lengths in millimetres.
+    values: a name of `cell_fields` or a function `block -> (ni, nj)`; every: draw each so many grid
+    lines, 0 none; bar: the label of a colour bar, none without; title: above the panel, "t" for
+    the time; mm: lengths in millimetres.
     """
     make = values if callable(values) else (lambda block: block.cell_fields[values])
-    fields = [make(block) / unit for block in dump.blocks]
-    low = min(float(np.nanmin(field)) for field in fields) if low is None else low
-    high = max(float(np.nanmax(field)) for field in fields) if high is None else high
+    fields = [make(block) / colours.unit for block in dump.blocks]
+    low = colours.low
+    if low is None:
+        low = min(float(np.nanmin(field)) for field in fields)
+    high = colours.high
+    if high is None:
+        high = max(float(np.nanmax(field)) for field in fields)
+    ends = {"vmin": low, "vmax": high}
     picture = None
-    scale = 1e3 if mm else 1.0
-    unit = "mm" if mm else dump.length_unit
-    for block, found in zip(dump.blocks, fields, strict=True):
-        x, y = nodes = scale * block.nodes
-        picture = axis.pcolormesh(x, y, found, cmap=colours, vmin=low, vmax=high, rasterized=True)
+    for block, field in zip(dump.blocks, fields, strict=True):
+        x, y = nodes = (1e3 if mm else 1.0) * block.nodes
+        picture = axis.pcolormesh(x, y, field, cmap=colours.map, rasterized=True, **ends)
         if every:
             draw_grid(axis, nodes, every)
-    for line in lines:
-        axis.plot(scale * line[0], scale * line[1], color="w", lw=0.8)
     axis.set_aspect("equal")
-    xlabel, ylabel = (name_axis(name, unit) for name in dump.axes)
+    length_unit = "mm" if mm else dump.length_unit
+    xlabel, ylabel = (name_axis(name, length_unit) for name in dump.axes)
     axis.set(xlabel=xlabel, ylabel=ylabel)
     if bar:
         axis.figure.colorbar(picture, ax=axis, shrink=0.8, label=bar)
     if title:
-        words = title_time(dump) if title == "t" else title
-        axis.set_title(words, fontsize="medium")
+        axis.set_title(title_time(dump) if title == "t" else title, fontsize="medium")
     return picture
+
+
+def draw_lines(axis, lines: Iterable[np.ndarray]) -> None:
+    """White polylines (2, n) over a field, in the units of its axes."""
+    for line in lines:
+        axis.plot(*line, color="w", lw=0.8)
 
 
 def title_time(dump) -> str:

@@ -29,7 +29,7 @@ from hydro.links import join
 from hydro.motion.line import LineRule
 from problems.deck import MOST_CELLS, Deck, Limiter, Output, Regrid, RunControl, key
 from problems.initial_states import make_plane_grid, mix_states, put_walls
-from problems.pictures import draw_field, draw_grid, find_dump, make_panels
+from problems.pictures import Colours, draw_field, draw_grid, find_dump, make_panels
 from problems.problem import Problem, Report, Row, align, find_time, get_last
 from problems.references.hugoniot import shock_with_mach
 from problems.references.riemann import solve_riemann
@@ -430,7 +430,8 @@ def draw_shadowgraph(axis, gas: str, dump) -> None:
     def darken(block):
         return np.log10(np.maximum(compute_slope(block) / most, 1e-9))
 
-    draw_field(axis, dump, darken, colours="Greys", low=-DRAWN_GRADIENT_DECADES, high=0.2, mm=True)
+    colours = Colours(low=-DRAWN_GRADIENT_DECADES, high=0.2, map="Greys")
+    draw_field(axis, dump, darken, colours, mm=True)
     for block in dump.blocks:
         x, y = 1e3 * block.nodes
         draw_grid(axis, np.array([x, -y]), color="C0" if block.material == gas else "0.6")

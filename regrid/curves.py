@@ -555,12 +555,15 @@ def fill_on_spline(line, arc, positions, second, first, last, out):
 
 
 @kernel
-def fill_redistributed(line, law, keys, spline, relax, closed, wall_first, wall_last, work, out):
+def fill_redistributed(line, spacing, keys, spline, closed, walls, work, out):
     """Nodes of `line` redistributed between the key nodes `keys`; see `redistribute`.
 
-    Returns -1, or the first key node of the segment in which nodes would cross; `work` (6, n) is
-    scratch.
+    spacing: positions (n,) and the fraction of the way to them that nodes go; walls: their normals
+    at both ends; `work` (6, n) is scratch.  Returns -1, or the first key node of the segment in
+    which nodes would cross.
     """
+    law, relax = spacing
+    wall_first, wall_last = walls
     count = line.shape[1]
     arc = work[0]
     positions = work[1]
@@ -633,9 +636,9 @@ def redistribute(
     out = np.empty_like(line)
     work = np.empty((6, count))
     wall_first, wall_last = ((float(wall[0]), float(wall[1])) for wall in walls)
-    failed = fill_redistributed(
-        line, law, ends, shape == "spline", float(relax), closed, wall_first, wall_last, work, out
-    )
+    spacing = law, float(relax)
+    normals = wall_first, wall_last
+    failed = fill_redistributed(line, spacing, ends, shape == "spline", closed, normals, work, out)
     if failed >= 0:
         raise make_crossing(failed)
     return out

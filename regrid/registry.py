@@ -71,16 +71,30 @@ def make_regridder(name: str, **options: Any) -> Regridder:
 
 def call_with_options(maker: Any, name: str, options: dict[str, Any]) -> Any:
     """The regridder that a class makes; BadInput for an option or a value that is none."""
-    parameters = inspect.signature(maker).parameters
+    annotations = find_options(maker)
     for option, value in options.items():
-        if option not in parameters:
-            hint = suggest(option, list(parameters))
+        if option not in annotations:
+            hint = suggest(option, list(annotations))
             raise BadInput(f"regridder '{name}' has no option '{option}'{hint}")
-        wanted = KINDS.get(str(parameters[option].annotation).removesuffix(" | None"))
+        wanted = KINDS.get(annotations[option].removesuffix(" | None"))
         if wanted and value is not None and (type(value) is bool or not isinstance(value, wanted)):
             words = {Real: "a number", Integral: "a whole number", str: "a word"}[wanted]
             raise BadInput(f"regridder '{name}': {option} = {value!r}; it must be {words}")
     return maker(**options)
+
+
+def find_options(maker: Any) -> dict[str, str]:
+    """Names of the options of a regridder's class, and their annotations.
+
+    Options that the class takes together, as `**numbers`, are listed in its attribute `numbers`.
+    """
+    found: dict[str, str] = {}
+    for name, parameter in inspect.signature(maker).parameters.items():
+        if parameter.kind is inspect.Parameter.VAR_KEYWORD:
+            found |= maker.numbers
+        else:
+            found[name] = str(parameter.annotation)
+    return found
 
 
 def takes_weight(name: str) -> bool:

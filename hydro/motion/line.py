@@ -154,10 +154,11 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, shaping, walls):
     out = moved
     if relax > 0.0:
         out = work[6:]
+        wanted = turned if shortest > 0.0 else spacing
+        ends = np.array([0, count - 1])
         failed = curves.fill_redistributed(
-            moved, turned if shortest > 0.0 else spacing, np.array([0, count - 1]), spline, relax,
-            periodic, walls[0], walls[1], work[:6], out,
-        )  # fmt: skip
+            moved, (wanted, relax), ends, spline, periodic, walls, work[:6], out
+        )
         if dt > 0.0:
             limit_spreading(moved, rim, first, dt, out)
             for c in range(2):

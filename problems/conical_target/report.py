@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydro.block import Block
-from problems.pictures import draw_field, draw_grid, make_panels, spread_dumps
+from problems.pictures import Colours, draw_field, draw_grid, draw_lines, make_panels, spread_dumps
 from problems.problem import Report, Row, fit_slope, reduce_between
 from problems.references.hugoniot import caution_fit, shock_to_pressure
 from problems.references.shock_polars import CrossedLine
@@ -363,9 +363,10 @@ class Results:
         for axis, dump in zip(top, (first, last), strict=False):
             _draw_materials(axis, dump, names, grid=False)
             axis.set_title(f"t = {dump.t * US:.3g} µs", fontsize="medium")
-        lines = [trace_outline(block.nodes) for block in last.blocks]
-        words = {"title": f"t = {last.t * US:.3g} µs", "bar": "pressure [GPa]", "lines": lines}
-        draw_field(top[2], last, "p", unit=1e9, mm=True, **words)
+        title = f"t = {last.t * US:.3g} µs"
+        pressures = Colours(unit=1e9)
+        draw_field(top[2], last, "p", pressures, bar="pressure [GPa]", title=title, mm=True)
+        draw_lines(top[2], [MM * trace_outline(block.nodes) for block in last.blocks])
         for axis in (near, corner):
             axis.set_facecolor(FACES["shell"])  # what shows between chords and the line
             _draw_materials(axis, last, {}, grid=True)

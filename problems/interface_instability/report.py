@@ -17,8 +17,10 @@ from problems.interface_instability.theories import (
     predict_amplitude,
 )
 from problems.pictures import (
+    Colours,
     compute_rates,
     draw_field,
+    draw_lines,
     find_dump,
     name_axis,
     spread_dumps,
@@ -331,8 +333,9 @@ class Results:
         panels = [figure.add_subplot(grid[1, column]) for column in range(len(dumps))]
         for axes, dump, line, window in zip(panels, dumps, lines, windows, strict=True):
             title = f"density and grid, {self.scale_time(dump.t)}"
-            style = {"low": rho.min(), "high": rho.max(), "every": 1, "lines": [line]}
-            picture = draw_field(axes, dump, "rho", title=title, **style)
+            colours = Colours(low=rho.min(), high=rho.max())
+            picture = draw_field(axes, dump, "rho", colours, every=1, title=title)
+            draw_lines(axes, [line])
             axes.set_xlim(*window)
         if panels:
             label = name_axis("density", "kg/m3" if self.t_unit == "s" else "1")

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from problems.pictures import compute_rates, draw_field, make_panels, spread_dumps
+from problems.pictures import Colours, compute_rates, draw_field, make_panels, spread_dumps
 from problems.problem import Report, Row
 from problems.references.hugoniot import caution_fit
 from problems.references.shock_polars import compute_jet_speed
@@ -434,9 +434,9 @@ class Results:
         last = run.dumps[-1].blocks
         top = max(float(np.percentile(block.cell_fields["p"], 99.5)) for block in last)
         top = 1.1 * self.collision.p if self.collision.attached else top
-        style = {"colours": "turbo", "low": 0.0, "high": top / 1e9, "every": 1, "mm": True}
+        colours = Colours(unit=1e9, low=0.0, high=top / 1e9, map="turbo")
         for axes, dump in panels:
-            image = draw_field(axes, dump, "p", unit=1e9, **style)
+            image = draw_field(axes, dump, "p", colours, every=1, mm=True)
             axes.label_outer()
         axes = [panel for panel, _ in panels]
         figure.colorbar(image, ax=axes, label="pressure [GPa]", extend="max", pad=0.01)

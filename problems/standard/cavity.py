@@ -24,7 +24,7 @@ from hydro.boundary import put
 from hydro.eos.materials import find_material, find_name
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, VoidFill, key
 from problems.initial_states import lay_rays, put_walls
-from problems.pictures import draw_field, find_dump, make_panels
+from problems.pictures import Colours, draw_field, find_dump, make_panels
 from problems.problem import Problem, Report, Row, find_most, find_time, measure_below
 from problems.references.hugoniot import caution_fit, release, shock_with_particle_speed
 
@@ -128,7 +128,8 @@ class Cavity(Problem):
         dumps = [find_dump(run_data, t) for t in (start, 0.5 * (start + end), end, last)]
         high = max(1e-9 * float(np.quantile(dump.blocks[0].p, 0.995)) for dump in dumps)
         for axis, dump in zip(axes.flat, dumps, strict=True):
-            words = {"title": f"t = {1e6 * dump.t:.3f} µs", "unit": 1e9}
-            picture = draw_field(axis, dump, "p", low=0.0, high=high, every=1, **words)
+            colours = Colours(unit=1e9, low=0.0, high=high)
+            title = f"t = {1e6 * dump.t:.3f} µs"
+            picture = draw_field(axis, dump, "p", colours, every=1, title=title)
             axis.set(xlim=(-1.6 * radius, 2.4 * radius), ylim=(0.0, 2.0 * radius))
         figure.colorbar(picture, ax=axes, shrink=0.7, label="pressure [GPa]")

@@ -18,7 +18,7 @@ from hydro.eos import IdealGas
 from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import swing_square
-from problems.pictures import draw_field, make_panels
+from problems.pictures import Colours, draw_field, make_panels
 from problems.problem import Problem, Report, Row, compare
 from problems.references.exact_flows import GAUSS, average_points
 
@@ -92,7 +92,7 @@ class Gresho(Problem):
         *panels, right = make_panels(figure, 12.0, 4.0, 1, 3)
         for axis, dump in zip(panels, (run_data.dumps[0], run_data.dumps[-1]), strict=True):
             title = f"speed, t = {dump.t:.3g}"
-            draw_field(axis, dump, speed, low=0.0, high=1.0, every=2, title=title)
+            draw_field(axis, dump, speed, Colours(low=0.0, high=1.0), every=2, title=title)
         square = run_data.dumps[-1]["square"]
         right.plot(np.hypot(*square.centres).ravel(), speed(square).ravel(), ".", ms=2)
         right.plot([0.0, 0.2, 0.4, 0.7], [0.0, 1.0, 0.0, 0.0], "k", lw=0.8)

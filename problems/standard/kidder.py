@@ -22,7 +22,7 @@ from hydro.boundary import put
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
 from problems.initial_states import RadialProblem
-from problems.pictures import draw_field, make_panels
+from problems.pictures import Colours, draw_field, make_panels
 from problems.problem import Report, compare, get_last
 from problems.references.exact_flows import RADII, Shell
 from regrid.measure.corners import compute_centres
@@ -113,13 +113,13 @@ class Kidder(RadialProblem):
         high = float(dumps[-1]["shell"].rho.max())
         for h, bar in ((1.0, ""), (0.75, ""), (0.5, "density")):
             dump = min(dumps, key=lambda dump: abs(shrink(dump.t) - h))
-            draw_field(left, dump, "rho", low=0.0, high=high, every=4, bar=bar)
-            words = f"t = {dump.t / self.shell.tau:.3g} tau"
+            draw_field(left, dump, "rho", Colours(low=0.0, high=high), every=4, bar=bar)
+            label = f"t = {dump.t / self.shell.tau:.3g} tau"
             outer = 1.01 * RADII[1] * shrink(dump.t)
             if self.deck.n == 1:
-                left.text(outer, 0.5, words, rotation=90, va="center", fontsize="small")
+                left.text(outer, 0.5, label, rotation=90, va="center", fontsize="small")
             else:
-                left.text(0.02, outer, words)
+                left.text(0.02, outer, label)
         times, h = np.array([(dump.t / self.shell.tau, shrink(dump.t)) for dump in dumps]).T
         for edge, words, exact in ((-1, "outer", None), (0, "inner", "exact")):
             radius = [self.compute_radii(d["shell"].nodes[:, edge, :]).mean() for d in dumps]

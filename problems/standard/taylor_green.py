@@ -20,7 +20,7 @@ from hydro.block import Block
 from hydro.eos import IdealGas
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import put_walls
-from problems.pictures import draw_field, find_dump, make_panels
+from problems.pictures import Colours, draw_field, find_dump, make_panels
 from problems.problem import BlockPlan, Problem, Report, compare
 from problems.references.exact_flows import (
     CELL_GAMMA,
@@ -91,11 +91,11 @@ class TaylorGreen(Problem):
         options = {"every": every, "title": "t"}
         for axis, part in zip(panels, (0.25, 1.0), strict=True):
             dump = find_dump(run_data, part * last.t)
-            draw_field(axis, dump, "p", low=0.5, high=1.5, bar="pressure", **options)
+            draw_field(axis, dump, "p", Colours(low=0.5, high=1.5), bar="pressure", **options)
 
         def compute_error(block):
             u, v, _ = compute_cell(*block.centres)
             return np.hypot(block.u - u, block.v - v)
 
-        options |= {"bar": "error of the velocity", "colours": "magma_r"}
-        draw_field(right, last, compute_error, low=0.0, **options)
+        options["bar"] = "error of the velocity"
+        draw_field(right, last, compute_error, Colours(low=0.0, map="magma_r"), **options)

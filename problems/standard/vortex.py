@@ -18,7 +18,7 @@ from hydro.eos import IdealGas
 from hydro.links import join
 from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from problems.initial_states import swing_square
-from problems.pictures import draw_field
+from problems.pictures import Colours, draw_field
 from problems.problem import BlockPlan, Problem, Report, compare, get_last, say_unreached
 from problems.references.exact_flows import Vortex as ExactVortex
 
@@ -93,6 +93,6 @@ class Vortex(Problem):
         most = np.abs(error).max()
         every = max(1, n // 32)
         draw_field(left, dump, "rho", every=every, bar="density")
-        ends = {"low": -most, "high": most, "colours": "RdBu_r"}
-        draw_field(right, dump, lambda _: error, every=every, bar="density - exact", **ends)
+        colours = Colours(low=-most, high=most, map="RdBu_r")
+        draw_field(right, dump, lambda _: error, colours, every=every, bar="density - exact")
         figure.suptitle(f"{n} x {n}, t = {dump.t:.4g}")

@@ -12,14 +12,14 @@ result must depend only on `previous` and `boundary`, never on earlier calls.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
+from dataclasses import fields, replace
+from typing import Any, ClassVar
 
 import numpy as np
 
 from regrid.barrier.newton_move import Folded, NewtonMove
 from regrid.barrier.side_laws import fill_family_weights
-from regrid.barrier.tuning import DEFAULT, Tuning
+from regrid.barrier.tuning import DEFAULT, OPTIONS, Tuning
 from regrid.barrier.turning import Look, choose_look, is_convex, turn_bend
 from regrid.barrier.workspace import Workspace, find_bend, is_bent
 from regrid.errors import BadInput, RegridFailure
@@ -70,24 +70,22 @@ class BarrierRegridder:
     ni+1, nj+1); without it inner lines have the mean spacing of the outer two.
     """
 
+    # the options that are fields of `Tuning`, and their types
+    numbers: ClassVar[dict[str, str]] = {
+        one.name: str(one.type) for one in fields(Tuning) if one.name in OPTIONS
+    }
+
     def __init__(
         self,
-        epsilon: float | None = None,
+        *,
         method: str = "newton",
         edge_lengths: str = "conditional",
         family="auto",
-        area_weight: float | None = None,
-        strengthening: float | None = None,
-        tolerance: float | None = None,
-        floor: float | None = None,
-        max_iterations: int | None = None,
-        newton_steps: int | None = None,
-        cost_weight: float | None = None,
         first_grid: np.ndarray | None = None,
-        coarse_from: float | None = None,
         curves: bool = True,
         threads: int = 1,
         tuning: Tuning = DEFAULT,
+        **numbers: float | None,
     ):
         if method not in ("newton", "sweeps"):
             raise BadInput(f"barrier regridder: method '{method}' is neither 'newton' nor 'sweeps'")
@@ -97,13 +95,9 @@ class BarrierRegridder:
                 "nor 'unit'"
             )
         given: dict[str, Any] = {
-            "epsilon": epsilon, "area_weight": area_weight, "strengthening": strengthening,
-            "tolerance": tolerance, "floor": floor, "max_iterations": max_iterations,
-            "newton_steps": newton_steps, "cost_weight": cost_weight, "coarse_from": coarse_from,
-        }  # fmt: skip
-        self.tuning = replace(
-            tuning, **{name: value for name, value in given.items() if value is not None}
-        )
+            name: value for name, value in numbers.items() if value is not None
+        }
+        self.tuning = replace(tuning, **given)
         _check_tuning(self.tuning)
         self.conditional = edge_lengths == "conditional"
         if not isinstance(curves, bool):
@@ -130,9 +124,8 @@ class BarrierRegridder:
             from regrid.barrier.sweeps import Sweeps
 
             self._sweeps = Sweeps(
-                epsilon=1e-2 if epsilon is None else epsilon,
-                edge_lengths=edge_lengths, family=family, threads=threads,
-            )  # fmt: skip
+                given.get("epsilon", 1e-2), edge_lengths=edge_lengths, family=family
+            )
 
     works_in_place = True  # into `boundary`, whose sides are preserved bitwise
 
@@ -390,13 +383,13 @@ class _FixedFamily(BarrierRegridder):
         threads: int = 1,
     ):
         super().__init__(
-            epsilon=epsilon,
             method=method,
             edge_lengths=edge_lengths,
             family=self.fixed,
+            threads=threads,
+            epsilon=epsilon,
             area_weight=area_weight,
             cost_weight=cost_weight,
-            threads=threads,
         )
 
 

@@ -364,16 +364,19 @@ def count_nodes(boxes: np.ndarray) -> int:
     return int(((boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2])).sum())
 
 
+# least new corner area relative to the old one; the paper has 0, plain convexity
+LEAST_AREA_PART = 0.1
+
+
 class Sweeps:
     """Charakhch'yan's iteration as a regridder.
 
     `epsilon` weighs the barrier against the straight lines; `functional` "ivanenko-charakhchyan" is
     I alone with all edge lengths 1, the paper's method for comparison.  At most `sweeps` sweeps are
     made while some node's relative residual exceeds `tolerance` (0: all of them, on all nodes).
-    tau_s is 1 in the first `plain_sweeps` sweeps, then set by a parabola.  `floor` is the least new
-    corner area relative to the old one (0: the paper's plain convexity).  `start` is the grid tried
-    first.  `family` is "i" (lines j = const straight), "j", "auto", or two weights, the larger of
-    which determines it.
+    tau_s is 1 in the first `plain_sweeps` sweeps, then set by a parabola.  `start` is the grid
+    tried first.  `family` is "i" (lines j = const straight), "j", "auto", or two weights, the
+    larger of which determines it.
     """
 
     def __init__(
@@ -384,10 +387,8 @@ class Sweeps:
         sweeps: int = 15,
         tolerance: float = 1e-3,
         plain_sweeps: int = 4,
-        floor: float = 0.1,
         start: str = "displacement",
         family="auto",
-        threads: int = 1,
     ):
         for word, value, known in (
             ("edge_lengths", edge_lengths, ("conditional", "unit")),
@@ -399,10 +400,8 @@ class Sweeps:
         self.alone = functional == "ivanenko-charakhchyan"
         if not (epsilon >= 0.0 and (epsilon > 0.0 or not self.alone)):
             raise BadInput(f"sweeps: epsilon {epsilon} must not be negative")
-        if not 0.0 <= floor < 1.0:
-            raise BadInput(f"sweeps: floor {floor} must lie in 0..1, below 1")
         self.epsilon = float(epsilon)
-        self.floor = float(floor)
+        self.floor = LEAST_AREA_PART
         self.start = start
         self.conditional = edge_lengths == "conditional" and not self.alone
         self.sweeps = int(sweeps)

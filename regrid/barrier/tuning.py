@@ -61,3 +61,8 @@ class Tuning:
 
 
 DEFAULT = Tuning()
+# the fields that are options of the regridder by themselves, in decks too
+OPTIONS = (
+    "epsilon", "area_weight", "strengthening", "tolerance", "floor", "max_iterations",
+    "newton_steps", "cost_weight", "coarse_from",
+)  # fmt: skip

@@ -12,7 +12,8 @@ plane barrier regridder unless stated otherwise.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import ClassVar
 
 import numpy as np
 
@@ -75,14 +76,14 @@ LEAST_FALL = 0.1  # of the energy, in the formula for e
 class HexahedraOptions:
     """Parameters of a move; see `BarrierRegridder3D`."""
 
-    epsilon: float
-    area_weight: float
-    strengthening: float
-    conditional: bool
-    tolerance: float
-    floor: float
-    max_iterations: int
-    newton_steps: int
+    epsilon: float = 1e-3
+    area_weight: float = 1.0
+    strengthening: float = 30.0
+    conditional: bool = True
+    tolerance: float = 0.05
+    floor: float = 1e-3
+    max_iterations: int = 16
+    newton_steps: int = 1
 
 
 class Workspace:
@@ -446,37 +447,34 @@ class BarrierRegridder3D:
     per call.
     """
 
-    def __init__(
-        self,
-        epsilon: float = 1e-3,
-        edge_lengths: str = "conditional",
-        family="auto",
-        area_weight: float = 1.0,
-        strengthening: float = 30.0,
-        tolerance: float = 0.05,
-        floor: float = 1e-3,
-        max_iterations: int = 16,
-        newton_steps: int = 1,
-    ):
+    # the options that are fields of HexahedraOptions, and their types
+    numbers: ClassVar[dict[str, str]] = {
+        one.name: str(one.type) for one in fields(HexahedraOptions) if one.type != "bool"
+    }
+
+    def __init__(self, edge_lengths: str = "conditional", family="auto", **numbers: float):
         if edge_lengths not in ("conditional", "unit"):
             raise BadInput(
                 f"barrier regridder: edge_lengths '{edge_lengths}' is neither 'conditional' "
                 "nor 'unit'"
             )
-        for name, value, least in (
-            ("epsilon", epsilon, 0.0),
-            ("area_weight", area_weight, -1e-300),
-            ("strengthening", strengthening, 1.0 - 1e-15),
+        converted = {
+            name: int(value) if self.numbers.get(name) == "int" else float(value)
+            for name, value in numbers.items()
+        }
+        options = HexahedraOptions(conditional=edge_lengths == "conditional", **converted)  # type: ignore[arg-type]
+        for name, least in (
+            ("epsilon", 0.0),
+            ("area_weight", -1e-300),
+            ("strengthening", 1.0 - 1e-15),
         ):
+            value = getattr(options, name)
             if not least < value < np.inf:
                 raise BadInput(
                     f"barrier regridder: {name} {value} must be finite and "
                     + ("1 or more" if name == "strengthening" else "positive")
                 )
-        self.options = HexahedraOptions(
-            float(epsilon), float(area_weight), float(strengthening), edge_lengths == "conditional",
-            float(tolerance), float(floor), int(max_iterations), int(newton_steps),
-        )  # fmt: skip
+        self.options = options
         self.family = _family_weights(family)
         self._workspaces: dict[tuple[int, ...], Workspace] = {}
 

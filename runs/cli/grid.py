@@ -181,7 +181,7 @@ def check(file, block, picture, force) -> int:
 @block
 @click.option("--plot", "picture", metavar="FILE", help="Draw the last grids side by side.")
 @force
-def compare(source, cells, picture, force, **words) -> None:
+def compare(source, cells, picture, force, **options) -> None:
     """Compare families of grids: a table, and a picture side by side.
 
     Of a named domain; of a deck of a flow, such as interface-instability-mushroom,
@@ -191,7 +191,8 @@ def compare(source, cells, picture, force, **words) -> None:
     from a deforming side (in a file: any side) over that of the quasi-1D grid,
     µs/node the median step.
     """
-    from runs.grids.commands import compare_families, parse_cells
+    from runs.grids.commands import Comparison, compare_families, parse_cells
 
-    for line in compare_families(source, picture, force, cells=parse_cells(cells), **words):
+    comparison = Comparison(cells=parse_cells(cells), **options)
+    for line in compare_families(source, comparison, picture, force):
         echo(line)

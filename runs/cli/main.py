@@ -9,9 +9,11 @@ shockgrid (`--debug` shows where).
 
 from __future__ import annotations
 
+import functools
 import os
 import sys
 from functools import partial
+from typing import NamedTuple
 
 import click
 
@@ -65,6 +67,29 @@ limits = click.option("--limits", metavar="LOW,HIGH", help="Ends of the colour s
 colours = click.option("--colours", metavar="NAME", help="A colour map of matplotlib.")
 
 
+class March(NamedTuple):
+    """Options that `run` and `restart` have in common."""
+
+    settings: tuple[str, ...]
+    threads: int | None
+    max_wall: str | None
+    picture: bool
+    quiet: bool
+
+
+def with_march(command):
+    """Give a command the options of `March`; it takes them together, as `march`."""
+
+    @functools.wraps(command)
+    def call(*arguments, **options):
+        march = March(**{name: options.pop(name) for name in March._fields})
+        return command(*arguments, march=march, **options)
+
+    for option in (quiet, with_plot, max_wall, threads, setting):
+        call = option(call)
+    return call
+
+
 @cli.command("list")
 @click.argument("name", required=False)
 def list_problems(name: str | None) -> None:
@@ -79,25 +104,19 @@ def list_problems(name: str | None) -> None:
 
 @cli.command()
 @click.argument("deck", metavar="PROBLEM_OR_DECK")
-@setting
 @click.option("-o", "--output", metavar="DIR", help="Run directory [out/<problem>-<n>].")
 @click.option("--force", is_flag=True, help="Replace the run that is in the output directory.")
 @click.option("--dry-run", is_flag=True, help="Check the deck, print its size and cost, and stop.")
 @click.option("--ranks", type=click.IntRange(1), help="With --dry-run: as on N MPI ranks.")
-@threads
-@max_wall
-@with_plot
-@quiet
+@with_march
 @click.pass_obj  # the ranks of MPI that share the command, or None
-def run(
-    world, deck, settings, output, force, dry_run, ranks, threads, max_wall, picture, quiet
-) -> int:
+def run(world, deck, output, force, dry_run, ranks, march: March) -> int:
     """Run a problem, a packaged deck, a deck file (TOML) or a problem's own file (Python)."""
     from runs.deck import reading as deck_reading
     from runs.march.runner import WallLimit
 
-    limit = WallLimit(max_wall) if max_wall is not None else None
-    checked = deck_reading.read_deck(deck, _with_threads(settings, threads))
+    limit = WallLimit(march.max_wall) if march.max_wall is not None else None
+    checked = deck_reading.read_deck(deck, _with_threads(march.settings, march.threads))
     if dry_run:
         from regrid.jit import interpreted
         from runs.forecast import foretell, measure_size
@@ -121,12 +140,12 @@ def run(
     from runs.march.compiling import compiling
     from runs.march.launching import start_runner
 
-    with compiling(quiet, helped=world is None):
-        runner = start_runner(checked, output, force, quiet, _say, world)
+    with compiling(march.quiet, helped=world is None):
+        runner = start_runner(checked, output, force, march.quiet, _say, world)
         runner.limit = limit
         runner.world = world
         end = runner.start()
-    return _finish(end, runner.directory, picture, quiet)
+    return _finish(end, runner.directory, march.picture, march.quiet)
 
 
 @cli.command()
@@ -135,15 +154,9 @@ def run(
 @click.option("--cells", metavar="N[,M]", help="Continue with these cells, in another DIR.")
 @click.option("-o", "--output", metavar="DIR", help="With --cells: where [out/<problem>-<n>].")
 @click.option("--force", is_flag=True, help="With --cells: replace the run that is there.")
-@setting
-@threads
-@max_wall
-@with_plot
-@quiet
+@with_march
 @click.pass_obj
-def restart(
-    world, directory, at, cells, output, force, settings, threads, max_wall, picture, quiet
-) -> int:
+def restart(world, directory, at, cells, output, force, march: March) -> int:
     """Continue a run from its last restart point.
 
     Keys that do not affect the state may be changed (run.t_end, output.*, ...;
@@ -154,20 +167,20 @@ def restart(
     from runs.march.runner import WallLimit
     from runs.store.directory import open_directory
 
-    limit = WallLimit(max_wall) if max_wall is not None else None
+    limit = WallLimit(march.max_wall) if march.max_wall is not None else None
     opened = open_directory(directory)
-    settings = _with_threads(settings, threads)
+    settings = _with_threads(march.settings, march.threads)
     if cells is not None:
-        runner = remap_runner(opened, cells, settings, at, output, force, quiet, _say)
+        runner = remap_runner(opened, cells, settings, at, output, force, march.quiet, _say)
         runner.limit = limit
         runner.world = world
-        return _finish(runner.start(), runner.directory, picture, quiet)
+        return _finish(runner.start(), runner.directory, march.picture, march.quiet)
     if output is not None or force:
         raise BadInput("restart: -o and --force need --cells; a run continues in its directory")
-    runner = continue_runner(opened, settings, quiet, at, _say, world)
+    runner = continue_runner(opened, settings, march.quiet, at, _say, world)
     runner.limit = limit
     runner.world = world
-    return _finish(runner.resume(at, _say), opened, picture, quiet)
+    return _finish(runner.resume(at, _say), opened, march.picture, march.quiet)
 
 
 @cli.command()
@@ -187,16 +200,17 @@ def restart(
 @click.option("--retry", is_flag=True, help="Also continue failed runs.")
 @click.option("--dry-run", is_flag=True, help="List the runs and the state of each, and stop.")
 @quiet
-def study(deck, **words) -> int:
+def study(deck, **options) -> int:
     """Run a deck at many points: table, orders and picture.
 
     DECK may be a study file, or the folder of a study to continue.  Each point is a run directory
     in DIR/runs and is computed once, also if the study was killed; after a change of the deck only
     what has changed is computed.  Failed runs are listed; the study continues.
     """
+    from runs.study.command import Request
     from runs.study.command import study as compute
 
-    return compute(deck, **words, say=echo, note=_say)
+    return compute(Request(deck, **options), say=echo, note=_say)
 
 
 @cli.command()

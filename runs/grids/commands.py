@@ -14,7 +14,7 @@ import inspect
 import math
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -231,51 +231,57 @@ def every_family() -> list[str]:
     return [first, "barrier:method=sweeps", *others]
 
 
+@dataclass(frozen=True)
+class Comparison:
+    """Which families are compared, and on what; the options of `shockgrid grid compare`."""
+
+    families: Sequence[str]
+    cells: tuple[int, int] | None
+    steps: int
+    weight: str | None
+    settings: tuple[str, ...]
+    block: str | None
+
+
 def compare_families(
-    domains: str,
-    picture: str | None,
-    force: bool,
-    *,
-    families: Sequence[str],
-    cells: tuple[int, int] | None,
-    steps: int,
-    weight: str | None,
-    settings: tuple[str, ...],
-    block: str | None,
+    domains: str, comparison: Comparison, picture: str | None, force: bool
 ) -> Iterator[str]:
     """Lines of the tables, as they are found; one table a domain, deck or file."""
-    known = {words: parse_family(words) for words in families or every_family()}
+    known = {label: parse_family(label) for label in comparison.families or every_family()}
     names = [name.strip() for name in domains.split(",") if name.strip()]
     kinds = {name: _find_kind(name) for name in names}
     if not names:
         raise BadInput(
             "name a domain, a deck of a flow or a file; `shockgrid grid list` shows the domains"
         )
-    if settings and "flow" not in kinds.values():
+    if comparison.settings and "flow" not in kinds.values():
         raise BadInput(f"--set changes the deck of a flow; a {kinds[names[0]]} has none")
     pictures = _plan_pictures(picture, names, force)
     for name in names:
         if kinds[name] == "flow":
-            title, compute = _prepare_flow(name, settings)
+            title, compute = _prepare_flow(name, comparison.settings)
         elif kinds[name] == "file":
-            title, compute = _prepare_file(name, block, cells, steps)
+            title, compute = _prepare_file(
+                name, comparison.block, comparison.cells, comparison.steps
+            )
         else:
-            title, compute = _prepare_domain(name, cells, steps)
+            title, compute = _prepare_domain(name, comparison.cells, comparison.steps)
         yield f"{name}: {title}"
         yield HEAD
         drawn = []
         reasons = []
         for label, (family, options) in known.items():
-            weighted = {} if weight is None or not takes_weight(family) else {"weight": weight}
-            march, done, sides = compute(family, weighted | options)
+            if comparison.weight is not None and takes_weight(family):
+                options = {"weight": comparison.weight} | options
+            march, done, sides = compute(family, options)
             yield describe_march(label, march, done)
             if march.failure:
                 why = march.failure.removeprefix("regrid: ")
                 why = textwrap.shorten(why, REASON_CHARACTERS, placeholder="...")
                 reasons.append(f"  {label}, step {march.done + 1}: {why}")
             number, _, part = done.partition(" ")
-            words = f"{label}: {number} steps" + f", {part.strip()}" * bool(part)
-            drawn.append((words, march, sides))
+            heading = f"{label}: {number} steps" + f", {part.strip()}" * bool(part)
+            drawn.append((heading, march, sides))
         yield from reasons
         if name in pictures:
             import runs.pictures  # noqa: F401 - loads matplotlib

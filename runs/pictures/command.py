@@ -312,7 +312,13 @@ def name_paths(runs: list[RunData]) -> list[str]:
     return [str(run.path) if same else run.path.name for run in runs]
 
 
-def make_view(zoom: Numbers, mirror, mesh: bool, limits: Numbers, colours: str | None) -> View:
+def make_view(
+    zoom: Numbers = None,
+    mirror: str | None = None,
+    mesh: bool = False,
+    limits: Numbers = None,
+    colours: str | None = None,
+) -> View:
     """The view of a picture or film; BadInput for invalid values."""
     if limits is not None:
         limits = parse_numbers("--limits", limits, "low,high with low < high", 1)

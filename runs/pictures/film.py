@@ -12,6 +12,7 @@ import re
 import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import animation
@@ -22,7 +23,6 @@ from problems.pictures import name_axis
 from problems.prefixes import pick_prefix
 from regrid.errors import BadInput
 from runs.pictures import command, fields
-from runs.pictures.command import Numbers
 from runs.pictures.fields import View
 from runs.store.files import check_folder, disk_errors
 from runs.store.provenance import describe_software, hash_deck
@@ -45,31 +45,29 @@ def make_film(
     output: str | Path | None = None,
     *,
     follow: bool = False,
-    zoom: Numbers = None,
-    mesh: bool = False,
-    mirror: str | None = None,
-    limits: Numbers = None,
-    colours: str | None = None,
     fps: int | None = None,
     dpi: int = 110,
+    **look: Any,
 ) -> Path:
     """Write a film of a run and return its path; [DIR/film-FIELD.mp4, .gif without ffmpeg].
 
     Other choices are part of the name, too: film-p-mesh.mp4.
 
     field: of the dumps or derived, by default the density; follow: the window moves with the
-    interface, else it is `zoom` (x0,x1,y0,y1 [m]), the domain or, if that is long, the interface's
-    surroundings.  limits: low,high of the colours; colours: a map of matplotlib; fps: frames per
-    second, one per dump.  Raises BadInput.
+    interface, else it is `zoom`, the domain or, if that is long, the interface's surroundings; fps:
+    frames per second, one per dump.  look, as for pictures: zoom (x0,x1,y0,y1 [m]), mesh (bool),
+    mirror ("x" or "y"), limits (low,high of the colours), colours (a map of matplotlib).  Raises
+    BadInput.
     """
     run = RunData(directory)
-    view = command.make_view(zoom, mirror, mesh, limits, colours)
+    view = command.make_view(**look)
     if follow and view.zoom:
         raise BadInput("--follow and --zoom: the window follows the interface or is fixed; use one")
     name = field or command.default_fields(run)[0]
-    marks = ["follow"] * follow + ["mesh"] * mesh + [f"mirror-{mirror}"] * bool(mirror)
-    marks += [colours] if colours else []
-    marks += [re.sub(r"[^\w.+-]+", "_", f"zoom-{zoom}")] * bool(zoom)
+    marks = ["follow"] * follow + ["mesh"] * view.mesh
+    marks += [f"mirror-{view.mirror}"] if view.mirror else []
+    marks += [view.colours] if view.colours else []
+    marks += [re.sub(r"[^\w.+-]+", "_", f"zoom-{look['zoom']}")] if view.zoom else []
     has_ffmpeg = animation.writers.is_available("ffmpeg")
     stem = "-".join(["film", name, *marks])
     path = Path(output) if output else run.path / f"{stem}{KINDS[0] if has_ffmpeg else KINDS[1]}"
@@ -113,17 +111,19 @@ def make_film(
         try:
             digest = hash_deck(run.dumps[-1].deck_text)
             made = {"comment": f"{describe_software()}; deck SHA-256 {digest}"}
-            words = {"codec": "h264", "extra_args": ["-movflags", "+faststart"]}
-            make, more = (animation.FFMpegWriter, words) if kind == ".mp4" else (CommentedGif, {})
-            writer = make(fps=rate, metadata=made, **more)
+            if kind == ".mp4":
+                options = {"codec": "h264", "extra_args": ["-movflags", "+faststart"]}
+                writer = animation.FFMpegWriter(fps=rate, metadata=made, **options)
+            else:
+                writer = CommentedGif(fps=rate, metadata=made)
             with writer.saving(figure, str(part), dpi):
                 for number in tqdm(range(len(paths)), "frames", leave=False, disable=None):
                     draw_frame(number)
                     writer.grab_frame()
             os.replace(part, path)
         except subprocess.CalledProcessError as error:
-            words = (error.stderr or error.stdout or b"").decode(errors="replace").strip()
-            reason = words.splitlines()[-1] if words else f"exit code {error.returncode}"
+            printed = (error.stderr or error.stdout or b"").decode(errors="replace").strip()
+            reason = printed.splitlines()[-1] if printed else f"exit code {error.returncode}"
             raise BadInput(f"{path}: ffmpeg cannot write it ({reason}); try a .gif") from error
         finally:
             part.unlink(missing_ok=True)

@@ -8,6 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from regrid.errors import BadInput
@@ -24,38 +25,43 @@ MOST_CAUTIONS = 10  # on the screen
 STATES = {"done": "done", "failed": "failed", "half": "half done", "other": "of another deck"}
 
 
-def study(
-    source: str,
-    vary: Sequence[str],
-    settings: Sequence[str],
-    output: str | None,
-    jobs: int | None,
-    engine: str,
-    shown: Sequence[str],
-    refine: str | None,
-    retry: bool,
-    dry_run: bool,
-    quiet: bool,
-    say: Callable[[str], None],
-    note: Callable[[str], None],
-) -> int:
+@dataclass(frozen=True)
+class Request:
+    """Arguments of the command; their meanings are those of its options in `runs.cli.main`."""
+
+    source: str
+    vary: Sequence[str]
+    settings: Sequence[str]
+    output: str | None
+    jobs: int | None
+    engine: str
+    shown: Sequence[str]
+    refine: str | None
+    retry: bool
+    dry_run: bool
+    quiet: bool
+
+
+def study(request: Request, say: Callable[[str], None], note: Callable[[str], None]) -> int:
     """Compute a study and print the results (`say`; progress goes to `note`).
 
     The exit code is 0 if all runs reached their end, 3 if some failed, 130 or 143 after a signal.
     """
-    varied, fixed = read_words(vary, settings)
-    names = [name for entry in shown for name in entry.split(",") if name]
-    made = make_study(source, varied, output or "", (), fixed, names, refine)
+    varied, fixed = read_words(request.vary, request.settings)
+    names = [name for entry in request.shown for name in entry.split(",") if name]
+    made = make_study(
+        request.source, varied, request.output or "", (), fixed, names, request.refine
+    )
     began = time.monotonic()
-    if dry_run:
+    if request.dry_run:
         made.check()
         check_same_deck(made.path, made.definition)
         say(describe_plan(made))
         return 0
-    progress = Progress(made, quiet, note)
+    progress = Progress(made, request.quiet, note)
     with terminate_softly() as caught:
         try:
-            if not made.run(engine, jobs, progress.tell, retry):
+            if not made.run(request.engine, request.jobs, progress.tell, request.retry):
                 return 0  # an MPI rank that only computes
         except KeyboardInterrupt as stop:  # by now all workers have stopped
             left = count(made.results.count(None), "run")
@@ -65,7 +71,7 @@ def study(
         finally:
             progress.close()
     paths = made.write(note)
-    if not quiet:
+    if not request.quiet:
         say(describe_study(made, progress, time.monotonic() - began))
         say("written: " + "  ".join(str(path) for path in paths))
     return EXIT_FAILED if made.failures else 0

@@ -113,7 +113,7 @@ def test_interior_left_behind_is_found_by_newton_steps_too(ni, nj, most, error):
     behind = moved.copy()
     behind[:, 1:-1, 1:-1] = nodes[:, 1:-1, 1:-1]
     regridder = BarrierRegridder(
-        1e-2,
+        epsilon=1e-2,
         family="i",
         tolerance=0.04,
         max_iterations=40,

@@ -19,6 +19,9 @@ DEEP_NODE_PART = 0.05
 MOST_LAID = 0.3  # of a face's length: nodes that have gone further into the other body fail
 # of a face's length: nodes of both lines that lie so near each other are a pair
 MATCHED_NODE_DISTANCE = 1e-6
+# of the way to the foot: an end of a contact that would go further to lie on a straight line does
+# not do so; the faces that hold each other's nodes overlap too little to give it a direction
+MOST_STRAIGHTENED_WAY = 10.0
 STILL_NODE_DISTANCE = 1e-12  # of a face's length: a node this near is where it is to be
 
 
@@ -56,13 +59,22 @@ def find_held(facets, count, back_positions, held, back_held, inner, closed_befo
 
 
 @compiled_once
-def straighten(points, k, start, x, y):
-    """The place of point `k` on the straight line from the point `start` to (x, y)."""
+def straighten(points, k, start, x_free, y_free, x_foot, y_foot):
+    """The place of point `k` on the straight line from the point `start` to the free one.
+
+    Its foot where the line would take it much further than that: where both faces share next to
+    nothing they may meet at any angle, and a node would go a finite way in however short a step.
+    """
     x_start, y_start = points[0, start], points[1, start]
-    dx, dy = x - x_start, y - y_start
+    dx, dy = x_free - x_start, y_free - y_start
     way = (points[0, k] - x_start) * dx + (points[1, k] - y_start) * dy
     part = min(1.0, max(0.0, way / (dx * dx + dy * dy)))
-    return x_start + part * dx, y_start + part * dy
+    x, y = x_start + part * dx, y_start + part * dy
+    square = (x - points[0, k]) ** 2 + (y - points[1, k]) ** 2
+    square_of_foot = (x_foot - points[0, k]) ** 2 + (y_foot - points[1, k]) ** 2
+    if square > MOST_STRAIGHTENED_WAY**2 * square_of_foot:
+        return x_foot, y_foot
+    return x, y
 
 
 @kernel
@@ -101,7 +113,7 @@ def lay(
             inwards = -1 if closed_before[k] else 1
             pin, free = (a + 1, a) if inwards < 0 else (a, a + 1)
             if 0.0 < inwards * (others[pin] - k) < 1.0 and others[free] < 0.0:
-                x, y = straighten(points, k, k + inwards, line[0, free], line[1, free])
+                x, y = straighten(points, k, k + inwards, line[0, free], line[1, free], x, y)
         x, y = x - points[0, k], y - points[1, k]
         outside = (y * dx - x * dy) / length  # of the foot, from the node
         beside = abs(x * dx + y * dy) / length
@@ -171,8 +183,10 @@ def match(points, line, places, hits, held, ends):
         way = x * x + y * y
         most_slip = MATCHED_NODE_DISTANCE * (way + MATCHED_NODE_DISTANCE * square)  # squared
         slips = (x * dx + y * dy) ** 2 > most_slip * (dx * dx + dy * dy)
-        if slips or way > MOST_LAID * MOST_LAID * square:
+        if slips:
             continue
+        if 0.25 * way > MOST_LAID * MOST_LAID * square:
+            return -1
         met += 1
         if 0 < k < last:
             points[0, k] += 0.5 * x

@@ -308,12 +308,24 @@ class Pair:
     def match(self) -> int:
         """Let new nodes of both lines that meet go half of the way each; how many have met.
 
-        The ends' ways are in `shifts`, the follower's first.
+        The ends' ways are in `shifts`, the follower's first.  Raises RegridFailure where one has
+        gone far.
         """
         places = np.maximum(self.positions, self.hits)
         one = self.follower.new
         other = self.leader.new
-        return match(one, other, places, self.hits, self.held, self.shifts)
+        met = match(one, other, places, self.hits, self.held, self.shifts)
+        if met < 0:
+            raise self._tell_lost(self.follower)
+        return met
+
+    def _tell_lost(self, mover: Surface) -> RegridFailure:
+        return RegridFailure(
+            f"contact of {self.leader} and {self.follower}: nodes of one come far into the other "
+            "in one step",
+            cause="contact-lost",
+            place=Place(mover.block.name),
+        )
 
     def lay(self, back: bool, part_back: float) -> int:
         """Lay the follower's new nodes on the leader's new line (the leader's with `back`).
@@ -334,12 +346,7 @@ class Pair:
             self.closed_before, back, self.straight, part_back, self._ways, self.shifts[:2],
         )  # fmt: skip
         if moved < 0:
-            raise RegridFailure(
-                f"contact of {self.leader} and {self.follower}: nodes of one come far into the "
-                "other in one step",
-                cause="contact-lost",
-                place=Place(mover.block.name),
-            )
+            raise self._tell_lost(mover)
         return moved
 
 

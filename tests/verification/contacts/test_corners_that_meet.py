@@ -1,0 +1,90 @@
+"""Corners of bodies that meet each other, or a face: mirror images, conservation, free flight."""
+
+import numpy as np
+import pytest
+
+from builders import box, check_budget, find_unexplained, free, make_body, march_whole, wall_off
+from hydro.rows import P
+from hydro.simulation import Simulation
+
+CELL = 1e-4
+SIDES = "i_min", "i_max", "j_min", "j_max"
+
+
+def turn(nodes, degrees):
+    """Nodes (2, ...) turned about the origin."""
+    angle = np.radians(degrees)
+    cos = np.cos(angle)
+    sin = np.sin(angle)
+    x, y = nodes
+    return np.array([cos * x - sin * y, sin * x + cos * y])
+
+
+def make_inclined_plate(degrees, speed, gap, sign):
+    """A plate of copper that comes down on y = 0 with an edge first, along its normal."""
+    nodes = turn(box((0.0, 0.0), (20 * CELL, 5 * CELL), (20, 5)), degrees)
+    nodes[1] = sign * (nodes[1] + gap)
+    if sign < 0.0:
+        nodes = nodes[:, :, ::-1].copy()
+    u, v = -speed * turn(np.array([0.0, 1.0]), degrees)
+    plate = make_body("upper" if sign > 0.0 else "lower", "Cu", nodes, u, sign * v)
+    free(plate, *SIDES)
+    return plate
+
+
+def make_far_wall():
+    """A body at rest between walls, of which one continues along y = 0."""
+    body = make_body("far", "Cu", box((-0.02, 0.0), (-0.019, 1e-3), (2, 2)), 0.0)
+    wall_off(body, *SIDES)
+    return body
+
+
+@pytest.mark.parametrize(
+    ("degrees", "speed", "gap", "steps"),
+    [
+        (20.0, 1000.0, 2e-5, 40),
+        (30.0, 2000.0, 2e-5, 60),
+        (45.0, 1000.0, 0.0, 60),
+        (60.0, 1500.0, 5e-6, 60),
+    ],
+)
+def test_plates_meet_as_on_the_plane_between_them(degrees, speed, gap, steps):
+    """Mirror images, and the same as one plate on a plane, edges first: to 1e-10."""
+    upper = make_inclined_plate(degrees, speed, gap, 1.0)
+    lower = make_inclined_plate(degrees, speed, gap, -1.0)
+    single = make_inclined_plate(degrees, speed, gap, 1.0)
+    both = Simulation([upper, lower], [], t_end=1.0)
+    one = Simulation([single, make_far_wall()], [], t_end=1.0)
+    rows = [both.advance() for _ in range(steps)]
+    for _ in range(steps):
+        one.advance()
+    assert rows[-1]["contacts_made"] > 0
+    assert one.t == pytest.approx(both.t, rel=1e-10)
+    mirrored = lower.nodes[:, :, ::-1] * np.array([1.0, -1.0])[:, None, None]
+    pressure = upper.state[P, 1:-1, 1:-1]
+    for nodes, p in (
+        (mirrored, lower.state[P, 1:-1, -2:0:-1]),
+        (single.nodes, single.state[P, 1:-1, 1:-1]),
+    ):
+        assert np.abs(upper.nodes - nodes).max() < 1e-10 * CELL
+        assert np.abs(pressure - p).max() < 1e-10 * np.abs(pressure).max()
+
+
+@pytest.mark.parametrize(("cells", "degrees"), [(8, 45.0), (9, 40.0), (6, 30.0)])
+def test_a_corner_hits_a_face_and_leaves(cells, degrees):
+    """The smaller body bounces; momentum and energy are those of the start."""
+    speed = 500.0
+    size = 1e-3
+    nodes = turn(box((0.0, 0.0), (size, size), (cells, cells)), degrees)
+    nodes[1] += 5e-5
+    small = make_body("small", "Cu", nodes, 0.0, -speed, material="metal")
+    large_nodes = box((-2e-3, -1.2e-3), (2e-3, 0.0), (3 * cells, cells))
+    large = make_body("large", "Al1100", large_nodes, 0.0, material="metal")
+    free(small, *SIDES)
+    free(large, *SIDES)
+    rows = march_whole(Simulation([small, large], [], t_end=1.6e-6))
+    assert rows[-1]["contacts_made"] > 0
+    assert max(row["cells_not_convex"] for row in rows[1:]) == 0
+    check_budget(rows, names=("momentum_y", "energy"))
+    momentum = rows[0]["total_mass_metal"] * speed
+    assert find_unexplained(rows, "momentum_x") < 1e-12 * momentum

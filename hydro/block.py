@@ -6,13 +6,15 @@ swaps them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from hydro import rim as on
 from hydro import rows as of
+from hydro.carried.fields import CarriedField, read_fields
+from hydro.carried.transport import Transport
 from hydro.eos import EquationOfState
 from hydro.eos.base import check_eos, check_formulas
 from hydro.eos.conversion import compute_energy
@@ -83,12 +85,11 @@ class Block:
     nodes (2, ni + 1, nj + 1); rho, u, v, p: numbers or arrays (ni, nj), cell averages, SI.
     flux: "hllc", with HLL at strong shocks, or "hll" on all faces, which damps the errors that
     skewed grid lines leave behind a shock, but smears contacts inside the block.
+    carried: fields that move with the mass, `hydro.carried`; their values are in `carried`
+    (fields, ni + 2, nj + 2).
     Raises BadInput for a grid with a bad cell, for a density or sound speed that is not positive,
     and for an equation of state whose formulas disagree.
     """
-
-    units = UNITS
-    long_names = LONG_NAMES
 
     def __init__(
         self,
@@ -103,6 +104,7 @@ class Block:
         material: str | None = None,
         limiter: str = DEFAULT_LIMITER,
         flux: str = DEFAULT_FLUX,
+        carried: Sequence[CarriedField] = (),
     ):
         _check_name(name, "a block")
         _check_name(material or name, f"the material of block {name!r}", other=",")
@@ -129,6 +131,7 @@ class Block:
         for array_name, array in of.make_held(self.ni, self.nj).items():
             setattr(self, array_name, held[array_name])
             setattr(self, f"{array_name}_new", array)
+        self._carry(carried)
         self._starts: dict[str, np.ndarray] = {}  # separate if a body source acts
         # the equation of state's numbers, of the types for which kernels are compiled, as those of
         # a user's own need not be
@@ -147,7 +150,7 @@ class Block:
         # the perimeter: its faces, accelerations (2, faces) by a body source of their cells, and
         # volumes of polygon cells beyond their straight faces
         faces = 2 * (self.ni + self.nj)
-        self.rim = make_rim(faces)
+        self.rim = make_rim(faces, len(self.carried_fields))
         self.body_acceleration: np.ndarray | None = None
         self.excess_volume = np.zeros(faces)
         self.excess_volume_new = np.zeros(faces)
@@ -169,6 +172,21 @@ class Block:
                     f"block {self.name!r}: {label} has shape {np.shape(value)}; "
                     f"the block has {self.ni} x {self.nj} cells"
                 ) from None
+
+    def _carry(self, given: Sequence[CarriedField]) -> None:
+        """Give the cells carried fields, and name what they hold (`HELD_ARRAYS` and these)."""
+        self.carried_fields = fields = read_fields(self.name, given)
+        self.carried = np.zeros((len(fields), self.ni + 2, self.nj + 2))
+        self.carried_new = np.zeros(self.carried.shape)
+        for number, field in enumerate(fields):
+            self.carried[number, 1:-1, 1:-1] = field.find_first(self.name, self.centres)
+        self.transport = Transport(len(fields), self.ni, self.nj)
+        self.held_arrays = (*of.HELD_ARRAYS, "carried") if fields else of.HELD_ARRAYS
+        self.step_arrays = ("nodes", *self.held_arrays, "rates")
+        self.units = UNITS | {field.name: field.unit for field in fields}
+        self.long_names = LONG_NAMES | {
+            field.name: field.long_name or field.name for field in fields
+        }
 
     def set_geometry(self, geometry: Geometry) -> None:
         """Make the flow plane or axisymmetric; called by the simulation.
@@ -246,16 +264,16 @@ class Block:
         array = getattr(self, name)
         return array[..., 1:-1, 1:-1] if self.count_ghosts(array) else array
 
-    def list_new(self) -> list[np.ndarray]:
-        """The arrays of HELD_ARRAYS that a step makes."""
-        return [getattr(self, f"{name}_new") for name in of.HELD_ARRAYS]
+    def list_new(self, names: Sequence[str] = of.HELD_ARRAYS) -> list[np.ndarray]:
+        """The arrays that a step makes: the flow's own, or those named of `held_arrays`."""
+        return [getattr(self, f"{name}_new") for name in names]
 
-    def list_starts(self) -> list[np.ndarray]:
-        """The arrays of HELD_ARRAYS that a step starts from; see `get_start`."""
-        return [self.get_start(name) for name in of.HELD_ARRAYS]
+    def list_starts(self, names: Sequence[str] = of.HELD_ARRAYS) -> list[np.ndarray]:
+        """The arrays that a step starts from, of such names; see `get_start`."""
+        return [self.get_start(name) for name in names]
 
     def get_start(self, name: str) -> np.ndarray:
-        """One of HELD_ARRAYS as a step starts from it: the present one, or a source's copy."""
+        """One of `held_arrays` as a step starts from it: the present one, or a source's copy."""
         return self._starts.get(name, getattr(self, name))
 
     @property
@@ -265,7 +283,7 @@ class Block:
 
     def part_start(self, apart: bool) -> None:
         """Set whether steps start from copies of what cells hold, which a source may modify."""
-        self._starts = {name: getattr(self, name).copy() for name in of.HELD_ARRAYS if apart}
+        self._starts = {name: getattr(self, name).copy() for name in self.held_arrays if apart}
 
     def copy_start(self) -> None:
         """Let the next step start from the present state, where it starts from copies."""
@@ -279,7 +297,7 @@ class Block:
 
     def accept(self) -> None:
         """Make the new grid and state the current ones."""
-        for name in of.STEP_ARRAYS:
+        for name in self.step_arrays:
             old = getattr(self, name)
             setattr(self, name, getattr(self, f"{name}_new"))
             setattr(self, f"{name}_new", old)
@@ -344,7 +362,13 @@ class Block:
             self._fill_energy(self.state, rows, e)
             return e
 
-        return CellFields({"rho": rho, "u": u, "v": v, "p": p}, compute_energy)
+        stored = {"rho": rho, "u": u, "v": v, "p": p} | self._list_carried(self.carried)
+        return CellFields(stored, compute_energy)
+
+    def _list_carried(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        """Views (ni, nj) of the carried fields by name, of their values (n, ni + 2, nj + 2)."""
+        inside = values[:, 1:-1, 1:-1]
+        return {field.name: inside[n] for n, field in enumerate(self.carried_fields)}
 
     def compute_fields(self, state: np.ndarray) -> dict[str, np.ndarray]:
         """`cell_fields` of a state (4, ni + 2, nj + 2) of this block: views, and a new `e`."""

@@ -25,6 +25,7 @@ import numpy as np
 
 from hydro import rim as on
 from hydro.block import Block
+from hydro.carried.fields import read_values
 from hydro.perimeter.contacts import (
     AT_CELLS,
     AT_FLUX,
@@ -215,14 +216,17 @@ class Inflow(Segment):
 
     Each of the four is a number, or an array with a value for every face of the segment.  It is
     the state at the face, so slopes use it at half a cell's distance.  The nodes stay on their
-    line or move with a given constant `velocity` [m/s]; the fluid passes through them.
+    line or move with a given constant `velocity` [m/s]; the fluid passes through them.  carried:
+    the value of each carried field of the block, by name, with which material comes in.
     """
 
     kind = "inflow"
     beyond = on.RHO_BEYOND
 
-    def __init__(self, block, side, start, stop, state, velocity=None):
+    def __init__(self, block, side, start, stop, state, velocity=None, carried=None):
         super().__init__(block, side, start, stop)
+        values = read_values(f"{self}: inflow segment", block.carried_fields, carried)
+        self._carried = values[:, None]
         self.state = state if callable(state) else (lambda t: state)
         # the rows beyond keep it
         self._is_steady = not callable(state)
@@ -243,6 +247,8 @@ class Inflow(Segment):
         rim = self.rim
         rim.rho_ghost[:], rim.u_ghost[:], rim.v_ghost[:], rim.p_ghost[:] = self.state(t)
         rim.length_ghost[:] = 0.0
+        rim.get_carried(on.CARRIED_GHOST)[...] = self._carried
+        rim.get_carried(on.CARRIED_BEYOND)[...] = self._carried
 
     def fill_speeds(self, t):
         """The state beyond at mid-time, for the flux."""

@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from hydro.block import Block
 from hydro.boundary import Linked, Seam, Sliding, put
+from hydro.carried.fields import check_same
 from hydro.eos.base import is_same_material
 from hydro.perimeter.contacts import (
     AT_CELLS,
@@ -104,6 +105,12 @@ def _check_materials(leader: Linked, follower: Linked) -> None:
         raise BadInput(
             f"{leader.kind}: material passes between {leader} and {follower}, and their equations "
             f"of state differ: {one} and {two}; join two materials by an interface"
+        )
+    if isinstance(leader, Seam):
+        check_same(
+            f"{leader.kind}: material passes between {leader} and {follower}",
+            leader.block.carried_fields,
+            follower.block.carried_fields,
         )
 
 

@@ -25,6 +25,8 @@ def gather(block: Block, t: float = 0.0) -> None:
         block.start, block.nodes, block.parameters, plan.inwards, plan.walls, plan.wall_speeds,
         kernels.scratch, block.rim.rows,
     )  # fmt: skip
+    if block.transport.count:
+        block.transport.gather(block)
     if block.body_acceleration is not None:
         _add_weight(block, block.body_acceleration)
 
@@ -47,6 +49,8 @@ def predict(block: Block, dt: float) -> None:
         _list_old(block), 0.5 * dt, block.parameters, block.plan.moving, kernels.scratch,
         block.rim.rows,
     )  # fmt: skip
+    if block.transport.count:
+        block.transport.predict(block, 0.5 * dt)
 
 
 def trace(block: Block, dt: float) -> None:
@@ -56,6 +60,8 @@ def trace(block: Block, dt: float) -> None:
         block.nodes, block.nodes_new, 1.0 / dt, block.parameters, block.wave_law, plan.walls,
         plan.opened, block.rim.rows,
     )  # fmt: skip
+    if block.transport.count:
+        block.transport.trace(block)
 
 
 def update(block: Block, dt: float, threads: int = 1) -> None:
@@ -71,9 +77,11 @@ def update(block: Block, dt: float, threads: int = 1) -> None:
     block.totals.start_update()
     advance = kernels.flow.advance_threaded if threads > 1 else kernels.flow.advance
     advance.entry(
-        _list_old(block), _list_new(block), block.rim.rows, dt, block.parameters, kernels.scratch,
-        block.tiles, block.totals.of_tiles,
+        _list_old(block), (*_list_new(block), block.transport.masses), block.rim.rows, dt,
+        block.parameters, kernels.scratch, block.tiles, block.totals.of_tiles,
     )  # fmt: skip
+    if block.transport.count:
+        block.transport.carry(block, dt)
     if block.is_follower and not block.is_cut:
         fill_polygons(block)
 

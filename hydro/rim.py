@@ -58,8 +58,14 @@ AREA_X, AREA_Y, SWEPT, X_AREA, Y_AREA = _rows(5)
 MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, PUSH, HOOP = _rows(6)
 
 ROWS = next(_next)
+
+# after these, for each carried field (`hydro.carried`): its value in the cell, in the ghost, traced
+# to the face, beyond an open face; what goes out, rate of mass times the value beyond the cell's
+CARRIED_CELL, CARRIED_GHOST, CARRIED_TRACE, CARRIED_BEYOND, CARRIED_FLUX = range(5)
+CARRIED_ROWS = 5
 _NAMES = {name.lower(): row for name, row in vars().items() if name.isupper()}
-_NAMES.pop("rows")
+for _name in [name for name in _NAMES if name.startswith(("rows", "carried"))]:
+    _NAMES.pop(_name)
 
 # rows that are taken together
 STATE = slice(RHO, P + 1)
@@ -102,17 +108,39 @@ class Rim:
     def __getitem__(self, span: Span) -> Rim:
         return Rim(self.rows[:, span.first : span.last])
 
+    def get_carried(self, part: int) -> np.ndarray:
+        """A view (fields, faces) of a row of all carried fields, such as CARRIED_GHOST."""
+        return self.rows[ROWS + part :: CARRIED_ROWS]
+
     @property
     def faces(self) -> int:
         """How many there are."""
         return self.rows.shape[1]
 
 
-def make_rim(faces: int) -> Rim:
-    """A rim of so many faces; the ghosts beyond have lengths before they are filled."""
-    rows = np.zeros((ROWS, faces))
+def make_rim(faces: int, carried: int = 0) -> Rim:
+    """A rim of so many faces, of a block with so many carried fields.
+
+    The ghosts beyond have lengths before they are filled.
+    """
+    rows = np.zeros((ROWS + CARRIED_ROWS * carried, faces))
     rows[LENGTH_GHOST] = 1.0
     return Rim(rows)
+
+
+# --- carried fields -------------------------------------------------------------------------------
+
+
+@inlined
+def find_carried_row(field):
+    """The first row of a carried field, by its number."""
+    return ROWS + CARRIED_ROWS * field
+
+
+@inlined
+def count_carried(rim):
+    """How many carried fields the rows of a rim have."""
+    return (rim.shape[0] - ROWS) // CARRIED_ROWS
 
 
 # --- how faces are numbered -----------------------------------------------------------------------

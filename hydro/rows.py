@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 # Arrays of a block by their names: what its cells hold, which moves with the mass that crosses
-# faces; and all that the next step starts from.  Each has one of the same name with `_new` for the
-# step.  Acceptance, restarts, ranks, cut blocks, refinement and remapping go through these lists.
+# faces.  Some blocks have `carried` besides: `Block.held_arrays`.  Each has one of the same name
+# with `_new` for the step.  Acceptance, restarts, ranks, cut blocks, refinement and remapping go
+# through `Block.held_arrays` and `Block.step_arrays`.
 HELD_ARRAYS = ("state", "void_energy")
-STEP_ARRAYS = ("nodes", *HELD_ARRAYS, "rates")
 
 RHO, U, V, P = range(4)
 STATE_ROWS = 4

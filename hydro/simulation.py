@@ -24,7 +24,6 @@ from hydro.motion.line import Line, LineRule
 from hydro.motion.overlaps import Overlaps
 from hydro.motion.tension import SurfaceTension
 from hydro.ranks.blocks import Blocks
-from hydro.rows import STEP_ARRAYS
 from hydro.sliding.contact import SlidingContact
 from hydro.small_cells import SmallCells
 from hydro.sources import BodySource, SourceLaw
@@ -56,7 +55,7 @@ class Refining(Protocol):
     def lay(
         self, places: np.ndarray, blocks: Sequence[Block], motion: GridMotion, t: float
     ) -> list[tuple[np.ndarray, dict[str, np.ndarray]]]:
-        """Nodes, and what cells hold (HELD_ARRAYS), of all blocks; `motion` moves the new ones."""
+        """Nodes and what cells hold (`Block.held_arrays`) of all blocks; `motion` has the new."""
         ...
 
 
@@ -400,7 +399,7 @@ class Simulation:
         for number, contact in enumerate(self.exchange.contacts):
             state[f"contact{number}/fixed"] = contact.fixed.copy()
         for block in self.blocks:
-            for name in STEP_ARRAYS:
+            for name in block.step_arrays:
                 state[f"{block.name}/{name}"] = block.get_inside(name).copy()
         return state
 
@@ -416,7 +415,7 @@ class Simulation:
         for number, contact in enumerate(self.exchange.contacts):
             contact.fixed[:] = state[f"contact{number}/fixed"]
         for block in self.blocks:
-            for name in STEP_ARRAYS:
+            for name in block.step_arrays:
                 block.get_inside(name)[...] = state[f"{block.name}/{name}"]
         self.small_cells.find_fastest()
         self._note_end()

@@ -47,19 +47,17 @@ from regrid.errors import BadInput
 from regrid.jit import compiled_once, kernel
 
 MOST_REACH = 6  # cells of a neighbourhood on either side of its own cell
-CONSERVED_ROWS = 4  # per volume: mass, momentum x and y, energy
 # fraction of a state redistributed per step, besides all of the step's change
 RELAXED_FRACTION = 0.1
-# rows of a cell's record: what it redistributes per volume, mean and slope of its neighbourhood,
-# position of that mean along the line, volume, number of its neighbourhoods, what it keeps per
-# volume
-MEAN_ROW = 4
-SLOPE_ROW = 8
-LEVER_ROW = 12
-VOLUME_RECORD_ROW = 13
-PARTS_ROW = 14
-KEPT_ROW = 15
-RECORD_ROWS = 19
+# A cell's record is a pair of arrays.  `amounts` (4, quantities, ni, nj) has four groups of
+# conserved quantities per volume (mass, momentum x and y, energy, mass times each carried field):
+# what the cell redistributes, mean and slope of its neighbourhood, what it keeps.
+GIVEN, MEAN, SLOPE, KEPT = range(4)
+RECORD_GROUPS = 4
+FLOW_QUANTITIES = 4
+# `sizes` (3, ni, nj): position of that mean along the line, volume, number of its neighbourhoods
+LEVER, VOLUME, PARTS = range(3)
+SIZE_ROWS = 3
 
 
 @compiled_once(allocates=False)
@@ -157,17 +155,19 @@ def make_redistribution(eos_class, geometry: Geometry):
     find_volume, find_share = make_measures(geometry)
 
     @compiled_once
-    def fill_conserved(held, i, j, part, parameters, first, record):
-        """Store a fraction of a cell's state per volume in four rows of its record."""
+    def fill_conserved(held, carried, i, j, part, parameters, group, amounts):
+        """Store a fraction of what a cell holds, per volume, in a group of its record."""
         rho, u, v, total = read_cell(held, i, j, parameters)
         rho *= part
-        record[first, i, j] = rho
-        record[first + 1, i, j] = rho * u
-        record[first + 2, i, j] = rho * v
-        record[first + 3, i, j] = rho * total
+        amounts[group, 0, i, j] = rho
+        amounts[group, 1, i, j] = rho * u
+        amounts[group, 2, i, j] = rho * v
+        amounts[group, 3, i, j] = rho * total
+        for q in range(carried.shape[0]):
+            amounts[group, FLOW_QUANTITIES + q, i, j] = rho * carried[q, i + 1, j + 1]
 
     @compiled_once
-    def mark_neighbourhoods(small, reaches, marks, record, touched):
+    def mark_neighbourhoods(small, reaches, marks, sizes, touched):
         """List the cells in neighbourhoods (mark 1) and those just beyond their ends (2)."""
         ni, nj = marks.shape
         for n in range(small.shape[0]):
@@ -180,8 +180,8 @@ def make_redistribution(eos_class, geometry: Geometry):
                     if marks[a, b] == 0:
                         marks[a, b] = 1
                         touched.append((a, b))
-                        record[PARTS_ROW, a, b] = 1.0 if reaches[a, b] == 0 else 0.0
-                    record[PARTS_ROW, a, b] += 1.0
+                        sizes[PARTS, a, b] = 1.0 if reaches[a, b] == 0 else 0.0
+                    sizes[PARTS, a, b] += 1.0
         for n in range(small.shape[0]):
             # a cell beyond either end of a neighbourhood determines its slope
             i, j = small[n]
@@ -192,51 +192,53 @@ def make_redistribution(eos_class, geometry: Geometry):
                 if 0 <= a < ni and 0 <= b < nj and marks[a, b] == 0:
                     marks[a, b] = 2
                     touched.append((a, b))
-                    record[PARTS_ROW, a, b] = 1.0
+                    sizes[PARTS, a, b] = 1.0
 
     @compiled_once
     def fill_means(small, reaches, nodes, record):
         """Mean of each neighbourhood and its position along the line."""
+        amounts, sizes = record
         ni, nj = reaches.shape
-        total = np.empty(CONSERVED_ROWS)
+        total = np.empty(amounts.shape[1])
         for n in range(small.shape[0]):
             i, j = small[n]
             along_i = reaches[i, j] > 0
-            volume = record[VOLUME_RECORD_ROW, i, j] / record[PARTS_ROW, i, j]
+            volume = sizes[VOLUME, i, j] / sizes[PARTS, i, j]
             lever = 0.0
-            for q in range(CONSERVED_ROWS):
-                total[q] = volume * record[q, i, j]
+            for q in range(amounts.shape[1]):
+                total[q] = volume * amounts[GIVEN, q, i, j]
             for way in range(1, abs(reaches[i, j]) + 1):
                 v1 = v2 = d1 = d2 = 0.0
                 row, column = (i - way, j) if along_i else (i, j - way)
                 a = max(row, 0)
                 b = max(column, 0)
                 if row == a and column == b:
-                    v1 = record[VOLUME_RECORD_ROW, a, b] / record[PARTS_ROW, a, b]
+                    v1 = sizes[VOLUME, a, b] / sizes[PARTS, a, b]
                     d1 = find_way(nodes, i, j, a, b)
                 row, column = (i + way, j) if along_i else (i, j + way)
                 c = min(row, ni - 1)
                 d = min(column, nj - 1)
                 if row == c and column == d:
-                    v2 = record[VOLUME_RECORD_ROW, c, d] / record[PARTS_ROW, c, d]
+                    v2 = sizes[VOLUME, c, d] / sizes[PARTS, c, d]
                     d2 = find_way(nodes, i, j, c, d)
                 # if a side has no such cell its weight is zero
                 volume += v1 + v2
                 lever += v2 * d2 - v1 * d1
-                for q in range(CONSERVED_ROWS):
-                    total[q] += (v1 * record[q, a, b] if v1 > 0.0 else 0.0) + (
-                        v2 * record[q, c, d] if v2 > 0.0 else 0.0
+                for q in range(amounts.shape[1]):
+                    total[q] += (v1 * amounts[GIVEN, q, a, b] if v1 > 0.0 else 0.0) + (
+                        v2 * amounts[GIVEN, q, c, d] if v2 > 0.0 else 0.0
                     )
-            for q in range(CONSERVED_ROWS):
-                record[MEAN_ROW + q, i, j] = total[q] / volume
-            record[LEVER_ROW, i, j] = lever / volume
+            for q in range(amounts.shape[1]):
+                amounts[MEAN, q, i, j] = total[q] / volume
+            sizes[LEVER, i, j] = lever / volume
 
     @compiled_once
     def fill_slopes(small, reaches, nodes, record):
         """Slope of each neighbourhood, from the means beyond its ends."""
+        amounts, sizes = record
         ni, nj = reaches.shape
-        ones = np.zeros(CONSERVED_ROWS)
-        twos = np.zeros(CONSERVED_ROWS)
+        ones = np.zeros(amounts.shape[1])
+        twos = np.zeros(amounts.shape[1])
         for n in range(small.shape[0]):
             i, j = small[n]
             way = abs(reaches[i, j]) + 1
@@ -244,23 +246,23 @@ def make_redistribution(eos_class, geometry: Geometry):
             a, b = (i - way, j) if along_i else (i, j - way)
             c, d = (i + way, j) if along_i else (i, j + way)
             low, high = a >= 0 and b >= 0, c < ni and d < nj
-            here = record[LEVER_ROW, i, j]
+            here = sizes[LEVER, i, j]
             before = after = 1.0
             if low:
-                turn = record[LEVER_ROW, a, b] if (reaches[a, b] > 0) == along_i else 0.0
+                turn = sizes[LEVER, a, b] if (reaches[a, b] > 0) == along_i else 0.0
                 far = find_way(nodes, i, j, a, b)
                 gap = here + far - turn
                 # neighbourhoods whose means nearly coincide determine no slope
                 before = 1.0 / gap if gap > 0.5 * far else 0.0
             if high:
-                turn = record[LEVER_ROW, c, d] if (reaches[c, d] > 0) == along_i else 0.0
+                turn = sizes[LEVER, c, d] if (reaches[c, d] > 0) == along_i else 0.0
                 far = find_way(nodes, i, j, c, d)
                 gap = far + turn - here
                 after = 1.0 / gap if gap > 0.5 * far else 0.0
-            for q in range(CONSERVED_ROWS):
-                mean = record[MEAN_ROW + q, i, j]
-                one = (mean - record[MEAN_ROW + q, a, b]) * before if low else 0.0
-                two = (record[MEAN_ROW + q, c, d] - mean) * after if high else 0.0
+            for q in range(amounts.shape[1]):
+                mean = amounts[MEAN, q, i, j]
+                one = (mean - amounts[MEAN, q, a, b]) * before if low else 0.0
+                two = (amounts[MEAN, q, c, d] - mean) * after if high else 0.0
                 ones[q] = one if low else two
                 twos[q] = two if high else one
             # momentum along the line and across it, so that slopes are rotation invariant
@@ -270,14 +272,19 @@ def make_redistribution(eos_class, geometry: Geometry):
             x, y = x / length, y / length
             along = limit_slope(x * ones[1] + y * ones[2], x * twos[1] + y * twos[2])
             across = limit_slope(x * ones[2] - y * ones[1], x * twos[2] - y * twos[1])
-            record[SLOPE_ROW, i, j] = limit_slope(ones[0], twos[0])
-            record[SLOPE_ROW + 1, i, j] = x * along - y * across
-            record[SLOPE_ROW + 2, i, j] = y * along + x * across
-            record[SLOPE_ROW + 3, i, j] = limit_slope(ones[3], twos[3])
+            amounts[SLOPE, 0, i, j] = limit_slope(ones[0], twos[0])
+            amounts[SLOPE, 1, i, j] = x * along - y * across
+            amounts[SLOPE, 2, i, j] = y * along + x * across
+            for q in range(3, ones.size):
+                amounts[SLOPE, q, i, j] = limit_slope(ones[q], twos[q])
 
     @compiled_once
-    def gather_shares(i, j, reaches, nodes, record, pair, line, total):
-        """Sum into `total` the values that a cell's neighbourhoods give for it."""
+    def gather_shares(i, j, reaches, nodes, record, sums):
+        """Sum into `sums[0]` the values that a cell's neighbourhoods give for it."""
+        amounts, sizes = record
+        total = sums[0]
+        line = sums[1]
+        pair = sums[2]
         ni, nj = reaches.shape
         total[:] = 0.0
         for along_i in (True, False):
@@ -293,18 +300,18 @@ def make_redistribution(eos_class, geometry: Geometry):
                         continue
                     far = find_way(nodes, i, j, a, b)
                     # the other cell's neighbourhood is on that side: this cell precedes it
-                    far = (-far if side > 0 else far) - record[LEVER_ROW, a, b]
-                    for q in range(CONSERVED_ROWS):
-                        pair[q] += record[MEAN_ROW + q, a, b] + record[SLOPE_ROW + q, a, b] * far
-                for q in range(CONSERVED_ROWS):
+                    far = (-far if side > 0 else far) - sizes[LEVER, a, b]
+                    for q in range(amounts.shape[1]):
+                        pair[q] += amounts[MEAN, q, a, b] + amounts[SLOPE, q, a, b] * far
+                for q in range(amounts.shape[1]):
                     line[q] += pair[q]
-            for q in range(CONSERVED_ROWS):
+            for q in range(amounts.shape[1]):
                 total[q] += line[q]
-        far = -record[LEVER_ROW, i, j]
-        part = 1.0 / record[PARTS_ROW, i, j]
-        for q in range(CONSERVED_ROWS):
-            own = record[MEAN_ROW + q, i, j] + record[SLOPE_ROW + q, i, j] * far
-            total[q] = (total[q] + own) * part + record[KEPT_ROW + q, i, j]
+        far = -sizes[LEVER, i, j]
+        part = 1.0 / sizes[PARTS, i, j]
+        for q in range(amounts.shape[1]):
+            own = amounts[MEAN, q, i, j] + amounts[SLOPE, q, i, j] * far
+            total[q] = (total[q] + own) * part + amounts[KEPT, q, i, j]
 
     @kernel
     def redistribute(squeezed, grids, excess, inverse_dt, parameters, before, after, scratch):
@@ -312,46 +319,50 @@ def make_redistribution(eos_class, geometry: Geometry):
 
         squeezed: (small, reaches); grids: nodes (2, ni + 1, nj + 1) before and after the step;
         excess (faces,): volume of perimeter cells beyond their straight faces; before: the arrays
-        of HELD_ARRAYS that the step started from; after: these and rates (ni, nj), updated in
-        place; scratch: marks (ni, nj), zero on entry and exit, and records (RECORD_ROWS, ni, nj).
-        Returns the number of changed cells, their least c², and the increase in the number of cells
-        with voids.
+        of HELD_ARRAYS that the step started from, and carried fields (n, ni + 2, nj + 2); after:
+        these and rates (ni, nj), updated in place; scratch: marks (ni, nj), zero on entry and exit,
+        and the records of all cells, amounts (4, 4 + n, ni, nj) and sizes (3, ni, nj).  Returns the
+        number of changed cells, their least c², and the increase in the number of cells with voids.
         """
         small, reaches = squeezed
         nodes, nodes_new = grids
         marks, record = scratch
-        rates = after[-1]
+        amounts, sizes = record
+        held_before, carried_before = before
+        held, carried, rates = after
         ni, nj = rates.shape
         touched = [(0, 0)]
         touched.clear()
-        mark_neighbourhoods(small, reaches, marks, record, touched)
+        mark_neighbourhoods(small, reaches, marks, sizes, touched)
         voided = 0
         for i, j in touched:
-            voided -= 1 if marks[i, j] == 1 and has_voids(after, i, j) else 0
-            fill_conserved(after, i, j, 1.0, parameters, 0, record)
-            fill_conserved(before, i, j, 1.0 - RELAXED_FRACTION, parameters, KEPT_ROW, record)
-            record[VOLUME_RECORD_ROW, i, j] = find_volume(nodes_new, excess, i, j, ni, nj)
-            record[LEVER_ROW, i, j] = 0.0
-            for q in range(CONSERVED_ROWS):
-                record[q, i, j] -= record[KEPT_ROW + q, i, j]
-                record[MEAN_ROW + q, i, j] = record[q, i, j]
-                record[SLOPE_ROW + q, i, j] = 0.0
+            voided -= 1 if marks[i, j] == 1 and has_voids(held, i, j) else 0
+            fill_conserved(held, carried, i, j, 1.0, parameters, GIVEN, amounts)
+            kept = 1.0 - RELAXED_FRACTION
+            fill_conserved(held_before, carried_before, i, j, kept, parameters, KEPT, amounts)
+            sizes[VOLUME, i, j] = find_volume(nodes_new, excess, i, j, ni, nj)
+            sizes[LEVER, i, j] = 0.0
+            for q in range(amounts.shape[1]):
+                amounts[GIVEN, q, i, j] -= amounts[KEPT, q, i, j]
+                amounts[MEAN, q, i, j] = amounts[GIVEN, q, i, j]
+                amounts[SLOPE, q, i, j] = 0.0
         fill_means(small, reaches, nodes_new, record)
         fill_slopes(small, reaches, nodes_new, record)
         least = 1e300
         changed = 0
-        pair = np.empty(CONSERVED_ROWS)
-        line = np.empty(CONSERVED_ROWS)
-        total = np.empty(CONSERVED_ROWS)
+        sums = np.empty((3, amounts.shape[1]))
+        total = sums[0]
         for i, j in touched:
             if marks[i, j] == 2:
                 continue
             changed += 1
-            gather_shares(i, j, reaches, nodes_new, record, pair, line, total)
+            gather_shares(i, j, reaches, nodes_new, record, sums)
             rho = total[0]
             u = total[1] / rho
             v = total[2] / rho
-            is_voided, c2 = write_cell(after, i, j, rho, u, v, total[3] / rho, parameters)
+            is_voided, c2 = write_cell(held, i, j, rho, u, v, total[3] / rho, parameters)
+            for q in range(carried.shape[0]):
+                carried[q, i + 1, j + 1] = total[FLOW_QUANTITIES + q] / rho
             voided += 1 if is_voided else 0
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
             least = min(least, c2)
@@ -405,7 +416,9 @@ class BlockSharing:
             block = self.block
             self.reaches = np.zeros((block.ni, block.nj), dtype=np.int64)
             self.marks = np.zeros((block.ni, block.nj), dtype=np.int64)
-            self.record = np.zeros((RECORD_ROWS, block.ni, block.nj))
+            quantities = FLOW_QUANTITIES + len(block.carried_fields)
+            amounts = np.zeros((RECORD_GROUPS, quantities, block.ni, block.nj))
+            self.record = amounts, np.zeros((SIZE_ROWS, block.ni, block.nj))
             self.fill_reaches = make_fill_reaches(block.geometry)
             self.redistribute = make_redistribution(type(block.eos), block.geometry)
         return small
@@ -438,7 +451,8 @@ class BlockSharing:
         self.fill_reaches(small, block.rates, limit, block.nodes, block.excess_volume, self.reaches)
         block.shared_cells, least, voided = self.redistribute(
             (small, self.reaches), (block.nodes, block.nodes_new), block.excess_volume_new,
-            inverse_dt, block.parameters, tuple(block.list_starts()), _list_mended(block),
+            inverse_dt, block.parameters, (tuple(block.list_starts()), block.get_start("carried")),
+            (tuple(block.list_new()), block.carried_new, block.rates_new),
             (self.marks, self.record),
         )  # fmt: skip
         block.totals.add_redistributed(least, voided)
@@ -540,7 +554,7 @@ class SmallCells:
         above = self._find_rows_above(limit)
         for number, cut in self.blocks.cuts.items():
             block = cut.block
-            for array in (*_list_mended(block), block.rates, *block.list_starts()):
+            for array in (*_list_mended(block), block.rates, *block.list_starts(block.held_arrays)):
                 cut.gather_rows(array, above[number])
         changed = [
             [self.sharing[number].share(limit, 1.0 / dt, above[number])]
@@ -554,4 +568,4 @@ class SmallCells:
 
 def _list_mended(block: Block) -> tuple[np.ndarray, ...]:
     """The arrays that redistribution changes."""
-    return *block.list_new(), block.rates_new
+    return *block.list_new(block.held_arrays), block.rates_new

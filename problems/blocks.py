@@ -23,6 +23,7 @@ from msgspec import Meta
 
 from hydro.block import Block
 from hydro.boundary import put
+from hydro.carried.fields import CarriedField
 from hydro.eos.materials import Material, find_material, find_name, make_material
 from hydro.links import join, slide
 from hydro.simulation import Simulation
@@ -96,6 +97,16 @@ class Curves(DeckTable, kw_only=True):
     j_max: Curve
 
 
+class CarriedTable(DeckTable, kw_only=True):
+    """A field that the cells of a block carry with their mass, such as a dye."""
+
+    name: key(Name, "letters, digits and _, as in dumps and pictures")
+    first: key(Formula, "its value at the start, a number or a formula of x and y") = 0.0
+    unit: key(str, "its unit") = "1"
+    least: key(float | None, "its least value. If left out: none") = None
+    most: key(float | None, "its greatest value. If left out: none") = None
+
+
 class BlockSide(DeckTable, kw_only=True):
     """What is at a side of a block, or at some of its faces."""
 
@@ -105,6 +116,7 @@ class BlockSide(DeckTable, kw_only=True):
     velocity: key(Pair | None, "of a piston or an open side: u, v [m/s] of t") = None
     pressure: key(Formula | None, "on a free surface [Pa], a number or a formula of t") = None
     state: key(State | None, "beyond an inflow: rho, u, v, p, numbers or formulas of t") = None
+    carried: key(dict[str, float], "of carried fields, what comes in at an inflow, by name") = NONE
     options: key(Options, "further options of the kind, passed on") = NONE
 
 
@@ -121,6 +133,7 @@ class BlockTable(DeckTable, kw_only=True):
     u: key(Formula, "velocity along x [m/s], of x and y") = 0.0
     v: key(Formula, "velocity along y [m/s], of x and y") = 0.0
     p: key(Formula, "pressure [Pa], of x and y") = 1e5
+    carried: key(tuple[CarriedTable, ...], "fields that its cells carry with their mass") = ()
     side: key(tuple[BlockSide, ...], "what is at its sides that are not linked") = ()
 
 
@@ -393,7 +406,17 @@ class Blocks(Problem):
         given = {"rho": rho, "u": table.u, "v": table.v, "p": table.p}.items()
         state = [evaluate(text, places, f"{where}, {name}") for name, text in given]
         label = find_name(table.material) if isinstance(table.material, str) else table.name
-        options = {"material": label, "limiter": self.deck.limiter}
+        carried = [
+            CarriedField(
+                field.name,
+                field.unit,
+                first=evaluate(field.first, places, f"{where}, carried {field.name!r}"),
+                least=-math.inf if field.least is None else field.least,
+                most=math.inf if field.most is None else field.most,
+            )
+            for field in table.carried
+        ]
+        options = {"material": label, "limiter": self.deck.limiter, "carried": carried}
         block = Block(table.name, material.eos, nodes, *state, **options)
         for side in table.side:
             if side.kind in LINKED.values():
@@ -453,6 +476,8 @@ def collect_options(side: BlockSide, where: str) -> dict[str, Any]:
         options["velocity"] = side.velocity if fixed else follow_time(side.velocity, where)
     if side.state is not None:
         options["state"] = follow_time(side.state, where)
+    if side.carried:
+        options["carried"] = dict(side.carried)
     if side.pressure is not None:
         first = follow_time((side.pressure,), where)
         options["pressure"] = lambda t: first(t)[0]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hydro.block import Block
     from hydro.boundary import Segment, put
+    from hydro.carried.fields import CarriedField
     from hydro.eos import (
         JWL,
         EquationOfState,
@@ -52,6 +53,7 @@ MODULES = {
     "BadInput": "regrid.errors",
     "BarrierRegridder": "regrid.barrier.regridder",
     "Block": "hydro.block",
+    "CarriedField": "hydro.carried.fields",
     "Case": "runs.interface.case",
     "Deck": "problems.deck",
     "DeckTable": "problems.deck",
@@ -112,6 +114,7 @@ __all__ = [
     "BadInput",
     "BarrierRegridder",
     "Block",
+    "CarriedField",
     "Case",
     "Deck",
     "DeckTable",

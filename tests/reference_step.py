@@ -36,8 +36,10 @@ Trace = namedtuple("Trace", "rho u v p e c2 hll acoustic part")  # rows of what 
 find_wall_pressure = np.vectorize(riemann.compute_wave_pressure, excluded={3})
 
 
-def take_step(blocks, links, t, dt, curved=False, contacts=()):
+def take_step(blocks, links, t, dt, curved=False, contacts=(), carry=None):
     """New states (4, ni, nj) and void energies of all blocks, in their order.
+
+    With `carry` of `reference_carried`: then also the new values of carried fields.
 
     A block has `nodes`, `nodes_new`, `state` (4, ni + 2, nj + 2), whose ghosts are not read,
     `void_energy`, `eos`, `limiter`, `is_first_order`, `flux_name` and `segments`.
@@ -61,7 +63,11 @@ def take_step(blocks, links, t, dt, curved=False, contacts=()):
         patch.fill_inner_fluxes()
     for side in sides.values():
         side.fill_flux(t + 0.5 * dt)
-    return [patch.update() for patch in patches]
+    found = [patch.update() for patch in patches]
+    if carry is None:
+        return found
+    carried = carry(patches, list(sides.values()))
+    return [(*one, values) for one, values in zip(found, carried, strict=True)]
 
 
 def cross(a, b):

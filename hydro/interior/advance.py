@@ -95,7 +95,9 @@ def make_flow_kernels(
     def advance_tile(old, new, rim, dt, parameters, tile, Z, tile_totals):
         """Advance the cells of one tile; see `advance` for the arguments."""
         state, void_energy, nodes = old
-        state_new, void_energy_new, nodes_new, rates_new, crowding_new = new
+        state_new, void_energy_new, nodes_new, rates_new, crowding_new, masses = new
+        mass_i, mass_j = masses
+        keeps_masses = mass_i.shape[0] > 1
         inverse_dt = 1.0 / dt if dt > 0.0 else 0.0
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
@@ -203,6 +205,8 @@ def make_flow_kernels(
                     use_hll_i(Z, first_face, last_face, parameters)
                 if curved:
                     fill_push_i(Z, n)
+            if keeps_masses and row >= row0:
+                copy_back(Z, at.FLUX_I_MASS + first, j1 - j0, mass_i, row, j0)
             if row < row1:
                 # the faces towards +i replace those towards -i, whose fluxes are known
                 fill_faces_i(Z, w, inverse_dt)
@@ -224,6 +228,8 @@ def make_flow_kernels(
                     for q in range(of.FLUX_ROWS):
                         out = rim[on.MASS + q, 2 * nj + ni + row]
                         Z[at.FLUX_J_MASS + q * at.SCRATCH_SPAN + last] = out
+                if keeps_masses:
+                    copy_back(Z, at.FLUX_J_MASS + first, j1 - j0 + 1, mass_j, row, j0)
             if inside and row > row0:
                 update_rows(Z, w, dt, inverse_dt, parameters)
             elif inside:
@@ -261,10 +267,11 @@ def make_flow_kernels(
 
         old: state (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells; void energy (ni,
         nj): energy of cells with voids minus that of intact material at the same density and p = 0;
-        nodes (2, ni + 1, nj + 1).  new: the same three, of which the first two are written, and the
-        rates and crowding (ni, nj) of the new cells, theory F7.1, F7.3.  rim: rows of `hydro.rim`
-        with the fluxes through the sides and the lengths of the ghosts; scratch (threads, SIZE);
-        tile_totals (tiles, 8): columns as in `hydro.rows`.
+        nodes (2, ni + 1, nj + 1).  new: the same three, of which the first two are written, the
+        rates and crowding (ni, nj) of the new cells, theory F7.1, F7.3, and the rates of mass
+        through faces, (ni + 1, nj) and (ni, nj + 1), (1, 1) where nobody asks for them.  rim: rows
+        of `hydro.rim` with the fluxes through the sides and the lengths of the ghosts; scratch
+        (threads, SIZE); tile_totals (tiles, 8): columns as in `hydro.rows`.
         """
         for tile in range(tiles[0], tiles[1]):
             advance_tile(old, new, rim, dt, parameters, tile, scratch[0], tile_totals)

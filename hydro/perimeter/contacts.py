@@ -142,6 +142,19 @@ def let_pass(rim, k, other, m, beyond, hll, acoustic_weight, curved):
     split_momentum(rim, k, momentum_y, pressure, curved)
 
 
+@compiled_once(allocates=False)
+def carry_through(rim, k, other, m, part):
+    """What goes out of carried fields with the mass through face k of a rim.
+
+    The value out there is in the row `part` of each field at face m of the other rim.
+    """
+    mass = rim[on.MASS, k]
+    for q in range(on.count_carried(rim)):
+        row = on.find_carried_row(q)
+        value = rim[row + on.CARRIED_TRACE, k] if mass > 0.0 else other[row + part, m]
+        rim[row + on.CARRIED_FLUX, k] = mass * (value - rim[row + on.CARRIED_CELL, k])
+
+
 @compiled_once
 def add_layer_flux(rim, speeds, backwards, closed, first):
     """Add to the outward fluxes through a contact's faces what flows on to the next cell.
@@ -209,6 +222,12 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
                 rim[on.MOMENTUM_X, first + cell] += part * rho * u
                 rim[on.MOMENTUM_Y, first + cell] += part * rho * v
                 rim[on.ENERGY, first + cell] += part * energy
+                for q in range(on.count_carried(rim)):
+                    row = on.find_carried_row(q)
+                    beyond = (
+                        rim[row + on.CARRIED_TRACE, m] - rim[row + on.CARRIED_CELL, first + cell]
+                    )
+                    rim[row + on.CARRIED_FLUX, first + cell] += part * rho * beyond
 
 
 @kernel
@@ -252,12 +271,18 @@ def pass_seam(rim, other, pairs, phase, curved):
                 other[on.RHO_GHOST + q, m] = rim[q, k]
             rim[on.LENGTH_GHOST, k] = other[on.LENGTH, m]
             other[on.LENGTH_GHOST, m] = rim[on.LENGTH, k]
+            for q in range(on.count_carried(rim)):
+                row = on.find_carried_row(q)
+                rim[row + on.CARRIED_GHOST, k] = other[row + on.CARRIED_CELL, m]
+                other[row + on.CARRIED_GHOST, m] = rim[row + on.CARRIED_CELL, k]
         else:
             hll = rim[on.HLL, k] + other[on.HLL, m]
             weight = max(rim[on.ACOUSTIC, k], other[on.ACOUSTIC, m])
             let_pass(rim, k, other, m, on.RHO_TRACE, hll, weight, curved)
             for q in range(on.MASS, on.MASS + FLUX_ROWS):
                 other[q, m] = -rim[q, k]
+            carry_through(rim, k, other, m, on.CARRIED_TRACE)
+            carry_through(other, m, rim, k, on.CARRIED_TRACE)
 
 
 @kernel(allocates=False)
@@ -371,7 +396,18 @@ def pass_open_sides(rim, opened, curved):
             let_pass(rim, k, rim, k, opened[number, 2], rim[on.HLL, k], rim[on.ACOUSTIC, k], curved)
 
 
+@compiled_once(allocates=False)
+def carry_through_open_sides(rim, opened):
+    """What goes out of carried fields through the faces of `pass_open_sides`."""
+    for number in range(opened.shape[0]):
+        as_inside = opened[number, 2] == on.RHO_TRACE
+        beyond = on.CARRIED_TRACE if as_inside else on.CARRIED_BEYOND
+        for k in range(opened[number, 0], opened[number, 1]):
+            carry_through(rim, k, rim, k, beyond)
+
+
 @kernel(allocates=False)
 def fill_open_flux(rim, opened, curved):
-    """`pass_open_sides` by itself."""
+    """`pass_open_sides` by itself, with what carried fields lose there."""
     pass_open_sides(rim, opened, curved)
+    carry_through_open_sides(rim, opened)

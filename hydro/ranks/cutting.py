@@ -24,7 +24,7 @@ import numpy as np
 from hydro.block import Block
 from hydro.interior.advance import TILE_ROWS, count_tiles
 from hydro.interior.update import sum_tiles
-from hydro.rows import HELD_ARRAYS, TOTAL_ROWS
+from hydro.rows import TOTAL_ROWS
 
 MOST_UNCUT = 1.2  # times a rank's fair share: a block of more is cut
 GHOST_ROWS = 2  # of cells beyond a band, which its update reads
@@ -206,12 +206,12 @@ class CutBlock:
 
     def bring_fields(self) -> None:
         """Send the owner the states of all cells at the start of the step."""
-        for array in self.block.list_starts():
+        for array in self.block.list_starts(self.block.held_arrays):
             self.gather_rows(array)
 
     def bring_states(self) -> None:
         """Send the owner the present states of all cells."""
-        for name in HELD_ARRAYS:
+        for name in self.block.held_arrays:
             self.gather_rows(getattr(self.block, name))
 
     def send_nodes(self) -> None:
@@ -226,7 +226,7 @@ class CutBlock:
         ni = self.block.ni
         block = self.block
         need = [(max(a - GHOST_ROWS, 0), min(b + GHOST_ROWS, ni)) for a, b in self.bands]
-        for array in block.list_new():
+        for array in block.list_new(block.held_arrays):
             shift = block.count_ghosts(array)
             self.send_rows(array, _shift(self.bands, shift), _shift(need, shift))
 

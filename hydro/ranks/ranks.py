@@ -40,13 +40,14 @@ from hydro.ranks.cutting import (
     find_bounds,
     spread_evenly,
 )
-from hydro.rows import HELD_ARRAYS, STEP_ARRAYS, TOTAL_ROWS
+from hydro.rows import TOTAL_ROWS
 from regrid.errors import RunFailure
 
 STEP, COLLECT, COUNT, END = range(4)  # what the first rank tells the others to do
 # seconds that a rank waits wide awake, and that it sleeps then
 AWAKE_SECONDS = 5e-3
 NAP_SECONDS = 2e-4
+MOST_KEPT_ARRAYS = 8  # of a block, for the tags of messages
 
 
 class Ranks(Blocks):
@@ -129,7 +130,7 @@ class Ranks(Blocks):
                             attrgetter(name + suffix),
                             messages.find_ring_of_array(block, name, rows),
                         )
-                        for name in HELD_ARRAYS
+                        for name in blocks[number].held_arrays
                     ]
                     items.append(messages.Item(number, rank, parts))
             sums = [(_get_sums, np.arange(TOTAL_ROWS))]
@@ -306,7 +307,7 @@ class Ranks(Blocks):
         """Who has what of a block, as rank, tag, name of an array and its rows; nodes at home."""
         block = self[number]
         found = []
-        for tag, name in enumerate(STEP_ARRAYS, len(STEP_ARRAYS) * number):
+        for tag, name in enumerate(block.step_arrays, MOST_KEPT_ARRAYS * number):
             if name == "nodes":
                 found.append((self.owners[number], tag, name, (0, block.ni + 1)))
                 continue
@@ -325,9 +326,13 @@ class Ranks(Blocks):
             first = max(first - GHOST_ROWS, 0)
             last = min(last + GHOST_ROWS, block.ni)
         parted = block.start is not block.state
-        rings = {name: messages.find_ring_of_array(block, name) for name in HELD_ARRAYS}
+        rings = {name: messages.find_ring_of_array(block, name) for name in block.held_arrays}
         rings["nodes"] = messages.find_ring_of_nodes(block)
-        for name in (*STEP_ARRAYS, *(f"{name}_new" for name in STEP_ARRAYS), "crowding"):
+        for name in (
+            *block.step_arrays,
+            *(f"{name}_new" for name in block.step_arrays),
+            "crowding",
+        ):
             array = getattr(block, name)
             if name.startswith("nodes") and block.is_here:
                 continue
@@ -378,13 +383,13 @@ def _find_starts(block: Block) -> list[messages.Part]:
             lambda of_block, name=name: of_block.get_start(name),
             messages.find_ring_of_array(block, name),
         )
-        for name in HELD_ARRAYS
+        for name in block.held_arrays
     ]
 
 
 def _find_polygon_parts(block: Block, rows: Rows) -> list[messages.Part]:
     """What polygon cells read and change of an update."""
-    names = (*(f"{name}_new" for name in HELD_ARRAYS), "rates_new", "crowding")
+    names = (*(f"{name}_new" for name in block.held_arrays), "rates_new", "crowding")
     return [(attrgetter(name), messages.find_ring_of_array(block, name, rows, 1)) for name in names]
 
 

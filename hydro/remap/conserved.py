@@ -33,7 +33,7 @@ from hydro.remap.overlay import (
     lay_over,
     make_linear_fields,
 )
-from hydro.rows import RHO, P, U, V
+from hydro.rows import HELD_ARRAYS, RHO, P, U, V
 from regrid.errors import BadInput, Place, RunFailure
 from regrid.measure.quality import find_bad_cells, say_not_convex
 from regrid.sides import J_MIN, SIDE_NAMES, get_sides
@@ -124,6 +124,7 @@ def share_slivers(
     return content, slivers
 
 
+FLOW_QUANTITIES = 4  # mass, momentum x, y and energy, before what is carried
 LEAST_LEFT = 0.05  # of a cell's density and c² that its linear fields must leave at its corners
 FILTERS = (minimum_filter, maximum_filter)
 BEYOND_SIDES = 0.05  # of density and rho c²: how far beyond those around corners at a side may be
@@ -161,12 +162,14 @@ def find_bounds(eos: EquationOfState, state: np.ndarray) -> tuple[np.ndarray, np
 
 
 def lessen_slopes(eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, centres) -> int:
-    """Lessen slopes of `fields` (ni, nj, 4, 3) in place where corners are no states; how many.
+    """Lessen slopes of `fields` (ni, nj, n, 3) in place where corners are no states; how many.
 
+    The first four are those of `compute_conserved`.
     nodes (2, ni+1, nj+1), centres (2, ni, nj) [m].
     """
-    means = np.ascontiguousarray(np.moveaxis(fields[..., MEAN], -1, 0))
-    slopes = np.ascontiguousarray(np.moveaxis(fields[..., SLOPE_X:], (-1, -2), (0, 1)))
+    flow = fields[..., :FLOW_QUANTITIES, :]
+    means = np.ascontiguousarray(np.moveaxis(flow[..., MEAN], -1, 0))
+    slopes = np.ascontiguousarray(np.moveaxis(flow[..., SLOPE_X:], (-1, -2), (0, 1)))
     state = find_held(eos, means)["state"]
     least, greatest = find_bounds(eos, state)
     stiffness = eos.sound_speed_squared_part(state[RHO], state[P], eos.parameters)
@@ -246,15 +249,18 @@ def remap_state(
 ) -> tuple[dict[str, np.ndarray], Slivers]:
     """What the cells of a block hold on a new grid, and the slivers; theory F12.
 
-    held: the arrays of `hydro.rows.HELD_ARRAYS` by name, without ghosts, (..., ni, nj) each, on
-    `nodes` (2, ni+1, nj+1); new_nodes (2, mi+1, mj+1).  Returns such arrays.
+    held: the arrays of `Block.held_arrays` by name, without ghosts, (..., ni, nj) each, on `nodes`
+    (2, ni+1, nj+1); new_nodes (2, mi+1, mj+1).  Returns such arrays.
     Raises BadInput, with the block's name, for cells that are not convex and for outlines that
     differ by more than slivers; RunFailure where an average is no state of the material.
     """
     check_convex(name, nodes)
     check_convex(name, new_nodes)
     volumes, centres = compute_cell_moments(nodes, curved)
-    conserved = compute_conserved(eos, **held)
+    conserved = compute_conserved(eos, *(held[array] for array in HELD_ARRAYS))
+    carried = held.get("carried")
+    if carried is not None:
+        conserved = np.concatenate((conserved, conserved[RHO] * carried))
     fields = make_linear_fields(conserved, nodes, centres)
     lessen_slopes(eos, fields, nodes, centres)
     for _ in range(2):
@@ -267,9 +273,11 @@ def remap_state(
                 "grids of one outline can take over each other's state"
             )
         found = np.moveaxis(content / overlay.volumes[..., None], -1, 0)
-        new_held = find_held(eos, found)
+        new_held = find_held(eos, found[:FLOW_QUANTITIES])
         bad = ~is_state(eos, new_held["state"])
         if not bad.any():
+            if carried is not None:
+                new_held["carried"] = found[FLOW_QUANTITIES:] / found[RHO]
             return new_held, slivers
         fields[..., SLOPE_X:] = 0.0  # averages of states, where those of linear fields fail
     i, j = (int(index) for index in np.argwhere(bad)[0])

@@ -35,7 +35,6 @@ from hydro.boundary import NodeMotion
 from hydro.motion.grid_motion import GridMotion, MeshLaw
 from hydro.motion.line import Line, StraightLine
 from hydro.remap.conserved import Slivers, remap_state
-from hydro.rows import HELD_ARRAYS
 from hydro.simulation import Simulation
 from regrid.curves import compute_arc_lengths
 from regrid.errors import BadInput
@@ -99,7 +98,7 @@ class RemappedBlock:
 
 def _remap_block(block: Block, nodes: np.ndarray) -> tuple[dict[str, np.ndarray], Slivers]:
     """What the cells of a block hold on new nodes (2, mi+1, mj+1): see `remap_state`."""
-    held = {name: block.get_inside(name) for name in HELD_ARRAYS}
+    held = {name: block.get_inside(name) for name in block.held_arrays}
     return remap_state(block.name, block.eos, block.geometry.curved, block.nodes, held, nodes)
 
 
@@ -326,7 +325,7 @@ class Refinement:
     def lay(
         self, places: np.ndarray, blocks: Sequence[Block], motion: GridMotion, t: float
     ) -> list[tuple[np.ndarray, dict[str, np.ndarray]]]:
-        """Nodes, and what cells hold (HELD_ARRAYS), of all blocks on lines at these places.
+        """Nodes, and what cells hold (`Block.held_arrays`), of all blocks on lines at these places.
 
         The nodes of interfaces stay, or lie half way between two of them; straight sides are spread
         by their spacings at t [s], and the grids inside settle before they get the states.

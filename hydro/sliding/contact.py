@@ -16,6 +16,8 @@ import numpy as np
 
 from hydro import rim as on
 from hydro.boundary import NodeMotion, Sliding
+from hydro.carried.fields import check_same
+from hydro.carried.sliding import carry_through_closing_faces
 from hydro.eos.base import is_same_material
 from hydro.facets.lines import fill_radius_weighted_areas, fill_slopes
 from hydro.facets.rows import (
@@ -28,6 +30,7 @@ from hydro.facets.rows import (
 from hydro.facets.states import make_add_facet_flux, solve_facets, sum_over_faces
 from hydro.formulas.geometry import PLANE, Geometry
 from hydro.perimeter.contacts import AT_CELLS, AT_FLUX
+from hydro.rows import MASS
 from hydro.sliding.pieces import (
     SURFACE_ROWS,
     fill_pieces,
@@ -196,6 +199,11 @@ class SlidingContact:
                 "materials; lines on which materials meet are the leader's"
             )
         for segment in follower:
+            check_same(
+                f"sliding: material passes along {follower[0]} and {segment}",
+                follower[0].block.carried_fields,
+                segment.block.carried_fields,
+            )
             segment.motion = NodeMotion.FOLLOW
             segment.has_own_line = False
         line = self.leader.line()
@@ -228,6 +236,7 @@ class SlidingContact:
             )
         if not (np.diff(positions) > 0.0).all():
             raise BadInput(f"sliding: {follower[0]} and {leader[0]} do not lie along each other")
+        self.carries = bool(follower[0].block.carried_fields)
         self.first_spacing = arc_law(np.ascontiguousarray(other))
         self.refinement = 1.0  # how many times shorter the steps at a contact point are
         self.fixed_new = self.fixed.copy()
@@ -336,6 +345,20 @@ class SlidingContact:
         )
         leader.scatter(on.FLUX, self.halves[LEADER].flux)
         follower.scatter(on.FLUX, self.halves[FOLLOWER].flux)
+        if self.carries:
+            self._carry_along(self.halves[FOLLOWER].flux[MASS])
+
+    def _carry_along(self, masses: np.ndarray) -> None:
+        """What carried fields gain and lose through the closing faces, into the follower's rims."""
+        for number in range(len(self.segments[-1].block.carried_fields)):
+            row = on.find_carried_row(number)
+            traces, cells = (
+                self.follower.gather(slice(row + part, row + part + 1))[0].copy()
+                for part in (on.CARRIED_TRACE, on.CARRIED_CELL)
+            )
+            change = carry_through_closing_faces(masses, traces, cells)
+            place = slice(row + on.CARRIED_FLUX, row + on.CARRIED_FLUX + 1)
+            self.follower.scatter(place, change[None])
 
     def _measure_closing(self, middle, moved, follower, follower_moved) -> np.ndarray:
         """Normal times area (2, n + 1) of the closing faces at the follower's nodes.

@@ -36,7 +36,7 @@ ROOMS = (
     ("hydro.workers", "hydro.clock"),
     ("hydro.interior", "hydro.convection"),
     ("hydro.perimeter",),
-    ("hydro.kernels", "hydro.totals"),
+    ("hydro.kernels", "hydro.totals", "hydro.carried"),
     ("hydro.block",),
     ("hydro.phases",),
     ("hydro.ranks",),

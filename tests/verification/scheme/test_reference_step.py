@@ -12,12 +12,14 @@ import pytest
 from builders import box
 from hydro.block import Block
 from hydro.boundary import OWN, put
+from hydro.carried.fields import CarriedField
 from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
 from hydro.eos.base import REMAINING_DENSITY_PART, make_least_pressure
 from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
 from hydro.formulas.riemann import DEFAULT_FLUX
 from hydro.links import join, slide
 from hydro.simulation import Simulation
+from reference_carried import carry
 from reference_sliding import find_points, find_positions
 from reference_step import take_step
 
@@ -83,10 +85,12 @@ def make_state(nodes, material, rough, random):
 
 
 def make_block(name, materials, nodes, rough, random, **options):
-    eos, *_ = material = materials[name in OTHERS]
+    eos, eos_rho, _ = material = materials[name in OTHERS]
     state = make_state(nodes(name, 0.0), material, rough, random)
     words = f"of {name in OTHERS}"
-    return Block(name, eos, nodes(name, 0.0), *state, material=words, **options)
+    first = random.uniform(size=state[0].shape) if rough else 0.5 + 0.4 * np.sin(state[0] / eos_rho)
+    fields = [CarriedField("mark", first=first), CarriedField("one", first=0.7)]
+    return Block(name, eos, nodes(name, 0.0), *state, material=words, carried=fields, **options)
 
 
 def make_flow(materials, geometry, rough, limiter=DEFAULT_LIMITER, flux=DEFAULT_FLUX, seed=1):
@@ -121,7 +125,7 @@ def make_flow(materials, geometry, rough, limiter=DEFAULT_LIMITER, flux=DEFAULT_
         join("seam", (lower, "i_max"), (beside, "i_min")),
     ]
     stream = rho * np.linspace(0.9, 1.1, 5), 0.2 * c, 0.1 * c, p
-    put(lower, "i_min", "inflow", state=stream)
+    put(lower, "i_min", "inflow", state=stream, carried={"mark": 0.2, "one": 0.7})
     put(lower, "j_min", "axis" if curved else "wall")
     put(beside, "j_min", "axis" if curved else "wall")
     put(beside, "i_max", "outflow")
@@ -163,7 +167,7 @@ def make_sliding_flow(materials, rough):
 
 def hold(block):
     """What the reference needs of a block before a step."""
-    names = "nodes", "state", "void_energy"
+    names = "nodes", "state", "void_energy", "carried"
     kept = {name: getattr(block, name).copy() for name in names}
     others = "eos", "limiter", "flux_name", "segments"
     return SimpleNamespace(**kept, **{name: getattr(block, name) for name in others})
@@ -185,8 +189,11 @@ def follow(simulation, by_mass=False):
             block.is_first_order = now.kernels.is_first_order
         exchange = simulation.exchange
         curved = simulation.geometry.curved
-        found = take_step(given, exchange.links, start, row["dt"], curved, exchange.contacts)
-        for block, (state, void) in zip(simulation.blocks, found, strict=True):
+        contacts = exchange.contacts
+        found = take_step(given, exchange.links, start, row["dt"], curved, contacts, carry)
+        for block, (state, void, carried) in zip(simulation.blocks, found, strict=True):
+            if not contacts:
+                assert np.abs(block.carried[:, 1:-1, 1:-1] - carried).max(initial=0.0) <= EXACT
             rho = state[0].max()
             c2 = block.eos.sound_speed(state[0], state[3]).max() ** 2
             got = *block.state[:, 1:-1, 1:-1], block.void_energy

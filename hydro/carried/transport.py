@@ -1,0 +1,363 @@
+"""How carried fields move: with the mass that the flow's own fluxes carry through the faces.
+
+In a step, beside the phases of the flow (`hydro.phases`):
+
+    gather    values of the cells along the sides, which also stand for what is beyond these
+    predict   limited slopes of all cells, and their values at mid-time            theory F15.2
+    trace     values at the faces of the sides; what passes through open sides
+    carry     what the mass brings and takes                                       theory F15.1
+
+Faces take the value of the cell that the mass leaves.  The change of a cell is summed of the
+differences between what comes through its faces and what is there, so a constant stays one to the
+bit.  Slopes are bounded: at no corner of a cell is its field beyond the values around.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+
+from hydro import rim as on
+from hydro.formulas.geometry import (
+    Geometry,
+    compute_centre_offset,
+    lean_lines,
+    weigh_differences,
+)
+from hydro.formulas.reconstruction import (
+    compute_gradient,
+    compute_line_geometry,
+    compute_weights,
+    limit_van_leer,
+)
+from hydro.interior.scratch import find_twist
+from hydro.perimeter.contacts import carry_through_open_sides
+from hydro.perimeter.faces import find_corners, measure_volume
+from hydro.rim import find_cell, find_excess
+from hydro.rows import RHO, U, V
+from regrid.jit import compiled_once, inlined, kernel
+
+# rows of `measures`: lengths of cells along both lines, and how far their centres of volume lie
+# from their middles along them
+LENGTH_I, SHIFT_I, LENGTH_J, SHIFT_J = range(4)
+MEASURE_ROWS = 4
+# rows of `slopes` of a field: value at mid-time at the cell's centre, gradient
+AT_CENTRE, SLOPE_X, SLOPE_Y = range(3)
+SLOPE_PARTS = 3
+
+
+@inlined
+def bound(change, value, least, most):
+    """The part of a change of `value` that does not lead beyond least..most: at most 1."""
+    room = most - value if change > 0.0 else value - least
+    size = abs(change)
+    return room / size if size > room else 1.0
+
+
+@kernel(allocates=False)
+def gather(values, rim):
+    """The fields (n, ni + 2, nj + 2) of the cells along the sides; the same beyond the faces."""
+    ni = values.shape[1] - 2
+    nj = values.shape[2] - 2
+    for q in range(values.shape[0]):
+        row = on.find_carried_row(q)
+        for k in range(rim.shape[1]):
+            _, i, j = find_cell(k, ni, nj)
+            rim[row + on.CARRIED_CELL, k] = values[q, i + 1, j + 1]
+            rim[row + on.CARRIED_GHOST, k] = values[q, i + 1, j + 1]
+
+
+@compiled_once(allocates=False)
+def spread_ghosts(rim, row, field):
+    """Write a row of ghosts of the rim into the layer around a field (ni + 2, nj + 2)."""
+    ni = field.shape[0] - 2
+    nj = field.shape[1] - 2
+    for k in range(nj):
+        field[0, k + 1] = rim[row, k]
+        field[ni + 1, k + 1] = rim[row, nj + k]
+    for k in range(ni):
+        field[k + 1, 0] = rim[row, 2 * nj + k]
+        field[k + 1, nj + 1] = rim[row, 2 * nj + ni + k]
+
+
+@functools.cache
+def make_predict(geometry: Geometry):
+    """Kernel that fills the slopes of carried fields, of a geometry."""
+    curved = geometry.curved
+
+    @compiled_once(allocates=False)
+    def measure_cell(nodes, i, j, measures, centres):
+        """Lengths, shifts and the centre of a cell."""
+        a, b, c, d = find_corners(nodes, i, j)
+        mid_i, mid_j, _ = compute_line_geometry(a, b, c, d)
+        length_i = (mid_i[0] * mid_i[0] + mid_i[1] * mid_i[1]) ** 0.5
+        length_j = (mid_j[0] * mid_j[0] + mid_j[1] * mid_j[1]) ** 0.5
+        offset_x = 0.0
+        offset_y = 0.0
+        if curved:
+            twist, y = find_twist(a, b, c, d)
+            offset_x, offset_y = compute_centre_offset(mid_i, mid_j, twist, y)
+        measures[LENGTH_I, i + 1, j + 1] = length_i
+        measures[LENGTH_J, i + 1, j + 1] = length_j
+        measures[SHIFT_I, i + 1, j + 1] = (offset_x * mid_i[0] + offset_y * mid_i[1]) / length_i
+        measures[SHIFT_J, i + 1, j + 1] = (offset_x * mid_j[0] + offset_y * mid_j[1]) / length_j
+        centres[0, i, j] = 0.25 * ((a[0] + c[0]) + (b[0] + d[0])) + offset_x
+        centres[1, i, j] = 0.25 * ((a[1] + c[1]) + (b[1] + d[1])) + offset_y
+
+    @inlined
+    def weigh(measures, length, here, before, after):
+        """Weights of the differences to the cells before and after; indices (i, j)."""
+        shift = length + 1
+        if curved:
+            return weigh_differences(
+                measures[length, before[0], before[1]],
+                measures[shift, before[0], before[1]],
+                measures[length, here[0], here[1]],
+                measures[shift, here[0], here[1]],
+                measures[length, after[0], after[1]],
+                measures[shift, after[0], after[1]],
+            )
+        return compute_weights(
+            measures[length, before[0], before[1]],
+            measures[length, here[0], here[1]],
+            measures[length, after[0], after[1]],
+        )
+
+    @compiled_once(allocates=False)
+    def fill_slope(field, state, nodes, i, j, half_dt, measures, centres, slopes):
+        """Bounded slopes of a field in a cell, and its value there at mid-time."""
+        a, b, c, d = find_corners(nodes, i, j)
+        line_i, line_j, area = compute_line_geometry(a, b, c, d)
+        inverse = 1.0 / area
+        if curved:
+            twist, y = find_twist(a, b, c, d)
+            line_i, line_j = lean_lines(line_i, line_j, twist, y)
+            inverse = 1.0 / (line_i[0] * line_j[1] - line_i[1] * line_j[0])
+        here = i + 1, j + 1
+        value = field[i + 1, j + 1]
+        before = field[i, j + 1]
+        after = field[i + 2, j + 1]
+        below = field[i + 1, j]
+        above = field[i + 1, j + 2]
+        first, second = weigh(measures, LENGTH_I, here, (i, j + 1), (i + 2, j + 1))
+        along_i = limit_van_leer((value - before) * first, (after - value) * second)
+        first, second = weigh(measures, LENGTH_J, here, (i + 1, j), (i + 1, j + 2))
+        along_j = limit_van_leer((value - below) * first, (above - value) * second)
+        slope_x, slope_y = compute_gradient(along_i, along_j, line_i, line_j, inverse)
+        # nowhere in the cell beyond the values around
+        least = min(value, min(min(before, after), min(below, above)))
+        most = max(value, max(max(before, after), max(below, above)))
+        x = centres[0, i, j]
+        y = centres[1, i, j]
+        part = 1.0
+        for corner in (a, b, c, d):
+            change = slope_x * (corner[0] - x) + slope_y * (corner[1] - y)
+            part = min(part, bound(change, value, least, most))
+        slope_x *= part
+        slope_y *= part
+        along_flow = state[U, i + 1, j + 1] * slope_x + state[V, i + 1, j + 1] * slope_y
+        slopes[AT_CENTRE, i, j] = value - half_dt * along_flow
+        slopes[SLOPE_X, i, j] = slope_x
+        slopes[SLOPE_Y, i, j] = slope_y
+
+    @kernel(allocates=False)
+    def predict(values, state, nodes, rim, half_dt, rows, measures, centres, slopes):
+        """Slopes (n, 3, ni, nj) of fields (n, ni + 2, nj + 2) in the cells that a step reads.
+
+        These are the rows first..last - 1 of cells of `rows`, one more on either side, and the
+        cells along all sides.  measures (4, ni + 2, nj + 2), centres (2, ni, nj): scratch.
+        """
+        ni = nodes.shape[1] - 1
+        nj = nodes.shape[2] - 1
+        first, last = rows
+        low = max(first - 1, 0)
+        high = min(last + 1, ni) if last > first else low
+        for i in range(ni):
+            near = low - 1 <= i < high + 1 and high > low
+            near |= i < 2 or i >= ni - 2
+            for j in range(nj):
+                if near or j < 2 or j >= nj - 2:
+                    measure_cell(nodes, i, j, measures, centres)
+        spread_ghosts(rim, on.LENGTH_GHOST, measures[LENGTH_I])
+        spread_ghosts(rim, on.LENGTH_GHOST, measures[LENGTH_J])
+        for q in range(values.shape[0]):
+            spread_ghosts(rim, on.find_carried_row(q) + on.CARRIED_GHOST, values[q])
+            for i in range(ni):
+                near = low <= i < high or i == 0 or i == ni - 1
+                for j in range(nj):
+                    if near or j == 0 or j == nj - 1:
+                        fill_slope(
+                            values[q], state, nodes, i, j, half_dt, measures, centres, slopes[q]
+                        )
+
+    return predict
+
+
+@kernel(allocates=False)
+def trace(slopes, centres, opened, rim):
+    """Values at the faces of the sides; what passes through open sides, and nothing elsewhere yet.
+
+    opened (n, 3): first faces of open sides, those after the last, and the row of the state beyond.
+    """
+    ni = centres.shape[1]
+    nj = centres.shape[2]
+    for q in range(slopes.shape[0]):
+        row = on.find_carried_row(q)
+        for k in range(rim.shape[1]):
+            _, i, j = find_cell(k, ni, nj)
+            rim[row + on.CARRIED_TRACE, k] = find_value(
+                slopes[q], centres, i, j, rim[on.X_TRACE, k], rim[on.Y_TRACE, k]
+            )
+            rim[row + on.CARRIED_FLUX, k] = 0.0
+    carry_through_open_sides(rim, opened)
+
+
+@inlined
+def find_value(slopes, centres, i, j, x, y):
+    """The value of a cell's field at mid-time at the point (x, y)."""
+    return slopes[AT_CENTRE, i, j] + (
+        slopes[SLOPE_X, i, j] * (x - centres[0, i, j])
+        + slopes[SLOPE_Y, i, j] * (y - centres[1, i, j])
+    )
+
+
+@functools.cache
+def make_carry(geometry: Geometry):
+    """Kernel that carries fields over a step, of a geometry."""
+    weigh_volume = geometry.volume
+    compute_face = geometry.face
+
+    @inlined
+    def find_middle(grids, i, j, i_end, j_end):
+        """Where the flux goes through the face between two nodes (theory F3.1, F9.2)."""
+        nodes, nodes_new = grids
+        a = nodes[0, i, j], nodes[1, i, j]
+        b = nodes[0, i_end, j_end], nodes[1, i_end, j_end]
+        a_new = nodes_new[0, i, j], nodes_new[1, i, j]
+        b_new = nodes_new[0, i_end, j_end], nodes_new[1, i_end, j_end]
+        _, _, _, x, y = compute_face(a, b, a_new, b_new, 1.0)
+        return x, y
+
+    @compiled_once(allocates=False)
+    def fill_faces_i(slopes, centres, grids, mass_i, i, faces):
+        """Values (nj,) at the faces between the rows of cells i - 1 and i; none along the sides."""
+        if i == 0 or i == centres.shape[1]:
+            return
+        for j in range(centres.shape[2]):
+            giver = i - 1 if mass_i[i, j] > 0.0 else i
+            x, y = find_middle(grids, i, j, i, j + 1)
+            faces[j] = find_value(slopes, centres, giver, j, x, y)
+
+    @compiled_once(allocates=False)
+    def fill_faces_j(slopes, centres, grids, mass_j, i, faces):
+        """Values (nj + 1,) at the faces between the cells of a row; none along the sides."""
+        for j in range(1, centres.shape[2]):
+            giver = j - 1 if mass_j[i, j] > 0.0 else j
+            x, y = find_middle(grids, i + 1, j, i, j)
+            faces[j] = find_value(slopes, centres, i, giver, x, y)
+
+    @compiled_once(allocates=False)
+    def find_change(value, i, j, masses, faces, sides):
+        """Rate of mass times what is carried beyond `value`, out of a cell.
+
+        masses: rates of mass through both pairs of faces; faces: the values there; sides: what the
+        rim has of the faces along the sides (rim, row).
+        """
+        mass_i, mass_j = masses
+        low, high, face_j = faces
+        rim, row = sides
+        ni = mass_i.shape[0] - 1
+        nj = mass_i.shape[1]
+        flux = row + on.CARRIED_FLUX
+        before = mass_i[i, j] * (low[j] - value) if i > 0 else -rim[flux, j]
+        after = mass_i[i + 1, j] * (high[j] - value) if i < ni - 1 else rim[flux, nj + j]
+        below = mass_j[i, j] * (face_j[j] - value) if j > 0 else -rim[flux, 2 * nj + i]
+        above = (
+            mass_j[i, j + 1] * (face_j[j + 1] - value) if j < nj - 1 else rim[flux, 2 * nj + ni + i]
+        )
+        return (after - before) + (above - below)
+
+    @kernel
+    def carry(values, state, grids, excess, rim, masses, dt, rows, scratch):
+        """New values of fields after a step.
+
+        values: old and new fields (n, ni + 2, nj + 2); state (4, ni + 2, nj + 2) at the start;
+        grids: nodes (2, ni + 1, nj + 1) before and after; excess (faces,): volumes of cells along
+        the sides beyond their straight faces, at the start; masses: rates of mass through the
+        faces, (ni + 1, nj) towards +i and (ni, nj + 1) towards +j; rows: the first row of cells and
+        the one after the last; scratch: slopes and centres of `predict`.
+        """
+        old, new = values
+        nodes = grids[0]
+        mass_i, mass_j = masses
+        slopes, centres = scratch
+        first, last = rows
+        ni = centres.shape[1]
+        nj = centres.shape[2]
+        low = np.empty(nj)
+        high = np.empty(nj)
+        face_j = np.empty(nj + 1)
+        for q in range(old.shape[0]):
+            row = on.find_carried_row(q)
+            fill_faces_i(slopes[q], centres, grids, mass_i, first, high)
+            for i in range(first, last):
+                # the faces towards +i of the row before are those towards -i of this one
+                low, high = high, low
+                fill_faces_i(slopes[q], centres, grids, mass_i, i + 1, high)
+                fill_faces_j(slopes[q], centres, grids, mass_j, i, face_j)
+                for j in range(nj):
+                    volume = measure_volume(nodes, i, j, weigh_volume)
+                    volume += find_excess(excess, i, j, ni, nj)
+                    leaving = (mass_i[i + 1, j] - mass_i[i, j]) + (mass_j[i, j + 1] - mass_j[i, j])
+                    mass = volume * state[RHO, i + 1, j + 1] - dt * leaving
+                    value = old[q, i + 1, j + 1]
+                    change = find_change(value, i, j, masses, (low, high, face_j), (rim, row))
+                    new[q, i + 1, j + 1] = value - dt * change / mass
+
+    return carry
+
+
+class Transport:
+    """The carried fields of a block, and the scratch of the kernels that move them.
+
+    Its phases, in their order, are called where there are fields.
+
+    count: how many fields; masses: rates of mass through the faces, which the flow's update fills,
+    (ni + 1, nj) towards +i and (ni, nj + 1) towards +j; without fields (1, 1), and not filled.
+    """
+
+    def __init__(self, count: int, ni: int, nj: int):
+        self.count = count
+        self.masses = np.zeros((1, 1)), np.zeros((1, 1))
+        if count == 0:
+            return
+        self.masses = np.zeros((ni + 1, nj)), np.zeros((ni, nj + 1))
+        self.measures = np.ones((MEASURE_ROWS, ni + 2, nj + 2))
+        self.measures[[SHIFT_I, SHIFT_J]] = 0.0
+        self.centres = np.zeros((2, ni, nj))
+        self.slopes = np.zeros((count, SLOPE_PARTS, ni, nj))
+
+    def gather(self, block: Any) -> None:
+        """Phase 2, before the couplings fill what is beyond the sides: see `gather`."""
+        gather(block.get_start("carried"), block.rim.rows)
+
+    def predict(self, block: Any, half_dt: float) -> None:
+        """Phase 2, after the couplings: slopes and values at mid-time."""
+        make_predict(block.geometry)(
+            block.get_start("carried"), block.start, block.nodes, block.rim.rows, half_dt,
+            (block.rows.start, block.rows.stop), self.measures, self.centres, self.slopes,
+        )  # fmt: skip
+
+    def trace(self, block: Any) -> None:
+        """Phase 6, with the traces of the sides known, before the couplings' fluxes."""
+        trace(self.slopes, self.centres, block.plan.opened, block.rim.rows)
+
+    def carry(self, block: Any, dt: float) -> None:
+        """Phase 6, after the flow's update: the new values."""
+        make_carry(block.geometry)(
+            (block.get_start("carried"), block.carried_new), block.start,
+            (block.nodes, block.nodes_new), block.excess_volume, block.rim.rows, self.masses, dt,
+            (block.rows.start, block.rows.stop), (self.slopes, self.centres),
+        )  # fmt: skip

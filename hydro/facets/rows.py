@@ -33,7 +33,7 @@ FACET_ROWS = 7
 # then sound speed, specific internal energy, c²
 STATE_C = 4
 STATE_E = 5
-STATE_ROWS = 7
+FACE_STATE_ROWS = 7
 
 # slopes along a line: unit direction, change of velocity and pressure per length
 ALONG_X, ALONG_Y, U_SLOPE, V_SLOPE, P_SLOPE = range(5)
@@ -96,7 +96,7 @@ def make_line_arrays(laws: np.ndarray, rigid: bool = False) -> LineArrays:
     """Arrays for a line of faces with these wave laws (3, n); beyond a wall there is no void."""
     count = laws.shape[1]
     return LineArrays(
-        states=np.zeros((STATE_ROWS, count)),
+        states=np.zeros((FACE_STATE_ROWS, count)),
         laws=np.ascontiguousarray(laws, dtype=float),
         middles=np.zeros((2, count)),
         slopes=np.zeros((SLOPE_ROWS, count)),

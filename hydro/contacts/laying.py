@@ -22,6 +22,8 @@ MATCHED_NODE_DISTANCE = 1e-6
 # of the way to the foot: an end of a contact that would go further to lie on a straight line does
 # not do so; the faces that hold each other's nodes overlap too little to give it a direction
 MOST_STRAIGHTENED_WAY = 10.0
+# of a face's length: a node whose foot is beside the line's end by no more is on the line
+BESIDE_END_DISTANCE = 1e-9
 STILL_NODE_DISTANCE = 1e-12  # of a face's length: a node this near is where it is to be
 
 
@@ -124,7 +126,7 @@ def lay(
             takes = outside < 0.0
         takes = takes or held[k] or hits[k] >= 0.0
         if not straight and (found[k] == 0.0 or found[k] == most):
-            takes = takes and beside <= max(abs(outside), 1e-9 * length)
+            takes = takes and beside <= BESIDE_END_DISTANCE * length  # else beyond the line's end
         if not takes or (not straight and max(abs(x), abs(y)) <= STILL_NODE_DISTANCE * length):
             continue
         way = (x * x + y * y) ** 0.5

@@ -88,3 +88,41 @@ def test_a_corner_hits_a_face_and_leaves(cells, degrees):
     check_budget(rows, names=("momentum_y", "energy"))
     momentum = rows[0]["total_mass_metal"] * speed
     assert find_unexplained(rows, "momentum_x") < 1e-12 * momentum
+
+
+def make_quadrilateral(name, material, corners, cells, u, v):
+    """A body between four corners [micrometres], in the order of its sides' ends."""
+    first, second, third, fourth = 1e-6 * np.array(corners, float)[:, :, None, None]
+    part_i = np.linspace(0.0, 1.0, cells[0] + 1)[:, None]
+    part_j = np.linspace(0.0, 1.0, cells[1] + 1)
+    lower = first + part_i * (second - first)
+    upper = fourth + part_i * (third - fourth)
+    body = make_body(name, material, lower + part_j * (upper - lower), u, v, material="metal")
+    free(body, *SIDES)
+    return body
+
+
+@pytest.mark.parametrize("cells", [((16, 13), (20, 33)), ((16, 13), (10, 16))])
+def test_a_side_slides_round_a_corner(cells):
+    """Nodes that slide past the corner follow each other: no face between two of them is lost."""
+    one = make_quadrilateral(
+        "one",
+        "Al1100",
+        [(371, 385), (-127, 359), (-414, -52), (451, -404)],
+        cells[0],
+        669.0,
+        -344.0,
+    )
+    other = make_quadrilateral(
+        "other",
+        "PMMA",
+        [(1567, -883), (410, -410), (-426, -1333), (162, -2362)],
+        cells[1],
+        -135.0,
+        689.0,
+    )
+    simulation = Simulation([one, other], [], t_end=0.2e-6)
+    rows = march_whole(simulation, until=lambda rows: len(rows) > 300)
+    assert simulation.finished
+    assert sum(row["retries"] for row in rows[1:]) < 5
+    check_budget(rows, names=("momentum_x", "momentum_y", "energy"))

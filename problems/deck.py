@@ -52,10 +52,19 @@ Name = Annotated[str, Meta(pattern="^[A-Za-z][A-Za-z0-9_-]*$")]
 Options = dict[str, bool | int | float | str]
 NONE: Any = msgspec.field(default_factory=dict)  # of a key that is a table by name: no entry
 Limiter = key(  # the names of hydro.formulas.reconstruction.LIMITERS
-    Literal["low-mach", "smooth-shear", "monotonised-central", "van-leer", "minmod"],
-    "slope limiter, from sharp to smooth; smooth-shear: van-leer, except for the velocity where "
-    "the flow turns or shears without jumps; low-mach: monotonised-central with that exception, "
-    "and smaller jumps of the velocity at faces where the flow is slow",
+    Literal[
+        "low-mach",
+        "monotonised-central",
+        "van-leer",
+        "smooth-shear",
+        "generalised-minmod",
+        "minmod",
+    ],
+    "slope limiter, from sharp to smooth; the first three are steep: sharp fronts, with a sawtooth "
+    "of single cells behind shocks; low-mach: monotonised-central, except for the velocity where "
+    "the flow turns or shears without jumps, and smaller jumps of the velocity at faces where the "
+    "flow is slow; smooth-shear: generalised-minmod with that exception. Materials with a phase "
+    "transition have no steep one: generalised-minmod stands for it",
 )
 
 

@@ -26,7 +26,7 @@ import numpy as np
 
 from hydro.eos.base import make_least_pressure
 from hydro.formulas import riemann
-from hydro.formulas.reconstruction import FIRST_ORDER_LIMITER, LIMITERS, RELAXED, limit_wholly
+from hydro.formulas.reconstruction import FIRST_ORDER_LIMITER, RELAXED, choose_limit
 from reference_sliding import SlidingContact, dot, find_free_speed, solve_contact
 
 GAUSS = 0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5
@@ -247,7 +247,7 @@ class Patch:
     def limit_variations(self, axis):
         """Limited variations along an axis; of the velocity's parts along and across the line."""
         a, b = self.find_variations(axis)
-        limit = np.vectorize({**LIMITERS, FIRST_ORDER_LIMITER: limit_wholly}[self.limiter])
+        limit = np.vectorize(choose_limit(self.limiter, self.eos.has_kinks))
         line = self.mid_lines[axis]
         found = limit(a, b)
         along = limit(dot(line, a[1:3]), dot(line, b[1:3]))

@@ -48,6 +48,8 @@ class EquationOfState:
     - `least_density_part(parameters)`, optional: the density [kg/m³] down to which fragments leave
       a cell (`make_leaving_part`); by default they all do
     - `opens_voids`: False if there is no such pressure; the flow kernels then omit voids
+    - `has_kinks`: True where the sound speed drops under compression, as at a phase transition: one
+      shock may then split into two, which steep limiters run together (theory F3.13)
 
     Kernels share a division that several formulas contain if all write it as `1.0 / rho`.
     """
@@ -58,6 +60,7 @@ class EquationOfState:
     sound_speed_squared_part: ClassVar[Callable[..., Any]]
     least_pressure_part: ClassVar[Callable[..., Any]]
     opens_voids: ClassVar[bool] = True
+    has_kinks: ClassVar[bool] = False
     optional: ClassVar[tuple[str, ...]] = ()  # parameters that a material file may leave out
     positive: ClassVar[tuple[str, ...]] = ()  # parameters that must be greater than 0
     # eta = 1 - rho0/rho where a mixture of two phases starts and ends on the Hugoniot
@@ -140,8 +143,9 @@ def check_eos(block: str, eos: object) -> None:
         name = eos.__name__
         raise BadInput(f"{where} is the class {name}; one made of it is wanted, {name}(...)")
     kind = type(eos)
-    missing = [name for name in (*PARTS, "opens_voids", "parameters") if not hasattr(kind, name)]
-    if len(missing) == len(PARTS) + 2:
+    wanted = (*PARTS, "opens_voids", "has_kinks", "parameters")
+    missing = [name for name in wanted if not hasattr(kind, name)]
+    if len(missing) == len(wanted):
         raise BadInput(
             f"{where} is {eos!r}; an equation of state is wanted, such as shockgrid.IdealGas(1.4)"
         )

@@ -171,6 +171,7 @@ class PhaseTransition(EquationOfState):
     onset: float = 2.5e10
     complete: float = 4.0e10
 
+    has_kinks = True
     kind = "phase-transition"
     positive = (
         "rho0", "c0", "s", "gruneisen", "strength", "rho0_second", "c0_second", "s_second",

@@ -136,6 +136,7 @@ class Tabular(EquationOfState):
     sound_speed_squared_part = staticmethod(sound_speed_squared)
     least_pressure_part = staticmethod(least_pressure)
     opens_voids = False
+    has_kinks = True  # a table may hold any phase transition
 
     def __post_init__(self):
         if not Path(self.path).is_file():

@@ -11,12 +11,10 @@ from typing import NamedTuple
 
 from hydro.formulas.geometry import Geometry
 from hydro.formulas.reconstruction import (
-    FIRST_ORDER_LIMITER,
-    LIMITERS,
     RELAXED,
+    choose_limit,
     compute_hll_switch,
     compute_line_geometry,
-    limit_wholly,
     mark_torn,
 )
 from hydro.formulas.riemann import FLUXES
@@ -130,7 +128,7 @@ def make_row_phases(eos_class, limiter: str, geometry: Geometry, flux: str) -> R
     sound = eos_class.sound_speed_squared_part
     curved = geometry.curved
     switch = sound, eos_class.energy_part, FLUXES[flux], eos_class.opens_voids
-    limit = limit_wholly if limiter == FIRST_ORDER_LIMITER else LIMITERS[limiter]
+    limit = choose_limit(limiter, eos_class.has_kinks)
     fill_slopes = make_slopes(limit, limiter in RELAXED, geometry, switch)
     fill_geometry = make_geometry(geometry.volume)
     fill_switch = make_switch(*switch)

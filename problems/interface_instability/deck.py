@@ -95,7 +95,11 @@ class InterfaceDeck(Deck, kw_only=True):
         "crossed: the shock is beyond the interface; incident: before it; auto: beyond if it can",
     ) = "auto"
     layer: key(
-        float | None, "start crossed: cells to the nearer wave. If left out: 3 to 8", ge=3, le=1000
+        float | None,
+        "start crossed: cells to the nearer wave. If left out: those of 3/16 of the shortest "
+        "wavelength of the interface, at least 8 or a quarter of that wavelength",
+        ge=3,
+        le=1000,
     ) = None
     gap: key(float, "initial wavelengths from shock to interface", ge=0.01, le=20) = 0.3
     passage_refinement: key(

@@ -62,7 +62,21 @@ LEAST_REACH_RATIO = 6.0
 # least length over what waves take of it before a start after the passage
 LEAST_LENGTH_RATIO = 1.25
 MOST_SLOPE = 0.3  # sum of the k a0 up to which the state after the passage is that of linear theory
+LAYER_PART = 0.1875  # of the shortest wave, to the nearer front at a start after the passage
+LEAST_LAYER_CELLS = 3.0
+CLEAR_LAYER_CELLS = 8.0  # that keep a captured front clear of the interface
+COARSE_LAYER_PART = 0.25  # of a wave of few cells, up to CLEAR_LAYER_CELLS
 FAR_FIELD_PART = 0.25  # part of each block, counted from its far side, that is called the far field
+
+
+def choose_layer(cells: float) -> float:
+    """Cells between interface and nearer front at a start after the passage.
+
+    cells: of the shortest wave.  The error that a captured front beside the interface makes falls
+    with the cells only if the front is the same part of a wave away on all grids.
+    """
+    least = min(COARSE_LAYER_PART * cells, CLEAR_LAYER_CELLS)
+    return max(LAYER_PART * cells, least, LEAST_LAYER_CELLS)
 
 
 class InterfaceInstability(Results, Problem):
@@ -142,12 +156,16 @@ class InterfaceInstability(Results, Problem):
         if self.deck.start == "crossed":
             self.deck.refuse(fault, "start", f"{fault}; take 'incident'")
             return "crossed"
-        return "crossed" if not fault and Growth(self).first_slope <= MOST_SLOPE else "incident"
+        begins_in_time = (
+            self.deck.run.t_end is not None or self._choose_since() * self._rate < self.deck.kct_end
+        )
+        can_cross = not fault and begins_in_time and Growth(self).first_slope <= MOST_SLOPE
+        return "crossed" if can_cross else "incident"
 
     def _choose_since(self) -> float:
         """Time [s] from the shock's arrival at the mean line to a start after the passage."""
         shortest = max((h.number for h in self.harmonics), default=1)
-        cells = self.deck.layer or min(max(self.deck.cells / (8.0 * shortest), 3.0), 8.0)
+        cells = self.deck.layer or choose_layer(self.deck.cells / shortest)
         layer = cells * self.deck.wavelength / self.deck.cells
         passage = self.amplitude / self.shock.shock_speed
         return max(layer / find_nearer_speed(self.theory.base), CLEAR_TIME_RATIO * passage)

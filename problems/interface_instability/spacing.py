@@ -20,7 +20,9 @@ from regrid.errors import BadInput
 FINE_ZONE_WAVELENGTHS = 0.05
 PASSAGE_CELL_GROWTH = 1.1  # of the finer cells, from one to the next beyond that
 MOST_SIDE_CELLS = 10 * MOST_CELLS  # cells along a side
-NODE_SPEED = 0.25  # most speed of nodes that are respaced, over that of sound
+# most speed of nodes that are respaced, over that of sound: faster, what a strong shock has left
+# beside the interface is smeared over the wider cells before it has moved the interface
+NODE_SPEED = 0.1
 
 
 def grow_steps(steps: list[float], stretch: float, length: float) -> list[float]:

@@ -5,8 +5,10 @@ import pytest
 
 from hydro.eos import JWL, IdealGas, MieGruneisen, PhaseTransition, StiffenedGas
 from hydro.eos.base import make_least_pressure
-from hydro.eos.materials import find_material
+from hydro.eos.materials import LIBRARY, find_material, read_materials
 from hydro.eos.phase_transition import hugoniot
+from hydro.formulas.reconstruction import GENTLE_STEEPNESS, LIMITERS, choose_limit
+from problems.references.hugoniot import shock_to_pressure
 from regrid.errors import BadInput
 from shockgrid.testing import check_inverse, check_numbers, check_sound_speed
 
@@ -181,3 +183,32 @@ def test_the_sound_speed_is_real_wherever_shocks_and_isentropes_lead(graphite):
                     e = 0.5 * p * first / 2200.0 + 0.5 * (p + p2) * (1.0 / rho0 - 1.0 / rho)
                     p2 = float(graphite.pressure(rho, e))
                 assert graphite.sound_speed(rho, p2) > 0.2 * graphite.c0
+
+
+PRESSURES = np.linspace(0.02, 1.6, 80)  # over rho0 c0 squared
+
+
+def find_steepness(limiter: str, has_kinks: bool) -> float:
+    """Largest limited variation over the smaller of two differences of one sign."""
+    limit = choose_limit(limiter, has_kinks)
+    return max(limit(sign, sign * more) / sign for sign in (1.0, -1.0) for more in (1.0, 2.0, 50.0))
+
+
+@pytest.mark.parametrize("limiter", LIMITERS)
+def test_a_material_with_kinks_has_no_steep_limiter(limiter):
+    assert find_steepness(limiter, True) <= GENTLE_STEEPNESS
+    assert find_steepness(limiter, True) <= find_steepness(limiter, False)
+
+
+@pytest.mark.parametrize("name", read_materials(LIBRARY))
+def test_a_material_says_whether_a_shock_may_split_in_it(name):
+    """One may where the material gets softer under compression, as at a phase transition."""
+    material = find_material(name)
+    eos = material.eos
+    if not eos.opens_voids:
+        assert not eos.has_kinks
+        return
+    scale = material.rho0 * eos.sound_speed(material.rho0, 0.0) ** 2
+    shocks = [shock_to_pressure(eos, material.rho0, 0.0, part * scale) for part in PRESSURES]
+    speed = np.array([float(eos.sound_speed(shock.rho, shock.p)) for shock in shocks])
+    assert eos.has_kinks == bool((np.diff(speed) < -0.05 * speed[:-1]).any())

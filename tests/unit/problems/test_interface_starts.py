@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from problems.deck import RunControl
+from problems.interface_instability.crossed_start import find_nearer_speed
 from problems.interface_instability.deck import Fluid, InterfaceDeck, SecondShock
 from problems.interface_instability.line import Mode, Spectrum, measure_mode
 from problems.interface_instability.problem import LEAST_REACH_RATIO, InterfaceInstability
@@ -188,5 +189,30 @@ def test_the_line_has_the_amplitudes_of_linear_theory(name):
 
 def test_an_end_before_the_start_is_refused():
     with pytest.raises(BadInput, match=r"kct_end = 1; .* start = 'incident'"):
-        InterfaceInstability(InterfaceDeck(cells=8, kct_end=1.0))
-    InterfaceInstability(InterfaceDeck(cells=8, kct_end=1.0, start="incident"))
+        InterfaceInstability(InterfaceDeck(cells=8, kct_end=1.0, start="crossed"))
+    assert InterfaceInstability(InterfaceDeck(cells=8, kct_end=1.0)).start == "incident"
+
+
+def find_layer(cells: int, numbers=(1,), **deck) -> float:
+    """Way to the nearer front at the start over the shortest wave of the line."""
+    modes = [Mode(number=number, ka0=0.01) for number in numbers]
+    problem = make_of_start(cells=cells, kct_end=30.0, modes=modes, **deck)
+    way = -problem.arrival * find_nearer_speed(problem.theory.base)
+    return way / problem.deck.wavelength * max(numbers)
+
+
+@pytest.mark.parametrize("mach", [1.2, 5.0])
+def test_the_nearer_front_begins_at_one_part_of_a_wave_on_all_fine_grids(mach):
+    """So what it leaves at the interface falls with the cells; on coarse ones it is 8 cells off."""
+    layers = {cells: find_layer(cells, mach=mach) for cells in (16, 32, 64, 128, 256)}
+    assert layers[64] == pytest.approx(3.0 / 16.0)
+    assert layers[128] == pytest.approx(layers[64])
+    assert layers[256] == pytest.approx(layers[64])
+    assert layers[32] * 32 == pytest.approx(8.0)
+    assert layers[16] == pytest.approx(0.25)
+
+
+def test_the_shortest_wave_has_the_say():
+    """And never fewer cells than a captured front has."""
+    assert find_layer(192, numbers=(1, 3)) == pytest.approx(find_layer(64))
+    assert find_layer(64, numbers=(1, 8)) * 64 / 8 == pytest.approx(3.0)

@@ -13,7 +13,7 @@ from builders import box
 from hydro.block import Block
 from hydro.boundary import OWN, put
 from hydro.carried.fields import CarriedField
-from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
+from hydro.eos import IdealGas, MieGruneisen, PhaseTransition, StiffenedGas
 from hydro.eos.base import REMAINING_DENSITY_PART, make_least_pressure
 from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
 from hydro.formulas.riemann import DEFAULT_FLUX
@@ -26,6 +26,7 @@ from reference_step import take_step
 GAS = (IdealGas(1.4), 1.2, 1e5)
 WATER = (StiffenedGas(4.4, 6e8), 1000.0, 3e8)
 METAL = (MieGruneisen(2707.0, 5386.0, 1.339, 1.97), 2800.0, 6e9)
+GRAPHITE = (PhaseTransition(), 2500.0, 1e10)
 MATERIALS = {"gas": (GAS, GAS), "metal": (METAL, WATER)}
 # of nodes [m]: a tenth of a cell, anew in every step
 STEPS = 6
@@ -251,6 +252,12 @@ def test_fast_step_is_the_plain_one_where_blocks_slide(materials, rough):
 @pytest.mark.parametrize("limiter", [name for name in LIMITERS if name != DEFAULT_LIMITER])
 def test_fast_step_is_the_plain_one_with_every_limiter(limiter):
     follow(make_flow(MATERIALS["gas"], "plane", False, limiter))
+
+
+@pytest.mark.kernels
+def test_fast_step_is_the_plain_one_in_a_material_with_kinks():
+    """Neither has the slopes of the default limiter there."""
+    follow(make_flow((GRAPHITE, GAS), "plane", False))
 
 
 @pytest.mark.kernels

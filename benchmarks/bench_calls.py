@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from result_tables import Tables
 
-from regrid.jit import KERNEL_CODES
+from regrid.compilation.first_calls import KERNEL_CODES
 from runs.deck.reading import read_deck
 
 STEPS_DECK = "interface-instability"  # two blocks, a contact, walls and a piston

@@ -29,8 +29,8 @@ from hydro.small_cells import SmallCells
 from hydro.sources import BodySource, SourceLaw
 from hydro.step import Flow, take_step
 from hydro.workers import Workers
+from regrid.compilation.first_calls import is_interpreting
 from regrid.errors import BadInput, Place, RunFailure
-from regrid.jit import is_interpreting
 from regrid.sides import SIDE_NAMES
 
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end

@@ -30,8 +30,9 @@ from problems.pictures import Colours, draw_field, make_panels, title_time
 from problems.problem import BlockPlan, Problem, find_crossing, say_unreached
 from problems.references.exact_flows import average_points
 from problems.references.hugoniot import Shock, shock_with_mach
+from regrid.compilation.contents import PACKAGES
+from regrid.compilation.kept_files import remember
 from regrid.errors import BadInput
-from regrid.jit import PACKAGES, remember
 from regrid.measure.cells import compute_area_fractions
 from regrid.sides import SIDE_NAMES
 

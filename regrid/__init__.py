@@ -3,11 +3,11 @@
 This package is an independent library.  It loads only numpy and numba; `__all__` lists its public
 names, each of which is loaded when it is first used.
 
-The files of the folder itself define the interfaces: errors, compilation, protocols, sides, entry
-points of other packages, whole marches, and the registry of regridders.
+The files of the folder itself define the interfaces: errors, decorators of kernels, protocols,
+sides, entry points of other packages, whole marches, and the registry of regridders.
 Each subpackage imports only those to its left:
 
-    errors, jit, protocol, sides <- curves, measure <- algebraic
+    compilation <- errors, jit, protocol, sides <- curves, measure <- algebraic
     <- barrier, domains, node_speeds <- equidistribution, given, marching <- variational <- registry
 """
 

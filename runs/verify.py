@@ -16,8 +16,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from regrid.compilation.first_calls import read_processor_time
 from regrid.errors import BadInput, RunFailure
-from regrid.jit import read_processor_time
 from runs.deck.reading import read_deck, suggest_deck
 from runs.engines import Engine, InTurn, open_engine
 from runs.store.files import check_free, write_atomically

@@ -243,7 +243,7 @@ def check_compiled(eos: EquationOfState, rho: float, p: float) -> None:
     """The formulas compile, and give the numbers that numpy gives (to 1e-12)."""
     from numba import njit
 
-    from regrid.jit import prepare_compiler
+    from regrid.compilation.first_calls import prepare_compiler
 
     prepare_compiler()  # without a kernel numba does not know what is marked `inlined`
     parameters = eos.parameters

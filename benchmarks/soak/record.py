@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.soak.trial import Outcome
-from regrid.jit import ROOT
+from regrid.compilation.kept_files import ROOT
 from runs.store.files import write_atomically
 
 # folders of one machine in what commands said: the trial's and the code's

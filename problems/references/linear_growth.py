@@ -39,8 +39,8 @@ from problems.references.perturbed_layers import (
     move_states,
 )
 from problems.references.riemann import RiemannSolution, solve_riemann
+from regrid.compilation.kept_files import remember
 from regrid.errors import BadInput, RunFailure
-from regrid.jit import remember
 
 
 def compute_atwood_number(rho_first: float, rho_second: float) -> float:

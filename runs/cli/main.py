@@ -118,7 +118,7 @@ def run(world, deck, output, force, dry_run, ranks, march: March) -> int:
     limit = WallLimit(march.max_wall) if march.max_wall is not None else None
     checked = deck_reading.read_deck(deck, _with_threads(march.settings, march.threads))
     if dry_run:
-        from regrid.jit import interpreted
+        from regrid.compilation.first_calls import interpreted
         from runs.forecast import foretell, measure_size
         from runs.inspection.listing import describe_plan
         from runs.march.launching import check_deck_fully
@@ -222,7 +222,7 @@ def check(deck, settings) -> None:
     Keys without a value are commented out.  Cautions about the results go to
     standard error.
     """
-    from regrid.jit import interpreted
+    from regrid.compilation.first_calls import interpreted
     from runs.deck import reading as deck_reading
     from runs.deck.checking import describe_deck
     from runs.inspection.account import describe_cautions

@@ -11,8 +11,8 @@ from problems.problem import check_memory
 from problems.problem_file import is_problem_file
 from problems.registry import INSTALLED, PROBLEMS, SUBJECTS, read_docstring, summary_line
 from problems.registry import OWN as OWN_PROBLEMS
+from regrid.compilation.first_calls import interpreted
 from regrid.errors import BadInput
-from regrid.jit import interpreted
 from regrid.plug_ins import GROUPS, find_plug_ins
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
 from runs.quantities import add_unit, is_time

@@ -16,7 +16,7 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
-from regrid.jit import count_compiling, leave_telling
+from regrid.compilation.first_calls import count_compiling, leave_telling
 
 LOOK_EVERY = 0.2  # wall seconds until the run is looked at again: how much does it compile?
 MANY_KERNELS = 5  # compiled kernels from which on a second process is worth its start

@@ -19,8 +19,8 @@ from hydro.simulation import Simulation
 from problems.deck import Deck, Output, Regrid
 from problems.evolution import Evolution, get_node_fields
 from problems.problem import Problem, check_memory
+from regrid.compilation.first_calls import interpreted
 from regrid.errors import BadInput, suggest
-from regrid.jit import interpreted
 from runs.deck.checking import find_differences, is_runtime_key, list_runtime_keys, show
 from runs.deck.reading import ReadDeck, resolve_deck
 from runs.forecast import foretell

@@ -13,7 +13,8 @@ import numpy as np
 from problems.deck import Deck, place_gauges
 from problems.evolution import Evolution
 from problems.problem import Problem
-from regrid.jit import can_use_threads, read_clock
+from regrid.compilation.first_calls import read_clock
+from regrid.jit import can_use_threads
 from regrid.text_files import escape_controls
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import name_failure

@@ -30,8 +30,8 @@ from hydro.history import compute_chosen_columns, find_columns
 from problems.deck import Output
 from problems.evolution import Evolution, get_missed, get_start_row
 from problems.problem import Problem
+from regrid.compilation.first_calls import read_clock
 from regrid.errors import BadInput, RunFailure
-from regrid.jit import read_clock
 from regrid.text_files import escape_controls
 from runs.deck.reading import ReadDeck
 from runs.early_end.causes import ENDS

@@ -18,6 +18,7 @@ ORDER = ("regrid", "hydro", "problems", "runs", "shockgrid")
 # rooms by rising floor: a room imports those of lower floors and, in its own package, nothing else
 ROOMS = (
     ("regrid.errors",),
+    ("regrid.compilation",),
     ("regrid.hdf5_files", "regrid.jit", "regrid.plug_ins", "regrid.roots", "regrid.text_files",
      "regrid.work_arrays"),
     ("regrid.sides",),

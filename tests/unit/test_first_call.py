@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from regrid import jit
+from regrid.compilation import first_calls
 
 CALL = """
 import numpy as np, regrid
@@ -35,17 +35,17 @@ def test_an_interrupt_while_compiling_is_one(tmp_path, seconds):
 
 
 def test_an_interrupt_that_numba_turns_into_an_error_stays_one():
-    with pytest.raises(KeyboardInterrupt), jit._interrupts_kept():
+    with pytest.raises(KeyboardInterrupt), first_calls.interrupts_kept():
         try:
             signal.raise_signal(signal.SIGINT)
         except KeyboardInterrupt:
             raise RuntimeError("no compiled object yet") from None
-    with pytest.raises(KeyboardInterrupt), jit._interrupts_kept():
+    with pytest.raises(KeyboardInterrupt), first_calls.interrupts_kept():
         try:
             signal.raise_signal(signal.SIGINT)
         except KeyboardInterrupt:
             pass
-    with pytest.raises(RuntimeError, match="its own"), jit._interrupts_kept():
+    with pytest.raises(RuntimeError, match="its own"), first_calls.interrupts_kept():
         raise RuntimeError("its own")
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
@@ -55,12 +55,12 @@ def test_a_terminal_is_told_once_that_kernels_are_compiled(monkeypatch, terminal
     stream = io.StringIO()
     stream.isatty = lambda: terminal
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(jit._compiling, "told", False)
-    monkeypatch.setattr(jit._compiling, "begun", time.perf_counter() - 1.0)
-    monkeypatch.setattr(jit._compiling, "seconds", 0.0)
-    jit._tell()
+    monkeypatch.setattr(first_calls._compiling, "told", False)
+    monkeypatch.setattr(first_calls._compiling, "begun", time.perf_counter() - 1.0)
+    monkeypatch.setattr(first_calls._compiling, "seconds", 0.0)
+    first_calls._tell()
     assert stream.getvalue() == ""
-    monkeypatch.setattr(jit._compiling, "seconds", 2.5)
-    jit._tell()
-    jit._tell()
+    monkeypatch.setattr(first_calls._compiling, "seconds", 2.5)
+    first_calls._tell()
+    first_calls._tell()
     assert stream.getvalue().count("\n") == (1 if terminal else 0)

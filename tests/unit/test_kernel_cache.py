@@ -14,8 +14,10 @@ from types import SimpleNamespace
 import pytest
 
 from builders import ROOT
-from regrid import jit
-from regrid.jit import compute_contents_digest, kernel, read_clock
+from regrid.compilation import first_calls, kept_files
+from regrid.compilation.contents import compute_contents_digest
+from regrid.compilation.first_calls import read_clock
+from regrid.jit import kernel
 from runs.march import compiling
 
 LAW = """
@@ -168,7 +170,7 @@ def test_the_clock_of_steps_stands_while_a_kernel_is_compiled(monkeypatch):
         return 2.0 * x
 
     clocks = SimpleNamespace(perf_counter=lambda: wall.now, thread_time=lambda: wall.now)
-    monkeypatch.setattr(jit, "time", clocks)
+    monkeypatch.setattr(first_calls, "time", clocks)
     monkeypatch.setattr(type(double), "_compile_for_args", compile_for_a_minute)
     began = read_clock()
     assert double(1.5) == 3.0
@@ -269,12 +271,14 @@ def test_a_damaged_file_is_compiled_anew(tmp_path, monkeypatch):
     for damaged in list_damaged(whole):  # each would run, crash or compute something else
         file.write_bytes(damaged)
         with pytest.raises(ValueError, match="damaged"):
-            jit.read_kept(file)
+            kept_files.read_kept(file)
     for place in (len(whole) // 3, len(whole) // 2, len(whole) - 1):
         file.write_bytes(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
         assert not compile_and_call().stats.cache_hits
-        assert len(jit.read_kept(file)) > 0.9 * len(whole)
-    file.write_bytes(jit.compute_checksum(b"no kernel") + b"no kernel")  # sound, of another numba
+        assert len(kept_files.read_kept(file)) > 0.9 * len(whole)
+    file.write_bytes(
+        kept_files.compute_checksum(b"no kernel") + b"no kernel"
+    )  # sound, of another numba
     assert not compile_and_call().stats.cache_hits
 
 
@@ -283,9 +287,9 @@ def test_what_was_computed_is_remembered_until_its_file_is_damaged(tmp_path, mon
     asked = []
 
     def remember(words, first=1.0):
-        return jit.remember("sum", words, lambda: asked.append(words) or [first, 2.0])
+        return kept_files.remember("sum", words, lambda: asked.append(words) or [first, 2.0])
 
-    with jit.interpreted():
+    with first_calls.interpreted():
         assert remember("a", 0.0) == [0.0, 2.0]
     assert [remember("a"), remember("a"), remember("b")] == [[1.0, 2.0]] * 3
     assert asked == ["a", "a", "b"]

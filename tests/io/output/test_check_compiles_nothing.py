@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from builders import ROOT
-from regrid.jit import MOST_NUMBERS, interpreted, kernel
+from regrid.compilation.first_calls import MOST_NUMBERS, interpreted
+from regrid.jit import kernel
 from regrid.measure.quality import compute_corner_areas
 
 LOOK = """

@@ -14,7 +14,7 @@ from hydro.formulas.riemann import FLUXES
 from hydro.interior import axisymmetric, faces, reconstruction, slopes, update
 from hydro.interior import scratch as at
 from regrid.barrier import residual_estimate as look
-from regrid.jit import prepare_compiler
+from regrid.compilation.first_calls import prepare_compiler
 
 CURVED = GEOMETRIES["axisymmetric"]
 LIMIT, SOUND, ENERGY = (

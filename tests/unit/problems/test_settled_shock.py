@@ -20,7 +20,7 @@ from problems.initial_states import (
     settle_shock,
 )
 from problems.references.hugoniot import Shock, shock_to_pressure, shock_with_mach
-from regrid import jit
+from regrid.compilation import kept_files
 
 CFL = 0.8
 LIMITER = "monotonised-central"
@@ -130,7 +130,7 @@ def test_a_shock_that_starts_settled_leaves_no_spot_behind():
 
 
 def test_a_settled_front_from_the_cache_is_the_one_that_was_computed(tmp_path, monkeypatch):
-    monkeypatch.setattr(jit, "find_kept", lambda *words: tmp_path / "settled")
+    monkeypatch.setattr(kept_files, "find_kept", lambda *words: tmp_path / "settled")
     speed = 2.0 * 1.4**0.5  # Mach 2
     ahead = (1.0, 0.0, 1.0)
     behind = (8.0 / 3.0, 0.625 * speed, 4.5)

@@ -317,6 +317,10 @@ def equalise_products(
 TURN = np.radians(10.0)  # that one segment takes where nodes suffice
 LEAST_EVEN = 0.3  # least part of the nodes that keep the first spacing
 TURNING_SMOOTHINGS = 3  # of the turning, over neighbouring segments
+# up to which a line counts as symmetric: parts of the mean segment, and of a segment that is wanted
+SYMMETRIC_SEGMENT = 1e-9
+SYMMETRIC_TURNING = 1e-7
+ROUNDING_OF_LAW = 1e-12  # up to which a law differs from its image by rounding
 
 
 @kernel
@@ -401,6 +405,34 @@ def fill_turning_law(line, first, turning, closed, wall_first, wall_last, shorte
         before = after
     for k in range(following, edges):  # round-off at the end
         law[k] = 1.0 - (edges - k) * (1.0 - law[following - 1]) / (edges - following + 1)
+    even_out_law(arc, first, wanted, law)
+
+
+@kernel
+def even_out_law(arc, first, wanted, law):
+    """Make a law (n,) symmetric where its line is so up to rounding; theory R9.
+
+    arc [m], first law (n,), wanted (n - 1,) segments: of the line, see `fill_turning_law`.  Laws by
+    turning magnify rounding step by step where a line has too few nodes for its turning.
+    """
+    edges = arc.shape[0] - 1
+    most = SYMMETRIC_SEGMENT * arc[edges] / edges
+    for k in range(edges // 2):
+        other = edges - 1 - k
+        length = arc[k + 1] - arc[k]
+        if not abs(length - (arc[other + 1] - arc[other])) <= most:
+            return
+        if not abs(wanted[k] - wanted[other]) <= SYMMETRIC_TURNING:
+            return
+        if not abs(first[k] - (1.0 - first[edges - k])) <= SYMMETRIC_SEGMENT / edges:
+            return
+    departure = 0.0
+    for k in range(edges // 2 + 1):
+        departure = max(departure, abs(law[k] - (1.0 - law[edges - k])))
+    if departure > ROUNDING_OF_LAW:
+        for k in range(edges // 2 + 1):
+            law[k] = 0.5 * (law[k] + (1.0 - law[edges - k]))
+            law[edges - k] = 1.0 - law[k]
 
 
 SHAPES = ("chord", "spline")

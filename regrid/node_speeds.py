@@ -17,6 +17,7 @@ from regrid.algebraic import fill_displacement
 from regrid.jit import inlined, kernel
 from regrid.measure.corners import compute_doubled_area, find_triangle
 from regrid.measure.quality import find_bad_cells
+from regrid.symmetry import find_symmetry
 from regrid.work_arrays import share_memory
 
 MOST_CELL_HALVINGS = 8
@@ -253,8 +254,21 @@ class MotionLimiter:
 
         Where the limit sharpens corners, nodes move towards LOOSE times as many spacings, by
         halves; those of folded cells return to `new`.  If that keeps folding others, all nodes
-        return by the same fraction to `new`, the least of halvings that leaves no fold.
+        return by the same fraction to `new`, the least of halvings that leaves no fold.  A
+        symmetric block stays so.
         """
+        limited, count = self._limit(old, new, most)
+        symmetry = find_symmetry(old, new) if count > 0 else None
+        if symmetry is not None:
+            back = limited - new
+            if symmetry.even_out(back):
+                even = new + back
+                if len(find_bad_cells(even)) == 0:
+                    limited = even
+        return limited, count
+
+    def _limit(self, old: np.ndarray, new: np.ndarray, most: float) -> tuple[np.ndarray, int]:
+        """`limit` without regard to symmetry."""
         first = self.first
         last = self.last
         whole = share_memory(3 * new.size)[: 3 * new.size]

@@ -293,6 +293,7 @@ class NewtonMove:
         fast = tuning.fast_sides
         stiffness = compute_stiffness(work.old, work.sides, tuning.stiffness, slow, fast)
         work.law = work.law._replace(stiffness=stiffness)
+        work.find_symmetry()
         moved = self.moved_ratio > tuning.start_ratio
         untangled = False
         if moved:

@@ -20,7 +20,7 @@ import numpy as np
 from regrid.barrier.newton_move import Folded, NewtonMove
 from regrid.barrier.side_laws import fill_family_weights
 from regrid.barrier.tuning import DEFAULT, OPTIONS, Tuning
-from regrid.barrier.turning import Look, choose_look, is_convex, turn_bend
+from regrid.barrier.turning import Look, choose_look, is_convex
 from regrid.barrier.workspace import Workspace, find_bend, is_bent
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.faults import (
@@ -32,6 +32,7 @@ from regrid.measure.faults import (
 )
 from regrid.protocol import RegridResult
 from regrid.sides import compute_area, copy_sides, get_sides
+from regrid.symmetry import turn_bend
 
 # families whose weights differ by less are ranked by the block's shape
 EVEN_WEIGHT_DIFFERENCE = 1e-6

@@ -22,38 +22,10 @@ import numpy as np
 
 from regrid.measure.corners import find_folded_cells
 from regrid.sides import compute_area, copy_sides
+from regrid.symmetry import TURNS, Turn, even_out_grid, find_mean_length, is_even, turn_bend
 
 SAME_LENGTH = 1e-5  # of the mean length: up to which grids differ by magnified rounding only
 GOLDEN_FRACTION = 0.6180339887498949  # its multiples weigh lengths; no two weights agree
-
-
-class Turn(NamedTuple):
-    """Whether the indices i and j run backwards."""
-
-    i: bool
-    j: bool
-
-    @property
-    def mirrors(self) -> bool:
-        """Does it change the way round?"""
-        return self.i != self.j
-
-    def exchange(self) -> Turn:
-        """The same turn where i and j are exchanged."""
-        return Turn(self.j, self.i)
-
-    def apply(self, values: np.ndarray) -> np.ndarray:
-        """A view of `values` (..., n, m), their last two axes turned."""
-        return values[..., :: -1 if self.i else 1, :: -1 if self.j else 1]
-
-
-TURNS = (Turn(False, False), Turn(True, False), Turn(False, True), Turn(True, True))
-
-
-def turn_bend(turn: Turn, bend: np.ndarray) -> np.ndarray:
-    """Departures (ni+1, nj+1) of the lines' spacing (`find_bend`), counted from the turned ends."""
-    turned = turn.apply(bend)
-    return np.ascontiguousarray(-turned if turn.i else turned)
 
 
 class Look(NamedTuple):
@@ -82,19 +54,7 @@ class Look(NamedTuple):
 
         `nodes`, `axes`: (2, ni+1, nj+1); `axes` itself comes out exactly symmetric.
         """
-        place = axes[0] + 1j * axes[1]
-        centre = place.mean()
-        place -= centre
-        given = nodes[0] + 1j * nodes[1] - centre
-        total = given.copy()
-        for turn in self.same:
-            like, other = (turn.apply(values) for values in (place, given))
-            if turn.mirrors:
-                like, other = np.conj(like), np.conj(other)
-            rotation = np.vdot(like, place)
-            total += (rotation / abs(rotation)) * other
-        total = total / (1 + len(self.same)) + centre
-        return np.array((total.real, total.imag))
+        return even_out_grid(nodes, axes, self.same)
 
     def even_out_cells(self, values: np.ndarray) -> np.ndarray:
         """The mean of turned values (ni, nj) and those that `same` makes of them."""
@@ -139,23 +99,16 @@ def choose_look(
         same = [other for other in same if np.abs(turn_bend(other, own) - own).max() <= SAME_LENGTH]
     negated = turn.mirrors != (compute_area(previous) < 0.0)
     look = Look(turn, negated, tuple(same))
-    for grid in (previous, wanted):
-        turned = look.turn_grid(grid)
-        most = SAME_LENGTH * _find_mean_length(grid)
-        if not np.abs(look.even_out(turned, turned) - turned).max() <= most:
-            return Look(turn, negated, ())
-    return look
+    grids = [look.turn_grid(grid) for grid in (previous, wanted)]
+    if all(is_even(grid, look.same, SAME_LENGTH) for grid in grids):
+        return look
+    return Look(turn, negated, ())
 
 
 def is_convex(nodes: np.ndarray) -> bool:
     """Are all cells of a grid (2, ni+1, nj+1) convex, whichever way round they go?  Exact."""
     upright = nodes if compute_area(nodes) > 0.0 else nodes[::-1]
     return not find_folded_cells(upright).size
-
-
-def _find_mean_length(nodes: np.ndarray) -> float:
-    steps = np.diff(nodes, axis=1), np.diff(nodes, axis=2)
-    return float(np.concatenate([np.hypot(*step).ravel() for step in steps]).mean())
 
 
 def _measure(turn: Turn, grids, cells) -> np.ndarray:
@@ -171,7 +124,7 @@ def _measure(turn: Turn, grids, cells) -> np.ndarray:
             (np.s_[1:, :-1], np.s_[:-1, 1:]),
         ):
             lengths.append(np.hypot(x[first] - x[second], y[first] - y[second]).ravel())
-        parts.append(np.concatenate(lengths) / _find_mean_length(grid))
+        parts.append(np.concatenate(lengths) / find_mean_length(grid))
     for values in cells:
         parts.append(turn.apply(values).ravel() / np.abs(values).max())
     return np.concatenate(parts)

@@ -42,6 +42,7 @@ from regrid.measure.corners import BLOCK_CORNERS
 from regrid.measure.crossings import BoundaryCheck
 from regrid.measure.quality import compute_scaled_jacobians
 from regrid.sides import copy_sides, get_sides
+from regrid.symmetry import Symmetry, find_symmetry
 from regrid.work_arrays import Carver, count_numbers, share_memory
 
 VECTORS = ("solution", "r", "z", "p", "p_old", "product")  # of the solve
@@ -138,6 +139,7 @@ class Workspace:
             np.zeros(nj + 1),
         )  # fmt: skip
         self.least_limiting_rate = 0.0
+        self.symmetry: Symmetry | None = None
         self.coarse = CoarseCorrection(ni, nj, tuning)
         # what is of the block's size, by name: shape, and the column at which a cache line begins
         self.arrays = {
@@ -286,6 +288,7 @@ class Workspace:
             float(tuning.strengthening), 1.0, self.sound, 0.0,
             float(tuning.cost_weight) if cost else 0.0,
         )  # fmt: skip
+        self.symmetry = None
         self.motion = SideMotion(self.sides, *self.motion_tables)
         self.block = prepare.entry(
             self.old, law, self.motion, conditional,
@@ -403,7 +406,24 @@ class Workspace:
             (float(tolerance), float(floor), int(most)), self.scratch,
         )  # fmt: skip
         self.iterations += done
+        if self.symmetry is not None:
+            self._even_out_change(guess)
         return done, first, last
+
+    def find_symmetry(self) -> None:
+        """See how `old` and its displaced grid in `base` are symmetric: solutions will be, too."""
+        cells = [self.sound] if self.law.cost_weight > 0.0 else []
+        bend = self.bend if self.bent else None
+        self.symmetry = find_symmetry(self.old, self.base, cells, bend)
+
+    def _even_out_change(self, guess) -> None:
+        """Leave the symmetric part of what a solve has added to `guess` in `change`."""
+        if guess is None:
+            self.symmetry.even_out(self.change)
+        else:
+            added = self.change - guess
+            self.symmetry.even_out(added)
+            np.add(guess, added, out=self.change)
 
     def compare_corners(self, trial, old) -> float:
         """Least ratio of corner areas of `trial` to `old`; 0 unless all are positive numbers."""

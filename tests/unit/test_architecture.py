@@ -23,7 +23,7 @@ ROOMS = (
      "regrid.work_arrays"),
     ("regrid.sides",),
     ("regrid.protocol",),
-    ("regrid.curves", "regrid.measure"),
+    ("regrid.curves", "regrid.measure", "regrid.symmetry"),
     ("regrid.algebraic",),
     ("regrid.barrier", "regrid.domains", "regrid.domains_in_space", "regrid.node_speeds"),
     ("regrid.hexahedra",),

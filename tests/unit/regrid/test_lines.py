@@ -144,3 +144,14 @@ def test_a_mirror_image_has_the_mirrored_law_and_half_a_line_half_of_it():
     assert np.abs(law + law[::-1] - 1.0).max() < 1e-13
     half = find_law(whole[:, 32:], walls=(WALL, WALL))
     assert np.abs(0.5 + 0.5 * half - law[32:]).max() < 1e-13
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+@pytest.mark.parametrize("noise", [1e-11, 1e-6])
+def test_the_law_of_a_line_that_is_symmetric_up_to_rounding_is_symmetric(angle, noise):
+    line = make_hook(24)
+    x, y = line + noise * np.random.default_rng(1).standard_normal(line.shape)
+    line = np.array((np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y))
+    law = find_law(line)
+    departure = np.abs(law + law[::-1] - 1.0).max()
+    assert departure < 1e-15 if noise == 1e-11 else departure > 1e-7

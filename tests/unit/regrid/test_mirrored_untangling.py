@@ -1,4 +1,4 @@
-"""Untangling is the mirror image of its mirror image, and keeps the symmetry of a block."""
+"""Untangling is the mirror image of its mirror image; every step keeps the symmetry of a block."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from benchmarks.random_motions import make_motions
 from regrid.barrier.regridder import BarrierRegridder
 from regrid.errors import RegridFailure
 from regrid.sides import get_sides
+from regrid.symmetry import find_symmetry
 
 SAME_NODES = 1e-10  # of a cell
 
@@ -102,3 +103,24 @@ def test_a_symmetric_block_stays_symmetric_though_rounding_is_not(cells, angle, 
         nodes = np.einsum("ba,bij", turn, nodes)
         assert np.abs(nodes - mirror_i(nodes)).max() < SAME_NODES / cells
     assert untangled > 5
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+def test_only_the_symmetric_part_of_a_solution_is_left(angle):
+    rng = np.random.default_rng(3)
+    turn = np.array(((np.cos(angle), -np.sin(angle)), (np.sin(angle), np.cos(angle))))
+    previous, _ = symmetric_motion(rng, 24)
+    previous[1] += 0.1 * previous[0] ** 2  # of two mirror images the first is left
+    here = np.einsum("ab,bij", turn, previous)
+    symmetry = find_symmetry(here, here + 0.3)
+    assert [tuple(turn) for turn in symmetry.turns] == [(True, False)]
+    change = rng.standard_normal(here.shape)
+    kept = 0.5 * (change + mirror_i(change))
+    found = np.einsum("ab,bij", turn, change)
+    symmetry.even_out(found)
+    assert np.abs(np.einsum("ba,bij", turn, found) - kept).max() < 1e-14
+    before = found.copy()
+    symmetry.even_out(found)
+    assert np.array_equal(found, before)
+    here[:, 3, 5] += 1e-8
+    assert find_symmetry(here, here) is None

@@ -51,6 +51,20 @@ def test_folds_without_end_do_not_let_a_block_jump(most):
     assert np.abs(held - old).max() < 0.1 * np.abs(new - old).max()
 
 
+def test_the_limit_keeps_a_block_symmetric():
+    """Heights of thin cells differ by more than their nodes do."""
+    part = np.linspace(-1.0, 1.0, 13)
+    x, y = np.meshgrid(part, np.linspace(0.0, 1.0, 9), indexing="ij")
+    inside = (1.0 - x**2) * np.sin(np.pi * y)
+    old = np.array((x, y - 0.309 * inside))
+    new = np.array((x, y))
+    assert len(find_bad_cells(old)) == 0
+    old[:, 1:-1, 1:-1] += 1e-11 * np.random.default_rng(2).standard_normal((2, 11, 7))
+    held, count = MotionLimiter(old.shape).limit(old, new, 0.3)
+    image = held[:, ::-1] * np.array((-1.0, 1.0))[:, None, None]
+    assert count > 0 and np.abs(held - image).max() < 1e-14
+
+
 def test_a_flat_corner_opens_without_a_jump():
     """Its height is next to nothing, but its cell is not thin: its node need not go all the way."""
     new = unit_steps(4, 4)

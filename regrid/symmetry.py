@@ -1,0 +1,157 @@
+"""Blocks that agree with their mirror image, or with themselves turned by half a circle.
+
+Such a block must stay so, but some operations magnify rounding:
+
+    solves       conjugate gradients reduce what their residual shows, and multiply what it does
+                 not show by 2 to 10; in a symmetric block that is all that is not symmetric
+    speed limit  nodes move by fractions of the heights of their old cells, which differ by
+                 rounding, step by step where cells are thin
+
+Where the rest exceeds rounding, the motion of the nodes is therefore replaced by its symmetric part
+(`Symmetry`).  Theory R5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+SYMMETRIC_LENGTH = 1e-9  # of the mean length: up to which a block counts as symmetric
+ROUNDING_OF_MOTION = 1e-13  # of the mean length: up to which it differs from its image by rounding
+
+
+class Turn(NamedTuple):
+    """Whether the indices i and j run backwards."""
+
+    i: bool
+    j: bool
+
+    @property
+    def mirrors(self) -> bool:
+        """Does it change the way round?"""
+        return self.i != self.j
+
+    def exchange(self) -> Turn:
+        """The same turn where i and j are exchanged."""
+        return Turn(self.j, self.i)
+
+    def apply(self, values: np.ndarray) -> np.ndarray:
+        """A view of `values` (..., n, m), their last two axes turned."""
+        return values[..., :: -1 if self.i else 1, :: -1 if self.j else 1]
+
+
+TURNS = (Turn(False, False), Turn(True, False), Turn(False, True), Turn(True, True))
+
+
+def turn_bend(turn: Turn, bend: np.ndarray) -> np.ndarray:
+    """Departures (ni+1, nj+1) of the lines' spacing (`find_bend`), counted from the turned ends."""
+    turned = turn.apply(bend)
+    return np.ascontiguousarray(-turned if turn.i else turned)
+
+
+class Symmetry(NamedTuple):
+    """The `turns` after which a grid agrees with itself, and the `rotations` (complex numbers of
+    modulus 1) that bring its image back; `rounding` [m] of places."""
+
+    turns: tuple[Turn, ...]
+    rotations: tuple[complex, ...]
+    rounding: float
+
+    def even_out(self, change: np.ndarray) -> bool:
+        """Leave the symmetric part of displacements (2, ni+1, nj+1), in place.
+
+        False, and bitwise the same displacements, where the rest is rounding.
+        """
+        given = change[0] + 1j * change[1]
+        total = given.copy()
+        for turn, rotation in zip(self.turns, self.rotations, strict=True):
+            image = turn.apply(given)
+            total += rotation * (np.conj(image) if turn.mirrors else image)
+        total /= 1 + len(self.turns)
+        if not np.abs(total - given).max() > self.rounding:
+            return False
+        change[0] = total.real
+        change[1] = total.imag
+        return True
+
+
+def find_symmetry(
+    previous: np.ndarray,
+    displaced: np.ndarray,
+    cells: Sequence[np.ndarray] = (),
+    bend: np.ndarray | None = None,
+) -> Symmetry | None:
+    """How a block agrees with itself up to rounding, before and after its motion.
+
+    `previous`, `displaced`: (2, ni+1, nj+1); `cells`: values (ni, nj) of its cells; `bend`
+    (ni+1, nj+1): the spacing of its lines, if they have their own (`find_bend`).  The lengths along
+    the sides are compared first: most blocks end there.
+    """
+    sides = [_find_side_lengths(grid) for grid in (previous, displaced)]
+    turns = []
+    for turn in TURNS[1:]:
+        if not all(_agree(turn, lengths, mean) for parts, mean in sides for lengths in parts):
+            continue
+        if not all(_agree(turn, values, np.abs(values).max()) for values in cells):
+            continue
+        if bend is not None and np.abs(turn_bend(turn, bend) - bend).max() > SYMMETRIC_LENGTH:
+            continue
+        if all(is_even(grid, (turn,), SYMMETRIC_LENGTH) for grid in (previous, displaced)):
+            turns.append(turn)
+    if not turns:
+        return None
+    place = displaced[0] + 1j * displaced[1]
+    place -= place.mean()
+    rotations = tuple(_find_rotation(turn, place) for turn in turns)
+    return Symmetry(tuple(turns), rotations, ROUNDING_OF_MOTION * find_mean_length(displaced))
+
+
+def even_out_grid(nodes: np.ndarray, axes: np.ndarray, turns: Sequence[Turn]) -> np.ndarray:
+    """The mean of a grid and those that `turns` make of it, about the axes of another.
+
+    `nodes`, `axes`: (2, ni+1, nj+1); `axes` itself comes out exactly symmetric.
+    """
+    place = axes[0] + 1j * axes[1]
+    centre = place.mean()
+    place -= centre
+    given = nodes[0] + 1j * nodes[1] - centre
+    total = given.copy()
+    for turn in turns:
+        image = turn.apply(given)
+        total += _find_rotation(turn, place) * (np.conj(image) if turn.mirrors else image)
+    total = total / (1 + len(turns)) + centre
+    return np.array((total.real, total.imag))
+
+
+def is_even(nodes: np.ndarray, turns: Sequence[Turn], most: float) -> bool:
+    """Does a grid (2, ni+1, nj+1) agree with those that `turns` make of it, up to `most` of the
+    mean length?"""
+    away = np.abs(even_out_grid(nodes, nodes, turns) - nodes).max()
+    return bool(away <= most * find_mean_length(nodes))
+
+
+def find_mean_length(nodes: np.ndarray) -> float:
+    """Mean length [m] of the edges of a grid (2, ni+1, nj+1)."""
+    steps = np.diff(nodes, axis=1), np.diff(nodes, axis=2)
+    return float(np.concatenate([np.hypot(*step).ravel() for step in steps]).mean())
+
+
+def _find_side_lengths(nodes: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], float]:
+    """Lengths of the edges along the sides j = const and i = const of a grid, and their mean."""
+    along_i = np.hypot(*np.diff(nodes[:, :, [0, -1]], axis=1))
+    along_j = np.hypot(*np.diff(nodes[:, [0, -1]], axis=2))
+    return (along_i, along_j), float((along_i.mean() + along_j.mean()) / 2.0)
+
+
+def _agree(turn: Turn, values: np.ndarray, scale: float) -> bool:
+    """Do values (n, m) agree with their turned ones?"""
+    return bool(np.abs(turn.apply(values) - values).max() <= SYMMETRIC_LENGTH * scale)
+
+
+def _find_rotation(turn: Turn, place: np.ndarray) -> complex:
+    """What brings the turned places (ni+1, nj+1) round their mean, complex, to the places."""
+    turned = turn.apply(place)
+    rotation = np.vdot(np.conj(turned) if turn.mirrors else turned, place)
+    return complex(rotation / abs(rotation))

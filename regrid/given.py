@@ -27,6 +27,7 @@ from regrid.barrier.repair import RepairReport, repair_grid
 from regrid.domains import distribute_by_arc_length
 from regrid.errors import BadInput
 from regrid.hdf5_files import open_hdf5
+from regrid.measure.cuts import Cuts, join_wakes
 from regrid.sides import SIDE_NAMES, get_side, get_sides
 
 ALIASES = dict(zip(("left", "right", "bottom", "top"), SIDE_NAMES, strict=True))
@@ -35,6 +36,7 @@ LEAST_EXTENT = 1e-100
 MOST_EXTENT = 1e100
 # ends of sides that are to meet may lie so far apart, over the size of the whole
 MOST_CORNER_GAP = 1e-6
+SAME_GAP = 1e-9  # of the block's size: gaps that differ by less are equally good
 CORNERS = (  # a side and its end that meets the end of another
     ("i_min", 0, "j_min", 0), ("i_min", -1, "j_max", 0),
     ("i_max", 0, "j_min", -1), ("i_max", -1, "j_max", -1),
@@ -243,11 +245,12 @@ def orient_sides(
 ) -> dict[str, np.ndarray]:
     """The four curves, turned so that i_* run along +j and j_* along +i, with common corners.
 
-    Of the ways in which each may run the one of least gaps is taken.  Raises BadInput naming the
-    two sides, by their `names` in the file, whose ends do not meet.
+    Of the ways in which each may run the one of least gaps is taken; if sides are closed, of those
+    ways the one round the least area, so that what an inner side encloses is no part of the block.
+    Raises BadInput naming the two sides, by their `names` in the file, whose ends do not meet.
     """
     size = max(np.ptp(np.concatenate(list(sides.values()), axis=1), axis=1))
-    best: tuple[float, dict, tuple] | None = None
+    ways = []
     for flips in np.ndindex(2, 2, 2, 2):
         turned = {
             side: line[:, ::-1] if flip else line
@@ -258,9 +261,10 @@ def orient_sides(
             for a, p, b, q in CORNERS
         ]
         total = sum(gap for gap, _ in gaps)
-        if best is None or total < best[0]:
-            best = total, turned, max(gaps, key=lambda pair: pair[0])
-    _, turned, (gap, (first, second, point)) = best
+        ways.append((total, _round_area(turned, size), turned, max(gaps, key=lambda pair: pair[0])))
+    least = min(total for total, *_ in ways)
+    ways = [way for way in ways if way[0] <= least + SAME_GAP * size]
+    _, _, turned, (gap, (first, second, point)) = min(ways, key=lambda way: way[1])
     if gap > MOST_CORNER_GAP * size:
         x, y = point
         raise BadInput(
@@ -271,6 +275,15 @@ def orient_sides(
     for a, p, b, q in CORNERS:
         turned[b][:, q] = turned[a][:, p]
     return turned
+
+
+def _round_area(sides: Mapping[str, np.ndarray], size: float) -> float:
+    """The area inside four sides over the square of `size`, of either sign, without round-off."""
+    i_min, i_max, j_min, j_max = (sides[side] for side in SIDE_NAMES)
+    x, y = np.concatenate((j_min, i_max, j_max[:, ::-1], i_min[:, ::-1]), axis=1)
+    x = (x - x[0]) / size
+    y = (y - y[0]) / size
+    return round(abs(0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))), 9)
 
 
 def make_boundary(
@@ -302,7 +315,7 @@ def make_boundary(
     boundary = np.full((2, ni + 1, nj + 1), np.nan)
     for side in SIDE_NAMES:
         get_side(boundary, side)[:] = lines[side]
-    return boundary
+    return join_wakes(boundary)
 
 
 def read_sides(name: str, block: str | None, cells: tuple[int, int] | None) -> np.ndarray:
@@ -376,12 +389,12 @@ def read_structured(path: Path) -> np.ndarray:
     return np.ascontiguousarray(flat[:2])
 
 
-def find_start(boundary: np.ndarray) -> tuple[np.ndarray, str]:
+def find_start(boundary: np.ndarray, cuts: Cuts = ()) -> tuple[np.ndarray, str]:
     """A valid grid on the sides of `boundary` and words for it; RegridFailure where none is found.
 
-    Transfinite interpolation, repaired where it is folded.
+    Transfinite interpolation, repaired where it is folded.  `cuts`: see `BarrierRegridder`.
     """
-    repaired = repair_grid(transfinite_grid(boundary))
+    repaired = repair_grid(transfinite_grid(boundary), cuts=cuts)
     return repaired.nodes, f"transfinite interpolation{describe_repair(repaired.report)}"
 
 

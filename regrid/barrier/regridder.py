@@ -23,6 +23,8 @@ from regrid.barrier.tuning import DEFAULT, OPTIONS, Tuning
 from regrid.barrier.turning import Look, choose_look, is_convex
 from regrid.barrier.workspace import Workspace, find_bend, is_bent
 from regrid.errors import BadInput, RegridFailure
+from regrid.measure.crossings import find_crossing
+from regrid.measure.cuts import Cuts, take_cuts
 from regrid.measure.faults import (
     explain_failure,
     find_unit,
@@ -68,7 +70,10 @@ class BarrierRegridder:
     minimum number of Newton steps per call; in blocks of `coarse_from` cells and more (9000; inf:
     none) smooth errors are removed on coarse nodes (theory R4.13); these and all other parameters
     have their defaults in `tuning`.  With family "i" lines keep the spacing of `first_grid` (2,
-    ni+1, nj+1); without it inner lines have the mean spacing of the outer two.
+    ni+1, nj+1); without it inner lines have the mean spacing of the outer two.  `cuts` are lines
+    that the boundary runs along twice, out and back, the block on both sides: a side and two of its
+    nodes each, such as ("j_min", 0, 80).  The wake of a C grid, whose nodes are the same from both
+    ends of a side, and a ring that is closed on itself are seen without being told.
     """
 
     # the options that are fields of `Tuning`, and their types
@@ -84,6 +89,7 @@ class BarrierRegridder:
         family="auto",
         first_grid: np.ndarray | None = None,
         curves: bool = True,
+        cuts: Cuts = (),
         threads: int = 1,
         tuning: Tuning = DEFAULT,
         **numbers: float | None,
@@ -118,7 +124,8 @@ class BarrierRegridder:
             if is_bent(bend):  # evenly spaced lines need no stored spacing
                 self.bend = bend
         self.threads = int(threads)
-        self.meets_itself = False  # whether the boundary may touch itself
+        self.cuts = take_cuts(cuts)
+        self.meets_itself = False  # set by flows whose bodies touch themselves: nothing is checked
         self._workspaces: dict[tuple[int, int], Workspace] = {}
         self._sweeps = None
         if method == "sweeps":
@@ -167,7 +174,9 @@ class BarrierRegridder:
         except Folded:
             return self._untangle(*given, into)
         except _NoGrid as end:
-            raise explain_failure(boundary, end.trial, end.transposed, end.flat) from None
+            raise explain_failure(
+                boundary, end.trial, end.transposed, end.flat, cuts=self.cuts
+            ) from None
 
     def _regrid_in(
         self, unit: float, previous, boundary, sound_speed, least_limiting_rate, into
@@ -207,7 +216,8 @@ class BarrierRegridder:
             self.tuning, work, untangles, repairs, conditional=self.conditional, ki=float(ki),
             kj=float(kj), cost=sound_speed is not None, curved=self.curved,
         )  # fmt: skip
-        simple = work.block.area > 0.0 and (self.meets_itself or work.is_simple)
+        checked = self.meets_itself or untangles  # a block is untangled after a first try
+        simple = work.block.area > 0.0 and (checked or self._is_simple(work, boundary))
         if not (simple and move.is_settled()):
             if not move.estimate < np.inf:  # otherwise all nodes are finite
                 if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
@@ -217,13 +227,17 @@ class BarrierRegridder:
                         "regrid: the previous grid has nodes that are not finite numbers"
                     )
             if not simple:
-                raise explain_failure(boundary, previous=previous)
+                raise explain_failure(boundary, previous=previous, cuts=self.cuts)
             if not move.run():
                 raise _NoGrid(work.trial, transposed, move.broken)
         report = move.report()
         if report.quality and mirrored != transposed:  # of a clockwise grid
             report = replace(report, quality=None)
         return RegridResult(work.give(), report)
+
+    def _is_simple(self, work: Workspace, boundary: np.ndarray) -> bool:
+        """Do the sides neither cross nor touch, but for cuts?"""
+        return work.is_simple if not self.cuts else find_crossing(boundary, self.cuts) is None
 
     def _weigh(self, boundary):
         """The weights of the two families, and whether the lines i = const are the heavier one."""
@@ -250,7 +264,7 @@ class BarrierRegridder:
             result = self._move_evenly(look, *given) if look.same else None
             result = result or self._move(*given, None, untangles=True, repairs=repairs)
         except _NoGrid as end:
-            raise explain_failure(boundary, *end.turn_back(look)) from None
+            raise explain_failure(boundary, *end.turn_back(look), cuts=self.cuts) from None
         finally:
             if self.bend is not None:
                 self._workspace(before.shape, False).take_laws(self.bend)

@@ -31,6 +31,7 @@ from regrid.measure.corners import (
     is_collapsed,
 )
 from regrid.measure.crossings import find_crossing
+from regrid.measure.cuts import Cuts, take_cuts
 from regrid.measure.faults import explain_failure
 from regrid.sides import compute_area
 
@@ -63,11 +64,11 @@ class Repaired:
     report: RepairReport
 
 
-def repair_grid(nodes: np.ndarray, project: bool = True) -> Repaired:
+def repair_grid(nodes: np.ndarray, project: bool = True, cuts: Cuts = ()) -> Repaired:
     """A valid grid on the sides of `nodes` (2, ni+1, nj+1), near it; see the module.
 
     Raises RegridFailure, naming the bad cells, where no valid grid is found; BadInput for nodes
-    that are not finite.  Grids may turn either way.
+    that are not finite.  Grids may turn either way.  `cuts`: see `BarrierRegridder`.
     """
     nodes = np.array(nodes, dtype=np.float64, order="C")
     if nodes.ndim != 3 or nodes.shape[0] != 2 or min(nodes.shape[1:]) < 2:
@@ -75,6 +76,7 @@ def repair_grid(nodes: np.ndarray, project: bool = True) -> Repaired:
     if not np.isfinite(nodes).all():
         broken = np.argwhere(~np.isfinite(nodes).all(axis=0))[0]
         raise BadInput(f"repair: node ({broken[0]}, {broken[1]}) is not a finite number")
+    cuts = take_cuts(cuts)
     flip = slice(None, None, -1) if compute_area(nodes) < 0.0 else slice(None)
     nodes = np.ascontiguousarray(nodes[flip])
     excluded = find_excluded_corners(nodes)
@@ -86,8 +88,9 @@ def repair_grid(nodes: np.ndarray, project: bool = True) -> Repaired:
         projected = project_nodes(nodes, excluded)
         bad = find_folded_cells(nodes, excluded)
     if len(bad):
-        if find_crossing(nodes) is None and min(nodes.shape[1:]) > 2 and not is_collapsed(excluded):
-            start = _regrid(nodes)
+        simple = find_crossing(nodes, cuts) is None
+        if simple and min(nodes.shape[1:]) > 2 and not is_collapsed(excluded):
+            start = _regrid(nodes, cuts)
         bad = find_folded_cells(nodes, excluded)
     if len(bad):
         named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
@@ -98,9 +101,9 @@ def repair_grid(nodes: np.ndarray, project: bool = True) -> Repaired:
                 f"a side has nodes in one point, and such a block cannot be untangled; {also}",
                 grid=nodes[flip],
             )
-        raise explain_failure(nodes, nodes, also=also, grid=nodes[flip])
-    if before and find_crossing(nodes) is not None:
-        raise explain_failure(nodes, grid=nodes[flip])
+        raise explain_failure(nodes, nodes, also=also, grid=nodes[flip], cuts=cuts)
+    if before and find_crossing(nodes, cuts) is not None:
+        raise explain_failure(nodes, grid=nodes[flip], cuts=cuts)
     report = RepairReport(before, int(excluded.sum()), projected, bool(start), start)
     return Repaired(np.ascontiguousarray(nodes[flip]), report)
 
@@ -155,10 +158,10 @@ def _count_wrong(nodes, excluded, p: int, q: int) -> int:
     return int(((signs <= 0) & ~excluded[:, p - 1 : p + 1, q - 1 : q + 1]).sum())
 
 
-def _regrid(nodes: np.ndarray) -> str:
+def _regrid(nodes: np.ndarray, cuts: Cuts) -> str:
     """Regrid a folded grid in place on its own sides; how it was begun, "" where none was found."""
     try:
-        result = BarrierRegridder().regrid(nodes, nodes)
+        result = BarrierRegridder(cuts=cuts).regrid(nodes, nodes)
     except RegridFailure:
         return ""
     nodes[:] = result.nodes

@@ -301,7 +301,8 @@ class Workspace:
 
     @property
     def is_simple(self) -> bool:
-        """Do the sides run round an area, and neither cross nor touch?"""
+        """Do the sides run round an area, and neither cross nor touch?  But for cuts that are seen
+        (`find_cut_edges`)."""
         return self.block.area > 0.0 and self.boundary_check.is_clear(
             self.block.meeting, self.sides
         )

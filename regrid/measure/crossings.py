@@ -6,8 +6,8 @@ boundary is a closed polygon.  A binary tree keeps, for each piece of it, a boun
 half planes x > 0, x < 0, y > 0, y < 0 that hold all of its edges: a piece with one of them runs
 in that direction and cannot meet itself.  Signs of triangles are computed with their error bound;
 what is in doubt is decided with rational numbers: exact, and cheap enough for every regrid.
-Note: touching counts as crossing, except where two whole opposite sides are the same nodes, as
-in a ring that is closed on itself.
+Note: touching counts as crossing, except along a cut: two whole opposite sides that are the same
+nodes, as in a ring that is closed on itself, or one line twice on one side (`find_cut_edges`).
 
 Polylines are compared in floating point, by boxes of `GROUP` segments first, so that a check of a
 few hundred nodes costs microseconds; lines of more than 64 groups use wider ones.
@@ -19,6 +19,7 @@ import numpy as np
 
 from regrid.jit import kernel
 from regrid.measure.corners import ORIENTATION_ERROR_BOUND, UNDERFLOW, compute_turns
+from regrid.measure.cuts import Cuts, find_cut_edges, join_cuts
 from regrid.sides import get_side
 
 LEAF_EDGES = 4  # edges of the smallest pieces
@@ -219,17 +220,20 @@ class BoundaryCheck:
             np.empty((2, 256), dtype=np.int64),
         )  # fmt: skip
 
-    def is_simple(self, nodes: np.ndarray) -> bool:
+    def is_simple(self, nodes: np.ndarray, cuts: Cuts = ()) -> bool:
         """Does the boundary of `nodes` (2, ni+1, nj+1) neither cross nor touch itself?  Exact.
 
-        False as well where two neighbours on it are one point, or a node is not finite.
+        False as well where two neighbours on it are one point, or a node is not finite.  `cuts`: as
+        `find_crossing` takes them.
         """
-        return self.is_clear(search_meeting(nodes, *self.scratch)[0], nodes)
+        return self.is_clear(search_meeting(nodes, *self.scratch)[0], nodes, cuts)
 
     @staticmethod
-    def is_clear(first: int, nodes: np.ndarray) -> bool:
+    def is_clear(first: int, nodes: np.ndarray, cuts: Cuts = ()) -> bool:
         """`is_simple`, where `search_meeting` has found `first`."""
-        return first == NO_CROSSING or (first != COINCIDENT_EDGES and find_crossing(nodes) is None)
+        if first == COINCIDENT_EDGES:
+            return False
+        return first == NO_CROSSING or find_crossing(nodes, cuts) is None
 
 
 def walk_boundary(nodes: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]]]:
@@ -241,17 +245,26 @@ def walk_boundary(nodes: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]]]
     return np.array(points).T, positions
 
 
-def find_crossing(nodes: np.ndarray) -> tuple[tuple[str, int], tuple[str, int]] | None:
+def find_crossing(
+    nodes: np.ndarray, cuts: Cuts = ()
+) -> tuple[tuple[str, int], tuple[str, int]] | None:
     """The first two edges of the boundary that cross or touch, as (side, node) of their starts.
 
     `nodes` (2, ni+1, nj+1) is read on its sides.  Exact; every pair of edges whose boxes overlap.
-    Edges without length are left out: their ends are one node.
+    Edges without length are left out: their ends are one node.  So are those of cuts, on both of
+    whose sides the block lies: of any line, one that is there twice winds round nothing.  `cuts`:
+    besides those that are seen (`find_cut_edges`), a side and two of its nodes each, between which
+    the boundary goes out and back.
     """
+    cut = find_cut_edges(nodes, cuts)
+    if cuts:
+        nodes = join_cuts(nodes, cuts)
     line, positions = walk_boundary(nodes)
     following = np.roll(line, -1, axis=1)
     kept = np.flatnonzero((line != following).any(axis=0))
-    if all_seam := _find_seams(nodes):
-        kept = np.array([k for k in kept if positions[k][0] not in all_seam], dtype=np.int64)
+    closed = any(edges.any() for edges in cut.values())
+    if closed:
+        kept = kept[[not _is_cut(cut, *positions[k]) for k in kept]]
     start, end = line[:, kept], following[:, kept]
     low, high = np.minimum(start, end), np.maximum(start, end)
     near = np.triu(np.ones((kept.size, kept.size), dtype=bool), 1)
@@ -262,7 +275,7 @@ def find_crossing(nodes: np.ndarray) -> tuple[tuple[str, int], tuple[str, int]] 
     b = end[:, first]
     c = start[:, second]
     d = end[:, second]
-    if all_seam:
+    if closed:
         leads, follows = (a == d).all(axis=0), (b == c).all(axis=0)
     else:
         leads, follows = (first == 0) & (second == kept.size - 1), second == first + 1
@@ -287,14 +300,10 @@ def find_crossing(nodes: np.ndarray) -> tuple[tuple[str, int], tuple[str, int]] 
     return positions[kept[first[hits[0]]]], positions[kept[second[hits[0]]]]
 
 
-def _find_seams(nodes: np.ndarray) -> tuple[str, ...]:
-    """Sides that are the same nodes as the opposite ones."""
-    seams: tuple[str, ...] = ()
-    if np.array_equal(nodes[:, 0], nodes[:, -1]):
-        seams += ("i_min", "i_max")
-    if np.array_equal(nodes[:, :, 0], nodes[:, :, -1]):
-        seams += ("j_min", "j_max")
-    return seams
+def _is_cut(cut: dict[str, np.ndarray], side: str, node: int) -> bool:
+    """Is the edge that `walk_boundary` takes from a side's node one of `find_cut_edges`?"""
+    edge = node if side in ("i_min", "j_max") else node - 1
+    return bool(cut[side][edge])
 
 
 GROUP_EDGES = 12

@@ -24,6 +24,7 @@ from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
 from regrid.measure.corners import BLOCK_CORNERS, TRIANGLES
 from regrid.measure.crossings import BoundaryCheck, find_crossing, walk_boundary
+from regrid.measure.cuts import Cuts
 from regrid.measure.quality import compute_corner_areas
 from regrid.sides import compute_area, get_sides
 
@@ -291,21 +292,23 @@ def explain_failure(
     also: str = "",
     grid: np.ndarray | None = None,
     previous: np.ndarray | None = None,
+    cuts: Cuts = (),
 ) -> RegridFailure:
     """The failure to be raised: which side, which of its nodes, and what is wrong with them.
 
     `boundary` (2, ni+1, nj+1) is read on its sides; `trial`, of that shape or transposed, is the
     grid that came closest, in the frame of a workspace; `flat` says that it is valid, with a corner
     too sharp for the equations to be solved.  `also` ends the sentence, `grid` is what the failure
-    shows, `previous` the grid before, if its way round is to be compared.
+    shows, `previous` the grid before, if its way round is to be compared; `cuts` as `find_crossing`
+    takes them.
     """
-    cause, what, side, nodes, cell = _find_fault(boundary, trial, transposed, flat, previous)
+    cause, what, side, nodes, cell = _find_fault(boundary, trial, transposed, flat, previous, cuts)
     what = f"{what}; {also}" if also else what
     return RegridFailure(what, side=side, nodes=nodes, grid=grid, cell=cell, cause=cause)
 
 
 def _find_fault(
-    boundary, trial, transposed: bool, flat: bool, previous=None
+    boundary, trial, transposed: bool, flat: bool, previous=None, cuts: Cuts = ()
 ) -> tuple[str, str, str, tuple[int, ...], tuple[int, int] | None]:
     """The id of the cause, what is wrong, the side, its nodes, the cell where one is to blame."""
     line, positions = walk_boundary(boundary)
@@ -313,7 +316,7 @@ def _find_fault(
     if broken.size:
         side, node = positions[broken[0]]
         return "not-finite", "not a finite number", side, (node,), None
-    crossing = find_crossing(boundary)
+    crossing = find_crossing(boundary, cuts)
     if crossing is not None:
         common = _find_common_node(boundary, crossing)
         (first, node), (second, other) = common or crossing

@@ -16,6 +16,7 @@ from __future__ import annotations
 import inspect
 import time
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -43,6 +44,7 @@ from regrid.hexahedra.regridder import BarrierRegridder3D
 from regrid.marching import March, march_domain
 from regrid.measure import hexahedra
 from regrid.measure.corners import compute_hexahedron_centres
+from regrid.measure.cuts import Cuts, reverse_cuts
 from regrid.measure.faults import name_cells
 from regrid.measure.quality import compute_scaled_jacobians, measure_quality
 from regrid.protocol import Regridder, call_regridder
@@ -289,9 +291,9 @@ def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> 
 
     A failure begins with `where`.
     """
-    turned = _positive(boundary)
+    turned, regridder = _turn(boundary, regridder)
     try:
-        nodes, words = find_start(turned)
+        nodes, words = find_start(turned, _find_cuts(regridder))
     except RegridFailure as failure:
         made = Grid(transfinite_grid(turned), [], str(failure))
     else:
@@ -305,9 +307,9 @@ def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> 
 
 def regrid_plane(nodes: np.ndarray, regridder: Regridder, passes: int) -> Grid:
     """A user's plane grid regenerated on its sides; one that is not valid is untangled first."""
-    turned = _positive(nodes)
+    turned, regridder = _turn(nodes, regridder)
     try:
-        repaired = repair_grid(turned)
+        repaired = repair_grid(turned, cuts=_find_cuts(regridder))
     except RegridFailure as failure:
         return Grid(nodes, [], str(failure))
     start = repaired.nodes
@@ -318,9 +320,20 @@ def regrid_plane(nodes: np.ndarray, regridder: Regridder, passes: int) -> Grid:
     return made
 
 
-def _positive(nodes: np.ndarray) -> np.ndarray:
-    """The grid itself, or with j reversed where its sides turn clockwise."""
-    return nodes if compute_area(nodes) > 0.0 else np.ascontiguousarray(nodes[:, :, ::-1])
+def _turn(nodes: np.ndarray, regridder) -> tuple[np.ndarray, Any]:
+    """Grid and regridder, or with j reversed where the grid's sides turn clockwise."""
+    if compute_area(nodes) > 0.0:
+        return nodes, regridder
+    cuts = _find_cuts(regridder)
+    if cuts:
+        regridder = copy(regridder)
+        regridder.cuts = reverse_cuts(cuts, nodes)
+    return np.ascontiguousarray(nodes[:, :, ::-1]), regridder
+
+
+def _find_cuts(regridder) -> Cuts:
+    """The cuts that a family was told of; none where it knows of no such thing."""
+    return getattr(regridder, "cuts", ())
 
 
 def settle(nodes, boundary, regridder, passes: int, words: str) -> Grid:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hydro.contacts.lines import BOTH, EARLIER, LATER
 from hydro.facets.lines import find_curve_normal, find_point, measure_square, project
 from hydro.facets.rows import (
     AREA_X,
@@ -30,7 +31,6 @@ from hydro.facets.rows import (
 from regrid.jit import compiled_once, kernel
 from regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
 
-BOTH, LATER, EARLIER = range(3)  # parts, see `may_lie_on`
 SNAPPED_FACE_PART = 1e-9  # parts of a face closer than this to a node are at the node
 SEARCHED_FACES = 3  # faces on either side of its old one on which a pin is looked for again
 MOST_BULGE = 0.1  # of a face: so far off it may the other line's nodes lie between its two pins
@@ -117,17 +117,18 @@ def is_film(inner, k, line, a, x, y):
 
 
 @kernel
-def find_pins(
-    points, inner, line, boxes, group, tolerance, reach, asked, one_body, part, positions
-):  # fmt: skip
-    """Positions (n,) of the points (2, n) that lie on a line (2, m + 1), -1.0 for all others.
+def find_pins(nodes, other, pins, tolerance, reach, one_body):
+    """Fill the positions of the nodes that lie on the other line, -1.0 for all others.
 
     On: closer than `tolerance` of a face's length, or behind a face that looks at the points' own
     line, by no more than BULGE of it: where a curved contact has opened, nodes lie behind the
-    other line's chords.  inner (2, n), one_body: see `is_film`; asked (n,): of which nodes.  boxes
-    (4, groups): of `group` faces each; reach: BULGE of the longest [m]; part: see `may_lie_on`.
-    Returns how many do.
+    other line's chords.  nodes, other: `LineNodes`; pins: `Pins` of the nodes; one_body: see
+    `is_film`; reach: BULGE of the longest face [m].  Returns how many do.
     """
+    points = nodes.line
+    line = other.line
+    boxes = other.boxes
+    group = other.group
     count = line.shape[1] - 1
     last = points.shape[1] - 1
     groups = np.empty(boxes.shape[1], np.int64)
@@ -136,7 +137,7 @@ def find_pins(
     for k in range(last + 1):
         if k % group == 0:
             near = find_groups(points, points, k, min(last + 1, k + group), boxes, reach, groups)
-        positions[k] = -1.0
+        pins.positions[k] = -1.0
         if near == 0:
             continue
         x, y = points[0, k], points[1, k]
@@ -148,7 +149,7 @@ def find_pins(
             if lies_away(x, y, boxes, g, reach):
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
-                if not may_lie_on(part, k, a):
+                if not may_lie_on(pins.part, k, a):
                     continue
                 at, away = project(line, a, x, y)
                 if away >= least:
@@ -162,23 +163,29 @@ def find_pins(
                         is_on = False  # behind the next side, at the corner of a body
                     if a == count - 1 and (1.0 - at) * square**0.5 < deep:
                         is_on = False
-                if is_on and not (asked[k] and one_body and is_film(inner, k, line, a, x, y)):
+                if is_on and pins.asked[k] and one_body:
+                    is_on = not is_film(nodes.inner, k, line, a, x, y)
+                if is_on:
                     least = away
                     position = snap_position(a + at)
-        positions[k] = position
+        pins.positions[k] = position
         if position >= 0.0:
             found += 1
     return found
 
 
 @kernel
-def find_deepest(points, pinned, line, boxes, group, reach):
-    """The point furthest behind a face that looks at the points' line, in faces: (depth, point).
+def find_deepest(nodes, other, pinned, reach):
+    """The node furthest behind a face that looks at the nodes' line, in faces: (depth, node).
 
-    Points that are `pinned`, with a position that is not negative, are not looked at, nor those
-    further from the line than `reach` [m], nor its end faces: round a
-    body's corner what is behind one side is in front of the next.
+    Nodes that are `pinned`, with a position that is not negative, are not looked at, nor those
+    further from the other line than `reach` [m], nor its end faces: round a body's corner what is
+    behind one side is in front of the next.
     """
+    points = nodes.line
+    line = other.line
+    boxes = other.boxes
+    group = other.group
     count = line.shape[1] - 1
     last = points.shape[1] - 1
     groups = np.empty(boxes.shape[1], np.int64)

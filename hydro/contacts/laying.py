@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.contacts.facets import MOST_BULGE, find_depth
+from hydro.facets.lines import find_point
 from hydro.facets.rows import (
     CLOSED,
     FOLLOWER_START,
@@ -28,36 +29,38 @@ STILL_NODE_DISTANCE = 1e-12  # of a face's length: a node this near is where it 
 
 
 @kernel
-def find_held(facets, count, back_positions, held, back_held, inner, closed_before):
-    """Mark the nodes that the contact lays on the other line.
+def find_held(facets, count, leader, follower):
+    """Mark the nodes that the contact lays on the other line; leader, follower: `Pins`.
 
-    held: those of the follower at which a closed facet ends; back_held: those of the leader at
-    which the closed part ends within a face of the follower; inner: the leader's nodes within it;
-    closed_before: those of the leader at which a closed facet stops.
+    held: those of the follower at which a closed facet ends; of the leader those at which the
+    closed part ends within a face of the follower; inside: the leader's nodes within that part;
+    stops: those of the leader at which a closed facet stops.
     """
     states = facets.states
     ends = facets.ends
+    inside = leader.inside
+    held = leader.held
+    follower.held[:] = False
+    leader.stops[:] = False
     held[:] = False
-    closed_before[:] = False
-    back_held[:] = False
-    inner[:] = False
+    inside[:] = False
     for k in range(count):
         if states[CLOSED, k] == 0.0:
             continue
         for row in (FOLLOWER_START, FOLLOWER_STOP):
             node = int(ends[row, k])
             if node == ends[row, k]:
-                held[node] = True
+                follower.held[node] = True
         for row in (LEADER_START, LEADER_STOP):
             node = int(ends[row, k])
-            if node == ends[row, k] and node < inner.shape[0]:
-                inner[node] = back_held[node]
-                back_held[node] = True
+            if node == ends[row, k] and node < inside.shape[0]:
+                inside[node] = held[node]
+                held[node] = True
                 if row == LEADER_STOP:
-                    closed_before[node] = True
-    for node in range(inner.shape[0]):
-        at = back_positions[node]
-        back_held[node] = back_held[node] and not inner[node] and at != np.floor(at)
+                    leader.stops[node] = True
+    for node in range(inside.shape[0]):
+        at = leader.positions[node]
+        held[node] = held[node] and not inside[node] and at != np.floor(at)
 
 
 @compiled_once
@@ -79,24 +82,48 @@ def straighten(points, k, start, x_free, y_free, x_foot, y_foot):
     return x, y
 
 
-@kernel
-def lay(
-    points, line, old_points, old_line, places, found, others, hits, held, inner, closed_before,
-    back, straight, part_back, ways, ends,
-):  # fmt: skip
-    """Move new nodes (2, n + 1) onto the other's new line: the closed part, and what came through.
+@compiled_once
+def find_place(points, k, line, pins, others, back):
+    """Where on the other line, or beside it, node `k` belongs; see `lay`."""
+    a = min(int(pins.found[k]), line.shape[1] - 2)
+    x, y = find_point(line, a, pins.found[k])
+    if back and pins.held[k]:
+        inwards = -1 if pins.stops[k] else 1
+        pin, free = (a + 1, a) if inwards < 0 else (a, a + 1)
+        if 0.0 < inwards * (others[pin] - k) < 1.0 and others[free] < 0.0:
+            x, y = straighten(points, k, k + inwards, line[0, free], line[1, free], x, y)
+    return x, y
 
-    found (n + 1,): positions of the nodes' feet, negative where they have none; others (m + 1,): of
-    the line's nodes on the points' line.  back: the points are the leader's, whose line holds: its
-    ends alone are laid, what comes through in this step, and what lies deep behind.  An end of the
-    contact may lie on a face of the follower which begins on the leader's face before that end:
-    both faces hold each other's nodes, so they are one straight line, from the leader's node before
-    to the follower's free one.  straight: the line is a plane.  ways (2, n + 1): scratch; ends
-    (2, 3): for both ends, is it to be moved (by who knows all that meets there), and the way.
-    A node that was behind the other line when the step began, at `places`, goes back by the part
-    `part_back` of that alone: a finite way in a short step would crush its cells.
+
+@compiled_once
+def measure_distance_before(mover, k, target, position):
+    """How far a node was from a position on the other line when the step began [m]."""
+    a = min(int(position), target.line.shape[1] - 2)
+    x, y = find_point(target.line, a, position)
+    dx, dy = x - mover.line[0, k], y - mover.line[1, k]
+    return (dx * dx + dy * dy) ** 0.5
+
+
+@kernel
+def lay(mover, pins, target, others, how, ways, ends):
+    """Move new nodes onto the other's new line: the closed part, and what came through.
+
+    mover, target: `LineNodes`; pins: `Pins` of the mover, whose `found` are the feet of its nodes;
+    others (m + 1,): positions of the target's nodes on the mover's line; ways (2, n + 1): scratch;
+    ends (2, 3): for both ends, is it to be moved (by who knows all that meets there), and the way.
+    how: back, straight, part_back.
+    back: the mover is the leader, whose line holds: its ends alone are laid, what comes through in
+    this step, and what lies deep behind.  An end of the contact may lie on a face of the follower
+    which begins on the leader's face before that end: both faces hold each other's nodes, so they
+    are one straight line, from the leader's node before to the follower's free one.
+    straight: the target is a plane.
+    part_back: a node that was behind the other line when the step began goes back by this part of
+    that alone: a finite way in a short step would crush its cells.
     Returns how many inner nodes are moved, -1 where one has gone far into the other body.
     """
+    back, straight, part_back = how
+    points = mover.new
+    line = target.new
     last = points.shape[1] - 1
     most = line.shape[1] - 1
     ends[:] = 0.0
@@ -104,40 +131,34 @@ def lay(
     for k in range(last + 1):
         ways[0, k] = 0.0
         ways[1, k] = 0.0
-        if found[k] < 0.0:
+        found = pins.found[k]
+        if found < 0.0:
             continue
-        a = min(int(found[k]), most - 1)
-        part = found[k] - a
+        # the way to its place, across the face there and along it
+        a = min(int(found), most - 1)
         dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
         length = (dx * dx + dy * dy) ** 0.5
-        x, y = line[0, a] + part * dx, line[1, a] + part * dy
-        if back and held[k]:
-            inwards = -1 if closed_before[k] else 1
-            pin, free = (a + 1, a) if inwards < 0 else (a, a + 1)
-            if 0.0 < inwards * (others[pin] - k) < 1.0 and others[free] < 0.0:
-                x, y = straighten(points, k, k + inwards, line[0, free], line[1, free], x, y)
+        x, y = find_place(points, k, line, pins, others, back)
         x, y = x - points[0, k], y - points[1, k]
-        outside = (y * dx - x * dy) / length  # of the foot, from the node
+        outside = (y * dx - x * dy) / length
         beside = abs(x * dx + y * dy) / length
+        # is it laid there?
         if back:
-            at_end = (k == 0 or k == last) and not inner[k]
+            at_end = (k == 0 or k == last) and not pins.inside[k]
             takes = (outside < 0.0 and at_end) or outside < -DEEP_NODE_PART * length
         else:
             takes = outside < 0.0
-        takes = takes or held[k] or hits[k] >= 0.0
-        if not straight and (found[k] == 0.0 or found[k] == most):
+        takes = takes or pins.held[k] or pins.hits[k] >= 0.0
+        if not straight and (found == 0.0 or found == most):
             takes = takes and beside <= BESIDE_END_DISTANCE * length  # else beyond the line's end
         if not takes or (not straight and max(abs(x), abs(y)) <= STILL_NODE_DISTANCE * length):
             continue
         way = (x * x + y * y) ** 0.5
         if way > MOST_LAID * length:
             return -1
-        if hits[k] < 0.0 and places[k] >= 0.0:
-            b = min(int(places[k]), most - 1)
-            at = places[k] - b
-            dx = old_line[0, b] + at * (old_line[0, b + 1] - old_line[0, b]) - old_points[0, k]
-            dy = old_line[1, b] + at * (old_line[1, b + 1] - old_line[1, b]) - old_points[1, k]
-            was = (dx * dx + dy * dy) ** 0.5
+        # what was behind before goes back by a part
+        if pins.hits[k] < 0.0 and pins.positions[k] >= 0.0:
+            was = measure_distance_before(mover, k, target, pins.positions[k])
             if was > MATCHED_NODE_DISTANCE * length:
                 scale = max(0.0, 1.0 - (1.0 - part_back) * was / way)
                 x, y = scale * x, scale * y

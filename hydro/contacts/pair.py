@@ -5,9 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.contacts.facets import (
-    BOTH,
-    EARLIER,
-    LATER,
     MOST_BULGE,
     fill_facets,
     find_deepest,
@@ -25,6 +22,7 @@ from hydro.contacts.laying import (
     match,
     measure_clearance_of_plane,
 )
+from hydro.contacts.lines import BOTH, EARLIER, LATER, make_pins
 from hydro.contacts.start import (
     ON_LINE_DISTANCE,
     find_lying,
@@ -44,64 +42,94 @@ ROUND_OFF_PRESSURE = 1e-12  # part of rho c² by which a pressure below that of 
 FAR_SEARCH_FACES = 2.0  # longest faces: surfaces of one body are not looked for further off
 
 
+class Half:
+    """One line of a pair: its surface, and what its nodes have to do with the other line."""
+
+    def __init__(self, surface: Surface, part: int):
+        self.surface = surface
+        self.pins = make_pins(surface.count + 1, part)
+
+    def count_common(self, other: Half) -> int:
+        """How many nodes, at its ends, both lines have; from now on they do not count."""
+        is_one = other.surface is self.surface
+        for end, key_node in enumerate(self.surface.ends):
+            others = (self.surface.ends[1 - end],) if is_one else other.surface.ends
+            self.pins.asked[-end] = key_node is None or not any(key_node is node for node in others)
+        return int((~self.pins.asked).sum())
+
+    def forget_pins(self) -> None:
+        """No node lies on the other line."""
+        self.pins.positions.fill(-1.0)
+        self.pins.covered.fill(False)
+
+    def find_pins(self, other: Half, one_body: bool) -> int:
+        """The nodes that lie on the other line; how many."""
+        surface = other.surface
+        return find_pins.entry(
+            self.surface.nodes, surface.nodes, self.pins, ON_LINE_DISTANCE,
+            MOST_BULGE * surface.longest, one_body,
+        )  # fmt: skip
+
+    def find_touch(self, other: Half, cuts: bool) -> float:
+        """When a node comes through the other line; see `find_touches`."""
+        return find_touches.entry(
+            self.surface.nodes, self.pins, other.surface.nodes, other.pins.positions, cuts
+        )
+
+
 class Pair:
     """A leader, whose line holds where both lie on each other, and a follower.
 
-    A line that meets itself is both: nodes of its later part follow.  `positions`: of the
-    follower's nodes on the leader, `back_positions`: of the leader's nodes on the follower, -1.0
-    where they lie on nothing.  `clearance`: a distance by which the lines are apart at least [m],
-    not above 0 where it must be measured.  bond [Pa], friction: what the contact holds.
+    A line that meets itself is both: nodes of its later part follow.  `lead`, `follow`: both
+    halves.  `clearance`: a distance by which the lines are apart at least [m], not above 0 where it
+    must be measured.  bond [Pa], friction: what the contact holds.
     """
 
     straight = False  # is the leader a plane?
 
     def __init__(self, one: Surface, other: Surface, one_body: bool = False, curved: bool = False):
         first = one.rigid or (not other.rigid and one.length >= other.length)
-        self.leader, self.follower = (one, other) if first else (other, one)
+        leader, follower = (one, other) if first else (other, one)
         self.bond = min(one.bond, other.bond)
         self.friction = min(one.friction, other.friction)
         self.one_body = one_body
         self.one_block = one.block if one.block is other.block else None
         self.is_one = one is other
-        self.parts = (LATER, EARLIER) if self.is_one else (BOTH, BOTH)
+        self.lead = Half(leader, EARLIER if self.is_one else BOTH)
+        self.follow = Half(follower, LATER if self.is_one else BOTH)
         self.clearance = 0.0
         self.is_near = False
         self.stretches = 0  # that are closed
         self.touched = False  # does a node of one come through the other in this step?
-        self.count = self.closed = self.pinned = self.common = 0  # common: pins at shared ends
-        nodes = self.follower.count + 1
-        back = self.leader.count + 1
-        facets = nodes + back
-        self.positions = np.full(nodes, -1.0)
-        self.back_positions = np.full(back, -1.0)
-        self._found = self.positions.copy()
-        self._back_found = self.back_positions.copy()
-        self.hits = self.positions.copy()
-        self.back_hits = self.back_positions.copy()
-        self._pins = np.empty((6, facets))
-        self.covered = np.zeros(back, dtype=np.bool_)
-        self._covered = np.zeros(back, dtype=np.bool_)
-        self.held = np.zeros(nodes, dtype=np.bool_)  # of `find_held`
-        self.back_held = self.covered.copy()
-        self.inner = self.covered.copy()
-        self.closed_before = self.covered.copy()  # leader's nodes at which a closed facet stops
+        self.count = self.closed = self.pinned = 0
+        self.common = self._count_common()  # pins at shared ends
+        most = leader.count + follower.count + 2
         self.curved = curved
-        self.facets = make_facets(facets, curved)
-        self._still = np.zeros((2, back))
-        self._ways = np.empty((2, facets))
+        self.facets = make_facets(most, curved)
+        self._sorted_pins = np.empty((6, most))
+        self._covered = np.zeros(leader.count + 1, dtype=np.bool_)  # at mid-time, which nobody asks
+        self._still = np.zeros((2, leader.count + 1))
+        self._ways = np.empty((2, most))
         self.shifts = np.zeros((4, 3))
-        self.asked = self._find_asked(self.follower, self.leader)
-        self.back_asked = self._find_asked(self.leader, self.follower)
-        if one_body:
-            self.common = int((~self.asked).sum() + (~self.back_asked).sum())
 
-    def _find_asked(self, surface: Surface, other: Surface) -> np.ndarray:
-        """Which nodes' distances count: not those that both lines have, at their ends."""
-        asked = np.ones(surface.count + 1, dtype=np.bool_)
-        for end, key_node in enumerate(surface.ends):
-            others = (surface.ends[1 - end],) if self.is_one else other.ends
-            asked[-end] = key_node is None or not any(key_node is node for node in others)
-        return asked
+    @property
+    def leader(self) -> Surface:
+        """The surface whose line holds."""
+        return self.lead.surface
+
+    @property
+    def follower(self) -> Surface:
+        """The surface that is laid on it."""
+        return self.follow.surface
+
+    @property
+    def halves(self) -> tuple[tuple[Half, Half], tuple[Half, Half]]:
+        """Each half with the other one, the follower first."""
+        return (self.follow, self.lead), (self.lead, self.follow)
+
+    def _count_common(self) -> int:
+        common = sum([half.count_common(other) for half, other in self.halves])
+        return common if self.one_body else 0
 
     # --- where they lie on each other ------------------------------------------------------------
 
@@ -119,75 +147,55 @@ class Pair:
             self.is_near = self.clearance <= 0.0
         if not self.is_near:
             self.pinned = 0
-            self.positions.fill(-1.0)
-            self.back_positions.fill(-1.0)
-            self.covered.fill(False)
+            self.follow.forget_pins()
+            self.lead.forget_pins()
             return
         if self.pinned > 1:
             line = self.leader.line
             other = self.follower.line
-            self._cut(line, other, self.positions, self.back_positions, self.covered)
+            positions = self.follow.pins.positions, self.lead.pins.positions
+            self._cut(line, other, positions, self.lead.pins.covered)
             self._measure(line, other, self._still, 0.0)
         else:
-            self.covered.fill(False)
+            self.lead.pins.covered.fill(False)
         if not self.count:
-            self.held.fill(False)
-            self.back_held.fill(False)
+            self.follow.pins.held.fill(False)
+            self.lead.pins.held.fill(False)
 
     def _find_pins(self) -> int:
-        one = self.leader
-        other = self.follower
-        parts = self.parts
-        pinned = find_pins(
-            other.line, other.inner, one.line, one.boxes, one.group,
-            ON_LINE_DISTANCE, MOST_BULGE * one.longest, self.asked,
-            self.one_body, parts[0], self.positions,
-        )  # fmt: skip
-        return pinned + find_pins(
-            one.line, one.inner, other.line, other.boxes, other.group,
-            ON_LINE_DISTANCE, MOST_BULGE * other.longest, self.back_asked,
-            self.one_body, parts[1], self.back_positions,
-        )  # fmt: skip
+        return sum([half.find_pins(other, self.one_body) for half, other in self.halves])
 
     def find_crossing(self) -> tuple[Surface, Surface, int] | None:
         """A surface, the other one and the node of the first that is deep behind it, or None."""
         if self.one_body:
             return None  # what is behind a surface may be the other side of a film
-        for one, pinned, other in (
-            (self.leader, self.back_positions, self.follower),
-            (self.follower, self.positions, self.leader),
-        ):
+        for half, other_half in reversed(self.halves):
+            one = half.surface
+            other = other_half.surface
             reach = 2.0 * MOST_BEHIND * other.longest
-            depth, node = find_deepest(
-                one.line, pinned, other.line, other.boxes, other.group, reach
-            )
+            depth, node = find_deepest.entry(one.nodes, other.nodes, half.pins.positions, reach)
             # behind a line, yet beyond the other side of a thin body, is not in it
             if depth > MOST_BEHIND and is_inside(tuple(one.line[:, node]), other.block.nodes):
                 return one, other, int(node)
         return None
 
     def _measure_clearance(self) -> float:
-        one = self.leader
-        other = self.follower
-        longest = max(one.longest, other.longest)
+        longest = max(self.leader.longest, self.follower.longest)
         width = MOST_BULGE * longest
         most = FAR_SEARCH_FACES * longest if self.one_body else np.inf
-        near = measure_distance(
-            other.line, other.inner, one.line, one.boxes, one.group, self.asked, self.parts[0],
-            self.one_body, most,
-        )  # fmt: skip
-        if near > width and not self.is_one:
-            near = min(near, measure_distance(
-                one.line, one.inner, other.line, other.boxes, other.group, self.back_asked,
-                self.parts[1], self.one_body, most,
-            ))  # fmt: skip
+        near = np.inf
+        for half, other in self.halves[:1] if self.is_one else self.halves:
+            if near > width:
+                found = measure_distance.entry(
+                    half.surface.nodes, other.surface.nodes, half.pins, self.one_body, most
+                )
+                near = min(near, found)
         return near - width
 
-    def _cut(self, leader, follower, positions, back_positions, covered) -> None:
+    def _cut(self, leader, follower, positions, covered) -> None:
         self.count = fill_facets.entry(
-            leader, follower, positions, back_positions, self.straight, self._pins, covered,
-            self.facets,
-        )  # fmt: skip
+            leader, follower, *positions, self.straight, self._sorted_pins, covered, self.facets
+        )
 
     def _measure(self, line, other, moved, inverse_dt) -> None:
         rigid = self.leader.rigid
@@ -215,17 +223,19 @@ class Pair:
     def cut_middle(self, dt: float) -> None:
         """Facets at mid-time, both grids being known."""
         leader = self.leader
-        self._follow(self.follower.middle, leader.middle, self.positions, self._found, 0)
-        self._follow(leader.middle, self.follower.middle, self.back_positions, self._back_found, 1)
-        self._cut(leader.middle, self.follower.middle, self._found, self._back_found, self._covered)
+        for half, other in self.halves:
+            self._follow(half, half.surface.middle, other.surface.middle, half.pins.positions)
+        found = self.follow.pins.found, self.lead.pins.found
+        self._cut(leader.middle, self.follower.middle, found, self._covered)
         self._measure(leader.middle, self.follower.middle, leader.moved, 1.0 / dt)
         if self.curved:
             fill_radius_weighted_areas.entry(
                 leader.line, leader.new, 1.0, 1.0 / dt, self.facets, self.count
             )
 
-    def _follow(self, points, line, positions, found, side: int) -> None:
-        follow_pins(points, line, positions, self.parts[side], found)
+    def _follow(self, half: Half, points, line, positions) -> None:
+        """Fill `found` of the half's pins: positions of the points on a line near the old ones."""
+        follow_pins(points, line, positions, half.pins.part, half.pins.found)
 
     def measure_closed(self) -> tuple[int, float]:
         """Closed stretches and their length."""
@@ -235,8 +245,8 @@ class Pair:
 
     def forget_hits(self) -> None:
         """No node has come through the other line yet."""
-        self.hits.fill(-1.0)
-        self.back_hits.fill(-1.0)
+        self.follow.pins.hits.fill(-1.0)
+        self.lead.pins.hits.fill(-1.0)
         self.touched = False
 
     def find_lying(self) -> None:
@@ -251,11 +261,12 @@ class Pair:
         other = self.follower
         one_sizes = measure_sizes(one.line, one.inner)
         other_sizes = measure_sizes(other.line, other.inner)
-        self.hits[:] = find_lying(other.line, other_sizes, one.line, one_sizes)
+        hits = self.follow.pins.hits
+        hits[:] = find_lying(other.line, other_sizes, one.line, one_sizes)
         ends = [0, -1]
         found = find_lying(one.line[:, ends], one_sizes[ends], other.line, other_sizes)
-        self.back_hits[ends] = found
-        self.touched = bool((self.hits >= 0.0).any() or (found >= 0.0).any())
+        self.lead.pins.hits[ends] = found
+        self.touched = bool((hits >= 0.0).any() or (found >= 0.0).any())
 
     def may_touch(self, stretch: float) -> bool:
         """May nodes of one come to the other within so many steps as this one?"""
@@ -282,28 +293,16 @@ class Pair:
         return self.is_near and self.pinned > self.common
 
     def _find_touch(self, stretch: float, cuts: bool) -> float:
-        one = self.leader
-        other = self.follower
-        parts = self.parts
-        for surface in (one, other):
+        for half, _ in reversed(self.halves):
+            surface = half.surface
             surface.stretch(stretch)
-            fill_swept_boxes(surface.line, surface.further, surface.group, surface.swept)
-        none = self.covered[:0]
-        first = find_touches(
-            other.line, other.further, self.positions, none, self.back_positions, cuts, one.line,
-            one.further, one.swept, one.group, parts[0], self.hits,
-        )  # fmt: skip
-        return min(first, find_touches(
-            one.line, one.further, self.back_positions, self.covered, self.positions, cuts,
-            other.line, other.further, other.swept, other.group, parts[1], self.back_hits,
-        ))  # fmt: skip
+            nodes = surface.nodes
+            fill_swept_boxes(nodes.line, nodes.further, surface.group, nodes.swept)
+        return min([half.find_touch(other, cuts) for half, other in self.halves])
 
     def find_held(self) -> None:
         """Mark the nodes that the contact lays on the other line."""
-        find_held.entry(
-            self.facets, self.count, self.back_positions, self.held, self.back_held, self.inner,
-            self.closed_before,
-        )  # fmt: skip
+        find_held.entry(self.facets, self.count, self.lead.pins, self.follow.pins)
 
     def match(self) -> int:
         """Let new nodes of both lines that meet go half of the way each; how many have met.
@@ -311,10 +310,11 @@ class Pair:
         The ends' ways are in `shifts`, the follower's first.  Raises RegridFailure where one has
         gone far.
         """
-        places = np.maximum(self.positions, self.hits)
+        pins = self.follow.pins
+        places = np.maximum(pins.positions, pins.hits)
         one = self.follower.new
         other = self.leader.new
-        met = match(one, other, places, self.hits, self.held, self.shifts)
+        met = match(one, other, places, pins.hits, pins.held, self.shifts)
         if met < 0:
             raise self._tell_lost(self.follower)
         return met
@@ -333,17 +333,14 @@ class Pair:
         Those of the closed part, and those that have come through.  How many inner nodes moved;
         the ends' ways are in `shifts`.  Raises RegridFailure where one has gone far.
         """
-        line, mover = (self.follower, self.leader) if back else (self.leader, self.follower)
-        old, hits, found, held = (
-            (self.back_positions, self.back_hits, self._back_found, self.back_held)
-            if back
-            else (self.positions, self.hits, self._found, self.held)
-        )
-        self._follow(mover.new, line.new, np.maximum(old, hits), found, int(back))
-        others = self.positions if back else self.back_positions
-        moved = lay(
-            mover.new, line.new, mover.line, line.line, old, found, others, hits, held, self.inner,
-            self.closed_before, back, self.straight, part_back, self._ways, self.shifts[:2],
+        half, other = self.halves[int(back)]
+        pins = half.pins
+        mover = half.surface
+        target = other.surface
+        self._follow(half, mover.new, target.new, np.maximum(pins.positions, pins.hits))
+        moved = lay.entry(
+            mover.nodes, pins, target.nodes, other.pins.positions,
+            (back, self.straight, part_back), self._ways, self.shifts[:2],
         )  # fmt: skip
         if moved < 0:
             raise self._tell_lost(mover)
@@ -354,41 +351,47 @@ class PlanePair(Pair):
     """A plane that leads, and a surface that may come down on it."""
 
     straight = True
-    leader: Plane  # type: ignore[assignment]
 
     def __init__(self, plane: Plane, surface: Surface, curved: bool = False):
+        self.plane = plane
         super().__init__(plane, surface, curved=curved)  # type: ignore[arg-type]
-        self.asked[:] = True
-        for end, key_node in enumerate(surface.ends):
-            self.asked[-end] = key_node is None or not plane.holds(key_node)
-        self.common = int((~self.asked).sum())
+
+    def _count_common(self):
+        asked = self.follow.pins.asked
+        for end, key_node in enumerate(self.follower.ends):
+            asked[-end] = key_node is None or not self.plane.holds(key_node)
+        return int((~asked).sum())
 
     def find_lying(self):
         """The nodes that lie on the plane but for rounding."""
         self.forget_hits()
         other = self.follower
         sizes = measure_sizes(other.line, other.inner)
-        self.hits[:] = find_lying_on_plane(other.line, sizes, self.leader.line)
-        self.touched = bool((self.hits >= 0.0).any())
+        hits = self.follow.pins.hits
+        hits[:] = find_lying_on_plane(other.line, sizes, self.plane.line)
+        self.touched = bool((hits >= 0.0).any())
 
     def _measure_clearance(self):
-        return measure_clearance_of_plane(self.follower.line, self.leader.line, self.asked)
+        return measure_clearance_of_plane(
+            self.follower.line, self.plane.line, self.follow.pins.asked
+        )
 
     def _find_pins(self):
         return find_plane_pins(
-            self.follower.line, self.leader.line, ON_LINE_DISTANCE, self.positions
+            self.follower.line, self.plane.line, ON_LINE_DISTANCE, self.follow.pins.positions
         )
 
     def find_crossing(self):
         return None
 
-    def _follow(self, points, line, positions, found, side):
-        if side == 0:
-            follow_plane(points, line, positions, found)
+    def _follow(self, half, points, line, positions):
+        if half is self.follow:
+            follow_plane(points, line, positions, half.pins.found)
 
     def _find_touch(self, stretch, cuts):
         other = self.follower
         other.stretch(stretch)
+        pins = self.follow.pins
         return find_plane_touches(
-            other.line, other.further, self.positions, self.leader.line, self.hits
+            other.line, other.nodes.further, pins.positions, self.plane.line, pins.hits
         )

@@ -11,6 +11,7 @@ from hydro.block import Block
 from hydro.boundary import Axis, FreeSurface, Piston, Segment, Wall
 from hydro.contacts.friction import cover_surface
 from hydro.contacts.laying import fit_plane
+from hydro.contacts.lines import make_line_nodes
 from hydro.contacts.touch import fill_inner, measure_way
 from hydro.facets.lines import fill_slopes, fill_squares
 from hydro.facets.rows import make_line_arrays
@@ -38,17 +39,13 @@ class Surface:
         self.step = -1 if self.back else 1
         self.start = segment.last - 1 if self.back else segment.first
         self.group = max(GROUP_EDGES, -(-self.count // MOST_GROUPS))
-        boxes = 4, -(-self.count // self.group)
-        self.boxes = np.empty(boxes)
-        self.swept = np.empty(boxes)
-        nodes = 2, self.count + 1
-        self.line = np.empty(nodes)
-        self.new = np.empty(nodes)
-        self.further = np.empty(nodes)
+        self.nodes = make_line_nodes(self.count, self.group)
+        self.line = self.nodes.line
+        self.new = self.nodes.new
+        self.inner = self.nodes.inner
         # at mid-time, in the step
-        self.middle = np.empty(nodes)
-        self.moved = np.empty(nodes)
-        self.inner = np.empty(nodes)  # the next nodes inwards
+        self.middle = np.empty_like(self.line)
+        self.moved = np.empty_like(self.line)
         laws = np.repeat(np.reshape(self.block.wave_law, (3, 1)), self.count, axis=1)
         self.arrays = make_line_arrays(laws, self.rigid)
         self.bond = np.inf if self.rigid else float(getattr(segment, "bond", 0.0))
@@ -76,7 +73,7 @@ class Surface:
     def read(self) -> None:
         """Take up the present nodes."""
         self.line[...] = self.segment.line(self.block.nodes)[:, :: self.step]
-        fill_boxes(self.line, self.group, self.boxes)
+        fill_boxes(self.line, self.group, self.nodes.boxes)
         self.longest = fill_squares(self.line, self.arrays.squares)
         fill_inner(self.block.nodes, self.side, self.segment.start, self.back, self.inner)
 
@@ -93,9 +90,10 @@ class Surface:
 
     def stretch(self, stretch: float) -> None:
         """Fill `further`, the nodes after so many steps as this one."""
-        np.subtract(self.new, self.line, out=self.further)
-        self.further *= stretch
-        self.further += self.line
+        further = self.nodes.further
+        np.subtract(self.new, self.line, out=further)
+        further *= stretch
+        further += self.line
 
     def measure_way(self) -> None:
         """How far the node goes in this step that goes furthest, into `way`."""
@@ -192,9 +190,11 @@ class Plane:
         self.segments = list(segments)
         self.under = under
         self.arrays = make_line_arrays(np.zeros((3, 1)), rigid=True)
-        self.line = np.zeros((2, 2))
+        still = make_line_nodes(self.count, self.count)
+        self.line = still.line
         self.moved = np.zeros((2, 2))
         self.new = self.middle = self.line  # at rest
+        self.nodes = still._replace(new=self.line)
 
     def put_under(self, surface: Surface) -> Plane:
         """The same, with a face as long as a surface's, and positions that are not negative."""

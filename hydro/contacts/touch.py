@@ -42,12 +42,16 @@ def fill_swept_boxes(old, new, group, boxes):
 
 
 @kernel
-def measure_distance(points, inner, line, boxes, group, asked, part, one_body, most):
-    """Least distance from the points (2, n) that are `asked` (n,) to a line; at most `most`.
+def measure_distance(nodes, other, pins, one_body, most):
+    """Least distance from the nodes that are `asked` to the other line; at most `most`.
 
-    part: see `may_lie_on`.  Between surfaces of one body faces count that look at the points' line,
-    where there is no film between (`is_film`).
+    nodes, other: `LineNodes`; pins: `Pins` of the nodes.  Between surfaces of one body faces count
+    that look at the nodes' line, where there is no film between (`is_film`).
     """
+    points = nodes.line
+    line = other.line
+    boxes = other.boxes
+    group = other.group
     least = most * most
     count = line.shape[1] - 1
     last = points.shape[1]
@@ -55,10 +59,9 @@ def measure_distance(points, inner, line, boxes, group, asked, part, one_body, m
     near = 0
     for k in range(last):
         if k % group == 0:
-            near = find_groups(
-                points, points, k, min(last, k + group), boxes, least**0.5, groups
-            )  # fmt: skip
-        if near == 0 or not asked[k]:
+            stop = min(last, k + group)
+            near = find_groups(points, points, k, stop, boxes, least**0.5, groups)
+        if near == 0 or not pins.asked[k]:
             continue
         x, y = points[0, k], points[1, k]
         along_x, along_y = find_direction(points, k)
@@ -69,7 +72,7 @@ def measure_distance(points, inner, line, boxes, group, asked, part, one_body, m
             if away_x * away_x + away_y * away_y >= least:
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
-                if not may_lie_on(part, k, a):
+                if not may_lie_on(pins.part, k, a):
                     continue
                 _, away = project(line, a, x, y)
                 if away >= least:
@@ -77,7 +80,7 @@ def measure_distance(points, inner, line, boxes, group, asked, part, one_body, m
                 if one_body:
                     if not faces_each_other(line, a, along_x, along_y):
                         continue
-                    if is_film(inner, k, line, a, x, y):
+                    if is_film(nodes.inner, k, line, a, x, y):
                         continue
                 least = away
     return least**0.5
@@ -144,16 +147,20 @@ def find_touch(x, y, dx, dy, old, new, a):
 
 
 @kernel
-def find_touches(
-    old_points, new_points, pinned, covered, others, cuts, old, new, boxes, group, part, positions
-):  # fmt: skip
-    """The first touch of points (2, n) on a line within the step, 0 to 1; 2.0 without one.
+def find_touches(nodes, pins, other, others, cuts):
+    """The first touch of nodes on the other line on the way to `further`, 0 to 1; 2.0 without one.
 
-    pinned (n,), covered (n,) or (0,): points with a position on the line, and those marked, are not
-    looked at; with `cuts` neither are those close to a pin on their own line, of the positions
-    `others` (m + 1,) of the line's nodes.  positions (n,): where each point that comes through does
-    so, else -1.0.  part: see `may_lie_on`.
+    nodes, other: `LineNodes`; pins: `Pins` of the nodes.  Pins and covered nodes are not looked at;
+    with `cuts` neither are those close to a pin on their own line, of the positions `others` (m +
+    1,) of the other line's nodes.  Fills the hits: where each node that comes through does so.
     """
+    old_points = nodes.line
+    new_points = nodes.further
+    boxes = other.swept
+    group = other.group
+    old = other.line
+    new = other.further
+    positions = pins.hits
     first = 2.0
     count = old.shape[1] - 1
     last = old_points.shape[1]
@@ -169,7 +176,7 @@ def find_touches(
             stop = min(last, k + group)
             near = find_groups(old_points, new_points, k, stop, boxes, 0.0, groups)
         positions[k] = -1.0
-        if near == 0 or pinned[k] >= 0.0 or beside[k] or (covered.shape[0] > 0 and covered[k]):
+        if near == 0 or pins.positions[k] >= 0.0 or beside[k] or pins.covered[k]:
             continue
         x, y = old_points[0, k], old_points[1, k]
         x_new, y_new = new_points[0, k], new_points[1, k]
@@ -181,7 +188,7 @@ def find_touches(
             if max(y, y_new) < boxes[LEAST_Y, g] or min(y, y_new) > boxes[MOST_Y, g]:
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
-                if not may_lie_on(part, k, a):
+                if not may_lie_on(pins.part, k, a):
                     continue
                 time, at = find_touch(x, y, x_new - x, y_new - y, old, new, a)
                 if time < own:

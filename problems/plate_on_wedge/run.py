@@ -52,7 +52,7 @@ class PlateRun(Simulation):
         nodes = [0]
         points = [self.start]
         for pair in self.meetings.near:
-            parts = ((pair.follower, pair.positions), (pair.leader, pair.back_positions))
+            parts = [(half.surface, half.pins.positions) for half, _ in pair.halves]
             segments = [getattr(surface, "segment", None) for surface, _ in parts]
             sides = {segment.block: segment.side for segment in segments if segment}
             if sides.get(self.plate) != "j_min" or sides.get(self.wedge) != "j_max":

@@ -47,7 +47,7 @@ def find_end(simulation):
     """x of the contact's end that is furthest on; -inf where there is no contact."""
     found = -math.inf
     for pair in simulation.meetings.near:
-        nodes = pair.follower.line[:, pair.positions >= 0.0]
+        nodes = pair.follower.line[:, pair.follow.pins.positions >= 0.0]
         if nodes.size:
             found = max(found, float(nodes[0].max()))
     return found

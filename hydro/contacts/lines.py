@@ -1,0 +1,61 @@
+"""Records in which kernels take the lines of a pair: nodes, and what is known of each."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+BOTH, LATER, EARLIER = range(3)  # parts, see `may_lie_on` in `hydro.contacts.facets`
+
+
+class LineNodes(NamedTuple):
+    """Nodes of a surface's line (2, n + 1), with its outside on the right.
+
+    line: at the start of the step; new: at its end; further: after some steps like it; inner: the
+    next nodes inwards, at its start; boxes, swept (4, groups): around `group` faces each, of the
+    line and of its way to `further`.
+    """
+
+    line: np.ndarray
+    new: np.ndarray
+    further: np.ndarray
+    inner: np.ndarray
+    boxes: np.ndarray
+    swept: np.ndarray
+    group: int
+
+
+def make_line_nodes(faces: int, group: int) -> LineNodes:
+    """Arrays for a line of so many faces, with a box for each `group` of them."""
+    nodes = (np.zeros((2, faces + 1)) for _ in range(4))
+    boxes = (np.zeros((4, -(-faces // group))) for _ in range(2))
+    return LineNodes(*nodes, *boxes, group=group)
+
+
+class Pins(NamedTuple):
+    """What is known of the n + 1 nodes of one line of a pair, and where they lie on the other.
+
+    positions: of those that lie on it (pins), -1.0 for all others; found: the same on lines of a
+    later time; hits: where nodes have come through it in this step, else -1.0.  covered: lies it
+    between pins, on one face of the other line?  Of closed facets: held: the contact lays it on the
+    other line; inside: it is between two of them; stops: one ends there, counted along the leader.
+    asked: does it count, or have both lines this node?  part: see `may_lie_on`.
+    """
+
+    positions: np.ndarray
+    found: np.ndarray
+    hits: np.ndarray
+    covered: np.ndarray
+    held: np.ndarray
+    inside: np.ndarray
+    stops: np.ndarray
+    asked: np.ndarray
+    part: int
+
+
+def make_pins(nodes: int, part: int) -> Pins:
+    """No pins yet among so many nodes; all of them count."""
+    numbers = (np.full(nodes, -1.0) for _ in range(3))
+    marks = (np.zeros(nodes, dtype=np.bool_) for _ in range(4))
+    return Pins(*numbers, *marks, asked=np.ones(nodes, dtype=np.bool_), part=part)

@@ -20,7 +20,7 @@ DEEP_NODE_PART = 0.05
 MOST_LAID = 0.3  # of a face's length: nodes that have gone further into the other body fail
 # of a face's length: nodes of both lines that lie so near each other are a pair
 MATCHED_NODE_DISTANCE = 1e-6
-# of the way to the foot: an end of a contact that would go further to lie on a straight line does
+# of its way without that: the end of a contact that would go further to lie on a straight line does
 # not do so; the faces that hold each other's nodes overlap too little to give it a direction
 MOST_STRAIGHTENED_WAY = 10.0
 # of a face's length: a node whose foot is beside the line's end by no more is on the line
@@ -64,34 +64,27 @@ def find_held(facets, count, leader, follower):
 
 
 @compiled_once
-def straighten(points, k, start, x_free, y_free, x_foot, y_foot):
-    """The place of point `k` on the straight line from the point `start` to the free one.
+def straighten(points, k, line, pins, others, x_way, y_way):
+    """The way of node `k`, where the contact ends, to the straight line of both faces there.
 
-    Its foot where the line would take it much further than that: where both faces share next to
-    nothing they may meet at any angle, and a node would go a finite way in however short a step.
+    See `lay`.  The given way, of its other rules, where there is no such line, and where the line
+    would take the node much further: where both faces share next to nothing they may meet at any
+    angle, and a node would go a finite way in however short a step.
     """
-    x_start, y_start = points[0, start], points[1, start]
-    dx, dy = x_free - x_start, y_free - y_start
-    way = (points[0, k] - x_start) * dx + (points[1, k] - y_start) * dy
-    part = min(1.0, max(0.0, way / (dx * dx + dy * dy)))
-    x, y = x_start + part * dx, y_start + part * dy
-    square = (x - points[0, k]) ** 2 + (y - points[1, k]) ** 2
-    square_of_foot = (x_foot - points[0, k]) ** 2 + (y_foot - points[1, k]) ** 2
-    if square > MOST_STRAIGHTENED_WAY**2 * square_of_foot:
-        return x_foot, y_foot
-    return x, y
-
-
-@compiled_once
-def find_place(points, k, line, pins, others, back):
-    """Where on the other line, or beside it, node `k` belongs; see `lay`."""
     a = min(int(pins.found[k]), line.shape[1] - 2)
-    x, y = find_point(line, a, pins.found[k])
-    if back and pins.held[k]:
-        inwards = -1 if pins.stops[k] else 1
-        pin, free = (a + 1, a) if inwards < 0 else (a, a + 1)
-        if 0.0 < inwards * (others[pin] - k) < 1.0 and others[free] < 0.0:
-            x, y = straighten(points, k, k + inwards, line[0, free], line[1, free], x, y)
+    inwards = -1 if pins.stops[k] else 1
+    pin, free = (a + 1, a) if inwards < 0 else (a, a + 1)
+    if not 0.0 < inwards * (others[pin] - k) < 1.0 or others[free] >= 0.0:
+        return x_way, y_way
+    x_start, y_start = points[0, k + inwards], points[1, k + inwards]
+    dx, dy = line[0, free] - x_start, line[1, free] - y_start
+    along = (points[0, k] - x_start) * dx + (points[1, k] - y_start) * dy
+    part = min(1.0, max(0.0, along / (dx * dx + dy * dy)))
+    x = x_start + part * dx - points[0, k]
+    y = y_start + part * dy - points[1, k]
+    most = MOST_STRAIGHTENED_WAY**2 * (x_way * x_way + y_way * y_way)
+    if x * x + y * y > most:
+        return x_way, y_way
     return x, y
 
 
@@ -134,11 +127,11 @@ def lay(mover, pins, target, others, how, ways, ends):
         found = pins.found[k]
         if found < 0.0:
             continue
-        # the way to its place, across the face there and along it
+        # the way to its foot, across the face there and along it
         a = min(int(found), most - 1)
         dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
         length = (dx * dx + dy * dy) ** 0.5
-        x, y = find_place(points, k, line, pins, others, back)
+        x, y = find_point(line, a, found)
         x, y = x - points[0, k], y - points[1, k]
         outside = (y * dx - x * dy) / length
         beside = abs(x * dx + y * dy) / length
@@ -154,14 +147,16 @@ def lay(mover, pins, target, others, how, ways, ends):
         if not takes or (not straight and max(abs(x), abs(y)) <= STILL_NODE_DISTANCE * length):
             continue
         way = (x * x + y * y) ** 0.5
-        if way > MOST_LAID * length:
-            return -1
         # what was behind before goes back by a part
         if pins.hits[k] < 0.0 and pins.positions[k] >= 0.0:
             was = measure_distance_before(mover, k, target, pins.positions[k])
             if was > MATCHED_NODE_DISTANCE * length:
                 scale = max(0.0, 1.0 - (1.0 - part_back) * was / way)
                 x, y = scale * x, scale * y
+        if back and pins.held[k]:
+            x, y = straighten(points, k, line, pins, others, x, y)
+        if (x * x + y * y) ** 0.5 > MOST_LAID * length:
+            return -1
         if 0 < k < last:
             ways[0, k] = x
             ways[1, k] = y

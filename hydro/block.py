@@ -6,7 +6,8 @@ swaps them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import functools
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from hydro.carried.fields import CarriedField, read_fields
 from hydro.carried.transport import Transport
 from hydro.eos import EquationOfState
 from hydro.eos.base import check_eos, check_formulas
-from hydro.eos.conversion import compute_energy
+from hydro.eos.conversion import compute_energy, compute_temperature
 from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
 from hydro.formulas.reconstruction import DEFAULT_LIMITER
 from hydro.formulas.riemann import DEFAULT_FLUX
@@ -38,13 +39,14 @@ from regrid.measure.corners import compute_centres
 from regrid.measure.quality import find_bad_cells
 from regrid.sides import J_MIN, SIDE_NAMES, get_side, get_sides
 
-UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg"}
+UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg", "T": "K"}
 LONG_NAMES = {
     "rho": "density",
     "u": "velocity x",
     "v": "velocity y",
     "p": "pressure",
     "e": "specific internal energy",
+    "T": "temperature",
 }
 
 
@@ -349,36 +351,41 @@ class Block:
 
     @property
     def cell_fields(self) -> Mapping[str, np.ndarray]:
-        """Density, velocity, pressure and specific internal energy, each (ni, nj).
+        """Density, velocity, pressure and specific internal energy, each (ni, nj); carried fields.
 
-        Views of the state; the energy is computed at every access in the rows of this process, and
-        is 0 in the others.
+        Where the material has a heat capacity, then its temperature T.  Views of the state; energy
+        and temperature are computed at every access in the rows of this process, 0 in the others.
         """
         rho, u, v, p = self.state[:, 1:-1, 1:-1]
+        stored = {"rho": rho, "u": u, "v": v, "p": p} | self._list_carried()
+        computed = {"e": functools.partial(self._compute_in_own_rows, compute_energy)}
+        if self.eos.heat_capacity > 0.0:
+            computed["T"] = functools.partial(self._compute_in_own_rows, compute_temperature)
+        return CellFields(stored, computed)
+
+    def _compute_in_own_rows(self, compute: Callable[..., np.ndarray]) -> np.ndarray:
+        """What `compute` finds of the cells (ni, nj) of this process, 0 in the others."""
+        found = np.zeros((self.ni, self.nj))
         rows = slice(0, self.ni) if self.is_here else slice(self.rows.start, self.rows.stop)
+        self._fill(found, rows, self.state, compute)
+        return found
 
-        def compute_energy() -> np.ndarray:
-            e = np.zeros(rho.shape)
-            self._fill_energy(self.state, rows, e)
-            return e
-
-        stored = {"rho": rho, "u": u, "v": v, "p": p} | self._list_carried(self.carried)
-        return CellFields(stored, compute_energy)
-
-    def _list_carried(self, values: np.ndarray) -> dict[str, np.ndarray]:
-        """Views (ni, nj) of the carried fields by name, of their values (n, ni + 2, nj + 2)."""
-        inside = values[:, 1:-1, 1:-1]
+    def _list_carried(self) -> dict[str, np.ndarray]:
+        """Views (ni, nj) of the carried fields by name."""
+        inside = self.carried[:, 1:-1, 1:-1]
         return {field.name: inside[n] for n, field in enumerate(self.carried_fields)}
 
     def compute_fields(self, state: np.ndarray) -> dict[str, np.ndarray]:
         """`cell_fields` of a state (4, ni + 2, nj + 2) of this block: views, and a new `e`."""
         rho, u, v, p = state[:, 1:-1, 1:-1]
         e = np.empty(rho.shape)
-        self._fill_energy(state, slice(0, self.ni), e)
+        self._fill(e, slice(0, self.ni), state, compute_energy)
         return {"rho": rho, "u": u, "v": v, "p": p, "e": e}
 
-    def _fill_energy(self, state: np.ndarray, rows: slice, e: np.ndarray) -> None:
-        """Fill these rows of `e` (ni, nj): specific internal energies [J/kg] of a state.
+    def _fill(
+        self, found: np.ndarray, rows: slice, state: np.ndarray, compute: Callable[..., np.ndarray]
+    ) -> None:
+        """Fill these rows of an array (ni, nj) with what `compute` finds of a state.
 
         A few rows at a time, so that intermediate arrays fit into the cache.
         """
@@ -386,13 +393,12 @@ class Block:
         others = [self.get_inside(name) for name in of.HELD_ARRAYS if name != "state"]
         for first in range(rows.start, rows.stop, SLAB_ROWS):
             slab = slice(first, min(first + SLAB_ROWS, rows.stop))
-            e[slab] = compute_energy(self.eos, inside[:, slab], *(held[slab] for held in others))
+            found[slab] = compute(self.eos, inside[:, slab], *(held[slab] for held in others))
 
-    def compute_energy_at(self, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-        """Specific internal energies [J/kg] of the cells [i, j], shaped as i."""
-        return compute_energy(
-            self.eos, *(self.get_inside(name)[..., i, j] for name in of.HELD_ARRAYS)
-        )
+    def compute_at(self, name: str, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+        """Specific internal energies "e" [J/kg], temperatures "T" [K] of the cells [i, j]."""
+        compute = {"e": compute_energy, "T": compute_temperature}[name]
+        return compute(self.eos, *(self.get_inside(held)[..., i, j] for held in of.HELD_ARRAYS))
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
         """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2).

@@ -168,9 +168,6 @@ class Output(DeckTable, kw_only=True):
         return bool(self.fields) or self.precision != "double" or self.compression > 0
 
 
-Field = Literal["rho", "u", "v", "p", "e", "c"]
-
-
 Coordinate = Annotated[float, Meta(ge=-1e12, le=1e12)]  # [m]
 
 
@@ -182,9 +179,11 @@ class Gauge(DeckTable, kw_only=True):
     to: key(tuple[Coordinate, Coordinate] | None, "a line's last place [x, y] [m]") = None
     count: key(int, "points of a line, evenly from `at` to `to`", ge=1, le=10000) = 1
     moves: key(bool, "true: moves with the material; false: fixed in space") = False
-    fields: key(list[Field], "what is recorded; c is the sound speed", min_length=1) = (
-        msgspec.field(default_factory=lambda: ["rho", "u", "v", "p"])
-    )
+    fields: key(
+        list[str],
+        "what is recorded: rho, u, v, p, e, the sound speed c, the temperature T, carried fields",
+        min_length=1,
+    ) = msgspec.field(default_factory=lambda: ["rho", "u", "v", "p"])
 
 
 class VoidFill(DeckTable, kw_only=True):

@@ -20,7 +20,7 @@ import numpy as np
 from hydro.block import Block
 from problems.deck import Gauge, place_gauges
 from problems.evolution import BlockView, Evolution, get_material
-from regrid.errors import BadInput
+from regrid.errors import BadInput, suggest
 from regrid.measure.cells import OUTSIDE_BLOCK, find_places
 from runs.store.history import HistoryWriter
 
@@ -145,9 +145,23 @@ def place_points(points: Sequence[Gauge], blocks: Sequence[BlockView]) -> Places
 
 
 def _check_fields(points: Sequence[Gauge], blocks: Sequence[BlockView]) -> None:
-    """Raise BadInput if a gauge needs a field that a block does not have."""
+    """Raise BadInput if a gauge needs a field that a block does not have.
+
+    Carried fields and temperatures may be missing in some blocks of a flow, not in all of them.
+    """
+    if not points:
+        return
+    flows = [block for block in blocks if isinstance(block, Block)]
+    known = {"c", *(name for block in flows for name in block.cell_fields)}
+    for point in points:
+        for name in point.fields if flows else ():
+            if name not in known:
+                raise BadInput(
+                    f"deck: gauge {point.name!r}: there is no field {name!r}"
+                    f"{suggest(name, known)}; there are: {', '.join(sorted(known))}"
+                )
     for block in blocks:
-        if isinstance(block, Block) or not points:
+        if isinstance(block, Block):
             continue
         if block.nodes.shape[0] != 2:
             raise BadInput("deck: gauge: gauges are for plane and axisymmetric flows")
@@ -171,10 +185,13 @@ def take_cells(
     rho, u, v, p = block.state[:, i + 1, j + 1]
     found = {"rho": rho, "u": u, "v": v, "p": p}
     for name in fields:
-        if name == "e":
-            found["e"] = block.compute_energy_at(i, j)
+        if name in ("e", "T") and name in block.cell_fields:
+            found[name] = block.compute_at(name, i, j)
         elif name == "c":
             found["c"] = block.eos.sound_speed(rho, p)
+        elif name not in found:
+            fields = block.cell_fields
+            found[name] = fields[name][i, j] if name in fields else np.full(np.shape(i), np.nan)
     return found
 
 

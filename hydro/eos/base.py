@@ -17,16 +17,18 @@ pulled a hundred times as hard as the solid.
 
 from __future__ import annotations
 
+import copy
 import functools
 import inspect
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, fields
 from functools import cached_property
 from numbers import Real
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from hydro.eos.temperature import compute_solid_temperature
 from regrid.errors import BadInput
 from regrid.jit import choose, inlined
 
@@ -65,6 +67,9 @@ class EquationOfState:
     positive: ClassVar[tuple[str, ...]] = ()  # parameters that must be greater than 0
     # eta = 1 - rho0/rho where a mixture of two phases starts and ends on the Hugoniot
     mixed_region: ClassVar[tuple[float, float] | None] = None
+    # whether it knows the temperature of a material whose heat capacity [J/(kg K)] is given
+    has_temperature: ClassVar[bool] = False
+    heat_capacity: ClassVar[float] = 0.0  # of one material: see `with_heat_capacity`
     limits: ClassVar[str] = ""  # a sentence on the states that there are, where that can be said
     failure: ClassVar[str] = "density or sound speed is no longer positive"
     failure_cause: ClassVar[str] = "no-state"  # its id in `runs.early_end.causes`
@@ -112,6 +117,24 @@ class EquationOfState:
         sides whatever the law.
         """
         raise NotImplementedError
+
+    def with_heat_capacity(self, value: float) -> Self:
+        """The same with a constant heat capacity [J/(kg K)], by which it has a temperature.
+
+        Raises BadInput where it is not positive, and for a kind that has no temperature.
+        """
+        if not self.has_temperature:
+            raise BadInput(f"{self.kind}: it has no temperature, so no heat_capacity")
+        number = float(value) if isinstance(value, int | float) else np.nan
+        if not 0.0 < number < np.inf:
+            raise BadInput(f"heat_capacity is {value!r}; it must be a positive number of J/(kg K)")
+        found = copy.copy(self)
+        object.__setattr__(found, "heat_capacity", number)
+        return found
+
+    def temperature(self, rho, e):
+        """Temperature [K] from density and specific internal energy, where it has one: F16."""
+        return compute_solid_temperature(self, np.asarray(rho, float), np.asarray(e, float))
 
     def compute_second_part(self, rho) -> np.ndarray:
         """Part of a high-pressure phase, 0 to 1, at the density `rho` [kg/m³]; here 0."""

@@ -126,6 +126,15 @@ def compute_energy(eos: EquationOfState, state: np.ndarray, void_energy) -> np.n
     return eos.energy(state[RHO], state[P]) + void_energy
 
 
+def compute_temperature(eos: EquationOfState, state: np.ndarray, void_energy) -> np.ndarray:
+    """Temperatures (...) [K] of a material with a heat capacity; voids have none of their own."""
+    rho = state[RHO]
+    e = compute_energy(eos, state, void_energy)
+    rho0 = getattr(eos, "rho0", None)
+    pieces = rho if rho0 is None else np.where(void_energy != 0.0, rho0, rho)
+    return eos.temperature(pieces, e)
+
+
 def compute_conserved(eos: EquationOfState, state: np.ndarray, void_energy=0.0) -> np.ndarray:
     """Density, momentum x, y and total energy per volume (4, ...)."""
     to_conserved = make_conversion(type(eos)).to_conserved

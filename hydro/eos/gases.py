@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from hydro.eos.base import EquationOfState
 from regrid.errors import BadInput
 from regrid.jit import inlined
@@ -50,6 +52,7 @@ class IdealGas(EquationOfState):
 
     kind = "ideal-gas"
     opens_voids = False
+    has_temperature = True
     pressure_part = staticmethod(pressure)
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
@@ -65,6 +68,10 @@ class IdealGas(EquationOfState):
         """Exact for this gas: a = b = (gamma + 1)/4, and no impedance of its own."""
         slope = 0.25 * (self.gamma + 1.0)
         return slope, slope, 0.0
+
+    def temperature(self, rho, e):
+        """Temperature [K]: e = c_v T."""
+        return np.asarray(e, float) / self.heat_capacity
 
 
 @inlined
@@ -99,6 +106,7 @@ class StiffenedGas(EquationOfState):
     p_inf: float = 6.0e8
 
     kind = "stiffened-gas"
+    has_temperature = True
     failure_cause = "cold-gas"
     pressure_part = staticmethod(stiffened_pressure)
     energy_part = staticmethod(stiffened_energy)
@@ -116,3 +124,7 @@ class StiffenedGas(EquationOfState):
     def wave_law(self) -> tuple[float, float, float]:
         """As of an ideal gas."""
         return 0.25 * (self.gamma + 1.0), 0.25 * (self.gamma + 1.0), 0.0
+
+    def temperature(self, rho, e):
+        """Temperature [K]: e = c_v T + p_inf/rho."""
+        return (np.asarray(e, float) - self.p_inf / np.asarray(rho, float)) / self.heat_capacity

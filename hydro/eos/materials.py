@@ -54,6 +54,7 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
     eos_class = EQUATIONS_OF_STATE[numbers.pop("eos")]
     source = numbers.pop("source")
     names = tuple(numbers.pop("names", ()))
+    heat_capacity = numbers.pop("heat_capacity", None)
     rho0 = numbers["rho0"]
     if "rho0" not in _list_parameters(eos_class):
         del numbers["rho0"]
@@ -61,6 +62,8 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
         numbers["path"] = str(folder / str(numbers["path"]))
     try:
         eos = eos_class(**numbers)
+        if heat_capacity is not None:
+            eos = eos.with_heat_capacity(heat_capacity)
     except BadInput as error:
         raise BadInput(f"{where}: {error}") from None
     return Material(eos, float(rho0), source, names)
@@ -88,7 +91,7 @@ def _find_mistakes(table: dict) -> Iterator[str]:
     eos_class = EQUATIONS_OF_STATE[kind]
     wanted = _list_parameters(eos_class)
     for key, value in table.items():
-        if key in ("eos", "source"):
+        if key in ("eos", "source", "heat_capacity"):
             continue
         if key == "names":
             if not isinstance(value, list) or not all(isinstance(one, str) for one in value):

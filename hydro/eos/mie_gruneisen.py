@@ -102,6 +102,7 @@ class MieGruneisen(EquationOfState):
     strength: float = 1.0e9
 
     kind = "mie-gruneisen"
+    has_temperature = True
     positive = ("rho0", "c0", "s", "gruneisen", "strength")
     pressure_part = staticmethod(pressure)
     energy_part = staticmethod(energy)

@@ -173,6 +173,7 @@ class PhaseTransition(EquationOfState):
 
     has_kinks = True
     kind = "phase-transition"
+    has_temperature = True
     positive = (
         "rho0", "c0", "s", "gruneisen", "strength", "rho0_second", "c0_second", "s_second",
         "gruneisen_second", "onset", "complete",

@@ -1,4 +1,4 @@
-"""Fields of a block's cells; energy and sound speed are computed only when they are used.
+"""Fields of a block's cells; energy, temperature, sound speed are computed when they are used.
 
 Reading the names or the density at every step therefore costs no equation of state.
 """
@@ -17,7 +17,6 @@ from regrid.errors import BadInput
 from regrid.jit import kernel
 
 SLAB_ROWS = 64  # rows for which something is computed at a time
-ENERGY = "e"
 
 
 def check_first_state(name: str, eos: EquationOfState, state: np.ndarray) -> None:
@@ -40,27 +39,29 @@ def check_first_state(name: str, eos: EquationOfState, state: np.ndarray) -> Non
 
 
 class CellFields(Mapping[str, np.ndarray]):
-    """Density, velocity, pressure, each (ni, nj), and the specific internal energy [J/kg].
+    """Fields of a block's cells by name, each (ni, nj): those that it has, then others.
 
-    stored: the first four; compute_energy: gives the last.
+    stored: the arrays that the block has; computed: by name, what gives the others at each access.
     """
 
-    def __init__(self, stored: Mapping[str, np.ndarray], compute_energy: Callable[[], np.ndarray]):
+    def __init__(
+        self, stored: Mapping[str, np.ndarray], computed: Mapping[str, Callable[[], np.ndarray]]
+    ):
         self._stored = stored
-        self._compute_energy = compute_energy
+        self._computed = computed
 
     def __getitem__(self, name: str) -> np.ndarray:
-        return self._compute_energy() if name == ENERGY else self._stored[name]
+        return self._computed[name]() if name in self._computed else self._stored[name]
 
     def __iter__(self) -> Iterator[str]:
         yield from self._stored
-        yield ENERGY
+        yield from self._computed
 
     def __len__(self) -> int:
-        return len(self._stored) + 1
+        return len(self._stored) + len(self._computed)
 
     def __contains__(self, name: object) -> bool:
-        return name == ENERGY or name in self._stored
+        return name in self._computed or name in self._stored
 
 
 @functools.cache

@@ -432,7 +432,7 @@ def draw_panel(axes, t, history, names: Panel, units) -> None:
     axes.grid(alpha=0.3)
 
 
-UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg", "c": "m/s"}
+UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg", "c": "m/s", "T": "K"}
 # gauges with a line in the legend; more are distinguished by a row of colours
 MOST_NAMED_GAUGES = 10
 LEGEND_COLUMNS = 3
@@ -475,7 +475,7 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
         largest = max(np.abs(v[np.isfinite(v)]).max(initial=0.0) for v in values)
         is_round_off = largest <= SHOWN_ROUND_OFF * speed and field in fields.VELOCITIES
         size = speed if is_round_off else float(largest)
-        scale, field_unit = pick_prefix(size, UNITS[field] if in_units else "1")
+        scale, field_unit = pick_prefix(size, UNITS.get(field, "1") if in_units else "1")
         if is_round_off:
             axes.set_ylim(-FLAT_MARGIN * size * scale, FLAT_MARGIN * size * scale)
         for (k, point), curve in zip(writers, values, strict=True):

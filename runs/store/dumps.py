@@ -50,6 +50,7 @@ LONG_NAMES = {
     "p": "pressure",
     "e": "specific internal energy",
     "c": "sound speed",
+    "T": "temperature",
     "u_node": "velocity of the nodes in x",
     "v_node": "velocity of the nodes in y",
 }

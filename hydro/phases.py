@@ -77,7 +77,7 @@ def update(block: Block, dt: float, threads: int = 1) -> None:
     block.totals.start_update()
     advance = kernels.flow.advance_threaded if threads > 1 else kernels.flow.advance
     advance.entry(
-        _list_old(block), (*_list_new(block), block.transport.masses), block.rim.rows, dt,
+        _list_old(block), (*_list_new(block), *block.transport.masses), block.rim.rows, dt,
         block.parameters, kernels.scratch, block.tiles, block.totals.of_tiles,
     )  # fmt: skip
     if block.transport.count:

@@ -95,8 +95,7 @@ def make_flow_kernels(
     def advance_tile(old, new, rim, dt, parameters, tile, Z, tile_totals):
         """Advance the cells of one tile; see `advance` for the arguments."""
         state, void_energy, nodes = old
-        state_new, void_energy_new, nodes_new, rates_new, crowding_new, masses = new
-        mass_i, mass_j = masses
+        state_new, void_energy_new, nodes_new, rates_new, crowding_new, mass_i, mass_j = new
         keeps_masses = mass_i.shape[0] > 1
         inverse_dt = 1.0 / dt if dt > 0.0 else 0.0
         ni = nodes.shape[1] - 1

@@ -236,6 +236,8 @@ class PlateRun(Simulation):
         from scipy.spatial.distance import cdist  # slow to load
 
         free = self.get_free_line()
+        if free.shape[1] < 2:
+            return None  # all of the plate's lower side lies on the wedge
         problem = self.problem
         steps = np.hypot(*np.diff(free))
         spacing = np.minimum(np.append(steps, steps[-1]), np.append(steps[0], steps))

@@ -130,6 +130,13 @@ def make_flying(speed=3000.0, **options) -> PlateOnWedge:
     return make_problem(drive={"kind": "moving", "speed": speed}, **options)
 
 
+def test_a_plate_that_lies_on_the_wedge_as_a_whole_has_met_nothing_else(monkeypatch):
+    run = make_flying(gap=1e-3, cells=(16, 4)).build()
+    monkeypatch.setattr(run, "count_contact", lambda: run.plate.ni)
+    assert run.get_free_line().shape == (2, 1)
+    assert run.find_closure() is None
+
+
 @pytest.mark.parametrize("counts, lengths", [((49, 33), (30.0, 20.0)), ((97, 65), (12.0, 38.0))])
 @pytest.mark.parametrize("refinement", [1.2, 3.0, 8.0])
 def test_refined_laws_meet_in_one_short_step(counts, lengths, refinement):

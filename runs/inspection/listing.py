@@ -6,6 +6,7 @@ import re
 import textwrap
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 from problems.problem import check_memory
 from problems.problem_file import is_problem_file
@@ -93,24 +94,36 @@ def describe_materials(name: str | None = None) -> str:
     from hydro.eos.materials import LIBRARY, find_material, find_name, read_materials
 
     if name is None:
-        lines = [f"{'material':18}{'kind':18}{'density':>14}   other names"]
+        head = f"{'material':18}{'kind':18}{'density':>14}{'c0':>12}{'s':>8}"
+        lines = [f"{head}   other names"]
         for one, material in read_materials(LIBRARY).items():
             density = f"{material.rho0:g} kg/m3"
-            others = ", ".join(material.names)
-            lines.append(f"{one:18}{material.eos.kind:18}{density:>14}   {others}".rstrip())
+            line = f"{one:18}{material.eos.kind:18}{density:>14}{describe_hugoniot(material.eos)}"
+            lines.append(f"{line}   {', '.join(material.names)}".rstrip())
+        words = "c0, s: of a straight Hugoniot, Us = c0 + s up"
         usage = "shockgrid materials NAME: its parameters and their source"
-        return "\n".join([*lines, "", usage])
+        return "\n".join([*lines, "", words, usage])
     material = find_material(name)
     lines = [f"{find_name(name)}: {material.eos.kind}"]
     lines[0] += f", also {', '.join(material.names)}" if material.names else ""
     numbers = {
         one.name: getattr(material.eos, one.name) for one in fields(material.eos) if one.init
     }
+    if material.eos.heat_capacity > 0.0:
+        numbers["heat_capacity"] = material.eos.heat_capacity
     for one, value in ({"rho0": material.rho0} | numbers).items():
         lines.append(f"  {one} = {value:g}" if isinstance(value, float) else f"  {one} = {value}")
     return "\n".join(
         [*lines, "", *textwrap.wrap(f"source: {' '.join(material.source.split())}", 90)]
     )
+
+
+def describe_hugoniot(eos: Any) -> str:
+    """Two columns: c0 and s of a straight Hugoniot, empty for materials that have another."""
+    if not hasattr(eos, "c0"):
+        return f"{'':20}"
+    speed = f"{eos.c0:g} m/s"
+    return f"{speed:>12}{eos.s:>8g}"
 
 
 def describe_deck(path: Path) -> str:

@@ -269,6 +269,7 @@ class Meetings:
                 pair.rub(dt)
         for surface in self._sides:
             surface.write_flux()
+            surface.flow_along()
 
     def accept(self) -> None:
         """The step stands: count what closed and opened, and how far lines may have come."""

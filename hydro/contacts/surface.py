@@ -18,7 +18,7 @@ from hydro.facets.rows import make_line_arrays
 from hydro.motion.key_nodes import KeyNode
 from hydro.motion.line import Role
 from hydro.motion.sides import Sides
-from hydro.perimeter.contacts import fill_ghosts_from_faces
+from hydro.perimeter.contacts import fill_ghosts_from_faces, flow_along
 from regrid.measure.crossings import GROUP_EDGES, fill_boxes
 from regrid.sides import SIDE_NAMES, find_node
 
@@ -148,6 +148,12 @@ class Surface:
     def fill_ghosts(self) -> None:
         """Ghosts beyond the faces from the states there."""
         fill_ghosts_from_faces(self.block.rim.rows, self.segment.spans)
+
+    def flow_along(self) -> None:
+        """Let material flow along the line with its nodes, where they are respaced round bends."""
+        if self.moving_line.role is Role.ON_BODY:
+            speeds = self.moving_line.beside_contact
+            flow_along(self.block.rim.rows, speeds, self.segment.first)
 
     def press(self, pressure: float, first: int = 0, last: int | None = None) -> None:
         """Put the pressure in a void beside faces first..last - 1 of the line."""

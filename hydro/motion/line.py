@@ -117,6 +117,21 @@ def limit_spreading(moved, rim, first, dt, out):
                 out[c, k] = moved[c, k] + part * (out[c, k] - moved[c, k])
 
 
+@compiled_once(allocates=False)
+def move_beside_neighbours(moved, arc, positions, out):
+    """Inner nodes of `out` (2, n), moved along the line `moved` without area.
+
+    arc, positions (n,): where each is along the line and where it is to be.  A node that goes
+    parallel to the chord between its neighbours takes nothing from the body and adds nothing.  On
+    the line's own chords it would cut every convex tip, and press on it like a piston.  Where the
+    line turns back it goes less far.  Theory F16.9.
+    """
+    for k in range(1, moved.shape[1] - 1):
+        way = (positions[k] - arc[k]) / (arc[k + 1] - arc[k - 1])
+        for c in range(2):
+            out[c, k] = moved[c, k] + way * (moved[c, k + 1] - moved[c, k - 1])
+
+
 @kernel
 def carry_line(nodes, nodes_new, span, rim, dt, arrays, shaping, walls):
     """Move a line's nodes (`move_line`, where dt > 0), spread them and write them to `nodes_new`.
@@ -124,14 +139,15 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, shaping, walls):
     arrays: damping, what the nodes move beside the contact velocities [m/s] and moved nodes (2, n),
     spacing (n,), scratch for another (n,), turning (n - 1,), scratch (8, n).  shaping: how far to
     the spacing the nodes go, `relax` (not spread where it is 0, nor written below), is the curve a
-    spline, is it periodic, is it closed, and the shortest segment that turning asks for (0: none,
-    as of `fill_turning_law`).  walls at both ends as in `fill_redistributed`.  Returns the
-    stretching, and what that returns: below 0 if all is well.  No node is spread faster than sound:
-    in a step that a thin cell elsewhere makes very short, a part of the way would be a jump.
+    spline, do nodes move beside their neighbours' chords, is it periodic, is it closed, and the
+    shortest segment that turning asks for (0: none, as of `fill_turning_law`).  walls at both ends
+    as in `fill_redistributed`.  Returns the stretching, and what that returns: below 0 if all is
+    well.  No node is spread faster than sound: in a step that a thin cell elsewhere makes very
+    short, a part of the way would be a jump.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     damping, beside, moved, spacing, turned, turning, work = arrays
-    relax, spline, periodic, closed, shortest = shaping
+    relax, spline, beside_chords, periodic, closed, shortest = shaping
     side, start, count, first, _ = span
     stretching = 0.0
     if dt > 0.0:
@@ -159,6 +175,8 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, shaping, walls):
         failed = curves.fill_redistributed(
             moved, (wanted, relax), ends, spline, periodic, walls, work[:6], out
         )
+        if beside_chords and failed < 0:
+            move_beside_neighbours(moved, work[0], work[1], out)
         if dt > 0.0:
             limit_spreading(moved, rim, first, dt, out)
             for c in range(2):
@@ -247,7 +265,8 @@ class Shaping(NamedTuple):
     """How a line is kept in shape.
 
     `relax`: part of the way to its spacing that the nodes go along the line in a full step;
-    `shape` of the line between nodes, "chord" or "spline".  None: that of the flow's `LineRule`.
+    `shape` of the line between nodes, "chord" or "spline", or "beside", parallel to the chords
+    between their neighbours.  None: that of the flow's `LineRule`.
     """
 
     relax: float | None
@@ -257,8 +276,8 @@ class Shaping(NamedTuple):
 ROLES: dict[Role, Shaping] = {
     Role.WITH_ENDS: Shaping(0.0, None),
     Role.FLOWING: Shaping(None, None),
-    # a spline would swing about the end of the contact with the body
-    Role.ON_BODY: Shaping(None, "chord"),
+    # a spline would swing about the end of the contact with the body, chords cut a jet's tip
+    Role.ON_BODY: Shaping(None, "beside"),
     # a spline would loop in the fold above the tip of a jet
     Role.AT_CONTACT: Shaping(FOLLOWED_WAY_PART, "chord"),
     Role.OPPOSITE: Shaping(FOLLOWED_WAY_PART, "chord"),
@@ -396,7 +415,10 @@ class Line:
 
     def _carry(self, relax: float, shape: str, dt: float) -> float:
         block = self.segment.block
-        shaping = relax, shape == "spline", self.period is not None, self.closed, self.shortest
+        shaping = (
+            relax, shape == "spline", shape == "beside", self.period is not None, self.closed,
+            self.shortest,
+        )  # fmt: skip
         arrays = (
             self.damping, self.beside_contact, self.moved, self.spacing, self._turned_spacing,
             self._turning, self._work,

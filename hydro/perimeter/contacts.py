@@ -188,6 +188,8 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
     for k in range(count):
         left += 0.5 * (gain[k] + gain[count - 1 - k])
         whole += 0.5 * (size[k] + size[count - 1 - k])
+    if whole == 0.0:  # all of it lies on the axis
+        return
     # the sums from both ends: the same for the mirror image
     before = 0.0
     after = 0.0
@@ -228,6 +230,12 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
                         rim[row + on.CARRIED_TRACE, m] - rim[row + on.CARRIED_CELL, first + cell]
                     )
                     rim[row + on.CARRIED_FLUX, first + cell] += part * rho * beyond
+
+
+@kernel
+def flow_along(rim, speeds, first):
+    """`add_layer_flux` along a line with two ends; speeds (2, n + 1)."""
+    add_layer_flux(rim, speeds, False, False, first)
 
 
 @kernel

@@ -16,6 +16,7 @@ from hydro.perimeter import contacts
 from hydro.perimeter.strips import make_side_kernels
 from hydro.simulation import Simulation
 from hydro.sources import make_gravity
+from hydro.workers import LEAST_INSIDE
 from regrid.errors import RegridFailure, RunFailure
 from regrid.measure.quality import find_bad_cells
 from regrid.registry import make_regridder
@@ -99,9 +100,11 @@ def test_one_signature_a_kernel(eos_class):
     assert max(counts.values()) == 1, counts
 
 
+@pytest.mark.kernels
 def test_threads_give_the_same_bits():
-    one = make_pair(40, 140)
-    two = make_pair(40, 140, threads=2)
+    one = make_pair(48, 140)
+    two = make_pair(48, 140, threads=2)
+    assert all(block.ni * block.nj >= LEAST_INSIDE for block in two.blocks), "one thread is taken"
     march(one, 6)
     march(two, 6)
     assert get_bits(one) == get_bits(two)

@@ -27,6 +27,7 @@ from hydro.boundary import put
 from hydro.eos import IdealGas
 from hydro.links import join
 from hydro.motion.line import LineRule
+from hydro.motion.smoothing import THICK_CELLS
 from problems.deck import MOST_CELLS, Deck, Limiter, Output, Regrid, RunControl, key
 from problems.initial_states import make_plane_grid, mix_states, put_walls
 from problems.pictures import Colours, draw_field, draw_grid, find_dump, make_panels
@@ -47,6 +48,9 @@ HALF_HEIGHT = 0.0445
 CORE_PART = 0.5
 CORNER_PART = 0.68
 CROWN_PART = 0.7
+# Smoothing length of the surface over the radius.  With 0.75 of a cell alone, finer cells follow
+# ever finer lobes of the unstable surface, until one runs over the end of a border of blocks.
+LEAST_SMOOTHING_RADII = 0.05
 # Degrees from the axis where the three blocks around the bubble meet: the seam that leads from
 # there to the box's corner has to stay clear of the lobe that curls over it.
 JOINT = {"helium": 70.0, "R22": 38.0}
@@ -130,7 +134,12 @@ class ShockBubbleDeck(Deck, kw_only=True):
     gas: key(Literal["helium", "R22"], "in the bubble") = "helium"
     mach: key(float, "Mach number of the shock in air", ge=1.001, le=5) = 1.22
     cells: key(int, "cells along 45 degrees of the bubble's surface", ge=4, le=MOST_CELLS) = 12
-    thickness: key(float | None, "smoothing length. If left out: 0.75 of a cell", ge=0, le=1) = None
+    thickness: key(
+        float | None,
+        "smoothing length. If left out: 0.75 of a cell, at least 0.05 radii",
+        ge=0,
+        le=1,
+    ) = None
     limiter: Limiter = "van-leer"
 
 
@@ -203,6 +212,13 @@ class ShockBubble(Problem):
             grids[name] = grids[name][:, :, ::-1] if flip else grids[name][:, ::-1, :]
         return {name: np.ascontiguousarray(nodes) for name, nodes in grids.items()}
 
+    def choose_thickness(self, surface: list[np.ndarray]) -> float:
+        """Smoothing length [m] of the bubble's surface, whose parts are lines of nodes (2, n)."""
+        if self.deck.thickness is not None:
+            return self.deck.thickness
+        segments = np.concatenate([np.hypot(*np.diff(line, axis=1)) for line in surface])
+        return max(THICK_CELLS * float(segments.mean()), LEAST_SMOOTHING_RADII * BUBBLE_RADIUS)
+
     def estimate_cells(self) -> int:
         return 34 * (self.deck.cells + 2) ** 2
 
@@ -228,10 +244,11 @@ class ShockBubble(Problem):
             for kind, one, side, other, other_side in LINKS
         ]
         put_walls(*blocks.values())
+        surface = [blocks[name].nodes[:, row] for name, row in OUTLINE.items()]
         simulation = self.simulate(
             blocks.values(),
             links,
-            line_rule=LineRule(thickness=deck.thickness),
+            line_rule=LineRule(thickness=self.choose_thickness(surface)),
             measure_block=lambda block: (float(block.volume.sum()),),
         )
         west_seam, east_seam, west, east, _, top = (link.leader for link in links[:6])

@@ -19,6 +19,7 @@ from hydro.motion.sides import Sides, Span
 from hydro.ranks.blocks import Blocks
 from hydro.sliding.polygons import LEAST_VOLUME_LEFT, make_find_crushed
 from regrid.errors import BadInput, Place, RegridFailure, RunFailure
+from regrid.measure.crossings import find_crossing
 from regrid.measure.quality import find_bad_cells, measure_worst, say_not_convex
 from regrid.node_speeds import MotionLimiter
 from regrid.protocol import (
@@ -210,6 +211,8 @@ class GridMotion:
             )  # fmt: skip
         except RegridFailure as failure:
             failure.block = block.name
+            if failure.cause == "lines-cross" and crosses_seam(block):
+                failure.cause = "seam-crossed"
             raise
         nodes = result.nodes
         most = MOST_EXCESS * min(1.0, fraction)
@@ -248,6 +251,16 @@ class GridMotion:
                 cell=(int(i), int(j)),
                 cause="contact-lost",
             )
+
+
+def crosses_seam(block: Block) -> bool:
+    """Is one of the two lines that cross along the new sides of a block a seam?"""
+    for side, node in find_crossing(block.nodes_new) or ():
+        for segment in block.segments:
+            if segment.side == side and segment.start <= node <= segment.stop:
+                if segment.kind == "seam":
+                    return True
+    return False
 
 
 def _make_regridders(make_regridder, blocks: list[Block]) -> list[Any]:

@@ -315,7 +315,9 @@ def equalise_products(
 
 
 TURN = np.radians(10.0)  # that one segment takes where nodes suffice
-LEAST_EVEN = 0.3  # least part of the nodes that keep the first spacing
+# least part of the nodes that keep the first spacing: without them, nodes that go to a kink would
+# leave the tips of bubbles and spikes to segments many times longer than at first
+LEAST_EVEN = 0.5
 TURNING_SMOOTHINGS = 3  # of the turning, over neighbouring segments
 # up to which a line counts as symmetric: parts of the mean segment, and of a segment that is wanted
 SYMMETRIC_SEGMENT = 1e-9
@@ -383,7 +385,7 @@ def fill_turning_law(line, first, turning, closed, wall_first, wall_last, shorte
         wanted[k] = min(wanted[k], (arc[k + 1] - arc[k]) / shortest)
         total += wanted[k]
     even = max(1.0 - total / edges, LEAST_EVEN)
-    scale = edges / (even * edges + total)
+    granted = min(1.0, (1.0 - even) * edges / total) if total > 0.0 else 1.0
     # the number of segments up to node k, and the places where it is whole
     law[0] = 0.0
     law[edges] = 1.0
@@ -397,7 +399,7 @@ def fill_turning_law(line, first, turning, closed, wall_first, wall_last, shorte
             place += 1
         evenly = place + (reached - first[place]) / (first[place + 1] - first[place])
         done += wanted[k]
-        after = scale * (even * evenly + done)
+        after = even * evenly + granted * done
         while following < edges and following <= after:
             part = (following - before) / (after - before)
             law[following] = (arc[k] + part * (arc[k + 1] - arc[k])) / arc[edges]

@@ -137,6 +137,16 @@ def test_segments_of_a_hook_turn_by_little_and_change_gently(count):
     assert np.abs(np.log(lengths[1:] / lengths[:-1])).max() < np.log(3.0)
 
 
+@pytest.mark.parametrize("teeth", [2, 20, 200])
+def test_turning_leaves_straight_parts_half_of_their_nodes(teeth):
+    """However much the rest of the line turns."""
+    y = np.linspace(0.0, 1.0, 401)
+    x = np.where(y < 0.5, 0.0, 0.02 * np.abs((teeth * y) % 1.0 - 0.5))
+    line = np.array([x, y])
+    steps = np.diff(find_law(line))
+    assert steps.max() * 400 < 2.0 + 1e-9
+
+
 def test_a_mirror_image_has_the_mirrored_law_and_half_a_line_half_of_it():
     y = np.linspace(-0.5, 0.5, 65)
     whole = np.array([0.4 * np.cos(2.0 * np.pi * y), y])

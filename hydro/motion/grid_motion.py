@@ -271,8 +271,10 @@ def _make_regridders(make_regridder, blocks: list[Block]) -> list[Any]:
             "such as lambda: shockgrid.make_regridder('barrier')"
         )
     made = [make_regridder() for _ in blocks]
-    for regridder in made:
+    for regridder, block in zip(made, blocks, strict=True):
         check_regridder(regridder, "what make_regridder returns")
+        if hasattr(regridder, "take_first_grid"):
+            regridder.take_first_grid(block.nodes)
     return made
 
 

@@ -147,6 +147,43 @@ def fill_line_edges(nodes, i, laws, low, count, Z):
 
 
 @kernel(allocates=False)
+def keep_side_lengths(shares, i, low, cells, Z):
+    """Scale the edges along j of node row i by the `shares` of a given spacing (theory R4.19)."""
+    length, step = shares[0, i, low : low + cells], shares[1, i, low : low + cells]
+    for col in range(cells):
+        share = length[col]
+        Z[CX + col] *= share
+        Z[CY + col] *= share
+        Z[C2 + col] *= share * share
+        Z[GC + col] *= share
+        Z[RIGHT_Q + col] *= step[col]
+
+
+@kernel(allocates=False)
+def keep_line_lengths(shares, i, low, count, Z):
+    """The same of the edges along i between node rows i and i+1, and of the flux along them."""
+    length, step = shares[0, i, low : low + count], shares[1, i, low : low + count]
+    for col in range(count):
+        share = length[col]
+        part = step[col]
+        Z[AX + col] *= share
+        Z[AY + col] *= share
+        Z[A2 + col] *= share * share
+        Z[GA + col] *= share
+        Z[FX + col] *= part
+        Z[FY + col] *= part
+        Z[QA + col] *= part
+
+
+@kernel(allocates=False)
+def ease_row(ease, i, low, cells, Z):
+    """Weaken the barrier in a row of cells by the given `ease` (ni, nj) (theory R4.20)."""
+    row = ease[i, low : low + cells]
+    for col in range(cells):
+        Z[FADING_ROW + col] *= row[col]
+
+
+@kernel(allocates=False)
 def bend_sides(curve, i, low, cells, Z):
     """Subtract the edges of `curve` from the edges along j of node row i (theory R4.17)."""
     x, y = curve[0, i, low : low + cells + 1], curve[1, i, low : low + cells + 1]
@@ -485,10 +522,15 @@ def make_assembly(smooth):
         full = 0.25 * law.sigma * law.epsilon
         most = law.strengthening
         begin_columns(nodes, law.along_j, law.blend_i, law.blend_j, law.kj, low, cells, Z)
+        if law.given:
+            keep_side_lengths(law.shares_j, 0, low, cells, Z)
         for i in range(ni):
             now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
             past = H[max(i - 1, 0) * NODE_ROWS : (max(i - 1, 0) + 1) * NODE_ROWS]
             begin_row(nodes, i, laws, low, cells, Z)
+            if law.given:
+                keep_side_lengths(law.shares_j, i + 1, low, cells, Z)
+                keep_line_lengths(law.shares_i, i, low, cells + 1, Z)
             if law.curved:
                 bend_sides(law.curve, i + 1, low, cells, Z)
                 bend_lines(law.curve, i, low, cells + 1, Z)
@@ -555,6 +597,8 @@ def make_assembly(smooth):
                     Z[SLOPE_1 + col] = law.stiffness if (m1 > 1.0) & (m1 < most) else 1.0
                 Z[WEIGHT + col] = full if smooth else full * m1
             fill_fading(law.along_i[GROWTH, i], cells, Z)
+            if law.given:
+                ease_row(law.ease, i, low, cells, Z)
             for col in range(cells):
                 Z[WEIGHT + col] *= Z[FADING_ROW + col]
             for corner in range(4):

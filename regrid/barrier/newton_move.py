@@ -131,6 +131,8 @@ class NewtonMove:
         tuning = self.tuning
         if self.estimate * max(work.ni, work.nj) ** 2 < tuning.smooth_floor:
             return False  # n cells long, an error of d cells leaves a residual of some d (pi / n)²
+        if work.spacing is not None:
+            return False  # the sums are those of the sides' lengths
         if work.coarse.able:
             work.load_old()
         size = work.coarse.find(work.base, work.law, tuning.smooth_floor)
@@ -311,9 +313,8 @@ class NewtonMove:
             if not self._untangle():
                 return False
             ratio = 0.0
-        steps = self._polish(
-            ratio, tuning.most_polish if untangled else tuning.more_steps, untangled
-        )
+        settles = untangled or work.spacing is not None  # a grid from elsewhere may be far from it
+        steps = self._polish(ratio, tuning.most_polish if settles else tuning.more_steps, settles)
         if steps > 0 or self.start != "displacement" or not moved:
             ratio = work.compare_corners(work.trial, work.old)
         return self._accept(ratio)
@@ -347,14 +348,16 @@ class NewtonMove:
         """Newton steps from `work.trial` while the last kept too small a fraction `ratio` of a
         corner; returns their number.
 
-        After untangling (`afresh`) also until the residual is below `settled`.
+        After untangling (`afresh`) also until the residual is below `settled`, below the floor
+        where a spacing is given.
         """
         work = self.work
         tuning = self.tuning
+        settled = tuning.settled if work.spacing is None else tuning.floor
         for step in range(most):
             good = ratio > tuning.start_ratio
             if afresh:
-                good = good and self.error <= tuning.settled
+                good = good and self.error <= settled
             if good and step >= tuning.newton_steps - 1:
                 return step
             work.base[:] = work.trial

@@ -7,13 +7,13 @@
     3 residual check: corner areas, gradient, residual       6 shorten, untangle, or halve the move
 
 Every grid that it returns is convex; otherwise RegridFailure names side and nodes.  Note: the
-result must depend only on `previous` and `boundary`, never on earlier calls.
+result must depend only on `previous`, `boundary` and a first grid, never on earlier calls.
 """
 
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -57,6 +57,19 @@ class _NoGrid(Exception):
         return (trial[::-1] if turn.mirrors else trial), self.transposed, self.flat
 
 
+class Given(NamedTuple):
+    """What a regrid is given: the grid before and the new sides (2, ni+1, nj+1) in m, the cells'
+    speeds of sound (ni, nj) in m/s or None, the least limiting rate in 1/s, and the grid whose
+    spacing is kept or None.
+    """
+
+    previous: np.ndarray
+    boundary: np.ndarray
+    sound_speed: np.ndarray | None
+    least_limiting_rate: float
+    first: np.ndarray | None
+
+
 class BarrierRegridder:
     """Straight lines where they fit, a barrier against folding everywhere.
 
@@ -69,8 +82,11 @@ class BarrierRegridder:
     `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is the
     minimum number of Newton steps per call; in blocks of `coarse_from` cells and more (9000; inf:
     none) smooth errors are removed on coarse nodes (theory R4.13); these and all other parameters
-    have their defaults in `tuning`.  With family "i" lines keep the spacing of `first_grid` (2,
-    ni+1, nj+1); without it inner lines have the mean spacing of the outer two.  `cuts` are lines
+    have their defaults in `tuning`.  `spacing` "sides" gives every edge
+    a length between those of two opposite sides (theory R2.3); "given" keeps the spacing of
+    `first_grid` (2, ni+1, nj+1) in both families (R4.19), without one that of the first valid grid
+    that this regridder is given.  The latter is the default with a first grid, except that with
+    family "i" lines j = const keep its spacing along themselves alone (R4.9).  `cuts` are lines
     that the boundary runs along twice, out and back, the block on both sides: a side and two of its
     nodes each, such as ("j_min", 0, 80).  The wake of a C grid, whose nodes are the same from both
     ends of a side, and a ring that is closed on itself are seen without being told.
@@ -87,6 +103,7 @@ class BarrierRegridder:
         method: str = "newton",
         edge_lengths: str = "conditional",
         family="auto",
+        spacing: str | None = None,
         first_grid: np.ndarray | None = None,
         curves: bool = True,
         cuts: Cuts = (),
@@ -111,18 +128,28 @@ class BarrierRegridder:
             raise BadInput(f"barrier regridder: curves = {curves!r}; it must be true or false")
         self.family = _family_weights(family)
         self.curved = curves and self.family is None
-        if first_grid is not None and (self.family != (1.0, 0.0) or method != "newton"):
+        self.spacing = _choose_spacing(spacing, first_grid is not None, self.family)
+        if self.spacing != "sides" and not (method == "newton" and self.conditional):
             raise BadInput(
-                "barrier regridder: a first grid gives the spacing of lines j = const; it needs "
-                'family = "i" and method = "newton"'
+                'barrier regridder: a spacing that is given needs method = "newton" and '
+                'edge_lengths = "conditional"'
             )
+        if self.spacing == "given":
+            self.tuning = replace(
+                self.tuning, floor=min(self.tuning.floor, self.tuning.given_floor)
+            )
+        self.first_grid: np.ndarray | None = None
         self.bend: np.ndarray | None = None
-        self.first_shape: tuple[int, ...] | None = None
         if first_grid is not None:
-            bend = find_bend(np.asarray(first_grid, dtype=float))
-            self.first_shape = bend.shape
-            if is_bent(bend):  # evenly spaced lines need no stored spacing
-                self.bend = bend
+            self.first_grid = take_nodes(first_grid, "first_grid").copy()
+            if self.spacing == "lines":
+                bend = find_bend(self.first_grid)
+                if is_bent(bend):  # evenly spaced lines need no stored spacing
+                    self.bend = bend
+            elif not is_convex(self.first_grid):
+                raise BadInput(
+                    "barrier regridder: first_grid has folded cells, whose spacing cannot be kept"
+                )
         self.threads = int(threads)
         self.cuts = take_cuts(cuts)
         self.meets_itself = False  # set by flows whose bodies touch themselves: nothing is checked
@@ -168,11 +195,12 @@ class BarrierRegridder:
         unit = find_unit(previous)
         if unit != 1.0:  # eighth powers of lengths would not be numbers
             return self._regrid_in(unit, previous, boundary, sound_speed, least_limiting_rate, into)
-        given = previous, boundary, sound_speed, float(least_limiting_rate)
+        first = self._find_first(previous)
+        given = Given(previous, boundary, sound_speed, float(least_limiting_rate), first)
         try:
-            return self._move(*given, into, untangles=False)
+            return self._move(given, into, untangles=False)
         except Folded:
-            return self._untangle(*given, into)
+            return self._untangle(given, into)
         except _NoGrid as end:
             raise explain_failure(
                 boundary, end.trial, end.transposed, end.flat, cuts=self.cuts
@@ -192,25 +220,34 @@ class BarrierRegridder:
             nodes = into
         return replace(result, nodes=nodes)
 
-    def _move(
-        self,
-        previous,
-        boundary,
-        sound_speed,
-        least_limiting_rate,
-        into,
-        untangles: bool,
-        repairs: bool = False,
-    ) -> RegridResult:
+    def take_first_grid(self, nodes: np.ndarray) -> None:
+        """Let `nodes` (2, ni+1, nj+1) be the first grid, whose spacing is kept.
+
+        Does nothing where there is a first grid already, where no spacing is to be kept, or where
+        the grid is folded.
+        """
+        if self.spacing == "given" and self.first_grid is None and is_convex(nodes):
+            self.first_grid = nodes.copy()
+
+    def _find_first(self, previous: np.ndarray) -> np.ndarray | None:
+        """The grid whose spacing is kept, if one is."""
+        if self.spacing != "given":
+            return None
+        self.take_first_grid(previous)
+        self._check_shape(previous.shape)
+        return self.first_grid
+
+    def _move(self, given: Given, into, untangles: bool, repairs: bool = False) -> RegridResult:
         """`regrid` of checked arrays; raises `_NoGrid`, and `Folded` unless it `untangles`.
 
         `repairs`: the previous grid is folded.
         """
+        previous, boundary, sound_speed, least_limiting_rate, first = given
         weights, transposed = self._weigh(boundary)
         ki, kj = (weights[1], weights[0]) if transposed else (weights[0], weights[1])
         mirrored = (compute_area(previous) < 0.0) != transposed
         work = self._workspace(previous.shape, transposed)
-        work.take(previous, boundary, transposed, mirrored, sound_speed, into)
+        work.take(previous, boundary, transposed, mirrored, sound_speed, into, first)
         work.least_limiting_rate = least_limiting_rate
         move = NewtonMove(
             self.tuning, work, untangles, repairs, conditional=self.conditional, ki=float(ki),
@@ -247,8 +284,9 @@ class BarrierRegridder:
             fill_family_weights(boundary, weights)
         return weights, _runs_along_j(weights, boundary)
 
-    def _untangle(self, previous, boundary, sound_speed, least_limiting_rate, into) -> RegridResult:
+    def _untangle(self, given: Given, into) -> RegridResult:
         """`_move` as its mirror image is moved; a symmetric block stays symmetric."""
+        previous, boundary, sound_speed, least_limiting_rate, first = given
         cells = [] if sound_speed is None else [sound_speed]
         transposed = self._weigh(boundary)[1]
         look = choose_look(previous, boundary, cells, transposed, self.bend)
@@ -256,13 +294,16 @@ class BarrierRegridder:
         after = before.copy()
         copy_sides(look.turn_grid(boundary), after)
         sound = None if sound_speed is None else look.turn_cells(sound_speed)
-        given = before, after, sound, least_limiting_rate
+        if first is not None:
+            look = look._replace(same=())
+            first = look.turn_grid(first)
+        given = Given(before, after, sound, least_limiting_rate, first)
         if self.bend is not None:
             self._workspace(before.shape, False).take_laws(turn_bend(look.turn, self.bend))
         repairs = not is_convex(before)
         try:
-            result = self._move_evenly(look, *given) if look.same else None
-            result = result or self._move(*given, None, untangles=True, repairs=repairs)
+            result = self._move_evenly(look, given, repairs) if look.same else None
+            result = result or self._move(given, None, untangles=True, repairs=repairs)
         except _NoGrid as end:
             raise explain_failure(boundary, *end.turn_back(look), cuts=self.cuts) from None
         finally:
@@ -275,15 +316,16 @@ class BarrierRegridder:
             nodes = into
         return replace(result, nodes=nodes)
 
-    def _move_evenly(
-        self, look: Look, before, after, sound, least_limiting_rate
-    ) -> RegridResult | None:
+    def _move_evenly(self, look: Look, given: Given, repairs: bool) -> RegridResult | None:
         """`_move` of a turned block that is symmetric up to rounding, as if it were exactly so."""
-        if sound is not None:
-            sound = look.even_out_cells(sound)
-        even = look.even_out(before, before), look.even_out(after, after), sound
+        before, after, sound, _, _ = given
+        even = given._replace(
+            previous=look.even_out(before, before),
+            boundary=look.even_out(after, after),
+            sound_speed=None if sound is None else look.even_out_cells(sound),
+        )
         try:
-            result = self._move(*even, least_limiting_rate, None, untangles=True)
+            result = self._move(even, None, untangles=True, repairs=repairs)
         except (_NoGrid, RegridFailure):
             return None
         for nodes in (look.even_out(result.nodes, after), result.nodes):
@@ -300,22 +342,29 @@ class BarrierRegridder:
         boundary = take_nodes(boundary, "boundary")
         sound_speed = _take_sound(sound_speed, boundary)
         work = self._workspace(boundary.shape, False)
-        work.take(None, boundary, False, compute_area(boundary) < 0.0, sound_speed)
+        first = self.first_grid if self.spacing == "given" else None
+        mirrored = compute_area(boundary) < 0.0
+        work.take(None, boundary, False, mirrored, sound_speed, first=first)
         work.least_limiting_rate = 0.0
         work.begin(self.conditional, 1.0, 0.0, replace(self.tuning, cost_weight=1.0), cost=True)
         return float(np.sqrt(2.0 / work.law.cost_scale))
+
+    def _check_shape(self, shape: tuple[int, ...]) -> None:
+        """BadInput where the first grid has another shape."""
+        if self.first_grid is not None and self.first_grid.shape != shape:
+            first, block = (f"{n - 1} x {m - 1}" for _, n, m in (self.first_grid.shape, shape))
+            raise BadInput(
+                f"barrier regridder: the first grid has {first} cells, the block {block}; both "
+                "must be the same"
+            )
 
     def _workspace(self, shape, transposed) -> Workspace:
         ni, nj = shape[1] - 1, shape[2] - 1
         key = (nj, ni) if transposed else (ni, nj)
         if key not in self._workspaces:
             threads = self.threads if ni * nj >= SERIAL_NODES else 1
-            if self.first_shape not in (None, (ni + 1, nj + 1)):
-                i, j = (n - 1 for n in self.first_shape)
-                raise BadInput(
-                    f"barrier regridder: the first grid has {i} x {j} cells, the block "
-                    f"{ni} x {nj}; both must be the same"
-                )
+            if self.spacing == "lines":
+                self._check_shape(shape)
             self._workspaces[key] = Workspace(*key, threads, self.tuning, shared=True)
             if self.bend is not None:
                 self._workspaces[key].take_laws(self.bend)
@@ -343,6 +392,22 @@ def _check_tuning(tuning: Tuning) -> None:
     ):
         if not good:
             raise BadInput(f"barrier regridder: {name} {getattr(tuning, name)} must be {words}")
+
+
+def _choose_spacing(spacing: str | None, first: bool, family) -> str:
+    """`spacing`, by default "lines" with a first grid and family "i", "given" with other families,
+    "sides" without a first grid; BadInput for other words."""
+    if spacing is None:
+        straight = family == (1.0, 0.0)
+        return ("lines" if straight else "given") if first else "sides"
+    if spacing not in ("sides", "given"):
+        raise BadInput(f"barrier regridder: spacing {spacing!r} is neither 'sides' nor 'given'")
+    if spacing == "sides" and first:
+        raise BadInput(
+            "barrier regridder: spacing = 'sides' keeps nothing of a first grid; leave one of them "
+            "out"
+        )
+    return spacing
 
 
 def _family_weights(family):

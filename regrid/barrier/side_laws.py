@@ -35,6 +35,8 @@ class BarrierLaw(NamedTuple):
     the interpolated one,
     `most_bend` (nj+1), the most of it on each line, and the `way` (2, nj+1) that it is a part of,
     from i_min to i_max in m;
+    `shares_i` (2, ni, nj+1), `shares_j` (2, ni+1, nj) and `ease` (ni, nj), where a spacing is
+    `given`, of its `GivenSpacing`;
     `curve` (2, ni+1, nj+1), the grid in m that lines are drawn to, times its weight, read where
     `curved` (`regrid.algebraic`);
     the weights `ki`, `kj` of the two families of straight lines; `sigma`, the mean area of a cell
@@ -54,6 +56,10 @@ class BarrierLaw(NamedTuple):
     bend: np.ndarray
     most_bend: np.ndarray
     way: np.ndarray
+    given: bool
+    shares_i: np.ndarray
+    shares_j: np.ndarray
+    ease: np.ndarray
     curve: np.ndarray
     curved: bool
     ki: float

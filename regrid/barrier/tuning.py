@@ -30,6 +30,7 @@ class Tuning:
     # the linear solve
     tolerance: float = 0.05  # R4.8: of the first residual
     floor: float = 7e-4  # R4.8: residual in cells that is accepted
+    given_floor: float = 1e-4  # R4.20: the same where a spacing is given
     idle: float = 2.5  # R4.8, step 1: accepted estimate of a displaced grid, in floors
     max_iterations: int = 16  # R4.8
     exact_tolerance: float = 0.02  # R4.8, step 2, R4.14, R5.4: of solves treated as exact

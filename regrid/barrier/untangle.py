@@ -46,8 +46,13 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
         Z[ENERGY_ROW + col] = 0.0
         Z[LEAST_AREA_ROW + col] = 1e300
     at.begin_columns(nodes, law.along_j, law.blend_i, law.blend_j, law.kj, first, cells, Z)
+    if law.given:
+        at.keep_side_lengths(law.shares_j, 0, first, cells, Z)
     for i in range(ni):
         at.begin_row(nodes, i, laws, first, cells, Z)
+        if law.given:
+            at.keep_side_lengths(law.shares_j, i + 1, first, cells, Z)
+            at.keep_line_lengths(law.shares_i, i, first, cells + 1, Z)
         if law.curved:
             at.bend_sides(law.curve, i + 1, first, cells, Z)
             at.bend_lines(law.curve, i, first, cells + 1, Z)
@@ -92,6 +97,8 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
                 Z[LEAST_1 + corner] = 1e300
         inside = 1.0 if i < ni - 1 else 0.0
         at.fill_fading(law.along_i[GROWTH, i], cells, Z)
+        if law.given:
+            at.ease_row(law.ease, i, first, cells, Z)
         parts = barrier[i, first:last]
         for col in range(cells):
             straight = Z[at.FX + col] * Z[at.FX + col] + Z[at.FY + col] * Z[at.FY + col]
@@ -208,8 +215,8 @@ def make_even_law(work):
         laws[LENGTH] = scale * length
         laws[[LENGTH_CHANGE, STEP_CHANGE]] = 0.0
     return work.law._replace(
-        along_i=along[0], along_j=along[1], ki=0.0, kj=0.0, curved=False, area_target=1.0,
-        epsilon=1.0, area_weight=1.0, cost_weight=0.0,
+        along_i=along[0], along_j=along[1], ki=0.0, kj=0.0, curved=False, given=False,
+        area_target=1.0, epsilon=1.0, area_weight=1.0, cost_weight=0.0,
     )  # fmt: skip
 
 

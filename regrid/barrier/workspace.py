@@ -22,6 +22,7 @@ from regrid.barrier.assembly import (
     assemble_smoothed,
 )
 from regrid.barrier.coarse_nodes import CoarseCorrection
+from regrid.barrier.given_spacing import GivenSpacing, SideLengths, find_given_spacing
 from regrid.barrier.line_cg import fill_product, solve_serial, solve_threaded
 from regrid.barrier.residual_estimate import (
     ASPECT,
@@ -140,6 +141,8 @@ class Workspace:
         )  # fmt: skip
         self.least_limiting_rate = 0.0
         self.symmetry: Symmetry | None = None
+        self.spacing: GivenSpacing | None = None
+        self.no_shares = np.zeros((2, 1, 1))
         self.coarse = CoarseCorrection(ni, nj, tuning)
         # what is of the block's size, by name: shape, and the column at which a cache line begins
         self.arrays = {
@@ -202,12 +205,15 @@ class Workspace:
         self.frame = UPRIGHT
         self.given = None
 
-    def take(self, previous, boundary, transposed, mirrored, sound=None, into=None) -> None:
+    def take(
+        self, previous, boundary, transposed, mirrored, sound=None, into=None, first=None
+    ) -> None:
         """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides.
 
         `sound` (ni, nj) [m/s], where speeds of sound are given; without a grid before sides alone.
         In the workspace's own frame they are read where they are, and `base` is the array `into`,
-        a new one without it; else a look reads the grid before where it is (`load_old`).
+        a new one without it; else a look reads the grid before where it is (`load_old`).  `first`:
+        the grid whose spacing is kept.
         """
         if self.shared:
             self._lay(share_memory(self.size))
@@ -226,6 +232,11 @@ class Workspace:
                 self.given = previous
         if sound is not None:
             self.sound = np.ascontiguousarray(sound.T) if transposed else sound
+        self.spacing = None
+        if first is not None:
+            own = np.empty(self.shape)
+            load_grid(first, own, transposed, mirrored, inside=True)
+            self.spacing = find_given_spacing(own)
 
     def load_old(self) -> None:
         """Copy the grid before to `old`, and the displaced one to `base`, if a residual check has
@@ -283,9 +294,9 @@ class Workspace:
                 epsilon = max(epsilon, least)
         law = BarrierLaw(
             self.along_i, self.along_j, self.blend_i, self.blend_j, self.bent, self.bend,
-            self.most_bend, self.way, self.curve, share_i + share_j > 0.0, float(ki), float(kj),
-            0.0, 0.0, epsilon, float(tuning.area_weight), float(tuning.least_sine),
-            float(tuning.strengthening), 1.0, self.sound, 0.0,
+            self.most_bend, self.way, *self._take_shares(), self.curve, share_i + share_j > 0.0,
+            float(ki), float(kj), 0.0, 0.0, epsilon, float(tuning.area_weight),
+            float(tuning.least_sine), float(tuning.strengthening), 1.0, self.sound, 0.0,
             float(tuning.cost_weight) if cost else 0.0,
         )  # fmt: skip
         self.symmetry = None
@@ -296,8 +307,21 @@ class Workspace:
             self.boundary_check.scratch,
         )  # fmt: skip
         _, _, _, self.sigma, self.area_target, scale = self.block
+        if self.spacing is not None:
+            sides = SideLengths(self.along_i, self.along_j, self.blend_i, self.blend_j)
+            self.area_target = self.sigma / self.spacing.compute_mean_area(sides)
+            if law.cost_weight > 0.0:
+                rate = self.spacing.compute_limiting_rate(sides, self.sound, self.area_target)
+                rate = max(tuning.cost_margin * rate, self.least_limiting_rate)
+                scale = 2.0 / (rate * rate)
         self.law = law._replace(sigma=self.sigma, area_target=self.area_target, cost_scale=scale)
         self.iterations = 0
+
+    def _take_shares(self) -> tuple[bool, np.ndarray, np.ndarray, np.ndarray]:
+        """The fields of a `BarrierLaw` for a spacing that is given."""
+        if self.spacing is None:
+            return False, self.no_shares, self.no_shares, self.no_shares[0]
+        return True, *self.spacing
 
     @property
     def is_simple(self) -> bool:
@@ -319,7 +343,8 @@ class Workspace:
         the old ones, an estimate of its residual in cells, and how far inner nodes are from
         interpolated places at most, in old cell heights.
 
-        The ratio is 0 unless all areas are positive numbers; the estimate is infinite then.
+        The ratio is 0 unless all areas are positive numbers; the estimate is infinite then, and
+        where a spacing is given.
         """
         look = look_serial
         if self._set_threads():
@@ -338,6 +363,8 @@ class Workspace:
             self.load_old()
             ratio = self.compare_corners(self.base, self.old) if good else 0.0
             return ratio, math.inf, math.inf
+        if self.spacing is not None:  # the estimate knows of the sides' lengths alone
+            return float(1.0 / shrunk), math.inf, math.inf
         inner = (self.ni - 1) * (self.nj - 1)
         residual = math.sqrt(total / (self.sigma * inner))
         return float(1.0 / shrunk), residual, float(found[STRAYED])
@@ -413,6 +440,8 @@ class Workspace:
 
     def find_symmetry(self) -> None:
         """See how `old` and its displaced grid in `base` are symmetric: solutions will be, too."""
+        if self.spacing is not None:
+            return  # it need not be symmetric
         cells = [self.sound] if self.law.cost_weight > 0.0 else []
         bend = self.bend if self.bent else None
         self.symmetry = find_symmetry(self.old, self.base, cells, bend)

@@ -111,7 +111,7 @@ def make_grid(
 ) -> list[str]:
     """`grid make`; words: of `making.make`."""
     name = source.replace("-", "_")
-    given = parse_options(options)
+    given = _parse_family_options(options)
     size = parse_cells(cells, 3 if name in (*BLOCKS, *SHAPES) else 2)
     used = name_family(family, source, name in BLOCKS)
     label = f"{source}, {used}"
@@ -121,6 +121,16 @@ def make_grid(
     return _write(
         lambda: making.make(source, family, cells=size, **words, **given), label, stem, files
     )
+
+
+def _parse_family_options(words: tuple[str, ...]) -> dict[str, Any]:
+    """`parse_options` without those that are options of the command; BadInput for them."""
+    given = parse_options(words)
+    for key in ("family", "weight", "cells", "steps", "at", "block"):
+        if key in given:
+            other = ", such as --family barrier-i" if key == "family" else ""
+            raise BadInput(f"--option {key}: write --{key}{other}")
+    return given
 
 
 def regrid_file(
@@ -133,7 +143,7 @@ def regrid_file(
     **words,
 ) -> list[str]:
     """`grid regrid`; words: of `making.regrid`."""
-    given = parse_options(options)
+    given = _parse_family_options(options)
     grid = Grid(read_grid(file, block), made_by={"source": file})
     used = name_family(family, file, grid.nodes.shape[0] == 3)
     before = grid.quality

@@ -26,7 +26,9 @@ from typing import Any
 import numpy as np
 
 from regrid.algebraic import transfinite_grid
+from regrid.barrier.given_spacing import find_given_spacing, is_told_by_sides
 from regrid.barrier.repair import repair_grid
+from regrid.barrier.turning import is_convex
 from regrid.domains import DOMAINS, MovingDomain, make_domain
 from regrid.domains_in_space import BLOCKS, SHAPES, MovingBlock, find_block, make_moving_block
 from regrid.equidistribution import volumes
@@ -59,6 +61,7 @@ NONE: Mapping[str, Any] = MappingProxyType({})
 MOST_PASSES = 40
 MOTION_STEPS = 40
 CELLS_IN_SPACE = (20, 20, 20)
+SPACING_OPTIONS = {"spacing", "first_grid", "method", "edge_lengths"}
 SPATIAL_OPTIONS = ("iterations", "sides", "threads")
 FAMILIES_IN_SPACE = {
     "barrier": BarrierRegridder3D,
@@ -232,17 +235,29 @@ def regrid(
 ) -> Grid:
     """A grid regenerated on its own sides; one that is not valid is untangled first.
 
+    The barrier keeps the spacing of a plane grid that its sides do not tell, unless `spacing` says
+    "sides".
+
     grid: nodes (2 or 3, ...), a `Grid`, or a file.  Other arguments and what is raised: `make`.
     """
     nodes = find_nodes(grid)
     source = grid.made_by.get("source", "a grid") if isinstance(grid, Grid) else "a grid"
     used = name_family(family, source, nodes.shape[0] == 3)
+    if used == "barrier" and not SPACING_OPTIONS & options.keys() and is_graded_inside(nodes):
+        options = {"spacing": "given", **options}
     if nodes.shape[0] == 3:
         made = regrid_space(nodes, make_spatial_law(options, weight), options)
     else:
         made = regrid_plane(nodes, choose_family(family or used, options, weight), MOST_PASSES)
     made.made_by = {"source": source, "family": used}
     return _finish(made, options, weight)
+
+
+def is_graded_inside(nodes: np.ndarray) -> bool:
+    """Has a valid plane grid a spacing that its sides do not tell?"""
+    if nodes.shape[0] == 3 or not is_convex(nodes):
+        return False
+    return not is_told_by_sides(find_given_spacing(nodes))
 
 
 def find_nodes(grid: Grid | np.ndarray | str | Path) -> np.ndarray:
@@ -314,6 +329,8 @@ def regrid_plane(nodes: np.ndarray, regridder: Regridder, passes: int) -> Grid:
         return Grid(nodes, [], str(failure))
     start = repaired.nodes
     words = f"the given grid{describe_repair(repaired.report)}"
+    if getattr(regridder, "spacing", "sides") == "given":
+        words += ", whose spacing is kept"
     made = settle(start, turned, regridder, passes, words)
     if turned is not nodes:
         made.nodes = np.ascontiguousarray(made.nodes[:, :, ::-1])

@@ -173,3 +173,77 @@ def test_curves_round_an_aerofoil_in_any_direction(make, cells):
         given = {side: line[:, ::-1] if side in turned else line for side, line in sides.items()}
         boundary = make_boundary(orient_sides(given, "here", names), cells, "here")
         assert is_convex(find_start(boundary)[0])
+
+
+def pitch(nodes, degrees):
+    """Nodes turned about the quarter chord: the aerofoil as a whole, the outer sides not at all."""
+    x = nodes[0] - 0.25
+    y = nodes[1]
+    far = np.clip((np.hypot(x, y) - 0.8) / (0.5 * FAR), 0.0, 1.0)
+    angle = np.radians(degrees) * (1.0 - far * far * (3.0 - 2.0 * far))
+    cosine = np.cos(angle)
+    sine = np.sin(angle)
+    return np.array([0.25 + x * cosine + y * sine, y * cosine - x * sine])
+
+
+def find_first_heights(nodes):
+    """Lengths of the edges that leave the side j = 0."""
+    return np.hypot(*(nodes[:, :, 1] - nodes[:, :, 0]))
+
+
+AEROFOIL_OF_C = slice(WAKE_CELLS, WAKE_CELLS + AEROFOIL_CELLS + 1)
+
+
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("wake_height", [1e-4, 5e-2])
+def test_first_heights_of_a_c_grid_stay_while_it_pitches(wake_height, turn):
+    """Within a tenth, however thick the layers of the wake are."""
+    nodes = make_c_grid(wake_height=wake_height)
+    heights = find_first_heights(nodes)[AEROFOIL_OF_C]
+    regridder = BarrierRegridder(first_grid=np.ascontiguousarray(TURNS[turn](nodes)))
+    now = TURNS[turn](nodes)
+    for step in range(21):
+        sides = pitch(nodes, 10.0 * np.sin(2.0 * np.pi * step / 20.0))
+        now = regridder.regrid(now, TURNS[turn](sides)).nodes
+        assert is_convex(now)
+        ratio = find_first_heights(TURNS[turn](now))[AEROFOIL_OF_C] / heights
+        assert 0.9 < ratio.min() and ratio.max() < 1.1
+
+
+@pytest.mark.parametrize("angle", [10.0, -10.0])
+def test_first_heights_of_an_o_grid_stay_when_it_pitches_at_once(angle):
+    nodes = make_o_grid()
+    found = BarrierRegridder(spacing="given").regrid(nodes, pitch(nodes, angle)).nodes
+    ratio = find_first_heights(found) / find_first_heights(nodes)
+    assert 0.9 < ratio.min() and ratio.max() < 1.1
+
+
+def test_a_spacing_that_the_sides_tell_is_kept_as_without_a_first_grid():
+    floor = np.array([np.linspace(0.0, 1.0, 17), np.zeros(17)])
+    lid = np.array([floor[0], np.ones(17)])
+    nodes = fill_layers(floor, lid, 20, np.full(17, 1e-3))
+    boundary = nodes + 0.05 * np.sin(3.0 * nodes[::-1])
+    plain = BarrierRegridder().regrid(nodes, boundary).nodes
+    kept = BarrierRegridder(first_grid=nodes).regrid(nodes, boundary).nodes
+    assert np.abs(kept - plain).max() < 2e-3
+
+
+def test_what_a_first_grid_does_not_go_with_is_said():
+    nodes = make_o_grid(cells=8)
+    for options in (
+        {"spacing": "even"},
+        {"spacing": "sides", "first_grid": nodes},
+        {"spacing": "given", "method": "sweeps"},
+        {"spacing": "given", "edge_lengths": "unit"},
+        {"first_grid": shake_once(nodes)},
+    ):
+        with pytest.raises(BadInput, match="barrier regridder"):
+            BarrierRegridder(**options)
+    with pytest.raises(BadInput, match="first grid"):
+        BarrierRegridder(first_grid=nodes).regrid(nodes[:, :9], nodes[:, :9])
+
+
+def shake_once(nodes):
+    folded = nodes.copy()
+    folded[:, 3, 3] = folded[:, 3, 5]
+    return folded

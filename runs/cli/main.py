@@ -13,6 +13,7 @@ import functools
 import os
 import sys
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 import click
@@ -250,11 +251,28 @@ def schema(problem) -> None:
 
 @cli.command()
 @click.argument("name", required=False)
-def materials(name) -> None:
-    """List the materials of the library, or print the parameters of one."""
-    from runs.inspection import listing
+@click.option("-o", "--output", metavar="FILE.h5", help="Table to write of FILE.ses:NUMBER.")
+def materials(name, output) -> None:
+    """List the materials of the library, or print the parameters of one.
 
-    echo(listing.describe_materials(name))
+    NAME may be a file in the form of the SESAME library, FILE.ses, whose materials are listed, or
+    one of these, FILE.ses:3336, of which -o writes a table for `eos = "tabular"`.
+    """
+    from runs.inspection import listing, sesame
+
+    source = sesame.split_name(name) if name else None
+    if source is None:
+        if output is not None:
+            raise BadInput("--output: only a material of a SESAME file is written, FILE.ses:NUMBER")
+        echo(listing.describe_materials(name))
+        return
+    path, number = source
+    if number is None:
+        echo(sesame.describe_file(path))
+        return
+    if output is None:
+        raise BadInput(f"materials: {name}: say where its table is to be written, -o FILE.h5")
+    echo(sesame.convert(path, number, Path(output)))
 
 
 @cli.command()

@@ -311,11 +311,12 @@ def fill_facets(leader, follower, positions, back_positions, straight, pins, cov
     """Facets between the pins, by their positions on both lines (see `merge_pins`); how many.
 
     Fills their owners and ends.  straight: the leader is a plane, whose face goes on.
-    covered (m + 1,): set for the leader's nodes that lie between pins on one face of the follower.
+    covered (m + 1,): which of the leader's nodes lie between pins on one face of the follower.
     """
     owners = facets.owners
     ends = facets.ends
     found = 0
+    covered[:] = False
     count = merge_pins(back_positions, positions, pins)
     last = leader.shape[1] - 2
     last_follower = follower.shape[1] - 2

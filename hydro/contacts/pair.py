@@ -62,6 +62,12 @@ class Half:
         self.pins.positions.fill(-1.0)
         self.pins.covered.fill(False)
 
+    def forget_laying(self) -> None:
+        """No facet is closed that would lay nodes on the other line."""
+        self.pins.held.fill(False)
+        self.pins.inside.fill(False)
+        self.pins.stops.fill(False)
+
     def find_pins(self, other: Half, one_body: bool) -> int:
         """The nodes that lie on the other line; how many."""
         surface = other.surface
@@ -159,8 +165,8 @@ class Pair:
         else:
             self.lead.pins.covered.fill(False)
         if not self.count:
-            self.follow.pins.held.fill(False)
-            self.lead.pins.held.fill(False)
+            for half, _ in self.halves:
+                half.forget_laying()
 
     def _find_pins(self) -> int:
         return sum([half.find_pins(other, self.one_body) for half, other in self.halves])

@@ -3,9 +3,10 @@
     1 the displaced grid (R6.5), if necessary after a correction of its smooth errors (R4.13)
     2 Newton steps from it, shortened where corners would lose too much area (R4.8)
     3 if it lost too much itself: the motion of the sides extended by the old grid's Hessian
-    4 if that folds: untangling (R5.1)
-    5 half of the motion of the sides at a time
-    6 a grid made from the sides alone (R5.4); if the old grid is folded, this is all
+    4 if that folds: the same extension followed in parts, each as far as it is valid
+    5 if that takes too many: untangling (R5.1)
+    6 half of the motion of the sides at a time
+    7 a grid made from the sides alone (R5.4); if the old grid is folded, this is all
 
 If all of this fails, the error names side and nodes.
 """
@@ -17,7 +18,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from regrid.algebraic import fill_quasi_1d, quasi_1d_grid, transfinite_grid
+from regrid.algebraic import fill_displacement, fill_quasi_1d, quasi_1d_grid, transfinite_grid
 from regrid.barrier.side_laws import compute_stiffness
 from regrid.barrier.step_control import shorten_steps
 from regrid.barrier.tuning import Tuning
@@ -32,6 +33,7 @@ ROUND_OFF_RESIDUAL = 1e-12  # residual, in cells, that cannot be improved
 DOUBTFUL_CORNER_RATIO = 1e-6  # least ratio up to which the signs of corners are computed exactly
 SLOW_SIDE_FRACTION = 0.3  # of `fast_sides`: slower sides count as at rest
 LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
+LEAST_FOLLOWED_PART = 1.0 / 8.0  # of a predicted motion: shorter ones are not worth a solve
 
 
 def list_straight_grids(sides: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
@@ -297,7 +299,7 @@ class NewtonMove:
         work.law = work.law._replace(stiffness=stiffness)
         work.find_symmetry()
         moved = self.moved_ratio > tuning.start_ratio
-        untangled = False
+        folded = False
         if moved:
             done = self.iterations
             ratio = self._newton(work.base, work.old)
@@ -305,15 +307,16 @@ class NewtonMove:
                 ratio = self.moved_ratio
             if self.error > self._get_lost():
                 ratio = self._straighten(ratio)
-            untangled = self.broken
+            folded = self.broken
         else:
             ratio = self._predict()
-            untangled = ratio == 0.0
-        if untangled:
-            if not self._untangle():
+            folded = ratio == 0.0
+        if folded:
+            self._check_look()
+            if not ((not moved and self._follow()) or self._untangle()):
                 return False
             ratio = 0.0
-        settles = untangled or work.spacing is not None  # a grid from elsewhere may be far from it
+        settles = folded or work.spacing is not None  # a grid from elsewhere may be far from it
         steps = self._polish(ratio, tuning.most_polish if settles else tuning.more_steps, settles)
         if steps > 0 or self.start != "displacement" or not moved:
             ratio = work.compare_corners(work.trial, work.old)
@@ -348,7 +351,7 @@ class NewtonMove:
         """Newton steps from `work.trial` while the last kept too small a fraction `ratio` of a
         corner; returns their number.
 
-        After untangling (`afresh`) also until the residual is below `settled`, below the floor
+        After a fold (`afresh`) also until the residual is below `settled`, below the floor
         where a spacing is given.
         """
         work = self.work
@@ -381,6 +384,47 @@ class NewtonMove:
         if ratio > least:
             return ratio
         return self._newton(work.base, work.base) if self.moved_ratio > least else 0.0
+
+    def _follow(self) -> bool:
+        """Follow the prediction as far as it keeps enough of every corner, renew it there, and so
+        on to the new sides.
+
+        True when that is `work.trial`; after too many parts it is the first prediction again.
+        """
+        work = self.work
+        predicted = work.trial.copy()
+        here = work.old.copy()
+        left = np.empty_like(here)
+        for _ in range(self.tuning.most_parts):
+            part = self._go_along(here)
+            if part == 1.0:
+                self.start = "followed"
+                return True
+            if part == 0.0:
+                break
+            here[:] = work.trial
+            fill_displacement(here, work.sides, left)
+            work.assemble(here)
+            self._solve(left)
+            if self.broken:
+                break
+        work.trial[:] = predicted
+        return False
+
+    def _go_along(self, here: np.ndarray) -> float:
+        """`work.trial` = a part of `work.change` away from a valid grid, by which no corner loses
+        too much; returns the part, 0 where even a short one would."""
+        work = self.work
+        part = 1.0
+        while part >= LEAST_FOLLOWED_PART:
+            np.multiply(work.change, part, out=work.trial)
+            work.trial += here
+            if part == 1.0:
+                copy_sides(work.sides, work.trial)
+            if work.compare_corners(work.trial, here) > self.tuning.step_ratio:
+                return part
+            part *= 0.5
+        return 0.0
 
     def _newton(self, base, old) -> float:
         """`work.trial` = a Newton step from the valid `base`, shortened node by node if necessary.
@@ -452,7 +496,6 @@ class NewtonMove:
 
     def _untangle(self) -> bool:
         """Untangle the better of the displaced grid and the trial into `work.trial`."""
-        self._check_look()
         work = self.work
         self.rescues += 1
         self.start = "untangled"

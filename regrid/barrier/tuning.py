@@ -38,6 +38,7 @@ class Tuning:
     # the move
     start_ratio: float = 0.5  # R4.8, step 1: of every corner that a displaced grid must keep
     step_ratio: float = 0.25  # R4.8, steps 2, 3: of every corner that a step must keep
+    most_parts: int = 8  # R4.8, step 2: in which a prediction that folds is followed
     lost: float = 0.5  # R4.8, step 1: residual at the sides from which straight lines are tried
     newton_steps: int = 1  # R4.8: at least
     more_steps: int = 6  # R4.8, step 3: at most, after the first

@@ -59,6 +59,20 @@ def test_fingers_grow_without_a_bad_cell(name):
     assert worst["gap"] < 1.2 and worst["aspect"] < 25.0 and worst["sine"] > 0.03
 
 
+@pytest.mark.parametrize("cells", [2.0, 5.0, 8.0])
+@pytest.mark.parametrize("name", ["slender_finger", "hooked_fingers", "five_fingers"])
+def test_fingers_that_grow_by_cells_in_a_step_are_not_untangled(name, cells):
+    moving = make_domain(name, 24, 32)
+    regridder = BarrierRegridder()
+    nodes = moving.start
+    steps = moving.steps_for(cells)
+    for step in range(1, steps + 1):
+        found = regridder.regrid(nodes, moving.boundary(step / steps))
+        nodes = found.nodes
+        assert found.report.rescues == found.report.sub_moves == 0
+        assert len(find_bad_cells(nodes)) == 0
+
+
 @pytest.mark.parametrize("noise", [0.02, 0.05])
 def test_fresh_noise_on_the_boundary_is_survived(noise):
     assert march_domain("three_fingers", 60, 40, noise=noise)[0]["bad"] == 0

@@ -44,7 +44,7 @@ import numpy as np
 
 from regrid.algebraic import displaced_grid
 from regrid.barrier import assembly as at
-from regrid.barrier.functional import corner_blocks
+from regrid.barrier.functional import corner_blocks, prepare_corners
 from regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
 from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE
 from regrid.barrier.step_control import CHUNK_SPAN, shorten_steps
@@ -61,6 +61,7 @@ from regrid.sides import compute_area, copy_sides
 
 # Rows of the energy's scratch: edges along i, then along j at the near and the far row of nodes.
 EDGE_I_X, EDGE_I_Y, NEAR_X, NEAR_Y, FAR_X = range(5)
+AREA_ROWS = at.COSECANT_1  # of the assembly's scratch, which holds D here, corner by corner
 
 
 @kernel
@@ -135,16 +136,9 @@ def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
         past = H[max(i - 1, 0) * at.NODE_ROWS : (max(i - 1, 0) + 1) * at.NODE_ROWS]
         at.begin_row(nodes, i, laws, low, count, Z)
         for col in range(count):
-            ax, ay = Z[at.AX + col], Z[at.AY + col]
-            ux, uy = Z[at.AX + col + 1], Z[at.AY + col + 1]
-            bx = Z[at.BX + col]
-            by = Z[at.BY + col]
-            rx = Z[at.CX + col]
-            ry = Z[at.CY + col]
-            Z[at.AREA_1 + col] = ax * by - ay * bx
-            Z[at.AREA_2 + col] = ux * by - uy * bx
-            Z[at.AREA_3 + col] = ux * ry - uy * rx
-            Z[at.AREA_4 + col] = ax * ry - ay * rx
+            corners, _ = prepare_corners(*at.take_scaled_edges(col, Z))
+            for corner in range(4):
+                Z[AREA_ROWS + corner * CHUNK_SPAN + col] = corners[corner]
         for col in range(count):
             Z[at.WEIGHT + col] = volume[i, low + col]
         for corner in range(4):
@@ -152,7 +146,7 @@ def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
             shift = 1 if corner == 1 or corner == 2 else 0
             side = at.CX if corner >= 2 else at.BX
             term = at.CORNER_TERM_ROWS + corner * 14 * CHUNK_SPAN
-            area = at.AREA_1 + corner * CHUNK_SPAN
+            area = AREA_ROWS + corner * CHUNK_SPAN
             fill_variational_corner(
                 Z[at.AX + shift : at.AX + shift + 4 * CHUNK_SPAN],
                 Z[side : side + 4 * CHUNK_SPAN],

@@ -21,6 +21,7 @@ from regrid.barrier import functional
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
 from regrid.barrier.step_control import CHUNK_SPAN
 from regrid.jit import inlined, kernel
+from regrid.measure.quality import take_edges
 
 # Data of a column chunk for every row of nodes: the Hessian's couplings as 2 × 2 blocks (xx, xy,
 # yx, yy) to the nodes (i, j+1), (i+1, j+1), from (i+1, j) to (i, j+1), and to (i+1, j); the node's
@@ -48,7 +49,7 @@ OLD_RIGHT, OLD_RIGHT_GX, OLD_RIGHT_GY, OLD_FX, OLD_FY = (
 )
 FLUX_X = 59 * CHUNK_SPAN
 FLUX_Y = 60 * CHUNK_SPAN
-AREA_1, AREA_2, AREA_3, AREA_4 = (k * CHUNK_SPAN for k in range(61, 65))
+COSECANT_1, COSECANT_2, COSECANT_3, COSECANT_4 = (k * CHUNK_SPAN for k in range(61, 65))
 SLOPE_1, SLOPE_2, SLOPE_3, SLOPE_4 = (k * CHUNK_SPAN for k in range(65, 69))
 KEPT_OWN_BLOCKS = (
     69 * CHUNK_SPAN - FINE_OWN
@@ -244,6 +245,17 @@ def end_row(cells, Z):
             Z[OLD_RIGHT + k + col] = Z[RIGHT + k + col]
 
 
+@inlined
+def take_scaled_edges(col, Z):
+    """The four edges of a cell over their conditional lengths, for `prepare_corners`."""
+    return (
+        (Z[AX + col], Z[AY + col], Z[A2 + col]),
+        (Z[AX + col + 1], Z[AY + col + 1], Z[A2 + col + 1]),
+        (Z[BX + col], Z[BY + col], Z[B2 + col]),
+        (Z[CX + col], Z[CY + col], Z[C2 + col]),
+    )
+
+
 @kernel(allocates=False)
 def fill_fading(growth, cells, Z):
     """Fraction of the barrier applied in a row of cells, into FADING: 1 in ungraded blocks.
@@ -408,33 +420,28 @@ def fill_own_blocks(cells, now, past, Z):
 
 
 @kernel
-def add_cost(near, far, sound, scale, weight, cells, now, Z):
-    """Add gradient and Hessian of P (R4.10, R4.12) to those of a row of cells (`fill_cell_blocks`).
+def add_cell_terms(near, far, sound, numbers, cells, now, Z):
+    """Add gradient and Hessian of the terms of cells to those of a row (`fill_cell_blocks`).
 
-    x and y of the rows of nodes `near` and `far`, `sound` of its cells, `scale` = 2/R², `weight` =
-    mu sigma.
+    x and y of the rows of nodes `near` and `far`, `sound` of its cells, `numbers` as
+    `functional.take_cell_numbers` gives them.
     """
     x0, y0 = near
     x1, y1 = far
     for col in range(cells):
-        ax = 0.5 * ((x1[col] - x0[col]) + (x1[col + 1] - x0[col + 1]))
-        ay = 0.5 * ((y1[col] - y0[col]) + (y1[col + 1] - y0[col + 1]))
-        bx = 0.5 * ((x0[col + 1] - x0[col]) + (x1[col + 1] - x1[col]))
-        by = 0.5 * ((y0[col + 1] - y0[col]) + (y1[col + 1] - y1[col]))
-        rho = functional.cell_rate(ax, ay, bx, by, sound[col], scale)
-        if rho > 1.0:
-            slope = functional.cost_slope(ax, ay, bx, by, rho, sound[col], scale, weight)
-            first, _, dax, day, dbx, dby, _, _, _ = slope
+        low, up, before, behind = take_edges(x0, y0, x1, y1, col)
+        a, b = functional.find_mid_lines(low, up, before, behind)
+        if functional.is_active(a, b, sound[col], numbers):
+            slope_a, slope_b, parts = functional.cell_slope(a, b, sound[col], numbers)
             aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy = (
-                functional.cost_blocks(ax, ay, bx, by, slope)
+                functional.cell_blocks(a, b, parts)
             )
             # A and B are the means of the cell's two edges in each direction.
-            half = 0.5 * first
-            for edge, dx, dy in (
-                (LOW_GX, dax, day), (UP_GX, dax, day), (LEFT_GX, dbx, dby), (RIGHT_GX, dbx, dby),
+            for edge, slope in (
+                (LOW_GX, slope_a), (UP_GX, slope_a), (LEFT_GX, slope_b), (RIGHT_GX, slope_b),
             ):  # fmt: skip
-                Z[edge + col] += half * dx
-                Z[edge + CHUNK_SPAN + col] += half * dy
+                Z[edge + col] += 0.5 * slope[0]
+                Z[edge + CHUNK_SPAN + col] += 0.5 * slope[1]
             less_xx, less_xy = 0.25 * (aa_xx - bb_xx), 0.25 * (aa_xy - bb_xy)
             less_yy = 0.25 * (aa_yy - bb_yy)
             odd = 0.25 * (ab_xy - ab_yx)
@@ -518,8 +525,8 @@ def make_assembly(smooth):
         low = first - 1
         cells = last - first + 1
         laws = LineLaws(law.along_i, law.along_j, law.blend_i, law.bend, law.way, law.ki, law.kj)
-        area = law.area_weight * law.area_target, law.area_weight / law.area_target
-        full = 0.25 * law.sigma * law.epsilon
+        area = functional.take_area_numbers(law)
+        full = functional.take_corner_weight(law)
         most = law.strengthening
         begin_columns(nodes, law.along_j, law.blend_i, law.blend_j, law.kj, low, cells, Z)
         if law.given:
@@ -535,22 +542,8 @@ def make_assembly(smooth):
                 bend_sides(law.curve, i + 1, low, cells, Z)
                 bend_lines(law.curve, i, low, cells + 1, Z)
             for col in range(cells):
-                ax = Z[AX + col]
-                ay = Z[AY + col]
-                a2 = Z[A2 + col]
-                ux = Z[AX + col + 1]
-                uy = Z[AY + col + 1]
-                u2 = Z[A2 + col + 1]
-                bx = Z[BX + col]
-                by = Z[BY + col]
-                b2 = Z[B2 + col]
-                rx = Z[CX + col]
-                ry = Z[CY + col]
-                r2 = Z[C2 + col]
-                d1 = ax * by - ay * bx
-                d2 = ux * by - uy * bx
-                d3 = ux * ry - uy * rx
-                d4 = ax * ry - ay * rx
+                corners, squares = functional.prepare_corners(*take_scaled_edges(col, Z))
+                d1, d2, d3, d4 = corners
                 if smooth:
                     d1, s1 = functional.smooth_area(d1, spread * spread)
                     d2, s2 = functional.smooth_area(d2, spread * spread)
@@ -568,34 +561,30 @@ def make_assembly(smooth):
                 Z[INV_2 + col] = i2
                 Z[INV_3 + col] = i3
                 Z[INV_4 + col] = i4
-                m1 = (a2 * b2) * (i1 * i1)
-                m2 = (u2 * b2) * (i2 * i2)
-                m3 = (u2 * r2) * (i3 * i3)
-                m4 = (a2 * r2) * (i4 * i4)
-                Z[AREA_1 + col] = m1
-                Z[AREA_2 + col] = m2
-                Z[AREA_3 + col] = m3
-                Z[AREA_4 + col] = m4
+                m1, m2, m3, m4 = functional.find_square_cosecants(squares, (i1, i2, i3, i4))
+                Z[COSECANT_1 + col] = m1
+                Z[COSECANT_2 + col] = m2
+                Z[COSECANT_3 + col] = m3
+                Z[COSECANT_4 + col] = m4
             if i == 0 or i == ni - 1:
                 # The block's own corners must not enter e_c; where the sides make one flat, its
                 # 1/D is infinite, and infinity times the zeros of a boundary is no number.
                 if low == 0:
-                    Z[(AREA_1 if i == 0 else AREA_4)] = 0.0
+                    Z[(COSECANT_1 if i == 0 else COSECANT_4)] = 0.0
                     Z[(INV_1 if i == 0 else INV_4)] = 0.0
                 if last == nj:
-                    Z[(AREA_2 if i == 0 else AREA_3) + cells - 1] = 0.0
+                    Z[(COSECANT_2 if i == 0 else COSECANT_3) + cells - 1] = 0.0
                     Z[(INV_2 if i == 0 else INV_3) + cells - 1] = 0.0
             for col in range(cells):
-                m1 = Z[AREA_1 + col]
-                m2 = Z[AREA_2 + col]
-                m3 = Z[AREA_3 + col]
-                m4 = Z[AREA_4 + col]
-                m1 = m1 if m1 > m2 else m2
-                m3 = m3 if m3 > m4 else m4
-                m1 = functional.weigh(m1 if m1 > m3 else m3, law.least_sine, most)
+                square = functional.find_largest(
+                    Z[COSECANT_1 + col], Z[COSECANT_2 + col], Z[COSECANT_3 + col],
+                    Z[COSECANT_4 + col],
+                )  # fmt: skip
+                strength = functional.weigh(square, law.least_sine, most)
                 if not smooth:
-                    Z[SLOPE_1 + col] = law.stiffness if (m1 > 1.0) & (m1 < most) else 1.0
-                Z[WEIGHT + col] = full if smooth else full * m1
+                    is_sharp = (strength > 1.0) & (strength < most)
+                    Z[SLOPE_1 + col] = law.stiffness if is_sharp else 1.0
+                Z[WEIGHT + col] = full if smooth else full * strength
             fill_fading(law.along_i[GROWTH, i], cells, Z)
             if law.given:
                 ease_row(law.ease, i, low, cells, Z)
@@ -618,20 +607,11 @@ def make_assembly(smooth):
                 else:
                     fill_barrier_corner(A, B, inverse, slope, weight, area, out)
             fill_cell_blocks(cells, now, Z)
-            if not smooth and law.cost_weight > 0.0:
-                add_cost(
-                    (nodes[0, i, low : low + cells + 1], nodes[1, i, low : low + cells + 1]),
-                    (
-                        nodes[0, i + 1, low : low + cells + 1],
-                        nodes[1, i + 1, low : low + cells + 1],
-                    ),
-                    law.sound[i, low : low + cells],
-                    law.cost_scale,
-                    law.cost_weight * law.sigma,
-                    cells,
-                    now,
-                    Z,
-                )
+            if not smooth and functional.has_cell_terms(law):
+                near = nodes[0, i, low : low + cells + 1], nodes[1, i, low : low + cells + 1]
+                far = nodes[0, i + 1, low : low + cells + 1], nodes[1, i + 1, low : low + cells + 1]
+                numbers = functional.take_cell_numbers(law)
+                add_cell_terms(near, far, law.sound[i, low : low + cells], numbers, cells, now, Z)
             fill_line_blocks(cells, now, Z)
             if i > 0:
                 fill_side_blocks(cells, now, Z)

@@ -102,33 +102,31 @@ def gather_cells(nodes, law, first, last, first_columns, last_columns, Z):
         Z[SOUND, k] = take_mean(law.sound, first, last, j, j_last)
 
 
+@inlined
+def take_gathered_edges(k, Z):
+    """The four edges of a gathered cell, unscaled, as `take_edges` orders them."""
+    return (
+        (Z[LOW_X, k], Z[LOW_Y, k]), (Z[UP_X, k], Z[UP_Y, k]),
+        (Z[NEAR_X, k], Z[NEAR_Y, k]), (Z[FAR_X, k], Z[FAR_Y, k]),
+    )  # fmt: skip
+
+
 @kernel
 def weigh_cells(law, growth, count, Z):
     """Weight of a corner of the gathered cells (theory R4.3, R4.4); False if one is folded."""
-    full = 0.25 * law.sigma * law.epsilon
+    full = functional.take_corner_weight(law)
     folded = 0
     for k in range(count):
-        ax = Z[LOW_X, k]
-        ay = Z[LOW_Y, k]
-        ux = Z[UP_X, k]
-        uy = Z[UP_Y, k]
-        bx = Z[NEAR_X, k]
-        by = Z[NEAR_Y, k]
-        rx = Z[FAR_X, k]
-        ry = Z[FAR_Y, k]
-        a2 = ax * ax + ay * ay
-        u2 = ux * ux + uy * uy
-        b2 = bx * bx + by * by
-        r2 = rx * rx + ry * ry
-        d1 = ax * by - ay * bx
-        d2 = ux * by - uy * bx
-        d3 = ux * ry - uy * rx
-        d4 = ax * ry - ay * rx
-        folded += 0 if min(min(d1, d2), min(d3, d4)) > 0.0 else 1
-        square = max(
-            max(a2 * b2 / (d1 * d1), u2 * b2 / (d2 * d2)),
-            max(u2 * r2 / (d3 * d3), a2 * r2 / (d4 * d4)),
-        )
+        low, up, near, far = take_gathered_edges(k, Z)
+        corners, squares = functional.prepare_corners(
+            functional.measure_edge(low), functional.measure_edge(up),
+            functional.measure_edge(near), functional.measure_edge(far),
+        )  # fmt: skip
+        d1, d2, d3, d4 = corners
+        folded += 0 if functional.find_least(d1, d2, d3, d4) > 0.0 else 1
+        inverses = 1.0 / d1, 1.0 / d2, 1.0 / d3, 1.0 / d4
+        m1, m2, m3, m4 = functional.find_square_cosecants(squares, inverses)
+        square = functional.find_largest(m1, m2, m3, m4)
         ratio = (Z[LOW_G, k] + Z[UP_G, k]) / (Z[NEAR_G, k] + Z[FAR_G, k])
         strength = functional.weigh(square, law.least_sine, law.strengthening)
         Z[WEIGHT, k] = full * strength * functional.fade(ratio, growth)
@@ -142,7 +140,7 @@ def add_corners(near, far, a_g, b_g, law, count, Z):
     `near` and `far` are the rows of its edges along i and j, `a_g` and `b_g` those of their inverse
     lengths; D is positive.
     """
-    lam_c = law.area_weight * law.area_target
+    lam_c, _ = functional.take_area_numbers(law)
     for k in range(count):
         ga = Z[a_g, k]
         gb = Z[b_g, k]
@@ -170,15 +168,14 @@ def add_blocks(k, blocks, Z):
 
 
 @kernel
-def add_costs(scale, weight, count, Z):
-    """Add the Hessian of P of the gathered cells to T: `scale` = 2/R², `weight` = mu sigma."""
+def add_cell_terms(numbers, count, Z):
+    """Add the Hessian of the terms of the gathered cells to T."""
     for k in range(count):
-        ax, ay = 0.5 * (Z[LOW_X, k] + Z[UP_X, k]), 0.5 * (Z[LOW_Y, k] + Z[UP_Y, k])
-        bx, by = 0.5 * (Z[NEAR_X, k] + Z[FAR_X, k]), 0.5 * (Z[NEAR_Y, k] + Z[FAR_Y, k])
-        rho = functional.cell_rate(ax, ay, bx, by, Z[SOUND, k], scale)
-        if rho > 1.0:
-            slope = functional.cost_slope(ax, ay, bx, by, rho, Z[SOUND, k], scale, weight)
-            add_blocks(k, functional.cost_blocks(ax, ay, bx, by, slope), Z)
+        low, up, near, far = take_gathered_edges(k, Z)
+        a, b = functional.find_mid_lines(low, up, near, far)
+        if functional.is_active(a, b, Z[SOUND, k], numbers):
+            _, _, parts = functional.cell_slope(a, b, Z[SOUND, k], numbers)
+            add_blocks(k, functional.cell_blocks(a, b, parts), Z)
 
 
 @kernel
@@ -274,8 +271,8 @@ def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
         add_corners(UP_X, NEAR_X, UP_G, NEAR_G, law, parts_j, Z)
         add_corners(UP_X, FAR_X, UP_G, FAR_G, law, parts_j, Z)
         add_corners(LOW_X, FAR_X, LOW_G, FAR_G, law, parts_j, Z)
-        if law.cost_weight > 0.0:
-            add_costs(law.cost_scale, law.cost_weight * law.sigma, parts_j, Z)
+        if functional.has_cell_terms(law):
+            add_cell_terms(functional.take_cell_numbers(law), parts_j, Z)
         for k in range(parts_j):
             Z[BLOCK_AA, k] += Z[LINE_Q, k]
             Z[BLOCK_AA + 2, k] += Z[LINE_Q, k]

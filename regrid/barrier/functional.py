@@ -20,6 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.jit import inlined
+from regrid.measure.quality import find_areas, square
 
 LEAST_FADING = 1e-6  # of the barrier's part, so that the matrix keeps a coupling
 
@@ -41,6 +42,62 @@ def fade(ratio, growth):
     kept *= kept
     kept *= kept * kept
     return kept if kept > LEAST_FADING else LEAST_FADING
+
+
+@inlined
+def measure_edge(edge):
+    """An edge with the square of its length: x, y, x² + y²."""
+    return edge[0], edge[1], square(edge)
+
+
+@inlined
+def prepare_corners(low, up, near, far):
+    """D of a cell's four corners, and the squared lengths of its edges along i and along j.
+
+    The edges are in the order of `regrid.measure.quality.take_edges`, each with its square
+    (`measure_edge`), scaled or not: everyone who looks at corners begins with this.
+    """
+    return find_areas(low, up, near, far), (low[2], up[2], near[2], far[2])
+
+
+@inlined
+def find_square_cosecants(squares, inverses):
+    """The squared inverse sine of each corner, from the edges' squares and each 1/D."""
+    low, up, near, far = squares
+    inverse_1, inverse_2, inverse_3, inverse_4 = inverses
+    return (
+        (low * near) * (inverse_1 * inverse_1), (up * near) * (inverse_2 * inverse_2),
+        (up * far) * (inverse_3 * inverse_3), (low * far) * (inverse_4 * inverse_4),
+    )  # fmt: skip
+
+
+@inlined
+def take_area_numbers(law):
+    """lam c and lam/c of the area term; `law` is a `BarrierLaw`."""
+    lam = law.area_weight
+    return lam * law.area_target, lam / law.area_target
+
+
+@inlined
+def take_corner_weight(law):
+    """Weight of a corner in a cell that is neither sharp nor faded: a quarter of sigma epsilon."""
+    return 0.25 * law.sigma * law.epsilon
+
+
+@inlined
+def find_largest(first, second, third, fourth):
+    """The largest of four numbers, without branches."""
+    first = first if first > second else second
+    third = third if third > fourth else fourth
+    return first if first > third else third
+
+
+@inlined
+def find_least(first, second, third, fourth):
+    """The least of four numbers, without branches."""
+    first = first if first < second else second
+    third = third if third < fourth else fourth
+    return first if first < third else third
 
 
 @inlined
@@ -137,6 +194,78 @@ def smoothed_corner(a, b, inverse, slope, weight, area):
     return corner_blocks(a2 + b2, v, g, 0.0, inverse, 1.0, (weight, ga, gb), area)
 
 
+# Terms of a cell: functions of its mid-lines A and B.  A new one is added to the sums in
+# `cell_value`, `cell_slope`, `cell_stiffness` and `cell_blocks`; where it acts says `acts_on_cell`.
+
+
+@inlined
+def find_mid_lines(low, up, near, far):
+    """A and B, the lines through a cell's middle, from its edges along i and along j."""
+    return (
+        (0.5 * (low[0] + up[0]), 0.5 * (low[1] + up[1])),
+        (0.5 * (near[0] + far[0]), 0.5 * (near[1] + far[1])),
+    )
+
+
+@inlined
+def has_cell_terms(law):
+    """Whether a block has terms of cells at all; `law` is a `BarrierLaw`."""
+    return law.cost_weight > 0.0
+
+
+@inlined
+def take_cell_numbers(law):
+    """What the terms of cells need besides a cell's own numbers: 2/R², and mu sigma."""
+    return law.cost_scale, law.cost_weight * law.sigma
+
+
+@inlined
+def is_active(a, b, sound, numbers):
+    """Whether a term acts on a cell: rho > 1."""
+    return cell_rate(a[0], a[1], b[0], b[1], sound, numbers[0]) > 1.0
+
+
+@inlined
+def measure_activity(square, area, sound, numbers):
+    """More than 0 where `is_active`, without a division, for whole rows of cells.
+
+    `square` is 4 (A² + B²), `area` 4 A × B.
+    """
+    return ((4.0 * numbers[0]) * square) * (sound * sound) - area * area
+
+
+@inlined
+def cell_value(a, b, sound, numbers):
+    """The value of all terms of a cell with the mid-lines `a` and `b`."""
+    scale, weight = numbers
+    return weight * cost_value(cell_rate(a[0], a[1], b[0], b[1], sound, scale))
+
+
+@inlined
+def cell_slope(a, b, sound, numbers):
+    """The slope of all terms in A and in B, and what their second derivatives are made of.
+
+    Of a cell on which they act.
+    """
+    scale, weight = numbers
+    rho = cell_rate(a[0], a[1], b[0], b[1], sound, scale)
+    parts = cost_slope(a[0], a[1], b[0], b[1], rho, sound, scale, weight)
+    first, _, dax, day, dbx, dby, _, _, _ = parts
+    return (first * dax, first * day), (first * dbx, first * dby), parts
+
+
+@inlined
+def cell_stiffness(a, b, parts):
+    """Half the traces of AA and of BB of `cell_blocks`."""
+    return cost_stiffness(a[0], a[1], b[0], b[1], parts)
+
+
+@inlined
+def cell_blocks(a, b, parts):
+    """Blocks AA, BB (xx, xy, yy) and AB (xx, xy, yx, yy) of the Hessian of all terms of a cell."""
+    return cost_blocks(a[0], a[1], b[0], b[1], parts)
+
+
 @inlined
 def cell_rate(ax, ay, bx, by, sound, scale):
     """rho of (R4.10) of a cell with the lines A and B through its middle; `scale` is 2/R²."""
@@ -206,3 +335,14 @@ def cost_blocks(ax, ay, bx, by, slope):
         cost_number(shares, a_x, b_x), cost_number(shares, a_x, b_y),
         cost_number(shares, a_y, b_x), cost_number(shares, a_y, b_y),
     )  # fmt: skip
+
+
+@inlined
+def cost_stiffness(ax, ay, bx, by, slope):
+    """Half the traces of AA and BB of `cost_blocks`."""
+    first, curve, dax, day, dbx, dby, twice, share, inverse = slope
+    h = first * twice
+    both = (4.0 * share) * inverse
+    along_a = h * (both * (bx * bx + by * by) - 2.0) + curve * (dax * dax + day * day)
+    along_b = h * (both * (ax * ax + ay * ay) - 2.0) + curve * (dbx * dbx + dby * dby)
+    return along_a, along_b

@@ -23,7 +23,24 @@ from numba import prange
 
 from regrid.algebraic import blend, take_blend, take_curve, take_curve_sides
 from regrid.barrier.coarse_nodes import end_stretch
-from regrid.barrier.functional import cell_rate, corner_slope, cost_slope, fade, weigh
+from regrid.barrier.functional import (
+    cell_slope,
+    cell_stiffness,
+    corner_slope,
+    fade,
+    find_largest,
+    find_least,
+    find_mid_lines,
+    find_square_cosecants,
+    has_cell_terms,
+    measure_activity,
+    measure_edge,
+    prepare_corners,
+    take_area_numbers,
+    take_cell_numbers,
+    take_corner_weight,
+    weigh,
+)
 from regrid.barrier.line_cg import add_columns
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
 from regrid.barrier.step_control import (
@@ -50,7 +67,7 @@ from regrid.measure.quality import find_areas, square
     LINE_G, LINE_Q, NEAR_G, NEAR_Q, FAR_G, FAR_Q,
     LOW_X, LOW_Y, LOW_Q, UP_X, UP_Y, UP_Q, SIDE_X, SIDE_Y, SIDE_Q, RIGHT_X, RIGHT_Y, RIGHT_Q,
     FLUX_X, FLUX_Y, PIVOT, PART_X, PART_Y, PASSED, SUM,
-    SHRUNK, LEAST_AREA, SHARPEST, LONG, SHORT, OLD_AREA, LONG_LINE, LONG_SIDE, LIMITING,
+    SHRUNK, LEAST_AREA, SHARPEST, LONG, SHORT, OLD_AREA, LONG_LINE, LONG_SIDE, ACTIVITY,
     WHOLE_X, WHOLE_Y, NEAR_SUM_I, NEAR_SUM_J, FAR_SUM_I, FAR_SUM_J, PAST_X, PAST_Y,
 ) = range(0, 74 * CHUNK_SPAN, CHUNK_SPAN)  # fmt: skip
 # TILE rows of x and as many of y: of the old grid and of this one, in a transposed frame, where
@@ -235,16 +252,21 @@ def take_cell(col, numbers, Z):
     A corner of the block itself has OWN as old area; it enters neither the compared areas nor the
     weight, and its area comes from `given`.
     """
-    full, growth, least_sine, most, lam_c, flat, rate, given = numbers
-    (ax, ay), (ux, uy), (bx, by), (rx, ry) = take_edges(ROWS, col, Z)
+    full, growth, least_sine, most, lam_c, flat, cell_numbers, given = numbers
+    low, up, near, far = take_edges(ROWS, col, Z)
+    corners, squares = prepare_corners(
+        measure_edge(low), measure_edge(up), measure_edge(near), measure_edge(far)
+    )
+    a1, a2, a3, a4 = corners
+    pa, pu, pb, pr = squares
+    ax, ay = low
+    ux, uy = up
+    bx, by = near
+    rx, ry = far
     ga = Z[LINE_G + col]
     gu = Z[LINE_G + col + 1]
     gb = Z[NEAR_G + col]
     gr = Z[FAR_G + col]
-    a1 = ax * by - ay * bx
-    a2 = ux * by - uy * bx
-    a3 = ux * ry - uy * rx
-    a4 = ax * ry - ay * rx
     h1 = ga * gb
     h2 = gu * gb
     h3 = gu * gr
@@ -273,44 +295,31 @@ def take_cell(col, numbers, Z):
     i2 = low * d1
     i3 = up * d4
     i4 = up * d3
-    d1 = d1 if d1 < d2 else d2
-    d3 = d3 if d3 < d4 else d4
-    d1 = d1 if d1 < d3 else d3
+    d1 = find_least(d1, d2, d3, d4)
     d2 = Z[LEAST_AREA + col]
     Z[LEAST_AREA + col] = d1 if d1 < d2 else d2
-    pa = ax * ax + ay * ay
-    pu = ux * ux + uy * uy
-    pb = bx * bx + by * by
-    pr = rx * rx + ry * ry
     pa = (ga * ga) * pa
     pu = (gu * gu) * pu
     pb = (gb * gb) * pb
     pr = (gr * gr) * pr
-    j1 = i1 * i1
-    j2 = i2 * i2
-    j3 = i3 * i3
-    j4 = i4 * i4
-    c1 = (pa * pb) * j1 if o1 > NO_OWN_BLOCK else 0.0
-    c2 = (pu * pb) * j2 if o2 > NO_OWN_BLOCK else 0.0
-    c3 = (pu * pr) * j3 if o3 > NO_OWN_BLOCK else 0.0
-    c4 = (pa * pr) * j4 if o4 > NO_OWN_BLOCK else 0.0
+    c1, c2, c3, c4 = find_square_cosecants((pa, pu, pb, pr), (i1, i2, i3, i4))
+    c1 = c1 if o1 > NO_OWN_BLOCK else 0.0
+    c2 = c2 if o2 > NO_OWN_BLOCK else 0.0
+    c3 = c3 if o3 > NO_OWN_BLOCK else 0.0
+    c4 = c4 if o4 > NO_OWN_BLOCK else 0.0
     # Old over new areas of the corners.
     o1 = o1 * (h1 * i1)
     o2 = o2 * (h2 * i2)
     o3 = o3 * (h3 * i3)
     o4 = o4 * (h4 * i4)
-    o1 = o1 if o1 > o2 else o2
-    o3 = o3 if o3 > o4 else o4
-    o1 = o1 if o1 > o3 else o3
+    o1 = find_largest(o1, o2, o3, o4)
     o2 = Z[SHRUNK + col]
     Z[SHRUNK + col] = o1 if o1 > o2 else o2
-    c1 = c1 if c1 > c2 else c2
-    c3 = c3 if c3 > c4 else c4
-    c1 = c1 if c1 > c3 else c3
+    c1 = find_largest(c1, c2, c3, c4)
     c2 = Z[SHARPEST + col]
     Z[SHARPEST + col] = c1 if c1 > c2 else c2
     weight = (full * weigh(c1, least_sine, most)) * fade(ratio, growth)
-    # Twice the mid-lines: aspect ratio as a fraction, and whether the cell limits the step.
+    # Twice the mid-lines: aspect ratio as a fraction, and whether terms of cells act on this one.
     mx = ax + ux
     my = ay + uy
     nx = bx + rx
@@ -325,7 +334,7 @@ def take_cell(col, numbers, Z):
     Z[LONG + col] = longer if more else long
     Z[SHORT + col] = shorter if more else short
     area = (a1 + a3) + (a2 + a4)
-    Z[LIMITING + col] = (rate * (m2 + n2)) * (Z[SOUND + col] * Z[SOUND + col]) - area * area
+    Z[ACTIVITY + col] = measure_activity(m2 + n2, area, Z[SOUND + col], cell_numbers)
     k1, s1 = corner_slope(pa + pb, i1, lam_c, flat)
     k2, s2 = corner_slope(pu + pb, i2, lam_c, flat)
     k3, s3 = corner_slope(pu + pr, i3, lam_c, flat)
@@ -389,23 +398,24 @@ def take_cells(i, law, shape, low, cells, Z):
             Z[OLD_1 if i == 0 else OLD_4] = NO_OWN_BLOCK
         if low + cells == nj:
             Z[(OLD_2 if i == 0 else OLD_3) + cells - 1] = NO_OWN_BLOCK
-    with_cost = law.cost_weight > 0.0
-    if with_cost:
+    with_cell_terms = has_cell_terms(law)
+    if with_cell_terms:
         sound = law.sound[i, low : low + cells]
         for col in range(cells):
             Z[SOUND + col] = sound[col]
+    lam_c, flat = take_area_numbers(law)
+    cell_numbers = take_cell_numbers(law)
     numbers = (
-        0.25 * law.sigma * law.epsilon, law.along_i[GROWTH, i], law.least_sine, law.strengthening,
-        law.area_weight * law.area_target, law.area_weight / law.area_target, 4.0 * law.cost_scale,
-        law.area_target,
+        take_corner_weight(law), law.along_i[GROWTH, i], law.least_sine,
+        law.strengthening, lam_c, flat, cell_numbers, law.area_target,
     )  # fmt: skip
     take_row_of_cells(numbers, cells, Z)
-    if with_cost:
-        limiting = 0
+    if with_cell_terms:
+        active = 0
         for col in range(cells):
-            limiting += 1 if Z[LIMITING + col] > 0.0 else 0
-        if limiting > 0:
-            add_limiting_shares(law.cost_scale, law.cost_weight * law.sigma, cells, Z)
+            active += 1 if Z[ACTIVITY + col] > 0.0 else 0
+        if active > 0:
+            add_cell_terms(cell_numbers, cells, Z)
 
 
 @kernel(allocates=False)
@@ -435,37 +445,25 @@ def measure_old(cells, Z):
 
 
 @kernel(allocates=False)
-def add_limiting_shares(scale, weight, cells, Z):
-    """Gradient of P and half the trace of its blocks along edges, for cells that limit the step.
+def add_cell_terms(numbers, cells, Z):
+    """Gradient of the terms of cells and half the trace of their blocks along edges.
 
-    `scale` = 2/R², `weight` = mu sigma: see `cost_slope`.
+    `numbers` as `take_cell_numbers` gives them.
     """
     for col in range(cells):
-        if Z[LIMITING + col] > 0.0:
-            (ax, ay), (ux, uy), (bx, by), (rx, ry) = take_edges(ROWS, col, Z)
-            ax = 0.5 * (ax + ux)
-            ay = 0.5 * (ay + uy)
-            bx = 0.5 * (bx + rx)
-            by = 0.5 * (by + ry)
-            rho = cell_rate(ax, ay, bx, by, Z[SOUND + col], scale)
-            first, curve, dax, day, dbx, dby, twice, share, inverse = cost_slope(
-                ax, ay, bx, by, rho, Z[SOUND + col], scale, weight
-            )
-            half = 0.5 * first
-            h = first * twice
-            both = (4.0 * share) * inverse
+        if Z[ACTIVITY + col] > 0.0:
+            low, up, near, far = take_edges(ROWS, col, Z)
+            a, b = find_mid_lines(low, up, near, far)
+            slope_a, slope_b, parts = cell_slope(a, b, Z[SOUND + col], numbers)
+            stiff_a, stiff_b = cell_stiffness(a, b, parts)
             # half the traces of the blocks AA and BB, a quarter of them for each edge
-            stiff_a = h * (both * (bx * bx + by * by) - 2.0) + curve * (dax * dax + day * day)
-            stiff_b = h * (both * (ax * ax + ay * ay) - 2.0) + curve * (dbx * dbx + dby * dby)
-            stiff_a = 0.125 * stiff_a
-            stiff_b = 0.125 * stiff_b
-            for edge, stiff, dx, dy in (
-                (LOW_X, stiff_a, dax, day), (UP_X, stiff_a, dax, day),
-                (SIDE_X, stiff_b, dbx, dby), (RIGHT_X, stiff_b, dbx, dby),
+            for edge, stiff, slope in (
+                (LOW_X, stiff_a, slope_a), (UP_X, stiff_a, slope_a),
+                (SIDE_X, stiff_b, slope_b), (RIGHT_X, stiff_b, slope_b),
             ):  # fmt: skip
-                Z[edge + col] += half * dx
-                Z[edge + CHUNK_SPAN + col] += half * dy
-                Z[edge + 2 * CHUNK_SPAN + col] += stiff
+                Z[edge + col] += 0.5 * slope[0]
+                Z[edge + CHUNK_SPAN + col] += 0.5 * slope[1]
+                Z[edge + 2 * CHUNK_SPAN + col] += 0.125 * stiff
 
 
 @kernel(allocates=False)

@@ -11,11 +11,14 @@ effect.
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
 
 from regrid.algebraic import prepare_motion
+from regrid.barrier.functional import has_cell_terms
+from regrid.barrier.tuning import Weights
 from regrid.jit import kernel
 from regrid.measure.corners import count_turned_corners
 from regrid.measure.crossings import search_meeting
@@ -26,8 +29,8 @@ from regrid.sides import J_MIN, SIDE_NAMES, compute_area, find_node
 LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE, GROWTH = range(5)
 
 
-class BarrierLaw(NamedTuple):
-    """All that the barrier functional knows besides the nodes (theory R4.1), as kernels take it.
+class SideLaw(NamedTuple):
+    """What the barrier functional knows from the sides (theory R4.1), as kernels take it.
 
     The laws of the sides `along_i` (5, ni) and `along_j` (5, nj), rows as named above, in m and
     without unit; where lines lie between opposite sides, `blend_i` (ni+1) and `blend_j` (nj+1);
@@ -40,12 +43,8 @@ class BarrierLaw(NamedTuple):
     `curve` (2, ni+1, nj+1), the grid in m that lines are drawn to, times its weight, read where
     `curved` (`regrid.algebraic`);
     the weights `ki`, `kj` of the two families of straight lines; `sigma`, the mean area of a cell
-    in m²; `area_target`, the mean c of D; `epsilon`; `area_weight`, the lam of R4.1;
-    `least_sine` and `strengthening`: from which sine on and how many times at most the barrier of a
-    sharp cell goes up;
-    `stiffness`, of sharp cells' corners in the matrix (R4.18); what cells cost
-    (theory R4.10): `sound` (ni, nj) in m/s, `cost_scale` = 2/R² in s², and
-    `cost_weight`, its weight mu, 0 by default.
+    in m²; `area_target`, the mean c of D; for the cost of cells (R4.10) `sound` (ni, nj) in m/s and
+    `cost_scale` = 2/R² in s².
     """
 
     along_i: np.ndarray
@@ -66,14 +65,13 @@ class BarrierLaw(NamedTuple):
     kj: float
     sigma: float
     area_target: float
-    epsilon: float
-    area_weight: float
-    least_sine: float
-    strengthening: float
-    stiffness: float
     sound: np.ndarray
     cost_scale: float
-    cost_weight: float
+
+
+# All that the functional knows besides the nodes: the `Weights` as they are in this block, and a
+# `SideLaw`.  Flat: loops on threads take no tuple inside another one.
+BarrierLaw = namedtuple("BarrierLaw", (*Weights._fields, *SideLaw._fields))  # type: ignore[misc]
 
 
 COARSE_EDGES = 32  # a side's bend is measured on no more edges than about this many
@@ -390,7 +388,7 @@ def prepare(old, law, motion, conditional, limits, check):
                 law.way[k, j] = sides[k, -1, j] - sides[k, 0, j]
     area_target = sigma / compute_mean_area(along_i, along_j, blend_i, blend_j)
     scale = 0.0
-    if law.cost_weight > 0.0:
+    if has_cell_terms(law):
         rate = compute_limiting_rate(
             law.sound, along_i, along_j, blend_i, blend_j, area_target, limits[0]
         )

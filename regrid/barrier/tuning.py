@@ -8,6 +8,7 @@ round-off are not tuning parameters and are defined where they are used.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,28 @@ class Tuning:
     coarse_part: float = 0.6  # R4.14: fraction of the solution that is applied
     smooth_floor: float = 0.03  # R4.14: error in cells that is accepted
     smooth_part: float = 0.25  # R4.14: largest correction, over the motion of the fastest node
+
+    def get_weights(self, epsilon: float, stiffness: float, cost: bool) -> Weights:
+        """Those of the numbers that kernels of the functional take, as they are in a block.
+
+        There the barrier may be stronger than here, and the matrix softer; without speeds of sound
+        the cost has no weight.
+        """
+        return Weights(
+            epsilon, float(self.area_weight), float(self.least_sine), float(self.strengthening),
+            float(self.cost_weight) if cost else 0.0, stiffness,
+        )  # fmt: skip
+
+
+class Weights(NamedTuple):
+    """The numbers of the functional, as kernels take them; each is a field of `Tuning`."""
+
+    epsilon: float
+    area_weight: float
+    least_sine: float
+    strengthening: float
+    cost_weight: float
+    stiffness: float
 
 
 DEFAULT = Tuning()

@@ -15,11 +15,22 @@ from enum import Enum
 import numpy as np
 
 from regrid.barrier import assembly as at
-from regrid.barrier.functional import cell_rate, corner_value, cost_value, smooth_area
+from regrid.barrier.functional import (
+    cell_value,
+    corner_value,
+    find_least,
+    find_mid_lines,
+    has_cell_terms,
+    prepare_corners,
+    smooth_area,
+    take_cell_numbers,
+    take_corner_weight,
+)
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP_CHANGE
 from regrid.barrier.step_control import CHUNK_SPAN
 from regrid.barrier.tuning import DEFAULT, Tuning
 from regrid.jit import kernel
+from regrid.measure.quality import take_edges
 from regrid.sides import copy_sides
 
 TERM_1, TERM_2, TERM_3, TERM_4 = (at.ASSEMBLY_ROWS + k * CHUNK_SPAN for k in range(4))
@@ -41,7 +52,7 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
     laws = at.LineLaws(law.along_i, law.along_j, law.blend_i, law.bend, law.way, law.ki, law.kj)
     c = law.area_target
     lam = law.area_weight
-    quarter = 0.25 * law.sigma * law.epsilon
+    quarter = take_corner_weight(law)
     for col in range(cells):
         Z[ENERGY_ROW + col] = 0.0
         Z[LEAST_AREA_ROW + col] = 1e300
@@ -57,22 +68,9 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
             at.bend_sides(law.curve, i + 1, first, cells, Z)
             at.bend_lines(law.curve, i, first, cells + 1, Z)
         for col in range(cells):
-            ax = Z[at.AX + col]
-            ay = Z[at.AY + col]
-            a2 = Z[at.A2 + col]
-            ux = Z[at.AX + col + 1]
-            uy = Z[at.AY + col + 1]
-            u2 = Z[at.A2 + col + 1]
-            bx = Z[at.BX + col]
-            by = Z[at.BY + col]
-            b2 = Z[at.B2 + col]
-            rx = Z[at.CX + col]
-            ry = Z[at.CY + col]
-            r2 = Z[at.C2 + col]
-            d1 = ax * by - ay * bx
-            d2 = ux * by - uy * bx
-            d3 = ux * ry - uy * rx
-            d4 = ax * ry - ay * rx
+            corners, squares = prepare_corners(*at.take_scaled_edges(col, Z))
+            d1, d2, d3, d4 = corners
+            a2, u2, b2, r2 = squares
             Z[LEAST_1 + col] = d1
             Z[LEAST_2 + col] = d2
             Z[LEAST_3 + col] = d3
@@ -107,34 +105,27 @@ def fill_energy(nodes, law, spread, barrier, first, last, Z):
                 + Z[at.RIGHT_Y + col] * Z[at.RIGHT_Y + col]
             )
             terms = (Z[TERM_1 + col] + Z[TERM_2 + col]) + (Z[TERM_3 + col] + Z[TERM_4 + col])
-            m1 = Z[LEAST_1 + col]
-            m2 = Z[LEAST_2 + col]
-            m3 = Z[LEAST_3 + col]
-            m4 = Z[LEAST_4 + col]
-            m1 = m1 if m1 < m2 else m2
-            m3 = m3 if m3 < m4 else m4
-            m1 = m1 if m1 < m3 else m3
+            here = find_least(
+                Z[LEAST_1 + col], Z[LEAST_2 + col], Z[LEAST_3 + col], Z[LEAST_4 + col]
+            )
             least = Z[LEAST_AREA_ROW + col]
             straight = straight / Z[at.QA + col] if Z[at.QA + col] > 0.0 else 0.0  # F = q dx
             terms *= Z[at.FADING_ROW + col]
             Z[ENERGY_ROW + col] += (quarter * parts[col]) * terms + 0.5 * (
                 straight + inside * Z[at.RIGHT_Q + col] * side
             )
-            Z[LEAST_AREA_ROW + col] = m1 if m1 < least else least
-        if spread == 0.0 and law.cost_weight > 0.0:
+            Z[LEAST_AREA_ROW + col] = here if here < least else least
+        if spread == 0.0 and has_cell_terms(law):
             x0 = nodes[0, i]
             y0 = nodes[1, i]
             x1 = nodes[0, i + 1]
             y1 = nodes[1, i + 1]
-            weight = law.cost_weight * law.sigma
+            numbers = take_cell_numbers(law)
             for col in range(cells):
                 j = first + col
-                ax = 0.5 * ((x1[j] - x0[j]) + (x1[j + 1] - x0[j + 1]))
-                ay = 0.5 * ((y1[j] - y0[j]) + (y1[j + 1] - y0[j + 1]))
-                bx = 0.5 * ((x0[j + 1] - x0[j]) + (x1[j + 1] - x1[j]))
-                by = 0.5 * ((y0[j + 1] - y0[j]) + (y1[j + 1] - y1[j]))
-                rho = cell_rate(ax, ay, bx, by, law.sound[i, j], law.cost_scale)
-                Z[ENERGY_ROW + col] += weight * cost_value(rho)
+                low, up, near, far = take_edges(x0, y0, x1, y1, j)
+                a, b = find_mid_lines(low, up, near, far)
+                Z[ENERGY_ROW + col] += cell_value(a, b, law.sound[i, j], numbers)
 
 
 FIRST_PART = 0.2  # e of the first step, over the worst D

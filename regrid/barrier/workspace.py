@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
+from typing import Any
 
 import numba
 import numpy as np
@@ -22,6 +23,7 @@ from regrid.barrier.assembly import (
     assemble_smoothed,
 )
 from regrid.barrier.coarse_nodes import CoarseCorrection
+from regrid.barrier.functional import has_cell_terms
 from regrid.barrier.given_spacing import GivenSpacing, SideLengths, find_given_spacing
 from regrid.barrier.line_cg import fill_product, solve_serial, solve_threaded
 from regrid.barrier.residual_estimate import (
@@ -89,6 +91,7 @@ class Workspace:
     lays them out there.
     """
 
+    law: Any  # a `BarrierLaw`
     own_old: np.ndarray
     own_sides: np.ndarray
     own_base: np.ndarray
@@ -293,11 +296,9 @@ class Workspace:
                 fill_curves(self.sides, share_i, share_j, self.curve)
                 epsilon = max(epsilon, least)
         law = BarrierLaw(
-            self.along_i, self.along_j, self.blend_i, self.blend_j, self.bent, self.bend,
-            self.most_bend, self.way, *self._take_shares(), self.curve, share_i + share_j > 0.0,
-            float(ki), float(kj), 0.0, 0.0, epsilon, float(tuning.area_weight),
-            float(tuning.least_sine), float(tuning.strengthening), 1.0, self.sound, 0.0,
-            float(tuning.cost_weight) if cost else 0.0,
+            *tuning.get_weights(epsilon, 1.0, cost), self.along_i, self.along_j, self.blend_i,
+            self.blend_j, self.bent, self.bend, self.most_bend, self.way, *self._take_shares(),
+            self.curve, share_i + share_j > 0.0, float(ki), float(kj), 0.0, 0.0, self.sound, 0.0,
         )  # fmt: skip
         self.symmetry = None
         self.motion = SideMotion(self.sides, *self.motion_tables)
@@ -310,7 +311,7 @@ class Workspace:
         if self.spacing is not None:
             sides = SideLengths(self.along_i, self.along_j, self.blend_i, self.blend_j)
             self.area_target = self.sigma / self.spacing.compute_mean_area(sides)
-            if law.cost_weight > 0.0:
+            if has_cell_terms(law):
                 rate = self.spacing.compute_limiting_rate(sides, self.sound, self.area_target)
                 rate = max(tuning.cost_margin * rate, self.least_limiting_rate)
                 scale = 2.0 / (rate * rate)
@@ -442,7 +443,7 @@ class Workspace:
         """See how `old` and its displaced grid in `base` are symmetric: solutions will be, too."""
         if self.spacing is not None:
             return  # it need not be symmetric
-        cells = [self.sound] if self.law.cost_weight > 0.0 else []
+        cells = [self.sound] if has_cell_terms(self.law) else []
         bend = self.bend if self.bent else None
         self.symmetry = find_symmetry(self.old, self.base, cells, bend)
 

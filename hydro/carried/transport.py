@@ -3,9 +3,9 @@
 In a step, beside the phases of the flow (`hydro.phases`):
 
     gather    values of the cells along the sides, which also stand for what is beyond these
-    predict   limited slopes of all cells, and their values at mid-time            theory F15.2
+    predict   limited slopes of all cells, and their values at mid-time            theory F17.2
     trace     values at the faces of the sides; what passes through open sides
-    carry     what the mass brings and takes                                       theory F15.1
+    carry     what the mass brings and takes                                       theory F17.1
 
 Faces take the value of the cell that the mass leaves.  The change of a cell is summed of the
 differences between what comes through its faces and what is there, so a constant stays one to the

@@ -133,7 +133,7 @@ class EquationOfState:
         return found
 
     def temperature(self, rho, e):
-        """Temperature [K] from density and specific internal energy, where it has one: F16."""
+        """Temperature [K] from density and specific internal energy, where it has one: F18."""
         return compute_solid_temperature(self, np.asarray(rho, float), np.asarray(e, float))
 
     def compute_second_part(self, rho) -> np.ndarray:

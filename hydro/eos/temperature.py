@@ -1,6 +1,6 @@
 """Temperature from density and energy, of materials whose heat capacity is a constant.
 
-    T = T_s(rho) + (e - e_s(rho)) / c_v                                       theory F16.1
+    T = T_s(rho) + (e - e_s(rho)) / c_v                                       theory F18.1
 
 on the isentrope (e_s, T_s) through the material at rest, rho0 and REST_TEMPERATURE:
 de_s = p_s drho/rho², dT_s = Gamma T_s drho/rho with Gamma = (dp/de)/rho.  Along a Hugoniot this is

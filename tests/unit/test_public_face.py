@@ -40,7 +40,8 @@ def test_a_start_loads_nothing_heavy(start):
 
 
 PUBLIC = """
-AlgebraicRegridder BadInput BarrierRegridder Block Case Deck DeckTable EquationOfState Hook IdealGas
+AlgebraicRegridder BadInput BarrierRegridder Block CarriedField Case Deck DeckTable EquationOfState
+Hook IdealGas
 JWL MieGruneisen OpenRun Output PhaseTransition Problem Regrid RegridFailure RunControl RunFailure
 Segment Simulation StiffenedGas Study Tabular __version__ compare find_material gravity grid
 inlined join load make_regridder open plot put register restart run shock slide study testing

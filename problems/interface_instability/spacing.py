@@ -18,7 +18,7 @@ from regrid.errors import BadInput
 
 # wavelengths on each side with the finest cells while the shock passes
 FINE_ZONE_WAVELENGTHS = 0.05
-PASSAGE_CELL_GROWTH = 1.1  # of the finer cells, from one to the next beyond that
+PASSAGE_CELL_GROWTH = 1.1  # most growth of the finer cells, from one to the next beyond that
 MOST_SIDE_CELLS = 10 * MOST_CELLS  # cells along a side
 # most speed of nodes that are respaced, over that of sound: faster, what a strong shock has left
 # beside the interface is smeared over the wider cells before it has moved the interface
@@ -62,13 +62,17 @@ class Spacing:
         return positions * (length / positions[-1])
 
     def _make_finer_steps(self, size: float, length: float) -> np.ndarray:
-        """Sizes (n,) [m] of the finer cells."""
+        """Sizes (n,) [m] of the finer cells.
+
+        Their growth sets in and ends gradually, as the slope 6 x (1 - x) of 3 x² - 2 x³, at most
+        1.5: a captured shock sends a pulse back to the interface from where it changes at once.
+        """
         if self.finer == 1.0:
             return np.empty(0)
         first = size / self.finer
-        growing = first * PASSAGE_CELL_GROWTH ** np.arange(
-            1, math.log(self.finer) / math.log(PASSAGE_CELL_GROWTH)
-        )
+        count = math.ceil(1.5 * math.log(self.finer) / math.log(PASSAGE_CELL_GROWTH))
+        part = np.arange(1, count) / count
+        growing = first * self.finer ** (part * part * (3.0 - 2.0 * part))
         steps = np.append(
             np.full(round(FINE_ZONE_WAVELENGTHS * self.deck.wavelength / first), first), growing
         )

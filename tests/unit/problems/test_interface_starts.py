@@ -12,6 +12,7 @@ from problems.interface_instability.crossed_start import find_nearer_speed
 from problems.interface_instability.deck import Fluid, InterfaceDeck, SecondShock
 from problems.interface_instability.line import Mode, Spectrum, measure_mode
 from problems.interface_instability.problem import LEAST_REACH_RATIO, InterfaceInstability
+from problems.interface_instability.spacing import PASSAGE_CELL_GROWTH, Spacing
 from problems.interface_instability.theories import TRUSTED_RATE_ERROR, get_kct, predict_amplitude
 from regrid.errors import BadInput
 from regrid.measure.quality import find_bad_cells, measure_quality
@@ -216,3 +217,14 @@ def test_the_shortest_wave_has_the_say():
     """And never fewer cells than a captured front has."""
     assert find_layer(192, numbers=(1, 3)) == pytest.approx(find_layer(64))
     assert find_layer(64, numbers=(1, 8)) * 64 / 8 == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("finer", [2.0, 4.0, 8.0])
+@pytest.mark.parametrize("cells", [16, 64])
+def test_finer_cells_of_a_passage_begin_and_end_to_grow_gradually(cells, finer):
+    """A captured shock sends a pulse back to the interface from where the growth jumps."""
+    steps = np.diff(Spacing(InterfaceDeck(cells=cells), finer).make(4.0))
+    growth = steps[1:] / steps[:-1]
+    assert steps[0] * finer == pytest.approx(1.0 / cells, rel=0.05)
+    assert growth.min() > 0.999 and growth.max() <= PASSAGE_CELL_GROWTH
+    assert np.abs(np.diff(growth)).max() < 0.3 * (PASSAGE_CELL_GROWTH - 1.0)

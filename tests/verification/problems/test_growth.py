@@ -126,7 +126,7 @@ def measure_ripple(run: Finished, first=1.0, last=4.0, window=0.6) -> float:
 
 @pytest.mark.parametrize("case", CASES)
 def test_a_captured_shock_leaves_no_ripple_in_the_growth(case):
-    """Measured: .006 to .008; .12 with `van-leer`, which leaves a sawtooth behind the shock."""
+    """Measured: .003 to .007; .12 with `van-leer`, which leaves a sawtooth behind the shock."""
     run = Finished(cells=32, start="incident", kct_end=4.5, **CASES[case][0])
     assert measure_ripple(run) < 0.01
 

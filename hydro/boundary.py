@@ -288,12 +288,12 @@ class FreeSurface(Segment):
     ):  # fmt: skip
         super().__init__(block, side, start, stop)
         self.tension = self.check_tension(tension)
-        for name, value, words in (
+        for name, value, condition in (
             ("bond", bond, "the tension that a contact holds is a number of Pa, 0 or more"),
             ("friction", friction, "Coulomb's coefficient is a number, 0 or more"),
         ):
             if not isinstance(value, int | float | np.number) or not value >= 0.0:
-                raise BadInput(f"{self}: free-surface segment: {name} = {value!r}; {words}")
+                raise BadInput(f"{self}: free-surface segment: {name} = {value!r}; {condition}")
         if not isinstance(weld, bool):
             raise BadInput(f"{self}: free-surface segment: weld = {weld!r}; it is true or false")
         self.bond, self.friction = (math.inf,) * 2 if weld else (float(bond), float(friction))
@@ -442,9 +442,9 @@ def _check_options(place: str, make: type[Segment], options: dict) -> None:
             )
     missing = [one.name for one in given if one.default is one.empty and one.name not in options]
     if missing:
-        words = ", ".join(f"{name}=..." for name in missing)
+        examples = ", ".join(f"{name}=..." for name in missing)
         about = (make.__doc__ or "").strip().partition("\n")[0]
-        raise BadInput(f"{place}: {words} is missing ({about})")
+        raise BadInput(f"{place}: {examples} is missing ({about})")
 
 
 def put(

@@ -116,8 +116,10 @@ class ProgrammedBurn:
     def find_explosive(self, eos: JWL) -> Explosive:
         if eos not in self._known:
             speed, _, rho = eos.find_detonation()
-            rest = float(eos.energy(eos.rho0, 0.0))
-            self._known[eos] = Explosive(self.speed or speed, eos.heat, rest, 1.0 - eos.rho0 / rho)
+            energy_at_rest = float(eos.energy(eos.rho0, 0.0))
+            self._known[eos] = Explosive(
+                self.speed or speed, eos.heat, energy_at_rest, 1.0 - eos.rho0 / rho
+            )
         return self._known[eos]
 
     def compute_timed(self, speed: float, x, y, t: float) -> np.ndarray:

@@ -40,7 +40,7 @@ def compute_grid_quality(flow: Flow) -> dict[str, float | int]:
 
 def count_regridding(flow: Flow) -> dict[str, float | int]:
     """Activity of the regridders in the step."""
-    iterations = node_iterations = sub_moves = rescues = limited = told = 0
+    iterations = node_iterations = sub_moves = rescues = limited = reports = 0
     ratio = math.inf
     for row in flow.motion.counts:
         iterations += row[0]
@@ -48,14 +48,14 @@ def count_regridding(flow: Flow) -> dict[str, float | int]:
         sub_moves += row[2]
         rescues += row[3]
         limited += row[4]
-        told += row[5]
+        reports += row[5]
         ratio = row[6] if row[6] < ratio else ratio
     return {
         "regrid_iterations": int(iterations),
         "regrid_node_iterations": int(node_iterations),
         "regrid_sub_moves": int(sub_moves),
         "regrid_rescues": int(rescues),
-        "regrid_least_corner_ratio": ratio if told else 1.0,
+        "regrid_least_corner_ratio": ratio if reports else 1.0,
         "regrid_held_nodes": int(limited),
     }
 

@@ -184,9 +184,9 @@ def name_materials(blocks: Sequence[Block], links: Sequence[Link | SlidingContac
     for body in range(count):
         members = [block for block, own in zip(blocks, bodies, strict=True) if own == body]
         labels = list(dict.fromkeys(block.material for block in members))
-        rest = len(labels) - MOST_JOINED_NAMES
-        if rest > 0:
-            labels[MOST_JOINED_NAMES:] = [f"{rest} more"]
+        unnamed = len(labels) - MOST_JOINED_NAMES
+        if unnamed > 0:
+            labels[MOST_JOINED_NAMES:] = [f"{unnamed} more"]
         for block in members:
             block.material = "+".join(labels)
 

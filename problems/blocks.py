@@ -214,8 +214,10 @@ def check_grid(nodes: np.ndarray, deck: BlocksDeck, block: BlockTable, where: st
         raise BadInput(f"{where}: a 3D grid; blocks are 2D")
     cells = nodes.shape[1] - 1, nodes.shape[2] - 1
     if block.cells is not None and tuple(block.cells) != cells:
-        words = f"leave out cells = {list(block.cells)}, which is for blocks made on curves"
-        raise BadInput(f"{where}: the file has {cells[0]} x {cells[1]} cells; {words}")
+        raise BadInput(
+            f"{where}: the file has {cells[0]} x {cells[1]} cells; "
+            f"leave out cells = {list(block.cells)}, which is for blocks made on curves"
+        )
     bad = find_bad_cells(nodes)
     if not len(bad):
         return nodes
@@ -241,8 +243,10 @@ def read_curve(block: BlockTable, side: str) -> np.ndarray:
         raise BadInput(f"{where}: give x and y, formulas of s, or points, and not both")
     pieces = len(curve.points or (0,)) - 1
     if curve.cells is not None and len(curve.cells) != pieces:
-        words = f"{len(curve.cells)} numbers for {pieces} straight lines between points"
-        raise BadInput(f"{where}: cells has {words}")
+        raise BadInput(
+            f"{where}: cells has "
+            f"{len(curve.cells)} numbers for {pieces} straight lines between points"
+        )
     if curve.points is None:
         s = {"s": np.linspace(0.0, 1.0, FORMULA_CURVE_POINTS if block.cells else 2)}
         values = [evaluate(getattr(curve, axis), s, f"{where}, {axis}") for axis in "xy"]
@@ -281,12 +285,15 @@ def make_on_sides(
         if given is None:
             sides[side] = distribute_by_arc_length(line, count + 1)
         elif sum(given) != count:
-            words = f"curve {side} has {sum(given)} cells in all; the block has {count} along it"
-            raise BadInput(f"{where}: {words}")
+            raise BadInput(
+                f"{where}: "
+                f"curve {side} has {sum(given)} cells in all; the block has {count} along it"
+            )
     boundary = make_boundary(sides, None, where)
     if compute_area(np.nan_to_num(boundary)) <= 0.0:
-        words = "i and j turn clockwise; exchange i_min and i_max, or j_min and j_max"
-        raise BadInput(f"{where}: {words}")
+        raise BadInput(
+            f"{where}: i and j turn clockwise; exchange i_min and i_max, or j_min and j_max"
+        )
     try:
         nodes, _ = find_start(boundary)
         return settle(nodes, boundary, deck) if deck.mesh == "regrid" else nodes
@@ -377,8 +384,9 @@ class Blocks(Problem):
                 where = f"deck: link: {text!r}"
                 found = RUN_OF_FACES.fullmatch(text.strip())
                 if not found:
-                    words = 'is not a side; write "block.i_max" or "block.i_max[0:8]"'
-                    raise BadInput(f"{where} {words}")
+                    raise BadInput(
+                        f'{where} is not a side; write "block.i_max" or "block.i_max[0:8]"'
+                    )
                 if (name := found["block"]) not in blocks:
                     raise BadInput(f"{where}: there is no block {name!r}{suggest(name, blocks)}")
                 faces = (int(found["start"]), int(found["stop"])) if found["start"] else ()
@@ -420,8 +428,9 @@ class Blocks(Problem):
         block = Block(table.name, material.eos, nodes, *state, **options)
         for side in table.side:
             if side.kind in LINKED.values():
-                words = f"a side of kind {side.kind!r} is made by [[link]]"
-                raise BadInput(f"{where}, side {side.side}: {words}")
+                raise BadInput(
+                    f"{where}, side {side.side}: a side of kind {side.kind!r} is made by [[link]]"
+                )
             options = collect_options(side, f"{where}, side {side.side}")
             put(block, side.side, side.kind, *side.faces or (), **options)
         return block

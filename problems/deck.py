@@ -363,8 +363,10 @@ def check_digests(digests: Mapping[str, str]) -> None:
         if not Path(name).is_file():
             raise BadInput(f"{name}, which the deck names, is gone")
         if compute_digests([name], {})[name] != digest:
-            words = "has changed since this deck was stored (key digests)"
-            raise BadInput(f"{name} {words}: restore the file, or start a new run")
+            raise BadInput(
+                f"{name} has changed since this deck was stored (key digests)"
+                ": restore the file, or start a new run"
+            )
 
 
 def check_solid(key: str, label: str, material: Material) -> None:

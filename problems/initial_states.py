@@ -297,8 +297,8 @@ def settle_front(front: Front, *, cfl: float, limiter: str) -> tuple[int, np.nda
     if type(front.eos).__module__.split(".")[0] not in PACKAGES:
         return _settle(front, cfl, limiter)
     eos = front.eos
-    rest = [getattr(front, one.name) for one in fields(front)[1:]]
-    key_numbers = type(eos).__qualname__, eos.parameters, rest, cfl, limiter
+    numbers = [getattr(front, one.name) for one in fields(front)[1:]]
+    key_numbers = type(eos).__qualname__, eos.parameters, numbers, cfl, limiter
     return remember("settled", key_numbers, lambda: _settle(front, cfl, limiter))
 
 

@@ -45,8 +45,10 @@ class OwnSimulation(Problem):
         """Nothing is known without the blocks; BadInput where none were given."""
         if self.evolution is None:
             script = f" ({self.deck.script})" if self.deck.script else ""
-            words = "continue it there with shockgrid.restart(directory, simulation=...)"
-            raise BadInput(f"the blocks of this run were made in Python{script}: {words}")
+            raise BadInput(
+                f"the blocks of this run were made in Python{script}: "
+                "continue it there with shockgrid.restart(directory, simulation=...)"
+            )
 
     def say_repeat(self) -> str:
         """The script makes the blocks, and its deck alone no run."""
@@ -74,8 +76,9 @@ class OwnSimulation(Problem):
             try:
                 float(value)
             except (TypeError, ValueError):
-                words = f"measure returned {value!r} for {name!r}: a number is wanted"
-                raise BadInput(words) from None
+                raise BadInput(
+                    f"measure returned {value!r} for {name!r}: a number is wanted"
+                ) from None
         return dict(row)
 
     def say_restart(self, directory: str) -> str:

@@ -95,11 +95,11 @@ class Row:
     def format(self, width: int) -> str:
         """The line in the summary, the label padded to `width`; "-" for unknown numbers."""
         numbers = [self.computed, self.theory]
-        words = [f"{x / self.unit:.{self.digits}g}" if math.isfinite(x) else "-" for x in numbers]
+        texts = [f"{x / self.unit:.{self.digits}g}" if math.isfinite(x) else "-" for x in numbers]
         if math.isnan(self.theory):
-            words[1] = ""
+            texts[1] = ""
         off = f"{100.0 * self.difference:+.3f} %" if math.isfinite(self.difference) else ""
-        line = f"{words[0]:>14} {words[1]:>14} {self.off or off:>12}"
+        line = f"{texts[0]:>14} {texts[1]:>14} {self.off or off:>12}"
         return f"  {self.label:{width}} {line}   {self.source}".rstrip()
 
 

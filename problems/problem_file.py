@@ -106,8 +106,10 @@ def describe_mistake(error: BaseException) -> str:
     files = {str(found.path) for found in _LOADED.values()}
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         if frame.filename in files:
-            words = f" ({type(error).__name__}: {error})"
-            return f"{frame.filename}, line {frame.lineno}: a mistake in this file{words}"
+            return (
+                f"{frame.filename}, line {frame.lineno}: a mistake in this file"
+                f" ({type(error).__name__}: {error})"
+            )
     return ""
 
 
@@ -134,12 +136,12 @@ def _run(path: Path, text: bytes, stem: str, folder: Path) -> ModuleType:
 
 def _describe_failure(path: Path, error: BaseException) -> str:
     lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
-    what = f"the file cannot be run ({type(error).__name__}: {error})"
+    mistake = f"the file cannot be run ({type(error).__name__}: {error})"
     if isinstance(error, SyntaxError) and error.filename == str(path):
         lines = [error.lineno]
-        what = f"this is not valid Python ({error.msg})"
+        mistake = f"this is not valid Python ({error.msg})"
     place = f", line {lines[-1]}" if lines and lines[-1] else ""
-    return f"{path}{place}: {what}"
+    return f"{path}{place}: {mistake}"
 
 
 def _find_class(module: ModuleType, path: Path) -> type[Problem]:

@@ -295,12 +295,10 @@ class Riemann(Problem):
         beyond a Hugoniot."""
         case = self.case
         sides = ("left", case.left_eos), ("right", case.right_eos)
-        told = [
-            words
-            for side, eos in sides
-            for words in caution_fit(f"the {side} material", eos, self.exact.p)
-        ]
-        return told + self.caution_stars(history)
+        cautions = []
+        for side, eos in sides:
+            cautions += caution_fit(f"the {side} material", eos, self.exact.p)
+        return cautions + self.caution_stars(history)
 
     def caution_stars(self, history) -> list[str]:
         """What is off the exact solution, or may be, by how much and why."""
@@ -314,16 +312,20 @@ class Riemann(Problem):
         rows = self.report(history).rows if history is not None else []
         known = [row for row in rows if not math.isnan(row.difference)]
         if not known:
-            words = "with few cells it is off by tens of per cent; compare runs of several `cells`"
-            return [f"{parting}: {words}"] if heat < COLD_ENERGY_PART else []
+            if heat >= COLD_ENERGY_PART:
+                return []
+            return [
+                f"{parting}: "
+                "with few cells it is off by tens of per cent; compare runs of several `cells`"
+            ]
         worst = max(known, key=lambda row: abs(row.difference))
         off = worst.difference
         if abs(off) <= TRUSTED_STAR_ERROR:
             return []
         size = f"{1.0 + off:.3g} times" if off > 1.0 else f"{100.0 * abs(off):.3g} % off"
-        told = f"{worst.label} is {size} the exact solution"
+        deviation = f"{worst.label} is {size} the exact solution"
         why = parting if heat < COLD_ENERGY_PART else "its plateau has too few cells"
-        return [f"{told}: {why}; take more `cells`"]
+        return [f"{deviation}: {why}; take more `cells`"]
 
     def choose_domain(self) -> Domain:
         """Lengths, growths and end time: the deck's, the case's, or by the waves, of which one is
@@ -504,8 +506,14 @@ class Riemann(Problem):
             for block, colour in zip(dump.blocks, ("C0", "C3"), strict=False):
                 x = block.centres[0][:, 0]
                 values = block.cell_fields[name][:, 0]
-                words = block.name if self.on_line else "computed"
-                axis.plot(x, values, ".", ms=3, color=colour, label=words)
+                axis.plot(
+                    x,
+                    values,
+                    ".",
+                    ms=3,
+                    color=colour,
+                    label=block.name if self.on_line else "computed",
+                )
             axis.set_xlabel(name_axis("x", dump.length_unit))
             axis.set_title(name_axis(label, "1" if dump.t_unit == "1" else unit), fontsize="medium")
         figure.suptitle(f"{self.name}, {title_time(dump)}", fontsize="medium")

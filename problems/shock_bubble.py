@@ -398,9 +398,9 @@ class ShockBubble(Problem):
             "axis_front": ("shock on the axis", "C2"),
             "wall_front": ("shock at the wall", "0.5"),
         }
-        for name, (words, colour) in columns.items():
+        for name, (label, colour) in columns.items():
             places = np.where(inside, history[name], np.nan) if "front" in name else history[name]
-            axis.plot(1e3 * places, t, color=colour, label=words)
+            axis.plot(1e3 * places, t, color=colour, label=label)
         for feature in self.features:
             window, _ = self.fit_velocity(history, feature)
             if window is None or math.isnan(feature.measured):

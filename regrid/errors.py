@@ -54,10 +54,10 @@ class RunFailure(Exception):
 
     def tell(self, words: str, kind: type[RunFailure] | None = None) -> RunFailure:
         """A failure with other words, of the same cause, at the same place; of `kind`, if given."""
-        told = (kind or type(self))(words)
-        told.cause = self.cause
-        told._place = self.place
-        return told
+        repeated = (kind or type(self))(words)
+        repeated.cause = self.cause
+        repeated._place = self.place
+        return repeated
 
 
 class RegridFailure(RunFailure):
@@ -104,20 +104,20 @@ class RegridFailure(RunFailure):
     @property
     def without_block(self) -> str:
         """Side, nodes and what is wrong, for a sentence that names the place itself."""
-        words = [f"side {self.side}"] if self.side else []
+        parts = [f"side {self.side}"] if self.side else []
         if len(self.nodes) == 1:
-            words.append(f"node {self.nodes[0]}")
+            parts.append(f"node {self.nodes[0]}")
         elif self.nodes:
             *first, last = (str(node) for node in self.nodes)
-            words.append(f"nodes {', '.join(first)} and {last}")
-        return f"{', '.join(words)}: {self.what}" if words else self.what
+            parts.append(f"nodes {', '.join(first)} and {last}")
+        return f"{', '.join(parts)}: {self.what}" if parts else self.what
 
     def __str__(self) -> str:
-        rest = self.without_block
+        sentence = self.without_block
         if not self.block:
-            return rest
+            return sentence
         mark = ", " if self.side else ": "
-        return f"regrid: block {self.block!r}{mark}{rest}"
+        return f"regrid: block {self.block!r}{mark}{sentence}"
 
 
 def find_nearest(name: str, known: Iterable[str], cutoff: float = OFFERED_LIKENESS) -> str | None:
@@ -130,15 +130,15 @@ def find_nearest(name: str, known: Iterable[str], cutoff: float = OFFERED_LIKENE
     def plain(word: str) -> str:
         return word.lower().replace("_", "-")
 
-    words: dict[str, str] = {}
+    originals: dict[str, str] = {}
     for word in known:
-        words.setdefault(plain(word), word)
+        originals.setdefault(plain(word), word)
     wrong = plain(str(name))
     for least in (max(cutoff, MISSPELT_LIKENESS), cutoff):
-        if close := difflib.get_close_matches(wrong, words, n=1, cutoff=least):
-            return words[close[0]]
-        if begun := [word for word in words if wrong.startswith(f"{word}-")]:
-            return words[max(begun, key=len)]
+        if close := difflib.get_close_matches(wrong, originals, n=1, cutoff=least):
+            return originals[close[0]]
+        if begun := [word for word in originals if wrong.startswith(f"{word}-")]:
+            return originals[max(begun, key=len)]
     return None
 
 

@@ -94,11 +94,10 @@ def _choose_block(blocks: list[np.ndarray], path: Path, block: str | None) -> np
 
 
 def _say_sizes(known: Mapping[str, np.ndarray]) -> str:
-    words = [
+    return "there are: " + ", ".join(
         f"'{name}' ({' x '.join(str(n - 1) for n in nodes.shape[1:])} cells)"
         for name, nodes in known.items()
-    ]
-    return "there are: " + ", ".join(words)
+    )
 
 
 def read_grid(name: str, block: str | None = None) -> np.ndarray:
@@ -218,8 +217,10 @@ def check_nodes(nodes: np.ndarray, where: str) -> np.ndarray:
     extent = np.ptp(nodes.reshape(nodes.shape[0], -1), axis=1)
     for name, size in zip("xyz", extent, strict=False):
         if not LEAST_EXTENT < size < MOST_EXTENT:
-            words = f"{size:g}; it must be between {LEAST_EXTENT:g} and {MOST_EXTENT:g}"
-            raise BadInput(f"{where}: the grid's extent in {name} is {words}")
+            raise BadInput(
+                f"{where}: the grid's extent in {name} is "
+                f"{size:g}; it must be between {LEAST_EXTENT:g} and {MOST_EXTENT:g}"
+            )
     return nodes
 
 
@@ -403,11 +404,11 @@ BEGINNINGS = {"transfinite": " from transfinite interpolation", "quasi-1d": " fr
 
 def describe_repair(report: RepairReport) -> str:
     """What a grid needed, as the end of a sentence."""
-    words = f" with {report.bad_cells} bad cells" if report.bad_cells else ""
+    changes = f" with {report.bad_cells} bad cells" if report.bad_cells else ""
     if report.projected_nodes:
-        words += f", {report.projected_nodes} nodes projected"
+        changes += f", {report.projected_nodes} nodes projected"
     if report.untangled:
-        words += f", untangled{BEGINNINGS.get(report.start, '')}"
+        changes += f", untangled{BEGINNINGS.get(report.start, '')}"
     if report.excluded_corners:
-        words += f", {report.excluded_corners} corner triangles left out"
-    return words
+        changes += f", {report.excluded_corners} corner triangles left out"
+    return changes

@@ -97,26 +97,28 @@ def _cut_blocks(values: np.ndarray, sizes, marked: bool) -> list[np.ndarray] | N
 
 def _read_text(contents: bytes) -> Iterator[tuple[Way, list[np.ndarray]]]:
     """All ways to read a text; `3*1.5` means three times 1.5, `1.5D0` is 1.5."""
-    words = contents.decode("ascii", "replace").replace(",", " ").replace("\x1a", " ").split()
-    if any("*" in word for word in words):
+    numbers = contents.decode("ascii", "replace").replace(",", " ").replace("\x1a", " ").split()
+    if any("*" in word for word in numbers):
         several = []
-        for word in words:
+        for word in numbers:
             count, star, value = word.partition("*")
             several += [value] * int(count) if star and count.isdigit() else [word]
-        words = several
+        numbers = several
     try:
-        values = np.array([word.replace("D", "E").replace("d", "e") for word in words], dtype=float)
+        values = np.array(
+            [word.replace("D", "E").replace("d", "e") for word in numbers], dtype=float
+        )
     except ValueError:
         return
     for header, blocks, axes, words_of_blocks in _list_headers(values[: 1 + 3 * MOST_BLOCKS]):
         sizes = _list_sizes(header, axes) if (header == np.round(header)).all() else None
         if sizes is None:
             continue
-        rest = values[len(header) + (blocks > 0) :]
+        coordinates = values[len(header) + (blocks > 0) :]
         nodes = sum(int(np.prod(size)) for size in sizes)
         for marked in (False, True):
-            if rest.size == nodes * (axes + marked):
-                cut = _cut_blocks(rest, sizes, marked)
+            if coordinates.size == nodes * (axes + marked):
+                cut = _cut_blocks(coordinates, sizes, marked)
                 if cut is not None:
                     words_of_marks = " with iblank" if marked else ""
                     yield Way(axes, marked, f"text, {words_of_blocks}{words_of_marks}"), cut
@@ -177,14 +179,14 @@ def _read_records(records: list[bytes], order: str, words: str):
     if len(records) > 2 and len(records[0]) == 4 and len(records[1]) % 4 == 0:
         count = int(np.frombuffer(records[0], whole)[0])
         heads.append((count, np.frombuffer(records[1], whole), records[2:]))
-    for count, header, rest in heads:
+    for count, header, coordinates in heads:
         if not 1 <= count <= MOST_BLOCKS or len(header) not in (2 * count, 3 * count):
             continue
         axes = len(header) // count
         sizes = _list_sizes(header, axes)
-        if sizes is None or len(rest) != count:
+        if sizes is None or len(coordinates) != count:
             continue
-        yield from _read_numbers(rest, sizes, order, f"{words}, {count} blocks")
+        yield from _read_numbers(coordinates, sizes, order, f"{words}, {count} blocks")
 
 
 def _read_stream(contents: bytes, order: str, words: str):
@@ -196,15 +198,15 @@ def _read_stream(contents: bytes, order: str, words: str):
         sizes = _list_sizes(header, axes)
         if sizes is None:
             continue
-        rest = contents[4 * (len(header) + (count > 0)) :]
+        coordinates = contents[4 * (len(header) + (count > 0)) :]
         nodes = [int(np.prod(size)) for size in sizes]
         for marked in (False, True):
             for bytes_each in (4, 8):
                 lengths = [n * (axes * bytes_each + 4 * marked) for n in nodes]
-                if sum(lengths) != len(rest):
+                if sum(lengths) != len(coordinates):
                     continue
                 ends = np.cumsum([0, *lengths])
-                parts = [rest[a:b] for a, b in pairwise(ends)]
+                parts = [coordinates[a:b] for a, b in pairwise(ends)]
                 yield from _read_numbers(
                     parts, sizes, order, f"{words}, {words_of_blocks}", (marked, bytes_each)
                 )

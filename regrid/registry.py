@@ -78,8 +78,8 @@ def call_with_options(maker: Any, name: str, options: dict[str, Any]) -> Any:
             raise BadInput(f"regridder '{name}' has no option '{option}'{hint}")
         wanted = KINDS.get(annotations[option].removesuffix(" | None"))
         if wanted and value is not None and (type(value) is bool or not isinstance(value, wanted)):
-            words = {Real: "a number", Integral: "a whole number", str: "a word"}[wanted]
-            raise BadInput(f"regridder '{name}': {option} = {value!r}; it must be {words}")
+            kind = {Real: "a number", Integral: "a whole number", str: "a word"}[wanted]
+            raise BadInput(f"regridder '{name}': {option} = {value!r}; it must be {kind}")
     return maker(**options)
 
 

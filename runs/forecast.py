@@ -167,17 +167,17 @@ def foretell(
     past = find_past(name_flow(read.problem, read.deck), size.cells)
     first_dt = None if clock is None else clock.first_stable_dt
     steps = foretell_steps(size, past, first_dt, read.deck.run.max_steps)
-    words = "steps and time are unknown before the start: no similar run is known"
+    forecast = "steps and time are unknown before the start: no similar run is known"
     if past is not None and steps is not None:
         low, likely, high = (max(round(float(f"{number:.2g}")), 1) for number in steps)
-        words = f"about {likely}{f' ({low} to {high})' * (low < high)} steps; "
+        forecast = f"about {likely}{f' ({low} to {high})' * (low < high)} steps; "
         sure = SURE_TIME_FACTOR * math.exp(UNSURE_CELL_POWER * past.is_off(size.cells))
         if steps[2] / steps[0] * sure**2 > WIDEST_TIME_RANGE:
-            words += "the time of a step is measured in the run"
+            forecast += "the time of a step is measured in the run"
         else:
             a_step = past.seconds * (max(size.cells, 1) / past.cells) ** WORK_CELL_POWER
             seconds = describe_seconds(steps[0] * a_step / sure, steps[2] * a_step * sure)
-            words += f"time stepping will take {seconds} on a desktop computer"
+            forecast += f"time stepping will take {seconds} on a desktop computer"
     cells = f"{size.cells} cells in {count(len(size.blocks), 'block')}"
     if getattr(read.deck, "refine", False):
         cells += " initially, more where the interface needs them later (refine)"
@@ -190,18 +190,18 @@ def foretell(
     folder = Path(output or "out")
     free = find_free(folder)
     a_dump, needed, there = map(describe_bytes, (size.dump, disk, free))
-    told = (
+    shortage = (
         f"the run will need about {needed} of disk, two dumps of {a_dump} at least, where {there} "
         f"are free (the disk of {folder}): free some, choose another folder with -o, or take fewer "
         "dumps (output.dumps) or lighter ones (output.fields, output.precision, output.compression)"
     )
     if free < 2.0 * size.dump and evolution is not None:
-        raise BadInput(told)
+        raise BadInput(shortage)
     return [
-        f"cost: {cells}; {words}",
+        f"cost: {cells}; {forecast}",
         f"cost: memory about {describe_bytes(size.memory)}; disk about {needed} "
         f"({count(round(dumps), 'dump')} of {a_dump}{f', {there} free' * math.isfinite(free)})",
-    ], [f"caution: {told}"] * (disk > TIGHT_DISK_PART * free)
+    ], [f"caution: {shortage}"] * (disk > TIGHT_DISK_PART * free)
 
 
 def find_free(folder: Path) -> float:

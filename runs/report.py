@@ -101,8 +101,9 @@ def load_template(name: str) -> Any:
     try:
         import jinja2
     except ImportError as error:
-        words = "a report needs jinja2, which is not installed: pip install 'shockgrid[report]'"
-        raise BadInput(words) from error
+        raise BadInput(
+            "a report needs jinja2, which is not installed: pip install 'shockgrid[report]'"
+        ) from error
     loader = jinja2.FileSystemLoader(TEMPLATES)
     environment = jinja2.Environment(
         loader=loader,
@@ -142,8 +143,12 @@ def describe_run_in_words(run: RunData, left_out: list[str]) -> dict[str, Any]:
         states.append((convexity, not convexity.startswith("NOT")))
     if drifts:
         worst = max(drifts, key=drifts.__getitem__)
-        words = f"largest conservation error: {drifts[worst]:.1e} ({worst.replace('_', ' ')})"
-        states.append((words, drifts[worst] <= CONSERVATION_ERROR_LIMIT))
+        states.append(
+            (
+                f"largest conservation error: {drifts[worst]:.1e} ({worst.replace('_', ' ')})",
+                drifts[worst] <= CONSERVATION_ERROR_LIMIT,
+            )
+        )
     names = [block.name for block in last.blocks] if last else []
     deck = read_text(run.directory.deck)
     return {
@@ -202,7 +207,7 @@ def judge_blocks(dump: Dump) -> list[dict[str, str]]:
 
 def draw_pictures(run: RunData, dpi: int, left_out: list[str]) -> list[tuple[str, str]]:
     """Headings and data URIs: the fields, the grids, what the problem draws itself."""
-    wanted = [(heading, words) for heading, words in PICTURES if applies(run, words)]
+    wanted = [(heading, what) for heading, what in PICTURES if applies(run, what)]
     try:
         own = run.problem.figures()
         name = default_fields(run)[0]
@@ -216,10 +221,10 @@ def draw_pictures(run: RunData, dpi: int, left_out: list[str]) -> list[tuple[str
     deck_text = find_deck_text(run)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.png")
-        for heading, words in wanted:
+        for heading, what in wanted:
             try:
                 figure = new_figure()
-                fill_figure(figure, run, Wanted(**words))
+                fill_figure(figure, run, Wanted(**what))
                 save(figure, path, dpi, deck_text)
             except (BadInput, KeyError) as error:
                 left_out.append(f"{heading.format(field=field)} ({error})")

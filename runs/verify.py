@@ -65,12 +65,11 @@ def format_record(record: Mapping[str, Any]) -> tuple[str, ...]:
     error = record["error"]
     order = record["order"]
     bar = record["bar"]
-    words = record["failure"] or ("" if error is None else f"{error:.3g}")
     return (
         record["problem"],
         record["what"],
         str(record["size"]),
-        words,
+        record["failure"] or ("" if error is None else f"{error:.3g}"),
         "" if order is None else f"{order:.2f}",
         f"{bar:.3g}" if isinstance(bar, float) else bar or "",
         {None: "", True: "yes", False: "NO"}[record["met"]],
@@ -204,8 +203,13 @@ def verify(
             line = "  ".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=False))
             say(f"{line}  {cells[-1]}".rstrip())
     if output is not None:
-        words = ["shockgrid verify", *problems, *(["--short"] if short else []), "-o", output]
-        made = {"command": " ".join(words), "made_by": describe_software(), "rows": records}
+        made = {
+            "command": " ".join(
+                ["shockgrid verify", *problems, *(["--short"] if short else []), "-o", output]
+            ),
+            "made_by": describe_software(),
+            "rows": records,
+        }
         text = json.dumps(made, indent=1, allow_nan=False) + "\n"
         write_atomically(Path(output), text)
         say(f"written: {output}")

@@ -203,8 +203,9 @@ def check_regridder(regridder: Any) -> None:
         except AssertionError as error:
             raise AssertionError(f"regridder, {name}: {error}") from None
         except Exception as error:  # whatever somebody's regridder raises where it should not
-            words = f"it raised {type(error).__name__}: {error}"
-            raise AssertionError(f"regridder, {name}: {words}") from error
+            raise AssertionError(
+                f"regridder, {name}: it raised {type(error).__name__}: {error}"
+            ) from error
 
 
 # --- equations of state ------------------------------------------------------------------------
@@ -274,11 +275,15 @@ def check_eos(
     rho [kg/m³], p [Pa]: by default 0.1 to 30 and 1e3 to 1e8, or, if the equation has a density
     at rest rho0, 1.001 to 1.3 of it and 1e8 to 1e10.  AssertionError names the state.
     """
-    rest = getattr(eos, "rho0", None)
+    density_at_rest = getattr(eos, "rho0", None)
     if rho is None:
-        rho = [0.1, 1.0, 30.0] if rest is None else [1.001 * rest, 1.1 * rest, 1.3 * rest]
+        rho = (
+            [0.1, 1.0, 30.0]
+            if density_at_rest is None
+            else [1.001 * density_at_rest, 1.1 * density_at_rest, 1.3 * density_at_rest]
+        )
     if p is None:
-        p = [1e3, 1e5, 1e8] if rest is None else [1e8, 1e9, 1e10]
+        p = [1e3, 1e5, 1e8] if density_at_rest is None else [1e8, 1e9, 1e10]
     pairs = np.meshgrid(np.asarray(rho, float), np.asarray(p, float))
     densities, pressures = (one.ravel() for one in pairs)
     try:
@@ -392,8 +397,8 @@ def _check_problem(kind: type[Problem], deck: Deck, steps: int) -> None:
         t_end, blocks = plan
         _demand(np.isclose(t_end, flow.t_end), f"plan says t_end {t_end:g}, build {flow.t_end:g}")
         made = [(b.name, b.nodes.shape[1] - 1, b.nodes.shape[2] - 1) for b in flow.blocks]
-        told = [(b.name, *b.cells) for b in blocks]
-        _demand(made == told, f"plan says the blocks {told}, build makes {made}")
+        sizes = [(b.name, *b.cells) for b in blocks]
+        _demand(made == sizes, f"plan says the blocks {sizes}, build makes {made}")
     before = _copy_state(flow)
     first = one.measure(flow)
     _demand(_same(before, _copy_state(flow)), "measure changes the state")

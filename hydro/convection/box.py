@@ -76,8 +76,8 @@ class Fluid:
 
 def turn_gravity(tilt: float) -> tuple[float, float]:
     """Unit vector of gravity, turned by `tilt` degrees anticlockwise from straight down."""
-    quarter, rest = divmod(tilt, 90.0)
-    angle = math.radians(rest)
+    quarter, remainder = divmod(tilt, 90.0)
+    angle = math.radians(remainder)
     x, y = math.sin(angle), -math.cos(angle)
     for _ in range(int(quarter) % 4):  # quarter turns are exact
         x, y = -y, x

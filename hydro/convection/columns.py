@@ -271,7 +271,7 @@ class RowBlock:
         self._get_cells = get_cells
         self._ends = np.array([low, high])
         self.units = {field: unit for field, (unit, _) in described.items()}
-        self.long_names = {field: words for field, (_, words) in described.items()}
+        self.long_names = {field: description for field, (_, description) in described.items()}
 
     @property
     def nodes(self) -> np.ndarray:

@@ -399,8 +399,9 @@ class Factors:
         try:
             self._factors = _factorise(self.matrix)
         except RuntimeError as error:
-            words = f"convection: the {self.what} is singular"
-            raise RunFailure(words, cause="singular") from error
+            raise RunFailure(
+                f"convection: the {self.what} is singular", cause="singular"
+            ) from error
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solution (n,) for `right` (n,); raises RunFailure if no accurate one is found."""
@@ -409,8 +410,9 @@ class Factors:
             self._exchange_rows()
             solution = self._factors.solve(right)
         if not self._is_good(solution, right):
-            words = f"convection: the {self.what} is singular to working precision"
-            raise RunFailure(words, cause="singular")
+            raise RunFailure(
+                f"convection: the {self.what} is singular to working precision", cause="singular"
+            )
         return solution
 
     def _is_good(self, solution: np.ndarray, right: np.ndarray) -> bool:

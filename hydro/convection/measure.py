@@ -177,8 +177,9 @@ def compute_growth(
             operator, k=WANTED_EIGENVALUES, M=mass, sigma=near, OPinv=inverse, v0=start, which="LM"
         )
     except ArpackError as error:
-        words = f"convection: no growth rate was found near {near:g}: {error}"
-        raise RunFailure(words, cause="no-growth-rate") from error
+        raise RunFailure(
+            f"convection: no growth rate was found near {near:g}: {error}", cause="no-growth-rate"
+        ) from error
     # a drift between free walls has no temperature and neither grows nor decays
     sizes = [np.abs(part).max(axis=0) for part in np.split(vectors, [equations.sizes[0]])]
     warm = sizes[1] * fluid.diffusivity > 1e-6 * sizes[0] * float(np.ptp(temperature))

@@ -92,9 +92,9 @@ class EquationOfState:
         self.check_numbers()
         wrong = [name for name in self.positive if not getattr(self, name) > 0.0]
         if wrong:
-            told = ", ".join(f"{name} is {getattr(self, name):g}" for name in wrong)
+            values = ", ".join(f"{name} is {getattr(self, name):g}" for name in wrong)
             they = "it" if len(wrong) == 1 else "they"
-            raise BadInput(f"{self.kind}: {told}; {they} must be positive")
+            raise BadInput(f"{self.kind}: {values}; {they} must be positive")
 
     @property
     def parameters(self) -> tuple[float, ...]:

@@ -206,11 +206,12 @@ class Tabular(EquationOfState):
         bad = ~np.isfinite(found)
         if np.any(bad):
             rho, other = (np.broadcast_to(value, np.shape(found)) for value in (rho, other))
-            first = np.argmax(bad)
+            first_bad = np.argmax(bad)
             unit = {"e": "J/kg", "p": "Pa"}[name]
+            failure = self.failure.removeprefix("its state is ")
             raise BadInput(
-                f"the state rho = {np.ravel(rho)[first]:g} kg/m3, {name} = "
-                f"{np.ravel(other)[first]:g} {unit} is {self.failure.removeprefix('its state is ')}"
+                f"the state rho = {np.ravel(rho)[first_bad]:g} kg/m3, {name} = "
+                f"{np.ravel(other)[first_bad]:g} {unit} is {failure}"
             )
         return found
 

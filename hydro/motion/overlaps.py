@@ -295,8 +295,10 @@ def describe_depth(one: Block, other: Block) -> str:
                 away = np.array([[x], [y]]) - start
                 part = np.clip((away * way).sum(axis=0) / square, 0.0, 1.0)
                 depth = float(np.hypot(*(away - part * way)).min())
-                words = f"; block {block.name!r} is up to {depth:.3g} m inside block "
-                found = max(found, (depth, f"{words}{around.name!r}"))
+                place = (
+                    f"; block {block.name!r} is up to {depth:.3g} m inside block {around.name!r}"
+                )
+                found = max(found, (depth, place))
     return found[1]
 
 

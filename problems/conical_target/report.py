@@ -193,17 +193,19 @@ def compare_waves(problem, history) -> tuple[list[Row], list[str]]:
     for number, wave in enumerate(waves):
         if not np.isfinite(wave.amplitude).any():
             continue
-        words = []
+        comparison = []
         top = int(np.nanargmax(wave.amplitude))
         rate = wave.measure_rate()
         grown = wave.get_amplitude(AGES[1]) / wave.amplitude[0]
         if math.isfinite(rate):
-            words = ["theory of small slopes", f"a/a0 = {grown:.3g} at {AGES[1] * US:.2g} µs"]
+            comparison = ["theory of small slopes", f"a/a0 = {grown:.3g} at {AGES[1] * US:.2g} µs"]
         most = wave.amplitude[top]
         when = f"at {history['t'][top] * US:.2f} µs"
-        words.append(f"at most {most * MM:.3g} mm, k a = {k * most:.2g}, {when}")
+        comparison.append(f"at most {most * MM:.3g} mm, k a = {k * most:.2g}, {when}")
         label = f"wave {number + 1}, passed at {wave.passed * US:.2f} µs: growth [1/µs]"
-        rows.append(Row(f"growth_{number}", rate, theory, label, US, 3, source="; ".join(words)))
+        rows.append(
+            Row(f"growth_{number}", rate, theory, label, US, 3, source="; ".join(comparison))
+        )
     return rows, notes
 
 
@@ -243,32 +245,37 @@ class Results:
         t = history["t"]
         first, last = (part * self.impact[2] for part in PLATEAU)
         impact = reduce_between(np.mean, t, history["pressure_impact"], first, last)
-        words = f"mean from {US * first:.2f} to {US * last:.2f} µs; impedances match"
+        remark = f"mean from {US * first:.2f} to {US * last:.2f} µs; impedances match"
         label = "pressure on the impact face [GPa]"
-        rows = [Row("impact", impact, self.impact[0], label, 1e9, 5, "impact", source=words)]
+        rows = [Row("impact", impact, self.impact[0], label, 1e9, 5, "impact", source=remark)]
 
         def tell(name, computed, label, unit=1.0, source=""):
             rows.append(Row(name, float(computed), label=label, unit=unit, digits=3, source=source))
 
         for part in PARTS:
             p, t, x, y = find_peak(history, part)
-            words = f"at {t * US:.3g} µs, x = {x * MM:.3g}, r = {y * MM:.2g} mm"
+            remark = f"at {t * US:.3g} µs, x = {x * MM:.3g}, r = {y * MM:.2g} mm"
             label = f"greatest pressure in the {part}, {getattr(deck, part)} [GPa]"
-            tell(f"peak_{part}", p, label, 1e9, words)
+            tell(f"peak_{part}", p, label, 1e9, remark)
         for number, part in enumerate(GAUGES):
             p = np.nanmax(history[f"pressure_gauge_{number}"])
             tell(f"gauge_{number}", p, f"the same on the axis at {part:g} of the cone [GPa]", 1e9)
-        words = f"{100.0 * history['transformed'][-1]:.2g} % at the end"
+        remark = f"{100.0 * history['transformed'][-1]:.2g} % at the end"
         most = np.nanmax(history["transformed"])
-        tell("transformed", most, "most of the cone in the second phase [%]", 0.01, words)
+        tell("transformed", most, "most of the cone in the second phase [%]", 0.01, remark)
         for name, where in (("axis", "on the axis"), ("side", "along the side")):
             passages = measure_passage(self, history, name)
             for station, (t, speed, p) in zip(STATIONS, passages, strict=True):
                 if math.isfinite(t):
                     x = MM * (deck.front + station * deck.cone)
                     label = f"shock {where} at x = {x:.4g} mm [km/s]"
-                    words = f"at {t * US:.3f} µs, {p * GPA:.3g} GPa behind it"
-                    tell(f"shock_{name}_{station:g}", speed, label, 1e3, words)
+                    tell(
+                        f"shock_{name}_{station:g}",
+                        speed,
+                        label,
+                        1e3,
+                        f"at {t * US:.3f} µs, {p * GPA:.3g} GPa behind it",
+                    )
         head = (
             f"conical-target: {deck.impactor} at {deck.speed:g} m/s on {deck.shell}, "
             f"{deck.filling} in {deck.target}, {deck.cells} cells to the shell"
@@ -276,30 +283,37 @@ class Results:
         if self.ripple:
             waves, notes = compare_waves(self, history)
             return Report(head, rows + waves, notes)
-        begin, first, late = measure_growth(history)
+        begin, initial_growth, late = measure_growth(history)
         widest = int(np.nanargmax(history["line_amplitude"]))
         top, when = (history[name][widest] for name in ("line_amplitude", "t"))
-        words = f"half of peak to peak at the end; at most {top * MM:.2g} mm at {when * US:.2f} µs"
+        remark = f"half of peak to peak at the end; at most {top * MM:.2g} mm at {when * US:.2f} µs"
         label = "side: deviation from its own line [mm]"
-        tell("line_amplitude", history["line_amplitude"][-1], label, 1e-3, words)
+        tell("line_amplitude", history["line_amplitude"][-1], label, 1e-3, remark)
         bend = history["line_bend"][-1]
         length = history["line_length"]
-        words = f"{length[-1] / length[0]:.3f} times its initial length"
+        remark = f"{length[-1] / length[0]:.3f} times its initial length"
         label = "side: deviation from its chord [mm]"
-        tell("line_bend", bend, label, 1e-3, words)
-        if math.isfinite(first):
-            words = f"from {begin * US:.2f} µs on; {late:.3g} m/s in the latest half"
-            tell("line_growth", first, "initial growth of the side's amplitude [m/s]", 1.0, words)
+        tell("line_bend", bend, label, 1e-3, remark)
+        if math.isfinite(initial_growth):
+            tell(
+                "line_growth",
+                initial_growth,
+                "initial growth of the side's amplitude [m/s]",
+                1.0,
+                f"from {begin * US:.2f} µs on; {late:.3g} m/s in the latest half",
+            )
         return Report(head, rows)
 
     def cautions(self, history=None) -> list[str]:
         """Materials beyond their Hugoniots at the impact."""
         deck = self.deck
         return [
-            words
+            caution
             for part in ("impactor", "shell")
             if part in self.materials
-            for words in caution_fit(getattr(deck, part), self.materials[part].eos, self.impact[0])
+            for caution in caution_fit(
+                getattr(deck, part), self.materials[part].eos, self.impact[0]
+            )
         ]
 
     def figures(self):
@@ -339,12 +353,12 @@ class Results:
             age = np.linspace(0.0, max(wave.age[-1] for wave in waves), 200)
             impulse, shear = crossed.compute_rates(k)
             plus = crossed.compression
-            for values, style, words in (
+            for values, style, label in (
                 (crossed.compute_growth(k, age), "k--", "theory"),
                 (plus * (1.0 + impulse * age), "k-.", "impulse alone"),
                 (plus * np.cosh(shear * age), "k:", "slip alone"),
             ):
-                growth.plot(US * age, values, style, lw=0.9, label=words)
+                growth.plot(US * age, values, style, lw=0.9, label=label)
             growth.set_ylim(0.75, 2.0 * top / np.nanmean([wave.amplitude[0] for wave in waves]))
         amplitude.set(xlabel="t [µs]", ylabel="amplitude [mm]")
         amplitude.set_title("dashed: theory of small slopes", fontsize="medium")
@@ -421,13 +435,13 @@ class Results:
         """Place of the shock in the cone over time, pressure behind it and speed over the place."""
         path, pressure, speed = make_panels(figure, 11.0, 3.8, 1, 3)
         reach = FITTED_STRETCH_PART * self.deck.cone
-        for name, words in (("axis", "on the axis"), ("side", "along the side")):
+        for name, label in (("axis", "on the axis"), ("side", "along the side")):
             t, x, p = get_shock_path(run.history, name)
-            path.plot(US * t, MM * x, label=words)
-            pressure.plot(MM * x, GPA * p, label=words)
+            path.plot(US * t, MM * x, label=label)
+            pressure.plot(MM * x, GPA * p, label=label)
             positions = np.linspace(*x[[0, -1]], 40)[1:-1] if x.size > 8 else np.empty(0)
             speeds = [fit_slope(t, x, np.abs(x - place) < reach, 4) for place in positions]
-            speed.plot(MM * positions, 1e-3 * np.array(speeds), label=words)
+            speed.plot(MM * positions, 1e-3 * np.array(speeds), label=label)
         pressure.set(xlabel="x of the shock [mm]", ylabel="greatest pressure just behind [GPa]")
         speed.set(xlabel="x of the shock [mm]", ylabel="speed [km/s]")
         path.set(xlabel="t [µs]", ylabel="x of the shock [mm]")
@@ -442,7 +456,9 @@ class Results:
             shape.plot(*(MM * line), lw=1.0, label=label)
             away.plot(part, MM * departure, lw=1.0, label=label)
         shape.set(aspect="equal", xlabel="x [mm]", ylabel="r [mm]")
-        words = "deviation from its straight line [mm]"
-        away.set(xlabel="fraction of the side's length from the base", ylabel=words)
+        away.set(
+            xlabel="fraction of the side's length from the base",
+            ylabel="deviation from its straight line [mm]",
+        )
         for end in MIDDLE:
             away.axvline(end, color="0.7", lw=0.6)

@@ -303,9 +303,9 @@ class BoxProblem(Problem):
             axes[0].contour(x, y, psi, levels=levels, colors="k", **lines)
         warm = axes[1].contourf(x, y, nodal, levels=40, cmap="inferno")
         axes[1].contour(x, y, nodal, levels=CONTOUR_LEVELS, colors="w", **lines)
-        words = f"streamlines, |psi| up to {largest:.4g}", "isotherms"
+        titles = f"streamlines, |psi| up to {largest:.4g}", "isotherms"
         labels = "stream function [m2/s]", "temperature [K]"
-        for axis, picture, title, label in zip(axes, (flow, warm), words, labels, strict=True):
+        for axis, picture, title, label in zip(axes, (flow, warm), titles, labels, strict=True):
             figure.colorbar(picture, ax=axis, shrink=0.85, label=label, ticks=MaxNLocator(7))
             axis.set_title(title, fontsize=10)
             axis.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
@@ -318,16 +318,30 @@ class BoxProblem(Problem):
         hot, cold = self.hot_and_cold
         for side, colour, sign, way in ((hot, "C3", 1.0, "in"), (cold, "C0", -1.0, "out")):
             positions, values = compute_local_nusselt(*state, side, self.scale)
-            words = f"{SIDES[side]} wall, {way}"
-            axis.plot(positions, sign * values, ".-", color=colour, ms=4, lw=1.0, label=words)
+            axis.plot(
+                positions,
+                sign * values,
+                ".-",
+                color=colour,
+                ms=4,
+                lw=1.0,
+                label=f"{SIDES[side]} wall, {way}",
+            )
         if hot == "i_min":
             peak, position = find_nusselt_maximum(*state, hot, self.scale)
             axis.plot(position, peak, "k+", ms=10, label=f"maximum {peak:.4g} at {position:.4f}")
             if (reference := self.find_reference()) is not None:
                 peak = reference.nusselt_max
                 position = reference.nusselt_max_y
-                words = f"reference {peak:.4g} at {position:.4f}"
-                axis.plot(position, peak, "o", label=words, mfc="none", color="0.3", ms=9)
+                axis.plot(
+                    position,
+                    peak,
+                    "o",
+                    label=f"reference {peak:.4g} at {position:.4f}",
+                    mfc="none",
+                    color="0.3",
+                    ms=9,
+                )
         axis.set(xlabel="y [m]" if hot == "i_min" else "x [m]", ylabel="local Nusselt number")
 
     def draw_grid(self, figure, run_data) -> None:

@@ -53,8 +53,11 @@ class Convection1D(Problem):
 
     def __init__(self, deck: Convection1DDeck):
         super().__init__(deck)
-        words = "nothing would rise or sink, with mean_speed = 0; give one of them"
-        deck.refuse(deck.rayleigh == deck.mean_speed == 0.0, "rayleigh", words)
+        deck.refuse(
+            deck.rayleigh == deck.mean_speed == 0.0,
+            "rayleigh",
+            "nothing would rise or sink, with mean_speed = 0; give one of them",
+        )
         self.words = (
             f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}, {deck.cells} cells, "
             f"grid {deck.grid.kind}"

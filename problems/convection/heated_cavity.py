@@ -51,10 +51,12 @@ class Side(DeckTable, kw_only=True):
     def make(self, name: str):
         """The wall for the solver; BadInput where heat and value contradict."""
         if self.heat == "adiabatic" and self.value != 0.0:
-            words = f"{name}.heat = 'adiabatic'; take 'flux' or 'isothermal'"
-            raise BadInput(f"{name}.value = {self.value:g} contradicts {words}")
-        what = {"flux": "flux", "isothermal": "temperature"}.get(self.heat)
-        return Wall(self.flow, **({what: self.value} if what else {}))
+            raise BadInput(
+                f"{name}.value = {self.value:g} contradicts "
+                f"{name}.heat = 'adiabatic'; take 'flux' or 'isothermal'"
+            )
+        quantity = {"flux": "flux", "isothermal": "temperature"}.get(self.heat)
+        return Wall(self.flow, **({quantity: self.value} if quantity else {}))
 
 
 class HeatedCavityDeck(Deck, kw_only=True):
@@ -143,8 +145,8 @@ class HeatedCavity(BoxProblem):
         reference = self.find_reference()
         head = self.describe()
         rows = [
-            compare(history, name, getattr(reference, name, math.nan), words)
-            for name, words in ROWS.items()
+            compare(history, name, getattr(reference, name, math.nan), label)
+            for name, label in ROWS.items()
         ]
         if not history:
             return Report(head, rows)

@@ -63,8 +63,11 @@ class MovingGrid1D(Problem):
 
     def __init__(self, deck: MovingGrid1DDeck):
         super().__init__(deck)
-        words = f"they must be one more than the fronts, of which there are {len(deck.fronts)}"
-        deck.refuse(len(deck.levels) != len(deck.fronts) + 1, "levels", words)
+        deck.refuse(
+            len(deck.levels) != len(deck.fronts) + 1,
+            "levels",
+            f"they must be one more than the fronts, of which there are {len(deck.fronts)}",
+        )
         rises = any(ahead >= behind for behind, ahead in pairwise(deck.levels))
         deck.refuse(rises, "levels", "from front to front u has to fall")
         falls = any(one >= other for one, other in pairwise([0.0, *deck.fronts, 1.0]))
@@ -96,8 +99,11 @@ class MovingGrid1D(Problem):
         deck = self.deck
         steps = max(1, len(history["t"]) - 1)
         if not history or history["t"][-1] < 0.999999 * self.t_end:
-            words = "the families are compared at the end time, which is not reached"
-            return Report(f"moving-grid-1d: {words}" if history else "")
+            if not history:
+                return Report("")
+            return Report(
+                "moving-grid-1d: the families are compared at the end time, which is not reached"
+            )
         head = (
             f"{len(deck.fronts)} front{'s' * (len(deck.fronts) > 1)}, viscosity {deck.viscosity:g} "
             f"m2/s, {deck.cells} cells, {steps} steps"

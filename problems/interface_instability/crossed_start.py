@@ -157,9 +157,11 @@ class Side:
             places.append(places[-1] + count)
         if len(self.speeds) > 1:
             sizes = size
-        rest = self.length - edges[-1]
+        remaining_length = self.length - edges[-1]
         even = self.start.problem.deck.uniform * self.start.problem.deck.wavelength
-        positions.append(edges[-1] + self._grade(rest, sizes, max(0.0, even - edges[-1])))
+        positions.append(
+            edges[-1] + self._grade(remaining_length, sizes, max(0.0, even - edges[-1]))
+        )
         return np.concatenate(positions), places[1:]
 
     def _grade(self, length: float, size: float, even: float) -> np.ndarray:

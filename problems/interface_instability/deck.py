@@ -131,9 +131,9 @@ def check_sense(deck: InterfaceDeck, rho: tuple[float, float], drawn: Iterable[M
     """
     named = [(f"modes.{place}", mode) for place, mode in enumerate(deck.modes)]
     waves = [(name, mode) for name, mode in named if mode.ka0]
-    told = [*_list_wave_faults(deck, waves, drawn), *_list_size_faults(deck, rho)]
-    if told:
-        raise BadInput("\n".join(f"deck: {sentence}" for sentence in dict.fromkeys(told)))
+    faults = [*_list_wave_faults(deck, waves, drawn), *_list_size_faults(deck, rho)]
+    if faults:
+        raise BadInput("\n".join(f"deck: {sentence}" for sentence in dict.fromkeys(faults)))
 
 
 def _list_wave_faults(
@@ -150,8 +150,10 @@ def _list_wave_faults(
                 f"{LEAST_WAVE_CELLS}) hardly grow: take a number up to {most}, or cells = {least}"
             )
         if deck.sides == "wall" and abs(math.sin(mode.phase)) > WALL_SLOPE_PART:
-            words = "with phase 0 or 3.141592653589793; or take sides = 'periodic'"
-            yield f"{name}.phase is {mode.phase:g}; walls meet a line at a right angle, {words}"
+            yield (
+                f"{name}.phase is {mode.phase:g}; walls meet a line at a right angle, "
+                "with phase 0 or 3.141592653589793; or take sides = 'periodic'"
+            )
     piece, what = (0.5, "halves of waves") if deck.sides == "wall" else (1.0, "waves")
     for name, mode in [*waves, *(("spectrum", mode) for mode in drawn)]:
         count = mode.number * deck.width / piece

@@ -167,10 +167,16 @@ def draw_modes(deck, even: bool) -> list[Mode]:
     cells = deck.cells
     if spectrum is None:
         return []
-    words = f"it must be at least spectrum.first, {spectrum.first}"
-    deck.refuse(spectrum.last < spectrum.first, "spectrum.last", words)
-    words = f"nodes resolve waves up to number {cells // 2} with {cells} cells per wavelength"
-    deck.refuse(2 * spectrum.last > cells, "spectrum.last", words)
+    deck.refuse(
+        spectrum.last < spectrum.first,
+        "spectrum.last",
+        f"it must be at least spectrum.first, {spectrum.first}",
+    )
+    deck.refuse(
+        2 * spectrum.last > cells,
+        "spectrum.last",
+        f"nodes resolve waves up to number {cells // 2} with {cells} cells per wavelength",
+    )
     numbers = np.arange(spectrum.first, spectrum.last + 1)
     waves = _draw_normal(spectrum.seed, numbers.size)
     waves[1] *= not even
@@ -236,14 +242,14 @@ def read_line(path: str, width: float, curve: str = "spline") -> FileLine:
     table = read_columns(path, (1, 2), where)
     x, y = table if len(table) == 2 else (table[0], np.linspace(0.0, width, table.shape[1]))
     if x.size < FILE_CURVES[curve]:
-        words = f"a {curve} line_curve needs at least {FILE_CURVES[curve]}"
-        raise BadInput(f"{where} has {x.size} points; {words}")
+        raise BadInput(
+            f"{where} has {x.size} points; a {curve} line_curve needs at least {FILE_CURVES[curve]}"
+        )
     if not (np.diff(y) > 0.0).all():
         row = int(np.flatnonzero(np.diff(y) <= 0.0)[0]) + 2
         raise BadInput(f"{where}: y must rise from row to row; it does not at row {row}")
     if y[0] > 1e-9 * width or y[-1] < width * (1.0 - 1e-9):
-        words = f"y = {y[0]:g} to {y[-1]:g}; the domain has 0 to {width:g}"
-        raise BadInput(f"{where} covers {words}")
+        raise BadInput(f"{where} covers y = {y[0]:g} to {y[-1]:g}; the domain has 0 to {width:g}")
     return FileLine(np.array([x, y]), curve)
 
 
@@ -257,13 +263,16 @@ class FreeLine:
     def __init__(self, perturbation: Perturbation, y: np.ndarray, even: bool, what: str):
         x = np.asarray(perturbation(y), dtype=float)
         if x.shape != y.shape or not np.isfinite(x).all():
-            words = f"must give a finite x for each of the {y.size} heights; it gave {x}"
-            raise BadInput(f"deck: {what} {words}")
+            raise BadInput(
+                f"deck: {what} must give a finite x for each of the {y.size} heights; it gave {x}"
+            )
         if not even:
             gap = abs(x[-1] - x[0])
             if gap > PERIODIC_END_GAP * float(np.ptp(x)):
-                words = f"its ends are {gap:g} apart in x; between periodic sides they must meet"
-                raise BadInput(f"deck: {what}: {words}")
+                raise BadInput(
+                    f"deck: {what}: "
+                    f"its ends are {gap:g} apart in x; between periodic sides they must meet"
+                )
             x = np.append(x[:-1], x[0])
         weights = np.diff(y)
         mean = float((0.5 * (x[1:] + x[:-1]) * weights).sum() / weights.sum())

@@ -103,10 +103,16 @@ class InterfaceInstability(Results, Problem):
             raise BadInput("deck: give `mach` or `shock_pressure`, not both")
         self.shock = self._make_shock()
         if late := deck.second_shock:
-            words = f"it must be above the pressure behind the first shock, {self.shock.p:g}"
-            deck.refuse(late.pressure <= self.shock.p, "second_shock.pressure", words)
-            words = "with a second_shock it must be given; it is found for one shock only"
-            deck.refuse(deck.lengths is None, "lengths", words)
+            deck.refuse(
+                late.pressure <= self.shock.p,
+                "second_shock.pressure",
+                f"it must be above the pressure behind the first shock, {self.shock.p:g}",
+            )
+            deck.refuse(
+                deck.lengths is None,
+                "lengths",
+                "with a second_shock it must be given; it is found for one shock only",
+            )
         even = deck.sides == "wall"
         drawn = draw_modes(deck, even)
         check_sense(deck, (self.rho_first, self.rho_second), drawn)
@@ -129,8 +135,10 @@ class InterfaceInstability(Results, Problem):
         self.begun = arrival + self._choose_since() if self.start == "crossed" else 0.0
         self.arrival = arrival - self.begun
         if self.start == "crossed" and deck.run.t_end is None:
-            words = f"the run begins at k c t = {-self.arrival * self._rate:.3g}"
-            wanted = f"{words}; take a greater one, or start = 'incident'"
+            wanted = (
+                f"the run begins at k c t = {-self.arrival * self._rate:.3g}"
+                "; take a greater one, or start = 'incident'"
+            )
             deck.refuse(self.t_end <= 0.0, "kct_end", wanted)
 
     def _choose_start(self) -> str:
@@ -188,8 +196,11 @@ class InterfaceInstability(Results, Problem):
         deck = self.deck
         if deck.shock_pressure is None:
             return shock_with_mach(self.eos_first, self.rho_first, deck.pressure, deck.mach or 1.5)
-        words = f"it must be above the pressure ahead, {deck.pressure:g}"
-        deck.refuse(deck.shock_pressure <= deck.pressure, "shock_pressure", words)
+        deck.refuse(
+            deck.shock_pressure <= deck.pressure,
+            "shock_pressure",
+            f"it must be above the pressure ahead, {deck.pressure:g}",
+        )
         return shock_to_pressure(self.eos_first, self.rho_first, deck.pressure, deck.shock_pressure)
 
     @property
@@ -254,8 +265,11 @@ class InterfaceInstability(Results, Problem):
     def count_rows(self) -> int:
         """Cells along the interface; BadInput for more than a side may have."""
         rows = max(2, round(self.deck.cells * self.deck.width))
-        words = f"that makes {rows:.3g} cells along the interface; it may have {10 * MOST_CELLS}"
-        self.deck.refuse(rows > 10 * MOST_CELLS, "width", words)
+        self.deck.refuse(
+            rows > 10 * MOST_CELLS,
+            "width",
+            f"that makes {rows:.3g} cells along the interface; it may have {10 * MOST_CELLS}",
+        )
         return rows
 
     @property
@@ -384,10 +398,16 @@ class InterfaceInstability(Results, Problem):
         front = self.shape(y)
         lengths = self.choose_lengths()
         start = deck.gap * deck.wavelength + self.amplitude
-        words = f"each must be greater than twice the interface's amplitude, {self.amplitude:g}"
-        deck.refuse(min(lengths) <= 2.0 * self.amplitude, "lengths", words)
-        words = f"the first must be greater than {start:g}, the gap and the amplitude"
-        deck.refuse(lengths[0] <= start, "lengths", words)
+        deck.refuse(
+            min(lengths) <= 2.0 * self.amplitude,
+            "lengths",
+            f"each must be greater than twice the interface's amplitude, {self.amplitude:g}",
+        )
+        deck.refuse(
+            lengths[0] <= start,
+            "lengths",
+            f"the first must be greater than {start:g}, the gap and the amplitude",
+        )
         return np.array([front, y])
 
     def plan(self) -> tuple[float, list[BlockPlan]]:
@@ -415,8 +435,11 @@ class InterfaceInstability(Results, Problem):
         front, y = self.make_interface()
         if self.start == "crossed":
             grids = [side.make_nodes() for side in self.crossed.sides]
-            words = "the interface is too steep for a first grid by linear theory; take 'incident'"
-            self.deck.refuse(any(len(find_bad_cells(grid)) for grid in grids), "start", words)
+            self.deck.refuse(
+                any(len(find_bad_cells(grid)) for grid in grids),
+                "start",
+                "the interface is too steep for a first grid by linear theory; take 'incident'",
+            )
             return grids
         reach = max(self.deck.reach * self.deck.wavelength, LEAST_REACH_RATIO * np.abs(front).max())
         grids = []

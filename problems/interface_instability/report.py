@@ -89,9 +89,9 @@ def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
     until = min(t[-1], growth.open_time)
     after = (t > problem.arrival + 0.3 * (until - problem.arrival)) & (t <= until)
     speed = fit_slope(t, column["interface_mean"], after)
-    words = "interface speed" if math.isfinite(speed) else ""
+    label = "interface speed" if math.isfinite(speed) else ""
     source = "exact Riemann solution"
-    last = Row("interface_speed", speed, exact, words, digits=5, studied=True, source=source)
+    last = Row("interface_speed", speed, exact, label, digits=5, studied=True, source=source)
     modes = problem.harmonics
     several = len(problem.harmonics) > 1
     if not modes:
@@ -100,8 +100,7 @@ def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
     strongest = find_strongest(modes)
     rows = []
     for mode in modes:
-        words = shown and mode in strongest
-        rows += _compare_mode(growth, mode, column, kct, several, words)
+        rows += _compare_mode(growth, mode, column, kct, several, shown and mode in strongest)
     if len(strongest) < len(modes):
         notes.append(
             f"these are the {len(strongest)} steepest of {len(modes)} modes; all of them: "
@@ -110,9 +109,9 @@ def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
     known = [row for row in rows if row.label and row.source.startswith("linear")]
     rows.append(last)
     if any(not is_still(theory, row.theory) for row in known):
-        words = f"impulsive model ({theory.impulse})"
+        label = f"impulsive model ({theory.impulse})"
         source = "for comparison"
-        rows.append(Row("impulsive", math.nan, theory.impulsive, words, digits=5, source=source))
+        rows.append(Row("impulsive", math.nan, theory.impulsive, label, digits=5, source=source))
     if growth.linear_reach < kct:
         if several:
             start = growth.first_slope
@@ -137,7 +136,7 @@ def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, sho
     if window is None or mode.column not in column:
         return [Row(name, studied=True)]
     head = f"mode {mode.number}: " if several else ""
-    words = f"{head}(da/dt)/(k a0), {window.first:g} < k c t < {window.last:.3g}" if shown else ""
+    label = f"{head}(da/dt)/(k a0), {window.first:g} < k c t < {window.last:.3g}" if shown else ""
     rate = growth.measure_rate(column, mode, window.first, window.last)
     expected = float(theory.get_mean_rate(window.first, window.last))
     source = "linear compressible theory"
@@ -148,7 +147,7 @@ def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, sho
         beyond = {"off": "--", "source": f"{source}, beyond its range, {limit}"}
         return [
             Row(name, studied=True),
-            Row(f"{name}_beyond", rate, expected, words, digits=5, **beyond),
+            Row(f"{name}_beyond", rate, expected, label, digits=5, **beyond),
         ]
     returned = mode.number * growth.open_reach
     if window.last == returned:
@@ -156,17 +155,17 @@ def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, sho
     if not is_still(theory, expected):
         if not several and window.last < min(WINDOW[1], kct, returned):
             source += f", up to k a = {growth.limit:.2g}, its limit"
-        return [Row(name, rate, expected, words, digits=5, studied=True, source=source)]
+        return [Row(name, rate, expected, label, digits=5, studied=True, source=source)]
     share = f"{100.0 * (rate - expected) / theory.base.u:+.2f} % of u"
     source += "; u: interface speed"
     times = mode.number * get_kct(growth.problem, column["t"])
     size = float(np.interp(window.last, times, column[mode.column])) / mode.amplitude
     size_expected = float(predict_amplitude(theory, window.last))
-    words_size = f"{head}a / a0 at k c t = {window.last:.3g}" if shown else ""
+    size_label = f"{head}a / a0 at k c t = {window.last:.3g}" if shown else ""
     missing = {"off": f"{100.0 * (size - size_expected):+.2f} % of a0", "source": "the same theory"}
     return [
-        Row(name, rate, expected, words, digits=5, studied=True, source=source, off=share),
-        Row(f"{name}_size", size, size_expected, words_size, digits=5, **missing),
+        Row(name, rate, expected, label, digits=5, studied=True, source=source, off=share),
+        Row(f"{name}_size", size, size_expected, size_label, digits=5, **missing),
     ]
 
 
@@ -178,10 +177,10 @@ def _compare_model(growth, column, kct: float) -> Row:
     computed = float(np.interp(t, column["t"], column["amplitude"]))
     model = float(growth.compute_model(np.array([t]))[-1])
     ends = last < kct
-    words = f"amplitude at k c t = {last:.3g}" if ends else "amplitude at the end"
+    label = f"amplitude at k c t = {last:.3g}" if ends else "amplitude at the end"
     why = "waves return" if last == growth.open_reach else "its range ends"
     source = "Padé model, rough" + (f": {why} there" if ends else "")
-    return Row("model_amplitude", computed, model, words, digits=5, source=source)
+    return Row("model_amplitude", computed, model, label, digits=5, source=source)
 
 
 class _Curve(NamedTuple):
@@ -217,11 +216,11 @@ def _draw_theory(amplitude, rate, growth, curves: list[_Curve], column, kct: np.
         dashes = {"color": f"C{n}" if several else "k", "ls": "--"}
         amplitude.plot(kct[known], predict_amplitude(theory, curve.number * kct[known]), **dashes)
         rate.plot(kct[known], theory.get_rate(curve.number * problem.k, t), **dashes)
-    words = "linear compressible"
+    label = "linear compressible"
     modes = len(problem.harmonics) > 1
-    words += ", waves couple" if modes and reach == 0.0 else ""
+    label += ", waves couple" if modes and reach == 0.0 else ""
     for axes in (amplitude, rate)[modes:]:  # the first is too narrow for this and names of modes
-        axes.plot([], [], "k--", label=words)
+        axes.plot([], [], "k--", label=label)
     if modes and 0.0 < reach < kct[-1]:
         for axes in (amplitude, rate):
             axes.axvline(reach, color="0.4", lw=0.8, ls=":", label="waves couple")
@@ -313,9 +312,9 @@ class Results:
             _draw_theory(amplitude, rate, growth, curves, column, kct)
         if len(kct) > 3:
             _draw_rates(self, rate, column["t"], curves)
-        words = "k c t after the shock's arrival" + ", k of mode 1" * several
-        amplitude.set(xlabel=words, ylabel="a / a0")
-        rate.set(xlabel=words, ylabel="(da/dt) / (k a0)")
+        time_label = "k c t after the shock's arrival" + ", k of mode 1" * several
+        amplitude.set(xlabel=time_label, ylabel="a / a0")
+        rate.set(xlabel=time_label, ylabel="(da/dt) / (k a0)")
         windows = []
         shown = []
         dumps = spread_dumps(run, SHOWN_TIMES)
@@ -359,8 +358,14 @@ class Results:
             row = known[np.argmin(np.abs(kct[known] - kct[known[-1]] * (n + 1) / SHOWN_TIMES))]
             size = np.array([history[mode.column][row] for mode in modes])
             colour = f"C{n}"
-            words = f"k c t = {kct[row]:.3g}"
-            axes.semilogy(numbers, np.abs(size) * self.k, "o", color=colour, ms=4, label=words)
+            axes.semilogy(
+                numbers,
+                np.abs(size) * self.k,
+                "o",
+                color=colour,
+                ms=4,
+                label=f"k c t = {kct[row]:.3g}",
+            )
             if self.deck.second_shock is None and kct[row] > 0.0:
                 theory = first * predict_amplitude(self.theory, numbers * kct[row])
                 axes.semilogy(numbers, np.abs(theory) * self.k, "--", color=colour, lw=1)

@@ -35,10 +35,9 @@ def grow_steps(steps: list[float], stretch: float, length: float) -> list[float]
         steps.append(steps[-1] * stretch)
         reach += steps[-1]
         if len(steps) > MOST_SIDE_CELLS:
-            words = "take fewer `cells`, shorter `lengths`, more `stretch`"
             raise BadInput(
                 f"deck: a block of length {length:g} would have {MOST_SIDE_CELLS} cells and more: "
-                f"{words}"
+                "take fewer `cells`, shorter `lengths`, more `stretch`"
             )
     return steps
 

@@ -311,7 +311,7 @@ def sort_cautions(
     worst = max(found, key=find_error)
     error = find_error(worst)
     of_cells = []
-    told = []
+    cautions = []
     measured = f"with {worst.cells:g} cells per wavelength"
     if worst.cells > cells * (1.0 + RANGE_EDGE_MARGIN):
         of_cells.append(
@@ -320,20 +320,20 @@ def sort_cautions(
         )
         measured += f", and greater with {cells:.3g}"
     if error > TRUSTED_RATE_ERROR:
-        words = f"{100.0 * error:.2g} %"
+        size = f"{100.0 * error:.2g} %"
         if error != abs(worst.rate_error):
-            words = (
+            size = (
                 f"{100.0 * abs(worst.rate_error):.2g} % of the interface's speed, which is "
                 f"{100.0 * error:.2g} % of the growth here,"
             )
-        told.append(f"growth rates at {where} have errors of up to {words} {measured}")
+        cautions.append(f"growth rates at {where} have errors of up to {size} {measured}")
     rough = max(row.roughness for row in found)
     if rough > ROUGH_LINE:
-        told.append(
+        cautions.append(
             f"at {where} the interface became rough {measured}: "
             f"harmonics above the fourth are {rough:.2g} of the largest mode"
         )
-    return of_cells, told
+    return of_cells, cautions
 
 
 # phase of a capillary wave up to which its growth is within 1 % of that without
@@ -342,19 +342,23 @@ FREE_CAPILLARY_PHASE = 0.25
 
 def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str]:
     """Sentences for the deck of an `InterfaceInstability`; with a history, for the run as well."""
-    told = [words for some in sort_deck(problem) for words in some] if problem.harmonics else []
+    cautions = (
+        [caution for some in sort_deck(problem) for caution in some] if problem.harmonics else []
+    )
     deck = problem.deck
     base = problem.theory.base
-    told += _caution_no_interface(problem) + _caution_few_points(problem)
-    told += _caution_steep_line(problem, history)
+    cautions += _caution_no_interface(problem) + _caution_few_points(problem)
+    cautions += _caution_steep_line(problem, history)
     for name in ("first", "second"):
         side = getattr(deck, name)
         label = side.material or f"the {name} material"
-        told += caution_fit(label, getattr(problem, f"eos_{name}"), max(base.p, problem.shock.p))
+        cautions += caution_fit(
+            label, getattr(problem, f"eos_{name}"), max(base.p, problem.shock.p)
+        )
     single = deck.second_shock is None
     tension = deck.line.tension
     if single:  # waves that are back from the far ends before the run's end
-        told += [
+        cautions += [
             f"waves return to the interface from the far end of the {name} material at t = "
             f"{t:.4g} s, k c t = {float(get_kct(problem, t)):.3g}: later growth is not that of an "
             "open interface; for that run anew with longer `lengths`, or none and no run.t_set_up"
@@ -365,14 +369,14 @@ def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str
         number = problem.harmonics[-1].number
         omega = math.sqrt(tension * (number * problem.k) ** 3 / (base.rho_left + base.rho_right))
         if omega * (problem.t_end - problem.arrival) >= FREE_CAPILLARY_PHASE:
-            told.append(
+            cautions.append(
                 f"surface tension makes waves of mode {number} oscillate with a period of "
                 f"{2.0 * math.pi / omega:.3g} s; the theories of growth ignore it and hold "
                 f"until t = {problem.arrival + FREE_CAPILLARY_PHASE / omega:.3g} s"
             )
     if history is not None and problem.harmonics and single:
-        told += _caution_line(problem, history)
-    return told
+        cautions += _caution_line(problem, history)
+    return cautions
 
 
 MOST_OVERSHOOT = 0.1  # of a line's extent: a spline that goes farther beyond its points is told
@@ -384,19 +388,19 @@ LEAST_MUSHROOM_CELLS = 64  # in a wavelength: with fewer the stem and the cap ar
 
 def _caution_no_interface(problem) -> list[str]:
     """That nothing can grow: one material on both sides, or a line without waves."""
-    told = []
+    cautions = []
     same = is_same_material(problem.eos_first, problem.eos_second)
     if same and problem.rho_first == problem.rho_second:
-        told.append(
+        cautions.append(
             f"both materials are the same, of density {problem.rho_first:g}: there is no "
             "interface, and theory has no growth; take another second.rho or material"
         )
     if not problem.harmonics:
-        told.append(
+        cautions.append(
             "the interface is flat, with every ka0 0: there is no growth to measure; give a mode "
             "a ka0 such as 0.02"
         )
-    return told
+    return cautions
 
 
 def _caution_few_points(problem) -> list[str]:
@@ -419,15 +423,15 @@ def _caution_steep_line(problem, history) -> list[str]:
     """That the first line is steeper than any that was compared, or that few cells carry it."""
     deck = problem.deck
     slope = problem.k * problem.amplitude
-    told = []
+    cautions = []
     if slope > MOST_COMPARED_KA:
-        told.append(
+        cautions.append(
             f"the first line has k a0 = {slope:.3g}, {slope / (2.0 * math.pi):.2g} wavelengths; "
             f"lines beyond {MOST_COMPARED_KA:g} were never compared with theory or experiment"
         )
     most = 0.0 if history is None else problem.k * float(np.nanmax(history["amplitude"]))
     if most > ROLLED_UP_KA and deck.cells < LEAST_MUSHROOM_CELLS and not deck.refine:
-        told.append(
+        cautions.append(
             f"the wave has grown to k a = {most:.3g} on {deck.cells} cells per wavelength, "
             f"{problem.count_rows()} along the line: too few for a mushroom's stem and cap; take "
             f"cells = {2 * LEAST_MUSHROOM_CELLS} or refine = true"
@@ -436,12 +440,12 @@ def _caution_steep_line(problem, history) -> list[str]:
         first = float(history["largest_turn"][0])
         turn = float(np.nanmax(history["largest_turn"]))
         if turn > max(POLYGON_TURN, 1.2 * first):
-            told.append(
+            cautions.append(
                 f"the line turns by up to {turn:.0f} degrees from one segment to the next: it is a "
                 "polygon where it rolls up, and what it looks like there depends on its nodes; "
                 "take more cells, refine = true, or a greater line.thickness"
             )
-    return told
+    return cautions
 
 
 def sort_deck(problem) -> tuple[list[str], list[str]]:
@@ -483,8 +487,9 @@ def _caution_line(problem, history) -> list[str]:
     if "roughness" not in history or not modes or not gentle.any():  # of an earlier version, short
         return []
     last = float(growth.scale_roughness(history)[gentle][-1])
-    words = (
+    if last <= ROUGH_LINE:
+        return []
+    return [
         f"the interface is rough: harmonics above the fourth are {last:.2g} of the largest mode at "
         f"k c t = {kct[gentle][-1]:.3g}, and theory predicts almost none; try other or finer cells"
-    )
-    return [words] if last > ROUGH_LINE else []
+    ]

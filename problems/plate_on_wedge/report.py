@@ -277,13 +277,13 @@ def describe_jet(problem, history) -> str:
     if not math.isfinite(lead):
         return "jet: A has not run far enough to tell whether one runs ahead of it"
     if lead > LEAST_LEAD * spacing:
-        words = "one ahead of A, " + ("theory predicts none" if attached else "as predicted")
+        jet = "one ahead of A, " + ("theory predicts none" if attached else "as predicted")
     elif attached:
-        words = "none ahead of A, as predicted"
+        jet = "none ahead of A, as predicted"
     else:
-        words = "predicted ahead of A, but too thin to be resolved by these cells"
+        jet = "predicted ahead of A, but too thin to be resolved by these cells"
     ahead = f"at most {MM * lead:.2f} mm ({lead / spacing:.1f} cells)" if lead > 0.0 else "none"
-    return f"jet: {words}; {ahead} of the plate is ahead before {STEADY[1]:.0%} of the face"
+    return f"jet: {jet}; {ahead} of the plate is ahead before {STEADY[1]:.0%} of the face"
 
 
 SHOWN_PLATE_TIMES = 6  # times in a picture
@@ -318,31 +318,31 @@ class Results:
         chosen = choose_rows(self, history, (0.2, 0.8))
         if deck.drive.kind != "moving" and chosen.any():
             speed = float(np.median(history["surface_speed"][chosen]))
-            words = "speed of the free surface [km/s]"
-            rows.append(Row("plate_speed", speed, self.plate_speed, words, 1e3, 5))
+            label = "speed of the free surface [km/s]"
+            rows.append(Row("plate_speed", speed, self.plate_speed, label, 1e3, 5))
         speed, spread = measure_contact_speed(self, history)
-        words = "speed of A on the face [km/s]"
+        label = "speed of A on the face [km/s]"
         source = ""
         if math.isfinite(spread):
             source = f"constant within {100.0 * spread:.2f} % over fifths of its path"
         if not theory.attached:
-            words = "speed of A, the jet's tip [km/s]"
+            label = "speed of A, the jet's tip [km/s]"
             source = "where the plate would meet the face"
-        rows.append(Row("contact_speed", speed, theory.contact_speed, words, 1e3, 5, source=source))
+        rows.append(Row("contact_speed", speed, theory.contact_speed, label, 1e3, 5, source=source))
         if theory.attached:
             found = measure_behind(self, history)
             degree = math.pi / 180.0
             plateau = measure_plateau(self, history)
-            words = "pressure behind A [GPa]"
+            label = "pressure behind A [GPa]"
             source = describe_plateau(plateau)
-            rows.append(Row("pressure", plateau.p, theory.p, words, 1e9, 5, source=source))
+            rows.append(Row("pressure", plateau.p, theory.p, label, 1e9, 5, source=source))
             for name, wave in (("plate", theory.plate), ("wedge", theory.wedge)):
-                for kind, words, exact in (
+                for kind, label, exact in (
                     ("theta", f"deflection of the {name} [deg]", wave.deflection),
                     ("shock", f"shock angle in the {name} [deg]", wave.wave_angle),
                 ):
-                    what = f"{kind}_{name}"
-                    rows.append(Row(what, found[what], exact, words, degree, 5))
+                    name_of_row = f"{kind}_{name}"
+                    rows.append(Row(name_of_row, found[name_of_row], exact, label, degree, 5))
         # fastest material; single cells that are nearly empty are faster for a few steps
         speed = history["jet_speed"]
         t = history["t"]
@@ -385,19 +385,19 @@ class Results:
         ]
         if theory.attached and zone < WIDE_ZONE:
             part = max(100.0 * zone, 0.0)
-            words = f"the zone of constant states behind A is {part:.1f} % of A's path long"
             lines.append(
                 f"  near critical: the flow leaves A at Mach {theory.plate.mach_behind:.2f} in the "
-                f"plate, {theory.wedge.mach_behind:.2f} in the wedge; {words}"
+                f"plate, {theory.wedge.mach_behind:.2f} in the wedge; "
+                f"the zone of constant states behind A is {part:.1f} % of A's path long"
             )
-            words = "refinement=2 or 3 makes the cells at A finer, at as many times the steps"
+            advice = "refinement=2 or 3 makes the cells at A finer, at as many times the steps"
             if finer > 1.0:
-                words = (
+                advice = (
                     f"so the cells at A are {finer:.3g} times finer, at as many times the steps "
                     "(refinement=1: none of it)"
                 )
             ending = "; such a run ends at B" if deck.until == "auto" else ""
-            lines.append(f"    {words}{ending}")
+            lines.append(f"    {advice}{ending}")
         return "\n".join(lines)
 
     def cautions(self, history=None) -> list[str]:
@@ -405,9 +405,9 @@ class Results:
         it is beyond the Hugoniots."""
         p = self.collision.p or 0.0
         beyond = [
-            words
+            caution
             for name, body in self.materials.items()
-            for words in caution_fit(f"the {name}", body.eos, p)
+            for caution in caution_fit(f"the {name}", body.eos, p)
         ]
         return beyond + self.caution_cells()
 
@@ -420,13 +420,13 @@ class Results:
         away = math.degrees(self.critical) - deck.angle
         near = f"{away:.2g} degrees below the critical angle the pressure behind A"
         finer = f"cells=[{FINE_CELLS}, {math.ceil(FINE_CELLS * deck.cells[1] / cells)}]"
-        words = f"was found up to 5 % low with {COARSE_CELLS} cells" * (away < NEAR_CRITICAL)
+        finding = f"was found up to 5 % low with {COARSE_CELLS} cells" * (away < NEAR_CRITICAL)
         if cells < COARSE_CELLS:
-            words = f"was never compared with theory at fewer than {COARSE_CELLS} cells along it"
+            finding = f"was never compared with theory at fewer than {COARSE_CELLS} cells along it"
         elif self.refinement <= 1.0 and self.zone < SHORT_ZONE:
             finer = "refinement=3" if deck.drive.kind == "moving" else "refinement=2, until=arrival"
-            words = f"was found 5 to 8 % low with {COARSE_CELLS} unrefined cells"
-        return [f"{near} {words}; take {finer}"] if words else []
+            finding = f"was found 5 to 8 % low with {COARSE_CELLS} unrefined cells"
+        return [f"{near} {finding}; take {finer}"] if finding else []
 
     def draw_phases(self, figure, run) -> None:
         """Pressure with the grid at several times, all in one frame."""
@@ -477,5 +477,10 @@ class Results:
                 fills[block.name] = axes.fill(*outline, facecolor=shade, edgecolor="k", lw=0.9)[0]
             axes.set(xlabel="x [mm]", ylabel="y [mm]")
             axes.label_outer()
-        words = [f"{name} ({materials[name]})" for name in fills]
-        figure.legend(fills.values(), words, frameon=False, ncols=3, loc="outside lower center")
+        figure.legend(
+            fills.values(),
+            [f"{name} ({materials[name]})" for name in fills],
+            frameon=False,
+            ncols=3,
+            loc="outside lower center",
+        )

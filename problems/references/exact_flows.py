@@ -39,8 +39,10 @@ class SedovBlast:
         if abs(gamma - 2.0) < 0.02:
             raise BadInput(f"sedov: gamma is {gamma:g}; the closed form has a pole at gamma = 2")
         if 2.0 * (n * (gamma - 1.0) + 2.0) > 0.99 * (n + 2.0) * (gamma + 1.0):
-            words = "from 7 on a spherical blast is hollow, and near that the closed form fails"
-            raise BadInput(f"sedov: gamma is {gamma:g}; {words}")
+            raise BadInput(
+                f"sedov: gamma is {gamma:g}; "
+                "from 7 on a spherical blast is hollow, and near that the closed form fails"
+            )
         shells = PROFILE_SHELLS
         while True:
             self.positions, self.profile = _make_profile(n, gamma, shells)
@@ -146,8 +148,10 @@ def compute_taylor_wave(eos: JWL) -> TaylorWave:
     speed, pressure, density = eos.find_detonation()
     products = make_isentrope(eos, density, pressure)
     first = speed * (1.0 - eos.rho0 / density)
-    rest = find_root(lambda p: first - products.velocity_gain(p), 0.05 * pressure, pressure)
-    p = np.linspace(rest, pressure, WAVE_POINTS)
+    pressure_at_rest = find_root(
+        lambda p: first - products.velocity_gain(p), 0.05 * pressure, pressure
+    )
+    p = np.linspace(pressure_at_rest, pressure, WAVE_POINTS)
     u = first - products.velocity_gain(p)
     rho = products.density(p)
     c = products.sound_speed(p)

@@ -179,8 +179,10 @@ def release(eos, rho: float, p: float, p_end: float = 0.0) -> tuple[float, float
     """
     isentrope = make_isentrope(eos, rho, p)
     if p_end < isentrope.least_pressure:
-        words = f"it is below the material's least pressure, {isentrope.least_pressure:g}"
-        raise BadInput(f"no release to p = {p_end:g}: {words}")
+        raise BadInput(
+            f"no release to p = {p_end:g}: "
+            f"it is below the material's least pressure, {isentrope.least_pressure:g}"
+        )
     return float(isentrope.density(p_end)), float(isentrope.velocity_gain(p_end))
 
 
@@ -231,8 +233,9 @@ def _volume_behind(eos, rho: float, p: float, p_behind: float) -> float:
     if stiffened is not None:
         gamma, p_inf = stiffened
         if p + p_inf <= 0.0 or p_behind + p_inf <= 0.0:
-            words = f"both must be above {0.0 - p_inf:g}"
-            raise BadInput(f"shock from p = {p:g} to {p_behind:g}: {words}")
+            raise BadInput(
+                f"shock from p = {p:g} to {p_behind:g}: both must be above {0.0 - p_inf:g}"
+            )
         ratio = (p_behind + p_inf) / (p + p_inf)
         return ahead * (gamma + 1.0 + (gamma - 1.0) * ratio) / (gamma - 1.0 + (gamma + 1.0) * ratio)
     if p_behind == p:

@@ -175,8 +175,8 @@ class LinearGrowth:
     @functools.cached_property
     def _curve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
         """`kt`, `rate`, amplitudes (2, n) of the shocks over a0, and the error of the growth."""
-        words = self.layers.make_sides(CUTS[0], self.kt_end), self.kt_end
-        return remember("growth", words, self._march)
+        key = self.layers.make_sides(CUTS[0], self.kt_end), self.kt_end
+        return remember("growth", key, self._march)
 
     def _march(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
         march, error = self._march_layers(self.kt_end, CUTS, self._compare_growth)
@@ -260,8 +260,8 @@ class LinearGrowth:
 
         elsewhere no shock changes its entropy.
         """
-        words = self.layers.make_sides(CUTS[0], kt), self.compression, kt
-        return remember("flow", words, lambda: self._find_fields(kt))
+        key = self.layers.make_sides(CUTS[0], kt), self.compression, kt
+        return remember("flow", key, lambda: self._find_fields(kt))
 
     def _find_fields(self, kt: float) -> PerturbedFlow:
         march, _ = self._march_layers(kt, FIELD_CUTS, self._compare_fields)
@@ -313,8 +313,10 @@ class LinearGrowth:
     def _check_window(self, last: float) -> None:
         reach = self.kt[-1] * self.sound_speed
         if last > reach * (1.0 + 1e-9):
-            words = f"needs a solution beyond {reach:g}; ask for a longer one"
-            raise BadInput(f"linear growth: a mean up to k c t = {last:g} {words}")
+            raise BadInput(
+                f"linear growth: a mean up to k c t = {last:g} "
+                f"needs a solution beyond {reach:g}; ask for a longer one"
+            )
 
 
 def compute_linear_growth(

@@ -558,6 +558,8 @@ def _march_zones(
         np.empty((4, *state.shape)), velocities, ends,
     )  # fmt: skip
     if not np.isfinite(velocities).all():
-        words = "linear growth: the solution left the range of numbers; give fewer points"
-        raise RunFailure(words, cause="not-finite")
+        raise RunFailure(
+            "linear growth: the solution left the range of numbers; give fewer points",
+            cause="not-finite",
+        )
     return March(times, velocities, ends, sides, np.split(state, np.cumsum(sizes)[:-1], axis=1))

@@ -41,8 +41,11 @@ class _Side:
             raise BadInput(f"riemann problem: the {where} density is {self.rho:g}; give one > 0")
         self.isentrope = make_isentrope(eos, self.rho, self.p)
         if not math.isfinite(self.isentrope.c) or self.isentrope.c <= 0.0:
-            words = f"state rho = {self.rho:g}, p = {self.p:g} has no sound speed"
-            raise BadInput(f"riemann problem: the {where} {words} in its equation of state")
+            raise BadInput(
+                f"riemann problem: the {where} "
+                f"state rho = {self.rho:g}, p = {self.p:g} has no sound speed"
+                " in its equation of state"
+            )
 
     def velocity(self, p: float) -> float:
         """Velocity behind the wave that leads to pressure p."""

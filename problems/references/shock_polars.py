@@ -289,8 +289,9 @@ def cross_line(first: Body, second: Body, speed: float) -> CrossedLine:
     values = np.array([excess(share) for share in shares])
     found = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
     if found.size == 0:
-        words = f"no common pressure and deflection up to {top:g}"
-        raise BadInput(f"shocks along a line at {speed:g}: {words}")
+        raise BadInput(
+            f"shocks along a line at {speed:g}: no common pressure and deflection up to {top:g}"
+        )
     at = int(found[0])
     p = low + find_root(excess, shares[at], shares[at + 1], xtol=1e-13) * (top - low)
     return CrossedLine(float(speed), one.shock_to(p), two.shock_to(p))

@@ -80,8 +80,8 @@ class Cavity(Problem):
         put(block, "j_max", "free-surface", second, last)
         put_walls(block, curved=self.curved)
         least = 0.01 * measure_below(nodes[:, :, 0], self.curved)
-        words = "the void is closed but for 1 % of its size"
-        find_end = lambda flow: words if self.measure(flow)["void_size"] < least else None  # noqa: E731
+        condition = "the void is closed but for 1 % of its size"
+        find_end = lambda flow: condition if self.measure(flow)["void_size"] < least else None  # noqa: E731
         return self.simulate([block], geometry=deck.geometry, find_end=find_end)
 
     def measure(self, evolution) -> dict[str, float]:
@@ -106,10 +106,16 @@ class Cavity(Problem):
         closing = find_time(history, history["void_width"] <= 1e-6 * deck.radius)
         left = max(float(size[-1] / size[0]), 0.0)
         most = find_most(history, "most_pressure") if math.isfinite(closing) else math.nan
-        words = "greatest speed of the jet (theory: plane surface) [m/s]"
         rows = [
             Row("arrival", arrival, self.arrival, "arrival of the shock at the void [s]", digits=5),
-            Row("near_speed", find_most(history, "jet_speed"), near, words, digits=5, off=" "),
+            Row(
+                "near_speed",
+                find_most(history, "jet_speed"),
+                near,
+                "greatest speed of the jet (theory: plane surface) [m/s]",
+                digits=5,
+                off=" ",
+            ),
             Row("closing", closing, label="impact of the jet on the far side [s]", digits=4),
             Row("shock_pressure", most, p, "pressure of the impact [GPa]", 1e9, 4, off=" "),
             Row("left", left, label="void left at the end [%]", unit=0.01, digits=3),

@@ -120,14 +120,27 @@ class Detonation(Problem):
         t = history["t"]
         front = history["front"]
         speed = fit_slope(t, front, (t > 0.5 * t[-1]) & np.isfinite(front))
-        words = "pressure behind it [GPa]" if deck.behind == "piston" else "peak pressure [GPa]"
         rows = [
             Row("speed", speed, self.speed, "speed of the front [m/s]", error="cj_speed"),
-            compare(history, "pressure", self.pressure, words, unit=1e9, error="cj_pressure"),
+            compare(
+                history,
+                "pressure",
+                self.pressure,
+                "pressure behind it [GPa]" if deck.behind == "piston" else "peak pressure [GPa]",
+                unit=1e9,
+                error="cj_pressure",
+            ),
         ]
         if deck.behind == "wall":
-            words = "Taylor's wave: mean error of p"
-            rows.append(compare(history, "taylor_error", label=words, digits=3, error="taylor"))
+            rows.append(
+                compare(
+                    history,
+                    "taylor_error",
+                    label="Taylor's wave: mean error of p",
+                    digits=3,
+                    error="taylor",
+                )
+            )
         head = f"detonation, {deck.explosive}, {deck.cells} cells, {deck.behind}"
         return Report(f"{head}; theory: Chapman-Jouguet", rows, notes)
 

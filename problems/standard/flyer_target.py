@@ -74,8 +74,11 @@ class FlyerTarget(Problem):
         }
         first, second, *more = deck.plates
         first.refuse(first.gap, "gap", "nothing is before the first plate, whose gap must be 0")
-        words = "nothing is before the first plate; give it to the next one"
-        first.refuse(first.bond is not None, "bond", words)
+        first.refuse(
+            first.bond is not None,
+            "bond",
+            "nothing is before the first plate; give it to the next one",
+        )
         self.materials = [find_material(plate.material) for plate in deck.plates]
         impact = deck.speed, second.gap, first.thickness, second.thickness
         self.theory = compute_plate_impact(*self.materials[:2], *impact)
@@ -117,7 +120,7 @@ class FlyerTarget(Problem):
     def cautions(self, history=None) -> list[str]:
         """Lengths that may be meant in mm, an end before the impact, speeds beyond a Hugoniot."""
         deck = self.deck
-        told = [
+        cautions = [
             f"plates.{number}.{name} is {getattr(plate, name):g} m; lengths are in metres: 1 mm is "
             "1e-3"
             for number, plate in enumerate(deck.plates)
@@ -125,14 +128,14 @@ class FlyerTarget(Problem):
             if getattr(plate, name) >= LARGE_LENGTH
         ]
         if self.t_end <= self.theory.impact:
-            told.append(
+            cautions.append(
                 f"the run ends at t = {self.t_end:.4g} s, before the impact at "
                 f"{self.theory.impact:.4g} s; take a later run.t_end, or a smaller gap"
             )
         hit = dict(zip((plate.material for plate in deck.plates), self.materials, strict=True))
         for name in dict.fromkeys(plate.material for plate in deck.plates[:2]):
-            told += caution_fit(name, hit[name].eos, self.theory.pressure)
-        return told
+            cautions += caution_fit(name, hit[name].eos, self.theory.pressure)
+        return cautions
 
     def measure(self, evolution) -> dict[str, float]:
         row = {}
@@ -206,7 +209,6 @@ class FlyerTarget(Problem):
         axis = figure.subplots()
         theory = self.theory
         labels = {"free_surface_speed": "computed"}
-        words = "free surface of the last plate [m/s]"
-        draw_columns(axis, run_data.history, labels, words, "µs")
+        draw_columns(axis, run_data.history, labels, "free surface of the last plate [m/s]", "µs")
         if self.is_pair:
             axis.plot(*theory.make_trace(1e6), "k--", lw=0.8, label="theory, until the release")

@@ -111,9 +111,9 @@ class FreeStream(Problem):
 
     def report(self, history, final=None) -> Report:
         deck = self.deck
-        words = f"largest deviation, {history['deviation'].size - 1} steps"
+        label = f"largest deviation, {history['deviation'].size - 1} steps"
         most = find_most(history, "deviation")
-        row = Row("largest_deviation", most, label=words, digits=3)
+        row = Row("largest_deviation", most, label=label, digits=3)
         head = (
             f"uniform stream, Mach {deck.mach:g}, {' | '.join(deck.materials)}, {deck.contact}, "
             f"{deck.sides} sides, nodes shaken by {deck.shake:g} cells at every step:"

@@ -97,11 +97,11 @@ class Kidder(RadialProblem):
         h = self.shell.compute_shrinking(get_last(history, "t")) if history else 0.5
         kinds = {"error": "relative error", "worst": "at the worst ray", "roundness": "round to"}
         labels = {
-            f"{side}_{kind}": f"{side} radius, {words}"
+            f"{side}_{kind}": f"{side} radius, {label}"
             for side in ("inner", "outer")
-            for kind, words in kinds.items()
+            for kind, label in kinds.items()
         } | {"error_rho": "mean error of the density"}
-        rows = [compare(history, name, label=words, digits=3) for name, words in labels.items()]
+        rows = [compare(history, name, label=label, digits=3) for name, label in labels.items()]
         head = f"kidder, {SHAPES[deck.n]} of {deck.cells} x {deck.rays} cells: shrunk to {h:.4g}"
         return Report(f"{head} of the first radii", rows)
 
@@ -121,8 +121,8 @@ class Kidder(RadialProblem):
             else:
                 left.text(0.02, outer, label)
         times, h = np.array([(dump.t / self.shell.tau, shrink(dump.t)) for dump in dumps]).T
-        for edge, words, exact in ((-1, "outer", None), (0, "inner", "exact")):
+        for edge, place, exact in ((-1, "outer", None), (0, "inner", "exact")):
             radius = [self.compute_radii(d["shell"].nodes[:, edge, :]).mean() for d in dumps]
-            right.plot(times, radius, "o", ms=4, label=f"{words} surface")
+            right.plot(times, radius, "o", ms=4, label=f"{place} surface")
             right.plot(times, RADII[edge] * h, "k", lw=0.8, label=exact)
         right.set(xlabel="t / tau", ylabel="radius")

@@ -49,8 +49,11 @@ class Noh(RadialProblem):
         self.shock_speed = 0.5 * (deck.gamma - 1.0)
         shock = self.shock_speed * deck.run.t_end
         size = 1.0 - deck.shrink * deck.run.t_end
-        words = f"the shock is at r = {shock:.3g} then, the grid's end at {size:.3g}; end earlier"
-        deck.refuse(shock > 0.9 * size, "run.t_end", words)
+        deck.refuse(
+            shock > 0.9 * size,
+            "run.t_end",
+            f"the shock is at r = {shock:.3g} then, the grid's end at {size:.3g}; end earlier",
+        )
 
     def compute_density(self, r, t):
         n = self.dimensions
@@ -107,13 +110,13 @@ class Noh(RadialProblem):
         behind = float(self.compute_density(np.zeros(1), max(t, 1e-9))[0])
         reach = self.shock_speed * t
         p = self.shock_speed * behind
-        words = f"relative error of the density, r < {2 * reach:.3g}"
+        label = f"relative error of the density, r < {2 * reach:.3g}"
         grid = f"grid shrinking at {deck.shrink:g} a second" if deck.shrink else "fixed grid"
         rows = [
             compare(history, "density_behind", behind, "density behind the shock"),
             compare(history, "pressure_behind", p, "pressure behind it"),
             Row("shock_radius", theory=reach),
-            compare(history, "error_rho", label=words),
+            compare(history, "error_rho", label=label),
         ]
         head = f"noh, {deck.geometry}, {deck.cells} cells per side, {grid}"
         return Report(head, rows, self.list_notes(history))

@@ -54,12 +54,18 @@ class ObliqueShock(Problem):
         found = solve_collision(gas, None, fall, self.angle)  # as a plate thrown onto a rigid wedge
         if not found.attached:
             most = math.degrees(search_pressure([ShockPolar(gas, deck.mach)], fall)[2])
-            words = f"at Mach {deck.mach:g} the shock stays attached up to {most:.4g} degrees only"
-            deck.refuse(True, "angle", words)
+            deck.refuse(
+                True,
+                "angle",
+                f"at Mach {deck.mach:g} the shock stays attached up to {most:.4g} degrees only",
+            )
         self.beta = found.plate.wave_angle
         self.pressure = found.p
-        words = f"the shock, at {math.degrees(self.beta):.3g} degrees, leaves through the top"
-        deck.refuse(math.tan(self.beta) >= 1.0, "angle", words)
+        deck.refuse(
+            math.tan(self.beta) >= 1.0,
+            "angle",
+            f"the shock, at {math.degrees(self.beta):.3g} degrees, leaves through the top",
+        )
 
     def make_grids(self, t=0.0):
         """Straight upright lines between the wall and the top."""
@@ -103,7 +109,7 @@ class ObliqueShock(Problem):
     def report(self, history, final=None) -> Report:
         deck = self.deck
         beta = math.degrees(self.beta)
-        words = "angle of the shock [degrees]", "pressure on the wall over exact"
+        labels = "angle of the shock [degrees]", "pressure on the wall over exact"
         notes = [f"exact pressure: {self.pressure / self.ahead:.5g} of the stream's"]
         more = {}
         change = self.measure_change(history)
@@ -114,8 +120,8 @@ class ObliqueShock(Problem):
                 f"{100.0 * change:.2g} %: theory is of the steady flow, which a later run.t_end has"
             )
         rows = [
-            compare(history, "shock_angle", beta, words[0], error="angle", **more),
-            compare(history, "wall_pressure_ratio", 1.0, words[1], error="pressure", **more),
+            compare(history, "shock_angle", beta, labels[0], error="angle", **more),
+            compare(history, "wall_pressure_ratio", 1.0, labels[1], error="pressure", **more),
         ]
         head = f"oblique-shock, Mach {deck.mach:g} on {deck.angle:g} degrees, {deck.cells} cells"
         return Report(head, rows, notes)

@@ -125,10 +125,10 @@ class RayleighTaylor(Problem):
         if len(linear["t"]) < len(history["t"]):
             until = f"k a = {STEEPEST_LINEAR_KA:g} at t = {linear['t'][-1]:.4g}"
             notes.append(f"linear theory ends at {until}: the rate is that up to there")
-        what = "growth rate [1/s]" if self.grows else "angular frequency [1/s]"
+        label = "growth rate [1/s]" if self.grows else "angular frequency [1/s]"
         mean = history["interface_mean"]
         head = f"rayleigh-taylor, {self.deck.above} above, {self.deck.cells} cells per wavelength"
-        row = Row("rate", rate, self.exact, what, digits=7, error="rate")
+        row = Row("rate", rate, self.exact, label, digits=7, error="rate")
         rows = [row, compare(history, "amplitude", label="last amplitude", digits=4)]
         moved = f"the mean has moved by at most {np.abs(mean - mean[0]).max():.1e} m"
         return Report(head, rows, ["theory is without compression", *notes, moved])

@@ -102,13 +102,12 @@ class Saltzmann(Problem):
         for n, (*_, exact) in enumerate(PHASES, 1):
             for last in np.flatnonzero(np.isfinite(history[f"mean_error_{n}"]))[-1:]:
                 when = f"density {exact:g}, t = {history['t'][last]:.3f}"
-                for kind, words in KINDS.items():
+                for kind, error in KINDS.items():
                     name = f"{kind}_error_{n}"
-                    label = f"{when}: {words} [%]"
+                    label = f"{when}: {error} [%]"
                     rows.append(Row(name, history[name][last], label=label, unit=0.01, digits=3))
         most = find_most(history, "transverse_speed")
-        words = "largest speed across"
-        rows.append(Row("largest_transverse_speed", most, label=words, digits=2))
+        rows.append(Row("largest_transverse_speed", most, label="largest speed across", digits=2))
         head = f"saltzmann, {deck.cells} x {deck.rows} cells, {deck.regrid.name}"
         return Report(f"{head}; errors of the density behind each shock:", rows)
 

@@ -76,10 +76,10 @@ class TaylorGreen(Problem):
     def report(self, history, final=None) -> Report:
         n = self.deck.cells
         t = f", t = {history['t'][-1]:.3g}" if history else ""
-        what = {"error_velocity": "the velocity", "error_p": "the pressure"}
+        fields = {"error_velocity": "the velocity", "error_p": "the pressure"}
         rows = [
-            compare(history, name, label=f"mean error of {words}", digits=3)
-            for name, words in what.items()
+            compare(history, name, label=f"mean error of {field}", digits=3)
+            for name, field in fields.items()
         ]
         return Report(f"taylor-green, {n} x {n}, grid {self.deck.mesh}{t}", rows)
 

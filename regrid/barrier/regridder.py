@@ -384,14 +384,14 @@ def _take_sound(sound_speed, nodes: np.ndarray) -> np.ndarray:
 
 def _check_tuning(tuning: Tuning) -> None:
     """Raise BadInput for invalid parameters of the functional."""
-    for name, words, good in (
+    for name, condition, good in (
         ("epsilon", "positive", tuning.epsilon > 0.0),
         ("strengthening", "1 or more", tuning.strengthening >= 1.0),
         ("cost_weight", "finite and not negative", 0.0 <= tuning.cost_weight < np.inf),
         ("coarse_from", "a count of cells, 0 or more", tuning.coarse_from >= 0.0),
     ):
         if not good:
-            raise BadInput(f"barrier regridder: {name} {getattr(tuning, name)} must be {words}")
+            raise BadInput(f"barrier regridder: {name} {getattr(tuning, name)} must be {condition}")
 
 
 def _choose_spacing(spacing: str | None, first: bool, family) -> str:

@@ -309,8 +309,8 @@ def carry_faces(previous: np.ndarray, boundary: np.ndarray, out: np.ndarray) -> 
     moved += shift[:, None, None, None]
     for axis in range(3):
         for end in (0, -1):
-            rest = get_face(boundary, axis, end) - get_face(moved, axis, end)
-            get_face(out, axis, end)[:] = rest
+            missing = get_face(boundary, axis, end) - get_face(moved, axis, end)
+            get_face(out, axis, end)[:] = missing
     fill_from_faces(out, compute_laws(previous))
     out += moved
     copy_faces(boundary, out)

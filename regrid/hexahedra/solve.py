@@ -122,7 +122,7 @@ def solve(multiply, precondition, r, x, stop: float, most: int):
     Returns (iterations, first r.z, last r.z); stops when r.z is `stop` or less.
     """
     z = precondition(r)
-    first = rz = float((r * z).sum())
+    first_square = rz = float((r * z).sum())
     done = 0
     p = z.copy()
     while done < most and rz > stop:
@@ -139,7 +139,7 @@ def solve(multiply, precondition, r, x, stop: float, most: int):
         p *= rz / before
         p += z
         done += 1
-    return done, first, rz
+    return done, first_square, rz
 
 
 LEAST_CELLS = 1000  # of corrected blocks: in smaller ones the fine solve removes all errors

@@ -17,6 +17,7 @@ not hold; a boundary without a proof may have no grid either.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -302,71 +303,90 @@ def explain_failure(
     shows, `previous` the grid before, if its way round is to be compared; `cuts` as `find_crossing`
     takes them.
     """
-    cause, what, side, nodes, cell = _find_fault(boundary, trial, transposed, flat, previous, cuts)
-    what = f"{what}; {also}" if also else what
-    return RegridFailure(what, side=side, nodes=nodes, grid=grid, cell=cell, cause=cause)
+    fault = _find_fault(boundary, trial, transposed, flat, previous, cuts)
+    return RegridFailure(
+        f"{fault.sentence}; {also}" if also else fault.sentence,
+        side=fault.side,
+        nodes=fault.nodes,
+        grid=grid,
+        cell=fault.cell,
+        cause=fault.cause,
+    )
+
+
+class _Fault(NamedTuple):
+    """Id of the cause, what is wrong, the side, its nodes, the cell where one is to blame."""
+
+    cause: str
+    sentence: str
+    side: str
+    nodes: tuple[int, ...]
+    cell: tuple[int, int] | None = None
 
 
 def _find_fault(
     boundary, trial, transposed: bool, flat: bool, previous=None, cuts: Cuts = ()
-) -> tuple[str, str, str, tuple[int, ...], tuple[int, int] | None]:
-    """The id of the cause, what is wrong, the side, its nodes, the cell where one is to blame."""
+) -> _Fault:
+    """What is wrong with sides that have no grid; what they show themselves comes first."""
     line, positions = walk_boundary(boundary)
     broken = np.flatnonzero(~np.isfinite(line).all(axis=0))
     if broken.size:
         side, node = positions[broken[0]]
-        return "not-finite", "not a finite number", side, (node,), None
+        return _Fault("not-finite", "not a finite number", side, (node,))
+    # sides that cross or touch
     crossing = find_crossing(boundary, cuts)
     if crossing is not None:
         common = _find_common_node(boundary, crossing)
-        (first, node), (second, other) = common or crossing
-        if common and first == second:
-            return "lines-cross", "they are the same point", first, (node, other), None
+        (side, node), (other_side, other) = common or crossing
+        if common and side == other_side:
+            return _Fault("lines-cross", "they are the same point", side, (node, other))
         if common:
-            what = f"it is the same point as node {other} of side {second}"
-            return "lines-cross", what, first, (node,), None
-        if first == second:
-            return "lines-cross", "polyline crosses itself", first, (node, other), None
-        return "lines-cross", f"crosses side {second} at node {other}", first, (node,), None
+            same_point = f"it is the same point as node {other} of side {other_side}"
+            return _Fault("lines-cross", same_point, side, (node,))
+        if side == other_side:
+            return _Fault("lines-cross", "polyline crosses itself", side, (node, other))
+        return _Fault("lines-cross", f"crosses side {other_side} at node {other}", side, (node,))
     same = np.flatnonzero((line == np.roll(line, -1, axis=1)).all(axis=0))
     if same.size:
         side, node = positions[same[0]]
-        what = "the node and its neighbour on the boundary are the same point"
-        return "no-grid", what, side, (node,), None
+        doubled = "the node and its neighbour on the boundary are the same point"
+        return _Fault("no-grid", doubled, side, (node,))
     if previous is not None and compute_area(previous) * compute_area(boundary) <= 0.0:
-        what = (
+        turned = (
             "the boundary has the opposite orientation to the previous grid; "
             "give its sides in the same order and direction"
         )
-        return "no-grid", what, "i_min", (0, boundary.shape[2] - 1), None
+        return _Fault("no-grid", turned, "i_min", (0, boundary.shape[2] - 1))
+    # sides in which no grid exists
     ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
     place = find_impossible(boundary)
     if place is not None:
         side, node = _find_nearest_side(*place, ni, nj)
-        what = (
+        impossible = (
             f"no valid grid exists: the sides leave no place for node ({place[0]}, {place[1]}) "
             "in convex cells"
         )
-        return "no-grid", what, side, (node,), None
-    step = np.hypot(*(np.roll(line, -1, axis=1) - line))
-    turning = np.roll(step, 1)
+        return _Fault("no-grid", impossible, side, (node,))
+    # a grid may exist: where the best trial fails, or without one where edges are shortest
     if trial is None or not np.isfinite(trial).all():
-        side, node = positions[int(np.argmin(np.minimum(step, turning)))]
-        return "no-grid", "no valid grid was found near it", side, (node,), None
+        step = np.hypot(*(np.roll(line, -1, axis=1) - line))
+        shortest = int(np.argmin(np.minimum(step, np.roll(step, 1))))
+        side, node = positions[shortest]
+        return _Fault("no-grid", "no valid grid was found near it", side, (node,))
     i, j = _worst_cell(trial)
     i, j = (j, i) if transposed else (i, j)
     side, node = _find_nearest_side(i, j, ni - 1, nj - 1)
     if flat:
-        what = (
+        too_flat = (
             f"no grid was found near them: cell ({i}, {j}) is too flat for its equations to be "
             "solved; repair the grid there first"
         )
-    else:
-        what = (
-            f"no valid grid was found near them, cell ({i}, {j}) folds; the boundary moved too far "
-            "or turns too sharply there"
-        )
-    return ("flat-cell" if flat else "no-grid"), what, side, (node, node + 1), (i, j)
+        return _Fault("flat-cell", too_flat, side, (node, node + 1), (i, j))
+    folded = (
+        f"no valid grid was found near them, cell ({i}, {j}) folds; the boundary moved too far "
+        "or turns too sharply there"
+    )
+    return _Fault("no-grid", folded, side, (node, node + 1), (i, j))
 
 
 def _find_nearest_side(i: int, j: int, most_i: int, most_j: int) -> tuple[str, int]:

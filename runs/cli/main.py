@@ -288,9 +288,9 @@ def info(path, deck) -> int:
     if deck:
         echo(find_deck(path), nl=False)
         return 0
-    told = describe(path)
-    echo(told)
-    return EXIT_BAD_INPUT if f"\n{DAMAGED}" in told else 0
+    description = describe(path)
+    echo(description)
+    return EXIT_BAD_INPUT if f"\n{DAMAGED}" in description else 0
 
 
 @cli.command()
@@ -395,8 +395,8 @@ def compare(a, b, rtol, atol) -> int:
     """
     from runs.inspection.compare import compare_in_words
 
-    words, differ = compare_in_words(a, b, rtol, atol)
-    echo(words)
+    comparison, differ = compare_in_words(a, b, rtol, atol)
+    echo(comparison)
     return 1 if differ else 0
 
 
@@ -474,8 +474,8 @@ def _main(arguments: list[str], world: object = None) -> int:
     except Exception as error:
         if debug:
             raise
-        code, words = describe_error(error)
-        echo_sentences("\n".join([words, *getattr(error, "__notes__", [])]))
+        code, message = describe_error(error)
+        echo_sentences("\n".join([message, *getattr(error, "__notes__", [])]))
         return code
 
 

@@ -29,8 +29,8 @@ class Commands(click.Group):
 
     def resolve_command(self, ctx: click.Context, args: list[str]):
         if args and args[0] not in self.commands and not args[0].startswith("-"):
-            words = " ".join(ctx.command_path.split()[1:])
-            within = f" of {words!r}" if words else ""
+            command_words = " ".join(ctx.command_path.split()[1:])
+            within = f" of {command_words!r}" if command_words else ""
             hint = suggest(args[0], self.commands)
             raise BadInput(f"there is no command {args[0]!r}{within}{hint}")
         return super().resolve_command(ctx, args)
@@ -48,15 +48,15 @@ def check_pairs(arguments: Sequence[str]) -> None:
     for place, option in enumerate(arguments):
         if option not in PAIRS:
             continue
-        key, *rest = [*arguments[place + 1 : place + 4], ""]
+        key, *next_words = [*arguments[place + 1 : place + 4], ""]
         name = key.removesuffix("=")
         if not name or name.startswith("-") or "=" in name:
             continue
-        words = rest[:2] if rest[0] == "=" else rest[:1]
-        value = "".join(words).removeprefix("=")
+        following = next_words[:2] if next_words[0] == "=" else next_words[:1]
+        value = "".join(following).removeprefix("=")
         if not value or (value.startswith("-") and not NUMBER.match(value)) or is_deck(value):
             continue
-        raise BadInput(f"{' '.join([option, key, *words])}: write {option} {name}={value}")
+        raise BadInput(f"{' '.join([option, key, *following])}: write {option} {name}={value}")
 
 
 def is_deck(word: str) -> bool:
@@ -79,9 +79,9 @@ def echo_sentences(text: str, start: str = "shockgrid: ") -> None:
 
 def echo_usage(error: click.ClickException) -> None:
     """Print click's message about a mistyped command."""
-    words = io.StringIO()
-    error.show(file=words)
-    for line in words.getvalue().splitlines():
+    usage = io.StringIO()
+    error.show(file=usage)
+    for line in usage.getvalue().splitlines():
         echo(cut(line, MOST_IN_LINE), err=True)
 
 
@@ -100,17 +100,17 @@ def describe_error(error: Exception) -> tuple[int, str]:
         return EXIT_BAD_INPUT if isinstance(error, BadInput) else EXIT_FAILED, str(error)
     if mistake := describe_mistake(error):
         return EXIT_BAD_INPUT, f"{mistake}; --debug shows the traceback"
-    words = str(error)
+    message = str(error)
     if isinstance(error, OSError) and error.errno is not None:
         if error.filename is not None:
             return EXIT_BAD_INPUT, describe_disk_error(error, Path(os.fsdecode(error.filename)))
         return EXIT_BAD_INPUT, f"a given file or device cannot be used: {os.strerror(error.errno)}"
     if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
         return EXIT_BAD_INPUT, "a given name is not valid UTF-8; rename it, or give another"
-    if isinstance(error, RuntimeError) and words.startswith("Symlink loop from"):
-        name = words.removeprefix("Symlink loop from ")
+    if isinstance(error, RuntimeError) and message.startswith("Symlink loop from"):
+        name = message.removeprefix("Symlink loop from ")
         return EXIT_BAD_INPUT, f"{name} is a link that leads back to itself"
-    if isinstance(error, ValueError) and words in NULL:
+    if isinstance(error, ValueError) and message in NULL:
         return EXIT_BAD_INPUT, "a file's name cannot hold the character \\u0000"
     kind = type(error).__name__
     return EXIT_INTERNAL, f"a mistake in shockgrid itself ({kind}: {error}); --debug shows where"

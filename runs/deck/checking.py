@@ -178,9 +178,9 @@ BOUNDS = {
 
 def check_deck(table: dict[str, Any], kind: type, where: Where) -> None:
     """Raise BadInput with a line about each thing in `table` that a deck `kind` cannot take."""
-    told = [f"{where(key)}: {words}" for key, words in find_mistakes(table, kind, "", kind)]
-    if told:
-        raise BadInput("\n".join(dict.fromkeys(told)))
+    mistakes = [f"{where(key)}: {mistake}" for key, mistake in find_mistakes(table, kind, "", kind)]
+    if mistakes:
+        raise BadInput("\n".join(dict.fromkeys(mistakes)))
 
 
 def takes(value: Any, kind: Any) -> bool:
@@ -219,9 +219,9 @@ def find_mistakes(value: Any, kind: Any, key: str, deck: type) -> Iterator[tuple
         by_tag = {one.__struct_config__.tag: one for one in tables}
         table = by_tag.get(value.get(tag)) if tag else tables[0]
         if table is None:
-            words = ", ".join(repr(one) for one in by_tag)
-            told = f"{key}.{tag} = {show(value[tag])}; it must be" if tag in value else ""
-            yield key, f"{told or f'{key} lacks the key {tag!r}:'} one of {words}"
+            known_tags = ", ".join(repr(one) for one in by_tag)
+            beginning = f"{key}.{tag} = {show(value[tag])}; it must be" if tag in value else ""
+            yield key, f"{beginning or f'{key} lacks the key {tag!r}:'} one of {known_tags}"
             return
         fields = {field.encode_name: field for field in msgspec.structs.fields(table)}
         prefix = f"{key}." if key else ""
@@ -321,8 +321,8 @@ def describe(schema: Part, part: Part) -> str:
     kind = part.get("type", "object")
     items = part.get("items", {})
     if kind == "array" and isinstance(items, list):
-        words = ", ".join(describe(schema, one) for one in items)
-        return f"a list of {len(items)} values: {words}"
+        alternatives = ", ".join(describe(schema, one) for one in items)
+        return f"a list of {len(items)} values: {alternatives}"
     if kind == "array":
         low, high = part.get("minItems", 0), part.get("maxItems")
         count = f" of at least {low} values" if low else ""
@@ -333,7 +333,7 @@ def describe(schema: Part, part: Part) -> str:
         return f"a list{count}, each {describe(schema, items)}"
     if "properties" in part:
         return f"a table, such as {_show_table(schema, part)}"
-    bounds = " and ".join(f"{words} {part[k]:g}" for k, words in BOUNDS.items() if k in part)
+    bounds = " and ".join(f"{bound} {part[k]:g}" for k, bound in BOUNDS.items() if k in part)
     bounds = f" of {bounds}" if bounds.startswith("at ") else bounds and f" {bounds}"
     form = f" of the form {part['pattern']}" if "pattern" in part else ""
     return TYPES.get(kind, "something else") + bounds + form
@@ -370,8 +370,8 @@ def describe_deck(name: str, deck: Deck, t_unit: str = "s") -> str:
     commented out.  t_unit: that of the problem."""
     text = f"problem = {show(name)}\n"
     for line in _write_table(deck, ""):
-        key, mark, words = line.partition("# ")
-        text += f"{key}{mark}{drop_units(words, t_unit)}".rstrip() + "\n"
+        key, mark, comment = line.partition("# ")
+        text += f"{key}{mark}{drop_units(comment, t_unit)}".rstrip() + "\n"
     return text
 
 
@@ -387,26 +387,31 @@ def _write_table(table: DeckTable, path: str) -> Iterator[str]:
             continue
         part = make_parts(field.type)
         inner = resolve(part, part)
-        words = part.get("description", inner.get("description", "")).strip().partition("\n")[0]
+        description = (
+            part.get("description", inner.get("description", "")).strip().partition("\n")[0]
+        )
         entries = value if isinstance(value, list | tuple) else [value]
         head = f"{path}.{field.name}".lstrip(".")
         unset = value is None
         if entries and all(isinstance(entry, DeckTable) for entry in entries):
-            tables.append((f"[{head}]" if entries[0] is value else f"[[{head}]]", entries, words))
+            tables.append(
+                (f"[{head}]" if entries[0] is value else f"[[{head}]]", entries, description)
+            )
         elif unset and "properties" in inner:
-            tables.append((f"# [{head}]", inner["properties"], words))
+            tables.append((f"# [{head}]", inner["properties"], description))
         else:
             form = f" ({describe(part, part)})" if unset or "enum" in inner else ""
             line = f"# {field.name} =" if unset else f"{field.name} = {_write_value(value)}"
-            yield from _explain(line, words.rstrip(".") + form)
-    for line, entries, words in tables:
+            yield from _explain(line, description.rstrip(".") + form)
+    for line, entries, comment in tables:
         for entry in entries if isinstance(entries, list | tuple) else ():
-            yield from ("", *_explain(line, words), *_write_table(entry, line.strip("[]")))
+            yield from ("", *_explain(line, comment), *_write_table(entry, line.strip("[]")))
         if isinstance(entries, Mapping):
-            yield from ("", *_explain(line, words))
+            yield from ("", *_explain(line, comment))
             for name, one in entries.items():
-                words = f"{one.get('description', '')} ({describe(part, one)})"
-                yield from _explain(f"# {name} =", words)
+                yield from _explain(
+                    f"# {name} =", f"{one.get('description', '')} ({describe(part, one)})"
+                )
 
 
 def _explain(line: str, words: str) -> list[str]:

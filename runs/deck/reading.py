@@ -67,8 +67,8 @@ class ReadDeck:
     @property
     def described(self) -> str:
         """Where the deck came from, and every --set over it: `FILE with --set mach=2`."""
-        words = " ".join(f"--set {shlex.quote(setting)}" for setting in self.settings)
-        return f"{self.origin} with {words}" if words else self.origin
+        options = " ".join(f"--set {shlex.quote(setting)}" for setting in self.settings)
+        return f"{self.origin} with {options}" if options else self.origin
 
     @property
     def given_in(self) -> str:
@@ -93,8 +93,10 @@ class ReadDeck:
         except ArithmeticError as error:
             if mistake := describe_mistake(error):
                 raise BadInput(mistake) from error
-            words = "a number is too large or too small to compute with"
-            raise BadInput(f"{self.given_in}: {words} ({error.args[-1]})") from error
+            raise BadInput(
+                f"{self.given_in}: a number is too large or too small to compute with"
+                f" ({error.args[-1]})"
+            ) from error
 
     def to_toml(self) -> str:
         """The resolved deck: every key with its value, readable by `shockgrid run` again."""

@@ -70,8 +70,8 @@ SMALL_CELLS = "more-sharing", "stronger-barrier", "fewer-cells"
 def describe_settings(limit: str) -> str:
     """What can be changed where dt is short by a key of SHORT_STEPS, or by a cell, in a line."""
     names = SHORT_STEPS.get(limit, SMALL_CELLS)
-    words = [SETTINGS[name].described.replace("`", "") for name in names]
-    return "; ".join([*words, "run.t_end ends the run before"])
+    descriptions = [SETTINGS[name].described.replace("`", "") for name in names]
+    return "; ".join([*descriptions, "run.t_end ends the run before"])
 
 
 def name_failure(error: Exception) -> str:

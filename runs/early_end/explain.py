@@ -69,12 +69,12 @@ def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restar
         end.point = find_calm_point(directory)
 
     def list_commands() -> None:
-        told = list_settings(cause, deck)[:SHOWN_SETTINGS]
-        end.settings = [setting for setting, _ in told]
+        settings = list_settings(cause, deck)[:SHOWN_SETTINGS]
+        end.settings = [setting for setting, _ in settings]
         end.commands = [make_command(s, directory, deck, restart, end.point) for s in end.settings]
-        end.lines += ["what has helped in such runs:"] * bool(told)
-        for command, (_, words) in zip(end.commands, told, strict=True):
-            end.lines.append(f"  {command}   ({words})")
+        end.lines += ["what has helped in such runs:"] * bool(settings)
+        for command, (_, change) in zip(end.commands, settings, strict=True):
+            end.lines.append(f"  {command}   ({change})")
 
     def draw() -> None:
         from runs.early_end.picture import draw_early_end  # matplotlib may not be there
@@ -131,12 +131,12 @@ def list_settings(cause: Cause, deck: ReadDeck) -> list[tuple[str, str]]:
         present: Any = msgspec.to_builtins(deck.deck)
         for name in setting.key.split("."):
             present = present.get(name) if isinstance(present, dict) else None
-        words = f"{setting.key}={setting.choose(present)}"
+        assignment = f"{setting.key}={setting.choose(present)}"
         with contextlib.suppress(BadInput):  # not for this problem, or with this deck
             table = tomllib.loads(deck.to_toml())
             if setting.choose(present) is not None:
-                resolve_deck(table, deck.origin, (words,), deck.file).make_problem()
-                found.append((words, setting.words))
+                resolve_deck(table, deck.origin, (assignment,), deck.file).make_problem()
+                found.append((assignment, setting.words))
     return found
 
 
@@ -144,9 +144,9 @@ def make_command(
     setting: str, directory: RunDirectory, deck: ReadDeck, restart: str, point: int | None
 ) -> str:
     """The command that continues, or starts again, with a setting."""
-    words = f"--set {shlex.quote(setting)}"
+    option = f"--set {shlex.quote(setting)}"
     if not restart.startswith("shockgrid "):  # by a script: blocks of one's own
         return f"{restart}, with {setting}"
     if is_runtime_key(setting.partition("=")[0], type(deck.deck)) and point is not None:
-        return f"{restart} --at {point} {words}"
-    return f"shockgrid run {shlex.quote(str(directory.deck))} {words}"
+        return f"{restart} --at {point} {option}"
+    return f"shockgrid run {shlex.quote(str(directory.deck))} {option}"

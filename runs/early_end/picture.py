@@ -54,8 +54,8 @@ def draw_early_end(run: RunData, title: str, place: Place | None, point: int | N
     reach = 1.05 * max(np.abs(part[0] - x).max(), np.abs(part[1] - y).max())
     reach = min(reach, MOST_SHOWN * max(extent[1] - extent[0], extent[3] - extent[2]))
     window = x - reach, x + reach, y - reach, y + reach
-    words = f"block {block.name!r}, cell i={i}, j={j}{'' if named else ': the smallest'}"
-    for axes, box, title in ((near, window, words), (whole, extent, "the whole domain")):
+    cell = f"block {block.name!r}, cell i={i}, j={j}{'' if named else ': the smallest'}"
+    for axes, box, title in ((near, window, cell), (whole, extent, "the whole domain")):
         look = fields.choose_colours(dump, name, [fields.find_range(sheets, name, box)])
         fields.draw_blocks(axes, sheets, name, look, scale, box)
         bar = {"label": look.label, "extend": look.extend, "shrink": 0.9}

@@ -78,10 +78,10 @@ def draw_every_domain(picture: str, force: bool) -> str:
 
 
 def _first(thing, otherwise=None) -> str:
-    words = inspect.getdoc(thing) or ""
-    if not words or words.startswith("`"):
-        words = inspect.getdoc(otherwise) or words
-    return " ".join(words.split("\n\n")[0].split()).partition(". ")[0].rstrip(".")
+    docstring = inspect.getdoc(thing) or ""
+    if not docstring or docstring.startswith("`"):
+        docstring = inspect.getdoc(otherwise) or docstring
+    return " ".join(docstring.split("\n\n")[0].split()).partition(". ")[0].rstrip(".")
 
 
 def parse_cells(text: str | None, dimensions: int = 2) -> tuple[int, ...] | None:
@@ -202,9 +202,9 @@ def _write(compute: Callable[[], Grid], label: str, stem: str, files: Files) -> 
     if picture:
         _draw(made, title, drawn)
     if made.failure:
-        words = f"; what it came to is in {written}" if written else ""
-        words += f"; picture: {drawn}" if picture else ""
-        raise RunFailure(made.failure + words, cause="no-grid")
+        files_note = f"; what it came to is in {written}" if written else ""
+        files_note += f"; picture: {drawn}" if picture else ""
+        raise RunFailure(made.failure + files_note, cause="no-grid")
     lines = [title, *("  " + line for line in (*made.notes, *describe(made.quality)))]
     return [*lines, f"written: {written}", *[f"picture: {drawn}"] * picture]
 

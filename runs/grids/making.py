@@ -198,9 +198,9 @@ def make(
     """
     if not 0.0 <= at <= 1.0:
         raise BadInput(f"at = {at}: a number from 0 to 1 is wanted")
-    told = "an array" if isinstance(source, np.ndarray) else str(source)
-    name = told.replace("-", "_")
-    used = name_family(family, told, name in BLOCKS)
+    source_name = "an array" if isinstance(source, np.ndarray) else str(source)
+    name = source_name.replace("-", "_")
+    used = name_family(family, source_name, name in BLOCKS)
     if name in BLOCKS:
         law = make_spatial_law(options, weight)
         size = cells or CELLS_IN_SPACE
@@ -208,7 +208,7 @@ def make(
         made = _describe_ed3(found, law)
     elif name in SHAPES:
         if weight is not None:
-            raise BadInput(f"--weight: {told} moves; its families take none")
+            raise BadInput(f"--weight: {source_name} moves; its families take none")
         made = make_moving(name, used, options, cells or CELLS_IN_SPACE, steps, at)
     else:
         regridder = choose_family(family or used, options, weight)
@@ -217,12 +217,16 @@ def make(
             made = make_on_curves(nodes, regridder, MOST_PASSES, "the array")
         elif name in DOMAINS:
             made = make_on_domain(name, used, regridder, cells or default_cells(name), steps, at)
-        elif is_file_name(told):
-            made = make_on_curves(read_sides(told, block, cells), regridder, MOST_PASSES, told)
+        elif is_file_name(source_name):
+            made = make_on_curves(
+                read_sides(source_name, block, cells), regridder, MOST_PASSES, source_name
+            )
         else:
             known = [name.replace("_", "-") for name in (*DOMAINS, *BLOCKS, *SHAPES)]
-            raise BadInput(f"no domain and no file is called {told!r}{suggest(told, known)}")
-    made.made_by = {"source": told, "family": used, "at": at, "steps": steps}
+            raise BadInput(
+                f"no domain and no file is called {source_name!r}{suggest(source_name, known)}"
+            )
+    made.made_by = {"source": source_name, "family": used, "at": at, "steps": steps}
     return _finish(made, options, weight)
 
 
@@ -271,8 +275,10 @@ def find_nodes(grid: Grid | np.ndarray | str | Path) -> np.ndarray:
 
 def _finish(made: Grid, options: Mapping[str, Any], weight: str | None) -> Grid:
     """The grid with what it was made by and, in the plane, the weight at its cells."""
-    words = " ".join(f"{key}={value}" for key, value in options.items())
-    made.made_by |= {"options": words, "weight": weight or ""}
+    made.made_by |= {
+        "options": " ".join(f"{key}={value}" for key, value in options.items()),
+        "weight": weight or "",
+    }
     if made.failure:
         raise NoGrid(made)
     if weight is not None and made.nodes.shape[0] == 2:
@@ -308,11 +314,11 @@ def make_on_curves(boundary: np.ndarray, regridder, passes: int, where: str) -> 
     """
     turned, regridder = _turn(boundary, regridder)
     try:
-        nodes, words = find_start(turned, _find_cuts(regridder))
+        nodes, start = find_start(turned, _find_cuts(regridder))
     except RegridFailure as failure:
         made = Grid(transfinite_grid(turned), [], str(failure))
     else:
-        made = settle(nodes, turned, regridder, passes, words)
+        made = settle(nodes, turned, regridder, passes, start)
     if made.failure:
         made.failure = f"{where}: {made.failure}"
     if turned is not boundary:
@@ -328,10 +334,10 @@ def regrid_plane(nodes: np.ndarray, regridder: Regridder, passes: int) -> Grid:
     except RegridFailure as failure:
         return Grid(nodes, [], str(failure))
     start = repaired.nodes
-    words = f"the given grid{describe_repair(repaired.report)}"
+    origin = f"the given grid{describe_repair(repaired.report)}"
     if getattr(regridder, "spacing", "sides") == "given":
-        words += ", whose spacing is kept"
-    made = settle(start, turned, regridder, passes, words)
+        origin += ", whose spacing is kept"
+    made = settle(start, turned, regridder, passes, origin)
     if turned is not nodes:
         made.nodes = np.ascontiguousarray(made.nodes[:, :, ::-1])
     return made
@@ -488,8 +494,12 @@ def make_moving(
     block = make_moving_block(name, cells)
     found = march_in_space(block, regridder, steps, at)
     if found.failure:
-        words = f"{block.name}, family {family}: no grid at step {found.done + 1} of {steps}"
-        return Grid(found.nodes, [], f"{words}; {found.failure}")
+        return Grid(
+            found.nodes,
+            [],
+            f"{block.name}, family {family}: no grid at step {found.done + 1} of {steps}"
+            f"; {found.failure}",
+        )
     note = (
         f"marched in {steps} steps, {found.cost:.2f} µs per node and step, {found.iterations} "
         f"iterations, {found.sub_moves} sub-moves, {found.rescues} untangling events"

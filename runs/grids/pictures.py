@@ -67,9 +67,9 @@ def draw_grid(
     bars.set_yscale("log")
     plain.set_title(title, fontsize=10)
     number = len(judgement.bad_cells)
-    words = f"{number} cells not convex" if number else "every cell convex"
-    words += "; red: the sides without a grid" * (sides is not None)
-    coloured.set_title(words, fontsize=10)
+    caption = f"{number} cells not convex" if number else "every cell convex"
+    caption += "; red: the sides without a grid" * (sides is not None)
+    coloured.set_title(caption, fontsize=10)
     return save(figure, path, GRID_PICTURE_DPI)
 
 
@@ -166,9 +166,9 @@ def draw_block(
             *np.take(nodes, middle, axis=axis + 1), rstride=1, cstride=1, facecolors=colours,
             shade=False, edgecolor=(0.0, 0.0, 0.0, 0.35), linewidth=0.15,
         )  # fmt: skip
-    for axes, words in ((surface, title), (cuts, "cut planes: scaled Jacobian")):
+    for axes, heading in ((surface, title), (cuts, "cut planes: scaled Jacobian")):
         axes.set_box_aspect(np.ptp(nodes.reshape(3, -1), axis=1))
-        axes.set_title(words, fontsize=10)
+        axes.set_title(heading, fontsize=10)
         axes.tick_params(labelsize=7)
         axes.view_init(elev=24.0, azim=-58.0)
     figure.colorbar(ScalarMappable(norm, COLOURS), ax=cuts, shrink=0.7, pad=0.08)

@@ -95,12 +95,12 @@ def describe(judgement: Judgement) -> list[str]:
     cells = fields["size"].size
     lines = []
     if judgement.valid:
-        words = "convex" if plane else "valid: eight positive corners"
-        lines.append(f"every one of the {cells} cells is {words}")
+        verdict = "convex" if plane else "valid: eight positive corners"
+        lines.append(f"every one of the {cells} cells is {verdict}")
     else:
-        words = "not convex" if plane else "without eight positive corners"
+        verdict = "not convex" if plane else "without eight positive corners"
         named = name_cells(judgement.bad_cells, 8)
-        lines.append(f"{len(judgement.bad_cells)} of {cells} cells are {words}: {named}")
+        lines.append(f"{len(judgement.bad_cells)} of {cells} cells are {verdict}: {named}")
         if judgement.forced:
             lines.append(f"{judgement.forced} of these because of the sides' own nodes")
     if judgement.left_handed:

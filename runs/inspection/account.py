@@ -45,15 +45,15 @@ def describe_run(history: History, cells: int, blocks: Sequence[str] = ()) -> li
         ("largest conservation errors: ", ", ".join(drifts)),
         ("speed: ", describe_speed(history, cells)),
     )
-    return [head + words for head, words in lines if words]
+    return [head + content for head, content in lines if content]
 
 
 def describe_limits(history: History) -> str:
     """How often each limiter decided dt."""
-    words = history.get("dt_limit", NONE)
-    if words.dtype.kind != "U":
+    limits = history.get("dt_limit", NONE)
+    if limits.dtype.kind != "U":
         return ""
-    names, counts = np.unique(words[words != ""], return_counts=True)
+    names, counts = np.unique(limits[limits != ""], return_counts=True)
     shares = [describe_share(often) for often in counts / counts.sum()]
     return ", ".join(f"{names[k]} {shares[k]}" for k in np.argsort(-counts))
 
@@ -68,18 +68,18 @@ def describe_fastest(history: History, blocks: Sequence[str]) -> str:
     places, counts = np.unique(cells.astype(int), axis=1, return_counts=True)
     number, i, j = places[:, counts.argmax()]
     block = blocks[number] if number < len(blocks) else f"block {number}"
-    told = f"{block}, i={i}, j={j} in {describe_share(counts.max() / known.sum())} of the steps"
+    cell = f"{block}, i={i}, j={j} in {describe_share(counts.max() / known.sum())} of the steps"
     alone = round(float(over[known].sum()))  # steps, if none were longer than this cell's own
     if alone > 1.02 * known.sum():
         most = count(int(np.nanmax(history.get("shared_cells", np.zeros(1)))), "cell")
-        told += f"; state redistribution in up to {most} ({alone} steps would be needed without it)"
-    return told
+        cell += f"; state redistribution in up to {most} ({alone} steps would be needed without it)"
+    return cell
 
 
 def describe_regridding(history: History) -> str:
     """Totals of the regridder's work and the worst cells of the run."""
     parts = []
-    for name, words, find in (
+    for name, unit, find in (
         ("regrid_iterations", "{:.0f} iterations", np.nansum),
         ("regrid_sub_moves", "{:.0f} sub-moves", np.nansum),
         ("regrid_rescues", "{:.0f} untangling events", np.nansum),
@@ -87,19 +87,19 @@ def describe_regridding(history: History) -> str:
         ("worst_aspect", "worst aspect ratio {:.3g}", np.nanmax),
     ):
         if np.isfinite(history.get(name, NONE)).any():
-            parts.append(words.format(find(history[name])))
+            parts.append(unit.format(find(history[name])))
     return ", ".join(parts)
 
 
 def describe_contacts(history: History) -> str:
     """Number of contacts between bodies that closed and opened, and the first times."""
-    told = []
+    contacts = []
     for name in ("made", "opened"):
         counts = np.nan_to_num(history.get(f"contacts_{name}", NONE))
         if counts.any():
             first = float(history["t"][np.argmax(counts > 0)])
-            told.append(f"{int(counts.max())} {name}, the first by t = {first:.4g} s")
-    return "; ".join(told)
+            contacts.append(f"{int(counts.max())} {name}, the first by t = {first:.4g} s")
+    return "; ".join(contacts)
 
 
 def describe_convexity(history: History) -> str:
@@ -113,7 +113,7 @@ def describe_convexity(history: History) -> str:
     if bad is None:
         return ""
     flat = np.nan_to_num(history.get("cells_triangular", NONE))
-    words = "every cell convex in every step"
+    statement = "every cell convex in every step"
     for counts in (np.nan_to_num(bad), flat):
         if counts.any():
             since = f"first at t = {history['t'][np.argmax(counts > 0)]:.6g}"
@@ -121,8 +121,8 @@ def describe_convexity(history: History) -> str:
             if counts is not flat:
                 return f"NOT CONVEX: in {steps} of {counts.size}, {since}"
             most = count(int(flat.max()), "triangle")
-            words += f"; at corners of blocks {most} at most, in {steps}, {since}"
-    return words
+            statement += f"; at corners of blocks {most} at most, in {steps}, {since}"
+    return statement
 
 
 def measure_drifts(history: History) -> dict[str, float]:
@@ -176,9 +176,9 @@ def describe_cautions(problem: Problem, history: History | None = None) -> list[
 
     If a reference that they need cannot be computed, a line reports it.
     """
-    told = history if history and len(history.get("step", ())) > 1 else None
+    known_history = history if history and len(history.get("step", ())) > 1 else None
     try:
-        sentences = problem.cautions(told)
+        sentences = problem.cautions(known_history)
     except RunFailure as error:
         sentences = [f"cautions could not be computed: {error}"]
     return [HEAD + drop_units(one, problem.t_unit) for one in dict.fromkeys(sentences)]
@@ -273,11 +273,13 @@ def judge(
     found = []
     for rule in RULES if history else ():
         if (value := rule.measure(history, cells)) > rule.limit:
-            words = rule.words.format(value=value, share=describe_share(value))
-            found.append({"rule": rule.name, "value": value, "limit": rule.limit, "words": words})
+            sentence = rule.words.format(value=value, share=describe_share(value))
+            found.append(
+                {"rule": rule.name, "value": value, "limit": rule.limit, "words": sentence}
+            )
     if problem is not None and (number := len(describe_cautions(problem, history))):
-        words = f"{count(number, 'caution')} of the problem"
-        found.append({"rule": "cautions", "value": number, "limit": 0, "words": words})
+        sentence = f"{count(number, 'caution')} of the problem"
+        found.append({"rule": "cautions", "value": number, "limit": 0, "words": sentence})
     if status != "ended early":
         name = reason.partition(" = ")[0].partition(",")[0]
     return {"status": status, "name": name or "failed", "reason": reason, "trust": found}
@@ -291,5 +293,5 @@ def describe_verdict(verdict: Mapping[str, Any]) -> str:
         head = f"{head}, {verdict['name']}"
     elif head != "finished" and reason:  # which may begin so: "stopped by SIGTERM"
         head = reason if reason.startswith(head) else f"{head}, {reason}"
-    words = ", ".join(str(one["words"]) for one in verdict["trust"])
-    return f"verdict: {head}; {f'warnings: {words}' if words else 'no warnings'}"
+    reasons = ", ".join(str(one["words"]) for one in verdict["trust"])
+    return f"verdict: {head}; {f'warnings: {reasons}' if reasons else 'no warnings'}"

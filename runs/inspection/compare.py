@@ -127,8 +127,9 @@ def _find_differences(a: Side, b: Side, rtol: float, atol: float) -> list[Differ
     for run, lonely in ((a, set(one) - set(other)), (b, set(other) - set(one))):
         if lonely:
             steps = ", ".join(str(step) for step in sorted(lonely)[:5])
-            words = f"{len(lonely)} only in {run.path} (steps {steps}{', ...' * (len(lonely) > 5)})"
-            found.append(Difference("dumps", np.inf, 0.0, words))
+            steps += ", ..." * (len(lonely) > 5)
+            missing = f"{len(lonely)} only in {run.path} (steps {steps})"
+            found.append(Difference("dumps", np.inf, 0.0, missing))
     for step in sorted(set(one) & set(other)):
         found += compare_dumps(one[step], other[step], rtol, atol)
     return sorted(found, key=lambda difference: difference.order)
@@ -147,8 +148,9 @@ def compare_histories(a: Side, b: Side, rtol: float, atol: float) -> Iterator[Di
         yield Difference("history columns", -1.0, np.inf, f"only in one: {', '.join(lost)}")
     lengths = len(one.get("step", ())), len(other.get("step", ()))
     if lengths[0] != lengths[1]:
-        words = f"{lengths[0]} rows in {a.path}, {lengths[1]} in {b.path}"
-        yield Difference("history", np.inf, 0.0, words)
+        yield Difference(
+            "history", np.inf, 0.0, f"{lengths[0]} rows in {a.path}, {lengths[1]} in {b.path}"
+        )
     common = min(lengths)
     for name in (name for name in one if name in other):
         x, y = one[name][:common], other[name][:common]
@@ -160,9 +162,13 @@ def compare_histories(a: Side, b: Side, rtol: float, atol: float) -> Iterator[Di
             much = f", up to {relative:.2g} of its size"
         if bad.any():
             k = int(np.argmax(bad))
-            first = f"first at step {one['step'][k]}: {x[k]} and {y[k]}"
-            words = f"{first}, {np.count_nonzero(bad)} of {common} rows{much}"
-            yield Difference(f"history {name}", float(one["t"][k]), relative, words)
+            first_difference = f"first at step {one['step'][k]}: {x[k]} and {y[k]}"
+            yield Difference(
+                f"history {name}",
+                float(one["t"][k]),
+                relative,
+                f"{first_difference}, {np.count_nonzero(bad)} of {common} rows{much}",
+            )
 
 
 def compare_dumps(a: Dump, b: Dump, rtol: float, atol: float) -> Iterator[Difference]:
@@ -188,9 +194,9 @@ def compare_dumps(a: Dump, b: Dump, rtol: float, atol: float) -> Iterator[Differ
         if lost := sorted(set(left) ^ set(right)):
             yield Difference(where, a.t, np.inf, f"fields only in one: {', '.join(lost)}")
         for name in (name for name in left if name in right):
-            words, relative = describe_difference(left[name], right[name], rtol, atol)
-            if words:
-                yield Difference(f"{where}, {name}", a.t, relative, words)
+            difference, relative = describe_difference(left[name], right[name], rtol, atol)
+            if difference:
+                yield Difference(f"{where}, {name}", a.t, relative, difference)
 
 
 def describe_difference(
@@ -229,13 +235,13 @@ def report(differences: list[Difference], a: Side, b: Side) -> list[str]:
     """What differs first, what differs most, and how much more there is."""
     if not differences:
         return [f"no difference between {a.path} and {b.path}"]
-    first = differences[0]
+    first_difference = differences[0]
     most = max(differences, key=lambda difference: difference.relative)
-    lines = [f"first: {first}"] + [f"most:  {most}"] * (most is not first)
-    rest = [one for one in differences if one is not first and one is not most]
-    lines += [f"       {one}" for one in rest[:SHOWN_DIFFERENCES]]
-    return lines + [f"       and {len(rest) - SHOWN_DIFFERENCES} more"] * (
-        len(rest) > SHOWN_DIFFERENCES
+    lines = [f"first: {first_difference}"] + [f"most:  {most}"] * (most is not first_difference)
+    others = [one for one in differences if one is not first_difference and one is not most]
+    lines += [f"       {one}" for one in others[:SHOWN_DIFFERENCES]]
+    return lines + [f"       and {len(others) - SHOWN_DIFFERENCES} more"] * (
+        len(others) > SHOWN_DIFFERENCES
     )
 
 
@@ -243,8 +249,8 @@ def _describe_makers(a: Side, b: Side) -> list[str]:
     """A line on differences in versions, commit and packages; [] if there are none."""
     one, other = (side.dumps[-1].provenance for side in (a, b))
     names = [n for n in one if n in other and n != "deck_sha256" and one[n] != other[n]]
-    words = ", ".join(f"{n} {one[n] or 'unknown'} and {other[n] or 'unknown'}" for n in names)
-    return [f"made by different versions: {words}"] if names else []
+    versions = ", ".join(f"{n} {one[n] or 'unknown'} and {other[n] or 'unknown'}" for n in names)
+    return [f"made by different versions: {versions}"] if names else []
 
 
 def _needs_norms(a: Side, b: Side) -> bool:
@@ -299,11 +305,11 @@ def compare_by_norms(a: Side, b: Side, rtol: float, atol: float) -> tuple[list[s
     for (one, other), rows in zip(
         pairs[:-1][-SHOWN_DIFFERENCES:], found[:-1][-SHOWN_DIFFERENCES:], strict=True
     ):
-        words = "no fields of cells that both have"
+        result = "no fields of cells that both have"
         if rows:
             most, block, name = max((l1 / (size or 1.0), *row) for *row, l1, _, _, size in rows)
-            words = f"largest L1 norm of a difference: {name} in {block}, {most:.2g} of its size"
-        lines.append(f"{_describe_times(one, other)}: {words}")
+            result = f"largest L1 norm of a difference: {name} in {block}, {most:.2g} of its size"
+        lines.append(f"{_describe_times(one, other)}: {result}")
     lines.append(f"{_describe_times(*pairs[-1])}:")
     heads = "".join(f"{head:>11s}" for head in ("L1", "L2", "Linf", "size"))
     lines.append(f"  {'block':14s} {'field':8s}{heads}")

@@ -99,19 +99,23 @@ def describe_problem(run: RunData) -> str:
     if run.problem_name in PROBLEMS:
         return f" ({summary_line(run.problem_name)})"
     if run.directory.problem_copy.exists():
-        words = read_head(run.directory.problem_copy).splitlines()
-        return f" ({words[0]})" if words else ""
+        source_lines = read_head(run.directory.problem_copy).splitlines()
+        return f" ({source_lines[0]})" if source_lines else ""
     return ""
 
 
 def describe_state(last: Dump, history: Mapping[str, np.ndarray]) -> str:
     """How far a run got, from its history or else from its last dump."""
-    told = len(history.get("t", ()))
-    t, step = (history["t"][-1], int(history["step"][-1])) if told else (last.t, last.step)
+    t = last.t
+    step = last.step
+    if len(history.get("t", ())):
+        t = history["t"][-1]
+        step = int(history["step"][-1])
     ending = last.finished or "not finished"
     t_end = last.t_end
-    words = f"{describe_time(t, last.t_unit)} of {t_end:.6g} ({t / t_end:.0%})"
-    return f"{ending}: step {step}, {words}"
+    return (
+        f"{ending}: step {step}, {describe_time(t, last.t_unit)} of {t_end:.6g} ({t / t_end:.0%})"
+    )
 
 
 def describe_directory(path: str) -> str:
@@ -145,16 +149,22 @@ def describe_directory(path: str) -> str:
         first = run.dumps[0]
         number = len(run.outputs)
         newer = " and a newer restart point" if len(run.dumps) > number else ""
-        words = f"t = {first.t:.6g} to {describe_time(last.t, last.t_unit).removeprefix('t = ')}"
-        lines += ["", f"{count(number, 'dump')}{newer}, {words}; in the last:"]
+        lines += [
+            "",
+            f"{count(number, 'dump')}{newer}, "
+            f"t = {first.t:.6g} to {describe_time(last.t, last.t_unit).removeprefix('t = ')}"
+            "; in the last:",
+        ]
         lines += describe_blocks(last)
         lines += ["", *describe_provenance(last.provenance)] if last.provenance else []
     try:
         cautions = describe_cautions(run.problem, history)
         lines += ["", *cautions] if cautions else []
         if figures := ", ".join(run.problem.figures()):
-            words = f"{figures} (shockgrid plot {quoted} --what NAME)"
-            lines += ["", f"pictures of this problem: {words}"]
+            lines += [
+                "",
+                f"pictures of this problem: {figures} (shockgrid plot {quoted} --what NAME)",
+            ]
     except BadInput as error:
         lines.append(f"no results of the problem: its deck cannot be used any more: {error}")
     return "\n".join([*lines, *run.said, *_list_damage(run)])
@@ -235,8 +245,9 @@ def inspect(file: str | os.PathLike) -> str:
         with ProcessPoolExecutor(1) as apart:
             return apart.submit(describe_tree, path).result()
     except BrokenProcessPool:
-        words = "its tree cannot be read (HDF5's library crashes)"
-        raise BadInput(f"{path} is damaged: {words}") from None
+        raise BadInput(
+            f"{path} is damaged: its tree cannot be read (HDF5's library crashes)"
+        ) from None
 
 
 def describe_tree(path: Path) -> str:
@@ -262,12 +273,12 @@ def describe_tree(path: Path) -> str:
 def open_tree(path: Path) -> Iterator[h5py.File]:
     """The file, open for reading; BadInput if it is missing, not HDF5 or damaged."""
     if not path.is_file():
-        words = (
+        contents = (
             "is not an HDF5 file; `shockgrid info` describes runs"
             if path.is_dir()
             else "does not exist"
         )
-        raise BadInput(f"{path} {words}")
+        raise BadInput(f"{path} {contents}")
     try:
         file = open_hdf5(path)
     except OSError as error:
@@ -280,8 +291,8 @@ def open_tree(path: Path) -> Iterator[h5py.File]:
         except (RuntimeError, OSError, KeyError, ValueError, TypeError) as error:  # of the library
             if find_sum(path):
                 raise
-            told = str(error).partition("\n")[0]
-            raise BadInput(f"{path} is damaged: its tree cannot be read ({told})") from error
+            reason = str(error).partition("\n")[0]
+            raise BadInput(f"{path} is damaged: its tree cannot be read ({reason})") from error
 
 
 def list_items(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
@@ -308,7 +319,7 @@ def describe_array(data: h5py.Dataset) -> str:
     if not isinstance(values, np.ndarray):
         return " ".join(word for word in (_say_value(values), unit, name) if word)
     extent = "" if values.size else "empty"
-    told = []
+    remarks = []
     if values.dtype.kind in "fiub":
         finite = values[np.isfinite(values)]
         nans = int(np.isnan(values).sum())
@@ -317,10 +328,10 @@ def describe_array(data: h5py.Dataset) -> str:
                 f"{finite.min():.7g} to {finite.max():.7g}" if finite.size else "nothing finite"
             )
         infinite = values.size - finite.size - nans
-        told = [f"{nans} NaN"] * bool(nans) + [f"{infinite} infinite"] * bool(infinite)
-        told.append(f"crc32 {zlib.crc32(np.ascontiguousarray(values).data):08x}")
+        remarks = [f"{nans} NaN"] * bool(nans) + [f"{infinite} infinite"] * bool(infinite)
+        remarks.append(f"crc32 {zlib.crc32(np.ascontiguousarray(values).data):08x}")
     head = " ".join(word for word in (f"{values.shape} {values.dtype}", extent, unit) if word)
-    return ", ".join(word for word in (head, name, *told) if word)
+    return ", ".join(word for word in (head, name, *remarks) if word)
 
 
 def _say_value(value: Any) -> str:

@@ -29,13 +29,13 @@ def describe_all() -> str:
         if name != problem:
             decks.setdefault(problem, []).append((name, describe_deck(path)))
     lines = []
-    told = {name for names in SUBJECTS.values() for name in names}
-    others = [name for name in OWN_PROBLEMS if name not in told]  # registered by a script
+    listed = {name for names in SUBJECTS.values() for name in names}
+    others = [name for name in OWN_PROBLEMS if name not in listed]  # registered by a script
     for subject, names in {**SUBJECTS, "others": others}.items():
         lines += [f"\n{subject.upper()}"] * bool(names)
         for name in names:
             rows = [(name, summary_line(name)), *((f"  {n}", w) for n, w in decks.get(name, ()))]
-            lines += [f"{one:40} {re.match(SHORT, words)[0]}" for one, words in rows]  # type: ignore
+            lines += [f"{one:40} {re.match(SHORT, summary)[0]}" for one, summary in rows]  # type: ignore
     usage = "shockgrid run NAME; shockgrid list NAME: description; shockgrid check NAME: its keys"
     return "\n".join([*lines, *describe_installed(), "", usage]).strip()
 
@@ -64,14 +64,14 @@ def describe_installed() -> list[str]:
     for group, kind in GROUPS.items():
         found = plug_ins[group]
         for one in found:
-            words = ""
+            status = ""
             if one.name in own[group]:
-                words = "; not used: shockgrid has this name itself"
+                status = "; not used: shockgrid has this name itself"
             elif sum(other.name == one.name for other in found) > 1:
-                words = "; not used: two packages have this name"
+                status = "; not used: two packages have this name"
             elif group == INSTALLED.group:
-                words = f"; {summary_line(one.name)}"
-            lines.append(f"  {one.name:20s}  {kind} of {one.origin}{words}")
+                status = f"; {summary_line(one.name)}"
+            lines.append(f"  {one.name:20s}  {kind} of {one.origin}{status}")
     return ["", "from other packages:", *lines]
 
 
@@ -128,13 +128,13 @@ def describe_hugoniot(eos: Any) -> str:
 
 def describe_deck(path: Path) -> str:
     """The beginning of a deck's first comment, up to a semicolon or a bracket."""
-    words = []
+    lines_of_deck = []
     for line in path.read_text(encoding="utf-8").splitlines():
         if not line.startswith("#"):
             break
         if not line.startswith("#:"):
-            words.append(line.lstrip("# ").rstrip())
-    return re.split(r"; | \(", " ".join(words))[0]
+            lines_of_deck.append(line.lstrip("# ").rstrip())
+    return re.split(r"; | \(", " ".join(lines_of_deck))[0]
 
 
 def describe_plan(deck: ReadDeck) -> str:

@@ -114,13 +114,13 @@ def _describe_march(simulation: Evolution) -> dict[str, Any]:
 
 def _describe_materials(simulation: Evolution) -> dict[str, str]:
     """Material and equation of state of each block, to recognise the run in a restart."""
-    words = {}
+    tables = {}
     for block in simulation.blocks:
-        words[block.name] = get_material(block)
+        tables[block.name] = get_material(block)
         if eos := getattr(block, "eos", None):
             numbers = " ".join(map(_describe_parameter, getattr(eos, "parameters", ())[:8]))
-            words[block.name] += f", {getattr(eos, 'kind', type(eos).__name__)} {numbers}".rstrip()
-    return words
+            tables[block.name] += f", {getattr(eos, 'kind', type(eos).__name__)} {numbers}".rstrip()
+    return tables
 
 
 def _describe_parameter(value: Any) -> str:
@@ -197,7 +197,7 @@ def restart(
     """
     check_single("shockgrid.restart", "restart DIR")
     opened = open_directory(directory)
-    words = make_settings(settings)
+    changed = make_settings(settings)
     if cells is not None:
         if hooks:
             raise BadInput(
@@ -206,15 +206,15 @@ def restart(
         number = str(cells).strip("[()] ")
         place = None if output is None else str(output)
         with said_in_python():
-            runner = remap_runner(opened, number, words, at, place, force, quiet, say)
+            runner = remap_runner(opened, number, changed, at, place, force, quiet, say)
         return finish(runner, runner.start(), quiet)
     if output is not None or force:
         raise BadInput("output and force need cells; otherwise a run continues in its directory")
     with said_in_python():
         if simulation is not None:
-            case = make_case(simulation, words, measure, opened)
+            case = make_case(simulation, changed, measure, opened)
         else:
-            read = read_restart_deck(opened, words, at)
+            read = read_restart_deck(opened, changed, at)
             case = Case(read, read.make_problem())
         # the simulation says what is missing where the blocks are a script's
         gauges = check_requests(case.read, case.simulation)

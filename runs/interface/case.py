@@ -184,8 +184,10 @@ def open_run(directory: str | os.PathLike) -> OpenRun:
     try:
         path = os.fspath(directory)
     except TypeError:
-        words = f"a {type(directory).__name__} is not the directory of a run"
-        raise BadInput(f"{words}; a case gets one by its run()") from None
+        raise BadInput(
+            f"a {type(directory).__name__} is not the directory of a run"
+            "; a case gets one by its run()"
+        ) from None
     return OpenRun(path)
 
 
@@ -289,7 +291,7 @@ def _view(block: BlockView, axes: tuple[str, str], has_units: bool) -> BlockData
     def make_fields(get: Callable[[], Mapping[str, np.ndarray]]) -> Fields:
         return Fields(f"block {block.name!r}", get(), lambda name: lock(get()[name]))
 
-    words = get_long_names(block)
+    long_names = get_long_names(block)
     rates = getattr(block, "rates", None)
     return BlockData(
         block.name,
@@ -300,7 +302,10 @@ def _view(block: BlockView, axes: tuple[str, str], has_units: bool) -> BlockData
         make_fields(lambda: get_node_fields(block)),
         make_fields(lambda: {} if rates is None else {"rates": block.rates}),  # type: ignore[attr-defined]
         block.units if has_units else dict.fromkeys(block.units, "1"),
-        {name: words.get(name, name) for name in (*block.cell_fields, *get_node_fields(block))},
+        {
+            name: long_names.get(name, name)
+            for name in (*block.cell_fields, *get_node_fields(block))
+        },
     )
 
 

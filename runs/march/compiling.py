@@ -43,8 +43,7 @@ def compiling(quiet: bool, helped: bool = True) -> Iterator[None]:
         return
     helped = helped and (os.cpu_count() or 1) > 1 and os.environ.get("SHOCKGRID_COMPILERS") != "1"
     done = threading.Event()
-    words = done, sys.stderr, quiet, helped
-    watcher = threading.Thread(target=_watch, args=words, daemon=True)
+    watcher = threading.Thread(target=_watch, args=(done, sys.stderr, quiet, helped), daemon=True)
     watcher.start()
     try:
         yield

@@ -298,9 +298,9 @@ def remap_runner(
     directory = create_directory(output, deck.label, force)
     write_atomically(directory.deck, deck.to_toml())  # by which the directory is known
     columns = truncate_history(directory.history, step, rows)
-    words = "; ".join("{} {} x {} -> {} x {}".format(b.name, *b.before, *b.now) for b in blocks)
+    sizes = "; ".join("{} {} x {} -> {} x {}".format(b.name, *b.before, *b.now) for b in blocks)
     slivers = sum(block.slivers.count for block in blocks)
-    note = f"continues from step {step} of {old} on other cells: {words}"
+    note = f"continues from step {step} of {old} on other cells: {sizes}"
     if slivers:
         note += f"; cells with slivers between the outlines: {slivers}"
     directory.note(note)

@@ -78,39 +78,39 @@ class Progress:
         t = evolution.t
         t_end = evolution.t_end
         when = describe_time(t, self.t_unit, 4)
-        words = f"{self.remaining(evolution, now)} left, {self.describe(evolution, row, now)}"
+        status = f"{self.remaining(evolution, now)} left, {self.describe(evolution, row, now)}"
         if self.bar is not None:
             self.bar.set_description_str(when, refresh=False)
-            self.bar.set_postfix_str(words, refresh=False)
+            self.bar.set_postfix_str(status, refresh=False)
             self.bar.update(min(t, t_end) - self._t)
             self._t = min(t, t_end)
         else:
             self._said = now
-            self.say(f"{when} of {t_end:.4g} ({t / t_end:.0%}), {words}")
+            self.say(f"{when} of {t_end:.4g} ({t / t_end:.0%}), {status}")
 
     def describe(self, evolution: Evolution, row: Mapping[str, Any], now: float) -> str:
         """Steps, dt, speed and corner quality in a few words."""
-        words = [f"step {evolution.step}"]
+        parts = [f"step {evolution.step}"]
         if "dt" in row:
             limit = f" ({row['dt_limit']})" if row.get("dt_limit") else ""
             unit = "" if self.t_unit == "1" else " s"
-            words.append(f"dt {row['dt']:.2e}{unit}{limit}")
+            parts.append(f"dt {row['dt']:.2e}{unit}{limit}")
         running = now - self._began
         if self.steps and running > 0:
             rate = self.steps * self.cells / running
-            words.append(f"{rate / 1e6:.2f} Mcells/s" if rate > 1e5 else f"{rate:.0f} cells/s")
+            parts.append(f"{rate / 1e6:.2f} Mcells/s" if rate > 1e5 else f"{rate:.0f} cells/s")
         if "least_scaled_jacobian" in row:
-            words.append(f"corner {row['least_scaled_jacobian']:.3f}")
-        return ", ".join(words)
+            parts.append(f"corner {row['least_scaled_jacobian']:.3f}")
+        return ", ".join(parts)
 
     def remaining(self, evolution: Evolution, now: float) -> str:
         """Wall time left in words, a range where it is uncertain; updated once a second."""
-        since, words = self._left_said
+        since, duration = self._left_said
         if now - since >= 1.0:
             found = self.left.foretell(self.steps, evolution.t, now)
-            words = describe_seconds(found[0], found[2]) if found else "?"
-            self._left_said = now, words
-        return words
+            duration = describe_seconds(found[0], found[2]) if found else "?"
+            self._left_said = now, duration
+        return duration
 
     def say(self, text: str) -> None:
         """A line for the person, above the bar if there is one; nothing when quiet."""
@@ -179,8 +179,7 @@ class Outlook:
         part of the history is of other cells."""
         verdict = judge(status, reason, history, self.size.cells, self.problem, name)
         if remapped:
-            words = {"rule": REMAPPED, "value": 1, "limit": 0, "words": remapped}
-            verdict["trust"].append(words)
+            verdict["trust"].append({"rule": REMAPPED, "value": 1, "limit": 0, "words": remapped})
         write_verdict(self.directory, verdict)
         return verdict
 
@@ -191,14 +190,14 @@ def describe_gauges(deck: Deck, directory: RunDirectory) -> list[str]:
     if not points:
         return []
     table = read_history(directory.gauges)
-    words = f"{count(len(points), 'gauge')} in gauges.csv"
+    description = f"{count(len(points), 'gauge')} in gauges.csv"
     outside = {p.name: int((table[f"{p.name}_block"] == NO_BLOCK).sum()) for p in points if table}
     rows = len(table.get("step", ()))
-    told = [f"{name} in {times} of {rows} rows" for name, times in outside.items() if times]
-    if told:
-        more = f" and {len(told) - 3} more" if len(told) > 3 else ""
-        words += f"; outside of all blocks: {', '.join(told[:3])}{more}"
-    return [words]
+    absences = [f"{name} in {times} of {rows} rows" for name, times in outside.items() if times]
+    if absences:
+        more = f" and {len(absences) - 3} more" if len(absences) > 3 else ""
+        description += f"; outside of all blocks: {', '.join(absences[:3])}{more}"
+    return [description]
 
 
 def describe_threads(wanted: int | None, evolution: Evolution) -> str:

@@ -305,12 +305,12 @@ class Runner:
             with contextlib.suppress(BadInput):
                 self.directory.note(f"failed: {error}")
             self.outlook.fail(error)
-            words = f"{error}; {self._way_on()}"
+            message = f"{error}; {self._way_on()}"
             if isinstance(error, RunFailure):
-                raise self._explain(error.tell(words)) from error
+                raise self._explain(error.tell(message)) from error
             if not self.evolution.step:
                 raise  # the deck, found out late
-            raise type(error)(words) from error
+            raise type(error)(message) from error
         except KeyboardInterrupt:
             raise KeyboardInterrupt(self._way_on()) from None
         finally:
@@ -333,8 +333,8 @@ class Runner:
             self.outlook.fail(error)
             raise self._explain(error) from error
         if code == 3:
-            told = self._explain(RunFailure(reason, cause=MISSED)).early_end.lines
-            screen = "\n".join([screen, *told])
+            advice = self._explain(RunFailure(reason, cause=MISSED)).early_end.lines
+            screen = "\n".join([screen, *advice])
         write_noted(self.directory, self.directory.summary, screen + "\n")
         return Ending(reason, code, screen)
 
@@ -385,15 +385,16 @@ class Runner:
         evolution = self.evolution
         run = self.deck.deck.run
         if self.columns is None:
-            first = {"step": evolution.step, "t": evolution.t}
-            first |= get_start_row(evolution)
-            self.history.start(first | self._measure())
+            first_row = {"step": evolution.step, "t": evolution.t}
+            first_row |= get_start_row(evolution)
+            self.history.start(first_row | self._measure())
         if self.last_point is None:
             self._dump_light() if self.deck.deck.output.light else self._dump()
         written = time.monotonic()
         if self.world is not None:
-            words = self.world.begin(self.deck, self.problem, self.evolution, self.restored)
-            self.directory.note(words)
+            self.directory.note(
+                self.world.begin(self.deck, self.problem, self.evolution, self.restored)
+            )
         while True:
             reason = evolution.finished
             if reason is None and run.max_steps is not None and evolution.step >= run.max_steps:
@@ -407,8 +408,7 @@ class Runner:
                 return reason
             if self._signal:
                 self._write_restart_point()
-                words = f"stopped by {signal.Signals(self._signal).name}"
-                raise Stopped(words, 128 + self._signal)
+                raise Stopped(f"stopped by {signal.Signals(self._signal).name}", 128 + self._signal)
             if self.limit is not None and self.limit.reached:
                 self._write_restart_point()
                 raise Stopped(f"{self.limit} reached", 0)
@@ -460,8 +460,9 @@ class Runner:
         self.outlook.trend.follow(full)
         for name in ("t", "dt"):
             if name in full and not math.isfinite(full[name]):
-                words = f"{name} = {full[name]} at step {evolution.step}"
-                raise RunFailure(words, cause="not-finite")
+                raise RunFailure(
+                    f"{name} = {full[name]} at step {evolution.step}", cause="not-finite"
+                )
 
     def _dump(self) -> None:
         """A dump at this step, unless it is there, and the sidecar that lists it."""

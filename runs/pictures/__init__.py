@@ -25,8 +25,10 @@ def _load_matplotlib() -> None:
     try:
         import matplotlib
     except Exception as error:  # a broken installation may raise anything
-        words = str(error).partition("\n")[0] or type(error).__name__
-        raise BadInput(f"pictures need matplotlib, which cannot be loaded here: {words}") from error
+        reason = str(error).partition("\n")[0] or type(error).__name__
+        raise BadInput(
+            f"pictures need matplotlib, which cannot be loaded here: {reason}"
+        ) from error
     finally:
         if wanted is not None:
             os.environ[BACKEND] = wanted

@@ -41,8 +41,8 @@ NAMES = {  # of the fields of metadata: what made it, what of
 def clean_words(figure: Figure) -> None:
     """Escape control characters in all texts of a figure; only formulas are interpreted."""
     for text in figure.findobj(Text):
-        words = text.get_text()
-        if (plain := escape_controls(words)) != words:
+        content = text.get_text()
+        if (plain := escape_controls(content)) != content:
             text.set_text(plain)
         try:
             for line in plain.splitlines() if "$" in plain and is_math_text(plain) else ():
@@ -145,8 +145,8 @@ def fill_figure(
         shown += names
     if what == "fields":
         dumps = choose_pairs(runs, at, say) if beside else choose_dumps(run, at, say=say)
-        told = zip(name_paths(runs) * len(dumps), time_titles(dumps), strict=False)
-        titles = [f"{name}: {when}" for name, when in told] if beside else ()
+        pairs = zip(name_paths(runs) * len(dumps), time_titles(dumps), strict=False)
+        titles = [f"{name}: {when}" for name, when in pairs] if beside else ()
         part = draw_fields(figure, dumps, names, view, titles)
     elif what == "line":
         if line is None:
@@ -269,27 +269,31 @@ def choose_dumps(
     `say` receives a message for times outside the run.
     """
     if not run.dumps:
-        words = f": {run.skipped[0]}" if run.skipped else ""
-        raise BadInput(f"{run.path} has no dump that can be read{words}")
+        skipped = f": {run.skipped[0]}" if run.skipped else ""
+        raise BadInput(f"{run.path} has no dump that can be read{skipped}")
     if at is None and not is_time(run.dumps[-1].t_unit):
         return run.dumps[-1:]  # earlier ones are iterates, not states
     if at is None:
         numbers = np.unique(np.linspace(0, len(run.dumps) - 1, min(count, len(run.dumps))).round())
         return [run.dumps[int(k)] for k in numbers]
-    words = {"start": run.dumps[0].t, "end": run.dumps[-1].t}
+    named_times = {"start": run.dumps[0].t, "end": run.dumps[-1].t}
     at = at if isinstance(at, str) else ",".join(map(str, np.atleast_1d(at)))
-    times = [words[w] if w in words else parse_number("--at", at, w) for w in at.split(",")]
+    times = [
+        named_times[w] if w in named_times else parse_number("--at", at, w) for w in at.split(",")
+    ]
     chosen = list(dict.fromkeys(run.dump_at(t) for t in times))
-    first = words["start"]
-    last = words["end"]
+    first = named_times["start"]
+    last = named_times["end"]
     slack = 1e-3 * (last - first)
     if say and any(not first - slack <= t <= last + slack for t in times):
         drawn = ", ".join(f"{dump.t:.6g}" for dump in chosen[:-1])
         unit = chosen[-1].t_unit
         drawn += ", " * bool(drawn) + add_unit(chosen[-1].t, unit)
         before = "t = " if is_time(unit) else ""
-        words = f"{before}{first:.6g} to {add_unit(last, unit)}; drawn: {before}{drawn}"
-        say(f"--at {at}: the dumps are of {words}")
+        say(
+            f"--at {at}: the dumps are of "
+            f"{before}{first:.6g} to {add_unit(last, unit)}; drawn: {before}{drawn}"
+        )
     return chosen
 
 

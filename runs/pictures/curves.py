@@ -209,8 +209,8 @@ def take_lineouts(
             missed.append(f"--line {given}: it meets no cell of {dump.path}")
     if not lineouts:
         raise BadInput(missed[0])
-    for words in missed if say else ():
-        say(words)
+    for sentence in missed if say else ():
+        say(sentence)
     return lineouts
 
 
@@ -312,9 +312,9 @@ def draw_history(figure, run: RunData, names: list[str]) -> None:
     for axes, chosen in zip(grid, panels, strict=True):
         draw_panel(axes, history["t"] * factor, history, chosen, units)
     if constant:
-        words = ", ".join(f"{_say(name)} {np.nanmax(history[name]):.4g}" for name in constant)
+        constants = ", ".join(f"{_say(name)} {np.nanmax(history[name]):.4g}" for name in constant)
         letters = int(LETTERS_PER_INCH * figure.get_size_inches()[0])
-        label += "\n\n" + textwrap.fill(f"constant: {words}", letters)
+        label += "\n\n" + textwrap.fill(f"constant: {constants}", letters)
     figure.supxlabel(label, fontsize=9)
 
 
@@ -394,11 +394,11 @@ def make_panel(
         return title, [(_say(name), drift, False) for name, drift in drifts]
     largest = max(float(np.nanmax(np.abs(history[name]))) for name in names)
     factor, unit = pick_prefix(largest, units.get(names[0], "1"))
-    words = history.get("dt_limit")
-    if names == ["dt"] and words is not None and words.dtype.kind == "U":
-        kinds = [word for word in dict.fromkeys(words.tolist()) if word]
+    limits = history.get("dt_limit")
+    if names == ["dt"] and limits is not None and limits.dtype.kind == "U":
+        kinds = [word for word in dict.fromkeys(limits.tolist()) if word]
         dt = history["dt"] * factor
-        return name_axis("dt", unit), [(k, np.where(words == k, dt, np.nan), True) for k in kinds]
+        return name_axis("dt", unit), [(k, np.where(limits == k, dt, np.nan), True) for k in kinds]
     parts = zip(*(name.split("_") for name in names), strict=False)
     title = " ".join(one[0] for one in parts if len(set(one)) == 1)
     curves = [
@@ -480,9 +480,9 @@ def draw_gauges(figure, run: RunData, names: list[str]) -> None:
             axes.set_ylim(-FLAT_MARGIN * size * scale, FLAT_MARGIN * size * scale)
         for (k, point), curve in zip(writers, values, strict=True):
             style = "--" if point.moves else "-"
-            words = point.name + " (outside of all blocks)" * (not np.isfinite(curve).any())
+            label = point.name + " (outside of all blocks)" * (not np.isfinite(curve).any())
             lines[k] = axes.plot(
-                factor * table["t"], scale * curve, style, color=colours[k], lw=1, label=words
+                factor * table["t"], scale * curve, style, color=colours[k], lw=1, label=label
             )[0]
         axes.set_title(name_axis(LONG_NAMES[field], field_unit), fontsize=9)
         axes.tick_params(labelsize=8)

@@ -137,8 +137,9 @@ DERIVED = {
 def find_field(block: BlockData, name: str) -> Field | None:
     """A field of the block, or one that can be derived from its fields; otherwise None."""
     if name in block.cell_fields:
-        words = block.units[name], block.long_names[name]
-        return Field(lambda block: block.cell_fields[name], *words)
+        return Field(
+            lambda block: block.cell_fields[name], block.units[name], block.long_names[name]
+        )
     if name not in DERIVED or min(block.nodes.shape[1:]) < 3:
         return None
     known = {*block.cell_fields, *(f"state/{one}" for one in block.state_fields)}
@@ -284,8 +285,14 @@ def draw_fields(
             axes.set_title(title, fontsize=10)
         if look:
             bar = ScalarMappable(look.norm, look.map)
-            words = {"label": look.label, "extend": look.extend}
-            figure.colorbar(bar, ax=panels[k], shrink=0.9, pad=0.015, **words)
+            figure.colorbar(
+                bar,
+                ax=panels[k],
+                shrink=0.9,
+                pad=0.015,
+                label=look.label,
+                extend=look.extend,
+            )
     pairs = zip(boxes, extents, strict=True)
     return view.zoom is None and not all(_is_inside(extent, box) for box, (extent, _) in pairs)
 
@@ -334,12 +341,14 @@ def mark_largest(axes, sheets: Sequence[Sheet], name: str, scale: float, box) ->
     place = np.unravel_index(np.nanargmax(sheet.fields[name]), sheet.fields[name].shape)
     x, y = compute_centres(sheet.nodes)[:, *place] * scale
     axes.plot(x, y, "o", markersize=11, markeredgewidth=1.6, color="tab:red", fillstyle="none")
-    words = f"largest: {sheet.name}, i={place[0]}, j={place[1]}"
+    place_name = f"largest: {sheet.name}, i={place[0]}, j={place[1]}"
     if not (box[0] <= x / scale <= box[1] and box[2] <= y / scale <= box[3]):
-        words += f", outside at {x:.4g}, {y:.4g}"
+        place_name += f", outside at {x:.4g}, {y:.4g}"
     frame = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
     at = axes.transAxes
-    axes.text(0.01, 0.98, words, transform=at, va="top", fontsize=8, color="tab:red", bbox=frame)
+    axes.text(
+        0.01, 0.98, place_name, transform=at, va="top", fontsize=8, color="tab:red", bbox=frame
+    )
 
 
 def draw_grid_lines(axes, nodes: np.ndarray, colour: str, alpha: float = 1.0) -> None:
@@ -483,10 +492,10 @@ def make_panels(
     ratio = (box[3] - box[2]) / (box[1] - box[0])
     if is_slender(box):
         ratio = HIGH_PANEL_RATIO if ratio > 1.0 else LOW_PANEL_RATIO
-    words = 0.75 if apart else 0.45  # above and below a panel
+    text_height = 0.75 if apart else 0.45  # above and below a panel
 
     def measure_height(columns: int, rows: int) -> float:
-        return rows * (PICTURE_WIDTH_INCHES / columns * 0.85 * ratio + words) + 0.3
+        return rows * (PICTURE_WIDTH_INCHES / columns * 0.85 * ratio + text_height) + 0.3
 
     across = ratio >= 0.6
     columns, rows = (times, fields) if across else (fields, times)
@@ -631,10 +640,10 @@ def time_titles(dumps: Sequence[Dump]) -> list[str]:
     before = "t = " if is_time(dumps[-1].t_unit) else ""
     titles = []
     for dump in dumps:
-        words = f"{before}{dump.t * factor:.4g} {unit}".rstrip()
+        si_time = f"{before}{dump.t * factor:.4g} {unit}".rstrip()
         scaled = dump.scaled_time
-        words = f"{scaled} ({words})" if scaled else words
-        titles.append(words + " (restart point)" * dump.is_restart_point)
+        si_time = f"{scaled} ({si_time})" if scaled else si_time
+        titles.append(si_time + " (restart point)" * dump.is_restart_point)
     return titles
 
 

@@ -146,8 +146,13 @@ def make_frames(
     place = {"shrink": 0.9, "pad": 0.015}
     if box[3] - box[2] < SLENDER_WINDOW_RATIO * (box[1] - box[0]):  # no room for labels at the side
         place = {"location": "bottom", "aspect": 50}
-    words = {"label": look.label, "extend": look.extend}
-    figure.colorbar(ScalarMappable(look.norm, look.map), ax=axes, **words, **place)
+    figure.colorbar(
+        ScalarMappable(look.norm, look.map),
+        ax=axes,
+        label=look.label,
+        extend=look.extend,
+        **place,
+    )
 
     def draw(number: int) -> None:
         axes.clear()

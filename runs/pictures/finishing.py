@@ -98,18 +98,18 @@ def _leave_out_spikes(axes: Axes) -> None:
     if top - bottom <= SPIKE_RATIO * (high - low):
         return
     margin = SPIKE_MARGIN * (high - low)
-    words = []
+    notes = []
     if bottom < low - margin:
-        words.append(f"down to {bottom:.2g}")
+        notes.append(f"down to {bottom:.2g}")
     else:
         low = bottom
     if top > high + margin:
-        words.append(f"up to {top:.2g}")
+        notes.append(f"up to {top:.2g}")
     else:
         high = top
     axes.set_ylim(low - margin, high + margin)
     frame = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
-    note = f"single points {' and '.join(words)}"
+    note = f"single points {' and '.join(notes)}"
     axes.text(0.99, 0.01, note, transform=axes.transAxes, ha="right", fontsize=7, bbox=frame)
 
 

@@ -64,8 +64,8 @@ def describe_map(
     memories = estimate_memories(cells, shares, ranks)
     for rank in range(min(ranks, MOST_NAMED_RANKS)):
         memory = memories[rank] / 1e6
-        words = ", ".join(pieces[rank]) or "nothing"
-        lines.append(f"rank {rank}: {words}; {loads[rank]} cells, about {memory:.0f} MB")
+        names = ", ".join(pieces[rank]) or "nothing"
+        lines.append(f"rank {rank}: {names}; {loads[rank]} cells, about {memory:.0f} MB")
     if ranks > MOST_NAMED_RANKS:
         lines.append(f"and {ranks - MOST_NAMED_RANKS} more ranks")
     advice = ""
@@ -104,8 +104,8 @@ def estimate_memories(cells: Sequence[tuple[int, int]], shares: Shares, ranks: i
 def describe_shares(names: Sequence[str], shares: Shares, ranks: int) -> str:
     """One line for run.log, of blocks with these names."""
     pieces = name_pieces(names, shares, ranks)
-    words = [f"{rank}: {', '.join(pieces[rank]) or '-'}" for rank in range(ranks)]
-    return f"shared by {ranks} ranks of MPI; blocks of rank {'; '.join(words)}"
+    lists = [f"{rank}: {', '.join(pieces[rank]) or '-'}" for rank in range(ranks)]
+    return f"shared by {ranks} ranks of MPI; blocks of rank {'; '.join(lists)}"
 
 
 def name_pieces(names: Sequence[str], shares: Shares, ranks: int) -> list[list[str]]:

@@ -31,8 +31,8 @@ def find_rank() -> int:
 
 def is_for_ranks(arguments: list[str]) -> bool:
     """Were several ranks started for a command line that computes one flow on them?"""
-    words = [word for word in arguments if not word.startswith("-")]
-    return bool(words) and words[0] in COMMANDS and count_started() > 1
+    names = [word for word in arguments if not word.startswith("-")]
+    return bool(names) and names[0] in COMMANDS and count_started() > 1
 
 
 def check_single(call: str, command: str) -> None:

@@ -138,18 +138,18 @@ def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str
     books = world.ranks.count()
     note(f"ranks: {json.dumps(books)}")
     steps = books["steps"]
-    words = list[str]()
+    counts = list[str]()
     if steps:
         calls, size = (sum(books[name].values()) / steps for name in ("calls", "bytes"))
-        words.append(f"{calls:.1f} and {size / 1e6:.2g} MB a step")
-        parts = [
+        counts.append(f"{calls:.1f} and {size / 1e6:.2g} MB a step")
+        waits = [
             100.0 * waited / seconds
             for waited, seconds in zip(books["waited"], books["seconds"], strict=True)
             if seconds > 0.0
         ]
-        if parts:
-            words.append(f"{min(parts):.0f}% to {max(parts):.0f}% of a step are waits for them")
-    return [f"messages of ranks: {'; '.join(words) or 'none'}"]
+        if waits:
+            counts.append(f"{min(waits):.0f}% to {max(waits):.0f}% of a step are waits for them")
+    return [f"messages of ranks: {'; '.join(counts) or 'none'}"]
 
 
 # exit codes, as in `runs.cli.main`
@@ -222,8 +222,8 @@ def follow(comm: Any, screen: TextIO) -> int:
         code = (
             EXIT_BAD_INPUT if isinstance(error, BadInput | MemoryError | OSError) else EXIT_INTERNAL
         )
-        words = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"
-        print(f"shockgrid: rank {comm.rank}: {words}; all ranks end", file=screen, flush=True)
+        message = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"
+        print(f"shockgrid: rank {comm.rank}: {message}; all ranks end", file=screen, flush=True)
         comm.Abort(code)
         raise
 

@@ -162,8 +162,9 @@ def create_directory(wanted: str | None, problem: str, force: bool = False) -> R
         try:
             directory.path.mkdir(parents=True, exist_ok=True)
         except FileNotFoundError as error:  # such as /proc, where no folders are made
-            words = f"the output directory {wanted} cannot be created; choose another with -o"
-            raise BadInput(words) from error
+            raise BadInput(
+                f"the output directory {wanted} cannot be created; choose another with -o"
+            ) from error
         inside = _list_inside(directory)
     if inside and not force:
         shown = ", ".join(inside[:4]) + (", ..." if len(inside) > 4 else "")
@@ -241,19 +242,21 @@ def open_directory(path: str | os.PathLike) -> RunDirectory:
     if not directory.path.is_dir():
         raise BadInput(f"{path} is a file; a run directory is wanted")
     if not directory.deck.exists():
-        words = "it has no deck.toml"
+        explanation = "it has no deck.toml"
         if (directory.path / STUDY_FILE).exists():
-            words = f"its runs lie in {directory.path / 'runs'}; its table: shockgrid study {path}"
+            explanation = (
+                f"its runs lie in {directory.path / 'runs'}; its table: shockgrid study {path}"
+            )
         elif inside := _list_runs(directory.path):
-            words += (
+            explanation += (
                 "; there are runs in it: " + ", ".join(inside[:5]) + ", ..." * (len(inside) > 5)
             )
         elif not _list_inside(directory):
-            words += (
+            explanation += (
                 " yet: a run is just starting there, or ended before a step; if it ended, start it "
                 f"again: shockgrid run PROBLEM_OR_DECK -o {directory.quoted}"
             )
-        raise BadInput(f"{path} is not a run directory: {words}")
+        raise BadInput(f"{path} is not a run directory: {explanation}")
     for file in (directory.deck, directory.history, directory.summary, directory.log):
         check_regular(file)
     return directory
@@ -290,7 +293,7 @@ def check_deck(directory: RunDirectory) -> str:
     if is_noted(directory, directory.deck):
         return ""
     found = read_stored_deck(directory)
-    told = ""
+    differences = ""
     way = "no dump that can be read has it"
     if found is not None:
         text = directory.deck.read_text(encoding="utf-8", errors="replace")
@@ -302,16 +305,16 @@ def check_deck(directory: RunDirectory) -> str:
                     f"keys are those in {found.path.name}: the log was edited or damaged, the deck "
                     "is taken"
                 )
-            words = [f"{one.key} is {show(one.now)}, was {show(one.before)}" for one in changed]
-            more = [f"and {len(words) - SHOWN_KEYS} more"] * (len(words) > SHOWN_KEYS)
-            told = f" ({'; '.join(words[:SHOWN_KEYS] + more)})"
+            changes = [f"{one.key} is {show(one.now)}, was {show(one.before)}" for one in changed]
+            more = [f"and {len(changes) - SHOWN_KEYS} more"] * (len(changes) > SHOWN_KEYS)
+            differences = f" ({'; '.join(changes[:SHOWN_KEYS] + more)})"
         way = (
             f"the last dump has it: shockgrid info --deck {shlex.quote(str(found.path))} > "
             f"{shlex.quote(str(directory.deck))}"
         )
     raise BadInput(
-        f"{directory.deck} is not as it was written{told}; set it right ({way}), and change keys "
-        "with restart --set, or with --set in a new run"
+        f"{directory.deck} is not as it was written{differences}; set it right ({way}), and change "
+        "keys with restart --set, or with --set in a new run"
     )
 
 

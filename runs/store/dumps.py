@@ -180,9 +180,9 @@ WRITABLE_IMAGE = 1  # H5LT_FILE_IMAGE_OPEN_RW
 
 def _describe(block: BlockView, arrays: Arrays) -> tuple:
     """All of a block's group in a dump but numbers."""
-    words = get_material(block), dict(block.units), dict(get_long_names(block))
+    description = get_material(block), dict(block.units), dict(get_long_names(block))
     kinds = [(name, _describe_kind(values)) for name, values in arrays[block.name]]
-    return block.name, *words, kinds
+    return block.name, *description, kinds
 
 
 def _describe_kind(value: Any) -> Any:
@@ -299,9 +299,9 @@ def write_block(
         for name, size in zip(scales, shape, strict=True):
             scale = group.create_dataset(name, data=np.arange(size))
             scale.make_scale(name)
-            what = "node" if "node" in name else "cell"
+            location = "node" if "node" in name else "cell"
             scale.attrs["units"] = "1"
-            scale.attrs["long_name"] = f"number of the {what} in {name[0]}"
+            scale.attrs["long_name"] = f"number of the {location} in {name[0]}"
     long_names = {**LONG_NAMES, **get_long_names(block), **names}
     units = {"x": "m", "y": "m", "z": "m", **block.units} if has_units else {}
     filters = {"compression": compression, "shuffle": True} if compression else {}
@@ -347,8 +347,9 @@ def open_dump(path: Path) -> h5py.File:
             kind = file.attrs.get("format")
             version = file.attrs.get("format_version")
             if kind != FORMAT:
-                words = f"{path} is HDF5 but not a shockgrid dump (its 'format' is {kind!r})"
-                raise BadInput(words)
+                raise BadInput(
+                    f"{path} is HDF5 but not a shockgrid dump (its 'format' is {kind!r})"
+                )
             if version != FORMAT_VERSION:
                 found = "no format_version" if version is None else f"format_version {version}"
                 raise BadInput(

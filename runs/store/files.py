@@ -255,12 +255,14 @@ def find_sum(path: Path) -> str | None:
         now = os.fstat(file.fileno())
         key = str(path.absolute()), now.st_ino, now.st_size, now.st_mtime_ns
         if key not in judged:
-            first = _mark_closed(file.read(SEARCHED_BYTES))
-            place = first.find(SUM_HEAD)
+            first_bytes = _mark_closed(file.read(SEARCHED_BYTES))
+            place = first_bytes.find(SUM_HEAD)
             start = place + len(SUM_HEAD)
-            found = zlib.crc32(first[start + CHECKSUM_DIGITS :], zlib.crc32(first[:start]))
+            found = zlib.crc32(
+                first_bytes[start + CHECKSUM_DIGITS :], zlib.crc32(first_bytes[:start])
+            )
             while place >= 0 and (chunk := file.read(CHUNK_BYTES)):
                 found = zlib.crc32(chunk, found)
-            sound = first[start : start + CHECKSUM_DIGITS] == b"%08x" % found
+            sound = first_bytes[start : start + CHECKSUM_DIGITS] == b"%08x" % found
             judged[key] = None if place < 0 else f"{found:08x}" if sound else ""
         return judged[key]

@@ -137,8 +137,8 @@ class HistoryWriter:
         lines = []
         now = time.monotonic()
         if self.columns is None:
-            first = [name for one in self._waiting for name in one if name not in row]
-            self.columns = [*row, *dict.fromkeys(first)]
+            new_columns = [name for one in self._waiting for name in one if name not in row]
+            self.columns = [*row, *dict.fromkeys(new_columns)]
             self._names = set(self.columns)
             rows = [*self._waiting, row]
             self._waiting = []
@@ -193,8 +193,10 @@ def describe_change(before: Iterable[str], now: Iterable[str]) -> str:
     missing = [name for name in before if name not in now]
     new = [name for name in now if name not in before]
     kinds = (("without", missing), ("with", new))
-    told = " and ".join(f"{word} {', '.join(names)}" for word, names in kinds if names)
-    return f"the columns of a history stay the same through a run, and this one would go on {told}"
+    changes = " and ".join(f"{word} {', '.join(names)}" for word, names in kinds if names)
+    return (
+        f"the columns of a history stay the same through a run, and this one would go on {changes}"
+    )
 
 
 def read_history(path: Path) -> dict[str, np.ndarray]:

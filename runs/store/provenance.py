@@ -38,7 +38,7 @@ def hash_deck(deck_text: str) -> str:
 
 def describe_provenance(provenance: dict[str, str]) -> list[str]:
     """`provenance` in two lines for a screen: what computed, and what was computed."""
-    known = {name: words for name, words in provenance.items() if words}
+    known = {name: value for name, value in provenance.items() if value}
     packages = [f"{name} {known[name]}" for name in ("python", *PACKAGES) if name in known]
     made = [f"shockgrid {known.get('version', 'of unknown version')}"]
     if "commit" in known:
@@ -52,8 +52,8 @@ def describe_provenance(provenance: dict[str, str]) -> list[str]:
 def describe_software() -> str:
     """Version and commit in one line: what a picture, a film or a table was made by."""
     known = _find_surroundings()
-    words = f"shockgrid {known['version'] or 'of unknown version'}"
-    return f"{words}, commit {known['commit']}" if known["commit"] else words
+    software = f"shockgrid {known['version'] or 'of unknown version'}"
+    return f"{software}, commit {known['commit']}" if known["commit"] else software
 
 
 @functools.cache

@@ -128,8 +128,9 @@ def load_package(name: str, call: str) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        words = f"{call} needs {name}, which is not installed here: python -m pip install {name}"
-        raise BadInput(words) from error
+        raise BadInput(
+            f"{call} needs {name}, which is not installed here: python -m pip install {name}"
+        ) from error
 
 
 class Fields(Mapping[str, np.ndarray]):
@@ -327,7 +328,7 @@ class Dump(Snapshot):
             self.deck_text = str(at["deck"])
             made = dict(file["provenance"].attrs) if "provenance" in file else {}
             self.has_state = "state" in file  # can a run go on from it?  Not so for light dumps
-        self.provenance = {name: str(words) for name, words in made.items()}  # what made it
+        self.provenance = {name: str(value) for name, value in made.items()}  # what made it
         self.is_restart_point = path.name.startswith("restart")
 
     @cached_property
@@ -469,8 +470,7 @@ class RunData:
             if not path.exists():  # an old restart point of a run that goes on meanwhile
                 return None
             if not self.lenient:
-                words = f"{error}; move it elsewhere to see the others"
-                raise BadInput(words) from error
+                raise BadInput(f"{error}; move it elsewhere to see the others") from error
             if str(error) not in self.skipped:
                 self.skipped.append(str(error))
             return None

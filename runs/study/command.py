@@ -66,8 +66,10 @@ def study(request: Request, say: Callable[[str], None], note: Callable[[str], No
         except KeyboardInterrupt as stop:  # by now all workers have stopped
             left = count(made.results.count(None), "run")
             note(f"stopped with {left} to do; repeat the command to continue")
-            told = [number for number in find_numbers(*STOPPING) if _name(number) in str(stop)]
-            return 128 + [signal.SIGINT, *told, *caught][-1]  # `told`: signals that runs reported
+            reported = [number for number in find_numbers(*STOPPING) if _name(number) in str(stop)]
+            return (
+                128 + [signal.SIGINT, *reported, *caught][-1]
+            )  # `told`: signals that runs reported
         finally:
             progress.close()
     paths = made.write(note)
@@ -101,8 +103,8 @@ def describe_plan(study: Study) -> str:
     source = study.definition.source
     lines = [f"{count(len(points), 'run')} of {source} in {study.path}/runs"]
     for point, state in zip(points, study.describe_states(), strict=True):
-        words = "to do" if state == "new" else STATES.get(state, state)
-        lines.append(f"  {point.name}: {words}")
+        state_name = "to do" if state == "new" else STATES.get(state, state)
+        lines.append(f"  {point.name}: {state_name}")
     return "\n".join([*lines, "nothing was run"])
 
 
@@ -189,21 +191,21 @@ def describe_study(study: Study, progress: Progress, seconds: float) -> str:
     lines += describe_cautions(study)
     if study.failures:
         lines += ["", "failed:"]
-        lines += [f"  {name}: {words}" for name, words in study.failures.items()]
+        lines += [f"  {name}: {reason}" for name, reason in study.failures.items()]
     return "\n".join([*lines, ""])
 
 
 def describe_cautions(study: Study) -> list[str]:
     """How many runs are unreliable, and why; sentences that differ only in numbers appear once."""
-    told = study.cautions
-    if not told:
+    cautions = study.cautions
+    if not cautions:
         return []
     alike: dict[str, dict[str, str]] = {}  # the last such sentence of each run
-    for name, sentence in ((name, one) for name, several in told.items() for one in several):
+    for name, sentence in ((name, one) for name, several in cautions.items() for one in several):
         alike.setdefault(re.sub(NUMBER, "#", sentence), {})[name] = sentence
-    lines = ["", f"caution: {len(told)} of {count(len(study.results), 'run')}"]
+    lines = ["", f"caution: {len(cautions)} of {count(len(study.results), 'run')}"]
     for sentences in [list(runs.values()) for runs in alike.values()][:MOST_CAUTIONS]:
-        words = ", such as" if len(set(sentences)) > 1 else ""
-        lines.append(f"  in {count(len(sentences), 'run')}{words}: {sentences[0]}")
+        ending = ", such as" if len(set(sentences)) > 1 else ""
+        lines.append(f"  in {count(len(sentences), 'run')}{ending}: {sentences[0]}")
     more = len(alike) - MOST_CAUTIONS
     return [*lines, f"  ... and {more} more in {study.path}/study.csv"] if more > 0 else lines

@@ -133,8 +133,10 @@ def find_names(results: Sequence[Result | None]) -> tuple[list[str], list[str], 
     computed = dict.fromkeys(name for result in known for name in result.computed)
     errors = dict.fromkeys(name for result in known for name in result.errors)
     names = dict.fromkeys(name for result in known for name in result.values)
-    rest = [n for n in names if n not in (*computed, *errors) and n.removesuffix("_theory") == n]
-    return list(computed), list(errors), rest
+    other_names = [
+        n for n in names if n not in (*computed, *errors) and n.removesuffix("_theory") == n
+    ]
+    return list(computed), list(errors), other_names
 
 
 def read_result(folder: Path, digest: str) -> Result | None:
@@ -187,8 +189,8 @@ def _call(work: Work) -> Result:
             raise BadInput(f"{work.source} returned {found!r}; numbers by name are wanted (a dict)")
         result.values = {str(name): _number(value) for name, value in found.items()}
     except Exception as error:
-        told = "" if isinstance(error, BadInput | RunFailure) else f"{type(error).__name__}: "
-        result.failure = result.reason = f"{told}{error}"
+        kind = "" if isinstance(error, BadInput | RunFailure) else f"{type(error).__name__}: "
+        result.failure = result.reason = f"{kind}{error}"
     result.seconds = time.monotonic() - begun
     result.write(work.folder)
     return result
@@ -226,8 +228,9 @@ def _finish(runner: Runner, call: Callable[[], Any], digest: str) -> Result | No
         result.reason = ending.reason
         result.stopped = ending.exit_code >= 128
     except RunFailure as failure:
-        words = re.split("; last restart point is|; there is no restart point yet", str(failure))
-        result.failure = result.reason = words[0]
+        result.failure = result.reason = re.split(
+            "; last restart point is|; there is no restart point yet", str(failure)
+        )[0]
     except BadInput as error:
         if call == runner.resume and runner.last_point is None and "is in use" not in str(error):
             return None
@@ -240,8 +243,8 @@ def _finish(runner: Runner, call: Callable[[], Any], digest: str) -> Result | No
     result.seconds = float(np.nansum(history.get("seconds_step", 0.0)))
     if not result.failure and len(history.get("t", ())):
         result.units = {n: u for n, u in problem.find_units().items() if n in problem.units}
-        told = describe_cautions(problem, history)
-        result.cautions = [sentence.removeprefix(HEAD) for sentence in told]
+        cautions = describe_cautions(problem, history)
+        result.cautions = [sentence.removeprefix(HEAD) for sentence in cautions]
         fill_numbers(result, runner.deck.problem, problem, history, problem.measure(evolution))
     if not result.stopped:
         result.write(runner.directory.path)

@@ -108,13 +108,13 @@ def make_column(values: Sequence[Any]) -> np.ndarray:
 
 def read_vary(text: str) -> tuple[str, list[Any]]:
     """Key and values of `KEY=WORDS`, as `--vary` takes it."""
-    key, equals, words = text.partition("=")
-    if not equals or not key.strip() or not words.strip():
+    key, equals, values = text.partition("=")
+    if not equals or not key.strip() or not values.strip():
         raise BadInput(
             f"--vary {text!r}: the form is KEY=A:B:N, KEY=A:B:N:log or KEY=V1,V2,..., such as "
             "mach=1.2:3:7"
         )
-    return key.strip(), read_values(words.strip(), f"--vary {key.strip()}")
+    return key.strip(), read_values(values.strip(), f"--vary {key.strip()}")
 
 
 def read_values(words: str, where: str) -> list[Any]:
@@ -300,10 +300,10 @@ def is_study(source: str) -> Path | None:
     if path.is_dir() and source not in PROBLEMS:
         if (path / FILE).is_file():
             return path / FILE
-        words = f"there is no {FILE} in it"
+        reason = f"there is no {FILE} in it"
         if RunDirectory(path).deck.is_file():
-            words = f"it is a run; continue it with shockgrid restart {shlex.quote(source)}"
-        raise BadInput(f"{source} is not a study: {words}")
+            reason = f"it is a run; continue it with shockgrid restart {shlex.quote(source)}"
+        raise BadInput(f"{source} is not a study: {reason}")
     if path.suffix != ".toml" or not path.is_file():
         return None
     table = read_toml(path)

@@ -193,12 +193,12 @@ def _goes_with(texts: Sequence[dict[str, str]], key: str, other: str) -> bool:
 
 def find_series(definition: Definition, results: Sequence[Result | None], key: str) -> list[Series]:
     """All series of results, errors and measurements with at least two grids."""
-    computed, errors, rest = find_names(results)
+    computed, errors, other_names = find_names(results)
     cells = [count_cells(point[key]) for point in definition.points]
     found = []
-    for words, numbers in find_groups(definition, key).items():
+    for label, numbers in find_groups(definition, key).items():
         finest = results[numbers[-1]]
-        for name in dict.fromkeys([*computed, *errors, *rest]):
+        for name in dict.fromkeys([*computed, *errors, *other_names]):
             pairs = [
                 (cells[n], value)
                 for n in numbers
@@ -213,7 +213,7 @@ def find_series(definition: Definition, results: Sequence[Result | None], key: s
                 known = finest.values.get(theory) if finest else None
                 found.append(
                     Series(
-                        words, name, grids, values, name in errors,
+                        label, name, grids, values, name in errors,
                         look(sizes, values.tolist()), math.nan if known is None else known,
                     )
                 )  # fmt: skip
@@ -230,8 +230,8 @@ def make_row(one: Series, digits: int = 8) -> list[str]:
         " ".join(f"{float(value):.{digits}g}" for value in values)
         for values in (one.cells, one.values, refined.orders)
     )
-    told = ("" if math.isnan(number) else f"{number:.{digits - 2}g}" for number in numbers)
-    return [one.words, one.quantity, *lists, refined.kind, *told]
+    texts = ("" if math.isnan(number) else f"{number:.{digits - 2}g}" for number in numbers)
+    return [one.words, one.quantity, *lists, refined.kind, *texts]
 
 
 def describe_series(series: Sequence[Series], shown: Sequence[str]) -> list[str]:

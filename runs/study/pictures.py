@@ -44,8 +44,8 @@ def draw_study(study: Any) -> Figure:
     row = figure.subplots(1, max(1, len(panels)), squeeze=False)[0]
     for axes, panel in zip(row, panels, strict=False):
         panel(axes)
-    words = ", ".join(study.definition.settings)
-    title = study.definition.source + (f" ({words})" if words else "")
+    settings = ", ".join(study.definition.settings)
+    title = study.definition.source + (f" ({settings})" if settings else "")
     figure.suptitle(title if len(title) < 110 else f"{title[:107]}...", fontsize="medium")
     return figure
 
@@ -159,8 +159,15 @@ def _draw_map(axes: Any, study: Any, name: str) -> None:
     for (i, j), error in np.ndenumerate(errors) if errors.size <= MOST_WRITTEN_RUNS else ():
         text = f"{error:+.1f}"
         colour = "w" if abs(error) > BOUNDS[-2] else "k"
-        words = {"ha": "center", "va": "center", "fontsize": 6, "color": colour}
-        axes.text(x[i], y[j], "-" if np.isnan(error) else text, **words)
+        axes.text(
+            x[i],
+            y[j],
+            "-" if np.isnan(error) else text,
+            ha="center",
+            va="center",
+            fontsize=6,
+            color=colour,
+        )
     for axis, values in ((axes.xaxis, x), (axes.yaxis, y)):
         if _is_even_in_log(values):
             _mark(axis, values)
@@ -172,8 +179,8 @@ def _draw_map(axes: Any, study: Any, name: str) -> None:
 def _name_series(one: Series) -> str:
     order = one.refined.order
     kind = one.refined.kind.removeprefix("error")
-    told = f"order {order:.2f}" if np.isfinite(order) else kind
-    return ", ".join(words for words in (one.words, told) if words)
+    name_of_order = f"order {order:.2f}" if np.isfinite(order) else kind
+    return ", ".join(part for part in (one.words, name_of_order) if part)
 
 
 def _draw_errors(axes: Any, study: Any, name: str, series: list[Series]) -> None:

@@ -108,9 +108,9 @@ class Study:
         points = self.definition.points
         results = self.results
         table = {key: make_column([point[key] for point in points]) for key in self.definition.keys}
-        words = {"run": [point.name for point in points], "state": list(map(_say_state, results))}
-        words["cautions"] = [" | ".join(result.cautions) if result else "" for result in results]
-        table |= {name: np.array(column, dtype=str) for name, column in words.items()}
+        columns = {"run": [point.name for point in points], "state": list(map(_say_state, results))}
+        columns["cautions"] = [" | ".join(result.cautions) if result else "" for result in results]
+        table |= {name: np.array(column, dtype=str) for name, column in columns.items()}
         for name, kind in (("step", np.int64), ("t", float), ("seconds", float)):
             table[name] = np.array([getattr(r, name) if r else 0 for r in results], dtype=kind)
         for name in dict.fromkeys(name for result in results if result for name in result.values):
@@ -265,8 +265,8 @@ class Study:
                 return
             missing = [name for name in missing if name not in known]
         if missing:
-            words = f"; there are: {', '.join(dict.fromkeys(known))}" if known else ""
-            raise BadInput(f"--of {missing[0]}: no run has it{words}")
+            choices = f"; there are: {', '.join(dict.fromkeys(known))}" if known else ""
+            raise BadInput(f"--of {missing[0]}: no run has it{choices}")
 
     def _find_kinds(self, numbers: Iterable[int], plain: type | UnionType) -> list[int]:
         """The first point of each kind: points of one kind differ only in `plain` values."""
@@ -344,8 +344,8 @@ class Study:
         if len(works) > 1 and engine.workers > 1 and self.definition.function is None:
             # one step of one point of each kind, so that not every worker compiles the same
             # kernels: these are made for materials, limiters and the like, for what is no number
-            first = [works[number] for number in self._find_kinds(works, int | float)]
-            for _ in engine.compute(warm_up, first):
+            first_works = [works[number] for number in self._find_kinds(works, int | float)]
+            for _ in engine.compute(warm_up, first_works):
                 pass  # faults of a point are reported when it is computed
         numbers = list(works)
         for place, found in engine.compute(compute_point, list(works.values())):
@@ -474,7 +474,8 @@ def study(
             return None
     except KeyboardInterrupt:
         left = count(made.results.count(None), "run")
-        words = f"stopped with {left} to do; study({str(output)!r}) continues"
-        raise KeyboardInterrupt(words) from None
+        raise KeyboardInterrupt(
+            f"stopped with {left} to do; study({str(output)!r}) continues"
+        ) from None
     made.write()
     return made

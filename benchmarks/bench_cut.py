@@ -51,7 +51,7 @@ def main() -> None:
     largest = max(range(len(blocks)), key=lambda n: blocks[n].ni * blocks[n].nj)
     places = [(0, 1) if n == largest else (1,) for n in range(len(blocks))]
     ranks = Ranks(comm, blocks, places)
-    flow.spread(ranks)
+    flow.use_ranks(ranks)
     cut = ranks.cuts[largest]
     block = blocks[largest]
     size = block.ni * block.nj
@@ -59,7 +59,7 @@ def main() -> None:
     total = np.zeros(1)
     nodes = measure_seconds(comm, cut.send_nodes)
     sound = measure_seconds(comm, lambda: cut.gather_rows(block.sound))
-    ghosts = measure_seconds(comm, cut.share_ghost_rows)
+    ghosts = measure_seconds(comm, cut.exchange_ghost_rows)
     scan = measure_seconds(comm, flow.small_cells.scan_bands)
     latency = measure_seconds(comm, lambda: comm.Allreduce(number, total))
     beside = np.zeros((2, 2, block.ni))

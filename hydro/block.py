@@ -126,7 +126,7 @@ class Block:
         self.rates = np.zeros((self.ni, self.nj))
         self.rates_new = np.zeros((self.ni, self.nj))
         self.crowding = np.zeros((self.ni, self.nj))
-        self.shared_cells = 0
+        self.redistributed_cells = 0
         # made after those: memory freed by the checks is reused for arrays that are written anyway
         self.nodes_new = self.nodes.copy()
         self.state_new: np.ndarray
@@ -243,7 +243,7 @@ class Block:
         return self._plan
 
     @staticmethod
-    def take_perimeter(field: np.ndarray) -> np.ndarray:
+    def gather_perimeter(field: np.ndarray) -> np.ndarray:
         """Values (2, faces) of a field (2, ni, nj) in the cells along the perimeter."""
         return np.concatenate(get_sides(field), axis=1)
 
@@ -332,7 +332,7 @@ class Block:
                 cause=self.eos.failure_cause,
                 place=Place(self.name),
             )
-        if self.shared_cells:
+        if self.redistributed_cells:
             return None  # the failed cells have been redistributed since
         flat = find_bad_cells(self.nodes_new)
         cell = (int(flat[0, 0]), int(flat[0, 1])) if len(flat) else None

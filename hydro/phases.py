@@ -35,7 +35,7 @@ def _add_weight(block: Block, acceleration: np.ndarray) -> None:
     """Hydrostatic ghosts: pressure mirrored about that of a layer at rest on the wall."""
     rim = block.rim
     normal = rim.rows[on.NORMAL]
-    centres = block.take_perimeter(compute_centres(block.nodes))
+    centres = block.gather_perimeter(compute_centres(block.nodes))
     across = (acceleration * normal).sum(axis=0) / (normal * normal).sum(axis=0)
     way = ((rim.rows[on.AREA_CENTRE] - centres) * normal).sum(axis=0)
     for first, last, _ in block.plan.walls:

@@ -19,14 +19,14 @@ from hydro.formulas.geometry import find_geometry
 from hydro.history import compute_columns
 from hydro.ledger import Ledger
 from hydro.links import Exchange, Link, name_materials
-from hydro.motion.grid_motion import GridMotion, MeshLaw
+from hydro.motion.grid_motion import GridMotion, MeshMotion
 from hydro.motion.line import Line, LineRule
 from hydro.motion.overlaps import Overlaps
 from hydro.motion.tension import SurfaceTension
 from hydro.ranks.blocks import Blocks
 from hydro.sliding.contact import SlidingContact
 from hydro.small_cells import SmallCells
-from hydro.sources import BodySource, SourceLaw
+from hydro.sources import BodySource, SourceFunction
 from hydro.step import Flow, take_step
 from hydro.workers import Workers
 from regrid.compilation.first_calls import is_interpreting
@@ -86,10 +86,10 @@ class Simulation:
         t_end: float,
         cfl: float = 0.8,
         small_cells: float | None = None,
-        mesh: str | MeshLaw = "regrid",
+        mesh: str | MeshMotion = "regrid",
         make_regridder: Callable[[], object] | None = None,
         line_rule: LineRule | None = None,
-        source: SourceLaw | None = None,
+        source: SourceFunction | None = None,
         geometry: str = "plane",
         threads: int | None = 1,
         measure_block: Callable[[Block], Sequence[float]] | None = None,
@@ -218,7 +218,7 @@ class Simulation:
         """Make all blocks whole here, where other ranks have computed them; for the first rank."""
         self._shared.collect()
 
-    def spread(self, ranks: Blocks, processors: int | None = None) -> None:
+    def use_ranks(self, ranks: Blocks, processors: int | None = None) -> None:
         """From now on compute the pieces of `ranks` alone; all ranks have the same state.
 
         processors: as many are there for this rank, None for all that the process may use.  Raises
@@ -235,7 +235,7 @@ class Simulation:
         cells = [(last - first) * self._blocks[n].nj for n, first, last in ranks.pieces]
         ranks.workers = Workers(cells or [1], self._wanted_threads, processors)
         self._shared = self.small_cells.blocks = self._body_source.blocks = ranks
-        self.motion.spread(ranks)
+        self.motion.use_ranks(ranks)
         self._flow = replace(self._flow, blocks=ranks)
 
     @property
@@ -289,7 +289,7 @@ class Simulation:
         if self._measure_block is not None and ranks.size > 1:
             ranks.bring_states()
             own = [self._measure_block(self._blocks[number]) for number in ranks.own]
-            self._measured = list(ranks.share_rows(own, self._measured_numbers))
+            self._measured = list(ranks.exchange_rows(own, self._measured_numbers))
         self._note_end()  # within the step: every rank has what it reads
         ranks.end_step()
         return row
@@ -331,7 +331,7 @@ class Simulation:
         self.small_cells = SmallCells(self._shared, small.allowed, small.start)
         self._make_flow()
 
-    def take_cells(self, state) -> None:
+    def adopt_cells(self, state) -> None:
         """Have as many cells as a state of `get_state`, where lines may come and go."""
         if self.refining is None:
             return
@@ -359,8 +359,8 @@ class Simulation:
                 RunFailure,
             )
         pieces = [(n, self._blocks[n].find_rate()) for n, _, _ in ranks.pieces]
-        rates = ranks.share_pieces(pieces, 2)
-        smallest = ranks.share_rows([_find_smallest(self._blocks[n]) for n in ranks.own], 2)
+        rates = ranks.exchange_pieces(pieces, 2)
+        smallest = ranks.exchange_rows([_find_smallest(self._blocks[n]) for n in ranks.own], 2)
         number = int(max(rates, key=lambda row: row[1])[0])
         block = self._blocks[number]
         i, j = (int(index) for index in smallest[number])
@@ -405,7 +405,7 @@ class Simulation:
 
     def set_state(self, state) -> None:
         """Take up a state of `get_state` of the same blocks."""
-        self.take_cells(state)
+        self.adopt_cells(state)
         self.clock.set_state(state)
         self._measured = None
         self.ledger.set_state(state)

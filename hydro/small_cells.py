@@ -88,17 +88,17 @@ def make_measures(geometry: Geometry):
         return measure_volume(nodes, i, j, weigh) + find_excess(excess, i, j, ni, nj)
 
     @compiled_once(allocates=False)
-    def find_share(nodes, excess, i, j, ni, nj):
+    def find_volume_factor(nodes, excess, i, j, ni, nj):
         beyond = find_excess(excess, i, j, ni, nj)
         return 1.0 + beyond / measure_volume(nodes, i, j, weigh) if beyond != 0.0 else 1.0
 
-    return find_volume, find_share
+    return find_volume, find_volume_factor
 
 
 @functools.cache
 def make_fill_reaches(geometry: Geometry):
     """The kernel `fill_reaches` of a geometry."""
-    _, find_share = make_measures(geometry)
+    _, find_volume_factor = make_measures(geometry)
 
     @kernel
     def fill_reaches(small, rates, limit, nodes, excess, reaches):
@@ -114,7 +114,7 @@ def make_fill_reaches(geometry: Geometry):
             i, j = small[n]
             xi, yi, xj, yj, own = measure_lines(nodes, i, j)
             along_i = xi * xi + yi * yi < xj * xj + yj * yj
-            own *= find_share(nodes, excess, i, j, ni, nj)
+            own *= find_volume_factor(nodes, excess, i, j, ni, nj)
             need = own * rates[i, j] / limit
             held = own
             reach = 0
@@ -127,7 +127,7 @@ def make_fill_reaches(geometry: Geometry):
                     if 0 <= p < ni and 0 <= q < nj:
                         # half of a neighbour's area: the rest may belong to its own neighbourhood
                         area = measure_lines(nodes, p, q)[4]
-                        pair += 0.5 * area * find_share(nodes, excess, p, q, ni, nj)
+                        pair += 0.5 * area * find_volume_factor(nodes, excess, p, q, ni, nj)
                 held += pair
             if held < need:
                 left = max(left, own * rates[i, j] / held)
@@ -152,7 +152,7 @@ def make_redistribution(eos_class, geometry: Geometry):
     conversion = make_conversion(eos_class)
     read_cell = conversion.read_cell
     write_cell = conversion.write_cell
-    find_volume, find_share = make_measures(geometry)
+    find_volume, find_volume_factor = make_measures(geometry)
 
     @compiled_once
     def fill_conserved(held, carried, i, j, part, parameters, group, amounts):
@@ -377,7 +377,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                 )
             u -= 0.25 * w_x * inverse_dt
             v -= 0.25 * w_y * inverse_dt
-            area *= find_share(nodes_new, excess, i, j, ni, nj)
+            area *= find_volume_factor(nodes_new, excess, i, j, ni, nj)
             rates[i, j], _ = compute_rate(u, v, max(c2, 0.0), xi, yi, xj, yj, 1.0 / area)
         for i, j in touched:
             marks[i, j] = 0
@@ -399,7 +399,7 @@ class Fastest(NamedTuple):
     j: int
 
 
-class BlockSharing:
+class BlockRedistribution:
     """State redistribution in one block, with arrays allocated when first needed."""
 
     def __init__(self, block: Block):
@@ -442,14 +442,14 @@ class BlockSharing:
         self._forget(small)
         return left
 
-    def share(self, limit: float, inverse_dt: float, rows: Rows) -> int:
+    def redistribute_rows(self, limit: float, inverse_dt: float, rows: Rows) -> int:
         """Redistribute the new state at too small cells of these rows; returns how many changed."""
         block = self.block
         small = self._find_small(limit, rows)
         if len(small) == 0:
             return 0
         self.fill_reaches(small, block.rates, limit, block.nodes, block.excess_volume, self.reaches)
-        block.shared_cells, least, voided = self.redistribute(
+        block.redistributed_cells, least, voided = self.redistribute(
             (small, self.reaches), (block.nodes, block.nodes_new), block.excess_volume_new,
             inverse_dt, block.parameters, (tuple(block.list_starts()), block.get_start("carried")),
             (tuple(block.list_new()), block.carried_new, block.rates_new),
@@ -457,7 +457,7 @@ class BlockSharing:
         )  # fmt: skip
         block.totals.add_redistributed(least, voided)
         self._forget(small)
-        return block.shared_cells
+        return block.redistributed_cells
 
 
 class SmallCells:
@@ -469,7 +469,7 @@ class SmallCells:
     def __init__(self, blocks: Blocks, share: float, start: float = 0.0):
         if not 0.0 <= share <= 0.1:
             raise BadInput(f"small_cells = {share:g}; it must be between 0 and 0.1")
-        self.sharing = [BlockSharing(block) for block in blocks]
+        self.redistributions = [BlockRedistribution(block) for block in blocks]
         self.blocks = blocks
         self.scanned: Sequence[Sequence[Any]] = []  # of all blocks, by `scan`
         self.allowed = float(share)
@@ -487,7 +487,7 @@ class SmallCells:
     def find_first_rate(self, t: float) -> float:
         """`find_rate` of states given at t [s]; all blocks must be on this rank and updated."""
         self.set_time(t)
-        self.scanned = [self.scan(number)[:-1] for number in range(len(self.sharing))]
+        self.scanned = [self.scan(number)[:-1] for number in range(len(self.redistributions))]
         return self.find_rate()
 
     def find_rate(self) -> float:
@@ -505,14 +505,14 @@ class SmallCells:
         for number, cut in self.blocks.cuts.items():
             cut.gather_rows(cut.block.rates, above[number])
         left = [
-            [self.sharing[number].find_rate_left(limit, above[number])]
+            [self.redistributions[number].find_rate_left(limit, above[number])]
             for number in self.blocks.own
         ]
-        return max(rate for (rate,) in self.blocks.share_rows(left, 1))
+        return max(rate for (rate,) in self.blocks.exchange_rows(left, 1))
 
     def scan(self, number: int) -> tuple[float, int, int, float, bool]:
         """`scan_state` of a block, collectively with its other ranks if it is cut."""
-        block = self.sharing[number].block
+        block = self.redistributions[number].block
         cut = self.blocks.cuts.get(number)
         if cut is None:
             found = scan_state.entry(
@@ -539,15 +539,15 @@ class SmallCells:
 
     def find_fastest(self) -> None:
         """Find the fastest cell again, for a restored state."""
-        found = [scan_rates(s.block.rates, s.block.crowding, np.inf) for s in self.sharing]
+        found = [scan_rates(s.block.rates, s.block.crowding, np.inf) for s in self.redistributions]
         number = max(range(len(found)), key=lambda n: found[n][0])
         self.fastest = Fastest(found[number][0], number, *found[number][1:3])
 
-    def share_states(self, rate: float, dt: float) -> None:
+    def redistribute_states(self, rate: float, dt: float) -> None:
         """Redistribute the new states of cells above `rate`, for which `dt` is stable."""
         self.changed = 0
-        for sharing in self.sharing:
-            sharing.block.shared_cells = 0  # from the last step, or from this one before a retry
+        for one in self.redistributions:
+            one.block.redistributed_cells = 0  # from the last step, or from this one before a retry
         if self.fastest.rate <= rate * RATE_MARGIN:
             return
         limit = rate * RATE_MARGIN
@@ -557,13 +557,13 @@ class SmallCells:
             for array in (*_list_mended(block), block.rates, *block.list_starts(block.held_arrays)):
                 cut.gather_rows(array, above[number])
         changed = [
-            [self.sharing[number].share(limit, 1.0 / dt, above[number])]
+            [self.redistributions[number].redistribute_rows(limit, 1.0 / dt, above[number])]
             for number in self.blocks.own
         ]
         for number, cut in self.blocks.cuts.items():
             for array in _list_mended(cut.block):
                 cut.return_rows(array, above[number])
-        self.changed = sum(int(count) for (count,) in self.blocks.share_rows(changed, 1))
+        self.changed = sum(int(count) for (count,) in self.blocks.exchange_rows(changed, 1))
 
 
 def _list_mended(block: Block) -> tuple[np.ndarray, ...]:

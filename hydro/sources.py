@@ -20,10 +20,10 @@ from regrid.measure.corners import compute_centres
 
 # (block, x, y, t, dt) -> acceleration x, y [m/s²] and heat per mass over dt [J/kg], for the centres
 # x, y (ni, nj) of the block's cells from t to t + dt
-SourceLaw = Callable[[Block, np.ndarray, np.ndarray, float, float], tuple]
+SourceFunction = Callable[[Block, np.ndarray, np.ndarray, float, float], tuple]
 
 
-def make_gravity(acceleration_x: float, acceleration_y: float) -> SourceLaw:
+def make_gravity(acceleration_x: float, acceleration_y: float) -> SourceFunction:
     """A constant acceleration of all blocks [m/s²], for `source` of a `Simulation`."""
     return lambda block, x, y, t, dt: (acceleration_x, acceleration_y, 0.0)
 
@@ -34,7 +34,7 @@ class BodySource:
     `gained` (3,): momentum x, y [N s/m] and energy [J/m] added in this step.
     """
 
-    def __init__(self, blocks: Blocks, law: SourceLaw | None):
+    def __init__(self, blocks: Blocks, law: SourceFunction | None):
         self.blocks = blocks
         self.law = law
         self.gained = np.zeros(3)
@@ -51,10 +51,10 @@ class BodySource:
         for block in (self.blocks[number] for number in self.blocks.own):
             block.copy_start()
             push, gained = self._apply(block, block.list_starts(), t, 0.5 * dt)
-            pushes.append(block.take_perimeter(push))
+            pushes.append(block.gather_perimeter(push))
             gains.append((*gained, push.any()))
-        pushes = self.blocks.share_starts(pushes)
-        gains = self.blocks.share_rows(gains, 4)
+        pushes = self.blocks.exchange_starts(pushes)
+        gains = self.blocks.exchange_rows(gains, 4)
         for block, push, (*gained, pushed) in zip(self.blocks, pushes, gains, strict=True):
             self.gained += gained
             block.body_acceleration = push if pushed else None
@@ -69,9 +69,9 @@ class BodySource:
             _, gained = self._apply(block, held, t + 0.5 * dt, 0.5 * dt)
             block.totals.add_source(gained, block.is_follower)
             gains.append(gained)
-        for gained in self.blocks.share_rows(gains, 3):
+        for gained in self.blocks.exchange_rows(gains, 3):
             self.gained += gained
-        self.blocks.share_states()
+        self.blocks.exchange_states()
 
     def _apply(
         self, block: Block, held: list[np.ndarray], t: float, dt: float

@@ -242,7 +242,7 @@ def update_states(flow: Flow, dt: float) -> None:
     with flow.watch("flow"):
         # then the inside: slopes, traces, swept volumes, fluxes, new states; small cells share
         flow.blocks.update(dt)
-        flow.small_cells.share_states(flow.clock.cfl / dt, dt)
+        flow.small_cells.redistribute_states(flow.clock.cfl / dt, dt)
 
 
 def move_sides(motion: GridMotion, span: Span) -> None:

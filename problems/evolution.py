@@ -25,7 +25,7 @@ of an Evolution
 - `start_row()`: columns known before the first step
 - `missed`: what a run that ends now has not reached, in a few words; such a run has exit code 3
 - `geometry.curved`: is y the distance from the axis x?
-- `take_cells(state)`: have as many cells as a state of `get_state`, before `set_state` takes it up
+- `adopt_cells(state)`: have as many cells as a state of `get_state`, before `set_state` takes it up
 - `lists_in_state`: names of the arrays of `get_state` with a row for each thing that comes and goes
   (a void, say), which may be more or fewer than when the deck was built
 
@@ -96,9 +96,9 @@ def is_axisymmetric(evolution: Evolution) -> bool:
     return bool(getattr(getattr(evolution, "geometry", None), "curved", False))
 
 
-def take_cells(evolution: Evolution, state: State) -> None:
+def adopt_cells(evolution: Evolution, state: State) -> None:
     """Let the evolution have as many cells as the state, where it can have others."""
-    getattr(evolution, "take_cells", lambda state: None)(state)
+    getattr(evolution, "adopt_cells", lambda state: None)(state)
 
 
 def get_lists_in_state(evolution: Evolution) -> Sequence[str]:

@@ -31,7 +31,7 @@ def find_dump(run_data, t: float):
     return min(run_data.dumps, key=lambda dump: abs(dump.t - t))
 
 
-def spread_dumps(run_data, count: int) -> list:
+def choose_even_dumps(run_data, count: int) -> list:
     """At most so many dumps, evenly spread over the run up to the last one."""
     return run_data.dumps[-1 :: -max(1, len(run_data.dumps) // count)][count - 1 :: -1]
 

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from regrid.algebraic import transfinite_grid as transfinite_grid
     from regrid.barrier.regridder import BarrierRegridder as BarrierRegridder
     from regrid.barrier.repair import repair_grid as repair_grid
-    from regrid.curves import arc_law as arc_law
-    from regrid.curves import clustered_law as clustered_law
-    from regrid.curves import geometric_law as geometric_law
+    from regrid.curves import arc_spacing as arc_spacing
+    from regrid.curves import clustered_spacing as clustered_spacing
+    from regrid.curves import geometric_spacing as geometric_spacing
     from regrid.curves import redistribute as redistribute
-    from regrid.curves import uniform_law as uniform_law
+    from regrid.curves import uniform_spacing as uniform_spacing
     from regrid.domains import make_domain as make_domain
     from regrid.equidistribution.volumes import (
         EquidistributionRegridder3D as EquidistributionRegridder3D,
@@ -52,7 +52,7 @@ NAMES = {
     "regrid.algebraic": "AlgebraicRegridder transfinite_grid",
     "regrid.barrier.regridder": "BarrierRegridder",
     "regrid.barrier.repair": "repair_grid",
-    "regrid.curves": "arc_law clustered_law geometric_law redistribute uniform_law",
+    "regrid.curves": "arc_spacing clustered_spacing geometric_spacing redistribute uniform_spacing",
     "regrid.domains": "make_domain",
     "regrid.equidistribution.volumes": "EquidistributionRegridder3D",
     "regrid.errors": "BadInput RegridFailure",

@@ -30,32 +30,32 @@ from regrid.measure.quality import compute_corner_areas
 from regrid.protocol import RegridReport, RegridResult
 from regrid.sides import copy_sides
 
-# Rows of the scratch: along j, the law on i_min, its change towards i_max, the values on i_min
+# Rows of the scratch: along j, the spacing on i_min, its change towards i_max, the values on i_min
 # and their change towards i_max; then, along i, the same for the sides j_min and j_max.
-LAW, LAW_CHANGE, VALUE_X, VALUE_Y, CHANGE_X, CHANGE_Y = range(6)
+SPACING, SPACING_CHANGE, VALUE_X, VALUE_Y, CHANGE_X, CHANGE_Y = range(6)
 
 
 @kernel
-def fill_arc_law(x, y, law):
-    """Spacing law 0..1 by arc length of the polyline x, y; uniform where the line has no length."""
-    last = law.shape[0] - 1
-    law[0] = 0.0
+def fill_arc_spacing(x, y, spacing):
+    """Spacing 0..1 by arc length of the polyline x, y; uniform where the line has no length."""
+    last = spacing.shape[0] - 1
+    spacing[0] = 0.0
     for k in range(last):
         step_x, step_y = x[k + 1] - x[k], y[k + 1] - y[k]
-        law[k + 1] = law[k] + np.sqrt(step_x * step_x + step_y * step_y)
-    total = law[last]
+        spacing[k + 1] = spacing[k] + np.sqrt(step_x * step_x + step_y * step_y)
+    total = spacing[last]
     for k in range(1, last):
-        law[k] = law[k] / total if total > 0.0 else k / last
-    law[last] = 1.0
+        spacing[k] = spacing[k] / total if total > 0.0 else k / last
+    spacing[last] = 1.0
 
 
 @inlined
 def take_blend(i, along_i, corners):
-    """What the boolean sum (theory R6.4) takes of row i: its law and change, the corner terms."""
+    """What the boolean sum (theory R6.4) takes of row i: its spacing and change, corner terms."""
     low_x, low_y = along_i[VALUE_X, i], along_i[VALUE_Y, i]
     rise_x, rise_y = along_i[CHANGE_X, i], along_i[CHANGE_Y, i]
     return (
-        along_i[LAW, i], along_i[LAW_CHANGE, i],
+        along_i[SPACING, i], along_i[SPACING_CHANGE, i],
         (low_x - corners[0, 0], corners[0, 2] - corners[0, 0]),
         (low_y - corners[1, 0], corners[1, 2] - corners[1, 0]),
         (low_x + rise_x - corners[0, 1], corners[0, 3] - corners[0, 1]),
@@ -65,14 +65,14 @@ def take_blend(i, along_i, corners):
 
 
 @inlined
-def blend(row, law, bend, value_x, value_y, change_x, change_y):
+def blend(row, spacing, bend, value_x, value_y, change_x, change_y):
     """Boolean sum (theory R6.4) of the sides' values at a node: x and y.
 
     `row` is what `take_blend` gives of its row, the others are the rows along j at its column.
     """
     start, turn, under_x, under_y, over_x, over_y, mean_x, mean_y = row
-    blend_i = (start + law * turn) / (1.0 - turn * bend)
-    blend_j = law + blend_i * bend
+    blend_i = (start + spacing * turn) / (1.0 - turn * bend)
+    blend_j = spacing + blend_i * bend
     # Corner terms of the boolean sum, folded into the part that runs along j.
     low_x, low_y = under_x[0] - blend_i * under_x[1], under_y[0] - blend_i * under_y[1]
     high_x, high_y = over_x[0] - blend_i * over_x[1], over_y[0] - blend_i * over_y[1]
@@ -92,75 +92,75 @@ def fill_blend(along_i, along_j, corners, out):
         row_y = out[1, i]
         for j in range(1, out.shape[2] - 1):
             row_x[j], row_y[j] = blend(
-                here, along_j[LAW, j], along_j[LAW_CHANGE, j], along_j[VALUE_X, j],
+                here, along_j[SPACING, j], along_j[SPACING_CHANGE, j], along_j[VALUE_X, j],
                 along_j[VALUE_Y, j], along_j[CHANGE_X, j], along_j[CHANGE_Y, j],
             )  # fmt: skip
 
 
 @kernel
-def fill_tables(laws_of, values, moved, along_i, along_j, corners):
+def fill_tables(spacings_of, values, moved, along_i, along_j, corners):
     """Rows, as named above, of the values on the four sides of `values`; their corners and mean.
 
-    `laws_of` (2, ni+1, nj+1) is a grid whose sides give the spacing laws; where `moved`, its sides
+    `spacings_of` (2, ni+1, nj+1) is a grid whose sides give the spacings; where `moved`, its sides
     are taken from those of `values` (same shape).  `along_i` (6, ni+1), `along_j` (6, nj+1),
     `corners` (2, 5): (0, 0), (0, nj), (ni, 0), (ni, nj), and the mean that the values are beyond.
     """
     ni, nj = values.shape[1] - 1, values.shape[2] - 1
     part = 1.0 if moved else 0.0
-    # The value rows first hold the sides of the grid, for the laws.
-    for j, law in ((0, LAW), (nj, LAW_CHANGE)):
+    # The value rows first hold the sides of the grid, for the spacings.
+    for j, row in ((0, SPACING), (nj, SPACING_CHANGE)):
         for i in range(ni + 1):
-            along_i[VALUE_X, i] = laws_of[0, i, j]
-            along_i[VALUE_Y, i] = laws_of[1, i, j]
-        fill_arc_law(along_i[VALUE_X], along_i[VALUE_Y], along_i[law])
-    for i, law in ((0, LAW), (ni, LAW_CHANGE)):
-        fill_arc_law(laws_of[0, i], laws_of[1, i], along_j[law])
+            along_i[VALUE_X, i] = spacings_of[0, i, j]
+            along_i[VALUE_Y, i] = spacings_of[1, i, j]
+        fill_arc_spacing(along_i[VALUE_X], along_i[VALUE_Y], along_i[row])
+    for i, row in ((0, SPACING), (ni, SPACING_CHANGE)):
+        fill_arc_spacing(spacings_of[0, i], spacings_of[1, i], along_j[row])
     for k in range(2):
         own = values[k]
-        laws = laws_of[k]
+        spacings = spacings_of[k]
         value = VALUE_X + k
         change = CHANGE_X + k
-        first, second = own[0, 0] - part * laws[0, 0], own[0, nj] - part * laws[0, nj]
-        third = own[ni, 0] - part * laws[ni, 0]
-        fourth = own[ni, nj] - part * laws[ni, nj]
+        first, second = own[0, 0] - part * spacings[0, 0], own[0, nj] - part * spacings[0, nj]
+        third = own[ni, 0] - part * spacings[ni, 0]
+        fourth = own[ni, nj] - part * spacings[ni, nj]
         # The mean is symmetric in the corners, so that a mirrored or transposed block gets the
         # same bits, and is the value itself where all agree: a block moved bodily keeps its shape.
         mean = 0.25 * ((first + fourth) + (second + third))
         for i in range(ni + 1):
-            low = own[i, 0] - part * laws[i, 0]
+            low = own[i, 0] - part * spacings[i, 0]
             along_i[value, i] = low - mean
-            along_i[change, i] = (own[i, nj] - part * laws[i, nj]) - low
+            along_i[change, i] = (own[i, nj] - part * spacings[i, nj]) - low
         for j in range(nj + 1):
-            low = own[0, j] - part * laws[0, j]
+            low = own[0, j] - part * spacings[0, j]
             along_j[value, j] = low - mean
-            along_j[change, j] = (own[ni, j] - part * laws[ni, j]) - low
+            along_j[change, j] = (own[ni, j] - part * spacings[ni, j]) - low
         corners[k, 0] = along_j[value, 0]
         corners[k, 1] = along_j[value, nj]
         corners[k, 2] = along_j[value, 0] + along_j[change, 0]
         corners[k, 3] = along_j[value, nj] + along_j[change, nj]
         corners[k, 4] = mean
     for i in range(ni + 1):
-        along_i[LAW_CHANGE, i] -= along_i[LAW, i]
+        along_i[SPACING_CHANGE, i] -= along_i[SPACING, i]
     for j in range(nj + 1):
-        along_j[LAW_CHANGE, j] -= along_j[LAW, j]
+        along_j[SPACING_CHANGE, j] -= along_j[SPACING, j]
 
 
 @kernel
-def fill_from_sides(laws_of, out):
+def fill_from_sides(spacings_of, out):
     """Interpolate the values on the four sides of `out` to its inner nodes.
 
-    `laws_of` (2, ni+1, nj+1) is a grid whose sides give the spacing laws; the sides of `out`
+    `spacings_of` (2, ni+1, nj+1) is a grid whose sides give the spacings; the sides of `out`
     (same shape) are left as they are.
     """
     along_i, along_j = np.empty((6, out.shape[1])), np.empty((6, out.shape[2]))
     corners = np.empty((2, 5))
-    fill_tables(laws_of, out, False, along_i, along_j, corners)
+    fill_tables(spacings_of, out, False, along_i, along_j, corners)
     fill_blend(along_i, along_j, corners, out)
 
 
 @kernel
 def fill_displacement(previous, boundary, out):
-    """Carry the boundary's displacement `boundary - previous` into the block, by the old laws.
+    """Carry the boundary's displacement `boundary - previous` into the block, by the old spacings.
 
     `out` (2, ni+1, nj+1) is written everywhere; equal displacements on all sides come out as they
     are, and a displacement that is affine along a graded rectangle is affine inside.
@@ -183,7 +183,7 @@ class SideMotion(NamedTuple):
     """How the sides of a grid move, and the new `sides` (2, ni+1, nj+1) [m].
 
     `along_i`, `along_j` and `corners` are those of `fill_tables`.  Lines j = const that keep
-    spacing laws of their own (theory R4.9) take their part of the change `turn` (2, nj+1) of their
+    spacings of their own (theory R4.9) take their part of the change `turn` (2, nj+1) of their
     way from i_min to i_max; `reach` (nj+1) is the most that this is on each line.
     """
 
@@ -199,7 +199,7 @@ class SideMotion(NamedTuple):
 def prepare_motion(old, motion, most_bend, bent):
     """Fill the tables of a `SideMotion` from the `old` grid to its sides; theory R6.5.
 
-    Where lines are `bent`, `most_bend` (nj+1) is how far their laws depart at most.
+    Where lines are `bent`, `most_bend` (nj+1) is how far their spacings depart at most.
     """
     sides = motion.sides
     turn = motion.turn
@@ -253,12 +253,12 @@ def fill_quasi_1d(boundary: np.ndarray, out: np.ndarray) -> None:
     Sides are copied from `boundary` (2, ni+1, nj+1), inner nodes of it are not read.
     """
     copy_sides(boundary, out)
-    laws = np.empty((2, out.shape[1]))
+    spacings = np.empty((2, out.shape[1]))
     nj = out.shape[2] - 1
-    for law, j in zip(laws, (0, -1), strict=True):
-        fill_arc_law(*np.ascontiguousarray(boundary[:, :, j]), law)
-    low = laws[0, 1:-1, None]
-    change = (laws[1] - laws[0])[1:-1, None]
+    for spacing, j in zip(spacings, (0, -1), strict=True):
+        fill_arc_spacing(*np.ascontiguousarray(boundary[:, :, j]), spacing)
+    low = spacings[0, 1:-1, None]
+    change = (spacings[1] - spacings[0])[1:-1, None]
     part = low + change * (np.arange(1, nj) / nj)
     first = out[:, :1, 1:-1]
     last = out[:, -1:, 1:-1]

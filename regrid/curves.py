@@ -32,34 +32,34 @@ REFINED_STEP_RATIO = 1.15  # of neighbouring steps where a line is refined towar
 NODES_OF_E_FOLD = 5.0
 
 
-def uniform_law(count: int) -> np.ndarray:
+def uniform_spacing(count: int) -> np.ndarray:
     """`count` equidistant values from 0 to 1."""
     return np.linspace(0.0, 1.0, count)
 
 
-def arc_law(line: np.ndarray) -> np.ndarray:
+def arc_spacing(line: np.ndarray) -> np.ndarray:
     """The present spacing of the nodes of a polyline (2, n), by arc length."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=1)))])
     if not arc[-1] > 0.0:
-        return uniform_law(arc.size)
-    law = arc / arc[-1]
-    law[-1] = 1.0
-    return law
+        return uniform_spacing(arc.size)
+    spacing = arc / arc[-1]
+    spacing[-1] = 1.0
+    return spacing
 
 
-def geometric_law(count: int, ratio: float) -> np.ndarray:
+def geometric_spacing(count: int, ratio: float) -> np.ndarray:
     """Spacing of `count` nodes whose steps grow by the factor `ratio` from one to the next."""
     if not ratio > 0.0:
         raise BadInput(f"spacing: the growth ratio of steps must be positive, got {ratio}")
-    # Powers of the larger end are kept below 1, so that no law overflows.
+    # Powers of the larger end are kept below 1, so that no spacing overflows.
     powers = np.arange(count - 1) - (count - 2 if ratio > 1.0 else 0)
     steps = np.exp(powers * np.log(ratio))
-    law = np.concatenate([[0.0], np.cumsum(steps) / steps.sum()])
-    law[-1] = 1.0
-    return law
+    spacing = np.concatenate([[0.0], np.cumsum(steps) / steps.sum()])
+    spacing[-1] = 1.0
+    return spacing
 
 
-def clustered_law(count: int, first: float, at_end: bool = False) -> np.ndarray:
+def clustered_spacing(count: int, first: float, at_end: bool = False) -> np.ndarray:
     """Geometric spacing whose first step (last, if `at_end`) is `first` of the line."""
     steps = count - 1
     if not 0.0 < first < 1.0 or steps < 2:
@@ -69,7 +69,7 @@ def clustered_law(count: int, first: float, at_end: bool = False) -> np.ndarray:
         )
 
     def excess(log_ratio: float) -> float:
-        # First step of the law, as a logarithm: monotone in the ratio, and exact near 1.
+        # First step of the spacing, as a logarithm: monotone in the ratio, and exact near 1.
         if abs(log_ratio) < 1e-12:
             return -np.log(steps) - np.log(first)
         growth = np.log(np.expm1(abs(log_ratio)) / -np.expm1(-steps * abs(log_ratio)))
@@ -80,14 +80,14 @@ def clustered_law(count: int, first: float, at_end: bool = False) -> np.ndarray:
     while excess(bound) > 0.0 or excess(-bound) < 0.0:
         bound *= 2.0
     ratio = find_root(excess, -bound, bound, xtol=1e-15)
-    law = geometric_law(count, float(np.exp(ratio)))
-    return (1.0 - law)[::-1] if at_end else law
+    spacing = geometric_spacing(count, float(np.exp(ratio)))
+    return (1.0 - spacing)[::-1] if at_end else spacing
 
 
 @kernel
-def fill_grown_law(least, length, at_end, law):
+def fill_grown_spacing(least, length, at_end, spacing):
     """Law (n,) of a line whose steps grow from `least` at one end, as `meeting_laws` says."""
-    number = law.shape[0] - 1
+    number = spacing.shape[0] - 1
     step = length / number
     q = max(0.0, 1.0 - NODES_OF_E_FOLD / number)
     total = 0.0
@@ -99,24 +99,24 @@ def fill_grown_law(least, length, at_end, law):
     grows = step > least * (1.0 + 1e-9)
     power = 1.0
     position = 0.0
-    law[number if at_end else 0] = 1.0 if at_end else 0.0
+    spacing[number if at_end else 0] = 1.0 if at_end else 0.0
     for k in range(1, number):
         position += far - (far - least) * power if grows else step
         power *= q
         if at_end:
-            law[number - k] = 1.0 - position / length
+            spacing[number - k] = 1.0 - position / length
         else:
-            law[k] = position / length
-    law[0 if at_end else number] = 0.0 if at_end else 1.0
+            spacing[k] = position / length
+    spacing[0 if at_end else number] = 0.0 if at_end else 1.0
 
 
 @kernel
-def fill_refined_law(least, length, at_end, law):
+def fill_refined_spacing(least, length, at_end, spacing):
     """Law (n,) of a line whose steps grow from `least` at one end by RATIO each, then are even.
 
-    Falls back on `fill_grown_law` where even steps would be shorter, or growing ones too few.
+    Falls back on `fill_grown_spacing` where even steps would be shorter, or growing ones too few.
     """
-    number = law.shape[0] - 1
+    number = spacing.shape[0] - 1
     # of the growing steps; the step that comes next
     total = 0.0
     last = least
@@ -128,19 +128,19 @@ def fill_refined_law(least, length, at_end, law):
         total += last
         last *= REFINED_STEP_RATIO
     if even > last or even < least:
-        fill_grown_law(least, length, at_end, law)
+        fill_grown_spacing(least, length, at_end, spacing)
         return
     position = 0.0
     step = least
-    law[number if at_end else 0] = 1.0 if at_end else 0.0
+    spacing[number if at_end else 0] = 1.0 if at_end else 0.0
     for k in range(1, number):
         position += min(step, even)
         step *= REFINED_STEP_RATIO
         if at_end:
-            law[number - k] = 1.0 - position / length
+            spacing[number - k] = 1.0 - position / length
         else:
-            law[k] = position / length
-    law[0 if at_end else number] = 0.0 if at_end else 1.0
+            spacing[k] = position / length
+    spacing[0 if at_end else number] = 0.0 if at_end else 1.0
 
 
 def meeting_laws(
@@ -155,13 +155,13 @@ def meeting_laws(
     both lines grow, by the factor RATIO from one to the next.
     """
     least = min(lengths[0] / (counts[0] - 1), lengths[1] / (counts[1] - 1)) / refinement
-    laws = np.empty(counts[0]), np.empty(counts[1])
+    spacings = np.empty(counts[0]), np.empty(counts[1])
     for end in (0, 1):
         if refinement > 1.0:
-            fill_refined_law(least, lengths[end], end == 0, laws[end])
+            fill_refined_spacing(least, lengths[end], end == 0, spacings[end])
         else:
-            fill_grown_law(least, lengths[end], end == 0, laws[end])
-    return laws
+            fill_grown_spacing(least, lengths[end], end == 0, spacings[end])
+    return spacings
 
 
 def equidistribute(nodes: np.ndarray, weight: np.ndarray, count: int | None = None) -> np.ndarray:
@@ -176,7 +176,7 @@ def equidistribute(nodes: np.ndarray, weight: np.ndarray, count: int | None = No
         raise BadInput("spacing: a weight must be positive, one value a node or one a step")
     on_steps = weight if weight.size < nodes.size else 0.5 * (weight[1:] + weight[:-1])
     integral = np.concatenate([[0.0], np.cumsum(on_steps * np.abs(np.diff(nodes)))])
-    levels = integral[-1] * uniform_law(count or nodes.size)
+    levels = integral[-1] * uniform_spacing(count or nodes.size)
     if weight.size < nodes.size:
         found = np.interp(levels, integral, nodes)
     else:
@@ -223,8 +223,8 @@ def correct_polevikov(nodes: np.ndarray, speed: np.ndarray, floor: float = 1e-6)
     sums = size[1:] + size[:-1]
     if not sums.max() > 0.0:
         return np.linspace(nodes[0], nodes[-1], nodes.size)
-    law = np.concatenate([[0.0], np.cumsum(1.0 / np.maximum(sums, floor * sums.max()))])
-    found = nodes[0] + (nodes[-1] - nodes[0]) * (law / law[-1])
+    spacing = np.concatenate([[0.0], np.cumsum(1.0 / np.maximum(sums, floor * sums.max()))])
+    found = nodes[0] + (nodes[-1] - nodes[0]) * (spacing / spacing[-1])
     found[-1] = nodes[-1]
     return found
 
@@ -322,7 +322,7 @@ TURNING_SMOOTHINGS = 3  # of the turning, over neighbouring segments
 # up to which a line counts as symmetric: parts of the mean segment, and of a segment that is wanted
 SYMMETRIC_SEGMENT = 1e-9
 SYMMETRIC_TURNING = 1e-7
-ROUNDING_OF_LAW = 1e-12  # up to which a law differs from its image by rounding
+ROUNDING_OF_SPACING = 1e-12  # up to which a law differs from its image by rounding
 
 
 @kernel
@@ -363,10 +363,10 @@ def fill_turning(line, closed, wall_first, wall_last, wanted):
 
 
 @kernel
-def fill_turning_law(line, first, turning, closed, wall_first, wall_last, shortest, law):
-    """Spacing law (n,) of a line (2, n): places by length from 0 to 1.
+def fill_turning_spacing(line, first, turning, closed, wall_first, wall_last, shortest, spacing):
+    """Spacing (n,) of a line (2, n): places by length from 0 to 1.
 
-    `first` (n,) is the law where the line bends no more than it did at first, when it had
+    `first` (n,) is the spacing where the line bends no more than it did at first, when it had
     `turning` (n - 1,), see `fill_turning`: a line that only moves along keeps its nodes, so that a
     uniform flow along a bent line stays uniform.  `shortest` [m]: turning asks for no shorter
     segments.  The line is closed (its last node is the first or its periodic image), or ends on
@@ -387,8 +387,8 @@ def fill_turning_law(line, first, turning, closed, wall_first, wall_last, shorte
     even = max(1.0 - total / edges, LEAST_EVEN)
     granted = min(1.0, (1.0 - even) * edges / total) if total > 0.0 else 1.0
     # the number of segments up to node k, and the places where it is whole
-    law[0] = 0.0
-    law[edges] = 1.0
+    spacing[0] = 0.0
+    spacing[edges] = 1.0
     done = 0.0
     following = 1
     place = 0
@@ -402,19 +402,19 @@ def fill_turning_law(line, first, turning, closed, wall_first, wall_last, shorte
         after = even * evenly + granted * done
         while following < edges and following <= after:
             part = (following - before) / (after - before)
-            law[following] = (arc[k] + part * (arc[k + 1] - arc[k])) / arc[edges]
+            spacing[following] = (arc[k] + part * (arc[k + 1] - arc[k])) / arc[edges]
             following += 1
         before = after
     for k in range(following, edges):  # round-off at the end
-        law[k] = 1.0 - (edges - k) * (1.0 - law[following - 1]) / (edges - following + 1)
-    even_out_law(arc, first, wanted, law)
+        spacing[k] = 1.0 - (edges - k) * (1.0 - spacing[following - 1]) / (edges - following + 1)
+    even_out_spacing(arc, first, wanted, spacing)
 
 
 @kernel
-def even_out_law(arc, first, wanted, law):
-    """Make a law (n,) symmetric where its line is so up to rounding; theory R9.
+def even_out_spacing(arc, first, wanted, spacing):
+    """Make a spacing (n,) symmetric where its line is so up to rounding; theory R9.
 
-    arc [m], first law (n,), wanted (n - 1,) segments: of the line, see `fill_turning_law`.  Laws by
+    arc [m], first spacing (n,), wanted (n - 1,) segments: of the line, see `fill_turning_spacing`.  Spacings by
     turning magnify rounding step by step where a line has too few nodes for its turning.
     """
     edges = arc.shape[0] - 1
@@ -430,11 +430,11 @@ def even_out_law(arc, first, wanted, law):
             return
     departure = 0.0
     for k in range(edges // 2 + 1):
-        departure = max(departure, abs(law[k] - (1.0 - law[edges - k])))
-    if departure > ROUNDING_OF_LAW:
+        departure = max(departure, abs(spacing[k] - (1.0 - spacing[edges - k])))
+    if departure > ROUNDING_OF_SPACING:
         for k in range(edges // 2 + 1):
-            law[k] = 0.5 * (law[k] + (1.0 - law[edges - k]))
-            law[edges - k] = 1.0 - law[k]
+            spacing[k] = 0.5 * (spacing[k] + (1.0 - spacing[edges - k]))
+            spacing[edges - k] = 1.0 - spacing[k]
 
 
 SHAPES = ("chord", "spline")
@@ -452,18 +452,18 @@ def fill_arc_lengths(line, arc):
 
 
 @kernel
-def fill_positions(arc, law, first, last, relax, positions):
+def fill_positions(arc, spacing, first, last, relax, positions):
     """Arc lengths at which the nodes first..last are wanted; False when they are not increasing.
 
-    Between the two key nodes the wanted place follows `law`; a node goes there by the part `relax`
-    (theory R9.1).
+    Between the two key nodes the wanted place follows `spacing`; a node goes there by the part
+    `relax` (theory R9.1).
     """
     length = arc[last] - arc[first]
-    span = law[last] - law[first]
+    span = spacing[last] - spacing[first]
     positions[first] = arc[first]
     positions[last] = arc[last]
     for k in range(first + 1, last):
-        wanted = arc[first] + length * ((law[k] - law[first]) / span)
+        wanted = arc[first] + length * ((spacing[k] - spacing[first]) / span)
         positions[k] = arc[k] + relax * (wanted - arc[k])
     increasing = True
     for k in range(first, last):
@@ -589,14 +589,14 @@ def fill_on_spline(line, arc, positions, second, first, last, out):
 
 
 @kernel
-def fill_redistributed(line, spacing, keys, spline, closed, walls, work, out):
+def fill_redistributed(line, target, keys, spline, closed, walls, work, out):
     """Nodes of `line` redistributed between the key nodes `keys`; see `redistribute`.
 
-    spacing: positions (n,) and the fraction of the way to them that nodes go; walls: their normals
+    target: a spacing (n,) and the fraction of the way to it that nodes go; walls: their normals
     at both ends; `work` (6, n) is scratch.  Returns -1, or the first key node of the segment in
     which nodes would cross.
     """
-    law, relax = spacing
+    spacing, relax = target
     wall_first, wall_last = walls
     count = line.shape[1]
     arc = work[0]
@@ -610,7 +610,7 @@ def fill_redistributed(line, spacing, keys, spline, closed, walls, work, out):
     for segment in range(keys.shape[0] - 1):
         first = keys[segment]
         last = keys[segment + 1]
-        if not fill_positions(arc, law, first, last, relax, positions):
+        if not fill_positions(arc, spacing, first, last, relax, positions):
             return first
         if spline and closed and keys.shape[0] == 2 and last > 1:
             fill_closed_curvatures(line, arc, eliminated, second)
@@ -636,7 +636,7 @@ def compute_arc_lengths(line: np.ndarray) -> np.ndarray:
 
 def redistribute(
     line: np.ndarray,
-    law: np.ndarray | None = None,
+    spacing: np.ndarray | None = None,
     keys: Sequence[int] = (),
     shape: str = "chord",
     relax: float = 1.0,
@@ -645,7 +645,7 @@ def redistribute(
 ) -> np.ndarray:
     """Respace the nodes of a polyline along it; returns the new line (2, n).
 
-    `law` (n,) increases strictly (None: uniform between key nodes); between two key nodes its
+    `spacing` (n,) increases strictly (None: uniform between key nodes); between two key nodes its
     values are scaled to the arc length there.  `keys` are indices of inner nodes that stay; the
     ends always do.  `relax` in 0..1 is the fraction of the way to the spacing.  shape "chord" keeps
     nodes on the polyline, "spline" on the cubic spline by chord length, which breaks at key nodes
@@ -657,9 +657,11 @@ def redistribute(
     """
     line = np.ascontiguousarray(line, dtype=np.float64)
     count = line.shape[1]
-    law = np.arange(count, dtype=np.float64) if law is None else np.ascontiguousarray(law)
-    if law.shape != (count,):
-        raise BadInput(f"line: a spacing of {law.size} values cannot place {count} nodes")
+    spacing = (
+        np.arange(count, dtype=np.float64) if spacing is None else np.ascontiguousarray(spacing)
+    )
+    if spacing.shape != (count,):
+        raise BadInput(f"line: a spacing of {spacing.size} values cannot place {count} nodes")
     if shape not in SHAPES:
         raise BadInput(f"line: shape must be one of {', '.join(SHAPES)}, got '{shape}'")
     if not 0.0 <= relax <= 1.0:
@@ -670,9 +672,9 @@ def redistribute(
     out = np.empty_like(line)
     work = np.empty((6, count))
     wall_first, wall_last = ((float(wall[0]), float(wall[1])) for wall in walls)
-    spacing = law, float(relax)
+    target = spacing, float(relax)
     normals = wall_first, wall_last
-    failed = fill_redistributed(line, spacing, ends, shape == "spline", closed, normals, work, out)
+    failed = fill_redistributed(line, target, ends, shape == "spline", closed, normals, work, out)
     if failed >= 0:
         raise make_crossing(failed)
     return out

@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from regrid.algebraic import transfinite_grid
-from regrid.curves import arc_law, clustered_law
+from regrid.curves import arc_spacing, clustered_spacing
 from regrid.errors import BadInput, suggest
 from regrid.sides import SIDE_NAMES, copy_sides
 
@@ -81,12 +81,12 @@ def transpose_nodes(nodes: np.ndarray) -> np.ndarray:
 
 
 def distribute_by_arc_length(
-    curve: np.ndarray, count: int, law: np.ndarray | None = None
+    curve: np.ndarray, count: int, spacing: np.ndarray | None = None
 ) -> np.ndarray:
-    """`count` nodes on the fine polyline `curve` (2, n) with its ends, equidistant or by `law`."""
+    """`count` nodes on the fine polyline `curve` (2, n) with its ends, even or by `spacing`."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=1)))])
-    law = np.linspace(0.0, 1.0, count) if law is None else law
-    line = np.array([np.interp(law * arc[-1], arc, part) for part in curve])
+    spacing = np.linspace(0.0, 1.0, count) if spacing is None else spacing
+    line = np.array([np.interp(spacing * arc[-1], arc, part) for part in curve])
     line[:, 0] = curve[:, 0]
     line[:, -1] = curve[:, -1]
     return line
@@ -108,16 +108,16 @@ def march_line(
     The side's ends may slide along the straight sides j_min and j_max, whose spacing is kept.
     """
     count = start.shape[2]
-    law_low, law_high = (arc_law(start[:, :, j]) for j in (0, -1))
+    spacing_low, spacing_high = (arc_spacing(start[:, :, j]) for j in (0, -1))
 
     def sides(amplitude: float) -> np.ndarray:
         nodes = np.full_like(start, np.nan)
         nodes[:, -1] = start[:, -1]
         nodes[:, 0] = distribute_by_arc_length(curve_at(amplitude), count)
-        for j, law in ((0, law_low), (-1, law_high)):
+        for j, spacing in ((0, spacing_low), (-1, spacing_high)):
             foot = nodes[:, 0, j]
             top = nodes[:, -1, j]
-            nodes[:, :, j] = foot[:, None] + law * (top - foot)[:, None]
+            nodes[:, :, j] = foot[:, None] + spacing * (top - foot)[:, None]
             nodes[:, 0, j] = foot
             nodes[:, -1, j] = top
         return nodes
@@ -324,7 +324,7 @@ def strip(ni: int = 120, nj: int = 40) -> MovingDomain:
 
     The interface is a cosine of one wavelength across the width 1, amplitude up to 0.5.
     """
-    heights = 100.0 * clustered_law(ni + 1, 0.01 / nj)
+    heights = 100.0 * clustered_spacing(ni + 1, 0.01 / nj)
     start = make_box(1.0, heights, np.linspace(0.0, 1.0, nj + 1))
     return _graph("strip", ni, nj, start, lambda x: 0.5 * np.cos(2.0 * np.pi * x))
 

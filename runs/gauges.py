@@ -106,11 +106,11 @@ class Places:
             j = np.array([b, np.minimum(b + 1, nj - 1)])[[0, 0, 1, 1]]
             weights = np.array([(1 - s) * (1 - t), s * (1 - t), (1 - s) * t, s * t])
             own = self.cell[:, chosen]
-            corners = take_cells(block, fields, i, j)
+            corners = read_cells(block, fields, i, j)
             for name in fields:
                 result = (weights * corners[name]).sum(axis=0)
                 if name in POSITIVE and (bad := ~(result > 0.0)).any():
-                    result[bad] = take_cells(block, [name], own[0][bad], own[1][bad])[name]
+                    result[bad] = read_cells(block, [name], own[0][bad], own[1][bad])[name]
                 values[name][chosen] = result
         return values
 
@@ -176,7 +176,7 @@ def _check_fields(points: Sequence[Gauge], blocks: Sequence[BlockView]) -> None:
                     )
 
 
-def take_cells(
+def read_cells(
     block: BlockView, fields: Iterable[str], i: np.ndarray, j: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Fields of the cells [i, j], shaped as i; of a flow's block nothing else is computed."""

@@ -14,7 +14,7 @@ from collections import defaultdict
 import numpy as np
 
 from builders import get_bits, march
-from hydro.ranks.cutting import share_blocks
+from hydro.ranks.cutting import distribute_blocks
 from hydro.ranks.ranks import END, STEP, Ranks, hear, tell
 from hydro.simulation import Simulation
 from regrid.errors import RunFailure
@@ -185,8 +185,8 @@ def march_on_ranks(size: int, build, steps: int, look=lambda simulation: None, p
         simulation = built[comm.rank]
         blocks = simulation.blocks
         whole = dict.fromkeys(range(len(blocks)), 1)
-        there = places or share_blocks([(b.ni, b.nj) for b in blocks], size, whole).places
-        simulation.spread(Ranks(comm, blocks, there))
+        there = places or distribute_blocks([(b.ni, b.nj) for b in blocks], size, whole).places
+        simulation.use_ranks(Ranks(comm, blocks, there))
         for block in blocks:
             spoil(block)
         if comm.rank:

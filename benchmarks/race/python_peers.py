@@ -20,7 +20,7 @@ LENGTHS = (2.0, 2.0)  # of the domain on both sides of the interface; waves leav
 SAMPLES = 16  # of a cell's height, where the interface cuts it
 
 
-def find_share(x_face: np.ndarray, y_face: np.ndarray, a0: float) -> np.ndarray:
+def find_volume_factor(x_face: np.ndarray, y_face: np.ndarray, a0: float) -> np.ndarray:
     """Share of each cell beyond the line x = a0 cos(2 pi y), shape (nx, ny)."""
     within = (np.arange(SAMPLES) + 0.5) / SAMPLES
     y = y_face[:-1, None] + np.diff(y_face)[:, None] * within
@@ -37,7 +37,7 @@ def start(name: str, numbers: dict, x_face: np.ndarray, y_face: np.ndarray) -> n
         # the front stands before the crest, and t = 0 is when it meets the mean interface
         shock = x_shock(numbers)
         left, right, heavy = (np.array(numbers[key]) for key in ("left", "right", "heavy"))
-        share = find_share(x_face, y_face, numbers["a0"])
+        share = find_volume_factor(x_face, y_face, numbers["a0"])
         state = right[:, None, None] + (heavy - right)[:, None, None] * share
         state = np.where(x < shock, left[:, None, None], state)
         rho, u, p = state

@@ -70,7 +70,7 @@ def gather(values, rim):
 
 
 @compiled_once(allocates=False)
-def spread_ghosts(rim, row, field):
+def place_ghosts(rim, row, field):
     """Write a row of ghosts of the rim into the layer around a field (ni + 2, nj + 2)."""
     ni = field.shape[0] - 2
     nj = field.shape[1] - 2
@@ -126,8 +126,12 @@ def make_predict(geometry: Geometry):
         )
 
     @compiled_once(allocates=False)
-    def fill_slope(field, state, nodes, i, j, half_dt, measures, centres, slopes):
-        """Bounded slopes of a field in a cell, and its value there at mid-time."""
+    def fill_slope(field, state, nodes, i, j, half_dt, lines, slopes):
+        """Bounded slopes of a field in a cell, and its value there at mid-time.
+
+        lines: what `measure_cell` has filled, measures and centres.
+        """
+        measures, centres = lines
         a, b, c, d = find_corners(nodes, i, j)
         line_i, line_j, area = compute_line_geometry(a, b, c, d)
         inverse = 1.0 / area
@@ -163,12 +167,14 @@ def make_predict(geometry: Geometry):
         slopes[SLOPE_Y, i, j] = slope_y
 
     @kernel(allocates=False)
-    def predict(values, state, nodes, rim, half_dt, rows, measures, centres, slopes):
+    def predict(values, state, nodes, rim, half_dt, rows, scratch):
         """Slopes (n, 3, ni, nj) of fields (n, ni + 2, nj + 2) in the cells that a step reads.
 
         These are the rows first..last - 1 of cells of `rows`, one more on either side, and the
-        cells along all sides.  measures (4, ni + 2, nj + 2), centres (2, ni, nj): scratch.
+        cells along all sides.  scratch: measures (4, ni + 2, nj + 2), centres (2, ni, nj) and the
+        slopes, which are filled.
         """
+        measures, centres, slopes = scratch
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         first, last = rows
@@ -180,16 +186,23 @@ def make_predict(geometry: Geometry):
             for j in range(nj):
                 if near or j < 2 or j >= nj - 2:
                     measure_cell(nodes, i, j, measures, centres)
-        spread_ghosts(rim, on.LENGTH_GHOST, measures[LENGTH_I])
-        spread_ghosts(rim, on.LENGTH_GHOST, measures[LENGTH_J])
+        place_ghosts(rim, on.LENGTH_GHOST, measures[LENGTH_I])
+        place_ghosts(rim, on.LENGTH_GHOST, measures[LENGTH_J])
         for q in range(values.shape[0]):
-            spread_ghosts(rim, on.find_carried_row(q) + on.CARRIED_GHOST, values[q])
+            place_ghosts(rim, on.find_carried_row(q) + on.CARRIED_GHOST, values[q])
             for i in range(ni):
                 near = low <= i < high or i == 0 or i == ni - 1
                 for j in range(nj):
                     if near or j == 0 or j == nj - 1:
                         fill_slope(
-                            values[q], state, nodes, i, j, half_dt, measures, centres, slopes[q]
+                            values[q],
+                            state,
+                            nodes,
+                            i,
+                            j,
+                            half_dt,
+                            (measures, centres),
+                            slopes[q],
                         )
 
     return predict
@@ -280,16 +293,17 @@ def make_carry(geometry: Geometry):
         return (after - before) + (above - below)
 
     @kernel
-    def carry(values, state, grids, excess, rim, masses, dt, rows, scratch):
+    def carry(values, state, grids, sides, masses, dt, rows, scratch):
         """New values of fields after a step.
 
         values: old and new fields (n, ni + 2, nj + 2); state (4, ni + 2, nj + 2) at the start;
-        grids: nodes (2, ni + 1, nj + 1) before and after; excess (faces,): volumes of cells along
-        the sides beyond their straight faces, at the start; masses: rates of mass through the
-        faces, (ni + 1, nj) towards +i and (ni, nj + 1) towards +j; rows: the first row of cells and
-        the one after the last; scratch: slopes and centres of `predict`.
+        grids: nodes (2, ni + 1, nj + 1) before and after; sides: the rim, and volumes (faces,) of
+        cells along the sides beyond their straight faces, at the start; masses: rates of mass
+        through the faces, (ni + 1, nj) towards +i and (ni, nj + 1) towards +j; rows: the first row
+        of cells and the one after the last; scratch: slopes and centres of `predict`.
         """
         old, new = values
+        rim, excess = sides
         nodes = grids[0]
         mass_i, mass_j = masses
         slopes, centres = scratch
@@ -347,7 +361,7 @@ class Transport:
         """Phase 2, after the couplings: slopes and values at mid-time."""
         make_predict(block.geometry)(
             block.get_start("carried"), block.start, block.nodes, block.rim.rows, half_dt,
-            (block.rows.start, block.rows.stop), self.measures, self.centres, self.slopes,
+            (block.rows.start, block.rows.stop), (self.measures, self.centres, self.slopes),
         )  # fmt: skip
 
     def trace(self, block: Any) -> None:
@@ -358,6 +372,6 @@ class Transport:
         """Phase 6, after the flow's update: the new values."""
         make_carry(block.geometry)(
             (block.get_start("carried"), block.carried_new), block.start,
-            (block.nodes, block.nodes_new), block.excess_volume, block.rim.rows, self.masses, dt,
+            (block.nodes, block.nodes_new), (block.rim.rows, block.excess_volume), self.masses, dt,
             (block.rows.start, block.rows.stop), (self.slopes, self.centres),
         )  # fmt: skip

@@ -486,7 +486,7 @@ def measure_gradient(x: np.ndarray, u: np.ndarray, ends: np.ndarray) -> np.ndarr
     return 0.5 * (at_nodes[1:] + at_nodes[:-1])
 
 
-def move_by_law(
+def move_by_equation(
     x: np.ndarray, steep: np.ndarray, dt: float, tau: float, strength: float
 ) -> np.ndarray:
     """Nodes after `dt` at speeds s: `tau W s_qq + (w x_q)_q = 0`, w from the gradient `steep`.
@@ -559,7 +559,7 @@ class FrontColumn:
         else:
             steep = measure_gradient(x, self.u, ends(t))
             if self.family == "law":
-                target = move_by_law(x, steep, dt, placing.tau, placing.strength)
+                target = move_by_equation(x, steep, dt, placing.tau, placing.strength)
             else:
                 target = placing.correct(x, steep)
         step = step_front(x, target, self.u, viscosity, t, dt, ends)

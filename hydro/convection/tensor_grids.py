@@ -98,17 +98,17 @@ def make_clustered_axis(
         raise BadInput(f"clustering = {clustering}: the strength must lie between 0 and 20")
     if walls == "both":
         q = np.linspace(-1.0, 1.0, n + 1)
-        law = 0.5 * (1.0 + np.tanh(clustering * q) / np.tanh(clustering))
+        spacing = 0.5 * (1.0 + np.tanh(clustering * q) / np.tanh(clustering))
     else:
         q = np.linspace(0.0, 1.0, n + 1)
-        law = np.tanh(clustering * q) / np.tanh(clustering)  # clustered at the high end
-        law = 1.0 - law[::-1] if walls == "low" else law
-    if np.diff(law).min() < THINNEST_SPACING:
+        spacing = np.tanh(clustering * q) / np.tanh(clustering)  # clustered at the high end
+        spacing = 1.0 - spacing[::-1] if walls == "low" else spacing
+    if np.diff(spacing).min() < THINNEST_SPACING:
         raise BadInput(
-            f"clustering = {clustering:g} makes a step of {np.diff(law).min():.0e} of the axis at "
-            f"the wall with {n} cells, lost in round-off; take a smaller one (2 is usual)"
+            f"clustering = {clustering:g} makes a step of {np.diff(spacing).min():.0e} of the axis "
+            f"at the wall with {n} cells, lost in round-off; take a smaller one (2 is usual)"
         )
-    x = low + (high - low) * law
+    x = low + (high - low) * spacing
     x[0] = low
     x[-1] = high
     return x
@@ -316,8 +316,8 @@ def bound_steps(x: np.ndarray, ratio: float) -> np.ndarray:
         towards = -1 if order.step > 0 else 1
         for k in order:
             steps[k] = min(steps[k], ratio * steps[k + towards])
-    law = np.append(0.0, np.cumsum(steps))
-    placed = x[0] + (x[-1] - x[0]) * (law / law[-1])
+    spacing = np.append(0.0, np.cumsum(steps))
+    placed = x[0] + (x[-1] - x[0]) * (spacing / spacing[-1])
     placed[-1] = x[-1]
     return placed
 

@@ -158,7 +158,7 @@ def move_velocity(u, v, u_x, u_y, v_x, v_y, way_x, way_y):
 
 
 @inlined
-def spread_half_step(rho_half, p_half, rho, v, c2, y, half_dt):
+def thin_half_step(rho_half, p_half, rho, v, c2, y, half_dt):
     """Contribution of the divergence v/y of radial motion to predicted density and pressure."""
     thinning = half_dt * (v / y) * rho
     return rho_half - thinning, p_half - thinning * c2

@@ -18,7 +18,7 @@ docs/notes/decisions.md.
 from __future__ import annotations
 
 from hydro import rim as on
-from hydro.formulas.geometry import move_velocity, spread_half_step, weigh_differences
+from hydro.formulas.geometry import move_velocity, thin_half_step, weigh_differences
 from hydro.formulas.reconstruction import (
     compose_from,
     compute_acoustic_weight,
@@ -193,7 +193,7 @@ def make_slopes(limit, relaxed, geometry, switch):
                 (rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y), half_dt,
             )  # fmt: skip
             if curved:
-                rho_half, p_half = spread_half_step(rho_half, p_half, rho, v, c2, y, half_dt)
+                rho_half, p_half = thin_half_step(rho_half, p_half, rho, v, c2, y, half_dt)
             Z[at.RHO_X + k] = rho_x
             Z[at.RHO_Y + k] = rho_y
             Z[at.U_X + k] = u_x

@@ -36,7 +36,7 @@ SPARING_HALVINGS = 5  # of that motion, where it would crush a polygon cell
 
 NO_COUNTS = (0, 0, 0, 0, 0, 0, math.inf)  # of a block that was not regridded
 
-MeshLaw = Callable[[str, float], np.ndarray]
+MeshMotion = Callable[[str, float], np.ndarray]
 
 
 class GridMotion:
@@ -49,7 +49,7 @@ class GridMotion:
         self,
         blocks: Blocks,
         exchange: Exchange,
-        mesh: str | MeshLaw,
+        mesh: str | MeshMotion,
         make_regridder: Callable[[], object] | None,
         rule: LineRule,
     ):
@@ -58,7 +58,7 @@ class GridMotion:
         self.mesh = mesh
         self.exchange = exchange
         self.regridders = _make_regridders(make_regridder, blocks) if mesh == "regrid" else []
-        self.spread(blocks)
+        self.use_ranks(blocks)
         self.flow_aware = [find_flow_aware(regridder) for regridder in self.regridders]
         self.cost_aware = [sees_cost(regridder) for regridder in self.regridders]
         self.reports: list[RegridReport | None] = [None] * len(blocks)
@@ -74,7 +74,7 @@ class GridMotion:
         else:
             _refuse_flow(blocks, mesh)
 
-    def spread(self, blocks: Blocks) -> None:
+    def use_ranks(self, blocks: Blocks) -> None:
         """Regrid those of these blocks that are here alone, by their workers."""
         self.blocks = blocks
         for regridder in self.regridders:
@@ -153,7 +153,7 @@ class GridMotion:
             rows += [(*known, *self._count(own))]
         self.quality = []
         self.counts = []
-        for row in self.blocks.share_nodes(rows, number, failure):
+        for row in self.blocks.exchange_nodes(rows, number, failure):
             self.quality += [row[:4]]
             self.counts += [row[4:]]
         if callable(self.mesh):

@@ -140,7 +140,7 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, shaping, walls):
     spacing (n,), scratch for another (n,), turning (n - 1,), scratch (8, n).  shaping: how far to
     the spacing the nodes go, `relax` (not spread where it is 0, nor written below), is the curve a
     spline, do nodes move beside their neighbours' chords, is it periodic, is it closed, and the
-    shortest segment that turning asks for (0: none, as of `fill_turning_law`).  walls at both ends
+    shortest segment that turning asks for (0: none, as of `fill_turning_spacing`).  walls at both ends
     as in `fill_redistributed`.  Returns the stretching, and what that returns: below 0 if all is
     well.  No node is spread faster than sound: in a step that a thin cell elsewhere makes very
     short, a part of the way would be a jump.
@@ -158,7 +158,7 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, shaping, walls):
     if relax < 0.0:
         return stretching, -1
     if shortest > 0.0 and relax > 0.0:
-        curves.fill_turning_law(
+        curves.fill_turning_spacing(
             moved, spacing, turning, closed, walls[0], walls[1], shortest, turned
         )
     for end in range(2):
@@ -300,7 +300,7 @@ class Line:
         self.rule = rule
         line = np.ascontiguousarray(segment.line(segment.block.nodes))
         self.track = Track(line)
-        self.spacing = curves.arc_law(line)
+        self.spacing = curves.arc_spacing(line)
         self.last_spacing = None  # where it changes on the way
         if rule.respacing is not None and segment.side in ("j_min", "j_max"):
             self.last_spacing = rule.respacing.spacings.get(segment.block.name)

@@ -313,7 +313,7 @@ def make_side_kernels(
             trace_faces(rim, parameters, spans[number, 0], spans[number, 1])
 
     @compiled_once(allocates=False)
-    def spread_ghosts(rim, state):
+    def place_ghosts(rim, state):
         """Write the ghosts into the layer around a block's state."""
         ni = state.shape[1] - 2
         nj = state.shape[2] - 2
@@ -339,7 +339,7 @@ def make_side_kernels(
 
         old: state, void energy and nodes, as `advance` of `hydro.interior.advance` takes them.
         """
-        spread_ghosts(rim, old[0])
+        place_ghosts(rim, old[0])
         predict(old, half_dt, parameters, scratch[0], rim)
         # at mid-time these faces are half a step further: traced there, not where they were
         trace_moving(rim, half_dt, parameters, moving)

@@ -66,9 +66,9 @@ class Blocks(list[Block]):
             rows.append(row)
             if not good and (reason := self[number].find_failure()):
                 break
-        return self.share_new_states(rows, number, reason)
+        return self.exchange_new_states(rows, number, reason)
 
-    def share_nodes(self, rows: Sequence[Row], number: int, failure: RunFailure | None) -> Table:
+    def exchange_nodes(self, rows: Sequence[Row], number: int, failure: RunFailure | None) -> Table:
         """The new nodes along the sides of all blocks, for everybody, and a row of NODE_ROW
         numbers for every block, from those of one's own.
 
@@ -76,26 +76,26 @@ class Blocks(list[Block]):
         """
         return _give_or_raise(rows, failure)
 
-    def share_new_states(
+    def exchange_new_states(
         self, rows: Sequence[Row], number: int, failure: RunFailure | None
     ) -> Table:
         """The new states along the sides and the sums of all blocks, for everybody, and rows of
-        STATE_ROW numbers; raises like `share_nodes`."""
+        STATE_ROW numbers; raises like `exchange_nodes`."""
         return _give_or_raise(rows, failure)
 
-    def share_states(self) -> None:
+    def exchange_states(self) -> None:
         """The states along the sides and the sums again, where something has acted on them."""
 
-    def share_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def exchange_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
         """The states that a step starts from, along the sides; the accelerations (2, faces) by a
         body source of all blocks, from those of one's own."""
         return list(pushes)
 
-    def share_rows(self, rows: Sequence[Row], width: int) -> Table:
+    def exchange_rows(self, rows: Sequence[Row], width: int) -> Table:
         """A row of `width` numbers for every block, from those of one's own blocks."""
         return rows
 
-    def share_pieces(self, rows: Sequence[Row], width: int) -> Table:
+    def exchange_pieces(self, rows: Sequence[Row], width: int) -> Table:
         """A row of `width` numbers for every piece, in the order of blocks and rows of cells."""
         return rows
 

@@ -39,7 +39,7 @@ class Piece(NamedTuple):
     last: int
 
 
-class Shares(NamedTuple):
+class Distribution(NamedTuple):
     """The ranks of each block, its owner first, and the bounds of their bands, as rows of cells."""
 
     places: list[tuple[int, ...]]
@@ -51,7 +51,7 @@ def count_tile_rows(ni: int) -> int:
     return -(-ni // TILE_ROWS)
 
 
-def spread_evenly(tile_rows: int, bands: int) -> list[int]:
+def divide_evenly(tile_rows: int, bands: int) -> list[int]:
     """Rows of tiles in each of so many bands; the first have one more where it does not come out.
 
     Raises ValueError for more bands than rows, or none.
@@ -66,12 +66,12 @@ def find_bounds(ni: int, tile_rows: Sequence[int]) -> tuple[int, ...]:
     return (0, *(min(ni, TILE_ROWS * stop) for stop in accumulate(tile_rows)))
 
 
-def share_blocks(
+def distribute_blocks(
     cells: Sequence[tuple[int, int]],
     ranks: int,
     wanted: Mapping[int, int] | None = None,
     whole: Sequence[int] = (),
-) -> Shares:
+) -> Distribution:
     """Share blocks of these numbers of cells (ni, nj) among ranks, the largest block first.
 
     wanted: by a block's number, among how many ranks it is to be cut at most; a block that is not
@@ -94,7 +94,7 @@ def share_blocks(
         order = sorted(range(ranks), key=lambda r: (loads[r], r))
         bands = 1 if number in whole else min(wanted.get(number, rows), rows, ranks)
         if number in wanted or bands == 1:
-            taken = spread_evenly(rows, bands)
+            taken = divide_evenly(rows, bands)
         elif size > MOST_UNCUT * fair:
             taken = _fill_up(rows, size / rows, [fair - loads[r] for r in order])
         else:
@@ -109,7 +109,7 @@ def share_blocks(
         for k, rank in enumerate(there):
             first, last = bounds[number][k : k + 2]
             loads[rank] += (last - first) * cells[number][1]
-    return Shares(places, bounds)
+    return Distribution(places, bounds)
 
 
 def _fill_up(rows: int, size: float, room: Sequence[float]) -> list[int]:
@@ -136,7 +136,7 @@ def _fill_up(rows: int, size: float, room: Sequence[float]) -> list[int]:
     return taken
 
 
-def sum_cells(cells: Sequence[tuple[int, int]], shares: Shares, ranks: int) -> list[int]:
+def sum_cells(cells: Sequence[tuple[int, int]], shares: Distribution, ranks: int) -> list[int]:
     """Cells that each rank updates."""
     loads = [0] * ranks
     for (_, nj), there, rows in zip(cells, shares.places, shares.bounds, strict=True):
@@ -221,7 +221,7 @@ class CutBlock:
         need[0] = (0, 0)
         self.send_rows(self.block.nodes_new, self._for_home((0, ni + 1)), need)
 
-    def share_ghost_rows(self) -> None:
+    def exchange_ghost_rows(self) -> None:
         """Give every rank the new states of its ghost rows."""
         ni = self.block.ni
         block = self.block

@@ -109,7 +109,9 @@ class Message:
         self.received = np.zeros(sum(self.counts))
         self.sent = np.zeros(self.counts[comm.rank])
 
-    def share(self, rows: Sequence[Sequence[float]] = (), code: float = NO_FAILURE) -> int | None:
+    def exchange(
+        self, rows: Sequence[Sequence[float]] = (), code: float = NO_FAILURE
+    ) -> int | None:
         """Send one's own items, with a row for each that has one; write the others' into theirs.
 
         Where a rank's code is a failure, nothing is written; returns the rank whose code is least.

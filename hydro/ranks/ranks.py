@@ -37,8 +37,8 @@ from hydro.ranks.cutting import (
     Piece,
     Rows,
     count_tile_rows,
+    divide_evenly,
     find_bounds,
-    spread_evenly,
 )
 from hydro.rows import TOTAL_ROWS
 from regrid.errors import RunFailure
@@ -163,12 +163,12 @@ class Ranks(Blocks):
     ) -> RunFailure | None:
         """Send a message; the failure of the least number on all ranks, where there is one."""
         code = messages.NO_FAILURE if failure is None else float(number + 1)
-        first = message.share(rows, code)
+        first = message.exchange(rows, code)
         if first is None:
             return None
         return self.comm.bcast(failure if first == self.rank else None, root=first)
 
-    def share_nodes(self, rows: Sequence[Row], number: int, failure: RunFailure | None) -> Table:
+    def exchange_nodes(self, rows: Sequence[Row], number: int, failure: RunFailure | None) -> Table:
         found = self._exchange(self._nodes, rows, number, failure)
         if found is not None:
             raise found
@@ -176,7 +176,7 @@ class Ranks(Blocks):
             cut.send_nodes()
         return self._nodes.get_rows()
 
-    def share_new_states(
+    def exchange_new_states(
         self, rows: Sequence[Row], number: int, failure: RunFailure | None
     ) -> Table:
         found = self._exchange(self._new_states, rows, number, failure)
@@ -184,11 +184,11 @@ class Ranks(Blocks):
             raise found
         self._take_sums()
         for cut in self.cuts.values():
-            cut.share_ghost_rows()
+            cut.exchange_ghost_rows()
         return self._new_states.get_rows()
 
-    def share_states(self) -> None:
-        self._states.share()
+    def exchange_states(self) -> None:
+        self._states.exchange()
         self._take_sums()
 
     def _take_sums(self) -> None:
@@ -196,7 +196,7 @@ class Ranks(Blocks):
             if owner != self.rank:
                 self[number].totals.read_array()
 
-    def share_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def exchange_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
         if self._starts is None:
             self._pushes = [np.zeros((2, block.rim.faces)) for block in self]
             pushed = [(lambda _, push=push: push, np.arange(push.size)) for push in self._pushes]
@@ -204,17 +204,17 @@ class Ranks(Blocks):
             self._starts = self._make("sources", parts)
         for number, push in zip(self.own, pushes, strict=True):
             self._pushes[number][...] = push
-        self._starts.share()
+        self._starts.exchange()
         return self._pushes
 
-    def share_rows(self, rows: Sequence[Row], width: int) -> Table:
+    def exchange_rows(self, rows: Sequence[Row], width: int) -> Table:
         table = self._gather_table(rows, width, self._own_counts)
         found: list[list[float]] = [[]] * len(self)
         for number, row in zip(self._order, table, strict=True):
             found[number] = row
         return found
 
-    def share_pieces(self, rows: Sequence[Row], width: int) -> Table:
+    def exchange_pieces(self, rows: Sequence[Row], width: int) -> Table:
         ranks = self._ranks_of_pieces
         counts = [ranks.count(k) for k in range(self.size)]
         table = self._gather_table(rows, width, counts)
@@ -249,7 +249,7 @@ class Ranks(Blocks):
         super().update(dt)
         for number, cut in self.cuts.items():
             if number in self._polygons:  # done by all ranks of the block
-                self._polygons[number].share()
+                self._polygons[number].exchange()
                 phases.fill_polygons(cut.block)
             cut.bring_totals()
 
@@ -401,6 +401,6 @@ def _find_all_bounds(
     if bounds is not None:
         return [tuple(found) for found in bounds]
     return [
-        find_bounds(block.ni, spread_evenly(count_tile_rows(block.ni), len(there)))
+        find_bounds(block.ni, divide_evenly(count_tile_rows(block.ni), len(there)))
         for block, there in zip(blocks, places, strict=True)
     ]

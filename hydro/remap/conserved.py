@@ -30,8 +30,8 @@ from hydro.remap.overlay import (
     SLOPE_Y,
     Overlay,
     compute_cell_moments,
-    lay_over,
     make_linear_fields,
+    overlay_grids,
 )
 from hydro.rows import HELD_ARRAYS, RHO, P, U, V
 from regrid.errors import BadInput, Place, RunFailure
@@ -236,7 +236,7 @@ def remap_means(
     """
     _, centres = compute_cell_moments(nodes, curved)
     fields = make_linear_fields(means, nodes, centres)
-    return fill_in(lay_over(nodes, centres, fields, new_nodes, curved), fields, centres)
+    return fill_in(overlay_grids(nodes, centres, fields, new_nodes, curved), fields, centres)
 
 
 def remap_state(
@@ -264,7 +264,7 @@ def remap_state(
     fields = make_linear_fields(conserved, nodes, centres)
     lessen_slopes(eos, fields, nodes, centres)
     for _ in range(2):
-        overlay = lay_over(nodes, centres, fields, new_nodes, curved)
+        overlay = overlay_grids(nodes, centres, fields, new_nodes, curved)
         content, slivers = share_slivers(overlay, fields, volumes, centres, new_nodes)
         if max(slivers.given, slivers.borrowed) > MOST_SLIVERS * volumes.sum():
             raise BadInput(

@@ -32,7 +32,7 @@ from scipy.ndimage import map_coordinates
 from hydro import phases
 from hydro.block import Block
 from hydro.boundary import NodeMotion
-from hydro.motion.grid_motion import GridMotion, MeshLaw
+from hydro.motion.grid_motion import GridMotion, MeshMotion
 from hydro.motion.line import Line, StraightLine
 from hydro.remap.conserved import Slivers, remap_state
 from hydro.simulation import Simulation
@@ -43,7 +43,7 @@ from regrid.protocol import call_regridder
 from regrid.sides import SIDE_NAMES
 
 
-def spread_anew(line: np.ndarray, spacing: np.ndarray, new_spacing: np.ndarray) -> np.ndarray:
+def respace_line(line: np.ndarray, spacing: np.ndarray, new_spacing: np.ndarray) -> np.ndarray:
     """Nodes (2, m) on the polyline `line` (2, n) [m], the ends the same.
 
     spacing (n,), new_spacing (m,): of both, from 0 to 1, increasing.
@@ -191,7 +191,7 @@ def _lay_line(before: Line, line: Line, t: float) -> None:
             target[:, 1:-1] = line.track.spread(target[:, 0], target[:, -1], spacing)[:, 1:-1]
         return
     curve = before.segment.line(before.segment.block.nodes)
-    spread = spread_anew(curve, before.find_spacing(t), spacing)
+    spread = respace_line(curve, before.find_spacing(t), spacing)
     miss = target[:, [0, -1]] - spread[:, [0, -1]]  # ends that went on to a finer track
     spread += miss[:, :1] * (1.0 - spacing) + miss[:, 1:] * spacing
     target[:, 1:-1] = spread[:, 1:-1]
@@ -239,7 +239,7 @@ def settle_grid(
 
 
 def _follow_law(
-    blocks: list[Block], new_blocks: list[Block], law: MeshLaw, new_law: MeshLaw, t: float
+    blocks: list[Block], new_blocks: list[Block], law: MeshMotion, new_law: MeshMotion, t: float
 ) -> None:
     """Grids of a prescribed motion at the old time; one that depends on the flow is sampled."""
     for one, other in zip(blocks, new_blocks, strict=True):
@@ -252,7 +252,7 @@ def _follow_law(
             first = other.side_line(side, other.nodes)
             before = one.side_line(side, one.nodes)
             even = np.linspace(0.0, 1.0, before.shape[1])
-            sides[side] = spread_anew(before, even, np.linspace(0.0, 1.0, first.shape[1]))
+            sides[side] = respace_line(before, even, np.linspace(0.0, 1.0, first.shape[1]))
         places = sample_grid(one.nodes, sides)
         other.nodes[...] = [map_coordinates(row, places, order=1) for row in one.nodes]
 

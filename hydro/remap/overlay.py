@@ -415,7 +415,7 @@ class Overlay:
     centres: np.ndarray
 
 
-def lay_over(
+def overlay_grids(
     nodes: np.ndarray,
     centres: np.ndarray,
     fields: np.ndarray,

@@ -39,7 +39,7 @@ from hydro.sliding.pieces import (
     fill_surface,
 )
 from hydro.sliding.polygons import make_add_closing_flux, make_fill_excess_volume
-from regrid.curves import arc_law
+from regrid.curves import arc_spacing
 from regrid.errors import BadInput
 from regrid.measure.crossings import find_self_crossing
 
@@ -237,7 +237,8 @@ class SlidingContact:
         if not (np.diff(positions) > 0.0).all():
             raise BadInput(f"sliding: {follower[0]} and {leader[0]} do not lie along each other")
         self.carries = bool(follower[0].block.carried_fields)
-        self.first_spacing = arc_law(np.ascontiguousarray(other))
+        self.first_spacing = arc_spacing(np.ascontiguousarray(other))
+        self.first_spacing = arc_spacing(np.ascontiguousarray(other))
         self.refinement = 1.0  # how many times shorter the steps at a contact point are
         self.fixed_new = self.fixed.copy()
         self.follower.write_line(points, new=False)

@@ -13,7 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydro.block import Block
-from problems.pictures import Colours, draw_field, draw_grid, draw_lines, make_panels, spread_dumps
+from problems.pictures import (
+    Colours,
+    choose_even_dumps,
+    draw_field,
+    draw_grid,
+    draw_lines,
+    make_panels,
+)
 from problems.problem import Report, Row, fit_slope, reduce_between
 from problems.references.hugoniot import caution_fit, shock_to_pressure
 from problems.references.shock_polars import CrossedLine
@@ -327,7 +334,7 @@ class Results:
         grid = figure.add_gridspec(2, 2, height_ratios=(1.25, 1.0))
         shape = figure.add_subplot(grid[0, :])
         amplitude, growth = (figure.add_subplot(grid[1, column]) for column in (0, 1))
-        dumps = spread_dumps(run, MOST_SHOWN_DUMPS)
+        dumps = choose_even_dumps(run, MOST_SHOWN_DUMPS)
         k = self.ripple.wavenumber
         for shade, dump in zip(np.linspace(0.0, 0.9, len(dumps)), dumps, strict=True):
             line = MM * dump.block("cone").nodes[:, :, -1]
@@ -406,7 +413,7 @@ class Results:
         tops = [float(dump["cone"].p.max()) for dump in run.dumps]
         shares = [float(np.interp(dump.t, t, share)) for dump in run.dumps]
         most = run.dumps[int(np.argmax(shares if max(shares) > 0.0 else tops))]
-        for dump in spread_dumps(run, MOST_SHOWN_DUMPS)[1:]:
+        for dump in choose_even_dumps(run, MOST_SHOWN_DUMPS)[1:]:
             rho = dump["cone"].rho.ravel()
             p = GPA * dump["cone"].p.ravel()
             states.plot(rho, p, ".", ms=1.5, zorder=2, label=f"{US * dump.t:.3g} µs")
@@ -449,7 +456,7 @@ class Results:
     def draw_cone_side(self, figure, run) -> None:
         """The line between graphite and lead, and its departure from its own straight line."""
         shape, away = make_panels(figure, 9.5, 4.0, 1, 2)
-        for dump in spread_dumps(run, MOST_SHOWN_DUMPS):
+        for dump in choose_even_dumps(run, MOST_SHOWN_DUMPS):
             line = dump.block("cone").nodes[:, :, -1]
             label = f"{US * dump.t:.2g} µs"
             departure, part = measure_departure(line)

@@ -376,7 +376,7 @@ class InterfaceInstability(Results, Problem):
         laws = {}
         ways = []
         for name, length in zip(("first", "second"), self.choose_lengths(), strict=True):
-            law = self.spacing.make_last_law(length)
+            law = self.spacing.make_last_spacing(length)
             ways.append(np.abs(law * length - self.spacing.make(length)).max())
             laws[name] = law if name == "second" else (1.0 - law)[::-1]
         start = (

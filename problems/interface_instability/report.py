@@ -18,12 +18,12 @@ from problems.interface_instability.theories import (
 )
 from problems.pictures import (
     Colours,
+    choose_even_dumps,
     compute_rates,
     draw_field,
     draw_lines,
     find_dump,
     name_axis,
-    spread_dumps,
 )
 from problems.problem import Report, Row, fit_slope
 from regrid.measure.corners import compute_centres
@@ -317,7 +317,7 @@ class Results:
         rate.set(xlabel=time_label, ylabel="(da/dt) / (k a0)")
         windows = []
         shown = []
-        dumps = spread_dumps(run, SHOWN_TIMES)
+        dumps = choose_even_dumps(run, SHOWN_TIMES)
         margin = 0.05 * self.deck.wavelength
         lines = [dump.blocks[0].nodes[:, -1, :] for dump in dumps]
         # all panels are as wide as the widest needs

@@ -77,7 +77,7 @@ class Spacing:
         )
         return steps[np.cumsum(steps) <= length]
 
-    def make_last_law(self, length: float) -> np.ndarray:
+    def make_last_spacing(self, length: float) -> np.ndarray:
         """Places (n,), from 0 at the interface to 1, of the nodes when no cell is finer."""
         last = Spacing(self.deck).make(length)
         nodes = np.linspace(0.0, last.size - 1.0, self.make(length).size)

@@ -39,7 +39,7 @@ from problems.references.shock_polars import (
     release_driven_plate,
     solve_collision,
 )
-from regrid.curves import arc_law, clustered_law, meeting_laws
+from regrid.curves import arc_spacing, clustered_spacing, meeting_laws
 
 Cells = Annotated[int, Meta(ge=1, le=MOST_CELLS)]
 
@@ -225,7 +225,7 @@ class PlateOnWedge(Results, Problem):
         along = np.concatenate((edge, 1.0 + face[1:]))
         ends = (0.0, deck.edge, self.end[0]), (0.0, 0.0, self.end[1])
         top = np.array([np.interp(along, (0.0, 1.0, 2.0), places) for places in ends])
-        bottom = np.array([arc_law(top) * self.end[0], np.full(top.shape[1], self.base)])
+        bottom = np.array([arc_spacing(top) * self.end[0], np.full(top.shape[1], self.base)])
         part = self.lay_rows(max(6, round(deck.depth / self.coarse_spacing)), 1.0, from_end=True)
         grids["wedge"] = bottom[:, :, None] * (1.0 - part) + top[:, :, None] * part
         if self.flyer_rows:
@@ -239,7 +239,7 @@ class PlateOnWedge(Results, Problem):
         if self.refinement <= 1.0:
             return np.linspace(0.0, length, rows + 1)
         least = 1.0 / (rows * self.refinement**FINER_ROWS)
-        return length * clustered_law(rows + 1, least, from_end)
+        return length * clustered_spacing(rows + 1, least, from_end)
 
     def estimate_cells(self) -> int:
         """Cells of all blocks, counted from the sizes that the deck asks for."""

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from problems.pictures import Colours, compute_rates, draw_field, make_panels, spread_dumps
+from problems.pictures import Colours, choose_even_dumps, compute_rates, draw_field, make_panels
 from problems.problem import Report, Row
 from problems.references.hugoniot import caution_fit
 from problems.references.shock_polars import compute_jet_speed
@@ -292,7 +292,7 @@ SHADES = ("#c9d4e2", "#8c99a8", "#e2cfa9")
 
 def _make_panels(figure, run) -> list[tuple]:
     """Panels of one frame in rows of three, each with a dump, evenly over the run."""
-    dumps = spread_dumps(run, SHOWN_PLATE_TIMES)
+    dumps = choose_even_dumps(run, SHOWN_PLATE_TIMES)
     columns = min(3, len(dumps))
     shape = -(-len(dumps) // columns), columns
     frames = make_panels(

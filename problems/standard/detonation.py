@@ -26,7 +26,7 @@ from hydro.eos import JWL
 from hydro.eos.materials import find_material
 from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from problems.initial_states import put_walls
-from problems.pictures import draw_profiles, make_panels, spread_dumps
+from problems.pictures import choose_even_dumps, draw_profiles, make_panels
 from problems.problem import (
     BlockPlan,
     Problem,
@@ -147,7 +147,7 @@ class Detonation(Problem):
     def draw_detonation(self, figure, run_data) -> None:
         """Pressure along the lower side at several times, the place of the front over time."""
         left, right = make_panels(figure, 11.5, 4.6, 1, 2)
-        draw_profiles(left, spread_dumps(run_data, 5), "p", 1e9, self.wave)
+        draw_profiles(left, choose_even_dumps(run_data, 5), "p", 1e9, self.wave)
         left.axhline(1e-9 * self.pressure, color="k", ls="--", lw=0.8, label="pCJ")
         left.set(xlabel="x [mm]", ylabel="pressure [GPa]")
         left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)

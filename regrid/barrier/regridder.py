@@ -26,11 +26,11 @@ from regrid.errors import BadInput, RegridFailure
 from regrid.measure.crossings import find_crossing
 from regrid.measure.cuts import Cuts, take_cuts
 from regrid.measure.faults import (
+    convert_grids,
+    convert_nodes,
+    convert_numbers,
     explain_failure,
     find_unit,
-    take_grids,
-    take_nodes,
-    take_numbers,
 )
 from regrid.protocol import RegridResult
 from regrid.sides import compute_area, copy_sides, get_sides
@@ -188,7 +188,7 @@ class BarrierRegridder:
         if self._sweeps is not None:
             return self._sweeps.regrid(previous, boundary)
         target = boundary
-        previous, boundary = take_grids(previous, boundary)
+        previous, boundary = convert_grids(previous, boundary)
         into = boundary if in_place and boundary is target else None
         if sound_speed is not None:
             sound_speed = _take_sound(sound_speed, previous)
@@ -339,7 +339,7 @@ class BarrierRegridder:
 
         `boundary` (2, ni+1, nj+1; only its sides are read), `sound_speed` (ni, nj) [m/s].
         """
-        boundary = take_nodes(boundary, "boundary")
+        boundary = convert_nodes(boundary, "boundary")
         sound_speed = _take_sound(sound_speed, boundary)
         work = self._workspace(boundary.shape, False)
         first = self.first_grid if self.spacing == "given" else None
@@ -373,7 +373,7 @@ class BarrierRegridder:
 
 def _take_sound(sound_speed, nodes: np.ndarray) -> np.ndarray:
     """The sound speeds of a grid's cells as C-contiguous float64; BadInput for another shape."""
-    sound_speed = take_numbers(sound_speed, "sound_speed")
+    sound_speed = convert_numbers(sound_speed, "sound_speed")
     cells = nodes.shape[1] - 1, nodes.shape[2] - 1
     if sound_speed.shape != cells:
         raise BadInput(

@@ -38,7 +38,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE, fill_laws
-from regrid.curves import arc_law, solve_ed1
+from regrid.curves import arc_spacing, solve_ed1
 from regrid.errors import BadInput, suggest
 from regrid.measure.corners import compute_centres
 from regrid.measure.quality import compute_corner_areas
@@ -475,7 +475,7 @@ def distribute_on_sides(
         if name not in sides:
             continue
         line = np.ascontiguousarray(boundary[side])
-        law = arc_law(line)
+        law = arc_spacing(line)
         if cells is None:
 
             def weight_at(s, line=line, law=law):
@@ -486,7 +486,7 @@ def distribute_on_sides(
             wanted = np.concatenate([[0.0], np.cumsum(1.0 / cells[beside])])
             wanted /= wanted[-1]
         if np.isfinite(most):
-            here = arc_law(np.ascontiguousarray(previous[side]))
+            here = arc_spacing(np.ascontiguousarray(previous[side]))
             steps = np.diff(here)
             reach = most * np.minimum(steps[1:], steps[:-1])
             wanted[1:-1] = here[1:-1] + np.clip(wanted[1:-1] - here[1:-1], -reach, reach)

@@ -18,7 +18,7 @@ import numpy as np
 
 from regrid.errors import BadInput, RegridFailure
 from regrid.jit import kernel
-from regrid.measure.faults import check_size, choose_unit, take_nodes
+from regrid.measure.faults import check_size, choose_unit, convert_nodes
 from regrid.measure.hexahedra import compute_corner_volumes, find_bad_hexahedra
 
 FACES = ("i_min", "i_max", "j_min", "j_max", "k_min", "k_max")
@@ -322,8 +322,8 @@ def check_grids_in_space(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
     Inner nodes of `boundary` are ignored.  BadInput also for blocks too small or too large, and for
     those too far from the origin (`regrid.measure.faults.check_size`).
     """
-    previous = take_nodes(previous, "previous", "ijk")
-    boundary = take_nodes(boundary, "boundary", "ijk")
+    previous = convert_nodes(previous, "previous", "ijk")
+    boundary = convert_nodes(boundary, "boundary", "ijk")
     if previous.shape != boundary.shape:
         raise BadInput(
             f"regrid: previous has shape {previous.shape}, boundary {boundary.shape}; "

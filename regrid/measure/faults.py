@@ -45,14 +45,14 @@ def name_cells(cells: np.ndarray, most: int = 4) -> str:
     return named + (f" and {len(cells) - most} more" if len(cells) > most else "")
 
 
-def take_grids(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
+def convert_grids(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
     """Both as C-contiguous float64 of shape (2, ni+1, nj+1), in m; themselves where they are.
 
     Raises BadInput for what is no array of real numbers, for shapes that do not fit, for blocks
     outside LEAST_SIZE to MOST_SIZE, and for those too far from the origin.
     """
-    previous = take_nodes(previous, "previous")
-    boundary = take_nodes(boundary, "boundary")
+    previous = convert_nodes(previous, "previous")
+    boundary = convert_nodes(boundary, "boundary")
     if previous.shape != boundary.shape:
         raise BadInput(
             f"regrid: previous has shape {previous.shape}, boundary {boundary.shape}; "
@@ -64,9 +64,9 @@ def take_grids(previous, boundary) -> tuple[np.ndarray, np.ndarray]:
     return previous, boundary
 
 
-def take_nodes(nodes, name: str, axes: str = "ij") -> np.ndarray:
+def convert_nodes(nodes, name: str, axes: str = "ij") -> np.ndarray:
     """A grid as C-contiguous float64; BadInput, with its `name`, for what is none of these axes."""
-    nodes = take_numbers(nodes, name)
+    nodes = convert_numbers(nodes, name)
     shape = nodes.shape
     dimensions = len(axes)
     if len(shape) != dimensions + 1 or shape[0] != dimensions or min(shape) < 2:
@@ -76,7 +76,7 @@ def take_nodes(nodes, name: str, axes: str = "ij") -> np.ndarray:
     return nodes
 
 
-def take_numbers(values, name: str) -> np.ndarray:
+def convert_numbers(values, name: str) -> np.ndarray:
     """`values` as C-contiguous float64 of any shape; BadInput for what is no real numbers."""
     if type(values) is np.ndarray and values.dtype == FLOAT64 and values.flags.carray:
         return values
@@ -414,11 +414,11 @@ def _worst_cell(nodes: np.ndarray) -> tuple[int, int]:
 
 
 def check_grids(previous: np.ndarray, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both as `take_grids` makes them.
+    """Both as `convert_grids` makes them.
 
     BadInput for what is no grid, RegridFailure for sides that are not finite or cross.
     """
-    previous, boundary = take_grids(previous, boundary)
+    previous, boundary = convert_grids(previous, boundary)
     if not np.isfinite(previous).all():
         raise BadInput("regrid: the previous grid has nodes that are not finite numbers")
     if not all(np.isfinite(side).all() for side in get_sides(boundary)):

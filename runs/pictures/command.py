@@ -157,7 +157,7 @@ def fill_figure(
         dumps = choose_pairs(runs, at, say)
         titles = name_paths(runs)
         lineouts = [
-            curves.take_lineouts(dumps[k :: len(runs)], names, way, view, say)
+            curves.sample_lineouts(dumps[k :: len(runs)], names, way, view, say)
             for k in range(len(runs))
         ]
         curves.draw_lineouts(figure, lineouts, names, titles)

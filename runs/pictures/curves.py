@@ -176,7 +176,7 @@ def find_pieces(nodes: np.ndarray, line: Line) -> tuple[np.ndarray, np.ndarray]:
     return cells, np.stack([enter, leave], axis=-1)[cells[:, 0], cells[:, 1]]
 
 
-def take_lineouts(
+def sample_lineouts(
     dumps: Sequence[Dump],
     names: Sequence[str],
     line: Line,

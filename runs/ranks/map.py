@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from hydro.interior.advance import TILE_ROWS
-from hydro.ranks.cutting import Shares, share_blocks, sum_cells
+from hydro.ranks.cutting import Distribution, distribute_blocks, sum_cells
 from hydro.ranks.messages import CELLS_DEEP
 from hydro.simulation import Simulation
 from problems.problem import estimate_memory
@@ -19,12 +19,12 @@ def check_cut(cut: Mapping[str, int], names: Sequence[str]) -> None:
             raise BadInput(f"deck: run.cut: there is no block {name!r}{suggest(name, names)}")
 
 
-def share_named_blocks(
+def distribute_named_blocks(
     blocks: Sequence[tuple[str, Sequence[int]]],
     ranks: int,
     cut: Mapping[str, int],
     whole: bool = False,
-) -> Shares:
+) -> Distribution:
     """Share blocks, given as names and cells (ni, nj), among ranks; whole: none can be cut.
 
     Raises BadInput where `cut` names a block that there is not.
@@ -33,16 +33,16 @@ def share_named_blocks(
     check_cut(cut, names)
     wanted = {names.index(name): count for name, count in cut.items()}
     cells = [(int(ni), int(nj)) for _, (ni, nj) in blocks]
-    return share_blocks(cells, ranks, wanted, range(len(cells)) if whole else ())
+    return distribute_blocks(cells, ranks, wanted, range(len(cells)) if whole else ())
 
 
-def share_evolution(evolution: Simulation, ranks: int, cut: Mapping[str, int]) -> Shares:
+def distribute_evolution(evolution: Simulation, ranks: int, cut: Mapping[str, int]) -> Distribution:
     """Share the blocks of a flow among ranks; those that a body source acts on are not cut.
 
-    What a source adds is summed over whole blocks.  Raises BadInput as `share_named_blocks`.
+    What a source adds is summed over whole blocks.  Raises BadInput as `distribute_named_blocks`.
     """
     blocks = [(block.name, (block.ni, block.nj)) for block in evolution.blocks]
-    return share_named_blocks(blocks, ranks, cut, evolution.flow.source.law is not None)
+    return distribute_named_blocks(blocks, ranks, cut, evolution.flow.source.law is not None)
 
 
 MOST_NAMED_RANKS = 8  # ranks that are told one by one
@@ -56,7 +56,7 @@ def describe_map(
     nobody to wait for.  cut: as in a deck's `run`.
     """
     cells = [(int(ni), int(nj)) for _, (ni, nj) in blocks]
-    shares = share_named_blocks(blocks, ranks, cut)
+    shares = distribute_named_blocks(blocks, ranks, cut)
     loads = sum_cells(cells, shares, ranks)
     total = sum(loads)
     pieces = name_pieces([name for name, _ in blocks], shares, ranks)
@@ -82,7 +82,9 @@ def describe_map(
     return lines
 
 
-def estimate_memories(cells: Sequence[tuple[int, int]], shares: Shares, ranks: int) -> list[float]:
+def estimate_memories(
+    cells: Sequence[tuple[int, int]], shares: Distribution, ranks: int
+) -> list[float]:
     """Bytes that each rank takes at its peak, of blocks with these cells (ni, nj).
 
     The first rank and the owner of a cut block have whole blocks; the others their bands and the
@@ -101,14 +103,14 @@ def estimate_memories(cells: Sequence[tuple[int, int]], shares: Shares, ranks: i
     return [estimate_memory(sum(blocks), blocks) for blocks in held]
 
 
-def describe_shares(names: Sequence[str], shares: Shares, ranks: int) -> str:
+def describe_distribution(names: Sequence[str], shares: Distribution, ranks: int) -> str:
     """One line for run.log, of blocks with these names."""
     pieces = name_pieces(names, shares, ranks)
     lists = [f"{rank}: {', '.join(pieces[rank]) or '-'}" for rank in range(ranks)]
     return f"shared by {ranks} ranks of MPI; blocks of rank {'; '.join(lists)}"
 
 
-def name_pieces(names: Sequence[str], shares: Shares, ranks: int) -> list[list[str]]:
+def name_pieces(names: Sequence[str], shares: Distribution, ranks: int) -> list[list[str]]:
     """What each rank updates, in words: blocks, and rows of those that are cut."""
     pieces: list[list[str]] = [[] for _ in range(ranks)]
     for name, there, bounds in zip(names, shares.places, shares.bounds, strict=True):

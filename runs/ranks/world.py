@@ -21,7 +21,7 @@ import tomllib
 from collections.abc import Callable
 from typing import Any, TextIO
 
-from hydro.ranks.cutting import Shares
+from hydro.ranks.cutting import Distribution
 from hydro.ranks.ranks import COLLECT, COUNT, END, STEP, Ranks, hear, tell
 from hydro.simulation import Simulation
 from hydro.workers import count_processors
@@ -30,7 +30,7 @@ from problems.problem import Problem
 from problems.problem_file import read_problem_file
 from regrid.errors import BadInput, RunFailure
 from runs.deck.reading import ReadDeck, resolve_deck
-from runs.ranks.map import describe_shares, share_evolution
+from runs.ranks.map import describe_distribution, distribute_evolution
 from runs.ranks.started import count_started, find_rank
 from runs.signals import POINT, STOPPING, find_numbers
 from runs.store.dumps import EMPTY
@@ -78,15 +78,15 @@ class World:
         Returns words on who computes what.
         """
         self.check(evolution)
-        shares = share_evolution(evolution, self.size, deck.deck.run.cut)
+        shares = distribute_evolution(evolution, self.size, deck.deck.run.cut)
         state = evolution.get_state() if restored else {}
         self.build(deck)
         self._reads_cells = problem.reads_cells
         self._beginning = True
         tell(self.comm, BEGIN_MESSAGE)
-        _, self.ranks = share_flow(self.comm, evolution, shares, state)
+        _, self.ranks = distribute_flow(self.comm, evolution, shares, state)
         self._beginning = False
-        return describe_shares([block.name for block in evolution.blocks], shares, self.size)
+        return describe_distribution([block.name for block in evolution.blocks], shares, self.size)
 
     def measuring(self) -> contextlib.AbstractContextManager[None]:
         """For the block in which a problem measures: no more is collected than it reads."""
@@ -101,8 +101,8 @@ class World:
         tell(self.comm, END, code)
 
 
-def share_flow(
-    comm: Any, built: Any, shared: Shares | None = None, state: State = EMPTY
+def distribute_flow(
+    comm: Any, built: Any, shared: Distribution | None = None, state: State = EMPTY
 ) -> tuple[Simulation, Ranks]:
     """An evolution that each rank has built, with the first one's state, and the ranks that share
     it.
@@ -122,7 +122,7 @@ def share_flow(
     ranks = Ranks(comm, built.blocks, *shares)
     machines = comm.allgather(platform.node())
     beside = machines.count(platform.node())  # ranks that share the processors of a machine
-    built.spread(ranks, max(1, min(count_processors(), (os.cpu_count() or 1) // beside)))
+    built.use_ranks(ranks, max(1, min(count_processors(), (os.cpu_count() or 1) // beside)))
     return built, ranks
 
 
@@ -206,7 +206,7 @@ def follow(comm: Any, screen: TextIO) -> int:
             word, code = hear(comm)
         if word == END:
             return code
-        evolution, ranks = share_flow(comm, built)
+        evolution, ranks = distribute_flow(comm, built)
         while True:
             word, code = hear(comm)
             if word == END:

@@ -26,7 +26,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from problems.evolution import Evolution, get_lists_in_state, get_start_row, take_cells
+from problems.evolution import Evolution, adopt_cells, get_lists_in_state, get_start_row
 from regrid.errors import BadInput
 from runs.store.directory import RunDirectory
 from runs.store.dumps import has_state, open_dump, read_state
@@ -318,7 +318,7 @@ def restore(
     evolution: Evolution, state: dict[str, Any], directory: RunDirectory, step: int
 ) -> None:
     """Give `state` to a freshly built evolution; BadInput where the two do not fit."""
-    take_cells(evolution, state)
+    adopt_cells(evolution, state)
     expected = evolution.get_state()
     missing = sorted(set(expected) - set(state))
     if missing:

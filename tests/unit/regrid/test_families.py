@@ -7,7 +7,7 @@ from builders import make_tensor_grid, tensor
 from regrid.algebraic import fill_displacement, quasi_1d_grid, transfinite_grid
 from regrid.barrier.tuning import Tuning
 from regrid.barrier.workspace import Workspace
-from regrid.curves import arc_law
+from regrid.curves import arc_spacing
 from regrid.domains import make_domain
 from regrid.protocol import RegridReport
 from regrid.sides import SIDES
@@ -74,7 +74,7 @@ def test_gradient_of_q_vanishes_to_round_off():
     boundary = make_domain("valley", 14, 11).boundary(0.7)
     boundary[1, :, 0] = boundary[1, -1, 0] * np.linspace(0.0, 1.0, 15) ** 1.4
     x = quasi_1d_grid(boundary)
-    low, high = arc_law(x[:, :, 0]), arc_law(x[:, :, -1])
+    low, high = arc_spacing(x[:, :, 0]), arc_spacing(x[:, :, -1])
     law = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, 12)
     q = 1.0 / (14 * np.diff(law, axis=0))
     pull = q * np.diff(x, axis=1)

@@ -6,12 +6,12 @@ from scipy.interpolate import CubicSpline
 
 from regrid import curves as spacing
 from regrid.curves import (
-    arc_law,
-    clustered_law,
+    arc_spacing,
+    clustered_spacing,
     compute_arc_lengths,
-    fill_turning_law,
+    fill_turning_spacing,
     redistribute,
-    uniform_law,
+    uniform_spacing,
 )
 from regrid.measure.quality import measure_turns
 
@@ -20,7 +20,7 @@ from regrid.measure.quality import measure_turns
 def test_straight_line_stays_straight_and_gets_the_law(shape):
     place = np.sort(np.random.default_rng(4).uniform(0.0, 1.0, 25))
     line = np.array([1.0 + 3.0 * place, 2.0 - 4.0 * place])
-    law = clustered_law(25, 0.01)
+    law = clustered_spacing(25, 0.01)
     moved = redistribute(line, law, shape=shape)
     wanted = line[:, :1] + law * (line[:, -1:] - line[:, :1])
     assert np.abs(moved - wanted).max() < 4e-15
@@ -30,7 +30,7 @@ def test_straight_line_stays_straight_and_gets_the_law(shape):
 def test_a_periodic_line_goes_on_into_its_image():
     t = np.arange(61) / 60.0
     line = np.array([2.0 * t + 0.15 * np.sin(4.0 * np.pi * t), 0.8 * np.cos(2.0 * np.pi * t)])
-    law = arc_law(line)
+    law = arc_spacing(line)
     law[1:-1] += 0.004 * np.sin(6.0 * np.pi * t[1:-1])
     moved = redistribute(line, law, shape="spline", closed=True)
     arc = compute_arc_lengths(line)
@@ -63,17 +63,17 @@ def test_nodes_never_pass_each_other(shape):
 
 def test_geometric_law_has_its_ratio():
     for ratio in (0.8, 1.0, 1.3):
-        steps = np.diff(spacing.geometric_law(9, ratio))
+        steps = np.diff(spacing.geometric_spacing(9, ratio))
         assert np.allclose(steps[1:] / steps[:-1], ratio)
-    assert np.isfinite(spacing.geometric_law(2000, 3.0)).all()
+    assert np.isfinite(spacing.geometric_spacing(2000, 3.0)).all()
 
 
 @pytest.mark.parametrize("first", [1e-6, 0.01, 0.1, 0.1 + 1e-9, 0.3])
 def test_clustered_law_begins_with_the_wanted_step(first):
-    law = spacing.clustered_law(11, first)
+    law = spacing.clustered_spacing(11, first)
     assert np.isclose(law[1], first, rtol=1e-9)
     assert law[0] == 0.0 and law[-1] == 1.0 and np.diff(law).min() > 0.0
-    assert np.allclose(spacing.clustered_law(11, first, at_end=True), 1.0 - law[::-1])
+    assert np.allclose(spacing.clustered_spacing(11, first, at_end=True), 1.0 - law[::-1])
 
 
 def test_equidistribution_of_steps_is_exact():
@@ -100,8 +100,8 @@ WALL = (0.0, 1.0)
 def find_law(line, first=None, closed=False, walls=(FREE, FREE), shortest=1e-9):
     count = line.shape[1]
     law = np.empty(count)
-    first = uniform_law(count) if first is None else first
-    fill_turning_law(
+    first = uniform_spacing(count) if first is None else first
+    fill_turning_spacing(
         np.ascontiguousarray(line), first, np.zeros(count - 1), closed, *walls, shortest, law
     )
     assert law[0] == 0.0 and law[-1] == 1.0 and (np.diff(law) > 0.0).all()

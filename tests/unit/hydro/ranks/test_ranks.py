@@ -15,7 +15,7 @@ from builders import two_blocks, wall_off
 from hydro.block import Block
 from hydro.eos import IdealGas
 from hydro.interior.advance import TILE_ROWS
-from hydro.ranks.cutting import MOST_UNCUT, share_blocks, sum_cells
+from hydro.ranks.cutting import MOST_UNCUT, distribute_blocks, sum_cells
 from hydro.ranks.ranks import Ranks
 from hydro.simulation import Simulation
 from hydro.sources import make_gravity
@@ -61,7 +61,7 @@ def check_same(build, steps, sizes=(2, 3), settings=lambda simulation: None):
 )
 def test_whole_blocks_have_one_owner_and_no_rank_has_much_more_than_its_share(sizes, ranks):
     cells = [(1, size) for size in sizes]
-    shares = share_blocks(cells, ranks)
+    shares = distribute_blocks(cells, ranks)
     loads = sum_cells(cells, shares, ranks)
     assert [len(there) for there in shares.places] == [1] * len(sizes)
     assert sum(loads) == sum(sizes)
@@ -69,7 +69,7 @@ def test_whole_blocks_have_one_owner_and_no_rank_has_much_more_than_its_share(si
     assert max(loads) <= sum(sizes) / ranks + max(sizes)
     if len(sizes) <= ranks:
         assert max(loads) == max(sizes)
-    assert shares == share_blocks(cells, ranks)
+    assert shares == distribute_blocks(cells, ranks)
 
 
 def test_interfaces_and_a_junction_on_ranks_of_which_one_has_nothing_to_do():
@@ -142,8 +142,8 @@ sizes = st.lists(st.tuples(st.integers(2, 2000), st.integers(2, 500)), min_size=
 
 @given(sizes, st.integers(1, 9))
 def test_bands_cover_every_block_once_and_are_whole_rows_of_tiles(cells, ranks):
-    shares = share_blocks(cells, ranks)
-    assert shares == share_blocks(cells, ranks)
+    shares = distribute_blocks(cells, ranks)
+    assert shares == distribute_blocks(cells, ranks)
     for (ni, _), there, bounds in zip(cells, *shares, strict=True):
         assert len(there) == len(set(there)) == len(bounds) - 1
         assert bounds[0] == 0 and bounds[-1] == ni and list(bounds) == sorted(set(bounds))
@@ -155,7 +155,7 @@ def test_bands_cover_every_block_once_and_are_whole_rows_of_tiles(cells, ranks):
 @example([(55, 2)], 8)
 @example([(75, 2), (128, 109)], 9)
 def test_blocks_that_are_not_too_big_stay_whole_and_no_rank_has_much_too_much(cells, ranks):
-    shares = share_blocks(cells, ranks)
+    shares = distribute_blocks(cells, ranks)
     fair = sum(ni * nj for ni, nj in cells) / ranks
     for (ni, nj), there in zip(cells, shares.places, strict=True):
         assert len(there) == 1 or ni * nj > MOST_UNCUT * fair
@@ -227,6 +227,6 @@ def test_blocks_that_a_body_source_acts_on_are_not_cut():
     def spread(comm):
         simulation = build_tube(source=make_gravity(0.0, -1.0))
         with pytest.raises(BadInput, match="body source"):
-            simulation.spread(Ranks(comm, simulation.blocks, [(0, 1)]))
+            simulation.use_ranks(Ranks(comm, simulation.blocks, [(0, 1)]))
 
     run_on_threads(2, spread)

@@ -10,7 +10,7 @@ from hydro.eos.conversion import compute_conserved
 from hydro.formulas.geometry import GEOMETRIES, compute_volumes
 from hydro.remap.conserved import is_state, remap_means, remap_state
 from hydro.remap.flow import take_over
-from hydro.remap.overlay import compute_cell_moments, lay_over, make_linear_fields
+from hydro.remap.overlay import compute_cell_moments, make_linear_fields, overlay_grids
 from hydro.simulation import Simulation
 from regrid.errors import BadInput
 
@@ -77,7 +77,7 @@ def test_sums_are_kept_and_no_cell_is_missed(curved):
     new = shake((37, 11), 5)
     means = np.random.default_rng(6).normal(size=(3, 24, 19))
     volumes, centres = compute_cell_moments(old, curved)
-    overlay = lay_over(old, centres, make_linear_fields(means, old, centres), new, curved)
+    overlay = overlay_grids(old, centres, make_linear_fields(means, old, centres), new, curved)
     assert np.abs(overlay.covered[..., 0] / overlay.volumes - 1.0).max() < 1e-13
     assert np.abs(overlay.used[..., 0] / volumes - 1.0).max() < 1e-13
     before = (means * volumes).sum(axis=(1, 2))

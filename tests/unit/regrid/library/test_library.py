@@ -13,9 +13,9 @@ from builders import ROOT
 PUBLIC = """
 AlgebraicRegridder BadInput BarrierRegridder BarrierRegridder3D EquidistributionRegridder3D
 March Quality RegridFailure RegridReport RegridResult
-Regridder arc_law choose_times clustered_law compute_corner_areas find_bad_cells find_start
-geometric_law make_domain make_regridder march march_domain measure_first_line_gap measure_quality
-redistribute repair_grid transfinite_grid uniform_law
+Regridder arc_spacing choose_times clustered_spacing compute_corner_areas find_bad_cells find_start
+geometric_spacing make_domain make_regridder march march_domain measure_first_line_gap
+measure_quality redistribute repair_grid transfinite_grid uniform_spacing
 """
 PAGE = ROOT / "docs" / "regrid-library.md"
 

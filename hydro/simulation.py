@@ -269,6 +269,7 @@ class Simulation:
             raise BadInput(f"the run is at its end already: {self.finished}")
         ranks = self._shared
         clock = self.clock
+        # one step, or a failure that all ranks know
         ranks.begin_step()
         if self.tension.lines:
             clock.tension_dt = self.tension.find_step()
@@ -281,10 +282,12 @@ class Simulation:
             ranks.end_step()
             raise
         self.last_reason = record.reason or self.last_reason
+        # at the end, or with other grid lines from now on
         if record.last:
             self.finished = "t_end reached"
         elif self.refining is not None:
             self._refine(self.refining)
+        # what is measured of it
         row = self.compute_row(record.limit, record.retries)
         if self._measure_block is not None and ranks.size > 1:
             ranks.bring_states()

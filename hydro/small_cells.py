@@ -331,6 +331,7 @@ def make_redistribution(eos_class, geometry: Geometry):
         held_before, carried_before = before
         held, carried, rates = after
         ni, nj = rates.shape
+        # the cells concerned, and what each gives and keeps of its conserved quantities
         touched = [(0, 0)]
         touched.clear()
         mark_neighbourhoods(small, reaches, marks, sizes, touched)
@@ -346,12 +347,14 @@ def make_redistribution(eos_class, geometry: Geometry):
                 amounts[GIVEN, q, i, j] -= amounts[KEPT, q, i, j]
                 amounts[MEAN, q, i, j] = amounts[GIVEN, q, i, j]
                 amounts[SLOPE, q, i, j] = 0.0
+        # means and slopes of the neighbourhoods (theory F7.4)
         fill_means(small, reaches, nodes_new, record)
         fill_slopes(small, reaches, nodes_new, record)
         least = 1e300
         changed = 0
         sums = np.empty((3, amounts.shape[1]))
         total = sums[0]
+        # each cell's new state, from the neighbourhoods that contain it
         for i, j in touched:
             if marks[i, j] == 2:
                 continue
@@ -366,6 +369,7 @@ def make_redistribution(eos_class, geometry: Geometry):
             voided += 1 if is_voided else 0
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
             least = min(least, c2)
+            # its rate, relative to its own mean velocity (theory F7.1)
             xi, yi, xj, yj, area = measure_lines(nodes_new, i, j)
             w_x = w_y = 0.0
             for a, b in ((0, 1), (1, 0)):
@@ -379,6 +383,7 @@ def make_redistribution(eos_class, geometry: Geometry):
             v -= 0.25 * w_y * inverse_dt
             area *= find_volume_factor(nodes_new, excess, i, j, ni, nj)
             rates[i, j], _ = compute_rate(u, v, max(c2, 0.0), xi, yi, xj, yj, 1.0 / area)
+        # the scratch as it was
         for i, j in touched:
             marks[i, j] = 0
         return changed, least, voided
@@ -423,7 +428,8 @@ class BlockRedistribution:
             self.redistribute = make_redistribution(type(block.eos), block.geometry)
         return small
 
-    def _forget(self, small: np.ndarray) -> None:
+    def _clear_reaches(self, small: np.ndarray) -> None:
+        """Make `reaches` zero again, as they are between two uses, at the cells `small` (n, 2)."""
         self.reaches[small[:, 0], small[:, 1]] = 0
 
     def find_rate_left(self, limit: float, rows: Rows) -> float:
@@ -439,7 +445,7 @@ class BlockRedistribution:
         left = self.fill_reaches(
             small, rates, limit, block.nodes, block.excess_volume_new, self.reaches
         )
-        self._forget(small)
+        self._clear_reaches(small)
         return left
 
     def redistribute_rows(self, limit: float, inverse_dt: float, rows: Rows) -> int:
@@ -456,7 +462,7 @@ class BlockRedistribution:
             (self.marks, self.record),
         )  # fmt: skip
         block.totals.add_redistributed(least, voided)
-        self._forget(small)
+        self._clear_reaches(small)
         return block.redistributed_cells
 
 

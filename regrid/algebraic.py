@@ -299,6 +299,8 @@ def fill_curves(sides, share_i, share_j, curve):
     ni, nj = curve.shape[1] - 1, curve.shape[2] - 1
     x, y = sides
     curve[:] = 0.0
+    # lines j = const: shapes of j_min and j_max, mixed, turned and stretched between i_min and
+    # i_max (R4.15)
     if share_i > 0.0:
         line = np.empty((2, ni + 1))
         low = np.empty((2, ni + 1))
@@ -316,6 +318,7 @@ def fill_curves(sides, share_i, share_j, curve):
                 way_x, way_y = x[ni, j] - x[0, j], y[ni, j] - y[0, j]
                 curve[0, i, j] += share_i * (x[0, j] + (along * way_x - across * way_y))
                 curve[1, i, j] += share_i * (y[0, j] + (along * way_y + across * way_x))
+    # lines i = const likewise
     if share_j > 0.0:
         low, high = np.empty((2, nj + 1)), np.empty((2, nj + 1))
         fill_shape(x[0], y[0], low)

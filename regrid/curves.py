@@ -331,6 +331,7 @@ def fill_turning(line, closed, wall_first, wall_last, wanted):
     below."""
     count = line.shape[1]
     edges = count - 1
+    # angle by which the line turns at each node
     turn = np.empty(count)
     for k in range(count):
         before = max(k - 1, 0)
@@ -349,6 +350,7 @@ def fill_turning(line, closed, wall_first, wall_last, wanted):
                 turn[k] = 0.0
         else:
             turn[k] = abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))
+    # segments of the angle TURN each, smoothed along the line (R9.2)
     for k in range(edges):
         wanted[k] = 0.5 * (turn[k] + turn[k + 1]) / TURN
     for _ in range(TURNING_SMOOTHINGS):
@@ -603,6 +605,7 @@ def fill_redistributed(line, target, keys, spline, closed, walls, work, out):
     positions = work[1]
     eliminated = work[2:4]
     second = work[4:6]
+    # nodes stay where nothing moves them
     fill_arc_lengths(line, arc)
     for c in range(2):
         for k in range(count):
@@ -610,8 +613,10 @@ def fill_redistributed(line, target, keys, spline, closed, walls, work, out):
     for segment in range(keys.shape[0] - 1):
         first = keys[segment]
         last = keys[segment + 1]
+        # wanted arc lengths between two key nodes (R9.1)
         if not fill_positions(arc, spacing, first, last, relax, positions):
             return first
+        # places there: on a periodic spline, one between key nodes, or chords
         if spline and closed and keys.shape[0] == 2 and last > 1:
             fill_closed_curvatures(line, arc, eliminated, second)
             fill_on_spline(line, arc, positions, second, first, last, out)

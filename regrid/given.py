@@ -347,6 +347,7 @@ def read_structured(path: Path) -> np.ndarray:
 
     Raises BadInput where the file is none, cannot be read, or the vtk package is missing.
     """
+    # legacy text or XML, by its first bytes
     with path.open("rb") as file:
         head = file.read(64).lstrip()
     legacy = head.startswith(b"# vtk DataFile")
@@ -362,6 +363,7 @@ def read_structured(path: Path) -> np.ndarray:
             f"{path}: files of VTK are read by the package vtk, which is not installed; "
             'pip install "shockgrid[vtk]" brings it'
         ) from None
+    # read; VTK itself stays silent
     reader = vtkStructuredGridReader() if legacy else vtkXMLStructuredGridReader()
     shown = vtkObject.GetGlobalWarningDisplay()
     vtkObject.SetGlobalWarningDisplay(0)  # what is wrong is said below, in a sentence
@@ -374,12 +376,14 @@ def read_structured(path: Path) -> np.ndarray:
         vtkObject.SetGlobalWarningDisplay(shown)
     if not readable:
         raise BadInput(f"{path} is not a VTK file of a structured grid (StructuredGrid)")
+    # a point for every node
     grid = reader.GetOutput()
     extent = grid.GetExtent()
     counts = tuple(extent[2 * k + 1] - extent[2 * k] + 1 for k in range(3))
     number = grid.GetNumberOfPoints()
     if reader.GetErrorCode() or not number or number != np.prod(counts):
         raise BadInput(f"{path}: its points cannot be read ({number} of a structured grid)")
+    # as arrays, plane where it is flat
     points = vtk_to_numpy(grid.GetPoints().GetData())
     nodes = np.array([points[:, k].reshape(counts, order="F") for k in range(3)], dtype=float)
     if counts[2] > 1:

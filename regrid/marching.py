@@ -99,6 +99,7 @@ def march(
     _check(start, gap_sides, keep_every)
     if times is None:
         times = choose_times(start, boundary_at, cells, span)
+    # steps in time
     times = [float(t) for t in times]
     if not np.isfinite(times).all():
         raise BadInput("march: times must be finite numbers")
@@ -108,6 +109,7 @@ def march(
     if keep_every:
         found.kept.append(found.nodes)
         found.kept_times.append(span[0])
+    # each is regridded from the last good grid
     for step, t in enumerate(times, start=1):
         boundary = boundary_at(t)
         begun = time.process_time()
@@ -119,6 +121,7 @@ def march(
             found.error = failure
             break
         seconds = time.process_time() - begun
+        # convex, whichever way round it is
         upright = result.nodes[::-1] if turned else result.nodes
         quality = measure_quality(upright)
         if quality.bad_cells:
@@ -126,6 +129,7 @@ def march(
             found.failure = f"{say_not_convex(quality.bad_cells)}: {named}"
             found.folded = result.nodes
             break
+        # what is known of the march so far
         found.nodes = result.nodes
         found.done = step
         found.times.append(t)
@@ -186,6 +190,7 @@ def choose_times(
     begin, end = (float(t) for t in span)
     if not begin < end:
         raise BadInput(f"march: span {span} must begin before it ends")
+    # way of the fastest boundary node so far, at many times
     fine = np.linspace(begin, end, BOUNDARY_PATH_SAMPLES)
     last = None
     travel = np.zeros(BOUNDARY_PATH_SAMPLES)
@@ -201,6 +206,7 @@ def choose_times(
         if last is not None:
             travel[k] = travel[k - 1] + np.hypot(*(sides - last)).max()
         last = sides
+    # equal parts of it
     longest = cells * min(find_shortest_edge(start, side) for side in SIDE_NAMES)
     count = max(1, int(np.ceil(travel[-1] / longest - 1e-9)))
     if travel[-1] == 0.0:

@@ -56,8 +56,10 @@ def find_fast_rows(old, new, interpolated, most, first, last):
         way_y = interpolated[1, i]
         fast = 0
         for j in range(1, nj):
+            # motion of the node beside the interpolated one
             excess_x, excess_y = (new_x[j] - x[j]) - way_x[j], (new_y[j] - y[j]) - way_y[j]
             square = excess_x * excess_x + excess_y * excess_y
+            # edges of the four old triangles at the node, their squares and areas
             ax = x1[j] - x[j]
             ay = y1[j] - y[j]
             bx = x[j + 1] - x[j]
@@ -74,11 +76,13 @@ def find_fast_rows(old, new, interpolated, most, first, last):
             q = bx * cy - by * cx
             r = cx * dy - cy * dx
             s = dx * ay - dy * ax
+            # farther than `most` heights of any of them (R8.2)?
             beyond = square * (a if a > b else b) > part * (p * p)
             beyond |= square * (b if b > c else c) > part * (q * q)
             beyond |= square * (c if c > d else d) > part * (r * r)
             beyond |= square * (d if d > a else a) > part * (s * s)
             fast += 1 if beyond else 0
+        # then all inner nodes of the row are looked at again
         if fast > 0:
             first[i] = 1
             last[i] = nj - 1
@@ -119,9 +123,11 @@ def fill_limited(old, new, interpolated, most, first, last, wide, out):
         first[i] = nj
         last[i] = 0
         for j in range(begin, end + 1):
+            # motion of the node beside the interpolated one
             excess_x = (new[0, i, j] - x[i, j]) - interpolated[0, i, j]
             excess_y = (new[1, i, j] - y[i, j]) - interpolated[1, i, j]
             square = excess_x * excess_x + excess_y * excess_y
+            # heights of the four old triangles at the node
             ax, ay = x[i + 1, j] - x[i, j], y[i + 1, j] - y[i, j]
             bx, by = x[i, j + 1] - x[i, j], y[i, j + 1] - y[i, j]
             cx, cy = x[i - 1, j] - x[i, j], y[i - 1, j] - y[i, j]
@@ -135,6 +141,7 @@ def fill_limited(old, new, interpolated, most, first, last, wide, out):
             limit = min(limit, measure_spacing(cx * dy - cy * dx, cx * dx + cy * dy, c, d, wide))
             limit = min(limit, measure_spacing(dx * ay - dy * ax, dx * ax + dy * ay, d, a, wide))
             limit *= most * most
+            # taken back to the limit
             if square > limit:
                 keep = (limit / square) ** 0.5
                 out[0, i, j] = x[i, j] + interpolated[0, i, j] + keep * excess_x
@@ -269,6 +276,7 @@ class MotionLimiter:
 
     def _limit(self, old: np.ndarray, new: np.ndarray, most: float) -> tuple[np.ndarray, int]:
         """`limit` without regard to symmetry."""
+        # nodes that the limit of theory R8.2 holds
         first = self.first
         last = self.last
         whole = share_memory(3 * new.size)[: 3 * new.size]
@@ -279,6 +287,7 @@ class MotionLimiter:
         count = fill_limited(old, new, interpolated, most, first, last, False, held)
         if count == 0:
             return new, 0
+        # those that it sharpens may go to the looser limit, by halves
         self.far_first[:] = first
         self.far_last[:] = last
         far_first = self.far_first
@@ -289,6 +298,7 @@ class MotionLimiter:
         for _ in range(MOST_CELL_HALVINGS):
             if relax_sharpened(old, far, held, first, last, self.loose) == 0:
                 break
+        # folded ones go back to `new`
         for halvings in range(MOST_RETURN_ROUNDS):
             whole = halvings >= MOST_CELL_HALVINGS
             if release_folded(new, held, first, last, whole, self.loose) == 0:

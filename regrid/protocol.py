@@ -153,12 +153,14 @@ def call_regridder(
     `works_in_place` leaves alone.  Raises BadInput for other sides or no grid at all, and what
     `regrid` raises.
     """
+    # trusted: tests hold such regridders to it
     if in_place and hasattr(regridder, "works_in_place"):
         return regridder.regrid(previous, boundary, *more, in_place=True)  # type: ignore[call-arg]
     given = np.concatenate(get_sides(boundary), axis=1)
     result = regridder.regrid(previous, boundary, *more)
     name = f"regridder {type(regridder).__name__}"
     place = f"{name}: {where}" if where else name
+    # what it returned is a grid of that shape
     nodes = getattr(result, "nodes", None)
     if not isinstance(nodes, np.ndarray) or not hasattr(result, "report"):
         raise BadInput(
@@ -169,6 +171,7 @@ def call_regridder(
         raise BadInput(f"{place}: it returned nodes {nodes.shape}; the grid has {previous.shape}")
     if (np.concatenate(get_sides(nodes), axis=1) == given).all():
         return result
+    # with the given sides, but for those that it places itself
     free: tuple[str, ...] = ()
     if isinstance(regridder, FlowAwareRegridder) and regridder.owns_sides:
         free = regridder.free_sides

@@ -31,6 +31,7 @@ def find_root(
             raise ValueError(f"find_root: the function is NaN at {place:g}")
         return value
 
+    # the two last places, and one where the function has the other sign
     last = float(low)
     here = float(high)
     far = 0.0
@@ -45,6 +46,7 @@ def find_root(
     if (f_last < 0.0) == (f_here < 0.0):
         raise ValueError(f"find_root: the function has the same sign at {low:g} and {high:g}")
     for _ in range(MOST_ROOT_STEPS):
+        # the root lies between `here`, the best place, and `far`
         if f_last != 0.0 and f_here != 0.0 and (f_last < 0.0) != (f_here < 0.0):
             far = last
             f_far = f_last
@@ -52,10 +54,12 @@ def find_root(
         if abs(f_far) < abs(f_here):
             last, here, far = here, far, here
             f_last, f_here, f_far = f_here, f_far, f_here
+        # close enough?
         delta = 0.5 * (xtol + rtol * abs(here))
         half = 0.5 * (far - here)
         if f_here == 0.0 or abs(half) < delta:
             return here
+        # a secant, or inverse quadratic through the three places
         trial = math.inf
         if abs(before) > delta and abs(f_here) < abs(f_last):
             if last == far:
@@ -66,6 +70,7 @@ def find_root(
                 ratio = slope_far * slope * (f_far - f_last)
                 if ratio != 0.0:
                     trial = -f_here * (f_far * slope_far - f_last * slope) / ratio
+        # taken where it is short enough, else half the interval
         if 2.0 * abs(trial) < min(abs(before), 3.0 * abs(half) - delta):
             before = step
             step = trial

@@ -78,6 +78,7 @@ def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonalit
         bx = B[col]
         by = B[CHUNK_SPAN + col]
         gb = B[3 * CHUNK_SPAN + col]
+        # smoothness: as the barrier's corner (R2.2)
         keep = active[col]
         d = keep * area[col] + (1.0 - keep)
         wx, wy = ax - by, ay + bx
@@ -87,6 +88,7 @@ def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonalit
         terms = corner_blocks(wx * wx + wy * wy, v, g, 1.0, 1.0 / d, 1.0, scale, (0.0, 0.0))
         gax, gay, gbx, gby, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy = terms[:10]
         ab_xx, ab_xy, ab_yx, ab_yy = terms[10:]
+        # volume (D²) and orthogonality (a·b): gradients (R12.2)
         kappa = 2.0 * keep * volume[col]
         mu = 2.0 * keep * orthogonality
         dot = ax * bx + ay * by
@@ -96,6 +98,7 @@ def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonalit
         out[at.GRAD_AY + col] = gay + ga * (md * by - kd * bx)
         out[at.GRAD_BX + col] = gbx + gb * (md * ax - kd * ay)
         out[at.GRAD_BY + col] = gby + gb * (kd * ax + md * ay)
+        # and second derivatives
         kaa = kappa * ga * ga
         maa = mu * ga * ga
         kab = kappa * ga * gb
@@ -180,6 +183,7 @@ def fill_variational_energy(nodes, sides, cells, energy, least, Z):
     for i in range(ni):
         length = along_i[LENGTH, i]
         change = along_i[LENGTH_CHANGE, i]
+        # scaled edges along i of this row of cells, then both of its lines along j
         for j in range(nj + 1):
             g = 1.0 / (length + blend_j[j] * change)
             Z[EDGE_I_X, j] = g * (x[i + 1, j] - x[i, j])
@@ -190,6 +194,7 @@ def fill_variational_energy(nodes, sides, cells, energy, least, Z):
                 g = 1.0 / (along_j[LENGTH, j] + way * along_j[LENGTH_CHANGE, j])
                 Z[NEAR_X + 2 * row, j] = g * (x[i + row, j + 1] - x[i + row, j])
                 Z[NEAR_Y + 2 * row, j] = g * (y[i + row, j + 1] - y[i + row, j])
+        # terms of the four corners of each cell (R12.2)
         total = 0.0
         smallest = 1e300
         for corner in range(4):
@@ -237,11 +242,13 @@ def find_valid_start(
     The old grid plus the interpolated displacement of its sides, if that keeps more than `ratio`
     of every corner's area.  Raises RegridFailure where no valid grid is found.
     """
+    # the grid moved with its sides
     old = compute_corner_areas(previous)
     sign = 1.0 if old.sum() >= 0.0 else -1.0
     nodes = displaced_grid(previous, boundary)
     new = compute_corner_areas(nodes)
     excluded = np.zeros(new.shape, dtype=bool)
+    # corners that sides make flat, and the block's own, do not count
     if not ((sign * old > 0.0).all() and (sign * new > 0.0).all()):
         excluded = find_excluded_corners(boundary)
     collapsed = is_collapsed(excluded)
@@ -249,6 +256,7 @@ def find_valid_start(
     for corner in BLOCK_CORNERS:
         excluded[corner] = True
     old[excluded] = new[excluded] = sign
+    # it is taken where every corner keeps enough
     valid = (sign * old > 0.0).all() and (sign * new > ratio * sign * old).all()
     if valid and sign * compute_area(boundary) > 0.0:
         least = float((new / old).min())
@@ -343,9 +351,11 @@ class VariationalRegridder(WeightedRegridder):
         Raises RegridFailure, naming side and nodes, when no valid grid is found.
         """
         previous, boundary = check_grids(previous, boundary)
+        # sides and a valid start
         given = boundary
         boundary = self.distribute_sides(previous, boundary)
         start = find_valid_start(previous, boundary, self.barrier)
+        # turned so that areas are positive, then minimised
         ni, nj = previous.shape[1] - 1, previous.shape[2] - 1
         work = self._workspace(ni, nj)
         mirrored = compute_area(boundary) < 0.0
@@ -358,6 +368,7 @@ class VariationalRegridder(WeightedRegridder):
         limited = 0
         if min(ni, nj) > 1:
             done, residual, limited = self._minimise(work, weigh, start)
+        # turned back
         nodes = np.array(work.base[flip])
         report = replace(
             start.report,

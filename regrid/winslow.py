@@ -42,21 +42,25 @@ def fill_equation(nodes, steps_i, steps_j, residual, scale_i, scale_j, sums):
         for j in range(residual.shape[2]):
             p = i + 1
             q = j + 1
+            # metric at the node (R12.3)
             x1, y1 = 0.5 * (x[p + 1, q] - x[p - 1, q]), 0.5 * (y[p + 1, q] - y[p - 1, q])
             x2, y2 = 0.5 * (x[p, q + 1] - x[p, q - 1]), 0.5 * (y[p, q + 1] - y[p, q - 1])
             alpha = x2 * x2 + y2 * y2
             gamma = x1 * x1 + y1 * y1
             beta = x1 * x2 + y1 * y2
+            # wanted steps on either side of it
             low, high = steps_i[i, j], steps_i[i + 1, j]
             left, right = steps_j[i, j], steps_j[i, j + 1]
             a = 2.0 * alpha / (low + high)
             c = 2.0 * gamma / (left + right)
+            # differences along both lines and across
             cross_x = (x[p + 1, q + 1] + x[p - 1, q - 1]) - (x[p + 1, q - 1] + x[p - 1, q + 1])
             cross_y = (y[p + 1, q + 1] + y[p - 1, q - 1]) - (y[p + 1, q - 1] + y[p - 1, q + 1])
             along_x = high * (x[p + 1, q] - x[p, q]) - low * (x[p, q] - x[p - 1, q])
             along_y = high * (y[p + 1, q] - y[p, q]) - low * (y[p, q] - y[p - 1, q])
             across_x = right * (x[p, q + 1] - x[p, q]) - left * (x[p, q] - x[p, q - 1])
             across_y = right * (y[p, q + 1] - y[p, q]) - left * (y[p, q] - y[p, q - 1])
+            # residual over alpha, scales of both directions
             rx = (a * along_x + c * across_x) - 0.5 * beta * cross_x
             ry = (a * along_y + c * across_y) - 0.5 * beta * cross_y
             scale = 0.5 * (alpha + gamma)

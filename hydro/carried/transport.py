@@ -177,17 +177,21 @@ def make_predict(geometry: Geometry):
         measures, centres, slopes = scratch
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
+        # rows whose slopes the step reads: its own and one on either side
         first, last = rows
         low = max(first - 1, 0)
         high = min(last + 1, ni) if last > first else low
+        # lengths and centres of these cells, of those along the sides and of their neighbours
         for i in range(ni):
             near = low - 1 <= i < high + 1 and high > low
             near |= i < 2 or i >= ni - 2
             for j in range(nj):
                 if near or j < 2 or j >= nj - 2:
                     measure_cell(nodes, i, j, measures, centres)
+        # and beyond the sides
         place_ghosts(rim, on.LENGTH_GHOST, measures[LENGTH_I])
         place_ghosts(rim, on.LENGTH_GHOST, measures[LENGTH_J])
+        # slopes field by field
         for q in range(values.shape[0]):
             place_ghosts(rim, on.find_carried_row(q) + on.CARRIED_GHOST, values[q])
             for i in range(ni):

@@ -159,6 +159,7 @@ def check_walls(walls: Mapping[str, Wall]) -> None:
         raise BadInput(
             f"a convection cell has the sides {', '.join(SIDE_NAMES)}; check {wrong[0]!r}"
         )
+    # each side by itself
     for side in SIDE_NAMES:
         wall = walls[side]
         if wall.flow not in ("no-slip", "free", "periodic"):
@@ -171,6 +172,7 @@ def check_walls(walls: Mapping[str, Wall]) -> None:
             )
         if wall.flow == "periodic" and (wall.temperature is not None or wall.flux is not None):
             raise BadInput(f"side {side} is periodic and so has no temperature or flux of its own")
+    # both of a pair
     for low, high in PAIRS:
         if (walls[low].flow == "periodic") != (walls[high].flow == "periodic"):
             lonely = low if walls[low].flow == "periodic" else high

@@ -441,12 +441,14 @@ def step_front(
     ends: t -> u at both ends (2,), which are fixed.  Raises RunFailure if Newton's method does not
     converge.
     """
+    # what the cells hold at the start; their nodes move evenly
     speed = (x_new - x_old) / dt
     before = np.diff(x_old) * u
     stage_flux = 0.0
     through = 0.0
     iterations = 0
     tolerance = 1e-14 * float(np.abs(before).max()) + 1e-300
+    # two implicit stages, each by Newton's method
     for place, earlier in ((SDIRK_GAMMA, 0.0), (1.0, 1.0 - SDIRK_GAMMA)):
         x = x_new if place == 1.0 else x_old + place * (x_new - x_old)
         sizes = np.diff(x)
@@ -454,6 +456,7 @@ def step_front(
         values = enclose(u, outside)
         past = 0.5 * (values[:-1] + values[1:]) - speed
         factor = fit_diffusion("exponential", past * measure_distances(x) / viscosity)
+        # until the residual is round-off
         for _ in range(MOST_NEWTON_ITERATIONS):
             flux, by_left, by_right = compute_fluxes(x, u, outside, speed, viscosity, factor)
             residual = sizes * u - before
@@ -473,6 +476,7 @@ def step_front(
                 cause="implicit-step",
                 place=Place("", (worst, 0)),  # the caller knows the column's name
             )
+        # the flux of this stage, also in the next one
         stage_flux = np.diff(flux)
         through += (
             (SDIRK_GAMMA if place == 1.0 else 1.0 - SDIRK_GAMMA) * dt * float(flux[0] - flux[-1])

@@ -98,12 +98,14 @@ class Topology:
 def make_topology(cells: tuple[int, int], periodic: tuple[bool, bool]) -> Topology:
     """The topology of a grid with the given numbers of cells."""
     axes = tuple(Axis(np.arange(n + 1.0), p) for n, p in zip(cells, periodic, strict=True))
+    # unknowns of the stream function
     free, through = free_nodes(axes)
     curls = []
     averages = []
     halves = []
     outflows = []
     balance = []
+    # operators along each axis: products of one along it and one across
     for k in (0, 1):
         own = axes[k]
         cross = axes[1 - k]
@@ -115,6 +117,7 @@ def make_topology(cells: tuple[int, int], periodic: tuple[bool, bool]) -> Topolo
         halves.append(kron(k, own.halves_to_nodes(), np.ones(cross.node_count)))
         outflows.append((kron(k, own.difference_to_nodes(), inside), out_of_nodes))
         balance.append(kron(k, own.difference_to_cells(), inside))
+    # put together over both components
     curl = (sparse.vstack(curls) @ free).tocsr()
     spread = [[averages[0], None], [None, halves[0]], [None, averages[1]], [halves[1], None]]
     return Topology(

@@ -80,6 +80,7 @@ def _list_parameters(eos_class: type[EquationOfState]) -> dict[str, str]:
 
 def _find_mistakes(table: dict) -> Iterator[str]:
     """What is wrong with a material's table, as far as each number tells by itself."""
+    # where it comes from, and which equation of state
     kind = table.get("eos")
     source = table.get("source")
     if not isinstance(source, str) or not source.strip():
@@ -88,6 +89,7 @@ def _find_mistakes(table: dict) -> Iterator[str]:
         hint = _hint(str(kind), EQUATIONS_OF_STATE)
         yield f"eos is {kind!r}{hint} (known: {', '.join(EQUATIONS_OF_STATE)})"
         return
+    # each parameter by itself
     eos_class = EQUATIONS_OF_STATE[kind]
     wanted = _list_parameters(eos_class)
     for key, value in table.items():
@@ -105,6 +107,7 @@ def _find_mistakes(table: dict) -> Iterator[str]:
                 yield f"{key} is {value!r}; it must be a number in SI units"
             elif (key == "rho0" or key in eos_class.positive) and not value > 0.0:
                 yield f"{key} is {value:g}; it must be positive"
+    # those that are missing
     needed = [key for key in wanted if key not in eos_class.optional]
     missing = [key for key in dict.fromkeys([*needed, "rho0"]) if key not in table]
     if missing:

@@ -64,10 +64,12 @@ def second_hugoniot(eta, parameters):
 @inlined
 def hugoniot(eta, parameters):
     """pH and its slope in eta, for all pieces and expansion."""
+    # which of the pieces eta is in; kernels have no branches here
     first_end = parameters[ETA_ONSET]
     second_start = parameters[ETA_COMPLETE]
     in_first = 1.0 * (eta <= first_end)
     in_second = 1.0 * (eta >= second_start)
+    # first phase, and linear in expansion
     compression = 0.5 * (eta + abs(eta))
     first = 0.5 * (compression + first_end - abs(compression - first_end))  # at most first_end
     stretched = 0.5 * (eta - abs(eta))
@@ -87,11 +89,13 @@ def hugoniot(eta, parameters):
         * stretched
     )
     slope = in_first * modulus * narrowing * (1.0 + parameters[PARAMETER_S] * first)
+    # mixture: linear between both phases
     after = eta - first_end
     room = second_start - first_end
     mixed = 0.5 * (0.5 * (after + abs(after)) + room - abs(0.5 * (after + abs(after)) - room))
     pressure = pressure + parameters[PRESSURE_RISE] * mixed
     slope = slope + (1.0 - in_first) * (1.0 - in_second) * parameters[PRESSURE_RISE]
+    # second phase
     late = 0.5 * (eta + second_start + abs(eta - second_start))  # at least second_start
     second, second_slope = second_hugoniot(late, parameters)
     return pressure + (second - parameters[P_COMPLETE]), slope + in_second * second_slope

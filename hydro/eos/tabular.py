@@ -139,6 +139,7 @@ class Tabular(EquationOfState):
     has_kinks = True  # a table may hold any phase transition
 
     def __post_init__(self):
+        # the arrays, from the file
         if not Path(self.path).is_file():
             raise BadInput(f"table: there is no file {self.path!r}")
         try:
@@ -149,6 +150,7 @@ class Tabular(EquationOfState):
                 f"table {self.path}: it must be an HDF5 file with datasets rho, e and p ({error})"
             ) from None
         rho, e, p = arrays
+        # of one size, rising
         axes = (rho.ndim, e.ndim) == (1, 1) and min(rho.size, e.size) > 1
         if not axes or p.shape != (rho.size, e.size):
             raise BadInput(
@@ -165,6 +167,7 @@ class Tabular(EquationOfState):
                 )
         if rho[0] <= 0.0:
             raise BadInput(f"table {self.path}: rho starts at {rho[0]:g}; it must be positive")
+        # frozen: set as a dataclass sets its fields
         for name, values in zip(("axis_rho", "axis_e", "table"), arrays, strict=True):
             object.__setattr__(self, name, np.ascontiguousarray(values))
         contents = b"".join(values.tobytes() for values in (rho, e, p))

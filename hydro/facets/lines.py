@@ -133,10 +133,12 @@ def fill_slopes(nodes, line):
     middles = line.middles
     slopes = line.slopes
     last = middles.shape[1] - 1
+    # middles of the faces
     for k in range(last + 1):
         middles[0, k] = 0.5 * (nodes[0, k + 1] + nodes[0, k])
         middles[1, k] = 0.5 * (nodes[1, k + 1] + nodes[1, k])
     slopes[:] = 0.0
+    # direction along the line, weights of both differences
     for k in range(1, last):
         dx = middles[0, k + 1] - middles[0, k - 1]
         dy = middles[1, k + 1] - middles[1, k - 1]

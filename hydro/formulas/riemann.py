@@ -141,14 +141,17 @@ def compute_hll_flux(left, right, face):
     rho_r, u_r, v_r, p_r, e_r, c2_r = right
     area_x, area_y, sweep = face
     square = area_x * area_x + area_y * area_y
+    # waves that leave the face, both or none towards one side
     w_l, w_r = compute_normal_speeds(u_l, v_l, u_r, v_r, area_x, area_y, sweep)
     s_l, s_r = compute_waves(w_l, c2_l, w_r, c2_r, square)
     s_l = s_l if s_l < 0.0 else 0.0
     s_r = s_r if s_r > 0.0 else 0.0
+    # weights of the two sides and of the jump between them
     weight = 1.0 / (s_r - s_l)
     a = s_r * weight
     b = -s_l * weight
     d = s_l * a
+    # conserved quantities on both sides and their flux
     total_l = e_l + 0.5 * (u_l * u_l + v_l * v_l)
     total_r = e_r + 0.5 * (u_r * u_r + v_r * v_r)
     mass_l = rho_l * w_l
@@ -204,11 +207,13 @@ def compute_wave_pressure(rho, p, c, law, du):
     slope_a, slope_b, z = law
     impedance = rho * c
     if du > 0.0:
+        # a shock, by the material's shock speed (F4.2)
         bend = slope_b * du
         root = (bend * bend + c * c) ** 0.5
         pressure = p + rho * (slope_a * du + root) * du
         slope = rho * (2.0 * slope_a * du + root + bend * bend / root)
     elif z > 0.0:
+        # a release of condensed material: (rho c)² falls linearly with p (F4.4)
         fall = impedance * impedance - z * z
         steepest = 4.0 * slope_a * rho  # that of weak waves, as in the shock's law
         fall = fall / p if abs(fall) < steepest * abs(p) else steepest
@@ -219,6 +224,7 @@ def compute_wave_pressure(rho, p, c, law, du):
         slope = impedance + 0.5 * fall * part_du
         pressure = p + (impedance + 0.25 * fall * part_du) * part_du + least * (du - part_du)
     else:
+        # a release as that of a stiffened gas (F4.3)
         gamma = 4.0 * slope_a - 1.0
         base = 1.0 + 0.5 * (gamma - 1.0) * du / c
         base = base if base > 0.0 else 0.0

@@ -209,6 +209,7 @@ def make_flux(energy_part, face, target, pressure_row, opens_voids, find_leaving
     def fill_flux(Z, n, parameters):
         """Fluxes of mass, momentum and energy per time, from `fill_upwind`."""
         for k in range(1, n + 1):
+            # the upwind side of the contact, with the energy of a torn cell
             rho = Z[at.RHO_SIDE + k]
             p = Z[at.P_SIDE + k]
             e = energy_part(rho, p, parameters)
@@ -220,6 +221,7 @@ def make_flux(energy_part, face, target, pressure_row, opens_voids, find_leaving
             )  # fmt: skip
             u = Z[at.U_SIDE + k]
             v = Z[at.V_SIDE + k]
+            # its flux plus its wave's (theory F3.9), of gases held back in part (F4.12)
             flux = riemann.compute_star_flux(
                 (rho, u, v, p, e),
                 wave,
@@ -227,6 +229,7 @@ def make_flux(energy_part, face, target, pressure_row, opens_voids, find_leaving
             )
             if withholds:
                 flux = riemann.withhold(flux, (u, v, e), find_leaving_part(rho, parameters))
+            # kept for the update
             mass, momentum_x, momentum_y, energy, pressure = flux
             Z[target + k] = mass
             Z[target + at.SCRATCH_SPAN + k] = momentum_x
@@ -257,6 +260,7 @@ def make_hll_flux(
         start = (first - 1) // at.VECTOR_LANES * at.VECTOR_LANES
         Z = row[start:]  # loops that begin at a number which they do not know are not vectorised
         for k in range(1, at.count_padded(last - start - 1) + 1):
+            # states on both sides of the face, with the energy of torn cells
             rho_l = Z[left + k]
             p_l = Z[left + 3 * at.SCRATCH_SPAN + k]
             rho_r = Z[right + k]
@@ -270,6 +274,7 @@ def make_hll_flux(
             u_r, v_r = Z[right + at.SCRATCH_SPAN + k], Z[right + 2 * at.SCRATCH_SPAN + k]
             c2_l = Z[left + 4 * at.SCRATCH_SPAN + k]
             c2_r = Z[right + 4 * at.SCRATCH_SPAN + k]
+            # the HLL flux (theory F3.10)
             flux = riemann.compute_hll_flux(
                 (rho_l, u_l, v_l, p_l, e_l, c2_l),
                 (rho_r, u_r, v_r, p_r, e_r, c2_r),
@@ -283,6 +288,7 @@ def make_hll_flux(
                 e = e_l if from_left else e_r
                 flux = riemann.withhold(flux, (u, v, e), find_leaving_part(rho, parameters))
             mass, momentum_x, momentum_y, energy, pressure = flux
+            # it replaces the sharp one where either cell asks for it
             switch_on = Z[switch + k] + Z[at.HLL + k]
             sharp_mass = Z[target + k]
             sharp_x = Z[target + at.SCRATCH_SPAN + k]

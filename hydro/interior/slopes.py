@@ -98,6 +98,7 @@ def make_slopes(limit, relaxed, geometry, switch):
             xd, yd = d
             mid_i_x, mid_i_y = mid_i
             mid_j_x, mid_j_y = mid_j
+            # sound speed, energy and HLL switch of the cell
             rho = Z[at.RHO + k]
             p = Z[at.P + k]
             if curved:
@@ -128,6 +129,7 @@ def make_slopes(limit, relaxed, geometry, switch):
                     c2,
                     least_jump,
                 )
+            # weights of the differences to the cells on either side (theory F3.3, F9.6)
             before, after = weigh(
                 Z, at.LENGTH_BEFORE + k, at.LENGTH + k, at.LENGTH_AFTER + k, at.SHIFT - at.LENGTH
             )
@@ -135,6 +137,7 @@ def make_slopes(limit, relaxed, geometry, switch):
                 Z, at.LENGTH_J + k - 1, at.LENGTH_J + k, at.LENGTH_J + k + 1,
                 at.SHIFT_J - at.LENGTH_J,
             )  # fmt: skip
+            # density and pressure: steps limited along both lines (F3.4), then the gradient (F3.5)
             step_after = Z[at.RHO_AFTER + k] - rho
             along_i = limit(Z[at.RHO_STEP + k] * before, step_after * after)
             along_j = limit((rho - Z[at.RHO + k - 1]) * below, (Z[at.RHO + k + 1] - rho) * above)
@@ -145,6 +148,7 @@ def make_slopes(limit, relaxed, geometry, switch):
             along_j = limit((p - Z[at.P + k - 1]) * below, (Z[at.P + k + 1] - p) * above)
             Z[at.P_STEP + k] = step_after
             p_x, p_y = compute_gradient(along_i, along_j, line_i, line_j, inverse)
+            # velocity: limited along and across each line
             square_i = mid_i_x * mid_i_x + mid_i_y * mid_i_y
             square_j = mid_j_x * mid_j_x + mid_j_y * mid_j_y
             scale = 1.0 / (square_i * square_j)
@@ -175,6 +179,7 @@ def make_slopes(limit, relaxed, geometry, switch):
                 v_j = relax_limit(v_j, v_c, v_d, acoustic_weight)
                 Z[at.ACOUSTIC_BEFORE + k] = Z[at.ACOUSTIC + k]
                 Z[at.ACOUSTIC + k] = acoustic_weight
+            # gradients of the velocity, and the cell's centre
             u_x, u_y = compute_gradient(u_i, u_j, line_i, line_j, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, line_i, line_j, inverse)
             if curved:
@@ -188,12 +193,14 @@ def make_slopes(limit, relaxed, geometry, switch):
                 x = 0.25 * ((xa + xd) + (xb + xc))
                 y = 0.25 * ((ya + yd) + (yb + yc))
                 carried_x, carried_y = u, v
+            # half a step in time with these gradients (F3.6)
             rho_half, u_half, v_half, p_half = compute_half_step(
                 (rho, u, v, p), c2, (carried_x, carried_y),
                 (rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y), half_dt,
             )  # fmt: skip
             if curved:
                 rho_half, p_half = thin_half_step(rho_half, p_half, rho, v, c2, y, half_dt)
+            # kept for the traces
             Z[at.RHO_X + k] = rho_x
             Z[at.RHO_Y + k] = rho_y
             Z[at.U_X + k] = u_x
@@ -233,11 +240,13 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
             face = first + (k - 1) * step
             if not wanted[face]:
                 continue
+            # weights of the differences across the side
             before, after = weigh(
                 Z, at.LENGTH_BEFORE + k, at.LENGTH + k, at.LENGTH_AFTER + k, at.SHIFT - at.LENGTH
             )
             a, b, c, d = at.load_corners(Z, at.LOW, at.HIGH, k)
             (line_x, line_y), _, _ = compute_line_geometry(a, b, c, d)
+            # how rough the pressure is: none of the slope is taken at a shock (theory F4.7)
             rho = rim[on.RHO, face]
             p = rim[on.P, face]
             c = rim[on.C, face]
@@ -251,6 +260,7 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
             rough = rough if rough < 1.0 else 1.0
             smooth = (1.0 - rough) * (1.0 - rough) * (1.0 + 2.0 * rough)
             part = smooth * (0.5 * rim[on.LENGTH, face] / Z[at.LENGTH + k])
+            # limited steps from the cell to its face
             rho_step = limit_along(rho, Z[at.RHO + k], Z[at.RHO_AFTER + k], before, after)
             p_step = limit_along(p, Z[at.P + k], Z[at.P_AFTER + k], before, after)
             along, across = resolve_along(rim[on.U, face], rim[on.V, face], line_x, line_y)
@@ -265,6 +275,7 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
                 line_y,
                 1.0 / (line_x * line_x + line_y * line_y),
             )
+            # the state at the face, where it is one of the material
             rho = rho - part * rho_step
             p = p - part * p_step
             c2 = sound_speed_squared_part(rho, p, parameters)

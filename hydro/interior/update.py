@@ -54,6 +54,7 @@ def make_update(eos_class, geometry, finishes, gathers):
         """
         for k in range(1, n + 1):
             if finishes:
+                # conserved quantities of the row before, with the last flux (theory F3.2)
                 mass = Z[at.MASS + k] - dt * Z[at.FLUX_I_MASS + k]
                 momentum_x = Z[at.MOMENTUM_X + k] - dt * Z[at.FLUX_I_X + k]
                 momentum_y = Z[at.MOMENTUM_Y + k] - dt * Z[at.FLUX_I_Y + k]
@@ -66,6 +67,7 @@ def make_update(eos_class, geometry, finishes, gathers):
                         Z[at.HOOP_I + k],
                     )
                 total = Z[at.ENERGY + k] - dt * Z[at.FLUX_I_ENERGY + k]
+                # the state that they make (theory F4.10)
                 volume = Z[at.VOLUME_NEW + k]
                 # two divisions: of one for both, the rounding would add up in cells at rest
                 inverse_volume = 1.0 / volume
@@ -81,6 +83,7 @@ def make_update(eos_class, geometry, finishes, gathers):
                 if withholds:
                     part = find_leaving_part(rho, parameters)
                     Z[at.SUM_EMPTIED + k] += 1.0 if part < 1.0 else 0.0
+                # kept, with velocities that are not subnormal
                 slow = 1e-60 * c2
                 u = u if u * u > slow else 0.0
                 v = v if v * v > slow else 0.0
@@ -88,6 +91,7 @@ def make_update(eos_class, geometry, finishes, gathers):
                 Z[at.U_NEW + k] = u
                 Z[at.V_NEW + k] = v
                 Z[at.P_NEW + k] = p
+                # rate and crowding in the new cell (theory F7.1, F7.3)
                 mid_i_x = Z[at.MI_X_NEW + k]
                 mid_i_y = Z[at.MI_Y_NEW + k]
                 mid_j_x = Z[at.MJ_X_NEW + k]
@@ -110,10 +114,12 @@ def make_update(eos_class, geometry, finishes, gathers):
                 c2 = c2 if real else -1.0
                 least = Z[at.LEAST_C2 + k]
                 Z[at.LEAST_C2 + k] = least if least < c2 else c2
+                # sums of the tile
                 Z[at.SUM_MASS + k] += mass
                 Z[at.SUM_X + k] += momentum_x
                 Z[at.SUM_Y + k] += momentum_y
                 Z[at.SUM_ENERGY + k] += total
+            # this row: what it holds less the fluxes through the faces known so far
             if gathers:
                 volume = Z[at.VOLUME + k]
                 rho = Z[at.RHO + k]
@@ -133,10 +139,12 @@ def make_update(eos_class, geometry, finishes, gathers):
                     (Z[at.FLUX_J_ENERGY + k + 1] - Z[at.FLUX_J_ENERGY + k])
                     - Z[at.FLUX_I_ENERGY + k]
                 )
+                # its new cell
                 a, b, c, d = at.load_corners(Z, at.LOW_NEW, at.HIGH_NEW, k)
                 mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
                 twist, y_new = at.find_twist(a, b, c, d)
                 if curved:
+                    # weights of both forms of the radial pressure force (theory F9.5)
                     lever, share = compute_lever(
                         Z[at.Y_CENTRE + k],
                         0.25

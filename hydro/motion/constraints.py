@@ -163,6 +163,7 @@ class FollowerMotion:
         old = self.contact.lines[1]
         arc = compute_arc_lengths(line)
         self.contact.fixed_new[:] = self.contact.fixed
+        # where the follower begins and ends on the leader's line
         ends = [0.0, 0.0]
         for end in (0, 1):
             node = int(self.contact.fixed[end])
@@ -177,8 +178,10 @@ class FollowerMotion:
                 cause="contact-lost",
                 place=Place(self.contact.follower.segments[0].block.name),
             )
+        # its nodes between them, by its spacing
         wanted = ends[0] + self.spacing * (ends[1] - ends[0])
         points = np.array([np.interp(wanted, arc, row) for row in line])
+        # the key nodes at its ends go there
         shifts = points[:, [0, -1]] - self.contact.follower.new_ends()
         one, other = self.key_nodes
         one.shift(shifts[:, 0])
@@ -232,6 +235,7 @@ class FollowerMotion:
         """Arc length on the leader's line of the contact point at an end of the follower."""
         free = self.free_lines[end]
         position = None
+        # a free surface that goes on from the point: where it crosses the leader's line
         if free is not None:
             at_start = self.starts[end]
             away = np.ascontiguousarray(free.moved if at_start else free.moved[:, ::-1])
@@ -240,16 +244,19 @@ class FollowerMotion:
                 position = arc[face] + part * (arc[face + 1] - arc[face])
                 point = line[:, face] + part * (line[:, face + 1] - line[:, face])
                 free.cut(at_start, k, point)
+        # none crosses: the point nearest to the moved end
         if position is None:
             moved_end = self.contact.follower.line(new=True)[:, [-end]]
             found = np.empty(1)
             fill_positions(line, moved_end, found)
             face = min(int(found[0]), line.shape[1] - 2)
             position = arc[face] + (found[0] - face) * (arc[face + 1] - arc[face])
+        # where the point was, on the new line
         was = np.empty(1)
         fill_positions(line, np.reshape(start, (2, 1)), was)
         face = min(int(was[0]), line.shape[1] - 2)
         before = arc[face] + (was[0] - face) * (arc[face + 1] - arc[face])
+        # close to the end of the leader's line it is caught by its last node
         goal, node = (arc[-1], line.shape[1] - 1) if end == 1 else (arc[0], 0)
         step = position - before if end == 1 else before - position
         left = abs(goal - position)

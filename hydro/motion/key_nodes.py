@@ -150,6 +150,7 @@ class KeyNode:
         """
         first, face = self.given[0]
         velocity = first.velocity(t)
+        # lines with different velocities: the point common to both moves on
         for other, other_face in self.given[1:]:
             second = other.velocity(t)
             if second != velocity:
@@ -157,6 +158,7 @@ class KeyNode:
                     member.block.rim.rows[on.NORMAL, k]
                     for member, k in ((first, face), (other, other_face))
                 )
+                # of two normals
                 cross = float(a[0] * b[1] - a[1] * b[0])
                 if abs(cross) < 1e-9 * math.hypot(*a) * math.hypot(*b):
                     raise RunFailure(
@@ -170,6 +172,7 @@ class KeyNode:
                     (along * float(b[1]) - across * float(a[1])) / cross,
                     (across * float(a[0]) - along * float(b[0])) / cross,
                 )
+        # one velocity; beside a moving contact only across the piston
         if not self.on_piston:
             return velocity
         normal_x, normal_y = (float(n) for n in first.block.rim.rows[on.NORMAL, face])
@@ -252,6 +255,7 @@ def find_key_nodes(
     blocks: list[Block], links: list[Link], contacts: Sequence[SlidingContact] = ()
 ) -> list[KeyNode]:
     """All key nodes: ends of segments at one point, across blocks and periodic links."""
+    # ends of segments, each node of a block once
     points: list[tuple[Block, int, int]] = []
     ends: list[tuple[Segment, int, int]] = []  # segment, face, point
     index: dict[tuple[int, int, int], int] = {}
@@ -263,6 +267,7 @@ def find_key_nodes(
                     index[node] = len(points)
                     points.append((block, i, j))
                 ends.append((segment, face, index[node]))
+    # nodes that are one: those of links, and of leaders that follow each other
     parent = list(range(len(points)))
 
     def root(point: int) -> int:
@@ -288,6 +293,7 @@ def find_key_nodes(
                 for segment, end in (one, other)
             )
             parent[root(a)] = root(b)
+    # a key node for each group
     groups: dict[int, KeyNode] = {}
     for point, member in enumerate(points):
         groups.setdefault(root(point), KeyNode()).members.append(member)

@@ -64,11 +64,13 @@ def move_line(nodes, nodes_new, span, rim, damping, dt, out):
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     side, start, count, first, _ = span
+    # ends as they were moved before
     for end in range(2):
         k = end * (count - 1)
         i, j = find_node(side, start + k, 0, ni, nj)
         out[0, k] = nodes_new[0, i, j]
         out[1, k] = nodes_new[1, i, j]
+    # inner nodes: contact velocities of both faces, weighted by the other's length
     for node in range(1, count - 1):
         k = first + node
         i, j = find_node(side, start + node, 0, ni, nj)
@@ -81,6 +83,7 @@ def move_line(nodes, nodes_new, span, rim, damping, dt, out):
         for q in range(2):
             speed = weight_a * rim[on.U_STAR + q, k - 1] + weight_b * rim[on.U_STAR + q, k]
             out[q, node] = nodes[q, i, j] + dt * (damping[q, node] + speed)
+    # stretching: change of the segments over their lengths (theory F7.2)
     most = 0.0
     i, j = find_node(side, start, 0, ni, nj)
     for k in range(count - 1):
@@ -150,6 +153,7 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, shaping, walls):
     relax, spline, beside_chords, periodic, closed, shortest = shaping
     side, start, count, first, _ = span
     stretching = 0.0
+    # the nodes with the flow (theory F6.2)
     if dt > 0.0:
         stretching = move_line(nodes, nodes_new, span, rim, damping, dt, moved)
         for c in range(2):
@@ -157,15 +161,18 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, shaping, walls):
                 beside[c, k] = damping[c, k]
     if relax < 0.0:
         return stretching, -1
+    # a spacing that gives a bend the segments that it needs (theory R9.2)
     if shortest > 0.0 and relax > 0.0:
         curves.fill_turning_spacing(
             moved, spacing, turning, closed, walls[0], walls[1], shortest, turned
         )
+    # between the ends as they were moved before
     for end in range(2):
         k = end * (count - 1)
         i, j = find_node(side, start + k, 0, ni, nj)
         moved[0, k] = nodes_new[0, i, j]
         moved[1, k] = nodes_new[1, i, j]
+    # nodes respaced along the line (theory R9.1), no faster than sound
     failed = -1
     out = moved
     if relax > 0.0:
@@ -182,6 +189,7 @@ def carry_line(nodes, nodes_new, span, rim, dt, arrays, shaping, walls):
             for c in range(2):
                 for k in range(1, count - 1):
                     beside[c, k] += (out[c, k] - moved[c, k]) / dt
+    # into the block's new nodes
     for k in range(count):
         i, j = find_node(side, start + k, 0, ni, nj)
         nodes_new[0, i, j] = out[0, k]

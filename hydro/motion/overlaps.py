@@ -164,6 +164,7 @@ class Overlaps:
 
     def check_pistons(self, t_end: float) -> None:
         """Raise BadInput if a piston will enter a block bounded by walls only before `t_end`."""
+        # ways of all pistons
         times = np.linspace(0.0, t_end, CHECKED_TIMES)
         ways = {
             id(segment): integrate_motion(segment, times)
@@ -171,12 +172,14 @@ class Overlaps:
             if isinstance(segment, Piston)
         }
         for block in self.blocks if ways else ():
+            # blocks with walls only that keep their shape
             own = [segment for segment in self.segments if segment.block is block]
             if not own or not all(isinstance(s, Wall) and not isinstance(s, Axis) for s in own):
                 continue
             moved = [ways.get(id(segment), np.zeros((2, CHECKED_TIMES))) for segment in own]
             if not all(np.array_equal(way, moved[0]) for way in moved):
                 continue  # it changes its shape: detected when it happens
+            # pistons of other blocks, relative to this one
             for segment in self.segments:
                 linked = any({id(block), id(segment.block)} <= pair for pair in self._linked)
                 if segment.block is block or linked or id(segment) not in ways:

@@ -56,11 +56,13 @@ def solve_along(main, next_one, next_two, right, closed, backwards, band, out):
     """
     count = main.shape[0]
     band[:, :] = 0.0
+    # the diagonals and the right side, in the order of elimination
     for k in range(count):
         at = (count - k) % count if closed else count - 1 - k
         row = find_band_place(at if backwards else k, count, closed)
         band[row, 0] = main[k]
         band[row, HALF_BAND + 1] = right[k]
+    # the couplings, each into the later of its two rows
     for k in range(count):
         for step in range(1, 3):
             other = k + step
@@ -76,6 +78,7 @@ def solve_along(main, next_one, next_two, right, closed, backwards, band, out):
             row = find_band_place(a, count, closed)
             column = find_band_place(other, count, closed)
             band[max(row, column), abs(row - column)] += value
+    # factors L and D, and the right side through L
     for row in range(count):
         low = max(0, row - HALF_BAND)
         for column in range(low, row):
@@ -87,11 +90,13 @@ def solve_along(main, next_one, next_two, right, closed, backwards, band, out):
             factor = band[row, row - column]
             band[row, 0] -= factor * factor * band[column, 0]
             band[row, HALF_BAND + 1] -= factor * band[column, HALF_BAND + 1]
+    # back through L^T
     for row in range(count - 1, -1, -1):
         value = band[row, HALF_BAND + 1] / band[row, 0]
         for later in range(row + 1, min(count, row + HALF_BAND + 1)):
             value -= band[later, later - row] * band[later, HALF_BAND + 1]
         band[row, HALF_BAND + 1] = value
+    # the solution, in the line's order
     for k in range(count):
         at = (count - k) % count if closed else count - 1 - k
         row = find_band_place(at if backwards else k, count, closed)
@@ -116,12 +121,14 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
     total = nodes.shape[1]
     edges = total - 1
     count = edges if closed else total
+    # lengths h of the segments
     stiff = np.empty(edges)
     length = np.empty(edges)
     for k in range(edges):
         step_x, step_y = nodes[0, k + 1] - nodes[0, k], nodes[1, k + 1] - nodes[1, k]
         length[k] = (step_x * step_x + step_y * step_y) ** 0.5
         stiff[k] = 1.0 / length[k]
+    # at each node m, its normal and the curvature kappa
     mass = np.empty(count)
     inverse = np.empty(count)
     bend = np.empty(count)
@@ -152,11 +159,13 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
         bend[k] = 0.0
         if part > 0.0:
             bend[k] = (ax * by - ay * bx) / (length[before] * length[after] * width)
+    # M + strength D M^-1 D: main diagonal and right side
     main = np.zeros(count)
     next_one = np.zeros(count)
     next_two = np.zeros(count)
     right = np.empty(count)
     middle = np.empty(count)
+    # its couplings with the next node and the one after
     for k in range(count):
         left_stiff = stiff[k - 1] if k > 0 else (stiff[edges - 1] if closed else 0.0)
         right_stiff = stiff[k] if k < edges else 0.0
@@ -185,6 +194,7 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
             )
         if inverse[k] > 0.0 and inverse[two] > 0.0 and (closed or k + 2 < count):
             next_two[k] = strength * (stiff[k] * far_stiff) * inverse[one]
+    # solved from both ends
     first, second = np.empty(count), np.empty(count)
     band = np.empty((count, HALF_BAND + 2))
     solve_along(main, next_one, next_two, right, closed, False, band, first)
@@ -196,6 +206,7 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
         base[k] = 0.5 * (first[k] + second[k])
         way[k] = base[k]
         most = max(most, abs(way[k]))
+    # the area swept: its part of second order in phi is taken out, in a few passes
     for _ in range(MOST_PASSES):
         change = 0.0
         for k in range(edges):  # what the segments sweep beyond the sum of m phi
@@ -211,6 +222,7 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
             way[k] = new
         if change <= SETTLED_PASS_CHANGE * most:
             break
+    # ways along the normals
     for k in range(total):
         for c in range(2):
             out[c, k] = way[k % count] * normal[c, k % count]
@@ -317,6 +329,7 @@ def fill_sliding_damping(line, rim, start, strength, bend, most, out):
     line (2, n + 4): the nodes with two images beyond each end; most: largest rate [1/s].
     """
     count = out.shape[1]
+    # the line's mean velocity
     mean_x = 0.0
     mean_y = 0.0
     for k in range(start, start + count - 1):
@@ -326,6 +339,7 @@ def fill_sliding_damping(line, rim, start, strength, bend, most, out):
     mean_y /= count - 1
     for k in range(count):
         m = k + 2
+        # direction of the line and its fourth difference
         tx = line[0, m + 1] - line[0, m - 1]
         ty = line[1, m + 1] - line[1, m - 1]
         square = tx * tx + ty * ty
@@ -339,6 +353,7 @@ def fill_sliding_damping(line, rim, start, strength, bend, most, out):
             - 4.0 * (line[1, m + 1] + line[1, m - 1])
             + 6.0 * line[1, m]
         )
+        # V: slip and speed relative to the mean, over both faces
         speed = 0.0
         for face in (max(start, start + k - 1), min(start + count - 2, start + k)):
             away_x = rim[on.U_STAR, face] - mean_x
@@ -346,6 +361,7 @@ def fill_sliding_damping(line, rim, start, strength, bend, most, out):
             speed += 0.5 * (rim[on.SLIP, face] + (away_x * away_x + away_y * away_y) ** 0.5)
         spacing = 0.5 * square**0.5
         rate = strength * speed / (16.0 * spacing)
+        # stronger where the line turns
         ax = line[0, m] - line[0, m - 1]
         ay = line[1, m] - line[1, m - 1]
         bx = line[0, m + 1] - line[0, m]
@@ -353,6 +369,7 @@ def fill_sliding_damping(line, rim, start, strength, bend, most, out):
         turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by) / bend
         rate *= 1.0 + turn * turn
         rate = rate if rate < most else most
+        # normal part only
         along = (fourth_x * ty - fourth_y * tx) / square
         out[0, k] = -rate * along * ty
         out[1, k] = rate * along * tx

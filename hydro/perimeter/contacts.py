@@ -37,6 +37,7 @@ def solve_contact(rim, k, other, m, state, law, other_law):
     impedance; slip speed.  `state`: the first of the rows rho, u, v, p, c on which it is solved;
     law, other_law: `EquationOfState.wave_law`.  By JUMP the pressure is higher on this side.
     """
+    # states of both sides, resolved along the face's normal
     nx, ny = find_normal(rim, k)
     rho = rim[state + on.RHO, k]
     u = rim[state + on.U, k]
@@ -49,16 +50,19 @@ def solve_contact(rim, k, other, m, state, law, other_law):
     jump = rim[on.JUMP, k]
     w = u * nx + v * ny
     w_other = u_other * nx + v_other * ny
+    # pressure and normal speed (theory F4.1)
     p, w = riemann.compute_contact(
         (rho, w, rim[state + on.P, k], c, law),
         (rho_other, w_other, other[state + on.P, m], c_other, other_law),
         jump,
     )
+    # velocity of the contact: along the face the mean of both, weighted by impedance
     z = rho * c
     z_other = rho_other * c_other
     mean_x = (z * u + z_other * u_other) / (z + z_other)
     mean_y = (z * v + z_other * v_other) / (z + z_other)
     excess = w - (mean_x * nx + mean_y * ny)
+    # the same result in both rims
     rim[on.P_STAR, k] = p + 0.5 * jump
     other[on.P_STAR, m] = p - 0.5 * jump
     rim[on.W_STAR, k] = w
@@ -174,6 +178,7 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
     gain = np.empty(count)
     size = np.empty(count)
     along = np.empty(count + 1)
+    # volume that each face gains by the nodes' speeds beside the contact's
     for k in range(count):
         at = count - k if backwards else k
         other = at - 1 if backwards else at + 1
@@ -183,6 +188,7 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
             + (speeds[1, at] + speeds[1, other]) * area_y
         )
         size[k] = (area_x * area_x + area_y * area_y) ** 0.5
+    # what all gain together, to be spread over them by their lengths
     left = 0.0
     whole = 0.0
     for k in range(count):
@@ -201,11 +207,13 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
         after += gain[end] - left * size[end] / whole
         along[k + 1] += 0.5 * before
         along[end] += 0.5 * after
+    # around a closed line the flow along it is known up to a constant: none on average
     mean = 0.0
     if closed:
         for k in range(count):
             mean += 0.5 * (along[k] + along[count - k])
         mean /= count
+    # mass, momentum and energy of that volume, from the cell that gives it
     for k in range(count + 1):
         rate = along[k] - mean
         if not closed and (k == 0 or k == count):
@@ -382,15 +390,18 @@ def mirror_in_walls(rim, walls, speeds):
 
 
 @compiled_once(allocates=False)
-def press_on_walls(rim, walls, law, curved):
-    """Pressure on impermeable faces that move as SWEEP says, and its flux."""
+def press_on_walls(rim, walls, wave_law, curved):
+    """Pressure on impermeable faces that move as SWEEP says, and its flux.
+
+    walls (n, 3): first faces of walls, those after the last (and the kind, not read here).
+    """
     for wall in range(walls.shape[0]):
         for k in range(walls[wall, 0], walls[wall, 1]):
             x, y = rim[on.NX, k], rim[on.NY, k]
             length = (x * x + y * y) ** 0.5
             w = (rim[on.U_TRACE, k] * x + rim[on.V_TRACE, k] * y - rim[on.SWEEP, k]) / length
             rim[on.P_STAR, k], _ = riemann.compute_wave_pressure(
-                rim[on.RHO_TRACE, k], rim[on.P_TRACE, k], rim[on.C_TRACE, k], law, w
+                rim[on.RHO_TRACE, k], rim[on.P_TRACE, k], rim[on.C_TRACE, k], wave_law, w
             )
             press(rim, k, curved)
 

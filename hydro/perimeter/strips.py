@@ -140,17 +140,21 @@ def make_side_kernels(
         nj = nodes.shape[2] - 1
         for side in range(len(SIDE_NAMES)):
             strip, along, first_face, step, _, _ = find_strip(side, ni, nj)
+            # the strip of cells along a side, in chunks that fit the scratch
             deep = (ni if side < J_MIN else nj) > 2
             for start in range(0, along, at.CHUNK_CELLS):
                 m = min(at.CHUNK_CELLS, along - start)
                 n = at.count_padded(m)
                 first = first_face + start * step
+                # does any face of the chunk need the next cells inwards?
                 wanted = False
                 for k in range(m):
                     wanted |= inwards[first + k * step]
+                # lengths across the side
                 copy_nodes(nodes, strip, 0, start, m, Z, at.X_HIGH)
                 copy_nodes(nodes, strip, 1, start, m, Z, at.X_NEXT)
                 measure_after(Z, n)
+                # the cells' states, and the same at their faces
                 for k in range(m):
                     face = first + k * step
                     i, j = find_strip_cell(strip, 0, start + k)
@@ -163,6 +167,7 @@ def make_side_kernels(
                     rim[on.LENGTH, face] = length + 2.0 * shift
                     for q in range(on.C + 1):
                         rim[on.RHO_FACE + q, face] = rim[q, face]
+                # velocity of the next cells inwards, and the way to them
                 if wanted:
                     look_inwards(state, nodes, strip, start, deep, Z)
                     for k in range(1, m + 1):
@@ -172,6 +177,7 @@ def make_side_kernels(
                         way = 0.5 * (Z[at.LENGTH_BEFORE + k] + Z[at.LENGTH + k])
                         way += Z[at.SHIFT + k] - Z[at.SHIFT_BEFORE + k]
                         rim[on.WAY_NEXT, face] = way
+                # states extrapolated to the faces (theory F4.7)
                 if wanted and deep:
                     extrapolate(Z, m, inwards, first, step, parameters, rim)
 
@@ -345,9 +351,13 @@ def make_side_kernels(
         trace_moving(rim, half_dt, parameters, moving)
 
     @kernel(allocates=False)
-    def trace_sides(nodes, nodes_new, inverse_dt, parameters, law, walls, opened, rim):
+    def trace_sides(nodes, nodes_new, inverse_dt, parameters, wave_law, walls, opened, rim):
         """Faces between the old nodes and the new ones, traces in their middles, and the fluxes
-        through walls and open sides."""
+        through walls and open sides.
+
+        walls (n, 3): first faces of walls, those after the last, and whether it is the axis;
+        opened (n, 3): likewise of open sides, and the first row of the state beyond.
+        """
         fill_faces(nodes, nodes_new, inverse_dt, rim)
         for k in range(rim.shape[1]):
             rim[on.X_TRACE, k] = rim[on.X_AREA, k]
@@ -356,7 +366,7 @@ def make_side_kernels(
             if walls[wall, 2] == AXIS:
                 place_traces_on_axis(nodes, nodes_new, walls[wall, 0], walls[wall, 1], rim)
         trace_faces(rim, parameters, 0, rim.shape[1])
-        press_on_walls(rim, walls, law, curved)
+        press_on_walls(rim, walls, wave_law, curved)
         pass_open_sides(rim, opened, curved)
 
     return SideKernels(

@@ -81,6 +81,7 @@ def distribute_blocks(
     """
     if ranks < 1:
         raise ValueError(f"{ranks} ranks; one at least is needed")
+    # cells that each rank has so far, and those of the blocks that it owns
     sizes = [ni * nj for ni, nj in cells]
     fair = sum(sizes) / ranks
     wanted = wanted or {}
@@ -91,6 +92,7 @@ def distribute_blocks(
     for number in sorted(range(len(cells)), key=lambda n: (-sizes[n], n)):
         size = sizes[number]
         rows = count_tile_rows(cells[number][0])
+        # the largest block first, to the ranks with least to do
         order = sorted(range(ranks), key=lambda r: (loads[r], r))
         bands = 1 if number in whole else min(wanted.get(number, rows), rows, ranks)
         if number in wanted or bands == 1:
@@ -99,6 +101,7 @@ def distribute_blocks(
             taken = _fill_up(rows, size / rows, [fair - loads[r] for r in order])
         else:
             taken = [rows]
+        # its owner is the one that owns least
         there = order[: len(taken)]
         home = min(range(len(there)), key=lambda k: (homes[there[k]], k))
         for listed in (there, taken):

@@ -115,10 +115,12 @@ class Ranks(Blocks):
         blocks = self
         new = []
         now = []
+        # new nodes along all sides
         rings = [
             [(attrgetter("nodes_new"), messages.find_ring_of_nodes(block))] for block in blocks
         ]
         self._nodes = self._make("nodes", rings, NODE_ROW)
+        # what cells along the sides hold, by bands of cut blocks; sums of the owners
         for number, block in enumerate(blocks):
             there = self.places[number]
             bounds = self.bounds[number]
@@ -139,6 +141,7 @@ class Ranks(Blocks):
         comm = self.book.count("states")
         self._new_states = messages.Message(comm, blocks, new)
         self._states = messages.Message(comm, blocks, now)
+        # polygon cells, among the ranks of a cut block
         self._polygons = {
             number: self._make_polygons(number, cut)
             for number, cut in self.cuts.items()
@@ -304,7 +307,10 @@ class Ranks(Blocks):
         return found
 
     def _list_kept(self, number: int) -> list[tuple[int, int, str, tuple[int, int]]]:
-        """Who has what of a block, as rank, tag, name of an array and its rows; nodes at home."""
+        """Who has what of a block: rank, tag of the message, name of an array, and its rows.
+
+        Nodes are the owner's alone; of other arrays each rank has the rows of its band.
+        """
         block = self[number]
         found = []
         for tag, name in enumerate(block.step_arrays, MOST_KEPT_ARRAYS * number):

@@ -256,6 +256,7 @@ def remap_state(
     """
     check_convex(name, nodes)
     check_convex(name, new_nodes)
+    # linear fields of conserved quantities, and of carried fields by mass
     volumes, centres = compute_cell_moments(nodes, curved)
     conserved = compute_conserved(eos, *(held[array] for array in HELD_ARRAYS))
     carried = held.get("carried")
@@ -263,6 +264,7 @@ def remap_state(
         conserved = np.concatenate((conserved, conserved[RHO] * carried))
     fields = make_linear_fields(conserved, nodes, centres)
     lessen_slopes(eos, fields, nodes, centres)
+    # cut by the new grid; a second time with constant fields if a result is no state
     for _ in range(2):
         overlay = overlay_grids(nodes, centres, fields, new_nodes, curved)
         content, slivers = share_slivers(overlay, fields, volumes, centres, new_nodes)

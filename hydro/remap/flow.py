@@ -110,12 +110,14 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
     RegridFailure where no grid is found in the sides; RunFailure where an average is no state.
     """
     _check_same(old, new)
+    # the grid at this time
     if new.motion.mesh == "regrid":
         _lay_sides(old, new)
         for one, other, number in zip(old.blocks, new.blocks, range(len(old.blocks)), strict=True):
             _make_grid(one, other, new, number)
     elif callable(old.motion.mesh) and callable(new.motion.mesh):
         _follow_law(old.blocks, new.blocks, old.motion.mesh, new.motion.mesh, old.t)
+    # the state on it (theory F12)
     state = dict(new.get_state())
     report = []
     for one, other in zip(old.blocks, new.blocks, strict=True):
@@ -124,6 +126,7 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
         for name, array in found.items():
             state[f"{one.name}/{name}"] = array
         report.append(RemappedBlock(one.name, (one.ni, one.nj), (other.ni, other.nj), slivers))
+    # with the old time, totals and contacts
     new.set_state(
         state
         | {
@@ -132,6 +135,7 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
             **old.meetings.get_state_for(new.meetings),
         }
     )
+    # rates and totals of the new cells
     for block in new.blocks:
         block.copy_start()
         phases.update(block, 0.0)  # rates and totals of this state
@@ -296,7 +300,9 @@ class Refinement:
             return None
         lines = [line for line in lines if line.segment.kind == "interface"]
         count = lines[0].segment.block.nj
+        # by column, over all lines: above 1 where it is too long or bends too sharply (F12.6)
         split = np.zeros(count)
+        # by inner line between columns: above 1 where they are too long for one, or bent
         kept = np.zeros(count - 1)
         for line in lines:
             edges, turns = measure_line(line)
@@ -307,16 +313,16 @@ class Refinement:
             around = turns[:-2] + turns[1:-1] + turns[2:]
             long = (edges[:-1] + edges[1:]) / LONGEST_MERGED
             kept = np.maximum(kept, np.maximum(long, around / (CALM_LIMIT_PART * SHARPEST)))
+        # lines are added where they are wanted most, so many at once
         most = max(1, int(MOST_CHANGED_COLUMNS * count))
         columns = pick_largest(split, min(most, MOST_COLUMN_GROWTH * self.first_count - count))
         if columns.size:
             return np.sort(np.append(np.arange(count + 1), columns + 0.5))
         if count == self.first_count or split.max() > CALM_LIMIT_PART:
             return None
+        # otherwise lines go that are needed least, no two neighbours at once
         beside = np.minimum(np.append(kept[1:], np.inf), np.insert(kept[:-1], 0, np.inf))
-        kept = np.where(
-            kept < beside * (1.0 - MIRROR_TIE), kept, np.inf
-        )  # no two neighbours go at once
+        kept = np.where(kept < beside * (1.0 - MIRROR_TIE), kept, np.inf)
         ease = 1.0 / np.maximum(kept, MIRROR_TIE)
         removed = 1 + pick_largest(ease, min(most, count - self.first_count))
         fits = 0 < removed.size <= count - self.first_count

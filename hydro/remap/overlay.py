@@ -162,6 +162,7 @@ def fill_linear_fields(means, nodes, centres, least, greatest, fields):
     for i in range(ni):
         for j in range(nj):
             x, y = centres[0, i, j], centres[1, i, j]
+            # least squares over the cells around: normal equations of the slopes
             xx = 0.0
             xy = 0.0
             yy = 0.0
@@ -181,6 +182,7 @@ def fill_linear_fields(means, nodes, centres, least, greatest, fields):
                         rise = weight * (means[q, k, m] - means[q, i, j])
                         fields[i, j, q, SLOPE_X] += rise * way_x
                         fields[i, j, q, SLOPE_Y] += rise * way_y
+            # solved; then lessened until no corner is beyond the means around it (F12.3)
             inverse = 1.0 / (xx * yy - xy * xy)
             for q in range(count):
                 mean = means[q, i, j]
@@ -289,6 +291,7 @@ def take_overlaps(waiting, cell, old, curved, mark, scratch, out):
     while waiting > 0:
         waiting -= 1
         i, j = queue[waiting] // nj, queue[waiting] % nj
+        # what the old cell and the new one have in common
         n, below, right, above, left = cut_by_cell(work, nodes, i, j, x, y)
         if n < 3:
             continue
@@ -296,16 +299,19 @@ def take_overlaps(waiting, cell, old, curved, mark, scratch, out):
         volume, moment_x, moment_y = measure_polygon(work[0], work[1], n, curved, about_x, about_y)
         if not volume > 0.0:
             continue
+        # its content by the old cell's linear field (theory F12.1)
         for q in range(taken.shape[0]):
             taken[q] += fields[i, j, q, MEAN] * volume + (
                 fields[i, j, q, SLOPE_X] * moment_x + fields[i, j, q, SLOPE_Y] * moment_y
             )
+        # its volume and first moments, of the old cell and of the new one
         used[i, j, 0] += volume
         used[i, j, 1] += moment_x
         used[i, j, 2] += moment_y
         covered[0] += volume
         covered[1] += moment_x + (about_x - here[0]) * volume
         covered[2] += moment_y + (about_y - here[1]) * volume
+        # the new cell goes on into the neighbours across the edges that it crosses
         if below and j > 0 and marks[i, j - 1] != mark:
             marks[i, j - 1] = mark
             queue[waiting] = i * nj + j - 1
@@ -376,6 +382,7 @@ def fill_overlaps(old, new, curved, least_gap, scratch, out):
     taken[:, :, :] = 0.0
     covered[:, :, :] = 0.0
     used[:, :, :] = 0.0
+    # each new cell: start in the old cell at its centre, near that of the cell before
     row_i, row_j = 0, 0
     for i in range(taken.shape[0]):
         at_i, at_j = row_i, row_j
@@ -392,6 +399,7 @@ def fill_overlaps(old, new, curved, least_gap, scratch, out):
             cell = (x, y, here)
             own = (taken[i, j], covered[i, j], used)
             take_overlaps(1, cell, old, curved, mark, scratch, own)
+            # parts that a walk over edges does not reach, such as beside a curved side
             if covered[i, j, 0] < (1.0 - least_gap) * new_volumes[i, j]:
                 every = covered[i, j, 0] == 0.0
                 waiting = queue_missed(nodes, x, y, every, mark, marks, queue)

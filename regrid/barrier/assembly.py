@@ -119,6 +119,7 @@ def fill_line_edges(nodes, i, laws, low, count, Z):
     bend = laws.bend
     way = laws.way
     weight = laws.ki
+    # rows of nodes, spacings and bends
     x0, y0 = nodes[0, i, low : low + count], nodes[1, i, low : low + count]
     x1, y1 = nodes[0, i + 1, low : low + count], nodes[1, i + 1, low : low + count]
     length = along_i[LENGTH, i]
@@ -129,12 +130,14 @@ def fill_line_edges(nodes, i, laws, low, count, Z):
     bend1 = bend[i + 1, low : low + count]
     way_x, way_y = way[0, low : low + count], way[1, low : low + count]
     for col in range(count):
+        # conditional length (R2.3) and straight-line weight of the edge
         v = Z[V + col]
         s = length + Z[COLUMN_WEIGHT_ROW + col] * length_change
         t = step + v * step_change
         inverse = 1.0 / (s * t)
         g = t * inverse
         q = weight * (s * inverse)
+        # scaled edge (R2.1) and its pull along the straight or bent line (R1.5, R4.9)
         dx, dy = x1[col] - x0[col], y1[col] - y0[col]
         ax, ay = dx * g, dy * g
         Z[AX + col] = ax
@@ -372,6 +375,7 @@ def fill_own_blocks(cells, now, past, Z):
         e_yx, e_yy = past[FINE_EAST + 2 * CHUNK_SPAN + col], past[FINE_EAST + 3 * CHUNK_SPAN + col]
         f_xx, f_xy = now[FINE_EAST + col], now[FINE_EAST + CHUNK_SPAN + col]
         f_yx, f_yy = now[FINE_EAST + 2 * CHUNK_SPAN + col], now[FINE_EAST + 3 * CHUNK_SPAN + col]
+        # minus the sum of all couplings of the node
         xx = (e_xx + f_xx) + (now[FINE_NORTH + col] + now[FINE_NORTH + col - 1])
         xx += now[FINE_DIAGONAL + col] + past[FINE_DIAGONAL + col - 1]
         xx += past[FINE_CROSS + col] + now[FINE_CROSS + col - 1]
@@ -388,6 +392,7 @@ def fill_own_blocks(cells, now, past, Z):
         )
         xy += now[FINE_DIAGONAL + CHUNK_SPAN + col] + past[FINE_DIAGONAL + 2 * CHUNK_SPAN + col - 1]
         xy += past[FINE_CROSS + CHUNK_SPAN + col] + now[FINE_CROSS + 2 * CHUNK_SPAN + col - 1]
+        # the diagonal block
         Z[KEPT_OWN_BLOCKS + FINE_OWN + col] = -xx
         Z[KEPT_OWN_BLOCKS + FINE_OWN + CHUNK_SPAN + col] = -xy
         Z[KEPT_OWN_BLOCKS + FINE_OWN + 2 * CHUNK_SPAN + col] = -yy
@@ -402,6 +407,7 @@ def fill_own_blocks(cells, now, past, Z):
         p_yy = -yy - (e_xy * t_xy + e_yy * t_yy)
         square = p_xx * p_yy
         least = LEAST_PIVOT * square
+        # inverse pivot, kept positive, and the factor for the next row
         determinant = square - p_xy * p_xy
         scale = 1.0 / (determinant if determinant > least else least)
         v_xx = p_yy * scale
@@ -534,6 +540,7 @@ def make_assembly(smooth):
         for i in range(ni):
             now = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
             past = H[max(i - 1, 0) * NODE_ROWS : (max(i - 1, 0) + 1) * NODE_ROWS]
+            # edges of this row of cells
             begin_row(nodes, i, laws, low, cells, Z)
             if law.given:
                 keep_side_lengths(law.shares_j, i + 1, low, cells, Z)
@@ -553,6 +560,7 @@ def make_assembly(smooth):
                     Z[SLOPE_2 + col] = s2
                     Z[SLOPE_3 + col] = s3
                     Z[SLOPE_4 + col] = s4
+                # inverses, and 1/sine² of the corners
                 i1 = 1.0 / d1
                 i2 = 1.0 / d2
                 i3 = 1.0 / d3
@@ -590,6 +598,7 @@ def make_assembly(smooth):
                 ease_row(law.ease, i, low, cells, Z)
             for col in range(cells):
                 Z[WEIGHT + col] *= Z[FADING_ROW + col]
+            # gradient and second derivatives of each corner (R4.6, R4.7)
             for corner in range(4):
                 # Corners 2 and 3 use the line edge one column on, 3 and 4 the far side edge.
                 shift = 1 if corner == 1 or corner == 2 else 0
@@ -606,6 +615,7 @@ def make_assembly(smooth):
                     fill_smoothed_corner(A, B, inverse, slope, weight, area, out)
                 else:
                     fill_barrier_corner(A, B, inverse, slope, weight, area, out)
+            # gathered by cell, with the cost of narrow cells (R4.10)
             fill_cell_blocks(cells, now, Z)
             if not smooth and functional.has_cell_terms(law):
                 near = nodes[0, i, low : low + cells + 1], nodes[1, i, low : low + cells + 1]

@@ -61,6 +61,7 @@ def gather_cells(nodes, law, first, last, first_columns, last_columns, Z):
     x, y = nodes
     along_i, along_j = law.along_i, law.along_j
     ni, nj = along_i.shape[1], along_j.shape[1]
+    # lengths and steps of the row of cells
     low = 0.5 * (along_i[LENGTH, first] + along_i[LENGTH, last])
     low_change = 0.5 * (along_i[LENGTH_CHANGE, first] + along_i[LENGTH_CHANGE, last])
     step = 0.5 * (along_i[STEP, first] + along_i[STEP, last])
@@ -71,6 +72,7 @@ def gather_cells(nodes, law, first, last, first_columns, last_columns, Z):
     for k in range(first_columns.shape[0]):
         j = first_columns[k]
         j_last = last_columns[k]
+        # corners of the gathered cell, and its edges
         x1, y1 = take_mean(x, first, last, j, j_last), take_mean(y, first, last, j, j_last)
         x2 = take_mean(x, first, last, j + 1, j_last + 1)
         y2 = take_mean(y, first, last, j + 1, j_last + 1)
@@ -86,6 +88,7 @@ def gather_cells(nodes, law, first, last, first_columns, last_columns, Z):
         Z[NEAR_Y, k] = y2 - y1
         Z[FAR_X, k] = x3 - x4
         Z[FAR_Y, k] = y3 - y4
+        # inverse conditional lengths of its edges (R2.3)
         low_blend = 0.5 * (law.blend_j[j] + law.blend_j[j_last])
         up_blend = 0.5 * (law.blend_j[j + 1] + law.blend_j[j_last + 1])
         Z[LOW_G, k] = 1.0 / (low + low_blend * low_change)
@@ -94,6 +97,7 @@ def gather_cells(nodes, law, first, last, first_columns, last_columns, Z):
         change = 0.5 * (along_j[LENGTH_CHANGE, j] + along_j[LENGTH_CHANGE, j_last])
         Z[NEAR_G, k] = 1.0 / (near + near_blend * change)
         Z[FAR_G, k] = 1.0 / (near + far_blend * change)
+        # weights of the straight lines
         side = 0.5 * (along_j[STEP, j] + along_j[STEP, j_last])
         change = 0.5 * (along_j[STEP_CHANGE, j] + along_j[STEP_CHANGE, j_last])
         v = 0.5 * (j + j_last + 1) / nj
@@ -186,6 +190,7 @@ def couple_nodes(stretch, lines, count, Z, now, then):
     and `then` (ROWS, count + 1) are the blocks at its first and second row of coarse nodes.
     """
     for k in range(count):
+        # blocks of the four corners together, stretched to coarse cells (R4.14)
         along = 0.5 * lines[k] / stretch
         aa_xx = along * Z[BLOCK_AA, k]
         aa_xy = along * Z[BLOCK_AA + 1, k]
@@ -198,6 +203,7 @@ def couple_nodes(stretch, lines, count, Z, now, then):
         even = 0.25 * (Z[BLOCK_AB + 1, k] + Z[BLOCK_AB + 2, k])
         xx = 0.5 * Z[BLOCK_AB, k]
         yy = 0.5 * Z[BLOCK_AB + 3, k]
+        # couplings along i, along j and across
         now[COARSE_EAST, k] -= aa_xx
         now[COARSE_EAST + 1, k] += odd - aa_xy
         now[COARSE_EAST + 2, k] -= odd + aa_xy
@@ -227,6 +233,7 @@ def couple_nodes(stretch, lines, count, Z, now, then):
         then[COARSE_OWN, k] += Z[BLOCK_BB, k] - xx
         then[COARSE_OWN + 1, k] += Z[BLOCK_BB + 1, k] - even
         then[COARSE_OWN + 2, k] += Z[BLOCK_BB + 2, k] - yy
+    # the same towards the next line of nodes
     for k in range(count):
         now[COARSE_EAST, k + 1] -= Z[BLOCK_AA, k]
         now[COARSE_EAST + 1, k + 1] -= Z[BLOCK_AB, k] + Z[BLOCK_AA + 1, k]
@@ -254,18 +261,21 @@ def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
     Z = np.empty((COARSE_SCRATCH_ROWS, parts_j))
     lines = np.empty(parts_j)
     first_columns, last_columns = np.empty((2, parts_j), dtype=np.int64)
+    # the one or two fine cells in the middle of each coarse one
     for k in range(parts_j):
         first_columns[k] = (starts_j[k] + starts_j[k + 1] - 1) // 2
         last_columns[k] = (starts_j[k] + starts_j[k + 1]) // 2
         lines[k] = starts_j[k + 1] - starts_j[k]
     matrix[:] = 0.0
     for part in range(parts_i):
+        # those of this row, weighed
         first = (starts_i[part] + starts_i[part + 1] - 1) // 2
         last = (starts_i[part] + starts_i[part + 1]) // 2
         gather_cells(nodes, law, first, last, first_columns, last_columns, Z)
         growth = 0.5 * (law.along_i[GROWTH, first] + law.along_i[GROWTH, last])
         if not weigh_cells(law, growth, parts_j, Z):
             return False
+        # second derivatives: corners, narrow cells, straight lines
         Z[BLOCK_AA:] = 0.0
         add_corners(LOW_X, NEAR_X, LOW_G, NEAR_G, law, parts_j, Z)
         add_corners(UP_X, NEAR_X, UP_G, NEAR_G, law, parts_j, Z)
@@ -278,6 +288,7 @@ def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
             Z[BLOCK_AA + 2, k] += Z[LINE_Q, k]
             Z[BLOCK_BB, k] += Z[SIDE_Q, k]
             Z[BLOCK_BB + 2, k] += Z[SIDE_Q, k]
+        # coupled as coarse nodes
         stretch = starts_i[part + 1] - starts_i[part]
         couple_nodes(stretch, lines, parts_j, Z, matrix[part], matrix[part + 1])
     return True
@@ -291,6 +302,7 @@ def factor_lines(matrix):
         past = matrix[i - 1]
         now = matrix[i]
         for j in range(1, n_j):
+            # the block less the coupling through the row before
             xx = now[COARSE_OWN, j]
             xy = now[COARSE_OWN + 1, j]
             yy = now[COARSE_OWN + 2, j]
@@ -306,6 +318,7 @@ def factor_lines(matrix):
                 xx -= a * p + c * r
                 xy -= a * q + c * s
                 yy -= b * q + d * s
+            # its inverse, kept positive
             square = xx * yy
             least = LEAST_PIVOT * square
             determinant = square - xy * xy
@@ -314,6 +327,7 @@ def factor_lines(matrix):
             now[COARSE_PIVOT, j] = xx
             now[COARSE_PIVOT + 1, j] = xy
             now[COARSE_PIVOT + 2, j] = yy
+            # factor of the next row
             a = now[COARSE_EAST, j]
             b = now[COARSE_EAST + 1, j]
             c = now[COARSE_EAST + 2, j]
@@ -329,6 +343,7 @@ def solve_lines(matrix, r, z):
     """`z` = solution along every line in i for the residual `r`, (2, nodes); returns r·z."""
     n_i, n_j = r.shape[1] - 1, r.shape[2] - 1
     total = 0.0
+    # forward
     for i in range(1, n_i):
         past = matrix[i - 1]
         z_x = z[0, i]
@@ -345,6 +360,7 @@ def solve_lines(matrix, r, z):
                 u, v = b_x[j], b_y[j]
                 z_x[j] = r_x[j] - (past[COARSE_FACTOR, j] * u + past[COARSE_FACTOR + 2, j] * v)
                 z_y[j] = r_y[j] - (past[COARSE_FACTOR + 1, j] * u + past[COARSE_FACTOR + 3, j] * v)
+    # backward
     for i in range(n_i - 1, 0, -1):
         now = matrix[i]
         z_x = z[0, i]
@@ -380,6 +396,7 @@ def fill_product(matrix, p, out):
         a_y = p[1, i + 1]
         out_x, out_y = out[0, i], out[1, i]
         for j in range(1, n_j):
+            # the node, and its neighbours along i and j
             u, v = h_x[j], h_y[j]
             x, y = (
                 now[COARSE_OWN, j] * u + now[COARSE_OWN + 1, j] * v,
@@ -427,6 +444,7 @@ def solve(matrix, r, x, z, p, product, tolerance, most):
     the line solve, is below `tolerance`² of its first value, or after `most` iterations; returns
     their number, or -1 where the matrix is not positive definite.
     """
+    # residual of the first x
     p[:] = 0.0
     fill_product(matrix, x, product)
     r -= product
@@ -437,6 +455,7 @@ def solve(matrix, r, x, z, p, product, tolerance, most):
     if not rz >= 0.0:
         return -1
     while done < most and rz > stop:
+        # direction, and the step along it
         for k in range(2):
             for i in range(1, r.shape[1] - 1):
                 direction = p[k, i]
@@ -456,6 +475,7 @@ def solve(matrix, r, x, z, p, product, tolerance, most):
                 for j in range(r.shape[2]):
                     x_row[j] += alpha * p_row[j]
                     r_row[j] -= alpha * h_row[j]
+        # residual after it
         done += 1
         before = rz
         rz = solve_lines(matrix, r, z)

@@ -122,6 +122,7 @@ def fill_coarse_lines(nodes, starts_i, starts_j, solution, lines):
     lines[:] = 0.0
     for part_i in range(1, parts_i):
         for part_j in range(1, parts_j):
+            # frame of the lines at the coarse node (R4.13), and its shortest edge
             i, j = starts_i[part_i], starts_j[part_j]
             ix, iy = 0.5 * (x[i + 1, j] - x[i - 1, j]), 0.5 * (y[i + 1, j] - y[i - 1, j])
             jx, jy = 0.5 * (x[i, j + 1] - x[i, j - 1]), 0.5 * (y[i, j + 1] - y[i, j - 1])
@@ -131,9 +132,11 @@ def fill_coarse_lines(nodes, starts_i, starts_j, solution, lines):
                 edge_x, edge_y = x[a, b] - x[i, j], y[a, b] - y[i, j]
                 shortest = min(shortest, edge_x * edge_x + edge_y * edge_y)
             most = max(most, (dx * dx + dy * dy) / shortest)
+            # the displacement in this frame
             area = ix * jy - iy * jx
             solution[0, part_i, part_j] = (dx * jy - dy * jx) / area
             solution[1, part_i, part_j] = (ix * dy - iy * dx) / area
+        # linear between coarse nodes along j
         for k in range(2):
             for part_j in range(parts_j):
                 begin = starts_j[part_j]
@@ -248,15 +251,18 @@ class CoarseCorrection:
             return 0.0
         self.lines[:] = 0.0
         tuning = self.tuning
+        # level by level, each begins with the correction of the one before
         for level in self.levels:
             starts = self.starts_i, level.starts_j
             level.vectors[:] = 0.0
+            # right side, and the earlier correction as a first solution
             right, solution, z, p, product = level.vectors
             fill_coarse_right(level.starts_j, self.sums, right)
             if not take_frames(nodes, *starts, right, self.lines, solution):
                 return 0.0
             if not fill_coarse_matrix(nodes, law, *starts, level.matrix):
                 return 0.0
+            # solved
             factor_lines(level.matrix)
             done = solve(
                 level.matrix, right, solution, z, p, product, tuning.exact_tolerance,
@@ -265,6 +271,7 @@ class CoarseCorrection:
             if done < 0:
                 return 0.0
             self.iterations += done
+            # as displacements along the lines
             size = float(fill_coarse_lines(nodes, *starts, solution, self.lines))
             if size < least:
                 return 0.0

@@ -29,10 +29,12 @@ def fill_product_row(now, past, count, Z):
     `now` and `past` are the matrix rows of this row of nodes and the previous one.
     """
     for col in range(1, count + 1):
+        # the node itself
         x, y = Z[HERE_X + col], Z[HERE_Y + col]
         own = now[at.FINE_OWN + CHUNK_SPAN + col]
         s_x = now[at.FINE_OWN + col] * x + own * y
         s_y = own * x + now[at.FINE_OWN + 2 * CHUNK_SPAN + col] * y
+        # its neighbours along i
         u, v = Z[AFTER_X + col], Z[AFTER_Y + col]
         s_x += now[at.FINE_EAST + col] * u + now[at.FINE_EAST + CHUNK_SPAN + col] * v
         s_y += (
@@ -45,6 +47,7 @@ def fill_product_row(now, past, count, Z):
             past[at.FINE_EAST + CHUNK_SPAN + col] * u
             + past[at.FINE_EAST + 3 * CHUNK_SPAN + col] * v
         )
+        # along j
         u, v = Z[HERE_X + col + 1], Z[HERE_Y + col + 1]
         s_x += now[at.FINE_NORTH + col] * u + now[at.FINE_NORTH + CHUNK_SPAN + col] * v
         s_y += (
@@ -57,6 +60,7 @@ def fill_product_row(now, past, count, Z):
             now[at.FINE_NORTH + CHUNK_SPAN + col - 1] * u
             + now[at.FINE_NORTH + 3 * CHUNK_SPAN + col - 1] * v
         )
+        # and across cells
         u, v = Z[AFTER_X + col + 1], Z[AFTER_Y + col + 1]
         s_x += now[at.FINE_DIAGONAL + col] * u + now[at.FINE_DIAGONAL + CHUNK_SPAN + col] * v
         s_y += (
@@ -101,6 +105,7 @@ def fill_product(directions, beta, first, last, H, out, totals, Z):
     count = last - first
     low = first - 1
     high = last + 1
+    # rows of the direction pass through the scratch, one ahead
     total = totals[first:last]
     for k in range(count):
         total[k] = 0.0
@@ -115,6 +120,7 @@ def fill_product(directions, beta, first, last, H, out, totals, Z):
             Z[BEFORE_Y + col] = Z[HERE_Y + col]
             Z[HERE_X + col] = Z[AFTER_X + col]
             Z[HERE_Y + col] = Z[AFTER_Y + col]
+        # the next row of the direction
         new_x, new_y = direction[0, i + 1, low:high], direction[1, i + 1, low:high]
         if beta >= 0.0:
             step_x, step_y = z[0, i + 1, low:high], z[1, i + 1, low:high]
@@ -129,6 +135,7 @@ def fill_product(directions, beta, first, last, H, out, totals, Z):
             for col in range(count + 2):
                 Z[AFTER_X + col] = new_x[col]
                 Z[AFTER_Y + col] = new_y[col]
+        # product of the row in the middle
         if i > 0:
             now = H[i * at.NODE_ROWS : (i + 1) * at.NODE_ROWS]
             past = H[(i - 1) * at.NODE_ROWS : i * at.NODE_ROWS]
@@ -158,6 +165,7 @@ def fill_line_solution(alpha, step, vectors, first, last, H, totals):
         x_x = x[0, i, first:last]
         x_y = x[1, i, first:last]
         r_x, r_y = r[0, i, first:last], r[1, i, first:last]
+        # the step
         if alpha != 0.0:
             p_x, p_y = direction[0, i, first:last], direction[1, i, first:last]
             h_x, h_y = product[0, i, first:last], product[1, i, first:last]
@@ -166,6 +174,7 @@ def fill_line_solution(alpha, step, vectors, first, last, H, totals):
                 x_y[k] += alpha * p_y[k]
                 r_x[k] -= alpha * h_x[k]
                 r_y[k] -= alpha * h_y[k]
+        # forward along i with the factors of the lines
         z_x, z_y = z[0, i, first:last], z[1, i, first:last]
         if i == 1:
             for k in range(count):
@@ -186,6 +195,7 @@ def fill_line_solution(alpha, step, vectors, first, last, H, totals):
                 )
     for k in range(count):
         total[k] = 0.0
+    # backward, and the sums
     for i in range(ni - 1, 0, -1):
         now = H[i * at.NODE_ROWS : (i + 1) * at.NODE_ROWS]
         r_x, r_y = r[0, i, first:last], r[1, i, first:last]
@@ -237,6 +247,7 @@ def make_solver(parallel):
         end = columns[chunks]
         for c in prange(chunks):
             fill_line_solution(0.0, (p, product), vectors, columns[c], columns[c + 1], H[c], totals)
+        # norm of the first residual, and where to stop
         first = add_columns(totals, begin, end)
         rz = first
         stop = max(floor, tolerance * tolerance * first)
@@ -248,9 +259,11 @@ def make_solver(parallel):
                     (p, vectors[2], p_old), beta, columns[c], columns[c + 1], H[c], product, totals,
                     scratch[c],
                 )  # fmt: skip
+            # p·Hp; not positive: the matrix is no use any more
             curvature = add_columns(totals, begin, end)
             if not curvature > 0.0:
                 break
+            # step, next residual
             alpha = rz / curvature
             for c in prange(chunks):
                 fill_line_solution(

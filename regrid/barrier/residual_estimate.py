@@ -318,6 +318,7 @@ def take_cell(col, numbers, Z):
     c1 = find_largest(c1, c2, c3, c4)
     c2 = Z[SHARPEST + col]
     Z[SHARPEST + col] = c1 if c1 > c2 else c2
+    # weight of the cell (R4.3, R4.4)
     weight = (full * weigh(c1, least_sine, most)) * fade(ratio, growth)
     # Twice the mid-lines: aspect ratio as a fraction, and whether terms of cells act on this one.
     mx = ax + ux
@@ -343,6 +344,7 @@ def take_cell(col, numbers, Z):
     k2 = k2 * (weight * h2)
     k3 = k3 * (weight * h3)
     k4 = k4 * (weight * h4)
+    # gradient and diagonal of the matrix at the four edges
     w = weight * (ga * ga)
     t = (w + w) * (i1 + i4)
     Z[LOW_Q + col] = w * (s1 * pb + s4 * pr)
@@ -389,6 +391,7 @@ def take_cells(i, law, shape, low, cells, Z):
     Whole vectors of columns, as in `add_row`; entries behind the last cell affect no other.
     """
     ni, nj = shape
+    # areas of the old cells, none for the block's own corners
     if law.bent:
         measure_old(cells, Z)
     else:
@@ -540,16 +543,19 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
     cells = last - first + 1
     count = starts.shape[0] - 1
     stretch = 0
+    # rows pass through the scratch, one row of nodes ahead
     begin(law, motion, low, cells, Z)
     for i in range(-1, ni):
         shift_rows(cells + 1, Z)
         take_old_row(old, i + 1, frame, low, cells + 1, Z)
         make_new_row(i + 1, law, motion, low, cells + 1, ni, nj, Z)
+        # the displaced row, where it is wanted
         framed = frame[0] or frame[1]
         if framed:
             give_row(into, i + 1, frame, low, cells + 1, Z)
         if not framed or i < 1 or i > ni - 3:
             give_row(nodes, i + 1, UPRIGHT, low, cells + 1, Z)
+        # the functional's contributions of the row of cells below it
         row = law.along_i[:, max(i, 0)]
         line = row[LENGTH], row[LENGTH_CHANGE], row[STEP], row[STEP_CHANGE], law.ki
         take_laws(line, (law.blend_i[i + 1], (i + 1) / ni, law.kj), cells + 1, Z)
@@ -566,6 +572,7 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
             for col in range(1, cells):
                 Z[PIVOT + col] = Z[PART_X + col] = Z[PART_Y + col] = Z[SUM + col] = 0.0
                 Z[WHOLE_X + col] = Z[WHOLE_Y + col] = 0.0
+        # sums over stretches of lines, for smooth errors (R4.13)
         if count > 1:
             here = starts[stretch]
             end = starts[stretch + 1]
@@ -574,6 +581,7 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
                 end_stretch(stretch, low, cells, Z[NEAR_SUM_I:OLD_TILE], CHUNK_SPAN, sums)
                 stretch += 1
     for col in range(1, cells):
+        # results by column, then over all columns
         totals[low + col] = Z[SUM + col]
     found[MOST_SHRUNK] = 0.0
     found[LEAST_SCALED] = NO_LIMIT
@@ -585,6 +593,7 @@ def estimate_residual(nodes, given, law, motion, stretches, totals, chunk):
         found[LEAST_SCALED] = min(found[LEAST_SCALED], Z[LEAST_AREA + col])
         found[COSECANT] = max(found[COSECANT], Z[SHARPEST + col])
         found[ASPECT] = max(found[ASPECT], Z[LONG + col] / Z[SHORT + col])
+    # how far nodes strayed from bent lines
     if law.bent:
         for col in range(1, cells):
             longest = max(Z[LONG_LINE + col], Z[LONG_SIDE + col - 1], Z[LONG_SIDE + col])

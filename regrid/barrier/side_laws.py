@@ -126,6 +126,7 @@ def compute_stiffness(old, sides, stiffest, slow, fast):
     the side where that is least.  Theory R4.18.
     """
     ni, nj = sides.shape[1] - 1, sides.shape[2] - 1
+    # the block's own motion: that of its corners
     mean = np.empty(2)
     for k in range(2):
         now = sides[k]
@@ -134,6 +135,7 @@ def compute_stiffness(old, sides, stiffest, slow, fast):
             ((now[0, 0] - then[0, 0]) + (now[ni, nj] - then[ni, nj]))
             + ((now[0, nj] - then[0, nj]) + (now[ni, 0] - then[ni, 0]))
         )
+    # the farthest node beside it, and the mean edge of the shortest side
     farthest = 0.0
     shortest = np.inf
     for side in range(len(SIDE_NAMES)):
@@ -150,6 +152,7 @@ def compute_stiffness(old, sides, stiffest, slow, fast):
             last_x, last_y = x, y
         if length > 0.0:
             shortest = min(shortest, length / count)
+    # 1 below `slow`, 0 from `fast` on (R4.18)
     part = (fast - np.sqrt(farthest) / shortest) / (fast - slow)
     return 1.0 + (stiffest - 1.0) * min(1.0, max(0.0, part))
 

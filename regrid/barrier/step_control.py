@@ -78,6 +78,7 @@ def measure_corners(trial, old, first, last, Z):
         Z[LEAST_AREA + col] = NO_LIMIT
         Z[NOT_A_NUMBER + col] = 0.0
     for i in range(ni):
+        # corner areas of a row of cells, new and old
         for grid, rows in ((trial, NEW_ROWS), (old, OLD_ROWS)):
             take_row(grid, i, False, first, cells + 1, rows[:2], Z)
             take_row(grid, i + 1, False, first, cells + 1, rows[2:], Z)
@@ -88,6 +89,7 @@ def measure_corners(trial, old, first, last, Z):
             Z[OLD_1 + col], Z[OLD_2 + col], Z[OLD_3 + col], Z[OLD_4 + col] = find_areas(
                 *take_edges(OLD_ROWS, col, Z)
             )
+        # the block's own corners do not count: each as its neighbour
         corner_low, corner_up = (AREA_1, AREA_2) if i == 0 else (AREA_4, AREA_3)
         if i == 0 or i == ni - 1:
             for end in range(2):
@@ -97,6 +99,7 @@ def measure_corners(trial, old, first, last, Z):
                     other = corner_up if end == 0 else corner_low
                     Z[row + col] = Z[other + col]
                     Z[row + OLD_1 - AREA_1 + col] = Z[other + OLD_1 - AREA_1 + col]
+        # least area and ratio by column
         for col in range(cells):
             a1 = Z[AREA_1 + col]
             a2 = Z[AREA_2 + col]
@@ -124,6 +127,7 @@ def measure_corners(trial, old, first, last, Z):
             Z[LEAST_RATIO + col] = ratio if ratio < least else least
             Z[LEAST_AREA + col] = area
             Z[NOT_A_NUMBER + col] += bad
+    # over all columns
     ratio = NO_LIMIT
     area = NO_LIMIT
     bad = 0.0

@@ -253,6 +253,7 @@ def fill_directions(nodes, laws, numbers, boxes, kept, Z, out, per_line):
         stop = j1 + 1
         cells = lines + 1
         count = lines + 2
+        # the lines of the box with one more on either side
         lengths = laws_j[LENGTH, left:j1]
         changes = laws_j[LENGTH_CHANGE, left:j1]
         for col in range(count):
@@ -263,9 +264,11 @@ def fill_directions(nodes, laws, numbers, boxes, kept, Z, out, per_line):
             Z[ACTIVE_LAST + col] = -1.0
             for k in range(KEPT_ROWS):
                 Z[INVERSE_ROW + k * SWEEP_SPAN + col] = 0.0
+        # edges along j of the first row
         at = (i0 - 1) / ni
         fill_j_edges(x[i0 - 1, left:stop], y[i0 - 1, left:stop], lengths, changes, at, cells, Z)
         for i in range(i0 - 1, i1):
+            # edges of this row of cells; those along j were the far ones of the row before
             for row in range(0, 4 * SWEEP_SPAN, SWEEP_SPAN):
                 for col in range(count):
                     Z[BX + row + col] = Z[CX + row + col]
@@ -278,6 +281,7 @@ def fill_directions(nodes, laws, numbers, boxes, kept, Z, out, per_line):
             fill_i_edges(x0, y0, x1, y1, law, pull, count, Z)
             fill_j_edges(x1, y1, lengths, changes, (i + 1) / ni, cells, Z)
             fill_cells(cells, Z)
+            # elimination along i (R3.3), kept for the way back
             if i >= i0:
                 eliminate_row(float(i), weight, tolerance, lines, Z)
                 for row in range(0, KEPT_LENGTH, SWEEP_SPAN):
@@ -286,6 +290,7 @@ def fill_directions(nodes, laws, numbers, boxes, kept, Z, out, per_line):
             for row in range(0, 6 * SWEEP_SPAN, SWEEP_SPAN):
                 for col in range(lines):
                     Z[SAVED_ROW + row + col + 1] = Z[FOUR + row + col + 1] + Z[THREE + row + col]
+        # directions, residuals and active rows
         substitute_back(kept, j0, i0, i1, lines, Z, out)
         for k in range(3):
             for col in range(lines):
@@ -326,11 +331,13 @@ def fill_active_boxes(ni, nj, per_line, old_boxes, boxes):
         for j in range(old_boxes[b, 0], old_boxes[b, 1]):
             if per_line[LINE_LAST, j] < 0.0:
                 continue
+            # the line with its neighbours, from its first active row to its last
             low, high = max(1, j - 1), min(nj, j + 2)
             top = int(per_line[LINE_FIRST, j]) - 1
             end = int(per_line[LINE_LAST, j]) + 2
             top = max(1, top)
             end = min(ni, end)
+            # joined to the box before where they are close
             last = boxes[count - 1]
             if (
                 count > 0
@@ -341,6 +348,7 @@ def fill_active_boxes(ni, nj, per_line, old_boxes, boxes):
                 continue
             if count > 0:
                 low = max(low, last[1])
+            # or a box of its own
             if low < high:
                 new = boxes[count]
                 new[0] = low

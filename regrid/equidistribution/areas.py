@@ -90,6 +90,7 @@ def fill_nodes_equation(flux, residual, coefficients, sums):
     of the residual and of the fluxes that make it up.
     """
     ni, nj = flux.shape[1], flux.shape[2]
+    # coefficients of edges along i, then along j
     for i in range(ni):
         for j in range(nj - 1):
             coefficients[ALONG_I, i, j] = 0.5 * (flux[A, i, j] + flux[A, i, j + 1])
@@ -98,11 +99,13 @@ def fill_nodes_equation(flux, residual, coefficients, sums):
             coefficients[ALONG_J, i, j] = 0.5 * (flux[B, i, j] + flux[B, i + 1, j])
     for i in range(ni - 1):
         for j in range(nj - 1):
+            # scale C of a node, from its four cells
             low_a = flux[A, i, j] + flux[A, i, j + 1]
             low_b = flux[B, i, j] + flux[B, i, j + 1]
             high_a = flux[A, i + 1, j] + flux[A, i + 1, j + 1]
             high_b = flux[B, i + 1, j] + flux[B, i + 1, j + 1]
             coefficients[SCALE, i, j] = 0.125 * ((low_a + high_a) + (low_b + high_b))
+        # residual (R10.3)
         for k in range(2):
             for j in range(nj - 1):
                 along = (flux[AX + k, i + 1, j] + flux[AX + k, i + 1, j + 1]) - (
@@ -112,6 +115,7 @@ def fill_nodes_equation(flux, residual, coefficients, sums):
                     flux[BX + k, i, j] + flux[BX + k, i + 1, j]
                 )
                 residual[k, i, j] = 0.5 * (along + across)
+        # squares of the row, for the relative residual
         size = 0.0
         whole = 0.0
         for j in range(nj - 1):
@@ -178,6 +182,7 @@ def iterate(
     residuals: list[float] = []
     spreads: list[float] = []
     for iteration in range(iterations + 1):
+        # residual of this iterate
         residual = operator.evaluate(nodes, weigh(nodes))
         if not np.isfinite(residual):
             stop = "stalled"
@@ -186,13 +191,16 @@ def iterate(
         if iteration == 0:
             operator.sign = 1.0 if products.sum() >= 0.0 else -1.0
         residuals.append(residual)
+        # how even w times cell size is
         mean = products.mean()
         spreads.append(float(products.std() / abs(mean)) if mean != 0.0 else np.inf)
+        # the best valid iterate is kept
         ended = iteration == iterations or residual <= tolerance
         if residual < least and operator.is_good(nodes, iteration, ended):
             best = iteration
             least = residual
             kept[:] = nodes
+        # ended, or no better for a while
         if best == iteration and residual <= tolerance:
             stop = "converged"
             break
@@ -341,9 +349,11 @@ class EquidistributionRegridder(WeightedRegridder):
         """Grid on the sides of `boundary`; raises RegridFailure if no iterate is convex."""
         previous, boundary = check_grids(previous, boundary)
         boundary = self.distribute_sides(previous, boundary)
+        # a start on the new sides
         old = compute_corner_areas(previous)
         sign = 1.0 if old.sum() >= 0.0 else -1.0
         nodes, start = begin_grid(previous, boundary, sign)
+        # equations in lengths of the grid
         unit = find_unit(nodes)
         try:
             if min(nodes.shape[1:]) < 3:  # no inner node
@@ -363,6 +373,7 @@ class EquidistributionRegridder(WeightedRegridder):
             raise explain_failure(
                 boundary, nodes[:: int(sign)], also=str(failure), grid=grid
             ) from failure
+        # what it took
         inner = (nodes.shape[1] - 2) * (nodes.shape[2] - 2)
         done = found.residuals.size - 1
         ratio = float((compute_corner_areas(found.nodes) / old).min())

@@ -314,6 +314,7 @@ def sweep_first(residual, edges, tau, work, start, stop):
     upper = work[1]
     n = residual.shape[1]
     m = residual.shape[3]
+    # forward along i: all lines of the planes together
     for i in range(n):
         before = max(i - 1, 0)
         link = tau if i > 0 else 0.0
@@ -329,6 +330,7 @@ def sweep_first(residual, edges, tau, work, start, stop):
             lines = residual[0, i, j], residual[1, i, j], residual[2, i, j]
             past = residual[0, before, j], residual[1, before, j], residual[2, before, j]
             eliminate(lines, past, (a, b), own, tau, tau, link, (upper[before, j], upper[i, j]))
+    # backward
     for i in range(n - 2, -1, -1):
         for j in range(start, stop):
             for c in range(3):
@@ -352,6 +354,7 @@ def sweep_plane(residual, edges, tau, work, nodes, i, turned):
     x, y, z = residual[0, i], residual[1, i], residual[2, i]
     n = residual.shape[2]
     m = residual.shape[3]
+    # along j: forward, then backward
     for j in range(n):
         p = max(j - 1, 0)
         link = tau if j > 0 else 0.0
@@ -365,6 +368,7 @@ def sweep_plane(residual, edges, tau, work, nodes, i, turned):
             here = upper[j]
             for k in range(m):
                 row[k] += here[k] * after[k]
+    # lines along k, transposed
     for j in range(n):
         px = x[j]
         py = y[j]
@@ -378,6 +382,7 @@ def sweep_plane(residual, edges, tau, work, nodes, i, turned):
             turned[SCALE_ROW, k, j] = own[k]
             turned[EDGE_ROW, k, j] = edge[k]
         turned[EDGE_ROW, m, j] = edge[m]
+    # solved: forward, then backward
     for k in range(m):
         p = max(k - 1, 0)
         link = tau if k > 0 else 0.0
@@ -393,6 +398,7 @@ def sweep_plane(residual, edges, tau, work, nodes, i, turned):
             here = turned[SCALE_ROW, k]
             for j in range(n):
                 row[j] += here[j] * after[j]
+    # added to the nodes
     for c in range(3):
         for j in range(n):
             row = nodes[c, i + 1, j + 1]

@@ -101,6 +101,7 @@ class Expression:
         if depth > MOST_DEPTH:
             raise self._fault("it is nested too deeply")
         below: list[ast.expr] = []
+        # numbers and names
         if isinstance(node, ast.Constant):
             if isinstance(node.value, bool) or not isinstance(node.value, int | float):
                 raise self._fault(f"{node.value!r} is not a number")
@@ -114,6 +115,7 @@ class Expression:
                     else f"{node.id} is a function; write {node.id}(...)"
                 )
             self.names.add(node.id)
+        # operations, whose operands are checked below
         elif _is_over_max(node):
             below = [node.left]
         elif isinstance(node, ast.BinOp | ast.UnaryOp) and type(node.op) in OPERATORS:
@@ -125,6 +127,7 @@ class Expression:
             below = list(node.args)
         else:
             raise self._fault("only + - * / **, brackets, |...|, numbers, names and functions work")
+        # one level deeper
         for child in below:
             self._check(child, depth + 1)
 

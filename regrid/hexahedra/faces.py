@@ -222,6 +222,7 @@ def fill_blended(values, law_i, law_j, law_k, rows):
     for i in range(1, n1):
         for j in range(1, n2):
             for k in range(1, n3):
+                # coordinates of the node: where lines between the edges' spacings cross
                 p = 0.25 * (law_i[0, 0, i] + law_i[0, 1, i] + law_i[1, 0, i] + law_i[1, 1, i])
                 q = 0.25 * (law_j[0, 0, j] + law_j[0, 1, j] + law_j[1, 0, j] + law_j[1, 1, j])
                 r = 0.25 * (law_k[0, 0, k] + law_k[0, 1, k] + law_k[1, 0, k] + law_k[1, 1, k])
@@ -230,6 +231,7 @@ def fill_blended(values, law_i, law_j, law_k, rows):
                 rows[0, k] = p
                 rows[1, k] = q
                 rows[2, k] = r
+            # faces less edges plus corners (R14.9)
             for m in range(values.shape[0]):
                 f = values[m]
                 for k in range(1, n3):

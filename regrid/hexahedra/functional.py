@@ -152,6 +152,7 @@ def add_corner_value(Z, k, edges, forces, area_weight, e2):
 
     `edges` of CORNERS, `forces` of FORCES.
     """
+    # edges, areas between them and the smoothed volume
     a = take(Z, edges[0] + k)
     b = take(Z, edges[1] + k)
     c = take(Z, edges[2] + k)
@@ -159,6 +160,7 @@ def add_corner_value(Z, k, edges, forces, area_weight, e2):
     q = cross(c, a)
     r = cross(a, b)
     chi, slope = smooth_area(dot(a, p), e2)
+    # |F|² + |C|²
     aa = dot(a, a)
     bb = dot(b, b)
     cc = dot(c, c)
@@ -168,8 +170,10 @@ def add_corner_value(Z, k, edges, forces, area_weight, e2):
     size = aa + bb + cc + dot(p, p)
     size += dot(q, q) + dot(r, r)
     inverse = 1.0 / chi
+    # value (R14.1)
     weight = Z[WEIGHT + k]
     Z[SUM + k] += weight * ((size * inverse - 6.0) + area_weight * (chi + inverse - 2.0))
+    # gradient (R14.4)
     steep = weight * slope * (area_weight * (1.0 - inverse * inverse) - size * inverse * inverse)
     two = 2.0 * weight * inverse
     i = forces[0] + k
@@ -432,6 +436,7 @@ def add_centre_blocks(Z, i, j, n, own, ahead):
 def add_to_nodes(Z, edges, i, j, n, out):
     """Add the forces of the eight rows of edges and of the straight lines to four rows of nodes."""
     m = n + 1
+    # forces of the edges: those of their corners plus the straight lines'
     for edge in range(8):
         at = INVERSE + edge * HEXAHEDRON_SPAN
         inverse = Z[at : at + m]
@@ -447,6 +452,7 @@ def add_to_nodes(Z, edges, i, j, n, out):
             else:
                 for k in range(n):
                     flux[k] = flux[k] * inverse[k] + straight[k] * vector[k]
+    # each pulls its two nodes in opposite directions
     for a in range(2):
         for b in range(2):
             sign_i, sign_j = 2.0 * a - 1.0, 2.0 * b - 1.0
@@ -616,10 +622,12 @@ def halve_steps(nodes, old, inverse, floor, part, Z):
     short = 0
     for i in range(n1):
         for j in range(n2):
+            # corner volumes, new and old
             fill_edges(nodes, inverse, i, j, EDGE, Z)
             fill_edges(old, inverse, i, j, TURN, Z)
             fill_volumes(Z, round_up(n), 0, VOLUME_ROW)
             fill_volumes(Z, round_up(n), AWAY_ROW, OTHER_VOLUME)
+            # the four nodes of a corner that lost too much move half as far
             for corner in range(8):
                 a = corner & 1
                 b = (corner >> 1) & 1

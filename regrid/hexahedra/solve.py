@@ -65,6 +65,7 @@ def factor_lines(blocks):
         for j in range(1, n2):
             for k in range(1, n3):
                 xx, xy, xz, yy, yz, zz = get_six(own, i, j, k)
+                # the block less the coupling through the row before
                 if i > 1:
                     pivot = get_six(own, i - 1, j, k)
                     c = get_six(ahead, i - 1, j, k)
@@ -75,6 +76,7 @@ def factor_lines(blocks):
                     yy = yy - v[1]
                     yz = yz - w[1]
                     zz = zz - w[2]
+                # its inverse, symmetric
                 p = cross((xy, yy, yz), (xz, yz, zz))
                 q = xx * zz - xz * xz
                 r = xy * xz - xx * yz
@@ -220,6 +222,7 @@ class CoarseBlock:
         """
         if not self.able:
             return 0.0
+        # the coarse block, if it is valid
         coarse = np.ascontiguousarray(nodes[np.ix_(range(3), *self.starts)])
         cells = tuple(len(starts) - 1 for starts in self.starts)
         laws = self.make_laws(functional.laws)
@@ -227,10 +230,12 @@ class CoarseBlock:
         _, least = compare_corners(coarse, coarse, laws.inverse, cells, Z)
         if not least > LEAST_VOLUME:
             return 0.0
+        # its barrier: sums over the cells in each of its cells
         for axis in range(3):
             strength = np.add.reduceat(strength, self.starts[axis][:-1], axis=axis)
         strength = np.ascontiguousarray(strength)
         functional = Functional(laws, strength, functional.area_weight)
+        # its matrix and lines (R14.11)
         for array in (self.gradient, self.blocks, self.solution):
             array[:] = 0.0
         assemble(coarse, functional, WITH_MATRIX, self.gradient, self.blocks, self.planes, Z)

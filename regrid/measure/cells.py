@@ -91,6 +91,7 @@ def _walk(nodes, i, j, sign, x, y):
     """Cell in which a walk from cell (i, j) ends, and whether the point is in it."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     for _ in range(4 * (ni + nj) + 16):
+        # the side that the point is farthest beyond, but none of the block's
         worst = 0.0
         chosen = -1
         beyond = False
@@ -102,10 +103,12 @@ def _walk(nodes, i, j, sign, x, y):
                 if not ends[side] and excess > worst:
                     worst = excess
                     chosen = side
+        # arrived, or stuck at the block's side
         if not beyond:
             return i, j, True
         if chosen < 0:
             return i, j, False
+        # on to the next cell
         if chosen == 0:
             i -= 1
         elif chosen == 1:
@@ -147,6 +150,7 @@ def _compute_centre(nodes, a, b):
 @compiled_once
 def _solve_quad(nodes, a, b, x, y):
     """Parts s, t of the way from centre (a, b) to (a+1, b+1), and whether they are found."""
+    # bilinear map of the four centres
     x00, y00 = _compute_centre(nodes, a, b)
     x10, y10 = _compute_centre(nodes, a + 1, b)
     x01, y01 = _compute_centre(nodes, a, b + 1)
@@ -160,6 +164,7 @@ def _solve_quad(nodes, a, b, x, y):
     s = t = 0.5
     best = -1.0
     best_s = best_t = 0.5
+    # Newton's method for its inverse; the best place is kept
     for _ in range(MOST_ITERATIONS):
         rx = x - x00 - s * xs - t * xt - s * t * xst
         ry = y - y00 - s * ys - t * yt - s * t * yst
@@ -188,9 +193,11 @@ def _place(nodes, i, j, x, y):
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     most_a = max(ni - 2, 0)
     most_b = max(nj - 2, 0)
+    # the first quad near the cell
     a = min(i, most_a)
     b = min(j, most_b)
     s = t = 0.0
+    # from quad to quad until s and t lie within one
     for _ in range(MOST_QUADS):
         s, t, found = _solve_quad(nodes, a, b, x, y)
         if not found:
@@ -233,6 +240,7 @@ def find_places(nodes, points, reach, cells, quads, parts, where):
         where[k] = OUTSIDE_BLOCK
         if not (abs(x) < 1e300 and abs(y) < 1e300):  # nan, too
             continue
+        # the cell with the point: by a walk, else one after another
         i, j = min(max(cells[0, k], 0), ni - 1), min(max(cells[1, k], 0), nj - 1)
         i, j, inside = _walk(nodes, i, j, sign, x, y)
         if not inside and _is_in_outline(nodes, x, y):
@@ -244,7 +252,9 @@ def find_places(nodes, points, reach, cells, quads, parts, where):
                     break
         if not inside and reach <= 0.0:
             continue
+        # the quad of centres around it
         a, b, s, t, placed = _place(nodes, i, j, x, y)
+        # beside the block, within reach?
         if not inside:
             low = -0.5 - reach
             far_i = ni - 0.5 + reach
@@ -291,6 +301,7 @@ def _integrate_smaller(x0, x1, f0, f1, dy):
 @kernel
 def _integrate_edge(xa, ya, xb, yb, curve_x, curve_y):
     """Integral of min(x, f(y)) dy along the straight edge from (xa, ya) to (xb, yb)."""
+    # upwards
     sign = 1.0
     if yb < ya:
         xa, ya, xb, yb = xb, yb, xa, ya
@@ -304,6 +315,7 @@ def _integrate_edge(xa, ya, xb, yb, curve_x, curve_y):
     total = 0.0
     y0 = ya
     x0 = xa
+    # piece by piece of the curve, which is constant beyond its ends
     while y0 < yb:
         y1 = yb
         if piece < count and curve_y[piece] < yb:
@@ -333,6 +345,7 @@ def _fill_side_areas(x, y, curve_x, curve_y, below, whole):
         for j in range(nj):
             ring_x = (x[i, j], x[i + 1, j], x[i + 1, j + 1], x[i, j + 1])
             ring_y = (y[i, j], y[i + 1, j], y[i + 1, j + 1], y[i, j + 1])
+            # integrals around the cell
             area = 0.0
             side = 0.0
             for a in range(4):
@@ -341,6 +354,7 @@ def _fill_side_areas(x, y, curve_x, curve_y, below, whole):
                 side += _integrate_edge(
                     ring_x[a], ring_y[a], ring_x[b], ring_y[b], curve_x, curve_y
                 )
+            # a cell wholly on one side: exactly 0 or all of it
             low = min(ring_x)
             high = max(ring_x)
             bottom = min(ring_y)

@@ -94,6 +94,7 @@ def fill_tree(line, leaves, boxes, ways, ends):
     x, y = line[0], line[1]
     count = line.shape[1] - 1
     short = -1
+    # leaves: a few edges each
     for leaf in range(leaves):
         first = min(count, leaf * LEAF_EDGES)
         last = min(count, (leaf + 1) * LEAF_EDGES)
@@ -101,6 +102,7 @@ def fill_tree(line, leaves, boxes, ways, ends):
         low_y = np.inf
         high_x = -np.inf
         high_y = -np.inf
+        # box, and half planes into which all of its edges go
         way = 15
         for k in range(first, last):
             low_x, high_x = min(low_x, x[k], x[k + 1]), max(high_x, x[k], x[k + 1])
@@ -110,6 +112,7 @@ def fill_tree(line, leaves, boxes, ways, ends):
             way &= here
             if here == 0 and short < 0:
                 short = k
+        # kept as a leaf
         at = leaves + leaf
         boxes[LOW_X, at] = low_x
         boxes[HIGH_X, at] = high_x
@@ -118,6 +121,7 @@ def fill_tree(line, leaves, boxes, ways, ends):
         ways[at] = way
         ends[0, at] = first
         ends[1, at] = last
+    # larger pieces from their two parts
     for at in range(leaves - 1, 0, -1):
         one = 2 * at
         two = 2 * at + 1
@@ -158,6 +162,7 @@ def search_meeting(nodes, line, boxes, ways, ends, stack):
     `stack` (2, 64 * 4).
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    # the boundary and the tree of its pieces
     fill_boundary(nodes, line)
     seam_i, seam_j = are_one(nodes, True), are_one(nodes, False)
     closed = seam_i or seam_j
@@ -166,12 +171,14 @@ def search_meeting(nodes, line, boxes, ways, ends, stack):
     short = fill_tree(line, leaves, boxes, ways, ends)
     if short >= 0:
         return COINCIDENT_EDGES, short
+    # pairs of pieces that may meet, from the whole boundary down
     depth = 1
     stack[0, 0] = stack[1, 0] = 1
     while depth > 0:
         depth -= 1
         one = stack[0, depth]
         two = stack[1, depth]
+        # a piece with itself: all in one half plane, it cannot meet itself (R5.5)
         if one == two:
             if ways[one] != 0:
                 continue
@@ -185,6 +192,7 @@ def search_meeting(nodes, line, boxes, ways, ends, stack):
                 depth += 3
                 continue
         else:
+            # two pieces: apart, or neighbours in one half plane
             if boxes[LOW_X, one] > boxes[HIGH_X, two] or boxes[LOW_X, two] > boxes[HIGH_X, one]:
                 continue
             if boxes[LOW_Y, one] > boxes[HIGH_Y, two] or boxes[LOW_Y, two] > boxes[HIGH_Y, one]:
@@ -197,6 +205,7 @@ def search_meeting(nodes, line, boxes, ways, ends, stack):
                     stack[1, depth + part] = 2 * two + (part >> 1)
                 depth += 4
                 continue
+        # leaves: edge by edge
         for a in range(ends[0, one], ends[1, one]):
             if closed and is_seam(a, ni, nj, seam_i, seam_j):
                 continue
@@ -259,12 +268,14 @@ def find_crossing(
     cut = find_cut_edges(nodes, cuts)
     if cuts:
         nodes = join_cuts(nodes, cuts)
+    # edges with a length, without those of cuts
     line, positions = walk_boundary(nodes)
     following = np.roll(line, -1, axis=1)
     kept = np.flatnonzero((line != following).any(axis=0))
     closed = any(edges.any() for edges in cut.values())
     if closed:
         kept = kept[[not _is_cut(cut, *positions[k]) for k in kept]]
+    # pairs whose boxes overlap
     start, end = line[:, kept], following[:, kept]
     low, high = np.minimum(start, end), np.maximum(start, end)
     near = np.triu(np.ones((kept.size, kept.size), dtype=bool), 1)
@@ -275,17 +286,20 @@ def find_crossing(
     b = end[:, first]
     c = start[:, second]
     d = end[:, second]
+    # neighbours, which share a node
     if closed:
         leads, follows = (a == d).all(axis=0), (b == c).all(axis=0)
     else:
         leads, follows = (first == 0) & (second == kept.size - 1), second == first + 1
     apart = ~(leads | follows)
+    # they meet if one folds back on the other
     meets = np.zeros(first.size, dtype=bool)
     for other, one, two in ((leads, b - a, c - d), (follows, a - b, d - c)):
         if other.any():
             at = np.flatnonzero(other & ((one * two).sum(axis=0) > 0.0))
             node, k, n = (a, b, c) if other is leads else (b, a, d)
             meets[at] |= compute_turns(k[:, at], n[:, at], node[:, at])[0] == 0
+    # others if each has the ends of the other on both sides
     at = np.flatnonzero(apart)
     a = a[:, at]
     b = b[:, at]
@@ -362,6 +376,7 @@ def find_touching(line, other, same, group, boxes, other_boxes):
     found_b = -1
     for g in range(boxes.shape[1]):
         for f in range(g if same else 0, other_boxes.shape[1]):
+            # groups of segments whose boxes are apart
             apart = boxes[LEAST_X, g] > other_boxes[MOST_X, f]
             apart = apart or other_boxes[LEAST_X, f] > boxes[MOST_X, g]
             apart = apart or boxes[LEAST_Y, g] > other_boxes[MOST_Y, f]
@@ -369,11 +384,13 @@ def find_touching(line, other, same, group, boxes, other_boxes):
             if apart:
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
+                # the first pair only
                 if found_a >= 0 and a > found_a:
                     break
                 for b in range(f * group, min(other_count, (f + 1) * group)):
                     if same and b <= a:
                         continue
+                    # neighbours: folding back
                     if same and b == a + 1:
                         back = (x[b] - x[a]) * (x[b + 1] - x[b]) + (y[b] - y[a]) * (y[b + 1] - y[b])
                         turn = measure_turn(x[a], y[a], x[b], y[b], x[b + 1], y[b + 1])

@@ -172,6 +172,7 @@ def find_impossible(boundary: np.ndarray) -> tuple[int, int] | None:
     out.  Either way round.  A corner (i, j) on the boundary is named where a cell of a block one
     cell wide folds.
     """
+    # turned counter-clockwise, in units of the block
     nodes = boundary if compute_area(boundary) >= 0.0 else boundary[::-1]
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     sides = np.concatenate(get_sides(nodes), axis=1)
@@ -179,6 +180,7 @@ def find_impossible(boundary: np.ndarray) -> tuple[int, int] | None:
     size = float(np.ptp(sides, axis=1).max())
     if not (np.isfinite(size) and size > 0.0):
         return None
+    # where each node may lie: its place on the sides, the whole box inside
     regions: dict[tuple[int, int], list[Point]] = {}
     box = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
     for i in range(ni + 1):
@@ -190,6 +192,7 @@ def find_impossible(boundary: np.ndarray) -> tuple[int, int] | None:
                 regions[i, j] = box
     triangles = list(_list_triangles(ni, nj))
     given = [tuple(len(regions[node]) == 1 for node in triangle) for triangle in triangles]
+    # triangles with two nodes given cut the third one's region
     for triangle, known in zip(triangles, given, strict=True):
         if all(known):
             if _double_area(*(regions[node][0] for node in triangle)) <= -LOOSENED_CUT:
@@ -198,6 +201,7 @@ def find_impossible(boundary: np.ndarray) -> tuple[int, int] | None:
             return triangle[known.index(False)]
     if ni * nj > MOST_CELLS:
         return None
+    # then each region by those of its neighbours, until none shrinks
     for _ in range(NEIGHBOUR_CUT_ROUNDS):
         changed = False
         for triangle, known in zip(triangles, given, strict=True):

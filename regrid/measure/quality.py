@@ -270,9 +270,11 @@ def least_corner_area(nodes: np.ndarray) -> float:
 def measure_quality(nodes: np.ndarray) -> Quality:
     """All measures in one pass, cheap enough for every time step."""
     nodes = _checked(nodes)
+    # all rows in one pass
     rows, worst, bad_cells = _make_scratch(nodes)
     measure_rows(nodes, rows, worst, bad_cells)
     triangles = find_triangles(nodes)
+    # without corners that sides make flat
     if triangles:
         areas = compute_corner_areas(nodes)
         sines = compute_scaled_jacobians(nodes)
@@ -283,6 +285,7 @@ def measure_quality(nodes: np.ndarray) -> Quality:
         worst[AREA] = areas.min(axis=1)
         bad_cells[:] = (~(areas > 0.0)).sum(axis=1)
         worst[SINE] = (sines * np.abs(sines)).min(axis=1)
+    # where the worst are: their rows again
     area_row = int(worst[AREA].argmin())
     sine_row = int(worst[SINE].argmin())
     if triangles:
@@ -296,6 +299,7 @@ def measure_quality(nodes: np.ndarray) -> Quality:
                 (compute_scaled_jacobians, sine_row),
             )
         )
+    # from squares to values
     sine = worst[SINE, sine_row]
     return Quality(
         least_corner_area=float(worst[AREA, area_row]),
@@ -319,10 +323,12 @@ def reduce_worst(nodes, rows):
     sines = rows[0]
     aspects = rows[1]
     bad = rows[2]
+    # extremes by column, so that rows vectorise
     for j in range(nj):
         sines[j] = np.inf
         aspects[j] = 0.0
         bad[j] = 0.0
+    # areas, sine and aspect of the cells of a row
     for i in range(ni):
         x0 = nodes[0, i]
         y0 = nodes[1, i]
@@ -339,6 +345,7 @@ def reduce_worst(nodes, rows):
             sines[j] = sine if sine < sines[j] else sines[j]
             aspects[j] = aspect if aspect > aspects[j] else aspects[j]
             bad[j] += 0.0 if good else 1.0
+    # extremes of all columns
     sine = sines[0]
     aspect = aspects[0]
     count = 0.0

@@ -62,7 +62,7 @@ class Counted:
     sees_cost = True
 
     def __init__(self, tuning: Tuning, **options):
-        self.regridder = BarrierRegridder(tuning=tuning, **options)
+        self.regridder = BarrierRegridder(**vars(tuning), **options)
         self.sub_moves = self.rescues = self.iterations = 0
 
     def __call__(self, previous, boundary, *sound):

@@ -322,7 +322,7 @@ TURNING_SMOOTHINGS = 3  # of the turning, over neighbouring segments
 # up to which a line counts as symmetric: parts of the mean segment, and of a segment that is wanted
 SYMMETRIC_SEGMENT = 1e-9
 SYMMETRIC_TURNING = 1e-7
-ROUNDING_OF_SPACING = 1e-12  # up to which a law differs from its image by rounding
+ROUNDING_OF_SPACING = 1e-12  # up to which a spacing differs from its image by rounding
 
 
 @kernel
@@ -416,8 +416,8 @@ def fill_turning_spacing(line, first, turning, closed, wall_first, wall_last, sh
 def even_out_spacing(arc, first, wanted, spacing):
     """Make a spacing (n,) symmetric where its line is so up to rounding; theory R9.
 
-    arc [m], first spacing (n,), wanted (n - 1,) segments: of the line, see `fill_turning_spacing`.  Spacings by
-    turning magnify rounding step by step where a line has too few nodes for its turning.
+    arc [m], first spacing (n,), wanted (n - 1,) segments: of the line, see `fill_turning_spacing`.
+    Spacings by turning magnify rounding step by step where a line has too few nodes for that.
     """
     edges = arc.shape[0] - 1
     most = SYMMETRIC_SEGMENT * arc[edges] / edges

@@ -78,27 +78,27 @@ def march(
     times: Iterable[float] | None = None,
     *,
     cells: float = 0.5,
-    span: tuple[float, float] = (0.0, 1.0),
     gap_sides: Sequence[str] = (),
     keep_every: int = 0,
     sound_speed: np.ndarray | None = None,
 ) -> March:
     """March `start` (2, ni+1, nj+1) [m] along the sides of `boundary_at(time)`, of the same shape.
 
-    One step a time of `times`; without them, steps over `span` in each of which no boundary node
-    moves further than `cells` of the shortest edge at the sides of `start` (`choose_times`).  The
-    march ends at the first step without a grid, or with a non-convex cell; either is reported
-    in what is returned, and nothing is raised for it.  `start` may be of either orientation (i, j
-    turning clockwise too).  `gap_sides`: names of the sides whose first line is measured.  Every
-    `keep_every`-th grid is kept, with `start` as the first; 0 keeps none.  `sound_speed` (ni, nj)
-    [m/s] is passed on to a regridder that knows the cost of a step.
+    One step a time of `times`; without them, steps from 0 to 1 in each of which no boundary node
+    moves further than `cells` of the shortest edge at the sides of `start`, as `choose_times` gives
+    them; it gives them for other spans, too. The march ends at the first step without a grid, or
+    with a non-convex cell; either is reported in what is returned, and nothing is raised for it.
+    `start` may be of either orientation (i, j turning clockwise too). `gap_sides`: names of the
+    sides whose first line is measured. Every `keep_every`-th grid is kept, with `start` as the
+    first; 0 keeps none. `sound_speed` (ni, nj) [m/s] is passed on to a regridder that knows the
+    cost of a step.
 
     Raises BadInput for arrays, names or numbers that do not fit.
     """
     start = np.ascontiguousarray(start, dtype=np.float64)
     _check(start, gap_sides, keep_every)
     if times is None:
-        times = choose_times(start, boundary_at, cells, span)
+        times = choose_times(start, boundary_at, cells)
     # steps in time
     times = [float(t) for t in times]
     if not np.isfinite(times).all():
@@ -108,7 +108,7 @@ def march(
     found = March(start.copy(), len(times))
     if keep_every:
         found.kept.append(found.nodes)
-        found.kept_times.append(span[0])
+        found.kept_times.append(0.0)
     # each is regridded from the last good grid
     for step, t in enumerate(times, start=1):
         boundary = boundary_at(t)

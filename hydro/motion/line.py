@@ -139,14 +139,15 @@ def move_beside_neighbours(moved, arc, positions, out):
 def carry_line(nodes, nodes_new, span, rim, dt, arrays, shaping, walls):
     """Move a line's nodes (`move_line`, where dt > 0), spread them and write them to `nodes_new`.
 
-    arrays: damping, what the nodes move beside the contact velocities [m/s] and moved nodes (2, n),
-    spacing (n,), scratch for another (n,), turning (n - 1,), scratch (8, n).  shaping: how far to
-    the spacing the nodes go, `relax` (not spread where it is 0, nor written below), is the curve a
-    spline, do nodes move beside their neighbours' chords, is it periodic, is it closed, and the
-    shortest segment that turning asks for (0: none, as of `fill_turning_spacing`).  walls at both ends
-    as in `fill_redistributed`.  Returns the stretching, and what that returns: below 0 if all is
-    well.  No node is spread faster than sound: in a step that a thin cell elsewhere makes very
-    short, a part of the way would be a jump.
+    arrays: damping, what the nodes move beside the contact velocities [m/s] and moved nodes (2,
+    n), spacing (n,), scratch for another (n,), turning (n - 1,), scratch (8, n). shaping: how
+    far to the spacing the nodes go, `relax` (not spread where it is 0, nor written below), is
+    the curve a spline, do nodes move beside their neighbours' chords, is it periodic, is it
+    closed, and the shortest segment that turning asks for (0: none, as of
+    `fill_turning_spacing`). walls at both ends as in `fill_redistributed`. Returns the
+    stretching, and what that returns: below 0 if all is well. No node is spread faster than
+    sound: in a step that a thin cell elsewhere makes very short, a part of the way would be a
+    jump.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     damping, beside, moved, spacing, turned, turning, work = arrays

@@ -81,11 +81,11 @@ class BarrierRegridder:
     of cells that limit the time step (0: none); it acts only if sound speeds are given;
     `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is the
     minimum number of Newton steps per call; in blocks of `coarse_from` cells and more (9000; inf:
-    none) smooth errors are removed on coarse nodes (theory R4.13); these and all other parameters
-    have their defaults in `tuning`.  `spacing` "sides" gives every edge
-    a length between those of two opposite sides (theory R2.3); "given" keeps the spacing of
-    `first_grid` (2, ni+1, nj+1) in both families (R4.19), without one that of the first valid grid
-    that this regridder is given.  The latter is the default with a first grid, except that with
+    none) smooth errors are removed on coarse nodes (theory R4.13); these and all other fields of
+    `Tuning` have their defaults there.  `spacing` "sides" gives every edge a length between those
+    of two opposite sides (theory R2.3); "given" keeps the spacing of `first_grid` (2, ni+1, nj+1)
+    in both families (R4.19), without one that of the first valid grid that this regridder is given.
+    The latter is the default with a first grid, except that with
     family "i" lines j = const keep its spacing along themselves alone (R4.9).  `cuts` are lines
     that the boundary runs along twice, out and back, the block on both sides: a side and two of its
     nodes each, such as ("j_min", 0, 80).  The wake of a C grid, whose nodes are the same from both
@@ -108,8 +108,7 @@ class BarrierRegridder:
         curves: bool = True,
         cuts: Cuts = (),
         threads: int = 1,
-        tuning: Tuning = DEFAULT,
-        **numbers: float | None,
+        **numbers: Any,
     ):
         if method not in ("newton", "sweeps"):
             raise BadInput(f"barrier regridder: method '{method}' is neither 'newton' nor 'sweeps'")
@@ -118,10 +117,8 @@ class BarrierRegridder:
                 f"barrier regridder: edge_lengths '{edge_lengths}' is neither 'conditional' "
                 "nor 'unit'"
             )
-        given: dict[str, Any] = {
-            name: value for name, value in numbers.items() if value is not None
-        }
-        self.tuning = replace(tuning, **given)
+        given = {name: value for name, value in numbers.items() if value is not None}
+        self.tuning = replace(DEFAULT, **given)
         _check_tuning(self.tuning)
         self.conditional = edge_lengths == "conditional"
         if not isinstance(curves, bool):
@@ -141,7 +138,7 @@ class BarrierRegridder:
         self.first_grid: np.ndarray | None = None
         self.bend: np.ndarray | None = None
         if first_grid is not None:
-            self.first_grid = take_nodes(first_grid, "first_grid").copy()
+            self.first_grid = convert_nodes(first_grid, "first_grid").copy()
             if self.spacing == "lines":
                 bend = find_bend(self.first_grid)
                 if is_bent(bend):  # evenly spaced lines need no stored spacing

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.tuning import Tuning
 from regrid.domains import three_fingers
 from regrid.errors import BadInput, RegridFailure
 from regrid.measure.quality import find_bad_cells, measure_quality, measure_worst
@@ -119,7 +118,7 @@ def test_interior_left_behind_is_found_by_newton_steps_too(ni, nj, most, error):
         max_iterations=40,
         floor=1e-9,
         newton_steps=7,
-        tuning=Tuning(lost=np.inf),
+        lost=np.inf,
     )
     result = regridder.regrid(behind, moved)
     assert result.report.start == "displacement" and result.report.iterations <= most

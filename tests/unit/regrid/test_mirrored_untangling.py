@@ -5,7 +5,6 @@ import pytest
 
 from benchmarks.random_motions import make_motions
 from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.tuning import Tuning
 from regrid.errors import RegridFailure
 from regrid.sides import get_sides
 from regrid.symmetry import find_symmetry
@@ -42,7 +41,7 @@ def measure_cell(nodes):
 
 def regrid_or_fail(*given, most_parts=8):
     try:
-        return BarrierRegridder(tuning=Tuning(most_parts=most_parts)).regrid(*given)
+        return BarrierRegridder(most_parts=most_parts).regrid(*given)
     except RegridFailure:
         return None
 

@@ -9,8 +9,6 @@ from regrid.errors import BadInput
 
 def test_options_of_a_regridder_replace_its_tuning():
     assert BarrierRegridder().tuning == DEFAULT
-    assert BarrierRegridder(epsilon=0.1, tuning=Tuning(floor=0.2)).tuning == Tuning(
-        epsilon=0.1, floor=0.2
-    )
+    assert BarrierRegridder(epsilon=0.1, lost=0.2).tuning == Tuning(epsilon=0.1, lost=0.2)
     with pytest.raises(BadInput, match=r"strengthening .* must be 1 or more"):
-        BarrierRegridder(tuning=Tuning(strengthening=0.5))
+        BarrierRegridder(strengthening=0.5)

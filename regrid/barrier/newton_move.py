@@ -36,13 +36,6 @@ LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
 LEAST_FOLLOWED_PART = 1.0 / 8.0  # of a predicted motion: shorter ones are not worth a solve
 
 
-def list_straight_grids(sides: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Grids (2, ni+1, nj+1) that the sides alone define, with their names; they may be folded."""
-    yield "transfinite", transfinite_grid(sides)
-    yield "quasi-1d", quasi_1d_grid(sides, "i")
-    yield "quasi-1d", quasi_1d_grid(sides, "j")
-
-
 class Folded(Exception):
     """A grid has to be untangled, and how the block is looked at was not chosen for that."""
 
@@ -190,8 +183,7 @@ class NewtonMove:
     def _make_anew(self) -> bool:
         """A grid for the sides alone, which no motion leads to: the first that steps can settle.
 
-        It starts from a grid without folds that the sides define, else from one that unfolds
-        (theory R5.4).  Where none settles, the one closest to it is taken.
+        Where none settles, the one closest to it is taken (theory R5.4).
         """
         self._check_look()
         work = self.work
@@ -205,25 +197,43 @@ class NewtonMove:
         self._begin()
         work.look()
         displaced = work.base.copy()
-        for start, nodes in list_straight_grids(work.sides):
-            if not find_folded_cells(nodes).size:
-                self.start = start
-                self._settle(nodes)
-                return self._accept_anew()
-        if find_impossible(work.sides) is None and self._settle_unfolded(displaced):
-            return True
-        work.trial[:] = displaced
-        self.broken = broken
-        return False
-
-    def _settle_unfolded(self, displaced: np.ndarray) -> bool:
-        """Unfold a grid and settle it; True when `work.trial` is valid."""
-        work = self.work
-        self.start = "untangled"
-        straight = transfinite_grid(work.sides)
         best: np.ndarray | None = None
         least = np.inf
-        for begin, way in (
+        possible: bool | None = None
+        for start, nodes, way in self._list_beginnings(displaced):
+            if way is None:
+                if find_folded_cells(nodes).size:
+                    continue
+            else:
+                if possible is None:
+                    possible = best is not None or find_impossible(work.sides) is None
+                self._begin()
+                if not (possible and unfold(work, nodes, self.tuning, way)):
+                    continue
+            error = self._settle(nodes)
+            if best is None or error < least:
+                best = work.trial.copy()
+                least = error
+                self.start = start
+            if error <= self.tuning.settled:
+                break
+        if best is None:
+            work.trial[:] = displaced
+            self.broken = broken
+            return False
+        work.trial[:] = best
+        return self._accept_anew()
+
+    def _list_beginnings(
+        self, displaced: np.ndarray
+    ) -> Iterator[tuple[str, np.ndarray, Unfolding | None]]:
+        """Grids (2, ni+1, nj+1) to begin with, their names, and how they are unfolded if at all."""
+        work = self.work
+        straight = transfinite_grid(work.sides)
+        yield "transfinite", straight, None
+        yield "quasi-1d", quasi_1d_grid(work.sides, "i"), None
+        yield "quasi-1d", quasi_1d_grid(work.sides, "j"), None
+        for nodes, way in (
             (straight, Unfolding.STRAIGHT),
             (straight, Unfolding.GRADED_SPREAD),
             (straight, Unfolding.GRADED),
@@ -232,21 +242,7 @@ class NewtonMove:
             (straight, Unfolding.EVEN),
             (straight, Unfolding.EVEN_SPREAD),
         ):
-            found = begin.copy()
-            self._begin()
-            if not unfold(work, found, self.tuning, way):
-                continue
-            error = self._settle(found)
-            if best is None or error < least:
-                best = work.trial.copy()
-                least = error
-            if error <= self.tuning.settled:
-                break
-        if best is None:
-            return False
-        work.trial[:] = best
-        self.broken = False
-        return self._accept_anew()
+            yield "untangled", nodes.copy(), way
 
     def _settle(self, nodes: np.ndarray) -> float:
         """Steps from valid nodes (2, ni+1, nj+1) into `work.trial`; the residual left, in cells.

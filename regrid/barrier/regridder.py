@@ -294,10 +294,13 @@ class BarrierRegridder:
         if first is not None:
             look = look._replace(same=())
             first = look.turn_grid(first)
+        repairs = not is_convex(before)
+        if repairs and first is not None:  # it has the spacing that is to be kept, and no folds
+            before = first
+            repairs = False
         given = Given(before, after, sound, least_limiting_rate, first)
         if self.bend is not None:
             self._workspace(before.shape, False).take_laws(turn_bend(look.turn, self.bend))
-        repairs = not is_convex(before)
         try:
             result = self._move_evenly(look, given, repairs) if look.same else None
             result = result or self._move(given, None, untangles=True, repairs=repairs)

@@ -218,6 +218,17 @@ def test_first_heights_of_an_o_grid_stay_when_it_pitches_at_once(angle):
     assert 0.9 < ratio.min() and ratio.max() < 1.1
 
 
+@pytest.mark.parametrize("angle", [0.0, 10.0])
+def test_a_shaken_c_grid_has_the_heights_of_its_first_grid(angle):
+    nodes = make_c_grid(wake_height=5e-2)
+    shaken = nodes.copy()
+    inner = shaken[:, 1:-1, 1:-1]
+    inner += 0.3 * np.random.default_rng(0).normal(size=inner.shape)
+    found = BarrierRegridder(first_grid=nodes).regrid(shaken, pitch(nodes, angle)).nodes
+    ratio = (find_first_heights(found) / find_first_heights(nodes))[AEROFOIL_OF_C]
+    assert 0.9 < ratio.min() and ratio.max() < 1.1
+
+
 def test_a_spacing_that_the_sides_tell_is_kept_as_without_a_first_grid():
     floor = np.array([np.linspace(0.0, 1.0, 17), np.zeros(17)])
     lid = np.array([floor[0], np.ones(17)])

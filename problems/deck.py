@@ -56,6 +56,7 @@ Limiter = key(  # the names of hydro.formulas.reconstruction.LIMITERS
         "low-mach",
         "monotonised-central",
         "van-leer",
+        "smooth-low-mach",
         "smooth-shear",
         "generalised-minmod",
         "minmod",
@@ -63,8 +64,8 @@ Limiter = key(  # the names of hydro.formulas.reconstruction.LIMITERS
     "slope limiter, from sharp to smooth; the first three are steep: sharp fronts, with a sawtooth "
     "of single cells behind shocks; low-mach: monotonised-central, except for the velocity where "
     "the flow turns or shears without jumps, and smaller jumps of the velocity at faces where the "
-    "flow is slow; smooth-shear: generalised-minmod with that exception. Materials with a phase "
-    "transition have no steep one: generalised-minmod stands for it",
+    "flow is slow; smooth-low-mach: generalised-minmod with both; smooth-shear: with the first of "
+    "both. Materials with a phase transition have no steep one: generalised-minmod stands for it",
 )
 
 

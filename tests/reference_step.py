@@ -26,7 +26,7 @@ import numpy as np
 
 from hydro.eos.base import make_least_pressure
 from hydro.formulas import riemann
-from hydro.formulas.reconstruction import FIRST_ORDER_LIMITER, RELAXED, choose_limit
+from hydro.formulas.reconstruction import FIRST_ORDER_LIMITER, LOW_MACH, RELAXED, choose_limit
 from reference_sliding import SlidingContact, dot, find_free_speed, solve_contact
 
 GAUSS = 0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5
@@ -285,7 +285,7 @@ class Patch:
             weight = np.minimum(share + 8.0 * jumps / self.c2, 1.0)
             for axis, mean in means.items():
                 limited[axis][1:3] = weight * limited[axis][1:3] + (1.0 - weight) * mean
-            if self.limiter == "low-mach":
+            if self.limiter in LOW_MACH:
                 self.acoustic = weight
         self.slopes = self.find_gradient(limited["i"], limited["j"])  # (x or y, quantity, i, j)
         steps = [step[3] for axis in "ij" for step, _ in self.find_steps(axis)]

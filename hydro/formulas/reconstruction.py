@@ -86,11 +86,12 @@ LIMITERS = {
     "minmod": limit_minmod,
     # these as far as `compute_acoustic_weight` says:
     "smooth-shear": limit_gently,
+    "smooth-low-mach": limit_gently,
     "low-mach": limit_monotonised_central,
 }
-LOW_MACH = "low-mach"
+LOW_MACH = ("smooth-low-mach", "low-mach")  # limiters with smaller jumps at faces, too
 FIRST_ORDER_LIMITER = "first-order"  # of steps that no other limiter brings to an end
-RELAXED = ("smooth-shear", LOW_MACH)  # limiters that leave slopes of turning flow alone
+RELAXED = ("smooth-shear", *LOW_MACH)  # limiters that leave slopes of turning flow alone
 DEFAULT_LIMITER = "monotonised-central"
 STEEP_LIMITS = (limit_monotonised_central, limit_van_leer)  # slopes up to twice a difference
 

@@ -58,7 +58,7 @@ def make_flow_kernels(
     geometry and a flux (FLUXES of `formulas.riemann`)."""
     energy = eos_class.energy_part
     sound = eos_class.sound_speed_squared_part
-    low_mach = limiter == LOW_MACH
+    low_mach = limiter in LOW_MACH
     opens_voids = eos_class.opens_voids
     curved = geometry.curved
     measure_after, next_row, reconstruct, _ = make_row_phases(eos_class, limiter, geometry, flux)

@@ -119,7 +119,7 @@ def make_side_kernels(
     sound = eos_class.sound_speed_squared_part
     opens_voids = eos_class.opens_voids
     curved = geometry.curved
-    low_mach = limiter == LOW_MACH
+    low_mach = limiter in LOW_MACH
     rows = make_row_phases(eos_class, limiter, geometry, flux)
     measure_after = rows.measure_after
     next_row = rows.next_row

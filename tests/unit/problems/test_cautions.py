@@ -51,6 +51,22 @@ def test_usual_decks(name):
     assert USUAL[name]().cautions() == []
 
 
+@pytest.mark.parametrize(
+    ("mach", "limiter", "told"),
+    [(1.05, "smooth-shear", 1), (1.05, "smooth-low-mach", 0), (1.5, "smooth-shear", 0)],
+)
+def test_a_wave_that_rolls_up_slowly(mach, limiter, told):
+    """At the speed of linear theory, k a0 = 0.5."""
+    problem = make_interface(mach=mach, modes=[Mode(ka0=0.5)], limiter=limiter)
+    start = 0.5 / problem.k
+    speed = abs(problem.theory.get_asymptotic_rate()) * problem.k * start
+    t = np.linspace(0.0, 0.4 / speed, 50)
+    history = {"t": t, "amplitude": start + speed * t}
+    history["amplitude_mode_1"] = history["amplitude"]
+    found = [one for one in problem.cautions(history) if "slow vort" in one]
+    assert len(found) == told
+
+
 @pytest.mark.parametrize(("cells", "told"), [(48, 1), (128, 0)])
 def test_a_mushroom_on_few_cells(cells, told):
     problem = make_interface(cells=cells, modes=[Mode(ka0=0.2)])

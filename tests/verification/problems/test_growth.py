@@ -264,3 +264,11 @@ def test_a_steep_interface_runs_into_the_mushroom_stage():
     y = run.evolution.blocks[0].nodes[1, -1, :]
     assert (np.diff(y) < 0.0).any(), "the interface has rolled over: y is no function along it"
     assert run.history["amplitude"][-1] > 3.0 * run.history["amplitude"][0]
+
+
+def test_a_low_mach_limiter_needs_fewer_cells():
+    """Growth at 16 cells per wavelength, with the smaller jumps at faces and without."""
+    damped = compute_error(run_small())
+    free = compute_error(run_small(limiter="smooth-low-mach"))
+    assert damped < -0.05
+    assert abs(free) < 0.3 * abs(damped)

@@ -369,10 +369,23 @@ class Blocks(Problem):
         return self.grids
 
     def cautions(self, history=None) -> list[str]:
-        """None; without a history the grids are made, so that a check tells what is wrong."""
+        """On contacts; without a history the grids are made, so that a check tells of faults."""
         if history is None:
             self.build()
-        return []
+        sides = [side for table in self.deck.block for side in table.side]
+        surfaces = [side for side in sides if side.kind == "free-surface"]
+        told = []
+        if surfaces and any(link.kind == "periodic" for link in self.deck.link):
+            told.append(
+                "contacts of free surfaces do not go on across periodic sides: what meets only "
+                "beyond one passes through; make the period longer"
+            )
+        if any("friction" in side.options or "weld" in side.options for side in surfaces):
+            told.append(
+                "friction and welds hold the first row of cells along a contact alone, as "
+                "materials have no strength: the momentum that passes falls with the size of cells"
+            )
+        return told
 
     def build(self) -> Simulation:
         deck = self.deck

@@ -221,6 +221,70 @@ def find_deepest(nodes, other, pinned, reach):
 
 
 @kernel
+def measure_depths(nodes, other, reach, depths):
+    """Fill how far new nodes lie behind the other new line, `depths` (n,) [m]; below 0 in front.
+
+    Behind: behind the nearest face, where that looks at the nodes' line; not, where they lie round
+    a corner of the other body, behind its next side.  Nodes further from it than `reach` [m] are
+    -reach behind it.  reach: also for the way of both lines since their boxes were made.
+    """
+    points = nodes.new
+    line = other.new
+    group = other.group
+    count = line.shape[1] - 1
+    last = points.shape[1] - 1
+    groups = np.empty(other.boxes.shape[1], np.int64)
+    near = 0
+    for k in range(last + 1):
+        if k % group == 0:
+            stop = min(last + 1, k + group)
+            near = find_groups(points, points, k, stop, other.boxes, reach, groups)
+        depths[k] = -reach
+        if near == 0:
+            continue
+        x, y = points[0, k], points[1, k]
+        along_x, along_y = find_direction(points, k)
+        least = reach * reach
+        for n in range(near):
+            g = groups[n]
+            if lies_away(x, y, other.boxes, g, reach):
+                continue
+            for a in range(g * group, min(count, (g + 1) * group)):
+                part, away = project(line, a, x, y)
+                if away >= least:
+                    continue
+                least = away
+                depths[k] = -(away**0.5)
+                if not faces_each_other(line, a, along_x, along_y):
+                    continue
+                deep = find_depth(line, a, x, y)
+                beside = a - 1 if part <= 0.0 else a + 1
+                if not 0.0 < part < 1.0 and 0 <= beside < count:  # nearest to a node: of both faces
+                    deep = min(deep, find_depth(line, beside, x, y))
+                length = measure_square(line, a) ** 0.5
+                round_start = a == 0 and part * length < deep
+                round_end = a == count - 1 and (1.0 - part) * length < deep
+                if deep > 0.0 and not round_start and not round_end:
+                    depths[k] = away**0.5
+
+
+@kernel
+def sum_behind(points, depths):
+    """Area [m²] between a line (2, n) and the other one where its nodes lie `depths` behind that.
+
+    Between two nodes the depth changes linearly; where one is in front, up to where it is 0.
+    """
+    area = 0.0
+    for a in range(points.shape[1] - 1):
+        one = max(depths[a], depths[a + 1])
+        other = min(depths[a], depths[a + 1])
+        if one > 0.0:
+            mean = 0.5 * (one + other) if other >= 0.0 else 0.5 * one * one / (one - other)
+            area += mean * measure_square(points, a) ** 0.5
+    return area
+
+
+@kernel
 def follow_pins(points, line, positions, part, found):
     """Positions of the pins on the line near the old ones: where they were at `positions`."""
     last = line.shape[1] - 2

@@ -78,6 +78,7 @@ class Meetings:
         self._cuts = 0
         self.made = self.opened = 0
         self.length = 0.0
+        self.overlap = 0.0  # of bodies, in cells
 
     def set_in_contact(self) -> bool:
         """Before the first step: lay surfaces on each other that touch but for rounding or chords.
@@ -277,6 +278,7 @@ class Meetings:
             return
         self._found = False
         self.length = 0.0
+        self.overlap = 0.0
         if MOST_LONGER * self._most < self._room:
             self._room -= self._most
             self._gone += self._most
@@ -290,7 +292,20 @@ class Meetings:
             self.made += max(0, stretches - pair.stretches)
             self.opened += max(0, pair.stretches - stretches)
             pair.stretches = stretches
+        self._measure_overlaps()
         self._room = min(0.0 if pair.is_near else pair.clearance for pair in self.pairs)
+
+    def _measure_overlaps(self) -> None:
+        """How much of bodies lies in others, all pairs together, in cells of the finer of both."""
+        met = [pair for pair in self.pairs if pair.touched or pair in self.touching]
+        pairs = [pair for pair in met if not isinstance(pair, PlanePair)]
+        for surface in {s for pair in pairs for s in (pair.leader, pair.follower)}:
+            surface.read_accepted()
+        for pair in pairs:
+            area = pair.measure_overlap()
+            if area > 0.0:
+                cell = min(pair.leader.measure_cell(), pair.follower.measure_cell())
+                self.overlap += area / cell
 
     # --- parts -----------------------------------------------------------------------------------
 
@@ -347,6 +362,7 @@ class Meetings:
             "contacts_made": self.made,
             "contacts_opened": self.opened,
             "contact_length": self.length,
+            "contact_overlap": self.overlap,
             **self.voids.compute_row(),
         }
 
@@ -356,7 +372,8 @@ class Meetings:
             return {}
         numbers = [self.made, self.opened, *(pair.stretches for pair in self.pairs)]
         counts = np.array(numbers, dtype=np.int64)
-        return {"contacts/counts": counts, "contacts/length": self.length} | self.voids.get_state()
+        measured = {"contacts/length": self.length, "contacts/overlap": self.overlap}
+        return {"contacts/counts": counts, **measured} | self.voids.get_state()
 
     def get_state_for(self, other: Meetings) -> dict[str, Any]:
         """The same for a simulation of the same surfaces, with other numbers of faces."""
@@ -381,6 +398,7 @@ class Meetings:
         for pair, stretches in zip(self.pairs, counts[2:].tolist(), strict=True):
             pair.stretches = stretches
         self.length = float(state["contacts/length"])
+        self.overlap = float(state.get("contacts/overlap", 0.0))
 
 
 def _find_bodies(blocks: Sequence[Block], links: Sequence[Link | SlidingContact]) -> dict[int, int]:

@@ -10,7 +10,9 @@ from hydro.contacts.facets import (
     find_deepest,
     find_pins,
     follow_pins,
+    measure_depths,
     measure_facets,
+    sum_behind,
 )
 from hydro.contacts.friction import add_friction, measure_closed
 from hydro.contacts.laying import (
@@ -37,6 +39,8 @@ from hydro.facets.states import solve_facets, sum_over_faces
 from hydro.motion.overlaps import is_inside
 from regrid.errors import Place, RegridFailure
 
+DEEPEST_FACES = 2.0  # longest faces: so far behind a line nodes are looked for
+DOUBTED_DEPTH_PART = 0.01  # of a face's length: nodes so deep may be beyond a thin body
 MOST_BEHIND = 0.5  # of a face's length: lines that cross so far have lost each other
 ROUND_OFF_PRESSURE = 1e-12  # part of rho c² by which a pressure below that of the void is rounding
 FAR_SEARCH_FACES = 2.0  # longest faces: surfaces of one body are not looked for further off
@@ -184,6 +188,28 @@ class Pair:
             if depth > MOST_BEHIND and is_inside(tuple(one.line[:, node]), other.block.nodes):
                 return one, other, int(node)
         return None
+
+    def measure_overlap(self) -> float:
+        """Area [m²] of one body that lies in the other after an accepted step.
+
+        By the nodes of that line which has more in the other body.  0 for surfaces of one body.
+        The surfaces have read what was accepted.
+        """
+        if self.one_body:
+            return 0.0
+        areas = []
+        for half, other in self.halves:
+            one = half.surface
+            behind = other.surface
+            reach = DEEPEST_FACES * behind.longest + one.way + behind.way
+            depths = np.empty(one.count + 1)
+            measure_depths.entry(one.nodes, behind.nodes, reach, depths)
+            # behind a line, yet beyond the other side of a thin body, is not in it
+            for node in np.flatnonzero(depths > DOUBTED_DEPTH_PART * behind.longest):
+                if not is_inside(tuple(one.new[:, node]), behind.block.nodes):
+                    depths[node] *= -1.0
+            areas.append(sum_behind(one.new, depths))
+        return max(areas)
 
     def _measure_clearance(self) -> float:
         longest = max(self.leader.longest, self.follower.longest)

@@ -20,7 +20,7 @@ from hydro.motion.line import Role
 from hydro.motion.sides import Sides
 from hydro.perimeter.contacts import fill_ghosts_from_faces, flow_along
 from regrid.measure.crossings import GROUP_EDGES, fill_boxes
-from regrid.sides import SIDE_NAMES, find_node
+from regrid.sides import SIDE_NAMES, find_node, trace_outline
 
 MOST_GROUPS = 64  # boxes of a line
 IN_LINE = 1e-9  # of the size of all: walls so near to a line are on it
@@ -80,6 +80,16 @@ class Surface:
     def read_new(self) -> None:
         """Take up the new nodes."""
         self.new[...] = self.segment.line(self.block.nodes_new)[:, :: self.step]
+
+    def read_accepted(self) -> None:
+        """Take up the nodes of an accepted step as the new ones."""
+        self.new[...] = self.segment.line(self.block.nodes)[:, :: self.step]
+
+    def measure_cell(self) -> float:
+        """Mean area [m²] of the block's cells, by its outline."""
+        x, y = trace_outline(self.block.nodes)
+        area = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+        return abs(area) / (self.block.ni * self.block.nj)
 
     def read_middle(self) -> None:
         """Take up the new nodes; the line at mid-time, and how it has moved."""

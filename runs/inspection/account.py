@@ -251,6 +251,8 @@ RULES = (
          "mean fraction of cells too small for the step, with state redistribution"),
     Rule("dt", lambda history, _: measure_shrinkage(history), 100.0, "dt fell {value:.3g} times",
          "how many times dt fell below its largest value"),
+    Rule("overlap", most("contact_overlap"), 0.1, "bodies overlap by {value:.2g} cells",
+         "largest area by which bodies lay in each other after a step, in cells"),
     Rule("drift", lambda history, _: max(measure_drifts(history).values(), default=np.nan),
          CONSERVATION_ERROR_LIMIT, "conservation error {value:.1e}",
          "largest relative conservation error of mass, energy or momentum; round-off is below the "

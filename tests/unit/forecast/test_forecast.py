@@ -128,6 +128,7 @@ def test_a_good_run_has_nothing_that_limits_trust():
         ("first-order faces", "first_order_faces", fill(30), fill(3)),
         ("voids", "voided_cells", fill(1, 100), fill(0)),
         ("shared cells", "shared_cells", fill(45), fill(10)),
+        ("overlap", "contact_overlap", fill(0.2, 150), fill(0.05)),
         ("cells not convex", "cells_not_convex", fill(2, 150), fill(0)),
         ("drift", "total_energy", np.linspace(5.0, 5.0 + 1e-8, STEPS + 1), 5.0 + fill(1e-13)),
         ("dt", "dt", np.geomspace(0.1, 0.1 / 150, STEPS + 1), np.geomspace(0.1, 0.01, STEPS + 1)),

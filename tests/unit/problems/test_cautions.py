@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from problems.blocks import Blocks, BlocksDeck, BlockSide, BlockTable, Curves, LinkTable
 from problems.deck import RunControl
 from problems.interface_instability.deck import Fluid, InterfaceDeck
 from problems.interface_instability.line import Mode
@@ -18,6 +19,36 @@ def make_interface(**deck):
     return InterfaceInstability(InterfaceDeck(**{"cells": 128, **deck}))
 
 
+def make_bodies(ends="wall", **options):
+    """Two squares of copper with a gap between them; `ends` are the sides along it."""
+    tables = []
+    for name, x, inner, outer in (("one", 0.0, "i_max", "i_min"), ("two", 1.1, "i_min", "i_max")):
+        curves = Curves(
+            i_min=((x, 0.0), (x, 1.0)),
+            i_max=((x + 1.0, 0.0), (x + 1.0, 1.0)),
+            j_min=((x, 0.0), (x + 1.0, 0.0)),
+            j_max=((x, 1.0), (x + 1.0, 1.0)),
+        )
+        kinds = {inner: "free-surface", outer: "wall"}
+        if ends == "wall":
+            kinds |= {"j_min": "wall", "j_max": "wall"}
+        sides = [
+            BlockSide(side=side, kind=kind, options=options if kind == "free-surface" else {})
+            for side, kind in kinds.items()
+        ]
+        table = BlockTable(name=name, curves=curves, material="Cu", cells=(4, 4), side=tuple(sides))
+        tables.append(table)
+    links = (
+        ()
+        if ends == "wall"
+        else tuple(
+            LinkTable(kind="periodic", sides=(f"{name}.j_min", f"{name}.j_max"))
+            for name in ("one", "two")
+        )
+    )
+    return Blocks(BlocksDeck(block=tuple(tables), link=links))
+
+
 METRES = PlateTable(material="Al1100", thickness=1.0, cells=20), PlateTable(gap=1e-4)
 STRANGE = {
     "no interface": (lambda: make_interface(second=Fluid(rho=1.0)), "density 1: there is no int"),
@@ -28,6 +59,11 @@ STRANGE = {
         lambda: FlyerTarget(FlyerTargetDeck(run=RunControl(t_end=5e-8))), "before the impact at 1e",
     ),
     "fast flyer": (lambda: FlyerTarget(FlyerTargetDeck(speed=2e4)), r"Al1100 at 13\.3 km/s"),
+    "contacts beside periodic sides": (
+        lambda: make_bodies("periodic"), "do not go on across periodic sides",
+    ),
+    "friction": (lambda: make_bodies(friction=0.2), "falls with the size of cells"),
+    "weld": (lambda: make_bodies(weld=True), "falls with the size of cells"),
     "fast piston": (lambda: Cavity(CavityDeck(speed=2e4)), "20 km/s"),
 }  # fmt: skip
 USUAL = {
@@ -36,6 +72,7 @@ USUAL = {
     "rather steep": lambda: make_interface(modes=[Mode(ka0=1.0)]),
     "flyer": lambda: FlyerTarget(FlyerTargetDeck(speed=3e3)),
     "cavity": lambda: Cavity(CavityDeck()),
+    "bodies": make_bodies,
     "impact at 4 km/s": lambda: Riemann(RiemannDeck(case="al-ss304-4")),
 }
 

@@ -126,3 +126,19 @@ def test_a_side_slides_round_a_corner(cells):
     assert simulation.finished
     assert sum(row["retries"] for row in rows[1:]) < 5
     check_budget(rows, names=("momentum_x", "momentum_y", "energy"))
+
+
+def test_overlap_of_bodies_is_measured():
+    """A square whose edge lies .3 of a cell in another body, as lines: the area in cells."""
+    lower = make_body("lower", "Cu", box((-1e-3, -1e-3), (1e-3, 0.0), (20, 10)))
+    upper = make_body("upper", "Cu", box((-5e-4, 0.0), (5e-4, 1e-3), (10, 10)))
+    free(lower, *SIDES)
+    free(upper, *SIDES)
+    simulation = Simulation([lower, upper], [], t_end=1e-6)
+    row = simulation.advance()
+    assert row["contact_overlap"] == 0.0
+    meetings = simulation.meetings
+    upper.nodes[1, :, 0] -= 0.3 * CELL
+    meetings.accept()
+    # the edge goes down at both of its ends, where its body is 10 cells wide
+    assert meetings.overlap == pytest.approx(0.3 * 10.0, rel=0.05)

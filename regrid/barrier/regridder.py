@@ -18,6 +18,13 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from regrid.barrier.newton_move import Folded, NewtonMove
+from regrid.barrier.points import (
+    OPENED_PARTS,
+    PARTS_OF_TWO_POINTS,
+    close_points,
+    find_points,
+    open_points,
+)
 from regrid.barrier.side_laws import fill_family_weights
 from regrid.barrier.tuning import DEFAULT, OPTIONS, Tuning
 from regrid.barrier.turning import Look, choose_look, is_convex
@@ -180,6 +187,7 @@ class BarrierRegridder:
         those crossed in less than 1/R, with R the larger of this block's (`compute_limiting_rate`)
         and `least_limiting_rate` [1/s], the largest of the blocks that share the step.  `in_place`
         writes the grid into `boundary` if its layout allows, overwriting its interior anyway.
+        One side, or two opposite ones, may be a point: the cells there are triangles.
         Raises RegridFailure, naming side and nodes, if there is no valid grid or none is found.
         """
         if self._sweeps is not None:
@@ -192,16 +200,53 @@ class BarrierRegridder:
         unit = find_unit(previous)
         if unit != 1.0:  # eighth powers of lengths would not be numbers
             return self._regrid_in(unit, previous, boundary, sound_speed, least_limiting_rate, into)
-        first = self._find_first(previous)
-        given = Given(previous, boundary, sound_speed, float(least_limiting_rate), first)
+        given = Given(previous, boundary, sound_speed, float(least_limiting_rate), None)
+        try:
+            return self._regrid_given(given, into)
+        except RegridFailure:
+            points = find_points(previous), find_points(boundary)
+            if points == ((), ()):
+                raise
+        return self._regrid_opened(given, into, *points)
+
+    def _regrid_given(self, given: Given, into) -> RegridResult:
+        """`regrid` of checked arrays."""
+        given = given._replace(first=self._find_first(given.previous))
         try:
             return self._move(given, into, untangles=False)
         except Folded:
             return self._untangle(given, into)
         except _NoGrid as end:
             raise explain_failure(
-                boundary, end.trial, end.transposed, end.flat, cuts=self.cuts
+                given.boundary, end.trial, end.transposed, end.flat, cuts=self.cuts
             ) from None
+
+    def _regrid_opened(
+        self, given: Given, into, before: tuple[str, ...], after: tuple[str, ...]
+    ) -> RegridResult:
+        """`regrid` of a block whose sides `before` and `after` the motion are points."""
+        boundary = given.boundary
+        failure = RegridFailure("cells at this point fold", side=(after or before)[0])
+        for part in OPENED_PARTS if len(after) < 2 else PARTS_OF_TWO_POINTS:
+            opened = given._replace(
+                previous=open_points(given.previous, before, part),
+                boundary=open_points(boundary, after, part),
+            )
+            try:
+                result = self._regrid_given(opened, None)
+            except RegridFailure as found:
+                failure = found
+                continue
+            nodes = result.nodes
+            exempt = close_points(nodes, boundary, after)
+            if exempt is None:
+                continue
+            if into is not None:
+                into[:] = nodes
+                nodes = into
+            report = replace(result.report, exempt_corners=exempt, quality=None)
+            return RegridResult(nodes, report)
+        raise failure
 
     def _regrid_in(
         self, unit: float, previous, boundary, sound_speed, least_limiting_rate, into

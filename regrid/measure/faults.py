@@ -353,7 +353,10 @@ def _find_fault(
     same = np.flatnonzero((line == np.roll(line, -1, axis=1)).all(axis=0))
     if same.size:
         side, node = positions[same[0]]
-        doubled = "the node and its neighbour on the boundary are the same point"
+        doubled = (
+            "the node and its neighbour on the boundary are the same point; a side may shrink to a "
+            "point only as a whole"
+        )
         return _Fault("no-grid", doubled, side, (node,))
     if previous is not None and compute_area(previous) * compute_area(boundary) <= 0.0:
         turned = (

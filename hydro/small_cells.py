@@ -168,7 +168,11 @@ def make_redistribution(eos_class, geometry: Geometry):
 
     @compiled_once
     def mark_neighbourhoods(small, reaches, marks, sizes, touched):
-        """List the cells in neighbourhoods (mark 1) and those just beyond their ends (2)."""
+        """List the cells in neighbourhoods (mark 1) and those just beyond their ends (2).
+
+        Fills `marks` (ni, nj), `touched` and, of their sizes, PARTS: in how many neighbourhoods a
+        cell is, its own among them.
+        """
         ni, nj = marks.shape
         for n in range(small.shape[0]):
             i, j = small[n]

@@ -200,7 +200,7 @@ def agree_on_failures(motion: GridMotion, fraction: float) -> Iterator[None]:
 
 
 def fill_states_beyond(flow: Flow, dt: float) -> None:
-    """Phase 2."""
+    """Phase 2: what lies beyond all sides, and the cells along them at mid-time."""
     t = flow.clock.t
     with flow.watch("sides"):
         # 2 states beyond all sides; slopes and mid-time states of the cells along them
@@ -215,7 +215,7 @@ def fill_states_beyond(flow: Flow, dt: float) -> None:
 
 
 def find_contact_speeds(flow: Flow, dt: float) -> None:
-    """Phase 3."""
+    """Phase 3: contact states at the faces of moving lines, and so their velocities."""
     with flow.watch("sides"):
         # 3 contact speeds of all sides that move with the flow, from traces at mid-time
         for coupling in flow.couplings:
@@ -232,7 +232,7 @@ def move_lines(flow: Flow, dt: float, fraction: float) -> Touch | None:
 
 
 def update_states(flow: Flow, dt: float) -> None:
-    """Phase 6."""
+    """Phase 6: fluxes through the moved faces, and the new states."""
     with flow.watch("sides"):
         # 6 fluxes through the sides, from traces on the moved faces
         for block in flow.blocks:
@@ -271,7 +271,7 @@ def find_failure(flow: Flow) -> RunFailure | None:
 
 
 def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
-    """Phase 7 of an accepted step."""
+    """Phase 7 of an accepted step: the new becomes the current state; totals and time."""
     # 7 the new grid and state become the current ones; second half of the sources; ledger, clock
     for block in flow.blocks:
         block.accept()

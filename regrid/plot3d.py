@@ -171,7 +171,10 @@ def _list_records(contents: bytes, order: str) -> list[bytes] | None:
 
 
 def _read_records(records: list[bytes], order: str, words: str):
-    """A record for the count of blocks if there are several, one for the sizes, one a block."""
+    """All ways to read Fortran records: count of blocks if there are several, sizes, each block.
+
+    order: "<" or ">", of bytes; words: how the file is read so far, for a message.
+    """
     whole = order + "i4"
     heads: list[tuple[int, np.ndarray, list[bytes]]] = []
     if len(records) > 1 and len(records[0]) in (8, 12):
@@ -190,7 +193,11 @@ def _read_records(records: list[bytes], order: str, words: str):
 
 
 def _read_stream(contents: bytes, order: str, words: str):
-    """The same numbers without records."""
+    """All ways to read the numbers of `_read_records` where no marks of records are between them.
+
+    With integers for blanked nodes (`marked`) or without, and of 4 or 8 bytes, whichever gives the
+    file's length.
+    """
     if len(contents) < 12:
         return
     head = np.frombuffer(contents, order + "i4", min(len(contents) // 4, 1 + 3 * MOST_BLOCKS))

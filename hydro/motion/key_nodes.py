@@ -210,7 +210,7 @@ class KeyNode:
     def settle(self) -> None:
         """Put the new position back on the curved track that it left along the tangent."""
         if self.given:
-            return
+            return  # a given velocity moves it
         track = self.tracks[0][0]
         block, i, j = self.members[0]
         if any(other is not track for other, _, _ in self.tracks):

@@ -77,7 +77,7 @@ def fill_in(overlay: Overlay, fields: np.ndarray, centres: np.ndarray) -> np.nda
     return np.moveaxis(means, -1, 0)
 
 
-def share_slivers(
+def balance_slivers(
     overlay: Overlay,
     fields: np.ndarray,
     volumes: np.ndarray,
@@ -89,6 +89,7 @@ def share_slivers(
     fields (ni, nj, n, 3), the first quantity being the density; volumes (ni, nj) and centres (2,
     ni, nj) of the old cells; new_nodes (2, mi+1, mj+1).  Theory F12.4.
     """
+    # what of old cells lies outside the new grid, and what new cells need beyond the old one
     left = volumes - overlay.used[..., 0]
     given = left > LEAST_SLIVER * volumes
     short = overlay.volumes - overlay.covered[..., 0]
@@ -99,6 +100,7 @@ def share_slivers(
     )
     if slivers.count == 0:
         return content, slivers
+    # new cells are filled with their own mean; old ones give their linear fields away
     means = np.moveaxis(fill_in(overlay, fields, centres), 0, -1)
     loans = means[borrowed] * short[borrowed][:, None]
     content[borrowed] += loans
@@ -109,6 +111,7 @@ def share_slivers(
         + fields[given][..., SLOPE_X] * away[:, :1]
         + fields[given][..., SLOPE_Y] * away[:, 1:]
     )
+    # both go to the nearest face of a side
     positions = np.concatenate([
         centres[:, given].T + away / left[given][:, None],
         overlay.centres[:, borrowed].T + missing / short[borrowed][:, None],
@@ -116,7 +119,7 @@ def share_slivers(
     middles, owners = find_side_faces(new_nodes)
     balance = np.zeros((len(owners), content.shape[-1]))
     np.add.at(balance, cKDTree(middles.T).query(positions)[1], np.concatenate([gifts, -loans]))
-    # what is missing beside a side's face goes to the cells of the line that starts there
+    # and from there, by mass, to the cells of the line that starts at it
     for side in range(len(SIDE_NAMES)):
         axis = 0 if side < J_MIN else 1
         mass = content[..., 0] / content[..., 0].sum(axis=axis, keepdims=True)
@@ -267,7 +270,7 @@ def remap_state(
     # cut by the new grid; a second time with constant fields if a result is no state
     for _ in range(2):
         overlay = overlay_grids(nodes, centres, fields, new_nodes, curved)
-        content, slivers = share_slivers(overlay, fields, volumes, centres, new_nodes)
+        content, slivers = balance_slivers(overlay, fields, volumes, centres, new_nodes)
         if max(slivers.given, slivers.borrowed) > MOST_SLIVERS * volumes.sum():
             raise BadInput(
                 f"block {name!r}: the outlines of its two grids differ by "

@@ -169,7 +169,10 @@ class Workspace:
             self.use_own()
 
     def _lay(self, whole: np.ndarray) -> None:
-        """Lay the large arrays into `whole` (`size` or more,)."""
+        """Make the large arrays views of `whole` (`size` or more,), one behind the other.
+
+        In memory that other regrids of the thread may use too, nothing of them is kept.
+        """
         if whole is self._whole:
             return
         self._whole = whole

@@ -99,5 +99,5 @@ def name_by_contents(function, options) -> None:
     options) a name of its own variant: machine code is linked by name and types, and variants
     cached by two processes and loaded by a third would pass for one another."""
     if function.__closure__ or options or function.__module__.split(".")[0] not in PACKAGES:
-        words = f"{compute_contents_digest(function)} {options}"
-        function.__qualname__ += f"_{hashlib.sha256(words.encode()).hexdigest()[:10]}"
+        variant = f"{compute_contents_digest(function)} {options}"
+        function.__qualname__ += f"_{hashlib.sha256(variant.encode()).hexdigest()[:10]}"

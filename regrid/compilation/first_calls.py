@@ -61,8 +61,12 @@ def _tell() -> None:
         return
     _compiling.told = True
     if sys.stderr is not None and sys.stderr.isatty():
-        words = "compiling kernels, kept for later runs: a minute, several on a busy machine ..."
-        print(f"regrid: {words}", file=sys.stderr, flush=True)
+        print(
+            "regrid: compiling kernels, kept for later runs: "
+            "a minute, several on a busy machine ...",
+            file=sys.stderr,
+            flush=True,
+        )
 
 
 def leave_telling() -> None:

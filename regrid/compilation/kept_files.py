@@ -83,13 +83,13 @@ def digest_sources() -> str:
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
-def remember(name: str, words: Any, compute: Callable[[], Any]) -> Any:
+def remember(name: str, inputs: Any, compute: Callable[[], Any]) -> Any:
     """What `compute` gives; it stays in the cache until a file of the packages changes.
 
-    words: all that it depends on beside them, as pickle writes it.
+    inputs: all that it depends on beside them, as pickle writes it.
     """
-    words = hashlib.sha256(pickle.dumps(words)).hexdigest()
-    path = find_kept(name, digest_sources(), words)
+    digest = hashlib.sha256(pickle.dumps(inputs)).hexdigest()
+    path = find_kept(name, digest_sources(), digest)
     with contextlib.suppress(OSError, ValueError):
         return pickle.loads(read_kept(path))
     found = compute()

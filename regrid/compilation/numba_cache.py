@@ -42,8 +42,8 @@ WITHOUT_WRAPPERS: dict[str, Any] = {}
 
 def find_folder(function, options: dict) -> Path:
     """The folder of a kernel's files, named by all that determines them."""
-    words = compute_contents_digest(function), sorted(options.items()), find_machine(), VERSIONS
-    key = hashlib.sha256(repr(words).encode()).hexdigest()
+    causes = compute_contents_digest(function), sorted(options.items()), find_machine(), VERSIONS
+    key = hashlib.sha256(repr(causes).encode()).hexdigest()
     return find_cache() / "numba" / f"{function.__name__}-{key[:24]}"
 
 

@@ -100,9 +100,9 @@ def describe_materials(name: str | None = None) -> str:
             density = f"{material.rho0:g} kg/m3"
             line = f"{one:18}{material.eos.kind:18}{density:>14}{describe_hugoniot(material.eos)}"
             lines.append(f"{line}   {', '.join(material.names)}".rstrip())
-        words = "c0, s: of a straight Hugoniot, Us = c0 + s up"
+        legend = "c0, s: of a straight Hugoniot, Us = c0 + s up"
         usage = "shockgrid materials NAME: its parameters and their source"
-        return "\n".join([*lines, "", words, usage])
+        return "\n".join([*lines, "", legend, usage])
     material = find_material(name)
     lines = [f"{find_name(name)}: {material.eos.kind}"]
     lines[0] += f", also {', '.join(material.names)}" if material.names else ""

@@ -111,3 +111,48 @@ def test_constants_say_their_whole_meaning(package):
             words[name] += "_" not in name.strip("_")
     assert not {name for name, count in words.items() if count} - UNITS
     assert not {name: found for name, found in values.items() if len(found) > 1}
+
+
+# names and options that a user writes out, one by one
+TAKES_MANY = {
+    "regrid.barrier.regridder.BarrierRegridder.__init__",
+    "regrid.variational.VariationalRegridder.__init__",
+    "hydro.block.Block.__init__",
+    "hydro.boundary.FreeSurface.__init__",
+    "hydro.simulation.Simulation.__init__",
+    "runs.interface.calls.restart",
+    "runs.interface.case.Drawn.plot",
+    "runs.study.study.study",
+}
+MOST_ARGUMENTS = 8
+
+
+def find_functions(node: ast.AST, name: str) -> Iterator[tuple[str, ast.FunctionDef]]:
+    """Functions in a module, class or function, with their full names."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.FunctionDef | ast.ClassDef):
+            own = f"{name}.{child.name}"
+            if isinstance(child, ast.FunctionDef):
+                yield own, child
+            yield from find_functions(child, own)
+        else:
+            yield from find_functions(child, name)
+
+
+def count_arguments(function: ast.FunctionDef) -> int:
+    given = function.args
+    names = [one.arg for one in (*given.posonlyargs, *given.args, *given.kwonlyargs)]
+    return len([name for name in names if name not in ("self", "cls")]) + sum(
+        one is not None for one in (given.vararg, given.kwarg)
+    )
+
+
+@pytest.mark.parametrize("package", PRODUCT)
+def test_few_functions_take_many_arguments(package):
+    many = set()
+    for path, tree in read_trees(package):
+        module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        for name, function in find_functions(tree, module):
+            if count_arguments(function) > MOST_ARGUMENTS:
+                many.add(name)
+    assert many == {name for name in TAKES_MANY if name.startswith(f"{package}.")}

@@ -135,6 +135,7 @@ def find_pins(nodes, other, pins, tolerance, reach, one_body):
     near = 0
     found = 0
     for k in range(last + 1):
+        # groups of faces that are near this group of nodes
         if k % group == 0:
             near = find_groups(points, points, k, min(last + 1, k + group), boxes, reach, groups)
         pins.positions[k] = -1.0
@@ -142,6 +143,7 @@ def find_pins(nodes, other, pins, tolerance, reach, one_body):
             continue
         x, y = points[0, k], points[1, k]
         along_x, along_y = find_direction(points, k)
+        # the nearest face on which the node lies
         least = 1e300
         position = -1.0
         for n in range(near):
@@ -155,6 +157,7 @@ def find_pins(nodes, other, pins, tolerance, reach, one_body):
                 if away >= least:
                     continue
                 square = measure_square(line, a)
+                # on it, or behind it by no more than the bulge of a curved contact
                 is_on = away <= tolerance * tolerance * square
                 if not is_on and 0.0 < at < 1.0 and faces_each_other(line, a, along_x, along_y):
                     deep = find_depth(line, a, x, y)
@@ -163,6 +166,7 @@ def find_pins(nodes, other, pins, tolerance, reach, one_body):
                         is_on = False  # behind the next side, at the corner of a body
                     if a == count - 1 and (1.0 - at) * square**0.5 < deep:
                         is_on = False
+                # of one body: not through a film
                 if is_on and pins.asked[k] and one_body:
                     is_on = not is_film(nodes.inner, k, line, a, x, y)
                 if is_on:
@@ -193,12 +197,14 @@ def find_deepest(nodes, other, pinned, reach):
     deepest = 0.0
     which = -1
     for k in range(last + 1):
+        # groups of faces that are near this group of nodes
         if k % group == 0:
             near = find_groups(points, points, k, min(last + 1, k + group), boxes, reach, groups)
         if near == 0 or pinned[k] >= 0.0:
             continue
         x, y = points[0, k], points[1, k]
         along_x, along_y = find_direction(points, k)
+        # how far the node is behind the face nearest to it
         least = 1e300
         depth = 0.0
         for n in range(near):
@@ -214,6 +220,7 @@ def find_deepest(nodes, other, pinned, reach):
                 inner = 0 < a < count - 1 and 0.0 < part < 1.0
                 if inner and faces_each_other(line, a, along_x, along_y):
                     depth = max(0.0, find_depth(line, a, x, y) / measure_square(line, a) ** 0.5)
+        # the deepest so far
         if depth > deepest and least <= reach * reach:
             deepest = depth
             which = k
@@ -236,6 +243,7 @@ def measure_depths(nodes, other, reach, depths):
     groups = np.empty(other.boxes.shape[1], np.int64)
     near = 0
     for k in range(last + 1):
+        # groups of faces that are near this group of nodes
         if k % group == 0:
             stop = min(last + 1, k + group)
             near = find_groups(points, points, k, stop, other.boxes, reach, groups)
@@ -244,6 +252,7 @@ def measure_depths(nodes, other, reach, depths):
             continue
         x, y = points[0, k], points[1, k]
         along_x, along_y = find_direction(points, k)
+        # the nearest face
         least = reach * reach
         for n in range(near):
             g = groups[n]
@@ -257,6 +266,7 @@ def measure_depths(nodes, other, reach, depths):
                 depths[k] = -(away**0.5)
                 if not faces_each_other(line, a, along_x, along_y):
                     continue
+                # behind it, and not only round a corner of the other body
                 deep = find_depth(line, a, x, y)
                 beside = a - 1 if part <= 0.0 else a + 1
                 if not 0.0 < part < 1.0 and 0 <= beside < count:  # nearest to a node: of both faces
@@ -327,6 +337,7 @@ def merge_pins(leader_positions, follower_positions, pins):
     leader_positions (m + 1,): of the leader's nodes on the follower; follower_positions (n + 1,):
     of the follower's nodes on the leader; negative where a node lies on nothing.  Returns how many.
     """
+    # pins of each line, sorted
     own = 0
     others = 0
     for k in range(follower_positions.shape[0] - 1, -1, -1):
@@ -337,6 +348,7 @@ def merge_pins(leader_positions, follower_positions, pins):
         if leader_positions[k] >= 0.0:
             put_pin(pins, 4, others, float(k), leader_positions[k])
             others += 1
+    # both together, each place once
     kept = 0
     one = 0
     two = 0
@@ -390,14 +402,17 @@ def fill_facets(leader, follower, positions, back_positions, straight, pins, cov
         # the follower runs the other way
         high = pins[1, k]
         low = pins[1, k + 1]
+        # between two pins that are one place on a line there is no facet
         if stop <= start or low >= high:
             continue
+        # faces of both lines that look at each other
         a = min(int(start), last)
         b = min(int(low), last_follower)
         along_x = follower[0, b + 1] - follower[0, b]
         along_y = follower[1, b + 1] - follower[1, b]
         if high > b + 1.0 or not faces_each_other(leader, a, along_x, along_y):
             continue
+        # on one face of the leader, or on several within the bulge of the follower's
         if straight or stop <= a + 1.0:
             owners[LEADER, found] = a
             owners[FOLLOWER, found] = b

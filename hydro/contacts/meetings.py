@@ -160,6 +160,7 @@ class Meetings:
         """
         if not self.pairs:
             return None
+        # which pairs may meet in a step that is somewhat longer than this one
         for regridder, _ in self._folding:
             regridder.meets_itself = False
         for surface in self.surfaces:
@@ -174,6 +175,7 @@ class Meetings:
         if not awake:
             self._cuts = 0
             return None
+        # nodes that are in contact stay on the other line
         self._read_lines([s for pair in awake for s in (pair.follower, pair.leader)])
         for surface in self.surfaces:
             surface.read_new()
@@ -183,6 +185,7 @@ class Meetings:
         self._lay(self.touching, part_back)
         for surface in self._sides:
             surface.measure_way()
+        # the first touch: a step that ends with it is taken instead, a few times at most
         stretch = 1.0 if self._cuts == 0 else MOST_LONGER
         first = min(pair.find_touch(stretch) for pair in awake)
         least = LEAST_BESIDE if self.touching else LEAST_STEP
@@ -195,6 +198,7 @@ class Meetings:
             self._cuts += 1
             return other
         self._cuts = 0
+        # nodes that come through are laid on the other line
         if first < 1.0 + 2.0 * REACHED_TOUCH_PART or self.touching:
             for pair in awake:
                 pair.find_touch(1.0 + 2.0 * REACHED_TOUCH_PART, cuts=False)
@@ -202,6 +206,7 @@ class Meetings:
             for pair in awake:
                 pair.forget_hits()
         self._lay([pair for pair in awake if pair.touched], part_back)
+        # what that has changed beside them
         for guard in self.guards:  # of bodies' corners, which the laying may have opened
             guard.hold()
         for regridder, pairs in self._folding:
@@ -421,6 +426,7 @@ def _find_pairs(
     """Surfaces, and all pairs of them and of planes with them that may meet; walls lead."""
     if motion.mesh != "regrid":
         return [], []
+    # bodies, planes and the surfaces that belong to none
     bodies = _find_bodies(blocks, links)
     planes = find_planes(blocks, geometry.curved)
     bounds = {id(segment) for plane in planes for segment in plane.segments}
@@ -431,6 +437,7 @@ def _find_pairs(
         if is_surface(segment) and id(segment) not in bounds
     ]
     pairs: list[Pair] = []
+    # pairs of surfaces, the longest and walls first
     for one, other in itertools.combinations_with_replacement(surfaces, 2):
         if one.rigid and other.rigid:
             continue
@@ -439,6 +446,7 @@ def _find_pairs(
             continue  # what closes there is the sliding contact
         pairs.append(Pair(one, other, one_body, geometry.curved))
     pairs.sort(key=lambda pair: (not pair.leader.rigid, -pair.leader.length))
+    # and planes with each free surface
     free = [surface for surface in surfaces if not surface.rigid]
     pairs += [
         PlanePair(plane.put_under(surface), surface, geometry.curved)

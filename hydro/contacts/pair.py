@@ -145,6 +145,7 @@ class Pair:
 
     def find(self) -> None:
         """Facets of the old grid."""
+        # near each other? the clearance tells, or pins of the last step
         lay = self.touches  # then they will do so still, which pins tell
         if self.clearance <= 0.0 and not lay:
             self.clearance = self._measure_clearance()
@@ -155,11 +156,13 @@ class Pair:
         if self.is_near and lay and not self.touches:
             self.clearance = self._measure_clearance()
             self.is_near = self.clearance <= 0.0
+        # apart: nothing is kept
         if not self.is_near:
             self.pinned = 0
             self.follow.forget_pins()
             self.lead.forget_pins()
             return
+        # facets between the pins
         if self.pinned > 1:
             line = self.leader.line
             other = self.follower.line

@@ -252,6 +252,7 @@ def find_planes(blocks: Sequence[Block], axis: bool) -> list[Plane]:
         for segment in block.segments:
             if not isinstance(segment, Wall) or isinstance(segment, Piston):
                 continue
+            # the wall's line, with the blocks on its right
             line = segment.line(block.nodes)
             if segment.side in ("i_max", "j_min"):  # what is outside is then on the left
                 line = line[:, ::-1]
@@ -260,10 +261,12 @@ def find_planes(blocks: Sequence[Block], axis: bool) -> list[Plane]:
             if length <= IN_LINE * size:  # it closes on itself
                 continue
             along /= length
+            # straight, and all blocks on one side
             heights = _measure_heights(nodes, line[:, 0], along)
             on_line = np.abs(_measure_heights(line, line[:, 0], along)).max() <= IN_LINE * size
             if not on_line or heights.min() < -IN_LINE * size:
                 continue
+            # part of a plane that is known, or a new one
             for plane in planes:
                 off = _measure_heights(line, plane.origin, plane.along)
                 if np.abs(off).max() <= IN_LINE * size and plane.along @ along > 0.0:

@@ -58,6 +58,7 @@ def measure_distance(nodes, other, pins, one_body, most):
     groups = np.empty(boxes.shape[1], np.int64)
     near = 0
     for k in range(last):
+        # groups of faces nearer than what was found so far
         if k % group == 0:
             stop = min(last, k + group)
             near = find_groups(points, points, k, stop, boxes, least**0.5, groups)
@@ -67,6 +68,7 @@ def measure_distance(nodes, other, pins, one_body, most):
         along_x, along_y = find_direction(points, k)
         for n in range(near):
             g = groups[n]
+            # a group further away than that
             away_x = max(0.0, boxes[LEAST_X, g] - x, x - boxes[MOST_X, g])
             away_y = max(0.0, boxes[LEAST_Y, g] - y, y - boxes[MOST_Y, g])
             if away_x * away_x + away_y * away_y >= least:
@@ -77,6 +79,7 @@ def measure_distance(nodes, other, pins, one_body, most):
                 _, away = project(line, a, x, y)
                 if away >= least:
                     continue
+                # of one body: faces that look at the node, not through a film
                 if one_body:
                     if not faces_each_other(line, a, along_x, along_y):
                         continue
@@ -117,6 +120,7 @@ def find_touch(x, y, dx, dy, old, new, a):
 
     From the right of the face to its left; 2.0 where it does not.  Also at which part of the face.
     """
+    # node and face in time: the area of both is none + one t + two t²
     q_x, q_y = old[0, a], old[1, a]
     dq_x, dq_y = new[0, a] - q_x, new[1, a] - q_y
     e_x, e_y = old[0, a + 1] - q_x, old[1, a + 1] - q_y
@@ -126,6 +130,7 @@ def find_touch(x, y, dx, dy, old, new, a):
     none = d_x * e_y - d_y * e_x
     one = (dd_x * e_y - dd_y * e_x) + (d_x * de_y - d_y * de_x)
     two = dd_x * de_y - dd_y * de_x
+    # its first root from in front
     if none <= 0.0:
         return 2.0, 0.0
     inside = one * one - 4.0 * two * none
@@ -138,6 +143,7 @@ def find_touch(x, y, dx, dy, old, new, a):
         time = (one + root) / (-2.0 * two) if two < 0.0 else 2.0
     if not time <= 1.0:
         return 2.0, 0.0
+    # where on the face
     e_x, e_y = e_x + time * de_x, e_y + time * de_y
     d_x, d_y = d_x + time * dd_x, d_y + time * dd_y
     part = (d_x * e_x + d_y * e_y) / (e_x * e_x + e_y * e_y)
@@ -166,12 +172,14 @@ def find_touches(nodes, pins, other, others, cuts):
     last = old_points.shape[1]
     groups = np.empty(boxes.shape[1], np.int64)
     near = 0
+    # nodes close to a pin on their own line
     beside = np.zeros(last, np.bool_)
     for k in range(others.shape[0] if cuts else 0):
         node = int(others[k] + 0.5)
         if others[k] >= 0.0 and abs(others[k] - node) < BESIDE_PIN_DISTANCE:
             beside[node] = True
     for k in range(last):
+        # groups of faces that this group of nodes may come through
         if k % group == 0:
             stop = min(last, k + group)
             near = find_groups(old_points, new_points, k, stop, boxes, 0.0, groups)
@@ -180,6 +188,7 @@ def find_touches(nodes, pins, other, others, cuts):
             continue
         x, y = old_points[0, k], old_points[1, k]
         x_new, y_new = new_points[0, k], new_points[1, k]
+        # the first face that the node comes through
         own = 2.0
         for n in range(near):
             g = groups[n]

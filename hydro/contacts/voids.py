@@ -212,6 +212,7 @@ class Voids:
     def _find_steps(self) -> dict[int, list[tuple[float, Place]]]:
         """On each curve the positions where one goes over to another, and to where."""
         found = list(self._steps)
+        # surfaces that end on a plane
         for number, end, side in self._held:
             surface = self.surfaces[number]
             plane = self.planes[side - len(self.surfaces)]
@@ -221,6 +222,7 @@ class Voids:
             else:
                 found.append((number, float(surface.count), side, place))
         first_contact = len(found)
+        # contacts: from one curve to the other at both ends of each stretch of facets
         for pair in self.pairs:
             if not (pair.is_near and pair.count):
                 continue
@@ -234,10 +236,12 @@ class Voids:
             for k in (*breaks, pair.count - 1):
                 place = self._convert(pair, ends[LEADER_STOP, k])
                 found.append((other, float(ends[FOLLOWER_STOP, k]), one, place))
+        # which of the steps are those of contacts
         self._contact_steps = {
             (curve, position, (target, place))
             for curve, position, target, place in found[first_contact:]
         }
+        # by the curve on which they begin
         steps: dict[int, list[tuple[float, Place]]] = {}
         for curve, position, target, place in found:
             steps.setdefault(curve, []).append((position, (target, place)))

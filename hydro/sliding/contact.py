@@ -190,6 +190,7 @@ class SlidingContact:
         self.segments: list[Sliding] = [*leader, *follower]
         self.leader, self.follower = Chain(leader), Chain(follower)
         self.name = f"{leader[0].block.name}/{follower[0].block.name}"
+        # one material along the follower
         if self.leader.orientation == self.follower.orientation:
             self.follower.reverse()  # so that both run the same way
         first = follower[0].block.eos
@@ -206,6 +207,7 @@ class SlidingContact:
             )
             segment.motion = NodeMotion.FOLLOW
             segment.has_own_line = False
+        # a leader that does not cross itself
         line = self.leader.line()
         other = self.follower.line()
         crossing = _find_crossing(line)
@@ -224,6 +226,7 @@ class SlidingContact:
                     self.fixed[end] = node
             if self.fixed[end] >= 0:
                 other[:, -end] = line[:, self.fixed[end]]
+        # the follower's nodes lie on the leader's line, one after another
         positions = np.empty(other.shape[1])
         fill_positions(line, other, positions)
         points = np.empty_like(other)
@@ -236,8 +239,8 @@ class SlidingContact:
             )
         if not (np.diff(positions) > 0.0).all():
             raise BadInput(f"sliding: {follower[0]} and {leader[0]} do not lie along each other")
+        # what a step needs
         self.carries = bool(follower[0].block.carried_fields)
-        self.first_spacing = arc_spacing(np.ascontiguousarray(other))
         self.first_spacing = arc_spacing(np.ascontiguousarray(other))
         self.refinement = 1.0  # how many times shorter the steps at a contact point are
         self.fixed_new = self.fixed.copy()
@@ -322,6 +325,7 @@ class SlidingContact:
         old, follower_old = self.lines
         new = leader.line(new=True)
         follower_new = follower.line(new=True)
+        # pieces at mid-time
         middle = 0.5 * (old + new)
         moved = new - old
         follower_middle = 0.5 * (follower_old + follower_new)
@@ -334,16 +338,19 @@ class SlidingContact:
             fill_radius_weighted_areas.entry(
                 old, new, orientation, 1.0 / dt, self.pieces, self.count
             )
+        # their contact states, and the fluxes of both sides (theory F4)
         self._solve_pieces(on.TRACE, middle, follower_middle)
         for side, half in ((LEADER, self.halves[LEADER]), (FOLLOWER, self.halves[FOLLOWER])):
             half.flux[:] = 0.0
             self.add_facet_flux.entry(self.pieces, self.count, side, half)
+        # what passes between the follower's polygons
         closing = self._measure_closing(middle, moved, follower_middle, follower_new - follower_old)
         growth = (1.0 / dt) * (self.excess_volume_new - self.excess_volume)
         growth += follower.gather(on.AREAS)[SWEPT_RATE]
         self.add_closing_flux.entry(
             self.halves[FOLLOWER], closing, growth, self.pieces, self.count, self._part_at_first()
         )
+        # into the rims
         leader.scatter(on.FLUX, self.halves[LEADER].flux)
         follower.scatter(on.FLUX, self.halves[FOLLOWER].flux)
         if self.carries:

@@ -151,12 +151,15 @@ def fill_pieces(line, moved, positions, orientation, inverse_dt, facets):
     k = 0
     count = 0
     here = 0.0
+    # nodes of the follower before the leader's start
     while k < followers and positions[k] <= 0.0:
         k += 1
     while a < last:
+        # up to the next node of either line
         there = a + 1.0
         if k < followers and positions[k] < there:
             there = positions[k]
+        # a piece between them
         if there > here:
             facets.owners[LEADER, count] = a
             facets.owners[FOLLOWER, count] = k - 1 if 0 < k < followers else -1

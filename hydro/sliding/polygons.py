@@ -77,11 +77,13 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
         owners = facets.owners
         areas = facets.areas
         cells = flux.shape[1]
+        # the budget's rest, of the whole line
         rest = 0.0
         for piece in range(count):
             rest -= areas[SWEPT_RATE, piece] if owners[FOLLOWER, piece] >= 0 else 0.0
         for k in range(cells):
             rest -= growth[k]
+        # along the line: what each closing face sweeps, from the budget of the cells before it
         swept = -first * rest
         k = 0
         piece = 0
@@ -92,6 +94,7 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
                 swept -= areas[SWEPT_RATE, piece]
                 piece += 1
             swept -= growth[k]
+            # states on it: means, and upwind what passes
             area_x, area_y = closing[0, k + 1], closing[1, k + 1]
             u = 0.5 * (traces[U, k] + traces[U, k + 1])
             v = 0.5 * (traces[V, k] + traces[V, k + 1])
@@ -104,6 +107,7 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
             momentum_y, push, hoop = split(
                 mass * traces[V, up] + p * area_y, p, area_y, closing[closing.shape[0] - 1, k + 1]
             )
+            # out of the cell before it, into the one after
             parts = (
                 mass,
                 mass * traces[U, up] + p * area_x,

@@ -97,6 +97,24 @@ def measure_distance_before(mover, k, target, position):
     return (dx * dx + dy * dy) ** 0.5
 
 
+@compiled_once
+def is_laid(k, pins, away, length, back, at_end, ends_line):
+    """Is a node laid on the other line?  See `lay`.
+
+    away: how far its place is outside it, and beside its foot [m]; length: of the face there;
+    at_end: is it an end of its own line?  ends_line: is its foot an end of the other one?
+    """
+    outside, beside = away
+    if back:
+        takes = (outside < 0.0 and at_end and not pins.inside[k]) or (
+            outside < -DEEP_NODE_PART * length
+        )
+    else:
+        takes = outside < 0.0
+    takes = takes or pins.held[k] or pins.hits[k] >= 0.0
+    return takes and not (ends_line and beside > BESIDE_END_DISTANCE * length)
+
+
 @kernel
 def lay(mover, pins, target, others, how, ways, ends):
     """Move new nodes onto the other's new line: the closed part, and what came through.
@@ -135,16 +153,11 @@ def lay(mover, pins, target, others, how, ways, ends):
         x, y = x - points[0, k], y - points[1, k]
         outside = (y * dx - x * dy) / length
         beside = abs(x * dx + y * dy) / length
-        # is it laid there?
-        if back:
-            at_end = (k == 0 or k == last) and not pins.inside[k]
-            takes = (outside < 0.0 and at_end) or outside < -DEEP_NODE_PART * length
-        else:
-            takes = outside < 0.0
-        takes = takes or pins.held[k] or pins.hits[k] >= 0.0
-        if not straight and (found == 0.0 or found == most):
-            takes = takes and beside <= BESIDE_END_DISTANCE * length  # else beyond the line's end
-        if not takes or (not straight and max(abs(x), abs(y)) <= STILL_NODE_DISTANCE * length):
+        at_end = k == 0 or k == last
+        ends_line = not straight and (found == 0.0 or found == most)
+        if not is_laid(k, pins, (outside, beside), length, back, at_end, ends_line):
+            continue
+        if not straight and max(abs(x), abs(y)) <= STILL_NODE_DISTANCE * length:
             continue
         way = (x * x + y * y) ** 0.5
         # what was behind before goes back by a part

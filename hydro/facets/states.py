@@ -54,7 +54,12 @@ ROUND_OFF_TENSION = 1e-6
 
 @compiled_once
 def compute_state_at(line, k, x, y):
-    """Density, velocity, pressure, sound speed and wave law of face `k` at a point of its line."""
+    """State of face `k` at a point of its line: rho, u, v, p, c and wave law.
+
+    A wall has a velocity only.
+    """
+    if line.rigid:
+        return 0.0, line.velocity[0], line.velocity[1], 0.0, 0.0, (0.0, 0.0, 0.0)
     states = line.states
     slopes = line.slopes
     way = (x - line.middles[0, k]) * slopes[ALONG_X, k]
@@ -64,6 +69,23 @@ def compute_state_at(line, k, x, y):
     p = states[P, k] + way * slopes[P_SLOPE, k]
     law = line.laws[0, k], line.laws[1, k], line.laws[2, k]
     return states[RHO, k], u, v, p, states[STATE_C, k], law
+
+
+@compiled_once
+def press_together(rigid, own, other):
+    """Pressure and normal speed of the contact between two states (rho, w, p, c, law)."""
+    if not rigid:
+        return compute_contact(own, other, 0.0)
+    rho, w, p, c, law = other
+    pressure, _ = compute_wave_pressure(rho, p, c, law, own[1] - w)
+    return pressure, own[1]
+
+
+@compiled_once
+def find_free_speed(rigid, state, pressure):
+    """Normal speed of a surface at a pressure, outwards of its state (rho, w, p, c, law)."""
+    rho, w, p, c, law = state
+    return w if rigid else compute_speed_at_pressure(rho, w, p, c, law, pressure)
 
 
 @kernel
@@ -80,27 +102,21 @@ def solve_facets(leader, follower, facets, count, bond, round_off):
     """
     closed = 0
     pulled = 0
+    states = facets.states
     for k in range(count):
         a = facets.owners[LEADER, k]
         b = facets.owners[FOLLOWER, k]
-        x = facets.faces[FACE_X, k]
-        y = facets.faces[FACE_Y, k]
-        nx = facets.faces[NORMAL_X, k]
-        ny = facets.faces[NORMAL_Y, k]
-        # the leader's state there; a wall has a velocity only
-        rho = 0.0
-        p = 0.0
-        c = 0.0
-        law = (0.0, 0.0, 0.0)
-        u, v = leader.velocity[0], leader.velocity[1]
-        if not leader.rigid:
-            rho, u, v, p, c, law = compute_state_at(leader, a, x, y)
+        x, y = facets.faces[FACE_X, k], facets.faces[FACE_Y, k]
+        nx, ny = facets.faces[NORMAL_X, k], facets.faces[NORMAL_Y, k]
+        rho, u, v, p, c, law = compute_state_at(leader, a, x, y)
         w = u * nx + v * ny
+        own = (rho, w, p, c, law)
+        other = own
+        # the contact with the follower, if there is one
         void = leader.open_p[a]
-        # the contact with the follower
         is_closed = False
         pressure = 0.0
-        speed = w
+        speed = 0.0
         slip = 0.0
         w_other = 0.0
         if b >= 0:
@@ -108,14 +124,8 @@ def solve_facets(leader, follower, facets, count, bond, round_off):
                 follower, b, x, y
             )
             w_other = u_other * nx + v_other * ny
-            if leader.rigid:
-                pressure, _ = compute_wave_pressure(
-                    rho_other, p_other, c_other, law_other, w - w_other
-                )
-            else:
-                pressure, speed = compute_contact(
-                    (rho, w, p, c, law), (rho_other, w_other, p_other, c_other, law_other), 0.0
-                )
+            other = (rho_other, w_other, p_other, c_other, law_other)
+            pressure, speed = press_together(leader.rigid, own, other)
             slip = abs((u - u_other) * ny - (v - v_other) * nx)
             void = max(void, follower.open_p[b])
             stiffness = max(rho * c * c, rho_other * c_other * c_other)
@@ -129,20 +139,19 @@ def solve_facets(leader, follower, facets, count, bond, round_off):
         else:
             # free surfaces: each goes on with a speed of its own
             pressure = void
-            if not leader.rigid:
-                speed = compute_speed_at_pressure(rho, w, p, c, law, void)
+            speed = find_free_speed(leader.rigid, own, void)
             other_speed = speed
             if b >= 0:
-                other_speed = -compute_speed_at_pressure(
-                    rho_other, -w_other, p_other, c_other, law_other, void
-                )
-        facets.states[CLOSED, k] = 1.0 if is_closed else 0.0
-        facets.states[FACET_P, k] = pressure
-        facets.states[EXCESS_LEADER, k] = speed - w
-        facets.states[EXCESS_FOLLOWER, k] = other_speed - w_other
-        facets.states[FACET_SLIP, k] = slip
-        facets.states[FACET_U, k] = u + (speed - w) * nx
-        facets.states[FACET_V, k] = v + (speed - w) * ny
+                rho_other, _, p_other, c_other, law_other = other
+                turned = (rho_other, -w_other, p_other, c_other, law_other)
+                other_speed = -find_free_speed(False, turned, void)
+        states[CLOSED, k] = 1.0 if is_closed else 0.0
+        states[FACET_P, k] = pressure
+        states[EXCESS_LEADER, k] = speed - w
+        states[EXCESS_FOLLOWER, k] = other_speed - w_other
+        states[FACET_SLIP, k] = slip
+        states[FACET_U, k] = u + (speed - w) * nx
+        states[FACET_V, k] = v + (speed - w) * ny
     return closed, pulled
 
 

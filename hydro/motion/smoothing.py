@@ -103,32 +103,21 @@ def solve_along(main, next_one, next_two, right, closed, backwards, band, out):
         out[k] = band[row, HALF_BAND + 1]
 
 
-@kernel
-def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
-    """Ways (2, n) of a line's nodes in a step; `strength` is V delta^3 dt [m4].
-
-    With phi the way along the normal, m the distance between a node's neighbours over two, h the
-    lengths of the segments and D the difference of slopes, (D f)_k = [f / h]_(k+1/2) - (k-1/2),
-
-        (M + strength D M^-1 D) phi = -strength D kappa,                      theory F6.4
-
-    kappa the curvature of the circle through a node and its neighbours.  The matrix is symmetric
-    and has five diagonals; the sum of m phi is zero.  It is solved from both ends: the mean is the
-    same for the line's mirror image.  nodes (2, n): of a closed line the last one is the first or
-    its periodic image.  An open end lies on a wall of that unit normal, where the line goes on as
-    its mirror image, or is held, (0, 0).
-    """
-    total = nodes.shape[1]
-    edges = total - 1
-    count = edges if closed else total
-    # lengths h of the segments
-    stiff = np.empty(edges)
-    length = np.empty(edges)
-    for k in range(edges):
+@compiled_once
+def measure_lengths(nodes):
+    """Lengths (n,) of the segments between nodes (2, n + 1)."""
+    lengths = np.empty(nodes.shape[1] - 1)
+    for k in range(lengths.shape[0]):
         step_x, step_y = nodes[0, k + 1] - nodes[0, k], nodes[1, k + 1] - nodes[1, k]
-        length[k] = (step_x * step_x + step_y * step_y) ** 0.5
-        stiff[k] = 1.0 / length[k]
-    # at each node m, its normal and the curvature kappa
+        lengths[k] = (step_x * step_x + step_y * step_y) ** 0.5
+    return lengths
+
+
+@compiled_once
+def measure_nodes(nodes, lengths, closed, wall_first, wall_last):
+    """Of each node of `fill_thickness_way`: m, 1/m (0 if it is held), curvature, normal (2, n)."""
+    edges = lengths.shape[0]
+    count = edges if closed else edges + 1
     mass = np.empty(count)
     inverse = np.empty(count)
     bend = np.empty(count)
@@ -151,21 +140,31 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
                 bx, by = across * nx - ax, across * ny - ay
         tx, ty = 0.5 * (ax + bx), 0.5 * (ay + by)
         width = (tx * tx + ty * ty) ** 0.5
-        width = max(width, FOLDED_LINE_SINE * (length[before] + length[after]))
+        width = max(width, FOLDED_LINE_SINE * (lengths[before] + lengths[after]))
         normal[0, k] = -ty / width
         normal[1, k] = tx / width
         mass[k] = part * width
         inverse[k] = 1.0 / mass[k] if part > 0.0 else 0.0
         bend[k] = 0.0
         if part > 0.0:
-            bend[k] = (ax * by - ay * bx) / (length[before] * length[after] * width)
-    # M + strength D M^-1 D: main diagonal and right side
+            bend[k] = (ax * by - ay * bx) / (lengths[before] * lengths[after] * width)
+    return mass, inverse, bend, normal
+
+
+@compiled_once
+def make_system(stiff, mass, inverse, bend, closed, strength):
+    """The system of `fill_thickness_way`: the diagonals that `solve_along` takes, and right side.
+
+    stiff: 1/h of the segments.
+    """
+    edges = stiff.shape[0]
+    count = mass.shape[0]
     main = np.zeros(count)
     next_one = np.zeros(count)
     next_two = np.zeros(count)
     right = np.empty(count)
     middle = np.empty(count)
-    # its couplings with the next node and the one after
+    # the main diagonal; the curvature's differences
     for k in range(count):
         left_stiff = stiff[k - 1] if k > 0 else (stiff[edges - 1] if closed else 0.0)
         right_stiff = stiff[k] if k < edges else 0.0
@@ -182,6 +181,7 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
         if inverse[k] == 0.0:
             main[k] = 1.0
             right[k] = 0.0
+    # couplings with the next node and the one after it
     for k in range(count):
         if not closed and k == count - 1:
             break
@@ -194,36 +194,67 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
             )
         if inverse[k] > 0.0 and inverse[two] > 0.0 and (closed or k + 2 < count):
             next_two[k] = strength * (stiff[k] * far_stiff) * inverse[one]
-    # solved from both ends
-    first, second = np.empty(count), np.empty(count)
-    band = np.empty((count, HALF_BAND + 2))
-    solve_along(main, next_one, next_two, right, closed, False, band, first)
-    solve_along(main, next_one, next_two, right, closed, True, band, second)
-    way = np.empty(count)
-    base = np.empty(count)
+    return main, next_one, next_two, right
+
+
+@compiled_once
+def keep_area(base, normal, inverse, edges, closed):
+    """The ways along the normals, near `base`, by which the line sweeps no area in all.
+
+    The segments sweep a square of the ways beyond the sum of m phi; passes take it out.
+    """
+    count = base.shape[0]
+    way = base.copy()
+    swept = np.empty(count)
     most = 0.0
     for k in range(count):
-        base[k] = 0.5 * (first[k] + second[k])
-        way[k] = base[k]
         most = max(most, abs(way[k]))
-    # the area swept: its part of second order in phi is taken out, in a few passes
     for _ in range(MOST_PASSES):
         change = 0.0
-        for k in range(edges):  # what the segments sweep beyond the sum of m phi
+        for k in range(edges):
             a = k
             b = (k + 1) % count
-            first[k] = normal[0, a] * normal[1, b] - normal[1, a] * normal[0, b]
-            first[k] *= 0.25 * way[a] * way[b]
+            swept[k] = normal[0, a] * normal[1, b] - normal[1, a] * normal[0, b]
+            swept[k] *= 0.25 * way[a] * way[b]
         for k in range(count):
-            before = first[k - 1] if k > 0 else (first[edges - 1] if closed else 0.0)
-            after = first[k] if k < edges else 0.0
+            before = swept[k - 1] if k > 0 else (swept[edges - 1] if closed else 0.0)
+            after = swept[k] if k < edges else 0.0
             new = base[k] + (before + after) * inverse[k]
             change = max(change, abs(new - way[k]))
             way[k] = new
         if change <= SETTLED_PASS_CHANGE * most:
             break
-    # ways along the normals
-    for k in range(total):
+    return way
+
+
+@kernel
+def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
+    """Ways (2, n) of a line's nodes in a step; `strength` is V delta^3 dt [m4].
+
+    With phi the way along the normal, m the distance between a node's neighbours over two, h the
+    lengths of the segments and D the difference of slopes, (D f)_k = [f / h]_(k+1/2) - (k-1/2),
+
+        (M + strength D M^-1 D) phi = -strength D kappa,                      theory F6.4
+
+    kappa the curvature of the circle through a node and its neighbours.  The matrix is symmetric
+    and has five diagonals; the sum of m phi is zero.  It is solved from both ends: the mean is the
+    same for the line's mirror image.  nodes (2, n): of a closed line the last one is the first or
+    its periodic image.  An open end lies on a wall of that unit normal, where the line goes on as
+    its mirror image, or is held, (0, 0).
+    """
+    lengths = measure_lengths(nodes)
+    edges = lengths.shape[0]
+    mass, inverse, bend, normal = measure_nodes(nodes, lengths, closed, wall_first, wall_last)
+    main, next_one, next_two, right = make_system(
+        1.0 / lengths, mass, inverse, bend, closed, strength
+    )
+    count = mass.shape[0]
+    first, second = np.empty(count), np.empty(count)
+    band = np.empty((count, HALF_BAND + 2))
+    solve_along(main, next_one, next_two, right, closed, False, band, first)
+    solve_along(main, next_one, next_two, right, closed, True, band, second)
+    way = keep_area(0.5 * (first + second), normal, inverse, edges, closed)
+    for k in range(nodes.shape[1]):
         for c in range(2):
             out[c, k] = way[k % count] * normal[c, k % count]
 
@@ -245,11 +276,8 @@ def measure_line_speed(nodes, faces, walls):
     `fill_thickness_way`: across them the line and its images have their own speed for a mean.
     """
     count = faces.shape[1]
-    lengths = np.empty(count)
     sizes = np.ones(count)
-    for k in range(count):
-        step_x, step_y = nodes[0, k + 1] - nodes[0, k], nodes[1, k + 1] - nodes[1, k]
-        lengths[k] = (step_x * step_x + step_y * step_y) ** 0.5
+    lengths = measure_lengths(nodes)
     lengths /= sum_evenly(sizes, lengths)
     mean_x, mean_y = sum_evenly(faces[0], lengths), sum_evenly(faces[1], lengths)
     end_x = 0.0

@@ -20,8 +20,9 @@ from __future__ import annotations
 import numpy as np
 
 from regrid.barrier import functional
+from regrid.barrier.line_cg import make_solver
 from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
-from regrid.jit import inlined, kernel
+from regrid.jit import compiled_once, inlined, kernel
 
 LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of its diagonal
 # Blocks of the matrix at coarse nodes: xx, xy, yx, yy to the next one along i (EAST) and along j
@@ -338,7 +339,7 @@ def factor_lines(matrix):
             now[COARSE_FACTOR + 3, j] = xy * b + yy * d
 
 
-@kernel(allocates=False)
+@compiled_once(allocates=False)
 def solve_lines(matrix, r, z):
     """`z` = solution along every line in i for the residual `r`, (2, nodes); returns r·z."""
     n_i, n_j = r.shape[1] - 1, r.shape[2] - 1
@@ -436,48 +437,63 @@ def fill_product(matrix, p, out):
     return total
 
 
-@kernel(allocates=False)
-def solve(matrix, r, x, z, p, product, tolerance, most):
-    """Improve the solution `x` of the factored `matrix` for the right side `r`, overwritten.
+@compiled_once(allocates=False)
+def multiply_coarse(directions, beta, first, last, matrix, out, totals, Z):
+    """`regrid.barrier.line_cg.multiply` for the matrix of coarse nodes.
 
-    All (2, nodes) with zeros on the boundary.  It stops when the squared residual, in the norm of
-    the line solve, is below `tolerance`² of its first value, or after `most` iterations; returns
-    their number, or -1 where the matrix is not positive definite.
+    All its columns are one chunk, and the whole sum is in the first one.
     """
-    # residual of the first x
-    p[:] = 0.0
-    fill_product(matrix, x, product)
-    r -= product
-    rz = solve_lines(matrix, r, z)
-    stop = tolerance * tolerance * rz
-    beta = 0.0
-    done = 0
-    if not rz >= 0.0:
-        return -1
-    while done < most and rz > stop:
-        # direction, and the step along it
-        for k in range(2):
-            for i in range(1, r.shape[1] - 1):
-                direction = p[k, i]
-                step = z[k, i]
-                for j in range(r.shape[2]):
-                    direction[j] = step[j] + beta * direction[j]
-        curvature = fill_product(matrix, p, product)
-        if not curvature > 0.0:
-            return -1
-        alpha = rz / curvature
+    direction, step, old = directions
+    for k in range(2):
+        for i in range(1, out.shape[1] - 1):
+            direction_row = direction[k, i]
+            step_row = step[k, i]
+            old_row = old[k, i]
+            for j in range(out.shape[2]):
+                direction_row[j] = step_row[j] + beta * old_row[j]
+    totals[first] = fill_product(matrix, direction, out)
+
+
+@compiled_once(allocates=False)
+def advance_coarse(alpha, step, vectors, first, last, matrix, totals):
+    """`regrid.barrier.line_cg.advance` for the matrix of coarse nodes."""
+    direction, product = step
+    x, r, z = vectors
+    if alpha != 0.0:
         for k in range(2):
             for i in range(1, r.shape[1] - 1):
                 x_row = x[k, i]
                 r_row = r[k, i]
-                p_row = p[k, i]
+                p_row = direction[k, i]
                 h_row = product[k, i]
                 for j in range(r.shape[2]):
                     x_row[j] += alpha * p_row[j]
                     r_row[j] -= alpha * h_row[j]
-        # residual after it
-        done += 1
-        before = rz
-        rz = solve_lines(matrix, r, z)
-        beta = rz / before
-    return done
+    totals[first] = solve_lines(matrix, r, z)
+
+
+solve_coarse = make_solver(False, multiply_coarse, advance_coarse)
+NO_FLOOR = 0.0
+
+
+def solve(matrix, vectors, tolerance: float, most: int) -> int:
+    """Improve the solution x of the factored `matrix` (n_i + 1, ROWS, n_j + 1) for a right side.
+
+    `vectors` (6, 2, n_i + 1, n_j + 1) are the right side, which is overwritten, x, and work arrays,
+    with zeros on the boundary.  It stops when the squared residual, in the norm of the line solve,
+    is below `tolerance`² of its first value, or after `most` iterations; returns their number, or
+    -1 where the matrix is not positive definite.
+    """
+    r, x, z, p, p_old, product = vectors
+    # one chunk of all columns, whose sums stay zero but in the first one
+    columns = np.array([1, x.shape[2] - 1])
+    totals = np.zeros(x.shape[2])
+    scratch = np.zeros((1, 1))
+    # residual of the first x
+    fill_product(matrix, x, product)
+    r -= product
+    done, first, _, positive = solve_coarse(
+        columns, matrix[np.newaxis], (x, r, z), (p, p_old, product), totals,
+        (tolerance, NO_FLOOR, most), scratch,
+    )  # fmt: skip
+    return done if first >= 0.0 and positive else -1

@@ -195,7 +195,7 @@ class Level:
     def __init__(self, nodes_i: int, parts_j: int, nj: int):
         self.starts_j = cut_evenly(nj, parts_j)
         nodes_j = self.starts_j.size
-        self.shapes = (nodes_i, COARSE_ROWS, nodes_j), (5, 2, nodes_i, nodes_j)
+        self.shapes = (nodes_i, COARSE_ROWS, nodes_j), (6, 2, nodes_i, nodes_j)
 
     def take_arrays(self, whole: np.ndarray) -> None:
         """Place matrix and vectors at the start of `whole` (n,)."""
@@ -256,7 +256,8 @@ class CoarseCorrection:
             starts = self.starts_i, level.starts_j
             level.vectors[:] = 0.0
             # right side, and the earlier correction as a first solution
-            right, solution, z, p, product = level.vectors
+            right = level.vectors[0]
+            solution = level.vectors[1]
             fill_coarse_right(level.starts_j, self.sums, right)
             if not take_frames(nodes, *starts, right, self.lines, solution):
                 return 0.0
@@ -264,10 +265,7 @@ class CoarseCorrection:
                 return 0.0
             # solved
             factor_lines(level.matrix)
-            done = solve(
-                level.matrix, right, solution, z, p, product, tuning.exact_tolerance,
-                tuning.max_iterations,
-            )  # fmt: skip
+            done = solve(level.matrix, level.vectors, tuning.exact_tolerance, tuning.max_iterations)
             if done < 0:
                 return 0.0
             self.iterations += done

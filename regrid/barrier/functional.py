@@ -195,7 +195,8 @@ def smoothed_corner(a, b, inverse, slope, weight, area):
 
 
 # Terms of a cell: functions of its mid-lines A and B.  A new one is added to the sums in
-# `cell_value`, `cell_slope`, `cell_stiffness` and `cell_blocks`; where it acts says `acts_on_cell`.
+# `cell_value`, `cell_slope`, `cell_stiffness` and `cell_blocks`; where it acts say `is_active` and
+# `measure_activity`, and its numbers are those of `take_cell_numbers` (docs/extending.md).
 
 
 @inlined
@@ -243,12 +244,10 @@ def cell_value(a, b, sound, numbers):
 
 @inlined
 def cell_slope(a, b, sound, numbers):
-    """The slope of all terms in A and in B, and what their second derivatives are made of.
-
-    Of a cell on which they act.
-    """
+    """The slope of all terms in A and in B, and what their second derivatives are made of."""
     scale, weight = numbers
     rho = cell_rate(a[0], a[1], b[0], b[1], sound, scale)
+    weight = weight if rho > 1.0 else 0.0
     parts = cost_slope(a[0], a[1], b[0], b[1], rho, sound, scale, weight)
     first, _, dax, day, dbx, dby, _, _, _ = parts
     return (first * dax, first * day), (first * dbx, first * dby), parts

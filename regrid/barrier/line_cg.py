@@ -1,6 +1,7 @@
-"""Conjugate gradients for one Newton step, preconditioned by solves along the straight lines.
+"""Conjugate gradients, preconditioned by solves along the straight lines: of a Newton step.
 
-The matrix is that of `regrid.barrier.assembly`, stored by column chunks.  Every sum over the block
+The loop is `make_solver`'s, which coarse nodes use as well (`regrid.barrier.coarse_matrix`).  The
+matrix is that of `regrid.barrier.assembly`, stored by column chunks.  Every sum over the block
 has one partial sum per column, filled over i in order and summed over j in order, so results are
 bitwise independent of chunks and threads.  Note: a chunk also computes the direction in its
 neighbours' first columns, so a pass needs no synchronisation; both write the same value there.
@@ -12,7 +13,7 @@ from numba import prange
 
 from regrid.barrier import assembly as at
 from regrid.barrier.step_control import CHUNK_SPAN
-from regrid.jit import inlined, kernel
+from regrid.jit import compiled_once, inlined, kernel
 
 # Scratch of the product: the direction in three rows of nodes, and the product in the middle one,
 # far from them: a store less than 2 kB behind a shifted load halves the vector length (LLVM
@@ -92,8 +93,8 @@ def fill_product_row(now, past, count, Z):
         Z[OUT_Y + col] = s_y
 
 
-@kernel(allocates=False)
-def fill_product(directions, beta, first, last, H, out, totals, Z):
+@compiled_once(allocates=False)
+def multiply(directions, beta, first, last, H, out, totals, Z):
     """`direction = z + beta old`, `out = H direction` at columns first..last-1, and their product.
 
     `directions` are all three: direction, z, old.
@@ -149,8 +150,8 @@ def fill_product(directions, beta, first, last, H, out, totals, Z):
                 )
 
 
-@kernel(allocates=False)
-def fill_line_solution(alpha, step, vectors, first, last, H, totals):
+@compiled_once(allocates=False)
+def advance(alpha, step, vectors, first, last, H, totals):
     """Step `x += alpha p, r -= alpha Hp`, then `z` = line solve of r, and the sums of r·z.
 
     `step` is p and Hp, `vectors` are x, r, z.  Nothing is added if alpha is 0, so `step` may be
@@ -228,17 +229,28 @@ def add_columns(totals, begin, end):
     return total
 
 
-def make_solver(parallel):
-    """The conjugate-gradient loop, over column chunks in sequence or on threads."""
+@kernel(allocates=False)
+def fill_product(directions, beta, first, last, H, out, totals, Z):
+    """`multiply`, to be called from Python."""
+    multiply(directions, beta, first, last, H, out, totals, Z)
+
+
+def make_solver(parallel, multiply, advance):
+    """The conjugate-gradient loop, over column chunks in sequence or on threads.
+
+    Two functions know how the matrix is stored: `multiply` and `advance` of this module, or others
+    with the same arguments.
+    """
 
     @kernel(parallel=parallel)
     def solve(columns, H, vectors, directions, totals, limits, scratch):
-        """Solve `H x = r0` from the x whose residual is `r`; returns (iterations, rz0, rz).
+        """Solve `H x = r0` from the x whose residual is `r`.
 
         `columns` (chunks + 1) are the first node columns of the chunks, `vectors` x, r, z,
         `directions` work arrays for p, the previous one and Hp.  `limits`: it stops when the
         squared residual, in the norm of the preconditioner, is below tolerance² of its first value
-        or below floor, or after the given number of iterations.
+        or below floor, or after the given number of iterations.  Returns their number, the first
+        and the last squared residual, and whether the matrix was positive in all directions.
         """
         p, p_old, product = directions
         tolerance, floor, most = limits
@@ -246,38 +258,38 @@ def make_solver(parallel):
         begin = columns[0]
         end = columns[chunks]
         for c in prange(chunks):
-            fill_line_solution(0.0, (p, product), vectors, columns[c], columns[c + 1], H[c], totals)
+            advance(0.0, (p, product), vectors, columns[c], columns[c + 1], H[c], totals)
         # norm of the first residual, and where to stop
         first = add_columns(totals, begin, end)
         rz = first
         stop = max(floor, tolerance * tolerance * first)
         beta = 0.0
         done = 0
+        positive = True
         while done < most and rz > stop:
             for c in prange(chunks):
-                fill_product(
+                multiply(
                     (p, vectors[2], p_old), beta, columns[c], columns[c + 1], H[c], product, totals,
                     scratch[c],
                 )  # fmt: skip
             # p·Hp; not positive: the matrix is no use any more
             curvature = add_columns(totals, begin, end)
-            if not curvature > 0.0:
+            positive = curvature > 0.0
+            if not positive:
                 break
             # step, next residual
             alpha = rz / curvature
             for c in prange(chunks):
-                fill_line_solution(
-                    alpha, (p, product), vectors, columns[c], columns[c + 1], H[c], totals
-                )
+                advance(alpha, (p, product), vectors, columns[c], columns[c + 1], H[c], totals)
             done += 1
             previous = rz
             rz = add_columns(totals, begin, end)
             beta = rz / previous
             p, p_old = p_old, p
-        return done, first, rz
+        return done, first, rz, positive
 
     return solve
 
 
-solve_serial = make_solver(False)
-solve_threaded = make_solver(True)
+solve_serial = make_solver(False, multiply, advance)
+solve_threaded = make_solver(True, multiply, advance)

@@ -432,7 +432,7 @@ class Workspace:
         solver = solve_serial
         if self._set_threads():
             solver = solve_threaded
-        done, first, last = solver.entry(
+        done, first, last, _ = solver.entry(
             self.whole_columns, self.H, (self.solution, self.r, self.z),
             (self.p, self.p_old, self.product), self.totals,
             (float(tolerance), float(floor), int(most)), self.scratch,

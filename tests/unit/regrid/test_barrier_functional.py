@@ -155,9 +155,7 @@ def test_line_solve_inverts_the_blocks_of_each_line():
     rest[:, 1:-1, 1:-1] = np.random.default_rng(5).normal(size=(2, NI - 1, NJ - 1))
     found = np.zeros_like(rest)
     zero = np.zeros_like(rest)
-    newton.fill_line_solution(
-        0.0, (zero, zero), (zero.copy(), rest, found), 1, NJ, work.H[0], work.totals
-    )
+    newton.advance(0.0, (zero, zero), (zero.copy(), rest, found), 1, NJ, work.H[0], work.totals)
     places = np.arange(matrix.shape[0]).reshape(2, NI - 1, NJ - 1)
     for j in range(NJ - 1):
         line = places[:, :, j].ravel()

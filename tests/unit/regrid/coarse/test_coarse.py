@@ -76,8 +76,8 @@ def test_solve_is_that_of_the_dense_matrix():
     assert np.allclose(dense, dense.T, rtol=0.0, atol=1e-12 * np.abs(dense).max())
     assert np.linalg.eigvalsh(dense).min() > 0.0
     wanted = np.random.default_rng(1).normal(size=inner.sum())
-    right, x, z, p, product = np.zeros((5, 2, *shape))
-    right[inner] = dense @ wanted
+    vectors = np.zeros((6, 2, *shape))
+    vectors[0][inner] = dense @ wanted
     cells.factor_lines(level.matrix)
-    assert 0 < cells.solve(level.matrix, right, x, z, p, product, 1e-10, 500) < 500
-    assert np.allclose(x[inner], wanted, rtol=0.0, atol=1e-7)
+    assert 0 < cells.solve(level.matrix, vectors, 1e-10, 500) < 500
+    assert np.allclose(vectors[1][inner], wanted, rtol=0.0, atol=1e-7)

@@ -73,7 +73,7 @@ MISTAKES = {
     "left": (lambda: put(make_block(), "left", "wall"), SIDE.format("left")),
     "reflecting": (lambda: put(make_block(), "i_min", "reflecting"), "known are: wall, axis,"),
     "option": (lambda: put(make_block(), "i_min", "piston", speed=1.0), "piston segment"),
-    "material": (lambda: find_material("nickel"), r"no material 'nickel' \(known: Al1100, "),
+    "material": (lambda: find_material("cheese"), r"no material 'cheese' \(known: Al1100, "),
     "fixed": (
         lambda: close("i_min", [("piston", (), {"velocity": (1.0, 0.0)})]),
         "the mesh cannot be 'fixed'",

@@ -140,7 +140,6 @@ def draw_growth(runs: list[RunData]) -> None:
         1, 2, figsize=(11, 3.0), dpi=130, layout="constrained", width_ratios=(1.5, 1)
     )
     problem = runs[-1].problem
-    # what the shock gives to the interface
     theory = problem.theory
     speed = problem.theory.base.u
     t = np.linspace(0.0, runs[-1].history.t[-1] - problem.arrival, 600)[1:]
@@ -151,9 +150,8 @@ def draw_growth(runs: list[RunData]) -> None:
         width = max(1, len(history.t) // 200)
         slope = history.amplitude_mode_1 / SLOPE
         rate = (slope[width:] - slope[:-width]) / (history.t[width:] - history.t[:-width]) / speed
-        late = kct[width:] > START - 0.1
         style = {"color": f"C{n}", "lw": 1.4, "label": f"{cells} cells"}
-        left.plot(kct[width:][late], rate[late], **style)
+        left.plot(0.5 * (kct[width:] + kct[:-width]), rate, **style)
         exact = predict_amplitude(theory, kct) / problem.k
         gain, right_gain = (a - np.interp(START, kct, a) for a in (slope, exact))
         late = kct > START + 1.0
@@ -161,11 +159,11 @@ def draw_growth(runs: list[RunData]) -> None:
     words = {"color": INK, "ls": "--", "lw": 1.0, "label": "linear compressible theory"}
     left.plot(problem.k * theory.sound_speed * t, theory.get_rate(problem.k, t) / speed, **words)
     left.axhline(theory.impulsive / speed, color="0.6", lw=0.8, label="impulsive model (Richtmyer)")
-    left.set(xlabel="kct", ylabel="(da/dt) / (ka₀Δu)", xlim=(START, 30), ylim=(0.317, 0.394))
+    left.set(xlabel="kct", ylabel="(da/dt) / (ka₀Δu)", xlim=(0, 30), ylim=(0.0, 0.44))
     left.legend(ncols=2, loc="lower right", fontsize="small")
     right.axhline(0.0, color=INK, ls="--", lw=1.0)
     right.set(xlabel="kct", ylabel="error of the mean rate\nfrom kct = 6 on [%]", xlim=(START, 30))
-    right.set_ylim(-1.0, 3.0)
+    right.set_ylim(-0.5, 2.0)
     figure.savefig(PICTURES / "growth-rate.png")
 
 

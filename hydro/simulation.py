@@ -225,7 +225,7 @@ class Simulation:
         BadInput where blocks are cut that a body source acts on, which is summed over whole blocks,
         and where grid lines are added during the run.
         """
-        if ranks.cuts and self._flow.source.law is not None:
+        if ranks.cuts and self._flow.source.function is not None:
             raise BadInput("blocks that a body source acts on cannot be cut among ranks")
         if self.refining is not None and ranks.size > 1:
             raise BadInput(

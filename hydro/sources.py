@@ -34,16 +34,16 @@ class BodySource:
     `gained` (3,): momentum x, y [N s/m] and energy [J/m] added in this step.
     """
 
-    def __init__(self, blocks: Blocks, law: SourceFunction | None):
+    def __init__(self, blocks: Blocks, function: SourceFunction | None):
         self.blocks = blocks
-        self.law = law
+        self.function = function
         self.gained = np.zeros(3)
         for block in blocks:
-            block.part_start(law is not None)
+            block.part_start(function is not None)
 
     def start_step(self, t: float, dt: float) -> None:
         """The first half of the source from t over dt, on the states that the step starts from."""
-        if self.law is None:
+        if self.function is None:
             return
         self.gained[:] = 0.0
         pushes = []
@@ -61,7 +61,7 @@ class BodySource:
 
     def end_step(self, t: float, dt: float) -> None:
         """The second half, on the accepted state; also adds it to the block's totals."""
-        if self.law is None:
+        if self.function is None:
             return
         gains = []
         for block in (self.blocks[number] for number in self.blocks.own):
@@ -81,7 +81,7 @@ class BodySource:
         Returns the acceleration (2, ni, nj) and the block's gain (see `gained`).
         """
         x, y = compute_centres(block.nodes)
-        push_x, push_y, heat = self.law(block, x, y, t, dt)
+        push_x, push_y, heat = self.function(block, x, y, t, dt)
         push = np.array([np.broadcast_to(q, x.shape) for q in (push_x, push_y)])
         state, *others = held
         inside = state[:, 1:-1, 1:-1]

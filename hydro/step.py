@@ -278,7 +278,7 @@ def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
     flow.exchange.accept()
     flow.meetings.accept()
     flow.source.end_step(flow.clock.t, dt)
-    if flow.source.law is not None:
+    if flow.source.function is not None:
         flow.ledger.add_source(flow.source.gained)
     flow.ledger.add_boundary(dt)
     flow.ledger.keep_in_voids(flow.voids.work, flow.voids.energy_left)

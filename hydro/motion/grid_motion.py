@@ -100,12 +100,12 @@ class GridMotion:
         for block in (self.blocks[number] for number in self.blocks.own):
             if callable(self.mesh):
                 block.nodes_new[...] = self.mesh(block.name, span.t + span.dt)
-                self._check_law(block)
+                self._check_mesh(block)
             elif self.quality is None:  # else both arrays hold the fixed grid already
                 block.nodes_new[...] = block.nodes
 
     @staticmethod
-    def _check_law(block: Block) -> None:
+    def _check_mesh(block: Block) -> None:
         """The grid of a prescribed motion is convex; RegridFailure if not."""
         bad = find_bad_cells(block.nodes_new)
         if len(bad):

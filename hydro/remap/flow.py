@@ -116,7 +116,7 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
         for one, other, number in zip(old.blocks, new.blocks, range(len(old.blocks)), strict=True):
             _make_grid(one, other, new, number)
     elif callable(old.motion.mesh) and callable(new.motion.mesh):
-        _follow_law(old.blocks, new.blocks, old.motion.mesh, new.motion.mesh, old.t)
+        _follow_mesh(old.blocks, new.blocks, old.motion.mesh, new.motion.mesh, old.t)
     # the state on it (theory F12)
     state = dict(new.get_state())
     report = []
@@ -242,14 +242,18 @@ def settle_grid(
     return nodes
 
 
-def _follow_law(
-    blocks: list[Block], new_blocks: list[Block], law: MeshMotion, new_law: MeshMotion, t: float
+def _follow_mesh(
+    blocks: list[Block],
+    new_blocks: list[Block],
+    motion: MeshMotion,
+    new_motion: MeshMotion,
+    t: float,
 ) -> None:
     """Grids of a prescribed motion at the old time; one that depends on the flow is sampled."""
     for one, other in zip(blocks, new_blocks, strict=True):
         size = np.ptp(one.nodes, axis=(1, 2)).max()
-        if np.abs(law(one.name, t) - one.nodes).max() <= SAME_GRID_DISTANCE * size:
-            other.nodes[...] = new_law(other.name, t)
+        if np.abs(motion(one.name, t) - one.nodes).max() <= SAME_GRID_DISTANCE * size:
+            other.nodes[...] = new_motion(other.name, t)
             continue
         sides = {}
         for side in SIDE_NAMES:

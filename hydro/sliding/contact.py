@@ -70,7 +70,7 @@ class Chain:
         self.starts = np.concatenate(([0], np.cumsum(counts)))
         self.orientation = -self.orientation
 
-    def spread_laws(self) -> np.ndarray:
+    def list_wave_laws(self) -> np.ndarray:
         """Wave laws of the materials along the chain, (3, faces)."""
         parts = []
         for segment in self.segments:
@@ -250,7 +250,7 @@ class SlidingContact:
         self.positions = np.empty(self.follower.count + 1)
         self.positions_new = np.empty(self.follower.count + 1)
         chains = self.leader, self.follower
-        self.halves = [make_line_arrays(chain.spread_laws()) for chain in chains]
+        self.halves = [make_line_arrays(chain.list_wave_laws()) for chain in chains]
         self.surfaces = [np.zeros((SURFACE_ROWS, chain.count)) for chain in chains]
         self.lines = [chain.line() for chain in chains]  # of the old grid
         self.still = np.zeros_like(self.lines[0])

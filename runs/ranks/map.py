@@ -42,7 +42,7 @@ def distribute_evolution(evolution: Simulation, ranks: int, cut: Mapping[str, in
     What a source adds is summed over whole blocks.  Raises BadInput as `distribute_named_blocks`.
     """
     blocks = [(block.name, (block.ni, block.nj)) for block in evolution.blocks]
-    return distribute_named_blocks(blocks, ranks, cut, evolution.flow.source.law is not None)
+    return distribute_named_blocks(blocks, ranks, cut, evolution.flow.source.function is not None)
 
 
 MOST_NAMED_RANKS = 8  # ranks that are told one by one

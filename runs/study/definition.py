@@ -121,7 +121,7 @@ def read_values(words: str, where: str) -> list[Any]:
     """The values given by `words`: a range or a list; `where` starts the message of BadInput."""
     if LIKE_RANGE.fullmatch(words):
         match = RANGE.fullmatch(words)
-        values = _spread(*match.groups()) if match else []
+        values = _list_range(*match.groups()) if match else []
         if not values:
             raise BadInput(
                 f"{where} = {words}: a range is A:B:N or A:B:N:log, such as 1.2:3:7, with two "
@@ -136,7 +136,7 @@ def read_values(words: str, where: str) -> list[Any]:
     return [parse_value(word) for word in words.split(",") if word.strip()]
 
 
-def _spread(first: str, last: str, count: str, log: str | None) -> list[Any]:
+def _list_range(first: str, last: str, count: str, log: str | None) -> list[Any]:
     """The values of a range; [] if it is not one."""
     start, end = float(first), float(last)
     number = int(count) if len(count) < 10 else 0

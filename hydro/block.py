@@ -407,7 +407,8 @@ class Block:
         rows of this process are computed.
         """
         kind: Any = type(self.eos)
-        make_fill_sound_speed(kind).entry(
+        fill_sound_speed = make_fill_sound_speed(kind)
+        fill_sound_speed.entry(
             state, self.parameters, self.rows.start, self.rows.stop, self.rates_new
         )
         return self.rates_new

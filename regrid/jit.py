@@ -10,7 +10,10 @@ from __future__ import annotations
 import contextlib
 import functools
 import os
+import typing
+from collections.abc import Callable
 from types import SimpleNamespace
+from typing import Any, ParamSpec, Protocol, TypeVar
 
 # threads of a kernel that wait for others sleep after some 50 us, before OpenMP is loaded: spinning
 # on a busy machine they take the time of those that work
@@ -60,6 +63,30 @@ if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
     os.register_at_fork(after_in_child=_note_fork)
 
 
+Arguments = ParamSpec("Arguments")
+Result_co = TypeVar("Result_co", covariant=True)
+Inlined = TypeVar("Inlined", bound=Callable)
+
+
+class Kernel(Protocol[Arguments, Result_co]):
+    """What `kernel` makes of a function: called like it, so that editors show its arguments."""
+
+    py_func: Callable[Arguments, Result_co]
+    entry: Callable[Arguments, Result_co]
+
+    def __call__(self, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result_co: ...
+
+
+@typing.overload
+def kernel(function: Callable[Arguments, Result_co]) -> Kernel[Arguments, Result_co]: ...
+
+
+@typing.overload
+def kernel(
+    *, allocates: bool = ..., **options: Any
+) -> Callable[[Callable[Arguments, Result_co]], Kernel[Arguments, Result_co]]: ...
+
+
 def kernel(function=None, *, allocates=True, **options):
     """Compile `function` with numba: cached, without the interpreter lock, IEEE division.
 
@@ -84,10 +111,18 @@ def kernel(function=None, *, allocates=True, **options):
     return backend.make_kernel(function, {"nogil": True, "error_model": "numpy", **options})
 
 
-def inlined(function):
+def inlined(function: Inlined) -> Inlined:
     """Mark a plain function, which makes no arrays, to be inlined in every kernel that calls it;
     callable from Python too, on arrays.  LLVM inlines it: numba would compile it for every call."""
     return compiled_once(function, allocates=False, forceinline=True)
+
+
+@typing.overload
+def compiled_once(function: Inlined, *, allocates: bool = ..., **options: Any) -> Inlined: ...
+
+
+@typing.overload
+def compiled_once(*, allocates: bool = ..., **options: Any) -> Callable[[Inlined], Inlined]: ...
 
 
 def compiled_once(function=None, *, allocates=True, **options):

@@ -363,7 +363,8 @@ class Transport:
 
     def predict(self, block: Any, half_dt: float) -> None:
         """Phase 2, after the couplings: slopes and values at mid-time."""
-        make_predict(block.geometry)(
+        predict = make_predict(block.geometry)
+        predict(
             block.get_start("carried"), block.start, block.nodes, block.rim.rows, half_dt,
             (block.rows.start, block.rows.stop), (self.measures, self.centres, self.slopes),
         )  # fmt: skip
@@ -374,7 +375,8 @@ class Transport:
 
     def carry(self, block: Any, dt: float) -> None:
         """Phase 6, after the flow's update: the new values."""
-        make_carry(block.geometry)(
+        carry = make_carry(block.geometry)
+        carry(
             (block.get_start("carried"), block.carried_new), block.start,
             (block.nodes, block.nodes_new), (block.rim.rows, block.excess_volume), self.masses, dt,
             (block.rows.start, block.rows.stop), (self.slopes, self.centres),

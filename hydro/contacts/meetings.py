@@ -53,7 +53,7 @@ class Meetings:
     ):
         self.geometry = geometry
         self.blocks = list(blocks)
-        self.add_flux = make_add_facet_flux(geometry)
+        self.add_facet_flux = make_add_facet_flux(geometry)
         surfaces, self.pairs = _find_pairs(blocks, links, motion, geometry)
         used = {id(s) for pair in self.pairs for s in (pair.leader, pair.follower)}
         self.surfaces = [surface for surface in surfaces if id(surface) in used]
@@ -270,7 +270,7 @@ class Meetings:
         for pair in self.near:
             for side, surface in ((LEADER, pair.leader), (FOLLOWER, pair.follower)):
                 if not surface.rigid:
-                    self.add_flux.entry(pair.facets, pair.count, side, surface.arrays)
+                    self.add_facet_flux.entry(pair.facets, pair.count, side, surface.arrays)
             if pair.closed and pair.friction > 0.0:
                 pair.rub(dt)
         for surface in self._sides:

@@ -10,7 +10,7 @@ theory F2, F3, F10.
 from __future__ import annotations
 
 import functools
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -35,16 +35,19 @@ from hydro.interior.reconstruction import make_row_phases
 from hydro.interior.scratch import copy_back, copy_row, copy_rows, prefetch_row, prefetch_rows
 from hydro.interior.slopes import fill_steps
 from hydro.interior.update import make_update
-from regrid.jit import compiled_once, kernel
+from regrid.jit import Kernel, compiled_once, kernel
 
 TILE_ROWS = 32
 
 
 class FlowKernels(NamedTuple):
-    """Kernels of one equation of state; `advance` and `advance_threaded` share one signature."""
+    """Kernels of one equation of state; `advance` and `advance_threaded` share one signature.
 
-    advance: Any
-    advance_threaded: Any
+    Their text is in `make_flow_kernels`.
+    """
+
+    advance: Kernel
+    advance_threaded: Kernel
 
 
 @functools.cache

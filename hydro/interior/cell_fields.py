@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
 
 import numpy as np
 
 from hydro.eos.base import EquationOfState
 from hydro.rows import RHO, P
 from regrid.errors import BadInput
-from regrid.jit import kernel
+from regrid.jit import Kernel, kernel
 
 SLAB_ROWS = 64  # rows for which something is computed at a time
 
@@ -65,7 +64,7 @@ class CellFields(Mapping[str, np.ndarray]):
 
 
 @functools.cache
-def make_fill_sound_speed(eos_class) -> Any:
+def make_fill_sound_speed(eos_class) -> Kernel:
     """Kernel that fills the sound speeds of a material of an `EquationOfState` class."""
     sound_speed_squared_part = eos_class.sound_speed_squared_part
 

@@ -10,7 +10,7 @@ keeps its cells' orientation, one that is mirrored does not).
 from __future__ import annotations
 
 import functools
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from hydro import rim as on
 from hydro.eos.base import make_leaving_part
@@ -30,17 +30,20 @@ from hydro.perimeter.contacts import AXIS, mirror_in_walls, pass_open_sides, pre
 from hydro.perimeter.faces import make_fill_faces, make_fill_polygons, place_traces_on_axis
 from hydro.rim import find_first_face
 from hydro.rows import STATE_ROWS
-from regrid.jit import compiled_once, kernel
+from regrid.jit import Kernel, compiled_once, kernel
 from regrid.sides import I_MAX, I_MIN, J_MAX, J_MIN, SIDE_NAMES, find_node
 
 
 class SideKernels(NamedTuple):
-    """Kernels of one equation of state on block sides."""
+    """Kernels of one equation of state on block sides.
 
-    start_sides: Any
-    predict_sides: Any
-    trace_sides: Any
-    fill_polygons: Any
+    Their text is in `make_side_kernels`, of the last one in `hydro.perimeter.faces`.
+    """
+
+    start_sides: Kernel
+    predict_sides: Kernel
+    trace_sides: Kernel
+    fill_polygons: Kernel
 
 
 @compiled_once(allocates=False)

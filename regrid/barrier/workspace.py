@@ -396,11 +396,13 @@ class Workspace:
             self._clear()
         self._assemble(assemble_smoothed, nodes, spread)
 
-    def _assemble(self, kernel, nodes, spread) -> None:
+    def _assemble(self, assemble, nodes, spread) -> None:
         for c in range(self.columns.size - 1):
             first = self.columns[c]
             last = self.columns[c + 1]
-            kernel(nodes, self.law, spread, first, last, self.H[c], self.gradient, self.scratch[c])
+            assemble(
+                nodes, self.law, spread, first, last, self.H[c], self.gradient, self.scratch[c]
+            )
 
     def _set_threads(self) -> bool:
         """Are the chunks to be computed on threads?  As many are set then."""
@@ -429,10 +431,10 @@ class Workspace:
                 )  # fmt: skip
             np.add(self.gradient, self.product[:, :, : self.nj + 1], out=right)
             np.negative(right, out=right)
-        solver = solve_serial
+        solve = solve_serial
         if self._set_threads():
-            solver = solve_threaded
-        done, first, last, _ = solver.entry(
+            solve = solve_threaded
+        done, first, last, _ = solve.entry(
             self.whole_columns, self.H, (self.solution, self.r, self.z),
             (self.p, self.p_old, self.product), self.totals,
             (float(tolerance), float(floor), int(most)), self.scratch,

@@ -84,19 +84,20 @@ class BarrierRegridder:
     paper's own iteration); `edge_lengths` "conditional" or "unit"; `family` "auto" (by the sides;
     if all four bend, lines of their shapes unless `curves` is false), "i" (lines j = const
     straight), "j", or the two weights; `area_weight` is lam of theory R4.1; `strengthening` is the
-    largest factor of epsilon in sharp cells (30); `cost_weight` is mu of theory R4.10, the weight
-    of cells that limit the time step (0: none); it acts only if sound speeds are given;
-    `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps` is the
-    minimum number of Newton steps per call; in blocks of `coarse_from` cells and more (9000; inf:
-    none) smooth errors are removed on coarse nodes (theory R4.13); these and all other fields of
-    `Tuning` have their defaults there.  `spacing` "sides" gives every edge a length between those
+    largest factor of epsilon in sharp cells (30); `corner_weight` (1 or more) is how much sharp
+    corners count against the place of the first line (theory R4.3); `cost_weight` is mu of theory
+    R4.10, the weight of cells that limit the time step (0: none); it acts only if sound speeds are
+    given; `tolerance`, `floor` (in cells) and `max_iterations` end the linear solve; `newton_steps`
+    is the minimum number of Newton steps per call; in blocks of `coarse_from` cells and more (9000;
+    inf: none) smooth errors are removed on coarse nodes (theory R4.13); these and all other fields
+    of `Tuning` have their defaults there. `spacing` "sides" gives every edge a length between those
     of two opposite sides (theory R2.3); "given" keeps the spacing of `first_grid` (2, ni+1, nj+1)
     in both families (R4.19), without one that of the first valid grid that this regridder is given.
-    The latter is the default with a first grid, except that with
-    family "i" lines j = const keep its spacing along themselves alone (R4.9).  `cuts` are lines
-    that the boundary runs along twice, out and back, the block on both sides: a side and two of its
-    nodes each, such as ("j_min", 0, 80).  The wake of a C grid, whose nodes are the same from both
-    ends of a side, and a ring that is closed on itself are seen without being told.
+    The latter is the default with a first grid, except that with family "i" lines j = const keep
+    its spacing along themselves alone (R4.9). `cuts` are lines that the boundary runs along twice,
+    out and back, the block on both sides: a side and two of its nodes each, such as ("j_min", 0,
+    80). The wake of a C grid, whose nodes are the same from both ends of a side, and a ring that is
+    closed on itself are seen without being told.
     """
 
     # the options that are fields of `Tuning`, and their types
@@ -432,6 +433,7 @@ def _check_tuning(tuning: Tuning) -> None:
     for name, condition, good in (
         ("epsilon", "positive", tuning.epsilon > 0.0),
         ("strengthening", "1 or more", tuning.strengthening >= 1.0),
+        ("corner_weight", "finite and 1 or more", 1.0 <= tuning.corner_weight < np.inf),
         ("cost_weight", "finite and not negative", 0.0 <= tuning.cost_weight < np.inf),
         ("coarse_from", "a count of cells, 0 or more", tuning.coarse_from >= 0.0),
     ):

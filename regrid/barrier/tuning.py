@@ -20,6 +20,7 @@ class Tuning:
     area_weight: float = 2.0  # R4.1: lam, weight of the area term
     least_sine: float = 0.3  # R4.3: cells with a sharper corner have a stronger barrier, linearly
     strengthening: float = 30.0  # R4.3: up to this many times
+    corner_weight: float = 1.0  # R4.3: of sharp corners against the first line's place
     cost_weight: float = 0.15  # R4.10: mu, weight of cells that limit the time step
     cost_margin: float = 1.05  # R4.11: of the rate implied by the sides themselves
     open_side: float = 0.5  # R4.16: chord over arc from which a side's shape counts in full,
@@ -69,7 +70,8 @@ class Tuning:
         the cost has no weight.
         """
         return Weights(
-            epsilon, float(self.area_weight), float(self.least_sine), float(self.strengthening),
+            epsilon, float(self.area_weight), float(self.corner_weight * self.least_sine),
+            float(self.corner_weight * self.strengthening),
             float(self.cost_weight) if cost else 0.0, stiffness,
         )  # fmt: skip
 
@@ -88,6 +90,6 @@ class Weights(NamedTuple):
 DEFAULT = Tuning()
 # the fields that are options of the regridder by themselves, in decks too
 OPTIONS = (
-    "epsilon", "area_weight", "strengthening", "tolerance", "floor", "max_iterations",
-    "newton_steps", "cost_weight", "coarse_from",
+    "epsilon", "area_weight", "strengthening", "corner_weight", "tolerance", "floor",
+    "max_iterations", "newton_steps", "cost_weight", "coarse_from",
 )  # fmt: skip

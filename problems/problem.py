@@ -83,8 +83,12 @@ class Row:
 
     @property
     def difference(self) -> float:
-        """Computed minus theory, over `size`; NaN if undefined."""
-        size = self.size or abs(self.theory)
+        """Computed minus theory, over `size` or the theory; NaN if undefined.
+
+        Over the theory it is positive where the number is too large in magnitude, whatever its
+        sign.
+        """
+        size = self.size or self.theory
         return (self.computed - self.theory) / size if size else math.nan
 
     def find_error(self) -> float:

@@ -9,6 +9,7 @@ from scipy import integrate
 from hydro.eos import JWL, IdealGas, MieGruneisen, StiffenedGas
 from hydro.eos.materials import find_material
 from problems.initial_states import mix_states
+from problems.problem import Row
 from problems.references.exact_flows import SedovBlast, Vortex, compute_taylor_wave
 from problems.references.hugoniot import (
     GeneralIsentrope,
@@ -273,3 +274,12 @@ def test_products_that_part_from_air_for_good_are_refused_in_words():
     away = (1.2, 3e4, 1e5)
     with pytest.raises(BadInput, match=r"common pressure|does not reach"):
         solve_riemann(material.eos, (material.rho0, 0.0, 8.38e9), IdealGas(1.4), away)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_difference_has_the_sign_of_the_magnitude(sign):
+    """A number that is smaller than theory's is so whatever the sign of both."""
+    assert Row("rate", sign * 0.97, sign).difference == pytest.approx(-0.03)
+    assert Row("rate", sign * 1.03, sign).difference == pytest.approx(0.03)
+    assert Row("rate", -sign * 0.5, sign).difference == pytest.approx(-1.5)
+    assert Row("drift", sign * 0.1, 0.0, size=10.0).difference == pytest.approx(sign * 0.01)

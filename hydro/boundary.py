@@ -247,8 +247,9 @@ class Inflow(Segment):
         rim = self.rim
         rim.rho_ghost[:], rim.u_ghost[:], rim.v_ghost[:], rim.p_ghost[:] = self.state(t)
         rim.length_ghost[:] = 0.0
-        rim.get_carried(on.CARRIED_GHOST)[...] = self._carried
-        rim.get_carried(on.CARRIED_BEYOND)[...] = self._carried
+        if self.block.carried_fields:
+            rim.get_carried(on.CARRIED_GHOST)[...] = self._carried
+            rim.get_carried(on.CARRIED_BEYOND)[...] = self._carried
 
     def fill_speeds(self, t):
         """The state beyond at mid-time, for the flux."""

@@ -212,7 +212,8 @@ class BarrierRegridder:
 
     def _regrid_given(self, given: Given, into) -> RegridResult:
         """`regrid` of checked arrays."""
-        given = given._replace(first=self._find_first(given.previous))
+        if self.spacing == "given":
+            given = given._replace(first=self._find_first(given.previous))
         try:
             return self._move(given, into, untangles=False)
         except Folded:
@@ -273,9 +274,7 @@ class BarrierRegridder:
             self.first_grid = nodes.copy()
 
     def _find_first(self, previous: np.ndarray) -> np.ndarray | None:
-        """The grid whose spacing is kept, if one is."""
-        if self.spacing != "given":
-            return None
+        """The grid whose spacing is kept."""
         self.take_first_grid(previous)
         self._check_shape(previous.shape)
         return self.first_grid
@@ -297,7 +296,10 @@ class BarrierRegridder:
             kj=float(kj), cost=sound_speed is not None, curved=self.curved,
         )  # fmt: skip
         checked = self.meets_itself or untangles  # a block is untangled after a first try
-        simple = work.block.area > 0.0 and (checked or self._is_simple(work, boundary))
+        # the sides neither cross nor touch, but for cuts
+        if self.cuts and not checked:
+            checked = find_crossing(boundary, self.cuts) is None
+        simple = work.block.area > 0.0 and (checked or (not self.cuts and work.is_simple))
         if not (simple and move.is_settled()):
             if not move.estimate < np.inf:  # otherwise all nodes are finite
                 if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
@@ -314,10 +316,6 @@ class BarrierRegridder:
         if report.quality and mirrored != transposed:  # of a clockwise grid
             report = replace(report, quality=None)
         return RegridResult(work.give(), report)
-
-    def _is_simple(self, work: Workspace, boundary: np.ndarray) -> bool:
-        """Do the sides neither cross nor touch, but for cuts?"""
-        return work.is_simple if not self.cuts else find_crossing(boundary, self.cuts) is None
 
     def _weigh(self, boundary):
         """The weights of the two families, and whether the lines i = const are the heavier one."""

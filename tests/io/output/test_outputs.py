@@ -50,7 +50,7 @@ REFUSED = [
     ('[output]\ncolumns = ["none"]', "no installed package has a group of history columns 'none'"),
     (GAUGE + "moves = true", "gauge 'a' moves with the material, but at [99, 0.1] there is none"),
     (GAUGE + "count = 3", "a line needs its end `to`"),
-    (GAUGE + 'fields = ["rho", "T"]', "gauge.0.fields.1"),
+    (GAUGE + 'fields = ["rho", "roh"]', "there is no field 'roh'; did you mean 'rho'?"),
     (GAUGE + "speed = 1", "there is no key 'gauge.0.speed'"),
 ]
 

@@ -386,7 +386,7 @@ def test_a_restart_with_other_columns_is_refused_before_it_writes(stopped, again
     [
         ({"output": {"times": [99.0]}}, r"output\.times has 99, which is after the end"),
         ({"output": {"fields": ["roh"]}}, "output.fields has 'roh'; no block has such a field"),
-        ({"gauge": [{"name": "g", "x": 0.1, "y": 0.1, "fields": ["roh"]}]}, "roh"),
+        ({"gauge": [{"name": "g", "at": [0.1, 0.1], "fields": ["roh"]}]}, "roh"),
         ({"output": {"columns": ["nosuch"]}}, "no installed package has a group"),
     ],
 )

@@ -120,7 +120,7 @@ class Simulation:
             self._connect(blocks, links, make_regridder)
         self._overlaps.check_pistons(float(t_end))
         if refining is not None:  # contacts stay as thick as they are on the first cells
-            thickness = [contact.thickness for contact in self.motion.sides.contacts]
+            thickness = [contact.thickness for contact in self.motion.sides.thick_contacts]
             self._line_rule = replace(self._line_rule, thickness=max(thickness, default=None))
         self.ledger = Ledger(blocks)
         self.watch = Stopwatch()

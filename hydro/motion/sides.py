@@ -91,7 +91,7 @@ class Sides:
             self._let_slide_on_piston(node)
             self._end_lines(node)
             self._join_neighbours(node)
-        self.contacts: list[ThickContact] = find_thick_contacts(
+        self.thick_contacts: list[ThickContact] = find_thick_contacts(
             [line for line in self.lines if line.segment.kind == "interface" and line.respaced]
         )
         for link in exchange.links:
@@ -107,7 +107,7 @@ class Sides:
         self.damped: list[SlidingLine | ThickContact] = [
             SlidingLine(line) for line in self.moving if line.segment.kind == "sliding"
         ]
-        self.damped += self.contacts
+        self.damped += self.thick_contacts
         self.turning = [node for node in self.key_nodes if node.tracks]
         self.links = exchange.links
         self.cut = [line for line in self.moving if line.role is Role.AT_CONTACT]

@@ -70,6 +70,17 @@ class Chain:
         self.starts = np.concatenate(([0], np.cumsum(counts)))
         self.orientation = -self.orientation
 
+    def make_arrays(self) -> None:
+        """Arrays over its faces, in the order in which it runs: of `LineArrays`, and of `surface`
+        (5, faces), the contact states."""
+        self.arrays = make_line_arrays(self.list_wave_laws())
+        self.surface = np.zeros((SURFACE_ROWS, self.count))
+
+    def read_states(self, rows: slice, nodes: np.ndarray) -> None:
+        """States from these rows of the rims, and their slopes along the line of `nodes`."""
+        self.read(rows, self.arrays.states[: rows.stop - rows.start])
+        fill_slopes.entry(nodes, self.arrays)
+
     def list_wave_laws(self) -> np.ndarray:
         """Wave laws of the materials along the chain, (3, faces)."""
         parts = []
@@ -249,10 +260,11 @@ class SlidingContact:
         self.count = 0  # of the pieces
         self.positions = np.empty(self.follower.count + 1)
         self.positions_new = np.empty(self.follower.count + 1)
-        chains = self.leader, self.follower
-        self.halves = [make_line_arrays(chain.list_wave_laws()) for chain in chains]
-        self.surfaces = [np.zeros((SURFACE_ROWS, chain.count)) for chain in chains]
-        self.lines = [chain.line() for chain in chains]  # of the old grid
+        self.sides = (LEADER, self.leader), (FOLLOWER, self.follower)
+        for _, chain in self.sides:
+            chain.make_arrays()
+        self.arrays = self.leader.arrays, self.follower.arrays
+        self.lines = self.leader.line(), self.follower.line()  # of the old grid
         self.still = np.zeros_like(self.lines[0])
         self.excess_volume = np.zeros(self.follower.count)
         self.excess_volume_new = np.zeros(self.follower.count)
@@ -271,7 +283,8 @@ class SlidingContact:
 
     def cut(self) -> None:
         """Pieces, positions and polygon areas of the old grid."""
-        line, other = self.lines = self.leader.line(), self.follower.line()
+        self.lines = self.leader.line(), self.follower.line()
+        line, other = self.lines
         fill_positions(line, other, self.positions)
         self.count = fill_pieces.entry(
             line, self.still, self.positions, self.leader.orientation, 0.0, self.pieces
@@ -303,21 +316,18 @@ class SlidingContact:
 
     def _fill_surfaces(self) -> None:
         """The means of the pieces' states over the faces of both sides, into the rims."""
-        for half in self.halves:
-            half.sums[:] = 0.0
-        sum_over_faces.entry(*self.halves, self.pieces, self.count, True)
-        chains = (LEADER, self.leader), (FOLLOWER, self.follower)
-        for (side, chain), half, surface in zip(chains, self.halves, self.surfaces, strict=True):
-            fill_surface.entry(half, side, chain.gather(on.NORMAL), surface)
-            chain.scatter(on.CONTACT, surface)
+        for arrays in self.arrays:
+            arrays.sums[:] = 0.0
+        sum_over_faces.entry(*self.arrays, self.pieces, self.count, True)
+        for side, chain in self.sides:
+            fill_surface.entry(chain.arrays, side, chain.gather(on.NORMAL), chain.surface)
+            chain.scatter(on.CONTACT, chain.surface)
 
     def _solve_pieces(self, rows: slice, line: np.ndarray, other: np.ndarray) -> None:
         """States of the pieces between both lines from these rows of the rims."""
-        chains = self.leader, self.follower
-        for chain, half, nodes in zip(chains, self.halves, (line, other), strict=True):
-            chain.read(rows, half.states[: rows.stop - rows.start])
-            fill_slopes.entry(nodes, half)
-        _, self.pulled = solve_facets.entry(*self.halves, self.pieces, self.count, 0.0, 0.0)
+        self.leader.read_states(rows, line)
+        self.follower.read_states(rows, other)
+        _, self.pulled = solve_facets.entry(*self.arrays, self.pieces, self.count, 0.0, 0.0)
 
     def fill_flux(self, dt: float) -> None:
         """Fluxes of both sides' faces from the mid-time traces."""
@@ -340,21 +350,21 @@ class SlidingContact:
             )
         # their contact states, and the fluxes of both sides (theory F4)
         self._solve_pieces(on.TRACE, middle, follower_middle)
-        for side, half in ((LEADER, self.halves[LEADER]), (FOLLOWER, self.halves[FOLLOWER])):
-            half.flux[:] = 0.0
-            self.add_facet_flux.entry(self.pieces, self.count, side, half)
+        for side, chain in self.sides:
+            chain.arrays.flux[:] = 0.0
+            self.add_facet_flux.entry(self.pieces, self.count, side, chain.arrays)
         # what passes between the follower's polygons
         closing = self._measure_closing(middle, moved, follower_middle, follower_new - follower_old)
         growth = (1.0 / dt) * (self.excess_volume_new - self.excess_volume)
         growth += follower.gather(on.AREAS)[SWEPT_RATE]
         self.add_closing_flux.entry(
-            self.halves[FOLLOWER], closing, growth, self.pieces, self.count, self._part_at_first()
+            follower.arrays, closing, growth, self.pieces, self.count, self._part_at_first()
         )
         # into the rims
-        leader.scatter(on.FLUX, self.halves[LEADER].flux)
-        follower.scatter(on.FLUX, self.halves[FOLLOWER].flux)
+        leader.scatter(on.FLUX, leader.arrays.flux)
+        follower.scatter(on.FLUX, follower.arrays.flux)
         if self.carries:
-            self._carry_along(self.halves[FOLLOWER].flux[MASS])
+            self._carry_along(follower.arrays.flux[MASS])
 
     def _carry_along(self, masses: np.ndarray) -> None:
         """What carried fields gain and lose through the closing faces, into the follower's rims."""

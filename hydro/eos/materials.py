@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import functools
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 from hydro.eos import EQUATIONS_OF_STATE, EquationOfState
+from hydro.strength.laws import STRENGTH_LAWS, StrengthLaw
+from hydro.strength.laws.base import make_law
 from regrid.errors import BadInput, find_nearest
 from regrid.text_files import load_toml, read_text
 
@@ -26,13 +28,15 @@ LIBRARY = Path(__file__).with_name("materials.toml")
 class Material:
     """A material's equation of state, its density at rest in kg/m³, and where they come from.
 
-    names: other names by which it is found.
+    names: other names by which it is found; strength: of a solid, None for fluids and for solids
+    whose strength is not known.
     """
 
     eos: EquationOfState
     rho0: float
     source: str
     names: tuple[str, ...] = ()
+    strength: StrengthLaw | None = None
 
 
 def _hint(name: str, known) -> str:
@@ -55,6 +59,7 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
     source = numbers.pop("source")
     names = tuple(numbers.pop("names", ()))
     heat_capacity = numbers.pop("heat_capacity", None)
+    strength_table = numbers.pop("strength_law", None)
     rho0 = numbers["rho0"]
     if "rho0" not in _list_parameters(eos_class):
         del numbers["rho0"]
@@ -66,7 +71,27 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
             eos = eos.with_heat_capacity(heat_capacity)
     except BadInput as error:
         raise BadInput(f"{where}: {error}") from None
-    return Material(eos, float(rho0), source, names)
+    strength = None
+    if strength_table is not None:
+        strength = make_strength(f"{where}, strength_law", strength_table, eos, float(rho0))
+    return Material(eos, float(rho0), source, names, strength)
+
+
+def make_strength(where: str, table: object, eos: EquationOfState, rho0: float) -> StrengthLaw:
+    """The law of strength of a table of its kind `law` and parameters, for a material.
+
+    Raises BadInput, which begins with `where`, for a table that makes no law, and for a gas.
+    """
+    if not isinstance(table, Mapping):
+        raise BadInput(f"{where}: it is {table!r}; a table with law and parameters is wanted")
+    check_solid(where, eos)
+    return make_law(where, table, STRENGTH_LAWS, rho0)
+
+
+def check_solid(where: str, eos: EquationOfState) -> None:
+    """Raise BadInput where an equation of state is that of a gas, which bears no shear."""
+    if not eos.opens_voids:
+        raise BadInput(f"{where}: strength is for solids, and {eos.kind!r} is a gas")
 
 
 def _list_parameters(eos_class: type[EquationOfState]) -> dict[str, str]:
@@ -93,7 +118,7 @@ def _find_mistakes(table: dict) -> Iterator[str]:
     eos_class = EQUATIONS_OF_STATE[kind]
     wanted = _list_parameters(eos_class)
     for key, value in table.items():
-        if key in ("eos", "source", "heat_capacity"):
+        if key in ("eos", "source", "heat_capacity", "strength_law"):
             continue
         if key == "names":
             if not isinstance(value, list) or not all(isinstance(one, str) for one in value):

@@ -23,6 +23,7 @@ from regrid.errors import BadInput
 GROUPS = {
     "shockgrid.problems": "problem",
     "shockgrid.eos": "equation of state",
+    "shockgrid.strength": "law of strength",
     "shockgrid.regridders": "regridder",
     "shockgrid.boundaries": "boundary kind",
     "shockgrid.columns": "group of history columns",

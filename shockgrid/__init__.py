@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from hydro.links import join, slide
     from hydro.simulation import Simulation
     from hydro.sources import make_gravity as gravity
+    from hydro.strength.laws.base import StrengthLaw
     from problems.deck import Deck, DeckTable, Output, Regrid, RunControl, key
     from problems.initial_states import make_plane_grid, put_walls, shock
     from problems.pictures import draw_field
@@ -78,6 +79,7 @@ MODULES = {
     "Simulation": "hydro.simulation",
     "Study": "runs.study.study",
     "StiffenedGas": "hydro.eos.gases",
+    "StrengthLaw": "hydro.strength.laws.base",
     "Tabular": "hydro.eos.tabular",
     "compare": "runs.inspection.compare",
     "compare_column": "problems.problem",
@@ -145,6 +147,7 @@ __all__ = [
     "Segment",
     "Simulation",
     "StiffenedGas",
+    "StrengthLaw",
     "Study",
     "Tabular",
     "__version__",

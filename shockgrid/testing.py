@@ -1,8 +1,9 @@
 """Checks for parts of shockgrid that other packages add: `sg.testing`.
 
-`check_regridder`, `check_eos`, `check_boundary` and `check_problem` return nothing if a part is
-correct, and otherwise raise AssertionError with a sentence.  The tests of shockgrid check its own
-parts with the same functions; those of REGRIDDER_PROMISES can be called one by one.
+`check_regridder`, `check_eos`, `check_strength`, `check_boundary` and `check_problem` return
+nothing if a part is correct, and otherwise raise AssertionError with a sentence.  The tests of
+shockgrid check its own parts with the same functions; those of REGRIDDER_PROMISES can be called one
+by one.
 
 Note: states and motions here are examples.  A part that passes may still fail for others.
 """
@@ -11,6 +12,8 @@ from __future__ import annotations
 
 import functools
 import inspect
+import itertools
+import pickle
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -22,6 +25,7 @@ from hydro.boundary import SEGMENTS, NodeMotion, Segment, put
 from hydro.eos.base import EquationOfState, measure_inverse, measure_slopes, say_inverse, say_slope
 from hydro.eos.gases import IdealGas
 from hydro.simulation import Simulation
+from hydro.strength.laws import StrengthLaw
 from problems.deck import Deck
 from problems.problem import Problem
 from problems.registry import load_problem
@@ -293,6 +297,114 @@ def check_eos(
         check_compiled(eos, float(densities[-1]), float(pressures[-1]))
     except AssertionError as error:
         raise AssertionError(f"equation of state {eos.kind}: {error}") from None
+
+
+# --- laws of strength --------------------------------------------------------------------------
+
+PLASTIC_STRAINS = (0.0, 1e-3, 0.01, 0.1, 0.5, 3.0)
+STRAIN_RATES = (0.0, 1.0, 1e4, 1e8)  # [1/s]
+PRESSURES_OF_SOLIDS = (-1e9, 0.0, 1e9, 3e10)  # [Pa]
+TEMPERATURES_OF_SOLIDS = (77.0, 293.0, 900.0, 1e4)  # [K]
+COMPRESSIONS_OF_SOLIDS = (0.5, 0.95, 1.0, 1.1, 1.6)
+STRAIN_STEP_PART = 1e-4  # of a plastic strain, for the slope of the flow stress
+MOST_HARDENING_MISS = 1e-3  # of the slope
+MOST_ROUND_OFF_GAIN = 1e-12  # of the flow stress
+
+
+def list_solid_states(rho0: float) -> list[np.ndarray]:
+    """All states of a solid at once: plastic strain, rate, density, pressure, temperature, (n,)."""
+    densities = [part * rho0 for part in COMPRESSIONS_OF_SOLIDS]
+    all_of_them = itertools.product(
+        PLASTIC_STRAINS, STRAIN_RATES, densities, PRESSURES_OF_SOLIDS, TEMPERATURES_OF_SOLIDS
+    )
+    return list(np.array(list(all_of_them)).T.copy())
+
+
+def say_solid_state(state: Sequence[np.ndarray], k: int) -> str:
+    """One of the states in words."""
+    names = "plastic strain", "strain rate", "density", "pressure", "temperature"
+    return ", ".join(f"{name} {one[k]:g}" for name, one in zip(names, state, strict=True))
+
+
+def check_strength_values(law: StrengthLaw, state: list[np.ndarray]) -> None:
+    """G and Y are finite and 0 or more, H is finite and above -3 G; shapes are those given."""
+    shear = law.shear_modulus(*state[2:])
+    least = {"shear_modulus": 0.0 * shear, "flow_stress": 0.0 * shear, "hardening": -3.0 * shear}
+    for name, bound in least.items():
+        method = getattr(law, name)
+        given = state[2:] if name == "shear_modulus" else state
+        before = [one.copy() for one in given]
+        found = method(*given)
+        shape = np.shape(found)
+        _demand(shape == state[0].shape, f"{name} gives the shape {shape} for {state[0].shape}")
+        bad = np.flatnonzero(~(np.isfinite(found) & (found >= bound)))
+        if len(bad):
+            where = say_solid_state(state, bad[0])
+            raise AssertionError(f"{name} is {found[bad[0]]:g} Pa at {where}")
+        kept = all(map(np.array_equal, before, given))
+        _demand(kept, f"{name} writes its arguments")
+        square = [one.reshape(-1, 4) for one in given]
+        same = np.array_equal(method(*square), found.reshape(-1, 4))
+        _demand(same, f"{name} gives other numbers for cells (ni, nj) than for (n,)")
+        turned = method(*(one[::-1].copy() for one in given))
+        _demand(np.array_equal(turned[::-1], found), f"{name} of a cell depends on other cells")
+
+
+def check_hardening_slope(law: StrengthLaw, state: list[np.ndarray]) -> None:
+    """H is the slope of Y along the plastic strain, beside strains of 0 and kinks."""
+    strain = np.maximum(state[0], 1e-3)
+    step = STRAIN_STEP_PART * strain
+    strains = strain - step, strain, strain + step
+    low, middle, high = (law.flow_stress(one, *state[1:]) for one in strains)
+    down = (middle - low) / step
+    up = (high - middle) / step
+    slope = law.hardening(strain, *state[1:])
+    # at a kink, as where the flow stress reaches a greatest value, either slope is right
+    least = np.minimum(down, up)
+    most = np.maximum(down, up)
+    allowed = MOST_HARDENING_MISS * np.abs(slope) + 1e-9 * middle / step
+    off = np.maximum(slope - most, least - slope) - allowed
+    k = int(off.argmax())
+    where = say_solid_state([strain, *state[1:]], k)
+    words = f"hardening is {slope[k]:g} Pa, flow_stress has the slope {up[k]:g} Pa at {where}"
+    _demand(off[k] <= 0.0, words)
+
+
+def check_softening(law: StrengthLaw, state: list[np.ndarray]) -> None:
+    """Hotter material is not stronger, faster deformation does not meet less strength."""
+    y = law.flow_stress(*state)
+    for position, gain, sign, words in (
+        (4, 100.0, 1.0, "rises with temperature"),
+        (1, 10.0, -1.0, "falls with strain rate"),
+    ):
+        other = [one.copy() for one in state]
+        other[position] += gain
+        change = sign * (law.flow_stress(*other) - y) - MOST_ROUND_OFF_GAIN * y
+        k = int(change.argmax())
+        _demand(change[k] <= 0.0, f"flow_stress {words} at {say_solid_state(state, k)}")
+
+
+def check_strength(law: StrengthLaw, rho0: float | None = None) -> None:
+    """Check a law of strength in all respects, at some two thousand states around rest.
+
+    rho0: density at rest [kg/m³] of its material, by default that of the law, or 8000.
+    AssertionError names the state: densities of half to 1.6 of it, pressures of -1 to 30 GPa,
+    temperatures up to 10 000 K, plastic strains up to 3, strain rates up to 1e8 1/s.
+    """
+    state = list_solid_states(getattr(law, "rho0", 8000.0) if rho0 is None else rho0)
+    try:
+        check_strength_values(law, state)
+        check_hardening_slope(law, state)
+        check_softening(law, state)
+        _demand(pickle.loads(pickle.dumps(law)) == law, "pickled and read again it is another law")
+        _demand(hash(law) == hash(law), "it has no hash: mark the class @dataclass(frozen=True)")
+        if not law.needs_temperature:
+            strain, rate, density, pressure, _ = state
+            cold = law.flow_stress(strain, rate, density, pressure, None)
+            same = np.array_equal(cold, law.flow_stress(*state))
+            _demand(same, "it depends on the temperature, but needs_temperature is False")
+    except AssertionError as error:
+        raise AssertionError(f"law of strength {law.kind}: {error}") from None
 
 
 # --- boundary kinds ----------------------------------------------------------------------------

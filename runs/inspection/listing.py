@@ -51,11 +51,13 @@ def describe_installed() -> list[str]:
     from hydro.boundary import OWN as OWN_SEGMENTS
     from hydro.eos import OWN as OWN_EQUATIONS
     from hydro.history import COLUMNS
+    from hydro.strength.laws import OWN as OWN_STRENGTH_LAWS
     from regrid.registry import OWN as OWN_REGRIDDERS
 
     own = {
         "shockgrid.problems": OWN_PROBLEMS,
         "shockgrid.eos": OWN_EQUATIONS,
+        "shockgrid.strength": OWN_STRENGTH_LAWS,
         "shockgrid.regridders": OWN_REGRIDDERS,
         "shockgrid.boundaries": OWN_SEGMENTS,
         "shockgrid.columns": COLUMNS,

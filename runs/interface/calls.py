@@ -15,6 +15,7 @@ import numpy as np
 from hydro.boundary import SEGMENTS, Segment
 from hydro.eos import EQUATIONS_OF_STATE
 from hydro.eos.base import EquationOfState
+from hydro.strength.laws import STRENGTH_LAWS, StrengthLaw
 from problems.evolution import Evolution, get_material
 from problems.own_simulation import Measure, OwnSimulation, OwnSimulationDeck
 from problems.problem import Problem
@@ -245,7 +246,8 @@ _OWN: dict[tuple[str, str], str] = {}  # what was registered here: kind and name
 
 
 def register(name: str, thing: type) -> None:
-    """Register a class by name: a problem, an equation of state, a boundary kind, a regridder.
+    """Register a class by name: a problem, equation of state, law of strength, boundary kind or
+    regridder.
 
     A regridder is a class with a method `regrid(previous, boundary)`.  A new version of a class
     may be registered again under its name.  Raises BadInput for any other class, for a name that
@@ -262,6 +264,7 @@ def register(name: str, thing: type) -> None:
     kinds: tuple[tuple[str, MutableMapping[str, Any], bool, Any], ...] = (
         ("problem", PROBLEMS, issubclass(thing, Problem), place),
         ("equation of state", EQUATIONS_OF_STATE, issubclass(thing, EquationOfState), thing),
+        ("law of strength", STRENGTH_LAWS, issubclass(thing, StrengthLaw), thing),
         ("boundary kind", SEGMENTS, issubclass(thing, Segment), thing),
         ("regridder", REGRIDDERS, callable(getattr(thing, "regrid", None)), place),
     )
@@ -276,6 +279,6 @@ def register(name: str, thing: type) -> None:
         _OWN[kind, name] = place
         return
     raise BadInput(
-        f"{thing.__name__} is not a problem, equation of state, boundary kind or regridder: it "
-        "derives from none of these classes and has no method `regrid`"
+        f"{thing.__name__} is not a problem, equation of state, law of strength, boundary kind or "
+        "regridder: it derives from none of these classes and has no method `regrid`"
     )

@@ -18,6 +18,7 @@ from hydro.boundary import SEGMENTS, put
 from hydro.eos import IdealGas
 from hydro.eos.materials import find_material
 from hydro.simulation import Simulation
+from hydro.strength.laws import STRENGTH_LAWS
 from problems import registry as problem_registry
 from problems.initial_states import make_plane_grid
 from regrid import registry as regridder_registry
@@ -28,12 +29,19 @@ from regrid.plug_ins import GROUPS
 from regrid.registry import make_regridder
 from runs.cli.main import main
 from runs.store.history import read_history
-from shockgrid.testing import check_boundary, check_eos, check_problem, check_regridder
+from shockgrid.testing import (
+    check_boundary,
+    check_eos,
+    check_problem,
+    check_regridder,
+    check_strength,
+)
 
 PAGE = ROOT / "docs" / "extending.md"
 REGISTRIES = {
     "PROBLEMS": problem_registry.PROBLEMS,
     "EQUATIONS_OF_STATE": eos_registry.EQUATIONS_OF_STATE,
+    "STRENGTH_LAWS": STRENGTH_LAWS,
     "REGRIDDERS": regridder_registry.REGRIDDERS,
     "SEGMENTS": SEGMENTS,
     "COLUMNS": history.COLUMNS,
@@ -179,7 +187,23 @@ def test_history_column_is_the_energy_of_the_shocked_gas(add):
     assert row["kinetic_energy_gas"] == pytest.approx(0.5 * mass, rel=0.01)
 
 
+def test_law_of_strength_is_that_of_a_material(add, tmp_path):
+    add("voce.py")
+    strength = "law = 'voce', shear_modulus = 27.6e9, yield_strength = 0.2e9, greatest = 0.5e9"
+    (tmp_path / "own.toml").write_text(
+        "[mine]\neos = 'mie-gruneisen'\nsource = 'a test'\nrho0 = 2703.0\nc0 = 5240.0\ns = 1.4\n"
+        "gruneisen = 1.97\nstrength = 1e9\n"
+        f"strength_law = {{ {strength}, strain_scale = 0.1 }}\n"
+    )
+    law = find_material(f"{tmp_path / 'own.toml'}:mine").strength
+    strain = np.array([0.0, 0.1, 10.0])
+    at_rest = np.full((2, 3), 1.0)
+    found = law.flow_stress(strain, *at_rest, at_rest[0], None)
+    assert found == pytest.approx([0.2e9, 0.5e9 - 0.3e9 / np.e, 0.5e9])
+
+
 def test_examples_keep_the_promises(add):
+    check_strength(add("voce.py").Voce(27.6e9, 0.2e9, 0.5e9, 0.1))
     check_eos(add("noble_abel.py").NobleAbel(), rho=[1.0, 50.0, 200.0], p=[1e5, 1e8])
     check_regridder(add("averaged.py").AveragedRegridder)
     check_boundary(add("pressure_outlet.py").PressureOutlet, {"pressure": 0.9})

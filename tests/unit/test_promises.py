@@ -1,6 +1,7 @@
 """The checks for parts of other packages: ours pass, each broken part fails with its sentence."""
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from builders import box, wall_off
 from hydro import rim as on
 from hydro.boundary import FreeSurface, Outflow
 from hydro.eos import IdealGas, MieGruneisen
+from hydro.strength.laws import LinearHardening
 from problems.standard.free_stream import FreeStream
 from problems.standard.vortex import Vortex
 from regrid.algebraic import TransfiniteRegridder
@@ -276,3 +278,51 @@ def test_problems():
 def test_broken_problems(problem, words):
     with pytest.raises(AssertionError, match=words):
         sg.testing.check_problem(problem, FreeStream.Deck(cells=8))
+
+
+@dataclass(frozen=True)
+class Hardening(LinearHardening):
+    """Linear hardening, with one method replaced: a broken law."""
+
+    broken: ClassVar[str] = "none"
+
+    def flow_stress(self, plastic_strain, strain_rate, density, pressure, temperature):
+        y = super().flow_stress(plastic_strain, strain_rate, density, pressure, temperature)
+        if self.broken == "shape":
+            y = y.ravel()[:1]
+        elif self.broken == "sign":
+            y = y - 1e9
+        elif self.broken == "nan":
+            y = y + np.log(plastic_strain)
+        elif self.broken == "writes":
+            plastic_strain[...] += 1e-3
+        elif self.broken == "neighbours":
+            y = y + 1e-3 * np.arange(y.size).reshape(y.shape)
+        elif self.broken == "slope":
+            y = y + 1e8 * np.maximum(plastic_strain, 0.0) ** 2
+        elif self.broken == "heat":
+            y = y + 1e3 * (0.0 if temperature is None else temperature)
+        elif self.broken == "rate":
+            y = y - np.minimum(strain_rate, 1e4)
+        return y
+
+
+@pytest.mark.parametrize(
+    ("broken", "words"),
+    [
+        ("shape", r"flow_stress gives the shape \(1,\) for"),
+        ("sign", "flow_stress is -6e"),
+        ("nan", "flow_stress is -inf Pa at plastic strain 0,"),
+        ("writes", "flow_stress writes its arguments"),
+        ("neighbours", "flow_stress of a cell depends on other cells"),
+        ("slope", "hardening is 1e"),
+        ("heat", "flow_stress rises with temperature at"),
+        ("rate", "flow_stress falls with strain rate at"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_broken_laws_of_strength(broken, words):
+    sg.testing.check_strength(Hardening(43.3e9, 0.4e9, 0.1e9))
+    law = type("Broken", (Hardening,), {"broken": broken})(43.3e9, 0.4e9, 0.1e9)
+    with pytest.raises(AssertionError, match=f"^law of strength linear-hardening: {words}"):
+        sg.testing.check_strength(law)

@@ -42,7 +42,8 @@ def test_a_start_loads_nothing_heavy(start):
 PUBLIC = """
 AlgebraicRegridder BadInput BarrierRegridder Block CarriedField Case Deck DeckTable
 EquationOfState Hook IdealGas JWL MieGruneisen OpenRun Output PhaseTransition Problem Regrid
-RegridFailure Report Row RunControl RunFailure Segment Simulation StiffenedGas Study Tabular
+RegridFailure Report Row RunControl RunFailure Segment Simulation StiffenedGas StrengthLaw Study
+Tabular
 __version__ compare compare_column draw_field film find_material gravity grid inlined inspect join
 key load make_plane_grid make_regridder open plot put put_walls register report restart run shock
 slide study testing transfinite_grid verify

@@ -3,9 +3,36 @@
 May import: `regrid`.
 """
 
+from collections import ChainMap
+
 from hydro.strength.laws.base import StrengthLaw
+from hydro.strength.laws.johnson_cook import JohnsonCook
+from hydro.strength.laws.linear_hardening import LinearHardening
 from hydro.strength.laws.perfect import Perfect
+from hydro.strength.laws.steinberg_cochran_guinan import SteinbergCochranGuinan
+from hydro.strength.laws.zerilli_armstrong import ZerilliArmstrongBCC, ZerilliArmstrongFCC
+from regrid.plug_ins import PlugIns
 
-STRENGTH_LAWS: dict[str, type[StrengthLaw]] = {law.kind: law for law in (Perfect,)}
+OWN: dict[str, type[StrengthLaw]] = {
+    law.kind: law
+    for law in (
+        Perfect,
+        LinearHardening,
+        JohnsonCook,
+        SteinbergCochranGuinan,
+        ZerilliArmstrongFCC,
+        ZerilliArmstrongBCC,
+    )
+}
+STRENGTH_LAWS: ChainMap[str, type[StrengthLaw]] = ChainMap(OWN, PlugIns("shockgrid.strength"))  # type: ignore
 
-__all__ = ["STRENGTH_LAWS", "Perfect", "StrengthLaw"]
+__all__ = [
+    "STRENGTH_LAWS",
+    "JohnsonCook",
+    "LinearHardening",
+    "Perfect",
+    "SteinbergCochranGuinan",
+    "StrengthLaw",
+    "ZerilliArmstrongBCC",
+    "ZerilliArmstrongFCC",
+]

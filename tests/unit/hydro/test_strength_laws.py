@@ -8,8 +8,17 @@ import numpy as np
 import pytest
 
 from hydro.eos.materials import make_material
-from hydro.strength.laws import STRENGTH_LAWS, Perfect
+from hydro.strength.laws import (
+    STRENGTH_LAWS,
+    JohnsonCook,
+    LinearHardening,
+    Perfect,
+    SteinbergCochranGuinan,
+    ZerilliArmstrongBCC,
+    ZerilliArmstrongFCC,
+)
 from regrid.errors import BadInput
+from shockgrid.testing import check_strength
 
 ALUMINIUM = {
     "eos": "mie-gruneisen", "source": "a test", "rho0": 2785.0, "c0": 5328.0, "s": 1.338,
@@ -57,3 +66,87 @@ def test_a_gas_has_no_strength():
 
 def test_laws_are_registered_by_kind():
     assert all(law.kind == kind for kind, law in STRENGTH_LAWS.items())
+
+
+LAWS = {
+    "perfect": Perfect(27.6e9, 0.3e9),
+    "linear-hardening": LinearHardening(43.3e9, 0.4e9, 0.1e9),
+    "johnson-cook": JohnsonCook(80e9, 792e6, 510e6, 0.26, 0.014, 1.03, 1793.0),
+    "steinberg-cochran-guinan": SteinbergCochranGuinan(
+        27.6e9, 0.29e9, 0.68e9, 125.0, 0.1, 65.2e-12, 6.16e-4, 1220.0, 1.5, 1.97, 2703.0
+    ),
+    "zerilli-armstrong-fcc": ZerilliArmstrongFCC(47.7e9, 65e6, 890e6, 2.8e-3, 1.15e-4),
+    "zerilli-armstrong-bcc": ZerilliArmstrongBCC(80e9, 50e6, 1.8e9, 1.5e-3, 4.5e-5, 1.2e9, 0.62),
+}
+
+
+def evaluate(law, strain, rate, density, pressure, temperature):
+    """Flow stress of one state, as of an array of one cell."""
+    state = (np.array([one]) for one in (strain, rate, density, pressure, temperature))
+    return float(law.flow_stress(*state)[0])
+
+
+def test_all_laws_are_tried_here_and_keep_the_promises():
+    assert set(LAWS) == set(STRENGTH_LAWS)
+    for law in LAWS.values():
+        check_strength(law)
+
+
+def test_linear_hardening():
+    law = LAWS["linear-hardening"]
+    assert evaluate(law, 0.5, 0.0, 8930.0, 0.0, 300.0) == pytest.approx(0.45e9)
+    assert (
+        law
+        == make(
+            strength_law={
+                "law": "linear-hardening",
+                "shear_modulus": 43.3e9,
+                "yield_strength": 0.4e9,
+                "hardening": 0.1e9,
+            }
+        ).strength
+    )
+
+
+def test_johnson_cook_of_4340():
+    law = LAWS["johnson-cook"]
+    # evaluated apart from the code, at 1e4 1/s and 600 K
+    assert evaluate(law, 0.3, 1e4, 7830.0, 0.0, 600.0) == pytest.approx(1058481458.7, rel=1e-10)
+    # slow loading at the reference temperature, molten
+    assert evaluate(law, 0.0, 1e-6, 7830.0, 0.0, 293.0) == pytest.approx(792e6)
+    assert evaluate(law, 1.0, 1.0, 7830.0, 0.0, 200.0) == pytest.approx(1302e6)
+    assert evaluate(law, 1.0, 1e6, 7830.0, 0.0, 1793.0) == 0.0
+    with pytest.raises(BadInput, match="must be above reference_temperature"):
+        JohnsonCook(80e9, 792e6, 510e6, 0.26, 0.014, 1.03, 293.0)
+
+
+@pytest.mark.parametrize(
+    "density, pressure, temperature, strain, shear_modulus, flow_stress",
+    [
+        (3000.0, 15e9, 700.0, 0.2, 46.87027060726262e9, 0.6821560128645598e9),
+        (2703.0, 0.0, 300.0, 0.0, 27.6e9, 0.29e9),
+        (2703.0, 0.0, 300.0, 30.0, 27.6e9, 0.6604085759722659e9),
+        (2703.0, 0.0, 300.0, 60.0, 27.6e9, 0.68e9),  # the greatest
+        (2703.0, 0.0, 1221.0, 0.1, 0.0, 0.0),  # molten
+        (3000.0, 15e9, 1300.0, 0.1, 36.66931060726261e9, 0.4998331290396886e9),
+    ],
+)
+def test_steinberg_of_aluminium(density, pressure, temperature, strain, shear_modulus, flow_stress):
+    # evaluated apart from the code; the melting temperature at 3000 kg/m3 is 1689.35 K
+    law = LAWS["steinberg-cochran-guinan"]
+    state = (np.array([one]) for one in (density, pressure, temperature))
+    assert float(law.shear_modulus(*state)[0]) == pytest.approx(shear_modulus, rel=1e-12)
+    found = evaluate(law, strain, 1e6, density, pressure, temperature)
+    assert found == pytest.approx(flow_stress, rel=1e-12)
+    assert float(law.melting_point(3000.0)) == pytest.approx(1689.3534209717404, rel=1e-12)
+
+
+def test_zerilli_armstrong():
+    # evaluated apart from the code: copper at 5000 1/s and 350 K, a steel at 1000 1/s and 300 K
+    found = evaluate(LAWS["zerilli-armstrong-fcc"], 0.25, 5e3, 8930.0, 0.0, 350.0)
+    assert found == pytest.approx(300307062.02, rel=1e-10)
+    found = evaluate(LAWS["zerilli-armstrong-bcc"], 0.1, 1e3, 7830.0, 0.0, 300.0)
+    assert found == pytest.approx(1597771300.06, rel=1e-10)
+    # without thermal activation
+    cold = evaluate(LAWS["zerilli-armstrong-bcc"], 0.0, 1e3, 7830.0, 0.0, 0.0)
+    assert cold == pytest.approx(1.85e9)

@@ -262,7 +262,7 @@ class Block:
         return int(array.shape[-2] == self.ni + 2)
 
     def get_inside(self, name: str) -> np.ndarray:
-        """A view of an array of the block by its name, such as those of STEP_ARRAYS: no ghosts."""
+        """A view, without ghosts, of the block's array of this name (see `step_arrays`)."""
         array = getattr(self, name)
         return array[..., 1:-1, 1:-1] if self.count_ghosts(array) else array
 

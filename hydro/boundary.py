@@ -1,8 +1,8 @@
 """Segments: boundary conditions and contacts along a part of a block's side.
 
-A kind of segment is one class and one line in SEGMENTS.  It defines the ghost states beyond its
-faces (for the slopes), the motion of its nodes (`motion`), and the fluxes through its faces: rows
-of its `rim`, by the names of `hydro.rim`.
+A kind of segment is one class and one line in OWN_SEGMENTS (or a plug-in of a package).  It defines
+the ghost states beyond its faces (for the slopes), the motion of its nodes (`motion`), and the
+fluxes through its faces: rows of its `rim`, by the names of `hydro.rim`.
 
 Walls are at rest, lie on the axis of axisymmetric flow, or move with a given velocity (piston).
 The kernels of a block mirror cells in all its walls and compute the wall pressure
@@ -398,7 +398,7 @@ class Periodic(Seam):
     ends_flow = False
 
 
-OWN: dict[str, type[Segment]] = {
+OWN_SEGMENTS: dict[str, type[Segment]] = {
     "wall": Wall,
     "axis": Axis,
     "piston": Piston,
@@ -410,7 +410,10 @@ OWN: dict[str, type[Segment]] = {
     "seam": Seam,
     "periodic": Periodic,
 }
-SEGMENTS: ChainMap[str, type[Segment]] = ChainMap(OWN, PlugIns("shockgrid.boundaries"))  # type: ignore
+SEGMENTS: ChainMap[str, type[Segment]] = ChainMap(
+    OWN_SEGMENTS,
+    PlugIns("shockgrid.boundaries"),  # type: ignore
+)
 
 
 def make_segment(

@@ -17,12 +17,14 @@ from regrid.jit import kernel
 SIZE_BINS = 2048
 BIN_SHIFT = 52 - 3
 FIRST_BIN = (1023 - 128) << 3
-FAR_OUT = 1.2  # times the crowding exceeded by the fraction `share` of a block's cells
+# a cell is squeezed if its crowding is above so many times that exceeded by the fraction `share` of
+# its block's cells (theory F7.3): 1.2 in length, squared as crowding is
+SQUEEZED_CROWDING_RATIO = 1.2 * 1.2
 
 
 @kernel
 def count_crowding(crowding, counts):
-    """Histogram `counts` (BINS,) of the `crowding` (ni, nj) of a block's cells."""
+    """Histogram `counts` (SIZE_BINS,) of the `crowding` (ni, nj) of a block's cells."""
     counts[:] = 0
     for i in range(crowding.shape[0]):
         digits = crowding[i].view(np.int64)
@@ -73,7 +75,7 @@ def find_most_crowded(crowding, share, far_out, counts, kept):
     """`far_out` times the crowding exceeded by at most `share` of the cells; inf if none is above.
 
     The exact value of that cell is used, not the edge of a bin: round-off must not decide. counts
-    (BINS,), kept (cells,): scratch.
+    (SIZE_BINS,), kept (cells,): scratch.
     """
     count_crowding(crowding, counts)
     bin, rank, low = choose_bin(counts, crowding.size, share, far_out)
@@ -152,8 +154,8 @@ def scan_state(totals, sums, rates, crowding, part, counts, kept):
     """
     valid = sum_tiles(totals, sums)
     most, i, j = find_fastest_cell(rates, kept[: rates.shape[1]])
-    if part > 0.0 and is_squeezed(crowding, i, j, part, FAR_OUT * FAR_OUT):
-        edge = find_most_crowded(crowding, part, FAR_OUT * FAR_OUT, counts, kept)
+    if part > 0.0 and is_squeezed(crowding, i, j, part, SQUEEZED_CROWDING_RATIO):
+        edge = find_most_crowded(crowding, part, SQUEEZED_CROWDING_RATIO, counts, kept)
         return (*scan_rates(rates, crowding, edge), valid)
     return most, i, j, most, valid
 
@@ -163,7 +165,7 @@ def find_most_crowded_of_bands(
 ) -> float:
     """`find_most_crowded` over all bands of a block, with the same result on all of its ranks.
 
-    counts (BINS,), kept (cells,): scratch.
+    counts (SIZE_BINS,), kept (cells,): scratch.
     """
     block = cut.block
     crowding = block.crowding[slice(*cut.band)]

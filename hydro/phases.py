@@ -43,7 +43,7 @@ def _add_weight(block: Block, acceleration: np.ndarray) -> None:
 
 
 def predict(block: Block, dt: float) -> None:
-    """From the ghosts: mid-time predictions, and traces at moving faces at the old time."""
+    """From the ghosts: mid-time predictions, and traces at the moving faces half a step on."""
     kernels = block.kernels
     kernels.sides.predict_sides.entry(
         _list_old(block), 0.5 * dt, block.parameters, block.plan.moving, kernels.scratch,

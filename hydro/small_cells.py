@@ -10,8 +10,8 @@ either side as make it large enough for the step.  A cell belongs to every neigh
 contains it, including its own, with equal parts of its volume.  Each neighbourhood takes the mean
 of its parts and a limited slope; the new state of a cell is the mean of the values of its
 neighbourhoods there [BergerGiuliani2021].  The change in the step is redistributed in full, the
-state itself by the fraction RELAXED: redistributing all of it in every step would smear features
-along the short direction.  The fluxes are those of the scheme, and totals are conserved to
+state itself by the fraction RELAXED_FRACTION: redistributing all of it in every step would smear
+features along the short direction.  The fluxes are those of the scheme, and totals are conserved to
 round-off.  Theory F7.4.
 
 Notes: sums run outwards from a cell in pairs, so that a mirrored block gives bitwise mirrored
@@ -29,8 +29,8 @@ import numpy as np
 
 from hydro.block import Block
 from hydro.crowding import (
-    FAR_OUT,
     SIZE_BINS,
+    SQUEEZED_CROWDING_RATIO,
     find_most_crowded_of_bands,
     scan_rates,
     scan_rates_of_bands,
@@ -533,7 +533,7 @@ class SmallCells:
             return found
         edge = np.inf
         if self.part > 0.0:
-            how = self.part, FAR_OUT * FAR_OUT, self.counts, self.kept
+            how = self.part, SQUEEZED_CROWDING_RATIO, self.counts, self.kept
             edge = find_most_crowded_of_bands(cut, *how)
         return (*scan_rates_of_bands(cut, edge), block.totals.sum_up())
 

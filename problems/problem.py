@@ -432,13 +432,14 @@ class Problem:
 LARGE_GRID_CELLS = 100_000  # cells
 PROGRAM_BYTES = 190e6  # bytes of the program with its libraries and kernels, measured
 RUN_BYTES = 640  # per cell at the peak of a run, measured,
-LARGE_BYTES = 350  # for blocks of LARGE cells and more, two equal ones, with solves; without: 200
+# for blocks of LARGE_GRID_CELLS cells and more, two equal ones, with solves; without: 200
+LARGE_BYTES = 350
 
 
 def estimate_memory(cells: int, blocks: Sequence[int] = ()) -> float:
     """Peak memory [bytes] of a run with `cells` cells; `blocks`: the cells of each, if known.
 
-    Without `blocks`, LARGE cells and more are assumed to be in large blocks.
+    Without `blocks`, LARGE_GRID_CELLS cells and more are assumed to be in large blocks.
     """
     blocks = blocks or [cells]
     return PROGRAM_BYTES + sum(

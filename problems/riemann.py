@@ -329,7 +329,7 @@ class Riemann(Problem):
 
     def choose_domain(self) -> Domain:
         """Lengths, growths and end time: the deck's, the case's, or by the waves, of which one is
-        WAY of the way to its end where nothing else gives the end time."""
+        FASTEST_WAVE_WAY of the way to its end where nothing else gives the end time."""
         deck = self.deck
         case = self.case
         exact = self.exact

@@ -112,7 +112,8 @@ def fill_grown_spacing(least, length, at_end, spacing):
 
 @kernel
 def fill_refined_spacing(least, length, at_end, spacing):
-    """Law (n,) of a line whose steps grow from `least` at one end by RATIO each, then are even.
+    """Law (n,) of a line whose steps grow from `least` at one end by REFINED_STEP_RATIO each, then
+    are even.
 
     Falls back on `fill_grown_spacing` where even steps would be shorter, or growing ones too few.
     """
@@ -152,7 +153,7 @@ def meeting_laws(
     meeting point is h (1 - (1 - h0/h) q^k): within about a fifth of its nodes the steps grow from
     the shorter line's h0 to h, and stay uniform from there.  counts: nodes of the two lines (at
     least 3); lengths: theirs.  `refinement` makes h0 so many times shorter: above 1 the steps of
-    both lines grow, by the factor RATIO from one to the next.
+    both lines grow, by the factor REFINED_STEP_RATIO from one to the next.
     """
     least = min(lengths[0] / (counts[0] - 1), lengths[1] / (counts[1] - 1)) / refinement
     spacings = np.empty(counts[0]), np.empty(counts[1])
@@ -261,7 +262,8 @@ def equalise_products(
     """Nodes between the ends of `nodes` with `weigh(x[j], x[j+1]) (x[j+1] - x[j])` equal.
 
     Newton's method on the products, begun from the monotone `nodes`; a step is halved while it
-    would let nodes cross or the spread grow.  Raises RegridFailure where it ends above SETTLED.
+    would let nodes cross or the spread grow.  Raises RegridFailure where it ends above
+    SETTLED_PRODUCT_SPREAD.
     """
     x = np.array(nodes, dtype=float)
     if x.size < 3:

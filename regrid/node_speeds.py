@@ -94,8 +94,8 @@ def find_fast_rows(old, new, interpolated, most, first, last):
 def measure_spacing(area, along, a, b, wide):
     """Square of a corner's height over its longer edge; a, b: squares of the edges.
 
-    area, along: cross and scalar product of the edges.  wide: of a FLAT corner the shorter edge,
-    since a cell with a flat corner need not be thin.
+    area, along: cross and scalar product of the edges.  wide: of an almost straight corner the
+    shorter edge, since a cell with a flat corner need not be thin.
     """
     if wide and along < 0.0 and area * area < FLAT_CORNER_SINE * FLAT_CORNER_SINE * a * b:
         return min(a, b)
@@ -242,8 +242,9 @@ class MotionLimiter:
 
     In a curled block the boundary motion, interpolated inward, shears cells thinner step by step,
     and the thinner they are, the less of the regridder's correction the limit allows.  So where the
-    limit makes a corner sharper than in both grids, old and new, nodes may move LOOSE times as far;
-    without any limit, a regridder that oscillates at rest would shorten the time step indefinitely.
+    limit makes a corner sharper than in both grids, old and new, nodes may move
+    LOOSENED_LIMIT_FACTOR times as far; without any limit, a regridder that oscillates at rest would
+    shorten the time step indefinitely.
     """
 
     def __init__(self, shape: tuple[int, ...]):
@@ -259,10 +260,10 @@ class MotionLimiter:
 
         `new` must be convex; the result is valid until the next regrid of this thread.
 
-        Where the limit sharpens corners, nodes move towards LOOSE times as many spacings, by
-        halves; those of folded cells return to `new`.  If that keeps folding others, all nodes
-        return by the same fraction to `new`, the least of halvings that leaves no fold.  A
-        symmetric block stays so.
+        Where the limit sharpens corners, nodes move towards LOOSENED_LIMIT_FACTOR times as many
+        spacings, by halves; those of folded cells return to `new`.  If that keeps folding others,
+        all nodes return by the same fraction to `new`, the least of halvings that leaves no fold.
+        A symmetric block stays so.
         """
         limited, count = self._limit(old, new, most)
         symmetry = find_symmetry(old, new) if count > 0 else None

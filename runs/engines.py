@@ -97,7 +97,8 @@ class Processes:
             pool.shutdown(wait=True, cancel_futures=True)
 
     def compute(self, task: Task, arguments: Sequence[Any]) -> Iterator[tuple[int, Any]]:
-        """As `Engine.compute`; a task whose process died DEATHS times gives a WorkerDied."""
+        """As `Engine.compute`; a task whose process died MOST_TASK_DEATHS times gives a
+        WorkerDied."""
         waiting = collections.deque(range(len(arguments)))
         deaths: collections.Counter[int] = collections.Counter()
         running: dict[Future, tuple[int, ProcessPoolExecutor]] = {}

@@ -273,7 +273,8 @@ class TimeLeft:
 
 
 class ShortSteps:
-    """Says once where dt has fallen FALLEN times below its largest value; say: takes the line.
+    """Says once where dt has fallen FALLEN_STEP_FACTOR times below its largest value; say: takes
+    the line.
 
     Steps that are short on purpose do not count: the first five, the last two, those repeated with
     a smaller dt.

@@ -32,7 +32,8 @@ POSITIVE = ("rho", "c")
 
 
 class Places:
-    """Where points are: `position` (2, n) [m], `block` (n,) with NOWHERE for outside, and cells.
+    """Where points are: `position` (2, n) [m], `block` (n,) with OUTSIDE_ALL_BLOCKS for outside,
+    and cells.
 
     allowed (blocks, n): in which blocks a point may be; reach (n,): cells beside them.
     """

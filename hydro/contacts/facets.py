@@ -121,9 +121,9 @@ def find_pins(nodes, other, pins, tolerance, reach, one_body):
     """Fill the positions of the nodes that lie on the other line, -1.0 for all others.
 
     On: closer than `tolerance` of a face's length, or behind a face that looks at the points' own
-    line, by no more than BULGE of it: where a curved contact has opened, nodes lie behind the
+    line, by no more than MOST_BULGE of it: where a curved contact has opened, nodes lie behind the
     other line's chords.  nodes, other: `LineNodes`; pins: `Pins` of the nodes; one_body: see
-    `is_film`; reach: BULGE of the longest face [m].  Returns how many do.
+    `is_film`; reach: MOST_BULGE of the longest face [m].  Returns how many do.
     """
     points = nodes.line
     line = other.line
@@ -374,7 +374,7 @@ def merge_pins(leader_positions, follower_positions, pins):
 
 @compiled_once
 def lie_near(points, first, stop, line, a):
-    """Do the points first..stop - 1 lie no further than BULGE from face `a` of a line?"""
+    """Do the points first..stop - 1 lie no further than MOST_BULGE from face `a` of a line?"""
     for k in range(first, stop):
         _, away = project(line, a, points[0, k], points[1, k])
         if away > MOST_BULGE * MOST_BULGE * measure_square(line, a):

@@ -271,7 +271,7 @@ def fit_plane(points, origin, along, length, line):
 
 @kernel
 def measure_clearance_of_plane(points, line, asked):
-    """How much the points may fall before one is near: their heights less BULGE of a face."""
+    """How much the points may fall before one is near: their heights less MOST_BULGE of a face."""
     least = 1e300
     for k in range(points.shape[1]):
         if asked[k]:

@@ -244,7 +244,8 @@ def settle_column(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """Axis, T and v after alternating steady solves and corrections, and the number of these.
 
-    options: those of `correct_axis`.  Ends when no node moves by more than RESTING of the axis.
+    options: those of `correct_axis`.  Ends when no node moves by more than RESTING_NODE_MOVE of the
+    axis.
     """
     count = 0
     while count < corrections:

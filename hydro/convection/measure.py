@@ -199,7 +199,7 @@ def filter_disturbance(
 ) -> np.ndarray:
     """The disturbance (n,) of growth rate `rate` [1/s] in the temperature exp(x/width + y/height).
 
-    From rest with that temperature, repeated REPEATS times, with B `operator` and N `mass`,
+    From rest with that temperature, repeated FILTER_REPEATS times, with B `operator` and N `mass`,
 
         z <- (shift - rate) (shift N - B)^-1 N z,      shift = rate + detuning
 

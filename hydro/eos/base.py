@@ -44,7 +44,7 @@ class EquationOfState:
     - `energy_part(rho, p, parameters)`
     - `sound_speed_squared_part(rho, p, parameters)`
     - `least_pressure_part(parameters)`: minus the tensile strength; under more tension
-      voids open (see `hydro.interior.update.make_update`)
+      voids open (see `hydro.eos.conversion.make_conversion`)
     - `strength_left_part(rho, parameters)`, optional: the fraction of that tension that fragments
       with gaps between them can bear (`hydro.eos.base`); by default all of it
     - `least_density_part(parameters)`, optional: the density [kg/m³] down to which fragments leave

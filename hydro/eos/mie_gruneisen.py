@@ -55,7 +55,7 @@ def energy(rho, p, parameters):
 
 @inlined
 def sound_speed_squared(rho, p, parameters):
-    """c² = dp/drho at constant e + (p/rho²) dp/de, except in failed material (`tension`)."""
+    """c² = dp/drho at constant e + (p/rho²) dp/de; of failed material, that of its fragments."""
     rho0 = parameters[RHO0]
     ratio = rho0 / rho
     eta = 1.0 - ratio

@@ -274,11 +274,11 @@ WHOLE_CELL_MARK = 1e300  # marks a cell that has not failed
 
 @inlined
 def mark_torn(e, void):
-    """The energy of a cell that has failed by its void energy; WHOLE elsewhere."""
+    """The energy of a cell that has failed by its void energy; WHOLE_CELL_MARK elsewhere."""
     return e if void < 0.0 else WHOLE_CELL_MARK
 
 
 @inlined
 def choose_own(traced, own, torn):
-    """The traced value; the cell's own value if `torn`, from `mark_torn`, is not WHOLE."""
+    """The traced value; `own`, that of the cell, if `torn` (from `mark_torn`) is an energy."""
     return own if torn < WHOLE_CELL_MARK else traced

@@ -1,8 +1,8 @@
 """The scratch array of the row kernels.
 
 All rows lie in one array at constant offsets, so the vectoriser needs no run-time checks of overlap
-(it silently gives up beyond 128 of them).  SPAN is a multiple of 8 and not a power of two.  In
-every row of cells, entry k is cell k - 1 of the chunk, so that k = 0 and k = m + 1 are the
+(it silently gives up beyond 128 of them).  SCRATCH_SPAN is a multiple of 8 and not a power of two.
+In every row of cells, entry k is cell k - 1 of the chunk, so that k = 0 and k = m + 1 are the
 neighbours of its m cells; in rows of nodes or faces along j, entry k is on the low side of cell k.
 Note: entry 1, where most loops start, is aligned to a cache line (`allocate` aligns the first row);
 loads and stores across two lines take twice the time.  Loops run in whole vectors (`count_padded`),

@@ -232,9 +232,9 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
         """Fill the states at the faces of m cells of a side, `first`, first + step, ..., if wanted.
 
         The cells are the row before the current one, the next cells inwards the current one.  Where
-        the pressure's jumps between the three are below CALM all of the slope is taken, less in
-        larger ones and nothing from SHOCK on.  Where that would be no state of the material, the
-        cell's own is left.
+        the pressure's jumps between the three are below CALM_PRESSURE_JUMP all of the slope is
+        taken, less in larger ones and nothing from SHOCK_PRESSURE_JUMP on.  Where that would be no
+        state of the material, the cell's own is left.
         """
         for k in range(1, m + 1):
             face = first + (k - 1) * step

@@ -8,7 +8,8 @@ The check covers the segments that form the outline of linked blocks: those with
 the leaders of sliding contacts, whose ends may be uncovered.  If two blocks overlap, their outlines
 cross, or one block lies within the other, which is possible only in the initial grid.  Blocks may
 touch, and chords may cut curves, so a crossing counts if one outline has entered the other block by
-the fraction INSIDE of its first cells.  Self-intersection of a block is detected by its regridder.
+the fraction OVERLAP_DEPTH_PART of its first cells.  Self-intersection of a block is detected by its
+regridder.
 
 Note: linked blocks are checked in the initial grid only.  Where their contact ends, both outlines
 start from one node and may close on each other: a jet that bends round the end of a wedge presses
@@ -38,10 +39,10 @@ MOST_GROUPS = 64  # boxes of a line
 
 @kernel
 def fill_outline(nodes, side, start, line, inset):
-    """Fill `line` (2, n) with the nodes start.. of a side, and `inset` (2, n), INSIDE cells inward.
+    """Fill `line` (2, n) with a side's nodes from `start` on, and `inset` (2, n), further inwards.
 
-    The inset ends INSIDE of a face before the ends of the line.  Returns the least and the largest
-    x, then y, of the line.
+    The inset lies OVERLAP_DEPTH_PART of a cell inwards, and ends as much of a face before the line.
+    Returns the least and the largest x, then y, of the line.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     last = line.shape[1] - 1

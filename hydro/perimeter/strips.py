@@ -358,8 +358,8 @@ def make_side_kernels(
         """Faces between the old nodes and the new ones, traces in their middles, and the fluxes
         through walls and open sides.
 
-        walls (n, 3): first faces of walls, those after the last, and whether it is the axis;
-        opened (n, 3): likewise of open sides, and the first row of the state beyond.
+        walls (n, 3): first faces of walls, those after the last, and the kind: WALL, PISTON or
+        AXIS; opened (n, 3): likewise of open sides, and the first row of the state beyond.
         """
         fill_faces(nodes, nodes_new, inverse_dt, rim)
         for k in range(rim.shape[1]):

@@ -131,8 +131,9 @@ MEAN, SLOPE_X, SLOPE_Y = range(3)  # last index of linear fields (ni, nj, quanti
 def continue_beyond_sides(means: np.ndarray) -> np.ndarray:
     """Means (n, ni + 2, nj + 2) with a layer of cells around, theory F12.3.
 
-    There the last two means of (n, ni, nj) go on evenly, but by no more than STEEPEST times the
-    difference before that, and not at all after an extreme: a jump that ends at a side stays one.
+    There the last two means of (n, ni, nj) go on evenly, but by no more than STEEPEST_CONTINUATION
+    times the difference before that, and not at all after an extreme: a jump that ends at a side
+    stays one.
     """
     for axis in (1, 2):
         first = _continue_line(np.moveaxis(means, axis, 0))

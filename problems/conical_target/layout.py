@@ -155,7 +155,8 @@ class Ripple:
 
 
 def densify(line: np.ndarray) -> np.ndarray:
-    """POINTS times as many points (2, m) on the cubic spline through the line's nodes (2, n)."""
+    """FITTED_POINTS times as many points (2, m) on the cubic spline through the line's nodes (2,
+    n)."""
     arc = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line, axis=1)))))
     fine = np.arange(FITTED_POINTS * (arc.size - 1) + 1) / FITTED_POINTS
     fine = np.interp(fine, np.arange(arc.size, dtype=float), arc)

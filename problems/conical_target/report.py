@@ -75,7 +75,7 @@ def get_shock_path(history, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarr
 def measure_passage(problem, history, name: str) -> list[tuple[float, float, float]]:
     """Time [s], speed [m/s] and pressure behind [Pa] of the shock at STATIONS; NaN where unknown.
 
-    Speed: slope of the straight line through the path within WIDTH of the station.
+    Speed: slope of the straight line through the path within FITTED_STRETCH_PART of the station.
     """
     deck = problem.deck
     t, x, p = get_shock_path(history, name)

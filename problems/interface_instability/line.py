@@ -99,9 +99,9 @@ def measure_shape(line, wavenumber, left_out, even):
     """Mean, greatest and least x of a line's nodes (2, n) [m], its roughness [m], and its largest
     turn [rad] from segment to segment.
 
-    Roughness is the root of the sum of squares of the line's harmonics from ROUGH on, those that
-    the nodes can show: below half a wave between two; but for the numbers `left_out` (m,).  Of an
-    `even` line (between walls) cosines alone, else harmonics of any phase.
+    Roughness is the root of the sum of squares of the line's harmonics from FIRST_ROUGH_HARMONIC
+    on, those that the nodes can show: below half a wave between two; but for the numbers `left_out`
+    (m,).  Of an `even` line (between walls) cosines alone, else harmonics of any phase.
     """
     x, y = line
     count = x.shape[0]

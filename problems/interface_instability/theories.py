@@ -1,18 +1,19 @@
 """What the growth of a shocked interface is compared with, and how far each theory goes.
 
-Linear compressible theory [Yang1994] applies to one mode while (4 A² + 1) (k a)²/8 <= LOSS, which
-is the next term of perturbation theory (A: Atwood number), and k a <= LINEAR; to several while the
-sum of their k a is <= COUPLED [Haan1991].  The Padé model [ZhangSohn1997] is one for a single mode
-and a reflected shock, with k a+ < 1 and growth slower than INCOMPRESSIBLE, up to `PadeModel.reach`.
-k is the mode's own wavenumber, and so are its times k c t; c is the sound speed of the shocked
-second material, t counts from the shock's arrival at the mean interface.  All theories are of an
-interface between materials without ends: they stop where waves return from the far sides.
+Linear compressible theory [Yang1994] applies to one mode while (4 A² + 1) (k a)²/8 <=
+MOST_RATE_LOSS, which is the next term of perturbation theory (A: Atwood number), and k a <=
+MOST_LINEAR_KA; to several while the sum of their k a is <= MOST_COUPLED_KA [Haan1991].  The Padé
+model [ZhangSohn1997] is one for a single mode and a reflected shock, with k a+ < 1 and growth
+slower than MOST_INCOMPRESSIBLE_RATE, up to `PadeModel.reach`.  k is the mode's own wavenumber, and
+so are its times k c t; c is the sound speed of the shocked second material, t counts from the
+shock's arrival at the mean interface.  All theories are of an interface between materials without
+ends: they stop where waves return from the far sides.
 
 `accuracy.json` beside this file has a row for each run of `benchmarks/growth_accuracy.py`, see
 `Measured`.  A deck is looked up at the corners of the box of Mach numbers and density ratios around
 it, each at the greatest measured number of cells that is not above the deck's; a ratio more than
-NEAR times off is left out where the other one is nearer.  Note: between two corners an error may be
-larger than at both, and all gases measured have gamma 1.4.
+NEAR_RATIO_FACTOR times off is left out where the other one is nearer.  Note: between two corners an
+error may be larger than at both, and all gases measured have gamma 1.4.
 """
 
 import bisect

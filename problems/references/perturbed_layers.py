@@ -50,7 +50,7 @@ JOINT = (1.0, 1.0, 1.0)  # edge of a zone whose next one is of the same material
 class Zone:
     """A layer or a fan of n points, from the interface outwards.
 
-    matrix: derivative (n, n); coefficients: rows COEFFICIENTS (10, n); z: impedance at its outer
+    matrix: derivative (n, n); coefficients: rows CARRY to SOURCE (10, n); z: impedance at its outer
     end; edge: what closes that end, or TAIL, JOINT: the next zone; start: first state (3, n); speed
     (n,): of the points away from the interface; slope (n,): d rho/d p at constant entropy there;
     stiffness: its fastest rate.

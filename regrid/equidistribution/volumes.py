@@ -27,7 +27,7 @@ residual.
 Rows run along the contiguous third index.  A row of cells is computed in one flat scratch array at
 constant offsets and reduced to the contributions to its nodes; a plane of cells contributes to the
 two adjacent planes of nodes, lower plane first, so results are bitwise independent of the division
-into chunks of planes.  Rows longer than SPAN do not fit the scratch.
+into chunks of planes.  Rows longer than VOLUME_SPAN do not fit the scratch.
 
 Source: [KhakimzyanovShokina1998] §3 to §5.
 """
@@ -211,7 +211,7 @@ def sum_row(n, Z):
 def give_row(to_lower, to_upper, lower, upper, n, Z, c):
     """Contribution of a row to the residual: added to the nodes below in i, stored at those above.
 
-    c: SPAN times the index of the component.
+    c: VOLUME_SPAN times the index of the component.
     """
     for k in range(n - 1):
         across = Z[K + 3 * VOLUME_SPAN + c + k] - Z[L + 3 * VOLUME_SPAN + c + k]

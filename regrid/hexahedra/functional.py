@@ -310,9 +310,9 @@ def turn_about(weight, edges, shares, half, t, p):
 def fill_centre_blocks(Z, n, area_weight, e2):
     """Blocks of the cells: six rows for the edge along i, and six for the sum over all three.
 
-    xx, xy, xz, yy, yz, zz, each over lengths squared, into BLOCK and into BLOCKS.  Their weight is
-    a quarter of the eight corners, scaled by the cell's value (SUM) over that at its centre, so
-    that a cell is as stiff as its corners.
+    xx, xy, xz, yy, yz, zz, each over lengths squared, into BLOCK_ROW and into SUMMED_BLOCK_ROW.
+    Their weight is a quarter of the eight corners, scaled by the cell's value (SUM) over that at
+    its centre, so that a cell is as stiff as its corners.
     """
     for k in range(n):
         a = take_mean_vector(Z, I0 + k, I0 + k + 1, I1 + k, I1 + k + 1)

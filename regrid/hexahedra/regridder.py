@@ -54,12 +54,12 @@ SMOOTH_RATIO = 0.5  # and is followed by another one if it kept less than this
 LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
 MOST_SHORTENINGS = 40
 MOST_NEWTON_STEPS = 6  # Newton steps after the first
-MOST_POLISH = 15  # Newton steps after untangling, until the residual is below SETTLED cells
+MOST_POLISH = 15  # Newton steps after untangling, until the residual is below SETTLED_MOVE cells
 SETTLED_MOVE = 0.02
 # the solve that extends the faces' motion inward
 FAR_TOLERANCE = 0.01
 FAR_ITERATIONS = 30
-# a residual up to HOVER floors is solved down to DEEP floors
+# a residual up to HOVERING_FLOORS floors is solved down to DEEP_SOLVE_FLOORS floors
 HOVERING_FLOORS = 1.3
 DEEP_SOLVE_FLOORS = 0.2
 SMOOTH_FLOOR = 0.3  # floors: a smooth part below this is ignored

@@ -230,8 +230,8 @@ def find_places(nodes, points, reach, cells, quads, parts, where):
     nodes (2, ni+1, nj+1), points (2, n) [m]; `reach`: how far beyond the block's sides a point may
     lie, in cells; cells (2, n): where walks begin, and the cells found; quads (2, n): the lower of
     the four centres around each point, parts (2, n) of the way to the others (with one cell in a
-    direction there is no other: the part means nothing); where (n,): OUTSIDE, INSIDE or BESIDE.
-    Of a point OUTSIDE nothing else is written.
+    direction there is no other: the part means nothing); where (n,): OUTSIDE_BLOCK, INSIDE_BLOCK or
+    BESIDE_BLOCK.  Of a point OUTSIDE_BLOCK nothing else is written.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     sign = 1.0 if compute_area(nodes) >= 0.0 else -1.0

@@ -153,9 +153,10 @@ def mark_triangles(nodes, areas):
 def find_triangles(nodes: np.ndarray) -> list[tuple[int, int, int]]:
     """The block's corners (corner, i, j), of BLOCK_CORNERS, whose cells are triangles.
 
-    There the angle is above 90 degrees and the corner triangle FLAT of the cell or less (TURNED of
-    it over, at most), while the cell's area and its other three corner triangles are positive.
-    nodes (2, ni+1, nj+1); i, j turn counter-clockwise.  Source: [ProkopovND] §5.
+    There the angle is above 90 degrees and the corner triangle FLAT_TRIANGLE_PART of the cell or
+    less (TURNED_TRIANGLE_PART of it over, at most), while the cell's area and its other three
+    corner triangles are positive.  nodes (2, ni+1, nj+1); i, j turn counter-clockwise.  Source:
+    [ProkopovND] §5.
     """
     marks = mark_triangles(np.ascontiguousarray(nodes, dtype=np.float64), np.empty(4))
     return [place for place in BLOCK_CORNERS if marks >> place[0] & 1]

@@ -9,8 +9,8 @@ what is in doubt is decided with rational numbers: exact, and cheap enough for e
 Note: touching counts as crossing, except along a cut: two whole opposite sides that are the same
 nodes, as in a ring that is closed on itself, or one line twice on one side (`regrid.measure.cuts`).
 
-Polylines are compared in floating point, by boxes of `GROUP` segments first, so that a check of a
-few hundred nodes costs microseconds; lines of more than 64 groups use wider ones.
+Polylines are compared in floating point, by boxes of `GROUP_EDGES` segments first, so that a check
+of a few hundred nodes costs microseconds; lines of more than 64 groups use wider ones.
 """
 
 from __future__ import annotations
@@ -183,8 +183,8 @@ def search_meeting(nodes, line, boxes, ways, ends, stack):
     """A pair of edges that may meet, (first, second); (-1, -1) where there is none.
 
     (-2, k) where edge k has no length.  Scratch: `line` (2, 2 ni + 2 nj + 1), `boxes` (4, 2n),
-    `ways` (2n,), `ends` (2, 2n) with n leaves, a power of 2 of at least a LEAF-th of the edges;
-    `stack` (2, 64 * 4).
+    `ways` (2n,), `ends` (2, 2n) with n leaves, a power of 2 of at least a LEAF_EDGES-th of the
+    edges; `stack` (2, 64 * 4).
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     # the boundary and the tree of its pieces

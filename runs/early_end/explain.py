@@ -106,8 +106,8 @@ def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restar
 def find_calm_point(directory: RunDirectory) -> int | None:
     """Step of the last restart point from before the trouble; None where there is none at all.
 
-    Trouble begins after the last step that was not retried and had CALM of the usual dt.  Where all
-    points are later, the first of them.
+    Trouble begins after the last step that was not retried and had CALM_STEP_PART of the usual dt.
+    Where all points are later, the first of them.
     """
     points = []
     for step, path in directory.list_points():

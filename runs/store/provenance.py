@@ -86,7 +86,7 @@ def find_commit(home: Path) -> str:
             done = subprocess.run(command, capture_output=True, text=True, timeout=20)
         except (OSError, subprocess.SubprocessError):
             return ""
-        head, *lines = done.stdout.splitlines() or [""]  # "# branch.oid COMMIT", then others
+        head, *lines = done.stdout.splitlines() or [""]  # "# branch.oid <commit>", then others
         commit = head.rpartition(" ")[2]
         if done.returncode or commit == "(initial)":
             return ""

@@ -1,7 +1,9 @@
 """The code stays plain: one statement a line, names that say their whole meaning."""
 
 import ast
+import io
 import re
+import tokenize
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -156,3 +158,54 @@ def test_few_functions_take_many_arguments(package):
             if count_arguments(function) > MOST_ARGUMENTS:
                 many.add(name)
     assert many == {name for name in TAKES_MANY if name.startswith(f"{package}.")}
+
+
+# capital words of docstrings and comments that are no names of the code
+ACRONYMS = set(
+    "ASCII CPU CRC ED1 ED2 ED3 EDC EDS EOS GCL GIF GNU HLLC HTML IEEE JSON JWL LLVM MPI MUSCL NACA"
+    " NFS NUMBA PEP SDIRK URI XDMF XML".split()
+)
+# programs and formats of others, with names of their own
+OF_OTHERS = {"H5LT_FILE_IMAGE_OPEN_RW", "MPICH", "NUMBA_CPU_FEATURES", "NUMBA_CPU_NAME"}
+OF_OTHERS |= {"NUMBA_ENABLE_AVX", "X_Y"}
+CAPITALS = re.compile(r"\b[A-Z][A-Z_]{2,}[A-Z0-9_]*\b|\b[A-Z][A-Z0-9]*_[A-Z0-9_]*\b")
+
+
+def find_docstrings(tree: ast.Module) -> Iterator[ast.Constant]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and node.body:
+            first = node.body[0]
+            if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
+                yield first.value
+
+
+def read_words(path: Path) -> tuple[set[str], set[tuple[int, str]]]:
+    """Capital names in the code of a file, and the same in its docstrings and comments by lines."""
+    text = path.read_text(encoding="utf-8")
+    docstrings = {node.lineno: str(node.value) for node in find_docstrings(ast.parse(text))}
+    code = set()
+    told = set()
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        line = token.start[0]
+        if token.type == tokenize.COMMENT:
+            words = [] if "noqa" in token.string else CAPITALS.findall(token.string)
+            told.update((line, word) for word in words)
+        elif token.type == tokenize.STRING and line in docstrings:
+            told.update((line, word) for word in CAPITALS.findall(docstrings[line]))
+        elif token.type in (tokenize.NAME, tokenize.STRING):
+            code.update(CAPITALS.findall(token.string))
+    return code, told
+
+
+def test_constants_that_docstrings_name_exist():
+    """A renamed constant is renamed in what is said about it, too."""
+    code = ACRONYMS | OF_OTHERS
+    told = set()
+    for package in PRODUCT:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            of_file, told_there = read_words(path)
+            code |= of_file
+            if path.parent.name != "barrier":
+                told |= {(path.relative_to(ROOT), line, word) for line, word in told_there}
+    missing = sorted(f"{path}:{line}: {word}" for path, line, word in told if word not in code)
+    assert not missing, "\n".join(missing)

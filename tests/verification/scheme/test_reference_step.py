@@ -11,7 +11,7 @@ import pytest
 
 from builders import box
 from hydro.block import Block
-from hydro.boundary import OWN, put
+from hydro.boundary import OWN_SEGMENTS, put
 from hydro.carried.fields import CarriedField
 from hydro.eos import IdealGas, MieGruneisen, PhaseTransition, StiffenedGas
 from hydro.eos.base import REMAINING_DENSITY_PART, make_least_pressure
@@ -269,4 +269,4 @@ def test_every_kind_of_side_is_there():
     flows = [make_flow(MATERIALS["gas"], geometry, False) for geometry in ("plane", "axisymmetric")]
     flows += [make_sliding_flow(MATERIALS["gas"], False)]
     kinds = {s.kind for flow in flows for block in flow.blocks for s in block.segments}
-    assert kinds == set(OWN)
+    assert kinds == set(OWN_SEGMENTS)

@@ -29,7 +29,8 @@ class Material:
     """A material's equation of state, its density at rest in kg/m³, and where they come from.
 
     names: other names by which it is found; strength: of a solid, None for fluids and for solids
-    whose strength is not known.
+    whose strength is not known.  strengths: all laws that are known for it, the first being
+    `strength`, and strength_sources: where the numbers of each come from.
     """
 
     eos: EquationOfState
@@ -37,6 +38,8 @@ class Material:
     source: str
     names: tuple[str, ...] = ()
     strength: StrengthLaw | None = None
+    strengths: tuple[StrengthLaw, ...] = ()
+    strength_sources: tuple[str, ...] = ()
 
 
 def _hint(name: str, known) -> str:
@@ -59,7 +62,7 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
     source = numbers.pop("source")
     names = tuple(numbers.pop("names", ()))
     heat_capacity = numbers.pop("heat_capacity", None)
-    strength_table = numbers.pop("strength_law", None)
+    strength_tables = numbers.pop("strength_law", [])
     rho0 = numbers["rho0"]
     if "rho0" not in _list_parameters(eos_class):
         del numbers["rho0"]
@@ -71,10 +74,37 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
             eos = eos.with_heat_capacity(heat_capacity)
     except BadInput as error:
         raise BadInput(f"{where}: {error}") from None
-    strength = None
-    if strength_table is not None:
-        strength = make_strength(f"{where}, strength_law", strength_table, eos, float(rho0))
-    return Material(eos, float(rho0), source, names, strength)
+    laws = []
+    sources = []
+    for one in strength_tables if isinstance(strength_tables, list) else [strength_tables]:
+        law_table = dict(one) if isinstance(one, Mapping) else one
+        if isinstance(law_table, dict):
+            sources.append(str(law_table.pop("source", source)))
+        laws.append(make_strength(f"{where}, strength_law", law_table, eos, float(rho0)))
+    first = laws[0] if laws else None
+    return Material(eos, float(rho0), source, names, first, tuple(laws), tuple(sources))
+
+
+def choose_strength(where: str, material: Material, choice: object) -> StrengthLaw | None:
+    """The law of strength of a deck's value: True, the kind of a law that the material has, or a
+    table of a law and its parameters; None for False or None.
+
+    Raises BadInput, which begins with `where`, for a material without such a law.
+    """
+    if choice is None or choice is False:
+        return None
+    if isinstance(choice, Mapping):
+        return make_strength(where, choice, material.eos, material.rho0)
+    kinds = [law.kind for law in material.strengths]
+    if choice is True and kinds:
+        return material.strength
+    if choice in kinds:
+        return material.strengths[kinds.index(str(choice))]
+    known = f"it has {', '.join(kinds)}" if kinds else "it has none"
+    raise BadInput(
+        f"{where}: the material has no such law of strength, {choice!r} ({known}); give a table, "
+        'such as { law = "perfect", shear_modulus = 27.6e9, yield_strength = 0.3e9 }'
+    )
 
 
 def make_strength(where: str, table: object, eos: EquationOfState, rho0: float) -> StrengthLaw:

@@ -1,4 +1,4 @@
 """Exact and independent solutions by which problems are judged.
 
-May import: `regrid`, `hydro.eos`, `hydro.formulas`; no problem.
+May import: `regrid`, `hydro.eos`, `hydro.formulas`, `hydro.strength.laws`; no problem.
 """

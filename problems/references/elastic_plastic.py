@@ -23,10 +23,14 @@ from typing import Any
 
 import numpy as np
 
+from hydro.eos.materials import Material
+from hydro.eos.temperature import REST_TEMPERATURE
+from hydro.strength.laws import StrengthLaw
 from regrid.errors import BadInput
 from regrid.roots import find_root
 
 ROOT_TOLERANCE = 1e-15
+LOW_STRAIN_RATE = 1.0  # [1/s], at which elastic limits are given
 RELEASE_TOLERANCE = 1e-11
 # of rho0: how far a release from a shock is followed before S = 0 must have been reached
 RELEASED_DENSITY_PART = 0.7
@@ -83,6 +87,19 @@ class WaveState:
     def stress(self) -> float:
         """Compressive stress along the wave, p - s [Pa]."""
         return self.p - self.deviator
+
+
+def make_solid_at_rest(material: Material, law: StrengthLaw | None = None) -> Solid:
+    """The solid that a material is at rest: G and Y of `law`, by default its own, without plastic
+    strain, at REST_TEMPERATURE and strain rates up to `LOW_STRAIN_RATE`; a fluid without a law."""
+    law = law or material.strength
+    if law is None:
+        return Solid(material.eos, material.rho0, 0.0, 0.0)
+    rest = np.array([material.rho0]), np.zeros(1), np.full(1, REST_TEMPERATURE)
+    shear_modulus = float(law.shear_modulus(*rest)[0])
+    rate = np.full(1, LOW_STRAIN_RATE)
+    yield_stress = float(law.flow_stress(np.zeros(1), rate, *rest)[0])
+    return Solid(material.eos, material.rho0, shear_modulus, yield_stress)
 
 
 def make_rest(solid: Solid) -> WaveState:

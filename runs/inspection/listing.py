@@ -18,6 +18,7 @@ from regrid.plug_ins import GROUPS, find_plug_ins
 from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
 from runs.quantities import add_unit, is_time
 
+AUTHOR = r"\b[A-Z]\. (?:[A-Z]\. )*([A-Z][a-z]+)\b"  # initials and a surname
 SHORT = r".{1,70}(?=[:;] |\.?$)|.*"  # the longest beginning that is a clause
 
 
@@ -95,37 +96,79 @@ def describe_materials(name: str | None = None) -> str:
     """A line for each material of the library, or the parameters and source of material `name`."""
     from hydro.eos.materials import LIBRARY, find_material, find_name, read_materials
 
-    if name is None:
-        head = f"{'material':18}{'kind':18}{'density':>14}{'c0':>12}{'s':>8}"
-        lines = [f"{head}   other names"]
-        for one, material in read_materials(LIBRARY).items():
-            density = f"{material.rho0:g} kg/m3"
-            line = f"{one:18}{material.eos.kind:18}{density:>14}{describe_hugoniot(material.eos)}"
-            lines.append(f"{line}   {', '.join(material.names)}".rstrip())
-        legend = "c0, s: of a straight Hugoniot, Us = c0 + s up"
-        usage = "shockgrid materials NAME: its parameters and their source"
-        return "\n".join([*lines, "", legend, usage])
-    material = find_material(name)
-    lines = [f"{find_name(name)}: {material.eos.kind}"]
+    if name is not None:
+        return describe_material(find_name(name), find_material(name))
+    head = f"{'material':18}{'kind':18}{'density':>12}{'c0':>12}{'s':>7}{'HEL':>11}   {'source':18}"
+    lines = [f"{head}other names"]
+    for one, material in read_materials(LIBRARY).items():
+        density = f"{material.rho0:g} kg/m3"
+        line = f"{one:18}{material.eos.kind:18}{density:>12}{describe_hugoniot(material.eos)}"
+        line += f"{describe_elastic_limit(material):>11}   {shorten_source(material.source):18}"
+        lines.append(f"{line}{', '.join(material.names)}".rstrip())
+    legend = (
+        "c0, s: of a straight Hugoniot, Us = c0 + s up; HEL: Hugoniot elastic limit, the stress of "
+        "the strongest elastic shock, of materials with a law of strength"
+    )
+    usage = "shockgrid materials NAME: its parameters and their source"
+    return "\n".join([*lines, "", *textwrap.wrap(legend, 90), usage])
+
+
+def describe_material(name: str, material: Any) -> str:
+    """The parameters of a material, its laws of strength and their sources."""
+    lines = [f"{name}: {material.eos.kind}"]
     lines[0] += f", also {', '.join(material.names)}" if material.names else ""
-    numbers = {
-        one.name: getattr(material.eos, one.name) for one in fields(material.eos) if one.init
-    }
+    numbers = list_numbers(material.eos)
     if material.eos.heat_capacity > 0.0:
         numbers["heat_capacity"] = material.eos.heat_capacity
-    for one, value in ({"rho0": material.rho0} | numbers).items():
-        lines.append(f"  {one} = {value:g}" if isinstance(value, float) else f"  {one} = {value}")
-    return "\n".join(
-        [*lines, "", *textwrap.wrap(f"source: {' '.join(material.source.split())}", 90)]
-    )
+    lines += describe_numbers({"rho0": material.rho0} | numbers)
+    lines += ["", *textwrap.wrap(f"source: {' '.join(material.source.split())}", 90)]
+    for law, source in zip(material.strengths, material.strength_sources, strict=True):
+        limit = describe_elastic_limit(material, law)
+        lines += ["", f"strength law {law.kind}, Hugoniot elastic limit {limit}"]
+        own = {law.keys.get(key, key): value for key, value in list_numbers(law).items()}
+        lines += describe_numbers(own)
+        lines += ["", *textwrap.wrap(f"source: {' '.join(source.split())}", 90)]
+    return "\n".join(lines)
+
+
+def list_numbers(parts: Any) -> dict[str, Any]:
+    """The parameters of an equation of state or a law of strength by name."""
+    return {one.name: getattr(parts, one.name) for one in fields(parts) if one.init}
+
+
+def describe_numbers(numbers: dict[str, Any]) -> list[str]:
+    """A line for each parameter."""
+    return [
+        f"  {name} = {value:g}" if isinstance(value, float) else f"  {name} = {value}"
+        for name, value in numbers.items()
+    ]
 
 
 def describe_hugoniot(eos: Any) -> str:
     """Two columns: c0 and s of a straight Hugoniot, empty for materials that have another."""
     if not hasattr(eos, "c0"):
-        return f"{'':20}"
+        return f"{'':19}"
     speed = f"{eos.c0:g} m/s"
-    return f"{speed:>12}{eos.s:>8g}"
+    return f"{speed:>12}{eos.s:>7g}"
+
+
+def describe_elastic_limit(material: Any, law: Any = None) -> str:
+    """The Hugoniot elastic limit by a law of strength, by default the first; "" without one."""
+    if material.strength is None:
+        return ""
+    from problems.references.elastic_plastic import find_elastic_limit, make_solid_at_rest
+
+    stress = find_elastic_limit(make_solid_at_rest(material, law)).stress
+    return f"{1e-9 * stress:.3g} GPa"
+
+
+def shorten_source(source: str) -> str:
+    """The first author of a source, with the year; "ours", and "" where there is none."""
+    if source.strip().startswith("ours"):
+        return "ours"
+    author = re.search(AUTHOR, source)
+    year = re.search(r"\b(?:18|19|20)\d\d\b", source[author.end() :]) if author else None
+    return f"{author[1]} {year[0]}" if author and year else ""
 
 
 def describe_deck(path: Path) -> str:

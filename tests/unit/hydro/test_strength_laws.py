@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hydro.eos.materials import make_material
+from hydro.eos.materials import LIBRARY, choose_strength, make_material, read_materials
 from hydro.strength.laws import (
     STRENGTH_LAWS,
     JohnsonCook,
@@ -150,3 +150,38 @@ def test_zerilli_armstrong():
     # without thermal activation
     cold = evaluate(LAWS["zerilli-armstrong-bcc"], 0.0, 1e3, 7830.0, 0.0, 0.0)
     assert cold == pytest.approx(1.85e9)
+
+
+def test_a_material_may_have_several_laws():
+    two = make(
+        strength_law=[
+            PERFECT,
+            {"law": "linear-hardening", "hardening": 1e8}
+            | {key: value for key, value in PERFECT.items() if key != "law"},
+        ]
+    )
+    assert [law.kind for law in two.strengths] == ["perfect", "linear-hardening"]
+    assert choose_strength("a deck", two, True) is two.strength is two.strengths[0]
+    assert choose_strength("a deck", two, "linear-hardening") is two.strengths[1]
+    assert choose_strength("a deck", two, None) is choose_strength("a deck", two, False) is None
+    assert choose_strength("a deck", make(), PERFECT) == Perfect(27.6e9, 0.3e9)
+    with pytest.raises(BadInput, match=r"a deck: .* \(it has perfect, linear-hardening\)"):
+        choose_strength("a deck", two, "johnson-cook")
+    with pytest.raises(BadInput, match=r"a deck: .* \(it has none\)"):
+        choose_strength("a deck", make(), True)
+
+
+def test_laws_of_the_library_keep_the_promises_and_say_their_source():
+    materials = read_materials(LIBRARY)
+    for material in materials.values():
+        for law, source in zip(material.strengths, material.strength_sources, strict=True):
+            check_strength(law, material.rho0)
+            assert len(source) > 40
+    solids = {name for name, material in materials.items() if material.strength}
+    asked = "Al1100 Al2024 Al6061 Al7075 Cu steel-4340 SS304 Ta W Be Pb Ti Ni Sn U"
+    assert solids >= set(asked.split())
+    # misprints of public libraries
+    assert materials["Al1100"].strength.yield_strength == 0.04e9
+    assert materials["Be"].strength.melting_temperature == 1820.0
+    assert materials["Ti"].strength.modulus == 43.4e9
+    assert materials["Al6061"].strength.pressure_slope == 65.2e-12

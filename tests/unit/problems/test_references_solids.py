@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hydro.eos import MieGruneisen
+from hydro.eos.materials import find_material
 from problems.references.collapsing_shells import PlasticShell
 from problems.references.elastic_plastic import (
     Solid,
@@ -13,6 +14,7 @@ from problems.references.elastic_plastic import (
     compute_piston,
     compute_release,
     find_elastic_limit,
+    make_solid_at_rest,
 )
 from problems.references.elastic_waves import (
     compute_elastic_growth,
@@ -86,6 +88,16 @@ def test_jumps_conserve_mass_momentum_and_energy(name, speed):
         assert solid.eos.pressure(state.rho, state.e) == pytest.approx(state.p, rel=1e-12)
         rho, u, stress, e = state.rho, state.u, state.stress, state.e
     assert u == pytest.approx(speed, rel=1e-10)
+
+
+@pytest.mark.parametrize("name, least, most", [("Al6061", 0.5, 0.7), ("Ta", 1.5, 1.8)])
+def test_elastic_limits_of_the_library_are_those_of_measurements(name, least, most):
+    solid = make_solid_at_rest(find_material(name))
+    assert least < 1e-9 * find_elastic_limit(solid).stress < most
+    # Hooke's law: Y (c_l/c_s)²/2
+    longitudinal, shear = compute_wave_speeds(solid.eos, solid.rho0, 0.0, solid.shear_modulus)
+    hooke = 0.5 * solid.yield_stress * (longitudinal / shear) ** 2
+    assert find_elastic_limit(solid).stress == pytest.approx(hooke, rel=0.02)
 
 
 def test_shocks_by_strength():

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.contacts.lines import BOTH, EARLIER, LATER
+from hydro.contacts.lines import BOTH, EARLIER, LATER, is_mirrored_end
 from hydro.facets.lines import find_curve_normal, find_point, measure_square, project
 from hydro.facets.rows import (
     AREA_X,
@@ -116,6 +116,18 @@ def is_film(inner, k, line, a, x, y):
     return -find_depth(line, a, inner[0, k], inner[1, k]) <= 2.0 * deep
 
 
+@compiled_once
+def is_round_corner(line, mirrored, a, at, deep):
+    """Is a point, `deep` behind face `a` [m] at the part `at` of it, nearer to the next side?
+
+    So it is at a corner of the other body.  Lines go on where their ends are `mirrored`.
+    """
+    length = measure_square(line, a) ** 0.5
+    last = line.shape[1] - 2
+    round_start = a == 0 and not mirrored[0] and at * length < deep
+    return round_start or (a == last and not mirrored[1] and (1.0 - at) * length < deep)
+
+
 @kernel
 def find_pins(nodes, other, pins, tolerance, reach, one_body):
     """Fill the positions of the nodes that lie on the other line, -1.0 for all others.
@@ -159,13 +171,12 @@ def find_pins(nodes, other, pins, tolerance, reach, one_body):
                 square = measure_square(line, a)
                 # on it, or behind it by no more than the bulge of a curved contact
                 is_on = away <= tolerance * tolerance * square
-                if not is_on and 0.0 < at < 1.0 and faces_each_other(line, a, along_x, along_y):
+                beside = 0.0 < at < 1.0 or is_mirrored_end(other, a + at)
+                if not is_on and beside and faces_each_other(line, a, along_x, along_y):
                     deep = find_depth(line, a, x, y)
                     is_on = 0.0 < deep <= MOST_BULGE * square**0.5
-                    if a == 0 and at * square**0.5 < deep:
+                    if is_round_corner(line, other.mirrored, a, at, deep):
                         is_on = False  # behind the next side, at the corner of a body
-                    if a == count - 1 and (1.0 - at) * square**0.5 < deep:
-                        is_on = False
                 # of one body: not through a film
                 if is_on and pins.asked[k] and one_body:
                     is_on = not is_film(nodes.inner, k, line, a, x, y)
@@ -271,10 +282,7 @@ def measure_depths(nodes, other, reach, depths):
                 beside = a - 1 if part <= 0.0 else a + 1
                 if not 0.0 < part < 1.0 and 0 <= beside < count:  # nearest to a node: of both faces
                     deep = min(deep, find_depth(line, beside, x, y))
-                length = measure_square(line, a) ** 0.5
-                round_start = a == 0 and part * length < deep
-                round_end = a == count - 1 and (1.0 - part) * length < deep
-                if deep > 0.0 and not round_start and not round_end:
+                if deep > 0.0 and not is_round_corner(line, other.mirrored, a, part, deep):
                     depths[k] = away**0.5
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hydro.contacts.facets import MOST_BULGE, find_depth
+from hydro.contacts.lines import is_free_end
 from hydro.facets.lines import find_point
 from hydro.facets.rows import (
     CLOSED,
@@ -154,7 +155,7 @@ def lay(mover, pins, target, others, how, ways, ends):
         outside = (y * dx - x * dy) / length
         beside = abs(x * dx + y * dy) / length
         at_end = k == 0 or k == last
-        ends_line = not straight and (found == 0.0 or found == most)
+        ends_line = not straight and is_free_end(target, found)
         if not is_laid(k, pins, (outside, beside), length, back, at_end, ends_line):
             continue
         if not straight and max(abs(x), abs(y)) <= STILL_NODE_DISTANCE * length:

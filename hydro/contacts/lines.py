@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from regrid.jit import compiled_once
+
 BOTH, LATER, EARLIER = range(3)  # parts, see `may_lie_on` in `hydro.contacts.facets`
 
 
@@ -14,7 +16,8 @@ class LineNodes(NamedTuple):
 
     line: at the start of the step; new: at its end; further: after some steps like it; inner: the
     next nodes inwards, at its start; boxes, swept (4, groups): around `group` faces each, of the
-    line and of its way to `further`.
+    line and of its way to `further`.  mirrored (2,): is the end on a plane, in which the line goes
+    on as its mirror image?
     """
 
     line: np.ndarray
@@ -23,6 +26,7 @@ class LineNodes(NamedTuple):
     inner: np.ndarray
     boxes: np.ndarray
     swept: np.ndarray
+    mirrored: np.ndarray
     group: int
 
 
@@ -30,7 +34,23 @@ def make_line_nodes(faces: int, group: int) -> LineNodes:
     """Arrays for a line of so many faces, with a box for each `group` of them."""
     nodes = (np.zeros((2, faces + 1)) for _ in range(4))
     boxes = (np.zeros((4, -(-faces // group))) for _ in range(2))
-    return LineNodes(*nodes, *boxes, group=group)
+    return LineNodes(*nodes, *boxes, mirrored=np.zeros(2, dtype=np.bool_), group=group)
+
+
+@compiled_once
+def is_free_end(nodes, position):
+    """Is a position on a line its first or last node, beyond which there is nothing of it?"""
+    most = nodes.line.shape[1] - 1
+    at_start = position == 0.0 and not nodes.mirrored[0]
+    return at_start or (position == most and not nodes.mirrored[1])
+
+
+@compiled_once
+def is_mirrored_end(nodes, position):
+    """Is a position on a line a node on a plane, with the line's mirror image beyond it?"""
+    most = nodes.line.shape[1] - 1
+    at_start = position == 0.0 and nodes.mirrored[0]
+    return at_start or (position == most and nodes.mirrored[1])
 
 
 class Pins(NamedTuple):

@@ -446,6 +446,11 @@ def _find_pairs(
             continue  # what closes there is the sliding contact
         pairs.append(Pair(one, other, one_body, geometry.curved))
     pairs.sort(key=lambda pair: (not pair.leader.rigid, -pair.leader.length))
+    # lines that end on planes go on as their mirror images there
+    for surface in surfaces:
+        for end, node in enumerate(surface.ends):
+            held = node is not None and any(plane.holds(node) for plane in planes)
+            surface.nodes.mirrored[end] = held
     # and planes with each free surface
     free = [surface for surface in surfaces if not surface.rigid]
     pairs += [

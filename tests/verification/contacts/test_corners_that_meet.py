@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from discs import make_half_disc
 
 from builders import box, check_budget, find_unexplained, free, make_body, march_whole, wall_off
 from hydro.rows import P
@@ -126,6 +127,33 @@ def test_a_side_slides_round_a_corner(cells):
     assert simulation.finished
     assert sum(row["retries"] for row in rows[1:]) < 5
     check_budget(rows, names=("momentum_x", "momentum_y", "energy"))
+
+
+@pytest.mark.parametrize(("radius", "cells"), [(0.6, 16), (0.8, 12), (0.5, 20)])
+def test_a_body_is_stopped_on_a_wall_by_the_cavity_around_it(radius, cells):
+    """Half a disc in half a ring, cut off by y = 0: an end that has come past another goes back."""
+    part = np.linspace(0.0, np.pi, 37)[::-1, None]
+    inner = 1e-3
+    rings = np.linspace(inner, 1.5 * inner, 9)
+    ring = make_body("ring", "SS304", np.array([np.cos(part) * rings, np.sin(part) * rings]))
+    wall_off(ring, "i_min", "i_max")
+    free(ring, "j_min", "j_max")
+    middle = (0.995 - radius) * inner
+    core = make_body("core", "Al1100", make_half_disc(cells, middle, radius * inner), 800.0)
+    wall_off(core, "j_min")
+    free(core, "i_min", "i_max", "j_max")
+    simulation = Simulation([ring, core], [], t_end=0.1e-6)
+    rows = [simulation.start_row(), simulation.advance()]
+    while rows[-1]["contacts_made"] == 0:
+        rows.append(simulation.advance())
+    core.nodes[0, -1, 0] = ring.nodes[0, -1, 0] + 2e-3 * CELL
+    passed = []
+    while not simulation.finished:
+        rows.append(simulation.advance())
+        passed.append(core.nodes[0, -1, 0] - ring.nodes[0, -1, 0])
+    assert max(passed) < 3e-3 * CELL
+    assert abs(passed[-1]) < 1e-4 * CELL
+    assert max(row["contact_overlap"] for row in rows[1:]) < 0.05
 
 
 def test_overlap_of_bodies_is_measured():

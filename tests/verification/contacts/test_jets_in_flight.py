@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from discs import make_half_disc
 
 from builders import check_budget, free, make_body
 from hydro.boundary import put
@@ -11,25 +12,6 @@ from hydro.simulation import Simulation
 
 RADIUS = 1e-3
 GPA = 1e9
-
-
-def make_half_disc(cells, middle):
-    """Upper half of a disc around (middle, 0): j_min on y = 0, the arc on the other sides."""
-    angles = np.linspace(np.pi, 0.0, 2 * cells + 1)
-    arc = np.array([np.cos(angles), np.sin(angles)])
-    quarter = cells // 2
-    left = arc[:, : quarter + 1][:, None, :]
-    top = arc[:, quarter:-quarter][:, :, None]
-    right = arc[:, -quarter - 1 :][:, ::-1][:, None, :]
-    bottom = np.array([np.linspace(-1.0, 1.0, cells + 1), np.zeros(cells + 1)])[:, :, None]
-    i = np.linspace(0.0, 1.0, cells + 1)[:, None]
-    j = np.linspace(0.0, 1.0, quarter + 1)
-    corners = bottom[:, :1] * (1.0 - i) * (1.0 - j) + bottom[:, -1:] * i * (1.0 - j)
-    corners = corners + top[:, :1] * (1.0 - i) * j + top[:, -1:] * i * j
-    nodes = (1.0 - i) * left + i * right + (1.0 - j) * bottom + j * top - corners
-    nodes = RADIUS * nodes
-    nodes[0] += middle
-    return nodes
 
 
 def test_nodes_go_along_a_line_without_area():
@@ -49,7 +31,7 @@ def test_nodes_go_along_a_line_without_area():
 
 
 def make_half_ball(name, material, middle, speed, cells):
-    ball = make_body(name, material, make_half_disc(cells, middle), speed, material="metal")
+    ball = make_body(name, material, make_half_disc(cells, middle, RADIUS), speed, material="metal")
     put(ball, "j_min", "wall")
     free(ball, "i_min", "i_max", "j_max")
     return ball

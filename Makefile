@@ -1,4 +1,4 @@
-# Each target sets up .venv by itself when it is missing or pyproject.toml has changed.
+# Each target sets up .venv by itself when it is missing or pyproject.toml or setup.py has changed.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -14,7 +14,7 @@ SOURCES := regrid hydro problems runs shockgrid tests benchmarks docs examples
 # where it is set, as in many containers, each start would compile all that it imports, two seconds;
 # setting up writes the bytecode of a run
 unexport PYTHONDONTWRITEBYTECODE
-WRITE_BYTECODE := $(BIN)/python -c 'import runs.march.launching, runs.pictures.command'
+WRITE_BYTECODE := $(BIN)/python -c 'import shockgrid.runs.march.launching, shockgrid.runs.pictures.command'
 
 .PHONY: help run check test verify soak bench accuracy docs dist sbom requirements lint format \
         setup clean
@@ -43,13 +43,13 @@ $(BIN)/python:
 	  echo "$(PYTHON) -m venv failed: its venv module is missing (on Debian: python3-venv)" >&2; \
 	  rm -rf $(VENV); exit 1; }
 
-$(INSTALL): pyproject.toml | $(BIN)/python
+$(INSTALL): pyproject.toml setup.py | $(BIN)/python
 	@echo "installing into $(VENV) ..."
 	@$(PIP) --editable '.[report]'
 	@$(WRITE_BYTECODE)
 	@touch $@
 
-$(DEVELOP): pyproject.toml | $(BIN)/python
+$(DEVELOP): pyproject.toml setup.py | $(BIN)/python
 	@echo "installing into $(VENV), with what the tests need ..."
 	@$(PIP) $(WHEELS) --editable '.[dev,readers,mpi]' 2>/dev/null || { \
 	  $(PIP) --editable '.[dev]' && \

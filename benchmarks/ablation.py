@@ -25,9 +25,9 @@ from benchmarks.random_motions import OUTCOMES, judge, make_motions
 from benchmarks.regrid_suite.catalogue import NAMES, load_march
 from benchmarks.regrid_suite.harness import run_march
 from benchmarks.result_tables import Tables
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.tuning import DEFAULT, Tuning
-from regrid.errors import RegridFailure
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.barrier.tuning import DEFAULT, Tuning
+from shockgrid.regrid.errors import RegridFailure
 
 KEPT = Path(__file__).resolve().parents[1] / "tests" / "property" / "motions.npz"
 SEED = 20
@@ -121,7 +121,7 @@ def measure_motions(tuning: Tuning, count: int, **options) -> dict:
 
 def measure_deck(tuning: Tuning, name: str, *settings: str) -> str:
     """Steps, sub-moves, rescues and least sine of a flow whose blocks are all tuned so."""
-    from runs.cli.main import cli
+    from shockgrid.runs.cli.main import cli
 
     *given, _ = BarrierRegridder.__init__.__defaults__ or ()
     words = [word for setting in settings for word in ("--set", setting)]

@@ -33,10 +33,10 @@ import accuracy_tables as tables  # noqa: E402
 from benchmarks.growth_accuracy import list_decks, measure_row, write_rows  # noqa: E402
 from benchmarks.random_pairs import measure_random_pairs  # noqa: E402
 from benchmarks.shocked_lines import measure_null_line, sweep_flat_line  # noqa: E402
-from problems.deck import RunControl  # noqa: E402
-from problems.interface_instability.deck import Fluid, InterfaceDeck  # noqa: E402
-from problems.interface_instability.theories import PATH, Measured  # noqa: E402
-from regrid.errors import RunFailure  # noqa: E402
+from shockgrid.problems.deck import RunControl  # noqa: E402
+from shockgrid.problems.interface_instability.deck import Fluid, InterfaceDeck  # noqa: E402
+from shockgrid.problems.interface_instability.theories import PATH, Measured  # noqa: E402
+from shockgrid.regrid.errors import RunFailure  # noqa: E402
 
 RESULTS = ROOT / "docs" / "results"
 PICTURE = ROOT / "docs" / "pictures" / "accuracy.png"

@@ -16,8 +16,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from result_tables import Tables
 
-from regrid.compilation.first_calls import KERNEL_CODES
-from runs.deck.reading import read_deck
+from shockgrid.regrid.compilation.first_calls import KERNEL_CODES
+from shockgrid.runs.deck.reading import read_deck
 
 STEPS_DECK = "interface-instability"  # two blocks, a contact, walls and a piston
 FIRST_STEPS = 20  # not counted: kernels are loaded, the first steps are short

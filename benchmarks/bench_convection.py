@@ -14,8 +14,8 @@ import time
 
 from result_tables import Tables
 
-from problems.convection.heated_cavity import AxisGrid, HeatedCavity, HeatedCavityDeck
-from problems.deck import RunControl
+from shockgrid.problems.convection.heated_cavity import AxisGrid, HeatedCavity, HeatedCavityDeck
+from shockgrid.problems.deck import RunControl
 
 STEADY = ((1e6, 40), (1e6, 80), (1e7, 80), (1e6, 160))
 STEPS = 20

@@ -15,8 +15,8 @@ import argparse
 import numpy as np
 
 from benchmarks.result_tables import Tables
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.measure.quality import compute_scaled_jacobians, measure_first_line_gap
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.measure.quality import compute_scaled_jacobians, measure_first_line_gap
 
 PASSING_CELLS = 48, 24
 GEAR_CELLS = 96, 16

@@ -16,8 +16,8 @@ import time
 import numpy as np
 from mpi4py import MPI
 
-from hydro.ranks.ranks import Ranks
-from runs.deck.reading import read_deck
+from shockgrid.hydro.ranks.ranks import Ranks
+from shockgrid.runs.deck.reading import read_deck
 
 # steps that are measured, messages of a kind
 LAST = 50

@@ -17,11 +17,11 @@ import time
 import numpy as np
 from result_tables import Tables
 
-from regrid.domains_in_space import find_block
-from regrid.equidistribution.volumes import equidistribute_block, solve_ed3
-from regrid.equidistribution.weights import make_position_weight, weigh_points
-from regrid.measure.corners import compute_hexahedron_centres
-from regrid.measure.hexahedra import compute_hexahedron_sines, find_bad_hexahedra
+from shockgrid.regrid.domains_in_space import find_block
+from shockgrid.regrid.equidistribution.volumes import equidistribute_block, solve_ed3
+from shockgrid.regrid.equidistribution.weights import make_position_weight, weigh_points
+from shockgrid.regrid.measure.corners import compute_hexahedron_centres
+from shockgrid.regrid.measure.hexahedra import compute_hexahedron_sines, find_bad_hexahedra
 
 BLOCKS = ("ks_block_1", "ks_block_2")
 WEIGHTS = ("1", "1+10*(z+1)")

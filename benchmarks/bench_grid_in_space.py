@@ -15,16 +15,16 @@ import argparse
 import numpy as np
 from result_tables import Tables
 
-from regrid.domains_in_space import SHAPES, find_block, make_moving_block
-from regrid.equidistribution.volumes import interpolate_faces
-from regrid.hexahedra.regridder import BarrierRegridder3D
-from regrid.measure.hexahedra import (
+from shockgrid.regrid.domains_in_space import SHAPES, find_block, make_moving_block
+from shockgrid.regrid.equidistribution.volumes import interpolate_faces
+from shockgrid.regrid.hexahedra.regridder import BarrierRegridder3D
+from shockgrid.regrid.measure.hexahedra import (
     compute_hexahedron_sines,
     compute_least_jacobian,
     compute_volumes,
     find_bad_hexahedra,
 )
-from runs.grids.making import march_in_space
+from shockgrid.runs.grids.making import march_in_space
 
 BLOCKS = ("ks_block_1", "ks_block_2")
 SETTLED = 1e-3

@@ -14,10 +14,10 @@ import time
 import numpy as np
 from result_tables import Tables
 
-from regrid.algebraic import transfinite_grid
-from regrid.barrier.repair import repair_grid
-from regrid.domains import make_domain
-from regrid.measure.quality import compute_scaled_jacobians, find_bad_cells
+from shockgrid.regrid.algebraic import transfinite_grid
+from shockgrid.regrid.barrier.repair import repair_grid
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.measure.quality import compute_scaled_jacobians, find_bad_cells
 
 DOMAINS = (
     "swan",

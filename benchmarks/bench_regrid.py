@@ -14,13 +14,13 @@ import time
 import numpy as np
 from result_tables import Tables
 
-from regrid.barrier import newton_move
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.sweeps import Sweeps
-from regrid.barrier.workspace import Workspace
-from regrid.domains import make_domain
-from regrid.marching import march_domain
-from regrid.measure.quality import find_bad_cells
+from shockgrid.regrid.barrier import newton_move
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.barrier.sweeps import Sweeps
+from shockgrid.regrid.barrier.workspace import Workspace
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.marching import march_domain
+from shockgrid.regrid.measure.quality import find_bad_cells
 
 MARCHES = (
     "three_fingers",

@@ -16,10 +16,10 @@ import time
 import numpy as np
 from result_tables import Tables
 
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.tuning import DEFAULT
-from regrid.domains import make_domain
-from regrid.protocol import RegridReport
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.barrier.tuning import DEFAULT
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.protocol import RegridReport
 
 DOMAINS = ("three_fingers", "curled_fingers", "single_finger", "strip", "chicane")
 SIZES = "60x40,120x80,240x160"

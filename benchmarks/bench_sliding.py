@@ -18,12 +18,12 @@ import time
 import numpy as np
 from result_tables import Tables
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join, slide
-from hydro.simulation import Simulation
-from problems.plate_on_wedge.problem import PlateOnWedge, PlateOnWedgeDeck
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join, slide
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.plate_on_wedge.problem import PlateOnWedge, PlateOnWedgeDeck
 
 CASES = ("interface", "sliding, equal nodes", "sliding")
 

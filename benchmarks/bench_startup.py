@@ -16,7 +16,7 @@ from result_tables import Tables, read_child_time
 REPEATS = 5
 RUN = """
 import os, sys
-from hydro.simulation import Simulation
+from shockgrid.hydro.simulation import Simulation
 from shockgrid.command import main
 
 def advance(self, step=Simulation.advance):
@@ -33,8 +33,8 @@ CASES = {
     "shockgrid --help": ["-m", "shockgrid", "--help"],
     "shockgrid list": ["-m", "shockgrid", "list"],
     "shockgrid check grid-march": ["-m", "shockgrid", "check", "grid-march"],
-    "import of the runner": ["-c", "import runs.march.runner"],
-    "import of the pictures": ["-c", "import runs.pictures.command"],
+    "import of the runner": ["-c", "import shockgrid.runs.march.runner"],
+    "import of the pictures": ["-c", "import shockgrid.runs.pictures.command"],
     "python alone": ["-c", ""],
     "run interface-instability, to its first step": ["-c", RUN, "stop"],
     "run interface-instability, one step": ["-c", RUN, "go on"],

@@ -23,8 +23,8 @@ import sys
 
 import numpy as np
 
-from hydro.formulas.reconstruction import limit_van_leer as limit
-from problems.shock_bubble import (
+from shockgrid.hydro.formulas.reconstruction import limit_van_leer as limit
+from shockgrid.problems.shock_bubble import (
     AIR,
     AIR_DENSITY,
     AIR_PRESSURE,
@@ -37,7 +37,7 @@ from problems.shock_bubble import (
     ShockBubble,
     ShockBubbleDeck,
 )
-from regrid.jit import inlined, kernel
+from shockgrid.regrid.jit import inlined, kernel
 
 
 @inlined

@@ -11,12 +11,12 @@ import math
 import numpy as np
 from result_tables import Tables
 
-from hydro.convection import columns
-from hydro.convection.columns import FAMILIES
-from hydro.convection.tensor_grids import KINDS, compute_grid_reynolds, make_axis
-from problems.convection.convection_1d import Convection1D, measure_errors
-from problems.convection.moving_grid_1d import WORDS
-from runs.deck.reading import read_deck
+from shockgrid.hydro.convection import columns
+from shockgrid.hydro.convection.columns import FAMILIES
+from shockgrid.hydro.convection.tensor_grids import KINDS, compute_grid_reynolds, make_axis
+from shockgrid.problems.convection.convection_1d import Convection1D, measure_errors
+from shockgrid.problems.convection.moving_grid_1d import WORDS
+from shockgrid.runs.deck.reading import read_deck
 
 SIZES = (1, 2, 4)  # times the deck's cells
 PARTS = (4, 2, 1)  # of the deck's cells
@@ -86,7 +86,7 @@ def add_families(tables: Tables, deck: str) -> None:
 
 def draw_grids(path: str) -> None:
     """Steps of all kinds of grid, settled, and how their error of v falls with the cells."""
-    from runs.pictures.command import new_figure
+    from shockgrid.runs.pictures.command import new_figure
 
     problem = read_deck("convection-1d", ()).make_problem()
     cells = problem.deck.cells

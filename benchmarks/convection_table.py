@@ -12,9 +12,9 @@ import time
 import numpy as np
 from result_tables import Tables
 
-from problems.convection.heated_cavity import AxisGrid, HeatedCavity, HeatedCavityDeck
-from problems.references.convection import STATES
-from regrid.errors import RunFailure
+from shockgrid.problems.convection.heated_cavity import AxisGrid, HeatedCavity, HeatedCavityDeck
+from shockgrid.problems.references.convection import STATES
+from shockgrid.regrid.errors import RunFailure
 
 QUANTITIES = ("nusselt", "u_max", "v_max", "nusselt_max")
 PLACES = {"u_max": "u_max_y", "v_max": "v_max_x", "nusselt_max": "nusselt_max_y"}

@@ -23,16 +23,16 @@ import numba
 import numpy as np
 from result_tables import Tables, describe_machine, read_child_time
 
-from hydro import phases
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import EquationOfState, IdealGas, MieGruneisen
-from hydro.history import PHASES
-from hydro.links import join
-from hydro.simulation import Simulation
-from regrid.errors import BadInput
-from regrid.registry import make_regridder
-from runs.store.reader import RunData
+from shockgrid.hydro import phases
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import EquationOfState, IdealGas, MieGruneisen
+from shockgrid.hydro.history import PHASES
+from shockgrid.hydro.links import join
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.registry import make_regridder
+from shockgrid.runs.store.reader import RunData
 
 CELLS = 400
 STEPS = 87

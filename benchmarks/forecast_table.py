@@ -24,9 +24,9 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from hydro.clock import START_FACTORS  # noqa: E402
-from runs.deck.reading import read_deck  # noqa: E402
-from runs.forecast import (  # noqa: E402
+from shockgrid.hydro.clock import START_FACTORS  # noqa: E402
+from shockgrid.runs.deck.reading import read_deck  # noqa: E402
+from shockgrid.runs.forecast import (  # noqa: E402
     PARTS,
     PAST_RUNS,
     PastRun,
@@ -38,7 +38,7 @@ from runs.forecast import (  # noqa: E402
     name_flow,
     read_past,
 )
-from runs.store.reader import RunData  # noqa: E402
+from shockgrid.runs.store.reader import RunData  # noqa: E402
 
 # decks whose steps are foretold from a run of theirs, at cells that take seconds
 PAST = {

@@ -21,9 +21,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from problems.interface_instability.deck import Fluid, InterfaceDeck
-from problems.interface_instability.problem import InterfaceInstability
-from problems.interface_instability.theories import PATH, Growth, Measured, get_kct, is_still
+from shockgrid.problems.interface_instability.deck import Fluid, InterfaceDeck
+from shockgrid.problems.interface_instability.problem import InterfaceInstability
+from shockgrid.problems.interface_instability.theories import (
+    PATH,
+    Growth,
+    Measured,
+    get_kct,
+    is_still,
+)
 
 METALS = (("Al1100", "SS304"), ("SS304", "Al1100"), ("Al1100", "Pb"), ("Pb", "Al1100"))
 

@@ -25,7 +25,7 @@ from scipy.spatial import cKDTree
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import shockgrid as sg
-from regrid.measure.quality import measure_turns
+from shockgrid.regrid.measure.quality import measure_turns
 
 POINTS = 50_001  # on the curve through the nodes
 

@@ -15,7 +15,7 @@ import msgspec
 from result_tables import Tables
 from wedge_polars import make_angles, measure_polar_point
 
-from problems.plate_on_wedge.problem import PlateOnWedgeDeck
+from shockgrid.problems.plate_on_wedge.problem import PlateOnWedgeDeck
 
 BELOW = (-1.0, -0.1, 0.1, 0.25, 0.5, 1.0, 2.0, 3.0, 5.0)
 TABLE = "polars over the angle"

@@ -20,10 +20,10 @@ from pathlib import Path
 
 import numpy as np
 
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.errors import RegridFailure
-from regrid.measure.corners import BLOCK_CORNERS, compute_corner_signs, compute_turns
-from regrid.sides import SIDES
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.errors import RegridFailure
+from shockgrid.regrid.measure.corners import BLOCK_CORNERS, compute_corner_signs, compute_turns
+from shockgrid.regrid.sides import SIDES
 
 RESULTS = Path(__file__).resolve().parents[1] / "docs" / "results"
 KINDS = ("smooth", "noisy", "bumped", "single node")

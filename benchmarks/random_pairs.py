@@ -11,8 +11,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from problems.riemann import Riemann, RiemannDeck, SideState
-from regrid.errors import BadInput, RunFailure
+from shockgrid.problems.riemann import Riemann, RiemannDeck, SideState
+from shockgrid.regrid.errors import BadInput, RunFailure
 
 ROWS = 2  # of cells: nothing varies across
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import argparse
 
-from regrid.domains import make_domain
-from regrid.registry import make_regridder
-from runs.grids.commands import HEAD, describe_march
-from runs.grids.making import march
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.registry import make_regridder
+from shockgrid.runs.grids.commands import HEAD, describe_march
+from shockgrid.runs.grids.making import march
 
 DOMAINS = (
     "three_fingers",
@@ -43,7 +43,7 @@ METHODS = {
 def make(name: str, options: dict):
     """A regridder of the registry, or the sweeps with options that the barrier does not pass on."""
     if name == "sweeps":
-        from regrid.barrier.sweeps import Sweeps
+        from shockgrid.regrid.barrier.sweeps import Sweeps
 
         return Sweeps(**options)
     return make_regridder(name, **options)

@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput
 
 try:
     import resource

@@ -29,10 +29,10 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from problems.interface_instability.deck import InterfaceDeck
-from problems.interface_instability.line import Mode, measure_mode
-from problems.interface_instability.problem import InterfaceInstability
-from problems.interface_instability.theories import get_kct
+from shockgrid.problems.interface_instability.deck import InterfaceDeck
+from shockgrid.problems.interface_instability.line import Mode, measure_mode
+from shockgrid.problems.interface_instability.problem import InterfaceInstability
+from shockgrid.problems.interface_instability.theories import get_kct
 
 GAP = 0.25  # nearest first distance of the shock, in waves
 AWAY = 0.25  # how far the shock is beyond the line at the end, in waves

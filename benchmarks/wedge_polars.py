@@ -14,14 +14,14 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
-from problems.plate_on_wedge.problem import PlateOnWedge, PlateOnWedgeDeck
-from problems.plate_on_wedge.report import (
+from shockgrid.problems.plate_on_wedge.problem import PlateOnWedge, PlateOnWedgeDeck
+from shockgrid.problems.plate_on_wedge.report import (
     measure_behind,
     measure_contact_speed,
     measure_lead,
     measure_plateau,
 )
-from regrid.errors import RunFailure
+from shockgrid.regrid.errors import RunFailure
 
 DIGITS = 6  # of the numbers handed on
 

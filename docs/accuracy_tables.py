@@ -23,8 +23,8 @@ from typing import Any
 
 from benchmarks.growth_accuracy import METALS
 from benchmarks.random_pairs import make_random_pair
-from hydro.eos.materials import find_material
-from problems.interface_instability.theories import Measured, read_rows
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.problems.interface_instability.theories import Measured, read_rows
 
 RESULTS = Path(__file__).resolve().parent / "results"
 LEVELS = (0.01, 0.02, 0.05)  # errors that are counted; those above the first are bold

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from accuracy_tables import make_table
 
-from runs.inspection.account import RULES
+from shockgrid.runs.inspection.account import RULES
 
 RESULTS = Path(__file__).resolve().parent / "results"
 SHARES = ("10%", "25%", "50%")

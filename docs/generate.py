@@ -58,11 +58,11 @@ from soak_table import fill_soak  # noqa: E402
 from study_tables import fill_study, read_study  # noqa: E402
 
 from benchmarks.race.tables import fill_race  # noqa: E402
-from problems.registry import read_docstring  # noqa: E402
-from runs.early_end.causes import ENDS  # noqa: E402
-from runs.inspection.account import describe_convexity, measure_drifts  # noqa: E402
-from runs.store.reader import RunData  # noqa: E402
-from runs.verify import HEADS, describe_bars, format_record  # noqa: E402
+from shockgrid.problems.registry import read_docstring  # noqa: E402
+from shockgrid.runs.early_end.causes import ENDS  # noqa: E402
+from shockgrid.runs.inspection.account import describe_convexity, measure_drifts  # noqa: E402
+from shockgrid.runs.store.reader import RunData  # noqa: E402
+from shockgrid.runs.verify import HEADS, describe_bars, format_record  # noqa: E402
 
 REGION = re.compile(
     r"(<!-- generated: (?P<kind>\w+) (?P<arguments>.*?) -->\n)(.*?)(<!-- end generated -->)",

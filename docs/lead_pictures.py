@@ -21,9 +21,9 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Rectangle
 
-from problems.interface_instability.theories import get_kct, predict_amplitude
-from problems.pictures import find_dump
-from runs.store.reader import RunData
+from shockgrid.problems.interface_instability.theories import get_kct, predict_amplitude
+from shockgrid.problems.pictures import find_dump
+from shockgrid.runs.store.reader import RunData
 
 PICTURES = Path(__file__).resolve().parent / "pictures"
 INK = "#222222"

@@ -12,32 +12,32 @@ from typing import Any
 
 import numpy as np
 
-from hydro import rim as on
-from hydro import rows as of
-from hydro.carried.fields import CarriedField, read_fields
-from hydro.carried.transport import Transport
-from hydro.eos import EquationOfState
-from hydro.eos.base import check_eos, check_formulas
-from hydro.eos.conversion import compute_energy, compute_temperature
-from hydro.formulas.geometry import PLANE, Geometry, compute_volumes
-from hydro.formulas.reconstruction import DEFAULT_LIMITER
-from hydro.formulas.riemann import DEFAULT_FLUX
-from hydro.interior.advance import count_tiles
-from hydro.interior.cell_fields import (
+from shockgrid.hydro import rim as on
+from shockgrid.hydro import rows as of
+from shockgrid.hydro.carried.fields import CarriedField, read_fields
+from shockgrid.hydro.carried.transport import Transport
+from shockgrid.hydro.eos import EquationOfState
+from shockgrid.hydro.eos.base import check_eos, check_formulas
+from shockgrid.hydro.eos.conversion import compute_energy, compute_temperature
+from shockgrid.hydro.formulas.geometry import PLANE, Geometry, compute_volumes
+from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
+from shockgrid.hydro.formulas.riemann import DEFAULT_FLUX
+from shockgrid.hydro.interior.advance import count_tiles
+from shockgrid.hydro.interior.cell_fields import (
     SLAB_ROWS,
     CellFields,
     check_first_state,
     make_fill_sound_speed,
 )
-from hydro.kernels import BlockKernels
-from hydro.perimeter.contacts import fill_open_flux
-from hydro.perimeter.plan import PerimeterPlan
-from hydro.rim import find_first_face, make_rim
-from hydro.totals import TileTotals
-from regrid.errors import BadInput, Place, RunFailure, suggest
-from regrid.measure.corners import compute_centres
-from regrid.measure.quality import find_bad_cells
-from regrid.sides import J_MIN, SIDE_NAMES, get_side, get_sides
+from shockgrid.hydro.kernels import BlockKernels
+from shockgrid.hydro.perimeter.contacts import fill_open_flux
+from shockgrid.hydro.perimeter.plan import PerimeterPlan
+from shockgrid.hydro.rim import find_first_face, make_rim
+from shockgrid.hydro.totals import TileTotals
+from shockgrid.regrid.errors import BadInput, Place, RunFailure, suggest
+from shockgrid.regrid.measure.corners import compute_centres
+from shockgrid.regrid.measure.quality import find_bad_cells
+from shockgrid.regrid.sides import J_MIN, SIDE_NAMES, get_side, get_sides
 
 UNITS = {"rho": "kg/m3", "u": "m/s", "v": "m/s", "p": "Pa", "e": "J/kg", "T": "K"}
 LONG_NAMES = {

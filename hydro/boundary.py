@@ -23,10 +23,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from hydro import rim as on
-from hydro.block import Block
-from hydro.carried.fields import read_values
-from hydro.perimeter.contacts import (
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.carried.fields import read_values
+from shockgrid.hydro.perimeter.contacts import (
     AT_CELLS,
     AT_FLUX,
     AT_TRACES,
@@ -36,9 +36,9 @@ from hydro.perimeter.contacts import (
     fill_free_surface,
     fill_ghosts_from_faces,
 )
-from hydro.rows import RHO
-from regrid.errors import BadInput, Place, RunFailure, suggest
-from regrid.plug_ins import PlugIns
+from shockgrid.hydro.rows import RHO
+from shockgrid.regrid.errors import BadInput, Place, RunFailure, suggest
+from shockgrid.regrid.plug_ins import PlugIns
 
 
 class NodeMotion(Enum):

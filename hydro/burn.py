@@ -31,8 +31,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydro.eos import JWL
-from regrid.errors import BadInput
+from shockgrid.hydro.eos import JWL
+from shockgrid.regrid.errors import BadInput
 
 FRONT_LEAD_FRACTION = 0.5  # fraction of the front's width that is ahead of the front
 STARTED_BURN_FRACTION = 0.5  # burn fraction from which a self-propagating front burns the rest

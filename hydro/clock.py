@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from regrid.compilation.first_calls import read_clock
+from shockgrid.regrid.compilation.first_calls import read_clock
 
 START_FACTORS = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the stable step: the first steps of a run
 STEP_RECOVERY = 1.3  # growth of the step after it was cut

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.interior.update import sum_tiles
-from hydro.ranks.cutting import CutBlock
-from regrid.jit import kernel
+from shockgrid.hydro.interior.update import sum_tiles
+from shockgrid.hydro.ranks.cutting import CutBlock
+from shockgrid.regrid.jit import kernel
 
 # Bins of the histogram of crowding: binary exponent and three mantissa bits, from 2^-128 to 2^128
 # per square metre.

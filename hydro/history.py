@@ -11,10 +11,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from hydro.step import Flow
-from regrid.errors import BadInput, suggest
-from regrid.measure.quality import measure_worst
-from regrid.plug_ins import PlugIns
+from shockgrid.hydro.step import Flow
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.measure.quality import measure_worst
+from shockgrid.regrid.plug_ins import PlugIns
 
 PHASES = ("sides", "regrid", "flow")
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydro.formulas.geometry import PLANE, Geometry
-from hydro.formulas.reconstruction import FIRST_ORDER_LIMITER
-from hydro.interior.advance import allocate_scratch, make_flow_kernels
-from hydro.perimeter.strips import make_side_kernels
+from shockgrid.hydro.formulas.geometry import PLANE, Geometry
+from shockgrid.hydro.formulas.reconstruction import FIRST_ORDER_LIMITER
+from shockgrid.hydro.interior.advance import allocate_scratch, make_flow_kernels
+from shockgrid.hydro.perimeter.strips import make_side_kernels
 
 
 class BlockKernels:

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro import rim as on
-from hydro.block import Block
-from regrid.jit import kernel
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.block import Block
+from shockgrid.regrid.jit import kernel
 
 
 @kernel(allocates=False)

@@ -14,19 +14,19 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from hydro.block import Block
-from hydro.boundary import Linked, Seam, Sliding, put
-from hydro.carried.fields import check_same
-from hydro.eos.base import is_same_material
-from hydro.perimeter.contacts import (
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import Linked, Seam, Sliding, put
+from shockgrid.hydro.carried.fields import check_same
+from shockgrid.hydro.eos.base import is_same_material
+from shockgrid.hydro.perimeter.contacts import (
     AT_CELLS,
     AT_FLUX,
     AT_TRACES,
     pass_seam,
     solve_link,
 )
-from hydro.sliding.contact import SlidingContact
-from regrid.errors import BadInput
+from shockgrid.hydro.sliding.contact import SlidingContact
+from shockgrid.regrid.errors import BadInput
 
 # of the least of the cells' edges beside a link: nodes of both sides so near are one
 LARGEST_CLOSED_GAP = 1e-4

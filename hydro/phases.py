@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro import rim as on
-from hydro.block import Block
-from hydro.workers import LEAST_INSIDE
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.workers import LEAST_INSIDE
+from shockgrid.regrid.measure.corners import compute_centres
 
 
 def gather(block: Block, t: float = 0.0) -> None:

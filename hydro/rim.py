@@ -3,7 +3,7 @@
 The faces are numbered consecutively in the order of SIDE_NAMES, on each side by increasing i or j.
 Each quantity of a face (its cell, ghost, traces, contact state, flux) is one row (2 (ni + nj),) of
 `Rim.rows`.  Python code uses rows as attributes, `rim.rho`, `rim.p_star`; kernels take `rim.rows`
-and index it by the constants of this module (`from hydro import rim as on`, then
+and index it by the constants of this module (`from shockgrid.hydro import rim as on`, then
 `rim[on.P_STAR, k]`).  Note: faces towards -i and -j have outward normals, too.
 """
 
@@ -14,8 +14,8 @@ from typing import Protocol
 
 import numpy as np
 
-from regrid.jit import compiled_once, inlined
-from regrid.sides import find_node
+from shockgrid.regrid.jit import compiled_once, inlined
+from shockgrid.regrid.sides import find_node
 
 _next = count()
 

@@ -8,30 +8,30 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hydro import phases
-from hydro.block import Block
-from hydro.boundary import OpenSides
-from hydro.clock import Clock, Stopwatch
-from hydro.contacts.meetings import Meetings
-from hydro.contacts.start import check_overlaps
-from hydro.contacts.voids import FACES_IN_STATE, VOIDS_IN_STATE
-from hydro.formulas.geometry import find_geometry
-from hydro.history import compute_columns
-from hydro.ledger import Ledger
-from hydro.links import Exchange, Link, name_materials
-from hydro.motion.grid_motion import GridMotion, MeshMotion
-from hydro.motion.line import Line, LineRule
-from hydro.motion.overlaps import Overlaps
-from hydro.motion.tension import SurfaceTension
-from hydro.ranks.blocks import Blocks
-from hydro.sliding.contact import SlidingContact
-from hydro.small_cells import SmallCells
-from hydro.sources import BodySource, SourceFunction
-from hydro.step import Flow, take_step
-from hydro.workers import Workers
-from regrid.compilation.first_calls import is_interpreting
-from regrid.errors import BadInput, Place, RunFailure
-from regrid.sides import SIDE_NAMES
+from shockgrid.hydro import phases
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import OpenSides
+from shockgrid.hydro.clock import Clock, Stopwatch
+from shockgrid.hydro.contacts.meetings import Meetings
+from shockgrid.hydro.contacts.start import check_overlaps
+from shockgrid.hydro.contacts.voids import FACES_IN_STATE, VOIDS_IN_STATE
+from shockgrid.hydro.formulas.geometry import find_geometry
+from shockgrid.hydro.history import compute_columns
+from shockgrid.hydro.ledger import Ledger
+from shockgrid.hydro.links import Exchange, Link, name_materials
+from shockgrid.hydro.motion.grid_motion import GridMotion, MeshMotion
+from shockgrid.hydro.motion.line import Line, LineRule
+from shockgrid.hydro.motion.overlaps import Overlaps
+from shockgrid.hydro.motion.tension import SurfaceTension
+from shockgrid.hydro.ranks.blocks import Blocks
+from shockgrid.hydro.sliding.contact import SlidingContact
+from shockgrid.hydro.small_cells import SmallCells
+from shockgrid.hydro.sources import BodySource, SourceFunction
+from shockgrid.hydro.step import Flow, take_step
+from shockgrid.hydro.workers import Workers
+from shockgrid.regrid.compilation.first_calls import is_interpreting
+from shockgrid.regrid.errors import BadInput, Place, RunFailure
+from shockgrid.regrid.sides import SIDE_NAMES
 
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
 SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
@@ -431,7 +431,7 @@ def _find_smallest(block: Block) -> tuple[int, int]:
 
 
 def _make_barrier():
-    from regrid.registry import make_regridder
+    from shockgrid.regrid.registry import make_regridder
 
     return make_regridder("barrier")
 

@@ -27,8 +27,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.crowding import (
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.crowding import (
     SIZE_BINS,
     SQUEEZED_CROWDING_RATIO,
     find_most_crowded_of_bands,
@@ -36,15 +36,15 @@ from hydro.crowding import (
     scan_rates_of_bands,
     scan_state,
 )
-from hydro.eos.conversion import has_voids, make_conversion
-from hydro.formulas.geometry import Geometry
-from hydro.interior.update import compute_rate
-from hydro.perimeter.faces import measure_lines, measure_volume
-from hydro.ranks.blocks import Blocks
-from hydro.ranks.cutting import Rows
-from hydro.rim import find_excess
-from regrid.errors import BadInput
-from regrid.jit import compiled_once, kernel
+from shockgrid.hydro.eos.conversion import has_voids, make_conversion
+from shockgrid.hydro.formulas.geometry import Geometry
+from shockgrid.hydro.interior.update import compute_rate
+from shockgrid.hydro.perimeter.faces import measure_lines, measure_volume
+from shockgrid.hydro.ranks.blocks import Blocks
+from shockgrid.hydro.ranks.cutting import Rows
+from shockgrid.hydro.rim import find_excess
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import compiled_once, kernel
 
 MOST_REACH = 6  # cells of a neighbourhood on either side of its own cell
 # fraction of a state redistributed per step, besides all of the step's change

@@ -12,11 +12,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.eos.conversion import add_heat
-from hydro.ranks.blocks import Blocks
-from hydro.rows import HELD_ARRAYS
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos.conversion import add_heat
+from shockgrid.hydro.ranks.blocks import Blocks
+from shockgrid.hydro.rows import HELD_ARRAYS
+from shockgrid.regrid.measure.corners import compute_centres
 
 # (block, x, y, t, dt) -> acceleration x, y [m/s²] and heat per mass over dt [J/kg], for the centres
 # x, y (ni, nj) of the block's cells from t to t + dt

@@ -12,21 +12,21 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
-from hydro import phases
-from hydro.boundary import OpenSides
-from hydro.clock import MOST_STRETCHING, Clock, Stopwatch
-from hydro.contacts.meetings import Meetings
-from hydro.contacts.voids import Voids
-from hydro.ledger import Ledger
-from hydro.links import Exchange
-from hydro.motion import sides as on_sides
-from hydro.motion.grid_motion import GridMotion
-from hydro.motion.sides import Sides, Span
-from hydro.motion.tension import SurfaceTension
-from hydro.ranks.blocks import Blocks
-from hydro.small_cells import SmallCells
-from hydro.sources import BodySource
-from regrid.errors import RegridFailure, RunFailure
+from shockgrid.hydro import phases
+from shockgrid.hydro.boundary import OpenSides
+from shockgrid.hydro.clock import MOST_STRETCHING, Clock, Stopwatch
+from shockgrid.hydro.contacts.meetings import Meetings
+from shockgrid.hydro.contacts.voids import Voids
+from shockgrid.hydro.ledger import Ledger
+from shockgrid.hydro.links import Exchange
+from shockgrid.hydro.motion import sides as on_sides
+from shockgrid.hydro.motion.grid_motion import GridMotion
+from shockgrid.hydro.motion.sides import Sides, Span
+from shockgrid.hydro.motion.tension import SurfaceTension
+from shockgrid.hydro.ranks.blocks import Blocks
+from shockgrid.hydro.small_cells import SmallCells
+from shockgrid.hydro.sources import BodySource
+from shockgrid.regrid.errors import RegridFailure, RunFailure
 
 MOST_RETRIES = 12
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hydro import rows as of
-from hydro.interior.update import sum_tiles
+from shockgrid.hydro import rows as of
+from shockgrid.hydro.interior.update import sum_tiles
 
 
 class Sums(NamedTuple):

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from regrid.jit import can_use_threads
+from shockgrid.regrid.jit import can_use_threads
 
 LEAST_SIDE_BY_SIDE = 8000  # cells of a block from which a thread of its own pays off
 LEAST_INSIDE = 6400  # cells of a block from which threads inside it pay off

@@ -21,14 +21,14 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.carried.fields import CarriedField
-from hydro.eos.materials import Material, find_material, find_name, make_material
-from hydro.links import join, slide
-from hydro.simulation import Simulation
-from hydro.sources import make_gravity
-from problems.deck import (
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.carried.fields import CarriedField
+from shockgrid.hydro.eos.materials import Material, find_material, find_name, make_material
+from shockgrid.hydro.links import join, slide
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.sources import make_gravity
+from shockgrid.problems.deck import (
     NONE,
     Coordinate,
     Deck,
@@ -42,16 +42,22 @@ from problems.deck import (
     key,
     place_file,
 )
-from problems.problem import Problem, Report
-from regrid.domains import distribute_by_arc_length
-from regrid.equidistribution.weights import Expression
-from regrid.errors import BadInput, RegridFailure, suggest
-from regrid.given import find_start, make_boundary, make_polyline, orient_sides, read_source
-from regrid.measure.corners import compute_centres
-from regrid.measure.quality import find_bad_cells
-from regrid.protocol import call_regridder
-from regrid.sides import SIDE_NAMES, compute_area
-from regrid.text_files import read_columns
+from shockgrid.problems.problem import Problem, Report
+from shockgrid.regrid.domains import distribute_by_arc_length
+from shockgrid.regrid.equidistribution.weights import Expression
+from shockgrid.regrid.errors import BadInput, RegridFailure, suggest
+from shockgrid.regrid.given import (
+    find_start,
+    make_boundary,
+    make_polyline,
+    orient_sides,
+    read_source,
+)
+from shockgrid.regrid.measure.corners import compute_centres
+from shockgrid.regrid.measure.quality import find_bad_cells
+from shockgrid.regrid.protocol import call_regridder
+from shockgrid.regrid.sides import SIDE_NAMES, compute_area
+from shockgrid.regrid.text_files import read_columns
 
 FORMULA_CURVE_POINTS = 1025  # points on a curve given by formulas
 # of the regridder; the last moves no node by more cells than that

@@ -26,13 +26,13 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union, get_
 import msgspec
 from msgspec import Meta
 
-from regrid.equidistribution.weights import FIELDS, GEOMETRY, Expression
-from regrid.errors import BadInput
-from regrid.text_files import load_toml, read_text
+from shockgrid.regrid.equidistribution.weights import FIELDS, GEOMETRY, Expression
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.text_files import load_toml, read_text
 
 if TYPE_CHECKING:
-    from hydro.eos.materials import Material
-    from regrid.protocol import Regridder
+    from shockgrid.hydro.eos.materials import Material
+    from shockgrid.regrid.protocol import Regridder
 
 MOST_CELLS = 100_000  # along a side: arrays of one line stay small, whatever a deck says
 
@@ -219,7 +219,7 @@ class Regrid(DeckTable, kw_only=True):
 
         Raises BadInput for names and options that do not exist.
         """
-        from regrid.registry import make_regridder  # numba is slow to load; a deck is not
+        from shockgrid.regrid.registry import make_regridder  # numba is slow to load; a deck is not
 
         if "name" in self.options:
             raise BadInput('regrid.options has "name"; the regridder is named by regrid.name')
@@ -340,7 +340,9 @@ TABLE_KEY = "path"  # of a material: its file with a table of pressures
 
 def _list_tables(file: str, name: str) -> list[str] | None:
     """The files with tables that material `name` of a file needs; None where it cannot be read."""
-    from hydro.eos.materials import find_name  # loads numba, which most decks' names do not need
+    from shockgrid.hydro.eos.materials import (
+        find_name,  # loads numba, which most decks' names do not need
+    )
 
     try:
         table = load_toml(read_text(file))[find_name(f"{file}:{name}")].get(TABLE_KEY)

@@ -20,19 +20,19 @@ from typing import Literal
 
 import numpy as np
 
-from problems.deck import Deck, Regrid, RunControl, key
-from problems.problem import Problem, Report, Row
-from regrid.domains import DOMAINS, MovingDomain, make_domain
-from regrid.errors import RegridFailure
-from regrid.measure.quality import (
+from shockgrid.problems.deck import Deck, Regrid, RunControl, key
+from shockgrid.problems.problem import Problem, Report, Row
+from shockgrid.regrid.domains import DOMAINS, MovingDomain, make_domain
+from shockgrid.regrid.errors import RegridFailure
+from shockgrid.regrid.measure.quality import (
     compute_aspect_ratio,
     compute_scaled_jacobians,
     measure_first_line_gap,
     measure_quality,
 )
-from regrid.node_speeds import measure_node_speeds
-from regrid.protocol import call_regridder
-from regrid.sides import get_side
+from shockgrid.regrid.node_speeds import measure_node_speeds
+from shockgrid.regrid.protocol import call_regridder
+from shockgrid.regrid.sides import get_side
 
 DomainName = Literal[tuple(DOMAINS)]
 NUMBERS = {  # of all steps: label, what of the column, what is wanted

@@ -17,24 +17,24 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import EquationOfState, IdealGas, StiffenedGas
-from hydro.eos.conversion import compute_conserved, find_held
-from hydro.eos.materials import find_material
-from hydro.formulas.reconstruction import DEFAULT_LIMITER
-from hydro.simulation import Simulation
-from hydro.step import take_step
-from problems.deck import DeckTable, key
-from problems.pictures import Colours, draw_field, make_panels, title_time
-from problems.problem import BlockPlan, Problem, find_crossing, say_unreached
-from problems.references.exact_flows import average_points
-from problems.references.hugoniot import Shock, shock_with_mach
-from regrid.compilation.contents import PACKAGES
-from regrid.compilation.kept_files import remember
-from regrid.errors import BadInput
-from regrid.measure.cells import compute_area_fractions
-from regrid.sides import SIDE_NAMES
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import EquationOfState, IdealGas, StiffenedGas
+from shockgrid.hydro.eos.conversion import compute_conserved, find_held
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.step import take_step
+from shockgrid.problems.deck import DeckTable, key
+from shockgrid.problems.pictures import Colours, draw_field, make_panels, title_time
+from shockgrid.problems.problem import BlockPlan, Problem, find_crossing, say_unreached
+from shockgrid.problems.references.exact_flows import average_points
+from shockgrid.problems.references.hugoniot import Shock, shock_with_mach
+from shockgrid.regrid.compilation.contents import is_of_packages
+from shockgrid.regrid.compilation.kept_files import remember
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.cells import compute_area_fractions
+from shockgrid.regrid.sides import SIDE_NAMES
 
 Symmetry = Literal["plane", "cylindrical", "spherical"]
 STRIP_CELLS = 4  # cells across the strip of plane flow
@@ -294,7 +294,7 @@ def settle_front(front: Front, *, cfl: float, limiter: str) -> tuple[int, np.nda
     The shock's place is that of the mass in these cells.  For a material of ours the result is kept
     in the cache of kernels, until a file of the packages changes.
     """
-    if type(front.eos).__module__.split(".")[0] not in PACKAGES:
+    if not is_of_packages(type(front.eos).__module__):
         return _settle(front, cfl, limiter)
     eos = front.eos
     numbers = [getattr(front, one.name) for one in fields(front)[1:]]

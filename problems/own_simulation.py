@@ -8,10 +8,10 @@ import shlex
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from problems.deck import NONE, Deck, key
-from problems.evolution import Evolution
-from problems.problem import Problem
-from regrid.errors import BadInput
+from shockgrid.problems.deck import NONE, Deck, key
+from shockgrid.problems.evolution import Evolution
+from shockgrid.problems.problem import Problem
+from shockgrid.regrid.errors import BadInput
 
 Measure = Callable[[Any], dict[str, float]]
 NOT_IN_NAMES = ',"'  # what history.csv parts columns by

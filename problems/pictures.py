@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from problems.prefixes import pick_prefix
+from shockgrid.problems.prefixes import pick_prefix
 
 
 def name_axis(words: str, unit: str) -> str:

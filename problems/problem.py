@@ -18,15 +18,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from problems.deck import Deck
-from problems.evolution import Evolution
-from problems.pictures import finish_panels
-from regrid.errors import BadInput
+from shockgrid.problems.deck import Deck
+from shockgrid.problems.evolution import Evolution
+from shockgrid.problems.pictures import finish_panels
+from shockgrid.regrid.errors import BadInput
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from hydro.simulation import Simulation
+    from shockgrid.hydro.simulation import Simulation
 
 # `run_data` is runs.store.reader.RunData; the import would point the wrong way, hence Any.
 AnyDeck: TypeAlias = Deck  # inside Problem the name Deck means the problem's own deck
@@ -298,7 +298,7 @@ class Problem:
         class derived from Simulation.  first_dt: bound on the first step [s], for a flow without
         waves initially.
         """
-        from hydro.simulation import Simulation  # slow to load; a deck is not
+        from shockgrid.hydro.simulation import Simulation  # slow to load; a deck is not
 
         run = self.deck.run
         regrid = getattr(self.deck, "regrid", None)

@@ -16,11 +16,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from regrid.errors import BadInput
-from regrid.text_files import check_regular
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.text_files import check_regular
 
 if TYPE_CHECKING:
-    from problems.problem import Problem
+    from shockgrid.problems.problem import Problem
 
 ENDING = ".py"
 PREFIX = "problem_file_"  # of the names of modules, so that none hides another module
@@ -145,7 +145,7 @@ def _describe_failure(path: Path, error: BaseException) -> str:
 
 
 def _find_class(module: ModuleType, path: Path) -> type[Problem]:
-    from problems.problem import Problem
+    from shockgrid.problems.problem import Problem
 
     classes = dict.fromkeys(value for value in vars(module).values() if isinstance(value, type))
     own = [one for one in classes if issubclass(one, Problem) and one.__module__ == module.__name__]

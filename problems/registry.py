@@ -7,51 +7,52 @@ import importlib.util
 from collections import ChainMap
 from typing import TYPE_CHECKING, Any
 
-from problems.problem_file import is_problem_file, read_head, read_problem_file
-from regrid.errors import BadInput, suggest
-from regrid.plug_ins import PlugIns
+from shockgrid.problems.problem_file import is_problem_file, read_head, read_problem_file
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.plug_ins import PlugIns
 
 if TYPE_CHECKING:
-    from problems.problem import Problem
+    from shockgrid.problems.problem import Problem
 
 # by subject, in the order of `shockgrid list`
 SUBJECTS: dict[str, dict[str, str]] = {
     "interfaces": {
-        "interface-instability": "problems.interface_instability.problem:InterfaceInstability",
-        "rayleigh-taylor": "problems.standard.rayleigh_taylor:RayleighTaylor",
-        "shock-bubble": "problems.shock_bubble:ShockBubble",
-        "triple-point": "problems.standard.triple_point:TriplePoint",
+        "interface-instability": "shockgrid.problems.interface_instability.problem"
+        ":InterfaceInstability",
+        "rayleigh-taylor": "shockgrid.problems.standard.rayleigh_taylor:RayleighTaylor",
+        "shock-bubble": "shockgrid.problems.shock_bubble:ShockBubble",
+        "triple-point": "shockgrid.problems.standard.triple_point:TriplePoint",
     },
     "plates, impacts and cones": {
-        "plate-on-wedge": "problems.plate_on_wedge.problem:PlateOnWedge",
-        "flyer-target": "problems.standard.flyer_target:FlyerTarget",
-        "cavity": "problems.standard.cavity:Cavity",
-        "conical-target": "problems.conical_target.problem:ConicalTarget",
-        "detonation": "problems.standard.detonation:Detonation",
+        "plate-on-wedge": "shockgrid.problems.plate_on_wedge.problem:PlateOnWedge",
+        "flyer-target": "shockgrid.problems.standard.flyer_target:FlyerTarget",
+        "cavity": "shockgrid.problems.standard.cavity:Cavity",
+        "conical-target": "shockgrid.problems.conical_target.problem:ConicalTarget",
+        "detonation": "shockgrid.problems.standard.detonation:Detonation",
     },
     "verification against exact solutions": {
-        "riemann": "problems.riemann:Riemann",
-        "free-stream": "problems.standard.free_stream:FreeStream",
-        "vortex": "problems.standard.vortex:Vortex",
-        "gresho": "problems.standard.gresho:Gresho",
-        "taylor-green": "problems.standard.taylor_green:TaylorGreen",
-        "noh": "problems.standard.noh:Noh",
-        "sedov": "problems.standard.sedov:Sedov",
-        "kidder": "problems.standard.kidder:Kidder",
-        "saltzmann": "problems.standard.saltzmann:Saltzmann",
-        "oblique-shock": "problems.standard.oblique_shock:ObliqueShock",
+        "riemann": "shockgrid.problems.riemann:Riemann",
+        "free-stream": "shockgrid.problems.standard.free_stream:FreeStream",
+        "vortex": "shockgrid.problems.standard.vortex:Vortex",
+        "gresho": "shockgrid.problems.standard.gresho:Gresho",
+        "taylor-green": "shockgrid.problems.standard.taylor_green:TaylorGreen",
+        "noh": "shockgrid.problems.standard.noh:Noh",
+        "sedov": "shockgrid.problems.standard.sedov:Sedov",
+        "kidder": "shockgrid.problems.standard.kidder:Kidder",
+        "saltzmann": "shockgrid.problems.standard.saltzmann:Saltzmann",
+        "oblique-shock": "shockgrid.problems.standard.oblique_shock:ObliqueShock",
     },
     "convection and viscous flow": {
-        "heated-cavity": "problems.convection.heated_cavity:HeatedCavity",
-        "rayleigh-benard": "problems.convection.rayleigh_benard:RayleighBenard",
-        "convection-1d": "problems.convection.convection_1d:Convection1D",
-        "moving-grid-1d": "problems.convection.moving_grid_1d:MovingGrid1D",
+        "heated-cavity": "shockgrid.problems.convection.heated_cavity:HeatedCavity",
+        "rayleigh-benard": "shockgrid.problems.convection.rayleigh_benard:RayleighBenard",
+        "convection-1d": "shockgrid.problems.convection.convection_1d:Convection1D",
+        "moving-grid-1d": "shockgrid.problems.convection.moving_grid_1d:MovingGrid1D",
     },
     "grids without flow": {
-        "grid-march": "problems.grid_march:GridMarch",
+        "grid-march": "shockgrid.problems.grid_march:GridMarch",
     },
     "your own blocks": {
-        "blocks": "problems.blocks:Blocks",
+        "blocks": "shockgrid.problems.blocks:Blocks",
     },
 }
 OWN = {name: place for listed in SUBJECTS.values() for name, place in listed.items()}
@@ -59,7 +60,7 @@ INSTALLED = PlugIns("shockgrid.problems")  # of other packages
 # where each is, "module:class"; of an installed package, the class itself
 PROBLEMS: ChainMap[str, Any] = ChainMap(OWN, INSTALLED)  # type: ignore
 # run by name from a run directory, not from a deck of one's own: in no list
-INNER: dict[str, str] = {"simulation": "problems.own_simulation:OwnSimulation"}
+INNER: dict[str, str] = {"simulation": "shockgrid.problems.own_simulation:OwnSimulation"}
 
 
 def is_problem(name: object) -> bool:

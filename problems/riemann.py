@@ -21,20 +21,31 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from msgspec import Meta
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import EquationOfState, IdealGas, StiffenedGas
-from hydro.eos.materials import find_material
-from hydro.formulas.reconstruction import DEFAULT_LIMITER
-from hydro.links import join
-from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.initial_states import Fluid, make_plane_grid, put_walls
-from problems.pictures import name_axis, title_time
-from problems.problem import Problem, Report, average_plateau, compare, get_last, keep_until
-from problems.references.hugoniot import caution_fit
-from problems.references.riemann import RiemannSolution, compute_cell_averages, solve_riemann
-from regrid.errors import BadInput, suggest
-from regrid.roots import find_root
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import EquationOfState, IdealGas, StiffenedGas
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
+from shockgrid.hydro.links import join
+from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
+from shockgrid.problems.initial_states import Fluid, make_plane_grid, put_walls
+from shockgrid.problems.pictures import name_axis, title_time
+from shockgrid.problems.problem import (
+    Problem,
+    Report,
+    average_plateau,
+    compare,
+    get_last,
+    keep_until,
+)
+from shockgrid.problems.references.hugoniot import caution_fit
+from shockgrid.problems.references.riemann import (
+    RiemannSolution,
+    compute_cell_averages,
+    solve_riemann,
+)
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.roots import find_root
 
 # of the length of a side that its fastest wave goes, where no end time is given
 FASTEST_WAVE_WAY = 0.8

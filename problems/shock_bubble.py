@@ -22,20 +22,20 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join
-from hydro.motion.line import LineRule
-from hydro.motion.smoothing import THICK_CELLS
-from problems.deck import MOST_CELLS, Deck, Limiter, Output, Regrid, RunControl, key
-from problems.initial_states import make_plane_grid, mix_states, put_walls
-from problems.pictures import Colours, draw_field, draw_grid, find_dump, make_panels
-from problems.problem import Problem, Report, Row, align, find_time, get_last
-from problems.references.hugoniot import shock_with_mach
-from problems.references.riemann import solve_riemann
-from regrid.algebraic import fill_from_sides
-from regrid.measure.cells import compute_area_fractions
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.hydro.motion.line import LineRule
+from shockgrid.hydro.motion.smoothing import THICK_CELLS
+from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Output, Regrid, RunControl, key
+from shockgrid.problems.initial_states import make_plane_grid, mix_states, put_walls
+from shockgrid.problems.pictures import Colours, draw_field, draw_grid, find_dump, make_panels
+from shockgrid.problems.problem import Problem, Report, Row, align, find_time, get_last
+from shockgrid.problems.references.hugoniot import shock_with_mach
+from shockgrid.problems.references.riemann import solve_riemann
+from shockgrid.regrid.algebraic import fill_from_sides
+from shockgrid.regrid.measure.cells import compute_area_fractions
 
 SECONDS_PER_MICROSECOND = 1e-6
 AIR_PRESSURE = 101325.0

@@ -22,13 +22,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from regrid.errors import BadInput
-from regrid.jit import inlined, kernel
-from regrid.measure.corners import BLOCK_CORNERS
-from regrid.measure.faults import check_grids, explain_failure, name_cells
-from regrid.measure.quality import compute_corner_areas
-from regrid.protocol import RegridReport, RegridResult
-from regrid.sides import copy_sides
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import inlined, kernel
+from shockgrid.regrid.measure.corners import BLOCK_CORNERS
+from shockgrid.regrid.measure.faults import check_grids, explain_failure, name_cells
+from shockgrid.regrid.measure.quality import compute_corner_areas
+from shockgrid.regrid.protocol import RegridReport, RegridResult
+from shockgrid.regrid.sides import copy_sides
 
 # Rows of the scratch: along j, the spacing on i_min, its change towards i_max, the values on i_min
 # and their change towards i_max; then, along i, the same for the sides j_min and j_max.

@@ -22,9 +22,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from regrid.errors import BadInput, RegridFailure
-from regrid.jit import kernel
-from regrid.roots import find_root
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.roots import find_root
 
 SETTLED_PRODUCT_SPREAD = 1e-9  # relative spread of products that passes for equal
 REFINED_STEP_RATIO = 1.15  # of neighbouring steps where a line is refined towards one end

@@ -25,10 +25,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from regrid.algebraic import transfinite_grid
-from regrid.curves import arc_spacing, clustered_spacing
-from regrid.errors import BadInput, suggest
-from regrid.sides import SIDE_NAMES, copy_sides
+from shockgrid.regrid.algebraic import transfinite_grid
+from shockgrid.regrid.curves import arc_spacing, clustered_spacing
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.sides import SIDE_NAMES, copy_sides
 
 MOTION_SAMPLES = 129  # amplitudes at which the motion of a side is measured,
 SIDES_SAMPLES = 257  # and that of all sides, which may turn corners

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrid.errors import BadInput, suggest
+from shockgrid.regrid.errors import BadInput, suggest
 
 Mapping = Callable[[np.ndarray], np.ndarray]
 

@@ -21,14 +21,14 @@ from pathlib import Path
 
 import numpy as np
 
-from regrid import plot3d
-from regrid.algebraic import transfinite_grid
-from regrid.barrier.repair import RepairReport, repair_grid
-from regrid.domains import distribute_by_arc_length
-from regrid.errors import BadInput
-from regrid.hdf5_files import open_hdf5
-from regrid.measure.cuts import Cuts, join_wakes
-from regrid.sides import SIDE_NAMES, get_side, get_sides
+from shockgrid.regrid import plot3d
+from shockgrid.regrid.algebraic import transfinite_grid
+from shockgrid.regrid.barrier.repair import RepairReport, repair_grid
+from shockgrid.regrid.domains import distribute_by_arc_length
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.hdf5_files import open_hdf5
+from shockgrid.regrid.measure.cuts import Cuts, join_wakes
+from shockgrid.regrid.sides import SIDE_NAMES, get_side, get_sides
 
 ALIASES = dict(zip(("left", "right", "bottom", "top"), SIDE_NAMES, strict=True))
 # extents whose areas can be computed with

@@ -23,8 +23,8 @@ import numba
 import numpy as np
 from numba.extending import overload, register_jitable
 
-from regrid.compilation.contents import name_by_contents
-from regrid.compilation.first_calls import KERNEL_CODES, before_compiling
+from shockgrid.regrid.compilation.contents import name_by_contents
+from shockgrid.regrid.compilation.first_calls import KERNEL_CODES, before_compiling
 
 FIRST_TRIED = 0, 60  # releases of numba whose insides `machine_code` knows
 LAST_TRIED = 0, 68
@@ -34,9 +34,9 @@ try:
         raise ImportError("only numba's public interface is wanted")
     if not FIRST_TRIED <= numba.version_info.short <= LAST_TRIED:
         raise ImportError("the insides of this release of numba are not known")
-    from regrid.compilation import machine_code as backend
+    from shockgrid.regrid.compilation import machine_code as backend
 except ImportError:
-    from regrid.compilation import numba_cache as backend  # type: ignore[no-redef]
+    from shockgrid.regrid.compilation import numba_cache as backend  # type: ignore[no-redef]
 
 # was this process forked from one whose kernels had started threads?
 _forked = SimpleNamespace(from_threads=False)

@@ -14,17 +14,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from regrid.domains import MovingDomain, find_shortest_edge
-from regrid.errors import BadInput, RegridFailure
-from regrid.measure.faults import name_cells
-from regrid.measure.quality import (
+from shockgrid.regrid.domains import MovingDomain, find_shortest_edge
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.measure.faults import name_cells
+from shockgrid.regrid.measure.quality import (
     find_bad_cells,
     measure_first_line_gap,
     measure_quality,
     say_not_convex,
 )
-from regrid.protocol import Regridder, RegridReport, call_regridder
-from regrid.sides import SIDE_NAMES, compute_area, get_sides
+from shockgrid.regrid.protocol import Regridder, RegridReport, call_regridder
+from shockgrid.regrid.sides import SIDE_NAMES, compute_area, get_sides
 
 BOUNDARY_PATH_SAMPLES = 513  # times at which the way of the boundary is measured
 

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrid.algebraic import fill_displacement
-from regrid.jit import inlined, kernel
-from regrid.measure.corners import compute_doubled_area, find_triangle
-from regrid.measure.quality import find_bad_cells
-from regrid.symmetry import find_symmetry
-from regrid.work_arrays import share_memory
+from shockgrid.regrid.algebraic import fill_displacement
+from shockgrid.regrid.jit import inlined, kernel
+from shockgrid.regrid.measure.corners import compute_doubled_area, find_triangle
+from shockgrid.regrid.measure.quality import find_bad_cells
+from shockgrid.regrid.symmetry import find_symmetry
+from shockgrid.regrid.work_arrays import share_memory
 
 MOST_CELL_HALVINGS = 8
 MOST_RETURN_ROUNDS = 24  # at most, in which nodes of folded cells return to the new grid

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput
 
 ENDINGS = (".p3d", ".p2d", ".xyz", ".xy", ".x", ".g", ".fmt", ".p3dfmt", ".ufmt", ".grd")
 MOST_BLOCKS = 100_000

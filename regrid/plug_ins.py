@@ -18,7 +18,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput
 
 GROUPS = {
     "shockgrid.problems": "problem",

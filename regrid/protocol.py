@@ -15,8 +15,8 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from regrid.errors import BadInput
-from regrid.sides import SIDE_NAMES, get_sides
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.sides import SIDE_NAMES, get_sides
 
 
 @dataclass(frozen=True)

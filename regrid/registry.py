@@ -14,23 +14,23 @@ from collections import ChainMap
 from numbers import Integral, Real
 from typing import Any
 
-from regrid.errors import BadInput, suggest
-from regrid.plug_ins import PlugIns
-from regrid.protocol import Regridder
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.plug_ins import PlugIns
+from shockgrid.regrid.protocol import Regridder
 
 OWN: dict[str, str] = {
-    "barrier": "regrid.barrier.regridder:BarrierRegridder",
-    "barrier-i": "regrid.barrier.regridder:StraightAlongI",
-    "barrier-j": "regrid.barrier.regridder:StraightAlongJ",
-    "barrier-both": "regrid.barrier.regridder:StraightBothWays",
-    "quasi-1d": "regrid.algebraic:QuasiOneDimensionalRegridder",
-    "transfinite": "regrid.algebraic:TransfiniteRegridder",
-    "displacement": "regrid.algebraic:DisplacementRegridder",
-    "equidistribution": "regrid.equidistribution.areas:EquidistributionRegridder",
-    "brackbill-saltzman": "regrid.variational:VariationalRegridder",
-    "ivanenko-charakhchyan": "regrid.variational:IvanenkoCharakhchyanRegridder",
-    "node-speed": "regrid.variational:NodeSpeedRegridder",
-    "winslow": "regrid.winslow:WinslowRegridder",
+    "barrier": "shockgrid.regrid.barrier.regridder:BarrierRegridder",
+    "barrier-i": "shockgrid.regrid.barrier.regridder:StraightAlongI",
+    "barrier-j": "shockgrid.regrid.barrier.regridder:StraightAlongJ",
+    "barrier-both": "shockgrid.regrid.barrier.regridder:StraightBothWays",
+    "quasi-1d": "shockgrid.regrid.algebraic:QuasiOneDimensionalRegridder",
+    "transfinite": "shockgrid.regrid.algebraic:TransfiniteRegridder",
+    "displacement": "shockgrid.regrid.algebraic:DisplacementRegridder",
+    "equidistribution": "shockgrid.regrid.equidistribution.areas:EquidistributionRegridder",
+    "brackbill-saltzman": "shockgrid.regrid.variational:VariationalRegridder",
+    "ivanenko-charakhchyan": "shockgrid.regrid.variational:IvanenkoCharakhchyanRegridder",
+    "node-speed": "shockgrid.regrid.variational:NodeSpeedRegridder",
+    "winslow": "shockgrid.regrid.winslow:WinslowRegridder",
 }
 # where each is, "module:class"; of an installed package, the class itself
 REGRIDDERS: ChainMap[str, Any] = ChainMap(OWN, PlugIns("shockgrid.regridders"))  # type: ignore

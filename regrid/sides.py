@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.jit import inlined, kernel
+from shockgrid.regrid.jit import inlined, kernel
 
 SIDE_NAMES = ("i_min", "i_max", "j_min", "j_max")
 I_MIN, I_MAX, J_MIN, J_MAX = range(4)  # their numbers, as kernels take them

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput
 
 if TYPE_CHECKING:
     import numpy as np

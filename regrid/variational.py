@@ -42,22 +42,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from regrid.algebraic import displaced_grid
-from regrid.barrier import assembly as at
-from regrid.barrier.functional import corner_blocks, prepare_corners
-from regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
-from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE
-from regrid.barrier.step_control import CHUNK_SPAN, shorten_steps
-from regrid.barrier.tuning import Tuning
-from regrid.barrier.workspace import Workspace
-from regrid.equidistribution.weights import WeightedRegridder, compute_side_density
-from regrid.errors import BadInput, RegridFailure
-from regrid.jit import kernel
-from regrid.measure.corners import BLOCK_CORNERS, find_excluded_corners, is_collapsed
-from regrid.measure.faults import check_grids, name_cells
-from regrid.measure.quality import compute_corner_areas
-from regrid.protocol import RegridReport, RegridResult
-from regrid.sides import compute_area, copy_sides
+from shockgrid.regrid.algebraic import displaced_grid
+from shockgrid.regrid.barrier import assembly as at
+from shockgrid.regrid.barrier.functional import corner_blocks, prepare_corners
+from shockgrid.regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
+from shockgrid.regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE
+from shockgrid.regrid.barrier.step_control import CHUNK_SPAN, shorten_steps
+from shockgrid.regrid.barrier.tuning import Tuning
+from shockgrid.regrid.barrier.workspace import Workspace
+from shockgrid.regrid.equidistribution.weights import WeightedRegridder, compute_side_density
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.measure.corners import BLOCK_CORNERS, find_excluded_corners, is_collapsed
+from shockgrid.regrid.measure.faults import check_grids, name_cells
+from shockgrid.regrid.measure.quality import compute_corner_areas
+from shockgrid.regrid.protocol import RegridReport, RegridResult
+from shockgrid.regrid.sides import compute_area, copy_sides
 
 # Rows of the energy's scratch: edges along i, then along j at the near and the far row of nodes.
 EDGE_I_X, EDGE_I_Y, NEAR_X, NEAR_Y, FAR_X = range(5)

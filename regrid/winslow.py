@@ -18,13 +18,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.algebraic import begin_grid
-from regrid.equidistribution.areas import make_cycle, sweep_both_ways
-from regrid.errors import BadInput
-from regrid.jit import kernel
-from regrid.measure.faults import check_grids, explain_failure, find_unit, name_cells
-from regrid.measure.quality import compute_corner_areas
-from regrid.protocol import RegridReport, RegridResult
+from shockgrid.regrid.algebraic import begin_grid
+from shockgrid.regrid.equidistribution.areas import make_cycle, sweep_both_ways
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.measure.faults import check_grids, explain_failure, find_unit, name_cells
+from shockgrid.regrid.measure.quality import compute_corner_areas
+from shockgrid.regrid.protocol import RegridReport, RegridResult
 
 
 @kernel

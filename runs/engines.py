@@ -28,8 +28,8 @@ from concurrent.futures import (
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Protocol, cast
 
-from hydro.workers import count_processors
-from regrid.errors import BadInput
+from shockgrid.hydro.workers import count_processors
+from shockgrid.regrid.errors import BadInput
 
 Task = Callable[[Any], Any]
 

@@ -17,14 +17,14 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from problems.problem import Problem, estimate_memory, plan_blocks
-from regrid.errors import BadInput
-from runs.deck.checking import find_changes
-from runs.deck.reading import ReadDeck
-from runs.early_end.causes import SHORT_STEPS, describe_settings
-from runs.inspection.account import OWN_REASONS
-from runs.quantities import count, describe_bytes, describe_seconds
-from runs.store.directory import KEPT_RESTARTS
+from shockgrid.problems.problem import Problem, estimate_memory, plan_blocks
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.deck.checking import find_changes
+from shockgrid.runs.deck.reading import ReadDeck
+from shockgrid.runs.early_end.causes import SHORT_STEPS, describe_settings
+from shockgrid.runs.inspection.account import OWN_REASONS
+from shockgrid.runs.quantities import count, describe_bytes, describe_seconds
+from shockgrid.runs.store.directory import KEPT_RESTARTS
 
 DUMP_BYTES = 64  # a cell in a dump: nodes, five fields and a rate
 BLOCK_BYTES = 30_000  # of a block in a dump, for the form of the file; measured

@@ -17,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from hydro.block import Block
-from problems.deck import Gauge, place_gauges
-from problems.evolution import BlockView, Evolution, get_material
-from regrid.errors import BadInput, suggest
-from regrid.measure.cells import OUTSIDE_BLOCK, find_places
-from runs.store.history import HistoryWriter
+from shockgrid.hydro.block import Block
+from shockgrid.problems.deck import Gauge, place_gauges
+from shockgrid.problems.evolution import BlockView, Evolution, get_material
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.measure.cells import OUTSIDE_BLOCK, find_places
+from shockgrid.runs.store.history import HistoryWriter
 
 FIXED_POINT_GAP = 0.05  # cells beside a block at which a fixed point still counts as in it
 # the same for a point of the material, beside the blocks of that material

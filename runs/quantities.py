@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from problems.prefixes import pick_prefix
+from shockgrid.problems.prefixes import pick_prefix
 
 
 def describe_time(t: float, unit: str = "s", digits: int = 6) -> str:

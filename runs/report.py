@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from problems.evolution import get_material
-from regrid.errors import BadInput, RunFailure
-from regrid.text_files import escape_controls
-from runs.grids.quality import judge
-from runs.inspection.account import (
+from shockgrid.problems.evolution import get_material
+from shockgrid.regrid.errors import BadInput, RunFailure
+from shockgrid.regrid.text_files import escape_controls
+from shockgrid.runs.grids.quality import judge
+from shockgrid.runs.inspection.account import (
     CONSERVATION_ERROR_LIMIT,
     HEAD,
     describe_cautions,
@@ -29,14 +29,14 @@ from runs.inspection.account import (
     describe_verdict,
     measure_drifts,
 )
-from runs.inspection.info import (
+from shockgrid.runs.inspection.info import (
     describe_problem,
     describe_settings,
     describe_state,
     find_verdict,
     other_name,
 )
-from runs.pictures.command import (
+from shockgrid.runs.pictures.command import (
     Wanted,
     default_fields,
     fill_figure,
@@ -44,10 +44,10 @@ from runs.pictures.command import (
     new_figure,
     save,
 )
-from runs.pictures.fields import get_style, list_fields
-from runs.pictures.film import make_film
-from runs.store.files import check_folder, write_atomically
-from runs.store.reader import Dump, RunData
+from shockgrid.runs.pictures.fields import get_style, list_fields
+from shockgrid.runs.pictures.film import make_film
+from shockgrid.runs.store.files import check_folder, write_atomically
+from shockgrid.runs.store.reader import Dump, RunData
 
 TEMPLATES = Path(__file__).resolve().with_name("templates")
 KINDS = {".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4", ".toml": "text/plain"}

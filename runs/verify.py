@@ -16,12 +16,12 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from regrid.compilation.first_calls import read_processor_time
-from regrid.errors import BadInput, RunFailure
-from runs.deck.reading import read_deck, suggest_deck
-from runs.engines import Engine, InTurn, open_engine
-from runs.store.files import check_free, write_atomically
-from runs.store.provenance import describe_software
+from shockgrid.regrid.compilation.first_calls import read_processor_time
+from shockgrid.regrid.errors import BadInput, RunFailure
+from shockgrid.runs.deck.reading import read_deck, suggest_deck
+from shockgrid.runs.engines import Engine, InTurn, open_engine
+from shockgrid.runs.store.files import check_free, write_atomically
+from shockgrid.runs.store.provenance import describe_software
 
 
 class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

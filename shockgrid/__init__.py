@@ -1,8 +1,10 @@
 """The public Python interface: `import shockgrid as sg`, then `sg.load`, `sg.run`, `sg.open`, ...
 
 Each name is imported when it is first used.  May import: `regrid`, `hydro`, `problems`, `runs`,
-and only inside functions, so that `import shockgrid` loads nothing heavy and another package
-called `runs` is detected before it is run.
+and only inside functions, so that `import shockgrid` loads nothing heavy.
+
+These four lie inside this package once it is installed (`shockgrid.regrid`, ...) and beside it in
+the repository; docstrings and pages name their modules without the leading `shockgrid`.
 """
 
 from __future__ import annotations
@@ -11,10 +13,11 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from hydro.block import Block
-    from hydro.boundary import Segment, put
-    from hydro.carried.fields import CarriedField
-    from hydro.eos import (
+    from shockgrid import testing
+    from shockgrid.hydro.block import Block
+    from shockgrid.hydro.boundary import Segment, put
+    from shockgrid.hydro.carried.fields import CarriedField
+    from shockgrid.hydro.eos import (
         JWL,
         EquationOfState,
         IdealGas,
@@ -23,92 +26,91 @@ if TYPE_CHECKING:
         StiffenedGas,
         Tabular,
     )
-    from hydro.eos.materials import find_material
-    from hydro.links import join, slide
-    from hydro.simulation import Simulation
-    from hydro.sources import make_gravity as gravity
-    from hydro.strength.laws.base import StrengthLaw
-    from problems.deck import Deck, DeckTable, Output, Regrid, RunControl, key
-    from problems.initial_states import make_plane_grid, put_walls, shock
-    from problems.pictures import draw_field
-    from problems.problem import Problem, Report, Row
-    from problems.problem import compare as compare_column
-    from regrid.algebraic import AlgebraicRegridder, transfinite_grid
-    from regrid.barrier.regridder import BarrierRegridder
-    from regrid.errors import BadInput, RegridFailure, RunFailure
-    from regrid.jit import inlined
-    from regrid.registry import make_regridder
-    from runs.inspection.compare import compare
-    from runs.inspection.info import inspect
-    from runs.interface import grid
-    from runs.interface.calls import plot, register, restart, run, verify
-    from runs.interface.case import Case, Hook, OpenRun, load
-    from runs.interface.case import open_run as open
-    from runs.pictures.film import make_film as film
-    from runs.report import report
-    from runs.study.study import Study, study
-    from shockgrid import testing
+    from shockgrid.hydro.eos.materials import find_material
+    from shockgrid.hydro.links import join, slide
+    from shockgrid.hydro.simulation import Simulation
+    from shockgrid.hydro.sources import make_gravity as gravity
+    from shockgrid.hydro.strength.laws.base import StrengthLaw
+    from shockgrid.problems.deck import Deck, DeckTable, Output, Regrid, RunControl, key
+    from shockgrid.problems.initial_states import make_plane_grid, put_walls, shock
+    from shockgrid.problems.pictures import draw_field
+    from shockgrid.problems.problem import Problem, Report, Row
+    from shockgrid.problems.problem import compare as compare_column
+    from shockgrid.regrid.algebraic import AlgebraicRegridder, transfinite_grid
+    from shockgrid.regrid.barrier.regridder import BarrierRegridder
+    from shockgrid.regrid.errors import BadInput, RegridFailure, RunFailure
+    from shockgrid.regrid.jit import inlined
+    from shockgrid.regrid.registry import make_regridder
+    from shockgrid.runs.inspection.compare import compare
+    from shockgrid.runs.inspection.info import inspect
+    from shockgrid.runs.interface import grid
+    from shockgrid.runs.interface.calls import plot, register, restart, run, verify
+    from shockgrid.runs.interface.case import Case, Hook, OpenRun, load
+    from shockgrid.runs.interface.case import open_run as open
+    from shockgrid.runs.pictures.film import make_film as film
+    from shockgrid.runs.report import report
+    from shockgrid.runs.study.study import Study, study
 
     __version__: str
 
 MODULES = {
-    "AlgebraicRegridder": "regrid.algebraic",
-    "BadInput": "regrid.errors",
-    "BarrierRegridder": "regrid.barrier.regridder",
-    "Block": "hydro.block",
-    "CarriedField": "hydro.carried.fields",
-    "Case": "runs.interface.case",
-    "Deck": "problems.deck",
-    "DeckTable": "problems.deck",
-    "EquationOfState": "hydro.eos.base",
-    "Hook": "runs.interface.case",
-    "IdealGas": "hydro.eos.gases",
-    "JWL": "hydro.eos.jwl",
-    "MieGruneisen": "hydro.eos.mie_gruneisen",
-    "OpenRun": "runs.interface.case",
-    "Output": "problems.deck",
-    "PhaseTransition": "hydro.eos.phase_transition",
-    "Problem": "problems.problem",
-    "Regrid": "problems.deck",
-    "RegridFailure": "regrid.errors",
-    "Report": "problems.problem",
-    "Row": "problems.problem",
-    "RunControl": "problems.deck",
-    "RunFailure": "regrid.errors",
-    "Segment": "hydro.boundary",
-    "Simulation": "hydro.simulation",
-    "Study": "runs.study.study",
-    "StiffenedGas": "hydro.eos.gases",
-    "StrengthLaw": "hydro.strength.laws.base",
-    "Tabular": "hydro.eos.tabular",
-    "compare": "runs.inspection.compare",
-    "compare_column": "problems.problem",
-    "draw_field": "problems.pictures",
-    "film": "runs.pictures.film",
-    "find_material": "hydro.eos.materials",
-    "gravity": "hydro.sources",
-    "grid": "runs.interface",
-    "inlined": "regrid.jit",
-    "inspect": "runs.inspection.info",
-    "join": "hydro.links",
-    "key": "problems.deck",
-    "load": "runs.interface.case",
-    "make_plane_grid": "problems.initial_states",
-    "make_regridder": "regrid.registry",
-    "open": "runs.interface.case",
-    "plot": "runs.interface.calls",
-    "put": "hydro.boundary",
-    "put_walls": "problems.initial_states",
-    "register": "runs.interface.calls",
-    "report": "runs.report",
-    "restart": "runs.interface.calls",
-    "run": "runs.interface.calls",
-    "shock": "problems.initial_states",
-    "slide": "hydro.links",
-    "study": "runs.study.study",
+    "AlgebraicRegridder": "shockgrid.regrid.algebraic",
+    "BadInput": "shockgrid.regrid.errors",
+    "BarrierRegridder": "shockgrid.regrid.barrier.regridder",
+    "Block": "shockgrid.hydro.block",
+    "CarriedField": "shockgrid.hydro.carried.fields",
+    "Case": "shockgrid.runs.interface.case",
+    "Deck": "shockgrid.problems.deck",
+    "DeckTable": "shockgrid.problems.deck",
+    "EquationOfState": "shockgrid.hydro.eos.base",
+    "Hook": "shockgrid.runs.interface.case",
+    "IdealGas": "shockgrid.hydro.eos.gases",
+    "JWL": "shockgrid.hydro.eos.jwl",
+    "MieGruneisen": "shockgrid.hydro.eos.mie_gruneisen",
+    "OpenRun": "shockgrid.runs.interface.case",
+    "Output": "shockgrid.problems.deck",
+    "PhaseTransition": "shockgrid.hydro.eos.phase_transition",
+    "Problem": "shockgrid.problems.problem",
+    "Regrid": "shockgrid.problems.deck",
+    "RegridFailure": "shockgrid.regrid.errors",
+    "Report": "shockgrid.problems.problem",
+    "Row": "shockgrid.problems.problem",
+    "RunControl": "shockgrid.problems.deck",
+    "RunFailure": "shockgrid.regrid.errors",
+    "Segment": "shockgrid.hydro.boundary",
+    "Simulation": "shockgrid.hydro.simulation",
+    "Study": "shockgrid.runs.study.study",
+    "StiffenedGas": "shockgrid.hydro.eos.gases",
+    "StrengthLaw": "shockgrid.hydro.strength.laws.base",
+    "Tabular": "shockgrid.hydro.eos.tabular",
+    "compare": "shockgrid.runs.inspection.compare",
+    "compare_column": "shockgrid.problems.problem",
+    "draw_field": "shockgrid.problems.pictures",
+    "film": "shockgrid.runs.pictures.film",
+    "find_material": "shockgrid.hydro.eos.materials",
+    "gravity": "shockgrid.hydro.sources",
+    "grid": "shockgrid.runs.interface",
+    "inlined": "shockgrid.regrid.jit",
+    "inspect": "shockgrid.runs.inspection.info",
+    "join": "shockgrid.hydro.links",
+    "key": "shockgrid.problems.deck",
+    "load": "shockgrid.runs.interface.case",
+    "make_plane_grid": "shockgrid.problems.initial_states",
+    "make_regridder": "shockgrid.regrid.registry",
+    "open": "shockgrid.runs.interface.case",
+    "plot": "shockgrid.runs.interface.calls",
+    "put": "shockgrid.hydro.boundary",
+    "put_walls": "shockgrid.problems.initial_states",
+    "register": "shockgrid.runs.interface.calls",
+    "report": "shockgrid.runs.report",
+    "restart": "shockgrid.runs.interface.calls",
+    "run": "shockgrid.runs.interface.calls",
+    "shock": "shockgrid.problems.initial_states",
+    "slide": "shockgrid.hydro.links",
+    "study": "shockgrid.runs.study.study",
     "testing": "shockgrid",
-    "transfinite_grid": "regrid.algebraic",
-    "verify": "runs.interface.calls",
+    "transfinite_grid": "shockgrid.regrid.algebraic",
+    "verify": "shockgrid.runs.interface.calls",
 }
 ELSEWHERE = {
     "compare_column": "compare",
@@ -183,20 +185,16 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name; ImportError if another package hides one of shockgrid's."""
+    """Import a public name."""
     if name == "__version__":
         value: object = _find_version()
     elif name in MODULES:
-        from shockgrid.shadowing import find_shadow
-
-        if shadow := find_shadow():
-            raise ImportError(shadow)
         if name in SUBMODULES:
             value = importlib.import_module(f"{MODULES[name]}.{name}")
         else:
             value = getattr(importlib.import_module(MODULES[name]), ELSEWHERE.get(name, name))
         if name in OF_COMMANDS and callable(value):
-            from runs.interface.wording import said_in_python
+            from shockgrid.runs.interface.wording import said_in_python
 
             value = said_in_python()(value)
     else:

@@ -19,21 +19,27 @@ from typing import Any
 
 import numpy as np
 
-from hydro import phases, rim
-from hydro.block import Block
-from hydro.boundary import SEGMENTS, NodeMotion, Segment, put
-from hydro.eos.base import EquationOfState, measure_inverse, measure_slopes, say_inverse, say_slope
-from hydro.eos.gases import IdealGas
-from hydro.simulation import Simulation
-from hydro.strength.laws import StrengthLaw
-from problems.deck import Deck
-from problems.problem import Problem
-from problems.registry import load_problem
-from regrid.algebraic import transfinite_grid
-from regrid.domains import make_domain
-from regrid.errors import BadInput, RegridFailure
-from regrid.measure.quality import find_bad_cells
-from regrid.sides import SIDE_NAMES, SIDES
+from shockgrid.hydro import phases, rim
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import SEGMENTS, NodeMotion, Segment, put
+from shockgrid.hydro.eos.base import (
+    EquationOfState,
+    measure_inverse,
+    measure_slopes,
+    say_inverse,
+    say_slope,
+)
+from shockgrid.hydro.eos.gases import IdealGas
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.strength.laws import StrengthLaw
+from shockgrid.problems.deck import Deck
+from shockgrid.problems.problem import Problem
+from shockgrid.problems.registry import load_problem
+from shockgrid.regrid.algebraic import transfinite_grid
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.measure.quality import find_bad_cells
+from shockgrid.regrid.sides import SIDE_NAMES, SIDES
 
 Make = Callable[..., Any]  # makes a regridder
 DOMAINS = ("dome", "valley", "jet", "strip")  # whose first steps any family can follow
@@ -248,7 +254,7 @@ def check_compiled(eos: EquationOfState, rho: float, p: float) -> None:
     """The formulas compile, and give the numbers that numpy gives (to 1e-12)."""
     from numba import njit
 
-    from regrid.compilation.first_calls import prepare_compiler
+    from shockgrid.regrid.compilation.first_calls import prepare_compiler
 
     prepare_compiler()  # without a kernel numba does not know what is marked `inlined`
     parameters = eos.parameters

@@ -7,13 +7,21 @@ from pathlib import Path
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos.materials import find_material
-from hydro.links import join
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.links import join
 
 ROOT = next(p for p in Path(__file__).resolve().parents if (p / "pyproject.toml").is_file())
+INSIDE = ("regrid", "hydro", "problems", "runs")  # folders that are installed inside `shockgrid`
 SIDES = ("i_min", "i_max", "j_min", "j_max")
+
+
+def name_module(path: Path) -> str:
+    """The name by which a file of the packages is imported."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    parts = ("shockgrid", *parts) if parts[0] in INSIDE else parts
+    return ".".join(parts).removesuffix(".__init__")
 
 
 def tensor(*lines) -> np.ndarray:
@@ -144,7 +152,7 @@ def collect_columns(rows) -> dict[str, np.ndarray]:
 
 def measure_growth(problem, history, first=6.0, last=30.0) -> float:
     """Mean (da/dt)/(k a0) of a shocked interface's first mode over first < k c t < last."""
-    from problems.interface_instability.theories import Growth
+    from shockgrid.problems.interface_instability.theories import Growth
 
     known = np.isfinite(history["amplitude"]) & np.isfinite(history["t"])
     mode = problem.harmonics[0]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import fnmatch
+import importlib.util
 import os
-from pathlib import PurePath
+from pathlib import Path, PurePath
 
 import numpy as np
 import pytest
@@ -18,6 +19,14 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "dev"))
 
 # runs that tests start compile in one process: pytest's workers have the other processors
 os.environ["SHOCKGRID_COMPILERS"] = "1"
+
+
+def pytest_configure(config):
+    """End here where Python would import the packages of another tree."""
+    found = importlib.util.find_spec("shockgrid.hydro")
+    if found is None or Path(found.origin).resolve().parents[1] != config.rootpath.resolve():
+        where = "not installed" if found is None else f"that of {found.origin}"
+        pytest.exit(f"shockgrid.hydro is {where}: run `make setup` in {config.rootpath}", 4)
 
 
 def pytest_addoption(parser):

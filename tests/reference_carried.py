@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.formulas.reconstruction import limit_van_leer
 from reference_step import SIDES, find_corners, flow_out, lower, upper
+from shockgrid.hydro.formulas.reconstruction import limit_van_leer
 
 limit = np.vectorize(limit_van_leer)
 

@@ -18,7 +18,7 @@ import itertools
 
 import numpy as np
 
-from hydro.formulas import riemann
+from shockgrid.hydro.formulas import riemann
 
 solve_contact = np.vectorize(
     lambda rho, w, p, c, law, *other: riemann.compute_contact((rho, w, p, c, law), other, 0.0),

@@ -24,10 +24,15 @@ from collections import namedtuple
 
 import numpy as np
 
-from hydro.eos.base import make_least_pressure
-from hydro.formulas import riemann
-from hydro.formulas.reconstruction import FIRST_ORDER_LIMITER, LOW_MACH, RELAXED, choose_limit
 from reference_sliding import SlidingContact, dot, find_free_speed, solve_contact
+from shockgrid.hydro.eos.base import make_least_pressure
+from shockgrid.hydro.formulas import riemann
+from shockgrid.hydro.formulas.reconstruction import (
+    FIRST_ORDER_LIMITER,
+    LOW_MACH,
+    RELAXED,
+    choose_limit,
+)
 
 GAUSS = 0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5
 SIDES = ("i_min", "i_max", "j_min", "j_max")

@@ -14,10 +14,10 @@ from collections import defaultdict
 import numpy as np
 
 from builders import get_bits, march
-from hydro.ranks.cutting import distribute_blocks
-from hydro.ranks.ranks import END, STEP, Ranks, hear, tell
-from hydro.simulation import Simulation
-from regrid.errors import RunFailure
+from shockgrid.hydro.ranks.cutting import distribute_blocks
+from shockgrid.hydro.ranks.ranks import END, STEP, Ranks, hear, tell
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.errors import RunFailure
 
 PATIENCE = 3600.0  # seconds that a rank waits for the others, if one of them was lost
 

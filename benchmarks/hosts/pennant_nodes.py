@@ -21,8 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
-import regrid
 from benchmarks.result_tables import Tables
+from shockgrid import regrid
 
 NODES = Path(__file__).with_name("hot_layer.npz")
 PASSES = 5  # of the regridder on one boundary: more change nothing

@@ -23,8 +23,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-import regrid
 from benchmarks.result_tables import Tables
+from shockgrid import regrid
 
 GHOSTS = 2
 LINE = 0.25  # where the line is at first

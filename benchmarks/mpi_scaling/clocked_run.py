@@ -21,11 +21,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import hydro.step
-from hydro.ranks.messages import Message
-from hydro.simulation import Simulation
-from runs.cli.main import main
-from runs.ranks.started import find_rank
+from shockgrid.hydro import step as flow_step
+from shockgrid.hydro.ranks.messages import Message
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.runs.cli.main import main
+from shockgrid.runs.ranks.started import find_rank
 
 PHASES = ("sides", "regrid", "flow")
 COLUMNS = ("step", *PHASES, "lines", "packing", "messages", "loop", "calls", "bytes",
@@ -76,7 +76,7 @@ class Record:
 
     def watch(self) -> None:
         """Clock the calls of the packages from now on."""
-        self.clocks.wrap(hydro.step, "move_sides", "lines")
+        self.clocks.wrap(flow_step, "move_sides", "lines")
         self.clocks.wrap(Message, "share", "shares")
         advance = Simulation.advance
 

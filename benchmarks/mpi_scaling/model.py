@@ -25,7 +25,7 @@ import numpy as np
 from scipy.optimize import least_squares, lsq_linear
 
 from benchmarks.mpi_scaling.cases import Timing
-from hydro.ranks.messages import CELLS_DEEP, NODES_DEEP
+from shockgrid.hydro.ranks.messages import CELLS_DEEP, NODES_DEEP
 
 RING_BYTES = 8 * (2 * NODES_DEEP + 5 * CELLS_DEEP)  # that a face of a side stands for in a step
 # of a block that is cut: rows at each cut, numbers per cell

@@ -11,8 +11,8 @@ import numpy as np
 
 import shockgrid as sg
 from benchmarks.race.compiled_peers import spend
-from hydro.formulas.geometry import compute_volumes, find_geometry
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.formulas.geometry import compute_volumes, find_geometry
+from shockgrid.regrid.measure.corners import compute_centres
 
 SLAB = """problem = "blocks"
 run = {{ t_end = {t_end} }}

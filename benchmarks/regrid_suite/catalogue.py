@@ -14,9 +14,9 @@ import numpy as np
 
 from benchmarks.regrid_suite import shapes, solids
 from benchmarks.regrid_suite.marches import PLANE_SIDES, March, get_side, make_march
-from regrid.algebraic import transfinite_grid
-from regrid.domains import DOMAINS, make_domain
-from regrid.errors import BadInput, suggest
+from shockgrid.regrid.algebraic import transfinite_grid
+from shockgrid.regrid.domains import DOMAINS, make_domain
+from shockgrid.regrid.errors import BadInput, suggest
 
 DATA = Path(__file__).with_name("data")
 ROLL_PARTS = 4  # steps from one dump of the roll to the next

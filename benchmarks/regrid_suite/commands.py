@@ -19,7 +19,7 @@ from benchmarks.regrid_suite.catalogue import NAMES, load_march, tell
 from benchmarks.regrid_suite.files import ENDINGS, read_march, write_march
 from benchmarks.regrid_suite.marches import March
 from benchmarks.regrid_suite.regridders import REGRIDDERS, Entry, choose
-from regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput
 
 
 class Group(click.Group):

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from benchmarks.regrid_suite.marches import March, name_sides
-from regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput
 
 FORMAT = "regrid-march 1"
 WORDS = ("name", "about", "formula")

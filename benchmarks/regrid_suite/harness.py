@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmarks.regrid_suite import measures
 from benchmarks.regrid_suite.marches import March, get_side, name_sides
-from regrid.errors import RegridFailure
+from shockgrid.regrid.errors import RegridFailure
 
 Regrid = Callable[..., np.ndarray]
 MOST_PARTS = 16

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from regrid.algebraic import transfinite_grid
+from shockgrid.regrid.algebraic import transfinite_grid
 
 PLANE_SIDES = ("i_min", "i_max", "j_min", "j_max")
 SPACE_SIDES = (*PLANE_SIDES, "k_min", "k_max")

@@ -25,16 +25,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.measure.corners import compute_turns
-from regrid.measure.faults import walk_boundary
-from regrid.measure.hexahedra import (
+from shockgrid.regrid.measure.corners import compute_turns
+from shockgrid.regrid.measure.faults import walk_boundary
+from shockgrid.regrid.measure.hexahedra import (
     compute_hexahedron_aspects,
     compute_hexahedron_sines,
     find_bad_hexahedra,
 )
-from regrid.measure.hexahedra import compute_mid_lines as compute_space_lines
-from regrid.measure.hexahedra import compute_volumes as compute_space_volumes
-from regrid.measure.quality import (
+from shockgrid.regrid.measure.hexahedra import compute_mid_lines as compute_space_lines
+from shockgrid.regrid.measure.hexahedra import compute_volumes as compute_space_volumes
+from shockgrid.regrid.measure.quality import (
     compute_aspect_ratio,
     compute_corner_areas,
     compute_mid_lines,

@@ -10,11 +10,11 @@ from PIL import Image
 from benchmarks.regrid_suite.harness import Outcome, run_march
 from benchmarks.regrid_suite.marches import March
 from benchmarks.regrid_suite.regridders import Entry
-from regrid.errors import BadInput
-from regrid.measure.quality import find_bad_cells
-from runs.grids.pictures import BAD, LINE, frame, plot_sides
-from runs.pictures.command import new_figure, save
-from runs.pictures.fields import draw_grid_lines
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.quality import find_bad_cells
+from shockgrid.runs.grids.pictures import BAD, LINE, frame, plot_sides
+from shockgrid.runs.pictures.command import new_figure, save
+from shockgrid.runs.pictures.fields import draw_grid_lines
 
 PANEL = 2.9  # inches
 COLOURS = 64

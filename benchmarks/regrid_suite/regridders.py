@@ -17,9 +17,9 @@ from scipy.sparse.linalg import splu
 
 from benchmarks.regrid_suite.harness import Regrid
 from benchmarks.regrid_suite.marches import March, interpolate_faces
-from regrid.errors import BadInput, suggest
-from regrid.hexahedra.regridder import BarrierRegridder3D
-from regrid.registry import make_regridder
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.hexahedra.regridder import BarrierRegridder3D
+from shockgrid.regrid.registry import make_regridder
 
 OURS = "this project"
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.regrid_suite.harness import Refused
 from benchmarks.regrid_suite.marches import March, get_side, interpolate_faces, name_sides
-from regrid.algebraic import fill_displacement
+from shockgrid.regrid.algebraic import fill_displacement
 
 NEWTON = 8
 NEWTON_TOLERANCE = 1e-3
@@ -121,8 +121,8 @@ def carry(previous: np.ndarray, boundary: np.ndarray) -> np.ndarray:
 
 def least_determinant(nodes: np.ndarray) -> float:
     """Least determinant of the edges at all corners of all cells."""
-    from regrid.measure.hexahedra import compute_least_corner_volumes
-    from regrid.measure.quality import compute_corner_areas
+    from shockgrid.regrid.measure.hexahedra import compute_least_corner_volumes
+    from shockgrid.regrid.measure.quality import compute_corner_areas
 
     compute = compute_corner_areas if len(nodes) == 2 else compute_least_corner_volumes
     return float(compute(nodes).min())

@@ -23,15 +23,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from runs.cli.main import main
+from shockgrid.runs.cli.main import main
 
 CHANGES = {"open", "os.rename", "os.remove", "os.mkdir"}  # audit events of Python
 SLACK = 20.0  # a loaded machine gives so little of its time at worst
 CRASHED = 71
 COMMANDS = (
-    "runs.inspection.compare", "runs.inspection.compare", "runs.inspection.info",
-    "runs.inspection.info", "runs.march.launching", "runs.march.launching",
-    "runs.march.launching", "runs.store.reader",
+    "shockgrid.runs.inspection.compare", "shockgrid.runs.inspection.compare",
+    "shockgrid.runs.inspection.info", "shockgrid.runs.inspection.info",
+    "shockgrid.runs.march.launching", "shockgrid.runs.march.launching",
+    "shockgrid.runs.march.launching", "shockgrid.runs.store.reader",
 )  # fmt: skip
 
 

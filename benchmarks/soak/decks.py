@@ -8,10 +8,10 @@ from pathlib import Path
 
 from benchmarks.soak.child import call
 from benchmarks.soak.trial import Outcome, find_fault, make_random
-from problems.registry import PROBLEMS
-from runs.deck.reading import packaged_decks, read_deck
-from runs.inspection.account import describe_cautions
-from runs.march.launching import check_regridder
+from shockgrid.problems.registry import PROBLEMS
+from shockgrid.runs.deck.reading import packaged_decks, read_deck
+from shockgrid.runs.inspection.account import describe_cautions
+from shockgrid.runs.march.launching import check_regridder
 
 ODD_VALUES = (
     "0", "-0.0", "-1", "1", "1e308", "-1e308", "1e-320", "inf", "-inf", "nan",

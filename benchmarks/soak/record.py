@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.soak.trial import Outcome
-from regrid.compilation.kept_files import ROOT
-from runs.store.files import write_atomically
+from shockgrid.regrid.compilation.kept_files import ROOT
+from shockgrid.runs.store.files import write_atomically
 
 # folders of one machine in what commands said: the trial's and the code's
 MACHINE = re.compile(rf"\S*/soak-\w+/(?:trial/|undisturbed/|flips/)?|{re.escape(str(ROOT))}/")

@@ -12,8 +12,8 @@ import msgspec
 
 from benchmarks.soak.child import call
 from benchmarks.soak.trial import Outcome, find_fault, make_random, tell_last
-from runs.deck.checking import make_schema
-from runs.deck.reading import packaged_decks, read_deck, read_toml
+from shockgrid.runs.deck.checking import make_schema
+from shockgrid.runs.deck.reading import packaged_decks, read_deck, read_toml
 
 LEFT_ALONE = {"problem", "threads", "max_steps", "restart_every", "gauge", "output"}
 CHANGED = 6  # trials a deck: half the cells, twice as many, four settings

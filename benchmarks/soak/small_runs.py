@@ -6,8 +6,8 @@ import shutil
 from pathlib import Path
 
 from benchmarks.soak.child import Done, call, count_changes
-from runs.store.directory import RunDirectory
-from runs.store.files import LOCK
+from shockgrid.runs.store.directory import RunDirectory
+from shockgrid.runs.store.files import LOCK
 
 OFTEN = ("output.dumps=4", "output.restart_every=0.02", "run.threads=1")
 SMALL = {
@@ -52,7 +52,7 @@ class Undisturbed:
 
 def load_kernels(problem: str) -> None:
     """Take two steps of a small problem in this process."""
-    from runs.deck.reading import read_deck
+    from shockgrid.runs.deck.reading import read_deck
 
     evolution = read_deck(problem, (*SMALL[problem], "run.threads=1")).make_problem().build()
     for _ in range(2):

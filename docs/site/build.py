@@ -11,6 +11,7 @@ from __future__ import annotations
 import ast
 import json
 import re
+import shutil
 from importlib import metadata
 from pathlib import Path
 
@@ -20,6 +21,8 @@ import shockgrid
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("shockgrid", "runs", "problems", "hydro", "regrid")
+# a copy of the packages as they are installed, for the docstring reader (mkdocs.yml)
+INSTALLED = ROOT / "build" / "packages" / "shockgrid"
 MATHJAX = "django-static-mathjax"  # no more than MathJax's files in a wheel
 WANTED = ("tex-chtml.js", "output/chtml/fonts/woff-v2/")
 
@@ -30,12 +33,30 @@ def list_rooms(package: str) -> list[Path]:
 
 
 def name_module(path: Path) -> str:
-    return ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    """The name by which a folder or a file is imported."""
+    package, *inner = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(["shockgrid", *([package] if package != "shockgrid" else []), *inner])
+
+
+def find_module(name: str) -> Path:
+    """The folder or file of a module, without its ending."""
+    parts = name.split(".")
+    inside = len(parts) > 1 and parts[1] in PACKAGES
+    return ROOT.joinpath(*parts[1:] if inside else parts)
+
+
+def copy_packages() -> None:
+    """Copy the packages to where the docstring reader finds them under their import names."""
+    shutil.rmtree(INSTALLED, ignore_errors=True)
+    for package in PACKAGES:
+        target = INSTALLED if package == "shockgrid" else INSTALLED / package
+        shutil.copytree(ROOT / package, target, ignore=shutil.ignore_patterns("__pycache__"))
 
 
 def name_page(room: Path) -> str:
     """The page of a room; a package's own is the first of its group."""
-    package, _, inner = name_module(room).partition(".")
+    package, *rooms = room.relative_to(ROOT).parts
+    inner = ".".join(rooms)
     return f"reference/{package}/{inner or 'index'}.md"
 
 
@@ -62,7 +83,7 @@ def describe_names() -> str:
 
 def find_sentence(module: str, name: str) -> str:
     """The first sentence of the docstring of a class, function or module."""
-    path = ROOT.joinpath(*module.split("."))
+    path = find_module(module)
     path = path / f"{name}.py" if (path / f"{name}.py").is_file() else path.with_suffix(".py")
     tree = ast.parse(path.read_text(encoding="utf-8"))
     kinds = ast.ClassDef | ast.FunctionDef
@@ -74,6 +95,7 @@ def find_sentence(module: str, name: str) -> str:
 
 def on_config(config):
     """Put the reference into the navigation, that of `shockgrid` first, and list the problems."""
+    copy_packages()
     problems = sorted(Path(config.docs_dir, "problems").glob("*.md"))
     for entry in config.nav:
         if entry.get("Problems") == "problems/":
@@ -83,7 +105,7 @@ def on_config(config):
     groups = []
     for package in PACKAGES[1:]:
         first, *rooms = list_rooms(package)
-        entries = [{name_module(room).partition(".")[2]: name_page(room)} for room in rooms]
+        entries = [{".".join(room.relative_to(ROOT).parts[1:]): name_page(room)} for room in rooms]
         groups.append({package: [name_page(first), *entries]})  # a bare page: that of the group
     config.nav.append({"Reference": groups})
     return config

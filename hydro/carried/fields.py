@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput
 
 FLOW_FIELDS = ("rho", "u", "v", "p", "e")
 

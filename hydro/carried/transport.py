@@ -19,25 +19,25 @@ from typing import Any
 
 import numpy as np
 
-from hydro import rim as on
-from hydro.formulas.geometry import (
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.formulas.geometry import (
     Geometry,
     compute_centre_offset,
     lean_lines,
     weigh_differences,
 )
-from hydro.formulas.reconstruction import (
+from shockgrid.hydro.formulas.reconstruction import (
     compute_gradient,
     compute_line_geometry,
     compute_weights,
     limit_van_leer,
 )
-from hydro.interior.scratch import find_twist
-from hydro.perimeter.contacts import carry_through_open_sides
-from hydro.perimeter.faces import find_corners, measure_volume
-from hydro.rim import find_cell, find_excess
-from hydro.rows import RHO, U, V
-from regrid.jit import compiled_once, inlined, kernel
+from shockgrid.hydro.interior.scratch import find_twist
+from shockgrid.hydro.perimeter.contacts import carry_through_open_sides
+from shockgrid.hydro.perimeter.faces import find_corners, measure_volume
+from shockgrid.hydro.rim import find_cell, find_excess
+from shockgrid.hydro.rows import RHO, U, V
+from shockgrid.regrid.jit import compiled_once, inlined, kernel
 
 # rows of `measures`: lengths of cells along both lines, and how far their centres of volume lie
 # from their middles along them

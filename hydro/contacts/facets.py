@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.contacts.lines import BOTH, EARLIER, LATER, is_mirrored_end
-from hydro.facets.lines import find_curve_normal, find_point, measure_square, project
-from hydro.facets.rows import (
+from shockgrid.hydro.contacts.lines import BOTH, EARLIER, LATER, is_mirrored_end
+from shockgrid.hydro.facets.lines import find_curve_normal, find_point, measure_square, project
+from shockgrid.hydro.facets.rows import (
     AREA_X,
     AREA_Y,
     FACE_X,
@@ -28,8 +28,8 @@ from hydro.facets.rows import (
     NORMAL_Y,
     SWEPT_RATE,
 )
-from regrid.jit import compiled_once, kernel
-from regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
+from shockgrid.regrid.jit import compiled_once, kernel
+from shockgrid.regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
 
 SNAPPED_FACE_PART = 1e-9  # parts of a face closer than this to a node are at the node
 SEARCHED_FACES = 3  # faces on either side of its old one on which a pin is looked for again

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from hydro import rim as on
-from hydro.facets.rows import (
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.facets.rows import (
     AREA_X,
     AREA_Y,
     CLOSED,
@@ -19,8 +19,8 @@ from hydro.facets.rows import (
     SUM_SLIP,
     WEIGHT,
 )
-from hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y
-from regrid.jit import compiled_once, kernel
+from shockgrid.hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y
+from shockgrid.regrid.jit import compiled_once, kernel
 
 
 @kernel

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.contacts.facets import MOST_BULGE, find_depth
-from hydro.contacts.lines import is_free_end
-from hydro.facets.lines import find_point
-from hydro.facets.rows import (
+from shockgrid.hydro.contacts.facets import MOST_BULGE, find_depth
+from shockgrid.hydro.contacts.lines import is_free_end
+from shockgrid.hydro.facets.lines import find_point
+from shockgrid.hydro.facets.rows import (
     CLOSED,
     FOLLOWER_START,
     FOLLOWER_STOP,
     LEADER_START,
     LEADER_STOP,
 )
-from regrid.jit import compiled_once, kernel
+from shockgrid.regrid.jit import compiled_once, kernel
 
 # of a face's length: so far the leader's nodes may lie behind the follower's chords
 DEEP_NODE_PART = 0.05

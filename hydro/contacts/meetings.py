@@ -15,20 +15,20 @@ from typing import Any
 
 import numpy as np
 
-from hydro import rim as on
-from hydro.block import Block
-from hydro.boundary import Piston
-from hydro.contacts.pair import Pair, PlanePair
-from hydro.contacts.start import fill_normals
-from hydro.contacts.surface import Plane, Surface, find_planes, is_surface
-from hydro.contacts.voids import Voids
-from hydro.facets.rows import FOLLOWER, LEADER, WEIGHT
-from hydro.facets.states import make_add_facet_flux
-from hydro.formulas.geometry import Geometry
-from hydro.links import Link
-from hydro.motion.grid_motion import GridMotion
-from hydro.sliding.contact import SlidingContact
-from regrid.errors import Place, RunFailure
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import Piston
+from shockgrid.hydro.contacts.pair import Pair, PlanePair
+from shockgrid.hydro.contacts.start import fill_normals
+from shockgrid.hydro.contacts.surface import Plane, Surface, find_planes, is_surface
+from shockgrid.hydro.contacts.voids import Voids
+from shockgrid.hydro.facets.rows import FOLLOWER, LEADER, WEIGHT
+from shockgrid.hydro.facets.states import make_add_facet_flux
+from shockgrid.hydro.formulas.geometry import Geometry
+from shockgrid.hydro.links import Link
+from shockgrid.hydro.motion.grid_motion import GridMotion
+from shockgrid.hydro.sliding.contact import SlidingContact
+from shockgrid.regrid.errors import Place, RunFailure
 
 LEAST_STEP = 2e-3  # of the stable step: a touch that comes sooner is taken at its end
 LEAST_BESIDE = 5e-2  # the same where surfaces touch already

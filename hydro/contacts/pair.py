@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.contacts.facets import (
+from shockgrid.hydro.contacts.facets import (
     MOST_BULGE,
     fill_facets,
     find_deepest,
@@ -14,8 +14,8 @@ from hydro.contacts.facets import (
     measure_facets,
     sum_behind,
 )
-from hydro.contacts.friction import add_friction, measure_closed
-from hydro.contacts.laying import (
+from shockgrid.hydro.contacts.friction import add_friction, measure_closed
+from shockgrid.hydro.contacts.laying import (
     find_held,
     find_plane_pins,
     find_plane_touches,
@@ -24,20 +24,20 @@ from hydro.contacts.laying import (
     match,
     measure_clearance_of_plane,
 )
-from hydro.contacts.lines import BOTH, EARLIER, LATER, make_pins
-from hydro.contacts.start import (
+from shockgrid.hydro.contacts.lines import BOTH, EARLIER, LATER, make_pins
+from shockgrid.hydro.contacts.start import (
     ON_LINE_DISTANCE,
     find_lying,
     find_lying_on_plane,
     measure_sizes,
 )
-from hydro.contacts.surface import Plane, Surface
-from hydro.contacts.touch import fill_swept_boxes, find_touches, measure_distance
-from hydro.facets.lines import fill_radius_weighted_areas
-from hydro.facets.rows import make_facets
-from hydro.facets.states import solve_facets, sum_over_faces
-from hydro.motion.overlaps import is_inside
-from regrid.errors import Place, RegridFailure
+from shockgrid.hydro.contacts.surface import Plane, Surface
+from shockgrid.hydro.contacts.touch import fill_swept_boxes, find_touches, measure_distance
+from shockgrid.hydro.facets.lines import fill_radius_weighted_areas
+from shockgrid.hydro.facets.rows import make_facets
+from shockgrid.hydro.facets.states import solve_facets, sum_over_faces
+from shockgrid.hydro.motion.overlaps import is_inside
+from shockgrid.regrid.errors import Place, RegridFailure
 
 DEEPEST_FACES = 2.0  # longest faces: so far behind a line nodes are looked for
 DOUBTED_DEPTH_PART = 0.01  # of a face's length: nodes so deep may be beyond a thin body

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.links import LARGEST_CLOSED_GAP, Link
-from hydro.motion.overlaps import ADVICE
-from hydro.sliding.contact import SlidingContact
-from regrid.errors import BadInput
-from regrid.sides import SIDE_NAMES, get_sides
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.links import LARGEST_CLOSED_GAP, Link
+from shockgrid.hydro.motion.overlaps import ADVICE
+from shockgrid.hydro.sliding.contact import SlidingContact
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.sides import SIDE_NAMES, get_sides
 
 ON_LINE_DISTANCE = 1e-6  # of a face's length: closer than this a node lies on the other line
 # of the smaller of a face's length and its cell's depth

@@ -6,21 +6,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hydro import rim as on
-from hydro.block import Block
-from hydro.boundary import Axis, FreeSurface, Piston, Segment, Wall
-from hydro.contacts.friction import cover_surface
-from hydro.contacts.laying import fit_plane
-from hydro.contacts.lines import make_line_nodes
-from hydro.contacts.touch import fill_inner, measure_way
-from hydro.facets.lines import fill_slopes, fill_squares
-from hydro.facets.rows import make_line_arrays
-from hydro.motion.key_nodes import KeyNode
-from hydro.motion.line import Role
-from hydro.motion.sides import Sides
-from hydro.perimeter.contacts import fill_ghosts_from_faces, flow_along
-from regrid.measure.crossings import GROUP_EDGES, fill_boxes
-from regrid.sides import SIDE_NAMES, find_node, trace_outline
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import Axis, FreeSurface, Piston, Segment, Wall
+from shockgrid.hydro.contacts.friction import cover_surface
+from shockgrid.hydro.contacts.laying import fit_plane
+from shockgrid.hydro.contacts.lines import make_line_nodes
+from shockgrid.hydro.contacts.touch import fill_inner, measure_way
+from shockgrid.hydro.facets.lines import fill_slopes, fill_squares
+from shockgrid.hydro.facets.rows import make_line_arrays
+from shockgrid.hydro.motion.key_nodes import KeyNode
+from shockgrid.hydro.motion.line import Role
+from shockgrid.hydro.motion.sides import Sides
+from shockgrid.hydro.perimeter.contacts import fill_ghosts_from_faces, flow_along
+from shockgrid.regrid.measure.crossings import GROUP_EDGES, fill_boxes
+from shockgrid.regrid.sides import SIDE_NAMES, find_node, trace_outline
 
 MOST_GROUPS = 64  # boxes of a line
 IN_LINE = 1e-9  # of the size of all: walls so near to a line are on it

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.contacts.facets import (
+from shockgrid.hydro.contacts.facets import (
     faces_each_other,
     find_direction,
     find_groups,
@@ -16,10 +16,10 @@ from hydro.contacts.facets import (
     may_lie_on,
     snap_position,
 )
-from hydro.facets.lines import project
-from regrid.jit import compiled_once, kernel
-from regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
-from regrid.sides import find_node
+from shockgrid.hydro.facets.lines import project
+from shockgrid.regrid.jit import compiled_once, kernel
+from shockgrid.regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
+from shockgrid.regrid.sides import find_node
 
 # of a face's length: a node that close to a pin on its own line comes on with it
 BESIDE_PIN_DISTANCE = 0.1

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from hydro.contacts.pair import Pair, PlanePair
-from hydro.contacts.surface import Plane, Surface
-from hydro.facets.rows import FOLLOWER_START, FOLLOWER_STOP, LEADER_START, LEADER_STOP
-from regrid.errors import BadInput, RegridFailure
+from shockgrid.hydro.contacts.pair import Pair, PlanePair
+from shockgrid.hydro.contacts.surface import Plane, Surface
+from shockgrid.hydro.facets.rows import FOLLOWER_START, FOLLOWER_STOP, LEADER_START, LEADER_STOP
+from shockgrid.regrid.errors import BadInput, RegridFailure
 
 # of the depth of the cells around it: a void whose area has this side is closed
 SMALL_VOID_DEPTHS = 0.5

@@ -26,8 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from regrid.errors import BadInput
-from regrid.sides import SIDE_NAMES
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.sides import SIDE_NAMES
 
 
 @dataclass(frozen=True)

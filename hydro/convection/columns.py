@@ -60,8 +60,12 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg import solve_banded
 
-from hydro.convection.tensor_grids import compute_neighbour_ratio, correct_axis, weigh_gradient
-from regrid.errors import BadInput, Place, RunFailure
+from shockgrid.hydro.convection.tensor_grids import (
+    compute_neighbour_ratio,
+    correct_axis,
+    weigh_gradient,
+)
+from shockgrid.regrid.errors import BadInput, Place, RunFailure
 
 SCHEMES = ("exponential", "samarskii", "upwind", "central")
 

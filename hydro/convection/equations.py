@@ -39,9 +39,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from hydro.convection.box import PAIRS, Axis, Fluid, Wall, check_walls
-from regrid.errors import RunFailure
-from regrid.sides import SIDE_NAMES
+from shockgrid.hydro.convection.box import PAIRS, Axis, Fluid, Wall, check_walls
+from shockgrid.regrid.errors import RunFailure
+from shockgrid.regrid.sides import SIDE_NAMES
 
 Matrix = sparse.csr_matrix
 Ends = tuple[float, float]  # of an axis: 1 if the wall's value is given, 0 if the slope vanishes

@@ -26,9 +26,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from hydro.convection.box import Fluid
-from hydro.convection.equations import Equations, Factors
-from regrid.errors import BadInput, RunFailure
+from shockgrid.hydro.convection.box import Fluid
+from shockgrid.hydro.convection.equations import Equations, Factors
+from shockgrid.regrid.errors import BadInput, RunFailure
 
 # (equations of the new grid, time) -> (force on the control volumes of all faces [m4/s2],
 # heat over rho cp into the cells [K m2/s])

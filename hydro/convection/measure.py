@@ -23,11 +23,11 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
-from hydro.convection.box import PAIRS, Fluid, adiabatic
-from hydro.convection.equations import Equations, Factors
-from hydro.convection.steady import slip
-from regrid.errors import BadInput, RunFailure
-from regrid.sides import SIDE_NAMES
+from shockgrid.hydro.convection.box import PAIRS, Fluid, adiabatic
+from shockgrid.hydro.convection.equations import Equations, Factors
+from shockgrid.hydro.convection.steady import slip
+from shockgrid.regrid.errors import BadInput, RunFailure
+from shockgrid.regrid.sides import SIDE_NAMES
 
 
 def compute_local_nusselt(

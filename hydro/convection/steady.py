@@ -20,11 +20,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from hydro.convection.box import PAIRS, Axis, Fluid, fixes_temperature
-from hydro.convection.equations import Equations, Factors
-from hydro.convection.tensor_grids import check_kind, correct_tensor_grid
-from regrid.errors import BadInput, RunFailure
-from regrid.sides import SIDE_NAMES
+from shockgrid.hydro.convection.box import PAIRS, Axis, Fluid, fixes_temperature
+from shockgrid.hydro.convection.equations import Equations, Factors
+from shockgrid.hydro.convection.tensor_grids import check_kind, correct_tensor_grid
+from shockgrid.regrid.errors import BadInput, RunFailure
+from shockgrid.regrid.sides import SIDE_NAMES
 
 
 def transfer(

@@ -5,13 +5,13 @@ May import: `regrid`, `hydro.formulas`.
 
 from collections import ChainMap
 
-from hydro.eos.base import EquationOfState
-from hydro.eos.gases import IdealGas, StiffenedGas
-from hydro.eos.jwl import JWL
-from hydro.eos.mie_gruneisen import MieGruneisen
-from hydro.eos.phase_transition import PhaseTransition
-from hydro.eos.tabular import Tabular
-from regrid.plug_ins import PlugIns
+from shockgrid.hydro.eos.base import EquationOfState
+from shockgrid.hydro.eos.gases import IdealGas, StiffenedGas
+from shockgrid.hydro.eos.jwl import JWL
+from shockgrid.hydro.eos.mie_gruneisen import MieGruneisen
+from shockgrid.hydro.eos.phase_transition import PhaseTransition
+from shockgrid.hydro.eos.tabular import Tabular
+from shockgrid.regrid.plug_ins import PlugIns
 
 OWN: dict[str, type[EquationOfState]] = {
     eos.kind: eos for eos in (IdealGas, StiffenedGas, MieGruneisen, JWL, PhaseTransition, Tabular)

@@ -28,9 +28,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from hydro.eos.temperature import compute_solid_temperature
-from regrid.errors import BadInput
-from regrid.jit import choose, inlined
+from shockgrid.hydro.eos.temperature import compute_solid_temperature
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import choose, inlined
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hydro.eos.base import EquationOfState, make_least_pressure
-from hydro.rows import RHO, P, U, V
-from regrid.jit import choose, inlined
+from shockgrid.hydro.eos.base import EquationOfState, make_least_pressure
+from shockgrid.hydro.rows import RHO, P, U, V
+from shockgrid.regrid.jit import choose, inlined
 
 
 class Conversion(NamedTuple):

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydro.eos.base import EquationOfState
-from regrid.errors import BadInput
-from regrid.jit import inlined
+from shockgrid.hydro.eos.base import EquationOfState
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import inlined
 
 GAMMA, P_INF = range(2)  # positions in the parameter tuple
 

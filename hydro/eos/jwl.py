@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydro.eos.base import EquationOfState, compute_whole_ratio
-from hydro.eos.mie_gruneisen import least_density, strength_left
-from regrid.errors import BadInput
-from regrid.jit import inlined
+from shockgrid.hydro.eos.base import EquationOfState, compute_whole_ratio
+from shockgrid.hydro.eos.mie_gruneisen import least_density, strength_left
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import inlined
 
 RHO0, A, B, R1, R2, OMEGA, ENERGY0, STRENGTH = range(8)  # positions in the parameter tuple
 

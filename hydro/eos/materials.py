@@ -14,11 +14,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from hydro.eos import EQUATIONS_OF_STATE, EquationOfState
-from hydro.strength.laws import STRENGTH_LAWS, StrengthLaw
-from hydro.strength.laws.base import make_law
-from regrid.errors import BadInput, find_nearest
-from regrid.text_files import load_toml, read_text
+from shockgrid.hydro.eos import EQUATIONS_OF_STATE, EquationOfState
+from shockgrid.hydro.strength.laws import STRENGTH_LAWS, StrengthLaw
+from shockgrid.hydro.strength.laws.base import make_law
+from shockgrid.regrid.errors import BadInput, find_nearest
+from shockgrid.regrid.text_files import load_toml, read_text
 
 KEPT_TEXTS = 32  # of files of materials that are parsed once, as long as they stay as they are
 LIBRARY = Path(__file__).with_name("materials.toml")

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hydro.eos.base import (
+from shockgrid.hydro.eos.base import (
     REMAINING_DENSITY_PART,
     EquationOfState,
     compute_strength_left,
     compute_whole_ratio,
 )
-from regrid.jit import inlined
+from shockgrid.regrid.jit import inlined
 
 RHO0, C0, S, GRUNEISEN, STRENGTH = range(5)  # positions in the parameter tuple
 

@@ -22,11 +22,11 @@ from functools import cached_property
 
 import numpy as np
 
-from hydro.eos.base import EquationOfState, compute_whole_ratio
-from hydro.eos.mie_gruneisen import least_density, least_pressure, strength_left
-from regrid.errors import BadInput
-from regrid.jit import inlined
-from regrid.roots import find_root
+from shockgrid.hydro.eos.base import EquationOfState, compute_whole_ratio
+from shockgrid.hydro.eos.mie_gruneisen import least_density, least_pressure, strength_left
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import inlined
+from shockgrid.regrid.roots import find_root
 
 # positions in the parameter tuple, the first five as in Mie–Grüneisen
 PARAMETER_RHO0 = 0

@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from regrid.errors import BadInput
-from regrid.text_files import read_text
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.text_files import read_text
 
 WORDS_A_LINE = 5
 WORD_WIDTHS = (15, 22)  # characters of single and of double precision

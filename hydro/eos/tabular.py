@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hydro.eos.base import EquationOfState
-from regrid.errors import BadInput
-from regrid.hdf5_files import open_hdf5
-from regrid.jit import choose, compiled_once, inlined
+from shockgrid.hydro.eos.base import EquationOfState
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.hdf5_files import open_hdf5
+from shockgrid.regrid.jit import choose, compiled_once, inlined
 
 
 @compiled_once

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hydro.facets.rows import (
+from shockgrid.hydro.facets.rows import (
     ALONG_X,
     ALONG_Y,
     AREA_X,
@@ -15,9 +15,9 @@ from hydro.facets.rows import (
     U_SLOPE,
     V_SLOPE,
 )
-from hydro.formulas.geometry import compute_radius_weighted_face
-from hydro.rows import P, U, V
-from regrid.jit import compiled_once, kernel
+from shockgrid.hydro.formulas.geometry import compute_radius_weighted_face
+from shockgrid.hydro.rows import P, U, V
+from shockgrid.regrid.jit import compiled_once, kernel
 
 
 @compiled_once

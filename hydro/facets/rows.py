@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hydro.rows import FLUX_ROWS
+from shockgrid.hydro.rows import FLUX_ROWS
 
 # owners (2, facets): the faces of the two lines that a facet belongs to, counted along them; -1 for
 # a follower's where there is none

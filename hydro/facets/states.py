@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 
-from hydro.facets.rows import (
+from shockgrid.hydro.facets.rows import (
     ALONG_X,
     ALONG_Y,
     AREA_X,
@@ -39,14 +39,14 @@ from hydro.facets.rows import (
     V_SLOPE,
     WEIGHT,
 )
-from hydro.formulas.geometry import PLANE, Geometry
-from hydro.formulas.riemann import (
+from shockgrid.hydro.formulas.geometry import PLANE, Geometry
+from shockgrid.hydro.formulas.riemann import (
     compute_contact,
     compute_speed_at_pressure,
     compute_wave_pressure,
 )
-from hydro.rows import ENERGY, HOOP, MOMENTUM_X, MOMENTUM_Y, PUSH, RHO, P, U, V
-from regrid.jit import compiled_once, kernel
+from shockgrid.hydro.rows import ENERGY, HOOP, MOMENTUM_X, MOMENTUM_Y, PUSH, RHO, P, U, V
+from shockgrid.regrid.jit import compiled_once, kernel
 
 # part of the leader's rho c²: a facet is pulled at where its pressure is lower by more than that
 ROUND_OFF_TENSION = 1e-6

@@ -20,9 +20,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hydro.formulas.reconstruction import compute_line_geometry
-from regrid.errors import BadInput, suggest
-from regrid.jit import inlined
+from shockgrid.hydro.formulas.reconstruction import compute_line_geometry
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.jit import inlined
 
 TINY_RADIUS = 1e-300  # avoids 0/0 at faces on the axis
 

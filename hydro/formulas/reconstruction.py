@@ -11,7 +11,7 @@ give bitwise the same results.
 
 from __future__ import annotations
 
-from regrid.jit import inlined
+from shockgrid.regrid.jit import inlined
 
 TINY_SLOPE = 1e-300  # keeps 0/0 of a uniform flow from being a NaN
 # differences over c/sqrt(8) around a cell are shocks whatever the rest says

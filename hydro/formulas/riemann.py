@@ -9,7 +9,7 @@ chains of dependent operations then overlap between faces.
 
 from __future__ import annotations
 
-from regrid.jit import compiled_once, inlined
+from shockgrid.regrid.jit import compiled_once, inlined
 
 # pressure jump to a neighbour, over rho c², from which on all faces of a cell get HLL
 FLUXES = {"hllc": 0.1, "hll": -1.0}

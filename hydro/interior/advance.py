@@ -15,15 +15,15 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from hydro import rim as on
-from hydro import rows as of
-from hydro.eos.base import make_leaving_part
-from hydro.formulas.geometry import PLANE, Geometry
-from hydro.formulas.reconstruction import DEFAULT_LIMITER, LOW_MACH
-from hydro.formulas.riemann import DEFAULT_FLUX
-from hydro.interior import scratch as at
-from hydro.interior.axisymmetric import clear_shift_after, make_push, make_source_pressure
-from hydro.interior.faces import (
+from shockgrid.hydro import rim as on
+from shockgrid.hydro import rows as of
+from shockgrid.hydro.eos.base import make_leaving_part
+from shockgrid.hydro.formulas.geometry import PLANE, Geometry
+from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER, LOW_MACH
+from shockgrid.hydro.formulas.riemann import DEFAULT_FLUX
+from shockgrid.hydro.interior import scratch as at
+from shockgrid.hydro.interior.axisymmetric import clear_shift_after, make_push, make_source_pressure
+from shockgrid.hydro.interior.faces import (
     find_hll,
     make_faces,
     make_flux,
@@ -31,11 +31,17 @@ from hydro.interior.faces import (
     make_traces,
     make_upwind,
 )
-from hydro.interior.reconstruction import make_row_phases
-from hydro.interior.scratch import copy_back, copy_row, copy_rows, prefetch_row, prefetch_rows
-from hydro.interior.slopes import fill_steps
-from hydro.interior.update import make_update
-from regrid.jit import Kernel, compiled_once, kernel
+from shockgrid.hydro.interior.reconstruction import make_row_phases
+from shockgrid.hydro.interior.scratch import (
+    copy_back,
+    copy_row,
+    copy_rows,
+    prefetch_row,
+    prefetch_rows,
+)
+from shockgrid.hydro.interior.slopes import fill_steps
+from shockgrid.hydro.interior.update import make_update
+from shockgrid.regrid.jit import Kernel, compiled_once, kernel
 
 TILE_ROWS = 32
 

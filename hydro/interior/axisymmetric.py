@@ -7,10 +7,10 @@ of rings.  See `hydro.formulas.geometry`, and `hydro.interior.scratch`, whose ru
 
 from __future__ import annotations
 
-from hydro.formulas.geometry import compute_centre_offset, lean_lines
-from hydro.formulas.reconstruction import compute_line_geometry
-from hydro.interior import scratch as at
-from regrid.jit import compiled_once, inlined
+from shockgrid.hydro.formulas.geometry import compute_centre_offset, lean_lines
+from shockgrid.hydro.formulas.reconstruction import compute_line_geometry
+from shockgrid.hydro.interior import scratch as at
+from shockgrid.regrid.jit import compiled_once, inlined
 
 # jumps of the pressure over rho c² between neighbours, up to which flow is smooth, and from which
 # on it is not at all

@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from hydro.eos.base import EquationOfState
-from hydro.rows import RHO, P
-from regrid.errors import BadInput
-from regrid.jit import Kernel, kernel
+from shockgrid.hydro.eos.base import EquationOfState
+from shockgrid.hydro.rows import RHO, P
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import Kernel, kernel
 
 SLAB_ROWS = 64  # rows for which something is computed at a time
 

@@ -8,10 +8,10 @@ operations overlap between faces.
 
 from __future__ import annotations
 
-from hydro.formulas import riemann
-from hydro.formulas.reconstruction import WHOLE_CELL_MARK, choose_own, compute_face_state
-from hydro.interior import scratch as at
-from regrid.jit import compiled_once, inlined
+from shockgrid.hydro.formulas import riemann
+from shockgrid.hydro.formulas.reconstruction import WHOLE_CELL_MARK, choose_own, compute_face_state
+from shockgrid.hydro.interior import scratch as at
+from shockgrid.regrid.jit import compiled_once, inlined
 
 
 def make_faces(compute_face, node_a, node_b, target):

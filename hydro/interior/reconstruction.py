@@ -9,19 +9,24 @@ from __future__ import annotations
 import functools
 from typing import NamedTuple
 
-from hydro.formulas.geometry import Geometry
-from hydro.formulas.reconstruction import (
+from shockgrid.hydro.formulas.geometry import Geometry
+from shockgrid.hydro.formulas.reconstruction import (
     RELAXED,
     choose_limit,
     compute_hll_switch,
     compute_line_geometry,
     mark_torn,
 )
-from hydro.formulas.riemann import FLUXES
-from hydro.interior import scratch as at
-from hydro.interior.axisymmetric import fill_lines, fill_shift_after, fill_smooth, move_shifts
-from hydro.interior.slopes import make_extrapolation, make_slopes
-from regrid.jit import compiled_once
+from shockgrid.hydro.formulas.riemann import FLUXES
+from shockgrid.hydro.interior import scratch as at
+from shockgrid.hydro.interior.axisymmetric import (
+    fill_lines,
+    fill_shift_after,
+    fill_smooth,
+    move_shifts,
+)
+from shockgrid.hydro.interior.slopes import make_extrapolation, make_slopes
+from shockgrid.regrid.jit import compiled_once
 
 
 @compiled_once(allocates=False)

@@ -28,7 +28,7 @@ from itertools import count
 import numpy as np
 from numba.extending import intrinsic, overload
 
-from regrid.jit import compiled_once, inlined
+from shockgrid.regrid.jit import compiled_once, inlined
 
 VECTOR_LANES = 8  # entries of the widest vector
 CACHE_LINE_ENTRIES = 8  # entries of a cache line

@@ -17,9 +17,9 @@ docs/notes/decisions.md.
 
 from __future__ import annotations
 
-from hydro import rim as on
-from hydro.formulas.geometry import move_velocity, thin_half_step, weigh_differences
-from hydro.formulas.reconstruction import (
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.formulas.geometry import move_velocity, thin_half_step, weigh_differences
+from shockgrid.hydro.formulas.reconstruction import (
     compose_from,
     compute_acoustic_weight,
     compute_gradient,
@@ -32,8 +32,8 @@ from hydro.formulas.reconstruction import (
     relax_limit,
     resolve_along,
 )
-from hydro.interior import scratch as at
-from regrid.jit import compiled_once, inlined
+from shockgrid.hydro.interior import scratch as at
+from shockgrid.regrid.jit import compiled_once, inlined
 
 # jump of the pressure over rho c² from which on nothing is extrapolated to a side
 SHOCK_PRESSURE_JUMP = 0.05

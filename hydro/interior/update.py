@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro.eos.base import make_leaving_part
-from hydro.eos.conversion import make_conversion
-from hydro.formulas.geometry import compute_lever, push_outwards, stretch_ring
-from hydro.formulas.reconstruction import compute_line_geometry
-from hydro.interior import scratch as at
-from hydro.rows import LEAST_C2
-from regrid.jit import compiled_once, inlined, kernel
+from shockgrid.hydro.eos.base import make_leaving_part
+from shockgrid.hydro.eos.conversion import make_conversion
+from shockgrid.hydro.formulas.geometry import compute_lever, push_outwards, stretch_ring
+from shockgrid.hydro.formulas.reconstruction import compute_line_geometry
+from shockgrid.hydro.interior import scratch as at
+from shockgrid.hydro.rows import LEAST_C2
+from shockgrid.regrid.jit import compiled_once, inlined, kernel
 
 
 @inlined

@@ -33,14 +33,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import Segment
-from hydro.motion.key_nodes import KeyNode
-from hydro.motion.line import Line
-from hydro.sliding.contact import SlidingContact
-from hydro.sliding.pieces import fill_positions, find_last_crossing
-from regrid.curves import compute_arc_lengths, meeting_laws
-from regrid.errors import BadInput, Place, RegridFailure
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import Segment
+from shockgrid.hydro.motion.key_nodes import KeyNode
+from shockgrid.hydro.motion.line import Line
+from shockgrid.hydro.sliding.contact import SlidingContact
+from shockgrid.hydro.sliding.pieces import fill_positions, find_last_crossing
+from shockgrid.regrid.curves import compute_arc_lengths, meeting_laws
+from shockgrid.regrid.errors import BadInput, Place, RegridFailure
 
 JOINT_REACH_NODES = 3  # nodes of either line that the curve through a joint goes through
 MOST_JOINT_SLIDE = 4.0  # spacings that a joint wants to slide at most, before `relax`

@@ -12,17 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.links import Exchange
-from hydro.motion.line import LineRule
-from hydro.motion.sides import Sides, Span
-from hydro.ranks.blocks import Blocks
-from hydro.sliding.polygons import LEAST_VOLUME_LEFT, make_find_crushed
-from regrid.errors import BadInput, Place, RegridFailure, RunFailure
-from regrid.measure.crossings import find_crossing
-from regrid.measure.quality import find_bad_cells, measure_worst, say_not_convex
-from regrid.node_speeds import MotionLimiter
-from regrid.protocol import (
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.links import Exchange
+from shockgrid.hydro.motion.line import LineRule
+from shockgrid.hydro.motion.sides import Sides, Span
+from shockgrid.hydro.ranks.blocks import Blocks
+from shockgrid.hydro.sliding.polygons import LEAST_VOLUME_LEFT, make_find_crushed
+from shockgrid.regrid.errors import BadInput, Place, RegridFailure, RunFailure
+from shockgrid.regrid.measure.crossings import find_crossing
+from shockgrid.regrid.measure.quality import find_bad_cells, measure_worst, say_not_convex
+from shockgrid.regrid.node_speeds import MotionLimiter
+from shockgrid.regrid.protocol import (
     RegridReport,
     call_regridder,
     check_regridder,

@@ -20,14 +20,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hydro import rim as on
-from hydro.block import Block
-from hydro.boundary import NodeMotion, Segment
-from hydro.links import LARGEST_CLOSED_GAP, Link
-from hydro.motion.track import Track
-from hydro.sliding.contact import SlidingContact
-from regrid.errors import Place, RunFailure
-from regrid.sides import SIDE_NAMES, find_node
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import NodeMotion, Segment
+from shockgrid.hydro.links import LARGEST_CLOSED_GAP, Link
+from shockgrid.hydro.motion.track import Track
+from shockgrid.hydro.sliding.contact import SlidingContact
+from shockgrid.regrid.errors import Place, RunFailure
+from shockgrid.regrid.sides import SIDE_NAMES, find_node
 
 STRAIGHT_LINE_SINE = 1e-9  # sine of the angle up to which two lines are one
 

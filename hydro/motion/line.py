@@ -15,12 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hydro import rim as on
-from hydro.boundary import NodeMotion, Segment
-from hydro.motion.track import Track
-from regrid import curves
-from regrid.jit import compiled_once, kernel
-from regrid.sides import SIDE_NAMES, find_node
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.boundary import NodeMotion, Segment
+from shockgrid.hydro.motion.track import Track
+from shockgrid.regrid import curves
+from shockgrid.regrid.jit import compiled_once, kernel
+from shockgrid.regrid.sides import SIDE_NAMES, find_node
 
 # part of the way to its spacing that a line at or opposite a contact point goes in a full step
 FOLLOWED_WAY_PART = 0.2

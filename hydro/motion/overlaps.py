@@ -23,14 +23,14 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import Axis, NodeMotion, Piston, Segment, Wall
-from hydro.links import Link
-from hydro.sliding.contact import SlidingContact
-from regrid.errors import BadInput, Place, RunFailure
-from regrid.jit import kernel
-from regrid.measure.crossings import GROUP_EDGES, fill_boxes, find_touching
-from regrid.sides import SIDE_NAMES, find_node, trace_outline
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import Axis, NodeMotion, Piston, Segment, Wall
+from shockgrid.hydro.links import Link
+from shockgrid.hydro.sliding.contact import SlidingContact
+from shockgrid.regrid.errors import BadInput, Place, RunFailure
+from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.measure.crossings import GROUP_EDGES, fill_boxes, find_touching
+from shockgrid.regrid.sides import SIDE_NAMES, find_node, trace_outline
 
 CHECKED_TIMES = 101  # at which pistons are checked beforehand
 OVERLAP_DEPTH_PART = 0.25  # fraction of the cells along a side: further in, blocks overlap

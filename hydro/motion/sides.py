@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro import phases
-from hydro.block import Block
-from hydro.boundary import NodeMotion, Segment
-from hydro.links import Exchange
-from hydro.motion.constraints import CarriedSeam, CornerGuard, FollowerMotion, Joint
-from hydro.motion.key_nodes import KeyNode, find_key_nodes
-from hydro.motion.line import (
+from shockgrid.hydro import phases
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import NodeMotion, Segment
+from shockgrid.hydro.links import Exchange
+from shockgrid.hydro.motion.constraints import CarriedSeam, CornerGuard, FollowerMotion, Joint
+from shockgrid.hydro.motion.key_nodes import KeyNode, find_key_nodes
+from shockgrid.hydro.motion.line import (
     LINES,
     Line,
     LineRule,
@@ -24,10 +24,10 @@ from hydro.motion.line import (
     StraightLine,
     spread_straight,
 )
-from hydro.motion.smoothing import SlidingLine, ThickContact, find_thick_contacts
-from hydro.motion.track import join_tracks
-from regrid.errors import BadInput
-from regrid.sides import OPPOSITE_SIDES, SIDE_NAMES
+from shockgrid.hydro.motion.smoothing import SlidingLine, ThickContact, find_thick_contacts
+from shockgrid.hydro.motion.track import join_tracks
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.sides import OPPOSITE_SIDES, SIDE_NAMES
 
 TRACK_CORNER_SINE = 0.35  # sine of the angle from which two tracks that meet make a corner
 

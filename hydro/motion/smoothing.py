@@ -19,11 +19,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro import rim as on
-from hydro.motion.line import Line
-from regrid.curves import FREE_END
-from regrid.jit import compiled_once, kernel
-from regrid.sides import find_node
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.motion.line import Line
+from shockgrid.regrid.curves import FREE_END
+from shockgrid.regrid.jit import compiled_once, kernel
+from shockgrid.regrid.sides import find_node
 
 THICK_CELLS = 0.75  # default thickness of a contact, in its initial cells
 SHORTEST_TURNED_SEGMENT = 0.25  # segment required by turning, in thicknesses of its contact

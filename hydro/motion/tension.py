@@ -19,15 +19,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydro import rim as on
-from hydro.block import Block
-from hydro.boundary import Segment
-from hydro.links import Exchange
-from hydro.motion.grid_motion import GridMotion
-from hydro.motion.line import Line
-from hydro.rows import RHO
-from regrid.errors import BadInput
-from regrid.sides import get_side
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import Segment
+from shockgrid.hydro.links import Exchange
+from shockgrid.hydro.motion.grid_motion import GridMotion
+from shockgrid.hydro.motion.line import Line
+from shockgrid.hydro.rows import RHO
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.sides import get_side
 
 TINY_LENGTH = 1e-300  # keeps a line that turns back on itself from dividing by zero
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydro import rim as on
-from hydro.formulas import riemann
-from hydro.formulas.geometry import keep_flux, split_flux
-from hydro.rows import FLUX_ROWS
-from regrid.jit import compiled_once, kernel
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.formulas import riemann
+from shockgrid.hydro.formulas.geometry import keep_flux, split_flux
+from shockgrid.hydro.rows import FLUX_ROWS
+from shockgrid.regrid.jit import compiled_once, kernel
 
 AT_CELLS, AT_TRACES, AT_FLUX = range(3)  # phases of a step in which contacts are solved
 WALL, PISTON, AXIS = range(3)  # kinds of wall

@@ -5,15 +5,15 @@ Those beside the nodes of a sliding contact hold more, or less, than their strai
 
 from __future__ import annotations
 
-from hydro import rim as on
-from hydro import rows as of
-from hydro.eos.conversion import make_conversion
-from hydro.formulas.geometry import Geometry, compute_plane_face
-from hydro.formulas.reconstruction import compute_line_geometry
-from hydro.interior.scratch import find_twist
-from hydro.rim import find_cell
-from regrid.jit import compiled_once, inlined, kernel
-from regrid.sides import I_MAX, J_MIN, find_node
+from shockgrid.hydro import rim as on
+from shockgrid.hydro import rows as of
+from shockgrid.hydro.eos.conversion import make_conversion
+from shockgrid.hydro.formulas.geometry import Geometry, compute_plane_face
+from shockgrid.hydro.formulas.reconstruction import compute_line_geometry
+from shockgrid.hydro.interior.scratch import find_twist
+from shockgrid.hydro.rim import find_cell
+from shockgrid.regrid.jit import compiled_once, inlined, kernel
+from shockgrid.regrid.sides import I_MAX, J_MIN, find_node
 
 
 @inlined

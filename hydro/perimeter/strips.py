@@ -12,26 +12,35 @@ from __future__ import annotations
 import functools
 from typing import NamedTuple
 
-from hydro import rim as on
-from hydro.eos.base import make_leaving_part
-from hydro.formulas.geometry import PLANE, Geometry
-from hydro.formulas.reconstruction import (
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.eos.base import make_leaving_part
+from shockgrid.hydro.formulas.geometry import PLANE, Geometry
+from shockgrid.hydro.formulas.reconstruction import (
     DEFAULT_LIMITER,
     LOW_MACH,
     WHOLE_CELL_MARK,
     choose_own,
     compute_face_state,
 )
-from hydro.formulas.riemann import DEFAULT_FLUX
-from hydro.interior import scratch as at
-from hydro.interior.reconstruction import make_row_phases
-from hydro.interior.slopes import fill_steps
-from hydro.perimeter.contacts import AXIS, mirror_in_walls, pass_open_sides, press_on_walls
-from hydro.perimeter.faces import make_fill_faces, make_fill_polygons, place_traces_on_axis
-from hydro.rim import find_first_face
-from hydro.rows import STATE_ROWS
-from regrid.jit import Kernel, compiled_once, kernel
-from regrid.sides import I_MAX, I_MIN, J_MAX, J_MIN, SIDE_NAMES, find_node
+from shockgrid.hydro.formulas.riemann import DEFAULT_FLUX
+from shockgrid.hydro.interior import scratch as at
+from shockgrid.hydro.interior.reconstruction import make_row_phases
+from shockgrid.hydro.interior.slopes import fill_steps
+from shockgrid.hydro.perimeter.contacts import (
+    AXIS,
+    mirror_in_walls,
+    pass_open_sides,
+    press_on_walls,
+)
+from shockgrid.hydro.perimeter.faces import (
+    make_fill_faces,
+    make_fill_polygons,
+    place_traces_on_axis,
+)
+from shockgrid.hydro.rim import find_first_face
+from shockgrid.hydro.rows import STATE_ROWS
+from shockgrid.regrid.jit import Kernel, compiled_once, kernel
+from shockgrid.regrid.sides import I_MAX, I_MIN, J_MAX, J_MIN, SIDE_NAMES, find_node
 
 
 class SideKernels(NamedTuple):

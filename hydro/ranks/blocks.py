@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from hydro import phases
-from hydro.block import Block
-from hydro.ranks.cutting import CutBlock, Piece
-from hydro.workers import Workers
-from regrid.errors import RunFailure
+from shockgrid.hydro import phases
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.ranks.cutting import CutBlock, Piece
+from shockgrid.hydro.workers import Workers
+from shockgrid.regrid.errors import RunFailure
 
 NODE_ROW = 11  # numbers of a block that go with its new nodes: quality, account of regridding
 STATE_ROW = 4  # and with its new states: the fastest cell

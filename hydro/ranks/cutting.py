@@ -21,10 +21,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.interior.advance import TILE_ROWS, count_tiles
-from hydro.interior.update import sum_tiles
-from hydro.rows import TOTAL_ROWS
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.interior.advance import TILE_ROWS, count_tiles
+from shockgrid.hydro.interior.update import sum_tiles
+from shockgrid.hydro.rows import TOTAL_ROWS
 
 MOST_UNCUT = 1.2  # times a rank's fair share: a block of more is cut
 GHOST_ROWS = 2  # of cells beyond a band, which its update reads

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.ranks.cutting import Rows
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.ranks.cutting import Rows
 
 CELLS_DEEP = 3  # that kernels of the perimeter read, counted from a side
 NODES_DEEP = CELLS_DEEP + 1

@@ -27,11 +27,11 @@ from typing import Any
 
 import numpy as np
 
-from hydro import phases
-from hydro.block import Block
-from hydro.ranks import messages
-from hydro.ranks.blocks import NODE_ROW, STATE_ROW, Blocks, Row, Table
-from hydro.ranks.cutting import (
+from shockgrid.hydro import phases
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.ranks import messages
+from shockgrid.hydro.ranks.blocks import NODE_ROW, STATE_ROW, Blocks, Row, Table
+from shockgrid.hydro.ranks.cutting import (
     GHOST_ROWS,
     CutBlock,
     Piece,
@@ -40,8 +40,8 @@ from hydro.ranks.cutting import (
     divide_evenly,
     find_bounds,
 )
-from hydro.rows import TOTAL_ROWS
-from regrid.errors import RunFailure
+from shockgrid.hydro.rows import TOTAL_ROWS
+from shockgrid.regrid.errors import RunFailure
 
 STEP, COLLECT, COUNT, END = range(4)  # what the first rank tells the others to do
 # seconds that a rank waits wide awake, and that it sleeps then

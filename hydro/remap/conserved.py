@@ -22,9 +22,9 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import cKDTree
 
-from hydro.eos import EquationOfState
-from hydro.eos.conversion import compute_conserved, find_held, make_conversion
-from hydro.remap.overlay import (
+from shockgrid.hydro.eos import EquationOfState
+from shockgrid.hydro.eos.conversion import compute_conserved, find_held, make_conversion
+from shockgrid.hydro.remap.overlay import (
     MEAN,
     SLOPE_X,
     SLOPE_Y,
@@ -33,10 +33,10 @@ from hydro.remap.overlay import (
     make_linear_fields,
     overlay_grids,
 )
-from hydro.rows import HELD_ARRAYS, RHO, P, U, V
-from regrid.errors import BadInput, Place, RunFailure
-from regrid.measure.quality import find_bad_cells, say_not_convex
-from regrid.sides import J_MIN, SIDE_NAMES, get_sides
+from shockgrid.hydro.rows import HELD_ARRAYS, RHO, P, U, V
+from shockgrid.regrid.errors import BadInput, Place, RunFailure
+from shockgrid.regrid.measure.quality import find_bad_cells, say_not_convex
+from shockgrid.regrid.sides import J_MIN, SIDE_NAMES, get_sides
 
 LEAST_SLIVER = 1e-13  # part of a cell from which on a gap is no round-off
 

@@ -29,18 +29,18 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import map_coordinates
 
-from hydro import phases
-from hydro.block import Block
-from hydro.boundary import NodeMotion
-from hydro.motion.grid_motion import GridMotion, MeshMotion
-from hydro.motion.line import Line, StraightLine
-from hydro.remap.conserved import Slivers, remap_state
-from hydro.simulation import Simulation
-from regrid.curves import compute_arc_lengths
-from regrid.errors import BadInput
-from regrid.measure.quality import measure_turns
-from regrid.protocol import call_regridder
-from regrid.sides import SIDE_NAMES
+from shockgrid.hydro import phases
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import NodeMotion
+from shockgrid.hydro.motion.grid_motion import GridMotion, MeshMotion
+from shockgrid.hydro.motion.line import Line, StraightLine
+from shockgrid.hydro.remap.conserved import Slivers, remap_state
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.curves import compute_arc_lengths
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.quality import measure_turns
+from shockgrid.regrid.protocol import call_regridder
+from shockgrid.regrid.sides import SIDE_NAMES
 
 
 def respace_line(line: np.ndarray, spacing: np.ndarray, new_spacing: np.ndarray) -> np.ndarray:

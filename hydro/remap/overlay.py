@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrid.jit import compiled_once, kernel
+from shockgrid.regrid.jit import compiled_once, kernel
 
 MOST_CORNERS = 16  # of a quadrilateral cut by four lines, with room for corners that coincide
 

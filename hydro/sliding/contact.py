@@ -14,34 +14,34 @@ import itertools
 
 import numpy as np
 
-from hydro import rim as on
-from hydro.boundary import NodeMotion, Sliding
-from hydro.carried.fields import check_same
-from hydro.carried.sliding import carry_through_closing_faces
-from hydro.eos.base import is_same_material
-from hydro.facets.lines import fill_radius_weighted_areas, fill_slopes
-from hydro.facets.rows import (
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.boundary import NodeMotion, Sliding
+from shockgrid.hydro.carried.fields import check_same
+from shockgrid.hydro.carried.sliding import carry_through_closing_faces
+from shockgrid.hydro.eos.base import is_same_material
+from shockgrid.hydro.facets.lines import fill_radius_weighted_areas, fill_slopes
+from shockgrid.hydro.facets.rows import (
     FOLLOWER,
     LEADER,
     SWEPT_RATE,
     make_facets,
     make_line_arrays,
 )
-from hydro.facets.states import make_add_facet_flux, solve_facets, sum_over_faces
-from hydro.formulas.geometry import PLANE, Geometry
-from hydro.perimeter.contacts import AT_CELLS, AT_FLUX
-from hydro.rows import MASS
-from hydro.sliding.pieces import (
+from shockgrid.hydro.facets.states import make_add_facet_flux, solve_facets, sum_over_faces
+from shockgrid.hydro.formulas.geometry import PLANE, Geometry
+from shockgrid.hydro.perimeter.contacts import AT_CELLS, AT_FLUX
+from shockgrid.hydro.rows import MASS
+from shockgrid.hydro.sliding.pieces import (
     SURFACE_ROWS,
     fill_pieces,
     fill_points,
     fill_positions,
     fill_surface,
 )
-from hydro.sliding.polygons import make_add_closing_flux, make_fill_excess_volume
-from regrid.curves import arc_spacing
-from regrid.errors import BadInput
-from regrid.measure.crossings import find_self_crossing
+from shockgrid.hydro.sliding.polygons import make_add_closing_flux, make_fill_excess_volume
+from shockgrid.regrid.curves import arc_spacing
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.crossings import find_self_crossing
 
 
 class Chain:

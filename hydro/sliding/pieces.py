@@ -11,8 +11,8 @@ else -1.
 
 from __future__ import annotations
 
-from hydro.facets.lines import find_curve_normal, measure_square, project
-from hydro.facets.rows import (
+from shockgrid.hydro.facets.lines import find_curve_normal, measure_square, project
+from shockgrid.hydro.facets.rows import (
     AREA_X,
     AREA_Y,
     FACE_X,
@@ -31,8 +31,8 @@ from hydro.facets.rows import (
     SWEPT_RATE,
     WEIGHT,
 )
-from hydro.rows import U, V
-from regrid.jit import compiled_once, kernel
+from shockgrid.hydro.rows import U, V
+from shockgrid.regrid.jit import compiled_once, kernel
 
 SNAPPED_LEADER_PART = 1e-9  # parts of a face closer than this to a leader node are at the node
 # squared distance, in squared lengths of a face, of a point that lies on the line

@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import functools
 
-from hydro.facets.rows import FOLLOWER, STATE_E, SWEPT_RATE
-from hydro.formulas.geometry import PLANE, Geometry
-from hydro.perimeter.faces import measure_volume
-from hydro.rim import find_cell, find_excess
-from hydro.rows import RHO, P, U, V
-from regrid.jit import kernel
+from shockgrid.hydro.facets.rows import FOLLOWER, STATE_E, SWEPT_RATE
+from shockgrid.hydro.formulas.geometry import PLANE, Geometry
+from shockgrid.hydro.perimeter.faces import measure_volume
+from shockgrid.hydro.rim import find_cell, find_excess
+from shockgrid.hydro.rows import RHO, P, U, V
+from shockgrid.regrid.jit import kernel
 
 LEAST_VOLUME_LEFT = 0.5  # of a polygon cell's volume after a step
 

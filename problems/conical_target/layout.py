@@ -22,17 +22,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hydro.boundary import put
-from hydro.links import join, slide
-from problems.initial_states import make_plane_grid, put_walls
-from problems.references.hugoniot import shock_to_pressure, shock_with_particle_speed
-from problems.references.riemann import solve_riemann
-from problems.references.shock_polars import Body, CrossedLine, cross_line
-from regrid.errors import BadInput
-from regrid.measure.quality import find_bad_cells
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.links import join, slide
+from shockgrid.problems.initial_states import make_plane_grid, put_walls
+from shockgrid.problems.references.hugoniot import shock_to_pressure, shock_with_particle_speed
+from shockgrid.problems.references.riemann import solve_riemann
+from shockgrid.problems.references.shock_polars import Body, CrossedLine, cross_line
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.quality import find_bad_cells
 
 if TYPE_CHECKING:
-    from hydro.block import Block
+    from shockgrid.hydro.block import Block
 
 
 LEAST_RIPPLE_CELLS = 6  # a wave: the thickness of interfaces holds shorter ones back (theory F6.6)

@@ -26,14 +26,23 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.eos.materials import Material, find_material, make_material
-from hydro.simulation import Simulation
-from problems.conical_target import report as seen
-from problems.conical_target.layout import MATERIALS, Layout, Ripple
-from problems.deck import MOST_CELLS, NONE, Deck, DeckTable, Regrid, RunControl, check_solid, key
-from problems.problem import Problem, check_memory, find_crossing
-from problems.references.riemann import solve_riemann
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos.materials import Material, find_material, make_material
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.conical_target import report as seen
+from shockgrid.problems.conical_target.layout import MATERIALS, Layout, Ripple
+from shockgrid.problems.deck import (
+    MOST_CELLS,
+    NONE,
+    Deck,
+    DeckTable,
+    Regrid,
+    RunControl,
+    check_solid,
+    key,
+)
+from shockgrid.problems.problem import Problem, check_memory, find_crossing
+from shockgrid.problems.references.riemann import solve_riemann
 
 Touch = Literal["joined", "sliding"]
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydro.block import Block
-from problems.pictures import (
+from shockgrid.hydro.block import Block
+from shockgrid.problems.pictures import (
     Colours,
     choose_even_dumps,
     draw_field,
@@ -21,12 +21,12 @@ from problems.pictures import (
     draw_lines,
     make_panels,
 )
-from problems.problem import Report, Row, fit_slope, reduce_between
-from problems.references.hugoniot import caution_fit, shock_to_pressure
-from problems.references.shock_polars import CrossedLine
-from regrid.curves import compute_arc_lengths
-from regrid.errors import BadInput
-from regrid.sides import trace_outline
+from shockgrid.problems.problem import Report, Row, fit_slope, reduce_between
+from shockgrid.problems.references.hugoniot import caution_fit, shock_to_pressure
+from shockgrid.problems.references.shock_polars import CrossedLine
+from shockgrid.regrid.curves import compute_arc_lengths
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.sides import trace_outline
 
 PARTS = ("impactor", "shell", "target", "filling")
 MM = 1e3

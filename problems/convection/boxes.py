@@ -12,22 +12,22 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hydro.convection.box import Fluid
-from hydro.convection.equations import Equations
-from hydro.convection.march import March
-from hydro.convection.measure import compute_local_nusselt, find_nusselt_maximum
-from hydro.convection.steady import (
+from shockgrid.hydro.convection.box import Fluid
+from shockgrid.hydro.convection.equations import Equations
+from shockgrid.hydro.convection.march import March
+from shockgrid.hydro.convection.measure import compute_local_nusselt, find_nusselt_maximum
+from shockgrid.hydro.convection.steady import (
     GridControl,
     SteadySolver,
     compute_nodal_fields,
     expand_nodes,
     restrict_nodes,
 )
-from hydro.convection.tensor_grids import make_axis
-from problems.deck import DeckTable, key
-from problems.initial_states import make_plane_grid
-from problems.pictures import draw_grid, make_panels
-from problems.problem import BlockPlan, Problem, get_last
+from shockgrid.hydro.convection.tensor_grids import make_axis
+from shockgrid.problems.deck import DeckTable, key
+from shockgrid.problems.initial_states import make_plane_grid
+from shockgrid.problems.pictures import draw_grid, make_panels
+from shockgrid.problems.problem import BlockPlan, Problem, get_last
 
 # of factorised matrices per cell to the power 1.5, at the peak of a run: measured 4.5 kB a cell of
 # 10 000, 7.6 of 80 000, 21 of 320 000 (heat flux), 8.9 of 490 000 (given temperatures)

@@ -21,11 +21,11 @@ from typing import Literal
 
 import numpy as np
 
-from hydro.convection import columns
-from problems.convection.boxes import AxisGrid
-from problems.deck import Deck, Output, RunControl, key
-from problems.problem import Problem, Report, compare, get_last, say_unreached
-from problems.references.convection import VerticalPlates
+from shockgrid.hydro.convection import columns
+from shockgrid.problems.convection.boxes import AxisGrid
+from shockgrid.problems.deck import Deck, Output, RunControl, key
+from shockgrid.problems.problem import Problem, Report, compare, get_last, say_unreached
+from shockgrid.problems.references.convection import VerticalPlates
 
 ROUND_OFF_SWING = 1e-12  # relative: differences below are rounding, no swing
 LONGEST_DIFFUSIVE_TIMES = 50.0  # slowest diffusive times that a run may take: steady long before

@@ -17,14 +17,14 @@ import math
 from collections.abc import Mapping
 from typing import Literal
 
-from hydro.convection import measure
-from hydro.convection.box import Wall, make_fluid
-from hydro.convection.steady import SteadySolver, make_rest
-from problems.convection.boxes import SIDES, AxisGrid, BoxProblem, SteadyEvolution
-from problems.deck import Deck, DeckTable, Output, RunControl, key
-from problems.problem import Report, compare, get_last
-from problems.references.convection import AIR_PRANDTL, STATES, CavityState
-from regrid.errors import BadInput
+from shockgrid.hydro.convection import measure
+from shockgrid.hydro.convection.box import Wall, make_fluid
+from shockgrid.hydro.convection.steady import SteadySolver, make_rest
+from shockgrid.problems.convection.boxes import SIDES, AxisGrid, BoxProblem, SteadyEvolution
+from shockgrid.problems.deck import Deck, DeckTable, Output, RunControl, key
+from shockgrid.problems.problem import Report, compare, get_last
+from shockgrid.problems.references.convection import AIR_PRANDTL, STATES, CavityState
+from shockgrid.regrid.errors import BadInput
 
 CAVITY_MARCH_TIME = 0.2  # of a march in time: past the swings of the start
 STEADY_ITERATIONS = 200

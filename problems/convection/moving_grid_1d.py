@@ -22,10 +22,10 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from hydro.convection.columns import DRAWN_BLOCK_HEIGHT, FAMILIES, FrontRace, Placing
-from problems.deck import Deck, DeckTable, RunControl, key
-from problems.problem import BlockPlan, Problem, Report, align
-from problems.references.convection import BurgersFronts
+from shockgrid.hydro.convection.columns import DRAWN_BLOCK_HEIGHT, FAMILIES, FrontRace, Placing
+from shockgrid.problems.deck import Deck, DeckTable, RunControl, key
+from shockgrid.problems.problem import BlockPlan, Problem, Report, align
+from shockgrid.problems.references.convection import BurgersFronts
 
 WORDS = {
     "fixed": "nodes at rest",

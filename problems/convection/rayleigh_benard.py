@@ -22,14 +22,14 @@ from typing import Literal
 
 import numpy as np
 
-from hydro.convection import measure
-from hydro.convection.box import PERIODIC, adiabatic, isothermal, make_fluid
-from problems.convection.boxes import AxisGrid, BoxProblem
-from problems.deck import Deck, Output, RunControl, key
-from problems.pictures import make_panels
-from problems.problem import Report, Row, compare
-from problems.references import convection as linear
-from regrid.errors import BadInput
+from shockgrid.hydro.convection import measure
+from shockgrid.hydro.convection.box import PERIODIC, adiabatic, isothermal, make_fluid
+from shockgrid.problems.convection.boxes import AxisGrid, BoxProblem
+from shockgrid.problems.deck import Deck, Output, RunControl, key
+from shockgrid.problems.pictures import make_panels
+from shockgrid.problems.problem import Report, Row, compare
+from shockgrid.problems.references import convection as linear
+from shockgrid.regrid.errors import BadInput
 
 BENARD_MARCH_TIME = 1.5
 # of the last kinetic energy: below it a disturbance grows by linear theory

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.initial_states import Front, settle_front
-from problems.interface_instability.spacing import grow_steps
-from problems.references.linear_growth import PerturbedFlow, PerturbedLayer
-from problems.references.riemann import compute_cell_averages
+from shockgrid.problems.initial_states import Front, settle_front
+from shockgrid.problems.interface_instability.spacing import grow_steps
+from shockgrid.problems.references.linear_growth import PerturbedFlow, PerturbedLayer
+from shockgrid.problems.references.riemann import compute_cell_averages
 
 CLEAR_TIME_RATIO = 8.0  # least T over the time in which the shock runs over the line's amplitude
 THIN_RAREFACTION_CELLS = 0.5  # cells: a thinner rarefaction is no more than its cells' averages

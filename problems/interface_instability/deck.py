@@ -17,7 +17,7 @@ from typing import ClassVar, Literal
 
 import msgspec
 
-from problems.deck import (
+from shockgrid.problems.deck import (
     MOST_CELLS,
     Deck,
     DeckTable,
@@ -27,9 +27,9 @@ from problems.deck import (
     key,
     place_file,
 )
-from problems.initial_states import Fluid
-from problems.interface_instability.line import Mode, Spectrum
-from regrid.errors import BadInput
+from shockgrid.problems.initial_states import Fluid
+from shockgrid.problems.interface_instability.line import Mode, Spectrum
+from shockgrid.regrid.errors import BadInput
 
 LONGEST_WAVELENGTHS = 1e4  # wavelengths in a length
 

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.deck import MOST_CELLS, DeckTable, key
-from regrid.errors import BadInput
-from regrid.jit import inlined, kernel
-from regrid.text_files import read_columns
+from shockgrid.problems.deck import MOST_CELLS, DeckTable, key
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import inlined, kernel
+from shockgrid.regrid.text_files import read_columns
 
 FIRST_ROUGH_HARMONIC = 5  # harmonics from this one on are none of a gentle wave's own
 ROUND_OFF_MODE = 1e-12  # of the largest mode: what round-off leaves of modes that cancel

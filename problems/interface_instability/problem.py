@@ -16,22 +16,22 @@ from typing import ClassVar
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.links import Link, join
-from hydro.motion.line import LineRule, Respacing
-from hydro.motion.smoothing import THICK_CELLS
-from hydro.rows import V
-from hydro.simulation import Simulation
-from problems.deck import MOST_CELLS
-from problems.initial_states import put_walls, settle_shock
-from problems.interface_instability.crossed_start import (
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.links import Link, join
+from shockgrid.hydro.motion.line import LineRule, Respacing
+from shockgrid.hydro.motion.smoothing import THICK_CELLS
+from shockgrid.hydro.rows import V
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.deck import MOST_CELLS
+from shockgrid.problems.initial_states import put_walls, settle_shock
+from shockgrid.problems.interface_instability.crossed_start import (
     CLEAR_TIME_RATIO,
     CrossedStart,
     find_nearer_speed,
 )
-from problems.interface_instability.deck import InterfaceDeck, check_sense
-from problems.interface_instability.line import (
+from shockgrid.problems.interface_instability.deck import InterfaceDeck, check_sense
+from shockgrid.problems.interface_instability.line import (
     FreeLine,
     Harmonic,
     Mode,
@@ -42,20 +42,24 @@ from problems.interface_instability.line import (
     measure_shape,
     read_line,
 )
-from problems.interface_instability.report import Results
-from problems.interface_instability.spacing import FINE_ZONE_WAVELENGTHS, NODE_SPEED, Spacing
-from problems.interface_instability.theories import Growth, find_cautions
-from problems.problem import BlockPlan, Problem
-from problems.references.hugoniot import (
+from shockgrid.problems.interface_instability.report import Results
+from shockgrid.problems.interface_instability.spacing import (
+    FINE_ZONE_WAVELENGTHS,
+    NODE_SPEED,
+    Spacing,
+)
+from shockgrid.problems.interface_instability.theories import Growth, find_cautions
+from shockgrid.problems.problem import BlockPlan, Problem
+from shockgrid.problems.references.hugoniot import (
     Shock,
     shock_to_pressure,
     shock_with_mach,
     shock_with_particle_speed,
 )
-from problems.references.linear_growth import LinearGrowth, compute_linear_growth
-from regrid.errors import BadInput
-from regrid.measure.quality import find_bad_cells
-from regrid.roots import find_root
+from shockgrid.problems.references.linear_growth import LinearGrowth, compute_linear_growth
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.quality import find_bad_cells
+from shockgrid.regrid.roots import find_root
 
 # least reach over the amplitude: cells shrink or grow by no more than a quarter
 LEAST_REACH_RATIO = 6.0
@@ -460,7 +464,7 @@ class InterfaceInstability(Results, Problem):
         del grids  # the blocks have them
         refining = None
         if deck.refine:
-            from hydro.remap.flow import Refinement  # with scipy: slow to load
+            from shockgrid.hydro.remap.flow import Refinement  # with scipy: slow to load
 
             refining = Refinement(blocks, self.assemble)
         return self.simulate(

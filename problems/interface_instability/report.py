@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from problems.interface_instability.line import Harmonic
-from problems.interface_instability.theories import (
+from shockgrid.problems.interface_instability.line import Harmonic
+from shockgrid.problems.interface_instability.theories import (
     LEAST_WINDOW,
     MOST_COUPLED_KA,
     WINDOW,
@@ -16,7 +16,7 @@ from problems.interface_instability.theories import (
     is_still,
     predict_amplitude,
 )
-from problems.pictures import (
+from shockgrid.problems.pictures import (
     Colours,
     choose_even_dumps,
     compute_rates,
@@ -25,8 +25,8 @@ from problems.pictures import (
     find_dump,
     name_axis,
 )
-from problems.problem import Report, Row, fit_slope
-from regrid.measure.corners import compute_centres
+from shockgrid.problems.problem import Report, Row, fit_slope
+from shockgrid.regrid.measure.corners import compute_centres
 
 SHOWN_TIMES = 3  # times drawn beside the growth
 MOST_CURVES = 6  # modes that a screen and a picture of growth show one by one, the strongest

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.deck import MOST_CELLS
-from problems.interface_instability.deck import InterfaceDeck
-from regrid.errors import BadInput
+from shockgrid.problems.deck import MOST_CELLS
+from shockgrid.problems.interface_instability.deck import InterfaceDeck
+from shockgrid.regrid.errors import BadInput
 
 # wavelengths on each side with the finest cells while the shock passes
 FINE_ZONE_WAVELENGTHS = 0.05

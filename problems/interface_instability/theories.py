@@ -27,12 +27,12 @@ from pathlib import Path
 
 import numpy as np
 
-from hydro.eos import IdealGas
-from hydro.eos.base import is_same_material
-from hydro.formulas.reconstruction import LOW_MACH
-from problems.interface_instability.line import Harmonic
-from problems.references.hugoniot import caution_fit
-from problems.references.linear_growth import LinearGrowth, PadeModel
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.eos.base import is_same_material
+from shockgrid.hydro.formulas.reconstruction import LOW_MACH
+from shockgrid.problems.interface_instability.line import Harmonic
+from shockgrid.problems.references.hugoniot import caution_fit
+from shockgrid.problems.references.linear_growth import LinearGrowth, PadeModel
 
 WINDOW = (6.0, 30.0)  # k c t over which a growth rate is averaged
 LEAST_WINDOW = 1.0

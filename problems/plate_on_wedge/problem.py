@@ -22,24 +22,36 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from msgspec import Meta
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos.materials import find_material
-from hydro.links import join, slide
-from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, check_solid, key
-from problems.initial_states import make_plane_grid, put_walls
-from problems.plate_on_wedge.report import COLUMNS, WIDE_ZONE, Results
-from problems.plate_on_wedge.run import PlateRun
-from problems.problem import Problem
-from problems.references.hugoniot import Shock, shock_to_pressure, shock_with_particle_speed
-from problems.references.riemann import solve_riemann
-from problems.references.shock_polars import (
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.links import join, slide
+from shockgrid.problems.deck import (
+    MOST_CELLS,
+    Deck,
+    DeckTable,
+    Regrid,
+    RunControl,
+    check_solid,
+    key,
+)
+from shockgrid.problems.initial_states import make_plane_grid, put_walls
+from shockgrid.problems.plate_on_wedge.report import COLUMNS, WIDE_ZONE, Results
+from shockgrid.problems.plate_on_wedge.run import PlateRun
+from shockgrid.problems.problem import Problem
+from shockgrid.problems.references.hugoniot import (
+    Shock,
+    shock_to_pressure,
+    shock_with_particle_speed,
+)
+from shockgrid.problems.references.riemann import solve_riemann
+from shockgrid.problems.references.shock_polars import (
     Body,
     find_critical_angle,
     release_driven_plate,
     solve_collision,
 )
-from regrid.curves import arc_spacing, clustered_spacing, meeting_laws
+from shockgrid.regrid.curves import arc_spacing, clustered_spacing, meeting_laws
 
 Cells = Annotated[int, Meta(ge=1, le=MOST_CELLS)]
 

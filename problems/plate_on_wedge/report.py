@@ -14,11 +14,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from problems.pictures import Colours, choose_even_dumps, compute_rates, draw_field, make_panels
-from problems.problem import Report, Row
-from problems.references.hugoniot import caution_fit
-from problems.references.shock_polars import compute_jet_speed
-from regrid.sides import trace_outline
+from shockgrid.problems.pictures import (
+    Colours,
+    choose_even_dumps,
+    compute_rates,
+    draw_field,
+    make_panels,
+)
+from shockgrid.problems.problem import Report, Row
+from shockgrid.problems.references.hugoniot import caution_fit
+from shockgrid.problems.references.shock_polars import compute_jet_speed
+from shockgrid.regrid.sides import trace_outline
 
 # thousandths of A's path behind A between which pressures are averaged
 EDGES = (*range(10, 100, 10), 100, 125, 150, 175, 200, 250, 300, 350, 400, 450, 500)

@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.facets.lines import project
-from hydro.motion.overlaps import is_inside
-from hydro.simulation import Simulation
-from hydro.sliding.contact import SlidingContact
-from problems.plate_on_wedge import report
-from problems.problem import find_crossing
-from regrid.curves import compute_arc_lengths
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.facets.lines import project
+from shockgrid.hydro.motion.overlaps import is_inside
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.sliding.contact import SlidingContact
+from shockgrid.problems.plate_on_wedge import report
+from shockgrid.problems.problem import find_crossing
+from shockgrid.regrid.curves import compute_arc_lengths
+from shockgrid.regrid.measure.corners import compute_centres
 
 LEAST_JET = 3  # cells that make a jet
 MET_LINE_SPACINGS = 0.5  # of the local spacing: lines as near as this have met

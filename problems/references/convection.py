@@ -58,7 +58,7 @@ def compute_layer_growth(
     """
     from scipy.linalg import eig  # slow to load
 
-    from problems.references.perturbed_layers import make_chebyshev  # slow to load
+    from shockgrid.problems.references.perturbed_layers import make_chebyshev  # slow to load
 
     n = COLLOCATION_POINTS
     _, d, _ = make_chebyshev(n + 1)

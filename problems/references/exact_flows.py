@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hydro.eos import JWL
-from hydro.eos.materials import Material
-from problems.references.hugoniot import make_isentrope, release
-from problems.references.riemann import solve_riemann
-from regrid.errors import BadInput
-from regrid.roots import find_root
+from shockgrid.hydro.eos import JWL
+from shockgrid.hydro.eos.materials import Material
+from shockgrid.problems.references.hugoniot import make_isentrope, release
+from shockgrid.problems.references.riemann import solve_riemann
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.roots import find_root
 
 DIMENSIONS = {"plane": 1, "cylindrical": 2, "spherical": 3}
 PROFILE_SHELLS = 4000  # points of the tabulated profile, at first

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
-from regrid.errors import BadInput
-from regrid.roots import find_root
+from shockgrid.hydro.eos import IdealGas, MieGruneisen, StiffenedGas
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.roots import find_root
 
 HUGONIOT_TOLERANCE = 1e-12
 # of the first state's: with less an isentrope has come to its end; products of explosives expand

@@ -29,8 +29,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.references.hugoniot import Shock, shock_to_pressure
-from problems.references.perturbed_layers import (
+from shockgrid.problems.references.hugoniot import Shock, shock_to_pressure
+from shockgrid.problems.references.perturbed_layers import (
     Cut,
     Layers,
     March,
@@ -38,9 +38,9 @@ from problems.references.perturbed_layers import (
     march_layers,
     move_states,
 )
-from problems.references.riemann import RiemannSolution, solve_riemann
-from regrid.compilation.kept_files import remember
-from regrid.errors import BadInput, RunFailure
+from shockgrid.problems.references.riemann import RiemannSolution, solve_riemann
+from shockgrid.regrid.compilation.kept_files import remember
+from shockgrid.regrid.errors import BadInput, RunFailure
 
 
 def compute_atwood_number(rho_first: float, rho_second: float) -> float:

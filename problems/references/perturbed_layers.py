@@ -29,14 +29,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.references.hugoniot import (
+from shockgrid.problems.references.hugoniot import (
     Shock,
     compute_hugoniot_slopes,
     make_isentrope,
 )
-from problems.references.riemann import RiemannSolution
-from regrid.errors import RunFailure
-from regrid.jit import compiled_once, kernel
+from shockgrid.problems.references.riemann import RiemannSolution
+from shockgrid.regrid.errors import RunFailure
+from shockgrid.regrid.jit import compiled_once, kernel
 
 P, U, V = range(3)
 CARRY, STRETCH, EXPAND, BULK, PILE, PUSH, LIFT, DRAG, LIGHT, SOURCE = range(10)

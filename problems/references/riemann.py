@@ -12,9 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.references.hugoniot import RELATIVE_ROUND_OFF, make_isentrope, shock_to_pressure
-from regrid.errors import BadInput
-from regrid.roots import find_root
+from shockgrid.problems.references.hugoniot import (
+    RELATIVE_ROUND_OFF,
+    make_isentrope,
+    shock_to_pressure,
+)
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.roots import find_root
 
 GAUSS_POINTS = 8
 MOST_HALVINGS = 60  # of the higher given pressure, to find one below the common pressure

@@ -57,7 +57,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.references.hugoniot import (
+from shockgrid.problems.references.hugoniot import (
     RELATIVE_ROUND_OFF,
     Shock,
     release,
@@ -65,9 +65,9 @@ from problems.references.hugoniot import (
     shock_with_particle_speed,
     shock_with_speed,
 )
-from problems.references.linear_growth import compute_atwood_number
-from regrid.errors import BadInput
-from regrid.roots import find_root
+from shockgrid.problems.references.linear_growth import compute_atwood_number
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.roots import find_root
 
 
 @dataclass(frozen=True)

@@ -19,14 +19,14 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos.materials import find_material, find_name
-from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, VoidFill, key
-from problems.initial_states import lay_rays, put_walls
-from problems.pictures import Colours, draw_field, find_dump, make_panels
-from problems.problem import Problem, Report, Row, find_most, find_time, measure_below
-from problems.references.hugoniot import caution_fit, release, shock_with_particle_speed
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos.materials import find_material, find_name
+from shockgrid.problems.deck import MOST_CELLS, Deck, Regrid, RunControl, VoidFill, key
+from shockgrid.problems.initial_states import lay_rays, put_walls
+from shockgrid.problems.pictures import Colours, draw_field, find_dump, make_panels
+from shockgrid.problems.problem import Problem, Report, Row, find_most, find_time, measure_below
+from shockgrid.problems.references.hugoniot import caution_fit, release, shock_with_particle_speed
 
 
 class CavityDeck(Deck, kw_only=True):

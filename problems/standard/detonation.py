@@ -19,15 +19,15 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.burn import FRONT_LEAD_FRACTION, ProgrammedBurn
-from hydro.eos import JWL
-from hydro.eos.materials import find_material
-from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.initial_states import put_walls
-from problems.pictures import choose_even_dumps, draw_profiles, make_panels
-from problems.problem import (
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.burn import FRONT_LEAD_FRACTION, ProgrammedBurn
+from shockgrid.hydro.eos import JWL
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
+from shockgrid.problems.initial_states import put_walls
+from shockgrid.problems.pictures import choose_even_dumps, draw_profiles, make_panels
+from shockgrid.problems.problem import (
     BlockPlan,
     Problem,
     Report,
@@ -37,7 +37,7 @@ from problems.problem import (
     fit_slope,
     keep_until,
 )
-from problems.references.exact_flows import compute_taylor_wave, follow_burn
+from shockgrid.problems.references.exact_flows import compute_taylor_wave, follow_burn
 
 
 class DetonationDeck(Deck, kw_only=True):

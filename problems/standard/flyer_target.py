@@ -22,15 +22,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos.materials import find_material
-from problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, VoidFill, key
-from problems.initial_states import put_walls
-from problems.pictures import draw_columns
-from problems.problem import BlockPlan, Problem, Report, Row, find_time, reduce_between
-from problems.references.exact_flows import compute_plate_impact, compute_window_impact
-from problems.references.hugoniot import caution_fit
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, VoidFill, key
+from shockgrid.problems.initial_states import put_walls
+from shockgrid.problems.pictures import draw_columns
+from shockgrid.problems.problem import BlockPlan, Problem, Report, Row, find_time, reduce_between
+from shockgrid.problems.references.exact_flows import compute_plate_impact, compute_window_impact
+from shockgrid.problems.references.hugoniot import caution_fit
 
 
 class PlateTable(DeckTable, kw_only=True):

@@ -16,14 +16,14 @@ from typing import Literal
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.eos.materials import find_material
-from hydro.links import join
-from problems.deck import MOST_CELLS, Deck, RunControl, key
-from problems.initial_states import make_plane_grid
-from problems.problem import Problem, Report, Row, find_most
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.links import join
+from shockgrid.problems.deck import MOST_CELLS, Deck, RunControl, key
+from shockgrid.problems.initial_states import make_plane_grid
+from shockgrid.problems.problem import Problem, Report, Row, find_most
 
 # of the line between the blocks and of its neighbours, over the height of the domain
 LINE_BEND_PART = 0.1

@@ -13,14 +13,14 @@ from typing import Literal
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.eos import IdealGas
-from hydro.links import join
-from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.initial_states import swing_square
-from problems.pictures import Colours, draw_field, make_panels
-from problems.problem import Problem, Report, Row, compare
-from problems.references.exact_flows import GAUSS, average_points
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
+from shockgrid.problems.initial_states import swing_square
+from shockgrid.problems.pictures import Colours, draw_field, make_panels
+from shockgrid.problems.problem import Problem, Report, Row, compare
+from shockgrid.problems.references.exact_flows import GAUSS, average_points
 
 CORE_TURN_TIME = 0.4 * math.pi  # of the core [s]
 KINETIC_ENERGY = 8.0 * math.pi / 300.0

@@ -17,15 +17,15 @@ from typing import Literal
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
-from problems.initial_states import RadialProblem
-from problems.pictures import Colours, draw_field, make_panels
-from problems.problem import Report, compare, get_last
-from problems.references.exact_flows import RADII, Shell
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
+from shockgrid.problems.initial_states import RadialProblem
+from shockgrid.problems.pictures import Colours, draw_field, make_panels
+from shockgrid.problems.problem import Report, compare, get_last
+from shockgrid.problems.references.exact_flows import RADII, Shell
+from shockgrid.regrid.measure.corners import compute_centres
 
 END = math.sqrt(0.75)  # of tau: h is one half
 SHAPES = {1: "slab", 2: "ring", 3: "sphere"}

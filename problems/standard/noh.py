@@ -15,14 +15,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.initial_states import RadialProblem, Symmetry
-from problems.problem import Report, Row, compare, get_last
-from problems.references.exact_flows import DIMENSIONS
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
+from shockgrid.problems.initial_states import RadialProblem, Symmetry
+from shockgrid.problems.problem import Report, Row, compare, get_last
+from shockgrid.problems.references.exact_flows import DIMENSIONS
+from shockgrid.regrid.measure.corners import compute_centres
 
 
 class NohDeck(Deck, kw_only=True):

@@ -15,13 +15,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.pictures import draw_field, make_panels
-from problems.problem import Problem, Report, compare, find_crossing, fit_slope
-from problems.references.shock_polars import Body, ShockPolar, search_pressure, solve_collision
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
+from shockgrid.problems.pictures import draw_field, make_panels
+from shockgrid.problems.problem import Problem, Report, compare, find_crossing, fit_slope
+from shockgrid.problems.references.shock_polars import (
+    Body,
+    ShockPolar,
+    search_pressure,
+    solve_collision,
+)
 
 # length before the wedge; it is 1 long, and the top is 1 above its start
 LAST_TIME_PART = 0.1  # of the time: in it a steady flow does not change

@@ -19,15 +19,15 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join
-from hydro.sources import make_gravity
-from problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
-from problems.initial_states import put_walls
-from problems.pictures import draw_columns
-from problems.problem import (
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.hydro.sources import make_gravity
+from shockgrid.problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
+from shockgrid.problems.initial_states import put_walls
+from shockgrid.problems.pictures import draw_columns
+from shockgrid.problems.problem import (
     Problem,
     Report,
     Row,
@@ -37,8 +37,8 @@ from problems.problem import (
     find_time,
     keep_until,
 )
-from problems.references.exact_flows import compute_gravity_mode, compute_isentropic_layer
-from regrid.measure.corners import compute_centres
+from shockgrid.problems.references.exact_flows import compute_gravity_mode, compute_isentropic_layer
+from shockgrid.regrid.measure.corners import compute_centres
 
 GAS_GAMMA = 5.0 / 3.0
 WAVE_NUMBER = 2.0 * math.pi

@@ -18,14 +18,14 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.formulas.reconstruction import DEFAULT_LIMITER
-from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.initial_states import put_walls
-from problems.pictures import draw_field, find_dump
-from problems.problem import BlockPlan, Problem, Report, Row, find_most
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
+from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
+from shockgrid.problems.initial_states import put_walls
+from shockgrid.problems.pictures import draw_field, find_dump
+from shockgrid.problems.problem import BlockPlan, Problem, Report, Row, find_most
 
 # times at which a shock starts and ends, its first place, its speed, density behind it
 PHASES = (

@@ -17,13 +17,13 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.eos import IdealGas
-from hydro.formulas.geometry import compute_volumes, find_geometry
-from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.initial_states import RadialProblem, Symmetry, follow_gas
-from problems.problem import Report, Row, compare, get_last
-from problems.references.exact_flows import DIMENSIONS, SedovBlast
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.formulas.geometry import compute_volumes, find_geometry
+from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
+from shockgrid.problems.initial_states import RadialProblem, Symmetry, follow_gas
+from shockgrid.problems.problem import Report, Row, compare, get_last
+from shockgrid.problems.references.exact_flows import DIMENSIONS, SedovBlast
 
 # of the whole energy in the part that is computed: half a line, a quarter, a quarter a radian
 SHARES = {"plane": 0.5, "cylindrical": 0.25, "spherical": 0.25 / math.pi}

@@ -16,20 +16,20 @@ from typing import Literal
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.eos import IdealGas
-from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.initial_states import put_walls
-from problems.pictures import Colours, draw_field, find_dump, make_panels
-from problems.problem import BlockPlan, Problem, Report, compare
-from problems.references.exact_flows import (
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
+from shockgrid.problems.initial_states import put_walls
+from shockgrid.problems.pictures import Colours, draw_field, find_dump, make_panels
+from shockgrid.problems.problem import BlockPlan, Problem, Report, compare
+from shockgrid.problems.references.exact_flows import (
     CELL_GAMMA,
     compute_cell,
     compute_cell_velocity,
     follow_cell,
     heat_cell,
 )
-from regrid.measure.corners import compute_centres
+from shockgrid.regrid.measure.corners import compute_centres
 
 SWING_PERIOD = 0.6  # of the swinging grid [s]: at t = 0.75 it is as far as it goes
 PATH_STEPS = 12  # of Runge and Kutta along the paths that nodes follow

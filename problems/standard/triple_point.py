@@ -17,14 +17,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.eos import IdealGas
-from hydro.links import join
-from hydro.motion.line import LineRule
-from problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
-from problems.initial_states import put_walls
-from problems.problem import BlockPlan, Problem, Report, Row, average_plateau, get_last
-from problems.references.riemann import solve_riemann
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.hydro.motion.line import LineRule
+from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
+from shockgrid.problems.initial_states import put_walls
+from shockgrid.problems.problem import BlockPlan, Problem, Report, Row, average_plateau, get_last
+from shockgrid.problems.references.riemann import solve_riemann
 
 # equation of state; density, velocity, pressure; lower left and upper right corner
 GASES = {

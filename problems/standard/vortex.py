@@ -13,14 +13,14 @@ from typing import Literal
 
 import numpy as np
 
-from hydro.block import Block
-from hydro.eos import IdealGas
-from hydro.links import join
-from problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
-from problems.initial_states import swing_square
-from problems.pictures import Colours, draw_field
-from problems.problem import BlockPlan, Problem, Report, compare, get_last, say_unreached
-from problems.references.exact_flows import Vortex as ExactVortex
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
+from shockgrid.problems.initial_states import swing_square
+from shockgrid.problems.pictures import Colours, draw_field
+from shockgrid.problems.problem import BlockPlan, Problem, Report, compare, get_last, say_unreached
+from shockgrid.problems.references.exact_flows import Vortex as ExactVortex
 
 # mean |rho - exact| at t = 10, beta 5, on a fixed grid; computed independently
 FIXED_GRID_ERRORS = {32: 6.73e-3, 64: 1.60e-3, 128: 3.66e-4, 256: 8.85e-5}

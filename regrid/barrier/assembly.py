@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import prange
 
-from regrid.barrier import functional
-from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
-from regrid.barrier.step_control import CHUNK_SPAN
-from regrid.jit import inlined, kernel
-from regrid.measure.quality import take_edges
+from shockgrid.regrid.barrier import functional
+from shockgrid.regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
+from shockgrid.regrid.barrier.step_control import CHUNK_SPAN
+from shockgrid.regrid.jit import inlined, kernel
+from shockgrid.regrid.measure.quality import take_edges
 
 # Data of a column chunk for every row of nodes: the Hessian's couplings as 2 × 2 blocks (xx, xy,
 # yx, yy) to the nodes (i, j+1), (i+1, j+1), from (i+1, j) to (i, j+1), and to (i+1, j); the node's

@@ -19,10 +19,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.barrier import functional
-from regrid.barrier.line_cg import make_solver
-from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
-from regrid.jit import compiled_once, inlined, kernel
+from shockgrid.regrid.barrier import functional
+from shockgrid.regrid.barrier.line_cg import make_solver
+from shockgrid.regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
+from shockgrid.regrid.jit import compiled_once, inlined, kernel
 
 LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of its diagonal
 # Blocks of the matrix at coarse nodes: xx, xy, yx, yy to the next one along i (EAST) and along j

@@ -19,8 +19,13 @@ import math
 
 import numpy as np
 
-from regrid.barrier.coarse_matrix import COARSE_ROWS, factor_lines, fill_coarse_matrix, solve
-from regrid.jit import kernel
+from shockgrid.regrid.barrier.coarse_matrix import (
+    COARSE_ROWS,
+    factor_lines,
+    fill_coarse_matrix,
+    solve,
+)
+from shockgrid.regrid.jit import kernel
 
 # Sums of the residual check: the gradient along the lines j = const and i = const at coarse lines
 # i = const, summed over the stretches on either side with hat functions.

@@ -19,8 +19,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.jit import inlined
-from regrid.measure.quality import find_areas, square
+from shockgrid.regrid.jit import inlined
+from shockgrid.regrid.measure.quality import find_areas, square
 
 LEAST_FADING = 1e-6  # of the barrier's part, so that the matrix keeps a coupling
 

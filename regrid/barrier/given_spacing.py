@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE, fill_laws
-from regrid.measure.corners import BLOCK_CORNERS
-from regrid.measure.quality import compute_scaled_jacobians
+from shockgrid.regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE, fill_laws
+from shockgrid.regrid.measure.corners import BLOCK_CORNERS
+from shockgrid.regrid.measure.quality import compute_scaled_jacobians
 
 EASE_POWER = 6  # of the least sine of a cell of the first grid
 OTHER_PART = 3.0  # factor between an edge's part of its line and that of the sides

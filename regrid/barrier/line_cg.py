@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from numba import prange
 
-from regrid.barrier import assembly as at
-from regrid.barrier.step_control import CHUNK_SPAN
-from regrid.jit import compiled_once, inlined, kernel
+from shockgrid.regrid.barrier import assembly as at
+from shockgrid.regrid.barrier.step_control import CHUNK_SPAN
+from shockgrid.regrid.jit import compiled_once, inlined, kernel
 
 # Scratch of the product: the direction in three rows of nodes, and the product in the middle one,
 # far from them: a store less than 2 kB behind a shifted load halves the vector length (LLVM

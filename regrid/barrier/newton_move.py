@@ -18,16 +18,21 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from regrid.algebraic import fill_displacement, fill_quasi_1d, quasi_1d_grid, transfinite_grid
-from regrid.barrier.side_laws import compute_stiffness
-from regrid.barrier.step_control import shorten_steps
-from regrid.barrier.tuning import Tuning
-from regrid.barrier.untangle import Unfolding, unfold, untangle
-from regrid.barrier.workspace import Workspace
-from regrid.measure.corners import count_triangles, find_folded_cells
-from regrid.measure.faults import find_impossible
-from regrid.protocol import RegridReport
-from regrid.sides import copy_sides, get_sides
+from shockgrid.regrid.algebraic import (
+    fill_displacement,
+    fill_quasi_1d,
+    quasi_1d_grid,
+    transfinite_grid,
+)
+from shockgrid.regrid.barrier.side_laws import compute_stiffness
+from shockgrid.regrid.barrier.step_control import shorten_steps
+from shockgrid.regrid.barrier.tuning import Tuning
+from shockgrid.regrid.barrier.untangle import Unfolding, unfold, untangle
+from shockgrid.regrid.barrier.workspace import Workspace
+from shockgrid.regrid.measure.corners import count_triangles, find_folded_cells
+from shockgrid.regrid.measure.faults import find_impossible
+from shockgrid.regrid.protocol import RegridReport
+from shockgrid.regrid.sides import copy_sides, get_sides
 
 ROUND_OFF_RESIDUAL = 1e-12  # residual, in cells, that cannot be improved
 DOUBTFUL_CORNER_RATIO = 1e-6  # least ratio up to which the signs of corners are computed exactly

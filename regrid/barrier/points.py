@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.errors import RegridFailure
-from regrid.measure.corners import find_excluded_corners, find_folded_cells
-from regrid.sides import SIDE_NAMES, compute_area, get_side
+from shockgrid.regrid.errors import RegridFailure
+from shockgrid.regrid.measure.corners import find_excluded_corners, find_folded_cells
+from shockgrid.regrid.sides import SIDE_NAMES, compute_area, get_side
 
 # of the edges at a point, at which it is opened, in turn
 OPENED_PARTS = (1e-2, 1e-4)

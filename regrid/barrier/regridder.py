@@ -17,31 +17,31 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from regrid.barrier.newton_move import Folded, NewtonMove
-from regrid.barrier.points import (
+from shockgrid.regrid.barrier.newton_move import Folded, NewtonMove
+from shockgrid.regrid.barrier.points import (
     OPENED_PARTS,
     PARTS_OF_TWO_POINTS,
     close_points,
     find_points,
     open_points,
 )
-from regrid.barrier.side_laws import fill_family_weights
-from regrid.barrier.tuning import DEFAULT, OPTIONS, Tuning
-from regrid.barrier.turning import Look, choose_look, is_convex
-from regrid.barrier.workspace import Workspace, find_bend, is_bent
-from regrid.errors import BadInput, RegridFailure
-from regrid.measure.crossings import find_crossing
-from regrid.measure.cuts import Cuts, take_cuts
-from regrid.measure.faults import (
+from shockgrid.regrid.barrier.side_laws import fill_family_weights
+from shockgrid.regrid.barrier.tuning import DEFAULT, OPTIONS, Tuning
+from shockgrid.regrid.barrier.turning import Look, choose_look, is_convex
+from shockgrid.regrid.barrier.workspace import Workspace, find_bend, is_bent
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.measure.crossings import find_crossing
+from shockgrid.regrid.measure.cuts import Cuts, take_cuts
+from shockgrid.regrid.measure.faults import (
     convert_grids,
     convert_nodes,
     convert_numbers,
     explain_failure,
     find_unit,
 )
-from regrid.protocol import RegridResult
-from regrid.sides import compute_area, copy_sides, get_sides
-from regrid.symmetry import turn_bend
+from shockgrid.regrid.protocol import RegridResult
+from shockgrid.regrid.sides import compute_area, copy_sides, get_sides
+from shockgrid.regrid.symmetry import turn_bend
 
 # families whose weights differ by less are ranked by the block's shape
 EVEN_WEIGHT_DIFFERENCE = 1e-6
@@ -161,7 +161,7 @@ class BarrierRegridder:
         self._workspaces: dict[tuple[int, int], Workspace] = {}
         self._sweeps = None
         if method == "sweeps":
-            from regrid.barrier.sweeps import Sweeps
+            from shockgrid.regrid.barrier.sweeps import Sweeps
 
             self._sweeps = Sweeps(
                 given.get("epsilon", 1e-2), edge_lengths=edge_lengths, family=family

@@ -21,19 +21,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.errors import BadInput, RegridFailure
-from regrid.measure.corners import (
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.measure.corners import (
     TRIANGLES,
     compute_corner_signs,
     find_excluded_corners,
     find_folded_cells,
     is_collapsed,
 )
-from regrid.measure.crossings import find_crossing
-from regrid.measure.cuts import Cuts, take_cuts
-from regrid.measure.faults import explain_failure
-from regrid.sides import compute_area
+from shockgrid.regrid.measure.crossings import find_crossing
+from shockgrid.regrid.measure.cuts import Cuts, take_cuts
+from shockgrid.regrid.measure.faults import explain_failure
+from shockgrid.regrid.sides import compute_area
 
 MOST_PROJECTION_ROUNDS = 20  # of projection
 # how far a projected node goes past the segment, over the segment's length

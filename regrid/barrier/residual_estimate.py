@@ -21,9 +21,9 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from regrid.algebraic import blend, take_blend, take_curve, take_curve_sides
-from regrid.barrier.coarse_nodes import end_stretch
-from regrid.barrier.functional import (
+from shockgrid.regrid.algebraic import blend, take_blend, take_curve, take_curve_sides
+from shockgrid.regrid.barrier.coarse_nodes import end_stretch
+from shockgrid.regrid.barrier.functional import (
     cell_slope,
     cell_stiffness,
     corner_slope,
@@ -41,9 +41,9 @@ from regrid.barrier.functional import (
     take_corner_weight,
     weigh,
 )
-from regrid.barrier.line_cg import add_columns
-from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
-from regrid.barrier.step_control import (
+from shockgrid.regrid.barrier.line_cg import add_columns
+from shockgrid.regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
+from shockgrid.regrid.barrier.step_control import (
     CHUNK_SPAN,
     NO_LIMIT,
     UPRIGHT,
@@ -51,9 +51,9 @@ from regrid.barrier.step_control import (
     take_edges,
     take_row,
 )
-from regrid.jit import inlined, kernel
-from regrid.measure.corners import mark_triangles
-from regrid.measure.quality import find_areas, square
+from shockgrid.regrid.jit import inlined, kernel
+from shockgrid.regrid.measure.corners import mark_triangles
+from shockgrid.regrid.measure.quality import find_areas, square
 
 # Scratch: one row each.  The first ones hold node rows i and i + 1 of the old grid and of this one;
 # then the chunk's part of the tables along j, inverse conditional lengths of edges (G) and their

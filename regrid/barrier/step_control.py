@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.jit import inlined, kernel
-from regrid.measure.corners import compute_doubled_area, find_triangle
-from regrid.measure.quality import find_areas
+from shockgrid.regrid.jit import inlined, kernel
+from shockgrid.regrid.measure.corners import compute_doubled_area, find_triangle
+from shockgrid.regrid.measure.quality import find_areas
 
 CHUNK_SPAN = 136  # length of a row of scratch: a multiple of 8, not a power of two
 MOST_CHUNK_NODES = 128  # nodes of one chunk of columns; the halo is one node on either side

@@ -30,9 +30,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.algebraic import displaced_grid, fill_quasi_1d
-from regrid.barrier.functional import corner_blocks
-from regrid.barrier.side_laws import (
+from shockgrid.regrid.algebraic import displaced_grid, fill_quasi_1d
+from shockgrid.regrid.barrier.functional import corner_blocks
+from shockgrid.regrid.barrier.side_laws import (
     LENGTH,
     LENGTH_CHANGE,
     STEP,
@@ -40,20 +40,20 @@ from regrid.barrier.side_laws import (
     fill_family_weights,
     fill_laws,
 )
-from regrid.barrier.tuning import Tuning
-from regrid.barrier.untangle import untangle
-from regrid.barrier.workspace import Workspace
-from regrid.errors import BadInput
-from regrid.jit import inlined, kernel
-from regrid.measure.corners import (
+from shockgrid.regrid.barrier.tuning import Tuning
+from shockgrid.regrid.barrier.untangle import untangle
+from shockgrid.regrid.barrier.workspace import Workspace
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import inlined, kernel
+from shockgrid.regrid.measure.corners import (
     BLOCK_CORNERS,
     TRIANGLES,
     count_turned_corners,
 )
-from regrid.measure.faults import check_grids, explain_failure
-from regrid.measure.quality import compute_corner_areas
-from regrid.protocol import RegridReport, RegridResult
-from regrid.sides import compute_area, copy_sides, get_sides
+from shockgrid.regrid.measure.faults import check_grids, explain_failure
+from shockgrid.regrid.measure.quality import compute_corner_areas
+from shockgrid.regrid.protocol import RegridReport, RegridResult
+from shockgrid.regrid.sides import compute_area, copy_sides, get_sides
 
 SWEEP_SPAN = 136  # length of a scratch row: a multiple of 8, not a power of two
 MOST_CHUNK_LINES = 128  # lines in a chunk; a row of nodes has one more on either side

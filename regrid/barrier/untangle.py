@@ -14,8 +14,8 @@ from enum import Enum
 
 import numpy as np
 
-from regrid.barrier import assembly as at
-from regrid.barrier.functional import (
+from shockgrid.regrid.barrier import assembly as at
+from shockgrid.regrid.barrier.functional import (
     cell_value,
     corner_value,
     find_least,
@@ -26,12 +26,12 @@ from regrid.barrier.functional import (
     take_cell_numbers,
     take_corner_weight,
 )
-from regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP_CHANGE
-from regrid.barrier.step_control import CHUNK_SPAN
-from regrid.barrier.tuning import DEFAULT, Tuning
-from regrid.jit import kernel
-from regrid.measure.quality import take_edges
-from regrid.sides import copy_sides
+from shockgrid.regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP_CHANGE
+from shockgrid.regrid.barrier.step_control import CHUNK_SPAN
+from shockgrid.regrid.barrier.tuning import DEFAULT, Tuning
+from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.measure.quality import take_edges
+from shockgrid.regrid.sides import copy_sides
 
 TERM_1, TERM_2, TERM_3, TERM_4 = (at.ASSEMBLY_ROWS + k * CHUNK_SPAN for k in range(4))
 LEAST_1, LEAST_2, LEAST_3, LEAST_4 = (at.ASSEMBLY_ROWS + k * CHUNK_SPAN for k in range(4, 8))

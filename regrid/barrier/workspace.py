@@ -15,18 +15,18 @@ from typing import Any
 import numba
 import numpy as np
 
-from regrid.algebraic import SideMotion, fill_curves
-from regrid.barrier.assembly import (
+from shockgrid.regrid.algebraic import SideMotion, fill_curves
+from shockgrid.regrid.barrier.assembly import (
     NODE_ROWS,
     assemble_barrier,
     assemble_on_threads,
     assemble_smoothed,
 )
-from regrid.barrier.coarse_nodes import CoarseCorrection
-from regrid.barrier.functional import has_cell_terms
-from regrid.barrier.given_spacing import GivenSpacing, SideLengths, find_given_spacing
-from regrid.barrier.line_cg import fill_product, solve_serial, solve_threaded
-from regrid.barrier.residual_estimate import (
+from shockgrid.regrid.barrier.coarse_nodes import CoarseCorrection
+from shockgrid.regrid.barrier.functional import has_cell_terms
+from shockgrid.regrid.barrier.given_spacing import GivenSpacing, SideLengths, find_given_spacing
+from shockgrid.regrid.barrier.line_cg import fill_product, solve_serial, solve_threaded
+from shockgrid.regrid.barrier.residual_estimate import (
     ASPECT,
     COSECANT,
     LEAST_SCALED,
@@ -36,17 +36,22 @@ from regrid.barrier.residual_estimate import (
     look_serial,
     look_threaded,
 )
-from regrid.barrier.side_laws import BarrierLaw, prepare, weigh_curves
-from regrid.barrier.step_control import CHUNK_SPAN, MOST_CHUNK_NODES, UPRIGHT, measure_corners
-from regrid.barrier.tuning import DEFAULT, Tuning
-from regrid.barrier.untangle import ENERGY_ROW, ENERGY_ROWS, LEAST_AREA_ROW, fill_energy
-from regrid.jit import can_use_threads
-from regrid.measure.corners import BLOCK_CORNERS
-from regrid.measure.crossings import BoundaryCheck
-from regrid.measure.quality import compute_scaled_jacobians
-from regrid.sides import copy_sides, get_sides
-from regrid.symmetry import Symmetry, find_symmetry
-from regrid.work_arrays import Carver, count_numbers, share_memory
+from shockgrid.regrid.barrier.side_laws import BarrierLaw, prepare, weigh_curves
+from shockgrid.regrid.barrier.step_control import (
+    CHUNK_SPAN,
+    MOST_CHUNK_NODES,
+    UPRIGHT,
+    measure_corners,
+)
+from shockgrid.regrid.barrier.tuning import DEFAULT, Tuning
+from shockgrid.regrid.barrier.untangle import ENERGY_ROW, ENERGY_ROWS, LEAST_AREA_ROW, fill_energy
+from shockgrid.regrid.jit import can_use_threads
+from shockgrid.regrid.measure.corners import BLOCK_CORNERS
+from shockgrid.regrid.measure.crossings import BoundaryCheck
+from shockgrid.regrid.measure.quality import compute_scaled_jacobians
+from shockgrid.regrid.sides import copy_sides, get_sides
+from shockgrid.regrid.symmetry import Symmetry, find_symmetry
+from shockgrid.regrid.work_arrays import Carver, count_numbers, share_memory
 
 VECTORS = ("solution", "r", "z", "p", "p_old", "product")  # of the solve
 LEAST_SPACING_BEND = 1e-12  # departures of laws below it are round-off

@@ -13,7 +13,8 @@ import pickle
 import uuid
 from types import CodeType, FunctionType, ModuleType
 
-PACKAGES = ("regrid", "hydro", "problems")  # where the kernels are
+# where the kernels are
+PACKAGES = ("shockgrid.regrid", "shockgrid.hydro", "shockgrid.problems")
 TOOLCHAIN = ("numpy", "numba", "llvmlite", "math", "cmath", "operator", "builtins", "typing")
 
 
@@ -81,6 +82,11 @@ class _Contents(pickle.Pickler):
         return where, getattr(value, "__code__", None), extra, named
 
 
+def is_of_packages(module: str) -> bool:
+    """Whether a module is one of the packages that have kernels, not a user's own."""
+    return ".".join(module.split(".")[:2]) in PACKAGES
+
+
 def _has_names(value) -> bool:
     """Is it a function, module or class, and none of the toolchain's?"""
     if not isinstance(value, FunctionType | ModuleType | type):
@@ -98,6 +104,6 @@ def name_by_contents(function, options) -> None:
     """Give a function of which there may be variants (made by a factory, of a user's own, with
     options) a name of its own variant: machine code is linked by name and types, and variants
     cached by two processes and loaded by a third would pass for one another."""
-    if function.__closure__ or options or function.__module__.split(".")[0] not in PACKAGES:
+    if function.__closure__ or options or not is_of_packages(function.__module__):
         variant = f"{compute_contents_digest(function)} {options}"
         function.__qualname__ += f"_{hashlib.sha256(variant.encode()).hexdigest()[:10]}"

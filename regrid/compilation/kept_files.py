@@ -21,11 +21,11 @@ import llvmlite
 import numba
 import numpy as np
 
-from regrid.compilation.contents import PACKAGES
-from regrid.compilation.first_calls import is_interpreting
-from regrid.compilation.processor import find_machine
+from shockgrid.regrid.compilation.contents import PACKAGES
+from shockgrid.regrid.compilation.first_calls import is_interpreting
+from shockgrid.regrid.compilation.processor import find_machine
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[2]  # the folder in which the packages lie
 VERSIONS = numba.__version__, llvmlite.__version__, np.__version__, sys.version
 KEPT_FILES = 6000  # of the cache: when there are more, half of them go
 
@@ -79,7 +79,8 @@ def keep(path: Path, contents: bytes) -> None:
 @functools.cache
 def digest_sources() -> str:
     """Digest of all files of the packages: what is computed with them may differ with it."""
-    files = sorted(file for name in PACKAGES for file in ROOT.joinpath(name).rglob("*.py"))
+    folders = [ROOT / package.rpartition(".")[2] for package in PACKAGES]
+    files = sorted(file for folder in folders for file in folder.rglob("*.py"))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 

@@ -25,15 +25,15 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.environment import Environment, _rebuild_env, lookup_environment
 from numba.core.runtime import _nrt_python
 
-from regrid.compilation.contents import compute_contents_digest
-from regrid.compilation.first_calls import (
+from shockgrid.regrid.compilation.contents import compute_contents_digest
+from shockgrid.regrid.compilation.first_calls import (
     KERNEL_CODES,
     is_interpreted,
     note_compiled,
     prepare_compiler,
     stopped_clock,
 )
-from regrid.compilation.kept_files import find_kept, keep, read_kept
+from shockgrid.regrid.compilation.kept_files import find_kept, keep, read_kept
 
 # options of numba that are not documented: arrays are not counted, nor called from elsewhere
 WITHOUT_COUNTS = {"_nrt": False}

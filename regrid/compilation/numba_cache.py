@@ -21,15 +21,15 @@ from typing import Any
 import numba
 from numba.extending import typeof_impl
 
-from regrid.compilation.contents import compute_contents_digest
-from regrid.compilation.first_calls import (
+from shockgrid.regrid.compilation.contents import compute_contents_digest
+from shockgrid.regrid.compilation.first_calls import (
     is_interpreted,
     note_compiled,
     prepare_compiler,
     stopped_clock,
 )
-from regrid.compilation.kept_files import VERSIONS, find_cache
-from regrid.compilation.processor import find_machine
+from shockgrid.regrid.compilation.kept_files import VERSIONS, find_cache
+from shockgrid.regrid.compilation.processor import find_machine
 
 CHECKSUMS = "checksums"  # file of a kernel's folder: a line for each other file in it
 # what a kernel shows of the dispatcher that numba makes of it

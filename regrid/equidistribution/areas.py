@@ -28,13 +28,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from regrid.algebraic import begin_grid
-from regrid.equidistribution.weights import WeightedRegridder
-from regrid.errors import BadInput, RegridFailure
-from regrid.jit import kernel
-from regrid.measure.faults import check_grids, explain_failure, find_unit, name_cells
-from regrid.measure.quality import SINE, compute_corner_areas, find_bad_cells, measure_rows
-from regrid.protocol import RegridReport, RegridResult
+from shockgrid.regrid.algebraic import begin_grid
+from shockgrid.regrid.equidistribution.weights import WeightedRegridder
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.measure.faults import check_grids, explain_failure, find_unit, name_cells
+from shockgrid.regrid.measure.quality import (
+    SINE,
+    compute_corner_areas,
+    find_bad_cells,
+    measure_rows,
+)
+from shockgrid.regrid.protocol import RegridReport, RegridResult
 
 A, B, AX, AY, BX, BY = range(6)  # rows of the fluxes: w g22, w g11, their products with d1, d2
 SCALE, ALONG_I, ALONG_J = range(3)  # rows of the nodes' coefficients

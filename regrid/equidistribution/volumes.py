@@ -41,11 +41,11 @@ from dataclasses import replace
 import numpy as np
 from numba import prange
 
-from regrid.curves import equalise_products, equidistribute
-from regrid.equidistribution.areas import Equidistributed, iterate, iterate_ed2
-from regrid.equidistribution.weights import weigh_points
-from regrid.errors import BadInput, RegridFailure
-from regrid.hexahedra.faces import (
+from shockgrid.regrid.curves import equalise_products, equidistribute
+from shockgrid.regrid.equidistribution.areas import Equidistributed, iterate, iterate_ed2
+from shockgrid.regrid.equidistribution.weights import weigh_points
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.hexahedra.faces import (
     carry_faces,
     check_grids_in_space,
     compute_face_density,
@@ -54,16 +54,16 @@ from regrid.hexahedra.faces import (
     fill_from_faces,
     find_unit_in_space,
 )
-from regrid.hexahedra.functional import cross, dot
-from regrid.jit import can_use_threads, inlined, kernel
-from regrid.measure.corners import compute_centres, compute_hexahedron_centres
-from regrid.measure.faults import name_cells
-from regrid.measure.hexahedra import (
+from shockgrid.regrid.hexahedra.functional import cross, dot
+from shockgrid.regrid.jit import can_use_threads, inlined, kernel
+from shockgrid.regrid.measure.corners import compute_centres, compute_hexahedron_centres
+from shockgrid.regrid.measure.faults import name_cells
+from shockgrid.regrid.measure.hexahedra import (
     compute_corner_ratio,
     compute_least_corner_volumes,
     find_bad_hexahedra,
 )
-from regrid.protocol import RegridReport, RegridResult
+from shockgrid.regrid.protocol import RegridReport, RegridResult
 
 
 def solve_edc(

@@ -37,12 +37,12 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE, fill_laws
-from regrid.curves import arc_spacing, solve_ed1
-from regrid.errors import BadInput, suggest
-from regrid.measure.corners import compute_centres
-from regrid.measure.quality import compute_corner_areas
-from regrid.sides import SIDE_NAMES, SIDES
+from shockgrid.regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE, fill_laws
+from shockgrid.regrid.curves import arc_spacing, solve_ed1
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.measure.corners import compute_centres
+from shockgrid.regrid.measure.quality import compute_corner_areas
+from shockgrid.regrid.sides import SIDE_NAMES, SIDES
 
 OPERATORS = {
     ast.Add: operator.add,

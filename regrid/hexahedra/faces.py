@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from regrid.errors import BadInput, RegridFailure
-from regrid.jit import kernel
-from regrid.measure.faults import check_size, choose_unit, convert_nodes
-from regrid.measure.hexahedra import compute_corner_volumes, find_bad_hexahedra
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.measure.faults import check_size, choose_unit, convert_nodes
+from shockgrid.regrid.measure.hexahedra import compute_corner_volumes, find_bad_hexahedra
 
 FACES = ("i_min", "i_max", "j_min", "j_max", "k_min", "k_max")
 LEAST_LENGTH = 1e-6  # of a family's mean edge

@@ -24,8 +24,8 @@ from __future__ import annotations
 
 import math
 
-from regrid.barrier.functional import smooth_area
-from regrid.jit import kernel
+from shockgrid.regrid.barrier.functional import smooth_area
+from shockgrid.regrid.jit import kernel
 
 SHARP_CORNER_SINE = 0.3  # corner sine below which the barrier is strengthened
 CENTRE_E2 = 1e-6  # the centre of a cell with positive corners may be folded

@@ -17,8 +17,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from regrid.errors import BadInput
-from regrid.hexahedra.faces import (
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.hexahedra.faces import (
     Functional,
     carry_faces,
     check_grids_in_space,
@@ -32,7 +32,7 @@ from regrid.hexahedra.faces import (
     find_turned_edge,
     find_unit_in_space,
 )
-from regrid.hexahedra.functional import (
+from shockgrid.regrid.hexahedra.functional import (
     HEXAHEDRON_ROWS,
     LONGEST_HEXAHEDRON_ROW,
     ONLY_ENERGY,
@@ -43,8 +43,8 @@ from regrid.hexahedra.functional import (
     fill_strength,
     halve_steps,
 )
-from regrid.hexahedra.solve import CoarseBlock, factor_lines, solve, solve_lines
-from regrid.protocol import RegridReport, RegridResult
+from shockgrid.regrid.hexahedra.solve import CoarseBlock, factor_lines, solve, solve_lines
+from shockgrid.regrid.protocol import RegridReport, RegridResult
 
 LEAST_RATIO = 0.1  # least ratio of a predicted corner volume to its old value
 # the step starts from the moved grid if it keeps this much of every corner

@@ -18,9 +18,9 @@ import math
 
 import numpy as np
 
-from regrid.barrier.coarse_nodes import cut_evenly
-from regrid.hexahedra.faces import FaceLaws, Functional
-from regrid.hexahedra.functional import (
+from shockgrid.regrid.barrier.coarse_nodes import cut_evenly
+from shockgrid.regrid.hexahedra.faces import FaceLaws, Functional
+from shockgrid.regrid.hexahedra.functional import (
     WITH_MATRIX,
     assemble,
     compare_corners,
@@ -29,7 +29,7 @@ from regrid.hexahedra.functional import (
     formula,
     plus,
 )
-from regrid.jit import kernel
+from shockgrid.regrid.jit import kernel
 
 
 @formula

@@ -20,9 +20,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.errors import BadInput
-from regrid.jit import compiled_once, inlined, kernel
-from regrid.sides import I_MIN, J_MAX, compute_area, find_node
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import compiled_once, inlined, kernel
+from shockgrid.regrid.sides import I_MIN, J_MAX, compute_area, find_node
 
 # of the block: what `find_places` says of a point
 OUTSIDE_BLOCK = 0

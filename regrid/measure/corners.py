@@ -23,8 +23,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from regrid.jit import inlined, kernel
-from regrid.sides import compute_area
+from shockgrid.regrid.jit import inlined, kernel
+from shockgrid.regrid.sides import compute_area
 
 
 def compute_centres(nodes: np.ndarray) -> np.ndarray:

@@ -17,10 +17,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.jit import kernel
-from regrid.measure.corners import ORIENTATION_ERROR_BOUND, UNDERFLOW, compute_turns
-from regrid.measure.cuts import Cuts, find_cut_edges, join_cuts
-from regrid.sides import I_MAX, I_MIN, J_MAX, J_MIN, find_node, get_side
+from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.measure.corners import ORIENTATION_ERROR_BOUND, UNDERFLOW, compute_turns
+from shockgrid.regrid.measure.cuts import Cuts, find_cut_edges, join_cuts
+from shockgrid.regrid.sides import I_MAX, I_MIN, J_MAX, J_MIN, find_node, get_side
 
 LEAF_EDGES = 4  # edges of the smallest pieces
 LOW_X, HIGH_X, LOW_Y, HIGH_Y = range(4)  # rows of the boxes

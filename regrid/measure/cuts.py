@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from regrid.errors import BadInput
-from regrid.sides import OPPOSITE_SIDES, SIDE_NAMES, get_side
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.sides import OPPOSITE_SIDES, SIDE_NAMES, get_side
 
 CUT_ROUNDING = 1e-6  # of a mean edge: up to which nodes of a cut are one
 CUT_WORDS = 'a side and two of its nodes, between which it goes out and back: ["j_min", 0, 80]'

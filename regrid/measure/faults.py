@@ -21,13 +21,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from regrid.errors import BadInput, RegridFailure
-from regrid.jit import kernel
-from regrid.measure.corners import BLOCK_CORNERS, TRIANGLES
-from regrid.measure.crossings import BoundaryCheck, find_crossing, walk_boundary
-from regrid.measure.cuts import Cuts
-from regrid.measure.quality import compute_corner_areas
-from regrid.sides import compute_area, get_sides
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.measure.corners import BLOCK_CORNERS, TRIANGLES
+from shockgrid.regrid.measure.crossings import BoundaryCheck, find_crossing, walk_boundary
+from shockgrid.regrid.measure.cuts import Cuts
+from shockgrid.regrid.measure.quality import compute_corner_areas
+from shockgrid.regrid.sides import compute_area, get_sides
 
 FLOAT64 = np.dtype(np.float64)
 # of a block, in m: squares of its areas are still numbers

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from regrid.errors import BadInput
-from regrid.jit import kernel
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import kernel
 
 
 @kernel

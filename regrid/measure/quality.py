@@ -21,17 +21,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrid.errors import BadInput
-from regrid.jit import inlined, kernel
-from regrid.measure.corners import (
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import inlined, kernel
+from shockgrid.regrid.measure.corners import (
     ORIENTATION_ERROR_BOUND,
     UNDERFLOW,
     compute_corner_signs,
     count_triangles,
     find_triangles,
 )
-from regrid.measure.crossings import walk_boundary
-from regrid.sides import SIDE_NAMES
+from shockgrid.regrid.measure.crossings import walk_boundary
+from shockgrid.regrid.sides import SIDE_NAMES
 
 
 @dataclass(frozen=True)

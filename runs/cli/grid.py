@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import click
 
-from runs.cli.terminal import Commands, echo
+from shockgrid.runs.cli.terminal import Commands, echo
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
@@ -70,7 +70,7 @@ picture = click.option(
 @force
 def list_names(picture, force) -> None:
     """List the named domains, the 3D blocks and the families."""
-    from runs.grids.commands import draw_every_domain, list_everything
+    from shockgrid.runs.grids.commands import draw_every_domain, list_everything
 
     echo(list_everything())
     if picture:
@@ -112,7 +112,7 @@ def make(source, outputs, force, picture, **words) -> None:
     until it no longer changes.  In 3D blocks weight times size is equal on edges,
     on faces and in the volume; --option sides=false leaves edges and faces, iterations=100.
     """
-    from runs.grids.commands import make_grid
+    from shockgrid.runs.grids.commands import make_grid
 
     echo("\n".join(make_grid(source, (outputs, force, picture), **words)))
 
@@ -132,7 +132,7 @@ def regrid(file, outputs, force, picture, **words) -> None:
     A grid with non-convex cells is untangled first.  A 3D grid is
     equidistributed inside its faces (--weight, --option iterations=100).
     """
-    from runs.grids.commands import regrid_file
+    from shockgrid.runs.grids.commands import regrid_file
 
     echo("\n".join(regrid_file(file, (outputs, force, picture), **words)))
 
@@ -147,7 +147,7 @@ def check(file, block, picture, force) -> int:
 
     The exit code is 1 if a cell is not convex.
     """
-    from runs.grids.commands import check_file
+    from shockgrid.runs.grids.commands import check_file
 
     lines, valid = check_file(file, block, picture, force)
     echo("\n".join(lines))
@@ -191,7 +191,7 @@ def compare(source, cells, picture, force, **options) -> None:
     from a deforming side (in a file: any side) over that of the quasi-1D grid,
     µs/node the median step.
     """
-    from runs.grids.commands import Comparison, compare_families, parse_cells
+    from shockgrid.runs.grids.commands import Comparison, compare_families, parse_cells
 
     comparison = Comparison(cells=parse_cells(cells), **options)
     for line in compare_families(source, comparison, picture, force):

@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import click
 
-from regrid.errors import BadInput
-from runs.cli.grid import grid
-from runs.cli.terminal import (
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.cli.grid import grid
+from shockgrid.runs.cli.terminal import (
     EXIT_BAD_INPUT,
     Commands,
     check_pairs,
@@ -30,7 +30,7 @@ from runs.cli.terminal import (
     echo_usage,
     print_what_can_be_shown,
 )
-from runs.ranks.started import is_for_ranks
+from shockgrid.runs.ranks.started import is_for_ranks
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
@@ -98,7 +98,7 @@ def list_problems(name: str | None) -> None:
 
     With NAME, the page of that one.
     """
-    from runs.inspection import listing
+    from shockgrid.runs.inspection import listing
 
     echo(listing.describe_problem(name) if name else listing.describe_all())
 
@@ -113,17 +113,17 @@ def list_problems(name: str | None) -> None:
 @click.pass_obj  # the ranks of MPI that share the command, or None
 def run(world, deck, output, force, dry_run, ranks, march: March) -> int:
     """Run a problem, a packaged deck, a deck file (TOML) or a problem's own file (Python)."""
-    from runs.deck import reading as deck_reading
-    from runs.march.runner import WallLimit
+    from shockgrid.runs.deck import reading as deck_reading
+    from shockgrid.runs.march.runner import WallLimit
 
     limit = WallLimit(march.max_wall) if march.max_wall is not None else None
     checked = deck_reading.read_deck(deck, _with_threads(march.settings, march.threads))
     if dry_run:
-        from regrid.compilation.first_calls import interpreted
-        from runs.forecast import foretell, measure_size
-        from runs.inspection.listing import describe_plan
-        from runs.march.launching import check_deck_fully
-        from runs.ranks.map import describe_map
+        from shockgrid.regrid.compilation.first_calls import interpreted
+        from shockgrid.runs.forecast import foretell, measure_size
+        from shockgrid.runs.inspection.listing import describe_plan
+        from shockgrid.runs.march.launching import check_deck_fully
+        from shockgrid.runs.ranks.map import describe_map
 
         with interpreted():
             problem = checked.make_problem()
@@ -138,8 +138,8 @@ def run(world, deck, output, force, dry_run, ranks, march: March) -> int:
         return 0
     if ranks is not None:
         raise BadInput(f"--ranks needs --dry-run; to run, type mpiexec -n {ranks} shockgrid ...")
-    from runs.march.compiling import compiling
-    from runs.march.launching import start_runner
+    from shockgrid.runs.march.compiling import compiling
+    from shockgrid.runs.march.launching import start_runner
 
     with compiling(march.quiet, helped=world is None):
         runner = start_runner(checked, output, force, march.quiet, _say, world)
@@ -164,9 +164,9 @@ def restart(world, directory, at, cells, output, force, march: March) -> int:
     `shockgrid schema` marks them).  With --cells the state is
     remapped to another grid, and the run continues in a directory of its own.
     """
-    from runs.march.launching import continue_runner, remap_runner
-    from runs.march.runner import WallLimit
-    from runs.store.directory import open_directory
+    from shockgrid.runs.march.launching import continue_runner, remap_runner
+    from shockgrid.runs.march.runner import WallLimit
+    from shockgrid.runs.store.directory import open_directory
 
     limit = WallLimit(march.max_wall) if march.max_wall is not None else None
     opened = open_directory(directory)
@@ -208,8 +208,8 @@ def study(deck, **options) -> int:
     in DIR/runs and is computed once, also if the study was killed; after a change of the deck only
     what has changed is computed.  Failed runs are listed; the study continues.
     """
-    from runs.study.command import Request
-    from runs.study.command import study as compute
+    from shockgrid.runs.study.command import Request
+    from shockgrid.runs.study.command import study as compute
 
     return compute(Request(deck, **options), say=echo, note=_say)
 
@@ -223,11 +223,11 @@ def check(deck, settings) -> None:
     Keys without a value are commented out.  Cautions about the results go to
     standard error.
     """
-    from regrid.compilation.first_calls import interpreted
-    from runs.deck import reading as deck_reading
-    from runs.deck.checking import describe_deck
-    from runs.inspection.account import describe_cautions
-    from runs.march.launching import check_deck_fully
+    from shockgrid.regrid.compilation.first_calls import interpreted
+    from shockgrid.runs.deck import reading as deck_reading
+    from shockgrid.runs.deck.checking import describe_deck
+    from shockgrid.runs.inspection.account import describe_cautions
+    from shockgrid.runs.march.launching import check_deck_fully
 
     checked = deck_reading.read_deck(deck, settings)
     with interpreted():
@@ -244,7 +244,7 @@ def check(deck, settings) -> None:
 @click.argument("problem")
 def schema(problem) -> None:
     """Print the JSON schema of a problem's deck, for editors."""
-    from runs.deck.checking import schema_text
+    from shockgrid.runs.deck.checking import schema_text
 
     echo(schema_text(problem), nl=False)
 
@@ -258,7 +258,7 @@ def materials(name, output) -> None:
     NAME may be a file in the form of the SESAME library, FILE.ses, whose materials are listed, or
     one of these, FILE.ses:3336, of which -o writes a table for `eos = "tabular"`.
     """
-    from runs.inspection import listing, sesame
+    from shockgrid.runs.inspection import listing, sesame
 
     source = sesame.split_name(name) if name else None
     if source is None:
@@ -283,7 +283,7 @@ def info(path, deck) -> int:
 
     The exit code is 2 if a file of the run is damaged; a line names it.
     """
-    from runs.inspection.info import DAMAGED, describe, find_deck
+    from shockgrid.runs.inspection.info import DAMAGED, describe, find_deck
 
     if deck:
         echo(find_deck(path), nl=False)
@@ -297,7 +297,7 @@ def info(path, deck) -> int:
 @click.argument("file")
 def inspect(file) -> None:
     """Print a dump's contents: names, shapes, units, ranges, NaNs, checksums."""
-    from runs.inspection.info import inspect as describe
+    from shockgrid.runs.inspection.info import inspect as describe
 
     echo(describe(file))
 
@@ -328,7 +328,7 @@ def plot(directory, output, dpi, table, **words) -> None:
     the fields of the dumps: schlieren, pressure_gradient, vorticity, rate (of
     the cells; the largest limits dt).
     """
-    from runs.pictures.command import Wanted, draw
+    from shockgrid.runs.pictures.command import Wanted, draw
 
     for path in draw(directory, Wanted(**words), output, dpi, _say, table):
         echo(path)
@@ -342,7 +342,7 @@ def export(directory, output) -> None:
 
     At every dump: x, y and the length along each curve.
     """
-    from runs.pictures.curves import export_interfaces
+    from shockgrid.runs.pictures.curves import export_interfaces
 
     echo(export_interfaces(directory, output))
 
@@ -361,7 +361,7 @@ def export(directory, output) -> None:
 @click.option("-o", "--output", metavar="FILE", help="Film [DIR/film-FIELD.mp4 or .gif].")
 def film(directory, field, output, **words) -> None:
     """Make a film of a field over the dumps: mp4 with ffmpeg, else GIF."""
-    from runs.pictures.film import make_film
+    from shockgrid.runs.pictures.film import make_film
 
     echo(make_film(directory, field, output, **words))
 
@@ -376,7 +376,7 @@ def report(directory, output, film, dpi) -> None:
 
     The file is complete and needs no network.  Needs the extra: pip install 'shockgrid[report]'.
     """
-    from runs.report import report as write_report
+    from shockgrid.runs.report import report as write_report
 
     echo(write_report(directory, output, film=film, dpi=dpi, say=_say))
 
@@ -393,7 +393,7 @@ def compare(a, b, rtol, atol) -> int:
     count.  A tolerance is relative to the largest size in an array.  If numbers
     of cells or steps differ, dumps are paired by time, and tolerances apply to L1 norms.
     """
-    from runs.inspection.compare import compare_in_words
+    from shockgrid.runs.inspection.compare import compare_in_words
 
     comparison, differ = compare_in_words(a, b, rtol, atol)
     echo(comparison)
@@ -413,7 +413,7 @@ def verify(**words) -> int:
 
     The exit code is 1 if a bar is missed.
     """
-    from runs.verify import verify as run_all
+    from shockgrid.runs.verify import verify as run_all
 
     return run_all(**words, say=echo)
 
@@ -433,7 +433,7 @@ def _finish(ending, directory, picture: bool, quiet: bool) -> int:
         _say(f"shockgrid: {ending.reason}; {directory} can be continued")
     if picture and ending.exit_code < 128:  # not where a signal stopped it
         try:
-            from runs.pictures.command import draw_all
+            from shockgrid.runs.pictures.command import draw_all
 
             paths = draw_all(str(directory), None if quiet else _say)
         except Exception as error:  # whatever it is: the run has ended as it has
@@ -449,7 +449,7 @@ def main(arguments: list[str] | None = None) -> int:
     print_what_can_be_shown()
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     if is_for_ranks(arguments):
-        from runs.ranks.world import run_on_ranks
+        from shockgrid.runs.ranks.world import run_on_ranks
 
         return run_on_ranks(lambda world: _main(arguments, world), echo_sentences)
     return _main(arguments)

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import click
 
-from problems.problem_file import describe_mistake
-from problems.registry import is_problem
-from regrid.errors import BadInput, RunFailure, suggest
-from regrid.text_files import MOST_IN_LINE, cut, escape_controls
-from runs.store.files import describe_disk_error
+from shockgrid.problems.problem_file import describe_mistake
+from shockgrid.problems.registry import is_problem
+from shockgrid.regrid.errors import BadInput, RunFailure, suggest
+from shockgrid.regrid.text_files import MOST_IN_LINE, cut, escape_controls
+from shockgrid.runs.store.files import describe_disk_error
 
 
 class Commands(click.Group):
@@ -61,7 +61,7 @@ def check_pairs(arguments: Sequence[str]) -> None:
 
 def is_deck(word: str) -> bool:
     """Whether an argument may be the problem, deck or directory that a command is for."""
-    from runs.deck.reading import packaged_decks
+    from shockgrid.runs.deck.reading import packaged_decks
 
     return is_problem(word) or word in packaged_decks() or Path(word).exists()
 

@@ -20,10 +20,10 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from problems.deck import DIGESTS, Deck, DeckTable
-from problems.registry import load_problem, read_docstring
-from regrid.errors import BadInput, find_nearest
-from runs.quantities import drop_units
+from shockgrid.problems.deck import DIGESTS, Deck, DeckTable
+from shockgrid.problems.registry import load_problem, read_docstring
+from shockgrid.regrid.errors import BadInput, find_nearest
+from shockgrid.runs.quantities import drop_units
 
 UNIONS = (typing.Union, type(int | str))
 

@@ -21,18 +21,18 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from problems.deck import DIGESTS, Deck, DeckTable, check_digests, place_gauges
-from problems.problem_file import (
+from shockgrid.problems.deck import DIGESTS, Deck, DeckTable, check_digests, place_gauges
+from shockgrid.problems.problem_file import (
     ProblemFile,
     describe_mistake,
     find_problem_file,
     is_problem_file,
     read_problem_file,
 )
-from problems.registry import PROBLEMS, is_problem, load_problem
-from regrid.errors import BadInput, suggest
-from regrid.text_files import DEEPEST_NESTING, TooMuch, cut, load_toml, read_text
-from runs.deck.checking import check_deck, wants_text
+from shockgrid.problems.registry import PROBLEMS, is_problem, load_problem
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.text_files import DEEPEST_NESTING, TooMuch, cut, load_toml, read_text
+from shockgrid.runs.deck.checking import check_deck, wants_text
 
 PLAIN_KEY = re.compile(r"\w+(\.\w+)*")  # as it stands in a setting
 DECKS = Path(__file__).resolve().parent / "packaged"

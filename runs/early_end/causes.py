@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from regrid.errors import RunFailure
+from shockgrid.regrid.errors import RunFailure
 
 
 @dataclass(frozen=True)

@@ -18,16 +18,16 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from regrid.errors import BadInput, RunFailure
-from runs.deck.checking import is_runtime_key
-from runs.deck.reading import ReadDeck, resolve_deck
-from runs.early_end.causes import ENDS, Cause
-from runs.early_end.place import describe_event
-from runs.store.directory import RunDirectory
-from runs.store.dumps import has_state
-from runs.store.files import write_atomically
-from runs.store.history import read_history
-from runs.store.reader import RunData
+from shockgrid.regrid.errors import BadInput, RunFailure
+from shockgrid.runs.deck.checking import is_runtime_key
+from shockgrid.runs.deck.reading import ReadDeck, resolve_deck
+from shockgrid.runs.early_end.causes import ENDS, Cause
+from shockgrid.runs.early_end.place import describe_event
+from shockgrid.runs.store.directory import RunDirectory
+from shockgrid.runs.store.dumps import has_state
+from shockgrid.runs.store.files import write_atomically
+from shockgrid.runs.store.history import read_history
+from shockgrid.runs.store.reader import RunData
 
 CALM_STEP_PART = 0.3  # of the usual dt: with less a run is in trouble already
 SHOWN_SETTINGS = 3  # settings
@@ -77,7 +77,7 @@ def explain(failure: RunFailure, directory: RunDirectory, deck: ReadDeck, restar
             end.lines.append(f"  {command}   ({change})")
 
     def draw() -> None:
-        from runs.early_end.picture import draw_early_end  # matplotlib may not be there
+        from shockgrid.runs.early_end.picture import draw_early_end  # matplotlib may not be there
 
         title = re.split("; last restart point is|; there is no restart point yet", str(failure))[0]
         end.picture = draw_early_end(RunData(directory.path), title, place, end.point)

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from problems.pictures import name_axis
-from problems.prefixes import pick_prefix
-from regrid.errors import Place
-from regrid.sides import get_side
-from runs.early_end.place import find_marked
-from runs.pictures import fields
-from runs.pictures.command import default_fields, new_figure, save
-from runs.pictures.curves import draw_panel
-from runs.store.reader import RunData
+from shockgrid.problems.pictures import name_axis
+from shockgrid.problems.prefixes import pick_prefix
+from shockgrid.regrid.errors import Place
+from shockgrid.regrid.sides import get_side
+from shockgrid.runs.early_end.place import find_marked
+from shockgrid.runs.pictures import fields
+from shockgrid.runs.pictures.command import default_fields, new_figure, save
+from shockgrid.runs.pictures.curves import draw_panel
+from shockgrid.runs.store.reader import RunData
 
 CELLS_AROUND_MARK = 5  # cells on each side of the marked one in the picture
 MOST_SHOWN = 0.3  # of the longer side of the domain: half a window at most

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from regrid.errors import Place
-from regrid.measure.quality import compute_corner_areas
-from regrid.sides import SIDE_NAMES
+from shockgrid.regrid.errors import Place
+from shockgrid.regrid.measure.quality import compute_corner_areas
+from shockgrid.regrid.sides import SIDE_NAMES
 
 CELLS_BESIDE_SIDE = 2  # cells: so near to a side is beside it
 

@@ -21,21 +21,21 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from problems.registry import PROBLEMS
-from regrid.domains import DOMAINS, make_domain
-from regrid.domains_in_space import BLOCKS, SHAPES
-from regrid.errors import BadInput, RunFailure
-from regrid.given import is_file_name, read_grid, read_sides, read_source
-from regrid.marching import March
-from regrid.measure.quality import measure_first_line_gap
-from regrid.registry import find_usable, load_regridder, takes_weight
-from regrid.sides import SIDE_NAMES, get_side, get_sides
-from runs.deck.reading import packaged_decks, read_deck
-from runs.grids import making
-from runs.grids.making import Grid, choose_family, name_family, parse_options
-from runs.grids.quality import describe, plan_outputs
-from runs.quantities import add_unit
-from runs.store.files import check_free
+from shockgrid.problems.registry import PROBLEMS
+from shockgrid.regrid.domains import DOMAINS, make_domain
+from shockgrid.regrid.domains_in_space import BLOCKS, SHAPES
+from shockgrid.regrid.errors import BadInput, RunFailure
+from shockgrid.regrid.given import is_file_name, read_grid, read_sides, read_source
+from shockgrid.regrid.marching import March
+from shockgrid.regrid.measure.quality import measure_first_line_gap
+from shockgrid.regrid.registry import find_usable, load_regridder, takes_weight
+from shockgrid.regrid.sides import SIDE_NAMES, get_side, get_sides
+from shockgrid.runs.deck.reading import packaged_decks, read_deck
+from shockgrid.runs.grids import making
+from shockgrid.runs.grids.making import Grid, choose_family, name_family, parse_options
+from shockgrid.runs.grids.quality import describe, plan_outputs
+from shockgrid.runs.quantities import add_unit
+from shockgrid.runs.store.files import check_free
 
 MOST_GRID_CELLS = 4_000_000
 Files = tuple[tuple[str, ...], bool, bool]  # names given with -o, --force, --plot
@@ -64,8 +64,8 @@ def list_everything() -> str:
 
 def draw_every_domain(picture: str, force: bool) -> str:
     """`grid list --plot`: the last grid of every domain, marched in 40 steps by the barrier."""
-    import runs.pictures  # noqa: F401 - loads matplotlib
-    from runs.grids.pictures import draw_gallery
+    import shockgrid.runs.pictures  # noqa: F401 - loads matplotlib
+    from shockgrid.runs.grids.pictures import draw_gallery
 
     path = Path(picture)
     check_free(path, force)
@@ -210,8 +210,8 @@ def _write(compute: Callable[[], Grid], label: str, stem: str, files: Files) -> 
 
 
 def _draw(made: Grid, title: str, path: Path) -> Path:
-    import runs.pictures  # noqa: F401 - loads matplotlib
-    from runs.grids.pictures import draw_block, draw_grid
+    import shockgrid.runs.pictures  # noqa: F401 - loads matplotlib
+    from shockgrid.runs.grids.pictures import draw_block, draw_grid
 
     if made.nodes.shape[0] == 3:
         return draw_block(made.nodes, title, path, made.spreads)
@@ -294,8 +294,8 @@ def compare_families(
             drawn.append((heading, march, sides))
         yield from reasons
         if name in pictures:
-            import runs.pictures  # noqa: F401 - loads matplotlib
-            from runs.grids.pictures import draw_comparison
+            import shockgrid.runs.pictures  # noqa: F401 - loads matplotlib
+            from shockgrid.runs.grids.pictures import draw_comparison
 
             yield f"picture: {draw_comparison(drawn, name, pictures[name])}"
         yield ""

@@ -25,16 +25,22 @@ from typing import Any
 
 import numpy as np
 
-from regrid.algebraic import transfinite_grid
-from regrid.barrier.given_spacing import find_given_spacing, is_told_by_sides
-from regrid.barrier.repair import repair_grid
-from regrid.barrier.turning import is_convex
-from regrid.domains import DOMAINS, MovingDomain, make_domain
-from regrid.domains_in_space import BLOCKS, SHAPES, MovingBlock, find_block, make_moving_block
-from regrid.equidistribution import volumes
-from regrid.equidistribution.weights import Weight, make_position_weight
-from regrid.errors import BadInput, RegridFailure, suggest
-from regrid.given import (
+from shockgrid.regrid.algebraic import transfinite_grid
+from shockgrid.regrid.barrier.given_spacing import find_given_spacing, is_told_by_sides
+from shockgrid.regrid.barrier.repair import repair_grid
+from shockgrid.regrid.barrier.turning import is_convex
+from shockgrid.regrid.domains import DOMAINS, MovingDomain, make_domain
+from shockgrid.regrid.domains_in_space import (
+    BLOCKS,
+    SHAPES,
+    MovingBlock,
+    find_block,
+    make_moving_block,
+)
+from shockgrid.regrid.equidistribution import volumes
+from shockgrid.regrid.equidistribution.weights import Weight, make_position_weight
+from shockgrid.regrid.errors import BadInput, RegridFailure, suggest
+from shockgrid.regrid.given import (
     check_nodes,
     describe_repair,
     find_start,
@@ -42,18 +48,18 @@ from regrid.given import (
     read_grid,
     read_sides,
 )
-from regrid.hexahedra.regridder import BarrierRegridder3D
-from regrid.marching import March, march_domain
-from regrid.measure import hexahedra
-from regrid.measure.corners import compute_hexahedron_centres
-from regrid.measure.cuts import Cuts, reverse_cuts
-from regrid.measure.faults import name_cells
-from regrid.measure.quality import compute_scaled_jacobians, measure_quality
-from regrid.protocol import Regridder, call_regridder
-from regrid.registry import call_with_options, make_regridder
-from regrid.sides import compute_area
-from runs.deck.reading import parse_value
-from runs.grids.quality import Judgement, judge, plan_outputs, write_grid
+from shockgrid.regrid.hexahedra.regridder import BarrierRegridder3D
+from shockgrid.regrid.marching import March, march_domain
+from shockgrid.regrid.measure import hexahedra
+from shockgrid.regrid.measure.corners import compute_hexahedron_centres
+from shockgrid.regrid.measure.cuts import Cuts, reverse_cuts
+from shockgrid.regrid.measure.faults import name_cells
+from shockgrid.regrid.measure.quality import compute_scaled_jacobians, measure_quality
+from shockgrid.regrid.protocol import Regridder, call_regridder
+from shockgrid.regrid.registry import call_with_options, make_regridder
+from shockgrid.regrid.sides import compute_area
+from shockgrid.runs.deck.reading import parse_value
+from shockgrid.runs.grids.quality import Judgement, judge, plan_outputs, write_grid
 
 Cells = tuple[int, ...]
 Family = str | Regridder

@@ -14,12 +14,12 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 
-from regrid.marching import March
-from regrid.measure.hexahedra import compute_hexahedron_sines
-from regrid.sides import get_sides
-from runs.grids.quality import Judgement
-from runs.pictures.command import new_figure, save
-from runs.pictures.fields import draw_grid_lines, lay_out
+from shockgrid.regrid.marching import March
+from shockgrid.regrid.measure.hexahedra import compute_hexahedron_sines
+from shockgrid.regrid.sides import get_sides
+from shockgrid.runs.grids.quality import Judgement
+from shockgrid.runs.pictures.command import new_figure, save
+from shockgrid.runs.pictures.fields import draw_grid_lines, lay_out
 
 LONG_DOMAIN_WIDTHS = 6.0  # a domain longer than this, in its widths, is shown in part
 GRID_PICTURE_DPI = 120

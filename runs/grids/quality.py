@@ -14,14 +14,14 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from regrid.errors import BadInput
-from regrid.measure import hexahedra, quality
-from regrid.measure.corners import compute_corner_signs, find_excluded_corners
-from regrid.measure.faults import name_cells
-from runs.store.dumps import create_in_memory, write_block
-from runs.store.files import check_free, write_atomically
-from runs.store.paraview import HEAD, TAIL, describe_block, write_vts
-from runs.store.provenance import describe_software, find_provenance
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure import hexahedra, quality
+from shockgrid.regrid.measure.corners import compute_corner_signs, find_excluded_corners
+from shockgrid.regrid.measure.faults import name_cells
+from shockgrid.runs.store.dumps import create_in_memory, write_block
+from shockgrid.runs.store.files import check_free, write_atomically
+from shockgrid.runs.store.paraview import HEAD, TAIL, describe_block, write_vts
+from shockgrid.runs.store.provenance import describe_software, find_provenance
 
 LONG_NAMES = {
     "scaled_jacobian": "scaled Jacobian: smallest sine of a corner",

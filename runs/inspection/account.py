@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from problems.evolution import Evolution
-from problems.problem import Problem
-from regrid.errors import RunFailure
-from runs.quantities import count, describe_share, drop_units
+from shockgrid.problems.evolution import Evolution
+from shockgrid.problems.problem import Problem
+from shockgrid.regrid.errors import RunFailure
+from shockgrid.runs.quantities import count, describe_share, drop_units
 
 History = Mapping[str, np.ndarray]
 HEAD = "caution: "

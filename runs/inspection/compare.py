@@ -17,16 +17,16 @@ from typing import Any
 
 import numpy as np
 
-from hydro.remap.conserved import check_convex, remap_means
-from hydro.remap.overlay import compute_cell_moments
-from problems.problem import align
-from problems.problem_file import is_problem_file
-from regrid.errors import BadInput
-from runs.deck.checking import find_differences as find_changed_keys
-from runs.deck.checking import show
-from runs.quantities import add_unit, count
-from runs.store.provenance import NOTED_DIGITS
-from runs.store.reader import BlockData, Dump, RunData, Table
+from shockgrid.hydro.remap.conserved import check_convex, remap_means
+from shockgrid.hydro.remap.overlay import compute_cell_moments
+from shockgrid.problems.problem import align
+from shockgrid.problems.problem_file import is_problem_file
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.deck.checking import find_differences as find_changed_keys
+from shockgrid.runs.deck.checking import show
+from shockgrid.runs.quantities import add_unit, count
+from shockgrid.runs.store.provenance import NOTED_DIGITS
+from shockgrid.runs.store.reader import BlockData, Dump, RunData, Table
 
 SHOWN_DIFFERENCES = 8  # differences, and earlier dumps
 SAME_TIME = 1e-2  # relative: steps of one number nearer than this are the same

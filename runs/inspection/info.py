@@ -15,19 +15,24 @@ import h5py
 import msgspec
 import numpy as np
 
-from problems.deck import DIGESTS
-from problems.evolution import get_material
-from problems.problem_file import read_head
-from problems.registry import PROBLEMS, summary_line
-from regrid.errors import BadInput
-from regrid.hdf5_files import open_hdf5
-from runs.deck.checking import find_changes
-from runs.inspection.account import describe_cautions, describe_run, describe_verdict, judge
-from runs.quantities import add_unit, count, describe_seconds, describe_time
-from runs.store.directory import RunDirectory, read_stored_deck
-from runs.store.files import find_sum
-from runs.store.provenance import describe_provenance
-from runs.store.reader import Dump, RunData
+from shockgrid.problems.deck import DIGESTS
+from shockgrid.problems.evolution import get_material
+from shockgrid.problems.problem_file import read_head
+from shockgrid.problems.registry import PROBLEMS, summary_line
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.hdf5_files import open_hdf5
+from shockgrid.runs.deck.checking import find_changes
+from shockgrid.runs.inspection.account import (
+    describe_cautions,
+    describe_run,
+    describe_verdict,
+    judge,
+)
+from shockgrid.runs.quantities import add_unit, count, describe_seconds, describe_time
+from shockgrid.runs.store.directory import RunDirectory, read_stored_deck
+from shockgrid.runs.store.files import find_sum
+from shockgrid.runs.store.provenance import describe_provenance
+from shockgrid.runs.store.reader import Dump, RunData
 
 DAMAGED = "damaged: "  # head of a line about a file that is not as it was written
 

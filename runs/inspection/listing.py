@@ -8,15 +8,15 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from problems.problem import check_memory
-from problems.problem_file import is_problem_file
-from problems.registry import INSTALLED, PROBLEMS, SUBJECTS, read_docstring, summary_line
-from problems.registry import OWN as OWN_PROBLEMS
-from regrid.compilation.first_calls import interpreted
-from regrid.errors import BadInput
-from regrid.plug_ins import GROUPS, find_plug_ins
-from runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
-from runs.quantities import add_unit, is_time
+from shockgrid.problems.problem import check_memory
+from shockgrid.problems.problem_file import is_problem_file
+from shockgrid.problems.registry import INSTALLED, PROBLEMS, SUBJECTS, read_docstring, summary_line
+from shockgrid.problems.registry import OWN as OWN_PROBLEMS
+from shockgrid.regrid.compilation.first_calls import interpreted
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.plug_ins import GROUPS, find_plug_ins
+from shockgrid.runs.deck.reading import ReadDeck, packaged_decks, read_toml, suggest_deck
+from shockgrid.runs.quantities import add_unit, is_time
 
 AUTHOR = r"\b[A-Z]\. (?:[A-Z]\. )*([A-Z][a-z]+)\b"  # initials and a surname
 SHORT = r".{1,70}(?=[:;] |\.?$)|.*"  # the longest beginning that is a clause
@@ -49,11 +49,11 @@ def describe_installed() -> list[str]:
     plug_ins = {group: find_plug_ins(group) for group in GROUPS}
     if not any(plug_ins.values()):
         return []
-    from hydro.boundary import OWN as OWN_SEGMENTS
-    from hydro.eos import OWN as OWN_EQUATIONS
-    from hydro.history import COLUMNS
-    from hydro.strength.laws import OWN as OWN_STRENGTH_LAWS
-    from regrid.registry import OWN as OWN_REGRIDDERS
+    from shockgrid.hydro.boundary import OWN as OWN_SEGMENTS
+    from shockgrid.hydro.eos import OWN as OWN_EQUATIONS
+    from shockgrid.hydro.history import COLUMNS
+    from shockgrid.hydro.strength.laws import OWN as OWN_STRENGTH_LAWS
+    from shockgrid.regrid.registry import OWN as OWN_REGRIDDERS
 
     own = {
         "shockgrid.problems": OWN_PROBLEMS,
@@ -94,7 +94,7 @@ def describe_problem(name: str) -> str:
 
 def describe_materials(name: str | None = None) -> str:
     """A line for each material of the library, or the parameters and source of material `name`."""
-    from hydro.eos.materials import LIBRARY, find_material, find_name, read_materials
+    from shockgrid.hydro.eos.materials import LIBRARY, find_material, find_name, read_materials
 
     if name is not None:
         return describe_material(find_name(name), find_material(name))
@@ -156,7 +156,7 @@ def describe_elastic_limit(material: Any, law: Any = None) -> str:
     """The Hugoniot elastic limit by a law of strength, by default the first; "" without one."""
     if material.strength is None:
         return ""
-    from problems.references.elastic_plastic import find_elastic_limit, make_solid_at_rest
+    from shockgrid.problems.references.elastic_plastic import find_elastic_limit, make_solid_at_rest
 
     stress = find_elastic_limit(make_solid_at_rest(material, law)).stress
     return f"{1e-9 * stress:.3g} GPa"
@@ -184,10 +184,10 @@ def describe_deck(path: Path) -> str:
 
 def describe_plan(deck: ReadDeck) -> str:
     """Blocks, cells, memory, end time and cautions of the run that a deck would make."""
-    from problems.problem import plan_blocks
-    from runs.inspection.account import describe_cautions
-    from runs.inspection.info import other_name
-    from runs.quantities import count
+    from shockgrid.problems.problem import plan_blocks
+    from shockgrid.runs.inspection.account import describe_cautions
+    from shockgrid.runs.inspection.info import other_name
+    from shockgrid.runs.quantities import count
 
     with deck.numbers_in_reach(), interpreted():
         problem = deck.make_problem()

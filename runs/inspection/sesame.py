@@ -7,9 +7,9 @@ from pathlib import Path
 
 import h5py
 
-from hydro.eos.sesame import PressureTable, SesameTable, make_pressure_table, read_sesame
-from regrid.errors import BadInput
-from runs.store.files import write_atomically
+from shockgrid.hydro.eos.sesame import PressureTable, SesameTable, make_pressure_table, read_sesame
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.store.files import write_atomically
 
 ENDINGS = (".ses", ".sesame", ".asc")
 

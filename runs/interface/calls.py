@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hydro.boundary import SEGMENTS, Segment
-from hydro.eos import EQUATIONS_OF_STATE
-from hydro.eos.base import EquationOfState
-from hydro.strength.laws import STRENGTH_LAWS, StrengthLaw
-from problems.evolution import Evolution, get_material
-from problems.own_simulation import Measure, OwnSimulation, OwnSimulationDeck
-from problems.problem import Problem
-from problems.registry import PROBLEMS
-from regrid.errors import BadInput
-from regrid.registry import REGRIDDERS
-from runs.deck.reading import ReadDeck, read_toml, resolve_deck
-from runs.interface.case import (
+from shockgrid.hydro.boundary import SEGMENTS, Segment
+from shockgrid.hydro.eos import EQUATIONS_OF_STATE
+from shockgrid.hydro.eos.base import EquationOfState
+from shockgrid.hydro.strength.laws import STRENGTH_LAWS, StrengthLaw
+from shockgrid.problems.evolution import Evolution, get_material
+from shockgrid.problems.own_simulation import Measure, OwnSimulation, OwnSimulationDeck
+from shockgrid.problems.problem import Problem
+from shockgrid.problems.registry import PROBLEMS
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.registry import REGRIDDERS
+from shockgrid.runs.deck.reading import ReadDeck, read_toml, resolve_deck
+from shockgrid.runs.interface.case import (
     Case,
     HooksGiven,
     OpenRun,
@@ -34,12 +34,17 @@ from runs.interface.case import (
     open_run,
     say,
 )
-from runs.interface.wording import said_in_python
-from runs.march.launching import check_changeable, check_requests, read_restart_deck, remap_runner
-from runs.march.runner import Runner
-from runs.ranks.started import check_single
-from runs.store.directory import RunDirectory, open_directory
-from runs.store.provenance import NOTED_DIGITS
+from shockgrid.runs.interface.wording import said_in_python
+from shockgrid.runs.march.launching import (
+    check_changeable,
+    check_requests,
+    read_restart_deck,
+    remap_runner,
+)
+from shockgrid.runs.march.runner import Runner
+from shockgrid.runs.ranks.started import check_single
+from shockgrid.runs.store.directory import RunDirectory, open_directory
+from shockgrid.runs.store.provenance import NOTED_DIGITS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -236,7 +241,7 @@ def verify(*problems: str, short: bool = False) -> list[dict[str, Any]]:
     A record has "problem", "what", "size", "error", "order", "bar" and "met", with None for a
     missing value.  short: one small size of each.  Raises BadInput for an unknown name.
     """
-    from runs.verify import choose_cases, compute_records
+    from shockgrid.runs.verify import choose_cases, compute_records
 
     return list(compute_records(choose_cases(problems), short))
 

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from problems.evolution import (
+from shockgrid.problems.evolution import (
     BlockView,
     Evolution,
     Scalar,
@@ -30,17 +30,17 @@ from problems.evolution import (
     get_node_fields,
     is_axisymmetric,
 )
-from problems.problem import Problem, check_memory
-from regrid.errors import BadInput, suggest
-from runs.deck.reading import ReadDeck, read_deck, resolve_deck
-from runs.interface.wording import said_in_python
-from runs.march.compiling import compiling
-from runs.march.launching import start_runner
-from runs.march.runner import Ending, Runner
-from runs.quantities import describe_time
-from runs.ranks.started import check_single
-from runs.store.reader import BlockData, Fields, RunData, Snapshot, Table
-from runs.study.definition import flatten, write_settings
+from shockgrid.problems.problem import Problem, check_memory
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.runs.deck.reading import ReadDeck, read_deck, resolve_deck
+from shockgrid.runs.interface.wording import said_in_python
+from shockgrid.runs.march.compiling import compiling
+from shockgrid.runs.march.launching import start_runner
+from shockgrid.runs.march.runner import Ending, Runner
+from shockgrid.runs.quantities import describe_time
+from shockgrid.runs.ranks.started import check_single
+from shockgrid.runs.store.reader import BlockData, Fields, RunData, Snapshot, Table
+from shockgrid.runs.study.definition import flatten, write_settings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,7 +79,7 @@ class Drawn:
         x0, y0, x1, y1 [m], plots the fields along it; limits: range of the colours in units of the
         deck; colours: a colour map.  Raises BadInput for unknown fields, times or pictures.
         """
-        from runs.pictures.command import Wanted, fill_figure, new_figure
+        from shockgrid.runs.pictures.command import Wanted, fill_figure, new_figure
 
         if what is None and len(fields) == 1 and fields[0] in self.pictures:
             what = fields[0]
@@ -105,7 +105,7 @@ class Curve(NamedTuple):
 
 def find_interface(blocks: Sequence[BlockData], t: float, where: str) -> Curve:
     """The lines between blocks of different materials; BadInput if there are none."""
-    from runs.pictures.curves import find_curves
+    from shockgrid.runs.pictures.curves import find_curves
 
     lines = [curve[:2] for curve in find_curves(blocks).values()]
     if not lines:
@@ -150,7 +150,7 @@ class OpenRun(Drawn, RunData):
         options: zoom (x0, x1, y0, y1 [m]), follow, mesh (bool), mirror "x" or "y", fps, dpi.
         Raises BadInput.
         """
-        from runs.pictures.film import make_film
+        from shockgrid.runs.pictures.film import make_film
 
         with said_in_python():
             return make_film(self.path, field, output, **options)
@@ -160,7 +160,7 @@ class OpenRun(Drawn, RunData):
 
         options: film (bool), dpi.  Raises BadInput if the extra `report` is not installed.
         """
-        from runs.report import report
+        from shockgrid.runs.report import report
 
         with said_in_python():
             return report(self.path, output, **options)

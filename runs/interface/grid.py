@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from regrid.domains import DOMAINS, make_domain
-from regrid.given import read_grid
-from runs.grids import making
-from runs.grids.making import MOTION_STEPS, Family, Grid, March, find_nodes, make, regrid
-from runs.grids.quality import Judgement, judge
+from shockgrid.regrid.domains import DOMAINS, make_domain
+from shockgrid.regrid.given import read_grid
+from shockgrid.runs.grids import making
+from shockgrid.runs.grids.making import MOTION_STEPS, Family, Grid, March, find_nodes, make, regrid
+from shockgrid.runs.grids.quality import Judgement, judge
 
 __all__ = ("Grid", "compare", "make", "quality", "read", "regrid", "write")
 

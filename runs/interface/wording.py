@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-from regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput
 
 # text in messages for the command line, and for callers in Python
 PHRASES: Mapping[str, str] = {

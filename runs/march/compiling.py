@@ -16,7 +16,7 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
-from regrid.compilation.first_calls import count_compiling, leave_telling
+from shockgrid.regrid.compilation.first_calls import count_compiling, leave_telling
 
 LOOK_EVERY = 0.2  # wall seconds until the run is looked at again: how much does it compile?
 MANY_KERNELS = 5  # compiled kernels from which on a second process is worth its start
@@ -62,7 +62,7 @@ def _watch(done: threading.Event, stream: Any, quiet: bool, helped: bool) -> Non
             ready, compiled, seconds = count_compiling()
             if helped and compiled - before >= MANY_KERNELS:
                 helped = False
-                program = [sys.executable, "-m", "runs.march.compiling"]
+                program = [sys.executable, "-m", "shockgrid.runs.march.compiling"]
                 none = subprocess.DEVNULL
                 process = subprocess.Popen(program, stdin=none, stdout=none, stderr=none)
                 started.enter_context(process)
@@ -86,7 +86,7 @@ def _watch(done: threading.Event, stream: Any, quiet: bool, helped: bool) -> Non
 
 
 if __name__ == "__main__":  # the kernels of the default regridder: some steps of a small grid
-    from problems.grid_march import GridMarch, GridMarchDeck
+    from shockgrid.problems.grid_march import GridMarch, GridMarchDeck
 
     evolution = GridMarch(GridMarchDeck(domain="three_fingers", ni=24, nj=16)).build()
     for _ in range(SMALL_GRID_STEPS):

@@ -14,25 +14,30 @@ from operator import attrgetter
 
 import msgspec
 
-from hydro.history import compute_chosen_columns, find_columns
-from hydro.simulation import Simulation
-from problems.deck import Deck, Output, Regrid
-from problems.evolution import Evolution, get_node_fields
-from problems.problem import Problem, check_memory
-from regrid.compilation.first_calls import interpreted
-from regrid.errors import BadInput, suggest
-from runs.deck.checking import find_differences, is_runtime_key, list_runtime_keys, show
-from runs.deck.reading import ReadDeck, resolve_deck
-from runs.forecast import foretell
-from runs.gauges import Gauges, make_gauges
-from runs.inspection.account import describe_cautions
-from runs.march.compiling import compiling
-from runs.march.runner import Runner
-from runs.ranks.map import check_cut
-from runs.ranks.world import World
-from runs.store.directory import RunDirectory, create_directory, read_run_deck, read_stored_deck
-from runs.store.files import write_atomically
-from runs.store.history import find_restart_point, restore, truncate_history
+from shockgrid.hydro.history import compute_chosen_columns, find_columns
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.deck import Deck, Output, Regrid
+from shockgrid.problems.evolution import Evolution, get_node_fields
+from shockgrid.problems.problem import Problem, check_memory
+from shockgrid.regrid.compilation.first_calls import interpreted
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.runs.deck.checking import find_differences, is_runtime_key, list_runtime_keys, show
+from shockgrid.runs.deck.reading import ReadDeck, resolve_deck
+from shockgrid.runs.forecast import foretell
+from shockgrid.runs.gauges import Gauges, make_gauges
+from shockgrid.runs.inspection.account import describe_cautions
+from shockgrid.runs.march.compiling import compiling
+from shockgrid.runs.march.runner import Runner
+from shockgrid.runs.ranks.map import check_cut
+from shockgrid.runs.ranks.world import World
+from shockgrid.runs.store.directory import (
+    RunDirectory,
+    create_directory,
+    read_run_deck,
+    read_stored_deck,
+)
+from shockgrid.runs.store.files import write_atomically
+from shockgrid.runs.store.history import find_restart_point, restore, truncate_history
 
 CELLS = "cells"
 SET_UP = "run.t_set_up"
@@ -260,7 +265,7 @@ def remap_runner(
     the step of the restart point, None the last; output, force: as for a new run.  Its `start`
     continues it.  Raises BadInput, before anything is written, for what cannot be gone on with.
     """
-    from hydro.remap.flow import take_over  # with scipy: slow to load
+    from shockgrid.hydro.remap.flow import take_over  # with scipy: slow to load
 
     before = read_run_deck(old, strict=True, say=say)
     settle_deck(old, before, at)

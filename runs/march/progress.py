@@ -10,20 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from problems.deck import Deck, place_gauges
-from problems.evolution import Evolution
-from problems.problem import Problem
-from regrid.compilation.first_calls import read_clock
-from regrid.jit import can_use_threads
-from regrid.text_files import escape_controls
-from runs.deck.reading import ReadDeck
-from runs.early_end.causes import name_failure
-from runs.forecast import ShortSteps, TimeLeft, find_past, measure_size, name_flow
-from runs.gauges import NO_BLOCK
-from runs.inspection.account import count_cells, judge
-from runs.quantities import count, describe_seconds, describe_time, drop_units
-from runs.store.directory import RunDirectory, write_verdict
-from runs.store.history import read_history
+from shockgrid.problems.deck import Deck, place_gauges
+from shockgrid.problems.evolution import Evolution
+from shockgrid.problems.problem import Problem
+from shockgrid.regrid.compilation.first_calls import read_clock
+from shockgrid.regrid.jit import can_use_threads
+from shockgrid.regrid.text_files import escape_controls
+from shockgrid.runs.deck.reading import ReadDeck
+from shockgrid.runs.early_end.causes import name_failure
+from shockgrid.runs.forecast import ShortSteps, TimeLeft, find_past, measure_size, name_flow
+from shockgrid.runs.gauges import NO_BLOCK
+from shockgrid.runs.inspection.account import count_cells, judge
+from shockgrid.runs.quantities import count, describe_seconds, describe_time, drop_units
+from shockgrid.runs.store.directory import RunDirectory, write_verdict
+from shockgrid.runs.store.history import read_history
 
 LINE_EVERY = 15.0  # wall seconds between lines when there is no terminal
 FIRST_WORD = 3.0  # wall seconds after the first step until the whole run is foretold

@@ -26,28 +26,28 @@ from typing import Any
 
 import numpy as np
 
-from hydro.history import compute_chosen_columns, find_columns
-from problems.deck import Output
-from problems.evolution import Evolution, get_missed, get_start_row
-from problems.problem import Problem
-from regrid.compilation.first_calls import read_clock
-from regrid.errors import BadInput, RunFailure
-from regrid.text_files import escape_controls
-from runs.deck.reading import ReadDeck
-from runs.early_end.causes import ENDS
-from runs.gauges import Gauges
-from runs.inspection import account
-from runs.march.compiling import compiling
-from runs.march.progress import (
+from shockgrid.hydro.history import compute_chosen_columns, find_columns
+from shockgrid.problems.deck import Output
+from shockgrid.problems.evolution import Evolution, get_missed, get_start_row
+from shockgrid.problems.problem import Problem
+from shockgrid.regrid.compilation.first_calls import read_clock
+from shockgrid.regrid.errors import BadInput, RunFailure
+from shockgrid.regrid.text_files import escape_controls
+from shockgrid.runs.deck.reading import ReadDeck
+from shockgrid.runs.early_end.causes import ENDS
+from shockgrid.runs.gauges import Gauges
+from shockgrid.runs.inspection import account
+from shockgrid.runs.march.compiling import compiling
+from shockgrid.runs.march.progress import (
     REMAPPED,
     Outlook,
     Progress,
     describe_gauges,
     describe_threads,
 )
-from runs.quantities import count, describe_seconds, describe_time, drop_units, is_time
-from runs.ranks.world import World, describe_ranks
-from runs.signals import (
+from shockgrid.runs.quantities import count, describe_seconds, describe_time, drop_units, is_time
+from shockgrid.runs.ranks.world import World, describe_ranks
+from shockgrid.runs.signals import (
     POINT,
     STOPPING,
     find_numbers,
@@ -55,10 +55,15 @@ from runs.signals import (
     leave_terminals,
     list_terminals,
 )
-from runs.store.directory import RunDirectory, keep_problem_file, read_verdict, write_noted
-from runs.store.dumps import EMPTY, Names, list_arrays, make_image
-from runs.store.files import write_atomically, write_sealed
-from runs.store.history import (
+from shockgrid.runs.store.directory import (
+    RunDirectory,
+    keep_problem_file,
+    read_verdict,
+    write_noted,
+)
+from shockgrid.runs.store.dumps import EMPTY, Names, list_arrays, make_image
+from shockgrid.runs.store.files import write_atomically, write_sealed
+from shockgrid.runs.store.history import (
     HistoryWriter,
     check_columns,
     find_restart_point,
@@ -67,8 +72,8 @@ from runs.store.history import (
     restore,
     truncate_history,
 )
-from runs.store.paraview import Sidecar
-from runs.store.provenance import describe_provenance, find_provenance
+from shockgrid.runs.store.paraview import Sidecar
+from shockgrid.runs.store.provenance import describe_provenance, find_provenance
 
 
 class Background:
@@ -526,7 +531,7 @@ class Runner:
 
     def _explain(self, failure: RunFailure) -> RunFailure:
         """The failure with what it means and what has helped; the last state is in a dump then."""
-        from runs.early_end.explain import explain
+        from shockgrid.runs.early_end.explain import explain
 
         with contextlib.suppress(BadInput):
             if not self.directory.dump_path(self.evolution.step).exists():

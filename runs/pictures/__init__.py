@@ -13,7 +13,7 @@ import contextlib
 import os
 import sys
 
-from regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput
 
 BACKEND = "MPLBACKEND"
 

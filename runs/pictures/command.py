@@ -22,15 +22,15 @@ from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
 from matplotlib.text import Text
 
-from regrid.errors import BadInput, suggest
-from regrid.text_files import escape_controls
-from runs.pictures import curves
-from runs.pictures.fields import View, draw_fields, time_titles
-from runs.pictures.finishing import finish_figure
-from runs.quantities import add_unit, is_time
-from runs.store.files import check_folder, check_free, disk_errors
-from runs.store.provenance import describe_software, hash_deck
-from runs.store.reader import Dump, RunData
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.text_files import escape_controls
+from shockgrid.runs.pictures import curves
+from shockgrid.runs.pictures.fields import View, draw_fields, time_titles
+from shockgrid.runs.pictures.finishing import finish_figure
+from shockgrid.runs.quantities import add_unit, is_time
+from shockgrid.runs.store.files import check_folder, check_free, disk_errors
+from shockgrid.runs.store.provenance import describe_software, hash_deck
+from shockgrid.runs.store.reader import Dump, RunData
 
 NAMES = {  # of the fields of metadata: what made it, what of
     "png": ("Software", "Description"), "pdf": ("Creator", "Subject"),

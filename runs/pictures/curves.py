@@ -18,18 +18,18 @@ from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
-from problems.deck import place_gauges
-from problems.pictures import name_axis
-from problems.prefixes import pick_prefix
-from regrid.errors import BadInput
-from runs.inspection.account import compute_drifts
-from runs.pictures import fields
-from runs.pictures.fields import View
-from runs.pictures.finishing import FLAT_MARGIN, SHOWN_ROUND_OFF
-from runs.quantities import is_time
-from runs.store.dumps import LONG_NAMES
-from runs.store.files import check_free, make_csv, write_atomically
-from runs.store.reader import Dump, RunData
+from shockgrid.problems.deck import place_gauges
+from shockgrid.problems.pictures import name_axis
+from shockgrid.problems.prefixes import pick_prefix
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.inspection.account import compute_drifts
+from shockgrid.runs.pictures import fields
+from shockgrid.runs.pictures.fields import View
+from shockgrid.runs.pictures.finishing import FLAT_MARGIN, SHOWN_ROUND_OFF
+from shockgrid.runs.quantities import is_time
+from shockgrid.runs.store.dumps import LONG_NAMES
+from shockgrid.runs.store.files import check_free, make_csv, write_atomically
+from shockgrid.runs.store.reader import Dump, RunData
 
 CLOSE_END_DISTANCE = 1e-9  # of the interfaces' extent: closer ends are one point
 

@@ -15,15 +15,15 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize, PowerNorm
 
-from problems.evolution import get_material
-from problems.pictures import name_axis
-from problems.prefixes import pick_prefix
-from regrid.errors import BadInput, suggest
-from regrid.measure.corners import compute_centres
-from regrid.sides import SIDE_NAMES, get_side
-from runs.pictures.finishing import FLAT_MARGIN, SHOWN_ROUND_OFF, find_usual_range
-from runs.quantities import is_time
-from runs.store.reader import BlockData, Dump
+from shockgrid.problems.evolution import get_material
+from shockgrid.problems.pictures import name_axis
+from shockgrid.problems.prefixes import pick_prefix
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.measure.corners import compute_centres
+from shockgrid.regrid.sides import SIDE_NAMES, get_side
+from shockgrid.runs.pictures.finishing import FLAT_MARGIN, SHOWN_ROUND_OFF, find_usual_range
+from shockgrid.runs.quantities import is_time
+from shockgrid.runs.store.reader import BlockData, Dump
 
 CHORD_GAP_EDGES = 0.05  # of an edge: above the gap between different chords of one curve
 
@@ -105,7 +105,9 @@ class Field(NamedTuple):
 
 def compute_gradient(block: BlockData, name: str) -> np.ndarray:
     """Gradient (2, ni, nj) of a field of cells, in its unit per metre."""
-    from hydro.formulas.reconstruction import compute_gradient as solve  # numba: loaded if wanted
+    from shockgrid.hydro.formulas.reconstruction import (
+        compute_gradient as solve,  # numba: loaded if wanted
+    )
 
     x, y = compute_centres(block.nodes)
     values = block.cell_fields[name]

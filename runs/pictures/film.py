@@ -19,14 +19,14 @@ from matplotlib import animation
 from matplotlib.cm import ScalarMappable
 from tqdm import tqdm
 
-from problems.pictures import name_axis
-from problems.prefixes import pick_prefix
-from regrid.errors import BadInput
-from runs.pictures import command, fields
-from runs.pictures.fields import View
-from runs.store.files import check_folder, disk_errors
-from runs.store.provenance import describe_software, hash_deck
-from runs.store.reader import Dump, RunData
+from shockgrid.problems.pictures import name_axis
+from shockgrid.problems.prefixes import pick_prefix
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.pictures import command, fields
+from shockgrid.runs.pictures.fields import View
+from shockgrid.runs.store.files import check_folder, disk_errors
+from shockgrid.runs.store.provenance import describe_software, hash_deck
+from shockgrid.runs.store.reader import Dump, RunData
 
 FILM_SECONDS = 8.0  # length of a film, within the frame rates below
 SLOWEST_FRAME_RATE = 3

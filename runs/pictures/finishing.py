@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.ticker import ScalarFormatter
 
-from problems.prefixes import PREFIXED, pick_prefix
+from shockgrid.problems.prefixes import PREFIXED, pick_prefix
 
 # relative to the size of a quantity: smaller differences are those of round-off
 SHOWN_ROUND_OFF = 1e-11

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from hydro.interior.advance import TILE_ROWS
-from hydro.ranks.cutting import Distribution, distribute_blocks, sum_cells
-from hydro.ranks.messages import CELLS_DEEP
-from hydro.simulation import Simulation
-from problems.problem import estimate_memory
-from regrid.errors import BadInput, suggest
+from shockgrid.hydro.interior.advance import TILE_ROWS
+from shockgrid.hydro.ranks.cutting import Distribution, distribute_blocks, sum_cells
+from shockgrid.hydro.ranks.messages import CELLS_DEEP
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.problem import estimate_memory
+from shockgrid.regrid.errors import BadInput, suggest
 
 
 def check_cut(cut: Mapping[str, int], names: Sequence[str]) -> None:

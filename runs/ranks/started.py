@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 
-from regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput
 
 # what Open MPI, MPICH and its kin, and a step of Slurm with PMIx say
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")

@@ -21,19 +21,19 @@ import tomllib
 from collections.abc import Callable
 from typing import Any, TextIO
 
-from hydro.ranks.cutting import Distribution
-from hydro.ranks.ranks import COLLECT, COUNT, END, STEP, Ranks, hear, tell
-from hydro.simulation import Simulation
-from hydro.workers import count_processors
-from problems.evolution import Evolution, State
-from problems.problem import Problem
-from problems.problem_file import read_problem_file
-from regrid.errors import BadInput, RunFailure
-from runs.deck.reading import ReadDeck, resolve_deck
-from runs.ranks.map import describe_distribution, distribute_evolution
-from runs.ranks.started import count_started, find_rank
-from runs.signals import POINT, STOPPING, find_numbers
-from runs.store.dumps import EMPTY
+from shockgrid.hydro.ranks.cutting import Distribution
+from shockgrid.hydro.ranks.ranks import COLLECT, COUNT, END, STEP, Ranks, hear, tell
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.workers import count_processors
+from shockgrid.problems.evolution import Evolution, State
+from shockgrid.problems.problem import Problem
+from shockgrid.problems.problem_file import read_problem_file
+from shockgrid.regrid.errors import BadInput, RunFailure
+from shockgrid.runs.deck.reading import ReadDeck, resolve_deck
+from shockgrid.runs.ranks.map import describe_distribution, distribute_evolution
+from shockgrid.runs.ranks.started import count_started, find_rank
+from shockgrid.runs.signals import POINT, STOPPING, find_numbers
+from shockgrid.runs.store.dumps import EMPTY
 
 BUILD_MESSAGE = END + 1  # told first: the deck follows
 BEGIN_MESSAGE = END + 2  # told once: who has what and, of a run that goes on, the state follow

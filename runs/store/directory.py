@@ -21,14 +21,19 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from problems.problem_file import ProblemFile, compute_digest, is_problem_file, read_problem_file
-from problems.registry import is_problem, load_problem
-from regrid.errors import BadInput, find_nearest
-from regrid.text_files import check_regular, escape_controls
-from runs.deck.checking import find_changes, show
-from runs.deck.reading import ReadDeck, read_toml, resolve_deck
-from runs.store.dumps import open_dump
-from runs.store.files import (
+from shockgrid.problems.problem_file import (
+    ProblemFile,
+    compute_digest,
+    is_problem_file,
+    read_problem_file,
+)
+from shockgrid.problems.registry import is_problem, load_problem
+from shockgrid.regrid.errors import BadInput, find_nearest
+from shockgrid.regrid.text_files import check_regular, escape_controls
+from shockgrid.runs.deck.checking import find_changes, show
+from shockgrid.runs.deck.reading import ReadDeck, read_toml, resolve_deck
+from shockgrid.runs.store.dumps import open_dump
+from shockgrid.runs.store.files import (
     DUMPS,
     KEPT_NAMES,
     LOCK,
@@ -39,7 +44,7 @@ from runs.store.files import (
     try_lock,
     write_atomically,
 )
-from runs.store.provenance import NOTED_DIGITS, hash_deck
+from shockgrid.runs.store.provenance import NOTED_DIGITS, hash_deck
 
 SHOWN_KEYS = 3  # changed keys
 KEPT_RESTARTS = 2

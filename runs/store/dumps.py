@@ -23,8 +23,8 @@ from typing import Any, NamedTuple, TypeAlias
 import h5py
 import numpy as np
 
-from problems.deck import Output
-from problems.evolution import (
+from shockgrid.problems.deck import Output
+from shockgrid.problems.evolution import (
     BlockView,
     Evolution,
     State,
@@ -33,10 +33,10 @@ from problems.evolution import (
     get_node_fields,
     is_axisymmetric,
 )
-from regrid.errors import BadInput
-from regrid.hdf5_files import open_hdf5
-from runs.store.files import BLANK_CHECKSUM, CHECKSUM, find_sum
-from runs.store.provenance import find_provenance
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.hdf5_files import open_hdf5
+from shockgrid.runs.store.files import BLANK_CHECKSUM, CHECKSUM, find_sum
+from shockgrid.runs.store.provenance import find_provenance
 
 FORMAT = "shockgrid dump"
 FORMAT_VERSION = 4

@@ -24,7 +24,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput
 
 fcntl: Any = None  # on Windows
 msvcrt: Any = None  # everywhere else

@@ -26,11 +26,11 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from problems.evolution import Evolution, adopt_cells, get_lists_in_state, get_start_row
-from regrid.errors import BadInput
-from runs.store.directory import RunDirectory
-from runs.store.dumps import has_state, open_dump, read_state
-from runs.store.files import disk_errors, write_atomically
+from shockgrid.problems.evolution import Evolution, adopt_cells, get_lists_in_state, get_start_row
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.store.directory import RunDirectory
+from shockgrid.runs.store.dumps import has_state, open_dump, read_state
+from shockgrid.runs.store.files import disk_errors, write_atomically
 
 SUM = "crc32"
 STEP_TIME = "seconds_step"  # a column that the runner adds

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from regrid.errors import BadInput
-from runs.store.dumps import damage_told, open_dump
-from runs.store.files import find_sum, write_atomically
-from runs.store.provenance import describe_software
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.store.dumps import damage_told, open_dump
+from shockgrid.runs.store.files import find_sum, write_atomically
+from shockgrid.runs.store.provenance import describe_software
 
 
 def write_vts(path: Path, nodes: np.ndarray, cell_fields: Mapping[str, np.ndarray]) -> None:

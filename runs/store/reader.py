@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from problems.problem import Problem, align
-from regrid.errors import BadInput, suggest
-from regrid.measure.corners import compute_centres
-from runs.deck.reading import ReadDeck, read_toml
-from runs.quantities import describe_time
-from runs.store.directory import (
+from shockgrid.problems.problem import Problem, align
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.measure.corners import compute_centres
+from shockgrid.runs.deck.reading import ReadDeck, read_toml
+from shockgrid.runs.quantities import describe_time
+from shockgrid.runs.store.directory import (
     RunDirectory,
     check_deck,
     check_noted,
@@ -27,8 +27,8 @@ from runs.store.directory import (
     read_run_deck,
     read_verdict,
 )
-from runs.store.dumps import damage_told, open_dump, read_state
-from runs.store.history import read_columns, read_history, read_rows
+from shockgrid.runs.store.dumps import damage_told, open_dump, read_state
+from shockgrid.runs.store.history import read_columns, read_history, read_rows
 
 MOST_ROWS = 30  # of a table on the screen
 

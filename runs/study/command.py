@@ -11,14 +11,20 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from regrid.errors import BadInput
-from runs.deck.reading import parse_value
-from runs.quantities import count
-from runs.signals import STOPPING, find_numbers, is_hang_up, leave_terminals, list_terminals
-from runs.study.computing import Result
-from runs.study.definition import NUMBER, check_same_deck, read_vary
-from runs.study.orders import describe_series
-from runs.study.study import Study, make_study
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.deck.reading import parse_value
+from shockgrid.runs.quantities import count
+from shockgrid.runs.signals import (
+    STOPPING,
+    find_numbers,
+    is_hang_up,
+    leave_terminals,
+    list_terminals,
+)
+from shockgrid.runs.study.computing import Result
+from shockgrid.runs.study.definition import NUMBER, check_same_deck, read_vary
+from shockgrid.runs.study.orders import describe_series
+from shockgrid.runs.study.study import Study, make_study
 
 EXIT_FAILED = 3
 MOST_CAUTIONS = 10  # on the screen

@@ -25,19 +25,19 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from hydro.workers import count_processors
-from problems.problem import Problem
-from problems.problem_file import describe_mistake
-from problems.registry import PROBLEMS
-from regrid.errors import BadInput, RunFailure
-from runs.deck.reading import ReadDeck, packaged_decks, read_deck, read_toml, to_toml
-from runs.inspection.account import HEAD, describe_cautions
-from runs.march.launching import continue_runner, start_runner
-from runs.march.runner import Runner
-from runs.store.directory import RunDirectory, read_run_deck
-from runs.store.files import disk_errors, write_atomically
-from runs.store.history import read_history
-from runs.verify import CASES
+from shockgrid.hydro.workers import count_processors
+from shockgrid.problems.problem import Problem
+from shockgrid.problems.problem_file import describe_mistake
+from shockgrid.problems.registry import PROBLEMS
+from shockgrid.regrid.errors import BadInput, RunFailure
+from shockgrid.runs.deck.reading import ReadDeck, packaged_decks, read_deck, read_toml, to_toml
+from shockgrid.runs.inspection.account import HEAD, describe_cautions
+from shockgrid.runs.march.launching import continue_runner, start_runner
+from shockgrid.runs.march.runner import Runner
+from shockgrid.runs.store.directory import RunDirectory, read_run_deck
+from shockgrid.runs.store.files import disk_errors, write_atomically
+from shockgrid.runs.store.history import read_history
+from shockgrid.runs.verify import CASES
 
 
 def find_error_columns(problem: str, measured: Iterable[str] = ()) -> tuple[str, ...]:

@@ -30,12 +30,12 @@ import numpy as np
 import tomli_w
 from msgspec import Meta
 
-from problems.registry import PROBLEMS
-from regrid.errors import BadInput
-from regrid.text_files import TooMuch, cut, load_toml
-from runs.deck.checking import check_deck
-from runs.deck.reading import parse_value, read_toml
-from runs.store.directory import STUDY_FILE, RunDirectory
+from shockgrid.problems.registry import PROBLEMS
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.text_files import TooMuch, cut, load_toml
+from shockgrid.runs.deck.checking import check_deck
+from shockgrid.runs.deck.reading import parse_value, read_toml
+from shockgrid.runs.store.directory import STUDY_FILE, RunDirectory
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 RANGE = re.compile(rf"({NUMBER}):({NUMBER}):(\d+)(?::(log))?")

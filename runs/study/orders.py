@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from problems.problem import align
-from regrid.errors import BadInput, suggest
-from regrid.roots import find_root
-from runs.study.computing import Result, find_names
-from runs.study.definition import Definition, write_value
+from shockgrid.problems.problem import align
+from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.roots import find_root
+from shockgrid.runs.study.computing import Result, find_names
+from shockgrid.runs.study.definition import Definition, write_value
 
 # factors of safety for three grids, and for two
 THREE_GRID_SAFETY = 1.25

@@ -16,10 +16,10 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from problems.pictures import name_axis
-from runs.pictures.command import new_figure
-from runs.study.definition import make_column
-from runs.study.orders import Series
+from shockgrid.problems.pictures import name_axis
+from shockgrid.runs.pictures.command import new_figure
+from shockgrid.runs.study.definition import make_column
+from shockgrid.runs.study.orders import Series
 
 FEW_LINES = 5  # in a panel, with colours and a column of the legend for them
 LEAST_MAP = 4  # values of each key from which a map is drawn

@@ -27,16 +27,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from problems.evolution import get_start_row
-from problems.problem import Problem
-from regrid.errors import BadInput
-from runs.deck.reading import ReadDeck, read_deck
-from runs.engines import Engine, open_engine
-from runs.quantities import count
-from runs.store.directory import RunDirectory
-from runs.store.files import disk_errors, make_csv, write_atomically
-from runs.store.reader import Table, load_package
-from runs.study.computing import (
+from shockgrid.problems.evolution import get_start_row
+from shockgrid.problems.problem import Problem
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.deck.reading import ReadDeck, read_deck
+from shockgrid.runs.engines import Engine, open_engine
+from shockgrid.runs.quantities import count
+from shockgrid.runs.store.directory import RunDirectory
+from shockgrid.runs.store.files import disk_errors, make_csv, write_atomically
+from shockgrid.runs.store.reader import Table, load_package
+from shockgrid.runs.study.computing import (
     Result,
     Work,
     compute_digest_of,
@@ -48,7 +48,7 @@ from runs.study.computing import (
     share_processors,
     warm_up,
 )
-from runs.study.definition import (
+from shockgrid.runs.study.definition import (
     FILE,
     Definition,
     check_same_deck,
@@ -59,7 +59,7 @@ from runs.study.definition import (
     read_definition,
     write_settings,
 )
-from runs.study.orders import HEADS, Series, find_refined_key, find_series, make_row
+from shockgrid.runs.study.orders import HEADS, Series, find_refined_key, find_series, make_row
 
 if TYPE_CHECKING:
     import xarray
@@ -189,8 +189,8 @@ class Study:
 
     def plot(self, path: Path | str | None = None) -> Figure:
         """The figure of `shown`, written to `path` if given."""
-        from runs.pictures.command import save  # first: it loads matplotlib
-        from runs.study.pictures import draw_study
+        from shockgrid.runs.pictures.command import save  # first: it loads matplotlib
+        from shockgrid.runs.study.pictures import draw_study
 
         figure = draw_study(self)
         if path is not None:
@@ -389,7 +389,7 @@ def _describe_error(error: Exception) -> str:
     """A sentence for what a worker raised."""
     if isinstance(error, MemoryError):
         return "not enough memory; fewer cells or fewer jobs need less"
-    died = type(error).__module__.startswith(("runs.", "distributed"))
+    died = type(error).__module__.startswith(("shockgrid.runs.", "distributed"))
     if died or isinstance(error, BadInput):
         return str(error)
     return f"a mistake in shockgrid itself ({type(error).__name__}: {error})"

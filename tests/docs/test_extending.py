@@ -11,24 +11,24 @@ import numpy as np
 import pytest
 
 from builders import ROOT, march
-from hydro import eos as eos_registry
-from hydro import history
-from hydro.block import Block
-from hydro.boundary import SEGMENTS, put
-from hydro.eos import IdealGas
-from hydro.eos.materials import find_material
-from hydro.simulation import Simulation
-from hydro.strength.laws import STRENGTH_LAWS
-from problems import registry as problem_registry
-from problems.initial_states import make_plane_grid
-from regrid import registry as regridder_registry
-from regrid.domains import make_domain
-from regrid.errors import BadInput
-from regrid.measure.quality import find_bad_cells
-from regrid.plug_ins import GROUPS
-from regrid.registry import make_regridder
-from runs.cli.main import main
-from runs.store.history import read_history
+from shockgrid.hydro import eos as eos_registry
+from shockgrid.hydro import history
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import SEGMENTS, put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.strength.laws import STRENGTH_LAWS
+from shockgrid.problems import registry as problem_registry
+from shockgrid.problems.initial_states import make_plane_grid
+from shockgrid.regrid import registry as regridder_registry
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.quality import find_bad_cells
+from shockgrid.regrid.plug_ins import GROUPS
+from shockgrid.regrid.registry import make_regridder
+from shockgrid.runs.cli.main import main
+from shockgrid.runs.store.history import read_history
 from shockgrid.testing import (
     check_boundary,
     check_eos,

@@ -8,7 +8,7 @@ import re
 import numpy as np
 
 from builders import ROOT
-from regrid.measure.quality import find_bad_cells
+from shockgrid.regrid.measure.quality import find_bad_cells
 
 PAGE = ROOT / "docs" / "regrid-library.md"
 

@@ -11,7 +11,7 @@ import pytest
 
 import shockgrid as sg
 from builders import ROOT
-from regrid.registry import REGRIDDERS
+from shockgrid.regrid.registry import REGRIDDERS
 
 PAGE = ROOT / "docs" / "notebook.md"
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))

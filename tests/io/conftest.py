@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 import toy_problem
 
-from problems.registry import PROBLEMS
-from runs.cli.main import main
-from runs.march import compiling
+from shockgrid.problems.registry import PROBLEMS
+from shockgrid.runs.cli.main import main
+from shockgrid.runs.march import compiling
 
 TOY = Path(toy_problem.__file__)
 

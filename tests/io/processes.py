@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from runs.cli.main import main
+from shockgrid.runs.cli.main import main
 
 OPEN = open
 forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs a system that forks")

@@ -7,8 +7,8 @@ from pathlib import Path
 import h5py
 import pytest
 
-from runs.store.directory import RunDirectory
-from runs.store.reader import RunData
+from shockgrid.runs.store.directory import RunDirectory
+from shockgrid.runs.store.reader import RunData
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,7 @@ def test_own_mistake_has_no_traceback(shockgrid, monkeypatch):
     monkeypatch.setattr(toy_problem.ToyEvolution, "advance", lambda self: 1 / 0)
     code, _, error = shockgrid("run", "toy", "-q")
     assert code == 70 and "ZeroDivisionError" in error and "--debug" in error
-    from runs.cli.main import main
+    from shockgrid.runs.cli.main import main
 
     with pytest.raises(ZeroDivisionError):
         main(["run", "toy", "-q", "--debug"])

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runs.store.reader import RunData
+from shockgrid.runs.store.reader import RunData
 
 STREAM = """
 problem = "blocks"

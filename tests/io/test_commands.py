@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from problems.registry import PROBLEMS
-from runs.pictures.command import new_figure
-from runs.pictures.curves import draw_history
-from runs.store.reader import RunData
+from shockgrid.problems.registry import PROBLEMS
+from shockgrid.runs.pictures.command import new_figure
+from shockgrid.runs.pictures.curves import draw_history
+from shockgrid.runs.store.reader import RunData
 
 
 @pytest.fixture

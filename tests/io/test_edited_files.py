@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import shockgrid as sg
-from runs.store.reader import RunData
+from shockgrid.runs.store.reader import RunData
 
 MATERIALS = """
 [gas]

@@ -10,10 +10,10 @@ import pytest
 from foreign_readers import missing
 
 from builders import tensor
-from regrid.algebraic import transfinite_grid
-from regrid.domains import make_domain
-from regrid.measure.quality import find_bad_cells
-from regrid.sides import SIDES
+from shockgrid.regrid.algebraic import transfinite_grid
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.measure.quality import find_bad_cells
+from shockgrid.regrid.sides import SIDES
 
 PNG = b"\x89PNG"
 T9 = np.linspace(0.0, 1.0, 9)
@@ -64,7 +64,7 @@ def test_own_grid_is_untangled_and_keeps_its_sides(shockgrid, kind):
     np.savez("start.npz", x=nodes[0], y=nodes[1])
     with h5py.File("mine.h5", "w") as file:
         file["some/where/nodes"] = np.moveaxis(nodes, 0, -1)
-    from runs.store.paraview import write_vts
+    from shockgrid.runs.store.paraview import write_vts
 
     write_vts(Path("mine.vts"), nodes, {})
     np.savez("mine.npz", nodes=nodes)

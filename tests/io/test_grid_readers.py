@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from foreign_readers import READ_VTS, missing, read_elsewhere
 
-from regrid.given import read_structured
-from runs.store.paraview import write_vts
+from shockgrid.regrid.given import read_structured
+from shockgrid.runs.store.paraview import write_vts
 
 WRITE = """
 import sys

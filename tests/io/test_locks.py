@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import shockgrid as sg
-from regrid.given import read_grid
-from runs.store import files
+from shockgrid.regrid.given import read_grid
+from shockgrid.runs.store import files
 
 fcntl = pytest.importorskip("fcntl")
 

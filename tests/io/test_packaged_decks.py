@@ -7,11 +7,11 @@ import json
 import msgspec
 import pytest
 
-from problems.problem import Problem
-from problems.registry import PROBLEMS, load_problem
-from runs.deck.checking import check_deck, make_schema
-from runs.deck.reading import packaged_decks, read_deck, resolve_deck, to_toml
-from runs.inspection.listing import describe_deck
+from shockgrid.problems.problem import Problem
+from shockgrid.problems.registry import PROBLEMS, load_problem
+from shockgrid.runs.deck.checking import check_deck, make_schema
+from shockgrid.runs.deck.reading import packaged_decks, read_deck, resolve_deck, to_toml
+from shockgrid.runs.inspection.listing import describe_deck
 
 NAMES = tuple(PROBLEMS)
 

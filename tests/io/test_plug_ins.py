@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from hydro.boundary import make_segment
-from hydro.eos import EQUATIONS_OF_STATE
-from problems.registry import PROBLEMS
-from regrid.errors import BadInput
-from regrid.plug_ins import find_plug_ins
-from regrid.registry import make_regridder
-from runs.store.reader import RunData
+from shockgrid.hydro.boundary import make_segment
+from shockgrid.hydro.eos import EQUATIONS_OF_STATE
+from shockgrid.problems.registry import PROBLEMS
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.plug_ins import find_plug_ins
+from shockgrid.regrid.registry import make_regridder
+from shockgrid.runs.store.reader import RunData
 
 MODULE = '''
 """A gas, a regridder, an outlet and a column of somebody else."""
 
-from hydro.boundary import Outflow
-from hydro.eos.gases import IdealGas
-from regrid.algebraic import TransfiniteRegridder
+from shockgrid.hydro.boundary import Outflow
+from shockgrid.hydro.eos.gases import IdealGas
+from shockgrid.regrid.algebraic import TransfiniteRegridder
 from toy_problem import Toy
 
 
@@ -101,8 +101,8 @@ def test_a_deck_runs_a_problem_of_somebody_else(somebody, shockgrid):
 
 
 def test_materials_regridders_and_sides_take_their_names(somebody, tmp_path):
-    from hydro.block import Block
-    from hydro.eos.materials import find_material
+    from shockgrid.hydro.block import Block
+    from shockgrid.hydro.eos.materials import find_material
 
     (tmp_path / "own.toml").write_text(
         '[he]\neos = "helium"\ngamma = 1.67\nrho0 = 0.17\nsource = "a table"\n'

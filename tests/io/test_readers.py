@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from foreign_readers import READ_XDMF, missing, read_elsewhere
 
-from runs.store.reader import RunData
+from shockgrid.runs.store.reader import RunData
 
 READ_XARRAY = """
 import json, sys, xarray
@@ -56,8 +56,8 @@ def test_vtk_reads_the_sidecar(run):
 def test_state_comes_back_as_it_went(tmp_path):
     import toy_problem
 
-    from runs.store.dumps import Names, make_image, read_state
-    from runs.store.files import write_sealed
+    from shockgrid.runs.store.dumps import Names, make_image, read_state
+    from shockgrid.runs.store.files import write_sealed
 
     evolution = toy_problem.ToyEvolution(toy_problem.ToyDeck())
     evolution.advance()

@@ -15,7 +15,7 @@ import pytest
 import toy_problem
 from processes import wait_for
 
-from runs.store.reader import RunData
+from shockgrid.runs.store.reader import RunData
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import shockgrid as sg
-from runs.store.reader import RunData
+from shockgrid.runs.store.reader import RunData
 
 SHORT = ("--set=cells=16", "-q")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from runs.store.reader import RunData
+from shockgrid.runs.store.reader import RunData
 
 STEEP = "lengths=[2,2] modes=[{ka0=0.5}] regrid.options.family=auto"  # the regridder has work
 CASES = {

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from benchmarks.soak.settings import change_cells
-from runs.deck.reading import packaged_decks, read_deck
-from runs.store.reader import RunData
+from shockgrid.runs.deck.reading import packaged_decks, read_deck
+from shockgrid.runs.store.reader import RunData
 
 MOST_STEPS = 120
 PARTS_OF_CELLS = (0.25, 0.5, 0.7, 1.0)  # the smallest that the problem accepts

@@ -15,9 +15,9 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from problems.deck import Deck, DeckTable, RunControl
-from problems.problem import Problem
-from regrid.errors import BadInput, RunFailure
+from shockgrid.problems.deck import Deck, DeckTable, RunControl
+from shockgrid.problems.problem import Problem
+from shockgrid.regrid.errors import BadInput, RunFailure
 
 
 class Hot(DeckTable, kw_only=True, tag="hot", tag_field="kind"):
@@ -187,14 +187,14 @@ def draw_cooling(figure, run_data):
 
 def register():
     """Put the toy into the registry of this process."""
-    from problems.registry import PROBLEMS
+    from shockgrid.problems.registry import PROBLEMS
 
     PROBLEMS["toy"] = "toy_problem:Toy"
 
 
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-    from runs.cli.main import main
+    from shockgrid.runs.cli.main import main
 
     register()
     sys.exit(main())

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 
 DECK = ("interface-instability", "--set", "cells=8")
 SAME_END = """
-from runs.store.reader import RunData
+from shockgrid.runs.store.reader import RunData
 whole, parts = (RunData(name).dumps[-1] for name in ("run", "parts"))
 assert (whole.step, whole.t) == (parts.step, parts.t)
 for one, other in zip(whole.blocks, parts.blocks, strict=True):
@@ -54,7 +54,7 @@ def call(surroundings, tmp_path_factory):
     """Call Python without the folder it is called from; the text that it printed."""
     folder = tmp_path_factory.mktemp("elsewhere")
 
-    def call(*words: str, code: int = 0) -> str:
+    def call(*words: str, code: int = 0, traceback: bool = False) -> str:
         done = subprocess.run(
             [sys.executable, "-I", *words],
             cwd=folder,
@@ -64,7 +64,7 @@ def call(surroundings, tmp_path_factory):
             encoding="utf-8",
         )
         assert done.returncode == code, done.stdout + done.stderr
-        assert "Traceback" not in done.stderr
+        assert ("Traceback" in done.stderr) == traceback
         return done.stdout
 
     call.folder = folder
@@ -80,21 +80,22 @@ def finished(call) -> Path:
 
 @pytest.mark.skipif("SHOCKGRID_WHEEL" not in os.environ, reason="SHOCKGRID_WHEEL is not set")
 def test_packages_lie_in_site_packages(call):
-    for package in ("regrid", "hydro", "problems", "runs", "shockgrid"):
-        place = call("-c", f"import {package}; print({package}.__file__)")
-        assert "site-packages" in place
+    for package in ("regrid", "hydro", "problems", "runs"):
+        place = call("-c", f"import shockgrid.{package} as found; print(found.__file__)")
+        assert Path("site-packages", "shockgrid", package).as_posix() in Path(place).as_posix()
+        call("-c", f"import {package}", code=1, traceback=True)  # nothing beside it
 
 
 def test_packaged_data_are_there(call):
-    decks = [entry.name for entry in files("runs").joinpath("deck", "packaged").iterdir()]
+    decks = [entry.name for entry in files("shockgrid.runs").joinpath("deck", "packaged").iterdir()]
     assert "interface-instability-mushroom.toml" in decks
     shown = call("-m", "shockgrid", "list")
     for name in decks:
         if name.endswith(".toml"):
             assert name.removesuffix(".toml") in shown
-    assert files("hydro").joinpath("eos", "materials.toml").is_file()
-    assert files("runs").joinpath("templates", "run.html.j2").is_file()
-    assert files("problems").joinpath("interface_instability", "accuracy.json").is_file()
+    assert files("shockgrid.hydro").joinpath("eos", "materials.toml").is_file()
+    assert files("shockgrid.runs").joinpath("templates", "run.html.j2").is_file()
+    assert files("shockgrid.problems").joinpath("interface_instability", "accuracy.json").is_file()
 
 
 def test_a_deck_is_checked_and_has_a_schema(call):

@@ -7,18 +7,18 @@ import pytest
 
 from benchmarks.random_motions import OUTCOMES, count_outcomes, judge
 from builders import unit_steps
-from regrid.algebraic import transfinite_grid
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.tuning import DEFAULT
-from regrid.barrier.untangle import Unfolding, unfold
-from regrid.barrier.workspace import Workspace
-from regrid.domains import make_domain
-from regrid.errors import RegridFailure
-from regrid.marching import march
-from regrid.measure.corners import find_folded_cells
-from regrid.measure.quality import find_bad_cells
-from regrid.registry import REGRIDDERS, make_regridder
-from regrid.sides import copy_sides
+from shockgrid.regrid.algebraic import transfinite_grid
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.barrier.tuning import DEFAULT
+from shockgrid.regrid.barrier.untangle import Unfolding, unfold
+from shockgrid.regrid.barrier.workspace import Workspace
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.errors import RegridFailure
+from shockgrid.regrid.marching import march
+from shockgrid.regrid.measure.corners import find_folded_cells
+from shockgrid.regrid.measure.quality import find_bad_cells
+from shockgrid.regrid.registry import REGRIDDERS, make_regridder
+from shockgrid.regrid.sides import copy_sides
 
 CONVEX = ("brackbill-saltzman", "ivanenko-charakhchyan", "node-speed")
 

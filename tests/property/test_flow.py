@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from builders import box, march, two_blocks, wall_off
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
-from hydro.links import join
-from hydro.simulation import Simulation
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas, MieGruneisen, StiffenedGas
+from shockgrid.hydro.links import join
+from shockgrid.hydro.simulation import Simulation
 
 
 def make_flow(seed, inner="interface", piston=None):

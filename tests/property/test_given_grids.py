@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from regrid.domains import make_domain
-from regrid.registry import REGRIDDERS, make_regridder
-from regrid.sides import SIDES
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.registry import REGRIDDERS, make_regridder
+from shockgrid.regrid.sides import SIDES
 
 FAMILIES = {name: {} for name in sorted(REGRIDDERS)} | {"sweeps": {"method": "sweeps"}}
 DOME = make_domain("dome", 8, 6)

@@ -6,11 +6,11 @@ import re
 import numpy as np
 import pytest
 
-from regrid.domains import make_domain
-from regrid.errors import RegridFailure
-from regrid.measure.quality import compute_corner_areas, find_bad_cells
-from regrid.registry import REGRIDDERS, make_regridder
-from regrid.sides import SIDES
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.errors import RegridFailure
+from shockgrid.regrid.measure.quality import compute_corner_areas, find_bad_cells
+from shockgrid.regrid.registry import REGRIDDERS, make_regridder
+from shockgrid.regrid.sides import SIDES
 from shockgrid.testing import REGRIDDER_PROMISES, check_hard_motion, check_threads
 
 NAMES = sorted(REGRIDDERS)

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from problems.convection.heated_cavity import AxisGrid, HeatedCavity, HeatedCavityDeck
-from problems.convection.rayleigh_benard import RayleighBenard, RayleighBenardDeck
-from problems.deck import RunControl
+from shockgrid.problems.convection.heated_cavity import AxisGrid, HeatedCavity, HeatedCavityDeck
+from shockgrid.problems.convection.rayleigh_benard import RayleighBenard, RayleighBenardDeck
+from shockgrid.problems.deck import RunControl
 
 FOLDER = Path(__file__).parent / "baselines"
 TOLERANCE = 1e-7  # of converged states and of sums that processors may order differently

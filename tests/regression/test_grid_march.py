@@ -11,8 +11,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from problems.deck import Regrid
-from problems.grid_march import GridMarch, GridMarchDeck
+from shockgrid.problems.deck import Regrid
+from shockgrid.problems.grid_march import GridMarch, GridMarchDeck
 
 FOLDER = Path(__file__).parent / "baselines"
 STEPS = 20

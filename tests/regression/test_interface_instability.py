@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from problems.deck import Regrid, RunControl
-from problems.interface_instability.deck import InterfaceDeck
-from problems.interface_instability.line import Mode
-from problems.interface_instability.problem import InterfaceInstability
+from shockgrid.problems.deck import Regrid, RunControl
+from shockgrid.problems.interface_instability.deck import InterfaceDeck
+from shockgrid.problems.interface_instability.line import Mode
+from shockgrid.problems.interface_instability.problem import InterfaceInstability
 
 PATH = Path(__file__).parent / "baselines" / "interface_instability.txt"
 STEPS = 100

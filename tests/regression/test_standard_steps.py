@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from builders import march
-from problems.registry import PROBLEMS
-from runs.deck.reading import read_deck
+from shockgrid.problems.registry import PROBLEMS
+from shockgrid.runs.deck.reading import read_deck
 
 PATH = Path(__file__).parent / "baselines" / "standard_problems.json"
 TOLERANCE = 1e-9  # of sums that processors may order differently

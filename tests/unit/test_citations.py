@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from builders import ROOT
-from hydro.step import SIDE_PASSES
+from shockgrid.hydro.step import SIDE_PASSES
 
 DOCS = ROOT / "docs"
 PACKAGES = ("regrid", "hydro", "problems", "runs", "shockgrid")
@@ -111,6 +111,8 @@ def is_there(named: str) -> bool:
     if "/" in named:
         return any(ROOT.glob(named.rstrip("/.")))
     parts = named.split(".")
+    if parts[0] == "shockgrid" and parts[1] in PACKAGES:
+        parts = parts[1:]
     for length in range(len(parts), 0, -1):
         path = ROOT.joinpath(*parts[:length])
         for file in (path.with_suffix(".py"), path / "__init__.py"):

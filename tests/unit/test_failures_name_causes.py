@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 
 from builders import ROOT
-from runs.early_end.causes import ENDS
+from shockgrid.runs.early_end.causes import ENDS
 
 KINDS = {"RunFailure", "RegridFailure"}
 

@@ -9,10 +9,11 @@ import time
 
 import pytest
 
-from regrid.compilation import first_calls
+from shockgrid.regrid.compilation import first_calls
 
 CALL = """
-import numpy as np, regrid
+import numpy as np
+from shockgrid import regrid
 line = np.linspace(0.0, 1.0, 13)
 nodes = np.array(np.meshgrid(line, line, indexing="ij"))
 print("begins", flush=True)

@@ -14,15 +14,15 @@ from types import SimpleNamespace
 import pytest
 
 from builders import ROOT
-from regrid.compilation import first_calls, kept_files
-from regrid.compilation.contents import compute_contents_digest
-from regrid.compilation.first_calls import read_clock
-from regrid.jit import kernel
-from runs.march import compiling
+from shockgrid.regrid.compilation import first_calls, kept_files
+from shockgrid.regrid.compilation.contents import compute_contents_digest
+from shockgrid.regrid.compilation.first_calls import read_clock
+from shockgrid.regrid.jit import kernel
+from shockgrid.runs.march import compiling
 
 LAW = """
-from hydro.eos import IdealGas
-from regrid.jit import inlined
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.regrid.jit import inlined
 from exponents import EXPONENT
 
 FACTOR = 2.0
@@ -37,7 +37,7 @@ class Law(IdealGas):
 EXPONENTS = "EXPONENT = 1.0\n"
 SCRIPT = """
 import numpy as np
-from hydro.interior.cell_fields import make_fill_sound_speed
+from shockgrid.hydro.interior.cell_fields import make_fill_sound_speed
 from laws import Law
 
 state, sound = np.full((4, 5, 5), 2.0), np.zeros((3, 3))
@@ -50,7 +50,7 @@ print(sound[0, 0] ** 2, sum(fill.stats.cache_hits.values()))
 LEAST = """
 import sys
 import numpy as np
-from regrid.jit import kernel
+from shockgrid.regrid.jit import kernel
 
 @kernel
 def find_least(x):
@@ -91,7 +91,7 @@ def test_an_edited_equation_of_state_is_compiled_anew(tmp_path):
 
 
 CALLED = """
-from regrid.jit import kernel
+from shockgrid.regrid.jit import kernel
 
 @kernel
 def add(values, more):
@@ -101,7 +101,7 @@ def add(values, more):
 CALLING = """
 import numpy as np
 from called import add
-from regrid.jit import kernel
+from shockgrid.regrid.jit import kernel
 
 @kernel
 def add_twice(values, more):
@@ -205,7 +205,7 @@ def watch(monkeypatch, counts, terminal=False, helped=True) -> tuple[str, list]:
 
 
 def test_a_second_process_compiles_where_much_is_compiled(monkeypatch):
-    program = [sys.executable, "-m", "runs.march.compiling"]
+    program = [sys.executable, "-m", "shockgrid.runs.march.compiling"]
     assert watch(monkeypatch, COUNTS)[1] == [program]
     assert watch(monkeypatch, COUNTS, helped=False)[1] == []
     loaded = [(0, 0, 0.0), (30, 0, 4.0), (40, 2, 6.0)]

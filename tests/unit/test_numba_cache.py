@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from builders import ROOT
-from regrid import jit
-from regrid.compilation import numba_cache
-from regrid.compilation.first_calls import count_compiling, interpreted
-from regrid.compilation.numba_cache import CHECKSUMS, make_kernel
+from shockgrid.regrid import jit
+from shockgrid.regrid.compilation import numba_cache
+from shockgrid.regrid.compilation.first_calls import count_compiling, interpreted
+from shockgrid.regrid.compilation.numba_cache import CHECKSUMS, make_kernel
 
 OPTIONS = {"nogil": True, "error_model": "numpy"}
 NEXT_RELEASES = {  # what the next numba may do to a name that it keeps to itself
@@ -29,7 +29,7 @@ NEXT_RELEASES = {  # what the next numba may do to a name that it keeps to itsel
 }
 START = """
 import numpy as np
-from regrid.jit import backend, inlined, kernel
+from shockgrid.regrid.jit import backend, inlined, kernel
 
 @inlined
 def double(x):
@@ -158,14 +158,14 @@ def test_another_release_of_numba_does_not_break_the_start(tmp_path, change):
         [sys.executable, str(script)], env=environment, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["regrid.compilation.numba_cache", "6.0", "1"]
+    assert done.stdout.split() == ["shockgrid.regrid.compilation.numba_cache", "6.0", "1"]
     assert done.stderr == ""
 
 
 def test_the_installed_numba_is_a_known_one():
     """Where this fails: run all tests with it, then raise LAST_TRIED, or mend `machine_code`."""
     assert numba.version_info.short <= jit.LAST_TRIED
-    assert jit.backend.__name__ == "regrid.compilation.machine_code"
+    assert jit.backend.__name__ == "shockgrid.regrid.compilation.machine_code"
 
 
 def test_one_file_uses_what_numba_keeps_to_itself():

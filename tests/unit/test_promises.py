@@ -8,15 +8,15 @@ import pytest
 
 import shockgrid as sg
 from builders import box, wall_off
-from hydro import rim as on
-from hydro.boundary import FreeSurface, Outflow
-from hydro.eos import IdealGas, MieGruneisen
-from hydro.strength.laws import LinearHardening
-from problems.standard.free_stream import FreeStream
-from problems.standard.vortex import Vortex
-from regrid.algebraic import TransfiniteRegridder
-from regrid.errors import BadInput
-from regrid.jit import inlined
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.boundary import FreeSurface, Outflow
+from shockgrid.hydro.eos import IdealGas, MieGruneisen
+from shockgrid.hydro.strength.laws import LinearHardening
+from shockgrid.problems.standard.free_stream import FreeStream
+from shockgrid.problems.standard.vortex import Vortex
+from shockgrid.regrid.algebraic import TransfiniteRegridder
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.jit import inlined
 
 
 @inlined

@@ -5,7 +5,7 @@ import math
 import pytest
 from scipy.optimize import brentq
 
-from regrid.roots import find_root
+from shockgrid.regrid.roots import find_root
 
 CASES = [
     (lambda x: x**3 - 2.0, 0.0, 2.0),

@@ -10,7 +10,7 @@ import threading
 import pytest
 
 from builders import ROOT
-from hydro.workers import Workers
+from shockgrid.hydro.workers import Workers
 
 
 def make(count, threads):

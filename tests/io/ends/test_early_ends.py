@@ -9,13 +9,13 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from regrid.errors import Place, RunFailure
-from runs.deck.reading import read_deck
-from runs.early_end.causes import ENDS, Setting
-from runs.early_end.explain import find_calm_point
-from runs.march.launching import start_runner
-from runs.store.directory import RunDirectory
-from runs.store.reader import RunData
+from shockgrid.regrid.errors import Place, RunFailure
+from shockgrid.runs.deck.reading import read_deck
+from shockgrid.runs.early_end.causes import ENDS, Setting
+from shockgrid.runs.early_end.explain import find_calm_point
+from shockgrid.runs.march.launching import start_runner
+from shockgrid.runs.store.directory import RunDirectory
+from shockgrid.runs.store.reader import RunData
 
 
 def run_toy(shockgrid, *settings, at=40):

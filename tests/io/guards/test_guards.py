@@ -10,11 +10,11 @@ import h5py
 import numpy as np
 import pytest
 
-from regrid.errors import BadInput
-from runs.inspection.info import inspect
-from runs.store.dumps import open_dump
-from runs.store.files import find_sum, seal
-from runs.store.reader import RunData
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.inspection.info import inspect
+from shockgrid.runs.store.dumps import open_dump
+from shockgrid.runs.store.files import find_sum, seal
+from shockgrid.runs.store.reader import RunData
 
 LIGHT = ("--set", "output.precision=single")
 
@@ -68,7 +68,7 @@ def crash(path):
 
 def test_a_damaged_file_that_crashes_hdf5_is_told(dump, monkeypatch):
     dump.write_bytes(dump.read_bytes()[:-1] + b"x")
-    monkeypatch.setattr("runs.inspection.info.describe_tree", crash)
+    monkeypatch.setattr("shockgrid.runs.inspection.info.describe_tree", crash)
     with pytest.raises(BadInput, match=r"is damaged: .* crashes"):
         inspect(dump)
 

@@ -6,12 +6,12 @@ import tracemalloc
 
 import pytest
 
-from problems import problem as size
-from problems.registry import OWN, load_problem
-from regrid.errors import BadInput
-from runs.deck.checking import make_parts, resolve
-from runs.deck.reading import resolve_deck
-from runs.inspection.listing import describe_plan
+from shockgrid.problems import problem as size
+from shockgrid.problems.registry import OWN, load_problem
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.deck.checking import make_parts, resolve
+from shockgrid.runs.deck.reading import resolve_deck
+from shockgrid.runs.inspection.listing import describe_plan
 
 SMALL = size.PROGRAM_BYTES + 20_000 * size.RUN_BYTES  # bytes of a machine that holds so many cells
 HUGE = (2**63 - 1, 10**30)

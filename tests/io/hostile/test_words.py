@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from regrid.text_files import escape_controls
+from shockgrid.regrid.text_files import escape_controls
 
 EVIL = "k\x1b]0;x\x07\x9b31m\u202e\u2066\ufeff\u2028e"
 HARMLESS = "\n\t "

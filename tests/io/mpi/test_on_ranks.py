@@ -13,9 +13,9 @@ import pytest
 
 from builders import ROOT
 from mpiexec import find_mpiexec
-from runs.cli.main import main
-from runs.store.directory import RunDirectory
-from runs.store.history import read_history
+from shockgrid.runs.cli.main import main
+from shockgrid.runs.store.directory import RunDirectory
+from shockgrid.runs.store.history import read_history
 
 DECK = ("triple-point", "--set", "cells=8")
 
@@ -68,7 +68,7 @@ def test_a_run_on_ranks_and_its_restart_on_others_are_those_of_one_process(tmp_p
 
 FAILING = '''"""A problem that one rank alone cannot build."""
 import os
-from problems.standard.triple_point import TriplePoint
+from shockgrid.problems.standard.triple_point import TriplePoint
 
 
 class Lame(TriplePoint):

@@ -6,12 +6,12 @@ import io
 
 import pytest
 
-from regrid.errors import BadInput
-from runs.cli.main import main
-from runs.deck.reading import read_deck
-from runs.march.launching import start_runner
-from runs.ranks.world import World, follow
-from runs.store.directory import open_directory
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.cli.main import main
+from shockgrid.runs.deck.reading import read_deck
+from shockgrid.runs.march.launching import start_runner
+from shockgrid.runs.ranks.world import World, follow
+from shockgrid.runs.store.directory import open_directory
 from thread_ranks import run_on_threads
 
 SETTINGS = ("cells=8", "run.max_steps=5")
@@ -64,7 +64,7 @@ def test_a_follower_that_cannot_build_the_flow_says_so_and_breaks_off(tmp_path, 
 
     def rank(comm):
         if comm.rank:
-            monkeypatch.setattr("runs.ranks.world.resolve_deck", fail)
+            monkeypatch.setattr("shockgrid.runs.ranks.world.resolve_deck", fail)
             return follow(comm, screens)
         read = read_deck("triple-point", SETTINGS)
         runner = start_runner(read, str(tmp_path / "out"), False, True, lambda text: None)

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from builders import ROOT
-from regrid.compilation.first_calls import MOST_NUMBERS, interpreted
-from regrid.jit import kernel
-from regrid.measure.quality import compute_corner_areas
+from shockgrid.regrid.compilation.first_calls import MOST_NUMBERS, interpreted
+from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.measure.quality import compute_corner_areas
 
 LOOK = """
 import json
 import sys
 import click.testing
 from numba.core.event import install_recorder
-from problems.registry import OWN
-from runs.cli.main import cli
-from runs.deck.reading import packaged_decks, read_deck
+from shockgrid.problems.registry import OWN
+from shockgrid.runs.cli.main import cli
+from shockgrid.runs.deck.reading import packaged_decks, read_deck
 
 runner, told = click.testing.CliRunner(), {}
 for name in sorted({*packaged_decks(), *OWN} if "all" in sys.argv else OWN):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runs.store.reader import RunData
+from shockgrid.runs.store.reader import RunData
 
 DECK = """
 problem = "interface-instability"

@@ -10,7 +10,7 @@ import h5py
 import pytest
 
 from builders import ROOT
-from runs.cli.main import main
+from shockgrid.runs.cli.main import main
 
 PAGE = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
 RUNS = {

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from runs.store.dumps import read_state
-from runs.store.reader import RunData
+from shockgrid.runs.store.dumps import read_state
+from shockgrid.runs.store.reader import RunData
 
 GAS = ("interface-instability", "--set=mach=2", "--set=lengths=[2,2]", "--set=cells=16", "-q",
        "--set=modes=[{ka0=0.5}]", "--set=run.t_end=0.3",

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runs.store.reader import RunData
+from shockgrid.runs.store.reader import RunData
 
 DECK = ("interface-instability", "--set", "cells=16", "--set", "lengths=[2, 2]", "--set", "mach=2")
 

@@ -11,9 +11,9 @@ from types import SimpleNamespace
 import pytest
 from processes import wait_for
 
-from runs.march import runner as limits
-from runs.march.runner import WallLimit, parse_duration
-from runs.store.reader import RunData
+from shockgrid.runs.march import runner as limits
+from shockgrid.runs.march.runner import WallLimit, parse_duration
+from shockgrid.runs.store.reader import RunData
 
 
 @pytest.mark.parametrize(

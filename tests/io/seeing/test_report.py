@@ -15,7 +15,7 @@ from PIL import Image
 
 pytest.importorskip("jinja2")
 
-from runs.report import PICTURES, report
+from shockgrid.runs.report import PICTURES, report
 
 
 class Page(HTMLParser):
@@ -62,7 +62,7 @@ def run(shockgrid):
 @pytest.fixture
 def few_pictures(monkeypatch):
     """Pages with the problem's own picture alone, where others do not matter."""
-    monkeypatch.setattr("runs.report.PICTURES", PICTURES[:1])
+    monkeypatch.setattr("shockgrid.runs.report.PICTURES", PICTURES[:1])
 
 
 def test_a_page_has_all_in_it_and_nothing_from_a_network(run, shockgrid):

@@ -15,14 +15,14 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from PIL import Image
 
-from regrid.errors import BadInput
-from regrid.measure.corners import compute_centres
-from runs.pictures import fields, film
-from runs.pictures.fields import find_field
-from runs.pictures.film import make_film
-from runs.store.files import seal
-from runs.store.provenance import find_provenance, hash_deck
-from runs.store.reader import RunData
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.corners import compute_centres
+from shockgrid.runs.pictures import fields, film
+from shockgrid.runs.pictures.fields import find_field
+from shockgrid.runs.pictures.film import make_film
+from shockgrid.runs.store.files import seal
+from shockgrid.runs.store.provenance import find_provenance, hash_deck
+from shockgrid.runs.store.reader import RunData
 
 
 def run(shockgrid, name: str, *words: str) -> RunData:

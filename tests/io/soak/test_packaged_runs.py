@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from runs.deck.reading import packaged_decks
-from runs.inspection.account import measure_drifts
-from runs.store.reader import RunData
+from shockgrid.runs.deck.reading import packaged_decks
+from shockgrid.runs.inspection.account import measure_drifts
+from shockgrid.runs.store.reader import RunData
 
 ROUND_OFF = 1e-11  # relative, of sums over some thousand steps
 

@@ -14,8 +14,8 @@ import engine_tasks
 import pytest
 
 from mpiexec import find_mpiexec
-from regrid.errors import BadInput
-from runs.engines import open_engine
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.engines import open_engine
 
 HERE = Path(__file__).resolve().parent
 SQUARES = {number: number * number for number in range(1, 9)}
@@ -57,7 +57,7 @@ def test_a_task_that_kills_its_process_fails_alone(tmp_path, environment):
 def test_a_worker_ends_with_its_parent(tmp_path, environment):
     script = (
         "import engine_tasks, time, sys\n"
-        "from runs.engines import open_engine\n"
+        "from shockgrid.runs.engines import open_engine\n"
         "if __name__ == '__main__':\n"
         "    with open_engine('processes', 2) as engine:\n"
         "        for _ in engine.compute(engine_tasks.note_and_wait, [sys.argv[1]] * 2): pass\n"
@@ -124,7 +124,7 @@ def test_mpi_computes_on_the_ranks_but_the_first(tmp_path, environment):
     path = tmp_path / "ranks.py"
     path.write_text(
         "import sys, engine_tasks\n"
-        "from runs.engines import open_engine\n"
+        "from shockgrid.runs.engines import open_engine\n"
         "with open_engine('mpi') as engine:\n"
         "    if engine is not None:\n"
         "        tasks = [(sys.argv[1], n) for n in range(1, 9)]\n"

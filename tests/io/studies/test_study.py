@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from mpiexec import find_mpiexec
-from regrid.errors import BadInput
-from runs.study.definition import make_definition
-from runs.study.study import study
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.study.definition import make_definition
+from shockgrid.runs.study.study import study
 
 HOT = ("--set", "start.kind=hot")
 TOY = ("study", "toy", "--set", "shape=flat", "--set", "run.t_end=0.1", "--jobs", "1")

@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from regrid.errors import BadInput, RegridFailure, RunFailure
-from runs.early_end.causes import name_failure
-from runs.forecast import PARTS, ShortSteps, TimeLeft
-from runs.inspection.account import RULES, describe_verdict, judge
+from shockgrid.regrid.errors import BadInput, RegridFailure, RunFailure
+from shockgrid.runs.early_end.causes import name_failure
+from shockgrid.runs.forecast import PARTS, ShortSteps, TimeLeft
+from shockgrid.runs.inspection.account import RULES, describe_verdict, judge
 
 
 def follow(dts, limit="sound"):

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from builders import SIDES, march, wall_off
-from hydro.block import Block
-from hydro.burn import FRONT_LEAD_FRACTION, ProgrammedBurn
-from hydro.eos.materials import find_material
-from hydro.simulation import Simulation
-from problems.initial_states import make_plane_grid
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.burn import FRONT_LEAD_FRACTION, ProgrammedBurn
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.initial_states import make_plane_grid
 
 TNT = find_material("TNT").eos
 

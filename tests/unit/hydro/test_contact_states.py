@@ -4,9 +4,9 @@ does not settle."""
 import numpy as np
 import pytest
 
-from hydro.eos import IdealGas
-from hydro.formulas.riemann import compute_contact
-from problems.references.riemann import solve_riemann
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.formulas.riemann import compute_contact
+from shockgrid.problems.references.riemann import solve_riemann
 
 REST = (1.0, 0.4), (1.0, 0.2)  # density and pressure on both sides
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from hydro.convection.box import (
+from shockgrid.hydro.convection.box import (
     PERIODIC,
     Fluid,
     Wall,
@@ -15,10 +15,10 @@ from hydro.convection.box import (
     isothermal,
     make_fluid,
 )
-from hydro.convection.equations import Equations, Factors
-from hydro.convection.march import March
-from hydro.convection.measure import compute_mean_nusselt
-from hydro.convection.steady import SteadySolver, expand_nodes
+from shockgrid.hydro.convection.equations import Equations, Factors
+from shockgrid.hydro.convection.march import March
+from shockgrid.hydro.convection.measure import compute_mean_nusselt
+from shockgrid.hydro.convection.steady import SteadySolver, expand_nodes
 
 RANDOM = np.random.default_rng(5)
 
@@ -151,6 +151,6 @@ def test_factors_too_large_for_the_solver_are_out_of_memory(monkeypatch):
     def fail(*_, **__):
         raise SystemError("gstrf was called with invalid arguments")
 
-    monkeypatch.setattr("hydro.convection.equations.splu", fail)
+    monkeypatch.setattr("shockgrid.hydro.convection.equations.splu", fail)
     with pytest.raises(MemoryError):
         Factors(sparse.identity(3, format="csc"))

@@ -4,11 +4,11 @@ import h5py
 import numpy as np
 import pytest
 
-from hydro.eos import IdealGas, MieGruneisen, Tabular
-from hydro.eos.conversion import compute_conserved, find_held, make_conversion
-from hydro.remap.conserved import remap_state
-from problems.initial_states import make_plane_grid
-from regrid.jit import kernel
+from shockgrid.hydro.eos import IdealGas, MieGruneisen, Tabular
+from shockgrid.hydro.eos.conversion import compute_conserved, find_held, make_conversion
+from shockgrid.hydro.remap.conserved import remap_state
+from shockgrid.problems.initial_states import make_plane_grid
+from shockgrid.regrid.jit import kernel
 
 METAL = MieGruneisen(2707.0, 5386.0, 1.339, 1.97, strength=5e8)
 STATES = {

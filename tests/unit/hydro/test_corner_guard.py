@@ -5,11 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from hydro.motion.constraints import NARROW_CORNER_ANGLE, compute_way, compute_way_in, find_corner
-from problems.deck import Regrid
-from problems.standard.triple_point import TriplePoint, TriplePointDeck
-from regrid.measure.corners import find_triangles
-from regrid.measure.quality import find_bad_cells
+from shockgrid.hydro.motion.constraints import (
+    NARROW_CORNER_ANGLE,
+    compute_way,
+    compute_way_in,
+    find_corner,
+)
+from shockgrid.problems.deck import Regrid
+from shockgrid.problems.standard.triple_point import TriplePoint, TriplePointDeck
+from shockgrid.regrid.measure.corners import find_triangles
+from shockgrid.regrid.measure.quality import find_bad_cells
 
 
 def measure_angle(place, before, after):

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from builders import box, march, wall_off
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join
-from hydro.motion.key_nodes import find_key_nodes
-from hydro.motion.track import Track
-from hydro.simulation import Simulation
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.hydro.motion.key_nodes import find_key_nodes
+from shockgrid.hydro.motion.track import Track
+from shockgrid.hydro.simulation import Simulation
 
 GAS = IdealGas(1.4)
 AXIS = 0.25 * np.pi  # angle of the half ring's axis: its mirror exchanges x and y

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from builders import box, check_budget, free, make_body, march_whole, wall_off
-from hydro.eos.base import REMAINING_DENSITY_PART, make_leaving_part
-from hydro.eos.materials import find_material
-from hydro.links import join
-from hydro.simulation import Simulation
+from shockgrid.hydro.eos.base import REMAINING_DENSITY_PART, make_leaving_part
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.links import join
+from shockgrid.hydro.simulation import Simulation
 
 COPPER = find_material("Cu")
 LEAST = REMAINING_DENSITY_PART * COPPER.rho0

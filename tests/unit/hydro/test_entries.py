@@ -8,11 +8,11 @@ import pytest
 from numba.core.dispatcher import Dispatcher
 
 from builders import two_blocks, wall_off
-from hydro.boundary import put
-from hydro.eos import IdealGas, MieGruneisen
-from hydro.motion.line import LineRule
-from hydro.simulation import Simulation
-from regrid.registry import make_regridder
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas, MieGruneisen
+from shockgrid.hydro.motion.line import LineRule
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.registry import make_regridder
 
 
 def check_entries(monkeypatch) -> set[str]:

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from hydro.eos import JWL, IdealGas, MieGruneisen, PhaseTransition, StiffenedGas
-from hydro.eos.base import make_least_pressure
-from hydro.eos.materials import LIBRARY, find_material, read_materials
-from hydro.eos.phase_transition import hugoniot
-from hydro.formulas.reconstruction import GENTLE_STEEPNESS, LIMITERS, choose_limit
-from problems.references.hugoniot import shock_to_pressure
-from regrid.errors import BadInput
+from shockgrid.hydro.eos import JWL, IdealGas, MieGruneisen, PhaseTransition, StiffenedGas
+from shockgrid.hydro.eos.base import make_least_pressure
+from shockgrid.hydro.eos.materials import LIBRARY, find_material, read_materials
+from shockgrid.hydro.eos.phase_transition import hugoniot
+from shockgrid.hydro.formulas.reconstruction import GENTLE_STEEPNESS, LIMITERS, choose_limit
+from shockgrid.problems.references.hugoniot import shock_to_pressure
+from shockgrid.regrid.errors import BadInput
 from shockgrid.testing import check_inverse, check_numbers, check_sound_speed
 
 # equation of state, densities and pressures that it is asked for

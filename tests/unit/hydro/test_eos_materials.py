@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from builders import SIDES, box, march, wall_off
-from hydro.block import Block
-from hydro.eos import IdealGas, Tabular
-from hydro.eos.materials import LIBRARY, find_material, find_name, read_materials
-from hydro.simulation import Simulation
-from regrid.errors import BadInput
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos import IdealGas, Tabular
+from shockgrid.hydro.eos.materials import LIBRARY, find_material, find_name, read_materials
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.errors import BadInput
 
 # initials and a name, and after them a year in brackets or the like
 SOURCE = re.compile(r"[A-Z]\. (?:[A-Z]\. )*[A-Z][a-z]+\b.*\b(?:19|20)\d\d\b", re.DOTALL)

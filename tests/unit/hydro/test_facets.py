@@ -2,8 +2,14 @@
 
 import numpy as np
 
-from hydro.contacts.facets import fill_facets
-from hydro.facets.rows import FOLLOWER_START, FOLLOWER_STOP, LEADER_START, LEADER_STOP, make_facets
+from shockgrid.hydro.contacts.facets import fill_facets
+from shockgrid.hydro.facets.rows import (
+    FOLLOWER_START,
+    FOLLOWER_STOP,
+    LEADER_START,
+    LEADER_STOP,
+    make_facets,
+)
 
 
 def test_a_leaders_nodes_are_covered_while_they_lie_under_a_face_of_the_follower():

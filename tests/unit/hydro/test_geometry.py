@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hydro.formulas.geometry import (
+from shockgrid.hydro.formulas.geometry import (
     GEOMETRIES,
     compute_volumes,
 )

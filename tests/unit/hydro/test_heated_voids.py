@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from builders import box, march, wall_off
-from hydro.block import Block
-from hydro.eos import IdealGas
-from hydro.eos.base import make_least_pressure
-from hydro.eos.materials import find_material
-from hydro.rows import RHO, TOTAL_ENERGY, TOTAL_MOMENTUM_X, P
-from hydro.simulation import Simulation
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.eos.base import make_least_pressure
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.rows import RHO, TOTAL_ENERGY, TOTAL_MOMENTUM_X, P
+from shockgrid.hydro.simulation import Simulation
 
 HEAT_RATE = 1e13  # W/kg
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hydro.eos.materials import find_material
-from problems.references.hugoniot import shock_with_particle_speed
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.problems.references.hugoniot import shock_with_particle_speed
 
 # Water at 20 C: particle and shock speed [m/s], as a public code quotes them from
 # S. P. Marsh (ed.), LASL Shock Hugoniot Data, Univ. of California Press, 1980; those up to 2 km/s

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from builders import SIDES, box, wall_off
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.eos.materials import find_material
-from hydro.links import join
-from hydro.simulation import Simulation
-from regrid.errors import BadInput
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.links import join
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.errors import BadInput
 
 
 def make_block(name="gas", nodes=None, rho=1.0, p=1.0):

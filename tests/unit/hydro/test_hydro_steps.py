@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 
 from builders import SIDES, box, check_restarts, get_bits, march, two_blocks, wall_off
-from hydro import phases
-from hydro import rim as on
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas, MieGruneisen
-from hydro.interior.advance import make_flow_kernels
-from hydro.links import join
-from hydro.motion import line, smoothing
-from hydro.perimeter import contacts
-from hydro.perimeter.strips import make_side_kernels
-from hydro.simulation import Simulation
-from hydro.sources import make_gravity
-from hydro.workers import LEAST_INSIDE
-from regrid.errors import RegridFailure, RunFailure
-from regrid.measure.quality import find_bad_cells
-from regrid.registry import make_regridder
+from shockgrid.hydro import phases
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas, MieGruneisen
+from shockgrid.hydro.interior.advance import make_flow_kernels
+from shockgrid.hydro.links import join
+from shockgrid.hydro.motion import line, smoothing
+from shockgrid.hydro.perimeter import contacts
+from shockgrid.hydro.perimeter.strips import make_side_kernels
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.sources import make_gravity
+from shockgrid.hydro.workers import LEAST_INSIDE
+from shockgrid.regrid.errors import RegridFailure, RunFailure
+from shockgrid.regrid.measure.quality import find_bad_cells
+from shockgrid.regrid.registry import make_regridder
 
 
 def make_pair(ni=12, nj=8, threads=1, make_regridder=None):
@@ -44,7 +44,7 @@ class Stubborn:
     """Regridder that refuses `failures` times from its second call on."""
 
     def __init__(self, failures):
-        from regrid.registry import make_regridder
+        from shockgrid.regrid.registry import make_regridder
 
         self.inner = make_regridder("barrier")
         self.failures = failures

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from builders import box, wall_off
-from hydro import phases
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import StiffenedGas
-from hydro.motion.line import ROLES, FlowLine, LineRule, Role, Span, TrackLine
+from shockgrid.hydro import phases
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import StiffenedGas
+from shockgrid.hydro.motion.line import ROLES, FlowLine, LineRule, Role, Span, TrackLine
 
 RULE = LineRule(relax=0.05)
 ENDS = (0, -1)

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from builders import free, march
-from hydro import phases
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas, StiffenedGas
-from hydro.facets.lines import fill_slopes
-from hydro.facets.rows import (
+from shockgrid.hydro import phases
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas, StiffenedGas
+from shockgrid.hydro.facets.lines import fill_slopes
+from shockgrid.hydro.facets.rows import (
     AREAS,
     CLOSED,
     EXCESS_FOLLOWER,
@@ -22,12 +22,12 @@ from hydro.facets.rows import (
     make_facets,
     make_line_arrays,
 )
-from hydro.facets.states import make_add_facet_flux, solve_facets
-from hydro.formulas.geometry import find_geometry
-from hydro.links import join, slide
-from hydro.rows import HOOP, MOMENTUM_Y, PUSH, RHO, U, V
-from hydro.simulation import Simulation
-from hydro.sliding.pieces import fill_pieces, fill_points
+from shockgrid.hydro.facets.states import make_add_facet_flux, solve_facets
+from shockgrid.hydro.formulas.geometry import find_geometry
+from shockgrid.hydro.links import join, slide
+from shockgrid.hydro.rows import HOOP, MOMENTUM_Y, PUSH, RHO, U, V
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.sliding.pieces import fill_pieces, fill_points
 
 SEEDS = range(3)
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join
-from hydro.motion.grid_motion import crosses_seam
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.hydro.motion.grid_motion import crosses_seam
 
 
 def make_block(name, first, last):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hydro.eos import MieGruneisen, Tabular
-from hydro.eos.sesame import make_pressure_table, read_sesame
-from regrid.errors import BadInput
-from runs.inspection.sesame import convert, describe_file
+from shockgrid.hydro.eos import MieGruneisen, Tabular
+from shockgrid.hydro.eos.sesame import make_pressure_table, read_sesame
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.inspection.sesame import convert, describe_file
 
 LAW = MieGruneisen(8930.0, 3940.0, 1.489, 2.0).with_heat_capacity(385.0)
 DENSITIES = np.concatenate([[0.0], np.linspace(8600.0, 13000.0, 45)])

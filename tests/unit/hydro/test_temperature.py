@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from hydro.block import Block
-from hydro.eos import JWL, IdealGas, MieGruneisen, StiffenedGas
-from hydro.eos.materials import find_material, make_material
-from hydro.eos.temperature import REST_TEMPERATURE
-from problems.initial_states import make_plane_grid
-from regrid.errors import BadInput
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos import JWL, IdealGas, MieGruneisen, StiffenedGas
+from shockgrid.hydro.eos.materials import find_material, make_material
+from shockgrid.hydro.eos.temperature import REST_TEMPERATURE
+from shockgrid.problems.initial_states import make_plane_grid
+from shockgrid.regrid.errors import BadInput
 
 COPPER = MieGruneisen(8930.0, 3940.0, 1.489, 2.02).with_heat_capacity(385.0)
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from builders import beside_line, check_restarts, get_bits, march, two_blocks, wall_off
-from hydro import rim as on
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join
-from hydro.motion.smoothing import fill_thickness_way
-from hydro.motion.tension import compute_tangents
-from hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y, P
-from hydro.simulation import Simulation
-from regrid.errors import BadInput
+from shockgrid.hydro import rim as on
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.hydro.motion.smoothing import fill_thickness_way
+from shockgrid.hydro.motion.tension import compute_tangents
+from shockgrid.hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y, P
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.errors import BadInput
 from thread_ranks import march_on_ranks
 
 GAS = IdealGas(1.4)

@@ -7,14 +7,14 @@ import numba
 import numpy as np
 import pytest
 
-from hydro.eos import IdealGas
-from hydro.formulas.geometry import GEOMETRIES, PLANE
-from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
-from hydro.formulas.riemann import FLUXES
-from hydro.interior import axisymmetric, faces, reconstruction, slopes, update
-from hydro.interior import scratch as at
-from regrid.barrier import residual_estimate as look
-from regrid.compilation.first_calls import prepare_compiler
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.formulas.geometry import GEOMETRIES, PLANE
+from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
+from shockgrid.hydro.formulas.riemann import FLUXES
+from shockgrid.hydro.interior import axisymmetric, faces, reconstruction, slopes, update
+from shockgrid.hydro.interior import scratch as at
+from shockgrid.regrid.barrier import residual_estimate as look
+from shockgrid.regrid.compilation.first_calls import prepare_compiler
 
 CURVED = GEOMETRIES["axisymmetric"]
 LIMIT, SOUND, ENERGY = (

@@ -17,11 +17,11 @@ import pytest
 
 import shockgrid as sg
 from builders import ROOT, box, two_blocks, wall_off
-from hydro.eos.gases import energy, pressure, sound_speed_squared
-from runs.cli.main import main
-from runs.deck.reading import read_deck
-from runs.inspection.compare import compare_in_words
-from runs.interface.wording import say_in_python
+from shockgrid.hydro.eos.gases import energy, pressure, sound_speed_squared
+from shockgrid.runs.cli.main import main
+from shockgrid.runs.deck.reading import read_deck
+from shockgrid.runs.inspection.compare import compare_in_words
+from shockgrid.runs.interface.wording import say_in_python
 
 DECK = {"cells": 8, "run": {"max_steps": 12}}
 NAME = "interface-instability"

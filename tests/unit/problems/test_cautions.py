@@ -5,14 +5,14 @@ import re
 import numpy as np
 import pytest
 
-from problems.blocks import Blocks, BlocksDeck, BlockSide, BlockTable, Curves, LinkTable
-from problems.deck import RunControl
-from problems.interface_instability.deck import Fluid, InterfaceDeck
-from problems.interface_instability.line import Mode
-from problems.interface_instability.problem import InterfaceInstability
-from problems.riemann import Riemann, RiemannDeck
-from problems.standard.cavity import Cavity, CavityDeck
-from problems.standard.flyer_target import FlyerTarget, FlyerTargetDeck, PlateTable
+from shockgrid.problems.blocks import Blocks, BlocksDeck, BlockSide, BlockTable, Curves, LinkTable
+from shockgrid.problems.deck import RunControl
+from shockgrid.problems.interface_instability.deck import Fluid, InterfaceDeck
+from shockgrid.problems.interface_instability.line import Mode
+from shockgrid.problems.interface_instability.problem import InterfaceInstability
+from shockgrid.problems.riemann import Riemann, RiemannDeck
+from shockgrid.problems.standard.cavity import Cavity, CavityDeck
+from shockgrid.problems.standard.flyer_target import FlyerTarget, FlyerTargetDeck, PlateTable
 
 
 def make_interface(**deck):

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from builders import ROOT
-from problems.interface_instability.deck import InterfaceDeck
-from problems.interface_instability.line import Mode
-from problems.interface_instability.problem import InterfaceInstability
-from problems.interface_instability.theories import (
+from shockgrid.problems.interface_instability.deck import InterfaceDeck
+from shockgrid.problems.interface_instability.line import Mode
+from shockgrid.problems.interface_instability.problem import InterfaceInstability
+from shockgrid.problems.interface_instability.theories import (
     PATH,
     Growth,
     Measured,
@@ -21,10 +21,14 @@ from problems.interface_instability.theories import (
     read_rows,
     sort_cautions,
 )
-from problems.standard.rayleigh_taylor import GRAVITY_ACCELERATION, WAVE_NUMBER, RayleighTaylor
-from problems.standard.rayleigh_taylor import RayleighTaylorDeck as Deck
-from regrid.errors import BadInput
-from runs.deck.reading import read_deck
+from shockgrid.problems.standard.rayleigh_taylor import (
+    GRAVITY_ACCELERATION,
+    WAVE_NUMBER,
+    RayleighTaylor,
+)
+from shockgrid.problems.standard.rayleigh_taylor import RayleighTaylorDeck as Deck
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.deck.reading import read_deck
 
 
 def caution_growth(*numbers, **options):

@@ -7,15 +7,19 @@ import math
 import numpy as np
 import pytest
 
-from problems.deck import RunControl
-from problems.interface_instability.crossed_start import find_nearer_speed
-from problems.interface_instability.deck import Fluid, InterfaceDeck, SecondShock
-from problems.interface_instability.line import Mode, Spectrum, measure_mode
-from problems.interface_instability.problem import LEAST_REACH_RATIO, InterfaceInstability
-from problems.interface_instability.spacing import PASSAGE_CELL_GROWTH, Spacing
-from problems.interface_instability.theories import TRUSTED_RATE_ERROR, get_kct, predict_amplitude
-from regrid.errors import BadInput
-from regrid.measure.quality import find_bad_cells, measure_quality
+from shockgrid.problems.deck import RunControl
+from shockgrid.problems.interface_instability.crossed_start import find_nearer_speed
+from shockgrid.problems.interface_instability.deck import Fluid, InterfaceDeck, SecondShock
+from shockgrid.problems.interface_instability.line import Mode, Spectrum, measure_mode
+from shockgrid.problems.interface_instability.problem import LEAST_REACH_RATIO, InterfaceInstability
+from shockgrid.problems.interface_instability.spacing import PASSAGE_CELL_GROWTH, Spacing
+from shockgrid.problems.interface_instability.theories import (
+    TRUSTED_RATE_ERROR,
+    get_kct,
+    predict_amplitude,
+)
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.quality import find_bad_cells, measure_quality
 
 SEVERAL = [Mode(ka0=0.05), Mode(number=2, ka0=-0.03), Mode(number=5, ka0=0.02)]
 TURNED = [Mode(ka0=0.4, phase=0.7), Mode(number=3, ka0=0.3, phase=2.0)]

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from hydro.eos import JWL, IdealGas, MieGruneisen, StiffenedGas
-from hydro.eos.materials import find_material
-from problems.initial_states import mix_states
-from problems.problem import Row
-from problems.references.exact_flows import SedovBlast, Vortex, compute_taylor_wave
-from problems.references.hugoniot import (
+from shockgrid.hydro.eos import JWL, IdealGas, MieGruneisen, StiffenedGas
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.problems.initial_states import mix_states
+from shockgrid.problems.problem import Row
+from shockgrid.problems.references.exact_flows import SedovBlast, Vortex, compute_taylor_wave
+from shockgrid.problems.references.hugoniot import (
     GeneralIsentrope,
     make_isentrope,
     shock_to_pressure,
@@ -19,8 +19,8 @@ from problems.references.hugoniot import (
     shock_with_particle_speed,
     shock_with_speed,
 )
-from problems.references.riemann import compute_cell_averages, solve_riemann
-from regrid.errors import BadInput
+from shockgrid.problems.references.riemann import compute_cell_averages, solve_riemann
+from shockgrid.regrid.errors import BadInput
 
 AIR = IdealGas(1.4)
 AL = MieGruneisen(2.707, 5.386, 1.339, 1.97)

@@ -6,12 +6,17 @@ import math
 import numpy as np
 import pytest
 
-from hydro.eos import IdealGas, MieGruneisen
-from hydro.eos.materials import find_material
-from problems.references.hugoniot import make_isentrope, shock_with_mach
-from problems.references.linear_growth import PadeModel, compute_linear_growth
-from problems.references.perturbed_layers import Cut, find_kinks, interpolate_zones, march_layers
-from problems.references.shock_polars import Body, cross_line
+from shockgrid.hydro.eos import IdealGas, MieGruneisen
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.problems.references.hugoniot import make_isentrope, shock_with_mach
+from shockgrid.problems.references.linear_growth import PadeModel, compute_linear_growth
+from shockgrid.problems.references.perturbed_layers import (
+    Cut,
+    find_kinks,
+    interpolate_zones,
+    march_layers,
+)
+from shockgrid.problems.references.shock_polars import Body, cross_line
 
 
 def test_pade_amplitude_is_the_integral():

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from hydro.eos import IdealGas, StiffenedGas
-from hydro.eos.materials import find_material
-from problems.references.shock_polars import (
+from shockgrid.hydro.eos import IdealGas, StiffenedGas
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.problems.references.shock_polars import (
     Body,
     ShockPolar,
     compute_jet_speed,

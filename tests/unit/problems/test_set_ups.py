@@ -8,12 +8,12 @@ import pytest
 
 from benchmarks.random_pairs import make_random_pair
 from builders import march
-from problems.blocks import Blocks, BlocksDeck
-from problems.grid_march import GridMarch, GridMarchDeck
-from problems.interface_instability.deck import InterfaceDeck
-from problems.interface_instability.problem import InterfaceInstability
-from problems.plate_on_wedge.problem import PlateOnWedge, PlateOnWedgeDeck
-from problems.riemann import (
+from shockgrid.problems.blocks import Blocks, BlocksDeck
+from shockgrid.problems.grid_march import GridMarch, GridMarchDeck
+from shockgrid.problems.interface_instability.deck import InterfaceDeck
+from shockgrid.problems.interface_instability.problem import InterfaceInstability
+from shockgrid.problems.plate_on_wedge.problem import PlateOnWedge, PlateOnWedgeDeck
+from shockgrid.problems.riemann import (
     AHEAD_OF_WAVES_PART,
     MOST_GROWTH,
     PLATEAU_CELL_PART,
@@ -22,10 +22,10 @@ from problems.riemann import (
     SideState,
     grade,
 )
-from regrid.curves import REFINED_STEP_RATIO, meeting_laws
-from regrid.errors import BadInput
-from regrid.measure.quality import find_bad_cells
-from regrid.registry import REGRIDDERS
+from shockgrid.regrid.curves import REFINED_STEP_RATIO, meeting_laws
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.quality import find_bad_cells
+from shockgrid.regrid.registry import REGRIDDERS
 
 
 def make(left, right, **options) -> Riemann:

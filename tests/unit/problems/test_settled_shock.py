@@ -9,18 +9,18 @@ import pytest
 
 import shockgrid as sg
 from builders import march, wall_off
-from hydro.eos import IdealGas, StiffenedGas
-from hydro.eos.materials import find_material
-from problems import initial_states
-from problems.initial_states import (
+from shockgrid.hydro.eos import IdealGas, StiffenedGas
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.problems import initial_states
+from shockgrid.problems.initial_states import (
     KEPT_CELLS_BEHIND,
     Front,
     SettledShock,
     settle_front,
     settle_shock,
 )
-from problems.references.hugoniot import Shock, shock_to_pressure, shock_with_mach
-from regrid.compilation import kept_files
+from shockgrid.problems.references.hugoniot import Shock, shock_to_pressure, shock_with_mach
+from shockgrid.regrid.compilation import kept_files
 
 CFL = 0.8
 LIMITER = "monotonised-central"

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.repair import repair_grid
-from regrid.barrier.turning import is_convex
-from regrid.errors import BadInput, RegridFailure
-from regrid.given import find_start, make_boundary, orient_sides
-from regrid.measure.crossings import find_crossing
-from regrid.measure.cuts import find_cut_edges
-from regrid.sides import SIDE_NAMES, get_sides
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.barrier.repair import repair_grid
+from shockgrid.regrid.barrier.turning import is_convex
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.given import find_start, make_boundary, orient_sides
+from shockgrid.regrid.measure.crossings import find_crossing
+from shockgrid.regrid.measure.cuts import find_cut_edges
+from shockgrid.regrid.sides import SIDE_NAMES, get_sides
 
 FAR = 8.0  # chords to the outer side
 WAKE_CELLS = 12

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.domains import three_fingers
-from regrid.errors import BadInput, RegridFailure
-from regrid.measure.quality import find_bad_cells, measure_quality, measure_worst
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.domains import three_fingers
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.measure.quality import find_bad_cells, measure_quality, measure_worst
 
 
 def graded_box(ni=24, nj=16, ratio_i=1.08, ratio_j=0.93, width=2.0):

@@ -5,12 +5,12 @@ import functools
 import numpy as np
 import pytest
 
-from regrid.barrier import line_cg as newton
-from regrid.barrier import untangle
-from regrid.barrier.functional import LEAST_FADING
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.tuning import DEFAULT, Tuning
-from regrid.barrier.workspace import Workspace
+from shockgrid.regrid.barrier import line_cg as newton
+from shockgrid.regrid.barrier import untangle
+from shockgrid.regrid.barrier.functional import LEAST_FADING
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.barrier.tuning import DEFAULT, Tuning
+from shockgrid.regrid.barrier.workspace import Workspace
 
 NI = 7
 NJ = 9

@@ -5,8 +5,8 @@ import pytest
 
 from benchmarks.random_motions import is_simple
 from builders import unit_steps
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.measure.crossings import (
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.measure.crossings import (
     GROUP_EDGES,
     BoundaryCheck,
     fill_boxes,

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from builders import make_tensor_grid, tensor
-from regrid import curves as spacing
-from regrid.equidistribution.areas import Ed2Operator, iterate_ed2
-from regrid.equidistribution.volumes import solve_edc, solve_eds, weigh_surface
-from regrid.equidistribution.weights import weigh_points
-from regrid.measure.corners import compute_centres
+from shockgrid.regrid import curves as spacing
+from shockgrid.regrid.equidistribution.areas import Ed2Operator, iterate_ed2
+from shockgrid.regrid.equidistribution.volumes import solve_edc, solve_eds, weigh_surface
+from shockgrid.regrid.equidistribution.weights import weigh_points
+from shockgrid.regrid.measure.corners import compute_centres
 
 
 def solve_ed2(nodes, weight=1.0, iterations=200, tolerance=1e-10):

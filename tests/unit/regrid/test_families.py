@@ -4,21 +4,21 @@ import numpy as np
 import pytest
 
 from builders import make_tensor_grid, tensor
-from regrid.algebraic import fill_displacement, quasi_1d_grid, transfinite_grid
-from regrid.barrier.tuning import Tuning
-from regrid.barrier.workspace import Workspace
-from regrid.curves import arc_spacing
-from regrid.domains import make_domain
-from regrid.protocol import RegridReport
-from regrid.sides import SIDES
-from regrid.variational import (
+from shockgrid.regrid.algebraic import fill_displacement, quasi_1d_grid, transfinite_grid
+from shockgrid.regrid.barrier.tuning import Tuning
+from shockgrid.regrid.barrier.workspace import Workspace
+from shockgrid.regrid.curves import arc_spacing
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.protocol import RegridReport
+from shockgrid.regrid.sides import SIDES
+from shockgrid.regrid.variational import (
     BLOCK_CORNERS,
     IvanenkoCharakhchyanRegridder,
     ValidStart,
     VariationalFunctional,
     VariationalRegridder,
 )
-from regrid.winslow import iterate_winslow
+from shockgrid.regrid.winslow import iterate_winslow
 
 
 def graded_rectangle(ni=13, nj=9):

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-import regrid
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.repair import repair_grid
-from regrid.given import find_start
-from regrid.hexahedra.regridder import BarrierRegridder3D
-from regrid.measure.crossings import find_crossing
-from regrid.measure.faults import find_impossible
-from regrid.measure.hexahedra import find_bad_hexahedra
-from regrid.sides import compute_area, get_sides
+from shockgrid import regrid
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.barrier.repair import repair_grid
+from shockgrid.regrid.given import find_start
+from shockgrid.regrid.hexahedra.regridder import BarrierRegridder3D
+from shockgrid.regrid.measure.crossings import find_crossing
+from shockgrid.regrid.measure.faults import find_impossible
+from shockgrid.regrid.measure.hexahedra import find_bad_hexahedra
+from shockgrid.regrid.sides import compute_area, get_sides
 
 
 def grow(cells, ratio):

@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 
 from builders import tensor
-from regrid.domains_in_space import SHAPES, make_moving_block
-from regrid.errors import BadInput, RegridFailure
-from regrid.hexahedra.faces import compute_face_laws, gather_faces
-from regrid.hexahedra.functional import ONLY_ENERGY, WITH_MATRIX, fill_product
-from regrid.hexahedra.regridder import BarrierRegridder3D, HexahedraMove
-from regrid.measure.hexahedra import compute_hexahedron_sines, compute_least_corner_volumes
+from shockgrid.regrid.domains_in_space import SHAPES, make_moving_block
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.hexahedra.faces import compute_face_laws, gather_faces
+from shockgrid.regrid.hexahedra.functional import ONLY_ENERGY, WITH_MATRIX, fill_product
+from shockgrid.regrid.hexahedra.regridder import BarrierRegridder3D, HexahedraMove
+from shockgrid.regrid.measure.hexahedra import (
+    compute_hexahedron_sines,
+    compute_least_corner_volumes,
+)
 
 INNER = np.s_[:, 1:-1, 1:-1, 1:-1]
 

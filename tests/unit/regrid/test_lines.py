@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from regrid import curves as spacing
-from regrid.curves import (
+from shockgrid.regrid import curves as spacing
+from shockgrid.regrid.curves import (
     arc_spacing,
     clustered_spacing,
     compute_arc_lengths,
@@ -13,7 +13,7 @@ from regrid.curves import (
     redistribute,
     uniform_spacing,
 )
-from regrid.measure.quality import measure_turns
+from shockgrid.regrid.measure.quality import measure_turns
 
 
 @pytest.mark.parametrize("shape", ["chord", "spline"])

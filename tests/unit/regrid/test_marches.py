@@ -8,15 +8,15 @@ import pytest
 from benchmarks.regrid_suite import measures
 from benchmarks.regrid_suite.catalogue import ROLLS, load_march
 from builders import unit_steps
-from regrid.algebraic import transfinite_grid
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.repair import repair_grid
-from regrid.domains import DOMAINS, make_domain, transpose_nodes
-from regrid.errors import BadInput, RegridFailure
-from regrid.marching import march_domain
-from regrid.measure.crossings import find_self_crossing
-from regrid.measure.quality import find_bad_cells, measure_first_line_gap, measure_quality
-from regrid.sides import SIDES
+from shockgrid.regrid.algebraic import transfinite_grid
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.barrier.repair import repair_grid
+from shockgrid.regrid.domains import DOMAINS, make_domain, transpose_nodes
+from shockgrid.regrid.errors import BadInput, RegridFailure
+from shockgrid.regrid.marching import march_domain
+from shockgrid.regrid.measure.crossings import find_self_crossing
+from shockgrid.regrid.measure.quality import find_bad_cells, measure_first_line_gap, measure_quality
+from shockgrid.regrid.sides import SIDES
 
 NAMES = tuple(DOMAINS)
 

@@ -9,16 +9,16 @@ from hypothesis import strategies as st
 
 from benchmarks.regrid_suite import measures
 from builders import box, tensor, unit_steps
-from regrid.measure import quality
-from regrid.measure.cells import compute_area_fractions
-from regrid.measure.corners import compute_corner_signs, compute_turns, turn_exactly
-from regrid.measure.hexahedra import (
+from shockgrid.regrid.measure import quality
+from shockgrid.regrid.measure.cells import compute_area_fractions
+from shockgrid.regrid.measure.corners import compute_corner_signs, compute_turns, turn_exactly
+from shockgrid.regrid.measure.hexahedra import (
     compute_hexahedron_aspects,
     compute_hexahedron_sines,
     compute_least_corner_volumes,
     compute_volumes,
 )
-from regrid.measure.quality import compute_corner_areas, find_bad_cells
+from shockgrid.regrid.measure.quality import compute_corner_areas, find_bad_cells
 
 
 def one_cell(*corners):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from benchmarks.random_motions import make_motions
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.errors import RegridFailure
-from regrid.sides import get_sides
-from regrid.symmetry import find_symmetry
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.errors import RegridFailure
+from shockgrid.regrid.sides import get_sides
+from shockgrid.regrid.symmetry import find_symmetry
 
 SAME_NODES = 1e-10  # of a cell
 FOLDED = ("followed", "untangled")  # starts of steps whose prediction folds

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from builders import box, make_tensor_grid, unit_steps
-from regrid.measure.quality import find_bad_cells
-from regrid.node_speeds import MotionLimiter, limit_node_speeds, measure_node_speeds
-from regrid.variational import NodeSpeedRegridder
+from shockgrid.regrid.measure.quality import find_bad_cells
+from shockgrid.regrid.node_speeds import MotionLimiter, limit_node_speeds, measure_node_speeds
+from shockgrid.regrid.variational import NodeSpeedRegridder
 
 
 def thrown(old):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from builders import box
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.errors import RegridFailure
-from regrid.measure.corners import find_excluded_corners, find_folded_cells
-from regrid.sides import compute_area, get_sides
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.errors import RegridFailure
+from shockgrid.regrid.measure.corners import find_excluded_corners, find_folded_cells
+from shockgrid.regrid.sides import compute_area, get_sides
 
 
 def make_sector(angle, bump=0.0):

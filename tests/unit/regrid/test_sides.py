@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from regrid.jit import kernel
-from regrid.sides import SIDE_NAMES, find_node, get_side
+from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.sides import SIDE_NAMES, find_node, get_side
 
 
 @kernel

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from regrid.algebraic import quasi_1d_grid
-from regrid.barrier.sweeps import Sweeps
-from regrid.domains import make_domain
-from regrid.marching import march_domain
+from shockgrid.regrid.algebraic import quasi_1d_grid
+from shockgrid.regrid.barrier.sweeps import Sweeps
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.marching import march_domain
 
 
 def test_without_barrier_one_sweep_gives_the_quasi_1d_grid():

@@ -3,9 +3,9 @@
 import pytest
 
 from benchmarks.bench_corners import SHAPES, march
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.tuning import DEFAULT, Tuning
-from regrid.errors import BadInput
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.barrier.tuning import DEFAULT, Tuning
+from shockgrid.regrid.errors import BadInput
 
 
 def test_options_of_a_regridder_replace_its_tuning():

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from regrid.equidistribution.volumes import EquidistributionRegridder3D
-from regrid.errors import BadInput
-from regrid.hexahedra.regridder import BarrierRegridder3D
-from regrid.registry import REGRIDDERS, make_regridder
+from shockgrid.regrid.equidistribution.volumes import EquidistributionRegridder3D
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.hexahedra.regridder import BarrierRegridder3D
+from shockgrid.regrid.registry import REGRIDDERS, make_regridder
 
 REGRIDDERS_IN_SPACE = {
     "barrier": BarrierRegridder3D,

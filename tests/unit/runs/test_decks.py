@@ -10,12 +10,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from regrid.errors import BadInput
-from runs.deck.checking import describe_deck
-from runs.deck.reading import apply_setting, parse_value, read_deck
-from runs.inspection.account import measure_drifts
-from runs.quantities import drop_units
-from runs.store.history import HistoryWriter, read_history
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.deck.checking import describe_deck
+from shockgrid.runs.deck.reading import apply_setting, parse_value, read_deck
+from shockgrid.runs.inspection.account import measure_drifts
+from shockgrid.runs.quantities import drop_units
+from shockgrid.runs.store.history import HistoryWriter, read_history
 
 
 @pytest.mark.parametrize(

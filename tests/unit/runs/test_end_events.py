@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from regrid.errors import Place
-from runs.early_end.place import describe_event
+from shockgrid.regrid.errors import Place
+from shockgrid.runs.early_end.place import describe_event
 
 
 @pytest.mark.parametrize(

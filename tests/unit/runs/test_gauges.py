@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from problems.deck import Gauge
-from regrid.measure.corners import compute_centres
-from runs.gauges import Gauges, place_points
+from shockgrid.problems.deck import Gauge
+from shockgrid.regrid.measure.corners import compute_centres
+from shockgrid.runs.gauges import Gauges, place_points
 
 FIELDS = ("rho", "u", "v", "p", "e", "c")
 

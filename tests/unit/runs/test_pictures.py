@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from problems.pictures import compute_rates
-from runs.pictures import fields
-from runs.pictures.command import new_figure
-from runs.pictures.finishing import SMALLEST_PICTURE, finish_figure
+from shockgrid.problems.pictures import compute_rates
+from shockgrid.runs.pictures import fields
+from shockgrid.runs.pictures.command import new_figure
+from shockgrid.runs.pictures.finishing import SMALLEST_PICTURE, finish_figure
 
 SMALLEST = np.array(SMALLEST_PICTURE)
 

@@ -9,9 +9,9 @@ import pytest
 
 import shockgrid
 from benchmarks.bench_calls import count_calls, make_step
-from builders import ROOT
-from regrid.errors import BadInput
-from runs.ranks.started import RANKS, SIZES, SLURM, count_started, find_rank, is_for_ranks
+from builders import ROOT, name_module
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.ranks.started import RANKS, SIZES, SLURM, count_started, find_rank, is_for_ranks
 
 
 @pytest.fixture(autouse=True)
@@ -75,7 +75,7 @@ for name in ("fork", "getuid", "geteuid", "sched_getaffinity", "sysconf", "sync"
 
 def test_every_module_is_imported_without_the_modules_of_unix():
     names = [
-        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        name_module(path)
         for package in PACKAGES
         for path in sorted((ROOT / package).rglob("*.py"))
         if path.name != "__main__.py"

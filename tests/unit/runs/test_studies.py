@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from regrid.errors import BadInput
-from runs.study.definition import read_definition, read_vary, write_value
-from runs.study.orders import THREE_GRID_SAFETY, refine
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.study.definition import read_definition, read_vary, write_value
+from shockgrid.runs.study.orders import THREE_GRID_SAFETY, refine
 
 VALUES = st.recursive(
     st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | st.text(),

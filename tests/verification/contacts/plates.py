@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 
 from builders import box, free, make_body, wall_off
-from hydro.block import Block
-from hydro.rows import CONSERVED
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.rows import CONSERVED
 
 
 def make_plate(

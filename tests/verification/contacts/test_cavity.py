@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from builders import check_budget, march_measured
-from runs.deck.reading import read_deck
+from shockgrid.runs.deck.reading import read_deck
 
 
 @pytest.mark.parametrize(

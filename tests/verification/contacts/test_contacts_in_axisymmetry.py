@@ -5,8 +5,8 @@ import pytest
 from plates import make_plate
 
 from builders import box, check_budget, free, make_body, march_whole, wall_off
-from hydro.simulation import Simulation
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.measure.corners import compute_centres
 
 INNER = 3e-3  # radius of the rings
 

@@ -5,8 +5,8 @@ import pytest
 from discs import make_half_disc
 
 from builders import box, check_budget, find_unexplained, free, make_body, march_whole, wall_off
-from hydro.rows import P
-from hydro.simulation import Simulation
+from shockgrid.hydro.rows import P
+from shockgrid.hydro.simulation import Simulation
 
 CELL = 1e-4
 SIDES = "i_min", "i_max", "j_min", "j_max"

@@ -13,12 +13,12 @@ from builders import (
     make_body,
     march_whole,
 )
-from hydro.boundary import put
-from hydro.eos.materials import find_material
-from hydro.links import join
-from hydro.rows import P
-from hydro.simulation import Simulation
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.links import join
+from shockgrid.hydro.rows import P
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.measure.corners import compute_centres
 
 CELL = 1e-4  # of the U's arms
 ARM = 4e-3

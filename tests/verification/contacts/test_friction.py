@@ -13,11 +13,11 @@ from builders import (
     march_whole,
     wall_off,
 )
-from hydro.eos.materials import find_material
-from hydro.links import join
-from hydro.rows import RHO, P, U, V
-from hydro.simulation import Simulation
-from hydro.sources import make_gravity
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.links import join
+from shockgrid.hydro.rows import RHO, P, U, V
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.sources import make_gravity
 
 CU = find_material("Cu")
 AL = find_material("Al1100")

@@ -7,10 +7,15 @@ import pytest
 from scipy.optimize import brentq
 
 from builders import box, check_budget, free, make_body, march_whole, wall_off
-from hydro.eos.materials import find_material
-from hydro.rows import P
-from hydro.simulation import Simulation
-from problems.references.shock_polars import Body, ShockPolar, search_pressure, sum_deflections
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.rows import P
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.references.shock_polars import (
+    Body,
+    ShockPolar,
+    search_pressure,
+    sum_deflections,
+)
 
 CELL = 1e-4
 

@@ -5,10 +5,10 @@ import pytest
 from discs import make_half_disc
 
 from builders import check_budget, free, make_body
-from hydro.boundary import put
-from hydro.motion.line import move_beside_neighbours
-from hydro.rows import P
-from hydro.simulation import Simulation
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.motion.line import move_beside_neighbours
+from shockgrid.hydro.rows import P
+from shockgrid.hydro.simulation import Simulation
 
 RADIUS = 1e-3
 GPA = 1e9

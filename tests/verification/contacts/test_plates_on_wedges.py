@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from builders import check_budget, march_measured
-from problems.plate_on_wedge.report import measure_contact_speed
-from runs.deck.reading import read_deck
+from shockgrid.problems.plate_on_wedge.report import measure_contact_speed
+from shockgrid.runs.deck.reading import read_deck
 
 
 @pytest.mark.parametrize(

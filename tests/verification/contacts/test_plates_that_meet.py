@@ -6,10 +6,10 @@ from plates import find_event, make_plate, mean_speed, middle_row, take_plateau
 from wave_diagram import find_impact, find_parting
 
 from builders import check_budget, march_whole
-from hydro.eos import IdealGas, StiffenedGas
-from hydro.eos.materials import find_material
-from hydro.rows import P, U
-from hydro.simulation import Simulation
+from shockgrid.hydro.eos import IdealGas, StiffenedGas
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.rows import P, U
+from shockgrid.hydro.simulation import Simulation
 
 GAP = 1e-3
 GAS = IdealGas(1.4), 1.2

@@ -7,13 +7,13 @@ import pytest
 from plates import make_plate, mean_speed
 
 from builders import free, march, march_whole, wall_off
-from hydro.block import Block
-from hydro.eos.materials import find_material
-from hydro.links import join
-from hydro.rows import P
-from hydro.simulation import Simulation
-from regrid.errors import BadInput
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.links import join
+from shockgrid.hydro.rows import P
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.corners import compute_centres
 
 COPPER = find_material("Cu")
 RADIUS = 1e-2

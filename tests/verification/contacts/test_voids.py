@@ -15,12 +15,12 @@ from builders import (
     march_whole,
     wall_off,
 )
-from hydro.boundary import put
-from hydro.eos.materials import find_material
-from hydro.remap.flow import take_over
-from hydro.simulation import Simulation
-from regrid.errors import BadInput
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.remap.flow import take_over
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.corners import compute_centres
 
 WATER = find_material("water-hugoniot")
 INNER = 1e-3

@@ -16,11 +16,11 @@ from builders import (
     march_whole,
     wall_off,
 )
-from hydro.block import Block
-from hydro.eos import IdealGas
-from hydro.eos.materials import find_material
-from hydro.rows import P, U
-from hydro.simulation import Simulation
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.rows import P, U
+from shockgrid.hydro.simulation import Simulation
 from thread_ranks import march_on_ranks
 
 AL = find_material("Al1100")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from problems.references.hugoniot import make_isentrope, shock_to_pressure
+from shockgrid.problems.references.hugoniot import make_isentrope, shock_to_pressure
 
 
 def find_impact(flyer, target, speed, p=0.0):

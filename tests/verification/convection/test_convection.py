@@ -10,18 +10,18 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from builders import march
-from hydro.convection.box import PERIODIC, Fluid, adiabatic, isothermal, make_fluid
-from hydro.convection.equations import Equations
-from hydro.convection.march import March
-from hydro.convection.measure import (
+from shockgrid.hydro.convection.box import PERIODIC, Fluid, adiabatic, isothermal, make_fluid
+from shockgrid.hydro.convection.equations import Equations
+from shockgrid.hydro.convection.march import March
+from shockgrid.hydro.convection.measure import (
     compute_growth,
     find_onset,
     measure_energy,
     solve_rest,
 )
-from hydro.convection.steady import restrict_nodes
-from problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
-from problems.references.convection import (
+from shockgrid.hydro.convection.steady import restrict_nodes
+from shockgrid.problems.convection.heated_cavity import HeatedCavity, HeatedCavityDeck
+from shockgrid.problems.references.convection import (
     FREE_LAYER_ONSET,
     FREE_LAYER_WAVENUMBER,
     LAYER_ONSET,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from builders import march
-from hydro.convection.columns import (
+from shockgrid.hydro.convection.columns import (
     Column,
     compute_wall_fluxes,
     settle_column,
@@ -16,10 +16,10 @@ from hydro.convection.columns import (
     step_column,
     step_front,
 )
-from hydro.convection.tensor_grids import make_axis
-from problems.convection.convection_1d import measure_errors
-from problems.convection.moving_grid_1d import MovingGrid1D, MovingGrid1DDeck, PlacingPart
-from problems.references.convection import BurgersFronts, VerticalPlates
+from shockgrid.hydro.convection.tensor_grids import make_axis
+from shockgrid.problems.convection.convection_1d import measure_errors
+from shockgrid.problems.convection.moving_grid_1d import MovingGrid1D, MovingGrid1DDeck, PlacingPart
+from shockgrid.problems.references.convection import BurgersFronts, VerticalPlates
 
 
 def make(peclet=0.0, scheme="exponential", prandtl=0.71, mean=0.0, rayleigh=1e4):

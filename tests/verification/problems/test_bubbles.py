@@ -5,10 +5,10 @@ import pytest
 
 from benchmarks.bubble_on_fixed_grid import TwoGasFlow, find_first
 from builders import march
-from hydro import phases
-from hydro.eos import IdealGas
-from problems.references.riemann import solve_riemann
-from problems.shock_bubble import (
+from shockgrid.hydro import phases
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.problems.references.riemann import solve_riemann
+from shockgrid.problems.shock_bubble import (
     AIR_DENSITY,
     AIR_PRESSURE,
     BUBBLE_RADIUS,

@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import brentq
 
 from builders import check_budget, collect_columns, march_measured
-from problems.conical_target.layout import densify, fit_wave
-from problems.conical_target.problem import ConicalTarget, ConicalTargetDeck, Contact
-from problems.conical_target.report import (
+from shockgrid.problems.conical_target.layout import densify, fit_wave
+from shockgrid.problems.conical_target.problem import ConicalTarget, ConicalTargetDeck, Contact
+from shockgrid.problems.conical_target.report import (
     AGES,
     STATIONS,
     find_peak,
@@ -17,10 +17,10 @@ from problems.conical_target.report import (
     measure_passage,
     measure_waves,
 )
-from problems.deck import RunControl
-from problems.references.hugoniot import shock_with_particle_speed
-from regrid.errors import BadInput
-from runs.deck.reading import read_deck
+from shockgrid.problems.deck import RunControl
+from shockgrid.problems.references.hugoniot import shock_with_particle_speed
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.deck.reading import read_deck
 
 
 def march_target(problem, steps=None):

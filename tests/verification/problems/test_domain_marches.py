@@ -6,11 +6,11 @@ import functools
 import numpy as np
 import pytest
 
-from regrid.domains import make_domain, transpose_nodes
-from regrid.marching import march, march_domain
-from regrid.measure.crossings import find_crossing
-from regrid.measure.quality import find_best_sine
-from regrid.registry import make_regridder
+from shockgrid.regrid.domains import make_domain, transpose_nodes
+from shockgrid.regrid.marching import march, march_domain
+from shockgrid.regrid.measure.crossings import find_crossing
+from shockgrid.regrid.measure.quality import find_best_sine
+from shockgrid.regrid.registry import make_regridder
 
 STEPS = 40
 LEAST_SINE = {

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from benchmarks.shocked_lines import measure_null_line, sweep_flat_line
-from problems.deck import RunControl
-from problems.interface_instability.deck import Fluid, InterfaceDeck
-from problems.interface_instability.line import Mode, measure_mode
-from problems.interface_instability.problem import InterfaceInstability
-from problems.interface_instability.theories import get_kct
+from shockgrid.problems.deck import RunControl
+from shockgrid.problems.interface_instability.deck import Fluid, InterfaceDeck
+from shockgrid.problems.interface_instability.line import Mode, measure_mode
+from shockgrid.problems.interface_instability.problem import InterfaceInstability
+from shockgrid.problems.interface_instability.theories import get_kct
 
 
 @pytest.mark.parametrize("ratio", [3.0, 1.0 / 3.0])

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from builders import measure_growth
-from problems.deck import Regrid
-from problems.interface_instability.deck import Fluid, InterfaceDeck
-from problems.interface_instability.line import Mode
-from problems.interface_instability.problem import InterfaceInstability
+from shockgrid.problems.deck import Regrid
+from shockgrid.problems.interface_instability.deck import Fluid, InterfaceDeck
+from shockgrid.problems.interface_instability.line import Mode
+from shockgrid.problems.interface_instability.problem import InterfaceInstability
 
 AIR = Fluid(gamma=1.4, rho=1.0)
 SF6 = Fluid(gamma=1.093, rho=5.1)

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import pytest
 
-from problems.interface_instability.deck import Fluid
-from problems.interface_instability.line import Mode, Spectrum
-from problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
-from regrid.errors import BadInput
+from shockgrid.problems.interface_instability.deck import Fluid
+from shockgrid.problems.interface_instability.line import Mode, Spectrum
+from shockgrid.problems.interface_instability.problem import InterfaceDeck, InterfaceInstability
+from shockgrid.regrid.errors import BadInput
 
 NONSENSE = [
     ({"cells": 16, "modes": [Mode(number=40)]}, "modes.0.number is 40.* 0.4 cells .*cells = 120$"),

@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 
 from builders import collect_columns, tensor
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos.materials import find_material
-from hydro.links import slide
-from hydro.simulation import Simulation
-from problems.plate_on_wedge.problem import PlateOnWedge, PlateOnWedgeDeck
-from problems.plate_on_wedge.report import (
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.links import slide
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.plate_on_wedge.problem import PlateOnWedge, PlateOnWedgeDeck
+from shockgrid.problems.plate_on_wedge.report import (
     measure_behind,
     measure_contact_speed,
     measure_lead,
     measure_plateau,
 )
-from problems.references.hugoniot import release, shock_to_pressure
-from regrid.measure.quality import least_corner_area
-from runs.cli.main import main
-from runs.store.reader import RunData
+from shockgrid.problems.references.hugoniot import release, shock_to_pressure
+from shockgrid.regrid.measure.quality import least_corner_area
+from shockgrid.runs.cli.main import main
+from shockgrid.runs.store.reader import RunData
 
 BAR_PRESSURE = 0.01
 BAR_ANGLE = 0.15

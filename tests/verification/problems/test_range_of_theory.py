@@ -6,16 +6,16 @@ import msgspec
 import pytest
 
 from builders import march_measured
-from problems.deck import RunControl
-from problems.interface_instability.deck import InterfaceDeck
-from problems.interface_instability.line import Mode
-from problems.interface_instability.problem import InterfaceInstability
-from problems.interface_instability.theories import get_kct
-from problems.riemann import Riemann, RiemannDeck, SideState
-from problems.standard.detonation import Detonation, DetonationDeck
-from problems.standard.flyer_target import FlyerTarget, FlyerTargetDeck, PlateTable
-from problems.standard.oblique_shock import ObliqueShock, ObliqueShockDeck
-from problems.standard.rayleigh_taylor import RayleighTaylor, RayleighTaylorDeck
+from shockgrid.problems.deck import RunControl
+from shockgrid.problems.interface_instability.deck import InterfaceDeck
+from shockgrid.problems.interface_instability.line import Mode
+from shockgrid.problems.interface_instability.problem import InterfaceInstability
+from shockgrid.problems.interface_instability.theories import get_kct
+from shockgrid.problems.riemann import Riemann, RiemannDeck, SideState
+from shockgrid.problems.standard.detonation import Detonation, DetonationDeck
+from shockgrid.problems.standard.flyer_target import FlyerTarget, FlyerTargetDeck, PlateTable
+from shockgrid.problems.standard.oblique_shock import ObliqueShock, ObliqueShockDeck
+from shockgrid.problems.standard.rayleigh_taylor import RayleighTaylor, RayleighTaylorDeck
 
 
 def run(problem, **options):

@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.random_pairs import find_worst_star, measure_random_pairs
 from builders import march
-from problems.riemann import CASES, Riemann, RiemannDeck
+from shockgrid.problems.riemann import CASES, Riemann, RiemannDeck
 
 # Largest error of any star state at 200 cells, in per cent.  LeBlanc misses the wanted 0.1: its
 # strong shock starts from a pressure ratio of 1e9, the start leaves wrong entropy in the cells

@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 
 from builders import box, check_restarts, collect_columns, march, march_measured, wall_off
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.eos.materials import find_material
-from hydro.eos.phase_transition import hugoniot
-from hydro.links import join
-from hydro.simulation import Simulation
-from problems.deck import RunControl
-from problems.references.exact_flows import SedovBlast
-from problems.standard.detonation import Detonation, DetonationDeck
-from problems.standard.noh import Noh, NohDeck
-from problems.standard.sedov import Sedov, SedovDeck
-from problems.standard.vortex import FIXED_GRID_ERRORS, Vortex, VortexDeck
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.eos.phase_transition import hugoniot
+from shockgrid.hydro.links import join
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.deck import RunControl
+from shockgrid.problems.references.exact_flows import SedovBlast
+from shockgrid.problems.standard.detonation import Detonation, DetonationDeck
+from shockgrid.problems.standard.noh import Noh, NohDeck
+from shockgrid.problems.standard.sedov import Sedov, SedovDeck
+from shockgrid.problems.standard.vortex import FIXED_GRID_ERRORS, Vortex, VortexDeck
+from shockgrid.regrid.measure.corners import compute_centres
 
 N = 12
 

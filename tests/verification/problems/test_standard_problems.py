@@ -8,11 +8,11 @@ import math
 import numpy as np
 import pytest
 
-from problems.registry import PROBLEMS
-from problems.standard.oblique_shock import ObliqueShock, ObliqueShockDeck
-from regrid.errors import BadInput
-from runs.deck.reading import read_deck
-from runs.verify import march
+from shockgrid.problems.registry import PROBLEMS
+from shockgrid.problems.standard.oblique_shock import ObliqueShock, ObliqueShockDeck
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.deck.reading import read_deck
+from shockgrid.runs.verify import march
 
 SMALL = {
     "interface-instability": ("cells=8", "lengths=[2,2]"),

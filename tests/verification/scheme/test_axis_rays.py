@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from builders import march
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join
-from hydro.simulation import Simulation
-from problems.standard.kidder import END, RADII
-from runs.deck.reading import read_deck
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.standard.kidder import END, RADII
+from shockgrid.runs.deck.reading import read_deck
 
 EARLY = 0.17  # of the time of the end
 AXIS_RAYS = 3

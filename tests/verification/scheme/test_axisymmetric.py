@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from builders import box, check_budget, check_restarts, get_bits, march, wall_off
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas, MieGruneisen
-from hydro.links import join, slide
-from hydro.simulation import Simulation
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas, MieGruneisen
+from shockgrid.hydro.links import join, slide
+from shockgrid.hydro.simulation import Simulation
 
 GAS = IdealGas(1.4)
 SPEED = 0.6 * np.sqrt(1.4)

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from builders import beside_line, box, check_restarts, get_bits, march, wall_off
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.carried.fields import CarriedField
-from hydro.eos import IdealGas
-from hydro.formulas.geometry import GEOMETRIES
-from hydro.links import join, slide
-from hydro.remap.conserved import remap_state
-from hydro.remap.overlay import compute_cell_moments
-from hydro.simulation import Simulation
-from regrid.errors import BadInput
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.carried.fields import CarriedField
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.formulas.geometry import GEOMETRIES
+from shockgrid.hydro.links import join, slide
+from shockgrid.hydro.remap.conserved import remap_state
+from shockgrid.hydro.remap.overlay import compute_cell_moments
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.corners import compute_centres
 from thread_ranks import compare_with_ranks
 
 GAS = IdealGas(1.4)

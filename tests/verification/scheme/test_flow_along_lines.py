@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from builders import march, tensor, wall_off
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join, slide
-from hydro.motion.line import LineRule
-from hydro.simulation import Simulation
-from problems.standard.rayleigh_taylor import RayleighTaylor, RayleighTaylorDeck
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join, slide
+from shockgrid.hydro.motion.line import LineRule
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.standard.rayleigh_taylor import RayleighTaylor, RayleighTaylorDeck
 
 SLIP = 0.2  # of the sound speed
 K = 2.0 * np.pi

@@ -3,7 +3,7 @@
 import pytest
 
 from builders import march
-from problems.standard.free_stream import FreeStream, FreeStreamDeck
+from shockgrid.problems.standard.free_stream import FreeStream, FreeStreamDeck
 
 VARIANTS = {
     "interface of gases": {},

@@ -3,11 +3,11 @@
 import pytest
 
 from builders import box, find_unexplained, march_whole, wall_off
-from hydro.block import Block
-from hydro.eos import IdealGas
-from hydro.links import join, slide
-from hydro.simulation import Simulation
-from regrid.errors import BadInput
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join, slide
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.errors import BadInput
 
 PRESSURES = 5e5, 1e5, 2e5, 1e5, 4e5
 

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join, slide
-from hydro.simulation import Simulation
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join, slide
+from shockgrid.hydro.simulation import Simulation
 
 DENSITIES = {"one": 1.0, "two": 3.0, "three": 0.4}
 VELOCITIES = {"plane": (0.6, 0.3), "axisymmetric": (0.7, 0.0)}

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from builders import beside_line, march
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join
-from hydro.simulation import Simulation
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.hydro.simulation import Simulation
 
 GAS = IdealGas(1.4)
 HEAVY = IdealGas(1.2)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from builders import march
-from hydro.simulation import Simulation
-from problems.standard.gresho import Gresho, GreshoDeck
-from problems.standard.sedov import Sedov, SedovDeck
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.standard.gresho import Gresho, GreshoDeck
+from shockgrid.problems.standard.sedov import Sedov, SedovDeck
 
 
 def run_gresho(velocity=(0.0, 0.0), steps=None, **settings):

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from builders import beside_line, wall_off
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join
-from hydro.simulation import Simulation
-from hydro.sources import make_gravity
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.sources import make_gravity
 
 NI = 14
 NJ = 12

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from builders import box, check_budget, march, tensor, unit_steps, wall_off
-from hydro import phases
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas, MieGruneisen, StiffenedGas
-from hydro.eos.materials import find_material
-from hydro.links import join
-from hydro.simulation import Simulation
-from problems.references.hugoniot import release, shock_to_pressure
-from runs.deck.reading import read_deck
+from shockgrid.hydro import phases
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas, MieGruneisen, StiffenedGas
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.links import join
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.references.hugoniot import release, shock_to_pressure
+from shockgrid.runs.deck.reading import read_deck
 
 DENSITIES = (1.0, 3.0)
 

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 from builders import box
-from hydro.block import Block
-from hydro.boundary import OWN_SEGMENTS, put
-from hydro.carried.fields import CarriedField
-from hydro.eos import IdealGas, MieGruneisen, PhaseTransition, StiffenedGas
-from hydro.eos.base import REMAINING_DENSITY_PART, make_least_pressure
-from hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
-from hydro.formulas.riemann import DEFAULT_FLUX
-from hydro.links import join, slide
-from hydro.simulation import Simulation
 from reference_carried import carry
 from reference_sliding import find_points, find_positions
 from reference_step import take_step
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import OWN_SEGMENTS, put
+from shockgrid.hydro.carried.fields import CarriedField
+from shockgrid.hydro.eos import IdealGas, MieGruneisen, PhaseTransition, StiffenedGas
+from shockgrid.hydro.eos.base import REMAINING_DENSITY_PART, make_least_pressure
+from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
+from shockgrid.hydro.formulas.riemann import DEFAULT_FLUX
+from shockgrid.hydro.links import join, slide
+from shockgrid.hydro.simulation import Simulation
 
 GAS = (IdealGas(1.4), 1.2, 1e5)
 WATER = (StiffenedGas(4.4, 6e8), 1000.0, 3e8)

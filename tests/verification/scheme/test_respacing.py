@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from builders import box, check_restarts, wall_off
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join
-from hydro.motion.line import LineRule, Respacing
-from hydro.simulation import Simulation
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.hydro.motion.line import LineRule, Respacing
+from shockgrid.hydro.simulation import Simulation
 
 SPEED = 0.3
 

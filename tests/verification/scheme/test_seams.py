@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from builders import box, march, wall_off
-from hydro.block import Block
-from hydro.eos import IdealGas, MieGruneisen
-from hydro.links import join
-from hydro.simulation import Simulation
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos import IdealGas, MieGruneisen
+from shockgrid.hydro.links import join
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.measure.corners import compute_centres
 
 NI = 40
 NJ = 36

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from builders import box, check_restarts, find_unexplained, get_bits, march
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join, slide
-from hydro.simulation import Simulation
-from regrid.errors import BadInput
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join, slide
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.corners import compute_centres
 
 GAS = IdealGas(1.4)
 MACH = 2.0

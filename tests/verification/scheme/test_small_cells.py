@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hydro.block import Block
-from hydro.eos.gases import IdealGas
-from hydro.simulation import Simulation
-from regrid.measure.corners import compute_centres
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos.gases import IdealGas
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.measure.corners import compute_centres
 from tests.builders import check_restarts, march, tensor, wall_off
 
 GAS = IdealGas(1.4)
@@ -32,7 +32,7 @@ def make_box(
     nodes = tensor(squeeze(cells[0], flat), np.linspace(0.0, HEIGHT, cells[1] + 1))
     block = Block("gas", eos, nodes, *state(*compute_centres(nodes)))
     if geometry == "axisymmetric":
-        from hydro.boundary import put
+        from shockgrid.hydro.boundary import put
 
         put(block, "j_min", "axis")
     wall_off(block)

@@ -22,20 +22,20 @@ from builders import (
     march_measured,
     wall_off,
 )
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join
-from hydro.simulation import Simulation
-from problems.problem import find_frequency, find_growth_rate
-from problems.standard.rayleigh_taylor import (
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.problem import find_frequency, find_growth_rate
+from shockgrid.problems.standard.rayleigh_taylor import (
     GRAVITY_ACCELERATION,
     WAVE_NUMBER,
     RayleighTaylor,
     RayleighTaylorDeck,
 )
-from regrid.algebraic import fill_from_sides
-from regrid.measure.corners import compute_centres
+from shockgrid.regrid.algebraic import fill_from_sides
+from shockgrid.regrid.measure.corners import compute_centres
 
 GAS = IdealGas(1.4)
 K = 2.0 * math.pi

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from builders import check_restarts, march
-from problems.interface_instability.deck import InterfaceDeck
-from problems.interface_instability.problem import InterfaceInstability
+from shockgrid.problems.interface_instability.deck import InterfaceDeck
+from shockgrid.problems.interface_instability.problem import InterfaceInstability
 
 WEIGHTED = ("brackbill-saltzman", "equidistribution", "node-speed")
 WEIGHT = "sides*(1 + 5*|grad(rho)|/max)"

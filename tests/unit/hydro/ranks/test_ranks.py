@@ -12,17 +12,17 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from builders import two_blocks, wall_off
-from hydro.block import Block
-from hydro.eos import IdealGas
-from hydro.interior.advance import TILE_ROWS
-from hydro.ranks.cutting import MOST_UNCUT, distribute_blocks, sum_cells
-from hydro.ranks.ranks import Ranks
-from hydro.simulation import Simulation
-from hydro.sources import make_gravity
-from problems.initial_states import make_plane_grid
-from regrid.errors import BadInput, RegridFailure, RunFailure
-from regrid.protocol import RegridReport, RegridResult
-from runs.deck.reading import read_deck
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.interior.advance import TILE_ROWS
+from shockgrid.hydro.ranks.cutting import MOST_UNCUT, distribute_blocks, sum_cells
+from shockgrid.hydro.ranks.ranks import Ranks
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.sources import make_gravity
+from shockgrid.problems.initial_states import make_plane_grid
+from shockgrid.regrid.errors import BadInput, RegridFailure, RunFailure
+from shockgrid.regrid.protocol import RegridReport, RegridResult
+from shockgrid.runs.deck.reading import read_deck
 from thread_ranks import compare_with_ranks, march_on_ranks, run_on_threads
 
 GAS = IdealGas(1.4)

@@ -5,17 +5,17 @@ from typing import ClassVar
 import numpy as np
 
 from builders import beside_line, find_unexplained, get_bits, march
-from hydro.block import Block
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.links import join
-from hydro.remap.flow import STEPS_PER_LINE_CHECK, Refinement
-from hydro.simulation import Simulation
-from problems.deck import RunControl
-from problems.interface_instability.deck import InterfaceDeck
-from problems.interface_instability.line import Mode
-from problems.interface_instability.problem import InterfaceInstability
-from regrid.measure.quality import find_bad_cells
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.links import join
+from shockgrid.hydro.remap.flow import STEPS_PER_LINE_CHECK, Refinement
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.deck import RunControl
+from shockgrid.problems.interface_instability.deck import InterfaceDeck
+from shockgrid.problems.interface_instability.line import Mode
+from shockgrid.problems.interface_instability.problem import InterfaceInstability
+from shockgrid.regrid.measure.quality import find_bad_cells
 
 GASES = IdealGas(1.4), IdealGas(1.2)
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from builders import box, check_budget, march, two_blocks, wall_off
-from hydro.boundary import put
-from hydro.eos import IdealGas
-from hydro.eos.conversion import compute_conserved
-from hydro.formulas.geometry import GEOMETRIES, compute_volumes
-from hydro.remap.conserved import is_state, remap_means, remap_state
-from hydro.remap.flow import take_over
-from hydro.remap.overlay import compute_cell_moments, make_linear_fields, overlay_grids
-from hydro.simulation import Simulation
-from regrid.errors import BadInput
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas
+from shockgrid.hydro.eos.conversion import compute_conserved
+from shockgrid.hydro.formulas.geometry import GEOMETRIES, compute_volumes
+from shockgrid.hydro.remap.conserved import is_state, remap_means, remap_state
+from shockgrid.hydro.remap.flow import take_over
+from shockgrid.hydro.remap.overlay import compute_cell_moments, make_linear_fields, overlay_grids
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.errors import BadInput
 
 LOW = (0.0, 0.3)
 HIGH = (1.0, 1.5)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from regrid.barrier import coarse_matrix as cells
-from regrid.barrier.line_cg import fill_product as multiply_fine
-from regrid.barrier.tuning import Tuning
-from regrid.barrier.workspace import Workspace
+from shockgrid.regrid.barrier import coarse_matrix as cells
+from shockgrid.regrid.barrier.line_cg import fill_product as multiply_fine
+from shockgrid.regrid.barrier.tuning import Tuning
+from shockgrid.regrid.barrier.workspace import Workspace
 
 
 def make_work(ni=64, nj=48, limiting=False, seed=0):

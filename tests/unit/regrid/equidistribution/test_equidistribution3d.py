@@ -3,7 +3,7 @@
 import numpy as np
 
 from builders import box
-from regrid.equidistribution.volumes import solve_ed3
+from shockgrid.regrid.equidistribution.volumes import solve_ed3
 
 
 def cube(*shape):

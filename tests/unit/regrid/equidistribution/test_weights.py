@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from builders import box
-from regrid.equidistribution.weights import (
+from shockgrid.regrid.equidistribution.weights import (
     Expression,
     Weight,
     measure_gradient,
 )
-from regrid.errors import BadInput
-from regrid.measure.corners import compute_centres
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.corners import compute_centres
 
 F = np.array([1.0, 2.0, 4.0])
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.hosts import pennant_nodes
-from regrid.measure.quality import measure_quality
-from regrid.sides import get_sides
+from shockgrid.regrid.measure.quality import measure_quality
+from shockgrid.regrid.sides import get_sides
 
 
 @pytest.mark.parametrize("index", [1, 2, 3])

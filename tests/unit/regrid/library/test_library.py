@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
-import regrid
 from builders import ROOT
+from shockgrid import regrid
 
 PUBLIC = """
 AlgebraicRegridder BadInput BarrierRegridder BarrierRegridder3D EquidistributionRegridder3D

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from regrid.errors import BadInput
-from regrid.given import read_grid
-from regrid.plot3d import read_plot3d
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.given import read_grid
+from shockgrid.regrid.plot3d import read_plot3d
 
 
 def make_blocks(axes, count):

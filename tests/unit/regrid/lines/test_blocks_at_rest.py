@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.side_laws import compute_stiffness
-from regrid.barrier.tuning import DEFAULT
-from regrid.domains import make_domain
-from regrid.measure.quality import measure_quality
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.barrier.side_laws import compute_stiffness
+from shockgrid.regrid.barrier.tuning import DEFAULT
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.measure.quality import measure_quality
 
 CELLS = (60, 40)
 STIFFEST = DEFAULT.stiffness

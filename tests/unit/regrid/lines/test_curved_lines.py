@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from regrid.algebraic import fill_curves
-from regrid.barrier.regridder import BarrierRegridder
-from regrid.barrier.side_laws import fill_family_weights, weigh_curves
-from regrid.barrier.tuning import DEFAULT
-from regrid.domains import make_domain
-from regrid.measure.quality import measure_first_line_gap, measure_quality
+from shockgrid.regrid.algebraic import fill_curves
+from shockgrid.regrid.barrier.regridder import BarrierRegridder
+from shockgrid.regrid.barrier.side_laws import fill_family_weights, weigh_curves
+from shockgrid.regrid.barrier.tuning import DEFAULT
+from shockgrid.regrid.domains import make_domain
+from shockgrid.regrid.measure.quality import measure_first_line_gap, measure_quality
 
 # domain: least corner sine, largest first line gap at the sides that deform; a little beyond the
 # figures of the marches (.527, 1.27; .308, 1.81; .28, 1.33; .411, 1.14; .410, 1.12; .316, 2.09;

@@ -1,0 +1,1 @@
+../../shockgrid/__init__.py

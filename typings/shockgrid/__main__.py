@@ -1,0 +1,1 @@
+../../shockgrid/__main__.py

@@ -1,0 +1,1 @@
+../../shockgrid/command.py

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrid.errors import BadInput
-from regrid.roots import find_root
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.roots import find_root
 
 QUADRATURE_POINTS = 64
 POWERS = {"cylindrical": 1, "spherical": 2}

@@ -23,11 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from hydro.eos.materials import Material
-from hydro.eos.temperature import REST_TEMPERATURE
-from hydro.strength.laws import StrengthLaw
-from regrid.errors import BadInput
-from regrid.roots import find_root
+from shockgrid.hydro.eos.materials import Material
+from shockgrid.hydro.eos.temperature import REST_TEMPERATURE
+from shockgrid.hydro.strength.laws import StrengthLaw
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.roots import find_root
 
 ROOT_TOLERANCE = 1e-15
 LOW_STRAIN_RATE = 1.0  # [1/s], at which elastic limits are given

@@ -23,8 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from regrid.errors import BadInput
-from regrid.roots import find_root
+from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.roots import find_root
 
 # below it the series of the left side is used, above it its formula; the bound of the root's search
 SMALL_GROWTH = 1e-3

@@ -5,13 +5,13 @@ May import: `regrid`.
 
 from collections import ChainMap
 
-from hydro.strength.laws.base import StrengthLaw
-from hydro.strength.laws.johnson_cook import JohnsonCook
-from hydro.strength.laws.linear_hardening import LinearHardening
-from hydro.strength.laws.perfect import Perfect
-from hydro.strength.laws.steinberg_cochran_guinan import SteinbergCochranGuinan
-from hydro.strength.laws.zerilli_armstrong import ZerilliArmstrongBCC, ZerilliArmstrongFCC
-from regrid.plug_ins import PlugIns
+from shockgrid.hydro.strength.laws.base import StrengthLaw
+from shockgrid.hydro.strength.laws.johnson_cook import JohnsonCook
+from shockgrid.hydro.strength.laws.linear_hardening import LinearHardening
+from shockgrid.hydro.strength.laws.perfect import Perfect
+from shockgrid.hydro.strength.laws.steinberg_cochran_guinan import SteinbergCochranGuinan
+from shockgrid.hydro.strength.laws.zerilli_armstrong import ZerilliArmstrongBCC, ZerilliArmstrongFCC
+from shockgrid.regrid.plug_ins import PlugIns
 
 OWN: dict[str, type[StrengthLaw]] = {
     law.kind: law

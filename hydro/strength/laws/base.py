@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput
 
 
 @dataclass(frozen=True)

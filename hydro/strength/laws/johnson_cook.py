@@ -14,8 +14,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from hydro.strength.laws.base import StrengthLaw
-from regrid.errors import BadInput
+from shockgrid.hydro.strength.laws.base import StrengthLaw
+from shockgrid.regrid.errors import BadInput
 
 # below it the slope of strain^n, which is infinite at 0 for n < 1, is that at this strain
 LEAST_HARDENING_STRAIN = 1e-5

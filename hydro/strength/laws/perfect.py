@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from hydro.strength.laws.base import StrengthLaw
+from shockgrid.hydro.strength.laws.base import StrengthLaw
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from hydro.strength.laws.base import StrengthLaw
+from shockgrid.hydro.strength.laws.base import StrengthLaw
 
 ROOM_TEMPERATURE = 300.0  # [K], at which G0 and Y0 are given
 

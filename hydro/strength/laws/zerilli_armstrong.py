@@ -16,7 +16,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from hydro.strength.laws.base import StrengthLaw
+from shockgrid.hydro.strength.laws.base import StrengthLaw
 
 LEAST_STRAIN_RATE = 1e-4  # [1/s]: of slow laboratory tests
 # below it slopes of powers of strain, infinite at 0, are those at this strain

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hydro.eos.materials import LIBRARY, choose_strength, make_material, read_materials
-from hydro.strength.laws import (
+from shockgrid.hydro.eos.materials import LIBRARY, choose_strength, make_material, read_materials
+from shockgrid.hydro.strength.laws import (
     STRENGTH_LAWS,
     JohnsonCook,
     LinearHardening,
@@ -17,7 +17,7 @@ from hydro.strength.laws import (
     ZerilliArmstrongBCC,
     ZerilliArmstrongFCC,
 )
-from regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput
 from shockgrid.testing import check_strength
 
 ALUMINIUM = {

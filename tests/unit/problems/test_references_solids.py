@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from hydro.eos import MieGruneisen
-from hydro.eos.materials import find_material
-from problems.references.collapsing_shells import PlasticShell
-from problems.references.elastic_plastic import (
+from shockgrid.hydro.eos import MieGruneisen
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.problems.references.collapsing_shells import PlasticShell
+from shockgrid.problems.references.elastic_plastic import (
     Solid,
     compute_impact,
     compute_piston,
@@ -16,13 +16,13 @@ from problems.references.elastic_plastic import (
     find_elastic_limit,
     make_solid_at_rest,
 )
-from problems.references.elastic_waves import (
+from shockgrid.problems.references.elastic_waves import (
     compute_elastic_growth,
     compute_rayleigh_speed,
     compute_wave_speeds,
 )
-from problems.references.hugoniot import release, shock_with_particle_speed
-from regrid.errors import BadInput
+from shockgrid.problems.references.hugoniot import release, shock_with_particle_speed
+from shockgrid.regrid.errors import BadInput
 
 
 def make_solid(rho0, c0, s, gruneisen, shear_modulus, yield_stress):

@@ -93,9 +93,13 @@ def find_sentence(module: str, name: str) -> str:
     return re.split(r"(?<=\.) (?=[A-Z])", first)[0].replace("|", "\\|")
 
 
+def on_startup(command: str, dirty: bool) -> None:
+    """Copy the packages before the docstring reader looks for its folder."""
+    copy_packages()
+
+
 def on_config(config):
     """Put the reference into the navigation, that of `shockgrid` first, and list the problems."""
-    copy_packages()
     problems = sorted(Path(config.docs_dir, "problems").glob("*.md"))
     for entry in config.nav:
         if entry.get("Problems") == "problems/":

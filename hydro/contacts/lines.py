@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from regrid.jit import compiled_once
+from shockgrid.regrid.jit import compiled_once
 
 BOTH, LATER, EARLIER = range(3)  # parts, see `may_lie_on` in `hydro.contacts.facets`
 

@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from shockgrid.hydro import rim as on
-from shockgrid.hydro import rows as of
 from shockgrid.hydro.carried.fields import CarriedField, read_fields
 from shockgrid.hydro.carried.transport import Transport
 from shockgrid.hydro.eos import EquationOfState
@@ -32,7 +30,8 @@ from shockgrid.hydro.interior.cell_fields import (
 from shockgrid.hydro.kernels import BlockKernels
 from shockgrid.hydro.perimeter.contacts import fill_open_flux
 from shockgrid.hydro.perimeter.plan import PerimeterPlan
-from shockgrid.hydro.rim import find_first_face, make_rim
+from shockgrid.hydro.rim import RHO_BEYOND, find_first_face, make_rim
+from shockgrid.hydro.rows import HELD_ARRAYS, RHO, P, make_held
 from shockgrid.hydro.totals import TileTotals
 from shockgrid.regrid.errors import BadInput, Place, RunFailure, suggest
 from shockgrid.regrid.measure.corners import compute_centres
@@ -116,11 +115,11 @@ class Block:
         self.eos = eos
         self.nodes = _read_nodes(name, nodes)
         self.ni, self.nj = (size - 1 for size in self.nodes.shape[1:])
-        held = of.make_held(self.ni, self.nj)
+        held = make_held(self.ni, self.nj)
         self.state = held["state"]
         self._read_state({"rho": rho, "u": u, "v": v, "p": p})
         check_first_state(name, eos, self.state[:, 1:-1, 1:-1])
-        check_formulas(name, eos, *self.state[[of.RHO, of.P], 1:-1, 1:-1])
+        check_formulas(name, eos, *self.state[[RHO, P], 1:-1, 1:-1])
         # what a step finds besides the state: rates of the cells (theory F7.1), their crowding on
         # the new grid (F7.3), and the number of those that were redistributed
         self.rates = np.zeros((self.ni, self.nj))
@@ -130,7 +129,7 @@ class Block:
         # made after those: memory freed by the checks is reused for arrays that are written anyway
         self.nodes_new = self.nodes.copy()
         self.state_new: np.ndarray
-        for array_name, array in of.make_held(self.ni, self.nj).items():
+        for array_name, array in make_held(self.ni, self.nj).items():
             setattr(self, array_name, held[array_name])
             setattr(self, f"{array_name}_new", array)
         self._carry(carried)
@@ -183,7 +182,7 @@ class Block:
         for number, field in enumerate(fields):
             self.carried[number, 1:-1, 1:-1] = field.find_first(self.name, self.centres)
         self.transport = Transport(len(fields), self.ni, self.nj)
-        self.held_arrays = (*of.HELD_ARRAYS, "carried") if fields else of.HELD_ARRAYS
+        self.held_arrays = (*HELD_ARRAYS, "carried") if fields else HELD_ARRAYS
         self.step_arrays = ("nodes", *self.held_arrays, "rates")
         self.units = UNITS | {field.name: field.unit for field in fields}
         self.long_names = LONG_NAMES | {
@@ -225,7 +224,7 @@ class Block:
 
         For kinds of segments (`fill_flux`) that write the state beyond themselves.
         """
-        opened = np.array([(first, last, on.RHO_BEYOND) for first, last in spans])
+        opened = np.array([(first, last, RHO_BEYOND) for first, last in spans])
         fill_open_flux(self.rim.rows, opened, self.geometry.curved)
 
     # --- states of a step ----------------------------------------------------------------------
@@ -266,11 +265,11 @@ class Block:
         array = getattr(self, name)
         return array[..., 1:-1, 1:-1] if self.count_ghosts(array) else array
 
-    def list_new(self, names: Sequence[str] = of.HELD_ARRAYS) -> list[np.ndarray]:
+    def list_new(self, names: Sequence[str] = HELD_ARRAYS) -> list[np.ndarray]:
         """The arrays that a step makes: the flow's own, or those named of `held_arrays`."""
         return [getattr(self, f"{name}_new") for name in names]
 
-    def list_starts(self, names: Sequence[str] = of.HELD_ARRAYS) -> list[np.ndarray]:
+    def list_starts(self, names: Sequence[str] = HELD_ARRAYS) -> list[np.ndarray]:
         """The arrays that a step starts from, of such names; see `get_start`."""
         return [self.get_start(name) for name in names]
 
@@ -313,7 +312,7 @@ class Block:
         if not bad.any():
             return self._find_failed_totals()
         i, j = (int(index) for index in np.argwhere(bad)[0])
-        rho, p = self.state_new[[of.RHO, of.P], i + 1, j + 1]
+        rho, p = self.state_new[[RHO, P], i + 1, j + 1]
         known = f", its pressure {p:.6g} Pa" if np.isfinite(p) else ""
         return RunFailure(
             f"flow: block {self.name!r}, cell i={i}, j={j}: {self.eos.failure}; "
@@ -390,7 +389,7 @@ class Block:
         A few rows at a time, so that intermediate arrays fit into the cache.
         """
         inside = state[:, 1:-1, 1:-1]
-        others = [self.get_inside(name) for name in of.HELD_ARRAYS if name != "state"]
+        others = [self.get_inside(name) for name in HELD_ARRAYS if name != "state"]
         for first in range(rows.start, rows.stop, SLAB_ROWS):
             slab = slice(first, min(first + SLAB_ROWS, rows.stop))
             found[slab] = compute(self.eos, inside[:, slab], *(held[slab] for held in others))
@@ -398,7 +397,7 @@ class Block:
     def compute_at(self, name: str, i: np.ndarray, j: np.ndarray) -> np.ndarray:
         """Specific internal energies "e" [J/kg], temperatures "T" [K] of the cells [i, j]."""
         compute = {"e": compute_energy, "T": compute_temperature}[name]
-        return compute(self.eos, *(self.get_inside(held)[..., i, j] for held in of.HELD_ARRAYS))
+        return compute(self.eos, *(self.get_inside(held)[..., i, j] for held in HELD_ARRAYS))
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
         """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2).

@@ -23,7 +23,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.carried.fields import read_values
 from shockgrid.hydro.perimeter.contacts import (
@@ -36,6 +35,7 @@ from shockgrid.hydro.perimeter.contacts import (
     fill_free_surface,
     fill_ghosts_from_faces,
 )
+from shockgrid.hydro.rim import CARRIED_BEYOND, CARRIED_GHOST, GHOST, RHO_BEYOND, RHO_TRACE, STATE
 from shockgrid.hydro.rows import RHO
 from shockgrid.regrid.errors import BadInput, Place, RunFailure, suggest
 from shockgrid.regrid.plug_ins import PlugIns
@@ -203,11 +203,11 @@ class Outflow(Segment):
     """Open side: material flows out freely, and no state is prescribed beyond."""
 
     kind = "outflow"
-    beyond = on.RHO_TRACE  # as inside
+    beyond = RHO_TRACE  # as inside
 
     def fill_ghosts(self, t):
         rim = self.rim
-        rim.rows[on.GHOST] = rim.rows[on.STATE]
+        rim.rows[GHOST] = rim.rows[STATE]
         rim.length_ghost[:] = rim.length
 
 
@@ -221,7 +221,7 @@ class Inflow(Segment):
     """
 
     kind = "inflow"
-    beyond = on.RHO_BEYOND
+    beyond = RHO_BEYOND
 
     def __init__(self, block, side, start, stop, state, velocity=None, carried=None):
         super().__init__(block, side, start, stop)
@@ -248,8 +248,8 @@ class Inflow(Segment):
         rim.rho_ghost[:], rim.u_ghost[:], rim.v_ghost[:], rim.p_ghost[:] = self.state(t)
         rim.length_ghost[:] = 0.0
         if self.block.carried_fields:
-            rim.get_carried(on.CARRIED_GHOST)[...] = self._carried
-            rim.get_carried(on.CARRIED_BEYOND)[...] = self._carried
+            rim.get_carried(CARRIED_GHOST)[...] = self._carried
+            rim.get_carried(CARRIED_BEYOND)[...] = self._carried
 
     def fill_speeds(self, t):
         """The state beyond at mid-time, for the flux."""

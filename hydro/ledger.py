@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.block import Block
+from shockgrid.hydro.rim import ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y
 from shockgrid.regrid.jit import kernel
 
 
@@ -30,10 +30,10 @@ def sum_fluxes(rim, spans):
     energy = 0.0
     for span in range(spans.shape[0]):
         for face in range(spans[span, 0], spans[span, 1]):
-            mass += rim[on.MASS, face]
-            momentum_x += rim[on.MOMENTUM_X, face]
-            momentum_y += rim[on.MOMENTUM_Y, face]
-            energy += rim[on.ENERGY, face]
+            mass += rim[MASS, face]
+            momentum_x += rim[MOMENTUM_X, face]
+            momentum_y += rim[MOMENTUM_Y, face]
+            energy += rim[ENERGY, face]
     return mass, momentum_x, momentum_y, energy
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.block import Block
+from shockgrid.hydro.rim import AREA_CENTRE, NORMAL
 from shockgrid.hydro.workers import LEAST_INSIDE
 from shockgrid.regrid.measure.corners import compute_centres
 
@@ -34,10 +34,10 @@ def gather(block: Block, t: float = 0.0) -> None:
 def _add_weight(block: Block, acceleration: np.ndarray) -> None:
     """Hydrostatic ghosts: pressure mirrored about that of a layer at rest on the wall."""
     rim = block.rim
-    normal = rim.rows[on.NORMAL]
+    normal = rim.rows[NORMAL]
     centres = block.gather_perimeter(compute_centres(block.nodes))
     across = (acceleration * normal).sum(axis=0) / (normal * normal).sum(axis=0)
-    way = ((rim.rows[on.AREA_CENTRE] - centres) * normal).sum(axis=0)
+    way = ((rim.rows[AREA_CENTRE] - centres) * normal).sum(axis=0)
     for first, last, _ in block.plan.walls:
         rim.p_ghost[first:last] += (2.0 * rim.rho * across * way)[first:last]
 

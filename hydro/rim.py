@@ -3,8 +3,8 @@
 The faces are numbered consecutively in the order of SIDE_NAMES, on each side by increasing i or j.
 Each quantity of a face (its cell, ghost, traces, contact state, flux) is one row (2 (ni + nj),) of
 `Rim.rows`.  Python code uses rows as attributes, `rim.rho`, `rim.p_star`; kernels take `rim.rows`
-and index it by the constants of this module (`from shockgrid.hydro import rim as on`, then
-`rim[on.P_STAR, k]`).  Note: faces towards -i and -j have outward normals, too.
+and index it by the constants of this module: `rim[P_STAR, k]`.  Note: faces towards -i and -j have
+outward normals, too.
 """
 
 from __future__ import annotations

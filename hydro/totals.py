@@ -10,8 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shockgrid.hydro import rows as of
 from shockgrid.hydro.interior.update import sum_tiles
+from shockgrid.hydro.rows import (
+    CONSERVED,
+    EMPTIED,
+    LEAST_C2,
+    MOMENTUM_AND_ENERGY,
+    NO_C2,
+    TOTAL_ROWS,
+    VOIDED,
+)
 
 
 class Sums(NamedTuple):
@@ -40,25 +48,25 @@ class TileTotals:
     """
 
     def __init__(self, tiles: int):
-        self.rows = np.zeros((tiles + 1, of.TOTAL_ROWS))
+        self.rows = np.zeros((tiles + 1, TOTAL_ROWS))
         self.of_tiles = self.rows[:-1]
         self.rest = self.rows[-1]
-        self.rest[of.LEAST_C2] = of.NO_C2
-        self.array = np.zeros(of.TOTAL_ROWS)
+        self.rest[LEAST_C2] = NO_C2
+        self.array = np.zeros(TOTAL_ROWS)
         self._sums: Sums | None = None  # of the array, while it is valid
 
     def start_update(self) -> None:
         """Before the update: no cell beside those of the tiles yet."""
         self._sums = None
-        self.rest[of.LEAST_C2] = of.NO_C2
-        self.rest[of.VOIDED] = 0.0
-        self.rest[of.EMPTIED] = 0.0
+        self.rest[LEAST_C2] = NO_C2
+        self.rest[VOIDED] = 0.0
+        self.rest[EMPTIED] = 0.0
 
     def add_redistributed(self, least_c2: float, voided: int) -> None:
         """Take in the cells that redistribution has changed: their least c², voids gained."""
         self._sums = None
-        self.rest[of.LEAST_C2] = min(self.rest[of.LEAST_C2], least_c2)
-        self.rest[of.VOIDED] += voided
+        self.rest[LEAST_C2] = min(self.rest[LEAST_C2], least_c2)
+        self.rest[VOIDED] += voided
 
     def add_source(self, gained: np.ndarray, has_polygons: bool) -> None:
         """Add momentum x, y and energy (3,) of a body source after the update.
@@ -67,8 +75,8 @@ class TileTotals:
         """
         self._sums = None
         if not has_polygons:
-            self.rest[of.CONSERVED] = 0.0
-        self.rest[of.MOMENTUM_AND_ENERGY] += gained
+            self.rest[CONSERVED] = 0.0
+        self.rest[MOMENTUM_AND_ENERGY] += gained
 
     def sum_up(self) -> bool:
         """Sum the tiles; returns whether the state is valid.  See `sum_tiles`."""
@@ -91,4 +99,4 @@ class TileTotals:
     def find_lost(self) -> list[str]:
         """Names of the conserved quantities whose sums are not finite numbers."""
         names = np.array(("mass", "momentum x", "momentum y", "energy"))
-        return list(names[~np.isfinite(self.rows[:, of.CONSERVED]).all(axis=0)])
+        return list(names[~np.isfinite(self.rows[:, CONSERVED]).all(axis=0)])

@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.formulas.geometry import (
     Geometry,
     compute_centre_offset,
@@ -35,7 +34,18 @@ from shockgrid.hydro.formulas.reconstruction import (
 from shockgrid.hydro.interior.scratch import find_twist
 from shockgrid.hydro.perimeter.contacts import carry_through_open_sides
 from shockgrid.hydro.perimeter.faces import find_corners, measure_volume
-from shockgrid.hydro.rim import find_cell, find_excess
+from shockgrid.hydro.rim import (
+    CARRIED_CELL,
+    CARRIED_FLUX,
+    CARRIED_GHOST,
+    CARRIED_TRACE,
+    LENGTH_GHOST,
+    X_TRACE,
+    Y_TRACE,
+    find_carried_row,
+    find_cell,
+    find_excess,
+)
 from shockgrid.hydro.rows import RHO, U, V
 from shockgrid.regrid.jit import compiled_once, inlined, kernel
 
@@ -62,11 +72,11 @@ def gather(values, rim):
     ni = values.shape[1] - 2
     nj = values.shape[2] - 2
     for q in range(values.shape[0]):
-        row = on.find_carried_row(q)
+        row = find_carried_row(q)
         for k in range(rim.shape[1]):
             _, i, j = find_cell(k, ni, nj)
-            rim[row + on.CARRIED_CELL, k] = values[q, i + 1, j + 1]
-            rim[row + on.CARRIED_GHOST, k] = values[q, i + 1, j + 1]
+            rim[row + CARRIED_CELL, k] = values[q, i + 1, j + 1]
+            rim[row + CARRIED_GHOST, k] = values[q, i + 1, j + 1]
 
 
 @compiled_once(allocates=False)
@@ -189,11 +199,11 @@ def make_predict(geometry: Geometry):
                 if near or j < 2 or j >= nj - 2:
                     measure_cell(nodes, i, j, measures, centres)
         # and beyond the sides
-        place_ghosts(rim, on.LENGTH_GHOST, measures[LENGTH_I])
-        place_ghosts(rim, on.LENGTH_GHOST, measures[LENGTH_J])
+        place_ghosts(rim, LENGTH_GHOST, measures[LENGTH_I])
+        place_ghosts(rim, LENGTH_GHOST, measures[LENGTH_J])
         # slopes field by field
         for q in range(values.shape[0]):
-            place_ghosts(rim, on.find_carried_row(q) + on.CARRIED_GHOST, values[q])
+            place_ghosts(rim, find_carried_row(q) + CARRIED_GHOST, values[q])
             for i in range(ni):
                 near = low <= i < high or i == 0 or i == ni - 1
                 for j in range(nj):
@@ -221,13 +231,13 @@ def trace(slopes, centres, opened, rim):
     ni = centres.shape[1]
     nj = centres.shape[2]
     for q in range(slopes.shape[0]):
-        row = on.find_carried_row(q)
+        row = find_carried_row(q)
         for k in range(rim.shape[1]):
             _, i, j = find_cell(k, ni, nj)
-            rim[row + on.CARRIED_TRACE, k] = find_value(
-                slopes[q], centres, i, j, rim[on.X_TRACE, k], rim[on.Y_TRACE, k]
+            rim[row + CARRIED_TRACE, k] = find_value(
+                slopes[q], centres, i, j, rim[X_TRACE, k], rim[Y_TRACE, k]
             )
-            rim[row + on.CARRIED_FLUX, k] = 0.0
+            rim[row + CARRIED_FLUX, k] = 0.0
     carry_through_open_sides(rim, opened)
 
 
@@ -287,7 +297,7 @@ def make_carry(geometry: Geometry):
         rim, row = sides
         ni = mass_i.shape[0] - 1
         nj = mass_i.shape[1]
-        flux = row + on.CARRIED_FLUX
+        flux = row + CARRIED_FLUX
         before = mass_i[i, j] * (low[j] - value) if i > 0 else -rim[flux, j]
         after = mass_i[i + 1, j] * (high[j] - value) if i < ni - 1 else rim[flux, nj + j]
         below = mass_j[i, j] * (face_j[j] - value) if j > 0 else -rim[flux, 2 * nj + i]
@@ -318,7 +328,7 @@ def make_carry(geometry: Geometry):
         high = np.empty(nj)
         face_j = np.empty(nj + 1)
         for q in range(old.shape[0]):
-            row = on.find_carried_row(q)
+            row = find_carried_row(q)
             fill_faces_i(slopes[q], centres, grids, mass_i, first, high)
             for i in range(first, last):
                 # the faces towards +i of the row before are those towards -i of this one

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.facets.rows import (
     AREA_X,
     AREA_Y,
@@ -19,6 +18,7 @@ from shockgrid.hydro.facets.rows import (
     SUM_SLIP,
     WEIGHT,
 )
+from shockgrid.hydro.rim import LENGTH, NX, NY, P_STAR, RHO, SLIP, U_STAR, V_STAR, W_STAR, C, U, V
 from shockgrid.hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y
 from shockgrid.regrid.jit import compiled_once, kernel
 
@@ -37,17 +37,17 @@ def cover_surface(sums, start, step, state, rim):
         face = start + step * k
         scale = 1.0 if covered <= 1.0 else 1.0 / covered
         bare = max(0.0, 1.0 - covered)
-        area_x, area_y = rim[on.NX, face], rim[on.NY, face]
+        area_x, area_y = rim[NX, face], rim[NY, face]
         length = (area_x * area_x + area_y * area_y) ** 0.5
         nx, ny = area_x / length, area_y / length
-        u, v = rim[state + on.U, face], rim[state + on.V, face]
+        u, v = rim[state + U, face], rim[state + V, face]
         own = u * nx + v * ny
-        excess = bare * (rim[on.W_STAR, face] - own) + scale * sums[SUM_EXCESS, k]
-        rim[on.P_STAR, face] = bare * rim[on.P_STAR, face] + scale * sums[SUM_P, k]
-        rim[on.W_STAR, face] = own + excess
-        rim[on.U_STAR, face] = u + excess * nx
-        rim[on.V_STAR, face] = v + excess * ny
-        rim[on.SLIP, face] = scale * sums[SUM_SLIP, k]
+        excess = bare * (rim[W_STAR, face] - own) + scale * sums[SUM_EXCESS, k]
+        rim[P_STAR, face] = bare * rim[P_STAR, face] + scale * sums[SUM_P, k]
+        rim[W_STAR, face] = own + excess
+        rim[U_STAR, face] = u + excess * nx
+        rim[V_STAR, face] = v + excess * ny
+        rim[SLIP, face] = scale * sums[SUM_SLIP, k]
 
 
 @compiled_once
@@ -78,17 +78,17 @@ def add_friction(leader, follower, facets, count, friction, dt):
         other = facets.owners[FOLLOWER, k]
         x, y = -facets.faces[NORMAL_Y, k], facets.faces[NORMAL_X, k]
         # both sides' velocities, inverse masses per area, and the leader's part of the impedances
-        z_other = cells[on.RHO, other] * cells[on.C, other]
-        inverse = 1.0 / (cells[on.RHO, other] * cells[on.LENGTH, other])
-        u_other, v_other = cells[on.U, other], cells[on.V, other]
+        z_other = cells[RHO, other] * cells[C, other]
+        inverse = 1.0 / (cells[RHO, other] * cells[LENGTH, other])
+        u_other, v_other = cells[U, other], cells[V, other]
         u, v = own_line.velocity[0], own_line.velocity[1]
         part = 0.0
         own_inverse = 0.0
         if not own_line.rigid:
-            u, v = own_cells[on.U, own], own_cells[on.V, own]
-            z = own_cells[on.RHO, own] * own_cells[on.C, own]
+            u, v = own_cells[U, own], own_cells[V, own]
+            z = own_cells[RHO, own] * own_cells[C, own]
             part = z / (z + z_other)
-            own_inverse = 1.0 / (own_cells[on.RHO, own] * own_cells[on.LENGTH, own])
+            own_inverse = 1.0 / (own_cells[RHO, own] * own_cells[LENGTH, own])
         # traction on the leader, along (x, y)
         slip = (u_other - u) * x + (v_other - v) * y
         traction = abs(slip) / (dt * (inverse + own_inverse))

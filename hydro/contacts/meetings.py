@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import Piston
 from shockgrid.hydro.contacts.pair import Pair, PlanePair
@@ -27,6 +26,7 @@ from shockgrid.hydro.facets.states import make_add_facet_flux
 from shockgrid.hydro.formulas.geometry import Geometry
 from shockgrid.hydro.links import Link
 from shockgrid.hydro.motion.grid_motion import GridMotion
+from shockgrid.hydro.rim import AT_FACE, RHO_FACE, RHO_TRACE, TRACE
 from shockgrid.hydro.sliding.contact import SlidingContact
 from shockgrid.regrid.errors import Place, RunFailure
 
@@ -139,16 +139,16 @@ class Meetings:
             self._find()
         if self.near:
             self._set_velocities(t)
-            for surface in self._solve(on.AT_FACE):
-                surface.put_cover(on.RHO_FACE)
+            for surface in self._solve(AT_FACE):
+                surface.put_cover(RHO_FACE)
                 surface.fill_ghosts()
 
     def fill_speeds(self, t: float, dt: float) -> None:
         """Contact states from the traces, with which the lines move."""
         if self.near:
             self._set_velocities(t)
-            for surface in self._solve(on.TRACE):
-                surface.put_cover(on.RHO_TRACE)
+            for surface in self._solve(TRACE):
+                surface.put_cover(RHO_TRACE)
             for pair in self.near:
                 pair.find_held()
 
@@ -264,7 +264,7 @@ class Meetings:
             surface.read_middle()
         for pair in self.near:
             pair.cut_middle(dt)
-        self._solve(on.TRACE, middle=True)
+        self._solve(TRACE, middle=True)
         for surface in self._sides:
             surface.read_flux()
         for pair in self.near:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import Axis, FreeSurface, Piston, Segment, Wall
 from shockgrid.hydro.contacts.friction import cover_surface
@@ -19,6 +18,7 @@ from shockgrid.hydro.motion.key_nodes import KeyNode
 from shockgrid.hydro.motion.line import Role
 from shockgrid.hydro.motion.sides import Sides
 from shockgrid.hydro.perimeter.contacts import fill_ghosts_from_faces, flow_along
+from shockgrid.hydro.rim import FLUX, LENGTH, P_STAR, RHO, SWEPT, VOID_P
 from shockgrid.regrid.measure.crossings import GROUP_EDGES, fill_boxes
 from shockgrid.regrid.sides import SIDE_NAMES, find_node, trace_outline
 
@@ -125,22 +125,22 @@ class Surface:
 
     def gather_void_pressure(self) -> np.ndarray:
         """The pressure in the voids beside the line's faces."""
-        return np.ascontiguousarray(self._view(on.VOID_P))
+        return np.ascontiguousarray(self._view(VOID_P))
 
     def gather_swept(self) -> np.ndarray:
         """Volume swept by the line's faces in a second, outwards."""
-        return np.ascontiguousarray(self._view(on.SWEPT))
+        return np.ascontiguousarray(self._view(SWEPT))
 
     def gather_cells(self) -> np.ndarray:
         """The cells beside the line's faces: the rows RHO to LENGTH of the rim."""
-        return self.gather(slice(on.RHO, on.LENGTH + 1))
+        return self.gather(slice(RHO, LENGTH + 1))
 
     def read_states(self, rows: slice, line: np.ndarray) -> None:
         """Take up states from these rows of the rim, their slopes along a line, which is this one
         at some time, and the pressure where it is free."""
         arrays = self.arrays
         arrays.states[: rows.stop - rows.start] = self._view(rows)
-        arrays.open_p[:] = self._view(on.P_STAR)
+        arrays.open_p[:] = self._view(P_STAR)
         fill_slopes.entry(line, arrays)
 
     def put_cover(self, state: int) -> None:
@@ -149,11 +149,11 @@ class Surface:
 
     def read_flux(self) -> None:
         """Take up the flux with which the free surface is filled."""
-        self.arrays.flux[...] = self._view(on.FLUX)
+        self.arrays.flux[...] = self._view(FLUX)
 
     def write_flux(self) -> None:
         """Write the flux back into the rim."""
-        self._view(on.FLUX)[...] = self.arrays.flux
+        self._view(FLUX)[...] = self.arrays.flux
 
     def fill_ghosts(self) -> None:
         """Ghosts beyond the faces from the states there."""
@@ -224,7 +224,7 @@ class Plane:
 
     def gather_cells(self) -> np.ndarray:
         """None: the face is a wall."""
-        return np.zeros((on.LENGTH + 1, 1))
+        return np.zeros((LENGTH + 1, 1))
 
     def read(self) -> None:
         """Begin before the present nodes of the surface that it is under."""

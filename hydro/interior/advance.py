@@ -15,13 +15,11 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from shockgrid.hydro import rim as on
-from shockgrid.hydro import rows as of
 from shockgrid.hydro.eos.base import make_leaving_part
 from shockgrid.hydro.formulas.geometry import PLANE, Geometry
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER, LOW_MACH
 from shockgrid.hydro.formulas.riemann import DEFAULT_FLUX
-from shockgrid.hydro.interior import scratch as at
+from shockgrid.hydro.interior import scratch
 from shockgrid.hydro.interior.axisymmetric import clear_shift_after, make_push, make_source_pressure
 from shockgrid.hydro.interior.faces import (
     find_hll,
@@ -33,6 +31,7 @@ from shockgrid.hydro.interior.faces import (
 )
 from shockgrid.hydro.interior.reconstruction import make_row_phases
 from shockgrid.hydro.interior.scratch import (
+    SCRATCH_SPAN,
     copy_back,
     copy_row,
     copy_rows,
@@ -41,6 +40,20 @@ from shockgrid.hydro.interior.scratch import (
 )
 from shockgrid.hydro.interior.slopes import fill_steps
 from shockgrid.hydro.interior.update import make_update
+from shockgrid.hydro.rim import LENGTH_GHOST, MASS
+from shockgrid.hydro.rows import (
+    EMPTIED,
+    FIRST_ORDER,
+    FLUX_ROWS,
+    LEAST_C2,
+    STATE_ROWS,
+    TOTAL_ENERGY,
+    TOTAL_MASS,
+    TOTAL_MOMENTUM_X,
+    TOTAL_MOMENTUM_Y,
+    TOTAL_ROWS,
+    VOIDED,
+)
 from shockgrid.regrid.jit import Kernel, compiled_once, kernel
 
 TILE_ROWS = 32
@@ -71,33 +84,55 @@ def make_flow_kernels(
     opens_voids = eos_class.opens_voids
     curved = geometry.curved
     measure_after, next_row, reconstruct, _ = make_row_phases(eos_class, limiter, geometry, flux)
-    fill_faces_i = make_faces(geometry.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I)
-    fill_faces_j = make_faces(geometry.face, at.X_HIGH, at.X_LOW, at.AREA_X_J)
+    fill_faces_i = make_faces(geometry.face, scratch.X_HIGH, scratch.X_HIGH + 1, scratch.AREA_X_I)
+    fill_faces_j = make_faces(geometry.face, scratch.X_HIGH, scratch.X_LOW, scratch.AREA_X_J)
     gather_flux = make_update(eos_class, geometry, finishes=False, gathers=True)
     update_rows = make_update(eos_class, geometry, finishes=True, gathers=True)
     fill_new_state = make_update(eos_class, geometry, finishes=True, gathers=False)
     fill_traces_in, fill_traces = make_traces(sound, opens_voids)
-    pressure_i, pressure_j = (at.PRESSURE_I, at.PRESSURE_J) if curved else (0, 0)
-    i_faces = at.RHO_OUT, at.RHO_IN, at.AREA_X_I
-    j_faces = at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J
-    fill_upwind_i = make_upwind(*i_faces, at.TORN_BEFORE, at.ACOUSTIC_BEFORE, low_mach, opens_voids)
-    fill_upwind_j = make_upwind(*j_faces, at.TORN - 1, at.ACOUSTIC - 1, low_mach, opens_voids)
+    pressure_i, pressure_j = (scratch.PRESSURE_I, scratch.PRESSURE_J) if curved else (0, 0)
+    i_faces = scratch.RHO_OUT, scratch.RHO_IN, scratch.AREA_X_I
+    j_faces = scratch.RHO_UP - 1, scratch.RHO_DOWN, scratch.AREA_X_J
+    fill_upwind_i = make_upwind(
+        *i_faces, scratch.TORN_BEFORE, scratch.ACOUSTIC_BEFORE, low_mach, opens_voids
+    )
+    fill_upwind_j = make_upwind(
+        *j_faces, scratch.TORN - 1, scratch.ACOUSTIC - 1, low_mach, opens_voids
+    )
     voids = opens_voids, make_leaving_part(eos_class)
-    fill_flux_i = make_flux(energy, at.AREA_X_I, at.FLUX_I_MASS, pressure_i, *voids)
-    fill_flux_j = make_flux(energy, at.AREA_X_J, at.FLUX_J_MASS, pressure_j, *voids)
+    fill_flux_i = make_flux(energy, scratch.AREA_X_I, scratch.FLUX_I_MASS, pressure_i, *voids)
+    fill_flux_j = make_flux(energy, scratch.AREA_X_J, scratch.FLUX_J_MASS, pressure_j, *voids)
     use_hll_i = make_hll_flux(
-        energy, i_faces, at.HLL_BEFORE, at.TORN_BEFORE, at.FLUX_I_MASS, pressure_i, *voids
+        energy,
+        i_faces,
+        scratch.HLL_BEFORE,
+        scratch.TORN_BEFORE,
+        scratch.FLUX_I_MASS,
+        pressure_i,
+        *voids,
     )
     use_hll_j = make_hll_flux(
-        energy, j_faces, at.HLL - 1, at.TORN - 1, at.FLUX_J_MASS, pressure_j, *voids
+        energy, j_faces, scratch.HLL - 1, scratch.TORN - 1, scratch.FLUX_J_MASS, pressure_j, *voids
     )
     # axisymmetric flow alone
     fill_source_pressure = make_source_pressure(sound)
     fill_push_i = make_push(
-        geometry.split, at.PRESSURE_I, at.FLUX_I_Y, at.X_LOW, at.X_LOW + 1, at.AREA_Y_I, at.PUSH_I
+        geometry.split,
+        scratch.PRESSURE_I,
+        scratch.FLUX_I_Y,
+        scratch.X_LOW,
+        scratch.X_LOW + 1,
+        scratch.AREA_Y_I,
+        scratch.PUSH_I,
     )
     fill_push_j = make_push(
-        geometry.split, at.PRESSURE_J, at.FLUX_J_Y, at.X_HIGH, at.X_LOW, at.AREA_Y_J, at.PUSH_J
+        geometry.split,
+        scratch.PRESSURE_J,
+        scratch.FLUX_J_Y,
+        scratch.X_HIGH,
+        scratch.X_LOW,
+        scratch.AREA_Y_J,
+        scratch.PUSH_J,
     )
 
     @compiled_once(allocates=False)
@@ -109,7 +144,7 @@ def make_flow_kernels(
         inverse_dt = 1.0 / dt if dt > 0.0 else 0.0
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
-        chunks = (nj + at.CHUNK_CELLS - 1) // at.CHUNK_CELLS
+        chunks = (nj + scratch.CHUNK_CELLS - 1) // scratch.CHUNK_CELLS
         row0 = (tile // chunks) * TILE_ROWS
         row1 = min(ni, row0 + TILE_ROWS)
         j0 = (tile % chunks) * nj // chunks
@@ -118,40 +153,40 @@ def make_flow_kernels(
         jb = min(nj, j1 + 1)
         m = jb - ja
         # with the next neighbour, without
-        n = at.count_padded(m)
-        w = at.count_whole(m)
+        n = scratch.count_padded(m)
+        w = scratch.count_whole(m)
         # scratch entry k is column ja + k - 1; node columns from node0 on are there
         node0 = max(0, ja - 1)
         shift = node0 - (ja - 1)
         node_count = min(nj, jb + 1) - node0 + 1
         first = j0 - ja + 1
         last = j1 - ja + 1
-        for k in range(at.SCRATCH_SPAN):
-            Z[at.LEAST_C2 + k] = 1e300
-            Z[at.FIRST_ORDER + k] = 0.0
-            Z[at.SUM_MASS + k] = 0.0
-            Z[at.SUM_X + k] = 0.0
-            Z[at.SUM_Y + k] = 0.0
-            Z[at.SUM_ENERGY + k] = 0.0
-            Z[at.SUM_VOIDED + k] = 0.0
-            Z[at.SUM_EMPTIED + k] = 0.0
+        for k in range(SCRATCH_SPAN):
+            Z[scratch.LEAST_C2 + k] = 1e300
+            Z[scratch.FIRST_ORDER + k] = 0.0
+            Z[scratch.SUM_MASS + k] = 0.0
+            Z[scratch.SUM_X + k] = 0.0
+            Z[scratch.SUM_Y + k] = 0.0
+            Z[scratch.SUM_ENERGY + k] = 0.0
+            Z[scratch.SUM_VOIDED + k] = 0.0
+            Z[scratch.SUM_EMPTIED + k] = 0.0
         row = max(0, row0 - 1)
         # the row before the first one is loaded as the current one, then shifted
         if row > 0:
-            copy_rows(nodes, row - 1, node0, node_count, Z, at.X_HIGH + shift)
-            copy_rows(nodes, row, node0, node_count, Z, at.X_NEXT + shift)
+            copy_rows(nodes, row - 1, node0, node_count, Z, scratch.X_HIGH + shift)
+            copy_rows(nodes, row, node0, node_count, Z, scratch.X_NEXT + shift)
             measure_after(Z, n)
         else:
-            copy_row(rim, on.LENGTH_GHOST, ja, m, Z, at.LENGTH_AFTER + 1)
+            copy_row(rim, LENGTH_GHOST, ja, m, Z, scratch.LENGTH_AFTER + 1)
             if curved:
                 clear_shift_after(Z, n)
-            copy_rows(nodes, 0, node0, node_count, Z, at.X_NEXT + shift)
-        copy_rows(state, row, ja, m + 2, Z, at.RHO_AFTER)
+            copy_rows(nodes, 0, node0, node_count, Z, scratch.X_NEXT + shift)
+        copy_rows(state, row, ja, m + 2, Z, scratch.RHO_AFTER)
         next_row(Z, n)
-        copy_rows(nodes_new, row, node0, node_count, Z, at.X_HIGH_NEW + shift)
-        copy_rows(nodes, row + 1, node0, node_count, Z, at.X_NEXT + shift)
+        copy_rows(nodes_new, row, node0, node_count, Z, scratch.X_HIGH_NEW + shift)
+        copy_rows(nodes, row + 1, node0, node_count, Z, scratch.X_NEXT + shift)
         measure_after(Z, n)
-        copy_rows(state, row + 1, ja, m + 2, Z, at.RHO_AFTER)
+        copy_rows(state, row + 1, ja, m + 2, Z, scratch.RHO_AFTER)
         fill_steps(Z, w)
         fill_faces_i(Z, w, inverse_dt)
         next_row(Z, n)
@@ -164,17 +199,17 @@ def make_flow_kernels(
             inside = row0 <= row < row1
             counted = 1.0 if inside else 0.0
             if row < ni:
-                copy_rows(nodes_new, row + 1, node0, node_count, Z, at.X_HIGH_NEW + shift)
-                copy_rows(state, row + 2, ja, m + 2, Z, at.RHO_AFTER)
+                copy_rows(nodes_new, row + 1, node0, node_count, Z, scratch.X_HIGH_NEW + shift)
+                copy_rows(state, row + 2, ja, m + 2, Z, scratch.RHO_AFTER)
                 if row + 1 < ni:
-                    copy_rows(nodes, row + 2, node0, node_count, Z, at.X_NEXT + shift)
+                    copy_rows(nodes, row + 2, node0, node_count, Z, scratch.X_NEXT + shift)
                     measure_after(Z, n)
                 else:
-                    copy_row(rim, on.LENGTH_GHOST, nj + ja, m, Z, at.LENGTH_AFTER + 1)
+                    copy_row(rim, LENGTH_GHOST, nj + ja, m, Z, scratch.LENGTH_AFTER + 1)
                     if curved:
                         clear_shift_after(Z, n)
                 if opens_voids:
-                    copy_row(void_energy, row, ja, m, Z, at.VOID_LOADED + 1)
+                    copy_row(void_energy, row, ja, m, Z, scratch.VOID_LOADED + 1)
                 # prefetch what the next row reads and where this one's results are written
                 prefetch_rows(state, min(row + 3, ni + 1), ja, m + 2)
                 prefetch_rows(nodes, min(row + 3, ni), node0, node_count)
@@ -185,8 +220,8 @@ def make_flow_kernels(
                 if opens_voids:
                     prefetch_row(void_energy, min(row + 1, ni - 1), ja, m)
                     prefetch_row(void_energy_new, max(row - 1, 0), j0, j1 - j0)
-                length_below = rim[on.LENGTH_GHOST, 2 * nj + row] if ja == 0 else -1.0
-                length_above = rim[on.LENGTH_GHOST, 2 * nj + ni + row] if jb == nj else -1.0
+                length_below = rim[LENGTH_GHOST, 2 * nj + row] if ja == 0 else -1.0
+                length_above = rim[LENGTH_GHOST, 2 * nj + ni + row] if jb == nj else -1.0
                 reconstruct(Z, m, n, length_below, length_above, 0.5 * dt, parameters)
                 first_hll_before = first_hll
                 last_hll_before = last_hll
@@ -196,13 +231,18 @@ def make_flow_kernels(
                 if row >= row0:
                     fill_traces_in(Z, w, counted, parameters)
             if row == 0:
-                for q in range(of.FLUX_ROWS):
+                for q in range(FLUX_ROWS):
                     for k in range(m):  # fluxes of a rim are outward
-                        Z[at.FLUX_I_MASS + q * at.SCRATCH_SPAN + 1 + k] = -rim[on.MASS + q, ja + k]
+                        Z[scratch.FLUX_I_MASS + q * SCRATCH_SPAN + 1 + k] = -rim[MASS + q, ja + k]
             elif row == ni:
-                for q in range(of.FLUX_ROWS):
+                for q in range(FLUX_ROWS):
                     copy_row(
-                        rim, on.MASS + q, nj + ja, m, Z, at.FLUX_I_MASS + q * at.SCRATCH_SPAN + 1
+                        rim,
+                        MASS + q,
+                        nj + ja,
+                        m,
+                        Z,
+                        scratch.FLUX_I_MASS + q * SCRATCH_SPAN + 1,
                     )
             elif row >= row0:
                 fill_upwind_i(Z, w)
@@ -214,7 +254,7 @@ def make_flow_kernels(
                 if curved:
                     fill_push_i(Z, n)
             if keeps_masses and row >= row0:
-                copy_back(Z, at.FLUX_I_MASS + first, j1 - j0, mass_i, row, j0)
+                copy_back(Z, scratch.FLUX_I_MASS + first, j1 - j0, mass_i, row, j0)
             if row < row1:
                 # the faces towards +i replace those towards -i, whose fluxes are known
                 fill_faces_i(Z, w, inverse_dt)
@@ -228,16 +268,16 @@ def make_flow_kernels(
                 if curved:
                     fill_push_j(Z, n)
                 if j0 == 0:
-                    for q in range(of.FLUX_ROWS):
-                        Z[at.FLUX_J_MASS + q * at.SCRATCH_SPAN + first] = -rim[
-                            on.MASS + q, 2 * nj + row
+                    for q in range(FLUX_ROWS):
+                        Z[scratch.FLUX_J_MASS + q * SCRATCH_SPAN + first] = -rim[
+                            MASS + q, 2 * nj + row
                         ]
                 if j1 == nj:
-                    for q in range(of.FLUX_ROWS):
-                        out = rim[on.MASS + q, 2 * nj + ni + row]
-                        Z[at.FLUX_J_MASS + q * at.SCRATCH_SPAN + last] = out
+                    for q in range(FLUX_ROWS):
+                        out = rim[MASS + q, 2 * nj + ni + row]
+                        Z[scratch.FLUX_J_MASS + q * SCRATCH_SPAN + last] = out
                 if keeps_masses:
-                    copy_back(Z, at.FLUX_J_MASS + first, j1 - j0 + 1, mass_j, row, j0)
+                    copy_back(Z, scratch.FLUX_J_MASS + first, j1 - j0 + 1, mass_j, row, j0)
             if inside and row > row0:
                 update_rows(Z, w, dt, inverse_dt, parameters)
             elif inside:
@@ -245,32 +285,32 @@ def make_flow_kernels(
             elif row > row0:
                 fill_new_state(Z, w, dt, inverse_dt, parameters)
             if row > row0:
-                for q in range(of.STATE_ROWS):
-                    new = at.RHO_NEW + q * at.SCRATCH_SPAN + first
+                for q in range(STATE_ROWS):
+                    new = scratch.RHO_NEW + q * SCRATCH_SPAN + first
                     copy_back(Z, new, j1 - j0, state_new[q], row, j0 + 1)
                 if opens_voids:
-                    copy_back(Z, at.VOID_NEW + first, j1 - j0, void_energy_new, row - 1, j0)
-                copy_back(Z, at.RATE_NEW + first, j1 - j0, rates_new, row - 1, j0)
-                copy_back(Z, at.CROWDING_NEW + first, j1 - j0, crowding_new, row - 1, j0)
+                    copy_back(Z, scratch.VOID_NEW + first, j1 - j0, void_energy_new, row - 1, j0)
+                copy_back(Z, scratch.RATE_NEW + first, j1 - j0, rates_new, row - 1, j0)
+                copy_back(Z, scratch.CROWDING_NEW + first, j1 - j0, crowding_new, row - 1, j0)
             next_row(Z, n)
             row += 1
         least = 1e300
-        for q in range(of.TOTAL_ROWS):
+        for q in range(TOTAL_ROWS):
             tile_totals[tile, q] = 0.0
         for k in range(first, last):
-            c2 = Z[at.LEAST_C2 + k]
+            c2 = Z[scratch.LEAST_C2 + k]
             least = least if least < c2 else c2
-            tile_totals[tile, of.FIRST_ORDER] += Z[at.FIRST_ORDER + k]
-            tile_totals[tile, of.TOTAL_MASS] += Z[at.SUM_MASS + k]
-            tile_totals[tile, of.TOTAL_MOMENTUM_X] += Z[at.SUM_X + k]
-            tile_totals[tile, of.TOTAL_MOMENTUM_Y] += Z[at.SUM_Y + k]
-            tile_totals[tile, of.TOTAL_ENERGY] += Z[at.SUM_ENERGY + k]
-            tile_totals[tile, of.VOIDED] += Z[at.SUM_VOIDED + k]
-            tile_totals[tile, of.EMPTIED] += Z[at.SUM_EMPTIED + k]
-        tile_totals[tile, of.LEAST_C2] = least
+            tile_totals[tile, FIRST_ORDER] += Z[scratch.FIRST_ORDER + k]
+            tile_totals[tile, TOTAL_MASS] += Z[scratch.SUM_MASS + k]
+            tile_totals[tile, TOTAL_MOMENTUM_X] += Z[scratch.SUM_X + k]
+            tile_totals[tile, TOTAL_MOMENTUM_Y] += Z[scratch.SUM_Y + k]
+            tile_totals[tile, TOTAL_ENERGY] += Z[scratch.SUM_ENERGY + k]
+            tile_totals[tile, VOIDED] += Z[scratch.SUM_VOIDED + k]
+            tile_totals[tile, EMPTIED] += Z[scratch.SUM_EMPTIED + k]
+        tile_totals[tile, LEAST_C2] = least
 
     @kernel(allocates=False)
-    def advance(old, new, rim, dt, parameters, scratch, tiles, tile_totals):
+    def advance(old, new, rim, dt, parameters, scratches, tiles, tile_totals):
         """Advance the tiles tiles[0]..tiles[1] - 1 of a block by one step.
 
         old: state (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells; void energy (ni,
@@ -278,28 +318,28 @@ def make_flow_kernels(
         nodes (2, ni + 1, nj + 1).  new: the same three, of which the first two are written, the
         rates and crowding (ni, nj) of the new cells, theory F7.1, F7.3, and the rates of mass
         through faces, (ni + 1, nj) and (ni, nj + 1), (1, 1) where nobody asks for them.  rim: rows
-        of `hydro.rim` with the fluxes through the sides and the lengths of the ghosts; scratch
+        of `hydro.rim` with the fluxes through the sides and the lengths of the ghosts; scratches
         (threads, SIZE); tile_totals (tiles, 8): columns as in `hydro.rows`.
         """
         for tile in range(tiles[0], tiles[1]):
-            advance_tile(old, new, rim, dt, parameters, tile, scratch[0], tile_totals)
+            advance_tile(old, new, rim, dt, parameters, tile, scratches[0], tile_totals)
 
     @kernel(parallel=True)
-    def advance_threaded(old, new, rim, dt, parameters, scratch, tiles, tile_totals):
+    def advance_threaded(old, new, rim, dt, parameters, scratches, tiles, tile_totals):
         """`advance` with the tiles distributed over threads."""
-        threads = scratch.shape[0]
+        threads = scratches.shape[0]
         for thread in numba.prange(threads):
             for tile in range(tiles[0] + thread, tiles[1], threads):
-                advance_tile(old, new, rim, dt, parameters, tile, scratch[thread], tile_totals)
+                advance_tile(old, new, rim, dt, parameters, tile, scratches[thread], tile_totals)
 
     return FlowKernels(advance, advance_threaded)
 
 
 def count_tiles(ni: int, nj: int) -> int:
     """Number of tiles of a block of ni × nj cells, or before row ni of a larger one."""
-    return -(-ni // TILE_ROWS) * -(-nj // at.CHUNK_CELLS)
+    return -(-ni // TILE_ROWS) * -(-nj // scratch.CHUNK_CELLS)
 
 
 def allocate_scratch(threads: int) -> np.ndarray:
     """Scratch of `threads` threads, (threads, SIZE)."""
-    return at.allocate(threads)
+    return scratch.allocate(threads)

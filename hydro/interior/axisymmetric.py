@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from shockgrid.hydro.formulas.geometry import compute_centre_offset, lean_lines
 from shockgrid.hydro.formulas.reconstruction import compute_line_geometry
-from shockgrid.hydro.interior import scratch as at
+from shockgrid.hydro.interior import scratch
+from shockgrid.hydro.interior.scratch import SCRATCH_SPAN
 from shockgrid.regrid.jit import compiled_once, inlined
 
 # jumps of the pressure over rho c² between neighbours, up to which flow is smooth, and from which
@@ -22,7 +23,7 @@ STRONG_JUMP = 1.5
 def clear_shift_after(Z, n):
     """The cells after the row are ghosts: their lengths say where their centres are."""
     for k in range(1, n + 1):
-        Z[at.SHIFT_AFTER + k] = 0.0
+        Z[scratch.SHIFT_AFTER + k] = 0.0
 
 
 @inlined
@@ -42,7 +43,7 @@ def fill_shift_after(Z, n):
     By x and y, and along both lines; entry 0, the cell before the first one, included.
     """
     for k in range(n + 1):
-        a, b, c, d = at.load_corners(Z, at.HIGH, at.NEXT, k)
+        a, b, c, d = scratch.load_corners(Z, scratch.HIGH, scratch.NEXT, k)
         mid_i, mid_j, _ = compute_line_geometry(a, b, c, d)
         mid_i_x, mid_i_y = mid_i
         mid_j_x, mid_j_y = mid_j
@@ -50,41 +51,41 @@ def fill_shift_after(Z, n):
         x, y = compute_centre_offset(mid_i, mid_j, twist, middle)
         length_i = (mid_i_x * mid_i_x + mid_i_y * mid_i_y) ** 0.5
         length_j = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
-        Z[at.OFFSET_X_AFTER + k] = x
-        Z[at.OFFSET_Y_AFTER + k] = y
-        Z[at.SHIFT_AFTER + k] = (x * mid_i_x + y * mid_i_y) / length_i
-        Z[at.SHIFT_J_AFTER + k] = (x * mid_j_x + y * mid_j_y) / length_j
+        Z[scratch.OFFSET_X_AFTER + k] = x
+        Z[scratch.OFFSET_Y_AFTER + k] = y
+        Z[scratch.SHIFT_AFTER + k] = (x * mid_i_x + y * mid_i_y) / length_i
+        Z[scratch.SHIFT_J_AFTER + k] = (x * mid_j_x + y * mid_j_y) / length_j
 
 
 @compiled_once(allocates=False)
 def move_shifts(Z, n):
     """Make what `fill_shift_after` has found current."""
-    for k in range(1 - at.VECTOR_LANES, n + 1 + at.VECTOR_LANES):
-        Z[at.SHIFT_BEFORE + k] = Z[at.SHIFT + k]
-        Z[at.SHIFT + k] = Z[at.SHIFT_AFTER + k]
-        Z[at.SHIFT_J + k] = Z[at.SHIFT_J_AFTER + k]
-        Z[at.OFFSET_X + k] = Z[at.OFFSET_X_AFTER + k]
-        Z[at.OFFSET_Y + k] = Z[at.OFFSET_Y_AFTER + k]
+    for k in range(1 - scratch.VECTOR_LANES, n + 1 + scratch.VECTOR_LANES):
+        Z[scratch.SHIFT_BEFORE + k] = Z[scratch.SHIFT + k]
+        Z[scratch.SHIFT + k] = Z[scratch.SHIFT_AFTER + k]
+        Z[scratch.SHIFT_J + k] = Z[scratch.SHIFT_J_AFTER + k]
+        Z[scratch.OFFSET_X + k] = Z[scratch.OFFSET_X_AFTER + k]
+        Z[scratch.OFFSET_Y + k] = Z[scratch.OFFSET_Y_AFTER + k]
 
 
 @inlined
 def compute_plane_area_y(Z, a, b):
     """Radial normal per depth of a face at mid-time; places of x of its nodes, new ones follow."""
-    return 0.5 * ((Z[a] - Z[b]) + (Z[a + 2 * at.SCRATCH_SPAN] - Z[b + 2 * at.SCRATCH_SPAN]))
+    return 0.5 * ((Z[a] - Z[b]) + (Z[a + 2 * SCRATCH_SPAN] - Z[b + 2 * SCRATCH_SPAN]))
 
 
 @compiled_once(allocates=False)
 def fill_lines(Z, n):
     """Lines through the centres of volume, and 1/area between them."""
     for k in range(1, n + 1):
-        a, b, c, d = at.load_corners(Z, at.LOW, at.HIGH, k)
-        mid_i = Z[at.MI_X + k], Z[at.MI_Y + k]
-        mid_j = Z[at.MJ_X + k], Z[at.MJ_Y + k]
+        a, b, c, d = scratch.load_corners(Z, scratch.LOW, scratch.HIGH, k)
+        mid_i = Z[scratch.MI_X + k], Z[scratch.MI_Y + k]
+        mid_j = Z[scratch.MJ_X + k], Z[scratch.MJ_Y + k]
         twist, middle = find_even_twist(a, b, c, d)
         line_i, line_j = lean_lines(mid_i, mid_j, twist, middle)
-        at.store_vector(Z, at.LEAN_I, k, line_i)
-        at.store_vector(Z, at.LEAN_J, k, line_j)
-        Z[at.LEAN_INVERSE + k] = 1.0 / (line_i[0] * line_j[1] - line_i[1] * line_j[0])
+        scratch.store_vector(Z, scratch.LEAN_I, k, line_i)
+        scratch.store_vector(Z, scratch.LEAN_J, k, line_j)
+        Z[scratch.LEAN_INVERSE + k] = 1.0 / (line_i[0] * line_j[1] - line_i[1] * line_j[0])
 
 
 def make_push(split, pressure, flux, node_a, node_b, area, push):
@@ -103,7 +104,7 @@ def make_push(split, pressure, flux, node_a, node_b, area, push):
             momentum_y, force, hoop = split(Z[flux + k], Z[pressure + k], Z[area + k], plane_area_y)
             Z[flux + k] = momentum_y
             Z[push + k] = force
-            Z[push + at.SCRATCH_SPAN + k] = hoop
+            Z[push + SCRATCH_SPAN + k] = hoop
 
     return fill_push
 
@@ -115,18 +116,20 @@ def fill_smooth(Z, n):
     Between the row before and after; to be called before the gradients, which take the steps.
     """
     for k in range(1, n + 1):
-        p = Z[at.P + k]
-        a = abs(Z[at.P + k - 1] - p)
-        b = abs(Z[at.P + k + 1] - p)
-        c = abs(Z[at.P_STEP + k])
-        d = abs(Z[at.P_AFTER + k] - p)
+        p = Z[scratch.P + k]
+        a = abs(Z[scratch.P + k - 1] - p)
+        b = abs(Z[scratch.P + k + 1] - p)
+        c = abs(Z[scratch.P_STEP + k])
+        d = abs(Z[scratch.P_AFTER + k] - p)
         a = a if a > b else b
         c = c if c > d else d
         a = a if a > c else c
-        jump = (a / (Z[at.RHO + k] * Z[at.C2 + k]) - SMOOTH_JUMP) / (STRONG_JUMP - SMOOTH_JUMP)
+        jump = (a / (Z[scratch.RHO + k] * Z[scratch.C2 + k]) - SMOOTH_JUMP) / (
+            STRONG_JUMP - SMOOTH_JUMP
+        )
         jump = jump if jump > 0.0 else 0.0
         jump = jump if jump < 1.0 else 1.0
-        Z[at.SMOOTH + k] = (1.0 - jump) * (1.0 - jump) * (1.0 + 2.0 * jump)
+        Z[scratch.SMOOTH + k] = (1.0 - jump) * (1.0 - jump) * (1.0 + 2.0 * jump)
 
 
 @inlined
@@ -149,14 +152,18 @@ def make_source_pressure(sound_speed_squared_part):
         pressure that is traced to both radial faces.
         """
         for k in range(1, n + 1):
-            x = find_mean(Z, (at.X_LOW, at.X_HIGH, at.X_LOW_NEW, at.X_HIGH_NEW), k)
-            y = find_mean(Z, (at.Y_LOW, at.Y_HIGH, at.Y_LOW_NEW, at.Y_HIGH_NEW), k)
-            dx = x - Z[at.X_CENTRE + k]
-            dy = y - Z[at.Y_CENTRE + k]
-            rho = Z[at.RHO_HALF + k] + (Z[at.RHO_X + k] * dx + Z[at.RHO_Y + k] * dy)
-            p = Z[at.P_HALF + k] + (Z[at.P_X + k] * dx + Z[at.P_Y + k] * dy)
+            x = find_mean(
+                Z, (scratch.X_LOW, scratch.X_HIGH, scratch.X_LOW_NEW, scratch.X_HIGH_NEW), k
+            )
+            y = find_mean(
+                Z, (scratch.Y_LOW, scratch.Y_HIGH, scratch.Y_LOW_NEW, scratch.Y_HIGH_NEW), k
+            )
+            dx = x - Z[scratch.X_CENTRE + k]
+            dy = y - Z[scratch.Y_CENTRE + k]
+            rho = Z[scratch.RHO_HALF + k] + (Z[scratch.RHO_X + k] * dx + Z[scratch.RHO_Y + k] * dy)
+            p = Z[scratch.P_HALF + k] + (Z[scratch.P_X + k] * dx + Z[scratch.P_Y + k] * dy)
             c2 = sound_speed_squared_part(rho, p, parameters)
-            own = Z[at.P + k]
-            Z[at.SOURCE_P + k] = p if (rho > 0.0) & (c2 > 0.0) else own
+            own = Z[scratch.P + k]
+            Z[scratch.SOURCE_P + k] = p if (rho > 0.0) & (c2 > 0.0) else own
 
     return fill_source_pressure

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from shockgrid.hydro.formulas import riemann
 from shockgrid.hydro.formulas.reconstruction import WHOLE_CELL_MARK, choose_own, compute_face_state
-from shockgrid.hydro.interior import scratch as at
+from shockgrid.hydro.interior import scratch
+from shockgrid.hydro.interior.scratch import SCRATCH_SPAN
 from shockgrid.regrid.jit import compiled_once, inlined
 
 
@@ -27,16 +28,22 @@ def make_faces(compute_face, node_a, node_b, target):
     def fill_faces(Z, n, inverse_dt):
         """Faces at mid-time (theory F3.1)."""
         for k in range(1, n + 1):
-            a = Z[node_a + k], Z[node_a + at.SCRATCH_SPAN + k]
-            b = Z[node_b + k], Z[node_b + at.SCRATCH_SPAN + k]
-            a_new = Z[node_a + 2 * at.SCRATCH_SPAN + k], Z[node_a + 3 * at.SCRATCH_SPAN + k]
-            b_new = Z[node_b + 2 * at.SCRATCH_SPAN + k], Z[node_b + 3 * at.SCRATCH_SPAN + k]
+            a = Z[node_a + k], Z[node_a + SCRATCH_SPAN + k]
+            b = Z[node_b + k], Z[node_b + SCRATCH_SPAN + k]
+            a_new = (
+                Z[node_a + 2 * SCRATCH_SPAN + k],
+                Z[node_a + 3 * SCRATCH_SPAN + k],
+            )
+            b_new = (
+                Z[node_b + 2 * SCRATCH_SPAN + k],
+                Z[node_b + 3 * SCRATCH_SPAN + k],
+            )
             area_x, area_y, sweep, x, y = compute_face(a, b, a_new, b_new, inverse_dt)
             Z[target + k] = area_x
-            Z[target + at.SCRATCH_SPAN + k] = area_y
-            Z[target + 2 * at.SCRATCH_SPAN + k] = sweep
-            Z[target + 3 * at.SCRATCH_SPAN + k] = x
-            Z[target + 4 * at.SCRATCH_SPAN + k] = y
+            Z[target + SCRATCH_SPAN + k] = area_y
+            Z[target + 2 * SCRATCH_SPAN + k] = sweep
+            Z[target + 3 * SCRATCH_SPAN + k] = x
+            Z[target + 4 * SCRATCH_SPAN + k] = y
 
     return fill_faces
 
@@ -70,16 +77,33 @@ def make_traces(sound_speed_squared_part, opens_voids):
     def load(Z, k):
         """What is traced: predicted state, gradients, own state and c², whether torn, centre."""
         return (
-            (Z[at.RHO_HALF + k], Z[at.U_HALF + k], Z[at.V_HALF + k], Z[at.P_HALF + k]),
             (
-                Z[at.RHO_X + k], Z[at.RHO_Y + k], Z[at.U_X + k], Z[at.U_Y + k],
-                Z[at.V_X + k], Z[at.V_Y + k], Z[at.P_X + k], Z[at.P_Y + k],
+                Z[scratch.RHO_HALF + k],
+                Z[scratch.U_HALF + k],
+                Z[scratch.V_HALF + k],
+                Z[scratch.P_HALF + k],
             ),
-            (Z[at.RHO + k], Z[at.U + k], Z[at.V + k], Z[at.P + k], Z[at.C2 + k]),
-            Z[at.TORN + k] if opens_voids else WHOLE_CELL_MARK,
-            Z[at.X_CENTRE + k],
-            Z[at.Y_CENTRE + k],
-        )  # fmt: skip
+            (
+                Z[scratch.RHO_X + k],
+                Z[scratch.RHO_Y + k],
+                Z[scratch.U_X + k],
+                Z[scratch.U_Y + k],
+                Z[scratch.V_X + k],
+                Z[scratch.V_Y + k],
+                Z[scratch.P_X + k],
+                Z[scratch.P_Y + k],
+            ),
+            (
+                Z[scratch.RHO + k],
+                Z[scratch.U + k],
+                Z[scratch.V + k],
+                Z[scratch.P + k],
+                Z[scratch.C2 + k],
+            ),
+            Z[scratch.TORN + k] if opens_voids else WHOLE_CELL_MARK,
+            Z[scratch.X_CENTRE + k],
+            Z[scratch.Y_CENTRE + k],
+        )
 
     @inlined
     def put(Z, rows, k, traced):
@@ -93,25 +117,25 @@ def make_traces(sound_speed_squared_part, opens_voids):
         """Traces towards -i; `counted`: 1 where the row is the tile's (fallbacks count), else 0."""
         for k in range(1, n + 1):
             half, gradients, own, torn, x, y = load(Z, k)
-            dx, dy = Z[at.X_I + k] - x, Z[at.Y_I + k] - y
-            missed = put(Z, at.IN, k, trace(half, gradients, own, torn, dx, dy, parameters))
-            Z[at.FIRST_ORDER + k] += counted * missed
+            dx, dy = Z[scratch.X_I + k] - x, Z[scratch.Y_I + k] - y
+            missed = put(Z, scratch.IN, k, trace(half, gradients, own, torn, dx, dy, parameters))
+            Z[scratch.FIRST_ORDER + k] += counted * missed
 
     @compiled_once(allocates=False)
     def fill_traces(Z, n, counted, parameters):
         """Traces towards +i, -j and +j; the faces towards +i must have taken their place."""
         for k in range(1, n + 1):
             half, gradients, own, torn, x, y = load(Z, k)
-            dx, dy = Z[at.X_I + k] - x, Z[at.Y_I + k] - y
-            down_dx, down_dy = Z[at.X_J + k] - x, Z[at.Y_J + k] - y
-            up_dx, up_dy = Z[at.X_J + k + 1] - x, Z[at.Y_J + k + 1] - y
+            dx, dy = Z[scratch.X_I + k] - x, Z[scratch.Y_I + k] - y
+            down_dx, down_dy = Z[scratch.X_J + k] - x, Z[scratch.Y_J + k] - y
+            up_dx, up_dy = Z[scratch.X_J + k + 1] - x, Z[scratch.Y_J + k + 1] - y
             out = trace(half, gradients, own, torn, dx, dy, parameters)
-            missed = put(Z, at.OUT, k, out)
+            missed = put(Z, scratch.OUT, k, out)
             down = trace(half, gradients, own, torn, down_dx, down_dy, parameters)
-            missed += put(Z, at.DOWN, k, down)
+            missed += put(Z, scratch.DOWN, k, down)
             up = trace(half, gradients, own, torn, up_dx, up_dy, parameters)
-            missed += put(Z, at.UP, k, up)
-            Z[at.FIRST_ORDER + k] += counted * missed
+            missed += put(Z, scratch.UP, k, up)
+            Z[scratch.FIRST_ORDER + k] += counted * missed
 
     return fill_traces_in, fill_traces
 
@@ -129,28 +153,28 @@ def make_upwind(left, right, face, torn, acoustic_weight, low_mach, opens_voids)
         """State and wave on the face's side of the contact, and what the contact's speed is."""
         for k in range(1, n + 1):
             rho_l = Z[left + k]
-            u_l = Z[left + at.SCRATCH_SPAN + k]
-            v_l = Z[left + 2 * at.SCRATCH_SPAN + k]
-            p_l = Z[left + 3 * at.SCRATCH_SPAN + k]
+            u_l = Z[left + SCRATCH_SPAN + k]
+            v_l = Z[left + 2 * SCRATCH_SPAN + k]
+            p_l = Z[left + 3 * SCRATCH_SPAN + k]
             rho_r = Z[right + k]
-            u_r = Z[right + at.SCRATCH_SPAN + k]
-            v_r = Z[right + 2 * at.SCRATCH_SPAN + k]
-            p_r = Z[right + 3 * at.SCRATCH_SPAN + k]
+            u_r = Z[right + SCRATCH_SPAN + k]
+            v_r = Z[right + 2 * SCRATCH_SPAN + k]
+            p_r = Z[right + 3 * SCRATCH_SPAN + k]
             area_x = Z[face + k]
-            area_y = Z[face + at.SCRATCH_SPAN + k]
+            area_y = Z[face + SCRATCH_SPAN + k]
             square = area_x * area_x + area_y * area_y
             w_l, w_r = riemann.compute_normal_speeds(
-                u_l, v_l, u_r, v_r, area_x, area_y, Z[face + 2 * at.SCRATCH_SPAN + k]
+                u_l, v_l, u_r, v_r, area_x, area_y, Z[face + 2 * SCRATCH_SPAN + k]
             )
             if low_mach:
                 part_l = Z[acoustic_weight + k]
-                part_r = Z[at.ACOUSTIC + k]
+                part_r = Z[scratch.ACOUSTIC + k]
                 w_l, w_r = riemann.reduce_jump(w_l, w_r, part_l if part_l > part_r else part_r)
             s_l, s_r = riemann.compute_waves(
                 w_l,
-                Z[left + 4 * at.SCRATCH_SPAN + k],
+                Z[left + 4 * SCRATCH_SPAN + k],
                 w_r,
-                Z[right + 4 * at.SCRATCH_SPAN + k],
+                Z[right + 4 * SCRATCH_SPAN + k],
                 square,
             )
             push, drag, flow_l, flow_r = riemann.compute_contact_speed(
@@ -159,21 +183,21 @@ def make_upwind(left, right, face, torn, acoustic_weight, low_mach, opens_voids)
             left_side = push <= 0.0
             s_l_cut = s_l if s_l < 0.0 else 0.0
             s_r_cut = s_r if s_r > 0.0 else 0.0
-            Z[at.RHO_SIDE + k] = rho_l if left_side else rho_r
-            Z[at.U_SIDE + k] = u_l if left_side else u_r
-            Z[at.V_SIDE + k] = v_l if left_side else v_r
-            Z[at.P_SIDE + k] = p_l if left_side else p_r
+            Z[scratch.RHO_SIDE + k] = rho_l if left_side else rho_r
+            Z[scratch.U_SIDE + k] = u_l if left_side else u_r
+            Z[scratch.V_SIDE + k] = v_l if left_side else v_r
+            Z[scratch.P_SIDE + k] = p_l if left_side else p_r
             if opens_voids:
                 # chosen by weight: a choice between two loads would not be vectorised
                 part = 1.0 if left_side else 0.0
-                Z[at.TORN_SIDE + k] = part * Z[torn + k] + (1.0 - part) * Z[at.TORN + k]
-            Z[at.W_SIDE + k] = w_l if left_side else w_r
-            Z[at.FLOW_SIDE + k] = flow_l if left_side else flow_r
-            Z[at.S_SIDE + k] = s_l if left_side else s_r
-            Z[at.S_CUT + k] = s_l_cut if left_side else s_r_cut
-            Z[at.PUSH + k] = push
-            Z[at.DRAG + k] = drag
-            Z[at.SQUARE + k] = square
+                Z[scratch.TORN_SIDE + k] = part * Z[torn + k] + (1.0 - part) * Z[scratch.TORN + k]
+            Z[scratch.W_SIDE + k] = w_l if left_side else w_r
+            Z[scratch.FLOW_SIDE + k] = flow_l if left_side else flow_r
+            Z[scratch.S_SIDE + k] = s_l if left_side else s_r
+            Z[scratch.S_CUT + k] = s_l_cut if left_side else s_r_cut
+            Z[scratch.PUSH + k] = push
+            Z[scratch.DRAG + k] = drag
+            Z[scratch.SQUARE + k] = square
 
     return fill_upwind
 
@@ -183,15 +207,15 @@ def find_hll(Z, m):
     """First and last cell of this row whose HLL switch is on; (m + 1, 0) where none is."""
     switched = 0
     for k in range(1, m + 1):
-        switched += 1 if Z[at.HLL + k] > 0.0 else 0
+        switched += 1 if Z[scratch.HLL + k] > 0.0 else 0
     first = m + 1
     last = 0
     if switched > 0:
         first = 1
         last = m
-        while Z[at.HLL + first] <= 0.0:
+        while Z[scratch.HLL + first] <= 0.0:
             first += 1
-        while Z[at.HLL + last] <= 0.0:
+        while Z[scratch.HLL + last] <= 0.0:
             last -= 1
     return first, last
 
@@ -210,31 +234,40 @@ def make_flux(energy_part, face, target, pressure_row, opens_voids, find_leaving
         """Fluxes of mass, momentum and energy per time, from `fill_upwind`."""
         for k in range(1, n + 1):
             # the upwind side of the contact, with the energy of a torn cell
-            rho = Z[at.RHO_SIDE + k]
-            p = Z[at.P_SIDE + k]
+            rho = Z[scratch.RHO_SIDE + k]
+            p = Z[scratch.P_SIDE + k]
             e = energy_part(rho, p, parameters)
             if opens_voids:
-                e = choose_own(e, Z[at.TORN_SIDE + k], Z[at.TORN_SIDE + k])
+                e = choose_own(e, Z[scratch.TORN_SIDE + k], Z[scratch.TORN_SIDE + k])
             wave = (
-                Z[at.W_SIDE + k], Z[at.FLOW_SIDE + k], Z[at.S_SIDE + k], Z[at.S_CUT + k],
-                Z[at.PUSH + k], Z[at.DRAG + k], Z[at.SQUARE + k],
-            )  # fmt: skip
-            u = Z[at.U_SIDE + k]
-            v = Z[at.V_SIDE + k]
+                Z[scratch.W_SIDE + k],
+                Z[scratch.FLOW_SIDE + k],
+                Z[scratch.S_SIDE + k],
+                Z[scratch.S_CUT + k],
+                Z[scratch.PUSH + k],
+                Z[scratch.DRAG + k],
+                Z[scratch.SQUARE + k],
+            )
+            u = Z[scratch.U_SIDE + k]
+            v = Z[scratch.V_SIDE + k]
             # its flux plus its wave's (theory F3.9), of gases held back in part (F4.12)
             flux = riemann.compute_star_flux(
                 (rho, u, v, p, e),
                 wave,
-                (Z[face + k], Z[face + at.SCRATCH_SPAN + k], Z[face + 2 * at.SCRATCH_SPAN + k]),
+                (
+                    Z[face + k],
+                    Z[face + SCRATCH_SPAN + k],
+                    Z[face + 2 * SCRATCH_SPAN + k],
+                ),
             )
             if withholds:
                 flux = riemann.withhold(flux, (u, v, e), find_leaving_part(rho, parameters))
             # kept for the update
             mass, momentum_x, momentum_y, energy, pressure = flux
             Z[target + k] = mass
-            Z[target + at.SCRATCH_SPAN + k] = momentum_x
-            Z[target + 2 * at.SCRATCH_SPAN + k] = momentum_y
-            Z[target + 3 * at.SCRATCH_SPAN + k] = energy
+            Z[target + SCRATCH_SPAN + k] = momentum_x
+            Z[target + 2 * SCRATCH_SPAN + k] = momentum_y
+            Z[target + 3 * SCRATCH_SPAN + k] = energy
             if pressure_row:
                 Z[pressure_row + k] = pressure
 
@@ -257,28 +290,32 @@ def make_hll_flux(
     @compiled_once(allocates=False)
     def use_hll(row, first, last, parameters):
         """HLL where one of the two cells needs it, at the faces first..last, in whole vectors."""
-        start = (first - 1) // at.VECTOR_LANES * at.VECTOR_LANES
+        start = (first - 1) // scratch.VECTOR_LANES * scratch.VECTOR_LANES
         Z = row[start:]  # loops that begin at a number which they do not know are not vectorised
-        for k in range(1, at.count_padded(last - start - 1) + 1):
+        for k in range(1, scratch.count_padded(last - start - 1) + 1):
             # states on both sides of the face, with the energy of torn cells
             rho_l = Z[left + k]
-            p_l = Z[left + 3 * at.SCRATCH_SPAN + k]
+            p_l = Z[left + 3 * SCRATCH_SPAN + k]
             rho_r = Z[right + k]
-            p_r = Z[right + 3 * at.SCRATCH_SPAN + k]
+            p_r = Z[right + 3 * SCRATCH_SPAN + k]
             e_l = energy_part(rho_l, p_l, parameters)
             e_r = energy_part(rho_r, p_r, parameters)
             if opens_voids:
                 e_l = choose_own(e_l, Z[torn + k], Z[torn + k])
-                e_r = choose_own(e_r, Z[at.TORN + k], Z[at.TORN + k])
-            u_l, v_l = Z[left + at.SCRATCH_SPAN + k], Z[left + 2 * at.SCRATCH_SPAN + k]
-            u_r, v_r = Z[right + at.SCRATCH_SPAN + k], Z[right + 2 * at.SCRATCH_SPAN + k]
-            c2_l = Z[left + 4 * at.SCRATCH_SPAN + k]
-            c2_r = Z[right + 4 * at.SCRATCH_SPAN + k]
+                e_r = choose_own(e_r, Z[scratch.TORN + k], Z[scratch.TORN + k])
+            u_l, v_l = Z[left + SCRATCH_SPAN + k], Z[left + 2 * SCRATCH_SPAN + k]
+            u_r, v_r = Z[right + SCRATCH_SPAN + k], Z[right + 2 * SCRATCH_SPAN + k]
+            c2_l = Z[left + 4 * SCRATCH_SPAN + k]
+            c2_r = Z[right + 4 * SCRATCH_SPAN + k]
             # the HLL flux (theory F3.10)
             flux = riemann.compute_hll_flux(
                 (rho_l, u_l, v_l, p_l, e_l, c2_l),
                 (rho_r, u_r, v_r, p_r, e_r, c2_r),
-                (Z[face + k], Z[face + at.SCRATCH_SPAN + k], Z[face + 2 * at.SCRATCH_SPAN + k]),
+                (
+                    Z[face + k],
+                    Z[face + SCRATCH_SPAN + k],
+                    Z[face + 2 * SCRATCH_SPAN + k],
+                ),
             )
             if withholds:
                 from_left = flux[0] > 0.0
@@ -289,15 +326,15 @@ def make_hll_flux(
                 flux = riemann.withhold(flux, (u, v, e), find_leaving_part(rho, parameters))
             mass, momentum_x, momentum_y, energy, pressure = flux
             # it replaces the sharp one where either cell asks for it
-            switch_on = Z[switch + k] + Z[at.HLL + k]
+            switch_on = Z[switch + k] + Z[scratch.HLL + k]
             sharp_mass = Z[target + k]
-            sharp_x = Z[target + at.SCRATCH_SPAN + k]
-            sharp_y = Z[target + 2 * at.SCRATCH_SPAN + k]
-            sharp_energy = Z[target + 3 * at.SCRATCH_SPAN + k]
+            sharp_x = Z[target + SCRATCH_SPAN + k]
+            sharp_y = Z[target + 2 * SCRATCH_SPAN + k]
+            sharp_energy = Z[target + 3 * SCRATCH_SPAN + k]
             Z[target + k] = mass if switch_on > 0.0 else sharp_mass
-            Z[target + at.SCRATCH_SPAN + k] = momentum_x if switch_on > 0.0 else sharp_x
-            Z[target + 2 * at.SCRATCH_SPAN + k] = momentum_y if switch_on > 0.0 else sharp_y
-            Z[target + 3 * at.SCRATCH_SPAN + k] = energy if switch_on > 0.0 else sharp_energy
+            Z[target + SCRATCH_SPAN + k] = momentum_x if switch_on > 0.0 else sharp_x
+            Z[target + 2 * SCRATCH_SPAN + k] = momentum_y if switch_on > 0.0 else sharp_y
+            Z[target + 3 * SCRATCH_SPAN + k] = energy if switch_on > 0.0 else sharp_energy
             if pressure_row:
                 sharp_pressure = Z[pressure_row + k]
                 Z[pressure_row + k] = pressure if switch_on > 0.0 else sharp_pressure

@@ -18,7 +18,7 @@ from shockgrid.hydro.formulas.reconstruction import (
     mark_torn,
 )
 from shockgrid.hydro.formulas.riemann import FLUXES
-from shockgrid.hydro.interior import scratch as at
+from shockgrid.hydro.interior import scratch
 from shockgrid.hydro.interior.axisymmetric import (
     fill_lines,
     fill_shift_after,
@@ -34,20 +34,26 @@ def fill_length_after(Z, n):
     """Distance between the midpoints of the faces i + 1 and i + 2."""
     for k in range(1, n + 1):
         dx = 0.5 * (
-            (Z[at.X_NEXT + k] + Z[at.X_NEXT + k + 1]) - (Z[at.X_HIGH + k] + Z[at.X_HIGH + k + 1])
+            (Z[scratch.X_NEXT + k] + Z[scratch.X_NEXT + k + 1])
+            - (Z[scratch.X_HIGH + k] + Z[scratch.X_HIGH + k + 1])
         )
         dy = 0.5 * (
-            (Z[at.Y_NEXT + k] + Z[at.Y_NEXT + k + 1]) - (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
+            (Z[scratch.Y_NEXT + k] + Z[scratch.Y_NEXT + k + 1])
+            - (Z[scratch.Y_HIGH + k] + Z[scratch.Y_HIGH + k + 1])
         )
-        Z[at.LENGTH_AFTER + k] = (dx * dx + dy * dy) ** 0.5
+        Z[scratch.LENGTH_AFTER + k] = (dx * dx + dy * dy) ** 0.5
 
 
 @compiled_once(allocates=False)
 def fill_length_below(Z):
     """Length along j of the cell before the row's first one (entry 0)."""
-    mid_j_x = 0.5 * ((Z[at.X_LOW + 1] + Z[at.X_HIGH + 1]) - (Z[at.X_LOW] + Z[at.X_HIGH]))
-    mid_j_y = 0.5 * ((Z[at.Y_LOW + 1] + Z[at.Y_HIGH + 1]) - (Z[at.Y_LOW] + Z[at.Y_HIGH]))
-    Z[at.LENGTH_J] = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
+    mid_j_x = 0.5 * (
+        (Z[scratch.X_LOW + 1] + Z[scratch.X_HIGH + 1]) - (Z[scratch.X_LOW] + Z[scratch.X_HIGH])
+    )
+    mid_j_y = 0.5 * (
+        (Z[scratch.Y_LOW + 1] + Z[scratch.Y_HIGH + 1]) - (Z[scratch.Y_LOW] + Z[scratch.Y_HIGH])
+    )
+    Z[scratch.LENGTH_J] = (mid_j_x * mid_j_x + mid_j_y * mid_j_y) ** 0.5
 
 
 @compiled_once(allocates=False)
@@ -55,12 +61,14 @@ def fill_length_j(Z, n):
     """Lengths along j of the row's cells."""
     for k in range(1, n + 1):
         dx = 0.5 * (
-            (Z[at.X_LOW + k + 1] + Z[at.X_HIGH + k + 1]) - (Z[at.X_LOW + k] + Z[at.X_HIGH + k])
+            (Z[scratch.X_LOW + k + 1] + Z[scratch.X_HIGH + k + 1])
+            - (Z[scratch.X_LOW + k] + Z[scratch.X_HIGH + k])
         )
         dy = 0.5 * (
-            (Z[at.Y_LOW + k + 1] + Z[at.Y_HIGH + k + 1]) - (Z[at.Y_LOW + k] + Z[at.Y_HIGH + k])
+            (Z[scratch.Y_LOW + k + 1] + Z[scratch.Y_HIGH + k + 1])
+            - (Z[scratch.Y_LOW + k] + Z[scratch.Y_HIGH + k])
         )
-        Z[at.LENGTH_J + k] = (dx * dx + dy * dy) ** 0.5
+        Z[scratch.LENGTH_J + k] = (dx * dx + dy * dy) ** 0.5
 
 
 def make_geometry(weigh):
@@ -73,12 +81,12 @@ def make_geometry(weigh):
     def fill_geometry(Z, n):
         """Line vectors and volume of the row's cells."""
         for k in range(1, n + 1):
-            a, b, c, d = at.load_corners(Z, at.LOW, at.HIGH, k)
+            a, b, c, d = scratch.load_corners(Z, scratch.LOW, scratch.HIGH, k)
             mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
-            at.store_vector(Z, at.MI, k, mid_i)
-            at.store_vector(Z, at.MJ, k, mid_j)
-            twist, y = at.find_twist(a, b, c, d)
-            Z[at.VOLUME + k] = weigh(area, mid_i, mid_j, twist, y)
+            scratch.store_vector(Z, scratch.MI, k, mid_i)
+            scratch.store_vector(Z, scratch.MJ, k, mid_j)
+            twist, y = scratch.find_twist(a, b, c, d)
+            Z[scratch.VOLUME + k] = weigh(area, mid_i, mid_j, twist, y)
 
     return fill_geometry
 
@@ -93,23 +101,23 @@ def make_switch(sound_speed_squared_part, energy_part, least_jump, opens_voids):
     def fill_switch(Z, n, parameters):
         """The HLL switch is on where a neighbour's pressure differs by over least_jump rho c²."""
         for k in range(1, n + 1):
-            p = Z[at.P + k]
-            rho = Z[at.RHO + k]
+            p = Z[scratch.P + k]
+            rho = Z[scratch.RHO + k]
             c2 = sound_speed_squared_part(rho, p, parameters)
-            Z[at.HLL_BEFORE + k] = Z[at.HLL + k]
-            Z[at.C2 + k] = c2
+            Z[scratch.HLL_BEFORE + k] = Z[scratch.HLL + k]
+            Z[scratch.C2 + k] = c2
             e = energy_part(rho, p, parameters)
             if opens_voids:
-                void = Z[at.VOID_LOADED + k]
+                void = Z[scratch.VOID_LOADED + k]
                 e = e + void
-                Z[at.TORN_BEFORE + k] = Z[at.TORN + k]
-                Z[at.TORN + k] = mark_torn(e, void)
-            Z[at.E + k] = e
-            Z[at.HLL + k] = compute_hll_switch(
-                Z[at.P + k - 1] - p,
-                Z[at.P + k + 1] - p,
-                Z[at.P_STEP + k],
-                Z[at.P_AFTER + k] - p,
+                Z[scratch.TORN_BEFORE + k] = Z[scratch.TORN + k]
+                Z[scratch.TORN + k] = mark_torn(e, void)
+            Z[scratch.E + k] = e
+            Z[scratch.HLL + k] = compute_hll_switch(
+                Z[scratch.P + k - 1] - p,
+                Z[scratch.P + k + 1] - p,
+                Z[scratch.P_STEP + k],
+                Z[scratch.P_AFTER + k] - p,
                 rho,
                 c2,
                 least_jump,
@@ -148,7 +156,7 @@ def make_row_phases(eos_class, limiter: str, geometry: Geometry, flux: str) -> R
     @compiled_once(allocates=False)
     def next_row(Z, n):
         """Make the row after the current one current."""
-        at.shift_rows(Z, n)
+        scratch.shift_rows(Z, n)
         if curved:
             move_shifts(Z, n)
 
@@ -164,17 +172,17 @@ def make_row_phases(eos_class, limiter: str, geometry: Geometry, flux: str) -> R
             fill_lines(Z, n)
         fill_length_j(Z, n)
         if length_below >= 0.0:
-            Z[at.LENGTH_J] = length_below
-            Z[at.SHIFT_J] = 0.0
+            Z[scratch.LENGTH_J] = length_below
+            Z[scratch.SHIFT_J] = 0.0
         else:
             fill_length_below(Z)
         if length_above >= 0.0:
-            Z[at.LENGTH_J + m + 1] = length_above
-            Z[at.SHIFT_J + m + 1] = 0.0
+            Z[scratch.LENGTH_J + m + 1] = length_above
+            Z[scratch.SHIFT_J + m + 1] = 0.0
         if curved:
             fill_switch(Z, n, parameters)
             fill_smooth(Z, n)
-        fill_slopes(Z, at.count_whole(m), half_dt, parameters)
+        fill_slopes(Z, scratch.count_whole(m), half_dt, parameters)
 
     return RowPhases(
         measure_after, next_row, reconstruct, make_extrapolation(limit, geometry, sound)

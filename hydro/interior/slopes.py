@@ -17,7 +17,6 @@ docs/notes/decisions.md.
 
 from __future__ import annotations
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.formulas.geometry import move_velocity, thin_half_step, weigh_differences
 from shockgrid.hydro.formulas.reconstruction import (
     compose_from,
@@ -32,7 +31,8 @@ from shockgrid.hydro.formulas.reconstruction import (
     relax_limit,
     resolve_along,
 )
-from shockgrid.hydro.interior import scratch as at
+from shockgrid.hydro.interior import scratch
+from shockgrid.hydro.rim import C_FACE, LENGTH, P_FACE, RHO, RHO_FACE, U_FACE, V_FACE, C, P, U, V
 from shockgrid.regrid.jit import compiled_once, inlined
 
 # jump of the pressure over rho c² from which on nothing is extrapolated to a side
@@ -44,10 +44,10 @@ CALM_PRESSURE_JUMP = 0.01  # and up to which all of it is
 def fill_steps(Z, n):
     """Differences of the states from the current row to the row after it."""
     for k in range(1, n + 1):
-        Z[at.RHO_STEP + k] = Z[at.RHO_AFTER + k] - Z[at.RHO + k]
-        Z[at.U_STEP + k] = Z[at.U_AFTER + k] - Z[at.U + k]
-        Z[at.V_STEP + k] = Z[at.V_AFTER + k] - Z[at.V + k]
-        Z[at.P_STEP + k] = Z[at.P_AFTER + k] - Z[at.P + k]
+        Z[scratch.RHO_STEP + k] = Z[scratch.RHO_AFTER + k] - Z[scratch.RHO + k]
+        Z[scratch.U_STEP + k] = Z[scratch.U_AFTER + k] - Z[scratch.U + k]
+        Z[scratch.V_STEP + k] = Z[scratch.V_AFTER + k] - Z[scratch.V + k]
+        Z[scratch.P_STEP + k] = Z[scratch.P_AFTER + k] - Z[scratch.P + k]
 
 
 def make_weigh(geometry):
@@ -90,7 +90,7 @@ def make_slopes(limit, relaxed, geometry, switch):
         row before) become those of the row after.  The predicted state is that of the old centre.
         """
         for k in range(1, n + 1):
-            a, b, c, d = at.load_corners(Z, at.LOW, at.HIGH, k)
+            a, b, c, d = scratch.load_corners(Z, scratch.LOW, scratch.HIGH, k)
             mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
             xa, ya = a
             xb, yb = b
@@ -99,73 +99,79 @@ def make_slopes(limit, relaxed, geometry, switch):
             mid_i_x, mid_i_y = mid_i
             mid_j_x, mid_j_y = mid_j
             # sound speed, energy and HLL switch of the cell
-            rho = Z[at.RHO + k]
-            p = Z[at.P + k]
+            rho = Z[scratch.RHO + k]
+            p = Z[scratch.P + k]
             if curved:
-                line_i = Z[at.LEAN_I_X + k], Z[at.LEAN_I_Y + k]
-                line_j = Z[at.LEAN_J_X + k], Z[at.LEAN_J_Y + k]
-                inverse = Z[at.LEAN_INVERSE + k]
-                c2 = Z[at.C2 + k]
+                line_i = Z[scratch.LEAN_I_X + k], Z[scratch.LEAN_I_Y + k]
+                line_j = Z[scratch.LEAN_J_X + k], Z[scratch.LEAN_J_Y + k]
+                inverse = Z[scratch.LEAN_INVERSE + k]
+                c2 = Z[scratch.C2 + k]
             else:
                 line_i, line_j = mid_i, mid_j
                 inverse = 1.0 / area
-                Z[at.VOLUME + k] = area
+                Z[scratch.VOLUME + k] = area
                 c2 = sound(rho, p, parameters)
                 e = energy(rho, p, parameters)
                 if opens_voids:
-                    void = Z[at.VOID_LOADED + k]
+                    void = Z[scratch.VOID_LOADED + k]
                     e = e + void
-                    Z[at.TORN_BEFORE + k] = Z[at.TORN + k]
-                    Z[at.TORN + k] = mark_torn(e, void)
-                Z[at.C2 + k] = c2
-                Z[at.E + k] = e
-                Z[at.HLL_BEFORE + k] = Z[at.HLL + k]
-                Z[at.HLL + k] = compute_hll_switch(
-                    Z[at.P + k - 1] - p,
-                    Z[at.P + k + 1] - p,
-                    Z[at.P_STEP + k],
-                    Z[at.P_AFTER + k] - p,
+                    Z[scratch.TORN_BEFORE + k] = Z[scratch.TORN + k]
+                    Z[scratch.TORN + k] = mark_torn(e, void)
+                Z[scratch.C2 + k] = c2
+                Z[scratch.E + k] = e
+                Z[scratch.HLL_BEFORE + k] = Z[scratch.HLL + k]
+                Z[scratch.HLL + k] = compute_hll_switch(
+                    Z[scratch.P + k - 1] - p,
+                    Z[scratch.P + k + 1] - p,
+                    Z[scratch.P_STEP + k],
+                    Z[scratch.P_AFTER + k] - p,
                     rho,
                     c2,
                     least_jump,
                 )
             # weights of the differences to the cells on either side (theory F3.3, F9.6)
             before, after = weigh(
-                Z, at.LENGTH_BEFORE + k, at.LENGTH + k, at.LENGTH_AFTER + k, at.SHIFT - at.LENGTH
+                Z,
+                scratch.LENGTH_BEFORE + k,
+                scratch.LENGTH + k,
+                scratch.LENGTH_AFTER + k,
+                scratch.SHIFT - scratch.LENGTH,
             )
             below, above = weigh(
-                Z, at.LENGTH_J + k - 1, at.LENGTH_J + k, at.LENGTH_J + k + 1,
-                at.SHIFT_J - at.LENGTH_J,
+                Z, scratch.LENGTH_J + k - 1, scratch.LENGTH_J + k, scratch.LENGTH_J + k + 1,
+                scratch.SHIFT_J - scratch.LENGTH_J,
             )  # fmt: skip
             # density and pressure: steps limited along both lines (F3.4), then the gradient (F3.5)
-            step_after = Z[at.RHO_AFTER + k] - rho
-            along_i = limit(Z[at.RHO_STEP + k] * before, step_after * after)
-            along_j = limit((rho - Z[at.RHO + k - 1]) * below, (Z[at.RHO + k + 1] - rho) * above)
-            Z[at.RHO_STEP + k] = step_after
+            step_after = Z[scratch.RHO_AFTER + k] - rho
+            along_i = limit(Z[scratch.RHO_STEP + k] * before, step_after * after)
+            along_j = limit(
+                (rho - Z[scratch.RHO + k - 1]) * below, (Z[scratch.RHO + k + 1] - rho) * above
+            )
+            Z[scratch.RHO_STEP + k] = step_after
             rho_x, rho_y = compute_gradient(along_i, along_j, line_i, line_j, inverse)
-            step_after = Z[at.P_AFTER + k] - p
-            along_i = limit(Z[at.P_STEP + k] * before, step_after * after)
-            along_j = limit((p - Z[at.P + k - 1]) * below, (Z[at.P + k + 1] - p) * above)
-            Z[at.P_STEP + k] = step_after
+            step_after = Z[scratch.P_AFTER + k] - p
+            along_i = limit(Z[scratch.P_STEP + k] * before, step_after * after)
+            along_j = limit((p - Z[scratch.P + k - 1]) * below, (Z[scratch.P + k + 1] - p) * above)
+            Z[scratch.P_STEP + k] = step_after
             p_x, p_y = compute_gradient(along_i, along_j, line_i, line_j, inverse)
             # velocity: limited along and across each line
             square_i = mid_i_x * mid_i_x + mid_i_y * mid_i_y
             square_j = mid_j_x * mid_j_x + mid_j_y * mid_j_y
             scale = 1.0 / (square_i * square_j)
-            u = Z[at.U + k]
-            v = Z[at.V + k]
-            u_after = Z[at.U_AFTER + k] - u
-            v_after = Z[at.V_AFTER + k] - v
-            u_a = Z[at.U_STEP + k] * before
-            v_a = Z[at.V_STEP + k] * before
+            u = Z[scratch.U + k]
+            v = Z[scratch.V + k]
+            u_after = Z[scratch.U_AFTER + k] - u
+            v_after = Z[scratch.V_AFTER + k] - v
+            u_a = Z[scratch.U_STEP + k] * before
+            v_a = Z[scratch.V_STEP + k] * before
             u_b = u_after * after
             v_b = v_after * after
-            u_c = (u - Z[at.U + k - 1]) * below
-            v_c = (v - Z[at.V + k - 1]) * below
-            u_d = (Z[at.U + k + 1] - u) * above
-            v_d = (Z[at.V + k + 1] - v) * above
-            Z[at.U_STEP + k] = u_after
-            Z[at.V_STEP + k] = v_after
+            u_c = (u - Z[scratch.U + k - 1]) * below
+            v_c = (v - Z[scratch.V + k - 1]) * below
+            u_d = (Z[scratch.U + k + 1] - u) * above
+            v_d = (Z[scratch.V + k + 1] - v) * above
+            Z[scratch.U_STEP + k] = u_after
+            Z[scratch.V_STEP + k] = v_after
             u_i, v_i = limit_velocity(u_a, v_a, u_b, v_b, mid_i_x, mid_i_y, scale * square_j)
             u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i)
             if relaxed:
@@ -177,17 +183,17 @@ def make_slopes(limit, relaxed, geometry, switch):
                 v_i = relax_limit(v_i, v_a, v_b, acoustic_weight)
                 u_j = relax_limit(u_j, u_c, u_d, acoustic_weight)
                 v_j = relax_limit(v_j, v_c, v_d, acoustic_weight)
-                Z[at.ACOUSTIC_BEFORE + k] = Z[at.ACOUSTIC + k]
-                Z[at.ACOUSTIC + k] = acoustic_weight
+                Z[scratch.ACOUSTIC_BEFORE + k] = Z[scratch.ACOUSTIC + k]
+                Z[scratch.ACOUSTIC + k] = acoustic_weight
             # gradients of the velocity, and the cell's centre
             u_x, u_y = compute_gradient(u_i, u_j, line_i, line_j, inverse)
             v_x, v_y = compute_gradient(v_i, v_j, line_i, line_j, inverse)
             if curved:
                 # pairs of opposite corners: the same bits whichever way the cell is turned
-                x = 0.25 * ((xa + xc) + (xb + xd)) + Z[at.OFFSET_X + k]
-                y = 0.25 * ((ya + yc) + (yb + yd)) + Z[at.OFFSET_Y + k]
+                x = 0.25 * ((xa + xc) + (xb + xd)) + Z[scratch.OFFSET_X + k]
+                y = 0.25 * ((ya + yc) + (yb + yd)) + Z[scratch.OFFSET_Y + k]
                 carried_x, carried_y = move_velocity(
-                    u, v, u_x, u_y, v_x, v_y, -Z[at.OFFSET_X + k], -Z[at.OFFSET_Y + k]
+                    u, v, u_x, u_y, v_x, v_y, -Z[scratch.OFFSET_X + k], -Z[scratch.OFFSET_Y + k]
                 )
             else:
                 x = 0.25 * ((xa + xd) + (xb + xc))
@@ -201,20 +207,20 @@ def make_slopes(limit, relaxed, geometry, switch):
             if curved:
                 rho_half, p_half = thin_half_step(rho_half, p_half, rho, v, c2, y, half_dt)
             # kept for the traces
-            Z[at.RHO_X + k] = rho_x
-            Z[at.RHO_Y + k] = rho_y
-            Z[at.U_X + k] = u_x
-            Z[at.U_Y + k] = u_y
-            Z[at.V_X + k] = v_x
-            Z[at.V_Y + k] = v_y
-            Z[at.P_X + k] = p_x
-            Z[at.P_Y + k] = p_y
-            Z[at.RHO_HALF + k] = rho_half
-            Z[at.U_HALF + k] = u_half
-            Z[at.V_HALF + k] = v_half
-            Z[at.P_HALF + k] = p_half
-            Z[at.X_CENTRE + k] = x
-            Z[at.Y_CENTRE + k] = y
+            Z[scratch.RHO_X + k] = rho_x
+            Z[scratch.RHO_Y + k] = rho_y
+            Z[scratch.U_X + k] = u_x
+            Z[scratch.U_Y + k] = u_y
+            Z[scratch.V_X + k] = v_x
+            Z[scratch.V_Y + k] = v_y
+            Z[scratch.P_X + k] = p_x
+            Z[scratch.P_Y + k] = p_y
+            Z[scratch.RHO_HALF + k] = rho_half
+            Z[scratch.U_HALF + k] = u_half
+            Z[scratch.V_HALF + k] = v_half
+            Z[scratch.P_HALF + k] = p_half
+            Z[scratch.X_CENTRE + k] = x
+            Z[scratch.Y_CENTRE + k] = y
 
     return fill_slopes
 
@@ -242,16 +248,20 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
                 continue
             # weights of the differences across the side
             before, after = weigh(
-                Z, at.LENGTH_BEFORE + k, at.LENGTH + k, at.LENGTH_AFTER + k, at.SHIFT - at.LENGTH
+                Z,
+                scratch.LENGTH_BEFORE + k,
+                scratch.LENGTH + k,
+                scratch.LENGTH_AFTER + k,
+                scratch.SHIFT - scratch.LENGTH,
             )
-            a, b, c, d = at.load_corners(Z, at.LOW, at.HIGH, k)
+            a, b, c, d = scratch.load_corners(Z, scratch.LOW, scratch.HIGH, k)
             (line_x, line_y), _, _ = compute_line_geometry(a, b, c, d)
             # how rough the pressure is: none of the slope is taken at a shock (theory F4.7)
-            rho = rim[on.RHO, face]
-            p = rim[on.P, face]
-            c = rim[on.C, face]
-            jump = abs(p - Z[at.P + k])
-            jump_beyond = abs(Z[at.P + k] - Z[at.P_AFTER + k])
+            rho = rim[RHO, face]
+            p = rim[P, face]
+            c = rim[C, face]
+            jump = abs(p - Z[scratch.P + k])
+            jump_beyond = abs(Z[scratch.P + k] - Z[scratch.P_AFTER + k])
             jump = jump if jump > jump_beyond else jump_beyond
             rough = (jump / (rho * c * c) - CALM_PRESSURE_JUMP) / (
                 SHOCK_PRESSURE_JUMP - CALM_PRESSURE_JUMP
@@ -259,14 +269,16 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
             rough = rough if rough > 0.0 else 0.0
             rough = rough if rough < 1.0 else 1.0
             smooth = (1.0 - rough) * (1.0 - rough) * (1.0 + 2.0 * rough)
-            part = smooth * (0.5 * rim[on.LENGTH, face] / Z[at.LENGTH + k])
+            part = smooth * (0.5 * rim[LENGTH, face] / Z[scratch.LENGTH + k])
             # limited steps from the cell to its face
-            rho_step = limit_along(rho, Z[at.RHO + k], Z[at.RHO_AFTER + k], before, after)
-            p_step = limit_along(p, Z[at.P + k], Z[at.P_AFTER + k], before, after)
-            along, across = resolve_along(rim[on.U, face], rim[on.V, face], line_x, line_y)
-            along_next, across_next = resolve_along(Z[at.U + k], Z[at.V + k], line_x, line_y)
+            rho_step = limit_along(rho, Z[scratch.RHO + k], Z[scratch.RHO_AFTER + k], before, after)
+            p_step = limit_along(p, Z[scratch.P + k], Z[scratch.P_AFTER + k], before, after)
+            along, across = resolve_along(rim[U, face], rim[V, face], line_x, line_y)
+            along_next, across_next = resolve_along(
+                Z[scratch.U + k], Z[scratch.V + k], line_x, line_y
+            )
             along_beyond, across_beyond = resolve_along(
-                Z[at.U_AFTER + k], Z[at.V_AFTER + k], line_x, line_y
+                Z[scratch.U_AFTER + k], Z[scratch.V_AFTER + k], line_x, line_y
             )
             u_step, v_step = compose_from(
                 limit_along(along, along_next, along_beyond, before, after),
@@ -280,10 +292,10 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
             p = p - part * p_step
             c2 = sound_speed_squared_part(rho, p, parameters)
             if (rho > 0.0) & (c2 > 0.0):
-                rim[on.RHO_FACE, face] = rho
-                rim[on.U_FACE, face] -= part * u_step
-                rim[on.V_FACE, face] -= part * v_step
-                rim[on.P_FACE, face] = p
-                rim[on.C_FACE, face] = c2**0.5
+                rim[RHO_FACE, face] = rho
+                rim[U_FACE, face] -= part * u_step
+                rim[V_FACE, face] -= part * v_step
+                rim[P_FACE, face] = p
+                rim[C_FACE, face] = c2**0.5
 
     return extrapolate

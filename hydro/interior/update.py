@@ -11,7 +11,7 @@ from shockgrid.hydro.eos.base import make_leaving_part
 from shockgrid.hydro.eos.conversion import make_conversion
 from shockgrid.hydro.formulas.geometry import compute_lever, push_outwards, stretch_ring
 from shockgrid.hydro.formulas.reconstruction import compute_line_geometry
-from shockgrid.hydro.interior import scratch as at
+from shockgrid.hydro.interior import scratch
 from shockgrid.hydro.rows import LEAST_C2
 from shockgrid.regrid.jit import compiled_once, inlined, kernel
 
@@ -55,20 +55,20 @@ def make_update(eos_class, geometry, finishes, gathers):
         for k in range(1, n + 1):
             if finishes:
                 # conserved quantities of the row before, with the last flux (theory F3.2)
-                mass = Z[at.MASS + k] - dt * Z[at.FLUX_I_MASS + k]
-                momentum_x = Z[at.MOMENTUM_X + k] - dt * Z[at.FLUX_I_X + k]
-                momentum_y = Z[at.MOMENTUM_Y + k] - dt * Z[at.FLUX_I_Y + k]
+                mass = Z[scratch.MASS + k] - dt * Z[scratch.FLUX_I_MASS + k]
+                momentum_x = Z[scratch.MOMENTUM_X + k] - dt * Z[scratch.FLUX_I_X + k]
+                momentum_y = Z[scratch.MOMENTUM_Y + k] - dt * Z[scratch.FLUX_I_Y + k]
                 if curved:
                     momentum_y = push_outwards(
                         momentum_y,
-                        dt * Z[at.LEVER + k],
-                        Z[at.PUSH_I + k],
-                        dt * Z[at.SHARE + k],
-                        Z[at.HOOP_I + k],
+                        dt * Z[scratch.LEVER + k],
+                        Z[scratch.PUSH_I + k],
+                        dt * Z[scratch.SHARE + k],
+                        Z[scratch.HOOP_I + k],
                     )
-                total = Z[at.ENERGY + k] - dt * Z[at.FLUX_I_ENERGY + k]
+                total = Z[scratch.ENERGY + k] - dt * Z[scratch.FLUX_I_ENERGY + k]
                 # the state that they make (theory F4.10)
-                volume = Z[at.VOLUME_NEW + k]
+                volume = Z[scratch.VOLUME_NEW + k]
                 # two divisions: of one for both, the rounding would add up in cells at rest
                 inverse_volume = 1.0 / volume
                 inverse_mass = 1.0 / mass
@@ -78,30 +78,30 @@ def make_update(eos_class, geometry, finishes, gathers):
                 e = total * inverse_mass - 0.5 * (u * u + v * v)
                 p, void_energy, voided, c2 = to_pressure(rho, e, parameters)
                 if opens_voids:
-                    Z[at.VOID_NEW + k] = void_energy
-                    Z[at.SUM_VOIDED + k] += 1.0 if voided else 0.0
+                    Z[scratch.VOID_NEW + k] = void_energy
+                    Z[scratch.SUM_VOIDED + k] += 1.0 if voided else 0.0
                 if withholds:
                     part = find_leaving_part(rho, parameters)
-                    Z[at.SUM_EMPTIED + k] += 1.0 if part < 1.0 else 0.0
+                    Z[scratch.SUM_EMPTIED + k] += 1.0 if part < 1.0 else 0.0
                 # kept, with velocities that are not subnormal
                 slow = 1e-60 * c2
                 u = u if u * u > slow else 0.0
                 v = v if v * v > slow else 0.0
-                Z[at.RHO_NEW + k] = rho
-                Z[at.U_NEW + k] = u
-                Z[at.V_NEW + k] = v
-                Z[at.P_NEW + k] = p
+                Z[scratch.RHO_NEW + k] = rho
+                Z[scratch.U_NEW + k] = u
+                Z[scratch.V_NEW + k] = v
+                Z[scratch.P_NEW + k] = p
                 # rate and crowding in the new cell (theory F7.1, F7.3)
-                mid_i_x = Z[at.MI_X_NEW + k]
-                mid_i_y = Z[at.MI_Y_NEW + k]
-                mid_j_x = Z[at.MJ_X_NEW + k]
-                mid_j_y = Z[at.MJ_Y_NEW + k]
+                mid_i_x = Z[scratch.MI_X_NEW + k]
+                mid_i_y = Z[scratch.MI_Y_NEW + k]
+                mid_j_x = Z[scratch.MJ_X_NEW + k]
+                mid_j_y = Z[scratch.MJ_Y_NEW + k]
                 inverse_area = inverse_volume
                 if curved:
                     inverse_area = 1.0 / (mid_i_x * mid_j_y - mid_i_y * mid_j_x)
-                Z[at.RATE_NEW + k], Z[at.CROWDING_NEW + k] = compute_rate(
-                    u - Z[at.W_X + k] * inverse_dt,
-                    v - Z[at.W_Y + k] * inverse_dt,
+                Z[scratch.RATE_NEW + k], Z[scratch.CROWDING_NEW + k] = compute_rate(
+                    u - Z[scratch.W_X + k] * inverse_dt,
+                    v - Z[scratch.W_Y + k] * inverse_dt,
                     c2,
                     mid_i_x,
                     mid_i_y,
@@ -112,76 +112,82 @@ def make_update(eos_class, geometry, finishes, gathers):
                 # NaN too: no state of the material
                 real = (rho > 0.0) & (inverse_area > 0.0) & (c2 > 0.0)
                 c2 = c2 if real else -1.0
-                least = Z[at.LEAST_C2 + k]
-                Z[at.LEAST_C2 + k] = least if least < c2 else c2
+                least = Z[scratch.LEAST_C2 + k]
+                Z[scratch.LEAST_C2 + k] = least if least < c2 else c2
                 # sums of the tile
-                Z[at.SUM_MASS + k] += mass
-                Z[at.SUM_X + k] += momentum_x
-                Z[at.SUM_Y + k] += momentum_y
-                Z[at.SUM_ENERGY + k] += total
+                Z[scratch.SUM_MASS + k] += mass
+                Z[scratch.SUM_X + k] += momentum_x
+                Z[scratch.SUM_Y + k] += momentum_y
+                Z[scratch.SUM_ENERGY + k] += total
             # this row: what it holds less the fluxes through the faces known so far
             if gathers:
-                volume = Z[at.VOLUME + k]
-                rho = Z[at.RHO + k]
-                u = Z[at.U + k]
-                v = Z[at.V + k]
+                volume = Z[scratch.VOLUME + k]
+                rho = Z[scratch.RHO + k]
+                u = Z[scratch.U + k]
+                v = Z[scratch.V + k]
                 mass = volume * rho
-                Z[at.MASS + k] = mass - dt * (
-                    (Z[at.FLUX_J_MASS + k + 1] - Z[at.FLUX_J_MASS + k]) - Z[at.FLUX_I_MASS + k]
+                Z[scratch.MASS + k] = mass - dt * (
+                    (Z[scratch.FLUX_J_MASS + k + 1] - Z[scratch.FLUX_J_MASS + k])
+                    - Z[scratch.FLUX_I_MASS + k]
                 )
-                Z[at.MOMENTUM_X + k] = mass * u - dt * (
-                    (Z[at.FLUX_J_X + k + 1] - Z[at.FLUX_J_X + k]) - Z[at.FLUX_I_X + k]
+                Z[scratch.MOMENTUM_X + k] = mass * u - dt * (
+                    (Z[scratch.FLUX_J_X + k + 1] - Z[scratch.FLUX_J_X + k])
+                    - Z[scratch.FLUX_I_X + k]
                 )
                 momentum_y = mass * v - dt * (
-                    (Z[at.FLUX_J_Y + k + 1] - Z[at.FLUX_J_Y + k]) - Z[at.FLUX_I_Y + k]
+                    (Z[scratch.FLUX_J_Y + k + 1] - Z[scratch.FLUX_J_Y + k])
+                    - Z[scratch.FLUX_I_Y + k]
                 )
-                Z[at.ENERGY + k] = mass * (Z[at.E + k] + 0.5 * (u * u + v * v)) - dt * (
-                    (Z[at.FLUX_J_ENERGY + k + 1] - Z[at.FLUX_J_ENERGY + k])
-                    - Z[at.FLUX_I_ENERGY + k]
+                Z[scratch.ENERGY + k] = mass * (Z[scratch.E + k] + 0.5 * (u * u + v * v)) - dt * (
+                    (Z[scratch.FLUX_J_ENERGY + k + 1] - Z[scratch.FLUX_J_ENERGY + k])
+                    - Z[scratch.FLUX_I_ENERGY + k]
                 )
                 # its new cell
-                a, b, c, d = at.load_corners(Z, at.LOW_NEW, at.HIGH_NEW, k)
+                a, b, c, d = scratch.load_corners(Z, scratch.LOW_NEW, scratch.HIGH_NEW, k)
                 mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
-                twist, y_new = at.find_twist(a, b, c, d)
+                twist, y_new = scratch.find_twist(a, b, c, d)
                 if curved:
                     # weights of both forms of the radial pressure force (theory F9.5)
                     lever, share = compute_lever(
-                        Z[at.Y_CENTRE + k],
+                        Z[scratch.Y_CENTRE + k],
                         0.25
                         * (
-                            (Z[at.Y_LOW + k] + Z[at.Y_LOW + k + 1])
-                            + (Z[at.Y_HIGH + k] + Z[at.Y_HIGH + k + 1])
+                            (Z[scratch.Y_LOW + k] + Z[scratch.Y_LOW + k + 1])
+                            + (Z[scratch.Y_HIGH + k] + Z[scratch.Y_HIGH + k + 1])
                         ),
                         y_new,
-                        Z[at.SMOOTH + k],
+                        Z[scratch.SMOOTH + k],
                     )
                     momentum_y = push_outwards(
                         momentum_y,
                         dt * lever,
-                        (Z[at.PUSH_J + k + 1] - Z[at.PUSH_J + k]) - Z[at.PUSH_I + k],
+                        (Z[scratch.PUSH_J + k + 1] - Z[scratch.PUSH_J + k]) - Z[scratch.PUSH_I + k],
                         dt * share,
-                        (Z[at.HOOP_J + k + 1] - Z[at.HOOP_J + k]) - Z[at.HOOP_I + k],
+                        (Z[scratch.HOOP_J + k + 1] - Z[scratch.HOOP_J + k]) - Z[scratch.HOOP_I + k],
                     )
-                    lines = (Z[at.MI_X + k], Z[at.MI_Y + k]), (Z[at.MJ_X + k], Z[at.MJ_Y + k])
-                    push = dt * share * Z[at.SOURCE_P + k]
+                    lines = (
+                        (Z[scratch.MI_X + k], Z[scratch.MI_Y + k]),
+                        (Z[scratch.MJ_X + k], Z[scratch.MJ_Y + k]),
+                    )
+                    push = dt * share * Z[scratch.SOURCE_P + k]
                     momentum_y = stretch_ring(momentum_y, push, lines, (mid_i, mid_j))
-                    Z[at.LEVER + k] = lever
-                    Z[at.SHARE + k] = share
-                Z[at.MOMENTUM_Y + k] = momentum_y
-                at.store_vector(Z, at.MI_NEW, k, mid_i)
-                at.store_vector(Z, at.MJ_NEW, k, mid_j)
-                Z[at.VOLUME_NEW + k] = weigh(area, mid_i, mid_j, twist, y_new)
+                    Z[scratch.LEVER + k] = lever
+                    Z[scratch.SHARE + k] = share
+                Z[scratch.MOMENTUM_Y + k] = momentum_y
+                scratch.store_vector(Z, scratch.MI_NEW, k, mid_i)
+                scratch.store_vector(Z, scratch.MJ_NEW, k, mid_j)
+                Z[scratch.VOLUME_NEW + k] = weigh(area, mid_i, mid_j, twist, y_new)
                 xa, ya = a
                 xb, yb = b
                 xc, yc = c
                 xd, yd = d
-                Z[at.W_X + k] = 0.25 * (
-                    ((xa - Z[at.X_LOW + k]) + (xd - Z[at.X_LOW + k + 1]))
-                    + ((xb - Z[at.X_HIGH + k]) + (xc - Z[at.X_HIGH + k + 1]))
+                Z[scratch.W_X + k] = 0.25 * (
+                    ((xa - Z[scratch.X_LOW + k]) + (xd - Z[scratch.X_LOW + k + 1]))
+                    + ((xb - Z[scratch.X_HIGH + k]) + (xc - Z[scratch.X_HIGH + k + 1]))
                 )
-                Z[at.W_Y + k] = 0.25 * (
-                    ((ya - Z[at.Y_LOW + k]) + (yd - Z[at.Y_LOW + k + 1]))
-                    + ((yb - Z[at.Y_HIGH + k]) + (yc - Z[at.Y_HIGH + k + 1]))
+                Z[scratch.W_Y + k] = 0.25 * (
+                    ((ya - Z[scratch.Y_LOW + k]) + (yd - Z[scratch.Y_LOW + k + 1]))
+                    + ((yb - Z[scratch.Y_HIGH + k]) + (yc - Z[scratch.Y_HIGH + k + 1]))
                 )
 
     return update_rows

@@ -20,11 +20,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import NodeMotion, Segment
 from shockgrid.hydro.links import LARGEST_CLOSED_GAP, Link
 from shockgrid.hydro.motion.track import Track
+from shockgrid.hydro.rim import NORMAL
 from shockgrid.hydro.sliding.contact import SlidingContact
 from shockgrid.regrid.errors import Place, RunFailure
 from shockgrid.regrid.sides import SIDE_NAMES, find_node
@@ -155,7 +155,7 @@ class KeyNode:
             second = other.velocity(t)
             if second != velocity:
                 a, b = (
-                    member.block.rim.rows[on.NORMAL, k]
+                    member.block.rim.rows[NORMAL, k]
                     for member, k in ((first, face), (other, other_face))
                 )
                 # of two normals
@@ -175,7 +175,7 @@ class KeyNode:
         # one velocity; beside a moving contact only across the piston
         if not self.on_piston:
             return velocity
-        normal_x, normal_y = (float(n) for n in first.block.rim.rows[on.NORMAL, face])
+        normal_x, normal_y = (float(n) for n in first.block.rim.rows[NORMAL, face])
         length = math.hypot(normal_x, normal_y)
         x, y = self._flow()
         slip = (normal_x * (y - velocity[1]) - normal_y * (x - velocity[0])) / length**2

@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.boundary import NodeMotion, Segment
 from shockgrid.hydro.motion.track import Track
+from shockgrid.hydro.rim import NX, NY, U_STAR, C
 from shockgrid.regrid import curves
 from shockgrid.regrid.jit import compiled_once, kernel
 from shockgrid.regrid.sides import SIDE_NAMES, find_node
@@ -74,14 +74,14 @@ def move_line(nodes, nodes_new, span, rim, damping, dt, out):
     for node in range(1, count - 1):
         k = first + node
         i, j = find_node(side, start + node, 0, ni, nj)
-        a_x, a_y = rim[on.NX, k - 1], rim[on.NY, k - 1]
-        b_x, b_y = rim[on.NX, k], rim[on.NY, k]
+        a_x, a_y = rim[NX, k - 1], rim[NY, k - 1]
+        b_x, b_y = rim[NX, k], rim[NY, k]
         length_a = (a_x * a_x + a_y * a_y) ** 0.5
         length_b = (b_x * b_x + b_y * b_y) ** 0.5
         weight_a = length_b / (length_a + length_b)
         weight_b = length_a / (length_a + length_b)
         for q in range(2):
-            speed = weight_a * rim[on.U_STAR + q, k - 1] + weight_b * rim[on.U_STAR + q, k]
+            speed = weight_a * rim[U_STAR + q, k - 1] + weight_b * rim[U_STAR + q, k]
             out[q, node] = nodes[q, i, j] + dt * (damping[q, node] + speed)
     # stretching: change of the segments over their lengths (theory F7.2)
     most = 0.0
@@ -109,7 +109,7 @@ def limit_spreading(moved, rim, first, dt, out):
     sound = 0.0
     farthest = 0.0
     for k in range(count - 1):
-        sound = max(sound, rim[on.C, first + k])
+        sound = max(sound, rim[C, first + k])
         x, y = out[0, k] - moved[0, k], out[1, k] - moved[1, k]
         farthest = max(farthest, x * x + y * y)
     farthest = farthest**0.5

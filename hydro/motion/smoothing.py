@@ -19,8 +19,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.motion.line import Line
+from shockgrid.hydro.rim import SLIP, U_STAR, V_STAR
 from shockgrid.regrid.curves import FREE_END
 from shockgrid.regrid.jit import compiled_once, kernel
 from shockgrid.regrid.sides import find_node
@@ -314,8 +314,8 @@ def take_part(nodes, span, rim, start, backwards, line, faces):
     for k in range(count - 1):
         face = first + (count - 2 - k if backwards else k)
         for q in range(2):
-            faces[q, start + k] = rim[on.U_STAR + q, face]
-        faces[2, start + k] = rim[on.SLIP, face]
+            faces[q, start + k] = rim[U_STAR + q, face]
+        faces[2, start + k] = rim[SLIP, face]
 
 
 @kernel(allocates=False)
@@ -361,8 +361,8 @@ def fill_sliding_damping(line, rim, start, strength, bend, most, out):
     mean_x = 0.0
     mean_y = 0.0
     for k in range(start, start + count - 1):
-        mean_x += rim[on.U_STAR, k]
-        mean_y += rim[on.V_STAR, k]
+        mean_x += rim[U_STAR, k]
+        mean_y += rim[V_STAR, k]
     mean_x /= count - 1
     mean_y /= count - 1
     for k in range(count):
@@ -384,9 +384,9 @@ def fill_sliding_damping(line, rim, start, strength, bend, most, out):
         # V: slip and speed relative to the mean, over both faces
         speed = 0.0
         for face in (max(start, start + k - 1), min(start + count - 2, start + k)):
-            away_x = rim[on.U_STAR, face] - mean_x
-            away_y = rim[on.V_STAR, face] - mean_y
-            speed += 0.5 * (rim[on.SLIP, face] + (away_x * away_x + away_y * away_y) ** 0.5)
+            away_x = rim[U_STAR, face] - mean_x
+            away_y = rim[V_STAR, face] - mean_y
+            speed += 0.5 * (rim[SLIP, face] + (away_x * away_x + away_y * away_y) ** 0.5)
         spacing = 0.5 * square**0.5
         rate = strength * speed / (16.0 * spacing)
         # stronger where the line turns

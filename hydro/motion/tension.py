@@ -19,12 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import Segment
 from shockgrid.hydro.links import Exchange
 from shockgrid.hydro.motion.grid_motion import GridMotion
 from shockgrid.hydro.motion.line import Line
+from shockgrid.hydro.rim import AREA, TRACTION
 from shockgrid.hydro.rows import RHO
 from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.sides import get_side
@@ -120,7 +120,7 @@ class SurfaceTension:
             ]
             total = sum(densities)
             for side, order, rho in zip(tense.sides, tense.orders, densities, strict=True):
-                side.rim.rows[on.TRACTION] = (rho / total * rest)[:, ::order]
+                side.rim.rows[TRACTION] = (rho / total * rest)[:, ::order]
 
     def _fill_jump(self, tense: TenseLine, line: np.ndarray) -> np.ndarray:
         """Write the jumps of a line's faces, which must be those of its nodes `line`; the rest.
@@ -128,7 +128,7 @@ class SurfaceTension:
         Returns (2, n): what of the forces is no jump of the pressure.  Theory F14.3.
         """
         force = tense.tension * self._compute_force(line)
-        area = tense.sides[0].rim.rows[on.AREA]
+        area = tense.sides[0].rim.rows[AREA]
         jump = -(force * area).sum(axis=0) / _square(area)
         for side, order, sign in zip(tense.sides, tense.orders, (1.0, -1.0), strict=False):
             side.rim.jump[:] = sign * jump[::order]

@@ -10,9 +10,63 @@ from __future__ import annotations
 
 import numpy as np
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.formulas import riemann
 from shockgrid.hydro.formulas.geometry import keep_flux, split_flux
+from shockgrid.hydro.rim import (
+    ACOUSTIC,
+    AREA_X,
+    AREA_Y,
+    C2_TRACE,
+    C_TRACE,
+    CARRIED_BEYOND,
+    CARRIED_CELL,
+    CARRIED_FLUX,
+    CARRIED_GHOST,
+    CARRIED_TRACE,
+    E_TRACE,
+    ENERGY,
+    HLL,
+    HOOP,
+    JUMP,
+    LENGTH,
+    LENGTH_GHOST,
+    MASS,
+    MOMENTUM_X,
+    MOMENTUM_Y,
+    NX,
+    NY,
+    P_GHOST,
+    P_STAR,
+    P_TRACE,
+    PART_TRACE,
+    PUSH,
+    RHO,
+    RHO_FACE,
+    RHO_GHOST,
+    RHO_TRACE,
+    SLIP,
+    SWEEP,
+    SWEPT,
+    TRACTION_X,
+    TRACTION_Y,
+    U_GHOST,
+    U_NEXT,
+    U_STAR,
+    U_TRACE,
+    V_GHOST,
+    V_NEXT,
+    V_STAR,
+    V_TRACE,
+    VOID_P,
+    W_STAR,
+    WAY_NEXT,
+    C,
+    P,
+    U,
+    V,
+    count_carried,
+    find_carried_row,
+)
 from shockgrid.hydro.rows import FLUX_ROWS
 from shockgrid.regrid.jit import compiled_once, kernel
 
@@ -24,7 +78,7 @@ MOST_WIDENING = 1.5  # of a ghost's velocity over the cell's, outwards, in sound
 @compiled_once(allocates=False)
 def find_normal(rim, k):
     """Outward unit normal of a face."""
-    x, y = rim[on.NX, k], rim[on.NY, k]
+    x, y = rim[NX, k], rim[NY, k]
     length = (x * x + y * y) ** 0.5
     return x / length, y / length
 
@@ -39,21 +93,21 @@ def solve_contact(rim, k, other, m, state, law, other_law):
     """
     # states of both sides, resolved along the face's normal
     nx, ny = find_normal(rim, k)
-    rho = rim[state + on.RHO, k]
-    u = rim[state + on.U, k]
-    v = rim[state + on.V, k]
-    rho_other = other[state + on.RHO, m]
-    u_other = other[state + on.U, m]
-    v_other = other[state + on.V, m]
-    c = rim[state + on.C, k]
-    c_other = other[state + on.C, m]
-    jump = rim[on.JUMP, k]
+    rho = rim[state + RHO, k]
+    u = rim[state + U, k]
+    v = rim[state + V, k]
+    rho_other = other[state + RHO, m]
+    u_other = other[state + U, m]
+    v_other = other[state + V, m]
+    c = rim[state + C, k]
+    c_other = other[state + C, m]
+    jump = rim[JUMP, k]
     w = u * nx + v * ny
     w_other = u_other * nx + v_other * ny
     # pressure and normal speed (theory F4.1)
     p, w = riemann.compute_contact(
-        (rho, w, rim[state + on.P, k], c, law),
-        (rho_other, w_other, other[state + on.P, m], c_other, other_law),
+        (rho, w, rim[state + P, k], c, law),
+        (rho_other, w_other, other[state + P, m], c_other, other_law),
         jump,
     )
     # velocity of the contact: along the face the mean of both, weighted by impedance
@@ -63,13 +117,13 @@ def solve_contact(rim, k, other, m, state, law, other_law):
     mean_y = (z * v + z_other * v_other) / (z + z_other)
     excess = w - (mean_x * nx + mean_y * ny)
     # the same result in both rims
-    rim[on.P_STAR, k] = p + 0.5 * jump
-    other[on.P_STAR, m] = p - 0.5 * jump
-    rim[on.W_STAR, k] = w
-    other[on.W_STAR, m] = -w
-    rim[on.U_STAR, k] = other[on.U_STAR, m] = mean_x + excess * nx
-    rim[on.V_STAR, k] = other[on.V_STAR, m] = mean_y + excess * ny
-    rim[on.SLIP, k] = other[on.SLIP, m] = abs((u - u_other) * ny - (v - v_other) * nx)
+    rim[P_STAR, k] = p + 0.5 * jump
+    other[P_STAR, m] = p - 0.5 * jump
+    rim[W_STAR, k] = w
+    other[W_STAR, m] = -w
+    rim[U_STAR, k] = other[U_STAR, m] = mean_x + excess * nx
+    rim[V_STAR, k] = other[V_STAR, m] = mean_y + excess * ny
+    rim[SLIP, k] = other[SLIP, m] = abs((u - u_other) * ny - (v - v_other) * nx)
 
 
 @compiled_once(allocates=False)
@@ -82,15 +136,15 @@ def fill_ghost_from_face(rim, k):
     length sends out more kinetic energy than its mean has, and its heat would pay for that.
     """
     nx, ny = find_normal(rim, k)
-    c = rim[on.C, k]
-    jump = 2.0 * (rim[on.W_STAR, k] - (rim[on.U, k] * nx + rim[on.V, k] * ny))
+    c = rim[C, k]
+    jump = 2.0 * (rim[W_STAR, k] - (rim[U, k] * nx + rim[V, k] * ny))
     jump = jump if jump < MOST_WIDENING * c else MOST_WIDENING * c
-    rise = 2.0 * (rim[on.P_STAR, k] - rim[on.P, k])
-    rim[on.RHO_GHOST, k] = rim[on.RHO, k] + rise / (c * c)
-    rim[on.U_GHOST, k] = rim[on.U, k] + jump * nx
-    rim[on.V_GHOST, k] = rim[on.V, k] + jump * ny
-    rim[on.P_GHOST, k] = rim[on.P, k] + rise
-    rim[on.LENGTH_GHOST, k] = rim[on.LENGTH, k]
+    rise = 2.0 * (rim[P_STAR, k] - rim[P, k])
+    rim[RHO_GHOST, k] = rim[RHO, k] + rise / (c * c)
+    rim[U_GHOST, k] = rim[U, k] + jump * nx
+    rim[V_GHOST, k] = rim[V, k] + jump * ny
+    rim[P_GHOST, k] = rim[P, k] + rise
+    rim[LENGTH_GHOST, k] = rim[LENGTH, k]
 
 
 @compiled_once(allocates=False)
@@ -99,50 +153,50 @@ def press(rim, k, curved):
 
     The traction works with the velocity of the contact state.
     """
-    pressure = rim[on.P_STAR, k]
-    push = rim[on.P_STAR, k] * rim[on.AREA_Y, k]
-    traction_x, traction_y = rim[on.TRACTION_X, k], rim[on.TRACTION_Y, k]
-    work = traction_x * rim[on.U_STAR, k] + traction_y * rim[on.V_STAR, k]
-    rim[on.MASS, k] = 0.0
-    rim[on.MOMENTUM_X, k] = pressure * rim[on.AREA_X, k] - traction_x
-    rim[on.ENERGY, k] = pressure * rim[on.SWEPT, k] - work
+    pressure = rim[P_STAR, k]
+    push = rim[P_STAR, k] * rim[AREA_Y, k]
+    traction_x, traction_y = rim[TRACTION_X, k], rim[TRACTION_Y, k]
+    work = traction_x * rim[U_STAR, k] + traction_y * rim[V_STAR, k]
+    rim[MASS, k] = 0.0
+    rim[MOMENTUM_X, k] = pressure * rim[AREA_X, k] - traction_x
+    rim[ENERGY, k] = pressure * rim[SWEPT, k] - work
     split_momentum(rim, k, push, pressure, curved)
-    rim[on.MOMENTUM_Y, k] -= traction_y
+    rim[MOMENTUM_Y, k] -= traction_y
 
 
 @compiled_once(allocates=False)
 def split_momentum(rim, k, momentum_y, pressure, curved):
     """Rows MOMENTUM_Y, PUSH and HOOP of a face: `Geometry.split`."""
-    split = keep_flux(momentum_y, pressure, rim[on.AREA_Y, k], rim[on.NY, k])
+    split = keep_flux(momentum_y, pressure, rim[AREA_Y, k], rim[NY, k])
     if curved:
-        split = split_flux(momentum_y, pressure, rim[on.AREA_Y, k], rim[on.NY, k])
-    rim[on.MOMENTUM_Y, k], rim[on.PUSH, k], rim[on.HOOP, k] = split
+        split = split_flux(momentum_y, pressure, rim[AREA_Y, k], rim[NY, k])
+    rim[MOMENTUM_Y, k], rim[PUSH, k], rim[HOOP, k] = split
 
 
 @compiled_once(allocates=False)
 def let_pass(rim, k, other, m, beyond, hll, acoustic_weight, curved):
     """Flux through face k of a rim from its traces and the state from row `beyond` on at face m of
     the other: the Riemann solver of block interiors."""
-    row = beyond - on.RHO_TRACE
+    row = beyond - RHO_TRACE
     inside = (
-        rim[on.RHO_TRACE, k], rim[on.U_TRACE, k], rim[on.V_TRACE, k], rim[on.P_TRACE, k],
-        rim[on.E_TRACE, k], rim[on.C2_TRACE, k],
+        rim[RHO_TRACE, k], rim[U_TRACE, k], rim[V_TRACE, k], rim[P_TRACE, k],
+        rim[E_TRACE, k], rim[C2_TRACE, k],
     )  # fmt: skip
     outside = (
-        other[on.RHO_TRACE + row, m], other[on.U_TRACE + row, m], other[on.V_TRACE + row, m],
-        other[on.P_TRACE + row, m], other[on.E_TRACE + row, m], other[on.C2_TRACE + row, m],
+        other[RHO_TRACE + row, m], other[U_TRACE + row, m], other[V_TRACE + row, m],
+        other[P_TRACE + row, m], other[E_TRACE + row, m], other[C2_TRACE + row, m],
     )  # fmt: skip
-    face = rim[on.AREA_X, k], rim[on.AREA_Y, k], rim[on.SWEPT, k]
+    face = rim[AREA_X, k], rim[AREA_Y, k], rim[SWEPT, k]
     if hll > 0.0:
         flux = riemann.compute_hll_flux(inside, outside, face)
     else:
         flux = riemann.compute_hllc_flux(inside, outside, face, acoustic_weight)
     if flux[0] > 0.0:
-        flux = riemann.withhold(flux, (inside[1], inside[2], inside[4]), rim[on.PART_TRACE, k])
+        flux = riemann.withhold(flux, (inside[1], inside[2], inside[4]), rim[PART_TRACE, k])
     else:
-        part = other[on.PART_TRACE + row, m]
+        part = other[PART_TRACE + row, m]
         flux = riemann.withhold(flux, (outside[1], outside[2], outside[4]), part)
-    rim[on.MASS, k], rim[on.MOMENTUM_X, k], momentum_y, rim[on.ENERGY, k], pressure = flux
+    rim[MASS, k], rim[MOMENTUM_X, k], momentum_y, rim[ENERGY, k], pressure = flux
     split_momentum(rim, k, momentum_y, pressure, curved)
 
 
@@ -152,11 +206,11 @@ def carry_through(rim, k, other, m, part):
 
     The value out there is in the row `part` of each field at face m of the other rim.
     """
-    mass = rim[on.MASS, k]
-    for q in range(on.count_carried(rim)):
-        row = on.find_carried_row(q)
-        value = rim[row + on.CARRIED_TRACE, k] if mass > 0.0 else other[row + part, m]
-        rim[row + on.CARRIED_FLUX, k] = mass * (value - rim[row + on.CARRIED_CELL, k])
+    mass = rim[MASS, k]
+    for q in range(count_carried(rim)):
+        row = find_carried_row(q)
+        value = rim[row + CARRIED_TRACE, k] if mass > 0.0 else other[row + part, m]
+        rim[row + CARRIED_FLUX, k] = mass * (value - rim[row + CARRIED_CELL, k])
 
 
 @compiled_once
@@ -182,7 +236,7 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
     for k in range(count):
         at = count - k if backwards else k
         other = at - 1 if backwards else at + 1
-        area_x, area_y = rim[on.AREA_X, first + k], rim[on.AREA_Y, first + k]
+        area_x, area_y = rim[AREA_X, first + k], rim[AREA_Y, first + k]
         gain[k] = 0.5 * (
             (speeds[0, at] + speeds[0, other]) * area_x
             + (speeds[1, at] + speeds[1, other]) * area_y
@@ -220,24 +274,22 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
             continue
         giver = (k - 1) % count if rate > 0.0 else k % count
         m = first + giver
-        rho = rim[on.RHO_TRACE, m]
-        p = rim[on.P_TRACE, m]
-        u, v = rim[on.U_TRACE, m], rim[on.V_TRACE, m]
-        energy = rho * (rim[on.E_TRACE, m] + 0.5 * (u * u + v * v)) + p
+        rho = rim[RHO_TRACE, m]
+        p = rim[P_TRACE, m]
+        u, v = rim[U_TRACE, m], rim[V_TRACE, m]
+        energy = rho * (rim[E_TRACE, m] + 0.5 * (u * u + v * v)) + p
         for side in range(2):  # out of the cell before node k, into the one after
             cell = k - 1 + side
             if 0 <= cell < count:
                 part = rate if side == 0 else -rate
-                rim[on.MASS, first + cell] += part * rho
-                rim[on.MOMENTUM_X, first + cell] += part * rho * u
-                rim[on.MOMENTUM_Y, first + cell] += part * rho * v
-                rim[on.ENERGY, first + cell] += part * energy
-                for q in range(on.count_carried(rim)):
-                    row = on.find_carried_row(q)
-                    beyond = (
-                        rim[row + on.CARRIED_TRACE, m] - rim[row + on.CARRIED_CELL, first + cell]
-                    )
-                    rim[row + on.CARRIED_FLUX, first + cell] += part * rho * beyond
+                rim[MASS, first + cell] += part * rho
+                rim[MOMENTUM_X, first + cell] += part * rho * u
+                rim[MOMENTUM_Y, first + cell] += part * rho * v
+                rim[ENERGY, first + cell] += part * energy
+                for q in range(count_carried(rim)):
+                    row = find_carried_row(q)
+                    beyond = rim[row + CARRIED_TRACE, m] - rim[row + CARRIED_CELL, first + cell]
+                    rim[row + CARRIED_FLUX, first + cell] += part * rho * beyond
 
 
 @kernel
@@ -255,7 +307,7 @@ def solve_link(rim, other, pairs, law, other_law, layer, phase, curved):
     along a line with a thickness: layer = (speeds, backwards, closed) of `add_layer_flux`.
     """
     first, other_first, step, count = pairs
-    state = on.RHO_FACE if phase == AT_CELLS else on.RHO_TRACE
+    state = RHO_FACE if phase == AT_CELLS else RHO_TRACE
     for n in range(count):
         k = first + n
         m = other_first + step * n
@@ -282,23 +334,23 @@ def pass_seam(rim, other, pairs, phase, curved):
         k = first + n
         m = other_first + step * n
         if phase == AT_CELLS:
-            for q in range(on.P + 1):
-                rim[on.RHO_GHOST + q, k] = other[q, m]
-                other[on.RHO_GHOST + q, m] = rim[q, k]
-            rim[on.LENGTH_GHOST, k] = other[on.LENGTH, m]
-            other[on.LENGTH_GHOST, m] = rim[on.LENGTH, k]
-            for q in range(on.count_carried(rim)):
-                row = on.find_carried_row(q)
-                rim[row + on.CARRIED_GHOST, k] = other[row + on.CARRIED_CELL, m]
-                other[row + on.CARRIED_GHOST, m] = rim[row + on.CARRIED_CELL, k]
+            for q in range(P + 1):
+                rim[RHO_GHOST + q, k] = other[q, m]
+                other[RHO_GHOST + q, m] = rim[q, k]
+            rim[LENGTH_GHOST, k] = other[LENGTH, m]
+            other[LENGTH_GHOST, m] = rim[LENGTH, k]
+            for q in range(count_carried(rim)):
+                row = find_carried_row(q)
+                rim[row + CARRIED_GHOST, k] = other[row + CARRIED_CELL, m]
+                other[row + CARRIED_GHOST, m] = rim[row + CARRIED_CELL, k]
         else:
-            hll = rim[on.HLL, k] + other[on.HLL, m]
-            weight = max(rim[on.ACOUSTIC, k], other[on.ACOUSTIC, m])
-            let_pass(rim, k, other, m, on.RHO_TRACE, hll, weight, curved)
-            for q in range(on.MASS, on.MASS + FLUX_ROWS):
+            hll = rim[HLL, k] + other[HLL, m]
+            weight = max(rim[ACOUSTIC, k], other[ACOUSTIC, m])
+            let_pass(rim, k, other, m, RHO_TRACE, hll, weight, curved)
+            for q in range(MASS, MASS + FLUX_ROWS):
                 other[q, m] = -rim[q, k]
-            carry_through(rim, k, other, m, on.CARRIED_TRACE)
-            carry_through(other, m, rim, k, on.CARRIED_TRACE)
+            carry_through(rim, k, other, m, CARRIED_TRACE)
+            carry_through(other, m, rim, k, CARRIED_TRACE)
 
 
 @kernel(allocates=False)
@@ -313,24 +365,24 @@ def fill_ghosts_from_faces(rim, spans):
 def fill_free_surface(rim, spans, law, pressure, phase, curved):
     """Contact states of a surface under a given pressure; the phases are those of `solve_link`, but
     AT_FLUX solves nothing."""
-    state = on.RHO_FACE if phase == AT_CELLS else on.RHO_TRACE
+    state = RHO_FACE if phase == AT_CELLS else RHO_TRACE
     for number in range(spans.shape[0]):
         for k in range(spans[number, 0], spans[number, 1]):
-            inside = pressure + (rim[on.VOID_P, k] + rim[on.JUMP, k])
-            rim[on.P_STAR, k] = inside
+            inside = pressure + (rim[VOID_P, k] + rim[JUMP, k])
+            rim[P_STAR, k] = inside
             if phase == AT_FLUX:
                 press(rim, k, curved)
                 continue
             nx, ny = find_normal(rim, k)
-            u, v = rim[state + on.U, k], rim[state + on.V, k]
+            u, v = rim[state + U, k], rim[state + V, k]
             w = u * nx + v * ny
             w_star = riemann.compute_speed_at_pressure(
-                rim[state + on.RHO, k], w, rim[state + on.P, k], rim[state + on.C, k], law, inside
+                rim[state + RHO, k], w, rim[state + P, k], rim[state + C, k], law, inside
             )
-            rim[on.W_STAR, k] = w_star
-            rim[on.U_STAR, k] = u + (w_star - w) * nx
-            rim[on.V_STAR, k] = v + (w_star - w) * ny
-            rim[on.SLIP, k] = 0.0
+            rim[W_STAR, k] = w_star
+            rim[U_STAR, k] = u + (w_star - w) * nx
+            rim[V_STAR, k] = v + (w_star - w) * ny
+            rim[SLIP, k] = 0.0
             if phase == AT_CELLS:
                 fill_ghost_from_face(rim, k)
 
@@ -352,19 +404,19 @@ def limit_at_piston(rim, speed_x, speed_y, k):
     is a, which ends at the piston's velocity; those of minmod and of van Leer are below it.
     Nothing changes where b <= a.  speed_x, speed_y: the piston's velocity [m/s].
     """
-    nx, ny = rim[on.NX, k], rim[on.NY, k]
-    u, v = rim[on.U, k], rim[on.V, k]
+    nx, ny = rim[NX, k], rim[NY, k]
+    u, v = rim[U, k], rim[V, k]
     square = nx * nx + ny * ny
     excess = ((u - speed_x) * nx + (v - speed_y) * ny) / square
-    further = ((rim[on.U_NEXT, k] - u) * nx + (rim[on.V_NEXT, k] - v) * ny) / square
-    to_face = 2.0 * excess * rim[on.WAY_NEXT, k]
-    to_next = further * rim[on.LENGTH, k]
+    further = ((rim[U_NEXT, k] - u) * nx + (rim[V_NEXT, k] - v) * ny) / square
+    to_face = 2.0 * excess * rim[WAY_NEXT, k]
+    to_next = further * rim[LENGTH, k]
     if to_face * to_next > 0.0 and abs(to_next) > abs(to_face):
         factor = 2.0 - to_next / to_face
         factor = factor if factor > 0.5 else 0.5
         nearer = 2.0 * (1.0 - factor) * excess
-        rim[on.U_GHOST, k] += nearer * nx
-        rim[on.V_GHOST, k] += nearer * ny
+        rim[U_GHOST, k] += nearer * nx
+        rim[V_GHOST, k] += nearer * ny
 
 
 @compiled_once(allocates=False)
@@ -377,14 +429,14 @@ def mirror_in_walls(rim, walls, speeds):
     for wall in range(walls.shape[0]):
         speed_x, speed_y = speeds[wall, 0], speeds[wall, 1]
         for k in range(walls[wall, 0], walls[wall, 1]):
-            nx, ny = rim[on.NX, k], rim[on.NY, k]
-            u, v = rim[on.U, k], rim[on.V, k]
+            nx, ny = rim[NX, k], rim[NY, k]
+            u, v = rim[U, k], rim[V, k]
             excess = 2.0 * ((u - speed_x) * nx + (v - speed_y) * ny) / (nx * nx + ny * ny)
-            rim[on.RHO_GHOST, k] = rim[on.RHO, k]
-            rim[on.U_GHOST, k] = u - excess * nx
-            rim[on.V_GHOST, k] = v - excess * ny
-            rim[on.P_GHOST, k] = rim[on.P, k]
-            rim[on.LENGTH_GHOST, k] = rim[on.LENGTH, k]
+            rim[RHO_GHOST, k] = rim[RHO, k]
+            rim[U_GHOST, k] = u - excess * nx
+            rim[V_GHOST, k] = v - excess * ny
+            rim[P_GHOST, k] = rim[P, k]
+            rim[LENGTH_GHOST, k] = rim[LENGTH, k]
             if walls[wall, 2] == PISTON:
                 limit_at_piston(rim, speed_x, speed_y, k)
 
@@ -397,11 +449,11 @@ def press_on_walls(rim, walls, wave_law, curved):
     """
     for wall in range(walls.shape[0]):
         for k in range(walls[wall, 0], walls[wall, 1]):
-            x, y = rim[on.NX, k], rim[on.NY, k]
+            x, y = rim[NX, k], rim[NY, k]
             length = (x * x + y * y) ** 0.5
-            w = (rim[on.U_TRACE, k] * x + rim[on.V_TRACE, k] * y - rim[on.SWEEP, k]) / length
-            rim[on.P_STAR, k], _ = riemann.compute_wave_pressure(
-                rim[on.RHO_TRACE, k], rim[on.P_TRACE, k], rim[on.C_TRACE, k], wave_law, w
+            w = (rim[U_TRACE, k] * x + rim[V_TRACE, k] * y - rim[SWEEP, k]) / length
+            rim[P_STAR, k], _ = riemann.compute_wave_pressure(
+                rim[RHO_TRACE, k], rim[P_TRACE, k], rim[C_TRACE, k], wave_law, w
             )
             press(rim, k, curved)
 
@@ -412,15 +464,15 @@ def pass_open_sides(rim, opened, curved):
     last and the first row of the state beyond."""
     for number in range(opened.shape[0]):
         for k in range(opened[number, 0], opened[number, 1]):
-            let_pass(rim, k, rim, k, opened[number, 2], rim[on.HLL, k], rim[on.ACOUSTIC, k], curved)
+            let_pass(rim, k, rim, k, opened[number, 2], rim[HLL, k], rim[ACOUSTIC, k], curved)
 
 
 @compiled_once(allocates=False)
 def carry_through_open_sides(rim, opened):
     """What goes out of carried fields through the faces of `pass_open_sides`."""
     for number in range(opened.shape[0]):
-        as_inside = opened[number, 2] == on.RHO_TRACE
-        beyond = on.CARRIED_TRACE if as_inside else on.CARRIED_BEYOND
+        as_inside = opened[number, 2] == RHO_TRACE
+        beyond = CARRIED_TRACE if as_inside else CARRIED_BEYOND
         for k in range(opened[number, 0], opened[number, 1]):
             carry_through(rim, k, rim, k, beyond)
 

@@ -5,13 +5,34 @@ Those beside the nodes of a sliding contact hold more, or less, than their strai
 
 from __future__ import annotations
 
-from shockgrid.hydro import rim as on
-from shockgrid.hydro import rows as of
 from shockgrid.hydro.eos.conversion import make_conversion
 from shockgrid.hydro.formulas.geometry import Geometry, compute_plane_face
 from shockgrid.hydro.formulas.reconstruction import compute_line_geometry
 from shockgrid.hydro.interior.scratch import find_twist
-from shockgrid.hydro.rim import find_cell
+from shockgrid.hydro.rim import (
+    AREA_X,
+    AREA_Y,
+    NX,
+    NY,
+    SWEEP,
+    SWEPT,
+    X_AREA,
+    X_TRACE,
+    Y_AREA,
+    X,
+    Y,
+    find_cell,
+    find_ends,
+    find_face,
+)
+from shockgrid.hydro.rows import (
+    LEAST_C2,
+    NO_C2,
+    TOTAL_ENERGY,
+    TOTAL_MASS,
+    TOTAL_MOMENTUM_X,
+    TOTAL_MOMENTUM_Y,
+)
 from shockgrid.regrid.jit import compiled_once, inlined, kernel
 from shockgrid.regrid.sides import I_MAX, J_MIN, find_node
 
@@ -56,25 +77,25 @@ def make_fill_faces(geometry: Geometry):
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         for face in range(rim.shape[1]):
-            side, i, j, i_end, j_end = on.find_ends(face, ni, nj)
+            side, i, j, i_end, j_end = find_ends(face, ni, nj)
             sign = 1.0 if side == I_MAX or side == J_MIN else -1.0
             a = nodes[0, i, j], nodes[1, i, j]
             b = nodes[0, i_end, j_end], nodes[1, i_end, j_end]
             a_new = nodes_new[0, i, j], nodes_new[1, i, j]
             b_new = nodes_new[0, i_end, j_end], nodes_new[1, i_end, j_end]
             area_x, area_y, sweep, x, y = compute_plane_face(a, b, a_new, b_new, inverse_dt)
-            rim[on.NX, face] = sign * area_x
-            rim[on.NY, face] = sign * area_y
-            rim[on.SWEEP, face] = sign * sweep
-            rim[on.X, face] = x
-            rim[on.Y, face] = y
+            rim[NX, face] = sign * area_x
+            rim[NY, face] = sign * area_y
+            rim[SWEEP, face] = sign * sweep
+            rim[X, face] = x
+            rim[Y, face] = y
             if curved:
                 area_x, area_y, sweep, x, y = compute_face(a, b, a_new, b_new, inverse_dt)
-            rim[on.AREA_X, face] = sign * area_x
-            rim[on.AREA_Y, face] = sign * area_y
-            rim[on.SWEPT, face] = sign * sweep
-            rim[on.X_AREA, face] = x
-            rim[on.Y_AREA, face] = y
+            rim[AREA_X, face] = sign * area_x
+            rim[AREA_Y, face] = sign * area_y
+            rim[SWEPT, face] = sign * sweep
+            rim[X_AREA, face] = x
+            rim[Y_AREA, face] = y
 
     return fill_faces
 
@@ -90,9 +111,9 @@ def place_traces_on_axis(nodes, nodes_new, start, stop, rim):
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     for face in range(start, stop):
-        side, i, j, i_end, j_end = on.find_ends(face, ni, nj)
+        side, i, j, i_end, j_end = find_ends(face, ni, nj)
         # the radius along the next line of nodes inwards
-        _, k = on.find_face(face, ni, nj)
+        _, k = find_face(face, ni, nj)
         i_next, j_next = find_node(side, k, 1, ni, nj)
         y = 0.5 * (nodes[1, i_next, j_next] + nodes_new[1, i_next, j_next])
         i_next, j_next = find_node(side, k + 1, 1, ni, nj)
@@ -101,7 +122,7 @@ def place_traces_on_axis(nodes, nodes_new, start, stop, rim):
         for c in range(2):
             here = 0.5 * (nodes[c, i, j] + nodes_new[c, i, j])
             end = 0.5 * (nodes[c, i_end, j_end] + nodes_new[c, i_end, j_end])
-            rim[on.X_TRACE + c, face] = 0.5 * (end + here) + part * (end - here)
+            rim[X_TRACE + c, face] = 0.5 * (end + here) + part * (end - here)
 
 
 def make_fill_polygons(eos_class, geometry: Geometry):
@@ -125,7 +146,7 @@ def make_fill_polygons(eos_class, geometry: Geometry):
         excess_volume, excess_volume_new = excess
         ni, nj = rates_new.shape
         totals[:] = 0.0
-        totals[of.LEAST_C2] = of.NO_C2
+        totals[LEAST_C2] = NO_C2
         for face in range(excess_volume.shape[0]):
             side, i, j = find_cell(face, ni, nj)
             # volumes beyond the straight faces, in a corner of the block those of both its sides
@@ -154,10 +175,10 @@ def make_fill_polygons(eos_class, geometry: Geometry):
             rates_new[i, j] *= thinner
             crowding_new[i, j] *= thinner * thinner
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
-            totals[of.LEAST_C2] = totals[of.LEAST_C2] if totals[of.LEAST_C2] < c2 else c2
-            totals[of.TOTAL_MASS] += held
-            totals[of.TOTAL_MOMENTUM_X] += held * u_old
-            totals[of.TOTAL_MOMENTUM_Y] += held * v_old
-            totals[of.TOTAL_ENERGY] += held * energy_old
+            totals[LEAST_C2] = totals[LEAST_C2] if totals[LEAST_C2] < c2 else c2
+            totals[TOTAL_MASS] += held
+            totals[TOTAL_MOMENTUM_X] += held * u_old
+            totals[TOTAL_MOMENTUM_Y] += held * v_old
+            totals[TOTAL_ENERGY] += held * energy_old
 
     return fill_polygons

@@ -12,7 +12,6 @@ from __future__ import annotations
 import functools
 from typing import NamedTuple
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.eos.base import make_leaving_part
 from shockgrid.hydro.formulas.geometry import PLANE, Geometry
 from shockgrid.hydro.formulas.reconstruction import (
@@ -23,8 +22,9 @@ from shockgrid.hydro.formulas.reconstruction import (
     compute_face_state,
 )
 from shockgrid.hydro.formulas.riemann import DEFAULT_FLUX
-from shockgrid.hydro.interior import scratch as at
+from shockgrid.hydro.interior import scratch
 from shockgrid.hydro.interior.reconstruction import make_row_phases
+from shockgrid.hydro.interior.scratch import SCRATCH_SPAN
 from shockgrid.hydro.interior.slopes import fill_steps
 from shockgrid.hydro.perimeter.contacts import (
     AXIS,
@@ -37,7 +37,57 @@ from shockgrid.hydro.perimeter.faces import (
     make_fill_polygons,
     place_traces_on_axis,
 )
-from shockgrid.hydro.rim import find_first_face
+from shockgrid.hydro.rim import (
+    ACOUSTIC,
+    C2,
+    C2_TRACE,
+    C_TRACE,
+    E_TRACE,
+    HLL,
+    LENGTH,
+    LENGTH_GHOST,
+    NX,
+    NY,
+    P_HALF,
+    P_TRACE,
+    P_X,
+    P_Y,
+    PART_TRACE,
+    RHO,
+    RHO_FACE,
+    RHO_GHOST,
+    RHO_HALF,
+    RHO_TRACE,
+    RHO_X,
+    RHO_Y,
+    TORN,
+    U_HALF,
+    U_NEXT,
+    U_STAR,
+    U_TRACE,
+    U_X,
+    U_Y,
+    V_HALF,
+    V_NEXT,
+    V_STAR,
+    V_TRACE,
+    V_X,
+    V_Y,
+    WAY_NEXT,
+    X_AREA,
+    X_CELL,
+    X_TRACE,
+    Y_AREA,
+    Y_CELL,
+    Y_TRACE,
+    C,
+    P,
+    U,
+    V,
+    X,
+    Y,
+    find_first_face,
+)
 from shockgrid.hydro.rows import STATE_ROWS
 from shockgrid.regrid.jit import Kernel, compiled_once, kernel
 from shockgrid.regrid.sides import I_MAX, I_MIN, J_MAX, J_MIN, SIDE_NAMES, find_node
@@ -94,7 +144,7 @@ def copy_nodes(nodes, strip, row, start, count, Z, place):
     for k in range(first, last + 1):
         entry = k - start + 1
         Z[place + entry] = nodes[0, i + k * ki, j + k * kj]
-        Z[place + at.SCRATCH_SPAN + entry] = nodes[1, i + k * ki, j + k * kj]
+        Z[place + SCRATCH_SPAN + entry] = nodes[1, i + k * ki, j + k * kj]
 
 
 @compiled_once(allocates=False)
@@ -114,9 +164,7 @@ def copy_state(state, strip, row, start, count, Z, place):
     ki, kj = strip[4], strip[5]
     for q in range(STATE_ROWS):
         for k in range(count + 2):
-            Z[place + q * at.SCRATCH_SPAN + k] = state[
-                q, i + 1 + (k - 1) * ki, j + 1 + (k - 1) * kj
-            ]
+            Z[place + q * SCRATCH_SPAN + k] = state[q, i + 1 + (k - 1) * ki, j + 1 + (k - 1) * kj]
 
 
 @functools.cache
@@ -154,17 +202,17 @@ def make_side_kernels(
             strip, along, first_face, step, _, _ = find_strip(side, ni, nj)
             # the strip of cells along a side, in chunks that fit the scratch
             deep = (ni if side < J_MIN else nj) > 2
-            for start in range(0, along, at.CHUNK_CELLS):
-                m = min(at.CHUNK_CELLS, along - start)
-                n = at.count_padded(m)
+            for start in range(0, along, scratch.CHUNK_CELLS):
+                m = min(scratch.CHUNK_CELLS, along - start)
+                n = scratch.count_padded(m)
                 first = first_face + start * step
                 # does any face of the chunk need the next cells inwards?
                 wanted = False
                 for k in range(m):
                     wanted |= inwards[first + k * step]
                 # lengths across the side
-                copy_nodes(nodes, strip, 0, start, m, Z, at.X_HIGH)
-                copy_nodes(nodes, strip, 1, start, m, Z, at.X_NEXT)
+                copy_nodes(nodes, strip, 0, start, m, Z, scratch.X_HIGH)
+                copy_nodes(nodes, strip, 1, start, m, Z, scratch.X_NEXT)
                 measure_after(Z, n)
                 # the cells' states, and the same at their faces
                 for k in range(m):
@@ -172,23 +220,23 @@ def make_side_kernels(
                     i, j = find_strip_cell(strip, 0, start + k)
                     for q in range(STATE_ROWS):
                         rim[q, face] = state[q, i + 1, j + 1]
-                    c = sound(rim[on.RHO, face], rim[on.P, face], parameters) ** 0.5
-                    rim[on.C, face] = c
-                    length = Z[at.LENGTH_AFTER + k + 1]
-                    shift = Z[at.SHIFT_AFTER + k + 1]
-                    rim[on.LENGTH, face] = length + 2.0 * shift
-                    for q in range(on.C + 1):
-                        rim[on.RHO_FACE + q, face] = rim[q, face]
+                    c = sound(rim[RHO, face], rim[P, face], parameters) ** 0.5
+                    rim[C, face] = c
+                    length = Z[scratch.LENGTH_AFTER + k + 1]
+                    shift = Z[scratch.SHIFT_AFTER + k + 1]
+                    rim[LENGTH, face] = length + 2.0 * shift
+                    for q in range(C + 1):
+                        rim[RHO_FACE + q, face] = rim[q, face]
                 # velocity of the next cells inwards, and the way to them
                 if wanted:
                     look_inwards(state, nodes, strip, start, deep, Z)
                     for k in range(1, m + 1):
                         face = first + (k - 1) * step
-                        rim[on.U_NEXT, face] = Z[at.U + k]
-                        rim[on.V_NEXT, face] = Z[at.V + k]
-                        way = 0.5 * (Z[at.LENGTH_BEFORE + k] + Z[at.LENGTH + k])
-                        way += Z[at.SHIFT + k] - Z[at.SHIFT_BEFORE + k]
-                        rim[on.WAY_NEXT, face] = way
+                        rim[U_NEXT, face] = Z[scratch.U + k]
+                        rim[V_NEXT, face] = Z[scratch.V + k]
+                        way = 0.5 * (Z[scratch.LENGTH_BEFORE + k] + Z[scratch.LENGTH + k])
+                        way += Z[scratch.SHIFT + k] - Z[scratch.SHIFT_BEFORE + k]
+                        rim[WAY_NEXT, face] = way
                 # states extrapolated to the faces (theory F4.7)
                 if wanted and deep:
                     extrapolate(Z, m, inwards, first, step, parameters, rim)
@@ -199,13 +247,13 @@ def make_side_kernels(
         current row and the one after it; the strip's own lengths become those of the row before."""
         ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
         along = ni * abs(strip[4]) + nj * abs(strip[5])
-        m = min(at.CHUNK_CELLS, along - start)
-        n = at.count_padded(m)
+        m = min(scratch.CHUNK_CELLS, along - start)
+        n = scratch.count_padded(m)
         for row in range(2, 4 if deep else 3):
             next_row(Z, n)
-            copy_nodes(nodes, strip, row, start, m, Z, at.X_NEXT)
+            copy_nodes(nodes, strip, row, start, m, Z, scratch.X_NEXT)
             measure_after(Z, n)
-            copy_state(state, strip, row - 1, start, m, Z, at.RHO_AFTER)
+            copy_state(state, strip, row - 1, start, m, Z, scratch.RHO_AFTER)
         if not deep:
             next_row(Z, n)
 
@@ -217,31 +265,31 @@ def make_side_kernels(
         nj = nodes.shape[2] - 1
         for side in range(len(SIDE_NAMES)):
             strip, along, first_face, step, before, after = find_strip(side, ni, nj)
-            for start in range(0, along, at.CHUNK_CELLS):
-                m = min(at.CHUNK_CELLS, along - start)
-                n = at.count_padded(m)
+            for start in range(0, along, scratch.CHUNK_CELLS):
+                m = min(scratch.CHUNK_CELLS, along - start)
+                n = scratch.count_padded(m)
                 first = first_face + start * step
                 # the ghosts, then the strip's own row and the next one
                 for k in range(m):
-                    Z[at.LENGTH + 1 + k] = rim[on.LENGTH_GHOST, first + k * step]
-                    Z[at.SHIFT + 1 + k] = 0.0
-                copy_nodes(nodes, strip, 0, start, m, Z, at.X_HIGH)
-                copy_state(state, strip, -1, start, m, Z, at.RHO)
-                copy_nodes(nodes, strip, 1, start, m, Z, at.X_NEXT)
+                    Z[scratch.LENGTH + 1 + k] = rim[LENGTH_GHOST, first + k * step]
+                    Z[scratch.SHIFT + 1 + k] = 0.0
+                copy_nodes(nodes, strip, 0, start, m, Z, scratch.X_HIGH)
+                copy_state(state, strip, -1, start, m, Z, scratch.RHO)
+                copy_nodes(nodes, strip, 1, start, m, Z, scratch.X_NEXT)
                 measure_after(Z, n)
-                copy_state(state, strip, 0, start, m, Z, at.RHO_AFTER)
+                copy_state(state, strip, 0, start, m, Z, scratch.RHO_AFTER)
                 fill_steps(Z, n)
                 next_row(Z, n)
-                copy_nodes(nodes, strip, 2, start, m, Z, at.X_NEXT)
+                copy_nodes(nodes, strip, 2, start, m, Z, scratch.X_NEXT)
                 measure_after(Z, n)
-                copy_state(state, strip, 1, start, m, Z, at.RHO_AFTER)
+                copy_state(state, strip, 1, start, m, Z, scratch.RHO_AFTER)
                 if opens_voids:
                     for k in range(m):
-                        Z[at.VOID_LOADED + 1 + k] = void_energy[
+                        Z[scratch.VOID_LOADED + 1 + k] = void_energy[
                             find_strip_cell(strip, 0, start + k)
                         ]
-                low = rim[on.LENGTH_GHOST, before] if start == 0 else -1.0
-                high = rim[on.LENGTH_GHOST, after] if start + m == along else -1.0
+                low = rim[LENGTH_GHOST, before] if start == 0 else -1.0
+                high = rim[LENGTH_GHOST, after] if start + m == along else -1.0
                 reconstruct(Z, m, n, low, high, half_dt, parameters)
                 keep(Z, m, nodes, strip, start, first, step, rim)
 
@@ -251,60 +299,60 @@ def make_side_kernels(
         x, y = nodes[0], nodes[1]
         for k in range(1, m + 1):
             face = first + (k - 1) * step
-            rim[on.RHO_HALF, face] = Z[at.RHO_HALF + k]
-            rim[on.U_HALF, face] = Z[at.U_HALF + k]
-            rim[on.V_HALF, face] = Z[at.V_HALF + k]
-            rim[on.P_HALF, face] = Z[at.P_HALF + k]
-            rim[on.RHO_X, face] = Z[at.RHO_X + k]
-            rim[on.RHO_Y, face] = Z[at.RHO_Y + k]
-            rim[on.U_X, face] = Z[at.U_X + k]
-            rim[on.U_Y, face] = Z[at.U_Y + k]
-            rim[on.V_X, face] = Z[at.V_X + k]
-            rim[on.V_Y, face] = Z[at.V_Y + k]
-            rim[on.P_X, face] = Z[at.P_X + k]
-            rim[on.P_Y, face] = Z[at.P_Y + k]
+            rim[RHO_HALF, face] = Z[scratch.RHO_HALF + k]
+            rim[U_HALF, face] = Z[scratch.U_HALF + k]
+            rim[V_HALF, face] = Z[scratch.V_HALF + k]
+            rim[P_HALF, face] = Z[scratch.P_HALF + k]
+            rim[RHO_X, face] = Z[scratch.RHO_X + k]
+            rim[RHO_Y, face] = Z[scratch.RHO_Y + k]
+            rim[U_X, face] = Z[scratch.U_X + k]
+            rim[U_Y, face] = Z[scratch.U_Y + k]
+            rim[V_X, face] = Z[scratch.V_X + k]
+            rim[V_Y, face] = Z[scratch.V_Y + k]
+            rim[P_X, face] = Z[scratch.P_X + k]
+            rim[P_Y, face] = Z[scratch.P_Y + k]
             if curved:
-                rim[on.X_CELL, face] = Z[at.X_CENTRE + k]
-                rim[on.Y_CELL, face] = Z[at.Y_CENTRE + k]
+                rim[X_CELL, face] = Z[scratch.X_CENTRE + k]
+                rim[Y_CELL, face] = Z[scratch.Y_CENTRE + k]
             else:  # summed in the block's order, not the strip's: the bits of the block's inside
                 a, b = find_strip_cell(strip, 0, start + k - 1)
-                rim[on.X_CELL, face] = 0.25 * (
+                rim[X_CELL, face] = 0.25 * (
                     (x[a, b] + x[a, b + 1]) + (x[a + 1, b] + x[a + 1, b + 1])
                 )
-                rim[on.Y_CELL, face] = 0.25 * (
+                rim[Y_CELL, face] = 0.25 * (
                     (y[a, b] + y[a, b + 1]) + (y[a + 1, b] + y[a + 1, b + 1])
                 )
-            rim[on.C2, face] = Z[at.C2 + k]
-            rim[on.TORN, face] = Z[at.TORN + k] if opens_voids else WHOLE_CELL_MARK
-            rim[on.HLL, face] = Z[at.HLL + k]
+            rim[C2, face] = Z[scratch.C2 + k]
+            rim[TORN, face] = Z[scratch.TORN + k] if opens_voids else WHOLE_CELL_MARK
+            rim[HLL, face] = Z[scratch.HLL + k]
             # fluxes lessen jumps by it with low-mach alone, as inside
-            rim[on.ACOUSTIC, face] = Z[at.ACOUSTIC + k] if low_mach else 1.0
+            rim[ACOUSTIC, face] = Z[scratch.ACOUSTIC + k] if low_mach else 1.0
 
     @compiled_once(allocates=False)
     def trace_faces(rim, parameters, start, stop):
         """States at X_TRACE, Y_TRACE of the faces start..stop - 1; no state: the cell's own."""
         for k in range(start, stop):
-            state = rim[on.RHO_HALF, k], rim[on.U_HALF, k], rim[on.V_HALF, k], rim[on.P_HALF, k]
+            state = rim[RHO_HALF, k], rim[U_HALF, k], rim[V_HALF, k], rim[P_HALF, k]
             gradients = (
-                rim[on.RHO_X, k], rim[on.RHO_Y, k], rim[on.U_X, k], rim[on.U_Y, k],
-                rim[on.V_X, k], rim[on.V_Y, k], rim[on.P_X, k], rim[on.P_Y, k],
+                rim[RHO_X, k], rim[RHO_Y, k], rim[U_X, k], rim[U_Y, k],
+                rim[V_X, k], rim[V_Y, k], rim[P_X, k], rim[P_Y, k],
             )  # fmt: skip
-            dx, dy = rim[on.X_TRACE, k] - rim[on.X_CELL, k], rim[on.Y_TRACE, k] - rim[on.Y_CELL, k]
+            dx, dy = rim[X_TRACE, k] - rim[X_CELL, k], rim[Y_TRACE, k] - rim[Y_CELL, k]
             rho, u, v, p = compute_face_state(state, gradients, dx, dy)
-            torn = rim[on.TORN, k]
-            c2 = choose_own(sound(rho, p, parameters), rim[on.C2, k], torn)
+            torn = rim[TORN, k]
+            c2 = choose_own(sound(rho, p, parameters), rim[C2, k], torn)
             real = (rho > 0.0) & (c2 > 0.0)
-            rho = rho if real else rim[on.RHO, k]
-            p = p if real else rim[on.P, k]
-            c2 = c2 if real else rim[on.C2, k]
-            rim[on.RHO_TRACE, k] = rho
-            rim[on.U_TRACE, k] = u if real else rim[on.U, k]
-            rim[on.V_TRACE, k] = v if real else rim[on.V, k]
-            rim[on.P_TRACE, k] = p
-            rim[on.E_TRACE, k] = choose_own(energy(rho, p, parameters), torn, torn)
-            rim[on.C_TRACE, k] = c2**0.5
-            rim[on.C2_TRACE, k] = c2
-            rim[on.PART_TRACE, k] = find_leaving_part(rho, parameters) if withholds else 1.0
+            rho = rho if real else rim[RHO, k]
+            p = p if real else rim[P, k]
+            c2 = c2 if real else rim[C2, k]
+            rim[RHO_TRACE, k] = rho
+            rim[U_TRACE, k] = u if real else rim[U, k]
+            rim[V_TRACE, k] = v if real else rim[V, k]
+            rim[P_TRACE, k] = p
+            rim[E_TRACE, k] = choose_own(energy(rho, p, parameters), torn, torn)
+            rim[C_TRACE, k] = c2**0.5
+            rim[C2_TRACE, k] = c2
+            rim[PART_TRACE, k] = find_leaving_part(rho, parameters) if withholds else 1.0
 
     @compiled_once(allocates=False)
     def trace_moving(rim, half_dt, parameters, spans):
@@ -318,16 +366,16 @@ def make_side_kernels(
                 more_u = 0.0
                 more_v = 0.0
                 if curved:
-                    way_x = rim[on.X, k] - rim[on.X_CELL, k]
-                    way_y = rim[on.Y, k] - rim[on.Y_CELL, k]
-                    nx, ny = rim[on.NX, k], rim[on.NY, k]
+                    way_x = rim[X, k] - rim[X_CELL, k]
+                    way_y = rim[Y, k] - rim[Y_CELL, k]
+                    nx, ny = rim[NX, k], rim[NY, k]
                     part = (way_x * nx + way_y * ny) / (nx * nx + ny * ny)
                     way_x -= nx * part
                     way_y -= ny * part
-                    more_u = rim[on.U_X, k] * way_x + rim[on.U_Y, k] * way_y
-                    more_v = rim[on.V_X, k] * way_x + rim[on.V_Y, k] * way_y
-                rim[on.X_TRACE, k] = rim[on.X, k] + half_dt * (rim[on.U_STAR, k] + more_u)
-                rim[on.Y_TRACE, k] = rim[on.Y, k] + half_dt * (rim[on.V_STAR, k] + more_v)
+                    more_u = rim[U_X, k] * way_x + rim[U_Y, k] * way_y
+                    more_v = rim[V_X, k] * way_x + rim[V_Y, k] * way_y
+                rim[X_TRACE, k] = rim[X, k] + half_dt * (rim[U_STAR, k] + more_u)
+                rim[Y_TRACE, k] = rim[Y, k] + half_dt * (rim[V_STAR, k] + more_v)
             trace_faces(rim, parameters, spans[number, 0], spans[number, 1])
 
     @compiled_once(allocates=False)
@@ -336,7 +384,7 @@ def make_side_kernels(
         ni = state.shape[1] - 2
         nj = state.shape[2] - 2
         for q in range(STATE_ROWS):
-            ghosts = rim[on.RHO_GHOST + q]
+            ghosts = rim[RHO_GHOST + q]
             for k in range(nj):
                 state[q, 0, k + 1] = ghosts[k]
                 state[q, ni + 1, k + 1] = ghosts[nj + k]
@@ -345,20 +393,20 @@ def make_side_kernels(
                 state[q, k + 1, nj + 1] = ghosts[2 * nj + ni + k]
 
     @kernel(allocates=False)
-    def start_sides(state, nodes, parameters, inwards, walls, speeds, scratch, rim):
+    def start_sides(state, nodes, parameters, inwards, walls, speeds, scratches, rim):
         """Faces at the old time, then `gather`; ghosts beyond walls."""
         fill_faces(nodes, nodes, 0.0, rim)
-        gather(state, nodes, parameters, inwards, scratch[0], rim)
+        gather(state, nodes, parameters, inwards, scratches[0], rim)
         mirror_in_walls(rim, walls, speeds)
 
     @kernel(allocates=False)
-    def predict_sides(old, half_dt, parameters, moving, scratch, rim):
+    def predict_sides(old, half_dt, parameters, moving, scratches, rim):
         """With the ghosts known: `predict`, and traces at the faces of the spans `moving`.
 
         old: state, void energy and nodes, as `advance` of `hydro.interior.advance` takes them.
         """
         place_ghosts(rim, old[0])
-        predict(old, half_dt, parameters, scratch[0], rim)
+        predict(old, half_dt, parameters, scratches[0], rim)
         # at mid-time these faces are half a step further: traced there, not where they were
         trace_moving(rim, half_dt, parameters, moving)
 
@@ -372,8 +420,8 @@ def make_side_kernels(
         """
         fill_faces(nodes, nodes_new, inverse_dt, rim)
         for k in range(rim.shape[1]):
-            rim[on.X_TRACE, k] = rim[on.X_AREA, k]
-            rim[on.Y_TRACE, k] = rim[on.Y_AREA, k]
+            rim[X_TRACE, k] = rim[X_AREA, k]
+            rim[Y_TRACE, k] = rim[Y_AREA, k]
         for wall in range(walls.shape[0] if curved else 0):
             if walls[wall, 2] == AXIS:
                 place_traces_on_axis(nodes, nodes_new, walls[wall, 0], walls[wall, 1], rim)

@@ -14,7 +14,6 @@ import itertools
 
 import numpy as np
 
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.boundary import NodeMotion, Sliding
 from shockgrid.hydro.carried.fields import check_same
 from shockgrid.hydro.carried.sliding import carry_through_closing_faces
@@ -30,6 +29,18 @@ from shockgrid.hydro.facets.rows import (
 from shockgrid.hydro.facets.states import make_add_facet_flux, solve_facets, sum_over_faces
 from shockgrid.hydro.formulas.geometry import PLANE, Geometry
 from shockgrid.hydro.perimeter.contacts import AT_CELLS, AT_FLUX
+from shockgrid.hydro.rim import (
+    AREAS,
+    AT_FACE,
+    CARRIED_CELL,
+    CARRIED_FLUX,
+    CARRIED_TRACE,
+    CONTACT,
+    FLUX,
+    NORMAL,
+    TRACE,
+    find_carried_row,
+)
 from shockgrid.hydro.rows import MASS
 from shockgrid.hydro.sliding.pieces import (
     SURFACE_ROWS,
@@ -311,7 +322,7 @@ class SlidingContact:
         if phase == AT_FLUX:
             self.fill_flux(dt)
         else:
-            self._solve_pieces(on.AT_FACE if phase == AT_CELLS else on.TRACE, *self.lines)
+            self._solve_pieces(AT_FACE if phase == AT_CELLS else TRACE, *self.lines)
             self._fill_surfaces()
 
     def _fill_surfaces(self) -> None:
@@ -320,8 +331,8 @@ class SlidingContact:
             arrays.sums[:] = 0.0
         sum_over_faces.entry(*self.arrays, self.pieces, self.count, True)
         for side, chain in self.sides:
-            fill_surface.entry(chain.arrays, side, chain.gather(on.NORMAL), chain.surface)
-            chain.scatter(on.CONTACT, chain.surface)
+            fill_surface.entry(chain.arrays, side, chain.gather(NORMAL), chain.surface)
+            chain.scatter(CONTACT, chain.surface)
 
     def _solve_pieces(self, rows: slice, line: np.ndarray, other: np.ndarray) -> None:
         """States of the pieces between both lines from these rows of the rims."""
@@ -349,33 +360,33 @@ class SlidingContact:
                 old, new, orientation, 1.0 / dt, self.pieces, self.count
             )
         # their contact states, and the fluxes of both sides (theory F4)
-        self._solve_pieces(on.TRACE, middle, follower_middle)
+        self._solve_pieces(TRACE, middle, follower_middle)
         for side, chain in self.sides:
             chain.arrays.flux[:] = 0.0
             self.add_facet_flux.entry(self.pieces, self.count, side, chain.arrays)
         # what passes between the follower's polygons
         closing = self._measure_closing(middle, moved, follower_middle, follower_new - follower_old)
         growth = (1.0 / dt) * (self.excess_volume_new - self.excess_volume)
-        growth += follower.gather(on.AREAS)[SWEPT_RATE]
+        growth += follower.gather(AREAS)[SWEPT_RATE]
         self.add_closing_flux.entry(
             follower.arrays, closing, growth, self.pieces, self.count, self._part_at_first()
         )
         # into the rims
-        leader.scatter(on.FLUX, leader.arrays.flux)
-        follower.scatter(on.FLUX, follower.arrays.flux)
+        leader.scatter(FLUX, leader.arrays.flux)
+        follower.scatter(FLUX, follower.arrays.flux)
         if self.carries:
             self._carry_along(follower.arrays.flux[MASS])
 
     def _carry_along(self, masses: np.ndarray) -> None:
         """What carried fields gain and lose through the closing faces, into the follower's rims."""
         for number in range(len(self.segments[-1].block.carried_fields)):
-            row = on.find_carried_row(number)
+            row = find_carried_row(number)
             traces, cells = (
                 self.follower.gather(slice(row + part, row + part + 1))[0].copy()
-                for part in (on.CARRIED_TRACE, on.CARRIED_CELL)
+                for part in (CARRIED_TRACE, CARRIED_CELL)
             )
             change = carry_through_closing_faces(masses, traces, cells)
-            place = slice(row + on.CARRIED_FLUX, row + on.CARRIED_FLUX + 1)
+            place = slice(row + CARRIED_FLUX, row + CARRIED_FLUX + 1)
             self.follower.scatter(place, change[None])
 
     def _measure_closing(self, middle, moved, follower, follower_moved) -> np.ndarray:

@@ -8,9 +8,9 @@ import pytest
 
 import shockgrid as sg
 from builders import box, wall_off
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.boundary import FreeSurface, Outflow
 from shockgrid.hydro.eos import IdealGas, MieGruneisen
+from shockgrid.hydro.rim import GHOST
 from shockgrid.hydro.strength.laws import LinearHardening
 from shockgrid.problems.standard.free_stream import FreeStream
 from shockgrid.problems.standard.vortex import Vortex
@@ -207,7 +207,7 @@ class Spills(Outflow):
 
     def fill_ghosts(self, t):
         super().fill_ghosts(t)
-        self.block.rim.rows[on.GHOST, self.last : self.last + 1] = 1.0
+        self.block.rim.rows[GHOST, self.last : self.last + 1] = 1.0
 
 
 class Forgets(Outflow):
@@ -216,9 +216,9 @@ class Forgets(Outflow):
     kind = "forgets"
 
     def fill_ghosts(self, t):
-        keep = self.rim.rows[on.GHOST, -1].copy()
+        keep = self.rim.rows[GHOST, -1].copy()
         super().fill_ghosts(t)
-        self.rim.rows[on.GHOST, -1] = keep
+        self.rim.rows[GHOST, -1] = keep
 
 
 @pytest.mark.parametrize(

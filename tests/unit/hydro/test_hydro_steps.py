@@ -5,7 +5,6 @@ import pytest
 
 from builders import SIDES, box, check_restarts, get_bits, march, two_blocks, wall_off
 from shockgrid.hydro import phases
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos import IdealGas, MieGruneisen
@@ -14,6 +13,7 @@ from shockgrid.hydro.links import join
 from shockgrid.hydro.motion import line, smoothing
 from shockgrid.hydro.perimeter import contacts
 from shockgrid.hydro.perimeter.strips import make_side_kernels
+from shockgrid.hydro.rim import FLUX, W_STAR
 from shockgrid.hydro.simulation import Simulation
 from shockgrid.hydro.sources import make_gravity
 from shockgrid.hydro.workers import LEAST_INSIDE
@@ -169,7 +169,7 @@ def test_both_sides_of_a_link_have_the_same_bits(kind):
     for block in blocks:
         wall_off(block)
     march(Simulation(blocks, links, t_end=1.0, mesh="regrid"), 3)
-    rows = on.FLUX if kind == "seam" else slice(on.W_STAR, on.W_STAR + 1)
+    rows = FLUX if kind == "seam" else slice(W_STAR, W_STAR + 1)
     for link in links:
         order = -1 if link.reverse else 1
         one, other = (side.rim for side in link.segments)

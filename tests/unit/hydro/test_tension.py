@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from builders import beside_line, check_restarts, get_bits, march, two_blocks, wall_off
-from shockgrid.hydro import rim as on
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos import IdealGas
 from shockgrid.hydro.links import join
 from shockgrid.hydro.motion.smoothing import fill_thickness_way
 from shockgrid.hydro.motion.tension import compute_tangents
+from shockgrid.hydro.rim import FLUX
 from shockgrid.hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y, P
 from shockgrid.hydro.simulation import Simulation
 from shockgrid.regrid.errors import BadInput
@@ -59,7 +59,7 @@ def test_forces_sum_to_those_at_the_ends(periodic):
     simulation = make_wave(periodic=periodic)
     row = march(simulation, 40)[-1]
     left, right = simulation.blocks
-    one, other = (side.rim.rows[on.FLUX] for side in simulation.tension.lines[0].sides)
+    one, other = (side.rim.rows[FLUX] for side in simulation.tension.lines[0].sides)
     net = (one + other)[[MOMENTUM_X, MOMENTUM_Y]]
     assert np.abs(net).max() > 1e-3, "there are forces"
     assert np.abs(net.sum(axis=1)).max() < 1e-14

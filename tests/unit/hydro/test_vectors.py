@@ -11,8 +11,7 @@ from shockgrid.hydro.eos import IdealGas
 from shockgrid.hydro.formulas.geometry import GEOMETRIES, PLANE
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
 from shockgrid.hydro.formulas.riemann import FLUXES
-from shockgrid.hydro.interior import axisymmetric, faces, reconstruction, slopes, update
-from shockgrid.hydro.interior import scratch as at
+from shockgrid.hydro.interior import axisymmetric, faces, reconstruction, scratch, slopes, update
 from shockgrid.regrid.barrier import residual_estimate as look
 from shockgrid.regrid.compilation.first_calls import prepare_compiler
 
@@ -22,12 +21,19 @@ LIMIT, SOUND, ENERGY = (
     *(getattr(IdealGas, part) for part in ("sound_speed_squared_part", "energy_part")),
 )
 SWITCH = SOUND, ENERGY, FLUXES["hllc"], False
-I_FACES = at.RHO_OUT, at.RHO_IN, at.AREA_X_I
-J_FACES = at.RHO_UP - 1, at.RHO_DOWN, at.AREA_X_J
-UPWIND_I = *I_FACES, at.TORN_BEFORE, at.ACOUSTIC_BEFORE
-UPWIND_J = *J_FACES, at.TORN - 1, at.ACOUSTIC - 1
-HLL = J_FACES, at.HLL - 1, at.TORN - 1, at.FLUX_J_MASS, 0, True
-RADIAL = at.PRESSURE_J, at.FLUX_J_Y, at.X_HIGH, at.X_LOW, at.AREA_Y_J, at.PUSH_J
+I_FACES = scratch.RHO_OUT, scratch.RHO_IN, scratch.AREA_X_I
+J_FACES = scratch.RHO_UP - 1, scratch.RHO_DOWN, scratch.AREA_X_J
+UPWIND_I = *I_FACES, scratch.TORN_BEFORE, scratch.ACOUSTIC_BEFORE
+UPWIND_J = *J_FACES, scratch.TORN - 1, scratch.ACOUSTIC - 1
+HLL = J_FACES, scratch.HLL - 1, scratch.TORN - 1, scratch.FLUX_J_MASS, 0, True
+RADIAL = (
+    scratch.PRESSURE_J,
+    scratch.FLUX_J_Y,
+    scratch.X_HIGH,
+    scratch.X_LOW,
+    scratch.AREA_Y_J,
+    scratch.PUSH_J,
+)
 GAS = ((1.4,),)
 STEP = 0.1, 10.0, (1.4,)  # dt, 1/dt, parameters
 PHASES = {  # how a phase is made, its arguments after the scratch and the number of cells
@@ -36,15 +42,15 @@ PHASES = {  # how a phase is made, its arguments after the scratch and the numbe
     "geometry": (lambda: reconstruction.make_geometry(PLANE.volume), ()),
     "switch": (lambda: reconstruction.make_switch(*SWITCH[:3], True), GAS),
     "faces along i": (
-        lambda: faces.make_faces(PLANE.face, at.X_HIGH, at.X_HIGH + 1, at.AREA_X_I),
+        lambda: faces.make_faces(PLANE.face, scratch.X_HIGH, scratch.X_HIGH + 1, scratch.AREA_X_I),
         (0.1,),
     ),
     "faces along j": (
-        lambda: faces.make_faces(PLANE.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
+        lambda: faces.make_faces(PLANE.face, scratch.X_HIGH, scratch.X_LOW, scratch.AREA_X_J),
         (0.1,),
     ),
     "radial faces": (
-        lambda: faces.make_faces(CURVED.face, at.X_HIGH, at.X_LOW, at.AREA_X_J),
+        lambda: faces.make_faces(CURVED.face, scratch.X_HIGH, scratch.X_LOW, scratch.AREA_X_J),
         (0.1,),
     ),
     "slopes": (lambda: slopes.make_slopes(LIMIT, False, PLANE, SWITCH), (0.1, (1.4,))),
@@ -53,7 +59,7 @@ PHASES = {  # how a phase is made, its arguments after the scratch and the numbe
     "traces in": (lambda: faces.make_traces(SOUND, True)[0], (1.0, (1.4,))),
     "upwind along i": (lambda: faces.make_upwind(*UPWIND_I, False, False), ()),
     "upwind along j": (lambda: faces.make_upwind(*UPWIND_J, True, True), ()),
-    "flux": (lambda: faces.make_flux(ENERGY, at.AREA_X_J, at.FLUX_J_MASS, 0, False), GAS),
+    "flux": (lambda: faces.make_flux(ENERGY, scratch.AREA_X_J, scratch.FLUX_J_MASS, 0, False), GAS),
     "HLL flux": (lambda: faces.make_hll_flux(ENERGY, *HLL), (16, (1.4,))),
     "gathering": (lambda: update.make_update(IdealGas, PLANE, False, True), STEP),
     "new states": (lambda: update.make_update(IdealGas, PLANE, True, False), STEP),
@@ -103,6 +109,6 @@ def test_rows_of_cells_are_vectors(name):
     else:
         make, arguments = PHASES[name]
         count = 1 if name == "HLL flux" else 16
-        packed, scalar = count_kinds(make(), np.ones(at.SIZE), count, *arguments)
+        packed, scalar = count_kinds(make(), np.ones(scratch.SIZE), count, *arguments)
     scalar -= HOISTED.get(name, 0)
     assert packed >= 0.9 * scalar and packed > 0, (packed, scalar)

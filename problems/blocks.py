@@ -24,6 +24,7 @@ from msgspec import Meta
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.carried.fields import CarriedField
+from shockgrid.hydro.contacts.necks import Necks
 from shockgrid.hydro.eos.materials import Material, find_material, find_name, make_material
 from shockgrid.hydro.links import join, slide
 from shockgrid.hydro.simulation import Simulation
@@ -413,7 +414,7 @@ class Blocks(Problem):
             options = {"tension": link.tension} if link.tension else {}
             slides = link.kind == "slide"
             links.append(slide(*pair) if slides else join(link.kind, *pair, **options))
-        return self.simulate(
+        flow = self.simulate(
             blocks.values(),
             links,
             mesh=deck.mesh,
@@ -421,7 +422,10 @@ class Blocks(Problem):
             source=make_gravity(*deck.gravity) if any(deck.gravity) else None,
             measure_block=measure_means,
             measured_numbers=len(MEASURED),
+            find_end=lambda flow: necks.find_cut() if necks is not None else None,
         )
+        necks = Necks(flow.meetings.bodies) if flow.meetings.pairs else None
+        return flow
 
     def make_block(self, table: BlockTable) -> Block:
         """A block with its state and the segments of its sides that are not linked."""

@@ -33,6 +33,7 @@ from shockgrid.regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
 
 SNAPPED_FACE_PART = 1e-9  # parts of a face closer than this to a node are at the node
 SEARCHED_FACES = 3  # faces on either side of its old one on which a pin is looked for again
+RIGHT_ANGLE_COSINE = 1e-3  # of the angle between two faces that counts as a right one
 MOST_BULGE = 0.1  # of a face: so far off it may the other line's nodes lie between its two pins
 
 
@@ -103,6 +104,26 @@ def faces_each_other(line, a, along_x, along_y):
     """Does face `a` run against a direction of the other line?"""
     dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
     return along_x * dx + along_y * dy < 0.0
+
+
+@compiled_once
+def looks_at(points, k, line, a):
+    """Does a face beside node `k` of a line look at face `a` of the other one?
+
+    At the corner of a body a node lies on two of its sides, of which it may touch one alone.  Faces
+    at a right angle look at each other where the one is in front of the other.
+    """
+    dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
+    for way in (-1, 1):
+        if not 0 <= k + way < points.shape[1]:
+            continue
+        x, y = points[0, k + way], points[1, k + way]
+        along = way * ((x - points[0, k]) * dx + (y - points[1, k]) * dy)
+        square = (dx * dx + dy * dy) * ((x - points[0, k]) ** 2 + (y - points[1, k]) ** 2)
+        is_square = along * along <= RIGHT_ANGLE_COSINE * RIGHT_ANGLE_COSINE * square
+        if (find_depth(line, a, x, y) < 0.0) if is_square else along < 0.0:
+            return True
+    return False
 
 
 @compiled_once
@@ -177,9 +198,11 @@ def find_pins(nodes, other, pins, tolerance, reach, one_body):
                     is_on = 0.0 < deep <= MOST_BULGE * square**0.5
                     if is_round_corner(line, other.mirrored, a, at, deep):
                         is_on = False  # behind the next side, at the corner of a body
-                # of one body: not through a film
-                if is_on and pins.asked[k] and one_body:
-                    is_on = not is_film(nodes.inner, k, line, a, x, y)
+                # of the side that looks at it; of one body: not through a film
+                if is_on and pins.asked[k]:
+                    is_on = looks_at(points, k, line, a)
+                    if is_on and one_body:
+                        is_on = not is_film(nodes.inner, k, line, a, x, y)
                 if is_on:
                     least = away
                     position = snap_position(a + at)
@@ -439,6 +462,8 @@ def fill_facets(leader, follower, positions, back_positions, straight, pins, cov
                     node = int(there)
                     covered[node] = True
                     part, _ = project(follower, b, leader[0, node], leader[1, node])
+                    if find_depth(follower, b, leader[0, node], leader[1, node]) > 0.0:
+                        back_positions[node] = b + part  # even beside a corner of the follower
                     next_other = max(low, min(other, b + part))
                 owners[LEADER, found] = int(here)
                 owners[FOLLOWER, found] = b

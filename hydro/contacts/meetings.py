@@ -18,6 +18,7 @@ import numpy as np
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import Piston
 from shockgrid.hydro.contacts.pair import Pair, PlanePair
+from shockgrid.hydro.contacts.parting import Bodies
 from shockgrid.hydro.contacts.start import fill_normals
 from shockgrid.hydro.contacts.surface import Plane, Surface, find_planes, is_surface
 from shockgrid.hydro.contacts.voids import Voids
@@ -66,6 +67,7 @@ class Meetings:
             for regridder, block in zip(motion.regridders, blocks, strict=False)
             if (own := [pair for pair in self.pairs if pair.one_block is block])
         ]
+        self.bodies = Bodies(self.surfaces, _find_bodies(blocks, links))
         self.voids = Voids(self.surfaces, self.pairs, geometry.curved, void_fill)
         self.near: list[Pair] = []  # with facets
         self.touching: list[Pair] = []  # with pins
@@ -206,6 +208,9 @@ class Meetings:
             for pair in awake:
                 pair.forget_hits()
         self._lay([pair for pair in awake if pair.touched], part_back)
+        # bodies that lie in each other even so
+        if any(pair.touched or pair in self.touching for pair in awake if not pair.one_body):
+            self.bodies.push_apart()
         # what that has changed beside them
         for guard in self.guards:  # of bodies' corners, which the laying may have opened
             guard.hold()

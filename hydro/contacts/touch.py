@@ -13,6 +13,7 @@ from shockgrid.hydro.contacts.facets import (
     find_direction,
     find_groups,
     is_film,
+    looks_at,
     may_lie_on,
     snap_position,
 )
@@ -200,7 +201,7 @@ def find_touches(nodes, pins, other, others, cuts):
                 if not may_lie_on(pins.part, k, a):
                     continue
                 time, at = find_touch(x, y, x_new - x, y_new - y, old, new, a)
-                if time < own:
+                if time < own and looks_at(old_points, k, old, a):
                     own = time
                     positions[k] = snap_position(a + at)
         first = min(first, own)

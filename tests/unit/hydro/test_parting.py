@@ -1,0 +1,99 @@
+"""Bodies that lie in each other are pushed apart, at corners too; bodies that are cut."""
+
+import numpy as np
+import pytest
+
+from builders import box, free, make_body
+from shockgrid.hydro.contacts.facets import looks_at
+from shockgrid.hydro.contacts.necks import THINNEST_CELL_PART, Necks
+from shockgrid.hydro.contacts.parting import DEEPEST_NODE_PART
+from shockgrid.hydro.motion.overlaps import is_inside
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.sides import trace_outline
+
+SIDES = "i_min", "i_max", "j_min", "j_max"
+
+
+def make_boxes(*corners, apart=0.0):
+    """Boxes of 10 x 10 cells of 0.1, from these lower corners on, each `apart` [m] further out."""
+    bodies = []
+    for number, (x, y) in enumerate(corners):
+        start = x + 3.0 * number * apart, y
+        nodes = box(start, (start[0] + 1.0, start[1] + 1.0), (10, 10))
+        bodies.append(make_body(f"body{number}", "Cu", nodes, 0.0))
+        free(bodies[-1], *SIDES)
+    return bodies
+
+
+def push_apart(*shifts):
+    """Boxes that were shifted in a step; the grids after they are pushed apart, how many nodes."""
+    bodies = make_boxes((0.0, 0.0), (0.0, 0.0), apart=1.0)
+    simulation = Simulation(bodies, [], t_end=1.0)
+    for body, shift in zip(bodies, shifts, strict=True):
+        body.nodes_new[...] = body.nodes - body.nodes[:, :1, :1]
+        body.nodes_new += np.reshape(shift, (2, 1, 1))
+    moved = simulation.meetings.bodies.push_apart()
+    return [body.nodes_new for body in bodies], moved
+
+
+def measure_deepest(grids):
+    """How far nodes of one box lie in the other, in faces."""
+    deepest = 0.0
+    for one, other in (grids, grids[::-1]):
+        line = trace_outline(other)
+        way = np.roll(line, -1, axis=1) - line
+        line = line[:, way.any(axis=0)]
+        way = way[:, way.any(axis=0)]
+        for point in trace_outline(one).T:
+            if is_inside(tuple(point), other):
+                part = ((point[:, None] - line) * way).sum(axis=0) / (way**2).sum(axis=0)
+                foot = line + np.clip(part, 0.0, 1.0) * way
+                deepest = max(deepest, float(np.hypot(*(foot - point[:, None])).min()) / 0.1)
+    return deepest
+
+
+@pytest.mark.parametrize(
+    "shift",
+    [
+        (0.98, 0.3),  # a side in a side
+        (0.97, 0.97),  # a corner in a corner
+        (0.98, 0.93),
+        (0.33, 0.975),
+    ],
+)
+def test_no_node_stays_deep_in_another_body(shift):
+    grids, moved = push_apart((0.0, 0.0), shift)
+    assert moved > 0
+    assert measure_deepest(grids) <= DEEPEST_NODE_PART
+    # both give way alike
+    centres = [grid.mean(axis=(1, 2)) for grid in grids]
+    middle = 0.5 * (centres[0] + centres[1])
+    assert np.abs(middle - 0.5 * (1.0 + np.array(shift))).max() < 0.01
+
+
+def test_bodies_that_are_apart_keep_their_nodes():
+    grids, moved = push_apart((0.0, 0.0), (1.0, 0.3))
+    assert moved == 0
+    assert np.array_equal(grids[1][:, 0, 0], (1.0, 0.3))
+
+
+def test_a_node_beside_a_corner_touches_the_side_that_looks_at_it():
+    side = np.array([[0.0, 0.0, 0.0], [0.0, 0.1, 0.2]])  # with its outside at x > 0
+    facing = np.array([[0.0, 0.0], [0.1, -0.1]])  # of a body at x > 0 with its corner at node 1
+    on_top = np.array([[0.1, 0.0], [0.1, 0.1]])
+    assert looks_at(side, 1, facing, 0)
+    assert not looks_at(side[:, :2], 1, on_top, 0)
+
+
+@pytest.mark.parametrize("width", [0.5, 2.0])
+def test_a_neck_is_cut_below_a_part_of_a_cell(width):
+    body, other = make_boxes((0.0, 0.0), (9.0, 9.0))
+    simulation = Simulation([body, other], [], t_end=1.0)
+    necks = Necks(simulation.meetings.bodies)
+    assert necks.find_cut() is None
+    # both long sides come together in the middle
+    neck = width * THINNEST_CELL_PART * 0.1
+    body.nodes[1, 5] = 0.5 + neck * np.linspace(-0.5, 0.5, 11)
+    cut = necks.find_cut()
+    assert (cut is None) == (width > 1.0)
+    assert cut is None or ("body0" in cut and "x = 0.5" in cut)

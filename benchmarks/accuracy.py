@@ -26,13 +26,13 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
+sys.path[:0] = [str(ROOT), str(ROOT / "docs"), str(ROOT / "tests")]
 
 import accuracy_tables as tables  # noqa: E402
 
 from benchmarks.growth_accuracy import list_decks, measure_row, write_rows  # noqa: E402
-from benchmarks.random_pairs import measure_random_pairs  # noqa: E402
-from benchmarks.shocked_lines import measure_null_line, sweep_flat_line  # noqa: E402
+from oracles.random_pairs import measure_random_pairs  # noqa: E402
+from oracles.shocked_lines import measure_null_line, sweep_flat_line  # noqa: E402
 from shockgrid.problems.deck import RunControl  # noqa: E402
 from shockgrid.problems.interface_instability.deck import Fluid, InterfaceDeck  # noqa: E402
 from shockgrid.problems.interface_instability.theories import PATH, Measured  # noqa: E402

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.growth_accuracy import METALS
-from benchmarks.random_pairs import make_random_pair
+from oracles.random_pairs import make_random_pair
 from shockgrid.hydro.eos.materials import find_material
 from shockgrid.problems.interface_instability.theories import Measured, read_rows
 

@@ -21,7 +21,6 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     regrid_suite PART           a table of docs/regrid-suite.md; see docs/regrid_suite_table.py
     motions PART                outcomes of random motions; see docs/motions_table.py
     race PART                   tables of the race; see benchmarks/race/tables.py
-    scaling PART                what ranks of MPI gain; see docs/scaling_table.py
 
 Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
 Note: a result is as old as its last run; after a change of the scheme run all again.
@@ -47,13 +46,12 @@ from typing import Any
 DOCS = Path(__file__).resolve().parent
 ROOT = DOCS.parent
 RESULTS = DOCS / "results"
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 from accuracy_tables import fill_accuracy  # noqa: E402
 from cost_tables import fill_cost  # noqa: E402
 from motions_table import fill_motions  # noqa: E402
 from regrid_suite_table import fill_regrid_suite  # noqa: E402
-from scaling_table import fill_scaling  # noqa: E402
 from soak_table import fill_soak  # noqa: E402
 from study_tables import fill_study, read_study  # noqa: E402
 
@@ -301,7 +299,6 @@ KINDS = {
     "race": fill_race,
     "regrid_suite": fill_regrid_suite,
     "motions": fill_motions,
-    "scaling": fill_scaling,
 }
 
 

@@ -1,7 +1,6 @@
 """Every chosen number of the barrier regridder, in one place.
 
-Each field names the formula it belongs to (docs/theory/regridding.md).  The table made by
-`python benchmarks/ablation.py` shows the effect of halving or doubling it.  Guards against
+Each field names the formula it belongs to (docs/theory/regridding.md).  Guards against
 round-off are not tuning parameters and are defined where they are used.
 """
 

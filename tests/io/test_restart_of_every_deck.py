@@ -6,9 +6,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from benchmarks.soak.settings import change_cells
 from shockgrid.runs.deck.reading import packaged_decks, read_deck
 from shockgrid.runs.store.reader import RunData
+from soak.settings import change_cells
 
 MOST_STEPS = 120
 PARTS_OF_CELLS = (0.25, 0.5, 0.7, 1.0)  # the smallest that the problem accepts

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.random_motions import OUTCOMES, count_outcomes, judge
 from builders import unit_steps
+from oracles.random_motions import OUTCOMES, count_outcomes, judge
 from shockgrid.regrid.algebraic import transfinite_grid
 from shockgrid.regrid.barrier.regridder import BarrierRegridder
 from shockgrid.regrid.barrier.tuning import DEFAULT

@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from benchmarks.random_pairs import make_random_pair
 from builders import march
+from oracles.random_pairs import make_random_pair
 from shockgrid.problems.blocks import Blocks, BlocksDeck
 from shockgrid.problems.grid_march import GridMarch, GridMarchDeck
 from shockgrid.problems.interface_instability.deck import InterfaceDeck

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.random_motions import is_simple
 from builders import unit_steps
+from oracles.random_motions import is_simple
 from shockgrid.regrid.barrier.regridder import BarrierRegridder
 from shockgrid.regrid.measure.crossings import (
     GROUP_EDGES,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.regrid_suite import measures
-from benchmarks.regrid_suite.catalogue import ROLLS, load_march
 from builders import unit_steps
+from regrid_suite import measures
+from regrid_suite.catalogue import ROLLS, load_march
 from shockgrid.regrid.algebraic import transfinite_grid
 from shockgrid.regrid.barrier.regridder import BarrierRegridder
 from shockgrid.regrid.barrier.repair import repair_grid

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.regrid_suite import measures
 from builders import box, tensor, unit_steps
+from regrid_suite import measures
 from shockgrid.regrid.measure import quality
 from shockgrid.regrid.measure.cells import compute_area_fractions
 from shockgrid.regrid.measure.corners import compute_corner_signs, compute_turns, turn_exactly

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.random_motions import make_motions
+from oracles.random_motions import make_motions
 from shockgrid.regrid.barrier.regridder import BarrierRegridder
 from shockgrid.regrid.errors import RegridFailure
 from shockgrid.regrid.sides import get_sides

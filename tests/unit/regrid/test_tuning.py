@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.bench_corners import SHAPES, march
+from oracles.corners import SHAPES, march
 from shockgrid.regrid.barrier.regridder import BarrierRegridder
 from shockgrid.regrid.barrier.tuning import DEFAULT, Tuning
 from shockgrid.regrid.errors import BadInput

@@ -8,8 +8,8 @@ import sys
 import pytest
 
 import shockgrid
-from benchmarks.bench_calls import count_calls, make_step
 from builders import ROOT, name_module
+from oracles.calls import count_calls, make_step
 from shockgrid.regrid.errors import BadInput
 from shockgrid.runs.ranks.started import RANKS, SIZES, SLURM, count_started, find_rank, is_for_ranks
 

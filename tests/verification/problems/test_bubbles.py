@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.bubble_on_fixed_grid import TwoGasFlow, find_first
 from builders import march
+from oracles.bubble_on_fixed_grid import TwoGasFlow, find_first
 from shockgrid.hydro import phases
 from shockgrid.hydro.eos import IdealGas
 from shockgrid.problems.references.riemann import solve_riemann

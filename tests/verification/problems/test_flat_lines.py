@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.shocked_lines import measure_null_line, sweep_flat_line
+from oracles.shocked_lines import measure_null_line, sweep_flat_line
 from shockgrid.problems.deck import RunControl
 from shockgrid.problems.interface_instability.deck import Fluid, InterfaceDeck
 from shockgrid.problems.interface_instability.line import Mode, measure_mode

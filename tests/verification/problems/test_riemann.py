@@ -2,8 +2,8 @@
 
 import pytest
 
-from benchmarks.random_pairs import find_worst_star, measure_random_pairs
 from builders import march
+from oracles.random_pairs import find_worst_star, measure_random_pairs
 from shockgrid.problems.riemann import CASES, Riemann, RiemannDeck
 
 # Largest error of any star state at 200 cells, in per cent.  LeBlanc misses the wanted 0.1: its

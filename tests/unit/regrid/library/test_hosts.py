@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.hosts import pennant_nodes
+from examples.hosts import pennant_nodes
 from shockgrid.regrid.measure.quality import measure_quality
 from shockgrid.regrid.sides import get_sides
 

@@ -88,10 +88,10 @@ verify: lint
 	-@$(BIN)/shockgrid verify -o docs/results/verify.json
 	@$(BIN)/python docs/generate.py
 
-# SOAK: options of benchmarks/soak, such as --minutes 60 or --only kills,flips; goes on with what
+# SOAK: options of tests/soak, such as --minutes 60 or --only kills,flips; goes on with what
 # out/soak.jsonl holds: remove that file after a change of the code
 soak: $(DEVELOP)
-	@$(BIN)/python -m benchmarks.soak --json docs/results/soak.json $(SOAK); found=$$?; \
+	@$(BIN)/python tests/soak --json docs/results/soak.json $(SOAK); found=$$?; \
 	  $(BIN)/python docs/generate.py; exit $$found
 
 # PEER: a built checkout of CloverLeaf_ref to measure beside

@@ -77,7 +77,7 @@ class Feature(NamedTuple):
     shock leaves the bubble, `exit`, some microseconds added.  measured: Haas and Sturtevant's (the
     light gas's confirmed in other publications, the heavy gas's unchecked but for the incident
     shock's); computed: Quirk and Karni's; fixed_grid: on 200 cells per diameter, of
-    benchmarks/bubble_on_fixed_grid.py.
+    tests/oracles/bubble_on_fixed_grid.py.
     """
 
     words: str

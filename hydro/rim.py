@@ -29,14 +29,14 @@ RHO, U, V, P, C, LENGTH = _rows(6)
 # the same state and sound speed at the face: extrapolated where the face goes with the flow
 RHO_FACE, U_FACE, V_FACE, P_FACE, C_FACE = _rows(5)
 # the next cell inwards: its velocity, and the way to its centre along the grid line
-U_NEXT, V_NEXT, WAY_NEXT = _rows(3)
+U_NEXT, V_NEXT, DISTANCE_NEXT = _rows(3)
 # the ghosts beyond the faces
 RHO_GHOST, U_GHOST, V_GHOST, P_GHOST, LENGTH_GHOST = _rows(5)
 # the cells at mid-time: state, gradients, centre; c² and energy if torn (else WHOLE_CELL_MARK) at
 # the old time, HLL switch, acoustic weight
 RHO_HALF, U_HALF, V_HALF, P_HALF = _rows(4)
 RHO_X, RHO_Y, U_X, U_Y, V_X, V_Y, P_X, P_Y = _rows(8)
-X_CELL, Y_CELL, C2, TORN, HLL, ACOUSTIC = _rows(6)
+X_CELL, Y_CELL, C2, VOIDED_ENERGY, HLL, ACOUSTIC = _rows(6)
 # traces: where on the faces, state, sound speed, internal energy, c², part of it that may leave
 X_TRACE, Y_TRACE = _rows(2)
 RHO_TRACE, U_TRACE, V_TRACE, P_TRACE, C_TRACE, E_TRACE, C2_TRACE = _rows(7)

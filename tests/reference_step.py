@@ -296,7 +296,7 @@ class Patch:
         steps = [step[3] for axis in "ij" for step, _ in self.find_steps(axis)]
         jump = np.max(np.abs(steps), axis=0) / (self.rho * self.c2)
         self.smooth = fade(jump, 0.5, 1.5)
-        self.hll = 1.0 * (jump > riemann.FLUXES[self.block.flux_name])
+        self.hll = 1.0 * (jump > riemann.HLL_JUMP_THRESHOLDS[self.block.flux_name])
         # the half step: theory F3.6
         rho_slope, u_slope, v_slope, p_slope = np.moveaxis(self.slopes, 1, 0)
         rho = self.rho

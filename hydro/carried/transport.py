@@ -32,7 +32,7 @@ from shockgrid.hydro.formulas.reconstruction import (
     limit_van_leer,
 )
 from shockgrid.hydro.interior.scratch import find_twist
-from shockgrid.hydro.perimeter.contacts import carry_through_open_sides
+from shockgrid.hydro.perimeter.contacts import carry_fields_through_open_sides
 from shockgrid.hydro.perimeter.faces import find_corners, measure_volume
 from shockgrid.hydro.rim import (
     CARRIED_CELL,
@@ -238,7 +238,7 @@ def trace(slopes, centres, opened, rim):
                 slopes[q], centres, i, j, rim[X_TRACE, k], rim[Y_TRACE, k]
             )
             rim[row + CARRIED_FLUX, k] = 0.0
-    carry_through_open_sides(rim, opened)
+    carry_fields_through_open_sides(rim, opened)
 
 
 @inlined

@@ -37,12 +37,12 @@ def keep_area(area, mid_i, mid_j, twist, y):
 def weigh_area(area, mid_i, mid_j, twist, y):
     """Volume per radian of a quadrilateral: its integral of the radius, exactly (theory F9.1).
 
-    mi, mj: vectors between opposite face midpoints; twist = a - b + c - d of the corners; y: mean
-    of their radii; area = mi × mj.
+    mid_i, mid_j: vectors between opposite face midpoints; twist = a - b + c - d of the corners; y:
+    mean of their radii; area = mid_i × mid_j.
     """
-    bend_i = mid_i[0] * twist[1] - mid_i[1] * twist[0]
-    bend_j = twist[0] * mid_j[1] - twist[1] * mid_j[0]
-    return area * y + (mid_i[1] * bend_i + mid_j[1] * bend_j) / 12.0
+    twist_i = mid_i[0] * twist[1] - mid_i[1] * twist[0]
+    twist_j = twist[0] * mid_j[1] - twist[1] * mid_j[0]
+    return area * y + (mid_i[1] * twist_i + mid_j[1] * twist_j) / 12.0
 
 
 @inlined
@@ -85,11 +85,11 @@ def compute_radius_weighted_face(a, b, a_new, b_new, inverse_dt):
     twist = (bx_new - ax_new) - (bx - ax), (by_new - ay_new) - (by - ay)
     edge_x = 0.5 * ((bx - ax) + (bx_new - ax_new))
     edge_y = 0.5 * ((by - ay) + (by_new - ay_new))
-    way_x = 0.5 * ((ax_new - ax) + (bx_new - bx))
-    way_y = 0.5 * ((ay_new - ay) + (by_new - by))
+    motion_x = 0.5 * ((ax_new - ax) + (bx_new - bx))
+    motion_y = 0.5 * ((ay_new - ay) + (by_new - by))
     middle = 0.5 * (radius + radius_new)
-    area = way_x * edge_y - way_y * edge_x
-    swept = weigh_area(area, (way_x, way_y), (edge_x, edge_y), twist, middle)
+    area = motion_x * edge_y - motion_y * edge_x
+    swept = weigh_area(area, (motion_x, motion_y), (edge_x, edge_y), twist, middle)
     outwards = edge_y / (12.0 * middle + TINY_RADIUS)
     return (
         (by - ay) * weight + (by_new - ay_new) * weight_new,
@@ -107,32 +107,33 @@ def compute_centre_offset(mid_i, mid_j, twist, y):
     mid_j_x, mid_j_y = mid_j
     twist_x, twist_y = twist
     area = mid_i_x * mid_j_y - mid_i_y * mid_j_x
-    bend_i = mid_i_x * twist_y - mid_i_y * twist_x
-    bend_j = twist_x * mid_j_y - twist_y * mid_j_x
-    inverse = 1.0 / (12.0 * area * y + (mid_i_y * bend_i + mid_j_y * bend_j))
-    part_i = ((area * mid_i_y + y * bend_i) + twist_y * bend_j * (1.0 / 12.0)) * inverse
-    part_j = ((area * mid_j_y + y * bend_j) + twist_y * bend_i * (1.0 / 12.0)) * inverse
-    part_twist = (area * twist_y + (mid_i_y * bend_j + mid_j_y * bend_i)) * (inverse / 12.0)
+    twist_i = mid_i_x * twist_y - mid_i_y * twist_x
+    twist_j = twist_x * mid_j_y - twist_y * mid_j_x
+    inverse = 1.0 / (12.0 * area * y + (mid_i_y * twist_i + mid_j_y * twist_j))
+    weight_i = ((area * mid_i_y + y * twist_i) + twist_y * twist_j * (1.0 / 12.0)) * inverse
+    weight_j = ((area * mid_j_y + y * twist_j) + twist_y * twist_i * (1.0 / 12.0)) * inverse
+    weight_twist = (area * twist_y + (mid_i_y * twist_j + mid_j_y * twist_i)) * (inverse / 12.0)
     return (
-        (mid_i_x * part_i + mid_j_x * part_j) + twist_x * part_twist,
-        (mid_i_y * part_i + mid_j_y * part_j) + twist_y * part_twist,
+        (mid_i_x * weight_i + mid_j_x * weight_j) + twist_x * weight_twist,
+        (mid_i_y * weight_i + mid_j_y * weight_j) + twist_y * weight_twist,
     )
 
 
 @inlined
-def lean_line(m, n, twist, scale):
-    """The mid-line m through the centres of volume; n is the other mid-line.
+def lean_line(mid_line, other_mid_line, twist, scale):
+    """`mid_line` turned so that it goes through the centres of volume.
 
-    Their offsets from the middles along n, n n_y / (12 y), vary between cells; scale: 1/(12 y).
+    These lie beside the middles by n n_y / (12 y), with n the other mid-line, which varies between
+    cells; scale: 1/(12 y).
     """
-    mx, my = m
-    nx, ny = n
+    mid_x, mid_y = mid_line
+    other_x, other_y = other_mid_line
     twist_x, twist_y = twist
-    turn = my * ny * (12.0 * scale)
-    lean_x = scale * ((twist_x * ny + nx * twist_y) - nx * turn)
-    lean_y = scale * (2.0 * (twist_y * ny) - ny * turn)
-    along = (lean_x * mx + lean_y * my) / (mx * mx + my * my)
-    return mx + (lean_x - along * mx), my + (lean_y - along * my)
+    radius_term = mid_y * other_y * (12.0 * scale)
+    lean_x = scale * ((twist_x * other_y + other_x * twist_y) - other_x * radius_term)
+    lean_y = scale * (2.0 * (twist_y * other_y) - other_y * radius_term)
+    along = (lean_x * mid_x + lean_y * mid_y) / (mid_x * mid_x + mid_y * mid_y)
+    return mid_x + (lean_x - along * mid_x), mid_y + (lean_y - along * mid_y)
 
 
 @inlined
@@ -143,18 +144,18 @@ def lean_lines(mid_i, mid_j, twist, y):
 
 
 @inlined
-def weigh_differences(before, shift_before, here, shift, after, shift_after):
+def weigh_differences(length_before, shift_before, length, shift, length_after, shift_after):
     """Weights of two one-sided differences, from the distances between centres of volume."""
-    first = (here + 2.0 * shift) + (before - 2.0 * shift_before)
-    second = (here - 2.0 * shift) + (after + 2.0 * shift_after)
-    scale = 2.0 * here / (first * second)
-    return scale * second, scale * first
+    distance_before = (length + 2.0 * shift) + (length_before - 2.0 * shift_before)
+    distance_after = (length - 2.0 * shift) + (length_after + 2.0 * shift_after)
+    scale = 2.0 * length / (distance_before * distance_after)
+    return scale * distance_after, scale * distance_before
 
 
 @inlined
-def move_velocity(u, v, u_x, u_y, v_x, v_y, way_x, way_y):
+def move_velocity(u, v, u_x, u_y, v_x, v_y, offset_x, offset_y):
     """Velocity in the middle of a cell, displaced by `way` from the centre, where it is (u, v)."""
-    return u + (u_x * way_x + u_y * way_y), v + (v_x * way_x + v_y * way_y)
+    return u + (u_x * offset_x + u_y * offset_y), v + (v_x * offset_x + v_y * offset_y)
 
 
 @inlined

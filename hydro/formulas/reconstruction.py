@@ -14,9 +14,10 @@ from __future__ import annotations
 from shockgrid.regrid.jit import inlined
 
 TINY_SLOPE = 1e-300  # keeps 0/0 of a uniform flow from being a NaN
-# differences over c/sqrt(8) around a cell are shocks whatever the rest says
+# velocity differences of more than c/sqrt(8) around a cell are shocks, however the flow turns
 STRONG_SHOCK_FACTOR = 8.0
-# most slope, over the smaller difference, that leaves no sawtooth behind a captured shock; 1.3 does
+# largest slope over the smaller difference that leaves no sawtooth of single cells behind a
+# captured shock; with 1.3 there is one
 GENTLE_STEEPNESS = 1.15
 
 
@@ -40,18 +41,18 @@ def limit_minmod(a, b):
 def limit_monotonised_central(a, b):
     """The mean of two variations of one sign, at most twice either, zero otherwise [VanLeer1977].
 
-    The sharpest of the three and the default: Sod's problem at 100 cells with the contact on a
+    The sharpest of the limiters and the default: Sod's problem at 100 cells with the contact on a
     grid line has an L1 error of .0024 with it, .0033 with the harmonic mean.
     """
     lower = a if a < b else b
     upper = b if a < b else a
-    most = lower if lower > 0.0 else 0.0
-    least = upper if upper < 0.0 else 0.0
-    most = most + most
-    least = least + least
+    rising_bound = lower if lower > 0.0 else 0.0
+    falling_bound = upper if upper < 0.0 else 0.0
+    rising_bound = rising_bound + rising_bound
+    falling_bound = falling_bound + falling_bound
     mean = 0.5 * (a + b)
-    mean = mean if mean > least else least
-    return mean if mean < most else most
+    mean = mean if mean > falling_bound else falling_bound
+    return mean if mean < rising_bound else rising_bound
 
 
 @inlined
@@ -64,13 +65,13 @@ def limit_gently(a, b):
     """
     lower = a if a < b else b
     upper = b if a < b else a
-    most = lower if lower > 0.0 else 0.0
-    least = upper if upper < 0.0 else 0.0
-    most = GENTLE_STEEPNESS * most
-    least = GENTLE_STEEPNESS * least
+    rising_bound = lower if lower > 0.0 else 0.0
+    falling_bound = upper if upper < 0.0 else 0.0
+    rising_bound = GENTLE_STEEPNESS * rising_bound
+    falling_bound = GENTLE_STEEPNESS * falling_bound
     mean = 0.5 * (a + b)
-    mean = mean if mean > least else least
-    return mean if mean < most else most
+    mean = mean if mean > falling_bound else falling_bound
+    return mean if mean < rising_bound else rising_bound
 
 
 @inlined
@@ -124,21 +125,21 @@ def compute_line_geometry(a, b, c, d):
 
 
 @inlined
-def compute_half_step(state, c2, carried, gradients, half_dt):
+def compute_half_step(state, c2, advecting, gradients, half_dt):
     """Primitive state at mid-time at the cell's old centre (theory F3.6).
 
-    state: (rho, u, v, p); carried: the velocity with which it is carried; gradients: x and y of
+    state: (rho, u, v, p); advecting: the velocity with which it is carried; gradients: x and y of
     each of the four.
     """
     rho, u, v, p = state
-    x, y = carried
+    advecting_u, advecting_v = advecting
     rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y = gradients
     divergence = u_x + v_y
     volume = 1.0 / rho
-    rho_half = rho - half_dt * ((x * rho_x + y * rho_y) + rho * divergence)
-    u_half = u - half_dt * ((x * u_x + y * u_y) + p_x * volume)
-    v_half = v - half_dt * ((x * v_x + y * v_y) + p_y * volume)
-    p_half = p - half_dt * ((x * p_x + y * p_y) + rho * c2 * divergence)
+    rho_half = rho - half_dt * ((advecting_u * rho_x + advecting_v * rho_y) + rho * divergence)
+    u_half = u - half_dt * ((advecting_u * u_x + advecting_v * u_y) + p_x * volume)
+    v_half = v - half_dt * ((advecting_u * v_x + advecting_v * v_y) + p_y * volume)
+    p_half = p - half_dt * ((advecting_u * p_x + advecting_v * p_y) + rho * c2 * divergence)
     return rho_half, u_half, v_half, p_half
 
 
@@ -163,7 +164,7 @@ def compute_gradient(along_i, along_j, mid_i, mid_j, inverse):
 
 
 @inlined
-def compute_acoustic_weight(a, b, c, d, lines, inverse, c2):
+def compute_acoustic_weight(before, after, below, above, lines, inverse, c2):
     """How far the motion of a cell is sound or a shock, from 0 (turning flow) to 1.
 
         min(1, (2 div u)² / |grad u|² + 8 S/c²),   S: sum of the variations²     theory F3.11
@@ -172,34 +173,34 @@ def compute_acoustic_weight(a, b, c, d, lines, inverse, c2):
     one component in some frame; where velocities jump by a fraction of the sound speed; and where
     nothing moves.  Near 0 in slow flow without divergence.  Made of differences of velocities: the
     same in every frame, moved or turned.  Axisymmetric flow: that of the motion in the plane.
-    Variations (u, v) of the velocity over the cell: along i towards the cell before (a), after (b),
-    along j below (c), above (d); lines: both line vectors.
+    before, after, below, above: variations (u, v) of the velocity over the cell towards these four
+    neighbours, along i and along j; lines: both line vectors.
     """
-    u_a, v_a = a
-    u_b, v_b = b
-    u_c, v_c = c
-    u_d, v_d = d
-    u_i = 0.5 * (u_a + u_b)
-    v_i = 0.5 * (v_a + v_b)
-    u_j = 0.5 * (u_c + u_d)
-    v_j = 0.5 * (v_c + v_d)
+    u_before, v_before = before
+    u_after, v_after = after
+    u_below, v_below = below
+    u_above, v_above = above
+    u_i = 0.5 * (u_before + u_after)
+    v_i = 0.5 * (v_before + v_after)
+    u_j = 0.5 * (u_below + u_above)
+    v_j = 0.5 * (v_below + v_above)
     u_x, u_y = compute_gradient(u_i, u_j, *lines, inverse)
     v_x, v_y = compute_gradient(v_i, v_j, *lines, inverse)
     divergence = u_x + v_y
-    whole = ((u_x * u_x + v_y * v_y) + (u_y * u_y + v_x * v_x)) + TINY_SLOPE
-    jumps = ((u_a * u_a + v_a * v_a) + (u_b * u_b + v_b * v_b)) + (
-        (u_c * u_c + v_c * v_c) + (u_d * u_d + v_d * v_d)
-    )
-    share = (
+    gradient_square = ((u_x * u_x + v_y * v_y) + (u_y * u_y + v_x * v_x)) + TINY_SLOPE
+    jump_squares = (
+        (u_before * u_before + v_before * v_before) + (u_after * u_after + v_after * v_after)
+    ) + ((u_below * u_below + v_below * v_below) + (u_above * u_above + v_above * v_above))
+    acoustic_weight = (
         4.0 * (divergence * divergence) + TINY_SLOPE
-    ) / whole + STRONG_SHOCK_FACTOR * jumps / c2
-    return share if share < 1.0 else 1.0
+    ) / gradient_square + STRONG_SHOCK_FACTOR * jump_squares / c2
+    return acoustic_weight if acoustic_weight < 1.0 else 1.0
 
 
 @inlined
-def relax_limit(limited, a, b, acoustic_weight):
+def relax_limit(limited, before, after, acoustic_weight):
     """The limited variation in waves, the mean of both differences in turning flow."""
-    return acoustic_weight * limited + (1.0 - acoustic_weight) * (0.5 * (a + b))
+    return acoustic_weight * limited + (1.0 - acoustic_weight) * (0.5 * (before + after))
 
 
 @inlined
@@ -236,33 +237,33 @@ def make_limit_velocity(limit):
 @inlined
 def compute_hll_switch(fall, rise, fall_j, rise_j, rho, c2, least_jump):
     """1 where a pressure difference to one of four neighbours is over least_jump rho c², else 0."""
-    a = abs(fall)
-    b = abs(rise)
-    c = abs(fall_j)
-    d = abs(rise_j)
-    a = a if a > b else b
-    c = c if c > d else d
-    a = a if a > c else c
-    return 1.0 if a > least_jump * rho * c2 else 0.0
+    size_before = abs(fall)
+    size_after = abs(rise)
+    size_below = abs(fall_j)
+    size_above = abs(rise_j)
+    largest_i = size_before if size_before > size_after else size_after
+    largest_j = size_below if size_below > size_above else size_above
+    largest = largest_i if largest_i > largest_j else largest_j
+    return 1.0 if largest > least_jump * rho * c2 else 0.0
 
 
 @inlined
-def compute_weights(before, here, after):
+def compute_weights(length_before, length, length_after):
     """Factors that turn differences to both neighbours into variations over a cell.
 
     Lengths of three cells in a row; `2 here / (here + before)` and `2 here / (here + after)`, by
     one division.
     """
-    first = here + before
-    second = here + after
-    scale = 2.0 * here / (first * second)
-    return scale * second, scale * first
+    distance_before = length + length_before
+    distance_after = length + length_after
+    scale = 2.0 * length / (distance_before * distance_after)
+    return scale * distance_after, scale * distance_before
 
 
-# --- torn cells -----------------------------------------------------------------------------------
+# --- failed cells ---------------------------------------------------------------------------------
 
-# At their faces torn cells have their own energy and sound speed, whatever the trace there.  The
-# void energy of a torn cell makes up for what the equation of state says of a body expanded as a
+# At their faces failed cells have their own energy and sound speed, whatever the trace there.  The
+# void energy of a failed cell makes up for what the equation of state says of a body expanded as a
 # whole to the cell's density, which goes with 1/density.  With the void energy of the cell and the
 # density of a trace, what passes through a face would have an energy that no material has, beyond
 # all bounds where a cell is nearly empty.  And a trace is not quite at the tension at which pieces
@@ -273,12 +274,15 @@ WHOLE_CELL_MARK = 1e300  # marks a cell that has not failed
 
 
 @inlined
-def mark_torn(e, void):
+def mark_voided(e, void_energy):
     """The energy of a cell that has failed by its void energy; WHOLE_CELL_MARK elsewhere."""
-    return e if void < 0.0 else WHOLE_CELL_MARK
+    return e if void_energy < 0.0 else WHOLE_CELL_MARK
 
 
 @inlined
-def choose_own(traced, own, torn):
-    """The traced value; `own`, that of the cell, if `torn` (from `mark_torn`) is an energy."""
-    return own if torn < WHOLE_CELL_MARK else traced
+def choose_own(traced, of_cell, voided_energy):
+    """The traced value, or `of_cell`, that of the cell, where the cell has failed.
+
+    voided_energy: of `mark_voided`.
+    """
+    return of_cell if voided_energy < WHOLE_CELL_MARK else traced

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 from shockgrid.regrid.jit import compiled_once, inlined
 
-# pressure jump to a neighbour, over rho c², from which on all faces of a cell get HLL
-FLUXES = {"hllc": 0.1, "hll": -1.0}
+# by the name of a flux: the pressure jump to a neighbour, over rho c², from which on all faces of a
+# cell have the HLL flux, the others HLLC
+HLL_JUMP_THRESHOLDS = {"hllc": 0.1, "hll": -1.0}
 DEFAULT_FLUX = "hllc"
 IDEAL_GAS_ERROR = 1e-9  # of the pressure, from rho c²/gamma
 # difference of the pressures on both sides of a contact, over their sum, above which Newton's
@@ -172,29 +173,29 @@ def compute_hll_flux(left, right, face):
 
 
 @inlined
-def withhold(flux, side, part):
+def withhold(flux, side, leaving_part):
     """A flux of which only a part of the mass leaves the cell that it comes from.
 
-    flux: (mass, momentum x, momentum y, energy, pressure); side: (u, v, e) there; `part`: of
+    flux: (mass, momentum x, momentum y, energy, pressure); side: (u, v, e) there; leaving_part: of
     `hydro.eos.base.make_leaving_part`.  The pressure acts as it does.
     """
     mass, momentum_x, momentum_y, energy, pressure = flux
     u, v, e = side
-    held = (1.0 - part) * mass
+    kept_mass = (1.0 - leaving_part) * mass
     return (
-        mass - held,
-        momentum_x - held * u,
-        momentum_y - held * v,
-        energy - held * (e + 0.5 * (u * u + v * v)),
+        mass - kept_mass,
+        momentum_x - kept_mass * u,
+        momentum_y - kept_mass * v,
+        energy - kept_mass * (e + 0.5 * (u * u + v * v)),
         pressure,
     )
 
 
 @compiled_once(allocates=False)
-def compute_wave_pressure(rho, p, c, law, du):
+def compute_wave_pressure(rho, p, c, wave_law, du):
     """Pressure behind a wave that changes the normal velocity by `du`, and its slope in du.
 
-    law (a, b, z): see `EquationOfState.wave_law`.  For du > 0 a shock of the EOS's own shock
+    wave_law (a, b, z): see `EquationOfState.wave_law`.  For du > 0 a shock of the EOS's own shock
     speed.  For du < 0 an isentropic rarefaction.  With z = 0 it is that of the gas that has this
     sound speed and the same curvature for weak waves, gamma = 4 a - 1: exact for ideal and
     stiffened gases.  A condensed material breaks that law: released from a strong shock it
@@ -204,60 +205,68 @@ def compute_wave_pressure(rho, p, c, law, du):
     The slope is kept above 1e-3 rho c, so that Newton steps stay finite where material would break.
     Theory F4.2, F4.3, F4.4.
     """
-    slope_a, slope_b, z = law
+    slope_a, slope_b, z = wave_law
     impedance = rho * c
     if du > 0.0:
         # a shock, by the material's shock speed (F4.2)
-        bend = slope_b * du
-        root = (bend * bend + c * c) ** 0.5
+        half_jump = slope_b * du
+        root = (half_jump * half_jump + c * c) ** 0.5
         pressure = p + rho * (slope_a * du + root) * du
-        slope = rho * (2.0 * slope_a * du + root + bend * bend / root)
+        slope = rho * (2.0 * slope_a * du + root + half_jump * half_jump / root)
     elif z > 0.0:
         # a release of condensed material: (rho c)² falls linearly with p (F4.4)
-        fall = impedance * impedance - z * z
-        steepest = 4.0 * slope_a * rho  # that of weak waves, as in the shock's law
-        fall = fall / p if abs(fall) < steepest * abs(p) else steepest
-        fall = fall if fall > 1e-300 else 1e-300
-        least = 1e-3 * impedance
-        end = (least - impedance) / (0.5 * fall)  # where the slope has come down to the least
-        part_du = du if du > end else end
-        slope = impedance + 0.5 * fall * part_du
-        pressure = p + (impedance + 0.25 * fall * part_du) * part_du + least * (du - part_du)
+        fall_rate = impedance * impedance - z * z
+        steepest_fall = 4.0 * slope_a * rho  # that of weak waves, as in the shock's law
+        fall_rate = fall_rate / p if abs(fall_rate) < steepest_fall * abs(p) else steepest_fall
+        fall_rate = fall_rate if fall_rate > 1e-300 else 1e-300
+        least_slope = 1e-3 * impedance
+        slope_floor_du = (least_slope - impedance) / (
+            0.5 * fall_rate
+        )  # where the slope has come down to the least
+        linear_du = du if du > slope_floor_du else slope_floor_du
+        slope = impedance + 0.5 * fall_rate * linear_du
+        pressure = (
+            p
+            + (impedance + 0.25 * fall_rate * linear_du) * linear_du
+            + least_slope * (du - linear_du)
+        )
     else:
         # a release as that of a stiffened gas (F4.3)
         gamma = 4.0 * slope_a - 1.0
-        base = 1.0 + 0.5 * (gamma - 1.0) * du / c
-        base = base if base > 0.0 else 0.0
-        power = base ** ((gamma + 1.0) / (gamma - 1.0))
-        pressure = p + impedance * c / gamma * (power * base - 1.0)
+        sound_speed_ratio = 1.0 + 0.5 * (gamma - 1.0) * du / c
+        sound_speed_ratio = sound_speed_ratio if sound_speed_ratio > 0.0 else 0.0
+        power = sound_speed_ratio ** ((gamma + 1.0) / (gamma - 1.0))
+        pressure = p + impedance * c / gamma * (power * sound_speed_ratio - 1.0)
         power = power if power > 1e-3 else 1e-3
         slope = impedance * power
     return pressure, slope
 
 
 @inlined
-def compute_escape(c, law):
+def compute_escape(c, wave_law):
     """How much faster than a gas its edge is that expands into a vacuum: 2 c / (gamma - 1)."""
-    return c / (2.0 * law[0] - 1.0)
+    return c / (2.0 * wave_law[0] - 1.0)
 
 
 @inlined
-def is_ideal_gas(rho, p, c, law):
-    """Is p = rho c²/gamma: is its pressure in a vacuum zero?"""
-    gas = rho * c * c / (4.0 * law[0] - 1.0)
-    return law[2] == 0.0 and abs(gas - p) <= IDEAL_GAS_ERROR * p
+def is_ideal_gas(rho, p, c, wave_law):
+    """Whether p = rho c²/gamma, so that its pressure in a vacuum is zero."""
+    ideal_pressure = rho * c * c / (4.0 * wave_law[0] - 1.0)
+    return wave_law[2] == 0.0 and abs(ideal_pressure - p) <= IDEAL_GAS_ERROR * p
 
 
 @inlined
-def compute_gas_pressure(rho, p, c, law, du):
+def compute_gas_pressure(rho, p, c, wave_law, du):
     """The pressure of `compute_wave_pressure` for an ideal gas, with all its digits where it is a
     tiny part of `p`."""
     if du >= 0.0:
-        pressure, _ = compute_wave_pressure(rho, p, c, law, du)
+        pressure, _ = compute_wave_pressure(rho, p, c, wave_law, du)
         return pressure
-    gamma = 4.0 * law[0] - 1.0
-    base = 1.0 + 0.5 * (gamma - 1.0) * du / c
-    return p * base ** (2.0 * gamma / (gamma - 1.0)) if base > 0.0 else 0.0
+    gamma = 4.0 * wave_law[0] - 1.0
+    sound_speed_ratio = 1.0 + 0.5 * (gamma - 1.0) * du / c
+    return (
+        p * sound_speed_ratio ** (2.0 * gamma / (gamma - 1.0)) if sound_speed_ratio > 0.0 else 0.0
+    )
 
 
 @compiled_once(allocates=False)
@@ -306,30 +315,32 @@ def compute_contact(left, right, jump):
     z_r = rho_r * c_r
     w_star = ((z_l * w_l + z_r * w_r) + ((p_l - p_r) - jump)) / (z_l + z_r)
     small = 1e-14 * (c_l + c_r)
-    left = p_l
-    right = p_r
+    pressure_l = p_l
+    pressure_r = p_r
     for _ in range(20):
-        left, slope_l = compute_wave_pressure(rho_l, p_l, c_l, law_l, w_l - w_star)
-        right, slope_r = compute_wave_pressure(rho_r, p_r, c_r, law_r, w_star - w_r)
-        change = ((left - right) - jump) / (slope_l + slope_r)
+        pressure_l, slope_l = compute_wave_pressure(rho_l, p_l, c_l, law_l, w_l - w_star)
+        pressure_r, slope_r = compute_wave_pressure(rho_r, p_r, c_r, law_r, w_star - w_r)
+        change = ((pressure_l - pressure_r) - jump) / (slope_l + slope_r)
         w_star = w_star + change
         if abs(change) <= small:
             break
-    unsettled = jump == 0.0 and abs(left - right) > UNSETTLED_PRESSURES * (left + right)
+    unsettled = jump == 0.0 and abs(pressure_l - pressure_r) > UNSETTLED_PRESSURES * (
+        pressure_l + pressure_r
+    )
     if unsettled and is_ideal_gas(rho_l, p_l, c_l, law_l) and is_ideal_gas(rho_r, p_r, c_r, law_r):
         return bisect_contact((rho_l, w_l, p_l, c_l, law_l), (rho_r, w_r, p_r, c_r, law_r))
-    return 0.5 * (left + right), w_star
+    return 0.5 * (pressure_l + pressure_r), w_star
 
 
 @compiled_once(allocates=False)
-def compute_speed_at_pressure(rho, w, p, c, law, p_star):
+def compute_speed_at_pressure(rho, w, p, c, wave_law, p_star):
     """Normal velocity of a surface with given pressure `p_star` (free surface, pressure piston).
 
     `w`: velocity along the outward normal.  Newton steps from the acoustic solution.
     """
     w_star = w + (p - p_star) / (rho * c)
     for _ in range(20):
-        pressure, slope = compute_wave_pressure(rho, p, c, law, w - w_star)
+        pressure, slope = compute_wave_pressure(rho, p, c, wave_law, w - w_star)
         change = (pressure - p_star) / slope
         w_star = w_star + change
         if abs(change) <= 1e-14 * c:

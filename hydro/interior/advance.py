@@ -77,7 +77,7 @@ def make_flow_kernels(
     flux: str = DEFAULT_FLUX,
 ) -> FlowKernels:
     """Kernels of an `EquationOfState` class, a limiter (LIMITERS of `formulas.reconstruction`), a
-    geometry and a flux (FLUXES of `formulas.riemann`)."""
+    geometry and a flux (HLL_JUMP_THRESHOLDS of `formulas.riemann`)."""
     energy = eos_class.energy_part
     sound = eos_class.sound_speed_squared_part
     low_mach = limiter in LOW_MACH
@@ -92,12 +92,13 @@ def make_flow_kernels(
     fill_traces_in, fill_traces = make_traces(sound, opens_voids)
     pressure_i, pressure_j = (scratch.PRESSURE_I, scratch.PRESSURE_J) if curved else (0, 0)
     i_faces = scratch.RHO_OUT, scratch.RHO_IN, scratch.AREA_X_I
+    # the cell below the face of entry k is that of entry k - 1
     j_faces = scratch.RHO_UP - 1, scratch.RHO_DOWN, scratch.AREA_X_J
     fill_upwind_i = make_upwind(
-        *i_faces, scratch.TORN_BEFORE, scratch.ACOUSTIC_BEFORE, low_mach, opens_voids
+        *i_faces, scratch.VOIDED_ENERGY_BEFORE, scratch.ACOUSTIC_BEFORE, low_mach, opens_voids
     )
     fill_upwind_j = make_upwind(
-        *j_faces, scratch.TORN - 1, scratch.ACOUSTIC - 1, low_mach, opens_voids
+        *j_faces, scratch.VOIDED_ENERGY - 1, scratch.ACOUSTIC - 1, low_mach, opens_voids
     )
     voids = opens_voids, make_leaving_part(eos_class)
     fill_flux_i = make_flux(energy, scratch.AREA_X_I, scratch.FLUX_I_MASS, pressure_i, *voids)
@@ -106,13 +107,19 @@ def make_flow_kernels(
         energy,
         i_faces,
         scratch.HLL_BEFORE,
-        scratch.TORN_BEFORE,
+        scratch.VOIDED_ENERGY_BEFORE,
         scratch.FLUX_I_MASS,
         pressure_i,
         *voids,
     )
     use_hll_j = make_hll_flux(
-        energy, j_faces, scratch.HLL - 1, scratch.TORN - 1, scratch.FLUX_J_MASS, pressure_j, *voids
+        energy,
+        j_faces,
+        scratch.HLL - 1,
+        scratch.VOIDED_ENERGY - 1,
+        scratch.FLUX_J_MASS,
+        pressure_j,
+        *voids,
     )
     # axisymmetric flow alone
     fill_source_pressure = make_source_pressure(sound)
@@ -145,22 +152,22 @@ def make_flow_kernels(
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         chunks = (nj + scratch.CHUNK_CELLS - 1) // scratch.CHUNK_CELLS
-        row0 = (tile // chunks) * TILE_ROWS
-        row1 = min(ni, row0 + TILE_ROWS)
-        j0 = (tile % chunks) * nj // chunks
-        j1 = (tile % chunks + 1) * nj // chunks
-        ja = max(0, j0 - 1)  # reconstructed columns ja..jb - 1
-        jb = min(nj, j1 + 1)
-        m = jb - ja
-        # with the next neighbour, without
-        n = scratch.count_padded(m)
-        w = scratch.count_whole(m)
-        # scratch entry k is column ja + k - 1; node columns from node0 on are there
-        node0 = max(0, ja - 1)
-        shift = node0 - (ja - 1)
-        node_count = min(nj, jb + 1) - node0 + 1
-        first = j0 - ja + 1
-        last = j1 - ja + 1
+        first_row = (tile // chunks) * TILE_ROWS
+        stop_row = min(ni, first_row + TILE_ROWS)
+        first_j = (tile % chunks) * nj // chunks
+        stop_j = (tile % chunks + 1) * nj // chunks
+        first_column = max(0, first_j - 1)  # reconstructed: up to stop_column - 1
+        stop_column = min(nj, stop_j + 1)
+        cells = stop_column - first_column
+        # loop lengths in whole vectors: with the next neighbour, without
+        padded = scratch.count_padded(cells)
+        whole = scratch.count_whole(cells)
+        # scratch entry k is column first_column + k - 1; node columns from node0 on are there
+        node0 = max(0, first_column - 1)
+        shift = node0 - (first_column - 1)
+        node_count = min(nj, stop_column + 1) - node0 + 1
+        first_entry = first_j - first_column + 1
+        stop_entry = stop_j - first_column + 1
         for k in range(SCRATCH_SPAN):
             Z[scratch.LEAST_C2 + k] = 1e300
             Z[scratch.FIRST_ORDER + k] = 0.0
@@ -170,134 +177,163 @@ def make_flow_kernels(
             Z[scratch.SUM_ENERGY + k] = 0.0
             Z[scratch.SUM_VOIDED + k] = 0.0
             Z[scratch.SUM_EMPTIED + k] = 0.0
-        row = max(0, row0 - 1)
+        row = max(0, first_row - 1)
         # the row before the first one is loaded as the current one, then shifted
         if row > 0:
             copy_rows(nodes, row - 1, node0, node_count, Z, scratch.X_HIGH + shift)
             copy_rows(nodes, row, node0, node_count, Z, scratch.X_NEXT + shift)
-            measure_after(Z, n)
+            measure_after(Z, padded)
         else:
-            copy_row(rim, LENGTH_GHOST, ja, m, Z, scratch.LENGTH_AFTER + 1)
+            copy_row(rim, LENGTH_GHOST, first_column, cells, Z, scratch.LENGTH_AFTER + 1)
             if curved:
-                clear_shift_after(Z, n)
+                clear_shift_after(Z, padded)
             copy_rows(nodes, 0, node0, node_count, Z, scratch.X_NEXT + shift)
-        copy_rows(state, row, ja, m + 2, Z, scratch.RHO_AFTER)
-        next_row(Z, n)
+        copy_rows(state, row, first_column, cells + 2, Z, scratch.RHO_AFTER)
+        next_row(Z, padded)
         copy_rows(nodes_new, row, node0, node_count, Z, scratch.X_HIGH_NEW + shift)
         copy_rows(nodes, row + 1, node0, node_count, Z, scratch.X_NEXT + shift)
-        measure_after(Z, n)
-        copy_rows(state, row + 1, ja, m + 2, Z, scratch.RHO_AFTER)
-        fill_steps(Z, w)
-        fill_faces_i(Z, w, inverse_dt)
-        next_row(Z, n)
+        measure_after(Z, padded)
+        copy_rows(state, row + 1, first_column, cells + 2, Z, scratch.RHO_AFTER)
+        fill_steps(Z, whole)
+        fill_faces_i(Z, whole, inverse_dt)
+        next_row(Z, padded)
         # cells whose HLL switch is on: this row, the row before
-        first_hll = m + 1
-        last_hll = 0
-        first_hll_before = m + 1
+        first_hll_cell = cells + 1
+        last_hll_cell = 0
+        first_hll_before = cells + 1
         last_hll_before = 0
-        while row <= row1:
-            inside = row0 <= row < row1
+        while row <= stop_row:
+            inside = first_row <= row < stop_row
             counted = 1.0 if inside else 0.0
             if row < ni:
                 copy_rows(nodes_new, row + 1, node0, node_count, Z, scratch.X_HIGH_NEW + shift)
-                copy_rows(state, row + 2, ja, m + 2, Z, scratch.RHO_AFTER)
+                copy_rows(state, row + 2, first_column, cells + 2, Z, scratch.RHO_AFTER)
                 if row + 1 < ni:
                     copy_rows(nodes, row + 2, node0, node_count, Z, scratch.X_NEXT + shift)
-                    measure_after(Z, n)
+                    measure_after(Z, padded)
                 else:
-                    copy_row(rim, LENGTH_GHOST, nj + ja, m, Z, scratch.LENGTH_AFTER + 1)
+                    copy_row(
+                        rim, LENGTH_GHOST, nj + first_column, cells, Z, scratch.LENGTH_AFTER + 1
+                    )
                     if curved:
-                        clear_shift_after(Z, n)
+                        clear_shift_after(Z, padded)
                 if opens_voids:
-                    copy_row(void_energy, row, ja, m, Z, scratch.VOID_LOADED + 1)
+                    copy_row(void_energy, row, first_column, cells, Z, scratch.VOID_LOADED + 1)
                 # prefetch what the next row reads and where this one's results are written
-                prefetch_rows(state, min(row + 3, ni + 1), ja, m + 2)
+                prefetch_rows(state, min(row + 3, ni + 1), first_column, cells + 2)
                 prefetch_rows(nodes, min(row + 3, ni), node0, node_count)
                 prefetch_rows(nodes_new, min(row + 2, ni), node0, node_count)
-                prefetch_rows(state_new, row, j0 + 1, j1 - j0)
-                prefetch_row(rates_new, max(row - 1, 0), j0, j1 - j0)
-                prefetch_row(crowding_new, max(row - 1, 0), j0, j1 - j0)
+                prefetch_rows(state_new, row, first_j + 1, stop_j - first_j)
+                prefetch_row(rates_new, max(row - 1, 0), first_j, stop_j - first_j)
+                prefetch_row(crowding_new, max(row - 1, 0), first_j, stop_j - first_j)
                 if opens_voids:
-                    prefetch_row(void_energy, min(row + 1, ni - 1), ja, m)
-                    prefetch_row(void_energy_new, max(row - 1, 0), j0, j1 - j0)
-                length_below = rim[LENGTH_GHOST, 2 * nj + row] if ja == 0 else -1.0
-                length_above = rim[LENGTH_GHOST, 2 * nj + ni + row] if jb == nj else -1.0
-                reconstruct(Z, m, n, length_below, length_above, 0.5 * dt, parameters)
-                first_hll_before = first_hll
-                last_hll_before = last_hll
-                first_hll, last_hll = find_hll(Z, m)
+                    prefetch_row(void_energy, min(row + 1, ni - 1), first_column, cells)
+                    prefetch_row(void_energy_new, max(row - 1, 0), first_j, stop_j - first_j)
+                length_below = rim[LENGTH_GHOST, 2 * nj + row] if first_column == 0 else -1.0
+                length_above = rim[LENGTH_GHOST, 2 * nj + ni + row] if stop_column == nj else -1.0
+                reconstruct(Z, cells, padded, length_below, length_above, 0.5 * dt, parameters)
+                first_hll_before = first_hll_cell
+                last_hll_before = last_hll_cell
+                first_hll_cell, last_hll_cell = find_hll(Z, cells)
                 if curved:
-                    fill_source_pressure(Z, n, parameters)
-                if row >= row0:
-                    fill_traces_in(Z, w, counted, parameters)
+                    fill_source_pressure(Z, padded, parameters)
+                if row >= first_row:
+                    fill_traces_in(Z, whole, counted, parameters)
             if row == 0:
                 for q in range(FLUX_ROWS):
-                    for k in range(m):  # fluxes of a rim are outward
-                        Z[scratch.FLUX_I_MASS + q * SCRATCH_SPAN + 1 + k] = -rim[MASS + q, ja + k]
+                    for k in range(cells):  # fluxes of a rim are outward
+                        Z[scratch.FLUX_I_MASS + q * SCRATCH_SPAN + 1 + k] = -rim[
+                            MASS + q, first_column + k
+                        ]
             elif row == ni:
                 for q in range(FLUX_ROWS):
                     copy_row(
                         rim,
                         MASS + q,
-                        nj + ja,
-                        m,
+                        nj + first_column,
+                        cells,
                         Z,
                         scratch.FLUX_I_MASS + q * SCRATCH_SPAN + 1,
                     )
-            elif row >= row0:
-                fill_upwind_i(Z, w)
-                fill_flux_i(Z, w, parameters)
-                first_face = min(first_hll, first_hll_before)
-                last_face = max(last_hll, last_hll_before)
+            elif row >= first_row:
+                fill_upwind_i(Z, whole)
+                fill_flux_i(Z, whole, parameters)
+                first_face = min(first_hll_cell, first_hll_before)
+                last_face = max(last_hll_cell, last_hll_before)
                 if first_face <= last_face:
                     use_hll_i(Z, first_face, last_face, parameters)
                 if curved:
-                    fill_push_i(Z, n)
-            if keeps_masses and row >= row0:
-                copy_back(Z, scratch.FLUX_I_MASS + first, j1 - j0, mass_i, row, j0)
-            if row < row1:
+                    fill_push_i(Z, padded)
+            if keeps_masses and row >= first_row:
+                copy_back(
+                    Z, scratch.FLUX_I_MASS + first_entry, stop_j - first_j, mass_i, row, first_j
+                )
+            if row < stop_row:
                 # the faces towards +i replace those towards -i, whose fluxes are known
-                fill_faces_i(Z, w, inverse_dt)
-                fill_faces_j(Z, n, inverse_dt)
-                fill_traces(Z, w, counted, parameters)
+                fill_faces_i(Z, whole, inverse_dt)
+                fill_faces_j(Z, padded, inverse_dt)
+                fill_traces(Z, whole, counted, parameters)
             if inside:
-                fill_upwind_j(Z, w)
-                fill_flux_j(Z, w, parameters)
-                if first_hll <= last_hll:
-                    use_hll_j(Z, first_hll, last_hll + 1, parameters)
+                fill_upwind_j(Z, whole)
+                fill_flux_j(Z, whole, parameters)
+                if first_hll_cell <= last_hll_cell:
+                    use_hll_j(Z, first_hll_cell, last_hll_cell + 1, parameters)
                 if curved:
-                    fill_push_j(Z, n)
-                if j0 == 0:
+                    fill_push_j(Z, padded)
+                if first_j == 0:
                     for q in range(FLUX_ROWS):
-                        Z[scratch.FLUX_J_MASS + q * SCRATCH_SPAN + first] = -rim[
+                        Z[scratch.FLUX_J_MASS + q * SCRATCH_SPAN + first_entry] = -rim[
                             MASS + q, 2 * nj + row
                         ]
-                if j1 == nj:
+                if stop_j == nj:
                     for q in range(FLUX_ROWS):
                         out = rim[MASS + q, 2 * nj + ni + row]
-                        Z[scratch.FLUX_J_MASS + q * SCRATCH_SPAN + last] = out
+                        Z[scratch.FLUX_J_MASS + q * SCRATCH_SPAN + stop_entry] = out
                 if keeps_masses:
-                    copy_back(Z, scratch.FLUX_J_MASS + first, j1 - j0 + 1, mass_j, row, j0)
-            if inside and row > row0:
-                update_rows(Z, w, dt, inverse_dt, parameters)
+                    copy_back(
+                        Z,
+                        scratch.FLUX_J_MASS + first_entry,
+                        stop_j - first_j + 1,
+                        mass_j,
+                        row,
+                        first_j,
+                    )
+            if inside and row > first_row:
+                update_rows(Z, whole, dt, inverse_dt, parameters)
             elif inside:
-                gather_flux(Z, w, dt, inverse_dt, parameters)
-            elif row > row0:
-                fill_new_state(Z, w, dt, inverse_dt, parameters)
-            if row > row0:
+                gather_flux(Z, whole, dt, inverse_dt, parameters)
+            elif row > first_row:
+                fill_new_state(Z, whole, dt, inverse_dt, parameters)
+            if row > first_row:
                 for q in range(STATE_ROWS):
-                    new = scratch.RHO_NEW + q * SCRATCH_SPAN + first
-                    copy_back(Z, new, j1 - j0, state_new[q], row, j0 + 1)
+                    new = scratch.RHO_NEW + q * SCRATCH_SPAN + first_entry
+                    copy_back(Z, new, stop_j - first_j, state_new[q], row, first_j + 1)
                 if opens_voids:
-                    copy_back(Z, scratch.VOID_NEW + first, j1 - j0, void_energy_new, row - 1, j0)
-                copy_back(Z, scratch.RATE_NEW + first, j1 - j0, rates_new, row - 1, j0)
-                copy_back(Z, scratch.CROWDING_NEW + first, j1 - j0, crowding_new, row - 1, j0)
-            next_row(Z, n)
+                    copy_back(
+                        Z,
+                        scratch.VOID_NEW + first_entry,
+                        stop_j - first_j,
+                        void_energy_new,
+                        row - 1,
+                        first_j,
+                    )
+                copy_back(
+                    Z, scratch.RATE_NEW + first_entry, stop_j - first_j, rates_new, row - 1, first_j
+                )
+                copy_back(
+                    Z,
+                    scratch.CROWDING_NEW + first_entry,
+                    stop_j - first_j,
+                    crowding_new,
+                    row - 1,
+                    first_j,
+                )
+            next_row(Z, padded)
             row += 1
         least = 1e300
         for q in range(TOTAL_ROWS):
             tile_totals[tile, q] = 0.0
-        for k in range(first, last):
+        for k in range(first_entry, stop_entry):
             c2 = Z[scratch.LEAST_C2 + k]
             least = least if least < c2 else c2
             tile_totals[tile, FIRST_ORDER] += Z[scratch.FIRST_ORDER + k]

@@ -28,7 +28,10 @@ def clear_shift_after(Z, n):
 
 @inlined
 def find_even_twist(a, b, c, d):
-    """a - b + c - d of a cell's corners, opposite ones together, and the mean of their y."""
+    """a - b + c - d of a cell's corners, opposite ones together, and the mean of their y.
+
+    It is summed in another order than in `find_twist`: bitwise the same for a cell that is turned.
+    """
     xa, ya = a
     xb, yb = b
     xc, yc = c
@@ -88,23 +91,25 @@ def fill_lines(Z, n):
         Z[scratch.LEAN_INVERSE + k] = 1.0 / (line_i[0] * line_j[1] - line_i[1] * line_j[0])
 
 
-def make_push(split, pressure, flux, node_a, node_b, area, push):
+def make_push(split, pressure_row, flux_row, node_row_a, node_row_b, area_row, push_row):
     """Phase that takes the pressure out of the radial momentum of a row of faces: `Geometry.split`.
 
-    Scratch offsets: `pressure` in the fluxes; `flux`: of radial momentum; `node_a`, `node_b`: x of
-    the nodes at a face's ends, as in `hydro.interior.faces.make_faces`; `area`: the normals' y;
-    `push`: what is filled, and the row after it.
+    Scratch offsets: `pressure_row` in the fluxes; `flux_row`: of radial momentum; `node_row_a`,
+    `node_row_b`: x of the nodes at a face's ends, as in `hydro.interior.faces.make_faces`;
+    `area_row`: the normals' y; `push_row`: what is filled, and the row after it.
     """
 
     @compiled_once(allocates=False)
     def fill_push(Z, n):
         """Radial momentum carried through the faces; the pressure's force per depth and radian."""
         for k in range(1, n + 1):
-            plane_area_y = compute_plane_area_y(Z, node_a + k, node_b + k)
-            momentum_y, force, hoop = split(Z[flux + k], Z[pressure + k], Z[area + k], plane_area_y)
-            Z[flux + k] = momentum_y
-            Z[push + k] = force
-            Z[push + SCRATCH_SPAN + k] = hoop
+            plane_area_y = compute_plane_area_y(Z, node_row_a + k, node_row_b + k)
+            momentum_y, force, hoop = split(
+                Z[flux_row + k], Z[pressure_row + k], Z[area_row + k], plane_area_y
+            )
+            Z[flux_row + k] = momentum_y
+            Z[push_row + k] = force
+            Z[push_row + SCRATCH_SPAN + k] = hoop
 
     return fill_push
 
@@ -117,14 +122,14 @@ def fill_smooth(Z, n):
     """
     for k in range(1, n + 1):
         p = Z[scratch.P + k]
-        a = abs(Z[scratch.P + k - 1] - p)
-        b = abs(Z[scratch.P + k + 1] - p)
-        c = abs(Z[scratch.P_STEP + k])
-        d = abs(Z[scratch.P_AFTER + k] - p)
-        a = a if a > b else b
-        c = c if c > d else d
-        a = a if a > c else c
-        jump = (a / (Z[scratch.RHO + k] * Z[scratch.C2 + k]) - SMOOTH_JUMP) / (
+        below = abs(Z[scratch.P + k - 1] - p)
+        above = abs(Z[scratch.P + k + 1] - p)
+        before = abs(Z[scratch.P_STEP + k])
+        after = abs(Z[scratch.P_AFTER + k] - p)
+        largest_j = below if below > above else above
+        largest_i = before if before > after else after
+        largest = largest_j if largest_j > largest_i else largest_i
+        jump = (largest / (Z[scratch.RHO + k] * Z[scratch.C2 + k]) - SMOOTH_JUMP) / (
             STRONG_JUMP - SMOOTH_JUMP
         )
         jump = jump if jump > 0.0 else 0.0
@@ -163,7 +168,7 @@ def make_source_pressure(sound_speed_squared_part):
             rho = Z[scratch.RHO_HALF + k] + (Z[scratch.RHO_X + k] * dx + Z[scratch.RHO_Y + k] * dy)
             p = Z[scratch.P_HALF + k] + (Z[scratch.P_X + k] * dx + Z[scratch.P_Y + k] * dy)
             c2 = sound_speed_squared_part(rho, p, parameters)
-            own = Z[scratch.P + k]
-            Z[scratch.SOURCE_P + k] = p if (rho > 0.0) & (c2 > 0.0) else own
+            p_of_cell = Z[scratch.P + k]
+            Z[scratch.SOURCE_P + k] = p if (rho > 0.0) & (c2 > 0.0) else p_of_cell
 
     return fill_source_pressure

@@ -15,35 +15,35 @@ from shockgrid.hydro.interior.scratch import SCRATCH_SPAN
 from shockgrid.regrid.jit import compiled_once, inlined
 
 
-def make_faces(compute_face, node_a, node_b, target):
+def make_faces(compute_face, node_row_a, node_row_b, target_row):
     """Phase that fills normal times area, swept volume per time and centre of a row of faces.
 
-    `compute_face`: `Geometry.face`; `node_a, node_b`: scratch offsets of x of the nodes at a face's
-    ends, its normal to the right of the way from a to b (y, and the new x and y follow at the next
-    rows); `target`: offset of the normal's x.  Offsets are constants of the phase: the vectoriser
-    needs to know them.
+    `compute_face`: `Geometry.face`; `node_row_a`, `node_row_b`: scratch offsets of x of the nodes
+    at a face's ends, its normal to the right of the way from a to b (y, and the new x and y follow
+    in the next rows); `target_row`: offset of the normal's x.  Offsets are constants of the phase:
+    the vectoriser needs to know them.
     """
 
     @compiled_once(allocates=False)
     def fill_faces(Z, n, inverse_dt):
         """Faces at mid-time (theory F3.1)."""
         for k in range(1, n + 1):
-            a = Z[node_a + k], Z[node_a + SCRATCH_SPAN + k]
-            b = Z[node_b + k], Z[node_b + SCRATCH_SPAN + k]
+            a = Z[node_row_a + k], Z[node_row_a + SCRATCH_SPAN + k]
+            b = Z[node_row_b + k], Z[node_row_b + SCRATCH_SPAN + k]
             a_new = (
-                Z[node_a + 2 * SCRATCH_SPAN + k],
-                Z[node_a + 3 * SCRATCH_SPAN + k],
+                Z[node_row_a + 2 * SCRATCH_SPAN + k],
+                Z[node_row_a + 3 * SCRATCH_SPAN + k],
             )
             b_new = (
-                Z[node_b + 2 * SCRATCH_SPAN + k],
-                Z[node_b + 3 * SCRATCH_SPAN + k],
+                Z[node_row_b + 2 * SCRATCH_SPAN + k],
+                Z[node_row_b + 3 * SCRATCH_SPAN + k],
             )
             area_x, area_y, sweep, x, y = compute_face(a, b, a_new, b_new, inverse_dt)
-            Z[target + k] = area_x
-            Z[target + SCRATCH_SPAN + k] = area_y
-            Z[target + 2 * SCRATCH_SPAN + k] = sweep
-            Z[target + 3 * SCRATCH_SPAN + k] = x
-            Z[target + 4 * SCRATCH_SPAN + k] = y
+            Z[target_row + k] = area_x
+            Z[target_row + SCRATCH_SPAN + k] = area_y
+            Z[target_row + 2 * SCRATCH_SPAN + k] = sweep
+            Z[target_row + 3 * SCRATCH_SPAN + k] = x
+            Z[target_row + 4 * SCRATCH_SPAN + k] = y
 
     return fill_faces
 
@@ -52,25 +52,25 @@ def make_traces(sound_speed_squared_part, opens_voids):
     """Phases that fill the traces of a row: towards -i, and towards +i, -j and +j."""
 
     @inlined
-    def trace(half, gradients, own, torn, dx, dy, parameters):
+    def trace(half, gradients, of_cell, voided_energy, dx, dy, parameters):
         """State (rho, u, v, p) and c² at an offset; no state of the material: the cell's own.
 
-        c² is that of the cell if it has failed (`hydro.formulas.reconstruction.mark_torn`).  The
+        c² is that of the cell if it has failed (`hydro.formulas.reconstruction.mark_voided`).  The
         last number is 1 where the cell's own state is taken, else 0.
         """
         rho, u, v, p = compute_face_state(half, gradients, dx, dy)
-        own_rho, own_u, own_v, own_p, own_c2 = own
+        rho_of_cell, u_of_cell, v_of_cell, p_of_cell, c2_of_cell = of_cell
         c2 = sound_speed_squared_part(rho, p, parameters)
         if opens_voids:
-            c2 = choose_own(c2, own_c2, torn)
-        sound = (rho > 0.0) & (c2 > 0.0)
+            c2 = choose_own(c2, c2_of_cell, voided_energy)
+        is_state = (rho > 0.0) & (c2 > 0.0)
         return (
-            rho if sound else own_rho,
-            u if sound else own_u,
-            v if sound else own_v,
-            p if sound else own_p,
-            c2 if sound else own_c2,
-            0.0 if sound else 1.0,
+            rho if is_state else rho_of_cell,
+            u if is_state else u_of_cell,
+            v if is_state else v_of_cell,
+            p if is_state else p_of_cell,
+            c2 if is_state else c2_of_cell,
+            0.0 if is_state else 1.0,
         )
 
     @inlined
@@ -100,7 +100,7 @@ def make_traces(sound_speed_squared_part, opens_voids):
                 Z[scratch.P + k],
                 Z[scratch.C2 + k],
             ),
-            Z[scratch.TORN + k] if opens_voids else WHOLE_CELL_MARK,
+            Z[scratch.VOIDED_ENERGY + k] if opens_voids else WHOLE_CELL_MARK,
             Z[scratch.X_CENTRE + k],
             Z[scratch.Y_CENTRE + k],
         )
@@ -109,38 +109,40 @@ def make_traces(sound_speed_squared_part, opens_voids):
     def put(Z, rows, k, traced):
         """A traced state into its rows; 1 where it is the cell's own."""
         rho, u, v, p, c2 = rows
-        Z[rho + k], Z[u + k], Z[v + k], Z[p + k], Z[c2 + k], missed = traced
-        return missed
+        Z[rho + k], Z[u + k], Z[v + k], Z[p + k], Z[c2 + k], fell_back = traced
+        return fell_back
 
     @compiled_once(allocates=False)
     def fill_traces_in(Z, n, counted, parameters):
         """Traces towards -i; `counted`: 1 where the row is the tile's (fallbacks count), else 0."""
         for k in range(1, n + 1):
-            half, gradients, own, torn, x, y = load(Z, k)
+            half, gradients, of_cell, voided_energy, x, y = load(Z, k)
             dx, dy = Z[scratch.X_I + k] - x, Z[scratch.Y_I + k] - y
-            missed = put(Z, scratch.IN, k, trace(half, gradients, own, torn, dx, dy, parameters))
-            Z[scratch.FIRST_ORDER + k] += counted * missed
+            fell_back = put(
+                Z, scratch.IN, k, trace(half, gradients, of_cell, voided_energy, dx, dy, parameters)
+            )
+            Z[scratch.FIRST_ORDER + k] += counted * fell_back
 
     @compiled_once(allocates=False)
     def fill_traces(Z, n, counted, parameters):
         """Traces towards +i, -j and +j; the faces towards +i must have taken their place."""
         for k in range(1, n + 1):
-            half, gradients, own, torn, x, y = load(Z, k)
+            half, gradients, of_cell, voided_energy, x, y = load(Z, k)
             dx, dy = Z[scratch.X_I + k] - x, Z[scratch.Y_I + k] - y
             down_dx, down_dy = Z[scratch.X_J + k] - x, Z[scratch.Y_J + k] - y
             up_dx, up_dy = Z[scratch.X_J + k + 1] - x, Z[scratch.Y_J + k + 1] - y
-            out = trace(half, gradients, own, torn, dx, dy, parameters)
-            missed = put(Z, scratch.OUT, k, out)
-            down = trace(half, gradients, own, torn, down_dx, down_dy, parameters)
-            missed += put(Z, scratch.DOWN, k, down)
-            up = trace(half, gradients, own, torn, up_dx, up_dy, parameters)
-            missed += put(Z, scratch.UP, k, up)
-            Z[scratch.FIRST_ORDER + k] += counted * missed
+            out = trace(half, gradients, of_cell, voided_energy, dx, dy, parameters)
+            fell_back = put(Z, scratch.OUT, k, out)
+            down = trace(half, gradients, of_cell, voided_energy, down_dx, down_dy, parameters)
+            fell_back += put(Z, scratch.DOWN, k, down)
+            up = trace(half, gradients, of_cell, voided_energy, up_dx, up_dy, parameters)
+            fell_back += put(Z, scratch.UP, k, up)
+            Z[scratch.FIRST_ORDER + k] += counted * fell_back
 
     return fill_traces_in, fill_traces
 
 
-def make_upwind(left, right, face, torn, acoustic_weight, low_mach, opens_voids):
+def make_upwind(left_row, right_row, face_row, voided_row, acoustic_row, low_mach, opens_voids):
     """Phase that chooses the upwind side of the contact at a row of faces: first half of HLLC.
 
     Scratch offsets of the densities traced on both sides, of the faces' normals and of the torn
@@ -152,49 +154,54 @@ def make_upwind(left, right, face, torn, acoustic_weight, low_mach, opens_voids)
     def fill_upwind(Z, n):
         """State and wave on the face's side of the contact, and what the contact's speed is."""
         for k in range(1, n + 1):
-            rho_l = Z[left + k]
-            u_l = Z[left + SCRATCH_SPAN + k]
-            v_l = Z[left + 2 * SCRATCH_SPAN + k]
-            p_l = Z[left + 3 * SCRATCH_SPAN + k]
-            rho_r = Z[right + k]
-            u_r = Z[right + SCRATCH_SPAN + k]
-            v_r = Z[right + 2 * SCRATCH_SPAN + k]
-            p_r = Z[right + 3 * SCRATCH_SPAN + k]
-            area_x = Z[face + k]
-            area_y = Z[face + SCRATCH_SPAN + k]
+            rho_l = Z[left_row + k]
+            u_l = Z[left_row + SCRATCH_SPAN + k]
+            v_l = Z[left_row + 2 * SCRATCH_SPAN + k]
+            p_l = Z[left_row + 3 * SCRATCH_SPAN + k]
+            rho_r = Z[right_row + k]
+            u_r = Z[right_row + SCRATCH_SPAN + k]
+            v_r = Z[right_row + 2 * SCRATCH_SPAN + k]
+            p_r = Z[right_row + 3 * SCRATCH_SPAN + k]
+            area_x = Z[face_row + k]
+            area_y = Z[face_row + SCRATCH_SPAN + k]
             square = area_x * area_x + area_y * area_y
             w_l, w_r = riemann.compute_normal_speeds(
-                u_l, v_l, u_r, v_r, area_x, area_y, Z[face + 2 * SCRATCH_SPAN + k]
+                u_l, v_l, u_r, v_r, area_x, area_y, Z[face_row + 2 * SCRATCH_SPAN + k]
             )
             if low_mach:
-                part_l = Z[acoustic_weight + k]
-                part_r = Z[scratch.ACOUSTIC + k]
-                w_l, w_r = riemann.reduce_jump(w_l, w_r, part_l if part_l > part_r else part_r)
+                acoustic_l = Z[acoustic_row + k]
+                acoustic_r = Z[scratch.ACOUSTIC + k]
+                w_l, w_r = riemann.reduce_jump(
+                    w_l, w_r, acoustic_l if acoustic_l > acoustic_r else acoustic_r
+                )
             s_l, s_r = riemann.compute_waves(
                 w_l,
-                Z[left + 4 * SCRATCH_SPAN + k],
+                Z[left_row + 4 * SCRATCH_SPAN + k],
                 w_r,
-                Z[right + 4 * SCRATCH_SPAN + k],
+                Z[right_row + 4 * SCRATCH_SPAN + k],
                 square,
             )
             push, drag, flow_l, flow_r = riemann.compute_contact_speed(
                 (rho_l, p_l, w_l, s_l), (rho_r, p_r, w_r, s_r), square
             )
-            left_side = push <= 0.0
+            from_left = push <= 0.0
             s_l_cut = s_l if s_l < 0.0 else 0.0
             s_r_cut = s_r if s_r > 0.0 else 0.0
-            Z[scratch.RHO_SIDE + k] = rho_l if left_side else rho_r
-            Z[scratch.U_SIDE + k] = u_l if left_side else u_r
-            Z[scratch.V_SIDE + k] = v_l if left_side else v_r
-            Z[scratch.P_SIDE + k] = p_l if left_side else p_r
+            Z[scratch.RHO_SIDE + k] = rho_l if from_left else rho_r
+            Z[scratch.U_SIDE + k] = u_l if from_left else u_r
+            Z[scratch.V_SIDE + k] = v_l if from_left else v_r
+            Z[scratch.P_SIDE + k] = p_l if from_left else p_r
             if opens_voids:
                 # chosen by weight: a choice between two loads would not be vectorised
-                part = 1.0 if left_side else 0.0
-                Z[scratch.TORN_SIDE + k] = part * Z[torn + k] + (1.0 - part) * Z[scratch.TORN + k]
-            Z[scratch.W_SIDE + k] = w_l if left_side else w_r
-            Z[scratch.FLOW_SIDE + k] = flow_l if left_side else flow_r
-            Z[scratch.S_SIDE + k] = s_l if left_side else s_r
-            Z[scratch.S_CUT + k] = s_l_cut if left_side else s_r_cut
+                left_weight = 1.0 if from_left else 0.0
+                Z[scratch.VOIDED_ENERGY_SIDE + k] = (
+                    left_weight * Z[voided_row + k]
+                    + (1.0 - left_weight) * Z[scratch.VOIDED_ENERGY + k]
+                )
+            Z[scratch.W_SIDE + k] = w_l if from_left else w_r
+            Z[scratch.FLOW_SIDE + k] = flow_l if from_left else flow_r
+            Z[scratch.S_SIDE + k] = s_l if from_left else s_r
+            Z[scratch.S_CUT + k] = s_l_cut if from_left else s_r_cut
             Z[scratch.PUSH + k] = push
             Z[scratch.DRAG + k] = drag
             Z[scratch.SQUARE + k] = square
@@ -220,12 +227,12 @@ def find_hll(Z, m):
     return first, last
 
 
-def make_flux(energy_part, face, target, pressure_row, opens_voids, find_leaving_part=None):
+def make_flux(energy_part, face_row, flux_row, pressure_row, opens_voids, find_leaving_part=None):
     """Phase that turns the upwind sides of a row of faces into fluxes: second half of HLLC.
 
-    Scratch offsets: `face`: the faces' normals; `target`: mass flux (momentum, energy follow);
-    `pressure_row`: where the pressure in them is kept, 0: nowhere.  `find_leaving_part`: of
-    `hydro.eos.base.make_leaving_part`, where emptied cells keep what they have.
+    Scratch offsets: `face_row`: the faces' normals; `flux_row`: mass flux (momentum, energy
+    follow); `pressure_row`: where the pressure in them is kept, 0: nowhere.  `find_leaving_part`:
+    of `hydro.eos.base.make_leaving_part`, where emptied cells keep what they have.
     """
     withholds = find_leaving_part is not None
 
@@ -238,7 +245,9 @@ def make_flux(energy_part, face, target, pressure_row, opens_voids, find_leaving
             p = Z[scratch.P_SIDE + k]
             e = energy_part(rho, p, parameters)
             if opens_voids:
-                e = choose_own(e, Z[scratch.TORN_SIDE + k], Z[scratch.TORN_SIDE + k])
+                e = choose_own(
+                    e, Z[scratch.VOIDED_ENERGY_SIDE + k], Z[scratch.VOIDED_ENERGY_SIDE + k]
+                )
             wave = (
                 Z[scratch.W_SIDE + k],
                 Z[scratch.FLOW_SIDE + k],
@@ -255,19 +264,19 @@ def make_flux(energy_part, face, target, pressure_row, opens_voids, find_leaving
                 (rho, u, v, p, e),
                 wave,
                 (
-                    Z[face + k],
-                    Z[face + SCRATCH_SPAN + k],
-                    Z[face + 2 * SCRATCH_SPAN + k],
+                    Z[face_row + k],
+                    Z[face_row + SCRATCH_SPAN + k],
+                    Z[face_row + 2 * SCRATCH_SPAN + k],
                 ),
             )
             if withholds:
                 flux = riemann.withhold(flux, (u, v, e), find_leaving_part(rho, parameters))
             # kept for the update
             mass, momentum_x, momentum_y, energy, pressure = flux
-            Z[target + k] = mass
-            Z[target + SCRATCH_SPAN + k] = momentum_x
-            Z[target + 2 * SCRATCH_SPAN + k] = momentum_y
-            Z[target + 3 * SCRATCH_SPAN + k] = energy
+            Z[flux_row + k] = mass
+            Z[flux_row + SCRATCH_SPAN + k] = momentum_x
+            Z[flux_row + 2 * SCRATCH_SPAN + k] = momentum_y
+            Z[flux_row + 3 * SCRATCH_SPAN + k] = energy
             if pressure_row:
                 Z[pressure_row + k] = pressure
 
@@ -275,16 +284,23 @@ def make_flux(energy_part, face, target, pressure_row, opens_voids, find_leaving
 
 
 def make_hll_flux(
-    energy_part, faces, switch, torn, target, pressure_row, opens_voids, find_leaving_part=None
+    energy_part,
+    faces,
+    switch_row,
+    voided_row,
+    flux_row,
+    pressure_row,
+    opens_voids,
+    find_leaving_part=None,
 ):
     """Phase that replaces HLLC fluxes by HLL ones at the faces of cells whose switch is on.
 
     Scratch offsets as in `make_flux`; `faces`: the traced densities on both sides and the normals
-    of the faces; `switch`: the HLL
-    switch of the cells on the left; `torn`: their energies where they are torn.
+    of the faces; `switch_row`: the HLL
+    switch of the cells on the left; `voided_row`: their energies where they are torn.
     """
 
-    left, right, face = faces
+    left_row, right_row, face_row = faces
     withholds = find_leaving_part is not None
 
     @compiled_once(allocates=False)
@@ -294,27 +310,27 @@ def make_hll_flux(
         Z = row[start:]  # loops that begin at a number which they do not know are not vectorised
         for k in range(1, scratch.count_padded(last - start - 1) + 1):
             # states on both sides of the face, with the energy of torn cells
-            rho_l = Z[left + k]
-            p_l = Z[left + 3 * SCRATCH_SPAN + k]
-            rho_r = Z[right + k]
-            p_r = Z[right + 3 * SCRATCH_SPAN + k]
+            rho_l = Z[left_row + k]
+            p_l = Z[left_row + 3 * SCRATCH_SPAN + k]
+            rho_r = Z[right_row + k]
+            p_r = Z[right_row + 3 * SCRATCH_SPAN + k]
             e_l = energy_part(rho_l, p_l, parameters)
             e_r = energy_part(rho_r, p_r, parameters)
             if opens_voids:
-                e_l = choose_own(e_l, Z[torn + k], Z[torn + k])
-                e_r = choose_own(e_r, Z[scratch.TORN + k], Z[scratch.TORN + k])
-            u_l, v_l = Z[left + SCRATCH_SPAN + k], Z[left + 2 * SCRATCH_SPAN + k]
-            u_r, v_r = Z[right + SCRATCH_SPAN + k], Z[right + 2 * SCRATCH_SPAN + k]
-            c2_l = Z[left + 4 * SCRATCH_SPAN + k]
-            c2_r = Z[right + 4 * SCRATCH_SPAN + k]
+                e_l = choose_own(e_l, Z[voided_row + k], Z[voided_row + k])
+                e_r = choose_own(e_r, Z[scratch.VOIDED_ENERGY + k], Z[scratch.VOIDED_ENERGY + k])
+            u_l, v_l = Z[left_row + SCRATCH_SPAN + k], Z[left_row + 2 * SCRATCH_SPAN + k]
+            u_r, v_r = Z[right_row + SCRATCH_SPAN + k], Z[right_row + 2 * SCRATCH_SPAN + k]
+            c2_l = Z[left_row + 4 * SCRATCH_SPAN + k]
+            c2_r = Z[right_row + 4 * SCRATCH_SPAN + k]
             # the HLL flux (theory F3.10)
             flux = riemann.compute_hll_flux(
                 (rho_l, u_l, v_l, p_l, e_l, c2_l),
                 (rho_r, u_r, v_r, p_r, e_r, c2_r),
                 (
-                    Z[face + k],
-                    Z[face + SCRATCH_SPAN + k],
-                    Z[face + 2 * SCRATCH_SPAN + k],
+                    Z[face_row + k],
+                    Z[face_row + SCRATCH_SPAN + k],
+                    Z[face_row + 2 * SCRATCH_SPAN + k],
                 ),
             )
             if withholds:
@@ -326,15 +342,15 @@ def make_hll_flux(
                 flux = riemann.withhold(flux, (u, v, e), find_leaving_part(rho, parameters))
             mass, momentum_x, momentum_y, energy, pressure = flux
             # it replaces the sharp one where either cell asks for it
-            switch_on = Z[switch + k] + Z[scratch.HLL + k]
-            sharp_mass = Z[target + k]
-            sharp_x = Z[target + SCRATCH_SPAN + k]
-            sharp_y = Z[target + 2 * SCRATCH_SPAN + k]
-            sharp_energy = Z[target + 3 * SCRATCH_SPAN + k]
-            Z[target + k] = mass if switch_on > 0.0 else sharp_mass
-            Z[target + SCRATCH_SPAN + k] = momentum_x if switch_on > 0.0 else sharp_x
-            Z[target + 2 * SCRATCH_SPAN + k] = momentum_y if switch_on > 0.0 else sharp_y
-            Z[target + 3 * SCRATCH_SPAN + k] = energy if switch_on > 0.0 else sharp_energy
+            switch_on = Z[switch_row + k] + Z[scratch.HLL + k]
+            sharp_mass = Z[flux_row + k]
+            sharp_x = Z[flux_row + SCRATCH_SPAN + k]
+            sharp_y = Z[flux_row + 2 * SCRATCH_SPAN + k]
+            sharp_energy = Z[flux_row + 3 * SCRATCH_SPAN + k]
+            Z[flux_row + k] = mass if switch_on > 0.0 else sharp_mass
+            Z[flux_row + SCRATCH_SPAN + k] = momentum_x if switch_on > 0.0 else sharp_x
+            Z[flux_row + 2 * SCRATCH_SPAN + k] = momentum_y if switch_on > 0.0 else sharp_y
+            Z[flux_row + 3 * SCRATCH_SPAN + k] = energy if switch_on > 0.0 else sharp_energy
             if pressure_row:
                 sharp_pressure = Z[pressure_row + k]
                 Z[pressure_row + k] = pressure if switch_on > 0.0 else sharp_pressure

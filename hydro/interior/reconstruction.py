@@ -15,9 +15,9 @@ from shockgrid.hydro.formulas.reconstruction import (
     choose_limit,
     compute_hll_switch,
     compute_line_geometry,
-    mark_torn,
+    mark_voided,
 )
-from shockgrid.hydro.formulas.riemann import FLUXES
+from shockgrid.hydro.formulas.riemann import HLL_JUMP_THRESHOLDS
 from shockgrid.hydro.interior import scratch
 from shockgrid.hydro.interior.axisymmetric import (
     fill_lines,
@@ -71,8 +71,8 @@ def fill_length_j(Z, n):
         Z[scratch.LENGTH_J + k] = (dx * dx + dy * dy) ** 0.5
 
 
-def make_geometry(weigh):
-    """Phase that fills what the row's cells are on the old grid; `weigh`: `Geometry.volume`.
+def make_geometry(compute_volume):
+    """Phase that fills line vectors and volumes of a row's cells; compute_volume: of a `Geometry`.
 
     Only where lines lean (`hydro.interior.axisymmetric`): else the slopes' loop finds all of it.
     """
@@ -86,7 +86,7 @@ def make_geometry(weigh):
             scratch.store_vector(Z, scratch.MI, k, mid_i)
             scratch.store_vector(Z, scratch.MJ, k, mid_j)
             twist, y = scratch.find_twist(a, b, c, d)
-            Z[scratch.VOLUME + k] = weigh(area, mid_i, mid_j, twist, y)
+            Z[scratch.VOLUME + k] = compute_volume(area, mid_i, mid_j, twist, y)
 
     return fill_geometry
 
@@ -94,7 +94,8 @@ def make_geometry(weigh):
 def make_switch(sound_speed_squared_part, energy_part, least_jump, opens_voids):
     """Phase that fills c², the energy and the HLL switch of the row's cells.
 
-    `least_jump`: of `hydro.formulas.riemann.FLUXES`; `opens_voids`: of the equation of state.
+    `least_jump`: of HLL_JUMP_THRESHOLDS in `hydro.formulas.riemann`; `opens_voids`: of the equation
+    of state.
     """
 
     @compiled_once(allocates=False)
@@ -108,10 +109,10 @@ def make_switch(sound_speed_squared_part, energy_part, least_jump, opens_voids):
             Z[scratch.C2 + k] = c2
             e = energy_part(rho, p, parameters)
             if opens_voids:
-                void = Z[scratch.VOID_LOADED + k]
-                e = e + void
-                Z[scratch.TORN_BEFORE + k] = Z[scratch.TORN + k]
-                Z[scratch.TORN + k] = mark_torn(e, void)
+                void_energy = Z[scratch.VOID_LOADED + k]
+                e = e + void_energy
+                Z[scratch.VOIDED_ENERGY_BEFORE + k] = Z[scratch.VOIDED_ENERGY + k]
+                Z[scratch.VOIDED_ENERGY + k] = mark_voided(e, void_energy)
             Z[scratch.E + k] = e
             Z[scratch.HLL + k] = compute_hll_switch(
                 Z[scratch.P + k - 1] - p,
@@ -140,7 +141,7 @@ def make_row_phases(eos_class, limiter: str, geometry: Geometry, flux: str) -> R
     """Phases of an equation of state, a limiter, a geometry and a flux."""
     sound = eos_class.sound_speed_squared_part
     curved = geometry.curved
-    switch = sound, eos_class.energy_part, FLUXES[flux], eos_class.opens_voids
+    switch = sound, eos_class.energy_part, HLL_JUMP_THRESHOLDS[flux], eos_class.opens_voids
     limit = choose_limit(limiter, eos_class.has_kinks)
     fill_slopes = make_slopes(limit, limiter in RELAXED, geometry, switch)
     fill_geometry = make_geometry(geometry.volume)

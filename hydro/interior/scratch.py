@@ -63,7 +63,7 @@ SHIFT_BEFORE, SHIFT, SHIFT_AFTER, SHIFT_J, SHIFT_J_AFTER = _rows(5)  # ordered a
 # the two line vectors, volume, squared sound speed, energy, HLL switch (and the last row's)
 MI_X, MI_Y, MJ_X, MJ_Y, VOLUME, C2, E, HLL, HLL_BEFORE = _rows(9)
 # void energies of this row's cells; energies of failed cells of this row and the row before
-VOID_LOADED, TORN, TORN_BEFORE = _rows(3)
+VOID_LOADED, VOIDED_ENERGY, VOIDED_ENERGY_BEFORE = _rows(3)
 # degree to which the motion of the cells is waves: this row, the row before
 ACOUSTIC, ACOUSTIC_BEFORE = _rows(2)
 # gradients, mid-time state
@@ -74,7 +74,7 @@ AREA_X_I, AREA_Y_I, SWEEP_I, X_I, Y_I = _rows(5)
 AREA_X_J, AREA_Y_J, SWEEP_J, X_J, Y_J = _rows(5)
 # between the two halves of HLLC: the upwind side of the contact, its wave, the terms of s*
 RHO_SIDE, U_SIDE, V_SIDE, P_SIDE, W_SIDE, FLOW_SIDE, S_SIDE, S_CUT = _rows(8)
-PUSH, DRAG, SQUARE, TORN_SIDE = _rows(4)
+PUSH, DRAG, SQUARE, VOIDED_ENERGY_SIDE = _rows(4)
 # traces at the faces of the row, rho, u, v, p and c²: towards -i, +i, -j, +j
 IN = RHO_IN, *_ = _rows(5)
 OUT = RHO_OUT, *_ = _rows(5)
@@ -127,9 +127,9 @@ def count_whole(m):
 
 def allocate(threads: int) -> np.ndarray:
     """Scratch of `threads` threads, (threads, SIZE), zeroed so that no row ever holds a NaN."""
-    whole = np.zeros(threads * SIZE + CACHE_LINE_ENTRIES)
-    start = -(whole.ctypes.data // whole.itemsize) % CACHE_LINE_ENTRIES
-    return whole[start : start + threads * SIZE].reshape(threads, SIZE)
+    memory = np.zeros(threads * SIZE + CACHE_LINE_ENTRIES)
+    start = -(memory.ctypes.data // memory.itemsize) % CACHE_LINE_ENTRIES
+    return memory[start : start + threads * SIZE].reshape(threads, SIZE)
 
 
 # --- rows from arrays and back ------------------------------------------------------------------

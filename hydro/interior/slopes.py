@@ -27,7 +27,7 @@ from shockgrid.hydro.formulas.reconstruction import (
     compute_line_geometry,
     compute_weights,
     make_limit_velocity,
-    mark_torn,
+    mark_voided,
     relax_limit,
     resolve_along,
 )
@@ -50,12 +50,12 @@ def fill_steps(Z, n):
         Z[scratch.P_STEP + k] = Z[scratch.P_AFTER + k] - Z[scratch.P + k]
 
 
-def make_weigh(geometry):
+def make_difference_weights(geometry):
     """Formula for the factors that turn differences to both neighbours into variations."""
     curved = geometry.curved
 
     @inlined
-    def weigh(Z, before, here, after, shift):
+    def compute_difference_weights(Z, before, here, after, shift):
         """Of three cells with lengths at these entries; `shift`: their shifts lie so far on."""
         if curved:
             return weigh_differences(
@@ -63,7 +63,7 @@ def make_weigh(geometry):
             )
         return compute_weights(Z[before], Z[here], Z[after])
 
-    return weigh
+    return compute_difference_weights
 
 
 def make_slopes(limit, relaxed, geometry, switch):
@@ -79,7 +79,7 @@ def make_slopes(limit, relaxed, geometry, switch):
     """
     limit_velocity = make_limit_velocity(limit)
     curved = geometry.curved
-    weigh = make_weigh(geometry)
+    compute_difference_weights = make_difference_weights(geometry)
     sound, energy, least_jump, opens_voids = switch
 
     @compiled_once(allocates=False)
@@ -113,10 +113,10 @@ def make_slopes(limit, relaxed, geometry, switch):
                 c2 = sound(rho, p, parameters)
                 e = energy(rho, p, parameters)
                 if opens_voids:
-                    void = Z[scratch.VOID_LOADED + k]
-                    e = e + void
-                    Z[scratch.TORN_BEFORE + k] = Z[scratch.TORN + k]
-                    Z[scratch.TORN + k] = mark_torn(e, void)
+                    void_energy = Z[scratch.VOID_LOADED + k]
+                    e = e + void_energy
+                    Z[scratch.VOIDED_ENERGY_BEFORE + k] = Z[scratch.VOIDED_ENERGY + k]
+                    Z[scratch.VOIDED_ENERGY + k] = mark_voided(e, void_energy)
                 Z[scratch.C2 + k] = c2
                 Z[scratch.E + k] = e
                 Z[scratch.HLL_BEFORE + k] = Z[scratch.HLL + k]
@@ -130,28 +130,31 @@ def make_slopes(limit, relaxed, geometry, switch):
                     least_jump,
                 )
             # weights of the differences to the cells on either side (theory F3.3, F9.6)
-            before, after = weigh(
+            weight_before, weight_after = compute_difference_weights(
                 Z,
                 scratch.LENGTH_BEFORE + k,
                 scratch.LENGTH + k,
                 scratch.LENGTH_AFTER + k,
                 scratch.SHIFT - scratch.LENGTH,
             )
-            below, above = weigh(
+            weight_below, weight_above = compute_difference_weights(
                 Z, scratch.LENGTH_J + k - 1, scratch.LENGTH_J + k, scratch.LENGTH_J + k + 1,
                 scratch.SHIFT_J - scratch.LENGTH_J,
             )  # fmt: skip
             # density and pressure: steps limited along both lines (F3.4), then the gradient (F3.5)
             step_after = Z[scratch.RHO_AFTER + k] - rho
-            along_i = limit(Z[scratch.RHO_STEP + k] * before, step_after * after)
+            along_i = limit(Z[scratch.RHO_STEP + k] * weight_before, step_after * weight_after)
             along_j = limit(
-                (rho - Z[scratch.RHO + k - 1]) * below, (Z[scratch.RHO + k + 1] - rho) * above
+                (rho - Z[scratch.RHO + k - 1]) * weight_below,
+                (Z[scratch.RHO + k + 1] - rho) * weight_above,
             )
             Z[scratch.RHO_STEP + k] = step_after
             rho_x, rho_y = compute_gradient(along_i, along_j, line_i, line_j, inverse)
             step_after = Z[scratch.P_AFTER + k] - p
-            along_i = limit(Z[scratch.P_STEP + k] * before, step_after * after)
-            along_j = limit((p - Z[scratch.P + k - 1]) * below, (Z[scratch.P + k + 1] - p) * above)
+            along_i = limit(Z[scratch.P_STEP + k] * weight_before, step_after * weight_after)
+            along_j = limit(
+                (p - Z[scratch.P + k - 1]) * weight_below, (Z[scratch.P + k + 1] - p) * weight_above
+            )
             Z[scratch.P_STEP + k] = step_after
             p_x, p_y = compute_gradient(along_i, along_j, line_i, line_j, inverse)
             # velocity: limited along and across each line
@@ -160,29 +163,40 @@ def make_slopes(limit, relaxed, geometry, switch):
             scale = 1.0 / (square_i * square_j)
             u = Z[scratch.U + k]
             v = Z[scratch.V + k]
-            u_after = Z[scratch.U_AFTER + k] - u
-            v_after = Z[scratch.V_AFTER + k] - v
-            u_a = Z[scratch.U_STEP + k] * before
-            v_a = Z[scratch.V_STEP + k] * before
-            u_b = u_after * after
-            v_b = v_after * after
-            u_c = (u - Z[scratch.U + k - 1]) * below
-            v_c = (v - Z[scratch.V + k - 1]) * below
-            u_d = (Z[scratch.U + k + 1] - u) * above
-            v_d = (Z[scratch.V + k + 1] - v) * above
-            Z[scratch.U_STEP + k] = u_after
-            Z[scratch.V_STEP + k] = v_after
-            u_i, v_i = limit_velocity(u_a, v_a, u_b, v_b, mid_i_x, mid_i_y, scale * square_j)
-            u_j, v_j = limit_velocity(u_c, v_c, u_d, v_d, mid_j_x, mid_j_y, scale * square_i)
+            u_step_after = Z[scratch.U_AFTER + k] - u
+            v_step_after = Z[scratch.V_AFTER + k] - v
+            u_before = Z[scratch.U_STEP + k] * weight_before
+            v_before = Z[scratch.V_STEP + k] * weight_before
+            u_after = u_step_after * weight_after
+            v_after = v_step_after * weight_after
+            u_below = (u - Z[scratch.U + k - 1]) * weight_below
+            v_below = (v - Z[scratch.V + k - 1]) * weight_below
+            u_above = (Z[scratch.U + k + 1] - u) * weight_above
+            v_above = (Z[scratch.V + k + 1] - v) * weight_above
+            Z[scratch.U_STEP + k] = u_step_after
+            Z[scratch.V_STEP + k] = v_step_after
+            u_i, v_i = limit_velocity(
+                u_before,
+                v_before,
+                u_after,
+                v_after,
+                mid_i_x,
+                mid_i_y,
+                scale * square_j,
+            )
+            u_j, v_j = limit_velocity(
+                u_below, v_below, u_above, v_above, mid_j_x, mid_j_y, scale * square_i
+            )
             if relaxed:
                 acoustic_weight = compute_acoustic_weight(
-                    (u_a, v_a), (u_b, v_b), (u_c, v_c), (u_d, v_d),
+                    (u_before, v_before), (u_after, v_after),
+                    (u_below, v_below), (u_above, v_above),
                     (line_i, line_j), inverse, c2,
                 )  # fmt: skip
-                u_i = relax_limit(u_i, u_a, u_b, acoustic_weight)
-                v_i = relax_limit(v_i, v_a, v_b, acoustic_weight)
-                u_j = relax_limit(u_j, u_c, u_d, acoustic_weight)
-                v_j = relax_limit(v_j, v_c, v_d, acoustic_weight)
+                u_i = relax_limit(u_i, u_before, u_after, acoustic_weight)
+                v_i = relax_limit(v_i, v_before, v_after, acoustic_weight)
+                u_j = relax_limit(u_j, u_below, u_above, acoustic_weight)
+                v_j = relax_limit(v_j, v_below, v_above, acoustic_weight)
                 Z[scratch.ACOUSTIC_BEFORE + k] = Z[scratch.ACOUSTIC + k]
                 Z[scratch.ACOUSTIC + k] = acoustic_weight
             # gradients of the velocity, and the cell's centre
@@ -192,16 +206,16 @@ def make_slopes(limit, relaxed, geometry, switch):
                 # pairs of opposite corners: the same bits whichever way the cell is turned
                 x = 0.25 * ((xa + xc) + (xb + xd)) + Z[scratch.OFFSET_X + k]
                 y = 0.25 * ((ya + yc) + (yb + yd)) + Z[scratch.OFFSET_Y + k]
-                carried_x, carried_y = move_velocity(
+                advecting_u, advecting_v = move_velocity(
                     u, v, u_x, u_y, v_x, v_y, -Z[scratch.OFFSET_X + k], -Z[scratch.OFFSET_Y + k]
                 )
             else:
                 x = 0.25 * ((xa + xd) + (xb + xc))
                 y = 0.25 * ((ya + yd) + (yb + yc))
-                carried_x, carried_y = u, v
+                advecting_u, advecting_v = u, v
             # half a step in time with these gradients (F3.6)
             rho_half, u_half, v_half, p_half = compute_half_step(
-                (rho, u, v, p), c2, (carried_x, carried_y),
+                (rho, u, v, p), c2, (advecting_u, advecting_v),
                 (rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y), half_dt,
             )  # fmt: skip
             if curved:
@@ -227,7 +241,7 @@ def make_slopes(limit, relaxed, geometry, switch):
 
 def make_extrapolation(limit, geometry, sound_speed_squared_part):
     """Phase that takes the states of a side's cells to its faces."""
-    weigh = make_weigh(geometry)
+    compute_difference_weights = make_difference_weights(geometry)
 
     @compiled_once(allocates=False)
     def limit_along(before, here, after, weight_before, weight_after):
@@ -247,7 +261,7 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
             if not wanted[face]:
                 continue
             # weights of the differences across the side
-            before, after = weigh(
+            before, after = compute_difference_weights(
                 Z,
                 scratch.LENGTH_BEFORE + k,
                 scratch.LENGTH + k,
@@ -263,13 +277,13 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
             jump = abs(p - Z[scratch.P + k])
             jump_beyond = abs(Z[scratch.P + k] - Z[scratch.P_AFTER + k])
             jump = jump if jump > jump_beyond else jump_beyond
-            rough = (jump / (rho * c * c) - CALM_PRESSURE_JUMP) / (
+            roughness = (jump / (rho * c * c) - CALM_PRESSURE_JUMP) / (
                 SHOCK_PRESSURE_JUMP - CALM_PRESSURE_JUMP
             )
-            rough = rough if rough > 0.0 else 0.0
-            rough = rough if rough < 1.0 else 1.0
-            smooth = (1.0 - rough) * (1.0 - rough) * (1.0 + 2.0 * rough)
-            part = smooth * (0.5 * rim[LENGTH, face] / Z[scratch.LENGTH + k])
+            roughness = roughness if roughness > 0.0 else 0.0
+            roughness = roughness if roughness < 1.0 else 1.0
+            smoothness = (1.0 - roughness) * (1.0 - roughness) * (1.0 + 2.0 * roughness)
+            slope_part = smoothness * (0.5 * rim[LENGTH, face] / Z[scratch.LENGTH + k])
             # limited steps from the cell to its face
             rho_step = limit_along(rho, Z[scratch.RHO + k], Z[scratch.RHO_AFTER + k], before, after)
             p_step = limit_along(p, Z[scratch.P + k], Z[scratch.P_AFTER + k], before, after)
@@ -288,13 +302,13 @@ def make_extrapolation(limit, geometry, sound_speed_squared_part):
                 1.0 / (line_x * line_x + line_y * line_y),
             )
             # the state at the face, where it is one of the material
-            rho = rho - part * rho_step
-            p = p - part * p_step
+            rho = rho - slope_part * rho_step
+            p = p - slope_part * p_step
             c2 = sound_speed_squared_part(rho, p, parameters)
             if (rho > 0.0) & (c2 > 0.0):
                 rim[RHO_FACE, face] = rho
-                rim[U_FACE, face] -= part * u_step
-                rim[V_FACE, face] -= part * v_step
+                rim[U_FACE, face] -= slope_part * u_step
+                rim[V_FACE, face] -= slope_part * v_step
                 rim[P_FACE, face] = p
                 rim[C_FACE, face] = c2**0.5
 

@@ -40,7 +40,7 @@ def make_update(eos_class, geometry, finishes, gathers):
     opens_voids = eos_class.opens_voids
     find_leaving_part = make_leaving_part(eos_class)
     withholds = find_leaving_part is not None
-    weigh = geometry.volume
+    compute_volume = geometry.volume
     curved = geometry.curved
 
     @compiled_once(allocates=False)
@@ -81,12 +81,12 @@ def make_update(eos_class, geometry, finishes, gathers):
                     Z[scratch.VOID_NEW + k] = void_energy
                     Z[scratch.SUM_VOIDED + k] += 1.0 if voided else 0.0
                 if withholds:
-                    part = find_leaving_part(rho, parameters)
-                    Z[scratch.SUM_EMPTIED + k] += 1.0 if part < 1.0 else 0.0
+                    leaving_part = find_leaving_part(rho, parameters)
+                    Z[scratch.SUM_EMPTIED + k] += 1.0 if leaving_part < 1.0 else 0.0
                 # kept, with velocities that are not subnormal
-                slow = 1e-60 * c2
-                u = u if u * u > slow else 0.0
-                v = v if v * v > slow else 0.0
+                least_square = 1e-60 * c2
+                u = u if u * u > least_square else 0.0
+                v = v if v * v > least_square else 0.0
                 Z[scratch.RHO_NEW + k] = rho
                 Z[scratch.U_NEW + k] = u
                 Z[scratch.V_NEW + k] = v
@@ -110,8 +110,8 @@ def make_update(eos_class, geometry, finishes, gathers):
                     inverse_area,
                 )
                 # NaN too: no state of the material
-                real = (rho > 0.0) & (inverse_area > 0.0) & (c2 > 0.0)
-                c2 = c2 if real else -1.0
+                is_state = (rho > 0.0) & (inverse_area > 0.0) & (c2 > 0.0)
+                c2 = c2 if is_state else -1.0
                 least = Z[scratch.LEAST_C2 + k]
                 Z[scratch.LEAST_C2 + k] = least if least < c2 else c2
                 # sums of the tile
@@ -176,7 +176,7 @@ def make_update(eos_class, geometry, finishes, gathers):
                 Z[scratch.MOMENTUM_Y + k] = momentum_y
                 scratch.store_vector(Z, scratch.MI_NEW, k, mid_i)
                 scratch.store_vector(Z, scratch.MJ_NEW, k, mid_j)
-                Z[scratch.VOLUME_NEW + k] = weigh(area, mid_i, mid_j, twist, y_new)
+                Z[scratch.VOLUME_NEW + k] = compute_volume(area, mid_i, mid_j, twist, y_new)
                 xa, ya = a
                 xb, yb = b
                 xc, yc = c

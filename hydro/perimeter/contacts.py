@@ -23,6 +23,7 @@ from shockgrid.hydro.rim import (
     CARRIED_FLUX,
     CARRIED_GHOST,
     CARRIED_TRACE,
+    DISTANCE_NEXT,
     E_TRACE,
     ENERGY,
     HLL,
@@ -59,7 +60,6 @@ from shockgrid.hydro.rim import (
     V_TRACE,
     VOID_P,
     W_STAR,
-    WAY_NEXT,
     C,
     P,
     U,
@@ -84,30 +84,31 @@ def find_normal(rim, k):
 
 
 @compiled_once(allocates=False)
-def solve_contact(rim, k, other, m, state, law, other_law):
+def solve_contact(rim, k, other_rim, m, state_row, wave_law, other_wave_law):
     """Contact state between face k of a rim and face m of the other, into both.
 
     p*, w*; contact velocity: w* along the normal, along the face the mean of both sides weighted by
-    impedance; slip speed.  `state`: the first of the rows rho, u, v, p, c on which it is solved;
-    law, other_law: `EquationOfState.wave_law`.  By JUMP the pressure is higher on this side.
+    impedance; slip speed.  `state_row`: the first of the rows rho, u, v, p, c on which it is
+    solved; wave_law, other_wave_law: `EquationOfState.wave_law`.  By JUMP the pressure is higher on
+    this side.
     """
     # states of both sides, resolved along the face's normal
     nx, ny = find_normal(rim, k)
-    rho = rim[state + RHO, k]
-    u = rim[state + U, k]
-    v = rim[state + V, k]
-    rho_other = other[state + RHO, m]
-    u_other = other[state + U, m]
-    v_other = other[state + V, m]
-    c = rim[state + C, k]
-    c_other = other[state + C, m]
+    rho = rim[state_row + RHO, k]
+    u = rim[state_row + U, k]
+    v = rim[state_row + V, k]
+    rho_other = other_rim[state_row + RHO, m]
+    u_other = other_rim[state_row + U, m]
+    v_other = other_rim[state_row + V, m]
+    c = rim[state_row + C, k]
+    c_other = other_rim[state_row + C, m]
     jump = rim[JUMP, k]
     w = u * nx + v * ny
     w_other = u_other * nx + v_other * ny
     # pressure and normal speed (theory F4.1)
     p, w = riemann.compute_contact(
-        (rho, w, rim[state + P, k], c, law),
-        (rho_other, w_other, other[state + P, m], c_other, other_law),
+        (rho, w, rim[state_row + P, k], c, wave_law),
+        (rho_other, w_other, other_rim[state_row + P, m], c_other, other_wave_law),
         jump,
     )
     # velocity of the contact: along the face the mean of both, weighted by impedance
@@ -118,12 +119,12 @@ def solve_contact(rim, k, other, m, state, law, other_law):
     excess = w - (mean_x * nx + mean_y * ny)
     # the same result in both rims
     rim[P_STAR, k] = p + 0.5 * jump
-    other[P_STAR, m] = p - 0.5 * jump
+    other_rim[P_STAR, m] = p - 0.5 * jump
     rim[W_STAR, k] = w
-    other[W_STAR, m] = -w
-    rim[U_STAR, k] = other[U_STAR, m] = mean_x + excess * nx
-    rim[V_STAR, k] = other[V_STAR, m] = mean_y + excess * ny
-    rim[SLIP, k] = other[SLIP, m] = abs((u - u_other) * ny - (v - v_other) * nx)
+    other_rim[W_STAR, m] = -w
+    rim[U_STAR, k] = other_rim[U_STAR, m] = mean_x + excess * nx
+    rim[V_STAR, k] = other_rim[V_STAR, m] = mean_y + excess * ny
+    rim[SLIP, k] = other_rim[SLIP, m] = abs((u - u_other) * ny - (v - v_other) * nx)
 
 
 @compiled_once(allocates=False)
@@ -148,7 +149,7 @@ def fill_ghost_from_face(rim, k):
 
 
 @compiled_once(allocates=False)
-def press(rim, k, curved):
+def fill_impermeable_flux(rim, k, curved):
     """Flux through an impermeable face: the pressure P_STAR on the moving face, and the traction.
 
     The traction works with the velocity of the contact state.
@@ -174,18 +175,22 @@ def split_momentum(rim, k, momentum_y, pressure, curved):
 
 
 @compiled_once(allocates=False)
-def let_pass(rim, k, other, m, beyond, hll, acoustic_weight, curved):
+def fill_riemann_flux(rim, k, other_rim, m, beyond, hll, acoustic_weight, curved):
     """Flux through face k of a rim from its traces and the state from row `beyond` on at face m of
     the other: the Riemann solver of block interiors."""
-    row = beyond - RHO_TRACE
+    offset = beyond - RHO_TRACE
     inside = (
         rim[RHO_TRACE, k], rim[U_TRACE, k], rim[V_TRACE, k], rim[P_TRACE, k],
         rim[E_TRACE, k], rim[C2_TRACE, k],
     )  # fmt: skip
     outside = (
-        other[RHO_TRACE + row, m], other[U_TRACE + row, m], other[V_TRACE + row, m],
-        other[P_TRACE + row, m], other[E_TRACE + row, m], other[C2_TRACE + row, m],
-    )  # fmt: skip
+        other_rim[RHO_TRACE + offset, m],
+        other_rim[U_TRACE + offset, m],
+        other_rim[V_TRACE + offset, m],
+        other_rim[P_TRACE + offset, m],
+        other_rim[E_TRACE + offset, m],
+        other_rim[C2_TRACE + offset, m],
+    )
     face = rim[AREA_X, k], rim[AREA_Y, k], rim[SWEPT, k]
     if hll > 0.0:
         flux = riemann.compute_hll_flux(inside, outside, face)
@@ -194,22 +199,22 @@ def let_pass(rim, k, other, m, beyond, hll, acoustic_weight, curved):
     if flux[0] > 0.0:
         flux = riemann.withhold(flux, (inside[1], inside[2], inside[4]), rim[PART_TRACE, k])
     else:
-        part = other[PART_TRACE + row, m]
-        flux = riemann.withhold(flux, (outside[1], outside[2], outside[4]), part)
+        leaving_part = other_rim[PART_TRACE + offset, m]
+        flux = riemann.withhold(flux, (outside[1], outside[2], outside[4]), leaving_part)
     rim[MASS, k], rim[MOMENTUM_X, k], momentum_y, rim[ENERGY, k], pressure = flux
     split_momentum(rim, k, momentum_y, pressure, curved)
 
 
 @compiled_once(allocates=False)
-def carry_through(rim, k, other, m, part):
+def carry_fields_through(rim, k, other_rim, m, value_row):
     """What goes out of carried fields with the mass through face k of a rim.
 
-    The value out there is in the row `part` of each field at face m of the other rim.
+    The value out there is in the row `value_row` of each field at face m of the other rim.
     """
     mass = rim[MASS, k]
     for q in range(count_carried(rim)):
         row = find_carried_row(q)
-        value = rim[row + CARRIED_TRACE, k] if mass > 0.0 else other[row + part, m]
+        value = rim[row + CARRIED_TRACE, k] if mass > 0.0 else other_rim[row + value_row, m]
         rim[row + CARRIED_FLUX, k] = mass * (value - rim[row + CARRIED_CELL, k])
 
 
@@ -224,8 +229,8 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
     through a cell, and at a kink the pressures of two cells would run apart.  Theory F6.5.
 
     speeds (2, n + 1): of the line's nodes beside the contact speeds, in the other direction where
-    `backwards`; `first`: number of the first of n faces; closed: does the last cell lie beside the
-    first one?  States are those of the traces of the cell from which the volume comes.
+    `backwards`; `first`: number of the first of n faces; closed: whether the last cell lies beside
+    the first one.  States are those of the traces of the cell from which the volume comes.
     What the n faces gain together is spread over them.
     """
     count = speeds.shape[1] - 1
@@ -234,21 +239,21 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
     along = np.empty(count + 1)
     # volume that each face gains by the nodes' speeds beside the contact's
     for k in range(count):
-        at = count - k if backwards else k
-        other = at - 1 if backwards else at + 1
+        node = count - k if backwards else k
+        next_node = node - 1 if backwards else node + 1
         area_x, area_y = rim[AREA_X, first + k], rim[AREA_Y, first + k]
         gain[k] = 0.5 * (
-            (speeds[0, at] + speeds[0, other]) * area_x
-            + (speeds[1, at] + speeds[1, other]) * area_y
+            (speeds[0, node] + speeds[0, next_node]) * area_x
+            + (speeds[1, node] + speeds[1, next_node]) * area_y
         )
         size[k] = (area_x * area_x + area_y * area_y) ** 0.5
     # what all gain together, to be spread over them by their lengths
-    left = 0.0
-    whole = 0.0
+    total_gain = 0.0
+    total_size = 0.0
     for k in range(count):
-        left += 0.5 * (gain[k] + gain[count - 1 - k])
-        whole += 0.5 * (size[k] + size[count - 1 - k])
-    if whole == 0.0:  # all of it lies on the axis
+        total_gain += 0.5 * (gain[k] + gain[count - 1 - k])
+        total_size += 0.5 * (size[k] + size[count - 1 - k])
+    if total_size == 0.0:  # all of it lies on the axis
         return
     # the sums from both ends: the same for the mirror image
     before = 0.0
@@ -257,8 +262,8 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
         along[k] = 0.0
     for k in range(count):
         end = count - 1 - k
-        before -= gain[k] - left * size[k] / whole
-        after += gain[end] - left * size[end] / whole
+        before -= gain[k] - total_gain * size[k] / total_size
+        after += gain[end] - total_gain * size[end] / total_size
         along[k + 1] += 0.5 * before
         along[end] += 0.5 * after
     # around a closed line the flow along it is known up to a constant: none on average
@@ -281,15 +286,15 @@ def add_layer_flux(rim, speeds, backwards, closed, first):
         for side in range(2):  # out of the cell before node k, into the one after
             cell = k - 1 + side
             if 0 <= cell < count:
-                part = rate if side == 0 else -rate
-                rim[MASS, first + cell] += part * rho
-                rim[MOMENTUM_X, first + cell] += part * rho * u
-                rim[MOMENTUM_Y, first + cell] += part * rho * v
-                rim[ENERGY, first + cell] += part * energy
+                outflow = rate if side == 0 else -rate
+                rim[MASS, first + cell] += outflow * rho
+                rim[MOMENTUM_X, first + cell] += outflow * rho * u
+                rim[MOMENTUM_Y, first + cell] += outflow * rho * v
+                rim[ENERGY, first + cell] += outflow * energy
                 for q in range(count_carried(rim)):
                     row = find_carried_row(q)
                     beyond = rim[row + CARRIED_TRACE, m] - rim[row + CARRIED_CELL, first + cell]
-                    rim[row + CARRIED_FLUX, first + cell] += part * rho * beyond
+                    rim[row + CARRIED_FLUX, first + cell] += outflow * rho * beyond
 
 
 @kernel
@@ -299,7 +304,7 @@ def flow_along(rim, speeds, first):
 
 
 @kernel
-def solve_link(rim, other, pairs, law, other_law, layer, phase, curved):
+def solve_link(rim, other_rim, pairs, wave_law, other_wave_law, layer, phase, curved):
     """Contact states of a link's faces, into both rims, in a phase of the step.
 
     AT_CELLS: from the cells' states at the faces, with the ghosts that stand for them; AT_TRACES:
@@ -307,50 +312,50 @@ def solve_link(rim, other, pairs, law, other_law, layer, phase, curved):
     along a line with a thickness: layer = (speeds, backwards, closed) of `add_layer_flux`.
     """
     first, other_first, step, count = pairs
-    state = RHO_FACE if phase == AT_CELLS else RHO_TRACE
-    for n in range(count):
-        k = first + n
-        m = other_first + step * n
-        solve_contact(rim, k, other, m, state, law, other_law)
+    state_row = RHO_FACE if phase == AT_CELLS else RHO_TRACE
+    for pair in range(count):
+        k = first + pair
+        m = other_first + step * pair
+        solve_contact(rim, k, other_rim, m, state_row, wave_law, other_wave_law)
         if phase == AT_CELLS:
             fill_ghost_from_face(rim, k)
-            fill_ghost_from_face(other, m)
+            fill_ghost_from_face(other_rim, m)
         elif phase == AT_FLUX:
-            press(rim, k, curved)
-            press(other, m, curved)
+            fill_impermeable_flux(rim, k, curved)
+            fill_impermeable_flux(other_rim, m, curved)
     speeds, backwards, closed = layer
     if phase == AT_FLUX and speeds.shape[1] > 0:
         add_layer_flux(rim, speeds, False, closed, first)
         other_first = other_first if step > 0 else other_first - count + 1
-        add_layer_flux(other, speeds, backwards, closed, other_first)
+        add_layer_flux(other_rim, speeds, backwards, closed, other_first)
 
 
 @kernel(allocates=False)
-def pass_seam(rim, other, pairs, phase, curved):
+def pass_seam(rim, other_rim, pairs, phase, curved):
     """AT_CELLS: the cells on either side of a seam are the other's ghosts; AT_FLUX: the flux
     through the common faces, what one loses the other gets."""
     first, other_first, step, count = pairs
-    for n in range(count):
-        k = first + n
-        m = other_first + step * n
+    for pair in range(count):
+        k = first + pair
+        m = other_first + step * pair
         if phase == AT_CELLS:
             for q in range(P + 1):
-                rim[RHO_GHOST + q, k] = other[q, m]
-                other[RHO_GHOST + q, m] = rim[q, k]
-            rim[LENGTH_GHOST, k] = other[LENGTH, m]
-            other[LENGTH_GHOST, m] = rim[LENGTH, k]
+                rim[RHO_GHOST + q, k] = other_rim[q, m]
+                other_rim[RHO_GHOST + q, m] = rim[q, k]
+            rim[LENGTH_GHOST, k] = other_rim[LENGTH, m]
+            other_rim[LENGTH_GHOST, m] = rim[LENGTH, k]
             for q in range(count_carried(rim)):
                 row = find_carried_row(q)
-                rim[row + CARRIED_GHOST, k] = other[row + CARRIED_CELL, m]
-                other[row + CARRIED_GHOST, m] = rim[row + CARRIED_CELL, k]
+                rim[row + CARRIED_GHOST, k] = other_rim[row + CARRIED_CELL, m]
+                other_rim[row + CARRIED_GHOST, m] = rim[row + CARRIED_CELL, k]
         else:
-            hll = rim[HLL, k] + other[HLL, m]
-            weight = max(rim[ACOUSTIC, k], other[ACOUSTIC, m])
-            let_pass(rim, k, other, m, RHO_TRACE, hll, weight, curved)
+            hll = rim[HLL, k] + other_rim[HLL, m]
+            weight = max(rim[ACOUSTIC, k], other_rim[ACOUSTIC, m])
+            fill_riemann_flux(rim, k, other_rim, m, RHO_TRACE, hll, weight, curved)
             for q in range(MASS, MASS + FLUX_ROWS):
-                other[q, m] = -rim[q, k]
-            carry_through(rim, k, other, m, CARRIED_TRACE)
-            carry_through(other, m, rim, k, CARRIED_TRACE)
+                other_rim[q, m] = -rim[q, k]
+            carry_fields_through(rim, k, other_rim, m, CARRIED_TRACE)
+            carry_fields_through(other_rim, m, rim, k, CARRIED_TRACE)
 
 
 @kernel(allocates=False)
@@ -362,22 +367,27 @@ def fill_ghosts_from_faces(rim, spans):
 
 
 @kernel(allocates=False)
-def fill_free_surface(rim, spans, law, pressure, phase, curved):
+def fill_free_surface(rim, spans, wave_law, pressure, phase, curved):
     """Contact states of a surface under a given pressure; the phases are those of `solve_link`, but
     AT_FLUX solves nothing."""
-    state = RHO_FACE if phase == AT_CELLS else RHO_TRACE
+    state_row = RHO_FACE if phase == AT_CELLS else RHO_TRACE
     for number in range(spans.shape[0]):
         for k in range(spans[number, 0], spans[number, 1]):
-            inside = pressure + (rim[VOID_P, k] + rim[JUMP, k])
-            rim[P_STAR, k] = inside
+            p_inside = pressure + (rim[VOID_P, k] + rim[JUMP, k])
+            rim[P_STAR, k] = p_inside
             if phase == AT_FLUX:
-                press(rim, k, curved)
+                fill_impermeable_flux(rim, k, curved)
                 continue
             nx, ny = find_normal(rim, k)
-            u, v = rim[state + U, k], rim[state + V, k]
+            u, v = rim[state_row + U, k], rim[state_row + V, k]
             w = u * nx + v * ny
             w_star = riemann.compute_speed_at_pressure(
-                rim[state + RHO, k], w, rim[state + P, k], rim[state + C, k], law, inside
+                rim[state_row + RHO, k],
+                w,
+                rim[state_row + P, k],
+                rim[state_row + C, k],
+                wave_law,
+                p_inside,
             )
             rim[W_STAR, k] = w_star
             rim[U_STAR, k] = u + (w_star - w) * nx
@@ -409,7 +419,7 @@ def limit_at_piston(rim, speed_x, speed_y, k):
     square = nx * nx + ny * ny
     excess = ((u - speed_x) * nx + (v - speed_y) * ny) / square
     further = ((rim[U_NEXT, k] - u) * nx + (rim[V_NEXT, k] - v) * ny) / square
-    to_face = 2.0 * excess * rim[WAY_NEXT, k]
+    to_face = 2.0 * excess * rim[DISTANCE_NEXT, k]
     to_next = further * rim[LENGTH, k]
     if to_face * to_next > 0.0 and abs(to_next) > abs(to_face):
         factor = 2.0 - to_next / to_face
@@ -442,7 +452,7 @@ def mirror_in_walls(rim, walls, speeds):
 
 
 @compiled_once(allocates=False)
-def press_on_walls(rim, walls, wave_law, curved):
+def fill_wall_fluxes(rim, walls, wave_law, curved):
     """Pressure on impermeable faces that move as SWEEP says, and its flux.
 
     walls (n, 3): first faces of walls, those after the last (and the kind, not read here).
@@ -455,30 +465,32 @@ def press_on_walls(rim, walls, wave_law, curved):
             rim[P_STAR, k], _ = riemann.compute_wave_pressure(
                 rim[RHO_TRACE, k], rim[P_TRACE, k], rim[C_TRACE, k], wave_law, w
             )
-            press(rim, k, curved)
+            fill_impermeable_flux(rim, k, curved)
 
 
 @compiled_once(allocates=False)
-def pass_open_sides(rim, opened, curved):
+def fill_open_fluxes(rim, opened, curved):
     """Flux between the traces and the states beyond: opened (n, 3), first faces, those after the
     last and the first row of the state beyond."""
     for number in range(opened.shape[0]):
         for k in range(opened[number, 0], opened[number, 1]):
-            let_pass(rim, k, rim, k, opened[number, 2], rim[HLL, k], rim[ACOUSTIC, k], curved)
+            fill_riemann_flux(
+                rim, k, rim, k, opened[number, 2], rim[HLL, k], rim[ACOUSTIC, k], curved
+            )
 
 
 @compiled_once(allocates=False)
-def carry_through_open_sides(rim, opened):
-    """What goes out of carried fields through the faces of `pass_open_sides`."""
+def carry_fields_through_open_sides(rim, opened):
+    """What goes out of carried fields through the faces of `fill_open_fluxes`."""
     for number in range(opened.shape[0]):
         as_inside = opened[number, 2] == RHO_TRACE
         beyond = CARRIED_TRACE if as_inside else CARRIED_BEYOND
         for k in range(opened[number, 0], opened[number, 1]):
-            carry_through(rim, k, rim, k, beyond)
+            carry_fields_through(rim, k, rim, k, beyond)
 
 
 @kernel(allocates=False)
 def fill_open_flux(rim, opened, curved):
-    """`pass_open_sides` by itself, with what carried fields lose there."""
-    pass_open_sides(rim, opened, curved)
-    carry_through_open_sides(rim, opened)
+    """`fill_open_fluxes` by itself, with what carried fields lose there."""
+    fill_open_fluxes(rim, opened, curved)
+    carry_fields_through_open_sides(rim, opened)

@@ -54,12 +54,12 @@ def measure_lines(nodes, i, j):
 
 
 @inlined
-def measure_volume(nodes, i, j, weigh):
-    """Volume of a cell with straight faces; `weigh`: `Geometry.volume`."""
+def measure_volume(nodes, i, j, compute_volume):
+    """Volume of a cell with straight faces; `compute_volume`: `Geometry.volume`."""
     a, b, c, d = find_corners(nodes, i, j)
     mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
     twist, y = find_twist(a, b, c, d)
-    return weigh(area, mid_i, mid_j, twist, y)
+    return compute_volume(area, mid_i, mid_j, twist, y)
 
 
 def make_fill_faces(geometry: Geometry):
@@ -118,11 +118,11 @@ def place_traces_on_axis(nodes, nodes_new, start, stop, rim):
         y = 0.5 * (nodes[1, i_next, j_next] + nodes_new[1, i_next, j_next])
         i_next, j_next = find_node(side, k + 1, 1, ni, nj)
         y_end = 0.5 * (nodes[1, i_next, j_next] + nodes_new[1, i_next, j_next])
-        part = (y_end - y) / (6.0 * (y_end + y))
+        centre_shift = (y_end - y) / (6.0 * (y_end + y))
         for c in range(2):
-            here = 0.5 * (nodes[c, i, j] + nodes_new[c, i, j])
+            begin = 0.5 * (nodes[c, i, j] + nodes_new[c, i, j])
             end = 0.5 * (nodes[c, i_end, j_end] + nodes_new[c, i_end, j_end])
-            rim[X_TRACE + c, face] = 0.5 * (end + here) + part * (end - here)
+            rim[X_TRACE + c, face] = 0.5 * (end + begin) + centre_shift * (end - begin)
 
 
 def make_fill_polygons(eos_class, geometry: Geometry):
@@ -130,7 +130,7 @@ def make_fill_polygons(eos_class, geometry: Geometry):
     conversion = make_conversion(eos_class)
     read_cell = conversion.read_cell
     write_cell = conversion.write_cell
-    weigh = geometry.volume
+    compute_volume = geometry.volume
 
     @kernel
     def fill_polygons(old, new, excess, parameters, totals):
@@ -155,30 +155,30 @@ def make_fill_polygons(eos_class, geometry: Geometry):
             if side >= 2 and (i == 0 or i == ni - 1):
                 continue  # a corner cell: done with its other side
             if side < 2 and (j == 0 or j == nj - 1):
-                other = 2 * nj + i if j == 0 else 2 * nj + ni + i
-                beyond += excess_volume[other]
-                beyond_new += excess_volume_new[other]
+                other_face = 2 * nj + i if j == 0 else 2 * nj + ni + i
+                beyond += excess_volume[other_face]
+                beyond_new += excess_volume_new[other_face]
             if beyond == 0.0 and beyond_new == 0.0:
                 continue
             # the update's result and the part beyond, mixed by mass
-            volume = measure_volume(nodes_new, i, j, weigh)
+            volume = measure_volume(nodes_new, i, j, compute_volume)
             rho, u, v, energy = read_cell(new, i, j, parameters)
             rho_old, u_old, v_old, energy_old = read_cell(old, i, j, parameters)
-            held = beyond * rho_old
-            mass = volume * rho + held
-            u = (volume * rho * u + held * u_old) / mass
-            v = (volume * rho * v + held * v_old) / mass
-            energy = (volume * rho * energy + held * energy_old) / mass
+            mass_beyond = beyond * rho_old
+            mass = volume * rho + mass_beyond
+            u = (volume * rho * u + mass_beyond * u_old) / mass
+            v = (volume * rho * v + mass_beyond * v_old) / mass
+            energy = (volume * rho * energy + mass_beyond * energy_old) / mass
             rho = mass / (volume + beyond_new)
             _, c2 = write_cell(new, i, j, rho, u, v, energy, parameters)
-            thinner = volume / (volume + beyond_new)
-            rates_new[i, j] *= thinner
-            crowding_new[i, j] *= thinner * thinner
+            thinning = volume / (volume + beyond_new)
+            rates_new[i, j] *= thinning
+            crowding_new[i, j] *= thinning * thinning
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
             totals[LEAST_C2] = totals[LEAST_C2] if totals[LEAST_C2] < c2 else c2
-            totals[TOTAL_MASS] += held
-            totals[TOTAL_MOMENTUM_X] += held * u_old
-            totals[TOTAL_MOMENTUM_Y] += held * v_old
-            totals[TOTAL_ENERGY] += held * energy_old
+            totals[TOTAL_MASS] += mass_beyond
+            totals[TOTAL_MOMENTUM_X] += mass_beyond * u_old
+            totals[TOTAL_MOMENTUM_Y] += mass_beyond * v_old
+            totals[TOTAL_ENERGY] += mass_beyond * energy_old
 
     return fill_polygons

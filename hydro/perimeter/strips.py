@@ -28,9 +28,9 @@ from shockgrid.hydro.interior.scratch import SCRATCH_SPAN
 from shockgrid.hydro.interior.slopes import fill_steps
 from shockgrid.hydro.perimeter.contacts import (
     AXIS,
+    fill_open_fluxes,
+    fill_wall_fluxes,
     mirror_in_walls,
-    pass_open_sides,
-    press_on_walls,
 )
 from shockgrid.hydro.perimeter.faces import (
     make_fill_faces,
@@ -42,6 +42,7 @@ from shockgrid.hydro.rim import (
     C2,
     C2_TRACE,
     C_TRACE,
+    DISTANCE_NEXT,
     E_TRACE,
     HLL,
     LENGTH,
@@ -60,7 +61,6 @@ from shockgrid.hydro.rim import (
     RHO_TRACE,
     RHO_X,
     RHO_Y,
-    TORN,
     U_HALF,
     U_NEXT,
     U_STAR,
@@ -73,7 +73,7 @@ from shockgrid.hydro.rim import (
     V_TRACE,
     V_X,
     V_Y,
-    WAY_NEXT,
+    VOIDED_ENERGY,
     X_AREA,
     X_CELL,
     X_TRACE,
@@ -201,7 +201,7 @@ def make_side_kernels(
         for side in range(len(SIDE_NAMES)):
             strip, along, first_face, step, _, _ = find_strip(side, ni, nj)
             # the strip of cells along a side, in chunks that fit the scratch
-            deep = (ni if side < J_MIN else nj) > 2
+            is_deep = (ni if side < J_MIN else nj) > 2
             for start in range(0, along, scratch.CHUNK_CELLS):
                 m = min(scratch.CHUNK_CELLS, along - start)
                 n = scratch.count_padded(m)
@@ -229,32 +229,32 @@ def make_side_kernels(
                         rim[RHO_FACE + q, face] = rim[q, face]
                 # velocity of the next cells inwards, and the way to them
                 if wanted:
-                    look_inwards(state, nodes, strip, start, deep, Z)
+                    load_rows_inwards(state, nodes, strip, start, is_deep, Z)
                     for k in range(1, m + 1):
                         face = first + (k - 1) * step
                         rim[U_NEXT, face] = Z[scratch.U + k]
                         rim[V_NEXT, face] = Z[scratch.V + k]
-                        way = 0.5 * (Z[scratch.LENGTH_BEFORE + k] + Z[scratch.LENGTH + k])
-                        way += Z[scratch.SHIFT + k] - Z[scratch.SHIFT_BEFORE + k]
-                        rim[WAY_NEXT, face] = way
+                        distance = 0.5 * (Z[scratch.LENGTH_BEFORE + k] + Z[scratch.LENGTH + k])
+                        distance += Z[scratch.SHIFT + k] - Z[scratch.SHIFT_BEFORE + k]
+                        rim[DISTANCE_NEXT, face] = distance
                 # states extrapolated to the faces (theory F4.7)
-                if wanted and deep:
+                if wanted and is_deep:
                     extrapolate(Z, m, inwards, first, step, parameters, rim)
 
     @compiled_once(allocates=False)
-    def look_inwards(state, nodes, strip, start, deep, Z):
+    def load_rows_inwards(state, nodes, strip, start, is_deep, Z):
         """Bring the next cells inwards and those after them (where the block is deep enough) to the
         current row and the one after it; the strip's own lengths become those of the row before."""
         ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
         along = ni * abs(strip[4]) + nj * abs(strip[5])
         m = min(scratch.CHUNK_CELLS, along - start)
         n = scratch.count_padded(m)
-        for row in range(2, 4 if deep else 3):
+        for row in range(2, 4 if is_deep else 3):
             next_row(Z, n)
             copy_nodes(nodes, strip, row, start, m, Z, scratch.X_NEXT)
             measure_after(Z, n)
             copy_state(state, strip, row - 1, start, m, Z, scratch.RHO_AFTER)
-        if not deep:
+        if not is_deep:
             next_row(Z, n)
 
     @compiled_once(allocates=False)
@@ -291,10 +291,10 @@ def make_side_kernels(
                 low = rim[LENGTH_GHOST, before] if start == 0 else -1.0
                 high = rim[LENGTH_GHOST, after] if start + m == along else -1.0
                 reconstruct(Z, m, n, low, high, half_dt, parameters)
-                keep(Z, m, nodes, strip, start, first, step, rim)
+                store_predicted(Z, m, nodes, strip, start, first, step, rim)
 
     @compiled_once(allocates=False)
-    def keep(Z, m, nodes, strip, start, first, step, rim):
+    def store_predicted(Z, m, nodes, strip, start, first, step, rim):
         """What `predict` has found, from the scratch into the rim."""
         x, y = nodes[0], nodes[1]
         for k in range(1, m + 1):
@@ -323,7 +323,9 @@ def make_side_kernels(
                     (y[a, b] + y[a, b + 1]) + (y[a + 1, b] + y[a + 1, b + 1])
                 )
             rim[C2, face] = Z[scratch.C2 + k]
-            rim[TORN, face] = Z[scratch.TORN + k] if opens_voids else WHOLE_CELL_MARK
+            rim[VOIDED_ENERGY, face] = (
+                Z[scratch.VOIDED_ENERGY + k] if opens_voids else WHOLE_CELL_MARK
+            )
             rim[HLL, face] = Z[scratch.HLL + k]
             # fluxes lessen jumps by it with low-mach alone, as inside
             rim[ACOUSTIC, face] = Z[scratch.ACOUSTIC + k] if low_mach else 1.0
@@ -339,17 +341,17 @@ def make_side_kernels(
             )  # fmt: skip
             dx, dy = rim[X_TRACE, k] - rim[X_CELL, k], rim[Y_TRACE, k] - rim[Y_CELL, k]
             rho, u, v, p = compute_face_state(state, gradients, dx, dy)
-            torn = rim[TORN, k]
-            c2 = choose_own(sound(rho, p, parameters), rim[C2, k], torn)
-            real = (rho > 0.0) & (c2 > 0.0)
-            rho = rho if real else rim[RHO, k]
-            p = p if real else rim[P, k]
-            c2 = c2 if real else rim[C2, k]
+            voided_energy = rim[VOIDED_ENERGY, k]
+            c2 = choose_own(sound(rho, p, parameters), rim[C2, k], voided_energy)
+            is_state = (rho > 0.0) & (c2 > 0.0)
+            rho = rho if is_state else rim[RHO, k]
+            p = p if is_state else rim[P, k]
+            c2 = c2 if is_state else rim[C2, k]
             rim[RHO_TRACE, k] = rho
-            rim[U_TRACE, k] = u if real else rim[U, k]
-            rim[V_TRACE, k] = v if real else rim[V, k]
+            rim[U_TRACE, k] = u if is_state else rim[U, k]
+            rim[V_TRACE, k] = v if is_state else rim[V, k]
             rim[P_TRACE, k] = p
-            rim[E_TRACE, k] = choose_own(energy(rho, p, parameters), torn, torn)
+            rim[E_TRACE, k] = choose_own(energy(rho, p, parameters), voided_energy, voided_energy)
             rim[C_TRACE, k] = c2**0.5
             rim[C2_TRACE, k] = c2
             rim[PART_TRACE, k] = find_leaving_part(rho, parameters) if withholds else 1.0
@@ -363,19 +365,19 @@ def make_side_kernels(
         """
         for number in range(spans.shape[0]):
             for k in range(spans[number, 0], spans[number, 1]):
-                more_u = 0.0
-                more_v = 0.0
+                u_excess = 0.0
+                v_excess = 0.0
                 if curved:
-                    way_x = rim[X, k] - rim[X_CELL, k]
-                    way_y = rim[Y, k] - rim[Y_CELL, k]
+                    offset_x = rim[X, k] - rim[X_CELL, k]
+                    offset_y = rim[Y, k] - rim[Y_CELL, k]
                     nx, ny = rim[NX, k], rim[NY, k]
-                    part = (way_x * nx + way_y * ny) / (nx * nx + ny * ny)
-                    way_x -= nx * part
-                    way_y -= ny * part
-                    more_u = rim[U_X, k] * way_x + rim[U_Y, k] * way_y
-                    more_v = rim[V_X, k] * way_x + rim[V_Y, k] * way_y
-                rim[X_TRACE, k] = rim[X, k] + half_dt * (rim[U_STAR, k] + more_u)
-                rim[Y_TRACE, k] = rim[Y, k] + half_dt * (rim[V_STAR, k] + more_v)
+                    normal_part = (offset_x * nx + offset_y * ny) / (nx * nx + ny * ny)
+                    offset_x -= nx * normal_part
+                    offset_y -= ny * normal_part
+                    u_excess = rim[U_X, k] * offset_x + rim[U_Y, k] * offset_y
+                    v_excess = rim[V_X, k] * offset_x + rim[V_Y, k] * offset_y
+                rim[X_TRACE, k] = rim[X, k] + half_dt * (rim[U_STAR, k] + u_excess)
+                rim[Y_TRACE, k] = rim[Y, k] + half_dt * (rim[V_STAR, k] + v_excess)
             trace_faces(rim, parameters, spans[number, 0], spans[number, 1])
 
     @compiled_once(allocates=False)
@@ -426,8 +428,8 @@ def make_side_kernels(
             if walls[wall, 2] == AXIS:
                 place_traces_on_axis(nodes, nodes_new, walls[wall, 0], walls[wall, 1], rim)
         trace_faces(rim, parameters, 0, rim.shape[1])
-        press_on_walls(rim, walls, wave_law, curved)
-        pass_open_sides(rim, opened, curved)
+        fill_wall_fluxes(rim, walls, wave_law, curved)
+        fill_open_fluxes(rim, opened, curved)
 
     return SideKernels(
         start_sides, predict_sides, trace_sides, make_fill_polygons(eos_class, geometry)

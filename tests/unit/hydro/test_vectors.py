@@ -10,7 +10,7 @@ import pytest
 from shockgrid.hydro.eos import IdealGas
 from shockgrid.hydro.formulas.geometry import GEOMETRIES, PLANE
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
-from shockgrid.hydro.formulas.riemann import FLUXES
+from shockgrid.hydro.formulas.riemann import HLL_JUMP_THRESHOLDS
 from shockgrid.hydro.interior import axisymmetric, faces, reconstruction, scratch, slopes, update
 from shockgrid.regrid.barrier import residual_estimate as look
 from shockgrid.regrid.compilation.first_calls import prepare_compiler
@@ -20,12 +20,12 @@ LIMIT, SOUND, ENERGY = (
     LIMITERS[DEFAULT_LIMITER],
     *(getattr(IdealGas, part) for part in ("sound_speed_squared_part", "energy_part")),
 )
-SWITCH = SOUND, ENERGY, FLUXES["hllc"], False
+SWITCH = SOUND, ENERGY, HLL_JUMP_THRESHOLDS["hllc"], False
 I_FACES = scratch.RHO_OUT, scratch.RHO_IN, scratch.AREA_X_I
 J_FACES = scratch.RHO_UP - 1, scratch.RHO_DOWN, scratch.AREA_X_J
-UPWIND_I = *I_FACES, scratch.TORN_BEFORE, scratch.ACOUSTIC_BEFORE
-UPWIND_J = *J_FACES, scratch.TORN - 1, scratch.ACOUSTIC - 1
-HLL = J_FACES, scratch.HLL - 1, scratch.TORN - 1, scratch.FLUX_J_MASS, 0, True
+UPWIND_I = *I_FACES, scratch.VOIDED_ENERGY_BEFORE, scratch.ACOUSTIC_BEFORE
+UPWIND_J = *J_FACES, scratch.VOIDED_ENERGY - 1, scratch.ACOUSTIC - 1
+HLL = J_FACES, scratch.HLL - 1, scratch.VOIDED_ENERGY - 1, scratch.FLUX_J_MASS, 0, True
 RADIAL = (
     scratch.PRESSURE_J,
     scratch.FLUX_J_Y,

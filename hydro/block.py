@@ -17,6 +17,7 @@ from shockgrid.hydro.carried.transport import Transport
 from shockgrid.hydro.eos import EquationOfState
 from shockgrid.hydro.eos.base import check_eos, check_formulas
 from shockgrid.hydro.eos.conversion import compute_energy, compute_temperature
+from shockgrid.hydro.eos.mixture import SEEN_FIELDS, Mixture
 from shockgrid.hydro.formulas.geometry import PLANE, Geometry, compute_volumes
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
 from shockgrid.hydro.formulas.riemann import DEFAULT_FLUX
@@ -28,6 +29,8 @@ from shockgrid.hydro.interior.cell_fields import (
     make_fill_sound_speed,
 )
 from shockgrid.hydro.kernels import BlockKernels
+from shockgrid.hydro.mixture.phases import MixedCells
+from shockgrid.hydro.mixture.sides import RIM_FIELDS
 from shockgrid.hydro.perimeter.contacts import fill_open_flux
 from shockgrid.hydro.perimeter.plan import PerimeterPlan
 from shockgrid.hydro.rim import RHO_BEYOND, find_first_face, make_rim
@@ -79,6 +82,16 @@ def _read_nodes(name: str, given: Any) -> np.ndarray:
     return nodes
 
 
+def _read_parameters(eos: EquationOfState) -> tuple:
+    """The numbers of an equation of state, of types for which kernels are compiled."""
+    if isinstance(eos, Mixture):
+        return eos.parameters
+    return tuple(
+        np.ascontiguousarray(value, dtype=float) if np.ndim(value) else float(value)
+        for value in eos.parameters
+    )
+
+
 class Block:
     """One material on one structured grid: nodes, state, equation of state and segments.
 
@@ -118,8 +131,9 @@ class Block:
         held = make_held(self.ni, self.nj)
         self.state = held["state"]
         self._read_state({"rho": rho, "u": u, "v": v, "p": p})
-        check_first_state(name, eos, self.state[:, 1:-1, 1:-1])
-        check_formulas(name, eos, *self.state[[RHO, P], 1:-1, 1:-1])
+        if not isinstance(eos, Mixture):  # whose formulas need the fractions of each cell
+            check_first_state(name, eos, self.state[:, 1:-1, 1:-1])
+            check_formulas(name, eos, *self.state[[RHO, P], 1:-1, 1:-1])
         # what a step finds besides the state: rates of the cells (theory F7.1), their crowding on
         # the new grid (F7.3), and the number of those that were redistributed
         self.rates = np.zeros((self.ni, self.nj))
@@ -133,13 +147,11 @@ class Block:
             setattr(self, array_name, held[array_name])
             setattr(self, f"{array_name}_new", array)
         self._carry(carried)
+        self.mixed = self._mix(eos, limiter, flux) if isinstance(eos, Mixture) else None
         self._starts: dict[str, np.ndarray] = {}  # separate if a body source acts
         # the equation of state's numbers, of the types for which kernels are compiled, as those of
         # a user's own need not be
-        self.parameters = tuple(
-            np.ascontiguousarray(value, dtype=float) if np.ndim(value) else float(value)
-            for value in eos.parameters
-        )
+        self.parameters = _read_parameters(eos)
         self.wave_law = tuple(float(value) for value in eos.wave_law)
         self.limiter = limiter
         self.flux_name = flux
@@ -151,7 +163,7 @@ class Block:
         # the perimeter: its faces, accelerations (2, faces) by a body source of their cells, and
         # volumes of polygon cells beyond their straight faces
         faces = 2 * (self.ni + self.nj)
-        self.rim = make_rim(faces, len(self.carried_fields))
+        self.rim = make_rim(faces, RIM_FIELDS if self.mixed else len(self.carried_fields))
         self.body_acceleration: np.ndarray | None = None
         self.excess_volume = np.zeros(faces)
         self.excess_volume_new = np.zeros(faces)
@@ -181,13 +193,30 @@ class Block:
         self.carried_new = np.zeros(self.carried.shape)
         for number, field in enumerate(fields):
             self.carried[number, 1:-1, 1:-1] = field.find_first(self.name, self.centres)
-        self.transport = Transport(len(fields), self.ni, self.nj)
+        moved = 0 if isinstance(self.eos, Mixture) else len(fields)  # fractions move by themselves
+        self.transport = Transport(moved, self.ni, self.nj)
         self.held_arrays = (*HELD_ARRAYS, "carried") if fields else HELD_ARRAYS
         self.step_arrays = ("nodes", *self.held_arrays, "rates")
         self.units = UNITS | {field.name: field.unit for field in fields}
         self.long_names = LONG_NAMES | {
             field.name: field.long_name or field.name for field in fields
         }
+
+    def _mix(self, eos: Mixture, limiter: str, flux: str) -> MixedCells:
+        """What cells of two materials need besides; BadInput where they do not carry fractions."""
+        names = tuple(field.name for field in self.carried_fields)
+        if names != SEEN_FIELDS:
+            raise BadInput(
+                f"block {self.name!r}: its equation of state is a mixture; carried must be what "
+                "make_fraction_fields gives, and nothing else"
+            )
+        check_first_state(self.name, eos, self.state[:, 1:-1, 1:-1], self.carried[:, 1:-1, 1:-1])
+        return MixedCells(eos, limiter, flux, (self.ni, self.nj))
+
+    @property
+    def eos_of_cells(self) -> EquationOfState:
+        """The equation of state, with the fractions of all cells (ni, nj) where it sees them."""
+        return self.eos.with_fields(self.carried[:, 1:-1, 1:-1])
 
     def set_geometry(self, geometry: Geometry) -> None:
         """Make the flow plane or axisymmetric; called by the simulation.
@@ -307,7 +336,7 @@ class Block:
         """Why the new state is not admissible, with the cell's indices, or None."""
         rho, _, _, p = self.state_new[:, 1:-1, 1:-1]
         with np.errstate(all="ignore"):
-            c = self.eos.sound_speed(rho, p)
+            c = self.eos.with_fields(self.carried_new[:, 1:-1, 1:-1]).sound_speed(rho, p)
         bad = ~((rho > 0.0) & (c > 0.0))
         if not bad.any():
             return self._find_failed_totals()
@@ -392,12 +421,14 @@ class Block:
         others = [self.get_inside(name) for name in HELD_ARRAYS if name != "state"]
         for first in range(rows.start, rows.stop, SLAB_ROWS):
             slab = slice(first, min(first + SLAB_ROWS, rows.stop))
-            found[slab] = compute(self.eos, inside[:, slab], *(held[slab] for held in others))
+            eos = self.eos.with_fields(self.carried[:, 1:-1, 1:-1][:, slab])
+            found[slab] = compute(eos, inside[:, slab], *(held[slab] for held in others))
 
     def compute_at(self, name: str, i: np.ndarray, j: np.ndarray) -> np.ndarray:
         """Specific internal energies "e" [J/kg], temperatures "T" [K] of the cells [i, j]."""
         compute = {"e": compute_energy, "T": compute_temperature}[name]
-        return compute(self.eos, *(self.get_inside(held)[..., i, j] for held in HELD_ARRAYS))
+        eos = self.eos.with_fields(self.get_inside("carried")[..., i, j])
+        return compute(eos, *(self.get_inside(held)[..., i, j] for held in HELD_ARRAYS))
 
     def compute_sound_speed(self, state: np.ndarray) -> np.ndarray:
         """Sound speeds (ni, nj) [m/s] of a state (4, ni + 2, nj + 2).
@@ -405,6 +436,10 @@ class Block:
         The result is in `rates_new`, which the next update overwrites.  In a cut block only the
         rows of this process are computed.
         """
+        if self.mixed is not None:
+            rho, _, _, p = state[:, 1:-1, 1:-1]
+            self.rates_new[...] = self.eos_of_cells.sound_speed(rho, p)
+            return self.rates_new
         kind: Any = type(self.eos)
         fill_sound_speed = make_fill_sound_speed(kind)
         fill_sound_speed.entry(

@@ -248,8 +248,9 @@ class Inflow(Segment):
         rim.rho_ghost[:], rim.u_ghost[:], rim.v_ghost[:], rim.p_ghost[:] = self.state(t)
         rim.length_ghost[:] = 0.0
         if self.block.carried_fields:
-            rim.get_carried(CARRIED_GHOST)[...] = self._carried
-            rim.get_carried(CARRIED_BEYOND)[...] = self._carried
+            count = len(self._carried)
+            rim.get_carried(CARRIED_GHOST)[:count] = self._carried
+            rim.get_carried(CARRIED_BEYOND)[:count] = self._carried
 
     def fill_speeds(self, t):
         """The state beyond at mid-time, for the flux."""
@@ -257,7 +258,7 @@ class Inflow(Segment):
             return
         self._filled = True
         rim = self.rim
-        eos = self.block.eos
+        eos = self.block.eos.with_fields(self._carried[:, 0])
         rho, u, v, p = self.state(t)
         rim.rho_beyond[:] = rho
         rim.u_beyond[:] = u
@@ -424,6 +425,8 @@ def make_segment(
     if not isinstance(kind, str) or kind not in SEGMENTS:
         raise BadInput(f"{place}: there is no segment kind {kind!r}{suggest(kind, SEGMENTS)}")
     place += f": {kind} segment"
+    if block.mixed is not None and SEGMENTS[kind].motion in (NodeMotion.FLOW, NodeMotion.FOLLOW):
+        raise BadInput(f"{place}: a block of two materials has no line that goes with the flow")
     _check_options(place, SEGMENTS[kind], options)
     try:
         return SEGMENTS[kind](block, side, start, stop, **options)

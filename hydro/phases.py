@@ -21,6 +21,9 @@ def gather(block: Block, t: float = 0.0) -> None:
     kernels = block.kernels
     for number, wall in plan.pistons:
         plan.wall_speeds[number] = wall.velocity(t)
+    if block.mixed is not None:
+        block.mixed.gather(block)
+        return
     kernels.sides.start_sides.entry(
         block.start, block.nodes, block.parameters, plan.inwards, plan.walls, plan.wall_speeds,
         kernels.scratch, block.rim.rows,
@@ -44,6 +47,9 @@ def _add_weight(block: Block, acceleration: np.ndarray) -> None:
 
 def predict(block: Block, dt: float) -> None:
     """From the ghosts: mid-time predictions, and traces at the moving faces half a step on."""
+    if block.mixed is not None:
+        block.mixed.predict(block, 0.5 * dt)
+        return
     kernels = block.kernels
     kernels.sides.predict_sides.entry(
         _list_old(block), 0.5 * dt, block.parameters, block.plan.moving, kernels.scratch,
@@ -55,6 +61,9 @@ def predict(block: Block, dt: float) -> None:
 
 def trace(block: Block, dt: float) -> None:
     """From the new nodes: mid-time faces, their traces, and fluxes that need nothing else."""
+    if block.mixed is not None:
+        block.mixed.trace(block, dt)
+        return
     plan = block.plan
     block.kernels.sides.trace_sides.entry(
         block.nodes, block.nodes_new, 1.0 / dt, block.parameters, block.wave_law, plan.walls,
@@ -69,6 +78,9 @@ def update(block: Block, dt: float, threads: int = 1) -> None:
 
     In a cut block: the rows of this process only, without polygon cells.
     """
+    if block.mixed is not None:
+        block.mixed.update(block, dt)
+        return
     kernels = block.kernels
     if len(block.rows) * block.nj < LEAST_INSIDE:
         threads = 1

@@ -19,6 +19,7 @@ from shockgrid.hydro.formulas.geometry import find_geometry
 from shockgrid.hydro.history import compute_columns
 from shockgrid.hydro.ledger import Ledger
 from shockgrid.hydro.links import Exchange, Link, name_materials
+from shockgrid.hydro.mixture.phases import check_geometry
 from shockgrid.hydro.motion.grid_motion import GridMotion, MeshMotion
 from shockgrid.hydro.motion.line import Line, LineRule
 from shockgrid.hydro.motion.overlaps import Overlaps
@@ -147,6 +148,8 @@ class Simulation:
         """Check blocks and links, and make what passes between them and moves their grids."""
         for block in blocks:
             block.set_geometry(self.geometry)
+            if block.mixed is not None:
+                check_geometry(block)
             _check_cover(block)
             _check_axis(block)
         _check_links(blocks, links)

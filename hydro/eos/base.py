@@ -50,6 +50,8 @@ class EquationOfState:
     - `least_density_part(parameters)`, optional: the density [kg/m³] down to which fragments leave
       a cell (`make_leaving_part`); by default they all do
     - `opens_voids`: False if there is no such pressure; the flow kernels then omit voids
+    - `gruneisen_part(rho, parameters)`, optional: (dp/de)/rho, of a material whose pressure is
+      linear in the energy; such materials can share cells (`hydro.eos.mixture`)
     - `has_kinks`: True where the sound speed drops under compression, as at a phase transition: one
       shock may then split into two, which steep limiters run together (theory F3.13)
 
@@ -131,6 +133,10 @@ class EquationOfState:
         found = copy.copy(self)
         object.__setattr__(found, "heat_capacity", number)
         return found
+
+    def with_fields(self, fields: np.ndarray) -> Self:
+        """The same for cells that carry these fields (n, ...); itself where it sees none."""
+        return self
 
     def temperature(self, rho, e):
         """Temperature [K] from density and specific internal energy, where it has one: F18."""

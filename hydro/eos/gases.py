@@ -39,6 +39,12 @@ def sound_speed_squared(rho, p, parameters):
 
 
 @inlined
+def find_gruneisen(rho, parameters):
+    """(dp/de)/rho at constant density, of an ideal and of a stiffened gas."""
+    return parameters[GAMMA] - 1.0
+
+
+@inlined
 def least_pressure(parameters):
     """Pressure [Pa] below which voids open: none."""
     return -1e300
@@ -57,6 +63,7 @@ class IdealGas(EquationOfState):
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
     least_pressure_part = staticmethod(least_pressure)
+    gruneisen_part = staticmethod(find_gruneisen)
 
     def __post_init__(self):
         self.check_numbers()
@@ -112,6 +119,7 @@ class StiffenedGas(EquationOfState):
     energy_part = staticmethod(stiffened_energy)
     sound_speed_squared_part = staticmethod(stiffened_sound_speed_squared)
     least_pressure_part = staticmethod(cavitation_pressure)
+    gruneisen_part = staticmethod(find_gruneisen)
 
     def __post_init__(self):
         self.check_numbers()

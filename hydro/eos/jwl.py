@@ -60,6 +60,12 @@ def sound_speed_squared(rho, p, parameters):
 
 
 @inlined
+def find_gruneisen(rho, parameters):
+    """(dp/de)/rho at constant density."""
+    return parameters[OMEGA]
+
+
+@inlined
 def least_pressure(parameters):
     """Pressure [Pa] below which the material fails: minus its strength."""
     return -parameters[STRENGTH]
@@ -89,6 +95,7 @@ class JWL(EquationOfState):
     energy_part = staticmethod(energy)
     sound_speed_squared_part = staticmethod(sound_speed_squared)
     least_pressure_part = staticmethod(least_pressure)
+    gruneisen_part = staticmethod(find_gruneisen)
     strength_left_part = staticmethod(strength_left)
     least_density_part = staticmethod(least_density)
 

@@ -18,13 +18,19 @@ from shockgrid.regrid.jit import Kernel, kernel
 SLAB_ROWS = 64  # rows for which something is computed at a time
 
 
-def check_first_state(name: str, eos: EquationOfState, state: np.ndarray) -> None:
-    """Raise BadInput where a block's first `state` (4, ni, nj) is none of its material."""
+def check_first_state(
+    name: str, eos: EquationOfState, state: np.ndarray, fields: np.ndarray | None = None
+) -> None:
+    """Raise BadInput where a block's first `state` (4, ni, nj) is none of its material.
+
+    fields (n, ni, nj): those that its cells carry, where its equation of state sees them.
+    """
     rho, _, _, p = state
     for first in range(0, len(rho), SLAB_ROWS):
         rows = slice(first, first + SLAB_ROWS)
+        own = eos if fields is None else eos.with_fields(fields[:, rows])
         with np.errstate(all="ignore"):
-            c = eos.sound_speed(rho[rows], p[rows])
+            c = own.sound_speed(rho[rows], p[rows])
         bad = ~(np.isfinite(state[:, rows]).all(axis=0) & (rho[rows] > 0.0) & (c > 0.0))
         if not bad.any():
             continue

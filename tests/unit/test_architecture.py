@@ -39,6 +39,7 @@ ROOMS = (
     ("hydro.perimeter",),
     ("hydro.kernels", "hydro.totals", "hydro.carried"),
     ("hydro.strength",),
+    ("hydro.mixture",),
     ("hydro.block",),
     ("hydro.phases",),
     ("hydro.ranks",),

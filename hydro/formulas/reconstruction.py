@@ -274,9 +274,9 @@ WHOLE_CELL_MARK = 1e300  # marks a cell that has not failed
 
 
 @inlined
-def mark_voided(e, void_energy):
+def mark_voided(e, e_of_voids):
     """The energy of a cell that has failed by its void energy; WHOLE_CELL_MARK elsewhere."""
-    return e if void_energy < 0.0 else WHOLE_CELL_MARK
+    return e if e_of_voids < 0.0 else WHOLE_CELL_MARK
 
 
 @inlined

@@ -109,10 +109,10 @@ def make_switch(sound_speed_squared_part, energy_part, least_jump, opens_voids):
             Z[scratch.C2 + k] = c2
             e = energy_part(rho, p, parameters)
             if opens_voids:
-                void_energy = Z[scratch.VOID_LOADED + k]
-                e = e + void_energy
+                e_of_voids = Z[scratch.VOID_LOADED + k]
+                e = e + e_of_voids
                 Z[scratch.VOIDED_ENERGY_BEFORE + k] = Z[scratch.VOIDED_ENERGY + k]
-                Z[scratch.VOIDED_ENERGY + k] = mark_voided(e, void_energy)
+                Z[scratch.VOIDED_ENERGY + k] = mark_voided(e, e_of_voids)
             Z[scratch.E + k] = e
             Z[scratch.HLL + k] = compute_hll_switch(
                 Z[scratch.P + k - 1] - p,

@@ -113,10 +113,10 @@ def make_slopes(limit, relaxed, geometry, switch):
                 c2 = sound(rho, p, parameters)
                 e = energy(rho, p, parameters)
                 if opens_voids:
-                    void_energy = Z[scratch.VOID_LOADED + k]
-                    e = e + void_energy
+                    e_of_voids = Z[scratch.VOID_LOADED + k]
+                    e = e + e_of_voids
                     Z[scratch.VOIDED_ENERGY_BEFORE + k] = Z[scratch.VOIDED_ENERGY + k]
-                    Z[scratch.VOIDED_ENERGY + k] = mark_voided(e, void_energy)
+                    Z[scratch.VOIDED_ENERGY + k] = mark_voided(e, e_of_voids)
                 Z[scratch.C2 + k] = c2
                 Z[scratch.E + k] = e
                 Z[scratch.HLL_BEFORE + k] = Z[scratch.HLL + k]

@@ -14,7 +14,11 @@ from shockgrid.hydro.formulas.reconstruction import WHOLE_CELL_MARK
 from shockgrid.hydro.formulas.riemann import compute_wave_pressure
 from shockgrid.hydro.mixture.slopes import add_fractions
 from shockgrid.hydro.mixture.traces import make_trace
-from shockgrid.hydro.perimeter.contacts import mirror_in_walls, pass_open_sides, press
+from shockgrid.hydro.perimeter.contacts import (
+    fill_impermeable_flux,
+    fill_open_fluxes,
+    mirror_in_walls,
+)
 from shockgrid.hydro.perimeter.faces import make_fill_faces
 from shockgrid.hydro.rim import (
     ACOUSTIC,
@@ -26,6 +30,7 @@ from shockgrid.hydro.rim import (
     CARRIED_GHOST,
     CARRIED_ROWS,
     CARRIED_TRACE,
+    DISTANCE_NEXT,
     E_TRACE,
     ENERGY,
     HLL,
@@ -45,12 +50,11 @@ from shockgrid.hydro.rim import (
     RHO_GHOST,
     RHO_TRACE,
     SWEEP,
-    TORN,
     U_NEXT,
     U_TRACE,
     V_NEXT,
     V_TRACE,
-    WAY_NEXT,
+    VOIDED_ENERGY,
     X_AREA,
     Y_AREA,
     C,
@@ -136,7 +140,7 @@ def make_gather(eos_class):
             i, j = find_next(i, j, side, ni, nj)
             rim[U_NEXT, k] = state[U, i + 1, j + 1]
             rim[V_NEXT, k] = state[V, i + 1, j + 1]
-            rim[WAY_NEXT, k] = 0.5 * (rim[LENGTH, k] + across[i + 1, j + 1])
+            rim[DISTANCE_NEXT, k] = 0.5 * (rim[LENGTH, k] + across[i + 1, j + 1])
         mirror_in_walls(rim, walls, speeds)
 
     return gather
@@ -189,7 +193,7 @@ def make_trace_sides(eos_class):
     trace = make_trace(eos_class)
 
     @compiled_once(allocates=False)
-    def press_on_walls(rim, walls, laws):
+    def fill_wall_fluxes(rim, walls, laws):
         """Pressure on impermeable faces, and its flux."""
         for wall in range(walls.shape[0]):
             for k in range(walls[wall, 0], walls[wall, 1]):
@@ -206,10 +210,10 @@ def make_trace_sides(eos_class):
                     mix_laws(laws, volume),
                     w,
                 )
-                press(rim, k, False)
+                fill_impermeable_flux(rim, k, False)
 
     @compiled_once(allocates=False)
-    def carry_through_open_sides(rim, opened):
+    def carry_fields_through_open_sides(rim, opened):
         """What the mass brings along through the faces of open sides."""
         for number in range(opened.shape[0]):
             as_inside = opened[number, 2] == RHO_TRACE
@@ -252,7 +256,7 @@ def make_trace_sides(eos_class):
             rim[C_TRACE, k] = c2**0.5
             rim[C2_TRACE, k] = c2
             rim[PART_TRACE, k] = 1.0
-            rim[TORN, k] = WHOLE_CELL_MARK
+            rim[VOIDED_ENERGY, k] = WHOLE_CELL_MARK
             rim[HLL, k] = 0.0
             rim[ACOUSTIC, k] = 1.0
             # what a unit of mass brings along; beyond the cell's, which counts as nothing here
@@ -262,8 +266,8 @@ def make_trace_sides(eos_class):
             for q in range(RIM_FIELDS):
                 rim[find_field_row(q, CARRIED_CELL), k] = 0.0
                 rim[find_field_row(q, CARRIED_FLUX), k] = 0.0
-        press_on_walls(rim, walls, laws)
-        pass_open_sides(rim, opened, False)
-        carry_through_open_sides(rim, opened)
+        fill_wall_fluxes(rim, walls, laws)
+        fill_open_fluxes(rim, opened, False)
+        carry_fields_through_open_sides(rim, opened)
 
     return trace_sides

@@ -29,7 +29,7 @@ from shockgrid.hydro.formulas.reconstruction import (
     make_limit_velocity,
     relax_limit,
 )
-from shockgrid.hydro.formulas.riemann import FLUXES
+from shockgrid.hydro.formulas.riemann import HLL_JUMP_THRESHOLDS
 from shockgrid.hydro.interior.slopes import CALM_PRESSURE_JUMP, SHOCK_PRESSURE_JUMP
 from shockgrid.hydro.perimeter.faces import find_corners
 from shockgrid.hydro.rows import RHO, P, U, V
@@ -79,13 +79,13 @@ def load_cell(state, carried, i, j):
 def make_fill_slopes(eos_class, limiter: str, flux: str):
     """Kernel that fills slopes and mid-time values of a block's cells.
 
-    Of a class of mixtures, a limiter (LIMITERS of `formulas.reconstruction`) and a flux (FLUXES of
-    `formulas.riemann`).
+    Of a class of mixtures, a limiter (LIMITERS of `formulas.reconstruction`) and a flux
+    (HLL_JUMP_THRESHOLDS of `formulas.riemann`).
     """
     limit = choose_limit(limiter, eos_class.has_kinks)
     limit_velocity = make_limit_velocity(limit)
     relaxed = limiter in RELAXED
-    least_jump = FLUXES[flux]
+    least_jump = HLL_JUMP_THRESHOLDS[flux]
     sound_speed_squared = eos_class.sound_speed_squared_part
     compliance = eos_class.compliance_part
 

@@ -114,17 +114,19 @@ class Segment:
         `names` say what each is; arrays are for kinds that take one number a face.
         """
         try:
-            found = tuple(values)
-            good = len(found) == len(names) and all(np.isfinite(one).all() for one in found)
+            numbers = tuple(values)
+            are_numbers = len(numbers) == len(names) and all(
+                np.isfinite(one).all() for one in numbers
+            )
         except TypeError:
-            good = False
-        if not good:
+            are_numbers = False
+        if not are_numbers:
             wanted = ", ".join(names)
             raise BadInput(
                 f"{self}: {self.kind} segment: {name} gives {values!r}; ({wanted}) is wanted, or a "
                 "function of the time that returns it"
             )
-        return found
+        return numbers
 
     def __str__(self) -> str:
         return f"block {self.block.name!r}, side {self.side}, faces {self.start}-{self.stop}"
@@ -436,10 +438,12 @@ def make_segment(
 
 def _check_options(place: str, make: type[Segment], options: dict) -> None:
     """Raise BadInput for options that a kind does not have, and for those that it lacks."""
-    given = list(inspect.signature(make).parameters.values())[4:]  # block, side, start, stop
-    if any(one.kind is one.VAR_KEYWORD for one in given):
+    options_of_kind = list(inspect.signature(make).parameters.values())[
+        4:
+    ]  # block, side, start, stop
+    if any(one.kind is one.VAR_KEYWORD for one in options_of_kind):
         return
-    known = [one.name for one in given]
+    known = [one.name for one in options_of_kind]
     for name in options:
         if name not in known:
             raise BadInput(
@@ -447,7 +451,9 @@ def _check_options(place: str, make: type[Segment], options: dict) -> None:
                 if known
                 else f"{place}: {name!r} is given, and it has no options"
             )
-    missing = [one.name for one in given if one.default is one.empty and one.name not in options]
+    missing = [
+        one.name for one in options_of_kind if one.default is one.empty and one.name not in options
+    ]
     if missing:
         examples = ", ".join(f"{name}=..." for name in missing)
         about = (make.__doc__ or "").strip().partition("\n")[0]

@@ -50,18 +50,20 @@ class Clock:
         if dt > self.tension_dt:
             dt = self.tension_dt
             limit = "tension"
+        # the first steps are parts of the stable one, whatever limits that
         if self.step < len(START_FACTORS):
             dt = dt * START_FACTORS[self.step]
             limit = "start"
         if dt > self.retry_dt:
             dt = self.retry_dt
             limit = "retry"
-        left = self.t_end - self.t
-        if dt >= left:
-            dt = left
+        # two equal steps to the end rather than a long one and a tiny one
+        time_left = self.t_end - self.t
+        if dt >= time_left:
+            dt = time_left
             limit = "t_end"
-        elif 2.0 * dt > left:
-            dt = 0.5 * left
+        elif 2.0 * dt > time_left:
+            dt = 0.5 * time_left
             limit = "t_end"
         return dt, limit
 
@@ -70,7 +72,7 @@ class Clock:
         return dt * self.rate / self.cfl
 
     def tick(self, dt: float, limit: str, rate: float, stretching: float) -> bool:
-        """Take a step that stands; returns whether it was the last."""
+        """Add an accepted step of length dt; returns whether it was the last."""
         self.retry_dt = STEP_RECOVERY * dt if limit == "retry" else np.inf
         last = dt >= self.t_end - self.t
         self.t = self.t_end if last else self.t + dt
@@ -125,14 +127,14 @@ class Stopwatch:
 
     def __call__(self, phase: str) -> Phase:
         """The phase of that name, to be timed by `with`."""
-        found = self.phases.get(phase)
-        if found is None:
-            found = self.phases[phase] = Phase()
-        return found
+        timed = self.phases.get(phase)
+        if timed is None:
+            timed = self.phases[phase] = Phase()
+        return timed
 
     def take(self, phases: tuple[str, ...]) -> dict[str, float]:
         """Seconds of the phases since the last call, as history columns."""
-        taken = {f"seconds_{phase}": self(phase).seconds for phase in phases}
+        seconds = {f"seconds_{phase}": self(phase).seconds for phase in phases}
         for phase in self.phases.values():
             phase.seconds = 0.0
-        return taken
+        return seconds

@@ -33,10 +33,10 @@ def count_crowding(crowding, counts):
 
 
 @kernel
-def choose_bin(counts, cells, share, far_out):
+def choose_bin(counts, cells, share, ratio):
     """The cell exceeded by at most the fraction `share` of `cells`, from the histogram `counts`.
 
-    Returns its bin, -1 if no cell has `far_out` times its crowding; its index among the sorted
+    Returns its bin, -1 if no cell has `ratio` times its crowding; its index among the sorted
     cells of that bin, negative if before all of them; and the lower edge of the bin.
     """
     allowed = share * cells
@@ -44,45 +44,45 @@ def choose_bin(counts, cells, share, far_out):
     top = SIZE_BINS - 1
     while top > 0 and counts[top] == 0:
         top -= 1
-    bin = top
-    while bin > 0 and above + counts[bin] <= allowed:
-        above += counts[bin]
-        bin -= 1
+    chosen_bin = top
+    while chosen_bin > 0 and above + counts[chosen_bin] <= allowed:
+        above += counts[chosen_bin]
+        chosen_bin -= 1
     edges = np.empty(2, dtype=np.int64)
-    edges[0] = (bin + FIRST_BIN) << BIN_SHIFT
+    edges[0] = (chosen_bin + FIRST_BIN) << BIN_SHIFT
     edges[1] = (top + 1 + FIRST_BIN) << BIN_SHIFT
     low, high = edges.view(np.float64)
-    if high <= far_out * low:
+    if high <= ratio * low:
         return -1, 0, low
-    return bin, counts[bin] - 1 - (int(allowed) - above), low
+    return chosen_bin, counts[chosen_bin] - 1 - (int(allowed) - above), low
 
 
 @kernel
-def keep_bin(crowding, bin, kept):
-    """Copy the `crowding` (ni, nj) of the cells of a bin into `kept`; returns their number."""
-    size = 0
+def keep_bin(crowding, chosen_bin, members):
+    """Copy the `crowding` (ni, nj) of the cells of a bin into `members`; returns their number."""
+    count = 0
     for i in range(crowding.shape[0]):
         digits = crowding[i].view(np.int64)
         for j in range(digits.shape[0]):
-            if (digits[j] >> BIN_SHIFT) - FIRST_BIN == bin:
-                kept[size] = crowding[i, j]
-                size += 1
-    return size
+            if (digits[j] >> BIN_SHIFT) - FIRST_BIN == chosen_bin:
+                members[count] = crowding[i, j]
+                count += 1
+    return count
 
 
 @kernel
-def find_most_crowded(crowding, share, far_out, counts, kept):
-    """`far_out` times the crowding exceeded by at most `share` of the cells; inf if none is above.
+def find_most_crowded(crowding, share, ratio, counts, members):
+    """`ratio` times the crowding exceeded by at most `share` of the cells; inf if none is above.
 
     The exact value of that cell is used, not the edge of a bin: round-off must not decide. counts
-    (SIZE_BINS,), kept (cells,): scratch.
+    (SIZE_BINS,), members (cells,): scratch.
     """
     count_crowding(crowding, counts)
-    bin, rank, low = choose_bin(counts, crowding.size, share, far_out)
-    if bin < 0:
+    chosen_bin, rank, lower_edge = choose_bin(counts, crowding.size, share, ratio)
+    if chosen_bin < 0:
         return np.inf
-    size = keep_bin(crowding, bin, kept)
-    return far_out * np.sort(kept[:size])[rank] if rank >= 0 else far_out * low
+    count = keep_bin(crowding, chosen_bin, members)
+    return ratio * np.sort(members[:count])[rank] if rank >= 0 else ratio * lower_edge
 
 
 @kernel
@@ -161,24 +161,24 @@ def scan_state(totals, sums, rates, crowding, part, counts, kept):
 
 
 def find_most_crowded_of_bands(
-    cut: CutBlock, share: float, far_out: float, counts: np.ndarray, kept: np.ndarray
+    cut: CutBlock, share: float, ratio: float, counts: np.ndarray, members: np.ndarray
 ) -> float:
     """`find_most_crowded` over all bands of a block, with the same result on all of its ranks.
 
-    counts (SIZE_BINS,), kept (cells,): scratch.
+    counts (SIZE_BINS,), members (cells,): scratch.
     """
     block = cut.block
     crowding = block.crowding[slice(*cut.band)]
     count_crowding(crowding, counts)
-    every = np.sum(cut.group.allgather(counts), axis=0)
-    bin, rank, low = choose_bin(every, block.ni * block.nj, share, far_out)
-    if bin < 0:
+    total_counts = np.sum(cut.group.allgather(counts), axis=0)
+    chosen_bin, rank, lower_edge = choose_bin(total_counts, block.ni * block.nj, share, ratio)
+    if chosen_bin < 0:
         return np.inf
     if rank < 0:
-        return far_out * low
-    size = keep_bin(crowding, bin, kept)
-    found = np.concatenate(cut.group.allgather(kept[:size].copy()))
-    return far_out * float(np.sort(found)[rank])
+        return ratio * lower_edge
+    count = keep_bin(crowding, chosen_bin, members)
+    all_members = np.concatenate(cut.group.allgather(members[:count].copy()))
+    return ratio * float(np.sort(all_members)[rank])
 
 
 def scan_rates_of_bands(cut: CutBlock, most_crowded: float) -> tuple[float, int, int, float]:
@@ -188,6 +188,6 @@ def scan_rates_of_bands(cut: CutBlock, most_crowded: float) -> tuple[float, int,
     rate, i, j, bulk = scan_rates(
         block.rates_new[first:last], block.crowding[first:last], most_crowded
     )
-    found = cut.group.allgather((rate, first + i, j, bulk))
-    most = max(found, key=lambda band: band[0])  # the first maximum, as in the whole block
-    return *most[:3], max(band[3] for band in found)
+    rates_of_bands = cut.group.allgather((rate, first + i, j, bulk))
+    most = max(rates_of_bands, key=lambda band: band[0])  # the first maximum, as in the whole block
+    return *most[:3], max(band[3] for band in rates_of_bands)

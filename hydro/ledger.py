@@ -62,8 +62,9 @@ class Ledger:
         self.momentum_in += gained[:2]
         self.energy_in += float(gained[2])
 
-    def keep_in_voids(self, work: float, energy: float) -> None:
-        """The work of voids that resist did not come from outside: it is that of their energy."""
+    def count_void_energy(self, work: float, energy: float) -> None:
+        """Take the work of voids that resist their closing out of the boundary's energy: it is
+        theirs."""
         self.energy_in -= work
         self.energy_in_voids = energy
 
@@ -77,20 +78,18 @@ class Ledger:
             momentum_x += total.momentum_x
             momentum_y += total.momentum_y
             energy += total.energy
+        # radial momentum is not conserved
+        has_momentum_y = not self.blocks[0].geometry.curved
         row = {f"total_mass_{name}": value for name, value in sums.items()}
-        row |= {
-            "total_momentum_x": momentum_x,
-            "total_momentum_y": momentum_y,
-            "total_energy": energy + self.energy_in_voids,
-        }
+        row["total_momentum_x"] = momentum_x
+        if has_momentum_y:
+            row["total_momentum_y"] = momentum_y
+        row["total_energy"] = energy + self.energy_in_voids
         row |= {f"boundary_mass_{name}": value for name, value in self.mass_in.items()}
-        row |= {
-            "boundary_momentum_x": float(self.momentum_in[0]),
-            "boundary_momentum_y": float(self.momentum_in[1]),
-            "boundary_energy": self.energy_in,
-        }
-        if self.blocks[0].geometry.curved:
-            del row["total_momentum_y"], row["boundary_momentum_y"]
+        row["boundary_momentum_x"] = float(self.momentum_in[0])
+        if has_momentum_y:
+            row["boundary_momentum_y"] = float(self.momentum_in[1])
+        row["boundary_energy"] = self.energy_in
         return row
 
     def get_state(self) -> dict[str, float]:

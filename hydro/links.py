@@ -45,20 +45,24 @@ class Link:
         self.leader, self.follower = leader, follower
         self.segments = [leader, follower]
         _check_materials(leader, follower)
-        one = leader.line(leader.block.nodes)
-        two = follower.line(follower.block.nodes)
-        if one.shape != two.shape:
+        leader_line = leader.line(leader.block.nodes)
+        follower_line = follower.line(follower.block.nodes)
+        if leader_line.shape != follower_line.shape:
             raise BadInput(
-                f"{leader.kind}: {leader} has {one.shape[1] - 1} faces and {follower} has "
-                f"{two.shape[1] - 1}; they must be as many, or be a sliding contact (slide)"
+                f"{leader.kind}: {leader} has {leader_line.shape[1] - 1} faces and {follower} has "
+                f"{follower_line.shape[1] - 1}; they must be as many, or be a "
+                "sliding contact (slide)"
             )
-        misses = [_misfit(one, two[:, ::order], leader.kind == "periodic") for order in (1, -1)]
-        self.reverse = bool(misses[1][0].max() < misses[0][0].max())
-        gaps, self.shift = misses[self.reverse]
+        misfits = [
+            _misfit(leader_line, follower_line[:, ::order], leader.kind == "periodic")
+            for order in (1, -1)
+        ]
+        self.reverse = bool(misfits[1][0].max() < misfits[0][0].max())
+        gaps, self.shift = misfits[self.reverse]
         worst = int(gaps.argmax())
         closed_gap = LARGEST_CLOSED_GAP * min(map(measure_least_cell, (leader, follower)))
-        if gaps[worst] > max(closed_gap, ROUND_OFF_GAP * np.ptp(one, axis=1).max()):
-            x, y = one[:, worst]
+        if gaps[worst] > max(closed_gap, ROUND_OFF_GAP * np.ptp(leader_line, axis=1).max()):
+            x, y = leader_line[:, worst]
             raise BadInput(
                 f"{leader.kind}: nodes of {leader} and of {follower} do not match: the largest gap "
                 f"is {gaps[worst]:.3g} m at node {leader.start + worst}, ({x:.6g}, {y:.6g}); cut "
@@ -69,14 +73,15 @@ class Link:
         order = (follower.last - 1, -1) if self.reverse else (follower.first, 1)
         pairs = (leader.first, *order, leader.last - leader.first)
         self._rims = leader.block.rim.rows, follower.block.rim.rows, pairs
-        self._laws = leader.block.wave_law, follower.block.wave_law
-        # of a line, for `add_layer_flux`: velocities beside its contact's, whether it is closed
+        self._wave_laws = leader.block.wave_law, follower.block.wave_law
+        # set by `hydro.motion.sides`, for `add_layer_flux`: the velocities of the line's nodes
+        # beside those of its contact, and whether the line is closed
         self.layer = np.empty((2, 0)), False
         self.passes_mass = isinstance(leader, Seam)
         # make matching nodes bitwise equal
-        two[...] = self.to_follower(one)
+        follower_line[...] = self.arrange_for_follower(leader_line)
 
-    def to_follower(self, line: np.ndarray) -> np.ndarray:
+    def arrange_for_follower(self, line: np.ndarray) -> np.ndarray:
         """Nodes of the leader's line in the follower's order and position."""
         return (line + self.shift[:, None])[:, :: -1 if self.reverse else 1]
 
@@ -87,24 +92,24 @@ class Link:
         if not self.passes_mass:
             speeds, closed = self.layer
             layer = speeds, self.reverse, closed
-            solve_link.entry(*self._rims, *self._laws, layer, phase, curved)
+            solve_link.entry(*self._rims, *self._wave_laws, layer, phase, curved)
         elif phase != AT_TRACES:
             pass_seam(*self._rims, phase, curved)
 
-    def swap_line(self) -> None:
+    def copy_line_to_follower(self) -> None:
         """Copy the leader's new nodes to the follower."""
         line = self.leader.line(self.leader.block.nodes_new)
-        self.follower.line(self.follower.block.nodes_new)[...] = self.to_follower(line)
+        self.follower.line(self.follower.block.nodes_new)[...] = self.arrange_for_follower(line)
 
 
 def _check_materials(leader: Linked, follower: Linked) -> None:
     """Raise BadInput where a seam joins two materials."""
-    one = leader.block.eos
-    two = follower.block.eos
-    if isinstance(leader, Seam) and not is_same_material(one, two):
+    leader_eos = leader.block.eos
+    follower_eos = follower.block.eos
+    if isinstance(leader, Seam) and not is_same_material(leader_eos, follower_eos):
         raise BadInput(
             f"{leader.kind}: material passes between {leader} and {follower}, and their equations "
-            f"of state differ: {one} and {two}; join two materials by an interface"
+            f"of state differ: {leader_eos} and {follower_eos}; join two materials by an interface"
         )
     if isinstance(leader, Seam):
         check_same(
@@ -124,9 +129,11 @@ def measure_least_cell(segment: Linked) -> float:
     return float(lengths[lengths > 0.0].min())
 
 
-def _misfit(one: np.ndarray, two: np.ndarray, periodic: bool) -> tuple[np.ndarray, np.ndarray]:
+def _misfit(
+    leader_line: np.ndarray, follower_line: np.ndarray, periodic: bool
+) -> tuple[np.ndarray, np.ndarray]:
     """Distances (n + 1,) [m] of matching nodes, and the shift between the lines."""
-    difference = two - one
+    difference = follower_line - leader_line
     shift = difference.mean(axis=1) if periodic else np.zeros(2)
     return np.hypot(*(difference - shift[:, None])), shift
 
@@ -139,10 +146,10 @@ class Exchange:
         self.contacts = [link for link in links if isinstance(link, SlidingContact)]
         self.all: list[Any] = [*self.links, *self.contacts]
 
-    def cut_contacts(self) -> None:
+    def divide_contacts(self) -> None:
         """Prepare sliding contacts on the grid at the start of the step."""
         for contact in self.contacts:
-            contact.cut()
+            contact.divide_into_pieces()
 
     def fill_ghosts(self, t: float, dt: float) -> None:
         """Contact states from the cells on the old grid, with the ghosts that stand for them."""
@@ -182,7 +189,11 @@ def name_materials(blocks: Sequence[Block], links: Sequence[Link | SlidingContac
     graph = coo_array((np.ones(len(joined)), (leaders, followers)), shape=(len(blocks),) * 2)
     count, bodies = connected_components(graph, directed=False)
     for body in range(count):
-        members = [block for block, own in zip(blocks, bodies, strict=True) if own == body]
+        members = [
+            block
+            for block, body_of_block in zip(blocks, bodies, strict=True)
+            if body_of_block == body
+        ]
         labels = list(dict.fromkeys(block.material for block in members))
         unnamed = len(labels) - MOST_JOINED_NAMES
         if unnamed > 0:
@@ -200,14 +211,14 @@ def join(kind: str, leader: Faces, follower: Faces, **options: Any) -> Link:
     Nodes must match (up to a shift for "periodic") in either order; otherwise raises BadInput.
     options: options of the kind, such as `tension` [N/m] of an interface.
     """
-    one, two = (
+    leader_segment, follower_segment = (
         put(block, side, kind, *faces, **options) for block, side, *faces in (leader, follower)
     )
-    if not isinstance(one, Linked) or not isinstance(two, Linked):
+    if not isinstance(leader_segment, Linked) or not isinstance(follower_segment, Linked):
         raise BadInput(f"segments of kind {kind!r} cannot be joined; use `put`")
     if kind == "sliding":
         raise BadInput("segments of kind 'sliding' are joined by `slide`, not by `join`")
-    return Link(one, two)
+    return Link(leader_segment, follower_segment)
 
 
 def slide(leader: Faces | list[Faces], follower: Faces | list[Faces]) -> SlidingContact:

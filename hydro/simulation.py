@@ -172,7 +172,7 @@ class Simulation:
         if self._mesh != "fixed":
             self._overlaps.watch(everything=callable(self._mesh))
         self._body_source = BodySource(self._shared, self._source)
-        self.exchange.cut_contacts()
+        self.exchange.divide_contacts()
 
     def _update_rates(self) -> None:
         """Rates and totals of states that no step has made."""
@@ -294,8 +294,8 @@ class Simulation:
         row = self.compute_row(record.limit, record.retries)
         if self._measure_block is not None and ranks.size > 1:
             ranks.bring_states()
-            own = [self._measure_block(self._blocks[number]) for number in ranks.own]
-            self._measured = list(ranks.exchange_rows(own, self._measured_numbers))
+            own_rows = [self._measure_block(self._blocks[number]) for number in ranks.own]
+            self._measured = list(ranks.exchange_rows(own_rows, self._measured_numbers))
         self._note_end()  # within the step: every rank has what it reads
         ranks.end_step()
         return row
@@ -309,20 +309,20 @@ class Simulation:
         places = refining.choose(self.step, self.motion.sides.lines)
         if places is None:
             return
-        before = dict(self.__dict__)
+        attributes_before = dict(self.__dict__)
         old = self._blocks
         inside = [block.state[:, 1:-1, 1:-1][..., places[:-1].astype(int)] for block in old]
         self._lay_cells(refining, places.size - 1, inside)
         try:
-            found = refining.lay(places, old, self.motion, self.t)
+            laid_blocks = refining.lay(places, old, self.motion, self.t)
         except RunFailure:
-            self.__dict__.update(before)
+            self.__dict__.update(attributes_before)
             return
-        for block, (nodes, held) in zip(self._blocks, found, strict=True):
+        for block, (nodes, held) in zip(self._blocks, laid_blocks, strict=True):
             block.nodes[...] = block.nodes_new[...] = nodes
             for name, array in held.items():
                 block.get_inside(name)[...] = array
-        self.motion.counts = before["motion"].counts  # of the step that is over
+        self.motion.counts = attributes_before["motion"].counts  # of the step that is over
         self._update_rates()
         self.clock.rate = self.small_cells.find_first_rate(self.t)
 
@@ -341,12 +341,12 @@ class Simulation:
         """Have as many cells as a state of `get_state`, where lines may come and go."""
         if self.refining is None:
             return
-        found = [state.get(f"{block.name}/state") for block in self._blocks]
-        if any(array is None for array in found):
+        states = [state.get(f"{block.name}/state") for block in self._blocks]
+        if any(array is None for array in states):
             return  # told by who reads restart points
-        counts = {array.shape[2] for array in found}
+        counts = {array.shape[2] for array in states}
         if len(counts) == 1 and counts != {self._blocks[0].nj}:
-            self._lay_cells(self.refining, counts.pop(), found)
+            self._lay_cells(self.refining, counts.pop(), states)
 
     def _check_collapse(self) -> None:
         """Raise RunFailure where the next step would be too short to get anywhere.

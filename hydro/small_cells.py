@@ -52,16 +52,17 @@ RELAXED_FRACTION = 0.1
 # A cell's record is a pair of arrays.  `amounts` (4, quantities, ni, nj) has four groups of
 # conserved quantities per volume (mass, momentum x and y, energy, mass times each carried field):
 # what the cell redistributes, mean and slope of its neighbourhood, what it keeps.
-GIVEN, MEAN, SLOPE, KEPT = range(4)
+REDISTRIBUTED, MEAN, SLOPE, KEPT = range(4)
 RECORD_GROUPS = 4
 FLOW_QUANTITIES = 4
-# `sizes` (3, ni, nj): position of that mean along the line, volume, number of its neighbourhoods
-LEVER, VOLUME, PARTS = range(3)
+# `sizes` (3, ni, nj): position of that mean along the line, volume, in how many neighbourhoods it
+# is
+MEAN_POSITION, VOLUME, MEMBERSHIPS = range(3)
 SIZE_ROWS = 3
 
 
 @compiled_once(allocates=False)
-def find_way(nodes, i, j, far_i, far_j):
+def compute_distance(nodes, i, j, far_i, far_j):
     """Distance between the centres of two cells."""
     x = 0.25 * (
         (nodes[0, far_i, far_j] - nodes[0, i, j])
@@ -81,16 +82,16 @@ def find_way(nodes, i, j, far_i, far_j):
 @functools.cache
 def make_measures(geometry: Geometry):
     """Two functions of a geometry: volume of a cell, and its ratio to that in straight faces."""
-    weigh = geometry.volume
+    compute_volume = geometry.volume
 
     @compiled_once(allocates=False)
     def find_volume(nodes, excess, i, j, ni, nj):
-        return measure_volume(nodes, i, j, weigh) + find_excess(excess, i, j, ni, nj)
+        return measure_volume(nodes, i, j, compute_volume) + find_excess(excess, i, j, ni, nj)
 
     @compiled_once(allocates=False)
     def find_volume_factor(nodes, excess, i, j, ni, nj):
         beyond = find_excess(excess, i, j, ni, nj)
-        return 1.0 + beyond / measure_volume(nodes, i, j, weigh) if beyond != 0.0 else 1.0
+        return 1.0 + beyond / measure_volume(nodes, i, j, compute_volume) if beyond != 0.0 else 1.0
 
     return find_volume, find_volume_factor
 
@@ -101,38 +102,42 @@ def make_fill_reaches(geometry: Geometry):
     _, find_volume_factor = make_measures(geometry)
 
     @kernel
-    def fill_reaches(small, rates, limit, nodes, excess, reaches):
-        """Fill `reaches` (ni, nj): extents of the neighbourhoods of the cells `small` (n, 2).
+    def fill_reaches(squeezed, rates, limit, nodes, excess, reaches):
+        """Fill `reaches` (ni, nj): extents of the neighbourhoods of the cells `squeezed` (n, 2).
 
         excess (faces,): volume of perimeter cells beyond their straight faces.  `reaches` > 0:
         number of cells on either side along i; < 0: along j; 0: no neighbourhood.  Returns the
         largest remaining rate [1/s], above `limit` if MOST_REACH cells are too few.
         """
         ni, nj = rates.shape
-        left = limit
-        for n in range(small.shape[0]):
-            i, j = small[n]
-            xi, yi, xj, yj, own = measure_lines(nodes, i, j)
+        remaining_rate = limit
+        for number in range(squeezed.shape[0]):
+            i, j = squeezed[number]
+            xi, yi, xj, yj, area = measure_lines(nodes, i, j)
             along_i = xi * xi + yi * yi < xj * xj + yj * yj
-            own *= find_volume_factor(nodes, excess, i, j, ni, nj)
-            need = own * rates[i, j] / limit
-            held = own
+            area *= find_volume_factor(nodes, excess, i, j, ni, nj)
+            needed = area * rates[i, j] / limit
+            covered = area
             reach = 0
             # at least one, even if by round-off the cell appears large enough
-            while (held < need or reach == 0) and reach < MOST_REACH:
+            while (covered < needed or reach == 0) and reach < MOST_REACH:
                 reach += 1
-                pair = 0.0
-                for way in (-reach, reach):
-                    p, q = (i + way, j) if along_i else (i, j + way)
-                    if 0 <= p < ni and 0 <= q < nj:
+                added = 0.0
+                for offset in (-reach, reach):
+                    other_i, other_j = (i + offset, j) if along_i else (i, j + offset)
+                    if 0 <= other_i < ni and 0 <= other_j < nj:
                         # half of a neighbour's area: the rest may belong to its own neighbourhood
-                        area = measure_lines(nodes, p, q)[4]
-                        pair += 0.5 * area * find_volume_factor(nodes, excess, p, q, ni, nj)
-                held += pair
-            if held < need:
-                left = max(left, own * rates[i, j] / held)
+                        other_area = measure_lines(nodes, other_i, other_j)[4]
+                        added += (
+                            0.5
+                            * other_area
+                            * find_volume_factor(nodes, excess, other_i, other_j, ni, nj)
+                        )
+                covered += added
+            if covered < needed:
+                remaining_rate = max(remaining_rate, area * rates[i, j] / covered)
             reaches[i, j] = reach if along_i else -reach
-        return left
+        return remaining_rate
 
     return fill_reaches
 
@@ -140,9 +145,9 @@ def make_fill_reaches(geometry: Geometry):
 @compiled_once(allocates=False)
 def limit_slope(before, after):
     """The mean of two slopes of equal sign, at most twice the smaller one; otherwise zero."""
-    least = before if abs(before) < abs(after) else after
+    smaller = before if abs(before) < abs(after) else after
     mean = 0.5 * (before + after)
-    slope = mean if abs(mean) < 2.0 * abs(least) else 2.0 * least
+    slope = mean if abs(mean) < 2.0 * abs(smaller) else 2.0 * smaller
     return slope if before * after > 0.0 else 0.0
 
 
@@ -155,10 +160,10 @@ def make_redistribution(eos_class, geometry: Geometry):
     find_volume, find_volume_factor = make_measures(geometry)
 
     @compiled_once
-    def fill_conserved(held, carried, i, j, part, parameters, group, amounts):
+    def fill_conserved(held, carried, i, j, fraction, parameters, group, amounts):
         """Store a fraction of what a cell holds, per volume, in a group of its record."""
         rho, u, v, total = read_cell(held, i, j, parameters)
-        rho *= part
+        rho *= fraction
         amounts[group, 0, i, j] = rho
         amounts[group, 1, i, j] = rho * u
         amounts[group, 2, i, j] = rho * v
@@ -167,120 +172,154 @@ def make_redistribution(eos_class, geometry: Geometry):
             amounts[group, FLOW_QUANTITIES + q, i, j] = rho * carried[q, i + 1, j + 1]
 
     @compiled_once
-    def mark_neighbourhoods(small, reaches, marks, sizes, touched):
+    def mark_neighbourhoods(squeezed, reaches, marks, sizes, touched):
         """List the cells in neighbourhoods (mark 1) and those just beyond their ends (2).
 
-        Fills `marks` (ni, nj), `touched` and, of their sizes, PARTS: in how many neighbourhoods a
-        cell is, its own among them.
+        Fills `marks` (ni, nj), `touched` and, of their sizes, MEMBERSHIPS: in how many
+        neighbourhoods a cell is, its own among them.
         """
         ni, nj = marks.shape
-        for n in range(small.shape[0]):
-            i, j = small[n]
+        for number in range(squeezed.shape[0]):
+            i, j = squeezed[number]
             reach = abs(reaches[i, j])
             along_i = reaches[i, j] > 0
-            for way in range(-reach, reach + 1):
-                a, b = (i + way, j) if along_i else (i, j + way)
-                if 0 <= a < ni and 0 <= b < nj:
-                    if marks[a, b] == 0:
-                        marks[a, b] = 1
-                        touched.append((a, b))
-                        sizes[PARTS, a, b] = 1.0 if reaches[a, b] == 0 else 0.0
-                    sizes[PARTS, a, b] += 1.0
-        for n in range(small.shape[0]):
+            for offset in range(-reach, reach + 1):
+                other_i, other_j = (i + offset, j) if along_i else (i, j + offset)
+                if 0 <= other_i < ni and 0 <= other_j < nj:
+                    if marks[other_i, other_j] == 0:
+                        marks[other_i, other_j] = 1
+                        touched.append((other_i, other_j))
+                        sizes[MEMBERSHIPS, other_i, other_j] = (
+                            1.0 if reaches[other_i, other_j] == 0 else 0.0
+                        )
+                    sizes[MEMBERSHIPS, other_i, other_j] += 1.0
+        for number in range(squeezed.shape[0]):
             # a cell beyond either end of a neighbourhood determines its slope
-            i, j = small[n]
+            i, j = squeezed[number]
             beyond = abs(reaches[i, j]) + 1
             along_i = reaches[i, j] > 0
-            for way in (-beyond, beyond):
-                a, b = (i + way, j) if along_i else (i, j + way)
-                if 0 <= a < ni and 0 <= b < nj and marks[a, b] == 0:
-                    marks[a, b] = 2
-                    touched.append((a, b))
-                    sizes[PARTS, a, b] = 1.0
+            for offset in (-beyond, beyond):
+                other_i, other_j = (i + offset, j) if along_i else (i, j + offset)
+                if 0 <= other_i < ni and 0 <= other_j < nj and marks[other_i, other_j] == 0:
+                    marks[other_i, other_j] = 2
+                    touched.append((other_i, other_j))
+                    sizes[MEMBERSHIPS, other_i, other_j] = 1.0
 
     @compiled_once
-    def fill_means(small, reaches, nodes, record):
+    def fill_means(squeezed, reaches, nodes, record):
         """Mean of each neighbourhood and its position along the line."""
         amounts, sizes = record
         ni, nj = reaches.shape
         total = np.empty(amounts.shape[1])
-        for n in range(small.shape[0]):
-            i, j = small[n]
+        for number in range(squeezed.shape[0]):
+            i, j = squeezed[number]
             along_i = reaches[i, j] > 0
-            volume = sizes[VOLUME, i, j] / sizes[PARTS, i, j]
-            lever = 0.0
+            volume = sizes[VOLUME, i, j] / sizes[MEMBERSHIPS, i, j]
+            moment = 0.0
             for q in range(amounts.shape[1]):
-                total[q] = volume * amounts[GIVEN, q, i, j]
-            for way in range(1, abs(reaches[i, j]) + 1):
-                v1 = v2 = d1 = d2 = 0.0
-                row, column = (i - way, j) if along_i else (i, j - way)
-                a = max(row, 0)
-                b = max(column, 0)
-                if row == a and column == b:
-                    v1 = sizes[VOLUME, a, b] / sizes[PARTS, a, b]
-                    d1 = find_way(nodes, i, j, a, b)
-                row, column = (i + way, j) if along_i else (i, j + way)
-                c = min(row, ni - 1)
-                d = min(column, nj - 1)
-                if row == c and column == d:
-                    v2 = sizes[VOLUME, c, d] / sizes[PARTS, c, d]
-                    d2 = find_way(nodes, i, j, c, d)
+                total[q] = volume * amounts[REDISTRIBUTED, q, i, j]
+            for offset in range(1, abs(reaches[i, j]) + 1):
+                volume_before = volume_after = distance_before = distance_after = 0.0
+                row, column = (i - offset, j) if along_i else (i, j - offset)
+                i_before = max(row, 0)
+                j_before = max(column, 0)
+                if row == i_before and column == j_before:
+                    volume_before = (
+                        sizes[VOLUME, i_before, j_before] / sizes[MEMBERSHIPS, i_before, j_before]
+                    )
+                    distance_before = compute_distance(nodes, i, j, i_before, j_before)
+                row, column = (i + offset, j) if along_i else (i, j + offset)
+                i_after = min(row, ni - 1)
+                j_after = min(column, nj - 1)
+                if row == i_after and column == j_after:
+                    volume_after = (
+                        sizes[VOLUME, i_after, j_after] / sizes[MEMBERSHIPS, i_after, j_after]
+                    )
+                    distance_after = compute_distance(nodes, i, j, i_after, j_after)
                 # if a side has no such cell its weight is zero
-                volume += v1 + v2
-                lever += v2 * d2 - v1 * d1
+                volume += volume_before + volume_after
+                moment += volume_after * distance_after - volume_before * distance_before
                 for q in range(amounts.shape[1]):
-                    total[q] += (v1 * amounts[GIVEN, q, a, b] if v1 > 0.0 else 0.0) + (
-                        v2 * amounts[GIVEN, q, c, d] if v2 > 0.0 else 0.0
+                    total[q] += (
+                        volume_before * amounts[REDISTRIBUTED, q, i_before, j_before]
+                        if volume_before > 0.0
+                        else 0.0
+                    ) + (
+                        volume_after * amounts[REDISTRIBUTED, q, i_after, j_after]
+                        if volume_after > 0.0
+                        else 0.0
                     )
             for q in range(amounts.shape[1]):
                 amounts[MEAN, q, i, j] = total[q] / volume
-            sizes[LEVER, i, j] = lever / volume
+            sizes[MEAN_POSITION, i, j] = moment / volume
 
     @compiled_once
-    def fill_slopes(small, reaches, nodes, record):
+    def fill_slopes(squeezed, reaches, nodes, record):
         """Slope of each neighbourhood, from the means beyond its ends."""
         amounts, sizes = record
         ni, nj = reaches.shape
-        ones = np.zeros(amounts.shape[1])
-        twos = np.zeros(amounts.shape[1])
-        for n in range(small.shape[0]):
-            i, j = small[n]
-            way = abs(reaches[i, j]) + 1
+        slopes_before = np.zeros(amounts.shape[1])
+        slopes_after = np.zeros(amounts.shape[1])
+        for number in range(squeezed.shape[0]):
+            i, j = squeezed[number]
+            offset = abs(reaches[i, j]) + 1
             along_i = reaches[i, j] > 0
-            a, b = (i - way, j) if along_i else (i, j - way)
-            c, d = (i + way, j) if along_i else (i, j + way)
-            low, high = a >= 0 and b >= 0, c < ni and d < nj
-            here = sizes[LEVER, i, j]
-            before = after = 1.0
-            if low:
-                turn = sizes[LEVER, a, b] if (reaches[a, b] > 0) == along_i else 0.0
-                far = find_way(nodes, i, j, a, b)
-                gap = here + far - turn
+            i_before, j_before = (i - offset, j) if along_i else (i, j - offset)
+            i_after, j_after = (i + offset, j) if along_i else (i, j + offset)
+            has_before, has_after = i_before >= 0 and j_before >= 0, i_after < ni and j_after < nj
+            position = sizes[MEAN_POSITION, i, j]
+            inverse_before = inverse_after = 1.0
+            if has_before:
+                position_beyond = (
+                    sizes[MEAN_POSITION, i_before, j_before]
+                    if (reaches[i_before, j_before] > 0) == along_i
+                    else 0.0
+                )
+                distance = compute_distance(nodes, i, j, i_before, j_before)
+                gap = position + distance - position_beyond
                 # neighbourhoods whose means nearly coincide determine no slope
-                before = 1.0 / gap if gap > 0.5 * far else 0.0
-            if high:
-                turn = sizes[LEVER, c, d] if (reaches[c, d] > 0) == along_i else 0.0
-                far = find_way(nodes, i, j, c, d)
-                gap = far + turn - here
-                after = 1.0 / gap if gap > 0.5 * far else 0.0
+                inverse_before = 1.0 / gap if gap > 0.5 * distance else 0.0
+            if has_after:
+                position_beyond = (
+                    sizes[MEAN_POSITION, i_after, j_after]
+                    if (reaches[i_after, j_after] > 0) == along_i
+                    else 0.0
+                )
+                distance = compute_distance(nodes, i, j, i_after, j_after)
+                gap = distance + position_beyond - position
+                inverse_after = 1.0 / gap if gap > 0.5 * distance else 0.0
             for q in range(amounts.shape[1]):
                 mean = amounts[MEAN, q, i, j]
-                one = (mean - amounts[MEAN, q, a, b]) * before if low else 0.0
-                two = (amounts[MEAN, q, c, d] - mean) * after if high else 0.0
-                ones[q] = one if low else two
-                twos[q] = two if high else one
+                step_before = (
+                    (mean - amounts[MEAN, q, i_before, j_before]) * inverse_before
+                    if has_before
+                    else 0.0
+                )
+                step_after = (
+                    (amounts[MEAN, q, i_after, j_after] - mean) * inverse_after
+                    if has_after
+                    else 0.0
+                )
+                slopes_before[q] = step_before if has_before else step_after
+                slopes_after[q] = step_after if has_after else step_before
             # momentum along the line and across it, so that slopes are rotation invariant
             xi, yi, xj, yj, _ = measure_lines(nodes, i, j)
-            x, y = (xi, yi) if along_i else (xj, yj)
-            length = (x * x + y * y) ** 0.5
-            x, y = x / length, y / length
-            along = limit_slope(x * ones[1] + y * ones[2], x * twos[1] + y * twos[2])
-            across = limit_slope(x * ones[2] - y * ones[1], x * twos[2] - y * twos[1])
-            amounts[SLOPE, 0, i, j] = limit_slope(ones[0], twos[0])
-            amounts[SLOPE, 1, i, j] = x * along - y * across
-            amounts[SLOPE, 2, i, j] = y * along + x * across
-            for q in range(3, ones.size):
-                amounts[SLOPE, q, i, j] = limit_slope(ones[q], twos[q])
+            along_x, along_y = (xi, yi) if along_i else (xj, yj)
+            length = (along_x * along_x + along_y * along_y) ** 0.5
+            along_x, along_y = along_x / length, along_y / length
+            along = limit_slope(
+                along_x * slopes_before[1] + along_y * slopes_before[2],
+                along_x * slopes_after[1] + along_y * slopes_after[2],
+            )
+            across = limit_slope(
+                along_x * slopes_before[2] - along_y * slopes_before[1],
+                along_x * slopes_after[2] - along_y * slopes_after[1],
+            )
+            amounts[SLOPE, 0, i, j] = limit_slope(slopes_before[0], slopes_after[0])
+            amounts[SLOPE, 1, i, j] = along_x * along - along_y * across
+            amounts[SLOPE, 2, i, j] = along_y * along + along_x * across
+            for q in range(3, slopes_before.size):
+                amounts[SLOPE, q, i, j] = limit_slope(slopes_before[q], slopes_after[q])
 
     @compiled_once
     def gather_shares(i, j, reaches, nodes, record, sums):
@@ -293,29 +332,34 @@ def make_redistribution(eos_class, geometry: Geometry):
         total[:] = 0.0
         for along_i in (True, False):
             line[:] = 0.0
-            for way in range(1, MOST_REACH + 1):
+            for offset in range(1, MOST_REACH + 1):
                 pair[:] = 0.0
-                for side in (-way, way):
-                    a, b = (i + side, j) if along_i else (i, j + side)
-                    if not (0 <= a < ni and 0 <= b < nj):
+                for shift in (-offset, offset):
+                    other_i, other_j = (i + shift, j) if along_i else (i, j + shift)
+                    if not (0 <= other_i < ni and 0 <= other_j < nj):
                         continue
-                    reach = reaches[a, b] if along_i else -reaches[a, b]
-                    if reach < way:
+                    reach = reaches[other_i, other_j] if along_i else -reaches[other_i, other_j]
+                    if reach < offset:
                         continue
-                    far = find_way(nodes, i, j, a, b)
+                    distance = compute_distance(nodes, i, j, other_i, other_j)
                     # the other cell's neighbourhood is on that side: this cell precedes it
-                    far = (-far if side > 0 else far) - sizes[LEVER, a, b]
+                    distance = (-distance if shift > 0 else distance) - sizes[
+                        MEAN_POSITION, other_i, other_j
+                    ]
                     for q in range(amounts.shape[1]):
-                        pair[q] += amounts[MEAN, q, a, b] + amounts[SLOPE, q, a, b] * far
+                        pair[q] += (
+                            amounts[MEAN, q, other_i, other_j]
+                            + amounts[SLOPE, q, other_i, other_j] * distance
+                        )
                 for q in range(amounts.shape[1]):
                     line[q] += pair[q]
             for q in range(amounts.shape[1]):
                 total[q] += line[q]
-        far = -sizes[LEVER, i, j]
-        part = 1.0 / sizes[PARTS, i, j]
+        distance = -sizes[MEAN_POSITION, i, j]
+        inverse_count = 1.0 / sizes[MEMBERSHIPS, i, j]
         for q in range(amounts.shape[1]):
-            own = amounts[MEAN, q, i, j] + amounts[SLOPE, q, i, j] * far
-            total[q] = (total[q] + own) * part + amounts[KEPT, q, i, j]
+            own_value = amounts[MEAN, q, i, j] + amounts[SLOPE, q, i, j] * distance
+            total[q] = (total[q] + own_value) * inverse_count + amounts[KEPT, q, i, j]
 
     @kernel
     def redistribute(squeezed, grids, excess, inverse_dt, parameters, before, after, scratch):
@@ -342,19 +386,19 @@ def make_redistribution(eos_class, geometry: Geometry):
         voided = 0
         for i, j in touched:
             voided -= 1 if marks[i, j] == 1 and has_voids(held, i, j) else 0
-            fill_conserved(held, carried, i, j, 1.0, parameters, GIVEN, amounts)
+            fill_conserved(held, carried, i, j, 1.0, parameters, REDISTRIBUTED, amounts)
             kept = 1.0 - RELAXED_FRACTION
             fill_conserved(held_before, carried_before, i, j, kept, parameters, KEPT, amounts)
             sizes[VOLUME, i, j] = find_volume(nodes_new, excess, i, j, ni, nj)
-            sizes[LEVER, i, j] = 0.0
+            sizes[MEAN_POSITION, i, j] = 0.0
             for q in range(amounts.shape[1]):
-                amounts[GIVEN, q, i, j] -= amounts[KEPT, q, i, j]
-                amounts[MEAN, q, i, j] = amounts[GIVEN, q, i, j]
+                amounts[REDISTRIBUTED, q, i, j] -= amounts[KEPT, q, i, j]
+                amounts[MEAN, q, i, j] = amounts[REDISTRIBUTED, q, i, j]
                 amounts[SLOPE, q, i, j] = 0.0
         # means and slopes of the neighbourhoods (theory F7.4)
         fill_means(small, reaches, nodes_new, record)
         fill_slopes(small, reaches, nodes_new, record)
-        least = 1e300
+        least_c2 = 1e300
         changed = 0
         sums = np.empty((3, amounts.shape[1]))
         total = sums[0]
@@ -372,7 +416,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                 carried[q, i + 1, j + 1] = total[FLOW_QUANTITIES + q] / rho
             voided += 1 if is_voided else 0
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
-            least = min(least, c2)
+            least_c2 = min(least_c2, c2)
             # its rate, relative to its own mean velocity (theory F7.1)
             xi, yi, xj, yj, area = measure_lines(nodes_new, i, j)
             w_x = w_y = 0.0
@@ -387,10 +431,10 @@ def make_redistribution(eos_class, geometry: Geometry):
             v -= 0.25 * w_y * inverse_dt
             area *= find_volume_factor(nodes_new, excess, i, j, ni, nj)
             rates[i, j], _ = compute_rate(u, v, max(c2, 0.0), xi, yi, xj, yj, 1.0 / area)
-        # the scratch as it was
+        # the marks are zero again, as the next call expects them
         for i, j in touched:
             marks[i, j] = 0
-        return changed, least, voided
+        return changed, least_c2, voided
 
     return redistribute
 
@@ -415,13 +459,13 @@ class BlockRedistribution:
         self.block = block
         self.reaches: np.ndarray | None = None
 
-    def _find_small(self, limit: float, rows: Rows) -> np.ndarray:
+    def _find_squeezed(self, limit: float, rows: Rows) -> np.ndarray:
         """The cells (n, 2) of these rows whose rate is above `limit`."""
-        found = np.flatnonzero(self.block.rates[slice(*rows)] > limit)
-        small = np.empty((found.size, 2), dtype=np.int64)
-        np.divmod(found, self.block.nj, out=(small[:, 0], small[:, 1]))
-        small[:, 0] += rows[0]
-        if len(small) and self.reaches is None:
+        places = np.flatnonzero(self.block.rates[slice(*rows)] > limit)
+        squeezed = np.empty((places.size, 2), dtype=np.int64)
+        np.divmod(places, self.block.nj, out=(squeezed[:, 0], squeezed[:, 1]))
+        squeezed[:, 0] += rows[0]
+        if len(squeezed) and self.reaches is None:
             block = self.block
             self.reaches = np.zeros((block.ni, block.nj), dtype=np.int64)
             self.marks = np.zeros((block.ni, block.nj), dtype=np.int64)
@@ -430,50 +474,54 @@ class BlockRedistribution:
             self.record = amounts, np.zeros((SIZE_ROWS, block.ni, block.nj))
             self.fill_reaches = make_fill_reaches(block.geometry)
             self.redistribute = make_redistribution(type(block.eos), block.geometry)
-        return small
+        return squeezed
 
-    def _clear_reaches(self, small: np.ndarray) -> None:
-        """Make `reaches` zero again, as they are between two uses, at the cells `small` (n, 2)."""
-        self.reaches[small[:, 0], small[:, 1]] = 0
+    def _clear_reaches(self, squeezed: np.ndarray) -> None:
+        """Make `reaches` zero again, as they are between two uses, at the cells `squeezed` (n,
+        2)."""
+        self.reaches[squeezed[:, 0], squeezed[:, 1]] = 0
 
-    def find_rate_left(self, limit: float, rows: Rows) -> float:
+    def find_remaining_rate(self, limit: float, rows: Rows) -> float:
         """The largest rate of these rows if all cells above `limit` are redistributed.
 
-        0 without rows: a part of a cut block has none if no cell is above.
+        0 if `rows` is empty, as it is in a cut block where no rank has a cell above `limit`.
         """
-        small = self._find_small(limit, rows)
+        squeezed = self._find_squeezed(limit, rows)
         rates = self.block.rates
-        if len(small) == 0:
+        if len(squeezed) == 0:
             return float(rates[slice(*rows)].max(initial=0.0))
         block = self.block
-        left = self.fill_reaches(
-            small, rates, limit, block.nodes, block.excess_volume_new, self.reaches
+        remaining_rate = self.fill_reaches(
+            squeezed, rates, limit, block.nodes, block.excess_volume_new, self.reaches
         )
-        self._clear_reaches(small)
-        return left
+        self._clear_reaches(squeezed)
+        return remaining_rate
 
     def redistribute_rows(self, limit: float, inverse_dt: float, rows: Rows) -> int:
         """Redistribute the new state at too small cells of these rows; returns how many changed."""
         block = self.block
-        small = self._find_small(limit, rows)
-        if len(small) == 0:
+        squeezed = self._find_squeezed(limit, rows)
+        if len(squeezed) == 0:
             return 0
-        self.fill_reaches(small, block.rates, limit, block.nodes, block.excess_volume, self.reaches)
-        block.redistributed_cells, least, voided = self.redistribute(
-            (small, self.reaches), (block.nodes, block.nodes_new), block.excess_volume_new,
+        self.fill_reaches(
+            squeezed, block.rates, limit, block.nodes, block.excess_volume, self.reaches
+        )
+        block.redistributed_cells, least_c2, voided = self.redistribute(
+            (squeezed, self.reaches), (block.nodes, block.nodes_new), block.excess_volume_new,
             inverse_dt, block.parameters, (tuple(block.list_starts()), block.get_start("carried")),
             (tuple(block.list_new()), block.carried_new, block.rates_new),
             (self.marks, self.record),
         )  # fmt: skip
-        block.totals.add_redistributed(least, voided)
-        self._clear_reaches(small)
+        block.totals.add_redistributed(least_c2, voided)
+        self._clear_reaches(squeezed)
         return block.redistributed_cells
 
 
 class SmallCells:
     """Small cells of all blocks; `share`: the fraction of a block's cells that may be too small.
 
-    Before the time `start` [s] no cell is: those that are finer then are meant to be.
+    Before the time `start` [s] no cell counts as too small: those that are finer until then are
+    wanted.
     """
 
     def __init__(self, blocks: Blocks, share: float, start: float = 0.0):
@@ -484,14 +532,14 @@ class SmallCells:
         self.scanned: Sequence[Sequence[Any]] = []  # of all blocks, by `scan`
         self.allowed = float(share)
         self.start = start
-        self.part = 0.0  # of `allowed`, by `set_time`
+        self.part = 0.0  # `allowed`, or 0 before `start`: by `set_time`
         self.counts = np.zeros(SIZE_BINS, dtype=np.int64)
         self.kept = np.empty(max(block.ni * block.nj for block in blocks))
         self.changed = 0
         self.fastest = Fastest(0.0, 0, 0, 0)
 
     def set_time(self, t: float) -> None:
-        """May cells be too small at t [s]?"""
+        """Allow the fraction `allowed` of small cells from the time `start` on, none before it."""
         self.part = self.allowed if t >= self.start else 0.0
 
     def find_first_rate(self, t: float) -> float:
@@ -514,28 +562,28 @@ class SmallCells:
         above = self._find_rows_above(limit)
         for number, cut in self.blocks.cuts.items():
             cut.gather_rows(cut.block.rates, above[number])
-        left = [
-            [self.redistributions[number].find_rate_left(limit, above[number])]
+        remaining_rates = [
+            [self.redistributions[number].find_remaining_rate(limit, above[number])]
             for number in self.blocks.own
         ]
-        return max(rate for (rate,) in self.blocks.exchange_rows(left, 1))
+        return max(rate for (rate,) in self.blocks.exchange_rows(remaining_rates, 1))
 
     def scan(self, number: int) -> tuple[float, int, int, float, bool]:
         """`scan_state` of a block, collectively with its other ranks if it is cut."""
         block = self.redistributions[number].block
         cut = self.blocks.cuts.get(number)
         if cut is None:
-            found = scan_state.entry(
+            fastest_cells = scan_state.entry(
                 block.totals.rows, block.totals.array, block.rates_new, block.crowding, self.part,
                 self.counts, self.kept,
             )  # fmt: skip
             block.totals.read_array()
-            return found
-        edge = np.inf
+            return fastest_cells
+        most_crowded = np.inf
         if self.part > 0.0:
-            how = self.part, SQUEEZED_CROWDING_RATIO, self.counts, self.kept
-            edge = find_most_crowded_of_bands(cut, *how)
-        return (*scan_rates_of_bands(cut, edge), block.totals.sum_up())
+            options = self.part, SQUEEZED_CROWDING_RATIO, self.counts, self.kept
+            most_crowded = find_most_crowded_of_bands(cut, *options)
+        return (*scan_rates_of_bands(cut, most_crowded), block.totals.sum_up())
 
     def _find_rows_above(self, limit: float) -> dict[int, Rows]:
         """The rows of each block on this rank to be searched for rates above `limit`."""
@@ -549,33 +597,41 @@ class SmallCells:
 
     def find_fastest(self) -> None:
         """Find the fastest cell again, for a restored state."""
-        found = [scan_rates(s.block.rates, s.block.crowding, np.inf) for s in self.redistributions]
-        number = max(range(len(found)), key=lambda n: found[n][0])
-        self.fastest = Fastest(found[number][0], number, *found[number][1:3])
+        fastest_cells = [
+            scan_rates(s.block.rates, s.block.crowding, np.inf) for s in self.redistributions
+        ]
+        number = max(range(len(fastest_cells)), key=lambda n: fastest_cells[n][0])
+        self.fastest = Fastest(fastest_cells[number][0], number, *fastest_cells[number][1:3])
 
     def redistribute_states(self, rate: float, dt: float) -> None:
         """Redistribute the new states of cells above `rate`, for which `dt` is stable."""
         self.changed = 0
-        for one in self.redistributions:
-            one.block.redistributed_cells = 0  # from the last step, or from this one before a retry
+        for redistribution in self.redistributions:
+            redistribution.block.redistributed_cells = (
+                0  # from the last step, or from this one before a retry
+            )
         if self.fastest.rate <= rate * RATE_MARGIN:
             return
         limit = rate * RATE_MARGIN
         above = self._find_rows_above(limit)
         for number, cut in self.blocks.cuts.items():
             block = cut.block
-            for array in (*_list_mended(block), block.rates, *block.list_starts(block.held_arrays)):
+            for array in (
+                *list_redistributed_arrays(block),
+                block.rates,
+                *block.list_starts(block.held_arrays),
+            ):
                 cut.gather_rows(array, above[number])
         changed = [
             [self.redistributions[number].redistribute_rows(limit, 1.0 / dt, above[number])]
             for number in self.blocks.own
         ]
         for number, cut in self.blocks.cuts.items():
-            for array in _list_mended(cut.block):
+            for array in list_redistributed_arrays(cut.block):
                 cut.return_rows(array, above[number])
         self.changed = sum(int(count) for (count,) in self.blocks.exchange_rows(changed, 1))
 
 
-def _list_mended(block: Block) -> tuple[np.ndarray, ...]:
+def list_redistributed_arrays(block: Block) -> tuple[np.ndarray, ...]:
     """The arrays that redistribution changes."""
     return *block.list_new(block.held_arrays), block.rates_new

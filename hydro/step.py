@@ -131,21 +131,21 @@ def take_step(flow: Flow) -> StepRecord:
     # 1 dt from the largest rate of all blocks; halved for as long as the step fails
     dt, record.limit = flow.clock.choose_dt()
     first_dt = dt
-    while reason := try_step(flow, dt):
-        if isinstance(reason, Touch):
-            dt = reason.dt
+    while outcome := try_step(flow, dt):
+        if isinstance(outcome, Touch):
+            dt = outcome.dt
             first_dt = dt
             record.limit = "touch"
             continue
-        record.reason = reason
+        record.reason = outcome
         record.retries += 1
         if record.retries > MOST_RETRIES:
-            raise reason.tell(
-                f"{reason}, t = {flow.clock.t:.6g} s (step {flow.clock.step}); dt was cut "
+            raise outcome.tell(
+                f"{outcome}, t = {flow.clock.t:.6g} s (step {flow.clock.step}); dt was cut "
                 f"{MOST_RETRIES} times to {dt:.3g} s without success",
                 RunFailure,
             )
-        if lower_order(flow, reason):
+        if lower_order(flow, outcome):
             dt = first_dt
         else:
             dt = 0.5 * dt
@@ -204,7 +204,7 @@ def fill_states_beyond(flow: Flow, dt: float) -> None:
     t = flow.clock.t
     with flow.watch("sides"):
         # 2 states beyond all sides; slopes and mid-time states of the cells along them
-        flow.exchange.cut_contacts()  # sliding contacts: both lines cut into pieces
+        flow.exchange.divide_contacts()  # sliding contacts: both lines divided into pieces
         flow.source.start_step(t, dt)  # first half of gravity and heating
         for block in flow.blocks:
             phases.gather(block, t)  # cells along the sides, mirrored in walls
@@ -281,6 +281,6 @@ def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
     if flow.source.function is not None:
         flow.ledger.add_source(flow.source.gained)
     flow.ledger.add_boundary(dt)
-    flow.ledger.keep_in_voids(flow.voids.work, flow.voids.energy_left)
+    flow.ledger.count_void_energy(flow.voids.work, flow.voids.energy_left)
     rate = flow.small_cells.find_rate()
     record.last = flow.clock.tick(dt, record.limit, rate, flow.motion.sides.stretching)

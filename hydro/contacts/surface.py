@@ -140,7 +140,7 @@ class Surface:
         at some time, and the pressure where it is free."""
         arrays = self.arrays
         arrays.states[: rows.stop - rows.start] = self._view(rows)
-        arrays.open_p[:] = self._view(P_STAR)
+        arrays.gap_p[:] = self._view(P_STAR)
         fill_slopes.entry(line, arrays)
 
     def put_cover(self, state: int) -> None:

@@ -19,6 +19,11 @@ from shockgrid.hydro.formulas.geometry import compute_radius_weighted_face
 from shockgrid.hydro.rows import P, U, V
 from shockgrid.regrid.jit import compiled_once, kernel
 
+# cosine of the angle between two faces' normals below which there is a corner; the curve is smooth
+# from a cosine greater by 1/CORNER_BLEND_RATE on
+CORNER_COSINE = 0.8
+CORNER_BLEND_RATE = 10.0
+
 
 @compiled_once
 def measure_square(line, a):
@@ -27,35 +32,36 @@ def measure_square(line, a):
 
 
 @kernel
-def fill_squares(line, squares):
+def fill_squares(nodes, squares):
     """Squared lengths (n,) of all faces of a line; returns the length of the longest."""
-    most = 0.0
+    largest = 0.0
     for a in range(squares.shape[0]):
-        squares[a] = measure_square(line, a)
-        most = max(most, squares[a])
-    return most**0.5
+        squares[a] = measure_square(nodes, a)
+        largest = max(largest, squares[a])
+    return largest**0.5
 
 
 @compiled_once
 def project(line, a, point_x, point_y):
-    """Part of face `a` of a line nearest to a point (0..1), and the squared distance."""
+    """Fraction of face `a` of a line at which it is nearest to a point, and the squared
+    distance."""
     x, y = line[0, a], line[1, a]
     dx = line[0, a + 1] - x
     dy = line[1, a + 1] - y
-    part = ((point_x - x) * dx + (point_y - y) * dy) / (dx * dx + dy * dy)
-    part = min(1.0, max(0.0, part))
-    away_x = x + part * dx - point_x
-    away_y = y + part * dy - point_y
-    return part, away_x * away_x + away_y * away_y
+    fraction = ((point_x - x) * dx + (point_y - y) * dy) / (dx * dx + dy * dy)
+    fraction = min(1.0, max(0.0, fraction))
+    away_x = x + fraction * dx - point_x
+    away_y = y + fraction * dy - point_y
+    return fraction, away_x * away_x + away_y * away_y
 
 
 @compiled_once
 def find_point(line, a, position):
     """Point of face `a` of a line at a position: the number of the face and a part of it."""
-    part = position - a
+    fraction = position - a
     return (
-        line[0, a] + part * (line[0, a + 1] - line[0, a]),
-        line[1, a] + part * (line[1, a + 1] - line[1, a]),
+        line[0, a] + fraction * (line[0, a + 1] - line[0, a]),
+        line[1, a] + fraction * (line[1, a + 1] - line[1, a]),
     )
 
 
@@ -75,22 +81,23 @@ def compute_normal_at(line, a, end, ring, orientation):
     `ring`: the line's ends meet.
     """
     last = line.shape[1] - 2
-    b = a - 1 + 2 * end
+    neighbour = a - 1 + 2 * end
     if ring:
-        b = last if b < 0 else (0 if b > last else b)
-    b = min(max(b, 0), last)
+        neighbour = last if neighbour < 0 else (0 if neighbour > last else neighbour)
+    neighbour = min(max(neighbour, 0), last)
     x, y = compute_normal(line, a, orientation)
-    x_next, y_next = compute_normal(line, b, orientation)
-    part = 0.5 * min(1.0, max(0.0, 10.0 * (x * x_next + y * y_next - 0.8)))
-    return x + part * (x_next - x), y + part * (y_next - y)
+    x_next, y_next = compute_normal(line, neighbour, orientation)
+    cosine = x * x_next + y * y_next
+    blend = 0.5 * min(1.0, max(0.0, CORNER_BLEND_RATE * (cosine - CORNER_COSINE)))
+    return x + blend * (x_next - x), y + blend * (y_next - y)
 
 
 @compiled_once
-def find_curve_normal(line, a, part, ring, orientation):
+def find_curve_normal(line, a, fraction, ring, orientation):
     """Normal, of length 1 or a little less, of the curve at a part of face `a`."""
     start_x, start_y = compute_normal_at(line, a, 0, ring, orientation)
     end_x, end_y = compute_normal_at(line, a, 1, ring, orientation)
-    return start_x + part * (end_x - start_x), start_y + part * (end_y - start_y)
+    return start_x + fraction * (end_x - start_x), start_y + fraction * (end_y - start_y)
 
 
 @kernel
@@ -114,24 +121,24 @@ def fill_radius_weighted_areas(old, new, orientation, inverse_dt, facets, count)
 
 
 @compiled_once
-def compute_share(before, after):
+def compute_van_leer_weights(square_before, square_after):
     """Weights of two differences in van Leer's mean, from their squares."""
-    before = before**0.5
-    after = after**0.5
-    total = before + after
-    return (after / total, before / total) if total > 0.0 else (0.0, 0.0)
+    square_before = square_before**0.5
+    square_after = square_after**0.5
+    total = square_before + square_after
+    return (square_after / total, square_before / total) if total > 0.0 else (0.0, 0.0)
 
 
 @kernel
-def fill_slopes(nodes, line):
+def fill_slopes(nodes, arrays):
     """Middles of the faces, and limited slopes of the states along the line: of `LineArrays`.
 
     nodes (2, n + 1).  The velocity is limited as a vector, so that a turned flow has the same
     slopes; there are none at both ends.
     """
-    states = line.states
-    middles = line.middles
-    slopes = line.slopes
+    states = arrays.states
+    middles = arrays.middles
+    slopes = arrays.slopes
     last = middles.shape[1] - 1
     # middles of the faces
     for k in range(last + 1):
@@ -156,9 +163,11 @@ def fill_slopes(nodes, line):
         p = (states[P, k] - states[P, k - 1]) * before
         p_next = (states[P, k + 1] - states[P, k]) * after
         if u * u_next + v * v_next > 0.0:
-            one, two = compute_share(u * u + v * v, u_next * u_next + v_next * v_next)
-            slopes[U_SLOPE, k] = one * u + two * u_next
-            slopes[V_SLOPE, k] = one * v + two * v_next
+            weight_before, weight_after = compute_van_leer_weights(
+                u * u + v * v, u_next * u_next + v_next * v_next
+            )
+            slopes[U_SLOPE, k] = weight_before * u + weight_after * u_next
+            slopes[V_SLOPE, k] = weight_before * v + weight_after * v_next
         if p * p_next > 0.0:
-            one, two = compute_share(p * p, p_next * p_next)
-            slopes[P_SLOPE, k] = one * p + two * p_next
+            weight_before, weight_after = compute_van_leer_weights(p * p, p_next * p_next)
+            slopes[P_SLOPE, k] = weight_before * p + weight_after * p_next

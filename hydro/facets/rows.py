@@ -20,20 +20,20 @@ END_ROWS = 4
 # faces (7, facets): area outwards of the leader, swept volume per time, middle, unit normal of the
 # curve for which the lines stand
 AREA_X, AREA_Y, SWEPT_RATE, FACE_X, FACE_Y, NORMAL_X, NORMAL_Y = range(7)
-FACE_ROWS = 7
+GEOMETRY_ROWS = 7
 AREAS = slice(AREA_X, SWEPT_RATE + 1)
 AREA_ROWS = 3
 
 # states (7, facets): is it closed (1 or 0), pressure, speed of the facet beyond either side's own
 # outwards of the leader, slip speed, velocity with which the leader's line moves there
 CLOSED, FACET_P, EXCESS_LEADER, EXCESS_FOLLOWER, FACET_SLIP, FACET_U, FACET_V = range(7)
-FACET_ROWS = 7
+CONTACT_ROWS = 7
 
 # states (7, faces) of a line's cells at their faces, or traces: rho, u, v, p as in `hydro.rows`,
 # then sound speed, specific internal energy, c²
 STATE_C = 4
 STATE_E = 5
-FACE_STATE_ROWS = 7
+TRACE_ROWS = 7
 
 # slopes along a line: unit direction, change of velocity and pressure per length
 ALONG_X, ALONG_Y, U_SLOPE, V_SLOPE, P_SLOPE = range(5)
@@ -60,13 +60,13 @@ class Facets(NamedTuple):
 
 def make_facets(most: int, curved: bool) -> Facets:
     """Arrays for `most` facets; curved: axisymmetric flow."""
-    faces = np.zeros((FACE_ROWS, most))
+    faces = np.zeros((GEOMETRY_ROWS, most))
     return Facets(
         owners=np.zeros((2, most), dtype=np.int64),
         ends=np.zeros((END_ROWS, most)),
         faces=faces,
         areas=np.zeros((AREA_ROWS, most)) if curved else faces[AREAS],
-        states=np.zeros((FACET_ROWS, most)),
+        states=np.zeros((CONTACT_ROWS, most)),
     )
 
 
@@ -75,7 +75,7 @@ class LineArrays(NamedTuple):
 
     states (7, n): see above; laws (3, n): `EquationOfState.wave_law` of the materials; middles
     (2, n) of the faces; slopes (5, n) of the states along the line; squares (n,): of a facet's
-    length over its weight in `sums`; open_p (n,): pressure beyond a face where it is free; sums
+    length over its weight in `sums`; gap_p (n,): pressure beyond a face where it is free; sums
     (6, n) over the faces' facets; flux (6, n), outwards; rigid: it is a wall, which moves with
     `velocity` (2,) and has no states.
     """
@@ -85,7 +85,7 @@ class LineArrays(NamedTuple):
     middles: np.ndarray
     slopes: np.ndarray
     squares: np.ndarray
-    open_p: np.ndarray
+    gap_p: np.ndarray
     sums: np.ndarray
     flux: np.ndarray
     rigid: bool
@@ -96,12 +96,12 @@ def make_line_arrays(laws: np.ndarray, rigid: bool = False) -> LineArrays:
     """Arrays for a line of faces with these wave laws (3, n); beyond a wall there is no void."""
     count = laws.shape[1]
     return LineArrays(
-        states=np.zeros((FACE_STATE_ROWS, count)),
+        states=np.zeros((TRACE_ROWS, count)),
         laws=np.ascontiguousarray(laws, dtype=float),
         middles=np.zeros((2, count)),
         slopes=np.zeros((SLOPE_ROWS, count)),
         squares=np.ones(count),
-        open_p=np.full(count, -np.inf if rigid else 0.0),
+        gap_p=np.full(count, -np.inf if rigid else 0.0),
         sums=np.zeros((SUM_ROWS, count)),
         flux=np.zeros((FLUX_ROWS, count)),
         rigid=rigid,

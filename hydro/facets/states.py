@@ -62,30 +62,30 @@ def compute_state_at(line, k, x, y):
         return 0.0, line.velocity[0], line.velocity[1], 0.0, 0.0, (0.0, 0.0, 0.0)
     states = line.states
     slopes = line.slopes
-    way = (x - line.middles[0, k]) * slopes[ALONG_X, k]
-    way += (y - line.middles[1, k]) * slopes[ALONG_Y, k]
-    u = states[U, k] + way * slopes[U_SLOPE, k]
-    v = states[V, k] + way * slopes[V_SLOPE, k]
-    p = states[P, k] + way * slopes[P_SLOPE, k]
-    law = line.laws[0, k], line.laws[1, k], line.laws[2, k]
-    return states[RHO, k], u, v, p, states[STATE_C, k], law
+    distance = (x - line.middles[0, k]) * slopes[ALONG_X, k]
+    distance += (y - line.middles[1, k]) * slopes[ALONG_Y, k]
+    u = states[U, k] + distance * slopes[U_SLOPE, k]
+    v = states[V, k] + distance * slopes[V_SLOPE, k]
+    p = states[P, k] + distance * slopes[P_SLOPE, k]
+    wave_law = line.laws[0, k], line.laws[1, k], line.laws[2, k]
+    return states[RHO, k], u, v, p, states[STATE_C, k], wave_law
 
 
 @compiled_once
-def press_together(rigid, own, other):
+def solve_contact_state(rigid, leader_state, follower_state):
     """Pressure and normal speed of the contact between two states (rho, w, p, c, law)."""
     if not rigid:
-        return compute_contact(own, other, 0.0)
-    rho, w, p, c, law = other
-    pressure, _ = compute_wave_pressure(rho, p, c, law, own[1] - w)
-    return pressure, own[1]
+        return compute_contact(leader_state, follower_state, 0.0)
+    rho, w, p, c, wave_law = follower_state
+    pressure, _ = compute_wave_pressure(rho, p, c, wave_law, leader_state[1] - w)
+    return pressure, leader_state[1]
 
 
 @compiled_once
 def find_free_speed(rigid, state, pressure):
     """Normal speed of a surface at a pressure, outwards of its state (rho, w, p, c, law)."""
-    rho, w, p, c, law = state
-    return w if rigid else compute_speed_at_pressure(rho, w, p, c, law, pressure)
+    rho, w, p, c, wave_law = state
+    return w if rigid else compute_speed_at_pressure(rho, w, p, c, wave_law, pressure)
 
 
 @kernel
@@ -108,43 +108,43 @@ def solve_facets(leader, follower, facets, count, bond, round_off):
         b = facets.owners[FOLLOWER, k]
         x, y = facets.faces[FACE_X, k], facets.faces[FACE_Y, k]
         nx, ny = facets.faces[NORMAL_X, k], facets.faces[NORMAL_Y, k]
-        rho, u, v, p, c, law = compute_state_at(leader, a, x, y)
+        rho, u, v, p, c, wave_law = compute_state_at(leader, a, x, y)
         w = u * nx + v * ny
-        own = (rho, w, p, c, law)
-        other = own
+        leader_state = (rho, w, p, c, wave_law)
+        follower_state = leader_state
         # the contact with the follower, if there is one
-        void = leader.open_p[a]
+        gap_pressure = leader.gap_p[a]
         is_closed = False
         pressure = 0.0
         speed = 0.0
         slip = 0.0
         w_other = 0.0
         if b >= 0:
-            rho_other, u_other, v_other, p_other, c_other, law_other = compute_state_at(
+            rho_other, u_other, v_other, p_other, c_other, wave_law_other = compute_state_at(
                 follower, b, x, y
             )
             w_other = u_other * nx + v_other * ny
-            other = (rho_other, w_other, p_other, c_other, law_other)
-            pressure, speed = press_together(leader.rigid, own, other)
+            follower_state = (rho_other, w_other, p_other, c_other, wave_law_other)
+            pressure, speed = solve_contact_state(leader.rigid, leader_state, follower_state)
             slip = abs((u - u_other) * ny - (v - v_other) * nx)
-            void = max(void, follower.open_p[b])
+            gap_pressure = max(gap_pressure, follower.gap_p[b])
             stiffness = max(rho * c * c, rho_other * c_other * c_other)
-            least = void - bond - round_off * stiffness
-            is_closed = not pressure < least
-            if pressure < least - ROUND_OFF_TENSION * rho * c * c:
+            least_pressure = gap_pressure - bond - round_off * stiffness
+            is_closed = not pressure < least_pressure
+            if pressure < least_pressure - ROUND_OFF_TENSION * rho * c * c:
                 pulled += 1
         other_speed = speed
         if is_closed:
             closed += 1
         else:
             # free surfaces: each goes on with a speed of its own
-            pressure = void
-            speed = find_free_speed(leader.rigid, own, void)
+            pressure = gap_pressure
+            speed = find_free_speed(leader.rigid, leader_state, gap_pressure)
             other_speed = speed
             if b >= 0:
-                rho_other, _, p_other, c_other, law_other = other
-                turned = (rho_other, -w_other, p_other, c_other, law_other)
-                other_speed = -find_free_speed(False, turned, void)
+                rho_other, _, p_other, c_other, wave_law_other = follower_state
+                turned = (rho_other, -w_other, p_other, c_other, wave_law_other)
+                other_speed = -find_free_speed(False, turned, gap_pressure)
         states[CLOSED, k] = 1.0 if is_closed else 0.0
         states[FACET_P, k] = pressure
         states[EXCESS_LEADER, k] = speed - w
@@ -196,7 +196,7 @@ def make_add_facet_flux(geometry: Geometry = PLANE):
     def add_facet_flux(facets, count, side, line):
         """Add to the outward flux of one line's faces; facets outwards of the leader.
 
-        `open_p` is the pressure with which the flux was filled.  With no pressure in the void what
+        `gap_p` is the pressure with which the flux was filled.  With no pressure in the void what
         one side gets is taken from the other to the bit.
         """
         sign = 1.0 if side == LEADER else -1.0
@@ -206,7 +206,7 @@ def make_add_facet_flux(geometry: Geometry = PLANE):
             face = facets.owners[side, k]
             if face < 0 or facets.states[CLOSED, k] == 0.0:
                 continue
-            p = sign * (facets.states[FACET_P, k] - line.open_p[face])
+            p = sign * (facets.states[FACET_P, k] - line.gap_p[face])
             momentum_y, push, hoop = split(
                 p * areas[AREA_Y, k], p, areas[AREA_Y, k], facets.faces[AREA_Y, k]
             )

@@ -122,7 +122,7 @@ class GridMotion:
         for link in self.exchange.links:
             line = link.leader.line(link.leader.block.nodes_new)
             other = link.follower.line(link.follower.block.nodes_new)
-            miss = np.abs(link.to_follower(line) - other).max()
+            miss = np.abs(link.arrange_for_follower(line) - other).max()
             if miss > 1e-12 * np.ptp(line, axis=1).max():
                 raise RegridFailure(
                     f"mesh motion: {link.leader} and {link.follower} are {miss:.1e} m apart",

@@ -238,7 +238,7 @@ class Respacing:
     start: float
     end: float
 
-    def compute_share(self, t: float) -> float:
+    def compute_van_leer_weights(self, t: float) -> float:
         """How far the change has come at t [s], from 0 to 1."""
         part = min(1.0, max(0.0, (t - self.start) / (self.end - self.start)))
         return part * part * (3.0 - 2.0 * part)
@@ -337,7 +337,7 @@ class Line:
         if self.last_spacing is None:
             return self.spacing
         change = self.last_spacing - self.spacing
-        return self.spacing + self.rule.respacing.compute_share(t) * change
+        return self.spacing + self.rule.respacing.compute_van_leer_weights(t) * change
 
     def set_spacing(self, spacing: np.ndarray) -> None:
         """Where the nodes are to be along the line from now on: (n + 1,) from 0 to 1."""

@@ -49,7 +49,10 @@ class StraightSides:
 
     def spread(self, t: float) -> None:
         """Lay their new nodes, by their spacings at t [s], between their new ends."""
-        if self.respacing is not None and (share := self.respacing.compute_share(t)) != self.share:
+        if (
+            self.respacing is not None
+            and (share := self.respacing.compute_van_leer_weights(t)) != self.share
+        ):
             self.share = share
             self.spacings = np.concatenate([line.find_spacing(t) for line in self.lines])
         spread_straight(self.block.nodes_new, self.spans, self.spacings)
@@ -318,7 +321,7 @@ def spread_lines(sides: Sides, span: Span) -> None:
 
 def give_lines(sides: Sides, span: Span) -> None:
     for link in sides.links:
-        link.swap_line()
+        link.copy_line_to_follower()
 
 
 def hold_corners(sides: Sides, span: Span) -> None:

@@ -83,10 +83,10 @@ def distribute_blocks(
         raise ValueError(f"{ranks} ranks; one at least is needed")
     # cells that each rank has so far, and those of the blocks that it owns
     sizes = [ni * nj for ni, nj in cells]
-    fair = sum(sizes) / ranks
+    fair_share = sum(sizes) / ranks
     wanted = wanted or {}
     loads = [0.0] * ranks
-    homes = [0.0] * ranks
+    owned_cells = [0.0] * ranks
     places: list[tuple[int, ...]] = [(0,)] * len(cells)
     bounds: list[tuple[int, ...]] = [(0, ni) for ni, _ in cells]
     for number in sorted(range(len(cells)), key=lambda n: (-sizes[n], n)):
@@ -96,20 +96,20 @@ def distribute_blocks(
         order = sorted(range(ranks), key=lambda r: (loads[r], r))
         bands = 1 if number in whole else min(wanted.get(number, rows), rows, ranks)
         if number in wanted or bands == 1:
-            taken = divide_evenly(rows, bands)
-        elif size > MOST_UNCUT * fair:
-            taken = _fill_up(rows, size / rows, [fair - loads[r] for r in order])
+            tile_rows_of_bands = divide_evenly(rows, bands)
+        elif size > MOST_UNCUT * fair_share:
+            tile_rows_of_bands = _fill_up(rows, size / rows, [fair_share - loads[r] for r in order])
         else:
-            taken = [rows]
+            tile_rows_of_bands = [rows]
         # its owner is the one that owns least
-        there = order[: len(taken)]
-        home = min(range(len(there)), key=lambda k: (homes[there[k]], k))
-        for listed in (there, taken):
-            listed.insert(0, listed.pop(home))
-        homes[there[0]] += size
-        places[number] = tuple(there)
-        bounds[number] = find_bounds(cells[number][0], taken)
-        for k, rank in enumerate(there):
+        sharers = order[: len(tile_rows_of_bands)]
+        owner = min(range(len(sharers)), key=lambda k: (owned_cells[sharers[k]], k))
+        for listed in (sharers, tile_rows_of_bands):
+            listed.insert(0, listed.pop(owner))
+        owned_cells[sharers[0]] += size
+        places[number] = tuple(sharers)
+        bounds[number] = find_bounds(cells[number][0], tile_rows_of_bands)
+        for k, rank in enumerate(sharers):
             first, last = bounds[number][k : k + 2]
             loads[rank] += (last - first) * cells[number][1]
     return Distribution(places, bounds)
@@ -121,29 +121,34 @@ def _fill_up(rows: int, size: float, room: Sequence[float]) -> list[int]:
     As few ranks as have room.  What is left over goes, row by row, to the one with most room left,
     and to a further one where this takes more than half a row from the largest load.
     """
-    taken: list[int] = []
-    left = rows
+    tile_rows_of_bands: list[int] = []
+    rows_left = rows
     for space in room:
-        count = min(left, max(round(space / size), 0))
-        if left == 0 or (count == 0 and taken):
+        count = min(rows_left, max(round(space / size), 0))
+        if rows_left == 0 or (count == 0 and tile_rows_of_bands):
             break
-        taken.append(max(count, 1))
-        left -= taken[-1]
-    for _ in range(left):
-        free = [space - count * size for space, count in zip(room, taken, strict=False)]
-        most = max(range(len(taken)), key=lambda k: (free[k], -k))
-        if len(taken) < len(room) and room[len(taken)] - free[most] > 0.5 * size:
-            taken.append(1)
+        tile_rows_of_bands.append(max(count, 1))
+        rows_left -= tile_rows_of_bands[-1]
+    for _ in range(rows_left):
+        room_left = [
+            space - count * size for space, count in zip(room, tile_rows_of_bands, strict=False)
+        ]
+        emptiest = max(range(len(tile_rows_of_bands)), key=lambda k: (room_left[k], -k))
+        if (
+            len(tile_rows_of_bands) < len(room)
+            and room[len(tile_rows_of_bands)] - room_left[emptiest] > 0.5 * size
+        ):
+            tile_rows_of_bands.append(1)
         else:
-            taken[most] += 1
-    return taken
+            tile_rows_of_bands[emptiest] += 1
+    return tile_rows_of_bands
 
 
 def sum_cells(cells: Sequence[tuple[int, int]], shares: Distribution, ranks: int) -> list[int]:
     """Cells that each rank updates."""
     loads = [0] * ranks
-    for (_, nj), there, rows in zip(cells, shares.places, shares.bounds, strict=True):
-        for rank, first, last in zip(there, rows, rows[1:], strict=False):
+    for (_, nj), sharers, rows in zip(cells, shares.places, shares.bounds, strict=True):
+        for rank, first, last in zip(sharers, rows, rows[1:], strict=False):
             loads[rank] += (last - first) * nj
     return loads
 
@@ -158,7 +163,7 @@ class CutBlock:
         self.group = group
         self.block = block
         self.bands: list[Rows] = list(pairwise(bounds))
-        self.is_home = group.rank == 0
+        self.is_owner = group.rank == 0
         self.band = self.bands[group.rank]
 
     # --- rows of arrays ------------------------------------------------------------------------
@@ -187,23 +192,23 @@ class CutBlock:
         """Send the owner these rows, all of them if None, of an array (ni, nj) or of a state."""
         shift = self.block.count_ghosts(array)
         rows = (0, self.block.ni) if rows is None else rows
-        self.send_rows(array, _shift(self.bands, shift), _shift(self._for_home(rows), shift))
+        self.send_rows(array, _shift(self.bands, shift), _shift(self._at_owner(rows), shift))
 
     def return_rows(self, array: np.ndarray, rows: Rows) -> None:
         """Return these rows of the owner to the ranks in whose bands they lie."""
         shift = self.block.count_ghosts(array)
         need = [_find_common(band, rows) for band in self.bands]
         need[0] = (0, 0)
-        self.send_rows(array, _shift(self._for_home(rows), shift), _shift(need, shift))
+        self.send_rows(array, _shift(self._at_owner(rows), shift), _shift(need, shift))
 
-    def _for_home(self, rows: Rows) -> list[Rows]:
+    def _at_owner(self, rows: Rows) -> list[Rows]:
         return [rows] + [(0, 0)] * (len(self.bands) - 1)
 
     # --- phases of a step ----------------------------------------------------------------------
 
     def bring_sound_speeds(self) -> None:
         """Send the owner the sound speeds of all cells at the start of the step."""
-        if not self.is_home:  # it computes its own when it regrids
+        if not self.is_owner:  # it computes its own when it regrids
             self.block.compute_sound_speed(self.block.start)
         self.gather_rows(self.block.rates_new)  # where they are computed
 
@@ -222,7 +227,7 @@ class CutBlock:
         ni = self.block.ni
         need = [(max(a - GHOST_ROWS, 0), min(b + GHOST_ROWS, ni) + 1) for a, b in self.bands]
         need[0] = (0, 0)
-        self.send_rows(self.block.nodes_new, self._for_home((0, ni + 1)), need)
+        self.send_rows(self.block.nodes_new, self._at_owner((0, ni + 1)), need)
 
     def exchange_ghost_rows(self) -> None:
         """Give every rank the new states of its ghost rows."""
@@ -238,11 +243,11 @@ class CutBlock:
         totals = self.block.totals.rows
         nj = self.block.nj
         tiles = [(count_tiles(a, nj), count_tiles(b, nj)) for a, b in self.bands]
-        self.send_rows(totals, tiles, self._for_home((0, len(totals) - 1)))
+        self.send_rows(totals, tiles, self._at_owner((0, len(totals) - 1)))
 
     def bring_failed(self) -> None:
         """Send the owner the new states of all cells, where they are not admissible."""
-        good = self.is_home and sum_tiles(self.block.totals.rows, np.empty(TOTAL_ROWS))
+        good = self.is_owner and sum_tiles(self.block.totals.rows, np.empty(TOTAL_ROWS))
         if not self.group.bcast(good, root=0):
             self.gather_rows(self.block.state_new)
 
@@ -252,16 +257,16 @@ class CutBlock:
         """The rows from the first to the last that hold a rate above `limit`, `reach` more on
         either side; none, (0, 0), where there is no such rate."""
         first, last = self.band
-        found = np.flatnonzero((self.block.rates[first:last] > limit).any(axis=1)) + first
-        own = (int(found[0]), int(found[-1])) if len(found) else None
-        rows = [row for pair in self.group.allgather(own) if pair for row in pair]
+        rows_found = np.flatnonzero((self.block.rates[first:last] > limit).any(axis=1)) + first
+        own_range = (int(rows_found[0]), int(rows_found[-1])) if len(rows_found) else None
+        rows = [row for pair in self.group.allgather(own_range) if pair for row in pair]
         if not rows:
             return 0, 0
         return max(min(rows) - reach, 0), min(max(rows) + reach + 1, self.block.ni)
 
 
-def _find_common(one: Rows, other: Rows) -> Rows:
-    return max(one[0], other[0]), min(one[1], other[1])
+def _find_common(rows: Rows, other_rows: Rows) -> Rows:
+    return max(rows[0], other_rows[0]), min(rows[1], other_rows[1])
 
 
 def _shift(rows: Sequence[Rows], by: int) -> list[Rows]:

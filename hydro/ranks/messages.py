@@ -66,8 +66,8 @@ def find_ring_of_array(
 
 def find_ring_of_nodes(block: Block) -> np.ndarray:
     """Flat places of the nodes of a ring in the array of a block's `nodes`, x then y."""
-    at = find_ring(block.ni + 1, block.nj + 1, NODES_DEEP)
-    return (np.arange(2)[:, None] * block.nodes[0].size + at).ravel()
+    places = find_ring(block.ni + 1, block.nj + 1, NODES_DEEP)
+    return (np.arange(2)[:, None] * block.nodes[0].size + places).ravel()
 
 
 class Item(NamedTuple):
@@ -102,10 +102,10 @@ class Message:
         for item in items:
             placed.append((item, filled[item.rank]))
             filled[item.rank] += item.size
-        mine = self.starts[comm.rank]
-        self.own = [(item, at - mine) for item, at in placed if item.rank == comm.rank]
-        self.others = [(item, at) for item, at in placed if item.rank != comm.rank]
-        self.rows = [(at, at + item.width) for item, at in placed if item.width]
+        own_start = self.starts[comm.rank]
+        self.own = [(item, offset - own_start) for item, offset in placed if item.rank == comm.rank]
+        self.others = [(item, offset) for item, offset in placed if item.rank != comm.rank]
+        self.rows = [(offset, offset + item.width) for item, offset in placed if item.width]
         self.received = np.zeros(sum(self.counts))
         self.sent = np.zeros(self.counts[comm.rank])
 
@@ -123,26 +123,27 @@ class Message:
         codes = self.received[self.starts]
         if (codes != NO_FAILURE).any():
             return int(codes.argmin())
-        for item, at in self.others:
-            at += item.width
+        for item, offset in self.others:
+            offset += item.width
             for get_array, places in item.parts:
                 # a view: they are contiguous
                 flat = get_array(self.blocks[item.number]).reshape(-1)
-                flat[places] = self.received[at : at + places.size]
-                at += places.size
+                flat[places] = self.received[offset : offset + places.size]
+                offset += places.size
         return None
 
     def _pack(self, rows: Sequence[Sequence[float]]) -> None:
+        """Copy the own items' rows and parts of arrays into `sent`, one behind the other."""
         waiting = iter(rows)
-        for item, at in self.own:
+        for item, offset in self.own:
             if item.width:
-                self.sent[at : at + item.width] = next(waiting)
-            at += item.width
+                self.sent[offset : offset + item.width] = next(waiting)
+            offset += item.width
             for get_array, places in item.parts:
-                values = self.sent[at : at + places.size]
+                values = self.sent[offset : offset + places.size]
                 array = get_array(self.blocks[item.number])
                 np.take(array.reshape(-1), places, out=values, mode="clip")
-                at += places.size
+                offset += places.size
 
     def get_rows(self) -> list[list[float]]:
         """The rows of all blocks in the last message."""
@@ -180,11 +181,11 @@ class Counted:
 
         def counted(*arguments: Any, **options: Any) -> Any:
             began = time.perf_counter()
-            found = call(*arguments, **options)
+            result = call(*arguments, **options)
             traffic.seconds += time.perf_counter() - began
             traffic.calls += 1
             traffic.bytes += max(map(count_bytes, arguments), default=0)
-            return found
+            return result
 
         return counted
 
@@ -208,11 +209,11 @@ class Book:
         return Counted(group, self.kinds["cut blocks"])
 
     def begin_step(self) -> None:
-        """The clock of the steps runs."""
+        """Start the clock of a step."""
         self._began = time.perf_counter()
 
     def end_step(self) -> None:
-        """It stands still."""
+        """Stop it, and count the step."""
         self.steps += 1
         self.seconds += time.perf_counter() - self._began
 
@@ -220,23 +221,23 @@ class Book:
         """The message counts of all ranks, for each of them: all have to call it.
 
         `steps` and `ranks`, how many; `seconds`, of the steps, and `waited`, in their messages, one
-        a rank; `calls` and `bytes` by kind, of the rank that has most.
+        a rank; `calls` and `bytes` by kind, each the largest of any rank.
         """
         traffic = [(t.calls, t.bytes, t.seconds) for t in self.kinds.values()]
-        mine = np.array([*traffic, (self.steps, 0, self.seconds)], dtype=np.float64)
+        own_row = np.array([*traffic, (self.steps, 0, self.seconds)], dtype=np.float64)
         size = self.comm.size
-        table = np.zeros((size, *mine.shape))
-        places = [mine.size] * size, [mine.size * rank for rank in range(size)]
-        self.comm.Allgatherv(mine, [table, places])
-        most = table.max(axis=0)[:-1]
+        table = np.zeros((size, *own_row.shape))
+        layout = [own_row.size] * size, [own_row.size * rank for rank in range(size)]
+        self.comm.Allgatherv(own_row, [table, layout])
+        largest = table.max(axis=0)[:-1]
         in_steps = [number for number, kind in enumerate(KINDS) if kind != "whole blocks"]
         return {
             "ranks": int(size),
             "steps": self.steps,
             "seconds": table[:, -1, 2].tolist(),
             "waited": table[:, in_steps, 2].sum(axis=1).tolist(),
-            "calls": {kind: int(row[0]) for kind, row in zip(KINDS, most, strict=True)},
-            "bytes": {kind: int(row[1]) for kind, row in zip(KINDS, most, strict=True)},
+            "calls": {kind: int(row[0]) for kind, row in zip(KINDS, largest, strict=True)},
+            "bytes": {kind: int(row[1]) for kind, row in zip(KINDS, largest, strict=True)},
         }
 
 

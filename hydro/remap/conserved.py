@@ -67,13 +67,13 @@ def fill_in(overlay: Overlay, fields: np.ndarray, centres: np.ndarray) -> np.nda
     fields (ni, nj, n, 3), centres (2, ni, nj): of the old cells.  Nothing is conserved here where
     the outlines differ.
     """
-    part = overlay.covered[..., 0]
-    bare = part <= 0.0
+    covered_volume = overlay.covered[..., 0]
+    is_bare = covered_volume <= 0.0
     with np.errstate(invalid="ignore", divide="ignore"):
-        means = overlay.taken / part[..., None]
-    if bare.any():
-        nearest = cKDTree(centres.reshape(2, -1).T).query(overlay.centres[:, bare].T)[1]
-        means[bare] = fields.reshape(-1, *fields.shape[2:])[nearest, :, MEAN]
+        means = overlay.taken / covered_volume[..., None]
+    if is_bare.any():
+        nearest = cKDTree(centres.reshape(2, -1).T).query(overlay.centres[:, is_bare].T)[1]
+        means[is_bare] = fields.reshape(-1, *fields.shape[2:])[nearest, :, MEAN]
     return np.moveaxis(means, -1, 0)
 
 
@@ -90,31 +90,35 @@ def balance_slivers(
     ni, nj) of the old cells; new_nodes (2, mi+1, mj+1).  Theory F12.4.
     """
     # what of old cells lies outside the new grid, and what new cells need beyond the old one
-    left = volumes - overlay.used[..., 0]
-    given = left > LEAST_SLIVER * volumes
-    short = overlay.volumes - overlay.covered[..., 0]
-    borrowed = short > LEAST_SLIVER * overlay.volumes
+    left_over = volumes - overlay.used[..., 0]
+    gives = left_over > LEAST_SLIVER * volumes
+    lacking = overlay.volumes - overlay.covered[..., 0]
+    borrows = lacking > LEAST_SLIVER * overlay.volumes
     content = overlay.taken.copy()
     slivers = Slivers(
-        int(given.sum() + borrowed.sum()), float(left[given].sum()), float(short[borrowed].sum())
+        int(gives.sum() + borrows.sum()),
+        float(left_over[gives].sum()),
+        float(lacking[borrows].sum()),
     )
     if slivers.count == 0:
         return content, slivers
     # new cells are filled with their own mean; old ones give their linear fields away
     means = np.moveaxis(fill_in(overlay, fields, centres), 0, -1)
-    loans = means[borrowed] * short[borrowed][:, None]
-    content[borrowed] += loans
-    missing = -overlay.covered[borrowed][:, 1:]
-    away = -overlay.used[given][:, 1:]  # first moments of what is left, as those of a cell are 0
+    loans = means[borrows] * lacking[borrows][:, None]
+    content[borrows] += loans
+    missing = -overlay.covered[borrows][:, 1:]
+    left_moments = -overlay.used[gives][
+        :, 1:
+    ]  # first moments of what is left, as those of a cell are 0
     gifts = (
-        fields[given][..., MEAN] * left[given][:, None]
-        + fields[given][..., SLOPE_X] * away[:, :1]
-        + fields[given][..., SLOPE_Y] * away[:, 1:]
+        fields[gives][..., MEAN] * left_over[gives][:, None]
+        + fields[gives][..., SLOPE_X] * left_moments[:, :1]
+        + fields[gives][..., SLOPE_Y] * left_moments[:, 1:]
     )
     # both go to the nearest face of a side
     positions = np.concatenate([
-        centres[:, given].T + away / left[given][:, None],
-        overlay.centres[:, borrowed].T + missing / short[borrowed][:, None],
+        centres[:, gives].T + left_moments / left_over[gives][:, None],
+        overlay.centres[:, borrows].T + missing / lacking[borrows][:, None],
     ])  # fmt: skip
     middles, owners = find_side_faces(new_nodes)
     balance = np.zeros((len(owners), content.shape[-1]))
@@ -151,20 +155,22 @@ def find_bounds(eos: EquationOfState, state: np.ndarray) -> tuple[np.ndarray, np
     go on there and shocks do not.
     """
     rho, _, _, p = state
-    low, high = (find(state, size=(1, 3, 3), mode="nearest") for find in FILTERS)
-    reach = 0.5 * (high - low)
+    low, high = (find_extreme(state, size=(1, 3, 3), mode="nearest") for find_extreme in FILTERS)
+    half_range = 0.5 * (high - low)
     stiffness = rho * eos.sound_speed(rho, p) ** 2
-    beyond = np.full(p.shape, BEYOND_SIDES)
-    beyond[1:-1, 1:-1] = 0.0
+    margin = np.full(p.shape, BEYOND_SIDES)
+    margin[1:-1, 1:-1] = 0.0
     slack = np.array([
-        beyond * rho,
-        stiffness * (beyond + (reach[RHO] / rho) ** 2)
-        + 0.5 * rho * (reach[U] ** 2 + reach[V] ** 2),
+        margin * rho,
+        stiffness * (margin + (half_range[RHO] / rho) ** 2)
+        + 0.5 * rho * (half_range[U] ** 2 + half_range[V] ** 2),
     ])  # fmt: skip
     return low[[RHO, P]] - slack, high[[RHO, P]] + slack
 
 
-def lessen_slopes(eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, centres) -> int:
+def limit_slopes_to_states(
+    eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, centres
+) -> int:
     """Lessen slopes of `fields` (ni, nj, n, 3) in place where corners are no states; how many.
 
     The first four are those of `compute_conserved`.
@@ -185,34 +191,36 @@ def lessen_slopes(eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, c
     factor = np.empty(cells.shape[1])
     for start in range(0, factor.size, LOCATED_CELLS_CHUNK):
         stop = start + LOCATED_CELLS_CHUNK
-        factor[start:stop] = _find_parts(eos, cells[:, start:stop])
+        factor[start:stop] = _find_slope_fractions(eos, cells[:, start:stop])
     fields[..., SLOPE_X:] *= factor.reshape(fields.shape[:2])[..., None, None]
     return int((factor < 1.0).sum())
 
 
-def _find_parts(eos: EquationOfState, cells: np.ndarray) -> np.ndarray:
+def _find_slope_fractions(eos: EquationOfState, cells: np.ndarray) -> np.ndarray:
     """The largest of PARTS (n,) with which all corners of the cells (rows, n) are states."""
     to_pressure = make_conversion(type(eos)).to_pressure
     factor = np.zeros(cells.shape[1])
     waiting = np.arange(cells.shape[1])
-    for part in PARTS:
+    for fraction in PARTS:
         means = cells[0:4]
         slope_x = cells[4:8]
         slope_y = cells[8:12]
         least_rho, least_p = cells[12:14]
         most_rho, most_p = cells[14:16]
         left_rho, left_c2 = cells[16:18]
-        good = np.ones(waiting.size, dtype=bool)
+        is_good = np.ones(waiting.size, dtype=bool)
         with np.errstate(all="ignore"):
             for way_x, way_y in cells[18:].reshape(4, 2, -1):
-                rho, x, y, total = means + part * (slope_x * way_x + slope_y * way_y)
+                rho, x, y, total = means + fraction * (slope_x * way_x + slope_y * way_y)
                 e = (total - 0.5 * (x * x + y * y) / rho) / rho
                 p, _, _, c2 = to_pressure(rho, e, eos.parameters)
-                good &= (rho > left_rho) & (c2 > left_c2) & (rho >= least_rho) & (rho <= most_rho)
-                good &= (p >= least_p) & (p <= most_p)
-        factor[waiting[good]] = part
-        waiting = waiting[~good]
-        cells = cells[:, ~good]
+                is_good &= (
+                    (rho > left_rho) & (c2 > left_c2) & (rho >= least_rho) & (rho <= most_rho)
+                )
+                is_good &= (p >= least_p) & (p <= most_p)
+        factor[waiting[is_good]] = fraction
+        waiting = waiting[~is_good]
+        cells = cells[:, ~is_good]
         if waiting.size == 0:
             break
     return factor
@@ -266,7 +274,7 @@ def remap_state(
     if carried is not None:
         conserved = np.concatenate((conserved, conserved[RHO] * carried))
     fields = make_linear_fields(conserved, nodes, centres)
-    lessen_slopes(eos, fields, nodes, centres)
+    limit_slopes_to_states(eos, fields, nodes, centres)
     # cut by the new grid; a second time with constant fields if a result is no state
     for _ in range(2):
         overlay = overlay_grids(nodes, centres, fields, new_nodes, curved)
@@ -277,18 +285,18 @@ def remap_state(
                 f"{max(slivers.given, slivers.borrowed) / volumes.sum():.2g} of its volume; only "
                 "grids of one outline can take over each other's state"
             )
-        found = np.moveaxis(content / overlay.volumes[..., None], -1, 0)
-        new_held = find_held(eos, found[:FLOW_QUANTITIES])
-        bad = ~is_state(eos, new_held["state"])
-        if not bad.any():
+        new_means = np.moveaxis(content / overlay.volumes[..., None], -1, 0)
+        new_held = find_held(eos, new_means[:FLOW_QUANTITIES])
+        is_bad = ~is_state(eos, new_held["state"])
+        if not is_bad.any():
             if carried is not None:
-                new_held["carried"] = found[FLOW_QUANTITIES:] / found[RHO]
+                new_held["carried"] = new_means[FLOW_QUANTITIES:] / new_means[RHO]
             return new_held, slivers
         fields[..., SLOPE_X:] = 0.0  # averages of states, where those of linear fields fail
-    i, j = (int(index) for index in np.argwhere(bad)[0])
+    i, j = (int(index) for index in np.argwhere(is_bad)[0])
     raise RunFailure(
         f"remap: block {name!r}, cell i={i}, j={j} of the new grid: {eos.failure}; its density "
-        f"is {found[RHO, i, j]:.6g} kg/m3",
+        f"is {new_means[RHO, i, j]:.6g} kg/m3",
         cause="remap",
         place=Place(name, (i, j)),
     )

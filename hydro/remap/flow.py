@@ -113,19 +113,25 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
     # the grid at this time
     if new.motion.mesh == "regrid":
         _lay_sides(old, new)
-        for one, other, number in zip(old.blocks, new.blocks, range(len(old.blocks)), strict=True):
-            _make_grid(one, other, new, number)
+        for old_block, new_block, number in zip(
+            old.blocks, new.blocks, range(len(old.blocks)), strict=True
+        ):
+            _make_grid(old_block, new_block, new, number)
     elif callable(old.motion.mesh) and callable(new.motion.mesh):
         _follow_mesh(old.blocks, new.blocks, old.motion.mesh, new.motion.mesh, old.t)
     # the state on it (theory F12)
     state = dict(new.get_state())
     report = []
-    for one, other in zip(old.blocks, new.blocks, strict=True):
-        found, slivers = _remap_block(one, other.nodes)
-        state[f"{one.name}/nodes"] = other.nodes.copy()
-        for name, array in found.items():
-            state[f"{one.name}/{name}"] = array
-        report.append(RemappedBlock(one.name, (one.ni, one.nj), (other.ni, other.nj), slivers))
+    for old_block, new_block in zip(old.blocks, new.blocks, strict=True):
+        held, slivers = _remap_block(old_block, new_block.nodes)
+        state[f"{old_block.name}/nodes"] = new_block.nodes.copy()
+        for name, array in held.items():
+            state[f"{old_block.name}/{name}"] = array
+        report.append(
+            RemappedBlock(
+                old_block.name, (old_block.ni, old_block.nj), (new_block.ni, new_block.nj), slivers
+            )
+        )
     # with the old time, totals and contacts
     new.set_state(
         state
@@ -179,7 +185,7 @@ def _lay_sides(old: Simulation, new: Simulation) -> None:
     for before, line in pairs:
         _lay_line(before, line, old.t)
     for link in new.exchange.links:
-        link.swap_line()
+        link.copy_line_to_follower()
 
 
 def _lay_line(before: Line, line: Line, t: float) -> None:
@@ -196,8 +202,8 @@ def _lay_line(before: Line, line: Line, t: float) -> None:
         return
     curve = before.segment.line(before.segment.block.nodes)
     spread = respace_line(curve, before.find_spacing(t), spacing)
-    miss = target[:, [0, -1]] - spread[:, [0, -1]]  # ends that went on to a finer track
-    spread += miss[:, :1] * (1.0 - spacing) + miss[:, 1:] * spacing
+    end_gaps = target[:, [0, -1]] - spread[:, [0, -1]]  # ends that went on to a finer track
+    spread += end_gaps[:, :1] * (1.0 - spacing) + end_gaps[:, 1:] * spacing
     target[:, 1:-1] = spread[:, 1:-1]
 
 
@@ -229,16 +235,22 @@ def settle_grid(
     cells (2, ni, nj): whose flow of the block `before` the new cells see.  Raises RegridFailure.
     """
     regridder: Any = motion.regridders[number]
-    aware = motion.flow_aware[number]
-    if aware is not None and aware.sees_flow:
+    flow_aware = motion.flow_aware[number]
+    if flow_aware is not None and flow_aware.sees_flow:
         fields = before.compute_fields(before.state).items()
-        aware.take_step({name: np.ascontiguousarray(f[tuple(cells)]) for name, f in fields}, 1.0)
-    more: tuple[np.ndarray, ...] = ()
+        flow_aware.take_step(
+            {name: np.ascontiguousarray(f[tuple(cells)]) for name, f in fields}, 1.0
+        )
+    sound_speeds: tuple[np.ndarray, ...] = ()
     if motion.cost_aware[number]:
-        more = (np.ascontiguousarray(before.compute_sound_speed(before.state)[tuple(cells)]),)
+        sound_speeds = (
+            np.ascontiguousarray(before.compute_sound_speed(before.state)[tuple(cells)]),
+        )
     boundary = np.ascontiguousarray(boundary)
     for _ in range(passes):
-        nodes = call_regridder(regridder, np.ascontiguousarray(nodes), boundary, *more).nodes
+        nodes = call_regridder(
+            regridder, np.ascontiguousarray(nodes), boundary, *sound_speeds
+        ).nodes
     return nodes
 
 
@@ -250,19 +262,19 @@ def _follow_mesh(
     t: float,
 ) -> None:
     """Grids of a prescribed motion at the old time; one that depends on the flow is sampled."""
-    for one, other in zip(blocks, new_blocks, strict=True):
-        size = np.ptp(one.nodes, axis=(1, 2)).max()
-        if np.abs(motion(one.name, t) - one.nodes).max() <= SAME_GRID_DISTANCE * size:
-            other.nodes[...] = new_motion(other.name, t)
+    for old_block, new_block in zip(blocks, new_blocks, strict=True):
+        size = np.ptp(old_block.nodes, axis=(1, 2)).max()
+        if np.abs(motion(old_block.name, t) - old_block.nodes).max() <= SAME_GRID_DISTANCE * size:
+            new_block.nodes[...] = new_motion(new_block.name, t)
             continue
         sides = {}
         for side in SIDE_NAMES:
-            first = other.side_line(side, other.nodes)
-            before = one.side_line(side, one.nodes)
+            first = new_block.side_line(side, new_block.nodes)
+            before = old_block.side_line(side, old_block.nodes)
             even = np.linspace(0.0, 1.0, before.shape[1])
             sides[side] = respace_line(before, even, np.linspace(0.0, 1.0, first.shape[1]))
-        places = sample_grid(one.nodes, sides)
-        other.nodes[...] = [map_coordinates(row, places, order=1) for row in one.nodes]
+        places = sample_grid(old_block.nodes, sides)
+        new_block.nodes[...] = [map_coordinates(row, places, order=1) for row in old_block.nodes]
 
 
 STEPS_PER_LINE_CHECK = 50  # steps from one look at the lines to the next
@@ -305,30 +317,40 @@ class Refinement:
         lines = [line for line in lines if line.segment.kind == "interface"]
         count = lines[0].segment.block.nj
         # by column, over all lines: above 1 where it is too long or bends too sharply (F12.6)
-        split = np.zeros(count)
+        split_score = np.zeros(count)
         # by inner line between columns: above 1 where they are too long for one, or bent
-        kept = np.zeros(count - 1)
+        merge_score = np.zeros(count - 1)
         for line in lines:
             edges, turns = measure_line(line)
             first = line.segment.line(self.first[line.segment.block.name])
             edges = edges / (np.hypot(*np.diff(first, axis=1)).sum() / self.first_count)
-            sharp = np.where(edges > LEAST_SPLIT, np.maximum(turns[:-1], turns[1:]), 0.0)
-            split = np.maximum(split, np.maximum(edges / LONGEST_COLUMN_EDGE, sharp / SHARPEST))
-            around = turns[:-2] + turns[1:-1] + turns[2:]
-            long = (edges[:-1] + edges[1:]) / LONGEST_MERGED
-            kept = np.maximum(kept, np.maximum(long, around / (CALM_LIMIT_PART * SHARPEST)))
+            sharpness = np.where(edges > LEAST_SPLIT, np.maximum(turns[:-1], turns[1:]), 0.0)
+            split_score = np.maximum(
+                split_score, np.maximum(edges / LONGEST_COLUMN_EDGE, sharpness / SHARPEST)
+            )
+            summed_turns = turns[:-2] + turns[1:-1] + turns[2:]
+            merged_length = (edges[:-1] + edges[1:]) / LONGEST_MERGED
+            merge_score = np.maximum(
+                merge_score, np.maximum(merged_length, summed_turns / (CALM_LIMIT_PART * SHARPEST))
+            )
         # lines are added where they are wanted most, so many at once
-        most = max(1, int(MOST_CHANGED_COLUMNS * count))
-        columns = pick_largest(split, min(most, MOST_COLUMN_GROWTH * self.first_count - count))
+        most_changes = max(1, int(MOST_CHANGED_COLUMNS * count))
+        columns = pick_largest(
+            split_score, min(most_changes, MOST_COLUMN_GROWTH * self.first_count - count)
+        )
         if columns.size:
             return np.sort(np.append(np.arange(count + 1), columns + 0.5))
-        if count == self.first_count or split.max() > CALM_LIMIT_PART:
+        if count == self.first_count or split_score.max() > CALM_LIMIT_PART:
             return None
         # otherwise lines go that are needed least, no two neighbours at once
-        beside = np.minimum(np.append(kept[1:], np.inf), np.insert(kept[:-1], 0, np.inf))
-        kept = np.where(kept < beside * (1.0 - MIRROR_TIE), kept, np.inf)
-        ease = 1.0 / np.maximum(kept, MIRROR_TIE)
-        removed = 1 + pick_largest(ease, min(most, count - self.first_count))
+        neighbour_score = np.minimum(
+            np.append(merge_score[1:], np.inf), np.insert(merge_score[:-1], 0, np.inf)
+        )
+        merge_score = np.where(
+            merge_score < neighbour_score * (1.0 - MIRROR_TIE), merge_score, np.inf
+        )
+        merge_ease = 1.0 / np.maximum(merge_score, MIRROR_TIE)
+        removed = 1 + pick_largest(merge_ease, min(most_changes, count - self.first_count))
         fits = 0 < removed.size <= count - self.first_count
         return np.delete(np.arange(count + 1.0), removed) if fits else None
 
@@ -341,28 +363,30 @@ class Refinement:
         by their spacings at t [s], and the grids inside settle before they get the states.
         `motion`: of the new blocks.  Raises RunFailure, and nothing has changed.
         """
-        for one, other in zip(blocks, motion.blocks, strict=True):
-            other.nodes_new[...] = sample_lines(one.nodes, places)
+        for old_block, new_block in zip(blocks, motion.blocks, strict=True):
+            new_block.nodes_new[...] = sample_lines(old_block.nodes, places)
         for line in motion.sides.lines:
             if isinstance(line, StraightLine) and line.track.straight:
                 line.spread_straight(t)
-        found = []
-        parents = places[:-1].astype(int)
-        for number, (one, other) in enumerate(zip(blocks, motion.blocks, strict=True)):
-            cells = np.array(np.meshgrid(np.arange(one.ni), parents, indexing="ij"))
-            first = sample_lines(one.nodes, places)
-            sides = other.nodes_new
-            nodes = settle_grid(motion, number, one, cells, first, sides, SETTLING_PASSES).copy()
-            held, _ = _remap_block(one, nodes)
-            found.append((nodes, held))
-        return found
+        laid_blocks = []
+        old_columns = places[:-1].astype(int)
+        for number, (old_block, new_block) in enumerate(zip(blocks, motion.blocks, strict=True)):
+            cells = np.array(np.meshgrid(np.arange(old_block.ni), old_columns, indexing="ij"))
+            first = sample_lines(old_block.nodes, places)
+            sides = new_block.nodes_new
+            nodes = settle_grid(
+                motion, number, old_block, cells, first, sides, SETTLING_PASSES
+            ).copy()
+            held, _ = _remap_block(old_block, nodes)
+            laid_blocks.append((nodes, held))
+        return laid_blocks
 
 
 def sample_lines(nodes: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Lines j = const (2, ni+1, n) at places in numbers of columns, between those of `nodes`."""
     before = np.minimum(places.astype(int), nodes.shape[2] - 2)
-    part = places - before
-    return nodes[:, :, before] * (1.0 - part) + nodes[:, :, before + 1] * part
+    fraction = places - before
+    return nodes[:, :, before] * (1.0 - fraction) + nodes[:, :, before + 1] * fraction
 
 
 def measure_line(line: Line) -> tuple[np.ndarray, np.ndarray]:
@@ -387,5 +411,5 @@ def pick_largest(scores: np.ndarray, most: int) -> np.ndarray:
     above = np.flatnonzero(scores > 1.0)
     if most < 1 or above.size <= most:
         return above if most >= 1 else above[:0]
-    least = np.sort(scores[above])[-most]
-    return above[scores[above] >= least * (1.0 - MIRROR_TIE)]
+    smallest_picked = np.sort(scores[above])[-most]
+    return above[scores[above] >= smallest_picked * (1.0 - MIRROR_TIE)]

@@ -65,18 +65,18 @@ class Chain:
         self.starts = np.concatenate(([0], np.cumsum(counts)))
         self.count = int(self.starts[-1])
         self.gathered: dict[tuple[int, int], np.ndarray] = {}
-        orientations = {_find_orientation(*part) for part in self._parts()}
+        orientations = {_find_orientation(*segment_values) for segment_values in self._list_runs()}
         if len(orientations) != 1:
             raise BadInput(f"sliding: {segments[0]} and the segments after it face both ways")
         self.orientation = orientations.pop()
 
-    def _parts(self):
+    def _list_runs(self):
         return zip(self.segments, self.reversed, strict=True)
 
     def reverse(self) -> None:
         """Run through the same segments the other way."""
         self.segments = self.segments[::-1]
-        self.reversed = [not back for back in self.reversed[::-1]]
+        self.reversed = [not is_reversed for is_reversed in self.reversed[::-1]]
         counts = np.diff(self.starts)[::-1]
         self.starts = np.concatenate(([0], np.cumsum(counts)))
         self.orientation = -self.orientation
@@ -94,11 +94,11 @@ class Chain:
 
     def list_wave_laws(self) -> np.ndarray:
         """Wave laws of the materials along the chain, (3, faces)."""
-        parts = []
+        wave_laws = []
         for segment in self.segments:
-            law = np.reshape(segment.block.wave_law, (3, 1))
-            parts.append(np.repeat(law, segment.last - segment.first, axis=1))
-        return np.concatenate(parts, axis=1)
+            wave_law = np.reshape(segment.block.wave_law, (3, 1))
+            wave_laws.append(np.repeat(wave_law, segment.last - segment.first, axis=1))
+        return np.concatenate(wave_laws, axis=1)
 
     def slice(self, number: int) -> slice:
         """Faces of the chain that are the segment `number`."""
@@ -117,28 +117,34 @@ class Chain:
 
     def read(self, rows: slice, values: np.ndarray) -> None:
         """Fill values (rows, faces) with those rows of the blocks' rims along the chain."""
-        for number, (segment, back) in enumerate(self._parts()):
-            part = segment.rim.rows[rows]
-            values[:, self.slice(number)] = part[:, ::-1] if back else part
+        for number, (segment, is_reversed) in enumerate(self._list_runs()):
+            segment_values = segment.rim.rows[rows]
+            values[:, self.slice(number)] = (
+                segment_values[:, ::-1] if is_reversed else segment_values
+            )
 
     def scatter(self, rows: slice, values: np.ndarray) -> None:
         """Write values (rows, faces) into rows of the blocks' rims."""
-        for number, (segment, back) in enumerate(self._parts()):
-            part = values[:, self.slice(number)]
-            segment.rim.rows[rows] = part[:, ::-1] if back else part
+        for number, (segment, is_reversed) in enumerate(self._list_runs()):
+            segment_values = values[:, self.slice(number)]
+            segment.rim.rows[rows] = segment_values[:, ::-1] if is_reversed else segment_values
 
     def scatter_excess(self, name: str, values: np.ndarray) -> None:
         """Write volumes (faces,) into the blocks' `excess_volume` or `excess_volume_new`."""
-        for number, (segment, back) in enumerate(self._parts()):
-            part = values[self.slice(number)]
+        for number, (segment, is_reversed) in enumerate(self._list_runs()):
+            segment_values = values[self.slice(number)]
             target = getattr(segment.block, name)
-            target[segment.first : segment.last] = part[::-1] if back else part
+            target[segment.first : segment.last] = (
+                segment_values[::-1] if is_reversed else segment_values
+            )
 
     def find_joints(self) -> list[tuple[tuple[Sliding, int], tuple[Sliding, int]]]:
         """Where segments meet: (segment, 0 or 1 for its first or last node) before and after."""
         return [
-            ((one, 0 if one_back else 1), (other, 1 if other_back else 0))
-            for (one, one_back), (other, other_back) in itertools.pairwise(self._parts())
+            ((before, 0 if before_reversed else 1), (after, 1 if after_reversed else 0))
+            for (before, before_reversed), (after, after_reversed) in itertools.pairwise(
+                self._list_runs()
+            )
         ]
 
     def ends(self) -> list[tuple[Sliding, int]]:
@@ -152,27 +158,29 @@ class Chain:
 
     def line(self, new: bool = False) -> np.ndarray:
         """Nodes (2, faces + 1) of the old or the new grid."""
-        parts = []
-        for segment, back in self._parts():
+        lines = []
+        for segment, is_reversed in self._list_runs():
             nodes = segment.block.nodes_new if new else segment.block.nodes
-            part = segment.line(nodes)[:, :: -1 if back else 1]
-            parts.append(part if not parts else part[:, 1:])
-        return np.concatenate(parts, axis=1)
+            segment_values = segment.line(nodes)[:, :: -1 if is_reversed else 1]
+            lines.append(segment_values if not lines else segment_values[:, 1:])
+        return np.concatenate(lines, axis=1)
 
     def new_ends(self) -> np.ndarray:
         """First and last node (2, 2) of the new grid."""
         ends = []
         for segment, at_end in ((self.segments[0], False), (self.segments[-1], True)):
-            back = self.reversed[-1 if at_end else 0]
-            ends.append(segment.line(segment.block.nodes_new)[:, -1 if at_end != back else 0])
+            is_reversed = self.reversed[-1 if at_end else 0]
+            ends.append(
+                segment.line(segment.block.nodes_new)[:, -1 if at_end != is_reversed else 0]
+            )
         return np.stack(ends, axis=1)
 
     def write_line(self, line: np.ndarray, new: bool = True) -> None:
         """Write the nodes into the new (or the old) grids."""
-        for number, (segment, back) in enumerate(self._parts()):
-            part = line[:, self.starts[number] : self.starts[number + 1] + 1]
+        for number, (segment, is_reversed) in enumerate(self._list_runs()):
+            segment_values = line[:, self.starts[number] : self.starts[number + 1] + 1]
             nodes = segment.block.nodes_new if new else segment.block.nodes
-            segment.line(nodes)[...] = part[:, ::-1] if back else part
+            segment.line(nodes)[...] = segment_values[:, ::-1] if is_reversed else segment_values
 
 
 def _find_orientation(segment: Sliding, back: bool) -> float:
@@ -188,15 +196,15 @@ def _find_orders(segments: list[Sliding]) -> list[bool]:
         return [False]
     size = max(np.ptp(line, axis=1).max() for line in lines)
 
-    def meet(a, b):
+    def lie_together(a, b):
         return np.abs(a - b).max() < 1e-9 * size
 
-    orders = [not any(meet(lines[0][:, -1], lines[1][:, k]) for k in (0, -1))]
+    orders = [not any(lie_together(lines[0][:, -1], lines[1][:, k]) for k in (0, -1))]
     for before, line, segment in zip(lines, lines[1:], segments[1:], strict=False):
         tip = before[:, 0 if orders[-1] else -1]
-        if meet(tip, line[:, 0]):
+        if lie_together(tip, line[:, 0]):
             orders.append(False)
-        elif meet(tip, line[:, -1]):
+        elif lie_together(tip, line[:, -1]):
             orders.append(True)
         else:
             raise BadInput(f"sliding: {segment} does not begin where the segment before it ends")
@@ -231,7 +239,7 @@ class SlidingContact:
             segment.has_own_line = False
         # a leader that does not cross itself
         line = self.leader.line()
-        other = self.follower.line()
+        follower_line = self.follower.line()
         crossing = _find_crossing(line)
         if crossing is not None:
             raise BadInput(
@@ -244,26 +252,26 @@ class SlidingContact:
         self.fixed = np.full(2, -1)
         for end, candidates in ((0, (last, 0)), (1, (0, last))):  # on a ring both would do
             for node in candidates:
-                if np.abs(other[:, -end] - line[:, node]).max() < 1e-9 * size:
+                if np.abs(follower_line[:, -end] - line[:, node]).max() < 1e-9 * size:
                     self.fixed[end] = node
             if self.fixed[end] >= 0:
-                other[:, -end] = line[:, self.fixed[end]]
+                follower_line[:, -end] = line[:, self.fixed[end]]
         # the follower's nodes lie on the leader's line, one after another
-        positions = np.empty(other.shape[1])
-        fill_positions(line, other, positions)
-        points = np.empty_like(other)
+        positions = np.empty(follower_line.shape[1])
+        fill_positions(line, follower_line, positions)
+        points = np.empty_like(follower_line)
         fill_points(line, positions, points)
-        miss = np.abs(points - other).max() / np.ptp(other, axis=1).max()
-        if miss > 1e-6:
+        gap = np.abs(points - follower_line).max() / np.ptp(follower_line, axis=1).max()
+        if gap > 1e-6:
             raise BadInput(
-                f"sliding: nodes of {follower[0]} lie up to {miss:.1e} of the contact's length off "
+                f"sliding: nodes of {follower[0]} lie up to {gap:.1e} of the contact's length off "
                 f"the line of {leader[0]}"
             )
         if not (np.diff(positions) > 0.0).all():
             raise BadInput(f"sliding: {follower[0]} and {leader[0]} do not lie along each other")
         # what a step needs
         self.carries = bool(follower[0].block.carried_fields)
-        self.first_spacing = arc_spacing(np.ascontiguousarray(other))
+        self.first_spacing = arc_spacing(np.ascontiguousarray(follower_line))
         self.refinement = 1.0  # how many times shorter the steps at a contact point are
         self.fixed_new = self.fixed.copy()
         self.follower.write_line(points, new=False)
@@ -276,7 +284,7 @@ class SlidingContact:
             chain.make_arrays()
         self.arrays = self.leader.arrays, self.follower.arrays
         self.lines = self.leader.line(), self.follower.line()  # of the old grid
-        self.still = np.zeros_like(self.lines[0])
+        self.no_displacement = np.zeros_like(self.lines[0])
         self.excess_volume = np.zeros(self.follower.count)
         self.excess_volume_new = np.zeros(self.follower.count)
         self.set_geometry(PLANE)
@@ -287,21 +295,21 @@ class SlidingContact:
         self.fill_excess_volume = make_fill_excess_volume(geometry)
         self.add_facet_flux = make_add_facet_flux(geometry)
         self.add_closing_flux = make_add_closing_flux(geometry)
-        most = self.leader.count + self.follower.count + 2
-        self.pieces = make_facets(most, geometry.curved)
+        most_pieces = self.leader.count + self.follower.count + 2
+        self.pieces = make_facets(most_pieces, geometry.curved)
 
     # --- contact states ------------------------------------------------------------------------
 
-    def cut(self) -> None:
+    def divide_into_pieces(self) -> None:
         """Pieces, positions and polygon areas of the old grid."""
         self.lines = self.leader.line(), self.follower.line()
-        line, other = self.lines
-        fill_positions(line, other, self.positions)
+        line, follower_line = self.lines
+        fill_positions(line, follower_line, self.positions)
         self.count = fill_pieces.entry(
-            line, self.still, self.positions, self.leader.orientation, 0.0, self.pieces
+            line, self.no_displacement, self.positions, self.leader.orientation, 0.0, self.pieces
         )
         self.fill_excess_volume(
-            line, other, self.positions, self.leader.orientation, self.excess_volume
+            line, follower_line, self.positions, self.leader.orientation, self.excess_volume
         )
         self.follower.scatter_excess("excess_volume", self.excess_volume)
         self.follower.scatter_excess("excess_volume_new", self.excess_volume)
@@ -309,10 +317,10 @@ class SlidingContact:
     def measure_new_polygons(self) -> None:
         """With the sides' new nodes known: positions and polygon areas of the new grid."""
         line = self.leader.line(new=True)
-        other = self.follower.line(new=True)
-        fill_positions(line, other, self.positions_new)
+        follower_line = self.follower.line(new=True)
+        fill_positions(line, follower_line, self.positions_new)
         self.fill_excess_volume(
-            line, other, self.positions_new, self.leader.orientation, self.excess_volume_new
+            line, follower_line, self.positions_new, self.leader.orientation, self.excess_volume_new
         )
         self.follower.scatter_excess("excess_volume_new", self.excess_volume_new)
 
@@ -320,7 +328,7 @@ class SlidingContact:
         """Contact states of both sides from the cells, extrapolated to their faces, or from the
         traces; or fluxes from the traces."""
         if phase == AT_FLUX:
-            self.fill_flux(dt)
+            self.fill_fluxes(dt)
         else:
             self._solve_pieces(AT_FACE if phase == AT_CELLS else TRACE, *self.lines)
             self._fill_surfaces()
@@ -334,13 +342,13 @@ class SlidingContact:
             fill_surface.entry(chain.arrays, side, chain.gather(NORMAL), chain.surface)
             chain.scatter(CONTACT, chain.surface)
 
-    def _solve_pieces(self, rows: slice, line: np.ndarray, other: np.ndarray) -> None:
+    def _solve_pieces(self, rows: slice, line: np.ndarray, follower_line: np.ndarray) -> None:
         """States of the pieces between both lines from these rows of the rims."""
         self.leader.read_states(rows, line)
-        self.follower.read_states(rows, other)
+        self.follower.read_states(rows, follower_line)
         _, self.pulled = solve_facets.entry(*self.arrays, self.pieces, self.count, 0.0, 0.0)
 
-    def fill_flux(self, dt: float) -> None:
+    def fill_fluxes(self, dt: float) -> None:
         """Fluxes of both sides' faces from the mid-time traces."""
         leader, follower = self.leader, self.follower
         old, follower_old = self.lines
@@ -348,12 +356,12 @@ class SlidingContact:
         follower_new = follower.line(new=True)
         # pieces at mid-time
         middle = 0.5 * (old + new)
-        moved = new - old
+        displacement = new - old
         follower_middle = 0.5 * (follower_old + follower_new)
         fill_positions(middle, follower_middle, self.positions)
         orientation = leader.orientation
         self.count = fill_pieces.entry(
-            middle, moved, self.positions, orientation, 1.0 / dt, self.pieces
+            middle, displacement, self.positions, orientation, 1.0 / dt, self.pieces
         )
         if self.geometry.curved:
             fill_radius_weighted_areas.entry(
@@ -365,11 +373,18 @@ class SlidingContact:
             chain.arrays.flux[:] = 0.0
             self.add_facet_flux.entry(self.pieces, self.count, side, chain.arrays)
         # what passes between the follower's polygons
-        closing = self._measure_closing(middle, moved, follower_middle, follower_new - follower_old)
+        closing = self._measure_closing(
+            middle, displacement, follower_middle, follower_new - follower_old
+        )
         growth = (1.0 / dt) * (self.excess_volume_new - self.excess_volume)
         growth += follower.gather(AREAS)[SWEPT_RATE]
         self.add_closing_flux.entry(
-            follower.arrays, closing, growth, self.pieces, self.count, self._part_at_first()
+            follower.arrays,
+            closing,
+            growth,
+            self.pieces,
+            self.count,
+            self._compute_first_cell_part(),
         )
         # into the rims
         leader.scatter(FLUX, leader.arrays.flux)
@@ -389,7 +404,7 @@ class SlidingContact:
             place = slice(row + CARRIED_FLUX, row + CARRIED_FLUX + 1)
             self.follower.scatter(place, change[None])
 
-    def _measure_closing(self, middle, moved, follower, follower_moved) -> np.ndarray:
+    def _measure_closing(self, middle, displacement, follower, follower_moved) -> np.ndarray:
         """Normal times area (2, n + 1) of the closing faces at the follower's nodes.
 
         In axisymmetric flow means over the step, like those of all faces: their axial parts close
@@ -402,7 +417,7 @@ class SlidingContact:
         if not self.geometry.curved:
             return self.leader.orientation * np.stack((-gap[1], gap[0]))
         position_moved = np.empty_like(follower)
-        fill_points(moved, self.positions, position_moved)
+        fill_points(displacement, self.positions, position_moved)
         squares = [
             0.5 * y * y + dy * dy / 24.0
             for y, dy in ((at_positions[1], position_moved[1]), (follower[1], follower_moved[1]))
@@ -412,14 +427,14 @@ class SlidingContact:
             (squares[1] - squares[0], radius * gap[0], gap[0])
         )
 
-    def _part_at_first(self) -> float:
-        """Part of the budget's rest that belongs to a contact point at the follower's first end."""
+    def _compute_first_cell_part(self) -> float:
+        """Part of the volume that the budget leaves which belongs to the follower's first cell."""
         if self.fixed[0] >= 0:
             return 0.0
         return 1.0 if self.fixed[1] >= 0 else 0.5
 
     def accept(self) -> None:
-        """Keep what the follower's motion found: which ends are fixed, and where."""
+        """Keep which of the follower's ends are fixed, and where, as its motion has set them."""
         self.fixed[:] = self.fixed_new
 
 
@@ -427,8 +442,8 @@ def _find_crossing(line: np.ndarray) -> tuple[int, int] | None:
     """Faces at which a line touches itself; the ends of a ring may."""
     if np.abs(line[:, 0] - line[:, -1]).max() > 1e-9 * np.ptp(line, axis=1).max():
         return find_self_crossing(line)
-    found = find_self_crossing(line[:, :-1])
-    if found is None:
-        found = find_self_crossing(line[:, 1:])
-        found = None if found is None else (found[0] + 1, found[1] + 1)
-    return found
+    crossing = find_self_crossing(line[:, :-1])
+    if crossing is None:
+        crossing = find_self_crossing(line[:, 1:])
+        crossing = None if crossing is None else (crossing[0] + 1, crossing[1] + 1)
+    return crossing

@@ -52,23 +52,23 @@ def fill_positions(leader, points, positions):
     first face behind one that is near.
     """
     start = 0
-    last = 0.0
+    last_position = 0.0
     for k in range(points.shape[1]):
-        best = 1e300
-        position = last
+        least_square = 1e300
+        position = last_position
         for a in range(start, leader.shape[1] - 1):
-            part, away = project(leader, a, points[0, k], points[1, k])
-            if away < best:
-                best = away
-                position = a + part
-            elif best < NEAR_LINE_DISTANCE * measure_square(leader, a):
+            face_part, distance_square = project(leader, a, points[0, k], points[1, k])
+            if distance_square < least_square:
+                least_square = distance_square
+                position = a + face_part
+            elif least_square < NEAR_LINE_DISTANCE * measure_square(leader, a):
                 break
         nearest = float(int(position + 0.5))
         if abs(position - nearest) < SNAPPED_LEADER_PART:
             position = nearest
-        last = position if position > last else last
-        positions[k] = last
-        start = min(int(last), leader.shape[1] - 2)
+        last_position = position if position > last_position else last_position
+        positions[k] = last_position
+        start = min(int(last_position), leader.shape[1] - 2)
 
 
 @kernel
@@ -76,9 +76,9 @@ def fill_points(line, positions, points):
     """Points (2, n) of a line at the positions (n,)."""
     for k in range(positions.shape[0]):
         a = min(int(positions[k]), line.shape[1] - 2)
-        part = positions[k] - a
+        face_part = positions[k] - a
         for q in range(2):
-            points[q, k] = line[q, a] + part * (line[q, a + 1] - line[q, a])
+            points[q, k] = line[q, a] + face_part * (line[q, a + 1] - line[q, a])
 
 
 @kernel
@@ -90,9 +90,9 @@ def find_last_crossing(line, other):
     for k in range(line.shape[1] - 2, -1, -1):
         x, y = line[0, k], line[1, k]
         dx, dy = line[0, k + 1] - x, line[1, k + 1] - y
-        found = -1
-        found_part = 0.0
-        most = -1.0
+        crossed_face = -1
+        crossed_part = 0.0
+        last_part = -1.0
         for a in range(other.shape[1] - 1):
             ex = other[0, a + 1] - other[0, a]
             ey = other[1, a + 1] - other[1, a]
@@ -100,32 +100,36 @@ def find_last_crossing(line, other):
             cross = dx * ey - dy * ex
             if cross * cross <= PARALLEL_LINES_SINE * (dx * dx + dy * dy) * (ex * ex + ey * ey):
                 continue
-            along = (away_x * ey - away_y * ex) / cross
-            part = (away_x * dy - away_y * dx) / cross
-            if 0.0 <= along <= 1.0 and 0.0 <= part <= 1.0 and along > most:
-                found = a
-                found_part = part
-                most = along
-        if found >= 0:
-            return k, most, found, found_part
+            part_of_line = (away_x * ey - away_y * ex) / cross
+            part_of_other = (away_x * dy - away_y * dx) / cross
+            if (
+                0.0 <= part_of_line <= 1.0
+                and 0.0 <= part_of_other <= 1.0
+                and part_of_line > last_part
+            ):
+                crossed_face = a
+                crossed_part = part_of_other
+                last_part = part_of_line
+        if crossed_face >= 0:
+            return k, last_part, crossed_face, crossed_part
     return -1, 0.0, -1, 0.0
 
 
 @compiled_once
-def fill_piece_face(line, moved, a, piece, inverse_dt, faces):
+def fill_piece_face(line, displacement, a, piece, inverse_dt, faces):
     """Area, swept volume per time, middle and normal of one piece of face `a`.
 
     piece: where on the face it begins and ends, 0 to 1, its number, and the orientation; and
     whether the line's ends meet.
     """
-    first, second, k, orientation, ring = piece
+    start, stop, k, orientation, ring = piece
     dx = line[0, a + 1] - line[0, a]
     dy = line[1, a + 1] - line[1, a]
-    area_x = orientation * (second - first) * dy
-    area_y = -orientation * (second - first) * dx
-    middle = 0.5 * (first + second)
-    speed_x = moved[0, a] + middle * (moved[0, a + 1] - moved[0, a])
-    speed_y = moved[1, a] + middle * (moved[1, a + 1] - moved[1, a])
+    area_x = orientation * (stop - start) * dy
+    area_y = -orientation * (stop - start) * dx
+    middle = 0.5 * (start + stop)
+    speed_x = displacement[0, a] + middle * (displacement[0, a + 1] - displacement[0, a])
+    speed_y = displacement[1, a] + middle * (displacement[1, a + 1] - displacement[1, a])
     faces[AREA_X, k] = area_x
     faces[AREA_Y, k] = area_y
     faces[SWEPT_RATE, k] = inverse_dt * (speed_x * area_x + speed_y * area_y)
@@ -138,7 +142,7 @@ def fill_piece_face(line, moved, a, piece, inverse_dt, faces):
 
 
 @kernel
-def fill_pieces(line, moved, positions, orientation, inverse_dt, facets):
+def fill_pieces(line, displacement, positions, orientation, inverse_dt, facets):
     """Cut the leader at its own nodes and the follower's positions; returns the number of pieces.
 
     line (2, m + 1): leader at mid-time; moved (2, m + 1): its displacement in the step; positions
@@ -150,29 +154,29 @@ def fill_pieces(line, moved, positions, orientation, inverse_dt, facets):
     a = 0
     k = 0
     count = 0
-    here = 0.0
+    start = 0.0
     # nodes of the follower before the leader's start
     while k < followers and positions[k] <= 0.0:
         k += 1
     while a < last:
         # up to the next node of either line
-        there = a + 1.0
-        if k < followers and positions[k] < there:
-            there = positions[k]
+        stop = a + 1.0
+        if k < followers and positions[k] < stop:
+            stop = positions[k]
         # a piece between them
-        if there > here:
+        if stop > start:
             facets.owners[LEADER, count] = a
             facets.owners[FOLLOWER, count] = k - 1 if 0 < k < followers else -1
-            facets.ends[LEADER_START, count] = here
-            facets.ends[LEADER_STOP, count] = there
-            piece = (here - a, there - a, count, orientation, ring)
-            fill_piece_face(line, moved, a, piece, inverse_dt, facets.faces)
+            facets.ends[LEADER_START, count] = start
+            facets.ends[LEADER_STOP, count] = stop
+            piece = (start - a, stop - a, count, orientation, ring)
+            fill_piece_face(line, displacement, a, piece, inverse_dt, facets.faces)
             count += 1
-        while k < followers and positions[k] <= there:
+        while k < followers and positions[k] <= stop:
             k += 1
-        if there >= a + 1.0:
+        if stop >= a + 1.0:
             a += 1
-        here = there
+        start = stop
     return count
 
 

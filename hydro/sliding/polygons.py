@@ -19,7 +19,7 @@ from shockgrid.hydro.facets.rows import FOLLOWER, STATE_E, SWEPT_RATE
 from shockgrid.hydro.formulas.geometry import PLANE, Geometry
 from shockgrid.hydro.perimeter.faces import measure_volume
 from shockgrid.hydro.rim import find_cell, find_excess
-from shockgrid.hydro.rows import RHO, P, U, V
+from shockgrid.hydro.rows import FLUX_ROWS, RHO, P, U, V
 from shockgrid.regrid.jit import kernel
 
 LEAST_VOLUME_LEFT = 0.5  # of a polygon cell's volume after a step
@@ -28,7 +28,7 @@ LEAST_VOLUME_LEFT = 0.5  # of a polygon cell's volume after a step
 @functools.cache
 def make_fill_excess_volume(geometry: Geometry = PLANE):
     """Kernel that measures what polygon cells have beyond their chords."""
-    weigh = geometry.triangle
+    weigh_triangle = geometry.triangle
 
     @kernel
     def fill_excess_volume(leader, follower, positions, orientation, excess_volume):
@@ -41,15 +41,15 @@ def make_fill_excess_volume(geometry: Geometry = PLANE):
             end_x, end_y = follower[0, k + 1] - x0, follower[1, k + 1] - y0
             x = 0.0
             y = 0.0
-            twice = 0.0
+            doubled_volume = 0.0
             a = int(positions[k]) + 1
             while a < positions[k + 1]:
                 next_x, next_y = leader[0, a] - x0, leader[1, a] - y0
-                twice += weigh(x * next_y - next_x * y, y0, y, next_y)
+                doubled_volume += weigh_triangle(x * next_y - next_x * y, y0, y, next_y)
                 x, y = next_x, next_y
                 a += 1
-            twice += weigh(x * end_y - end_x * y, y0, y, end_y)
-            excess_volume[k] = -0.5 * orientation * twice
+            doubled_volume += weigh_triangle(x * end_y - end_x * y, y0, y, end_y)
+            excess_volume[k] = -0.5 * orientation * doubled_volume
 
     return fill_excess_volume
 
@@ -60,7 +60,7 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
     split = geometry.split
 
     @kernel
-    def add_closing_flux(line, closing, growth, facets, count, first):
+    def add_closing_flux(line, closing, growth, facets, count, first_cell_part):
         """Add what passes between neighbouring follower cells through their closing faces.
 
         line: the follower's, with its traces; closing (2, n + 1): normal times area of the closing
@@ -70,22 +70,21 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
         and that of its `excess_volume`.
         The closing face's own swept volume is what the polygon's budget leaves for it, summed along
         the line.  The budget of the whole line has a rest where an end is a contact point: the part
-        `first` of it is left in the first cell, the others in the last one.
+        `first_cell_part` of it is left in the first cell, the others in the last one.
         """
         traces = line.states
         flux = line.flux
         owners = facets.owners
         areas = facets.areas
         cells = flux.shape[1]
-        # the budget's rest, of the whole line
-        rest = 0.0
+        # what the budget of the whole line leaves unassigned
+        unassigned = 0.0
         for piece in range(count):
-            rest -= areas[SWEPT_RATE, piece] if owners[FOLLOWER, piece] >= 0 else 0.0
+            unassigned -= areas[SWEPT_RATE, piece] if owners[FOLLOWER, piece] >= 0 else 0.0
         for k in range(cells):
-            rest -= growth[k]
+            unassigned -= growth[k]
         # along the line: what each closing face sweeps, from the budget of the cells before it
-        swept = -first * rest
-        k = 0
+        swept = -first_cell_part * unassigned
         piece = 0
         while piece < count and owners[FOLLOWER, piece] < 0:
             piece += 1
@@ -101,24 +100,27 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
             p = 0.5 * (traces[P, k] + traces[P, k + 1])
             through = u * area_x + v * area_y
             rate = through - swept
-            up = k + 1 if rate > 0.0 else k
-            mass = traces[RHO, up] * rate
-            speed = traces[U, up] ** 2 + traces[V, up] ** 2
+            upwind = k + 1 if rate > 0.0 else k
+            mass = traces[RHO, upwind] * rate
+            speed = traces[U, upwind] ** 2 + traces[V, upwind] ** 2
             momentum_y, push, hoop = split(
-                mass * traces[V, up] + p * area_y, p, area_y, closing[closing.shape[0] - 1, k + 1]
+                mass * traces[V, upwind] + p * area_y,
+                p,
+                area_y,
+                closing[closing.shape[0] - 1, k + 1],
             )
             # out of the cell before it, into the one after
-            parts = (
+            passing = (
                 mass,
-                mass * traces[U, up] + p * area_x,
+                mass * traces[U, upwind] + p * area_x,
                 momentum_y,
-                mass * (traces[STATE_E, up] + 0.5 * speed) + p * through,
+                mass * (traces[STATE_E, upwind] + 0.5 * speed) + p * through,
                 push,
                 hoop,
             )
-            for q in range(6):
-                flux[q, k + 1] += parts[q]
-                flux[q, k] -= parts[q]
+            for q in range(FLUX_ROWS):
+                flux[q, k + 1] += passing[q]
+                flux[q, k] -= passing[q]
 
     return add_closing_flux
 
@@ -126,11 +128,11 @@ def make_add_closing_flux(geometry: Geometry = PLANE):
 @functools.cache
 def make_find_crushed(geometry: Geometry = PLANE):
     """The kernel `find_crushed` of a geometry."""
-    weigh = geometry.volume
+    compute_volume = geometry.volume
 
     @kernel
     def find_crushed(nodes, nodes_new, excess, excess_new):
-        """The polygon cell that keeps the least of its volume: that part, i and j.
+        """The polygon cell that keeps the least of its volume: the fraction left, i and j.
 
         nodes, nodes_new (2, ni + 1, nj + 1) [m] before and after; excess, excess_new (faces,):
         volume of perimeter cells beyond their straight faces.  Only cells count that a line takes
@@ -143,13 +145,13 @@ def make_find_crushed(geometry: Geometry = PLANE):
         for face in range(excess.shape[0]):
             if excess_new[face] < 0.0:
                 _, i, j = find_cell(face, ni, nj)
-                beyond = find_excess(excess, i, j, ni, nj)
-                volume = measure_volume(nodes, i, j, weigh) + beyond
-                beyond = find_excess(excess_new, i, j, ni, nj)
-                volume_new = measure_volume(nodes_new, i, j, weigh) + beyond
-                part = volume_new / volume if volume > 0.0 else min(volume_new, 0.0)
-                if part < least:
-                    least = part
+                excess_here = find_excess(excess, i, j, ni, nj)
+                volume = measure_volume(nodes, i, j, compute_volume) + excess_here
+                excess_here = find_excess(excess_new, i, j, ni, nj)
+                volume_new = measure_volume(nodes_new, i, j, compute_volume) + excess_here
+                volume_left = volume_new / volume if volume > 0.0 else min(volume_new, 0.0)
+                if volume_left < least:
+                    least = volume_left
                     at_i = i
                     at_j = j
         return least, at_i, at_j

@@ -216,7 +216,7 @@ def test_sums_are_kept_while_the_follower_slides_on_a_curve(ends):
     low, high = simulation.blocks
     high.state[1, 1:-1, 1:-1] = 0.5  # slips over the waves of the line
     high.state[3, 1:-1, 3] = 2.0
-    simulation.exchange.cut_contacts()
+    simulation.exchange.divide_contacts()
     for block in simulation.blocks:
         phases.update(block, 0.0)
     simulation.clock.rate = max(block.find_rate() for block in simulation.blocks)

@@ -68,10 +68,9 @@ class Simulation:
     part of the stable step, the rate being summed over both grid directions (1 is the limit of the
     unsplit scheme); `source`: gravity or heating (`hydro.sources`); `geometry`:
     "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
-    all integrals are then per radian); `measure_block`: gives the numbers of a block,
-    `measured_numbers` of them, that history columns want of the whole of it, found by whoever
-    computes it; `refining`: adds grid lines on the way (`hydro.remap.flow`), None: the cells
-    stay as many as they are; `void_fill`: pressure [Pa] and gamma of the gas that a void between
+    all integrals are then per radian);
+    `refining`: adds grid lines on the way (`hydro.remap.flow`), None: the cells stay as many as
+    they are; `void_fill`: pressure [Pa] and gamma of the gas that a void between
     surfaces holds when it closes, None: nothing; `find_end`: called after every step, gives words
     for a run that has come to its end before `t_end`.  Raises BadInput for sides that are not
     covered once by segments, and for blocks that lie on each other.
@@ -93,8 +92,6 @@ class Simulation:
         source: SourceFunction | None = None,
         geometry: str = "plane",
         threads: int | None = 1,
-        measure_block: Callable[[Block], Sequence[float]] | None = None,
-        measured_numbers: int = 1,
         refining: Refining | None = None,
         void_fill: tuple[float, float] | None = None,
         find_end: Callable[[Simulation], str | None] | None = None,
@@ -104,10 +101,6 @@ class Simulation:
         _check_positive("t_end", t_end, " s")
         _check_positive("cfl", cfl)
         self._wanted_threads = threads
-        self._measure_block = measure_block
-        self._measured_numbers = measured_numbers
-        # of the last step, where ranks share the blocks
-        self._measured: list[Sequence[float]] | None = None
         self._mesh = mesh
         self._line_rule = line_rule or LineRule()
         self._source = source
@@ -202,16 +195,6 @@ class Simulation:
         return self._blocks
 
     @property
-    def measured(self) -> Sequence[Sequence[float]]:
-        """What `measure_block` finds in each block, in their order; empty without it."""
-        if self._measure_block is None:
-            return []
-        if self._measured is not None:
-            return self._measured
-        blocks = self._blocks if self._shared.size == 1 else self.blocks
-        return [self._measure_block(block) for block in blocks]
-
-    @property
     def flow(self) -> Flow:
         """What a step works on, with whole blocks."""
         self.collect()
@@ -290,12 +273,7 @@ class Simulation:
             self.finished = "t_end reached"
         elif self.refining is not None:
             self._refine(self.refining)
-        # what is measured of it
         row = self.compute_row(record.limit, record.retries)
-        if self._measure_block is not None and ranks.size > 1:
-            ranks.bring_states()
-            own_rows = [self._measure_block(self._blocks[number]) for number in ranks.own]
-            self._measured = list(ranks.exchange_rows(own_rows, self._measured_numbers))
         self._note_end()  # within the step: every rank has what it reads
         ranks.end_step()
         return row

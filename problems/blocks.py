@@ -345,7 +345,6 @@ class Blocks(Problem):
     """The blocks of the deck; `grids` are made when first asked for."""
 
     Deck = BlocksDeck
-    measures_sides = True  # a block's means are found by who has the block
     deck: BlocksDeck
 
     def __init__(self, deck: BlocksDeck):
@@ -420,8 +419,6 @@ class Blocks(Problem):
             mesh=deck.mesh,
             geometry=deck.geometry,
             source=make_gravity(*deck.gravity) if any(deck.gravity) else None,
-            measure_block=measure_means,
-            measured_numbers=len(MEASURED),
             find_end=lambda flow: necks.find_cut() if necks is not None else None,
         )
         necks = Necks(flow.meetings.bodies) if flow.meetings.pairs else None
@@ -462,8 +459,8 @@ class Blocks(Problem):
         """Mean velocity and centre of mass by mass, greatest pressure, of every block."""
         return {
             f"{name}_{table.name}": number
-            for table, numbers in zip(self.deck.block, evolution.measured, strict=True)
-            for name, number in zip(MEASURED, numbers, strict=True)
+            for table, block in zip(self.deck.block, evolution.blocks, strict=True)
+            for name, number in zip(MEASURED, measure_means(block), strict=True)
         }
 
     def report(self, history, final=None) -> Report:

@@ -257,7 +257,6 @@ class Problem:
     units: ClassVar[Mapping[str, str]] = {}  # of columns of `measure` with a unit
     t_unit: str = "s"  # of t: "1" if the deck is dimensionless; or "iterations"
     counted: ClassVar[tuple[str, ...]] = ()  # keys or attributes: their product is all cells
-    measures_sides: ClassVar[bool] = False  # `measure` reads cells along sides alone: `reads_cells`
 
     def __init__(self, deck: AnyDeck):
         """Keep the deck; a subclass checks combinations of fields here (raises BadInput)."""
@@ -354,14 +353,9 @@ class Problem:
         keys, a function of the evolution's state alone (restarts must give the same)."""
         return {}
 
-    @property
-    def reads_cells(self) -> bool:
-        """Whether `measure` reads cell states beyond three rows along every side, or inner nodes.
-
-        With several MPI ranks, the first one, which measures, then receives all blocks after every
-        step.  Use of `measure_block` of a `hydro.simulation.Simulation` does not count.
-        """
-        return not (self.measures_sides or type(self).measure is Problem.measure)
+    def measures(self) -> bool:
+        """Whether `measure` has anything to measure."""
+        return type(self).measure is not Problem.measure
 
     def report(self, history: History, final: Evolution | None = None) -> Report:
         """Computed results compared with theory: the one method for all numbers of a run.

@@ -245,7 +245,6 @@ class RiemannDeck(Deck, kw_only=True):
 class Riemann(Problem):
     Deck = RiemannDeck
     counted = ("cells", "rows")
-    measures_sides = True
     units: ClassVar = {f"star_{name}": LABELS[name.partition("_")[0]][1] for name in STARS}
 
     def __init__(self, deck: RiemannDeck):

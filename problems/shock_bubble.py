@@ -147,7 +147,6 @@ class ShockBubble(Problem):
     Deck = ShockBubbleDeck
     places = "upwind", "downwind", "rear", "height", "axis_front", "wall_front"
     units: ClassVar = {**dict.fromkeys(places, "m"), "volume": "m2"}
-    measures_sides = True  # the bubble's outline, the axis and the wall
 
     def __init__(self, deck: ShockBubbleDeck):
         super().__init__(deck)
@@ -249,7 +248,6 @@ class ShockBubble(Problem):
             blocks.values(),
             links,
             line_rule=LineRule(thickness=self.choose_thickness(surface)),
-            measure_block=lambda block: (float(block.volume.sum()),),
         )
         west_seam, east_seam, west, east, _, top = (link.leader for link in links[:6])
         for side in (west, east):  # else the vortex takes these points into the fold of the jet
@@ -267,7 +265,6 @@ class ShockBubble(Problem):
         where it is weakened by refraction), from the tube's beginning on.
         """
         blocks = {block.name: block for block in evolution.blocks}
-        volumes = dict(zip(blocks, evolution.measured, strict=True))
         lines = west, _, east = [blocks[name].nodes[:, row] for name, row in OUTLINE.items()]
         axis = [(blocks[name].nodes[0, :, 0], blocks[name].state[3, 1:-1, 1]) for name in AXIS]
         lid = blocks["air-north"]
@@ -281,7 +278,7 @@ class ShockBubble(Problem):
             "downwind": float(east[0, 0]),
             "rear": min(float(line[0].min()) for line in lines),
             "height": max(float(line[1].max()) for line in lines),
-            "volume": sum(volumes[name][0] for name in BUBBLE),
+            "volume": sum(float(blocks[name].volume.sum()) for name in BUBBLE),
             "axis_front": find_front(axis, 1.05 * AIR_PRESSURE),
             "wall_front": find_front(wall, 0.5 * (AIR_PRESSURE + self.shock.p)),
         }

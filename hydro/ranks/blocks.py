@@ -102,9 +102,6 @@ class Blocks(list[Block]):
     def bring_starts(self, sounds: Sequence[bool], fields: Sequence[bool]) -> None:
         """For who regrids a block: sound speeds or states of all its cells at the start."""
 
-    def bring_states(self) -> None:
-        """For who regrids a block: the present states of all its cells."""
-
     # --- between steps -----------------------------------------------------------------------
 
     def begin_step(self) -> None:

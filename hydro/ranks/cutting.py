@@ -217,11 +217,6 @@ class CutBlock:
         for array in self.block.list_starts(self.block.held_arrays):
             self.gather_rows(array)
 
-    def bring_states(self) -> None:
-        """Send the owner the present states of all cells."""
-        for name in self.block.held_arrays:
-            self.gather_rows(getattr(self.block, name))
-
     def send_nodes(self) -> None:
         """Give every rank the new nodes of its band, with those of its ghost rows."""
         ni = self.block.ni

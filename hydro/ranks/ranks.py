@@ -18,9 +18,8 @@ communicate, or all wait for ever; and a block's inside is old on all ranks but 
 
 from __future__ import annotations
 
-import contextlib
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from operator import attrgetter
 from typing import Any
@@ -84,7 +83,6 @@ class Ranks(Blocks):
         self._starts: messages.Message | None = None  # where a body source acts
         self._pushes: list[np.ndarray] = []
         self.busy = False  # with what all ranks do together
-        self._glancing = False
         self.whole = True  # is the inside of all blocks that of this step here?
         for number, block in enumerate(blocks):
             block.is_here = self.owners[number] == self.rank
@@ -244,10 +242,6 @@ class Ranks(Blocks):
             if fields[number]:
                 cut.bring_fields()
 
-    def bring_states(self) -> None:
-        for cut in self.cuts.values():
-            cut.bring_states()
-
     def update(self, dt: float) -> None:
         super().update(dt)
         for number, cut in self.cuts.items():
@@ -277,8 +271,8 @@ class Ranks(Blocks):
         self.book.end_step()
 
     def collect(self) -> None:
-        """As `Blocks.collect`; within a step, or in a `glance`, nothing is done."""
-        if self.busy or self._glancing or (self.rank == 0 and self.whole):
+        """As `Blocks.collect`; within a step nothing is done."""
+        if self.busy or (self.rank == 0 and self.whole):
             return
         self.busy = True
         comm = self.book.count("whole blocks")
@@ -349,15 +343,6 @@ class Ranks(Blocks):
             empty[..., first : last + more, :] = array[..., first : last + more, :]
             setattr(block, name, empty)
         block.part_start(parted)
-
-    @contextlib.contextmanager
-    def glance(self) -> Iterator[None]:
-        """In the block nobody looks beyond the sides: nothing is collected."""
-        self._glancing = True
-        try:
-            yield
-        finally:
-            self._glancing = False
 
 
 def tell(comm: Any, word: int, code: int = 0) -> None:

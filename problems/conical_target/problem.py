@@ -101,7 +101,6 @@ CELLS_BEHIND_FRONT = 5  # cells behind the front: a shock is three or four wide
 
 class ConicalTarget(seen.Results, Problem):
     Deck = ConicalTargetDeck
-    measures_sides = True  # peaks are found by who has the block
     units: ClassVar[dict[str, str]] = {
         **dict.fromkeys(("greatest_x", "greatest_y", "shock_x_axis", "shock_x_side"), "m"),
         **dict.fromkeys(("line_bend", "line_amplitude", "line_length"), "m"),
@@ -174,8 +173,6 @@ class ConicalTarget(seen.Results, Problem):
             blocks.values(),
             self.layout.connect(blocks),
             geometry="axisymmetric",
-            measure_block=seen.measure_block,
-            measured_numbers=seen.MEASURED_NUMBERS,
         )
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
@@ -183,7 +180,7 @@ class ConicalTarget(seen.Results, Problem):
         blocks = {block.name: block for block in evolution.blocks}
         front = blocks["front"]
         cone = blocks["cone"]
-        measured = dict(zip(blocks, evolution.measured, strict=True))
+        measured = {name: seen.measure_block(block) for name, block in blocks.items()}
         greatest, x, y, transformed = measured["cone"]
         row = {"pressure_impact": float(front.state[3, 2, 1]), "greatest_pressure": greatest}
         row |= {"greatest_x": x, "greatest_y": y}

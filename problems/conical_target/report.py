@@ -32,7 +32,6 @@ PARTS = ("impactor", "shell", "target", "filling")
 MM = 1e3
 GPA = 1e-9
 US = 1e6
-MEASURED_NUMBERS = 4  # that `measure_block` gives
 
 
 def measure_block(block: Block) -> tuple[float, float, float, float]:

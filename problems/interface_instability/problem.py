@@ -85,7 +85,6 @@ def choose_layer(cells: float) -> float:
 
 class InterfaceInstability(Results, Problem):
     Deck = InterfaceDeck
-    measures_sides = True  # far speeds are found by who has the block
     units: ClassVar[dict[str, str]] = {
         **dict.fromkeys(("interface_mean", "interface_max", "interface_min", "amplitude"), "m"),
         **{"roughness": "m", "largest_turn": "deg", "far_transverse_speed": "m/s"},
@@ -474,7 +473,6 @@ class InterfaceInstability(Results, Problem):
                 deck.line.shape, deck.line.relax, self.thickness, self.make_respacing()
             ),
             make_regridder=make_regridder,
-            measure_block=measure_far_speed,
             refining=refining,
         )
 
@@ -570,16 +568,16 @@ class InterfaceInstability(Results, Problem):
             **{h.column: measure_mode(line, self.k, h.number, h.phase) for h in self.followed},
             "roughness": roughness,
             "largest_turn": math.degrees(turn),
-            "far_transverse_speed": max(evolution.measured)[0],
+            "far_transverse_speed": max(map(measure_far_speed, evolution.blocks)),
         }
 
     def cautions(self, history=None) -> list[str]:
         return find_cautions(self, history)
 
 
-def measure_far_speed(block: Block) -> tuple[float]:
+def measure_far_speed(block: Block) -> float:
     """The greatest transverse speed [m/s] in the far field of a block."""
     depth = max(1, int(FAR_FIELD_PART * block.ni))
     start = 1 if block.name == "first" else block.ni - depth + 1
     v = block.state[V, start : start + depth, 1:-1]
-    return (max(0.0, float(v.max()), -float(v.min())),)
+    return max(0.0, float(v.max()), -float(v.min()))

@@ -106,7 +106,6 @@ FINER_ROWS = 0.75  # power of the refinement by which rows are finer: torn cells
 
 
 class PlateOnWedge(Results, Problem):
-    measures_sides = True  # jet and shocks are found by who has the block
     Deck = PlateOnWedgeDeck
     units: ClassVar = {
         **dict.fromkeys(("contact_x", "contact_y", "contact_path", "lead"), "m"),

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from shockgrid.hydro.block import Block
 from shockgrid.hydro.facets.lines import project
 from shockgrid.hydro.motion.overlaps import is_inside
 from shockgrid.hydro.simulation import Simulation
@@ -26,7 +25,6 @@ class PlateRun(Simulation):
     """The flow, its phases and its end; the phases' times belong to the state."""
 
     def __init__(self, problem, blocks, links, **options):
-        options |= {"measure_block": self.measure_block, "measured_numbers": 4}
         super().__init__(blocks, links, **options)
         self.problem = problem
         self.plate = blocks[0]
@@ -101,20 +99,13 @@ class PlateRun(Simulation):
             return math.nan
         return float(self.measure_along(self.find_contact_point() - self.start))
 
-    def measure_block(self, block: Block) -> tuple[float, float, float, float]:
-        """Of plate or wedge: greatest speed [m/s], cells of the jet and their mass, angle of the
-        shock [degrees]; of others zeros."""
-        if block is not self.plate and block is not self.wedge:
-            return 0.0, 0.0, 0.0, 0.0
-        point = self.find_contact_point()
-        in_wedge = block is self.wedge
-        angle = self.measure_shock_angle(block, point, in_wedge)
-        if in_wedge:
-            return 0.0, 0.0, 0.0, angle
-        speed = np.hypot(*block.state[1:3, 1:-1, 1:-1])
+    def measure_jet(self) -> tuple[float, int, float]:
+        """Greatest speed in the plate [m/s], cells of its jet and their mass [kg/m]."""
+        plate = self.blocks[0]
+        speed = np.hypot(*plate.state[1:3, 1:-1, 1:-1])
         fast = speed > report.JET_SPEED_RATIO * self.problem.plate_speed
-        mass = float((block.volume * block.state[0, 1:-1, 1:-1])[fast].sum())
-        return float(speed.max()), float(fast.sum()), mass, angle
+        mass = float((plate.volume * plate.state[0, 1:-1, 1:-1])[fast].sum())
+        return float(speed.max()), int(fast.sum()), mass
 
     def measure(self) -> dict[str, float]:
         """Columns of the history: A, the states behind it, the jet, the phase."""
@@ -130,7 +121,7 @@ class PlateRun(Simulation):
         if count >= last:
             behind = float(pressure[count - last : count - first].mean())
             direction = line[:, first] - line[:, last]
-        (fastest, cells, mass, angle), (*_, angle_in_wedge) = self.measured[:2]
+        fastest, cells, mass = self.measure_jet()
         means = np.full(len(report.COLUMNS), math.nan)  # at fixed parts of A's path, while it runs
         if not arrived:
             arc = compute_arc_lengths(line)
@@ -150,8 +141,8 @@ class PlateRun(Simulation):
             "contact_pressure": behind,
             **dict(zip(report.COLUMNS, map(float, means), strict=True)),
             "interface_angle": -math.degrees(math.atan2(direction[1], direction[0])),
-            "shock_angle_plate": angle,
-            "shock_angle_wedge": angle_in_wedge,
+            "shock_angle_plate": self.measure_shock_angle(self.plate, point, in_wedge=False),
+            "shock_angle_wedge": self.measure_shock_angle(self.wedge, point, in_wedge=True),
             "surface_speed": float(np.median(free)) if free.size else math.nan,
             "lead": math.nan if arrived else self.measure_lead(),
             "jet_speed": fastest if cells >= LEAST_JET else 0.0,
@@ -213,7 +204,7 @@ class PlateRun(Simulation):
         begun = {
             "attached": lambda: np.hypot(*self.find_contact_point() - self.start) > far,
             "arrived": self.is_at_end,
-            "jet": lambda: self.measured[0][1] >= LEAST_JET,
+            "jet": lambda: self.measure_jet()[1] >= LEAST_JET,
         }
         for phase, is_there in begun.items():
             if not math.isfinite(self.times[phase]) and is_there():

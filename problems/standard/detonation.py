@@ -58,7 +58,6 @@ class DetonationDeck(Deck, kw_only=True):
 class Detonation(Problem):
     Deck = DetonationDeck
     units: ClassVar = {"front": "m", "pressure": "Pa"}
-    measures_sides = True
 
     def __init__(self, deck: DetonationDeck):
         super().__init__(deck)

@@ -61,7 +61,6 @@ class RayleighTaylor(Problem):
     t_unit = "1"
     counted = ("cells", "columns", "layers")
     units: ClassVar = {"amplitude": "m"}
-    measures_sides = True
 
     def __init__(self, deck: RayleighTaylorDeck):
         super().__init__(deck)

@@ -48,7 +48,6 @@ class TriplePoint(Problem):
     Deck = TriplePointDeck
     t_unit = "1"
     units: ClassVar = {"point_x": "m", "point_y": "m"}
-    measures_sides = True
 
     def __init__(self, deck: TriplePointDeck):
         super().__init__(deck)

@@ -397,9 +397,7 @@ class Runner:
             self._dump_light() if self.deck.deck.output.light else self._dump()
         written = time.monotonic()
         if self.world is not None:
-            self.directory.note(
-                self.world.begin(self.deck, self.problem, self.evolution, self.restored)
-            )
+            self.directory.note(self.world.begin(self.deck, self.evolution, self.restored))
         while True:
             reason = evolution.finished
             if reason is None and run.max_steps is not None and evolution.step >= run.max_steps:
@@ -450,8 +448,9 @@ class Runner:
     def _measure(self) -> dict[str, Any]:
         """Columns of the deck's chosen groups and of the problem."""
         chosen = compute_chosen_columns(self.evolution, self.chosen)
-        with self.world.measuring() if self.world else contextlib.nullcontext():
-            return chosen | self.problem.measure(self.evolution)
+        if self.world:
+            self.world.gather(self.problem)
+        return chosen | self.problem.measure(self.evolution)
 
     def _record(self, row: dict[str, Any], seconds: float) -> None:
         evolution = self.evolution

@@ -46,7 +46,6 @@ class World:
         self.comm = comm
         self.size = int(comm.size)
         self.ranks: Ranks | None = None
-        self._reads_cells = True  # does the problem measure inside blocks?
         self._beginning = False
         self._sent: str | None = None  # the deck that all ranks build
 
@@ -72,7 +71,7 @@ class World:
                 "run it without mpiexec"
             )
 
-    def begin(self, deck: ReadDeck, problem: Problem, evolution: Any, restored: bool) -> str:
+    def begin(self, deck: ReadDeck, evolution: Any, restored: bool) -> str:
         """Let all ranks build the evolution of `deck`; restored: and take up this one's state.
 
         Returns words on who computes what.
@@ -81,18 +80,16 @@ class World:
         shares = distribute_evolution(evolution, self.size, deck.deck.run.cut)
         state = evolution.get_state() if restored else {}
         self.build(deck)
-        self._reads_cells = problem.reads_cells
         self._beginning = True
         tell(self.comm, BEGIN_MESSAGE)
         _, self.ranks = distribute_flow(self.comm, evolution, shares, state)
         self._beginning = False
         return describe_distribution([block.name for block in evolution.blocks], shares, self.size)
 
-    def measuring(self) -> contextlib.AbstractContextManager[None]:
-        """For the block in which a problem measures: no more is collected than it reads."""
-        if self.ranks is None or self._reads_cells:
-            return contextlib.nullcontext()
-        return self.ranks.glance()
+    def gather(self, problem: Problem) -> None:
+        """Bring the first rank, which measures, all that a problem may read of a step."""
+        if self.ranks is not None and problem.measures():
+            self.ranks.collect()
 
     def dismiss(self, code: int) -> None:
         """End the other ranks with an exit code; at once, where they wait for this one's part."""

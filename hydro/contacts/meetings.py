@@ -53,6 +53,7 @@ class Meetings:
         void_fill: tuple[float, float] | None = None,
     ):
         self.geometry = geometry
+        self._moving_sides = motion.sides
         self.blocks = list(blocks)
         self.add_facet_flux = make_add_facet_flux(geometry)
         surfaces, self.pairs = _find_pairs(blocks, links, motion, geometry)
@@ -71,6 +72,7 @@ class Meetings:
         self.voids = Voids(self.surfaces, self.pairs, geometry.curved, void_fill)
         self.near: list[Pair] = []  # with facets
         self.touching: list[Pair] = []  # with pins
+        self._met: list[Surface] = []  # that have lain on others
         self._sides: list[Surface] = []  # of the near pairs, and their walls
         self._walls: list[Surface] = []
         self._found = False  # the present grid's facets?
@@ -262,8 +264,12 @@ class Meetings:
 
     def fill_fluxes(self, t: float, dt: float) -> None:
         """Add the fluxes through closed facets to those of the free surfaces."""
-        if not self.near:
-            return
+        if self.near:
+            self._fill_facet_fluxes(t, dt)
+        for surface in self._met:
+            surface.flow_along()
+
+    def _fill_facet_fluxes(self, t: float, dt: float) -> None:
         self._set_velocities(t)
         for surface in (*self._sides, *self._walls):
             surface.read_middle()
@@ -280,7 +286,6 @@ class Meetings:
                 pair.rub(dt)
         for surface in self._sides:
             surface.write_flux()
-            surface.flow_along()
 
     def accept(self) -> None:
         """The step stands: count what closed and opened, and how far lines may have come."""
@@ -337,12 +342,25 @@ class Meetings:
         sides = {id(s) for pair in self.near for s in (pair.leader, pair.follower)}
         self._sides = [s for s in self.surfaces if id(s) in sides and not s.rigid]
         self._walls = [s for s in self.surfaces if id(s) in sides and s.rigid]
+        met = {id(s.block) for pair in self.touching for s in (pair.leader, pair.follower)}
         for surface in self.surfaces:
-            surface.moving_line.lie_on_body(id(surface) in sides)
+            if id(surface.block) in met and not surface.rigid:
+                surface.meet(self._moving_sides)
+        self._met = [surface for surface in self.surfaces if surface.has_met]
+        self._hold_nodes()
         self._found = True
         if self.voids.are_due(step, bool(self.near)):
             self._read_lines((*self.surfaces, *self.planes))
             self.voids.find()
+
+    def _hold_nodes(self) -> None:
+        """Mark the nodes that lie on other surfaces: their waves do not decay by themselves."""
+        for surface in self._met:
+            surface.free_nodes()
+        for pair in self.touching:
+            for half, _ in pair.halves:
+                if not half.surface.rigid:
+                    half.surface.hold_nodes((half.pins.positions >= 0.0) | half.pins.covered)
 
     def _set_velocities(self, t: float) -> None:
         for surface in self.surfaces:
@@ -382,7 +400,11 @@ class Meetings:
             return {}
         numbers = [self.made, self.opened, *(pair.stretches for pair in self.pairs)]
         counts = np.array(numbers, dtype=np.int64)
-        measured = {"contacts/length": self.length, "contacts/overlap": self.overlap}
+        measured = {
+            "contacts/length": self.length,
+            "contacts/overlap": self.overlap,
+            "contacts/met": np.array([surface.has_met for surface in self.surfaces]),
+        }
         return {"contacts/counts": counts, **measured} | self.voids.get_state()
 
     def get_state_for(self, other: Meetings) -> dict[str, Any]:
@@ -399,6 +421,7 @@ class Meetings:
         for pair in self.pairs:
             pair.clearance = 0.0
             pair.is_near = False
+        self._set_met(state.get("contacts/met"))
         self.voids.set_state(state)
         counts = state.get("contacts/counts")
         if counts is None or len(counts) != len(self.pairs) + 2:
@@ -409,6 +432,12 @@ class Meetings:
             pair.stretches = stretches
         self.length = float(state["contacts/length"])
         self.overlap = float(state.get("contacts/overlap", 0.0))
+
+    def _set_met(self, met: np.ndarray | None) -> None:
+        """Which surfaces have lain on others, as of `get_state`; None: not known, so none."""
+        for number, surface in enumerate(self.surfaces):
+            if met is not None and len(met) == len(self.surfaces) and met[number]:
+                surface.meet(self._moving_sides)
 
 
 def _find_bodies(blocks: Sequence[Block], links: Sequence[Link | SlidingContact]) -> dict[int, int]:

@@ -17,6 +17,7 @@ from shockgrid.hydro.facets.rows import make_line_arrays
 from shockgrid.hydro.motion.key_nodes import KeyNode
 from shockgrid.hydro.motion.line import Role
 from shockgrid.hydro.motion.sides import Sides
+from shockgrid.hydro.motion.smoothing import SurfaceLine
 from shockgrid.hydro.perimeter.contacts import fill_ghosts_from_faces, flow_along
 from shockgrid.hydro.rim import FLUX, LENGTH, P_STAR, RHO, SWEPT, VOID_P
 from shockgrid.regrid.measure.crossings import GROUP_EDGES, fill_boxes
@@ -51,6 +52,7 @@ class Surface:
         self.bond = np.inf if self.rigid else float(getattr(segment, "bond", 0.0))
         self.friction = np.inf if self.rigid else float(getattr(segment, "friction", 0.0))
         self.way = 0.0  # of the node that goes furthest in this step
+        self.thick: SurfaceLine | None = None  # once it has met another one
         self.moving_line = next(line for line in sides.lines if line.segment is segment)
         self.read()
         self.length = float(np.hypot(*np.diff(self.line)).sum())
@@ -64,6 +66,29 @@ class Surface:
             if any(b is self.block and (p, q) == (i, j) for b, p, q in key_node.members):
                 return key_node
         return None
+
+    @property
+    def has_met(self) -> bool:
+        """Has it lain on another surface before?"""
+        return self.thick is not None
+
+    def meet(self, sides: Sides) -> None:
+        """It lies on another surface: from now on its short waves decay where it is free."""
+        if self.has_met or not self.moving_line.may_lie_on_body:
+            return
+        self.thick = SurfaceLine(self.moving_line)
+        sides.damped.append(self.thick)
+        self.moving_line.lie_on_body()
+
+    def free_nodes(self) -> None:
+        """No node lies on another surface, for what is known yet."""
+        if self.thick is not None:
+            self.thick.held[:] = False
+
+    def hold_nodes(self, which: np.ndarray) -> None:
+        """These of its nodes (n + 1,) lie on another surface."""
+        if self.thick is not None:
+            self.thick.held[:: self.step] |= which
 
     @property
     def at_sliding_contact(self) -> bool:

@@ -22,6 +22,8 @@ from shockgrid.regrid import curves
 from shockgrid.regrid.jit import compiled_once, kernel
 from shockgrid.regrid.sides import SIDE_NAMES, find_node
 
+# of the shorter face beside it: so far a node goes along a body's surface in a step
+MOST_RESPACED_PART = 0.1
 # part of the way to its spacing that a line at or opposite a contact point goes in a full step
 FOLLOWED_WAY_PART = 0.2
 
@@ -127,10 +129,13 @@ def move_beside_neighbours(moved, arc, positions, out):
     arc, positions (n,): where each is along the line and where it is to be.  A node that goes
     parallel to the chord between its neighbours takes nothing from the body and adds nothing.  On
     the line's own chords it would cut every convex tip, and press on it like a piston.  Where the
-    line turns back it goes less far.  Theory F16.9.
+    line turns back it goes less far, and nowhere further than MOST_RESPACED_PART of the shorter
+    face beside it: no node passes another.  Theory F16.9.
     """
     for k in range(1, moved.shape[1] - 1):
-        way = (positions[k] - arc[k]) / (arc[k + 1] - arc[k - 1])
+        length = arc[k + 1] - arc[k - 1]
+        most = MOST_RESPACED_PART * min(arc[k] - arc[k - 1], arc[k + 1] - arc[k]) / length
+        way = min(most, max(-most, (positions[k] - arc[k]) / length))
         for c in range(2):
             out[c, k] = moved[c, k] + way * (moved[c, k + 1] - moved[c, k - 1])
 
@@ -265,7 +270,7 @@ class Role(Enum):
 
     WITH_ENDS = "lies between its ends as its kind of motion says"
     FLOWING = "moves with the contact speeds of its faces"
-    ON_BODY = "does so, and lies on another body's surface in part"
+    ON_BODY = "does so, and has lain on another body's surface"
     AT_CONTACT = "goes on from an end of a sliding contact, which cuts it off"
     OPPOSITE = "lies opposite to such a contact point, whose spacing it shares"
 
@@ -343,10 +348,14 @@ class Line:
         """Where the nodes are to be along the line from now on: (n + 1,) from 0 to 1."""
         self.spacing = np.ascontiguousarray(spacing)
 
-    def lie_on_body(self, lies: bool) -> None:
-        """Whether it lies on another body's surface in part, if it moves with the flow."""
-        if self.role in (Role.FLOWING, Role.ON_BODY):
-            self.role = Role.ON_BODY if lies else Role.FLOWING
+    @property
+    def may_lie_on_body(self) -> bool:
+        """Does it move with the flow, away from sliding contacts?"""
+        return self.role in (Role.FLOWING, Role.ON_BODY)
+
+    def lie_on_body(self) -> None:
+        """It has lain on another body's surface."""
+        self.role = Role.ON_BODY
 
     def lie_opposite(self) -> None:
         """It lies opposite to a contact point, if it is not at one itself."""

@@ -24,7 +24,12 @@ from shockgrid.hydro.motion.line import (
     StraightLine,
     spread_straight,
 )
-from shockgrid.hydro.motion.smoothing import SlidingLine, ThickContact, find_thick_contacts
+from shockgrid.hydro.motion.smoothing import (
+    SlidingLine,
+    SurfaceLine,
+    ThickContact,
+    find_thick_contacts,
+)
 from shockgrid.hydro.motion.track import join_tracks
 from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.sides import OPPOSITE_SIDES, SIDE_NAMES
@@ -107,7 +112,7 @@ class Sides:
         self.guards = CornerGuard.find(self.key_nodes, self.followers)
         # lines in the order in which the passes take them
         self.moving = [line for line in self.lines if not line.waits]
-        self.damped: list[SlidingLine | ThickContact] = [
+        self.damped: list[SlidingLine | ThickContact | SurfaceLine] = [
             SlidingLine(line) for line in self.moving if line.segment.kind == "sliding"
         ]
         self.damped += self.thick_contacts

@@ -29,6 +29,7 @@ THICK_CELLS = 0.75  # default thickness of a contact, in its initial cells
 SHORTEST_TURNED_SEGMENT = 0.25  # segment required by turning, in thicknesses of its contact
 # of sliding lines: strength, and turn [rad]; see `fill_sliding_damping`
 SLIDING_DAMPING = 4.0
+SURFACE_DAMPING = 12.0  # strength of surfaces of bodies that have met; see `fill_surface_damping`
 SLIDING_BEND_ANGLE = 0.35
 MOST_DAMPING = 0.03  # part of a fourth difference that sliding lines lose in a step: stable
 # least sine of half the angle between two segments: where a line folds back on itself
@@ -344,6 +345,41 @@ def fill_speeds(nodes, faces, closed, walls, cube, dt, out):
             out[c, k] /= dt
 
 
+@compiled_once
+def damp_node(line, m, speed, bend, most):
+    """The velocity that lets the shortest waves decay at node `m` of a line (2, n).
+
+    speed: strength times V [m/s]; bend [rad], most [1/s]: see `fill_sliding_damping`.
+    """
+    # direction of the line and its fourth difference
+    tx = line[0, m + 1] - line[0, m - 1]
+    ty = line[1, m + 1] - line[1, m - 1]
+    square = tx * tx + ty * ty
+    fourth_x = (
+        (line[0, m + 2] + line[0, m - 2])
+        - 4.0 * (line[0, m + 1] + line[0, m - 1])
+        + 6.0 * line[0, m]
+    )
+    fourth_y = (
+        (line[1, m + 2] + line[1, m - 2])
+        - 4.0 * (line[1, m + 1] + line[1, m - 1])
+        + 6.0 * line[1, m]
+    )
+    spacing = 0.5 * square**0.5
+    rate = speed / (16.0 * spacing)
+    # stronger where the line turns
+    ax = line[0, m] - line[0, m - 1]
+    ay = line[1, m] - line[1, m - 1]
+    bx = line[0, m + 1] - line[0, m]
+    by = line[1, m + 1] - line[1, m]
+    turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by) / bend
+    rate *= 1.0 + turn * turn
+    rate = rate if rate < most else most
+    # normal part only
+    along = (fourth_x * ty - fourth_y * tx) / square
+    return -rate * along * ty, rate * along * tx
+
+
 @kernel
 def fill_sliding_damping(line, rim, start, strength, bend, most, out):
     """Velocities that damp the shortest waves of a sliding contact; out (2, n).
@@ -367,40 +403,41 @@ def fill_sliding_damping(line, rim, start, strength, bend, most, out):
     mean_y /= count - 1
     for k in range(count):
         m = k + 2
-        # direction of the line and its fourth difference
-        tx = line[0, m + 1] - line[0, m - 1]
-        ty = line[1, m + 1] - line[1, m - 1]
-        square = tx * tx + ty * ty
-        fourth_x = (
-            (line[0, m + 2] + line[0, m - 2])
-            - 4.0 * (line[0, m + 1] + line[0, m - 1])
-            + 6.0 * line[0, m]
-        )
-        fourth_y = (
-            (line[1, m + 2] + line[1, m - 2])
-            - 4.0 * (line[1, m + 1] + line[1, m - 1])
-            + 6.0 * line[1, m]
-        )
         # V: slip and speed relative to the mean, over both faces
         speed = 0.0
         for face in (max(start, start + k - 1), min(start + count - 2, start + k)):
             away_x = rim[U_STAR, face] - mean_x
             away_y = rim[V_STAR, face] - mean_y
             speed += 0.5 * (rim[SLIP, face] + (away_x * away_x + away_y * away_y) ** 0.5)
-        spacing = 0.5 * square**0.5
-        rate = strength * speed / (16.0 * spacing)
-        # stronger where the line turns
-        ax = line[0, m] - line[0, m - 1]
-        ay = line[1, m] - line[1, m - 1]
-        bx = line[0, m + 1] - line[0, m]
-        by = line[1, m + 1] - line[1, m]
-        turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by) / bend
-        rate *= 1.0 + turn * turn
-        rate = rate if rate < most else most
-        # normal part only
-        along = (fourth_x * ty - fourth_y * tx) / square
-        out[0, k] = -rate * along * ty
-        out[1, k] = rate * along * tx
+        out[0, k], out[1, k] = damp_node(line, m, strength * speed, bend, most)
+
+
+@kernel
+def fill_surface_damping(line, rim, start, held, strength, bend, most, out):
+    """Velocities that damp the shortest waves of a body's surface; out (2, n).
+
+    As for a sliding contact, with the speed of the four faces around a node beside their mean for
+    V.  None for nodes that are `held` (n,), and for nodes without two more on either side, up to
+    a held one: where a surface comes to lie on another one, and at its ends, it has kinks.
+    """
+    count = out.shape[1]
+    out[:, :] = 0.0
+    for k in range(2, count - 2):
+        if held[k - 1] or held[k] or held[k + 1]:
+            continue
+        # mean velocity of the four faces, and how fast the faces are beside it
+        first = start + k - 2
+        mean_x = 0.0
+        mean_y = 0.0
+        for face in range(first, first + 4):
+            mean_x += 0.25 * rim[U_STAR, face]
+            mean_y += 0.25 * rim[V_STAR, face]
+        speed = 0.0
+        for face in range(first, first + 4):
+            away_x = rim[U_STAR, face] - mean_x
+            away_y = rim[V_STAR, face] - mean_y
+            speed += 0.25 * (away_x * away_x + away_y * away_y) ** 0.5
+        out[0, k], out[1, k] = damp_node(line, k + 2, strength * speed, bend, most)
 
 
 class SlidingLine:
@@ -417,6 +454,31 @@ class SlidingLine:
             segment.block.rim.rows,
             segment.first,
             SLIDING_DAMPING,
+            SLIDING_BEND_ANGLE,
+            MOST_DAMPING / dt,
+            self.line.damping,
+        )
+
+
+class SurfaceLine:
+    """A body's surface, whose shortest waves decay where it lies on no other one.
+
+    `held` (n + 1,): which of its nodes lie on another surface.
+    """
+
+    def __init__(self, line: Line):
+        self.line = line
+        self.held = np.zeros(line.damping.shape[1], dtype=np.bool_)
+
+    def damp(self, dt: float) -> None:
+        """Fill the velocities of the line's nodes that let short waves decay."""
+        segment = self.line.segment
+        fill_surface_damping(
+            self.line.extend(),
+            segment.block.rim.rows,
+            segment.first,
+            self.held,
+            SURFACE_DAMPING,
             SLIDING_BEND_ANGLE,
             MOST_DAMPING / dt,
             self.line.damping,

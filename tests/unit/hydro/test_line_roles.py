@@ -50,16 +50,14 @@ def test_a_line_at_a_contact_point_goes_further():
 
 def test_what_a_line_is_at_a_contact_point_stays():
     line, _ = make_line(FlowLine, "free-surface")
-    line.lie_on_body(True)
+    assert line.may_lie_on_body
+    line.lie_on_body()
     assert line.role is Role.ON_BODY
-    line.lie_on_body(False)
-    assert line.role is Role.FLOWING
     line.role = Role.AT_CONTACT
-    line.lie_on_body(True)
+    assert not line.may_lie_on_body
     line.lie_opposite()
     assert line.role is Role.AT_CONTACT
     wall, _ = make_line(TrackLine, "wall")
-    wall.lie_on_body(True)
-    assert wall.role is Role.WITH_ENDS
+    assert not wall.may_lie_on_body
     wall.lie_opposite()
     assert wall.role is Role.OPPOSITE
